@@ -166,7 +166,7 @@ class BootstrapReport(Folder):
             if run:
                 (self.folder / path.relative_to(ROOT)).with_name(run["program"]).write_text(
                     "import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
-        for job, after_traces in (("report",), 8), (("report", "all"), 10):
+        for job, after_traces in (("report",), 9), (("report", "all"), 11):
             done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
                                   env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
             self.assertEqual(done.returncode, 0, done.stderr)

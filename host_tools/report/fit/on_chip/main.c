@@ -6,6 +6,7 @@
 #include "fit/fit.h"
 #include "fit/fit_gains.h"
 #include "fit/fit_load.h"
+#include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
 #include "fit/kernels.h"
 #include "port/port.h"
@@ -37,6 +38,9 @@ static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
 static struct fit_load load;
 static struct fit_gains gains;
+static struct fit_shapes_pad shapes_pad;
+static struct fit_shapes_state shapes_state;
+static struct fit_shapes_result shapes_result;
 
 static void nothing(void) {}
 
@@ -103,6 +107,18 @@ static void gains_of_touch(void) {
   fit_gains_learn(&gains, &layout, job.pressure_Pa_q10, &chosen, &contact);
 }
 
+/* The first frame of a contact, and one that ends with an answer, after `fit` of the same readings and
+ * the frames before, which are not counted. */
+static void shapes_first(void) {
+  fit_shapes(&layout, &shapes_pad, job.pressure_Pa_q10, &chosen, &contact, &shapes_state,
+             &shapes_result);
+}
+static void shapes(void) {
+  shapes_first();
+  job.x_mm = shapes_result.x_mm[0];
+  job.y_mm = shapes_result.y_mm[0];
+}
+
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
     const struct alternative_settings options = {(int)job.iterations,                              \
@@ -124,12 +140,13 @@ static void (*const kernels[])(void) = {
     naive_double, lm_float,  lm_double,
     tangential, load_0,    load_1,
     load_2,    load_3,    load_4,
-    load_5,    gains_of_touch, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+    load_5,    gains_of_touch, shapes_first, shapes, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
                      geometry.pitch_mm) != FT_OK ||
-      fit_pad_init(&pad, &layout, &profile) != FT_OK) {
+      fit_pad_init(&pad, &layout, &profile) != FT_OK ||
+      fit_shapes_init(&shapes_pad, &layout, &profile) != FT_OK) {
     port_panic();
   }
   for (;;) {
@@ -149,6 +166,13 @@ int main(void) {
       tangential_state = (struct fit_tangential_state){0};
       for (int frame = 1; frame < FIT_TANGENTIAL_FRAMES; frame++) {
         tangential();
+      }
+    }
+    if (kernel == shapes_first || kernel == shapes) {
+      fit();
+      shapes_state = (struct fit_shapes_state){0};
+      for (int frame = 1; kernel == shapes && frame < FIT_SHAPES_FRAMES; frame++) {
+        shapes();
       }
     }
     for (int part = 0; part < FIT_LOAD_PARTS; part++) {

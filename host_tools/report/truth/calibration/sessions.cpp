@@ -243,7 +243,11 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
                                    calibrating::shape_of(judgement.solution));
       if (judgement.state == calibrating::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
-        Calibrated left{{}, judgement.solution.reading_sd, scale->scale, scale->sd};
+        Calibrated left{{},
+                        judgement.solution.reading_sd,
+                        scale->scale,
+                        scale->sd,
+                        calibrating::shape_of(judgement.solution)};
         for (std::size_t k = 0; k < truth.size(); k++) {
           left.remaining_gain.push_back(truth[k] / judgement.solution.gain[k]);
         }

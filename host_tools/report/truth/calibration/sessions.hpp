@@ -98,10 +98,12 @@ private:
   std::vector<double> zero_Pa_, drift_Pa_;
 };
 
-// What a calibration left: true over estimated gains, and what the solver says of their sds.
+// What a calibration left: true over estimated gains, what the solver says of their sds, and the
+// response that it found.
 struct Calibrated {
   std::vector<double> remaining_gain, gain_sd; // [sensor]
   double force_scale, force_scale_sd;
+  calibrating::Shape shape;
 };
 // Of a good session of thirty placements on a pad of its own, until one is accepted.
 Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::uint64_t seed);

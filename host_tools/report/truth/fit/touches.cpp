@@ -37,6 +37,8 @@ double normal_within_limit(Random &random) {
 const twin::Indenter &indenter_of(const std::string &name) {
   using Shape = twin::Indenter::Shape;
   static const std::vector<twin::Indenter> all{
+      {"edge14", "", Shape::roller, 2, 14, 0, EDGE_mm, 0},
+      {"edge10", "", Shape::roller, 2, 10, 0, EDGE_mm, 0},
       {"cylinder6x12", "", Shape::roller, 6, 12, 0, EDGE_mm, 0},
       {"edge20", "", Shape::roller, 2, 20, 0, EDGE_mm, 0},
       {"cube15", "", Shape::flat_square, 15, 15, 0, EDGE_mm, 0},

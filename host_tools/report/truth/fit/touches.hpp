@@ -32,7 +32,8 @@ struct Contact {
 };
 
 // The twin's object by its name, or one of these: "cylinder6x12", a cylinder of 6 mm lying on a
-// side of 12 mm; "edge20", a straight edge: a cylinder of 2 mm lying on a side of 20 mm; "cube15".
+// side of 12 mm; "edge20", "edge14" and "edge10", straight edges: a cylinder of 2 mm lying on a side of
+// so many millimetres; "cube15".
 const twin::Indenter &indenter_of(const std::string &name);
 // Its table is solved if the cache does not hold it.
 Contact contact_of(const std::string &name, double layer_mm,

@@ -1,0 +1,117 @@
+/* What presses on the pad: one contact, a long one, one that pulls, or two.
+ *
+ * Three models explain the readings of each frame by the pad's profile (common/pad_profile.h) and
+ * by the dip that its calibration found (struct fit_settings):
+ *   round  one contact
+ *   long   one contact along a straight line, under a tangential load
+ *   two    two contacts with forces of their own
+ * Each has an unknown spread, and a broad term that holds what the profile and the dip are off by.
+ * Each takes one damped Gauss-Newton step a frame, from where the frame before ended. The first
+ * frame of a contact chooses where they start. So the cost is fixed, and a contact at rest has its
+ * answer after FIT_SHAPES_FRAMES frames.
+ *
+ * The answer is the model whose chi^2 is the least, in standard deviations that contain noise,
+ * gains and the model's own error. Long must beat round by FIT_SHAPES_PENALTY, and two must beat
+ * both by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a pair
+ * that looks like a long contact is called long, and a long one hardly ever a pair.
+ *
+ * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
+ * missing. NUMERICS.md has the fit itself; host_tools/report/two judges this part. No recording of
+ * a real pad under two contacts is public: all figures are simulated. */
+#ifndef FIT_FIT_SHAPES_H
+#define FIT_FIT_SHAPES_H
+
+#include "common/pad_profile.h"
+#include "fit/fit.h"
+#include "fit/fit_fixed.h"
+
+#define FIT_SHAPES_UNKNOWNS 9
+#define FIT_SHAPES_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
+
+/* With fewer sensors there are hardly more readings than unknowns. */
+#define FIT_SHAPES_SENSORS 12
+
+#define FIT_SHAPES_FRAMES 13
+#define FIT_SHAPES_PENALTY 8
+#define FIT_SHAPES_PAIR_PENALTY 6
+
+enum fit_shape {
+  FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */
+  FIT_SHAPE_ROUND,
+  FIT_SHAPE_PULLED,    /* one, under a tangential load */
+  FIT_SHAPE_ELONGATED, /* one along a line, under a load or not */
+  FIT_SHAPE_TWO,
+  FIT_SHAPE_NONE, /* none of these explains the readings */
+};
+
+/* Every member is finite. What a shape does not have is zero. */
+struct fit_shapes_result {
+  enum fit_shape shape;
+  float x_mm[2], y_mm[2], force_N[2]; /* the stronger one first; of one contact its middle */
+  float location_sd_mm[2]; /* radial, as in fit_result */
+  float force_sd_N[2];
+  float length_mm;              /* ELONGATED: of the line that presses evenly */
+  float along_x, along_y;       /* ELONGATED: its direction, a unit vector, along_x >= 0 */
+  float angle_sd_rad;           /* of that direction */
+  float qx_N, qy_N;             /* PULLED, ELONGATED: tangential force */
+  float chi_square[3];          /* of round, long and two */
+};
+
+/* The unknowns of one model, in pitches and units of the readings, Q20. */
+struct fit_shapes_at {
+  int32_t value[FIT_SHAPES_UNKNOWNS];
+};
+
+/* State of one contact, from frame to frame. All zeros: the next frame is its first. */
+struct fit_shapes_state {
+  struct fit_shapes_at at[3];
+  int32_t fit_x_q20, fit_y_q20; /* where the Gaussian was */
+  int32_t sum_q20;              /* of the readings, in the unit of amplitude */
+  uint8_t frames;
+};
+
+/* The normal equations of a step, and then the factors of their matrix. */
+struct fit_shapes_equations {
+  int count; /* of the unknowns */
+  uint32_t residual_size;
+  int32_t residual_square;
+  int8_t q[FIT_SHAPES_UNKNOWNS + 1]; /* of the columns and the residual: value = integer 2^-q */
+  int8_t half[FIT_SHAPES_UNKNOWNS];
+  int32_t inverse_q14[FIT_SHAPES_UNKNOWNS], right[FIT_SHAPES_UNKNOWNS];
+  int32_t matrix[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS];
+};
+
+/* A profile as the models need it, and their working memory. Fill with fit_shapes_init. */
+struct fit_shapes_pad {
+  int32_t variance_q26[PAD_NORMAL_TERMS], strength_q26[PAD_NORMAL_TERMS];
+  int32_t pull_variance_q26[PAD_TANGENTIAL_TERMS], pull_strength_q26[PAD_TANGENTIAL_TERMS];
+  int32_t far_k_q24;
+  int32_t spread_q20, per_spread_sd_q4, spread_least_q20, spread_most_q20;
+  float pitch_mm, per_pitch;
+  int32_t pitch_q22_mm, per_pitch_q28, origin_x_q20, origin_y_q20; /* the origin node's place */
+  float force_unit_N; /* normal force of amplitude 1 at 1 Pa */
+  float widest_mm2;   /* variance of the widest normal term */
+  struct {
+    int32_t row[FIT_SHAPES_NODES][FIT_SHAPES_UNKNOWNS + 1];
+    struct fit_shapes_equations equations[3]; /* of each model */
+    int32_t column[FIT_SHAPES_UNKNOWNS + 1][FIT_SHAPES_NODES];
+    int32_t weight_q12[FIT_SHAPES_NODES];
+  } room;
+};
+
+/* FT_ERR_ARGUMENT: the array is no full rectangle of the grid that this build knows, or the profile
+ * is not valid, or narrower than this pitch can show: its narrowest normal term's variance must be
+ * above FIT_SHAPES_VARIANCE_MIN pitches^2, which 9 mm and layers from 9 mm on have. */
+#define FIT_SHAPES_VARIANCE_MIN 0.08f
+enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
+                               const struct pad_profile *profile);
+
+/* Whether the result is of this frame. Where it is not, the one before stands: one frame in four
+ * only steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
+ * settings: its dip is the pad's, and cut_noises 0. */
+bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
+                const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                const struct fit_result *fit, struct fit_shapes_state *state,
+                struct fit_shapes_result *result);
+
+#endif

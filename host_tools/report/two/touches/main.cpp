@@ -1,0 +1,383 @@
+// two_touches: what the fingertip says of one contact, a long one, one that pulls, and two.
+//
+// The twin's objects press on calibrated pads of 12 mm with a dip, and hold until the firmware's
+// fit_shapes answers. Two contacts are the sum of their pressures. One JSON object on the standard
+// output: the keys that are judged, and under "touches" the table behind them. The constants of
+// fit_shapes.c were chosen with --seed 20000.
+#include "libfingertip/in_parallel.hpp"
+#include "report/reference/options.hpp"
+#include "shear/static/pulled.hpp"
+#include "truth/fit/statistics.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+#include "fit/fit_shapes.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::truth;
+using nlohmann::ordered_json;
+
+constexpr char HELP[] = "usage: two_touches [--seed S] [--pads N] [--cache DIR]\n"
+                        "  --seed S     of pads and touches, 40000 by default\n"
+                        "  --pads N     calibrated pads, 200 by default\n"
+                        "  --cache DIR  folder of the contact tables\n";
+
+constexpr double LAYER_mm = 12.0, DIP_PERCENT = 1.25, FRICTION = 0.5, LOAD = 0.3;
+constexpr int TOUCHES = 20;         // of each pad, in each case
+constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within these
+constexpr double BAD_mm = 1.0;
+constexpr double WEAKER_MIN_N = 2.0, WEAKER_MAX_N = 5.0;
+constexpr double DEGREES = 180.0 / M_PI;
+
+struct Options {
+  std::string cache = FINGERTIP_TABLES_DIR;
+  std::uint64_t seed = 40000, pads = 200;
+};
+
+struct DippedPad {
+  Pad gains;
+  calibrating::Shape shape;
+};
+
+enum class Towards { any, along, across }; // the pad's longer side, and its shorter one
+
+struct Case {
+  std::string name;
+  std::vector<const shear::Object *> objects; // one of them, or the same twice
+  double apart_mm = 0.0, ratio = 1.0;         // of a pair; forces, stronger to weaker
+  double load = 0.0;
+  bool exact = false; // no gain has an error, nor is one expected
+  Towards towards = Towards::any;
+};
+
+struct Judged {
+  fit_shapes_result said;
+  // Of one contact its place; of two the worse place, or, where the answer is one, its place from
+  // the middle of the forces; and what the answer says of that.
+  double off_mm, off_sd_mm;
+  double force;     // relative error of the sum
+  double angle_deg; // of a long contact or the line through two
+  bool pair, silent;
+};
+
+double distance(const Touch &touch, float x_mm, float y_mm) {
+  return std::hypot(static_cast<double>(x_mm) - touch.x_mm, static_cast<double>(y_mm) - touch.y_mm);
+}
+
+// Between undirected lines.
+double angle_deg(const fit_shapes_result &said, double angle_rad) {
+  const double off =
+      std::atan2(static_cast<double>(said.along_y), static_cast<double>(said.along_x)) - angle_rad;
+  return DEGREES * std::abs(std::remainder(off, M_PI));
+}
+
+Judged judge_touch(const fit_shapes_result &said, const std::vector<Touch> &touches) {
+  Judged judged{};
+  judged.said = said;
+  judged.pair = touches.size() == 2;
+  double force_N = 0.0;
+  for (const Touch &touch : touches) {
+    force_N += touch.force_N;
+  }
+  judged.force = static_cast<double>(said.force_N[0] + said.force_N[1]) / force_N - 1.0;
+  const bool told = said.shape == FIT_SHAPE_ROUND || said.shape == FIT_SHAPE_PULLED ||
+                    said.shape == FIT_SHAPE_ELONGATED || said.shape == FIT_SHAPE_TWO;
+  const auto sd_mm = [&](int c) { return static_cast<double>(said.location_sd_mm[c]); };
+  if (judged.pair && said.shape == FIT_SHAPE_TWO) {
+    double off_mm[2][2];
+    for (int c = 0; c < 2; c++) {
+      for (std::size_t t = 0; t < 2; t++) {
+        off_mm[c][t] = distance(touches[t], said.x_mm[c], said.y_mm[c]);
+      }
+    }
+    const double straight = std::max(off_mm[0][0], off_mm[1][1]);
+    const double crossed = std::max(off_mm[0][1], off_mm[1][0]);
+    const bool is_straight = straight <= crossed;
+    judged.off_mm = std::min(straight, crossed);
+    const int worse = is_straight ? (off_mm[0][0] >= off_mm[1][1] ? 0 : 1)
+                                  : (off_mm[0][1] >= off_mm[1][0] ? 0 : 1);
+    judged.off_sd_mm = sd_mm(worse);
+  } else if (told) {
+    Touch middle{};
+    for (const Touch &touch : touches) {
+      middle.x_mm += touch.x_mm * touch.force_N / force_N;
+      middle.y_mm += touch.y_mm * touch.force_N / force_N;
+    }
+    judged.off_mm = distance(middle, said.x_mm[0], said.y_mm[0]);
+    judged.off_sd_mm = std::max(sd_mm(0), sd_mm(1));
+    if (said.shape == FIT_SHAPE_TWO) { // of one contact: the nearer place
+      judged.off_mm = std::min(judged.off_mm, distance(middle, said.x_mm[1], said.y_mm[1]));
+    }
+  }
+  if (said.shape == FIT_SHAPE_ELONGATED) {
+    judged.angle_deg =
+        judged.pair ? angle_deg(said, std::atan2(touches[1].y_mm - touches[0].y_mm,
+                                                 touches[1].x_mm - touches[0].x_mm))
+                    : angle_deg(said, touches[0].angle_rad + 0.5 * M_PI); // a roller lies along y
+  }
+  // One place for two contacts is wrong whatever its error, unless it is called long.
+  const bool is_far =
+      judged.off_mm > BAD_mm ||
+      (judged.pair && (said.shape == FIT_SHAPE_ROUND || said.shape == FIT_SHAPE_PULLED)) ||
+      (!judged.pair && said.shape == FIT_SHAPE_TWO);
+  judged.silent =
+      told && is_far && judged.off_sd_mm <= static_cast<double>(FIT_LOCATION_SD_LIMIT_mm);
+  return judged;
+}
+
+bool is_right(const Judged &j) {
+  return j.said.shape == FIT_SHAPE_TWO && j.off_mm <= NEAR_mm && std::abs(j.force) <= FORCE_SHARE;
+}
+
+double share(const std::vector<Judged> &judged, bool (*predicate)(const Judged &)) {
+  return percent(static_cast<double>(std::count_if(judged.begin(), judged.end(), predicate)),
+                 static_cast<double>(judged.size()));
+}
+
+template <fit_shape SHAPE> bool is(const Judged &j) {
+  return j.said.shape == SHAPE;
+}
+
+template <typename Value>
+double quantile_where(const std::vector<Judged> &judged, double at,
+                      bool (*predicate)(const Judged &), const Value &value) {
+  std::vector<double> values;
+  for (const Judged &j : judged) {
+    if (predicate(j)) {
+      values.push_back(value(j));
+    }
+  }
+  return quantile(values, at);
+}
+
+bool has_place(const Judged &j) {
+  return j.said.shape != FIT_SHAPE_NONE && j.said.shape != FIT_SHAPE_UNDECIDED;
+}
+
+double chi_square_median(const std::vector<Judged> &judged, int model) {
+  return quantile_where(judged, 0.5, has_place, [model](const Judged &j) {
+    return static_cast<double>(j.said.chi_square[model]);
+  });
+}
+
+ordered_json row_of(const std::string &name, const std::vector<Judged> &judged) {
+  const auto off = [](const Judged &j) { return j.off_mm; };
+  const auto angle = [](const Judged &j) { return j.angle_deg; };
+  std::vector<Judged> placed;
+  std::copy_if(judged.begin(), judged.end(), std::back_inserter(placed), has_place);
+  return {{"case", name},
+          {"touches", judged.size()},
+          {"one", share(judged, is<FIT_SHAPE_ROUND>)},
+          {"pulled", share(judged, is<FIT_SHAPE_PULLED>)},
+          {"long", share(judged, is<FIT_SHAPE_ELONGATED>)},
+          {"two", share(judged, is<FIT_SHAPE_TWO>)},
+          {"none", share(judged, is<FIT_SHAPE_NONE>)},
+          {"undecided", share(judged, is<FIT_SHAPE_UNDECIDED>)},
+          {"two_and_right", share(judged, is_right)},
+          {"silent", share(judged, [](const Judged &j) { return j.silent; })},
+          {"off_p50_mm", quantile_where(judged, 0.5, has_place, off)},
+          {"off_p95_mm", quantile_where(judged, 0.95, has_place, off)},
+          {"within_1sd", share(placed, [](const Judged &j) { return j.off_mm <= j.off_sd_mm; })},
+          {"within_2sd",
+           share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
+          {"angle_p50_deg", quantile_where(judged, 0.5, is<FIT_SHAPE_ELONGATED>, angle)},
+          {"angle_p90_deg", quantile_where(judged, 0.9, is<FIT_SHAPE_ELONGATED>, angle)},
+          {"chi_square_one", chi_square_median(judged, 0)},
+          {"chi_square_long", chi_square_median(judged, 1)},
+          {"chi_square_two", chi_square_median(judged, 2)}};
+}
+
+std::vector<DippedPad> dipped_pads(const Options &options) {
+  const Feet feet(LAYER_mm, options.cache);
+  std::vector<DippedPad> pads(options.pads);
+  const std::uint64_t stream = stream_of("dipped sessions");
+  twin::in_parallel(pads.size(), [&](std::size_t i) {
+    PadOptions kind; // half of the pads relax, and have sensors off their places
+    kind.dip_percent = DIP_PERCENT;
+    kind.relaxation_percent = i % 2 == 0 ? 0.0 : 17.5;
+    kind.misplaced_mm = i % 2 == 0 ? 0.0 : 0.1;
+    const std::uint64_t seed = Random(options.seed, stream, i).next();
+    const Calibrated session = calibrated_session(feet, kind, seed);
+    pads[i] = {calibrated_pad(session), session.shape};
+  });
+  return pads;
+}
+
+// Anywhere on the array, both.
+std::vector<Touch> draw_touches(const fit_array &array, const Case &c, Random &random) {
+  std::vector<Touch> touches{draw_touch(array, random)};
+  if (c.apart_mm <= 0.0) {
+    return touches;
+  }
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  const double x_max = pitch_mm * static_cast<double>(array.x[SENSORS - 1]);
+  const double y_max = pitch_mm * static_cast<double>(array.y[SENSORS - 1]);
+  for (;;) {
+    Touch other = touches[0] = draw_touch(array, random);
+    double direction = random.uniform(-0.25 * M_PI, 0.25 * M_PI);
+    direction = c.towards == Towards::any       ? 4.0 * direction
+                : c.towards == Towards::across ? direction
+                                               : direction + 0.5 * M_PI;
+    other.x_mm += c.apart_mm * std::cos(direction);
+    other.y_mm += c.apart_mm * std::sin(direction);
+    if (std::abs(other.x_mm) <= x_max && std::abs(other.y_mm) <= y_max) {
+      other.force_N = random.uniform(WEAKER_MIN_N, WEAKER_MAX_N);
+      touches[0].force_N = c.ratio * other.force_N;
+      touches.push_back(other);
+      return touches;
+    }
+  }
+}
+
+Readings base_of(const fit_array &array, const shear::Object &object,
+                 const std::vector<Touch> &touches, double load, Random &random) {
+  Readings base{};
+  const double direction = random.uniform(0.0, 2.0 * M_PI);
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  for (const Touch &touch : touches) {
+    const double load_N = load * touch.force_N;
+    const twin::TractionTable::Load pull{
+        touch.force_N, twin::stuck_force_N(touch.force_N, load_N, FRICTION),
+        load_N * std::cos(direction), load_N * std::sin(direction)};
+    const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      const double dx = pitch_mm * static_cast<double>(array.x[k]) - touch.x_mm;
+      const double dy = pitch_mm * static_cast<double>(array.y[k]) - touch.y_mm;
+      const double along = c * dx + s * dy, across = c * dy - s * dx;
+      base[k] +=
+          object.pressure.base_pressure_Pa(touch.force_N, along, across, 0.01 * DIP_PERCENT);
+      base[k] += load > 0.0 ? object.traction.base_pressure_Pa(pull, along, across) : 0.0;
+    }
+  }
+  return base;
+}
+
+std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const Options &options) {
+  const fit_array array = firmware_array();
+  const pad_profile profile = shear::profile_of(LAYER_mm);
+  std::vector<Judged> judged(pads.size() * TOUCHES);
+  twin::in_parallel(pads.size(), [&](std::size_t p) {
+    Random random(options.seed, stream_of(c.name), p);
+    fit_shapes_pad shapes;
+    if (fit_shapes_init(&shapes, &array, &profile) != FT_OK) {
+      throw std::runtime_error("the firmware refuses the pad's profile");
+    }
+    const Pad pad = c.exact ? perfect_pad() : pads[p].gains;
+    for (std::size_t t = 0; t < TOUCHES; t++) {
+      const shear::Object &object = *c.objects[random.next() % c.objects.size()];
+      const std::vector<Touch> touches = draw_touches(array, c, random);
+      const Readings base = base_of(array, object, touches, c.load, random);
+      const double noise_Pa = draw_noise_Pa(random);
+      fit_settings settings = settings_for(pad, noise_Pa);
+      settings.cut_noises = 0; // as where a profile acts
+      settings.dip_share = static_cast<float>(pads[p].shape.dip_share);
+      settings.dip_sd_mm = static_cast<float>(pads[p].shape.dip_sd_mm);
+      fit_shapes_state state{};
+      fit_shapes_result said{};
+      for (int frame = 0; frame < FIT_SHAPES_FRAMES; frame++) {
+        std::array<std::int32_t, SENSORS> readings{};
+        for (std::size_t k = 0; k < SENSORS; k++) {
+          const double reading_Pa = pad.gain[k] * base[k] + noise_Pa * random.normal();
+          readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
+        }
+        fit_result fit;
+        fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &settings, &fit);
+        fit_shapes(&array, &shapes, readings.data(), &settings, &fit, &state, &said);
+      }
+      judged[p * TOUCHES + t] = judge_touch(said, touches);
+    }
+  });
+  std::fprintf(stderr, "two_touches: %s\n", c.name.c_str());
+  return judged;
+}
+
+ordered_json judge(const Options &options) {
+  if (options.pads == 0) {
+    throw std::runtime_error("--pads needs at least one pad");
+  }
+  shear::Objects objects(options.cache);
+  const auto named = [&](std::initializer_list<const char *> names) {
+    std::vector<const shear::Object *> found;
+    for (const char *name : names) {
+      found.push_back(&objects.on(LAYER_mm, name));
+    }
+    return found;
+  };
+  const auto round = named({"sphere6", "sphere15", "cylinder6", "cube6", "ping_pong"});
+  const auto everyday = named({"rubber_duck", "lime"});
+  const auto ball = named({"sphere6"});
+  std::vector<Case> cases{{"round", round},
+                          {"everyday", everyday},
+                          {"round, Q/F 0.3", round, 0.0, 1.0, LOAD},
+                          {"everyday, Q/F 0.3", everyday, 0.0, 1.0, LOAD}};
+  for (const char *name : {"cylinder6x12", "edge10", "edge14", "edge20", "cube15"}) {
+    cases.push_back({name, named({name})});
+  }
+  for (const double ratio : {1.0, 3.0}) {
+    for (const int apart_mm : {6, 8, 10, 12, 15, 20}) {
+      const std::string name = "two, " + std::to_string(apart_mm) + " mm, ";
+      cases.push_back({name + (ratio > 1.0 ? "3:1" : "1:1"), ball, double(apart_mm), ratio});
+    }
+  }
+  for (const int apart_mm : {8, 10, 12}) {
+    const std::string name = "two, " + std::to_string(apart_mm) + " mm, 1:1, ";
+    cases.push_back({name + "exact gains", ball, double(apart_mm), 1.0, 0.0, true});
+    cases.push_back(
+        {name + "along the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::along});
+    cases.push_back(
+        {name + "across the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::across});
+  }
+  const std::vector<DippedPad> pads = dipped_pads(options);
+  std::fprintf(stderr, "two_touches: %zu calibrations\n", pads.size());
+  ordered_json out;
+  out["seed"] = options.seed;
+  out["pads"] = options.pads;
+  double called_two = 0.0, silent = 0.0, touches = 0.0;
+  for (const Case &c : cases) {
+    const std::vector<Judged> judged = run(c, pads, options);
+    const ordered_json row = row_of(c.name, judged);
+    out["touches"].push_back(row);
+    if (c.apart_mm <= 0.0 && c.name != "cube15") { // a cube of 15 mm is neither round nor long
+      called_two = std::max(called_two, row["two"].get<double>());
+    }
+    if (!c.exact && c.towards == Towards::any) {
+      silent += row["silent"].get<double>() * static_cast<double>(judged.size());
+      touches += static_cast<double>(judged.size());
+    }
+    const auto key = [&](const char *name, const char *of_case, const char *of_row) {
+      if (c.name == of_case) {
+        out[name] = row[of_row];
+      }
+    };
+    key("two_right_percent_8mm", "two, 8 mm, 1:1", "two_and_right");
+    key("two_right_percent_12mm", "two, 12 mm, 1:1", "two_and_right");
+    key("two_right_percent_10mm_3to1", "two, 10 mm, 3:1", "two_and_right");
+    key("edge_angle_p50_deg_20mm", "edge20", "angle_p50_deg");
+    key("edge_angle_p50_deg_10mm", "edge10", "angle_p50_deg");
+  }
+  out["one_called_two_percent"] = called_two;
+  out["silent_over_1mm_percent"] = silent / touches;
+  return out;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  Options options;
+  return reference::print_found("two_touches", argc, argv,
+                                {{"--cache", &options.cache},
+                                 {"--seed", nullptr, &options.seed},
+                                 {"--pads", nullptr, &options.pads}},
+                                HELP, [&] { return judge(options); });
+}

@@ -1,0 +1,63 @@
+#!/usr/bin/python3
+"""What presses: one contact, a long one, one that pulls, or two; how often the firmware's answer is right.
+
+    two.py --build build/host -o build/report
+
+    two.json      the figures by which it is judged, with their goals; the table of two.md
+    two.md        the same to read
+    two.png       the same to look at
+
+Pads and touches are the twin's, with a dip and calibrated; the code that answers is the firmware's own, compiled for the host. No public
+recording has two contacts and their truth, so nothing here was seen on a real pad. Constants were chosen with seed 20000. No image
+runs this code yet.
+"""
+import pathlib
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+
+import two_report  # noqa: E402
+from boards import fit_cycles_of  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
+from reporting import chosen_parts, figures_printed, option_parser, report_of_programs  # noqa: E402
+
+# part: what it does
+PARTS = {
+    "touches": "touches of one contact and of two, and what each is called",
+    "cycles": "cycles of a frame on the emulated chip",
+}
+GOALS = (
+    ("two_right_percent_8mm", ">=", 90), ("two_right_percent_12mm", ">=", 97), ("two_right_percent_10mm_3to1", ">=", 80),
+    ("one_called_two_percent", "<=", 0.2), ("edge_angle_p50_deg_20mm", "<=", 1.5), ("edge_angle_p50_deg_10mm", "<=", 3),
+    ("silent_over_1mm_percent", "<=", 0.5), ("cycles_core1_max", "<=", 85000))
+
+
+def command_of(part, options):
+    program = pathlib.Path(options.build) / "host_tools/report/two/touches/two_touches" if part == "touches" else fit_cycles_of(options.boards)
+    if not program.is_file():
+        raise InputError(f"{program} is not there; build it: {'cmake --build --preset host' if part == 'touches' else 'sh cmake/bootstrap.sh'}")
+    if part == "cycles":
+        return ["node", pathlib.Path(__file__).with_name("cycles.mjs"), program]
+    command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
+    if options.seed is not None:
+        command += ["--seed", str(options.seed)]
+    if options.pads is not None:
+        command += ["--pads", str(options.pads)]
+    return command
+
+
+def main(argv):
+    parser = option_parser(__doc__)
+    parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
+    parser.add_argument("--seed", type=int, metavar="N")
+    parser.add_argument("--pads", type=int, metavar="N", help="calibrated pads; default 200")
+    parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's two.json")
+    options = parser.parse_args(argv)
+    parts = chosen_parts(options, PARTS, PARTS)
+    return report_of_programs(options, "two", PARTS, parts, GOALS, lambda part: figures_printed(f"two_{part}", command_of(part, options)),
+                              lambda found, out: {}, two_report)
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("two.py", main))

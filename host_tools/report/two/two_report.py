@@ -1,0 +1,80 @@
+"""What two.py measured as text and as a picture."""
+from drawing import BLUE, FAINT, INK, ORANGE, plt, save
+from fingertip.files import write_text
+from goals import goal_table_md
+from tables import table_of_dicts_md
+
+CALLED = (("one", BLUE), ("pulled", "#8fb4d9"), ("long", ORANGE), ("two", "#4a9a5b"), ("none", FAINT), ("undecided", "#dddddd"))
+DISTANCES_mm = (6, 8, 10, 12, 15, 20)
+
+
+def write(found, path):
+    lines = [
+        "# What presses", "", "Written by `sh cmake/bootstrap.sh report two`. Simulated pads of 12 mm with a dip, calibrated; the firmware's own code,",
+        "which no image runs yet. No public recording has two contacts and their truth.", "", "![Pairs by distance, what touches are called](two.png)", "",
+        *goal_table_md(found), ""]
+    if "touches" in found:
+        lines += [
+            "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
+            "or long, from the middle of the forces. `silent`: off by more than 1 mm, or one called two, or two called one, with a standard deviation",
+            "below 0.6 mm and no shape that says so. `exact gains`: a pad whose gains are known without error. `along` and `across`: the pad's longer",
+            "and shorter side, within 45 degrees.", "", *table_of_dicts_md(found["touches"]), ""]
+    write_text(path, "\n".join(lines))
+
+
+def tidy(axes, title, label):
+    axes.set_title(title, loc="left", size=10, color=INK)
+    axes.set_ylabel(label, size=9)
+    axes.grid(axis="y")
+    axes.tick_params(labelsize=8)
+
+
+def draw_pairs(axes, rows):
+    for ratio, colour in (("1:1", BLUE), ("3:1", ORANGE)):
+        line = [rows[f"two, {apart} mm, {ratio}"] for apart in DISTANCES_mm]
+        axes.plot(DISTANCES_mm, [row["two_and_right"] for row in line], "o-", color=colour, label=f"{ratio}, two and right")
+        axes.plot(DISTANCES_mm, [row["two_and_right"] + row["long"] for row in line], "s:", color=colour, ms=4, label=f"{ratio}, or called long")
+    axes.set_ylim(0, 105)
+    axes.set_xlabel("distance of the two, mm", size=9)
+    axes.legend(fontsize=8)
+    tidy(axes, "Pairs that are found", "% of touches")
+
+
+def draw_called(axes, rows):
+    names = list(rows)
+    left = [0.0] * len(names)
+    for called, colour in CALLED:
+        shares = [rows[name][called] for name in names]
+        axes.barh(range(len(names)), shares, left=left, color=colour, label=called)
+        left = [before + share for before, share in zip(left, shares)]
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
+    axes.set_xlim(0, 100)
+    axes.legend(fontsize=8, ncols=len(CALLED), loc="lower center", bbox_to_anchor=(0.4, -0.14))
+    axes.set_title("What each touch is called, %", loc="left", size=10, color=INK)
+    axes.tick_params(labelsize=7.5)
+
+
+def draw_errors(axes, rows):
+    names = [name for name, row in rows.items() if row["one"] + row["pulled"] + row["long"] + row["two"] > 50]
+    places = range(len(names))
+    axes.bar([x - 0.2 for x in places], [rows[name]["off_p50_mm"] for name in names], 0.38, color=BLUE, label="median")
+    axes.bar([x + 0.2 for x in places], [rows[name]["off_p95_mm"] for name in names], 0.38, color=ORANGE, label="95 %")
+    axes.set_xticks(places, names, rotation=60, ha="right")
+    axes.legend(fontsize=8)
+    tidy(axes, "Error of the place, of two the worse", "mm")
+
+
+def draw(found, path):
+    figure, places = plt.subplots(1, 3, figsize=(15, 7), layout="constrained")
+    if "touches" in found:
+        rows = {row["case"]: row for row in found["touches"]}
+        plain = {name: row for name, row in rows.items() if name.count(",") < 3}
+        draw_pairs(places[0], rows)
+        draw_called(places[1], plain)
+        draw_errors(places[2], plain)
+    else:
+        for axes in places:
+            axes.set_axis_off()
+    figure.suptitle("What presses: simulated pads, calibrated, with a dip; the firmware's own code; no real pad", x=0.01, ha="left", size=12, weight="bold")
+    save(figure, path)

@@ -1,0 +1,61 @@
+"""two_touches on few pads: its keys are there, repeatable, and as good as the shapes are meant to be.
+
+usage: test_two_touches.py TWO_TOUCHES [unittest arguments]
+"""
+import json
+import subprocess
+import sys
+import unittest
+
+# (key, least, most): what a full run finds on seed 40000, with room for a tenth of its pads.
+FOUND = (
+    ("two_right_percent_12mm", 86, 100), ("two_right_percent_10mm_3to1", 76, 100), ("one_called_two_percent", 0, 1.5), ("edge_angle_p50_deg_20mm", 0, 1.5),
+    ("edge_angle_p50_deg_10mm", 0, 3), ("silent_over_1mm_percent", 0, 2.5))
+
+
+def run(*options):
+    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+
+
+class TwoTouches(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.options = ("--pads", "20", "--seed", "3")
+        cls.text = run(*cls.options).stdout
+        cls.found = json.loads(cls.text)
+
+    def test_figures(self):
+        for key, least, most in FOUND:
+            with self.subTest(key):
+                self.assertGreaterEqual(self.found[key], least)
+                self.assertLessEqual(self.found[key], most)
+
+    def test_every_touch_is_called_something(self):
+        for row in self.found["touches"]:
+            with self.subTest(row["case"]):
+                self.assertEqual(row["touches"], 400)
+                called = sum(row[name] for name in ("one", "pulled", "long", "two", "none", "undecided"))
+                self.assertAlmostEqual(called, 100, places=6)
+                self.assertEqual(row["undecided"], 0)
+                self.assertLessEqual(row["two_and_right"], row["two"])
+
+    def test_round_touches_are_one_and_far_pairs_two(self):
+        rows = {row["case"]: row for row in self.found["touches"]}
+        self.assertGreater(rows["round"]["one"], 98)
+        self.assertLess(rows["round"]["off_p95_mm"], 0.4)
+        self.assertGreater(rows["two, 20 mm, 1:1"]["two_and_right"], 95)
+        self.assertGreater(rows["two, 8 mm, 1:1"]["long"] + rows["two, 8 mm, 1:1"]["two"], 98)
+
+    def test_repeatable_and_seeded(self):
+        self.assertEqual(run(*self.options).stdout, self.text)
+        self.assertNotEqual(json.loads(run("--pads", "1", "--seed", "4").stdout)["touches"], json.loads(run("--pads", "1", "--seed", "3").stdout)["touches"])
+
+    def test_no_pads_is_an_error(self):
+        done = run("--pads", "0")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("--pads needs at least one pad", done.stderr)
+
+
+if __name__ == "__main__":
+    PROGRAM = sys.argv.pop(1)
+    unittest.main(verbosity=2)

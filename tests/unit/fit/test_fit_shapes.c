@@ -1,0 +1,298 @@
+/* One contact, a long one, one that pulls, two, and what is none of these. */
+#include "common/contact_flags.h"
+#include "fit/fit_shapes.h"
+#include "support/random.h"
+#include "unity.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SENSORS 15
+#define ALL ((UINT32_C(1) << SENSORS) - 1)
+#define NOISE_Pa 4.0
+#define PI 3.14159265358979
+
+static struct fit_array array;
+static struct fit_shapes_pad pad;
+static struct random noise;
+
+/* Of 12 mm of rubber. */
+static const struct pad_profile profile = {
+    .thickness_mm = 12.0f,
+    .normal = {{0.0962158f, 3.563492f}, {0.8206275f, 5.739365f}},
+    .tangential = {{1.051876f, 4.802645f}, {4.015438f, 7.883257f}, {5.430944f, 19.82153f}},
+    .spread_mm2 = 4.0f,
+    .spread_sd_mm2 = 6.0f,
+    .force_ratio = 1.0f,
+    .tangential_scale = 1.0f,
+};
+
+void setUp(void) {
+  float x_mm[SENSORS], y_mm[SENSORS];
+  for (int k = 0; k < SENSORS; k++) {
+    x_mm[k] = 9.0f * (float)(k / 5 - 1);
+    y_mm[k] = 9.0f * (float)(k % 5 - 2);
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, 9.0f));
+  TEST_ASSERT_EQUAL(FT_OK, fit_shapes_init(&pad, &array, &profile));
+  noise = (struct random){UINT64_C(20221015)};
+}
+
+void tearDown(void) {}
+
+struct reading {
+  double Pa[SENSORS];
+};
+
+/* A contact of force_N with a spread of 4 mm^2 that pulls by qx_N, qy_N; with a dip of this share
+ * of its peak, 14 mm wide. */
+static void press(double x_mm, double y_mm, double force_N, double qx_N, double qy_N, double dip,
+                  struct reading *reading) {
+  for (int k = 0; k < SENSORS; k++) {
+    double dx = 9.0 * (k / 5 - 1) - x_mm, dy = 9.0 * (k % 5 - 2) - y_mm, r2 = dx * dx + dy * dy;
+    double sum = 0.0, peak = 0.0;
+    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+      double v = (double)profile.normal[j].sd_mm * (double)profile.normal[j].sd_mm + 4.0;
+      sum += (double)profile.normal[j].share / v * exp(-r2 / (2.0 * v));
+      peak += (double)profile.normal[j].share / v;
+    }
+    sum = force_N * (sum - dip * peak * exp(-r2 / (2.0 * 14.0 * 14.0)));
+    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+      double v = (double)profile.tangential[j].sd_mm * (double)profile.tangential[j].sd_mm + 5.2;
+      sum += (qx_N * dx + qy_N * dy) * (double)profile.tangential[j].moment_mm / (v * v) *
+             exp(-r2 / (2.0 * v));
+    }
+    reading->Pa[k] += 1e6 / (2.0 * PI) * sum;
+  }
+}
+
+static void line(double x_mm, double y_mm, double length_mm, double angle_rad, double force_N,
+                 struct reading *reading) {
+  const int parts = 60;
+  for (int i = 0; i < parts; i++) {
+    double at = length_mm * ((i + 0.5) / parts - 0.5);
+    press(x_mm + at * cos(angle_rad), y_mm + at * sin(angle_rad), force_N / parts, 0.0, 0.0, 0.0,
+          reading);
+  }
+}
+
+static struct fit_settings usual(double dip) {
+  struct fit_settings settings = {.iterations = 4, .noise_Pa_q10 = (int32_t)(1024 * NOISE_Pa)};
+  fit_set_errors(&settings, 0.01f, 0.0065f);
+  settings.dip_share = (float)dip;
+  settings.dip_sd_mm = 14.0f;
+  return settings;
+}
+
+static struct fit_shapes_result hold(const struct reading *reading, uint32_t usable, double dip,
+                                     int frames) {
+  struct fit_settings settings = usual(dip);
+  struct fit_shapes_state state;
+  struct fit_shapes_result result;
+  memset(&state, 0, sizeof state);
+  memset(&result, 0xFF, sizeof result);
+  for (int frame = 0; frame < frames; frame++) {
+    int32_t pressure_Pa_q10[SENSORS];
+    for (int k = 0; k < SENSORS; k++) {
+      pressure_Pa_q10[k] =
+          (int32_t)lround(1024.0 * (reading->Pa[k] + NOISE_Pa * random_between(&noise, -1.7, 1.7)));
+    }
+    struct fit_result fit;
+    fit_gaussian(&array, pressure_Pa_q10, usable, &settings, &fit);
+    fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+  }
+  return result;
+}
+
+static void test_a_round_press_is_one_at_its_place_and_force(void) {
+  for (int i = 0; i < 100; i++) {
+    struct reading reading = {{0.0}};
+    double x = random_between(&noise, -8.0, 8.0), y = random_between(&noise, -17.0, 17.0);
+    double force = random_between(&noise, 2.0, 12.0), dip = i % 2 ? 0.015 : 0.0;
+    press(x, y, force, 0.0, 0.0, dip, &reading);
+    struct fit_shapes_result result = hold(&reading, ALL, dip, FIT_SHAPES_FRAMES);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, result.shape);
+    TEST_ASSERT_FLOAT_WITHIN(0.15f, (float)x, result.x_mm[0]);
+    TEST_ASSERT_FLOAT_WITHIN(0.15f, (float)y, result.y_mm[0]);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f * (float)force, (float)force, result.force_N[0]);
+    TEST_ASSERT_TRUE(result.location_sd_mm[0] > 0.0f && result.location_sd_mm[0] < 0.6f);
+    TEST_ASSERT_TRUE(result.force_sd_N[0] > 0.0f);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, result.length_mm);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, result.force_N[1]);
+  }
+}
+
+static void test_a_pull_is_no_pair(void) {
+  for (int i = 0; i < 60; i++) {
+    struct reading reading = {{0.0}};
+    double x = random_between(&noise, -6.0, 6.0), y = random_between(&noise, -15.0, 15.0);
+    double direction = random_between(&noise, 0.0, 2.0 * PI), qx = 1.8 * cos(direction),
+           qy = 1.8 * sin(direction);
+    press(x, y, 6.0, qx, qy, 0.0, &reading);
+    struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+    TEST_ASSERT_TRUE(result.shape == FIT_SHAPE_PULLED || result.shape == FIT_SHAPE_ELONGATED);
+    TEST_ASSERT_FLOAT_WITHIN(0.6f, (float)x, result.x_mm[0]);
+    TEST_ASSERT_FLOAT_WITHIN(0.6f, (float)y, result.y_mm[0]);
+    TEST_ASSERT_FLOAT_WITHIN(0.8f, (float)qx, result.qx_N);
+    TEST_ASSERT_FLOAT_WITHIN(0.8f, (float)qy, result.qy_N);
+  }
+}
+
+static void test_a_line_has_its_length_and_direction(void) {
+  for (int i = 0; i < 60; i++) {
+    struct reading reading = {{0.0}};
+    double angle = random_between(&noise, -0.5 * PI, 0.5 * PI);
+    double length = random_between(&noise, 14.0, 22.0);
+    line(random_between(&noise, -3.0, 3.0), random_between(&noise, -9.0, 9.0), length, angle, 8.0,
+         &reading);
+    struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_ELONGATED, result.shape);
+    TEST_ASSERT_FLOAT_WITHIN(1.5f, (float)length, result.length_mm);
+    TEST_ASSERT_TRUE(result.along_x >= 0.0f);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.0f,
+                             result.along_x * result.along_x + result.along_y * result.along_y);
+    double off = fabs((double)result.along_x * sin(angle) - (double)result.along_y * cos(angle));
+    TEST_ASSERT_TRUE(off < 0.06);
+    TEST_ASSERT_TRUE(off < 4.0 * (double)result.angle_sd_rad);
+    TEST_ASSERT_TRUE(result.angle_sd_rad < 0.15f);
+  }
+}
+
+/* Behind one another: three columns do not tell every pair beside one another from a line. */
+static void test_two_have_their_places_and_forces(void) {
+  for (int i = 0; i < 60; i++) {
+    struct reading reading = {{0.0}};
+    double dip = i % 2 ? 0.015 : 0.0, angle = random_between(&noise, 0.25 * PI, 0.75 * PI);
+    double x[2], y[2], force[2];
+    double half = random_between(&noise, 6.5, 9.0);
+    double middle_x = random_between(&noise, -2.0, 2.0);
+    double middle_y = random_between(&noise, -8.0, 8.0);
+    for (int c = 0; c < 2; c++) {
+      x[c] = middle_x + (c ? -1.0 : 1.0) * half * cos(angle);
+      y[c] = middle_y + (c ? -1.0 : 1.0) * half * sin(angle);
+      force[c] = c ? random_between(&noise, 2.0, 4.0) : random_between(&noise, 5.0, 8.0);
+      press(x[c], y[c], force[c], 0.0, 0.0, dip, &reading);
+    }
+    struct fit_shapes_result result = hold(&reading, ALL, dip, FIT_SHAPES_FRAMES);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, result.shape);
+    for (int c = 0; c < 2; c++) { /* the stronger one first */
+      TEST_ASSERT_FLOAT_WITHIN(0.5f, (float)x[c], result.x_mm[c]);
+      TEST_ASSERT_FLOAT_WITHIN(0.5f, (float)y[c], result.y_mm[c]);
+      TEST_ASSERT_FLOAT_WITHIN(0.06f * (float)force[c], (float)force[c], result.force_N[c]);
+      TEST_ASSERT_TRUE(result.location_sd_mm[c] > 0.01f && result.location_sd_mm[c] < 1.0f);
+      TEST_ASSERT_TRUE(result.force_sd_N[c] > 0.0f);
+    }
+  }
+}
+
+static void test_a_short_pair_is_a_long_contact_not_one(void) {
+  struct reading reading = {{0.0}};
+  press(3.0, 1.0, 4.0, 0.0, 0.0, 0.0, &reading);
+  press(-3.0, 1.0, 4.0, 0.0, 0.0, 0.0, &reading);
+  struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_ELONGATED, result.shape);
+  TEST_ASSERT_FLOAT_WITHIN(0.05f, 1.0f, result.along_x);
+}
+
+static void test_three_are_none_of_these(void) {
+  struct reading reading = {{0.0}};
+  press(7.0, -14.0, 4.0, 0.0, 0.0, 0.0, &reading);
+  press(-7.0, 0.0, 4.0, 0.0, 0.0, 0.0, &reading);
+  press(7.0, 14.0, 4.0, 0.0, 0.0, 0.0, &reading);
+  struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_NONE, result.shape);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.force_N[0]);
+}
+
+static void test_what_moves_is_followed(void) {
+  struct fit_settings settings = usual(0.0);
+  struct fit_shapes_state state;
+  memset(&state, 0, sizeof state);
+  struct fit_shapes_result result = {FIT_SHAPE_UNDECIDED};
+  for (int frame = 0; frame < 80; frame++) {
+    struct reading reading = {{0.0}};
+    double y = -12.0 + 0.3 * frame, force = 3.0 + 0.05 * frame;
+    press(1.0, y, force, 0.0, 0.0, 0.0, &reading);
+    int32_t pressure_Pa_q10[SENSORS];
+    for (int k = 0; k < SENSORS; k++) {
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * reading.Pa[k]);
+    }
+    struct fit_result fit;
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
+    if (fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result) && frame > 13) {
+      TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, result.shape);
+      TEST_ASSERT_FLOAT_WITHIN(0.2f, (float)y, result.y_mm[0]);
+      TEST_ASSERT_FLOAT_WITHIN(0.04f * (float)force, (float)force, result.force_N[0]);
+    }
+  }
+}
+
+static void test_an_answer_takes_its_frames_and_its_sensors(void) {
+  struct reading reading = {{0.0}};
+  press(2.0, 3.0, 5.0, 0.0, 0.0, 0.0, &reading);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES - 1).shape);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, hold(&reading, ALL & ~0x4001u, 0.0, FIT_SHAPES_FRAMES).shape);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, hold(&reading, ALL & ~0x3u, 0.0, 1).shape);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED,
+                    hold(&reading, ALL & ~0x4013u, 0.0, FIT_SHAPES_FRAMES).shape);
+}
+
+static void test_what_hardly_presses_is_undecided(void) {
+  struct reading reading = {{0.0}};
+  press(2.0, 3.0, 0.02, 0.0, 0.0, 0.0, &reading);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES).shape);
+}
+
+static void test_thin_rubber_is_refused(void) {
+  struct pad_profile thin = profile;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    thin.normal[j].sd_mm *= 0.5f;
+  }
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &array, &thin));
+  thin = profile;
+  thin.normal[0].share = NAN;
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &array, &thin));
+}
+
+static void test_garbage_leaves_finite_results(void) {
+  struct fit_settings settings = usual(0.05);
+  for (int i = 0; i < 400; i++) {
+    struct fit_shapes_state state;
+    memset(&state, 0, sizeof state);
+    struct fit_shapes_result result;
+    memset(&result, 0, sizeof result);
+    for (int frame = 0; frame < 16; frame++) {
+      int32_t pressure_Pa_q10[SENSORS];
+      for (int k = 0; k < SENSORS; k++) {
+        pressure_Pa_q10[k] = (int32_t)random_between(&noise, -2147483647.0, 2147483647.0) >>
+                             (int)random_between(&noise, 0.0, i % 31);
+      }
+      struct fit_result fit;
+      fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
+      fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+      const float all[] = {result.x_mm[0],   result.y_mm[0],    result.force_N[0],
+                           result.x_mm[1],   result.y_mm[1],    result.force_N[1],
+                           result.length_mm, result.along_x,    result.angle_sd_rad,
+                           result.qx_N,      result.location_sd_mm[0], result.force_sd_N[1]};
+      for (size_t m = 0; m < sizeof all / sizeof all[0]; m++) {
+        TEST_ASSERT_TRUE(isfinite(all[m]));
+      }
+    }
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_round_press_is_one_at_its_place_and_force);
+  RUN_TEST(test_a_pull_is_no_pair);
+  RUN_TEST(test_a_line_has_its_length_and_direction);
+  RUN_TEST(test_two_have_their_places_and_forces);
+  RUN_TEST(test_a_short_pair_is_a_long_contact_not_one);
+  RUN_TEST(test_three_are_none_of_these);
+  RUN_TEST(test_what_moves_is_followed);
+  RUN_TEST(test_an_answer_takes_its_frames_and_its_sensors);
+  RUN_TEST(test_what_hardly_presses_is_undecided);
+  RUN_TEST(test_thin_rubber_is_refused);
+  RUN_TEST(test_garbage_leaves_finite_results);
+  return UNITY_END();
+}
