@@ -330,6 +330,10 @@ class Page:
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key, **({"text": key} if kind == "keyDown" and len(key) == 1 else {}))
 
+    def enter(self):
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", windowsVirtualKeyCode=13, **({"text": "\r"} if kind == "keyDown" else {}))
+
     def type(self, role, name, text):
         """Into a field, instead of what it holds."""
         node = self.find(role, name)

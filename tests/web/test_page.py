@@ -286,7 +286,11 @@ class BadInput(PageTest):
         (self.folder / "torn.csv").write_text("".join(lines[:-20]) + lines[-20][:40])
         page = self.open()
         page.give("input[type=file]", self.folder / "torn.csv")
-        self.alert(page, "/torn.csv/")
+        said = self.alert(page, "/torn.csv/").removesuffix("Close")
+        page.until("fingertip.fingertips[0].state === 'closed'")
+        page.shown()
+        page.until("[...document.querySelectorAll('.pad-card .state')].every(each => /ended/.test(each.textContent))")
+        self.assertEqual(page.run("document.body.textContent").count(said), 1, said)
         self.assertGreater(page.run("fingertip.fingertips[0].contacts"), 100)
 
     def test_a_recording_of_two(self):
@@ -307,6 +311,13 @@ class BadInput(PageTest):
         for finger in (0, 1):
             page.run(f"document.querySelectorAll('.pad-name')[{finger}].click()")
             page.until(f"document.querySelector('.trace-title .key')?.dataset.finger === '{finger}'")
+
+    def test_a_part_of_the_page_that_cannot_be_fetched(self):
+        page = self.browser.page()
+        self.addCleanup(page.close)
+        page.call("Network.setBlockedURLs", urls=["*core.wasm"])
+        page.go(self.url + "/")
+        self.assertRegex(self.alert(page, "/cannot start/"), "core.wasm.*Reload")
 
     def test_a_browser_without_web_serial(self):
         page = self.open(before="delete Navigator.prototype.serial;")
@@ -427,6 +438,93 @@ class Everyone(PageTest):
             self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
             for role, name in (("button", "Connect"), ("button", "Tare"), ("button", "Record")):
                 self.assertTrue(page.has(role, name), (width, name))
+
+    OVERLAP = """(() => {
+      const box = each => each.getBoundingClientRect(), found = [], low = document.querySelector('.timeline');
+      const inside = (part, whole) => box(part).top >= box(whole).top - 1 && box(part).bottom <= box(whole).bottom + 1 && box(part).right <= box(whole).right + 1;
+      const traces = document.querySelector('.traces'), parts = [...document.querySelectorAll('.trace, canvas.flags')];
+      for (const [i, part] of parts.entries()) {
+        if (box(part).height < 30) found.push(`${part.textContent}: ${box(part).height} px high`);
+        if (!inside(part, traces)) found.push(`${part.textContent || part.className} is cut`);
+        if (box(part).bottom > box(low).top + 1) found.push(`${part.textContent || part.className} under the time bar`);
+        if (i && box(part).top < box(parts[i - 1]).bottom - 1) found.push(`${part.textContent || part.className} over what is before it`);
+      }
+      return parts.length < 4 ? ['no traces'] : found;
+    })()"""
+
+    def test_nothing_covers_another(self):
+        """Traces, their times and the flags stand free, whatever was scrolled; where there is room, on the first screen, the time bar too."""
+        page = self.everything()
+        page.click("button", "Press")
+        page.until("fingertip.fingertips[0].contact.force_N > 2")
+        for width, height in ((1280, 800), (1920, 1080), (390, 844)):
+            page.size(width, height)
+            for part in (".top", ".over-time"):
+                page.run(f"document.querySelector('{part}').scrollIntoView()")
+                page.until(f"document.querySelector('.traces canvas').clientWidth <= {width}")
+                for _ in range(3):
+                    page.shown()
+                self.assertEqual(page.run(self.OVERLAP), [], (width, height))
+            if width > 390:
+                page.run("scrollTo(0, 0)")
+                self.assertLessEqual(page.run("document.querySelector('.timeline').getBoundingClientRect().bottom"), height)
+                self.assertGreater(page.run("document.querySelector('.pad').getBoundingClientRect().height"), 200)
+
+    WRITTEN = """globalThis.written = []; const fillText = CanvasRenderingContext2D.prototype.fillText;
+      CanvasRenderingContext2D.prototype.fillText = function (text, x, y, most) {
+        if (this.canvas.className) written.push({where: this.canvas.className, text, x, y, end: x + this.measureText(text).width});
+        return fillText.call(this, text, x, y, ...(most === undefined ? [] : [most])); };"""
+
+    def test_the_pad_has_axes_in_mm(self):
+        page = self.open(before=self.WRITTEN)
+        page.click("button", "Simulate")
+        driven.connected(page, 1)
+        page.click("button", "From above")
+        page.shown()
+        page.run("written.length = 0")
+        page.until("written.some(each => /y .*mm/.test(each.text))")
+        page.shown()
+        said = [(each["text"], (each["x"], each["y"])) for each in page.run("written.filter(each => each.where === 'pad-labels')")]
+        last = len(page.run("Array.from(fingertip.fingertips[0].info.x_mm)")) - 1
+        at = dict(said)
+        for axis, name, most_mm in ((0, "x", 10), (1, "y", 20)):
+            sensors_mm = page.run(f"Array.from(fingertip.fingertips[0].info.{name}_mm)")
+            px_per_mm = (at[str(last)][axis] - at["6"][axis]) / (sensors_mm[last] - sensors_mm[6])
+            end = at[f"{name} {most_mm} mm"]
+            opposite = [place for text, place in said if text == f"−{most_mm}" and abs(place[1 - axis] - end[1 - axis]) < 2]
+            self.assertTrue(opposite, said)
+            self.assertAlmostEqual((end[axis] - opposite[-1][axis]) / px_per_mm, 2 * most_mm, delta=0.5, msg=name)
+
+    def test_a_simulated_processor_has_no_load(self):
+        page = self.everything()
+        page.until("fingertip.fingertips[0].health")
+        page.until("[...document.querySelectorAll('.facts dt')].some(each => each.textContent === 'running for')")
+        self.assertEqual(page.run("[...document.querySelectorAll('.facts dt')].map(each => each.textContent).filter(each => /busy|stack/.test(each))"), [])
+
+    def test_the_focus_stays_where_something_was_pressed(self):
+        """Though its control is hidden, disabled or gone."""
+        page = self.open()
+        at = "document.activeElement"
+
+        def enter(name):
+            page.call("DOM.focus", backendNodeId=page.find("button", name))
+            page.enter()
+
+        enter("Try the simulated one")
+        driven.connected(page, 1)
+        page.until(f"{at}.closest('main') && {at} !== document.querySelector('main')")
+        enter("Tare")
+        page.until("[...document.querySelectorAll('[role=alert], h2')].some(each => /: tared/.test(each.textContent))")
+        page.until(f"{at}.textContent === 'Tare'")
+        enter("Close")
+        page.until(f"!document.querySelector('.notice') && {at} !== document.body")
+        enter("Record")
+        enter("Start recording")
+        page.until("!document.querySelector('dialog')")
+        page.until(f"{at}.closest('.doings')")
+        enter("Stop")
+        self.browser.saved(".csv")
+        page.until(f"{at}.closest('.doings')")
 
     def test_by_keys_alone(self):
         """Every control is reached, and none holds the focus."""

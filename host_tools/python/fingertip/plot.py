@@ -24,6 +24,8 @@ from .files import (
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
 ALONG_Y = "#0d9488"
+TIME_COLOURS = "winter"  # from blue to green: far from DOUBTFUL and SLIPPING
+ABOVE = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.2, "fontsize": 8, "frameon": False}  # a legend that covers no curve
 RIM_mm = 6.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
@@ -86,7 +88,7 @@ def draw_pad(axes, recording, t_s, x, y, good, doubtful, truth):
         axes.plot(np.where(on, truth.truth["x_mm"], np.nan), np.where(on, truth.truth["y_mm"], np.nan),
                   color=TRUTH, lw=5, solid_capstyle="round", zorder=2)
     axes.scatter(x[doubtful], y[doubtful], s=9, fc="none", ec=DOUBTFUL, lw=0.5, zorder=3)
-    points = axes.scatter(x[good], y[good], c=t_s[good], s=9, cmap="plasma", lw=0, zorder=3)
+    points = axes.scatter(x[good], y[good], c=t_s[good], s=9, cmap=TIME_COLOURS, lw=0, zorder=3)
     bar = plt.colorbar(points, ax=axes, orientation="horizontal", pad=0.07, fraction=0.03, aspect=40)
     bar.set_label("time, s", size=8)
     bar.outline.set_visible(False)
@@ -149,7 +151,7 @@ def draw_pull(axes, recording, rows, t_s, restarts_s, force, good, doubtful, tru
     draw_marks(ratios, [(t_s, recording.flag(MOVING)[rows], DOUBTFUL, "moving"), (t_s, recording.flag(SLIDING)[rows], SLIPPING, "sliding")])
     for panel in axes:
         if panel.get_legend_handles_labels()[0]:
-            panel.legend(loc="upper right", ncol=5, fontsize=8, frameon=False)
+            panel.legend(ncol=5, **ABOVE)
 
 
 def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
@@ -172,7 +174,7 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
         panel.set_ylabel(label)
         panel.grid(color="#e6e8ee", lw=0.6)
     draw_marks(axes[-1], [(t_s, slip, SLIPPING, "slip found")])
-    axes[-1].legend(loc="upper right", ncol=4, fontsize=8, frameon=False)
+    axes[-1].legend(ncol=4, **ABOVE)
     axes[0].set_title("over time" + (" (shaded: true slip)" if truth is not None else ""), loc="left", size=10)
 
 

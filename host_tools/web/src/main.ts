@@ -10,7 +10,10 @@
 import { loadCore } from './core';
 import type { Fingertip } from './model/fingertip';
 import { App } from './steps/app';
+import { wordsOf } from './steps/dialog';
 import { fingertipControls, pageControls } from './steps/toolbar';
+import { element } from './view/elements';
+import { keepFocus } from './view/focus';
 import { mountView } from './view/view';
 
 interface Console {
@@ -23,25 +26,44 @@ declare global {
   var fingertip: Console;
 }
 
-const library = await fetch(new URL('wasm/core.wasm', document.baseURI));
-await loadCore(await library.arrayBuffer());
-const app = new App();
-const view = mountView(document.body, app.bench, {
-  page: pageControls(app),
-  of: (fingertip) => fingertipControls(app, fingertip),
-  connect: () => void app.connect(),
-  simulate: () => app.simulate(),
-});
-app.notice = (text, kind) => view.notice(text, kind);
-let ready_ms = 0;
-globalThis.fingertip = {
-  fingertips: app.bench.fingertips,
-  get pictures() {
-    return view.pictures;
-  },
-  get ready_ms() {
-    return ready_ms;
-  },
-};
-requestAnimationFrame(() => (ready_ms = performance.now()));
-app.start();
+async function fetchCore(): Promise<void> {
+  const library = await fetch(new URL('wasm/core.wasm', document.baseURI));
+  if (!library.ok) {
+    throw new Error(`the server answers ${library.status}`);
+  }
+  await loadCore(await library.arrayBuffer());
+}
+
+function start(): void {
+  const app = new App();
+  const view = mountView(document.body, app.bench, {
+    page: pageControls(app),
+    of: (fingertip) => fingertipControls(app, fingertip),
+    connect: () => void app.connect(),
+    simulate: () => app.simulate(),
+  });
+  app.notice = (text, kind) => view.notice(text, kind);
+  keepFocus();
+  let ready_ms = 0;
+  globalThis.fingertip = {
+    fingertips: app.bench.fingertips,
+    get pictures() {
+      return view.pictures;
+    },
+    get ready_ms() {
+      return ready_ms;
+    },
+  };
+  requestAnimationFrame(() => (ready_ms = performance.now()));
+  app.start();
+}
+
+const problem = await fetchCore().then(() => null, wordsOf);
+if (problem === null) {
+  start();
+} else {
+  const text =
+    `This page cannot start: wasm/core.wasm cannot be used (${problem}). Reload the page. If that does not help, ` +
+    'start it with "fingertip web", or copy all of its files to the server again.';
+  document.body.replaceChildren(element('p', { class: 'notice bad', role: 'alert' }, text));
+}

@@ -501,6 +501,18 @@ class TangentialLoad(ToolTest):
         for line in panels["Q since touch, N"].lines:
             self.assertTrue(np.isnan(line.get_ydata()).all(), "no curve of what is doubtful")
 
+    def test_legends_cover_no_curve_and_no_time_looks_doubtful(self):
+        scenario = self.pulled_scenario()
+        panels = self.panels(self.pulled_recording(scenario), "--truth", scenario, "--run", self.run_report())
+        legends = {label: panel.get_legend() for label, panel in panels.items() if panel.get_legend()}
+        self.assertLessEqual({"force, N", "Q, N"}, set(legends))
+        for label, legend in legends.items():
+            self.assertFalse(any(panel.get_window_extent().overlaps(legend.get_window_extent()) for panel in panels.values()), label)
+        times = next(points.get_cmap() for points in panels["y, mm"].figure.axes[0].collections if points.get_array() is not None)
+        to_rgb = plot.matplotlib.colors.to_rgb
+        for colour in (plot.DOUBTFUL, plot.SLIPPING, plot.TRUTH):
+            self.assertGreater(np.linalg.norm(times(np.linspace(0, 1, 256))[:, :3] - to_rgb(colour), axis=1).min(), 0.4, colour)
+
     def test_without_loads_there_is_no_panel_of_them(self):
         panels = self.panels(self.recording(self.scenario()))
         self.assertIn("force, N", panels)

@@ -99,6 +99,8 @@ function problemOf(reader: Reader, packets: number): string {
 const STEP_MOST_ms = 250;
 const TICK_ms = 10;
 const ENDED = 'the replay has ended';
+/** Of each pad; what is wrong with the file is said once, by onEnd. */
+const ENDED_EARLY = 'the replay has ended before the end of the file';
 
 class ReplayLine implements Line {
   private receive: ((bytes: Uint8Array, at_ms: number) => void) | null = null;
@@ -258,7 +260,7 @@ export class Replay {
   private end(problem: string): void {
     this.stopped = true;
     for (const line of this.lines) {
-      line?.end(problem || ENDED);
+      line?.end(problem ? ENDED_EARLY : ENDED);
     }
     this.onEnd(problem);
   }

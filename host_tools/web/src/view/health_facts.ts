@@ -26,6 +26,8 @@ const ENDS = [
 /** A processor without a rest drops frames soon. */
 const BUSY_permille = 950;
 const LITTLE_STACK_bytes = 512;
+/** The most that the packet can say: no chip's stack, so firmware on a host, where neither load nor stack is measured. */
+const HOST_STACK_bytes = 65535;
 
 export function factsOf(shown: Shown): FactGroup[] {
   const { fingertip } = shown;
@@ -85,22 +87,25 @@ export function factsOf(shown: Shown): FactGroup[] {
         counted('zero readings', health.zero_readings),
       ],
     });
+    const on_host = health.stack_free_bytes === HOST_STACK_bytes;
+    const busy: Fact = {
+      name: 'busy',
+      value: `${(health.cpu_busy_permille / 10).toFixed(0)} %`,
+      level: health.cpu_busy_permille > BUSY_permille ? 'warning' : 'plain',
+    };
+    const stack: Fact = {
+      name: 'stack free',
+      value: `${health.stack_free_bytes} B`,
+      level: health.stack_free_bytes < LITTLE_STACK_bytes ? 'bad' : 'plain',
+    };
     groups.push({
       title: 'Processor',
       facts: [
-        {
-          name: 'busy',
-          value: `${(health.cpu_busy_permille / 10).toFixed(0)} %`,
-          level: health.cpu_busy_permille > BUSY_permille ? 'warning' : 'plain',
-        },
+        ...(on_host ? [] : [busy]),
         counted('frames skipped', health.frames_skipped),
         counted('incomplete', health.frames_incomplete),
         counted('packets dropped', health.packets_dropped),
-        {
-          name: 'stack free',
-          value: `${health.stack_free_bytes} B`,
-          level: health.stack_free_bytes < LITTLE_STACK_bytes ? 'bad' : 'plain',
-        },
+        ...(on_host ? [] : [stack]),
         { name: 'running for', value: duration(health.uptime_s) },
         counted('watchdog resets', health.watchdog_resets),
       ],

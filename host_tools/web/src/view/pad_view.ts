@@ -13,6 +13,10 @@ const ASLANT: Look = { turn_deg: -32, tilt_deg: 40 };
 const ASLANT_WIDE: Look = { turn_deg: -62, tilt_deg: 42 };
 const WIDE = 1.5;
 const TURN_STEP_deg = 5;
+/** Of the axes along two edges of the rubber; the numbers stand so far outside it. */
+const TICK_STEP_mm = 10;
+const TICK_mm = 1.5;
+const NUMBER_mm = 4;
 /** Labels are read, not watched. */
 const LABEL_INTERVAL_ms = 125;
 /** A pressure that a reader should notice. */
@@ -70,8 +74,8 @@ export class PadView {
   constructor(layout: ShownLayout, label: string) {
     this.size = padSize(layout);
     this.box = {
-      x_mm: this.size.x_mm,
-      y_mm: this.size.y_mm,
+      x_mm: this.size.x_mm + NUMBER_mm,
+      y_mm: this.size.y_mm + NUMBER_mm,
       low_mm: -THICKNESS_mm,
       high_mm: HEIGHT_mm * 0.6,
     };
@@ -363,7 +367,39 @@ export class PadView {
         write(value, x, flat ? y : y - px * 0.8, palette.css('text'), cssOf(behind));
       }
     }
+    this.axes(pen, palette, at);
     this.scale(pen, palette, height);
+  }
+
+  /** Millimetres on the edges of the surface that are nearest to who looks. */
+  private axes(
+    pen: CanvasRenderingContext2D,
+    palette: Palette,
+    at: (x_mm: number, y_mm: number, z_mm: number) => [number, number],
+  ): void {
+    const { x_mm, y_mm } = this.size;
+    const turn = (this.look.turn_deg * Math.PI) / 180;
+    const front = Math.cos(turn) >= 0 ? -1 : 1;
+    // Where the eye is; of none that is nearer, the left one.
+    const side = turn > 0 ? 1 : -1;
+    pen.font = '11px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.lineWidth = 1;
+    pen.strokeStyle = palette.css('edge');
+    pen.fillStyle = palette.css('faint');
+    const axis = (name: string, reach_mm: number, place: (along_mm: number, out_mm: number) => [number, number]) => {
+      const most = Math.floor(reach_mm / TICK_STEP_mm);
+      for (let i = -most; i <= most; i++) {
+        const along_mm = i * TICK_STEP_mm;
+        pen.beginPath();
+        pen.moveTo(...place(along_mm, 0));
+        pen.lineTo(...place(along_mm, TICK_mm));
+        pen.stroke();
+        pen.fillText(i === most ? `${name} ${along_mm} mm` : String(along_mm).replace('-', '−'), ...place(along_mm, NUMBER_mm));
+      }
+    };
+    axis('x', x_mm, (along_mm, out_mm) => at(along_mm, front * (y_mm + out_mm), 0));
+    axis('y', y_mm, (along_mm, out_mm) => at(side * (x_mm + out_mm), along_mm, 0));
   }
 
   private scale(pen: CanvasRenderingContext2D, palette: Palette, height: number): void {

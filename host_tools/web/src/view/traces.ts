@@ -17,6 +17,11 @@ const MOST_N = 50;
 /** A load below this is hardly more than its standard deviation: no axis is made for it. */
 const LEAST_PULL_N = 0.5;
 const ROW_px = 15;
+const TITLE_px = 20;
+const TIMES_px = 22;
+/** Of the height of a plot: below this nothing can be read off it. */
+const LEAST_PLOT_px = 40;
+const MOST_PLOT_px = 240;
 /** Longer between frames than this, and a line is broken. */
 const BREAK_s = 0.25;
 
@@ -61,6 +66,8 @@ export class Traces {
   private width = 0;
   private height = 0;
   private names: string[] = [];
+  /** Of the strip of flags: the most until now, so that plots do not jump as flags come and go. */
+  private rows = 2;
   /** A place in time was pointed at; null: no longer. */
   onPoint: ((t_s: number | null) => void) | null = null;
 
@@ -229,12 +236,12 @@ export class Traces {
         {
           ...axis,
           show: last,
-          size: 22,
+          size: TIMES_px,
           gap: 2,
           space: 70,
           values: (_chart, times) => times.map((t_s) => (t_s < 0 ? '' : clock(t_s))),
         },
-        { ...axis, size: AXIS_px, gap: 4, space: 26 },
+        { ...axis, size: AXIS_px, gap: 4, space: 17 },
       ],
       series: [
         {},
@@ -281,12 +288,15 @@ export class Traces {
     if (this.width < 60 || this.drawn.length === 0) {
       return;
     }
-    const titles = 20 * this.drawn.length;
-    const room = Math.max(this.height - titles - 6 * ROW_px - 40, 74 * this.drawn.length);
+    const flags = this.rows * ROW_px + 4;
+    const fixed = TITLE_px * this.drawn.length + TIMES_px + flags;
+    const least = LEAST_PLOT_px * this.drawn.length;
+    this.element.style.minHeight = `${fixed + least}px`;
+    const room = Math.max(this.height - fixed, least);
     const total = this.drawn.reduce((sum, { plot }) => sum + plot.height, 0);
     for (const { chart, plot } of this.drawn) {
       const last = plot === PLOTS[PLOTS.length - 1];
-      const height = Math.min(Math.floor((room * plot.height) / total), 240) + (last ? 22 : 0);
+      const height = Math.min(Math.floor((room * plot.height) / total), MOST_PLOT_px) + (last ? TIMES_px : 0);
       chart.setSize({ width: this.width, height });
     }
   }
@@ -310,6 +320,10 @@ export class Traces {
       .map((row) => ({ ...row, spans: spansOf(this.buckets, row.bit, first, last, join_s) }))
       .filter((row) => row.always || row.spans.length > 0);
     const dense = Math.min(devicePixelRatio, 2);
+    if (rows.length > this.rows) {
+      this.rows = rows.length;
+      this.resize();
+    }
     const height = rows.length * ROW_px + 4;
     if (this.strip.width !== Math.round(this.width * dense) || this.strip.height !== Math.round(height * dense)) {
       this.strip.width = Math.round(this.width * dense);
@@ -344,11 +358,21 @@ export class Traces {
       pen.strokeStyle = cssOf(palette.of('surface'));
       pen.lineWidth = 3;
       pen.lineJoin = 'round';
-      pen.strokeText(row.name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
+      const name = shortened(pen, row.name, inner - 10);
+      pen.strokeText(name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
       pen.fillStyle = palette.css('text');
-      pen.fillText(row.name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
+      pen.fillText(name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
     });
   }
+}
+
+/** What of a text has room, its end as an ellipsis. */
+function shortened(pen: CanvasRenderingContext2D, text: string, room: number): string {
+  let shown = text;
+  while (shown.length > 1 && pen.measureText(shown).width > room) {
+    shown = `${shown.slice(0, -2).trimEnd()}…`;
+  }
+  return shown;
 }
 
 function steady(limit: number, wanted: number): number {
