@@ -11,6 +11,8 @@
 #define WIDTH_USUAL 0.6f  /* of the touches that what was assumed stands for */
 #define REST_SHARE 0.02f  /* of p0 */
 #define NOISE_SHARE 0.05f /* of what remains, at most */
+#define VARIANCE_USUAL 0.01f
+#define TIMES_MOST 8.0f /* of these or what is learnt: one odd touch says little */
 #define SD_LEAST 0.02f
 #define SD_MOST 0.5f
 #define PARAMETERS 4
@@ -70,8 +72,9 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
   const float model_Pa = (float)settings->model_sd_q16 * (1.0f / 65536.0f) * largest_Pa;
   const float freedom = (float)(count - PARAMETERS);
   const float noise = freedom * noise_Pa * noise_Pa;
-  const float most = SD_MOST * SD_MOST * share;
-  if (!(noise * gains->share < NOISE_SHARE * share * gains->residual * fitted)) {
+  const float learnt = gains->residual / gains->share;
+  const float most = TIMES_MOST * share * (learnt > VARIANCE_USUAL ? learnt : VARIANCE_USUAL);
+  if (!(noise < NOISE_SHARE * share * learnt * fitted)) {
     return false;
   }
   const float residual = (left - noise - freedom * model_Pa * model_Pa) / fitted;
