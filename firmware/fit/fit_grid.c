@@ -467,7 +467,8 @@ static NOINLINE void add_tail_moves(const struct moments *m, const struct moves 
   const int32_t depth_q28 =
       fit_grid_dip(readings->dip_height, TAIL_ERROR, &system->at, 1 << 28, system->rise_q22,
                    (int32_t)(FIT_DIP_DEPTH_MAX * 268435456.0f), &dip);
-  const int32_t error = (depth_q28 >> 12) * (1 << gain_shift);
+  /* Larger only far beside the array, where the fit is at a limit. */
+  const int32_t error = fixed_clamp((depth_q28 >> 12) * (1 << (gain_shift + 1)) / 2, 0, INT16_MAX);
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t column = moves->column[i], g = m->x.g_q14[i];
