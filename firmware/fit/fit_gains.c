@@ -16,6 +16,7 @@
 #define SD_LEAST 0.02f
 #define SD_MOST 0.5f
 #define PARAMETERS 4
+#define SENSORS_LEAST 9
 #define READING_BITS 13 /* so that the squares of all FT_MAX_SENSORS fit into 32 bits */
 _Static_assert(FT_MAX_SENSORS <= 1 << (32 - 2 * READING_BITS), "sum of squares");
 
@@ -59,7 +60,8 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
   const float p0_Pa = result->p0_Pa, width = result->sigma_mm / array->pitch_mm;
   const bool rests = fabsf(p0_Pa - gains->p0_Pa) <= REST_SHARE * p0_Pa;
   gains->p0_Pa = p0_Pa;
-  if (gains->counted || !rests || !(result->flags & CONTACT_FLAG_FIT_VALID) ||
+  if (gains->counted || !rests || array->is_line || count < SENSORS_LEAST ||
+      !(result->flags & CONTACT_FLAG_FIT_VALID) ||
       (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) ||
       result->used != (UINT32_C(1) << count) - 1u || width < WIDTH_LEAST || width > WIDTH_MOST) {
     return false;

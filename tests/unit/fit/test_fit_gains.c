@@ -45,7 +45,8 @@ static void feel(struct touch touch, int32_t *pressure_Pa_q10, struct fit_result
   for (int k = 0; k < SENSORS; k++) {
     const double dx = 9.0 * (k / 5 - 1) - touch.x_mm, dy = 9.0 * (k % 5 - 2) - touch.y_mm;
     const double bell = exp(-(dx * dx + dy * dy) / (2.0 * touch.sigma_mm * touch.sigma_mm));
-    pressure_Pa_q10[k] = (int32_t)lround(1024.0 * (gain[k] * touch.p0_Pa * bell + 4.0 * random_normal(&random)));
+    pressure_Pa_q10[k] =
+        (int32_t)lround(1024.0 * (gain[k] * touch.p0_Pa * bell + 4.0 * random_normal(&random)));
   }
   fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, result);
 }
@@ -128,6 +129,30 @@ static void test_what_does_not_tell_does_not_count(void) {
   }
 }
 
+/* The law is one of rectangles. */
+static void test_a_strip_learns_nothing(void) {
+  float x_mm[SENSORS], y_mm[SENSORS];
+  for (int k = 0; k < SENSORS; k++) {
+    x_mm[k] = 0.0f;
+    y_mm[k] = 9.0f * (float)(k - 7);
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, 9.0f));
+  struct fit_gains gains;
+  fit_gains_begin(&gains, ASSUMED);
+  int32_t pressure_Pa_q10[SENSORS];
+  struct fit_result result;
+  for (int look = 0; look < 2; look++) {
+    for (int k = 0; k < SENSORS; k++) {
+      const double bell = exp(-9.0 * 9.0 * (k - 7) * (k - 7) / (2.0 * 5.6 * 5.6));
+      pressure_Pa_q10[k] =
+          (int32_t)lround(1024.0 * (14000.0 * bell + 4.0 * random_normal(&random)));
+    }
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &result);
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, result.flags);
+    TEST_ASSERT_FALSE(fit_gains_learn(&gains, &array, pressure_Pa_q10, &settings, &result));
+  }
+}
+
 /* A skin is changed: what sixty touches told of the old one fades. */
 static void test_another_pad_is_learnt(void) {
   struct fit_gains gains;
@@ -165,6 +190,7 @@ int main(void) {
   RUN_TEST(test_touches_tell_how_far_gains_are_apart);
   RUN_TEST(test_a_touch_counts_once_and_when_it_rests);
   RUN_TEST(test_what_does_not_tell_does_not_count);
+  RUN_TEST(test_a_strip_learns_nothing);
   RUN_TEST(test_another_pad_is_learnt);
   RUN_TEST(test_an_sd_has_limits);
   return UNITY_END();

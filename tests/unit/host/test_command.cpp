@@ -229,7 +229,7 @@ TEST(Names, EveryFlagBitHasAName) {
   EXPECT_EQ(flags_text(CONTACT_FLAG_CONTACT | CONTACT_FLAG_SLIP), "CONTACT SLIP");
   EXPECT_EQ(flags_text(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_SLIDING),
             "TANGENTIAL_VALID SLIDING");
-  EXPECT_EQ(flags_text(1u << 25 | 1u << 31), "bit25 bit31");
+  EXPECT_EQ(flags_text(1u << 26 | 1u << 31), "bit26 bit31");
 }
 
 TEST(Text, NumbersReadBackTheSame) {
