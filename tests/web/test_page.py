@@ -397,6 +397,14 @@ class Looks(PageTest):
             page.run("document.querySelectorAll('[style*=opacity]').forEach(each => each.style.opacity = '')")
 
 
+    def test_a_pause_follows_the_window(self):
+        """The flags, which are drawn with the page's own pen, as the plots."""
+        page = self.paused()
+        for width in (700, 1120):
+            page.size(width, 760)
+            page.until("document.querySelector('.traces').clientWidth === document.querySelector('canvas.flags').getBoundingClientRect().width")
+
+
 class Everyone(PageTest):
     """Who does not see it, who sees little, who holds it in one hand."""
 

@@ -68,6 +68,8 @@ export class Traces {
   private names: string[] = [];
   /** Of the strip of flags: the most until now, so that plots do not jump as flags come and go. */
   private rows = 2;
+  /** Its size is another: draw it again, in a pause too. */
+  onResize: (() => void) | null = null;
   /** A place in time was pointed at; null: no longer. */
   onPoint: ((t_s: number | null) => void) | null = null;
 
@@ -81,6 +83,7 @@ export class Traces {
         this.width = clientWidth;
         this.height = clientHeight;
         this.resize();
+        this.onResize?.();
       }
     }).observe(this.element);
   }

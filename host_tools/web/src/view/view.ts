@@ -102,6 +102,7 @@ export class View {
       }
     });
     this.timeline.onChange = () => this.timeChanged();
+    this.traces.onResize = () => (this.tracesDue = true);
     this.root.addEventListener('keydown', (event) => this.key(event));
     bench.listen(() => this.gather());
     this.gather();
