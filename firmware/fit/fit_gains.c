@@ -79,7 +79,7 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
   if (!(noise < NOISE_SHARE * share * learnt * fitted)) {
     return false;
   }
-  const float residual = (left - noise - freedom * model_Pa * model_Pa) / fitted;
+  const float residual = (left - freedom * model_Pa * model_Pa) / fitted;
   gains->residual += residual < most ? residual : most;
   gains->share += share;
   gains->counted = true;

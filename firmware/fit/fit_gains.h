@@ -4,7 +4,7 @@
  * Each touch shows a part of it: what four fitted parameters leave of the gains' errors is in the
  * residual. So
  *   gain_sd^2 = sum(R / M) / sum(0.58 (sigma / pitch)^3),
- * R and M the squares of the touch's residual, less those of noise and model, and of the fitted
+ * R and M the squares of the touch's residual, less those of the model's error, and of the fitted
  * Gaussian. The denominator is the share of independent relative errors that the fit leaves, the
  * mean over all places: within 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to
  * 1 pitch. Narrower contacts leave too little to tell.

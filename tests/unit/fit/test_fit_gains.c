@@ -115,7 +115,7 @@ static void test_what_does_not_tell_does_not_count(void) {
   fit_gains_begin(&gains, ASSUMED);
   before = gains;
   TEST_ASSERT_FALSE(hold(&gains, (struct touch){300.0, 5.6, 1.0, 2.0}));     /* noise */
-  TEST_ASSERT_FALSE(hold(&gains, (struct touch){14000.0, 3.0, 1.0, 2.0}));   /* thin rubber */
+  TEST_ASSERT_FALSE(hold(&gains, (struct touch){900000.0, 3.0, 1.0, 2.0}));  /* thin rubber */
   TEST_ASSERT_FALSE(hold(&gains, (struct touch){14000.0, 5.6, 30.0, 2.0}));  /* beside the array */
   TEST_ASSERT_FALSE(hold(&gains, (struct touch){14000.0, 200.0, 1.0, 2.0})); /* flat */
   TEST_ASSERT_FALSE(hold(&gains, (struct touch){0.0, 5.6, 1.0, 2.0}));
@@ -125,6 +125,51 @@ static void test_what_does_not_tell_does_not_count(void) {
   for (int i = 0; i < 2; i++) {
     feel((struct touch){14000.0, 5.6, 1.0, 2.0}, pressure_Pa_q10, &result);
     fit_gaussian(&array, pressure_Pa_q10, ALL & ~1u, &settings, &result);
+    TEST_ASSERT_FALSE(fit_gains_learn(&gains, &array, pressure_Pa_q10, &settings, &result));
+  }
+}
+
+/* Nothing of the model is wrong in its residual, and its place is. */
+static void test_a_fit_at_a_limit_does_not_count(void) {
+  struct fit_gains gains;
+  fit_gains_begin(&gains, ASSUMED);
+  int32_t pressure_Pa_q10[SENSORS];
+  struct fit_result result;
+  for (int i = 0; i < 4; i++) {
+    feel((struct touch){14000.0, 5.6, 1.0, 2.0}, pressure_Pa_q10, &result);
+    result.flags |= i < 2 ? CONTACT_FLAG_AT_BOUND : CONTACT_FLAG_FLAT;
+    TEST_ASSERT_FALSE(fit_gains_learn(&gains, &array, pressure_Pa_q10, &settings, &result));
+  }
+}
+
+static void test_an_odd_touch_says_little(void) {
+  struct fit_gains gains;
+  fit_gains_begin(&gains, ASSUMED);
+  for (int k = 0; k < SENSORS; k++) {
+    gain[k] = k % 2 ? 0.5 : 1.5;
+  }
+  TEST_ASSERT_TRUE(hold(&gains, (struct touch){14000.0, 6.0, 1.0, 2.0}));
+  TEST_ASSERT_TRUE(fit_gains_sd(&gains) > 0.12f && fit_gains_sd(&gains) < 0.22f);
+}
+
+static void test_eight_sensors_learn_nothing(void) {
+  float x_mm[8], y_mm[8];
+  for (int k = 0; k < 8; k++) {
+    x_mm[k] = 9.0f * (float)(k / 4);
+    y_mm[k] = 9.0f * (float)(k % 4);
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, 8, x_mm, y_mm, 9.0f));
+  struct fit_gains gains;
+  fit_gains_begin(&gains, ASSUMED);
+  int32_t pressure_Pa_q10[8];
+  struct fit_result result;
+  for (int look = 0; look < 2; look++) {
+    for (int k = 0; k < 8; k++) {
+      const double dx = (double)x_mm[k] - 5.0, dy = (double)y_mm[k] - 14.0;
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * 14000.0 * exp(-(dx * dx + dy * dy) / 62.7));
+    }
+    fit_gaussian(&array, pressure_Pa_q10, 0xFF, &settings, &result);
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, result.flags);
     TEST_ASSERT_FALSE(fit_gains_learn(&gains, &array, pressure_Pa_q10, &settings, &result));
   }
 }
@@ -190,6 +235,9 @@ int main(void) {
   RUN_TEST(test_touches_tell_how_far_gains_are_apart);
   RUN_TEST(test_a_touch_counts_once_and_when_it_rests);
   RUN_TEST(test_what_does_not_tell_does_not_count);
+  RUN_TEST(test_a_fit_at_a_limit_does_not_count);
+  RUN_TEST(test_an_odd_touch_says_little);
+  RUN_TEST(test_eight_sensors_learn_nothing);
   RUN_TEST(test_a_strip_learns_nothing);
   RUN_TEST(test_another_pad_is_learnt);
   RUN_TEST(test_an_sd_has_limits);
