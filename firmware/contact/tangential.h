@@ -58,7 +58,7 @@ struct tangential_course {
 };
 
 /* The estimate of one frame: a job of worker/worker.h. What the pointers lead to is handed over
- * with it: nobody writes it before the answer. The course is the worker's own. */
+ * with it: it is not written before the answer. The course is the worker's own. */
 struct tangential_job {
   const struct fit_array *array;
   struct fit_pad pad;

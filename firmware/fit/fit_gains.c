@@ -13,7 +13,7 @@
 #define NOISE_SHARE 0.05f /* of what remains, at most */
 #define VARIANCE_USUAL 0.01f
 #define TIMES_MOST 8.0f /* of these or what is learnt: one odd touch says little */
-#define SD_LEAST 0.02f
+#define SD_LEAST 0.08f
 #define SD_MOST 0.5f
 #define PARAMETERS 4
 #define SENSORS_LEAST 9

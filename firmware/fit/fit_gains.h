@@ -9,6 +9,9 @@
  * mean over all places: within 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to
  * 1 pitch. Narrower contacts leave too little to tell.
  *
+ * Gains that lie on a tilt or a bowl over the pad move and widen the fit and leave nothing in the
+ * residual. So it is never below 0.08, however well the readings fit.
+ *
  * A touch counts once, when it rests. What was assumed counts as much as FIT_GAINS_TOUCHES of them.
  * NUMERICS.md has what it is worth. */
 #ifndef FIT_FIT_GAINS_H
@@ -17,7 +20,7 @@
 #include "fit/fit.h"
 
 #define FIT_GAINS_TOUCHES 4
-/* So many touches at most are remembered, so that a changed pad is learnt anew. */
+/* So many touches at most are remembered, so that another pad is learnt. */
 #define FIT_GAINS_TOUCHES_MOST 64
 
 struct fit_gains {
@@ -40,7 +43,7 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
                      const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                      const struct fit_result *result);
 
-/* 0.02 to 0.5. */
+/* 0.08 to 0.5. */
 float fit_gains_sd(const struct fit_gains *gains);
 
 #endif

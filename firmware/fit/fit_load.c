@@ -46,12 +46,6 @@ _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 #define RESIDUAL UNKNOWNS /* its column */
 #define WORDS (UNKNOWNS + 1)
 
-/* 2^-z within 0.3 %. */
-FIXED_INLINE int32_t exp2_rough(uint32_t z_q22) {
-  uint32_t whole = z_q22 >> 22;
-  return whole > 29 ? 0 : fit_exp2_table[(z_q22 >> 14) & 255] >> whole;
-}
-
 #define DIP_PER_MAX_Q26 (1 << 29) /* 8 */
 #define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
 

@@ -81,7 +81,6 @@ struct problem {
   int32_t dip_share_q16, dip_k_q24;
 };
 
-
 static int32_t q26_from(float value) {
   return fit_fixed(value, 26);
 }
@@ -171,12 +170,6 @@ static int set_blobs(int model, const int32_t *at, struct blob *blob) {
   return count;
 }
 
-/* 2^-z within 0.3 %, Q15. */
-FIXED_INLINE int32_t exp2_rough(uint32_t z_q22) {
-  uint32_t whole = z_q22 >> 22;
-  return whole > 15 ? 0 : fit_exp2_table[(z_q22 >> 14) & 255] >> (whole + 15);
-}
-
 /* exp(-d^2 / (2 v)) along both axes, whose products are the bells at the nodes. */
 struct bell {
   int32_t x_q15[COLUMNS], y_q15[ROWS];
@@ -211,10 +204,10 @@ static NOINLINE void set_bell(const struct squares *squares, int32_t k_q24, stru
 static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24,
                                     struct bell *bell) {
   for (int i = 0; i < COLUMNS; i++) {
-    bell->x_q15[i] = exp2_rough((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24));
+    bell->x_q15[i] = exp2_rough((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
   }
   for (int k = 0; k < ROWS; k++) {
-    bell->y_q15[k] = exp2_rough((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24));
+    bell->y_q15[k] = exp2_rough((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
   }
 }
 

@@ -20,3 +20,10 @@ def save(figure, path):
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; choose another place") from None
     plt.close(figure)
+
+
+def tidy(axes, title, label):
+    axes.set_title(title, loc="left", size=10, color=INK)
+    axes.set_ylabel(label, size=9)
+    axes.grid(axis="y")
+    axes.tick_params(labelsize=8)

@@ -1,5 +1,5 @@
 """What truth.py measured as text and as a picture."""
-from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
+from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, tidy
 from fingertip.files import write_text
 from goals import goal_table_md
 from tables import table_of_dicts_md
@@ -21,13 +21,6 @@ def write(found, path):
     for name, rows in tables_of(found):
         lines += [f"## {name.replace('_', ' ')}", "", *table_of_dicts_md(rows), ""]
     write_text(path, "\n".join(lines))
-
-
-def tidy(axes, title, label):
-    axes.set_title(title, loc="left", size=10, color=INK)
-    axes.set_ylabel(label, size=9)
-    axes.grid(axis="y")
-    axes.tick_params(labelsize=8)
 
 
 def named(axes, names):

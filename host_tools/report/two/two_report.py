@@ -1,5 +1,5 @@
 """What two.py measured as text and as a picture."""
-from drawing import BLUE, FAINT, INK, ORANGE, plt, save
+from drawing import BLUE, FAINT, INK, ORANGE, plt, save, tidy
 from fingertip.files import write_text
 from goals import goal_table_md
 from tables import table_of_dicts_md
@@ -20,13 +20,6 @@ def write(found, path):
             "below 0.6 mm and no shape that says so. `exact gains`: a pad whose gains are known without error. `along` and `across`: the pad's longer",
             "and shorter side, within 45 degrees.", "", *table_of_dicts_md(found["touches"]), ""]
     write_text(path, "\n".join(lines))
-
-
-def tidy(axes, title, label):
-    axes.set_title(title, loc="left", size=10, color=INK)
-    axes.set_ylabel(label, size=9)
-    axes.grid(axis="y")
-    axes.tick_params(labelsize=8)
 
 
 def draw_pairs(axes, rows):

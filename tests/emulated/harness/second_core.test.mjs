@@ -40,7 +40,7 @@ function failsWith(name, source, pattern) {
   });
 }
 
-test('the boot ROM sends a 0 after a reset, answers each word with itself, and begins anew at a 0 and at what is no 1', () => {
+test('the boot ROM sends a 0 after a reset, answers each word with itself, and begins again at a 0 and at what is no 1', () => {
   const { found } = results(image('halt();', `
     RESULT(0) = pop(); drain();
     RESULT(1) = ask(0); RESULT(2) = ask(1); RESULT(3) = ask(0x10000100); RESULT(4) = ask(0);

@@ -1,13 +1,14 @@
 /* A load that is not estimated: its trace in the residual, and what that makes of the error. */
 #include "common/contact_flags.h"
 #include "fit/fit_load.h"
+#include "support/grid.h"
 #include "support/random.h"
 #include "unity.h"
 
 #include <math.h>
 #include <stdio.h>
 
-#define SENSORS 15
+#define SENSORS GRID_SENSORS
 #define ALL ((UINT32_C(1) << SENSORS) - 1)
 #define NOISE_Pa 4.0
 
@@ -15,12 +16,7 @@ static struct fit_array array;
 static struct random noise;
 
 void setUp(void) {
-  float x_mm[SENSORS], y_mm[SENSORS];
-  for (int k = 0; k < SENSORS; k++) {
-    x_mm[k] = 9.0f * (float)(k / 5 - 1);
-    y_mm[k] = 9.0f * (float)(k % 5 - 2);
-  }
-  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, 9.0f));
+  make_grid_of_15(&array);
   noise = (struct random){UINT64_C(20221015)};
 }
 

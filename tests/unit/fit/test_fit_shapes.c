@@ -1,13 +1,15 @@
 /* One contact, a long one, one that pulls, two, and what is none of these. */
 #include "common/contact_flags.h"
 #include "fit/fit_shapes.h"
+#include "support/grid.h"
+#include "support/pad.h"
 #include "support/random.h"
 #include "unity.h"
 
 #include <math.h>
 #include <string.h>
 
-#define SENSORS 15
+#define SENSORS GRID_SENSORS
 #define ALL ((UINT32_C(1) << SENSORS) - 1)
 #define NOISE_Pa 4.0
 #define PI 3.14159265358979
@@ -16,24 +18,11 @@ static struct fit_array array;
 static struct fit_shapes_pad pad;
 static struct random noise;
 
-/* Of 12 mm of rubber. */
-static const struct pad_profile profile = {
-    .thickness_mm = 12.0f,
-    .normal = {{0.0962158f, 3.563492f}, {0.8206275f, 5.739365f}},
-    .tangential = {{1.051876f, 4.802645f}, {4.015438f, 7.883257f}, {5.430944f, 19.82153f}},
-    .spread_mm2 = 4.0f,
-    .spread_sd_mm2 = 6.0f,
-    .force_ratio = 1.0f,
-    .tangential_scale = 1.0f,
-};
+static struct pad_profile profile;
 
 void setUp(void) {
-  float x_mm[SENSORS], y_mm[SENSORS];
-  for (int k = 0; k < SENSORS; k++) {
-    x_mm[k] = 9.0f * (float)(k / 5 - 1);
-    y_mm[k] = 9.0f * (float)(k % 5 - 2);
-  }
-  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, 9.0f));
+  make_grid_of_15(&array);
+  profile = pad_of_12_mm();
   TEST_ASSERT_EQUAL(FT_OK, fit_shapes_init(&pad, &array, &profile));
   noise = (struct random){UINT64_C(20221015)};
 }
@@ -270,9 +259,9 @@ static void test_garbage_leaves_finite_results(void) {
       struct fit_result fit;
       fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
       fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
-      const float all[] = {result.x_mm[0],   result.y_mm[0],    result.force_N[0],
-                           result.x_mm[1],   result.y_mm[1],    result.force_N[1],
-                           result.length_mm, result.along_x,    result.angle_sd_rad,
+      const float all[] = {result.x_mm[0],   result.y_mm[0],           result.force_N[0],
+                           result.x_mm[1],   result.y_mm[1],           result.force_N[1],
+                           result.length_mm, result.along_x,           result.angle_sd_rad,
                            result.qx_N,      result.location_sd_mm[0], result.force_sd_N[1]};
       for (size_t m = 0; m < sizeof all / sizeof all[0]; m++) {
         TEST_ASSERT_TRUE(isfinite(all[m]));

@@ -260,6 +260,26 @@ auto never_calibrated(double sd) {
   };
 }
 
+// Gains that rise over the pad in one direction, by so much rms: rubber that was cast aslant.
+auto tilted(double rms) {
+  return [rms](Random &random, std::size_t) {
+    const fit_array array = firmware_array();
+    Pad pad = raw_pad(0.0, static_cast<double>(DEFAULT_GAIN_SD), random);
+    const double angle = random.uniform(0.0, 2.0 * M_PI);
+    Readings along{};
+    double square = 0.0;
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      along[k] = std::cos(angle) * static_cast<double>(array.x[k]) +
+                 std::sin(angle) * static_cast<double>(array.y[k]);
+      square += along[k] * along[k] / static_cast<double>(SENSORS);
+    }
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      pad.gain[k] = 1.0 + rms * along[k] / std::sqrt(square);
+    }
+    return pad;
+  };
+}
+
 auto one_of(const CalibratedPads &pads) {
   return [&pads](Random &, std::size_t pad) { return pads[pad % pads.size()]; };
 }
@@ -283,6 +303,8 @@ void judge_coverage(const Options &options, const std::vector<Contact> &thick,
       {learnt({"12 mm, gains 10 %", thick, never_calibrated(0.10)}), true},
       {{"12 mm, gains 20 %, first touch", thick, never_calibrated(0.20)}, false},
       {learnt({"12 mm, gains 20 %", thick, never_calibrated(0.20)}), true},
+      {{"12 mm, gains aslant by 10 %, first touch", thick, tilted(0.10)}, false},
+      {learnt({"12 mm, gains aslant by 10 %", thick, tilted(0.10)}), true},
       {{"12 mm, calibrated", thick, one_of(calibrated)}, true},
       {{"6 mm, equal gains", thin, equal}, true},
       {learnt({"6 mm, gains 10 %", thin, never_calibrated(0.10)}), false},
@@ -315,7 +337,7 @@ void judge_coverage(const Options &options, const std::vector<Contact> &thick,
   out["cover_2sd_min"] = least_2;
 }
 
-// No profile, so that is not estimated the load. Without a load: what the look for one costs.
+// No profile, so the load is not estimated. Without a load: what the look for one costs.
 void judge_loaded(const Options &options, const CalibratedPads &calibrated, ordered_json &out) {
   shear::Objects objects(options.cache);
   struct Kind {

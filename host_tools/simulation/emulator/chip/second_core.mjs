@@ -2,7 +2,7 @@
  * The RP2040's second Cortex-M0+ (RP2040 datasheet 2.2, 2.3.1, 2.8.2), beside a first one that owns the time.
  *
  * After a reset it waits in the boot ROM until core 0 has sent 0, 0, 1, vector table, stack pointer and entry through the
- * FIFO of the SIO. It answers each word with the same word. A 0 begins anew. That part of the boot ROM is played here; what
+ * FIFO of the SIO. It answers each word with the same word. A 0 begins again. That part of the boot ROM is played here; what
  * it leaves behind is the boot ROM's: a read of the empty FIFO is noted (ROE), a 0 is sent unasked, an event is kept. Bit 16 of PSM FRCE_OFF
  * is its reset.
  *
