@@ -19,6 +19,8 @@ struct KnownPad {
   std::vector<double> x_mm, y_mm;
   std::vector<double> own_width; /* log: what each sensor feels a contact wider */
 
+  double dip = 0.0, dip_mm = 20.0; /* of cast rubber: share of the peak, and how wide */
+
   explicit KnownPad(std::uint64_t seed, double spread = 0.1, double misplaced_mm = 0.0) {
     fingertip::Random random(seed, 1, 0);
     array.pitch_mm = static_cast<double>(geometry.pitch_mm);
@@ -52,8 +54,10 @@ struct KnownPad {
     const double u = x_mm[k] - press.x_mm, v = y_mm[k] - press.y_mm;
     const double c = std::cos(press.slant), s = std::sin(press.slant), root = std::sqrt(press.axes);
     const double a = (c * u + s * v) / root, b = (c * v - s * u) * root;
+    const double square = a * a + b * b;
     return PEAK_Pa * press.force *
-           std::pow(1.0 + (a * a + b * b) / (2.0 * n * width_mm * width_mm), -n);
+           (std::pow(1.0 + square / (2.0 * n * width_mm * width_mm), -n) -
+            dip * std::exp(-square / (2.0 * dip_mm * dip_mm)));
   }
 
   fingertip::calibrating::Placement place(const Press &press, double t_s, fingertip::Random &random,

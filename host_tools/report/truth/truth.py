@@ -31,7 +31,8 @@ PARTS = {
     "flash": "what is kept, when power goes",
 }
 GOALS = (
-    ("cal_median_mm", "<=", 0.15), ("cal_rough_median_mm", "<=", 0.21), ("worse_after_accept", "<=", 0), ("accepted_good_percent", ">=", 95),
+    ("cal_median_mm", "<=", 0.15), ("cal_rough_median_mm", "<=", 0.21), ("cal_20_median_mm", "<=", 0.15),
+    ("cal_dip_median_mm", "<=", 0.13), ("worse_after_accept", "<=", 0), ("accepted_good_percent", ">=", 95),
     ("refused_percent_worst", ">=", 90), ("cal_force_mape_percent", "<=", 2), ("calibrated_warned_percent_worst", "<=", 5),
     ("cover_1sd_min", ">=", 55), ("cover_1sd_max", "<=", 75), ("cover_2sd_min", ">=", 93), ("cal_warned_percent", "<=", 5),
     ("cal_bad_unflagged_percent", "<=", 0.1), ("raw_warned_percent", "<=", 32), ("raw_bad_unflagged_percent", "<=", 1.3),

@@ -30,7 +30,8 @@ constexpr double HALVES_SHAPE_MAX = 0.025; /* odd and even placements: largest d
 constexpr double HALVES_GAUGE_MAX = 0.04;  /* and within */
 constexpr double FORCE_SPREAD_MAX = 0.065; /* rms of e: one weight */
 constexpr double ELLIPSE_MAX = 0.055;      /* rms of q1, q2 beyond their sds: a round foot */
-constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros */
+constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros, beyond what
+                                              the dip may be off by (FIT_DIP_ERROR) */
 constexpr double DRIFT_MAX = 0.006;        /* the same, from first to last placement */
 constexpr double POSITION_MAX_mm = 0.5;    /* rms: sensors where the layout says */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */

@@ -35,6 +35,11 @@ KnownPad::Press anywhere(Random &random, int = 0) {
   return {x, random.uniform(-18.0, 18.0)};
 }
 
+double rms(const std::vector<double> &values) {
+  return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) /
+                   double(values.size()));
+}
+
 void expect_refused(const Judgement &judgement, Reason reason, const std::string &words) {
   EXPECT_EQ(judgement.state, State::refused) << judgement.text;
   EXPECT_STREQ(name_of(judgement.reason), name_of(reason)) << judgement.text;
@@ -49,6 +54,18 @@ TEST(Judge, accepts_good_sessions) {
     EXPECT_EQ(judgement.state, State::good) << seed << judgement.text;
     EXPECT_STREQ(name_of(judgement.reason), "none");
     EXPECT_LE(judgement.solution.worst_shape_sd(), judgement.wanted_sd);
+  }
+}
+
+/* Such a dip looks like zeros that were off by more than OFFSET_MAX. */
+TEST(Judge, accepts_a_dip_narrower_than_its_model) {
+  for (std::uint64_t seed = 160; seed < 170; seed++) {
+    KnownPad pad(seed);
+    pad.dip = 0.09;
+    pad.dip_mm = 14.0;
+    const Judgement judgement = judge(pad.array, good_session(pad, 36, seed), true);
+    EXPECT_EQ(judgement.state, State::good) << seed << judgement.text;
+    EXPECT_GT(rms(judgement.solution.offset_Pa) / judgement.solution.peak_Pa, OFFSET_MAX);
   }
 }
 

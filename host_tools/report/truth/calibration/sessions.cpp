@@ -92,6 +92,12 @@ void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_
     base_Pa_[k] =
         object.base_pressure_Pa(force_N, c * dx + s * dy, c * dy - s * dx, pad_.dip_share());
   }
+  if (options_.block) {
+    const twin::BlockTable::Load load{force_N, 0.0, 0.0, object.contact_radius_mm(force_N)};
+    for (std::size_t k = 0; k < base_Pa_.size(); k++) {
+      base_Pa_[k] += options_.block->added_Pa(k, load, x_mm, y_mm);
+    }
+  }
 }
 
 calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double force_N,

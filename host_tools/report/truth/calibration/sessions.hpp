@@ -3,6 +3,7 @@
 #pragma once
 
 #include "libfingertip/random.hpp"
+#include "library/pad/block_table.hpp"
 #include "simulation/twin/contact_table.hpp"
 #include "simulation/twin/effects.hpp"
 #include "tool/calibration/judge.hpp"
@@ -23,6 +24,8 @@ struct PadOptions {
   double relaxation_percent = 0.0; // mean of what a sensor loses in a hold; 17.5: 9 to 26 %
   double misplaced_mm = 0.0;       // sd of a sensor's place, each way
   double dip_percent = 0.0, widths_percent = 0.0;
+  const twin::BlockTable *block =
+      nullptr; // of rubber that ends; of sensors that are in their places
 };
 
 // Fifteen sensors under a layer, over time. What touches it is a table of the twin.
