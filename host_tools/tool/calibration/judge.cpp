@@ -60,6 +60,28 @@ double dip_as_offset(const Solution &solution) {
   return static_cast<double>(FIT_DIP_ERROR) * solution.dip;
 }
 
+/* Rms of e about its mean, of placements within the array: beyond it a force is extrapolated, and
+ * rubber that ends near gives way. */
+double force_share(const Array &array, const Solution &solution) {
+  const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
+  const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
+  std::vector<double> forces;
+  for (const Fitted &fitted : solution.placements) {
+    if (fitted.kept && fitted.x_mm >= *left && fitted.x_mm <= *right && fitted.y_mm >= *bottom &&
+        fitted.y_mm <= *top) {
+      forces.push_back(fitted.force);
+    }
+  }
+  double mean = 0.0;
+  for (double force : forces) {
+    mean += force / double(forces.size());
+  }
+  for (double &force : forces) {
+    force -= mean;
+  }
+  return rms(forces);
+}
+
 /* Rms of the log gains, beyond what their sds make. */
 double spread_of(const Solution &solution) {
   std::vector<double> logs;
@@ -204,7 +226,7 @@ std::string text_of(const Judgement &j, std::size_t placements) {
            percent(s.worst_shape_sd()) +
            ": place the weight near them; on thin rubber too few sensors feel a placement";
   case Reason::weights:
-    return "the force differed by " + percent(s.spread.force) +
+    return "the force differed by " + percent(j.force_share) +
            " between placements: use one and the same weight, standing freely";
   case Reason::elongated:
     return "the contact is not round (its axes differ by " + percent(2.0 * j.ellipse) +
@@ -247,7 +269,7 @@ struct Evidence {
 Evidence against(const Judgement &j) {
   const Solution &s = j.solution;
   const Evidence all[] = {{Reason::elongated, j.ellipse / ELLIPSE_MAX},
-                          {Reason::weights, s.spread.force / FORCE_SPREAD_MAX},
+                          {Reason::weights, j.force_share / FORCE_SPREAD_MAX},
                           {Reason::offsets, j.offset_share / OFFSET_MAX},
                           {Reason::drift, j.drift_share / DRIFT_MAX},
                           {Reason::stray, (1.0 - j.kept_share) / (1.0 - KEPT_MIN)},
@@ -329,10 +351,11 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     }
   }
   if (s.solved) {
-    const double of_all = rms_beyond({std::begin(s.ellipse_of_all), std::end(s.ellipse_of_all)},
-                                     {std::begin(s.ellipse_of_all_sd),
-                                      std::end(s.ellipse_of_all_sd)});
+    const double of_all =
+        rms_beyond({std::begin(s.ellipse_of_all), std::end(s.ellipse_of_all)},
+                   {std::begin(s.ellipse_of_all_sd), std::end(s.ellipse_of_all_sd)});
     j.ellipse = std::hypot(of_all, s.spread.ellipse);
+    j.force_share = force_share(array, s);
     j.kept_share = double(s.kept) / double(placements.size());
     const double offset = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
     j.offset_share =

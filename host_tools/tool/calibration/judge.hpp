@@ -1,9 +1,9 @@
 /* Whether a calibration may be used, and if not, why, and what would help.
  *
  * Good: the calibration helps, and nothing in the session speaks against it. It helps if every gain
- * is known to SHAPE_SD_WANTED, or after PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ, and
- * if what half of the placements say makes the firmware's fit of the other half better. Refused:
- * what speaks against it does not go away with more placements. More: neither yet.
+ * is known to SHAPE_SD_WANTED, or after PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ,
+ * and if what half of the placements say makes the firmware's fit of the other half better.
+ * Refused: what speaks against it does not go away with more placements. More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm,
  * alike and as uneven as real ones (program truth_calibration, tables evidence_p1_p50_p99; chosen
@@ -28,15 +28,16 @@ constexpr double KEPT_MIN = 0.7;           /* share of the placements */
 constexpr double HALVES_SHAPE_MAX = 0.025; /* odd and even placements: largest difference of a gain
                                               outside the gauge, beyond two sds of it */
 constexpr double HALVES_GAUGE_MAX = 0.04;  /* and within */
-constexpr double FORCE_SPREAD_MAX = 0.065; /* rms of e: one weight */
+constexpr double FORCE_SPREAD_MAX = 0.065; /* rms of e within the array: one weight */
 constexpr double ELLIPSE_MAX = 0.055;      /* rms of q1, q2 beyond their sds: a round foot */
 constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros, beyond what
                                               the dip may be off by (FIT_DIP_ERROR) */
 constexpr double DRIFT_MAX = 0.006;        /* the same, from first to last placement */
 constexpr double POSITION_MAX_mm = 0.5;    /* rms: sensors where the layout says */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */
-constexpr std::size_t PLACEMENTS_ENOUGH = 20; /* more hardly make gains surer that are not by then */
-constexpr std::size_t PLACEMENTS_MAX = 60;    /* who is not done by then never will be */
+constexpr std::size_t PLACEMENTS_ENOUGH =
+    20;                                    /* more hardly make gains surer that are not by then */
+constexpr std::size_t PLACEMENTS_MAX = 60; /* who is not done by then never will be */
 
 enum class Reason {
   none,
@@ -66,11 +67,12 @@ struct Judgement {
   Solution solution;
   double halves_shape = 0.0, halves_gauge = 0.0; /* 0 before there are PLACEMENTS_WANTED */
   bool helps = false;                            /* the halves each other; as halves_shape */
-  double kept_share = 0.0;
-  double ellipse = 0.0;                         /* rms of q1, q2 beyond their sds */
+  double kept_share = 0.0, force_share = 0.0;    /* the latter: rms of e, of placements within the
+                                                    array */
+  double ellipse = 0.0;                          /* rms of q1, q2 beyond their sds */
   double offset_share = 0.0, drift_share = 0.0; /* rms over the sensors beyond what is by chance, of
                                                    the peak */
-  double wanted_sd = 0.0;          /* of the gains outside the gauge, to be good */
+  double wanted_sd = 0.0;                       /* of the gains outside the gauge, to be good */
   std::vector<std::size_t> unsure; /* sensors whose gain is not known well enough yet */
   std::vector<std::size_t> silent; /* of those, the ones without a reading in any placement */
 };
@@ -92,12 +94,11 @@ struct ForceScale {
   double scale = 1.0, sd = 0.0;
 };
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N,
-                                      const Shape &shape);
+                                      const Solution &solution, double force_N, const Shape &shape);
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements, with these
- * gains and this shape. Medians: of the distance of its locations from those of the solution, of the
- * force's deviation from its median, relative. */
+ * gains and this shape. Medians: of the distance of its locations from those of the solution, of
+ * the force's deviation from its median, relative. */
 struct Scatter {
   double location_mm = 0.0, force = 0.0;
 };

@@ -217,7 +217,7 @@ void note_evidence(json &evidence, const Judgement &j) {
   evidence["dip_sd"].push_back(j.solution.dip_sd);
   evidence["sigma_mm"].push_back(j.solution.sigma_mm);
   evidence["sigma_sd_mm"].push_back(j.solution.sigma_sd_mm);
-  evidence["force"].push_back(j.solution.spread.force);
+  evidence["force"].push_back(j.force_share);
   evidence["ellipse"].push_back(j.ellipse);
   evidence["memory"].push_back(j.solution.spread.memory);
   evidence["position_mm"].push_back(j.solution.spread.position_mm);
