@@ -152,7 +152,9 @@ private:
     const Object &object = options_.world.object;
     std::ostringstream text;
     text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: "
-         << options_.model << "\n# face: " << options_.face << "\n# width_mm: " << object.width_mm
+         << options_.model << "\n# face: " << options_.face << "\n# kind: "
+         << (options_.world.kind ? name_of(options_.world.kind->kind) : "none")
+         << "\n# width_mm: " << object.width_mm
          << "\n# mass_kg: " << object.mass_kg << "\n# friction: " << object.friction
          << "\n# crushes_N: " << object.crushes_N << "\n# seed: " << options_.seed << "\n";
     return text.str();
@@ -308,6 +310,12 @@ private:
 };
 
 } // namespace
+
+void be_of_kind(LiftOptions &options, Kind kind) {
+  const KindOfGrasp grasp = draw_grasp(kind, options.seed, 0);
+  World::be_of_kind(options.world, grasp);
+  options.opens_mm = grasp.opens_mm;
+}
 
 void check(const LiftOptions &options) {
   const GripperTraits &traits = gripper_traits(options.model);
