@@ -102,12 +102,18 @@ int main(int argc, char **argv) {
       "--press", is_press,
       "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is "
       "what happens without an option");
+  CLI::Option *mouse_flag =
+      app.add_flag("--mouse", options.press.by_hand,
+                   "A hand presses the ball: yours, with the pointer on the pad in the page of "
+                   "`fingertip web`")
+          ->excludes(press_flag);
   CLI::Option *lift_flag =
       app.add_flag("--lift",
                    "Two fingertips on a gripper with an object between: `fingertip grasp "
                    "--gripper 2f85 --gripper-port sim:gripper` grasps it, then a hand lifts it. "
                    "Obeys lines of standard input (help lists them)")
-          ->excludes(press_flag);
+          ->excludes(press_flag)
+          ->excludes(mouse_flag);
   const auto number = [&](const char *name, double &value, const char *unit, double low,
                           double high, const char *help) {
     return app.add_option(name, value, help)
