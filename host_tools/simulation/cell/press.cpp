@@ -167,6 +167,9 @@ void press(const PressOptions &options, const Place &place) {
   }
   std::printf("\n");
   std::fflush(stdout);
+  if (options.by_hand) {
+    std::fprintf(stderr, "press it with the pointer in the page: fingertip web\n");
+  }
   const std::int64_t began_us = steady_now_us();
   std::int64_t last_us = 0;
   while (!interrupted) {
