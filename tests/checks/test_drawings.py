@@ -1,4 +1,7 @@
-"""What boards/drawing draws: it follows the descriptor and the geometry, and refuses what cannot be wired."""
+"""What boards/drawing draws: it follows the descriptor and the geometry, as the firmware does, and refuses what cannot be wired.
+
+usage: test_drawings.py HEADERS [unittest arguments]; HEADERS: folder where the build has written <board>/board.h
+"""
 import contextlib
 import copy
 import io
@@ -17,6 +20,7 @@ import geometry  # noqa: E402
 import mould  # noqa: E402
 import wiring  # noqa: E402
 
+HEADERS = pathlib.Path(sys.argv[1])
 DESCRIPTORS = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in sorted(ROOT.glob("boards/*/board.json"))}
 BY_BUS = {descriptor["bus"]: (name, descriptor) for name, descriptor in DESCRIPTORS.items()}
 
@@ -42,6 +46,16 @@ class Wiring(unittest.TestCase):
             table = wiring.table(board)
             for gpio, pin in drawn:
                 self.assertIn(f"GP{gpio} (pin {pin})", table)
+
+    def test_the_firmware_has_the_pins_that_are_drawn(self):
+        for bus, (name, _) in BY_BUS.items():
+            board = wired(bus)
+            told = {key.lower(): int(value, 0) for key, value in re.findall(r"BOARD_(\w+) = (\w+),", (HEADERS / name / "board.h").read_text(encoding="utf-8"))}
+            self.assertEqual({key: value if isinstance(value, int) else int(value, 0) for key, value in board.wiring.items()}, told)
+            pins = [gpio for gpio, _ in pins_drawn(board)]
+            for key, gpio in told.items():
+                if key.startswith("pin_"):
+                    self.assertIn(gpio, pins, (name, key))
 
     def test_a_wire_that_moves_in_the_descriptor_moves_in_both(self):
         board = wired("multiplexed", pin_sda=12, pin_scl=13, pin_mux_reset_0=18, mux_address_0="0x74")
@@ -133,4 +147,4 @@ class Tree(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[2:]], verbosity=2)
