@@ -41,8 +41,9 @@ def remarks(path):
             kind = line.split(": ", 1)[1].strip()
         elif line.startswith("# event: "):
             time_us, _, text = line.removeprefix("# event: ").partition(",")
-            if text.split()[0] in HAPPENINGS:
-                happened.append((int(time_us), text.split()[0]))
+            what = text.partition(" ")[0]
+            if what in HAPPENINGS and time_us.isdigit():
+                happened.append((int(time_us), what))
     return kind, happened
 
 
