@@ -149,10 +149,13 @@ bool HandServer::is_due(std::int64_t host_us) {
   return true;
 }
 
-void HandServer::tell(std::size_t finger, std::int64_t device_us, const HandAt &truth) {
-  const std::string line = "truth " + std::string(SIDES[finger]) + " " +
-                           std::to_string(device_us) + " " + fixed(truth.x_mm, 3) + " " +
-                           fixed(truth.y_mm, 3) + " " + fixed(truth.force_N, 4) + "\n";
+void HandServer::tell(std::size_t finger, std::int64_t device_us, const TrueTouch &truth) {
+  std::string line =
+      "truth " + std::string(SIDES[finger]) + " " + std::to_string(device_us);
+  for (const double value : {truth.x_mm, truth.y_mm, truth.force_N, truth.qx_N, truth.qy_N}) {
+    line += " " + fixed(value, 4);
+  }
+  line += "\n";
   for (const auto &client : clients_) {
     put(client.first, line);
   }

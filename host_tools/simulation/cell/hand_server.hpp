@@ -4,8 +4,10 @@
 //
 //   press SIDE X_mm Y_mm FORCE_N        SIDE: left or right; 0 to 50 N. So it stays until another line
 //   lift SIDE
-//   truth SIDE T_us X_mm Y_mm FORCE_N   to every client each 20 ms; T_us: in the fingertip's own time,
-//                                       as in its packets; FORCE_N 0: no contact
+//   truth SIDE T_us X_mm Y_mm FORCE_N QX_N QY_N
+//                                       to every client each 20 ms; T_us: in the fingertip's own time,
+//                                       as in its packets; FORCE_N 0: no contact; QX_N, QY_N: the pull
+//                                       along the rubber
 //   error TEXT                          the answer to a line that cannot be
 //
 // A client that goes lifts what it pressed. Lines that a client does not take in time are lost.
@@ -22,6 +24,9 @@ namespace fingertip::cell {
 
 struct HandAt {
   double x_mm = 0.0, y_mm = 0.0, force_N = 0.0;
+};
+struct TrueTouch : HandAt {
+  double qx_N = 0.0, qy_N = 0.0;
 };
 
 class HandServer {
@@ -41,7 +46,7 @@ public:
   const std::optional<HandAt> &hand(std::size_t finger) const { return hands_[finger].at; }
   // Host time, and the fingertip's own; where it is time again.
   bool is_due(std::int64_t host_us);
-  void tell(std::size_t finger, std::int64_t device_us, const HandAt &truth);
+  void tell(std::size_t finger, std::int64_t device_us, const TrueTouch &truth);
 
 private:
   struct Held {

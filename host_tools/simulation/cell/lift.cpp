@@ -6,6 +6,7 @@
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "simulation/cell/gripper_server.hpp"
+#include "simulation/cell/hand_server.hpp"
 #include "tool/advice.hpp"
 
 #include <atomic>
@@ -116,6 +117,9 @@ public:
     stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
     world_.emplace(options.world, face_, motion_);
+    if (place.is_shared()) {
+      tells_.emplace(place, FINGERS, false);
+    }
     truth_.emplace(options.truth, options.overwrite, head() + "time_us," + World::columns() + "\n");
   }
 
@@ -194,6 +198,7 @@ private:
       tell_event(event);
     }
     truth_->row(now_us, world_->cells());
+    tell_truth(now_us);
     for (const std::string &line : lines_.take()) {
       std::string answer;
       try {
@@ -205,6 +210,20 @@ private:
       std::fflush(stdout);
     }
     fingers_.look();
+  }
+
+  void tell_truth(std::int64_t now_us) {
+    if (!tells_) {
+      return;
+    }
+    tells_->step();
+    if (tells_->is_due(now_us)) {
+      for (std::size_t i = 0; i < FINGERS; i++) {
+        const twin::Touch touch = world_->touch(i);
+        tells_->tell(i, fingers_.device_us(i, now_us),
+                     {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
+      }
+    }
   }
 
   void tell_event(const std::string &text) {
@@ -302,6 +321,7 @@ private:
   GripperServer server_;
   std::optional<World> world_;
   std::optional<Truth> truth_;
+  std::optional<HandServer> tells_; // and obeys no hand
   Lines lines_;
   LineTrouble line_;
   std::string at_touch_; // a command

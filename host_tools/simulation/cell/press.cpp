@@ -81,7 +81,7 @@ public:
     }
     feel(time_s);
   }
-  HandAt truth() const { return {touch_.x_mm, touch_.y_mm, touch_.force_N}; }
+  TrueTouch truth() const { return {{touch_.x_mm, touch_.y_mm, touch_.force_N}}; }
   Pressures pressures_Pa() const {
     Pressures pressures;
     std::copy(felt_Pa_.begin(), felt_Pa_.end(), pressures.begin());
@@ -159,7 +159,10 @@ void press(const PressOptions &options, const Place &place) {
   for (std::size_t i = 0; i < fingers.count(); i++) {
     pressed.emplace_back(face, options, 2 * options.seed + i);
   }
-  HandServer hands(place, fingers.count(), options.by_hand);
+  std::optional<HandServer> hands;
+  if (place.is_shared() || options.by_hand) {
+    hands.emplace(place, fingers.count(), options.by_hand);
+  }
   fingers.wait_until_ready();
   std::printf("ready:");
   for (std::size_t i = 0; i < fingers.count(); i++) {
@@ -178,17 +181,19 @@ void press(const PressOptions &options, const Place &place) {
     const double time_s = 1e-6 * static_cast<double>(now_us - began_us);
     if (now_us - last_us >= ROUND_us) {
       last_us = now_us;
-      hands.step();
-      const bool tells = hands.is_due(now_us);
+      if (hands) {
+        hands->step();
+      }
+      const bool tells = hands && hands->is_due(now_us);
       std::vector<Pressures> pressures;
       std::string cells;
       for (std::size_t i = 0; i < pressed.size(); i++) {
         Pressed &one = pressed[i];
-        options.by_hand ? one.follow(time_s, hands.hand(i)) : one.advance(time_s);
+        options.by_hand ? one.follow(time_s, hands->hand(i)) : one.advance(time_s);
         pressures.push_back(one.pressures_Pa());
         cells += (cells.empty() ? "" : ",") + one.cells();
         if (tells) {
-          hands.tell(i, fingers.device_us(i, now_us), one.truth());
+          hands->tell(i, fingers.device_us(i, now_us), one.truth());
         }
       }
       fingers.put(now_us, pressures);

@@ -156,7 +156,7 @@ private:
     const std::vector<std::string_view> words = split(line, ' ');
     if (words[0] == "error") {
       *why_not = line.substr(words[0].size() + 1);
-    } else if (words.size() == 6 && words[0] == "truth" && words[1] == side_) {
+    } else if (words.size() == 8 && words[0] == "truth" && words[1] == side_) {
       for (std::size_t i = 2; i < words.size(); i++) {
         if (!to_double(words[i])) {
           return;
@@ -166,7 +166,8 @@ private:
         return "\"" + std::string(name) + "\": " + std::string(words[i]);
       };
       newest_ = "{" + member("t_us", 2) + ", " + member("x_mm", 3) + ", " + member("y_mm", 4) +
-                ", " + member("force_N", 5) + "}";
+                ", " + member("force_N", 5) + ", " + member("qx_N", 6) + ", " + member("qy_N", 7) +
+                "}";
     }
   }
 

@@ -6,8 +6,8 @@
  *                                          hexadecimal digits of the page's own, new for each
  *   POST /simulated/line?client=           bytes for the fingertip
  *   POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or nothing; the answer is
- *                                          what is true: {"t_us", "x_mm", "y_mm", "force_N"}, or {}
- *                                          before anything is known
+ *                                          what is true: {"t_us", "x_mm", "y_mm", "force_N", "qx_N",
+ *                                          "qy_N"}, or {} before anything is known
  *
  * Requests are those of the page itself: one that another site makes is refused with 403. A client
  * is gone when its line is, and what its hand pressed is lifted then. Errors are one sentence, of

@@ -126,6 +126,22 @@ class Hand(SimulationsTest):
             self.until(lambda: (409, "no hand presses here; start fingertip simulate --mouse\n") == self.ask(f"/simulated/hand?client={ONE}", "lift"))
 
 
+class Lift(SimulationsTest):
+    def test_the_truth_has_the_pull(self):
+        """An object's weight, which both carry, is along y."""
+        with self.served(), self.run_tool("simulate", "--lift", "--mass", "0.2"):
+            with subprocess.Popen([FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", "sim:gripper"], env=self.environment,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as grasp, self.line(), self.line(OTHER, RIGHT):
+                try:
+                    self.until(lambda: self.hand()["qy_N"] > 0.9 * 0.1 * 9.81)
+                    truth = self.hand()
+                    self.assertAlmostEqual(truth["qy_N"], 0.1 * 9.81, delta=0.1 * 9.81)  # it swings at first
+                    self.assertGreater(truth["force_N"], truth["qy_N"])
+                    self.assertGreater(self.hand(client=OTHER)["force_N"], 0)
+                finally:
+                    grasp.kill()
+
+
 class Line(SimulationsTest):
     def test_it_is_a_line_to_the_fingertip(self):
         with self.served(), self.run_tool("simulate"):

@@ -10,6 +10,8 @@ export interface ServedTruth {
   x_mm: number;
   y_mm: number;
   force_N: number;
+  qx_N: number;
+  qy_N: number;
 }
 
 export interface Served {
@@ -18,7 +20,7 @@ export interface Served {
   hand: boolean;
 }
 
-const NOTHING: ServedTruth = { contact: false, x_mm: 0, y_mm: 0, force_N: 0 };
+const NOTHING: ServedTruth = { contact: false, x_mm: 0, y_mm: 0, force_N: 0, qx_N: 0, qy_N: 0 };
 const ASK_ms = 33;
 
 const at = (path: string, query: Record<string, string> = {}): string => {
@@ -124,8 +126,8 @@ export class ServedFingertip implements Line {
       const answer = await this.post('simulated/hand', command);
       if (answer.ok && this.timer !== null) {
         const told = (await answer.json()) as Partial<ServedTruth>;
-        const { x_mm = 0, y_mm = 0, force_N = 0 } = told;
-        this.truth = { contact: force_N > 0, x_mm, y_mm, force_N };
+        const { force_N = 0 } = told;
+        this.truth = { ...NOTHING, ...told, contact: force_N > 0 };
       }
     } catch {
       // The line says that the server has ended.
