@@ -19,7 +19,7 @@ part_runs() {
 
 usage() {
   echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|PART [FOLDER]]|fuzz HOURS|soak HOURS" >&2
-  echo "  demo    build what it needs, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
+  echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  test quick    build what the quick tests need and run them: about a minute once built" >&2
@@ -183,7 +183,7 @@ say "building firmware and host tools into build/"
 case $job in
   demo)
     configure host -DBUILD_TESTING=OFF
-    cmake --build --preset host --target fingertip twin "image_$(/usr/bin/python3 host_tools/report/shared/boards.py | head -n 1)"
+    cmake --build --preset host --target fingertip fingertip_player twin "image_$(/usr/bin/python3 host_tools/report/shared/boards.py | sed -n 1p)"
     ;;
   web)
     configure host -DBUILD_TESTING=OFF -DFINGERTIP_WEB=ON

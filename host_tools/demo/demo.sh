@@ -1,7 +1,8 @@
 #!/bin/sh
-# A lime is gripped and slips, three times, on two emulated fingertips side by side: one with a pad of rubber and its
-# errors, one with an ideal pad. Says how far each was off, and draws what the one of rubber felt. Then a gripper with two
-# fingertips lifts an object in the simulated cell, which becomes slick and slips. Says how far, and draws it.
+# A fingertip is calibrated with twenty placements of a weight. Then a lime is gripped and slips, three times, on two emulated
+# fingertips of the same rubber side by side: that one, and one that was never calibrated. Says how far each was off, and
+# draws both. Then a gripper with two fingertips lifts an object in the simulated cell: a grasp of kind usual. Says what
+# became of it, and draws it.
 # Everything goes to build/demo; run by `sh cmake/bootstrap.sh demo`.
 # usage: demo.sh [--stay]; --stay: goes on with the lime until Enter, to look at it
 set -eu
@@ -10,15 +11,19 @@ cd "$root"
 out=build/demo
 python=/usr/bin/python3
 tool=build/host/host_tools/tool/cli/fingertip
-board=$($python host_tools/report/shared/boards.py | head -n 1) # the fastest
+simulation=build/host/host_tools/simulation
+board=$($python host_tools/report/shared/boards.py | sed -n 1p) # the fastest
 seconds=14 # three slips: at 20, 50 and 100 mm/s
 rubber=000000000000B0BB
-ideal=000000000001DEA1
+raw=000000000000BA5E # the same rubber, never calibrated
+pad="--layer 12 --effects gain=5,relaxation --seed 3"
+weight_N=3
+grasp_seed=2022 # was chosen before its grasp was seen, and chose nothing
 rm -rf $out
 mkdir -p $out
 
 fail() {
-  for name in rubber ideal cell; do
+  for name in calibrating rubber raw cell; do
     [ ! -s $out/$name.log ] || tail -n 10 $out/$name.log >&2
   done
   echo "demo: $1; whole logs are $out/*.log" >&2
@@ -41,47 +46,65 @@ wait_for_port() {
   done
 }
 
-# SECONDS FILE
-play_lime() {
-  build/host/host_tools/simulation/twin/twin scenario slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds $1 --seed 3 \
-    --cache build/host/contact_tables -o $2 > $out/twin.log 2>&1 || { cat $out/twin.log >&2; fail "the pad could not be computed"; }
+# FILE KIND OPTION...: what the pad feels
+play() {
+  file=$1
+  shift
+  # shellcheck disable=SC2086
+  $simulation/twin/twin scenario "$@" $pad --cache build/host/contact_tables -o "$file" > $out/twin.log 2>&1 ||
+    { cat $out/twin.log >&2; fail "the pad could not be computed"; }
 }
+play_lime() { play $2 slip --indenter lime --seconds $1; }
 play_lime $seconds $out/lime.csv
-$python host_tools/demo/ideal.py $out/lime.csv -o $out/ideal.csv
 
 processes=
 trap 'kill $processes 2> /dev/null || true' EXIT
-emulate rubber $rubber $out/lime.csv $seconds --report $out/rubber.json
-rubber_process=$!
-processes=$rubber_process
-emulate ideal $ideal $out/ideal.csv 600 --report $out/ideal.json --seed 2
-ideal_process=$!
-processes="$rubber_process $ideal_process"
-wait_for_port rubber $rubber_process
-wait_for_port ideal $ideal_process
-
-echo "== two fingertips at full rate: $rubber is of rubber, $ideal has an ideal pad"
-for name in rubber ideal; do
-  $tool set --port $out/$name.tty osr=256 rate=max > /dev/null || fail "the fingertip cannot be set"
-done
-FINGERTIP_PORT=$out/rubber.tty:$out/ideal.tty $tool monitor --device $rubber --device $ideal --until-gone --record $out/recording.csv ||
-  fail "the monitor ended with an error"
-wait $rubber_process || fail "the emulator found something wrong"
-kill -INT $ideal_process 2> /dev/null || true # however far it came: it ends with the other
-wait $ideal_process || [ $? -eq 130 ] || fail "the emulator found something wrong" # 130: interrupted while it ended
+echo "== a weight of $weight_N N is set down at twenty places, in simulated time; what a calibration finds of it"
+play $out/placements.csv placements --force $weight_N --seconds 80
+$simulation/player/fingertip_player play $out/placements.csv -o $out/placed.csv --raw --rate 50 --serial $rubber --quiet > $out/player.log 2>&1 ||
+  { cat $out/player.log >&2; fail "the placements could not be played"; }
+emulate calibrating $rubber $out/placements.csv 600 --flash $out/flash.bin
+processes=$!
+wait_for_port calibrating $processes
+$tool calibrate --port $out/calibrating.tty --from $out/placed.csv --force $weight_N --yes > $out/calibration.txt 2>&1 ||
+  { cat $out/calibration.txt >&2; fail "the calibration failed"; }
+sed -n '/^good/p; /^of the placements/,$p' $out/calibration.txt
+kill -INT $processes 2> /dev/null || true # and keeps its flash
+wait $processes || [ $? -eq 130 ] || fail "the emulator found something wrong" # 130: interrupted while it ended
 processes=
 
-for name in rubber ideal; do
-  [ $name = rubber ] && serial=$rubber scenario=$out/lime.csv || serial=$ideal scenario=$out/ideal.csv
-  $python host_tools/python evaluate $out/recording.csv "$scenario" --device "$serial" --run $out/$name.json -o $out/$name.summary.json
+emulate rubber $rubber $out/lime.csv $seconds --flash $out/flash.bin --report $out/rubber.json
+rubber_process=$!
+processes=$rubber_process
+emulate raw $raw $out/lime.csv 600 --report $out/raw.json --seed 2
+raw_process=$!
+processes="$rubber_process $raw_process"
+wait_for_port rubber $rubber_process
+wait_for_port raw $raw_process
+
+echo "== a lime slips on two fingertips of the same rubber, at full rate: $rubber was calibrated, $raw never"
+for name in rubber raw; do
+  $tool set --port $out/$name.tty osr=256 rate=max > /dev/null || fail "the fingertip cannot be set"
 done
-$python host_tools/python plot $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json -o $out/demo.png
-$python host_tools/demo/errors.py "12 mm of rubber=$out/rubber.summary.json" "ideal=$out/ideal.summary.json"
-echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is no Gaussian: fingertip calibrate finds what of it can be found."
+FINGERTIP_PORT=$out/rubber.tty:$out/raw.tty $tool monitor --device $rubber --device $raw --until-gone --record $out/recording.csv ||
+  fail "the monitor ended with an error"
+wait $rubber_process || fail "the emulator found something wrong"
+kill -INT $raw_process 2> /dev/null || true # however far it came: it ends with the other
+wait $raw_process || [ $? -eq 130 ] || fail "the emulator found something wrong"
+processes=
+
+for name in rubber raw; do
+  [ $name = rubber ] && serial=$rubber || serial=$raw
+  $python host_tools/python evaluate $out/recording.csv $out/lime.csv --device "$serial" --run $out/$name.json -o $out/$name.summary.json
+done
+$python host_tools/python plot $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json --beside $raw --beside-run $out/raw.json \
+  -o $out/demo.png
+$python host_tools/demo/errors.py "never calibrated=$out/raw.summary.json" "calibrated=$out/rubber.summary.json"
+echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is no Gaussian."
 echo "picture: $out/demo.png"
 
-echo "== two fingertips on a gripper lift an object that becomes slick; the firmware on the host, all else simulated"
-$tool simulate --lift --ports $out/cell --gripper 2f85 --mass 0.25 --friction 0.5 --kinetic 0.9 --then slick:0.65@1 --seconds 60 --patience 1 \
+echo "== two fingertips on a gripper lift an object: a grasp of kind usual; the firmware on the host, all else simulated"
+$tool simulate --lift --ports $out/cell --gripper 2f85 --kind usual --seed $grasp_seed --seconds 60 --patience 1 \
   --cache build/host/contact_tables --truth $out/truth.csv < /dev/null > $out/cell.log 2>&1 &
 processes=$!
 while [ ! -e $out/cell/gripper ]; do
@@ -101,7 +124,7 @@ if [ "${1:-}" != --stay ]; then
   exit
 fi
 play_lime 600 $out/long.csv
-emulate rubber $rubber $out/long.csv 600
+emulate rubber $rubber $out/long.csv 600 --flash $out/flash.bin
 processes=$!
 wait_for_port rubber $processes
 cat << END

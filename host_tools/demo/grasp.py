@@ -21,6 +21,7 @@ from fingertip.files import InputError, check_output, read_grip, read_lines, run
 from fingertip.plot import FAINT, INK, MEASURED, SLIPPING, TRUTH, set_style, spans  # noqa: E402
 
 SLIP_mm, JOINED_s, MORE_FORCE = 0.3, 0.03, 1.05  # as the cell counts slips, and what is a reaction
+HAPPENINGS = ("lift", "pour", "jerk", "knock", "slick", "push", "vibrate", "carry")
 
 
 def read_truth(path):
@@ -30,6 +31,20 @@ def read_truth(path):
         return {name: values[:, i] for i, name in enumerate(rows[0])}
     except (ValueError, IndexError) as error:
         raise InputError(f"{path}: is no truth of fingertip simulate --lift") from error
+
+
+def remarks(path):
+    """The kind of the grasp, "none" if nothing drew it, and [(time_us, what)] of what happened to the object."""
+    kind, happened = "none", []
+    for line in read_lines(path):
+        if line.startswith("# kind: "):
+            kind = line.split(": ", 1)[1].strip()
+        elif line.startswith("# event: "):
+            time_us, _, text = line.removeprefix("# event: ").partition(",")
+            what = text.partition(" ")[0]
+            if what in HAPPENINGS and time_us.isdigit():
+                happened.append((int(time_us), what))
+    return kind, happened
 
 
 def slips_of(truth, t_s):
@@ -51,24 +66,28 @@ def slips_of(truth, t_s):
     return slips
 
 
-def draw(grip, t_s, truth, truth_s, slips):
+def draw(grip, t_s, truth, truth_s, slips, happened):
     set_style()
     figure, (force, load, slid, width) = plt.subplots(4, 1, sharex=True, figsize=(12, 8), height_ratios=[3, 1.6, 1.3, 1.6])
-    figure.subplots_adjust(left=0.065, right=0.985, top=0.91, bottom=0.065, hspace=0.14)
+    figure.subplots_adjust(left=0.065, right=0.985, top=0.9, bottom=0.065, hspace=0.14)
     controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping"))
     for panel, name in ((force, "force_N"), (load, "load_N"), (slid, "slid_mm"), (width, "width_mm")):
-        panel.plot(truth_s, truth[name], color=TRUTH, lw=3.5, label="truth", zorder=1)
+        panel.plot(truth_s, truth[name], color=TRUTH, lw=3.5, label="true force" if panel is force else "truth", zorder=1)
         panel.set_ylabel(name.replace("_", ", "))
         panel.grid(color="#e6e8ee", lw=0.6)
         for begin, reaction, end, _ in slips:
             panel.axvspan(begin, end, color=SLIPPING, alpha=0.15, lw=0, zorder=0)
             if reaction:
                 panel.axvline(reaction, color=SLIPPING, lw=1, ls=":", zorder=1)
-    force.plot(truth_s, np.where(truth["least_N"] > 0, truth["least_N"], np.nan), color=SLIPPING, lw=1, ls="--", label="least that holds it")
+    force.plot(truth_s, np.where(truth["least_N"] > 0, truth["least_N"], np.nan), color=SLIPPING, lw=1, ls="--", label="need: the least that holds it")
     force.plot(t_s, grip["force_N"], color=MEASURED, lw=1.1, label="felt", zorder=2)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.3, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
     width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
+    for at_s, what in happened:
+        force.axvline(at_s, color=FAINT, lw=0.8, zorder=0)
+        force.annotate(what, (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 1), textcoords="offset points", size=8, color=FAINT, ha="center", va="bottom")
+    slid.set_ylim(bottom=min(0, truth["slid_mm"].min()) - 0.05, top=max(1.0, 1.1 * truth["slid_mm"].max()))
     force.legend(loc="upper left", fontsize=8, frameon=False)
     width.legend(loc="upper right", fontsize=8, frameon=False)
     width.set_xlabel("time, s   (red: the object slips; dotted: the grip is 5 % stronger)")
@@ -89,7 +108,9 @@ def main(argv):
         raise InputError(f"{options.recording}: is no recording of a grasp, or {options.truth} is empty")
     t_s, truth_s = grip["time_us"] / 1e6, (truth["time_us"] - int(zero.split()[-1])) / 1e6
     slips = slips_of(truth, truth_s)
-    figure = draw(grip, t_s, truth, truth_s, slips)
+    kind, events = remarks(options.truth)
+    happened = [((time_us - int(zero.split()[-1])) / 1e6, what) for time_us, what in events]
+    figure = draw(grip, t_s, truth, truth_s, slips, happened)
     need_N = truth["least_N"].max()
     peak = f"peak force {truth['peak_N'].max():.1f} N" + (f", {truth['peak_N'].max() / need_N:.1f} times the need" if need_N > 0 else "")
     if truth["dropped"].max() > 0:
@@ -102,7 +123,7 @@ def main(argv):
         told += f" ({all_mm:.1f} mm in all); {peak}" if all_mm >= way_mm + SLIP_mm else f"; {peak}"
     else:
         told = f"never slipped; {peak}"
-    figure.text(0.065, 0.955, "An object in the simulated cell is lifted and becomes slick", size=15, weight="bold")
+    figure.text(0.065, 0.955, "A grasp in the simulated cell" + (f", of kind {kind}" if kind != "none" else ""), size=15, weight="bold")
     figure.text(0.065, 0.927, f"{told}  ·  simulated rubber, object and gripper; the firmware itself on the host", size=9, color=FAINT)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=100, format="png")

@@ -1,12 +1,13 @@
 #!/usr/bin/python3
-"""Draws the monitor's screen while it replays a recording, as an SVG.
+"""Draws the monitor's screen while it replays a recording: as an SVG, or as a PNG that moves (APNG).
 
     picture.py RECORDING.csv -o FILE.svg [--device SERIAL] [--at S] [--size COLUMNSxROWS] [--tool PATH]
+    picture.py RECORDING.csv -o FILE.png --until S [--every S] ...
 
-The picture in the project's README is that of the end of the second slip on the rubber pad of the demo, at S seconds:
+The picture in the README of the project is that of the first touch of the calibrated fingertip in the demo. The replay shows its S in the last line:
 
     sh cmake/bootstrap.sh demo
-    /usr/bin/python3 host_tools/demo/picture.py build/demo/recording.csv --device 000000000000B0BB --at S -o host_tools/demo/monitor.svg
+    /usr/bin/python3 host_tools/demo/picture.py build/demo/recording.csv --device 000000000000B0BB --at S --until S -o host_tools/demo/monitor.png
 
 That of a lift in host_tools/README.md is of the firmware on the host:
 
@@ -16,6 +17,7 @@ That of a lift in host_tools/README.md is of the firmware on the host:
     /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.svg
 """
 import argparse
+import copy
 import fcntl
 import html
 import os
@@ -32,16 +34,17 @@ import pyte
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-from fingertip.files import InputError, check_output, run_tool, write_text  # noqa: E402
+import moving  # noqa: E402
+from fingertip.files import InputError, check_output, run_tool, write_bytes, write_text  # noqa: E402
 
-PATIENCE_s = 60
+PATIENCE_s = 120
 SPEED = "8"  # times the recorded one, to save time
-WIDTH, HEIGHT = 8, 16  # of a cell
-BACKGROUND, FOREGROUND = "#0c0d16", "#dededf"
+STEPS_PER_s = 12  # of a monitor that replays, at least: so it shows each step of a picture that moves
+WIDTH, HEIGHT, BACKGROUND, FOREGROUND = moving.WIDTH, moving.HEIGHT, moving.BACKGROUND, moving.FOREGROUND
 
 
-def screen_at(command, columns, rows, at_s):
-    """The screen once it says that it is at this time."""
+def screens_at(command, columns, rows, times_s):
+    """The screen as soon as it says that it is at each of these times, which rise."""
     pid, terminal = pty.fork()
     if pid == 0:
         time.sleep(0.1)  # until the terminal has its size
@@ -50,7 +53,7 @@ def screen_at(command, columns, rows, at_s):
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
     screen = pyte.Screen(columns, rows)
     stream = pyte.ByteStream(screen)
-    end = time.monotonic() + PATIENCE_s
+    found, end = [], time.monotonic() + PATIENCE_s
     try:
         while time.monotonic() < end:
             if not select.select([terminal], [], [], 0.1)[0]:
@@ -62,29 +65,31 @@ def screen_at(command, columns, rows, at_s):
             for part in re.split(rb"(?<=\x1b\[\?2026l)", output):
                 stream.feed(part)
                 told = re.search(r"at (\d+\.\d) s of ", screen.display[-1])
-                if part.endswith(b"\x1b[?2026l") and told and float(told.group(1)) >= at_s:
+                if not part.endswith(b"\x1b[?2026l") or not told or float(told.group(1)) < times_s[len(found)]:
+                    continue
+                found.append(copy.deepcopy(screen))
+                while len(found) < len(times_s) and float(told.group(1)) >= times_s[len(found)]:
+                    found.append(found[-1])
+                if len(found) == len(times_s):
                     os.write(terminal, b"q")
-                    return screen
+                    return found
     finally:
         os.close(terminal)
         os.waitpid(pid, 0)
-    raise InputError(f"the monitor never came to {at_s} s; its last line: {screen.display[-1].strip()}")
+    raise InputError(f"the monitor never came to {times_s[len(found)]:g} s; its last line: {screen.display[-1].strip()}")
 
 
-def colour(name, default):
-    return default if name == "default" else f"#{name}"
+def screen_at(command, columns, rows, at_s):
+    return screens_at(command, columns, rows, [at_s])[0]
 
 
 def shapes(column, row, cell):
     """A cell's character where it is better drawn than written."""
-    x, y, ink = column * WIDTH, row * HEIGHT, colour(cell.fg, FOREGROUND)
+    x, y, ink = column * WIDTH, row * HEIGHT, moving.colour(cell.fg, FOREGROUND)
     if cell.data in "▀▄":
         return [f'<rect x="{x}" y="{y + (HEIGHT // 2 if cell.data == "▄" else 0)}" width="{WIDTH}" height="{HEIGHT // 2}" fill="{ink}"/>']
-    dots = ord(cell.data[0]) - 0x2800 if cell.data else -1
-    if 0 <= dots < 256:
-        places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]
-        return [f'<circle cx="{x + 2 + 4 * i}" cy="{y + 2 + 4 * j}" r="1.4" fill="{ink}"/>' for bit, (i, j) in enumerate(places) if dots >> bit & 1]
-    return None
+    dots = moving.dots(cell)
+    return dots if dots is None else [f'<circle cx="{x + i}" cy="{y + j}" r="1.4" fill="{ink}"/>' for i, j in dots]
 
 
 def svg(screen):
@@ -102,7 +107,7 @@ def svg(screen):
                 end += 1
             if cells[start].bg != "default":
                 out.append(f'<rect x="{start * WIDTH}" y="{row * HEIGHT}" width="{(end - start) * WIDTH}" height="{HEIGHT}" '
-                           f'fill="{colour(cells[start].bg, BACKGROUND)}"/>')
+                           f'fill="{moving.colour(cells[start].bg, BACKGROUND)}"/>')
             start = end
         column = 0
         while column < columns:
@@ -119,7 +124,7 @@ def svg(screen):
             word = "".join(each.data for each in cells[column:end])
             weight = ' font-weight="bold"' if cell.bold else ""
             texts.append(f'<text x="{column * WIDTH}" y="{row * HEIGHT + 12}" textLength="{(end - column) * WIDTH}" '
-                         f'fill="{colour(cell.fg, FOREGROUND)}"{weight}>{html.escape(word)}</text>')
+                         f'fill="{moving.colour(cell.fg, FOREGROUND)}"{weight}>{html.escape(word)}</text>')
             column = end
     return "\n".join([*out, *marks, '<g shape-rendering="auto">', *texts, "</g></g>", "</svg>"]) + "\n"
 
@@ -127,19 +132,31 @@ def svg(screen):
 def main(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", metavar="RECORDING.csv")
-    parser.add_argument("-o", "--output", required=True, metavar="FILE.svg")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
     parser.add_argument("--at", type=float, default=0.0, metavar="S", help="time in the recording")
+    parser.add_argument("--until", type=float, metavar="S", help="and where a picture that moves ends")
+    parser.add_argument("--every", type=float, default=0.1, metavar="S", help="time between its screens; default 0.1")
     parser.add_argument("--size", default="110x32", metavar="COLUMNSxROWS")
     parser.add_argument("--tool", default=str(ROOT / "build/host/host_tools/tool/cli/fingertip"), metavar="PATH")
     options = parser.parse_args(argv)
     size = re.fullmatch(r"(\d+)x(\d+)", options.size)
     if not size:
         raise InputError(f"--size {options.size}: give COLUMNSxROWS, as 110x32")
+    moves = options.until is not None
+    if not options.output.endswith(".png" if moves else ".svg"):
+        raise InputError(f"{options.output}: give a name that ends in .svg; with --until one that ends in .png")
+    if moves and not (options.every > 0 and options.until > options.at):
+        raise InputError("--until has to be later than --at, and --every more than 0")
     check_output(options.output, options.recording)
-    recording = os.path.relpath(options.recording)
-    command = [options.tool, "replay", recording, "--speed", SPEED, *(["--device", options.device] if options.device else [])]
-    write_text(options.output, svg(screen_at(command, int(size[1]), int(size[2]), options.at)))
+    speed = f"{options.every * STEPS_PER_s:g}" if moves else SPEED
+    command = [options.tool, "replay", os.path.relpath(options.recording), "--speed", speed, *(["--device", options.device] if options.device else [])]
+    columns, rows = int(size[1]), int(size[2])
+    if moves:
+        times_s = [options.at + i * options.every for i in range(1 + int((options.until - options.at) / options.every))]
+        write_bytes(options.output, moving.png(screens_at(command, columns, rows, times_s), options.every))
+    else:
+        write_text(options.output, svg(screen_at(command, columns, rows, options.at)))
     return 0
 
 

@@ -199,16 +199,17 @@ class Demo(Folder):
     def setUp(self):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
-        for script in ("python/__main__.py", "demo/grasp.py", "demo/ideal.py"):
+        for script in ("python/__main__.py", "demo/grasp.py"):
             self.write(f"host_tools/{script}", """
                 import sys
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
                 """)
         self.write("host_tools/demo/errors.py", "print('errors')\n")
         self.write("host_tools/report/shared/boards.py", "print('board')\n")
-        self.write("build/host/host_tools/simulation/twin/twin", "#!/bin/sh\n").chmod(0o755)
+        for program in ("twin/twin", "player/fingertip_player"):
+            self.write(f"build/host/host_tools/simulation/{program}", "#!/bin/sh\n").chmod(0o755)
         self.cell(self.CELL)
-        self.monitor('case $1 in set) test -e "$3" ;; esac')
+        self.monitor('case $1 in set | calibrate) test -e "$3" || exit; [ $1 = set ] || echo "good: all" ;; esac')
 
     def write(self, path, text):
         file = self.folder / path
@@ -249,6 +250,7 @@ class Demo(Folder):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("picture: build/demo/demo.png", done.stdout)
         self.assertIn("picture: build/demo/grasp.png", done.stdout)
+        self.assertIn("good: all\n", done.stdout)
         self.assertIn("errors\n", done.stdout)
 
     def test_it_stays_until_somebody_has_seen_enough(self):
@@ -282,8 +284,18 @@ class Demo(Folder):
 
     def test_a_monitor_that_fails(self):
         self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor('test $1 = set || exit 3')
+        self.monitor('case $1 in set | calibrate) ;; *) exit 3 ;; esac')
         self.assert_fails("the monitor ended with an error", "ready")
+
+    def test_a_calibration_that_fails(self):
+        self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
+        self.monitor('test $1 != calibrate || exit 3')
+        self.assert_fails("the calibration failed", "ready")
+
+    def test_a_player_that_fails(self):
+        self.emulator("")
+        self.write("build/host/host_tools/simulation/player/fingertip_player", "#!/bin/sh\necho no pad; exit 1\n").chmod(0o755)
+        self.assert_fails("the placements could not be played", "no pad")
 
     def test_a_cell_that_does_not_start(self):
         self.emulator("writeFileSync(link, ''); later(500, () => {});")

@@ -59,10 +59,18 @@ class Bench(contextlib.ExitStack):
         return self._until_there(self._start(
             self._tools.build / "tests/support/fake_device", port, f"serial={serial}", *options, stdout=subprocess.DEVNULL), port)
 
-    def served(self):
-        """The page, by `fingertip web`: its address without the last slash."""
+    def simulated(self, runtime, *options):
+        """`fingertip simulate`, which a page served with the same runtime folder finds."""
+        process = self._start(self._tools.build / "host_tools/tool/cli/fingertip", "simulate", *options, stdout=subprocess.PIPE, text=True,
+                              env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)})
+        if not process.stdout.readline().startswith("ready: "):
+            raise AssertionError("nothing is simulated")
+        return process
+
+    def served(self, runtime):
+        """The page, by `fingertip web`: its address without the last slash. runtime: folder where it finds what is simulated."""
         process = self._start(self._tools.build / "host_tools/tool/cli/fingertip", "web", "--port", "0", "--no-browser", stdout=subprocess.PIPE,
-                              stderr=subprocess.DEVNULL, text=True)
+                              stderr=subprocess.DEVNULL, text=True, env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)})
         url = process.stdout.readline().strip()
         if not re.fullmatch(r"http://127\.0\.0\.1:\d+/", url):
             raise AssertionError("the page is not served")

@@ -56,7 +56,9 @@ class PageTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-")))
         cls.tool = OPTIONS.build / "host_tools/tool/cli/fingertip"
-        cls.url = cls.enterClassContext(Bench(OPTIONS)).served()
+        cls.runtime = cls.folder / "run"
+        cls.runtime.mkdir()
+        cls.url = cls.enterClassContext(Bench(OPTIONS)).served(cls.runtime)
         cls.browser = cls.enterClassContext(Browser(cls.folder, OPTIONS.ports, cls.policy()))
 
     @classmethod
@@ -403,6 +405,61 @@ class Looks(PageTest):
         for width in (700, 1120):
             page.size(width, 760)
             page.until("document.querySelector('.traces').clientWidth === document.querySelector('canvas.flags').getBoundingClientRect().width")
+
+
+class Simulations(PageTest):
+    """What `fingertip simulate` runs on this computer."""
+
+    FIRST = "fingertip.fingertips[0]"
+    LOOKS = "globalThis.looks = 0; const asked = fetch; globalThis.fetch = (what, ...more) => { looks += /simulated$/.test(what); return asked(what, ...more); };"
+
+    def numbers(self, page):
+        """{title: text} of the numbers, once they are written."""
+        page.shown()
+        return dict(page.run("[...document.querySelectorAll('.number:not([hidden])')].map(each => [each.querySelector('dt').textContent, each.querySelector('dd').textContent])"))
+
+    def test_the_pointer_presses_the_pad(self):
+        page = self.open()
+        simulation = self.bench.simulated(self.runtime, "--mouse")
+        driven.connected(page, 1)
+        self.assertEqual(page.run(f"{self.FIRST}.info.serial"), "00000000000CE110")
+        self.assertFalse(page.has("combobox", "Object"))  # the ball is the only one
+        page.click("button", "From above")
+        page.shown()
+        x, y, width, height = page.run("(({x, y, width, height}) => [x, y, width, height])(document.querySelector('.pad').getBoundingClientRect())")
+        page.press_at(x + width / 2, y + height / 2)
+        page.until(f"{self.FIRST}.contact.force_N > 2")
+        page.until(f"{self.FIRST}.line.truth.force_N > 2")
+        felt = page.run(f"(({{x_mm, y_mm}}) => [x_mm, y_mm])({self.FIRST}.contact)")
+        true = page.run(f"(({{x_mm, y_mm}}) => [x_mm, y_mm])({self.FIRST}.line.truth)")
+        self.assertLess(np.hypot(*true), 2)  # the middle of the picture is that of the pad
+        self.assertLess(np.hypot(*np.subtract(felt, true)), 2.5)  # never calibrated
+        page.until("[...document.querySelectorAll('.truth')].filter(each => /^true /.test(each.textContent)).length === 3")  # force, place, pull
+        self.assertRegex(self.numbers(page)["Force"], r"^\d+\.\d\d.* N .*true \d+\.\d\d$")
+        page.drag_to(x + width / 2, y + height / 2 - height / 8)
+        page.until(f"{self.FIRST}.line.truth.y_mm > {true[1] + 2} && {self.FIRST}.contact.y_mm > {felt[1] + 1}")
+        page.release()
+        page.until(f"{self.FIRST}.line.truth.force_N === 0 && !({self.FIRST}.contact.flags & 1)")
+        page.until("[...document.querySelectorAll('.truth')].every(each => each.textContent === '')")
+
+        Bench.end(simulation)
+        page.until(f"{self.FIRST}.state === 'closed' && /simulation has ended/.test({self.FIRST}.why)")
+        self.bench.simulated(self.runtime, "--mouse")
+        driven.connected(page, 1)  # the same one again
+        self.assertEqual(page.run("fingertip.fingertips.length"), 1)
+
+    def test_two_that_no_hand_presses(self):
+        self.bench.simulated(self.runtime, "--fingertips", "2")
+        page = self.open(before=self.LOOKS)
+        driven.connected(page, 2)
+        self.assertFalse(page.has("button", "Press"))
+        page.until("fingertip.fingertips.every(each => each.line.truth.contact)")
+        page.until("[...document.querySelectorAll('.truth')].some(each => /^true /.test(each.textContent))")
+        page.click("button", "Disconnect")
+        page.until("fingertip.fingertips.length === 1")
+        looks = page.run("looks")
+        page.until(f"looks > {looks + 1}")  # it is not found again
+        self.assertEqual(page.run("fingertip.fingertips.length"), 1)
 
 
 class Everyone(PageTest):

@@ -1,5 +1,6 @@
 """Draws a recording, with the truth behind it if there is one; force along three axes where it has tangential loads.
 Of a grasp it draws what was wanted and felt, load, width and state, unless --device chooses one of its fingertips.
+With --beside it draws what another fingertip of the recording felt of the same scenario, for example before a calibration.
 
     fingertip-plot RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
@@ -154,7 +155,20 @@ def draw_pull(axes, recording, rows, t_s, restarts_s, force, good, doubtful, tru
             panel.legend(ncol=5, **ABOVE)
 
 
-def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
+class Beside:
+    """Another fingertip of the recording, compared with the same truth."""
+
+    def __init__(self, options, truth):
+        recording = load_recording(argparse.Namespace(**{**vars(options), "device": options.beside}), columns=COMPARED_COLUMNS)
+        check_time(recording)
+        self.serial, self.comparison = options.beside, Comparison(recording, truth, read_run(options.beside_run))
+        rows = recording.has_contact
+        self.t_s = self.comparison.t_s
+        self.good = recording.flag(FIT_VALID)[rows] & ~recording.flag(WARNINGS)[rows]
+        self.values = {"x_mm": self.comparison.x_mm, "y_mm": self.comparison.y_mm, "force_N": self.comparison.force_N}
+
+
+def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth, beside):
     for panel in axes:
         for i, at_s in enumerate(restarts_s):
             panel.axvline(at_s, color=FAINT, lw=1, ls=":", label="restarted" if i == 0 else None)
@@ -164,6 +178,8 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
             panel.plot(truth.t_s, np.where(on, truth.truth[name], np.nan), color=TRUTH, lw=4, label="truth", zorder=1)
             for start, end in truth.intervals("slip"):
                 panel.axvspan(start, end, color=SLIPPING, alpha=0.10, lw=0, zorder=0)
+        if beside:
+            panel.plot(beside.t_s, gaps_as_nan(beside.t_s, beside.values[name], beside.good), color=ALONG_Y, lw=1.1, ls="--", label=beside.serial, zorder=1.5)
         panel.plot(t_s, gaps_as_nan(t_s, values, good), color=MEASURED, lw=1.1, label="measured", zorder=2)
         # What carries a warning is shown, but no axis is made for it.
         low, high = panel.get_ylim()
@@ -174,20 +190,26 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
         panel.set_ylabel(label)
         panel.grid(color="#e6e8ee", lw=0.6)
     draw_marks(axes[-1], [(t_s, slip, SLIPPING, "slip found")])
-    axes[-1].legend(ncol=4, **ABOVE)
+    axes[-1].legend(ncol=5, **ABOVE)
     axes[0].set_title("over time" + (" (shaded: true slip)" if truth is not None else ""), loc="left", size=10)
 
 
-def draw_errors(axes, comparison):
+def draw_errors(axes, comparison, beside):
     location, force = axes
-    error_mm = comparison.location_error_mm[comparison.compared]
-    location.hist(error_mm, bins=40, range=(0, max(np.percentile(error_mm, 99), 1e-3)), color=MEASURED)
-    location.axvline(np.median(error_mm), color=INK, lw=1)
+    both = [(comparison, {"color": MEASURED})]
+    if beside:
+        both.append((beside.comparison, {"color": ALONG_Y, "histtype": "step", "lw": 1.1}))
+    errors_mm = [one.location_error_mm[one.compared] for one, _ in both]
+    reach_mm = max(np.percentile(np.concatenate(errors_mm), 99), 1e-3)
+    for error_mm, (_, style) in zip(errors_mm, both):
+        location.hist(error_mm, bins=40, range=(0, reach_mm), **style)
+        location.axvline(np.median(error_mm), color=INK if style["color"] == MEASURED else ALONG_Y, lw=1)
     location.set_xlabel("location error, mm (line: median)")
-    percent = 100 * comparison.force_error_N[comparison.strong] / comparison.true_force_N[comparison.strong]
-    if len(percent):
-        reach = max(np.percentile(np.abs(percent), 99), 1e-3)
-        force.hist(percent, bins=41, range=(-reach, reach), color=MEASURED)
+    percents = [100 * one.force_error_N[one.strong] / one.true_force_N[one.strong] for one, _ in both]
+    if any(map(len, percents)):
+        reach = max(np.percentile(np.abs(np.concatenate(percents)), 99), 1e-3)
+        for percent, (_, style) in zip(percents, both):
+            force.hist(percent, bins=41, range=(-reach, reach), **style)
         force.axvline(0, color=INK, lw=1)
     force.set_xlabel("force error, %")
     force.locator_params(axis="x", nbins=5)
@@ -269,19 +291,25 @@ def set_style():
         "text.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
 
 
-def header(recording, comparison, t_s, simulated):
+def compared_in_words(summary):
+    """How far location and force were off."""
+    force = summary["force_mape_percent"]
+    return (f"location: median {summary['localisation_median_mm']:.3f} mm, 95 % {summary['localisation_p95_mm']:.3f} mm  ·  force: "
+            + (f"median {force:.2f} %, " if force is not None else "") + f"RMSE {summary['force_rmse_N']:.3f} N")
+
+
+def header(recording, comparison, t_s, simulated, beside):
     identity = "  ·  ".join(recording.metadata[key] for key in ("serial", "board", "scene", "git") if recording.metadata.get(key))
     lines = [identity]
     if comparison:
         s = comparison.summary
         lines.append(
-            f"{s['frames']} frames at {s['frames_per_s']:.1f}/s  ·  location: median {s['localisation_median_mm']:.3f} mm, "
-            f"95 % {s['localisation_p95_mm']:.3f} mm  ·  force: "
-            + (f"median {s['force_mape_percent']:.2f} %, " if s["force_mape_percent"] is not None else "")
-            + f"RMSE {s['force_rmse_N']:.3f} N  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
+            f"{s['frames']} frames at {s['frames_per_s']:.1f}/s  ·  {compared_in_words(s)}  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
             f"{s['slip_false']} false frames  ·  "
             + (f"Q/F: median {s['tangential_ratio_error_p50']:.3f}  ·  " if s["tangential_frames"] else "")
             + f"dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}")
+        if beside:
+            lines.append(f"{beside.serial}, dashed  ·  {compared_in_words(beside.comparison.summary)}")
     else:
         dropped = (recording.end or {}).get("dropped_packets", "?")
         lines.append(f"{len(recording.has_contact)} frames in {t_s[-1] - t_s[0]:.1f} s  ·  dropped packets: {dropped}")
@@ -294,11 +322,15 @@ def main(argv):
     parser.add_argument("--truth", metavar="SCENARIO.csv", help="the scenario that was played")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
+    parser.add_argument("--beside", metavar="SERIAL", help="another fingertip of the recording that felt the same scenario; with --truth")
+    parser.add_argument("--beside-run", metavar="run.json", help="the emulator's report of that one")
     add_recording_options(parser)
     options = parser.parse_args(argv)
+    if options.beside and not options.truth:
+        raise InputError("--beside compares with a truth; give it with --truth SCENARIO.csv")
     if not options.output.lower().endswith(".png"):
         raise InputError(f"{options.output}: no name of a picture; give one that ends in .png")
-    check_output(options.output, options.recording, options.truth, options.run)
+    check_output(options.output, options.recording, options.truth, options.run, options.beside_run)
     if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
         grip = read_grip(options.recording, options.salvage)
         if grip:
@@ -312,6 +344,7 @@ def main(argv):
     if truth:
         check_time(recording)
     comparison = Comparison(recording, truth, run) if truth else None
+    beside = Beside(options, truth) if options.beside else None
     rows = recording.has_contact
     if not rows.any():
         raise InputError(f"{options.recording}: no contact packet in it; record with the contact stream on")
@@ -328,27 +361,27 @@ def main(argv):
     from_top = lambda of_usual: 1 - (1 - of_usual) * 9.2 / height
     figure = plt.figure(figsize=(14, height))
     grid = figure.add_gridspec(over_time + bool(comparison), 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27,
-                               left=0.055, right=0.985, top=from_top(0.87), bottom=0.06 * 9.2 / height)
+                               left=0.055, right=0.985, top=from_top(0.85 if beside else 0.87), bottom=0.06 * 9.2 / height)
     draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, good, doubtful, truth)
     first = figure.add_subplot(grid[0, 1:])
     panels = [first, *(figure.add_subplot(grid[i, 1:], sharex=first) for i in range(1, over_time))]
     series = [("x, mm", "x_mm", x), ("y, mm", "y_mm", y), ("force, N", "force_N", force)]
-    draw_over_time(panels[:3], t_s, restarts_s, series, good, doubtful, slip, truth)
+    draw_over_time(panels[:3], t_s, restarts_s, series, good, doubtful, slip, truth, beside)
     if pulled:
         draw_pull(panels[3:], recording, rows, t_s, restarts_s, force, good, doubtful, truth)
     panels[-1].set_xlabel("time, s")
     for panel in panels:
         panel.tick_params(labelbottom=panel is panels[-1])
     if comparison:
-        draw_errors([figure.add_subplot(grid[over_time, 1]), figure.add_subplot(grid[over_time, 2])], comparison)
-    title, lines = header(recording, comparison, t_s, options.run is not None)
+        draw_errors([figure.add_subplot(grid[over_time, 1]), figure.add_subplot(grid[over_time, 2])], comparison, beside)
+    title, lines = header(recording, comparison, t_s, options.run is not None, beside)
     figure.text(0.055, from_top(0.955), title, size=17, weight="bold")
     for i, line in enumerate(lines):
         figure.text(0.055, from_top(0.93 - 0.022 * i), line, size=9, color=INK if i else FAINT)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=110, format="png")
     write_bytes(options.output, picture.getvalue())
-    print(f"{options.output}: {lines[-1]}")
+    print(f"{options.output}: {lines[1]}")
     return 0
 
 

@@ -89,12 +89,12 @@ def measure(build, steps):
     try:
         for _ in range(LOADS):
             with tempfile.TemporaryDirectory(prefix="fingertip-") as folder, Bench(tools) as bench:
-                url = bench.served()
+                url = bench.served(folder)
                 with Browser(folder) as browser:
                     ready_s.append(driven.ready_s(browser.page(url + "/")))
         steps.say(f"{LOADS} pages opened")
         with tempfile.TemporaryDirectory(prefix="fingertip-") as folder, Bench(tools) as bench:
-            url = bench.served()
+            url = bench.served(folder)
             with Browser(folder, build / "tests/web/libweb_test_ports.so", {"SerialAllowAllPortsForUrls": [url]}) as browser:
                 bench.fake(browser, "AAAA", f"rate={RATE_Hz}", f"life={WATCHED_s + REMEMBERED_s + 120}")
                 page = browser.page(url + "/")

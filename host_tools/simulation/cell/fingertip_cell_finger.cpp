@@ -145,6 +145,7 @@ private:
     }
     if (!zero_us_) {
       zero_us_ = host_us - static_cast<std::int64_t>(device_us_);
+      pressures_.zero_us = *zero_us_;
     }
     if (host_us - *zero_us_ > static_cast<std::int64_t>(device_us_)) {
       run_device_to(static_cast<std::uint64_t>(host_us - *zero_us_));

@@ -29,6 +29,8 @@ public:
 
   // The other way: up to where its fingertip has got; 0: it has not begun.
   std::atomic<std::int64_t> reached_us{0};
+  // Host time at which its own clock was 0.
+  std::atomic<std::int64_t> zero_us{0};
   // It stands, as a process that is stopped.
   std::atomic<bool> frozen{false};
 

@@ -10,7 +10,7 @@
 namespace fingertip::cell {
 namespace {
 
-using Kind = Disturbance::Kind;
+using Disturbs = Disturbance::Kind;
 
 constexpr double STEP_s = 2.5e-4;                    // between two looks at the gripper
 constexpr double STANDS = 0.1, STANDS_LEAST_N = 0.2; // a force that changes by no more, stands
@@ -18,16 +18,16 @@ constexpr double LOST_N = 0.01;
 constexpr double JOINED_s = 0.03; // what goes on after less rest is one slip
 
 struct Known {
-  Kind kind;
+  Disturbs kind;
   double low, high, seconds;
 };
 // Ranges keep the physics within its steps; lengths are of scene.hpp's.
-constexpr Known KNOWN[] = {{Kind::pour, 0.0, 5.0, 1.0},
-                           {Kind::jerk, 0.0, 20.0, 0.3},
-                           {Kind::knock, 0.0, 0.5, 0.02},
-                           {Kind::slick, 0.0, 0.95, 0.5}};
+constexpr Known KNOWN[] = {{Disturbs::pour, 0.0, 5.0, 1.0},
+                           {Disturbs::jerk, 0.0, 20.0, 0.3},
+                           {Disturbs::knock, 0.0, 0.5, 0.02},
+                           {Disturbs::slick, 0.0, 0.95, 0.5}};
 
-const Known &known(Kind kind) {
+const Known &known(Disturbs kind) {
   return *std::find_if(std::begin(KNOWN), std::end(KNOWN),
                        [&](const Known &one) { return one.kind == kind; });
 }
@@ -73,6 +73,22 @@ bool is_disturbance(const std::string &name) {
                      [&](const Known &one) { return name == name_of(one.kind); });
 }
 
+void World::be_of_kind(Options &options, const KindOfGrasp &kind) {
+  const double left = kind.pads[0].friction, right = kind.pads[1].friction;
+  Object &object = options.object;
+  object.width_mm = kind.width_mm;
+  object.mass_kg = kind.mass_kg;
+  object.friction = 0.5 * (left + right);
+  object.uneven_friction = (left - right) / (left + right);
+  object.kinetic_share = kind.kinetic_share;
+  object.crushes_N = kind.crushes_N;
+  options.grasp.relaxation = 0.5 * (kind.pads[0].relaxation + kind.pads[1].relaxation);
+  options.lift_mm = kind.lift_mm;
+  options.lift_s = kind.lift_s;
+  options.kind = kind;
+  options.kind->lift_mm = 0.0; // the scene lifts
+}
+
 World::World(const Options &options, const Face &face, GripperMotion &motion)
     : scene_(scene_of(options)), options_(options), face_(face), motion_(motion),
       cell_(face, options.object, options.grasp) {
@@ -90,7 +106,7 @@ bool World::lift() {
   return true;
 }
 
-bool World::disturb(Kind kind, double amount) {
+bool World::disturb(Disturbs kind, double amount) {
   if (since_lift_s() < scene_.lift_s || !is_there_) {
     return false;
   }
@@ -98,14 +114,45 @@ bool World::disturb(Kind kind, double amount) {
   return true;
 }
 
+Drive World::drive(double since_s) const {
+  Drive drive = scene_.drive(since_s);
+  if (options_.kind && since_s >= 0.0) {
+    const KindOfGrasp::Acts acts = options_.kind->acts(since_s);
+    // The kind's y is upwards.
+    const Vector up{-std::cos(scene_.grasp.down_rad), -std::sin(scene_.grasp.down_rad)};
+    const Vector side{-up.y, up.x};
+    const auto add = [&](Vector &to, const Vector &what) {
+      to.x += what.x * side.x + what.y * up.x;
+      to.y += what.x * side.y + what.y * up.y;
+    };
+    add(drive.hand_m_s2, acts.hand_m_s2);
+    add(drive.knock_N, acts.push_N);
+    drive.mass_kg += acts.mass_kg - options_.kind->mass_kg;
+    drive.friction_share *= acts.friction_share;
+  }
+  return drive;
+}
+
+double World::need_N(double since_s) const {
+  if (!options_.kind) {
+    return scene_.least_N(since_s);
+  }
+  const Drive now = drive(since_s);
+  const double down_rad = scene_.grasp.down_rad;
+  const double x_N = now.mass_kg * (GRAVITY_m_s2 * std::cos(down_rad) - now.hand_m_s2.x);
+  const double y_N = now.mass_kg * (GRAVITY_m_s2 * std::sin(down_rad) - now.hand_m_s2.y);
+  return std::hypot(x_N + now.knock_N.x, y_N + now.knock_N.y) /
+         (2.0 * scene_.object.friction * now.friction_share);
+}
+
 void World::advance(double seconds) {
   for (double left_s = seconds; left_s > 0.0; left_s -= STEP_s) {
     const double step_s = std::min(STEP_s, left_s);
     motion_.step(step_s);
-    Drive drive = scene_.drive(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0);
-    drive.width_mm = motion_.width_mm();
+    Drive now = drive(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0);
+    now.width_mm = motion_.width_mm();
     if (is_there_) {
-      cell_.run(step_s, drive);
+      cell_.run(step_s, now);
     }
     time_s_ += step_s;
     look_at_force();
@@ -141,6 +188,15 @@ void World::look_at_object() {
     if (!told_[i] && since_s >= scene_.disturbances[i].begin_s) {
       told_[i] = true;
       events_.push_back(name_of(scene_.disturbances[i].kind));
+    }
+  }
+  const std::size_t events = options_.kind ? options_.kind->events.size() : 0;
+  kind_told_.resize(events);
+  for (std::size_t i = 0; i < events; i++) {
+    const Event &event = options_.kind->events[i];
+    if (!kind_told_[i] && since_s >= event.begin_s) {
+      kind_told_[i] = true;
+      events_.push_back(name_of(event.kind));
     }
   }
   const double slid_mm = cell_.slid_mm() - slid_before_mm_;
@@ -182,7 +238,7 @@ std::string World::cells() const {
     load_N += is_there_ ? 0.5 * std::hypot(touch.pull_x_N, touch.pull_y_N) : 0.0;
   }
   const double since_s = since_lift_s();
-  const double least_N = is_there_ && since_s >= scene_.lift_s ? scene_.least_N(since_s) : 0.0;
+  const double least_N = is_there_ && since_s >= scene_.lift_s ? need_N(since_s) : 0.0;
   const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
   std::string text = fixed(time_s_, 5);
   for (const double value : {motion_.width_mm(), is_there_ ? cell_.force_N() : 0.0, peak_N_, load_N,

@@ -2,11 +2,12 @@
 //
 // The object stands on the table between the fingers. Once the grip's force has stood for a while,
 // or by a command, the hand lifts it; disturbances (scene.hpp) come then, planned or by
-// a command. What slides by less than SLIP_mm at a time has not slipped. An object that slid
+// a command, and what happens in a grasp of a kind (kinds.hpp). What slides by less than SLIP_mm at a time has not slipped. An object that slid
 // DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
 #include "simulation/cell/gripper_motion.hpp"
+#include "simulation/cell/kinds.hpp"
 #include "simulation/cell/scene.hpp"
 #include "simulation/cell/trial.hpp"
 
@@ -33,7 +34,13 @@ public:
     double lift_mm = 10.0, lift_s = 0.5;
     std::optional<double> lift_after_s = 1.0; // none: only by a command
     std::vector<Planned> planned;
+    std::optional<KindOfGrasp> kind; // of_kind fills in the rest
   };
+
+  // What the kind says of object, lift and what happens then; lift_after_s stays. Left out is what
+  // is no part of this world: the rubber's law, a place off the gripper's middle, errors and delays
+  // of frames, a fingertip that goes silent.
+  static void be_of_kind(Options &options, const KindOfGrasp &kind);
 
   // Both outlive it. From now on the object is between the fingers of motion.
   World(const Options &options, const Face &face, GripperMotion &motion);
@@ -48,7 +55,12 @@ public:
   void take_away() { is_there_ = false; }
 
   Pressures pressures_Pa(std::size_t finger) const;
+  // Without a force where nothing is touched.
+  twin::Touch touch(std::size_t finger) const { return is_there_ ? cell_.touch(finger) : twin::Touch{}; }
 
+  // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
+  // With a kind, against all that acts; without, knocks are left out.
+  double need_N(double since_lift_s) const;
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
   // Of what truth tells, in its order.
@@ -60,6 +72,7 @@ public:
 private:
   static constexpr double TOUCHED_N = 0.05;
 
+  Drive drive(double since_lift_s) const;
   double since_lift_s() const { return lift_s_ ? time_s_ - *lift_s_ : -1.0; }
   void look_at_force();
   void look_at_object();
@@ -74,7 +87,7 @@ private:
     double since_s, force_N;
   };
   std::optional<Standing> stands_; // the force
-  std::vector<bool> told_;         // of the scene's disturbances, that it has begun
+  std::vector<bool> told_, kind_told_; // of the scene's disturbances and the kind's events: begun
   bool is_there_ = true, is_dropped_ = false, is_crushed_ = false, slips_ = false;
   double time_s_ = 0.0, peak_N_ = 0.0, slid_before_mm_ = 0.0, slipped_s_ = 0.0;
   std::optional<double> lift_s_;

@@ -6,6 +6,7 @@
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "simulation/cell/gripper_server.hpp"
+#include "simulation/cell/hand_server.hpp"
 #include "tool/advice.hpp"
 
 #include <atomic>
@@ -116,6 +117,9 @@ public:
     stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
     world_.emplace(options.world, face_, motion_);
+    if (place.is_shared()) {
+      tells_.emplace(place, FINGERS, false);
+    }
     truth_.emplace(options.truth, options.overwrite, head() + "time_us," + World::columns() + "\n");
   }
 
@@ -152,7 +156,9 @@ private:
     const Object &object = options_.world.object;
     std::ostringstream text;
     text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: "
-         << options_.model << "\n# face: " << options_.face << "\n# width_mm: " << object.width_mm
+         << options_.model << "\n# face: " << options_.face << "\n# kind: "
+         << (options_.world.kind ? name_of(options_.world.kind->kind) : "none")
+         << "\n# width_mm: " << object.width_mm
          << "\n# mass_kg: " << object.mass_kg << "\n# friction: " << object.friction
          << "\n# crushes_N: " << object.crushes_N << "\n# seed: " << options_.seed << "\n";
     return text.str();
@@ -192,6 +198,7 @@ private:
       tell_event(event);
     }
     truth_->row(now_us, world_->cells());
+    tell_truth(now_us);
     for (const std::string &line : lines_.take()) {
       std::string answer;
       try {
@@ -203,6 +210,20 @@ private:
       std::fflush(stdout);
     }
     fingers_.look();
+  }
+
+  void tell_truth(std::int64_t now_us) {
+    if (!tells_) {
+      return;
+    }
+    tells_->step();
+    if (tells_->is_due(now_us)) {
+      for (std::size_t i = 0; i < FINGERS; i++) {
+        const twin::Touch touch = world_->touch(i);
+        tells_->tell(i, fingers_.device_us(i, now_us),
+                     {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
+      }
+    }
   }
 
   void tell_event(const std::string &text) {
@@ -300,6 +321,7 @@ private:
   GripperServer server_;
   std::optional<World> world_;
   std::optional<Truth> truth_;
+  std::optional<HandServer> tells_; // and obeys no hand
   Lines lines_;
   LineTrouble line_;
   std::string at_touch_; // a command
@@ -308,6 +330,12 @@ private:
 };
 
 } // namespace
+
+void be_of_kind(LiftOptions &options, Kind kind) {
+  const KindOfGrasp grasp = draw_grasp(kind, options.seed, 0);
+  World::be_of_kind(options.world, grasp);
+  options.opens_mm = grasp.opens_mm;
+}
 
 void check(const LiftOptions &options) {
   const GripperTraits &traits = gripper_traits(options.model);

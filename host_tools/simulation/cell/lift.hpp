@@ -20,6 +20,10 @@ struct LiftOptions {
   bool overwrite = false;
 };
 
+// The first grasp of this kind at the options' seed (kinds.hpp, World::be_of_kind), and how far the
+// gripper stands open then.
+void be_of_kind(LiftOptions &options, Kind kind);
+
 // Throws Error, bad_value: the gripper does not open so far.
 void check(const LiftOptions &options);
 

@@ -4,6 +4,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
+#include "simulation/cell/hand_server.hpp"
 #include "simulation/twin/effects.hpp"
 
 #include <algorithm>
@@ -22,6 +23,8 @@ constexpr std::int64_t ROUND_us = 1'000;
 // Where the twin's placements are (twin/acts.hpp). Long enough for a calibration to take each.
 constexpr double HALF_WIDTH_mm = 9.0, HALF_LENGTH_mm = 18.0;
 constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, STANDS_s = 1.5;
+constexpr double FOLLOWS_s = 0.012; // time constant of the ball after the hand
+constexpr double LIFTED_N = 0.005;
 constexpr double PERIOD_s = RESTS_s + SETS_DOWN_s + STANDS_s + SETS_DOWN_s;
 
 // 0 to 1 within 0 to 1, smooth at both ends.
@@ -51,6 +54,7 @@ public:
     begin_y_ = random.uniform(0.0, 1.0);
   }
 
+  // Set down by the clock.
   void advance(double time_s) {
     const double number = std::floor(time_s / PERIOD_s);
     const double since_s = time_s - number * PERIOD_s - RESTS_s;
@@ -60,11 +64,24 @@ public:
     touch_.y_mm = HALF_LENGTH_mm * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
     touch_.force_N = weight_N_ * (smooth(since_s / SETS_DOWN_s) -
                                   smooth((since_s - SETS_DOWN_s - STANDS_s) / SETS_DOWN_s));
-    const Pressures pressures =
-        touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
-    std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
-    rubber_.report(time_s, base_Pa_, felt_Pa_);
+    feel(time_s);
   }
+  // Or where the hand is.
+  void follow(double time_s, const std::optional<HandAt> &hand) {
+    const double share = 1.0 - std::exp(-(time_s - followed_s_) / FOLLOWS_s);
+    followed_s_ = time_s;
+    if (hand) {
+      const bool comes = touch_.force_N == 0.0; // it comes down where the hand is
+      touch_.x_mm += (comes ? 1.0 : share) * (hand->x_mm - touch_.x_mm);
+      touch_.y_mm += (comes ? 1.0 : share) * (hand->y_mm - touch_.y_mm);
+    }
+    touch_.force_N += share * ((hand ? hand->force_N : 0.0) - touch_.force_N);
+    if (!hand && touch_.force_N < LIFTED_N) {
+      touch_.force_N = 0.0;
+    }
+    feel(time_s);
+  }
+  TrueTouch truth() const { return {{touch_.x_mm, touch_.y_mm, touch_.force_N}}; }
   Pressures pressures_Pa() const {
     Pressures pressures;
     std::copy(felt_Pa_.begin(), felt_Pa_.end(), pressures.begin());
@@ -82,8 +99,15 @@ public:
   }
 
 private:
+  void feel(double time_s) {
+    const Pressures pressures =
+        touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
+    std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
+    rubber_.report(time_s, base_Pa_, felt_Pa_);
+  }
+
   const Face &face_;
-  double weight_N_;
+  double weight_N_, followed_s_ = 0.0;
   twin::Pad rubber_;
   double begin_x_, begin_y_; // of both sequences
   twin::Touch touch_;
@@ -135,6 +159,10 @@ void press(const PressOptions &options, const Place &place) {
   for (std::size_t i = 0; i < fingers.count(); i++) {
     pressed.emplace_back(face, options, 2 * options.seed + i);
   }
+  std::optional<HandServer> hands;
+  if (place.is_shared() || options.by_hand) {
+    hands.emplace(place, fingers.count(), options.by_hand);
+  }
   fingers.wait_until_ready();
   std::printf("ready:");
   for (std::size_t i = 0; i < fingers.count(); i++) {
@@ -142,6 +170,9 @@ void press(const PressOptions &options, const Place &place) {
   }
   std::printf("\n");
   std::fflush(stdout);
+  if (options.by_hand) {
+    std::fprintf(stderr, "press it with the pointer in the page: fingertip web\n");
+  }
   const std::int64_t began_us = steady_now_us();
   std::int64_t last_us = 0;
   while (!interrupted) {
@@ -150,12 +181,20 @@ void press(const PressOptions &options, const Place &place) {
     const double time_s = 1e-6 * static_cast<double>(now_us - began_us);
     if (now_us - last_us >= ROUND_us) {
       last_us = now_us;
+      if (hands) {
+        hands->step();
+      }
+      const bool tells = hands && hands->is_due(now_us);
       std::vector<Pressures> pressures;
       std::string cells;
-      for (Pressed &one : pressed) {
-        one.advance(time_s);
+      for (std::size_t i = 0; i < pressed.size(); i++) {
+        Pressed &one = pressed[i];
+        options.by_hand ? one.follow(time_s, hands->hand(i)) : one.advance(time_s);
         pressures.push_back(one.pressures_Pa());
         cells += (cells.empty() ? "" : ",") + one.cells();
+        if (tells) {
+          hands->tell(i, fingers.device_us(i, now_us), one.truth());
+        }
       }
       fingers.put(now_us, pressures);
       truth.row(now_us, cells);

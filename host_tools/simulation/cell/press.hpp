@@ -1,5 +1,6 @@
 // `fingertip simulate --press`: a weight on a ball is set down evenly all over each fingertip, to
-// look at, to record and to calibrate from.
+// look at, to record and to calibrate from. With --mouse a hand presses instead (hand_server.hpp):
+// the ball goes where the hand is, within some 30 ms, without friction.
 //
 // The pad: 12 mm of silicone without ends, which relaxes as the twin's does (twin/effects.hpp).
 // Sensors' gains differ by 10 %, and are not calibrated.
@@ -11,6 +12,7 @@ namespace fingertip::cell {
 
 struct PressOptions {
   std::size_t fingertips = 1; // 1 or 2
+  bool by_hand = false;
   std::string cache, truth;
   double weight_g = 300.0, gain_spread = 0.1;
   std::optional<double> seconds;

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 namespace {
 
 struct Options {
-  std::string ports, cache, truth;
+  std::string ports, cache, truth, kind;
   PressOptions press;
   LiftOptions lift;
   double gain_spread = 0.0, seconds = 0.0;
@@ -67,6 +67,9 @@ void run(const Options &options, bool is_lift) {
     LiftOptions one = options.lift;
     both(one);
     one.cache = cache(one.face);
+    if (!options.kind.empty()) {
+      be_of_kind(one, kind_of(options.kind));
+    }
     check(one);
     lift(one, Place(options.ports));
   } else {
@@ -99,12 +102,18 @@ int main(int argc, char **argv) {
       "--press", is_press,
       "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is "
       "what happens without an option");
+  CLI::Option *mouse_flag =
+      app.add_flag("--mouse", options.press.by_hand,
+                   "A hand presses the ball: yours, with the pointer on the pad in the page of "
+                   "`fingertip web`")
+          ->excludes(press_flag);
   CLI::Option *lift_flag =
       app.add_flag("--lift",
                    "Two fingertips on a gripper with an object between: `fingertip grasp "
                    "--gripper 2f85 --gripper-port sim:gripper` grasps it, then a hand lifts it. "
                    "Obeys lines of standard input (help lists them)")
-          ->excludes(press_flag);
+          ->excludes(press_flag)
+          ->excludes(mouse_flag);
   const auto number = [&](const char *name, double &value, const char *unit, double low,
                           double high, const char *help) {
     return app.add_option(name, value, help)
@@ -155,11 +164,21 @@ int main(int argc, char **argv) {
   of_lift.push_back(app.add_option("--face", options.lift.face,
                                    "What of the object is touched: an indenter, or plate")
                         ->capture_default_str());
+  std::vector<std::string> kinds;
+  for (const Kind kind : KINDS) {
+    kinds.push_back(name_of(kind));
+  }
+  CLI::Option *kind =
+      app.add_option("--kind", options.kind,
+                     "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
+          ->check(CLI::IsMember(kinds));
+  const std::size_t before_drawn = of_lift.size();
   lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object");
   lift_number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
   lift_number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
   lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0,
               "Of the friction, while it slides");
+  const std::size_t stiffness = of_lift.size();
   of_lift.push_back(app.add_option("--stiffness", object.stiffness_N_mm,
                                    "Its stiffness; default: it does not yield")
                         ->type_name("N/MM")
@@ -172,6 +191,12 @@ int main(int argc, char **argv) {
               "The gripper stands so much wider at first");
   lift_number("--height", options.lift.world.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
   lift_number("--lift-time", options.lift.world.lift_s, "S", 0.05, 60.0, "And how long that takes");
+  for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
+    if (i != stiffness) { // which no kind says
+      kind->excludes(of_lift[i]);
+    }
+  }
+  of_lift.push_back(kind);
   CLI::Option *after = lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6,
                                    "Lifted once the force has stood for so long");
   of_lift.push_back(

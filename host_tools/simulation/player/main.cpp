@@ -15,6 +15,7 @@
 
 extern "C" {
 #include "native/native_cdc.h"
+#include "native/native_port.h"
 }
 
 #include <CLI/CLI.hpp>
@@ -30,7 +31,7 @@ constexpr std::uint64_t SLICE_us = 5000;
 constexpr double SECONDS_MAX = 24 * 3600;
 
 struct PlayOptions {
-  std::string scenario, recording, raw_bytes, commands;
+  std::string scenario, recording, raw_bytes, commands, serial = "0000000000000001";
   std::string osr = "1024", rate = "max", slip_threshold, slip_window;
   double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
   std::uint64_t seed = 1;
@@ -109,6 +110,7 @@ int play(const PlayOptions &options) {
   settings.prior_width_mm = options.prior_width_mm;
   settings.world = {&scenario, pressure_Pa, temperature_degC};
   settings.pad = pad ? &*pad : nullptr;
+  native_set_serial_number(options.serial.c_str());
   if (!native_fingertip_start(&settings)) {
     throw Error("--pad: this player reports no tangential load; build it with "
                 "-DFINGERTIP_SCENE=grasp");
@@ -364,6 +366,14 @@ int run(int argc, char **argv) {
                    "Calibration words differ from part to part by up to this; default 3")
       ->check(CLI::Range(0.0, 10.0))
       ->type_name("PERCENT");
+  player->add_option("--serial", play_options.serial, "Serial number of the fingertip")
+      ->check([](const std::string &text) {
+        const bool is_one = text.size() == 16 &&
+                            text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
+        return is_one ? std::string() : "give 16 hexadecimal digits, as 000000000000B0BB";
+      })
+      ->type_name("HEX16")
+      ->capture_default_str();
   player->add_option("--seed", play_options.seed, "Of noise and calibration; default 1")
       ->type_name("N");
   player->add_option("--seconds", play_options.seconds, "Default: to the scenario's end")

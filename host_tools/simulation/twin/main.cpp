@@ -25,7 +25,7 @@ using namespace fingertip;
 using namespace fingertip::twin;
 
 constexpr double LAYER_MIN_mm = 3.0, LAYER_MAX_mm = 20.0;
-constexpr double WIDTH_FORCE_N = 2.0;
+constexpr double SHORE_MIN = 5.0, SHORE_MAX = 70.0; // Gent's relation is for rubber
 
 struct Options {
   ScenarioOptions scenario;
@@ -36,6 +36,8 @@ struct Options {
   std::string cache;
   std::vector<std::string> indenters;
   std::vector<double> layers_mm;
+  std::optional<double> shore_a; // default: that of silicone()
+  double width_force_N = 2.0;
 };
 
 std::atomic<bool> interrupted{false};
@@ -150,13 +152,17 @@ ContactTable table_of(const std::string &name, const Layer &layer, const Options
 }
 
 int width(const Options &options) {
-  const Layer layer = layer_of(options.scenario.layer_mm);
+  Layer layer = layer_of(options.scenario.layer_mm);
+  if (options.shore_a) {
+    layer.youngs_modulus_Pa = youngs_modulus_Pa(*options.shore_a);
+  }
   const std::string name = complete(options.scenario).indenter;
   const BestGaussian gaussian(table_of(name, layer, options), layer.thickness_mm);
-  const BestGaussian::Fit fit = gaussian.at(WIDTH_FORCE_N);
+  const BestGaussian::Fit fit = gaussian.at(options.width_force_N);
   const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
-  std::printf("sigma_mm=%s force_share=%s\n", fixed(fit.sigma_mm, 3).c_str(),
-              fixed(force_N / WIDTH_FORCE_N, 3).c_str());
+  std::printf("sigma_mm=%s force_share=%s peak_kPa=%s\n", fixed(fit.sigma_mm, 3).c_str(),
+              fixed(force_N / options.width_force_N, 3).c_str(),
+              fixed(1e-3 * fit.p0_Pa, 2).c_str());
   return 0;
 }
 
@@ -257,8 +263,16 @@ int run(int argc, char **argv) {
 
   CLI::App *fit = app.add_subcommand(
       "width",
-      "Width of the Gaussian that fits the pressure under 2 N best, and its share of them");
+      "Width of the Gaussian that fits the pressure under a force best, its share of the force, and "
+      "its peak");
   with_contact(fit);
+  fit->add_option("--force", options.width_force_N, "What presses")
+      ->check(CLI::Range(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))
+      ->type_name("N")
+      ->capture_default_str();
+  fit->add_option("--shore", options.shore_a, "Hardness of the rubber, Shore A; default 15")
+      ->check(CLI::Range(SHORE_MIN, SHORE_MAX))
+      ->type_name("A");
   with_cache(fit);
   fit->callback([&] { action = [&] { return width(options); }; });
 

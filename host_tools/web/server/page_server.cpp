@@ -36,7 +36,11 @@ const httplib::Headers HEADERS{
 
 constexpr std::chrono::milliseconds LOOK_INTERVAL{50};
 
-enum { MISDIRECTED_REQUEST = 421, METHOD_NOT_ALLOWED = 405, NOT_FOUND = 404 };
+/* Lines of simulated fingertips, and as many for all that is short. */
+constexpr std::size_t THREADS = 2 * Simulations::MOST_LINES;
+constexpr std::size_t MOST_BODY_BYTES = 65536;
+
+enum { MISDIRECTED_REQUEST = 421, FORBIDDEN = 403, METHOD_NOT_ALLOWED = 405, NOT_FOUND = 404 };
 
 std::string type_of(const fs::path &file) {
   static const std::map<std::string, std::string> types{
@@ -120,6 +124,12 @@ PageServer::PageServer(const fs::path &folder, const std::string &address, unsig
   }
 
   server_->set_default_headers(HEADERS);
+  if (is_loopback(address)) {
+    simulations_ = std::make_unique<Simulations>();
+    simulations_->serve(*server_);
+    server_->new_task_queue = [] { return new httplib::ThreadPool(THREADS); };
+    server_->set_payload_max_length(MOST_BODY_BYTES);
+  }
   /* The library's own would share the port with another server. */
   server_->set_socket_options([](socket_t socket) {
     int yes = 1;
@@ -135,6 +145,11 @@ PageServer::PageServer(const fs::path &folder, const std::string &address, unsig
         auto file = files_.find(request.path == "/" ? "/index.html" : request.path);
         if (host != "localhost" && !is_address(host)) {
           refuse(MISDIRECTED_REQUEST, "ask for it by its address\n");
+        } else if (simulations_ && Simulations::is_for(request.path)) {
+          if (Simulations::is_from_page(request)) {
+            return httplib::Server::HandlerResponse::Unhandled;
+          }
+          refuse(FORBIDDEN, "only the page itself may ask\n");
         } else if (request.method != "GET" && request.method != "HEAD") {
           response.set_header("Allow", "GET, HEAD");
           refuse(METHOD_NOT_ALLOWED, "it is only to be read\n");

@@ -1,5 +1,6 @@
-/* Serves the built page to browsers of this machine, and nothing else: its files are read once, a
- * name is looked up among them and never becomes a path. The page may load nothing from elsewhere
+/* Serves the built page to browsers, and to those of this machine its simulated fingertips
+ * (simulations.hpp). Nothing else: the page's files are read once, a name is looked up among them and
+ * never becomes a path. The page may load nothing from elsewhere
  * (Content-Security-Policy), no other site may embed or read it, and it is given only to who asks
  * for it by an address or as localhost: a name of the asker's own that leads here (DNS rebinding)
  * is refused with 421.
@@ -7,6 +8,8 @@
  * Memory: the page's, some megabytes. Errors: Error, of a folder that cannot be read and an address
  * that cannot be had. */
 #pragma once
+
+#include "web/server/simulations.hpp"
 
 #include <filesystem>
 #include <functional>
@@ -40,6 +43,7 @@ private:
 
   std::map<std::string, File> files_; /* by the path of the request: /index.html */
   std::string url_;
+  std::unique_ptr<Simulations> simulations_; /* of a server that only this machine reaches */
   std::unique_ptr<httplib::Server> server_;
 };
 

@@ -207,6 +207,23 @@ class Course(CellTest):
             force_N = np.interp(finger.time_us[presses] + zero_us, truth["time_us"], truth["force_N"])
             self.assertLess(np.median(np.abs(finger["force_N"][presses] / force_N - 1)), 0.15)
 
+    def test_a_grasp_of_a_kind(self):
+        """What is drawn happens: the truth has it, and its need follows it."""
+        with self.cell("--kind", "slick", "--seed", "5"):
+            process = self.start("-o", self.csv)
+            self.wait_for_event("slick")
+            self.pass_time(0.5)
+            process.terminate()
+            self.assertEqual(process.wait(), DONE, self.said())
+        truth, events = self.truth()
+        with open(self.truth_csv, encoding="utf-8") as file:
+            head = dict(line[2:].strip().split(": ", 1) for line in file if line.startswith("# ") and ": " in line)
+        self.assertEqual((head["kind"], head["seed"]), ("slick", "5"))
+        self.assertNotEqual(head["mass_kg"], "0.3")
+        self.assertLess([text for _, text in events].index("lift"), [text for _, text in events].index("slick"))
+        need_N = truth["least_N"][truth["least_N"] > 0]
+        self.assertGreater(need_N[-1], 1.2 * need_N[0])
+
     def test_2f85(self):
         self.run_course("2f85")
 

@@ -7,6 +7,8 @@ import sys
 import tempfile
 import unittest
 
+from PIL import Image
+
 FINGERTIP, TWIN, PLAYER, TABLES = sys.argv[1:5]
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/demo"))
 import picture  # noqa: E402
@@ -62,6 +64,25 @@ class ReplayPull(unittest.TestCase):
         text = self.shown()
         self.assertEqual(text.count("no pad profile: fingertip pad"), 1)
         self.assertNotIn("Q/F", text)
+
+    def test_a_picture_that_moves(self):
+        self.shown()
+        out = folder / "moving.png"
+        self.assertEqual(picture.main([str(folder / ".csv"), "-o", str(out), "--at", "1", "--until", "4", "--every", "0.5", "--size", "100x30", "--tool", FINGERTIP]), 0)
+        with Image.open(out) as moving:
+            self.assertEqual((moving.n_frames, moving.size), (7, (100 * picture.WIDTH, 30 * picture.HEIGHT)))
+            frames = []
+            for i in range(moving.n_frames):
+                moving.seek(i)
+                frames.append(moving.convert("RGB").tobytes())
+        self.assertEqual(len(set(frames)), 7)  # a lift: each differs
+        self.assertLess(out.stat().st_size, 1e6)
+
+    def test_pictures_that_cannot_be(self):
+        for words, said in ((("-o", "p.png"), "ends in .svg; with --until one that ends in .png"), (("-o", "p.png", "--at", "3", "--until", "2"), "later than --at"),
+                            (("-o", "p.svg", "--until", "2"), "ends in .png")):
+            with self.assertRaisesRegex(picture.InputError, said):
+                picture.main(["lift.csv", *words])
 
 
 if __name__ == "__main__":

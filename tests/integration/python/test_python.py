@@ -7,6 +7,7 @@ import math
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -512,6 +513,19 @@ class TangentialLoad(ToolTest):
         to_rgb = plot.matplotlib.colors.to_rgb
         for colour in (plot.DOUBTFUL, plot.SLIPPING, plot.TRUTH):
             self.assertGreater(np.linalg.norm(times(np.linspace(0, 1, 256))[:, :3] - to_rgb(colour), axis=1).min(), 0.4, colour)
+
+    def test_another_fingertip_beside_it(self):
+        scenario = self.scenario()
+        other = self.folder / "other.csv"
+        shutil.copy(self.recording(scenario, change=lambda row: {**row, "force_N": 0.8 * row["force_N"]}), other)
+        one = self.recording(scenario)
+        self.assertIn("--beside compares with a truth", self.error("plot", one, "--beside", "AAAA", "-o", self.folder / "p.png"))
+        with mock.patch.object(plot, "load_recording", lambda options, **how: files.read_recording(other if options.device == "BBBB" else one)):
+            panels = self.panels(one, "--truth", scenario, "--run", self.run_report(), "--beside", "BBBB", "--beside-run", self.run_report())
+        drawn = {line.get_label(): np.nanmax(line.get_ydata()) for line in panels["force, N"].lines if len(line.get_ydata())}
+        self.assertAlmostEqual(drawn["BBBB"], 0.8 * drawn["measured"], delta=0.01 * drawn["measured"])
+        texts = " ".join(text.get_text() for text in panels["force, N"].figure.texts)
+        self.assertRegex(texts, r"BBBB, dashed .* force: median 20\.\d\d %")
 
     def test_without_loads_there_is_no_panel_of_them(self):
         panels = self.panels(self.recording(self.scenario()))

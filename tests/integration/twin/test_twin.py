@@ -1,6 +1,7 @@
 """The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES PLAYER [unittest arguments]."""
 import csv
 import json
+import math
 import os
 import pathlib
 import resource
@@ -252,9 +253,19 @@ class Usage(TwinTest):
     def test_width_is_that_of_the_layer(self):
         out, _ = self.run_twin("width", "--indenter", "sphere6", "--layer", "12", "--cache", TABLES)
         found = dict(word.split("=") for word in out.split())
-        self.assertEqual(list(found), ["sigma_mm", "force_share"])
+        self.assertEqual(list(found), ["sigma_mm", "force_share", "peak_kPa"])
         self.assertAlmostEqual(float(found["sigma_mm"]), 0.45 * 12, delta=0.36)
         self.assertAlmostEqual(float(found["force_share"]), 0.9, delta=0.02)
+        peak_kPa = 2 * float(found["force_share"]) / (2 * math.pi * float(found["sigma_mm"])**2) * 1000
+        self.assertAlmostEqual(float(found["peak_kPa"]), peak_kPa, delta=0.01 * peak_kPa)
+
+    def test_width_hardly_depends_on_hardness(self):
+        widths = []
+        for shore in ("10", "40"):
+            out, _ = self.run_twin("width", "--indenter", "sphere15", "--layer", "12", "--force", "5", "--shore", shore, "--cache", str(self.folder))
+            widths.append(float(out.split()[0].removeprefix("sigma_mm=")))
+        self.assertLess(widths[1], widths[0])  # a ball sinks deeper into softer rubber
+        self.assertGreater(widths[1], 0.95 * widths[0])
 
     def test_existing_files_stay_unless_told(self):
         self.scenario("taps", "--seconds", "5")

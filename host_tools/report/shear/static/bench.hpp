@@ -11,7 +11,7 @@
 namespace fingertip::shear {
 
 struct Options {
-  std::string cache = FINGERTIP_TABLES_DIR;
+  std::string cache = FINGERTIP_TABLES_DIR, only;
   std::uint64_t seed = 20221015, pads = 1500;
 };
 

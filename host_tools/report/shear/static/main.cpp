@@ -9,22 +9,32 @@
 #include "report/reference/options.hpp"
 #include "shear/static/tables.hpp"
 
+#include <stdexcept>
+
 namespace {
 
 using namespace fingertip;
 using namespace fingertip::shear;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--cache DIR]\n"
+constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--only pads] [--cache DIR]\n"
                         "  --seed S     of pads and touches, 20221015 by default\n"
                         "  --pads N     pads of each case, 1500 by default; a fifth for some\n"
+                        "  --only pads  only by pad and load, and by place\n"
                         "  --cache DIR  folder of the contact tables\n";
 
 ordered_json measure(const Options &options) {
   ordered_json out;
   out["shear_seed"] = options.seed;
   out["shear_pads"] = options.pads;
+  if (!options.only.empty() && options.only != "pads") {
+    throw std::runtime_error("--only " + options.only + " is no table; give pads");
+  }
   Bench bench(options);
+  if (!options.only.empty()) {
+    judge_pads(bench, out);
+    return out;
+  }
   for (const auto judge :
        {judge_pads, judge_objects, judge_elongated, judge_limits, judge_thickness, judge_learned,
         judge_bounds, judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
@@ -39,6 +49,7 @@ int main(int argc, char **argv) {
   Options options;
   return reference::print_found("shear_static", argc, argv,
                                 {{"--cache", &options.cache},
+                                 {"--only", &options.only},
                                  {"--seed", nullptr, &options.seed},
                                  {"--pads", nullptr, &options.pads}},
                                 HELP, [&] { return measure(options); });

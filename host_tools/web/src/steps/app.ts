@@ -11,6 +11,7 @@ import { Bench } from '../model/bench';
 import { Fingertip, OtherFingertip } from '../model/fingertip';
 import type { Recorder, RecordingKind } from '../recording/recorder';
 import type { Replay } from '../recording/replay_line';
+import { ServedFingertip, findServed } from '../simulated/served_fingertip';
 import { SimulatedFingertip } from '../simulated/simulated_fingertip';
 import { version } from '../../package.json';
 import { wordsOf } from './dialog';
@@ -23,6 +24,8 @@ const replaying = () => import('../recording/replay_line');
 
 /** Linux gives a port its group and rights a moment after it is there. */
 const RIGHTS_ms = 300;
+/** Between two looks for fingertips of `fingertip simulate`. */
+const LOOK_ms = 1500;
 
 const NONE_CHOSEN =
   'No fingertip was chosen. None in the list: plug one in, with a cable that carries data. No list: allow this site ' +
@@ -37,6 +40,8 @@ export class App {
 
   private readonly listeners = new Set<() => void>();
   private readonly ports = new Map<SerialPort, Fingertip>();
+  /** Of `fingertip simulate`, by serial number; null: the user took it off the page. */
+  private readonly served = new Map<string, Fingertip | null>();
   private finding: Promise<void> = Promise.resolve();
   private simulated = 0;
 
@@ -46,8 +51,10 @@ export class App {
     return () => this.listeners.delete(listener);
   }
 
-  /** Takes up the ports that the page may use, now and as they come. */
+  /** Takes up the ports that the page may use and the fingertips that this computer simulates, now
+   * and as they come. */
   start(): void {
+    void this.lookForServed();
     if (hasWebSerial()) {
       void this.find();
       navigator.serial.addEventListener('connect', (event) => {
@@ -118,6 +125,11 @@ export class App {
     for (const [port, each] of this.ports) {
       if (each === fingertip) {
         this.ports.delete(port);
+      }
+    }
+    for (const [serial, each] of this.served) {
+      if (each === fingertip) {
+        this.served.set(serial, null);
       }
     }
     if (fingertip.line instanceof SimulatedFingertip) {
@@ -213,6 +225,35 @@ export class App {
     await fingertip
       .open()
       .catch((error: unknown) => this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad'));
+  }
+
+  private async lookForServed(): Promise<void> {
+    try {
+      const found = await findServed();
+      if (found === null) {
+        return;
+      }
+      for (const serial of [...this.served.keys()]) {
+        // One that the user took off comes back with a new simulation.
+        if (this.served.get(serial) === null && !found.some((each) => each.serial === serial)) {
+          this.served.delete(serial);
+        }
+      }
+      for (const each of found) {
+        const known = this.served.get(each.serial);
+        if (known === undefined) {
+          const fingertip = new Fingertip(new ServedFingertip(each));
+          this.served.set(each.serial, fingertip);
+          this.bench.add(fingertip);
+          await fingertip.open();
+        } else if (known?.state === 'closed') {
+          await known.open(new ServedFingertip(each));
+        }
+      }
+    } catch {
+      // The server, or a simulation, has just ended: the next look tells.
+    }
+    setTimeout(() => void this.lookForServed(), LOOK_ms);
   }
 
   private changed(): void {

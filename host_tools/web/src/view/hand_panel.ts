@@ -25,33 +25,14 @@ export class HandPanel implements Touch {
   private sent = '';
 
   constructor(private readonly hand: Hand) {
-    const object = element(
-      'select',
-      { id: 'object' },
-      ...hand.objects.map(({ name, title }) => element('option', { value: name }, title)),
-    );
-    object.addEventListener('change', () => {
-      this.end();
-      hand.choose(object.value);
-    });
     const again = () => this.apply(performance.now());
     this.force = slider('Force', 'N', { least: 0.5, most: MOST_N, step: 0.5, value: 4 }, again);
     this.x = slider('Across', 'mm', { least: -13, most: 13, step: 0.5, value: 0 }, again);
     this.y = slider('Along', 'mm', { least: -22, most: 22, step: 0.5, value: 0 }, again);
     this.load = slider('Load', 'N', { least: 0, most: MOST_N, step: 0.1, value: 1 }, again);
     this.angle = slider('Direction', '°', { least: -180, most: 180, step: 5, value: -90 }, again);
-    const friction = slider(
-      'Friction',
-      '',
-      { least: 0.1, most: 1.5, step: 0.05, value: 0.5 },
-      (value) => hand.setFriction(value),
-    );
     this.pressButton = button('Press', () => this.toggle('press'), { 'aria-pressed': 'false' });
     this.holdButton = button('Hold in a grip', () => this.toggle('hold'), { 'aria-pressed': 'false' });
-    const drop = button('Drop it', () => {
-      this.end();
-      hand.drop(this.x.value, this.y.value);
-    });
     const lift = button('Lift', () => {
       this.end();
       hand.press(null);
@@ -65,20 +46,16 @@ export class HandPanel implements Touch {
         { class: 'hint' },
         'Press on the pad and drag: longer presses harder, the wheel too. All of it is simulated.',
       ),
-      element('div', { class: 'field' }, element('label', { for: 'object' }, 'Object'), object),
+      ...this.objects(),
       this.force.element,
-      element('div', { class: 'choices' }, this.pressButton, drop, lift),
+      element('div', { class: 'choices' }, this.pressButton, ...this.dropping(), lift),
       element(
         'details',
         {},
-        element('summary', {}, 'Where, and slip'),
+        element('summary', {}, hand.hold ? 'Where, and slip' : 'Where'),
         this.x.element,
         this.y.element,
-        friction.element,
-        element('p', { class: 'hint' }, 'A grip presses while a load pulls; more than friction holds slips.'),
-        this.load.element,
-        this.angle.element,
-        element('div', { class: 'choices' }, this.holdButton),
+        ...this.slipping(),
       ),
     );
   }
@@ -128,10 +105,56 @@ export class HandPanel implements Touch {
     }
     this.sent = doing;
     if (this.doing === 'hold') {
-      this.hand.hold({ x_mm, y_mm, force_N: rounded_N, ...grip });
+      this.hand.hold?.({ x_mm, y_mm, force_N: rounded_N, ...grip });
     } else {
       this.hand.press({ x_mm, y_mm, force_N: rounded_N });
     }
+  }
+
+  private objects(): HTMLElement[] {
+    const { hand } = this;
+    if (!hand.objects) {
+      return [];
+    }
+    const object = element(
+      'select',
+      { id: 'object' },
+      ...hand.objects.map(({ name, title }) => element('option', { value: name }, title)),
+    );
+    object.addEventListener('change', () => {
+      this.end();
+      hand.choose?.(object.value);
+    });
+    return [element('div', { class: 'field' }, element('label', { for: 'object' }, 'Object'), object)];
+  }
+
+  private dropping(): HTMLElement[] {
+    const { hand } = this;
+    const drop = () => {
+      this.end();
+      hand.drop?.(this.x.value, this.y.value);
+    };
+    return hand.drop ? [button('Drop it', drop)] : [];
+  }
+
+  private slipping(): HTMLElement[] {
+    const { hand } = this;
+    if (!hand.hold) {
+      return [];
+    }
+    const friction = slider(
+      'Friction',
+      '',
+      { least: 0.1, most: 1.5, step: 0.05, value: 0.5 },
+      (value) => hand.setFriction?.(value),
+    );
+    return [
+      friction.element,
+      element('p', { class: 'hint' }, 'A grip presses while a load pulls; more than friction holds slips.'),
+      this.load.element,
+      this.angle.element,
+      element('div', { class: 'choices' }, this.holdButton),
+    ];
   }
 
   private toggle(doing: 'press' | 'hold'): void {

@@ -2,7 +2,7 @@
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import { element, write } from './elements';
-import type { ShownContact } from './shown';
+import type { ShownContact, ShownTruth } from './shown';
 
 interface Number_ {
   readonly name: string;
@@ -12,6 +12,8 @@ interface Number_ {
   /** Whether warnings make it doubtful. */
   readonly value: (contact: ShownContact) => string;
   readonly sd?: (contact: ShownContact) => string;
+  /** Of a simulated fingertip; undefined: not known. */
+  readonly truth?: (truth: ShownTruth) => string | undefined;
   readonly tangential?: boolean;
 }
 
@@ -27,6 +29,7 @@ const NUMBERS: readonly Number_[] = [
     value: (contact) =>
       `${contact.flags & Flag.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`,
     sd: sdOf((contact) => contact.force_sd_N, 2),
+    truth: (truth) => fixed(truth.force_N, 2),
   },
   {
     name: 'place',
@@ -35,6 +38,7 @@ const NUMBERS: readonly Number_[] = [
     valid: Flag.FIT_VALID,
     value: (contact) => `${fixed(contact.x_mm, 1)}, ${fixed(contact.y_mm, 1)}`,
     sd: sdOf((contact) => contact.location_sd_mm, 2),
+    truth: (truth) => `${fixed(truth.x_mm, 1)}, ${fixed(truth.y_mm, 1)}`,
   },
   {
     name: 'slip',
@@ -57,6 +61,8 @@ const NUMBERS: readonly Number_[] = [
     valid: Flag.TANGENTIAL_VALID,
     value: (contact) => `${fixed(contact.qx_N, 2)}, ${fixed(contact.qy_N, 2)}`,
     sd: (contact) => `± ${fixed(contact.q_sd_N, 2)}`,
+    truth: ({ qx_N, qy_N }) =>
+      qx_N === undefined || qy_N === undefined ? undefined : `${fixed(qx_N, 2)}, ${fixed(qy_N, 2)}`,
     tangential: true,
   },
 ];
@@ -74,7 +80,7 @@ export class Numbers {
   readonly element: HTMLElement;
   private readonly rows = new Map<
     string,
-    { row: HTMLElement; value: HTMLElement; sd: HTMLElement; doubt: HTMLElement }
+    { row: HTMLElement; value: HTMLElement; sd: HTMLElement; doubt: HTMLElement; truth: HTMLElement }
   >();
   private readonly lamps: { bit: number; name: string; lamp: HTMLElement }[] = [];
   private readonly warnings = element('ul', { class: 'warnings' });
@@ -86,13 +92,14 @@ export class Numbers {
       const value = element('span', { class: 'value' });
       const sd = element('span', { class: 'sd' });
       const doubt = element('span', { class: 'doubt' });
+      const truth = element('span', { class: 'truth' });
       const row = element(
         'div',
         { class: `number ${number.name}` },
         element('dt', {}, number.title),
-        element('dd', {}, value, doubt, ' ', element('span', { class: 'unit' }, number.unit), ' ', sd),
+        element('dd', {}, value, doubt, ' ', element('span', { class: 'unit' }, number.unit), ' ', sd, ' ', truth),
       );
-      this.rows.set(number.name, { row, value, sd, doubt });
+      this.rows.set(number.name, { row, value, sd, doubt, truth });
       list.append(row);
     }
     const lamps = element('ul', { class: 'lamps', 'aria-label': 'State' });
@@ -109,8 +116,8 @@ export class Numbers {
     this.element = element('div', { class: 'telling' }, lamps, list, this.warnings);
   }
 
-  /** contact: null where nothing is known. */
-  show(contact: ShownContact | null, tangential: boolean, limit_mm: number): void {
+  /** contact: null where nothing is known. truth: null of a real fingertip, and in a pause. */
+  show(contact: ShownContact | null, tangential: boolean, limit_mm: number, truth: ShownTruth | null): void {
     const flags = contact?.flags ?? 0;
     const doubtful = (flags & WARNING_FLAGS) !== 0;
     for (const number of NUMBERS) {
@@ -122,6 +129,8 @@ export class Numbers {
       write(row.value, there ? number.value(contact) : '–');
       write(row.sd, there && number.sd ? number.sd(contact) : '');
       write(row.doubt, there && doubtful ? '?' : '');
+      const isTrue = truth?.contact ? number.truth?.(truth) : undefined;
+      write(row.truth, isTrue === undefined ? '' : `true ${isTrue}`);
       row.row.classList.toggle('doubtful', there && doubtful);
       row.row.hidden = number.tangential === true && !tangential;
     }

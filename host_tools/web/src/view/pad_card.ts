@@ -73,11 +73,10 @@ export class PadCard {
     const { shown } = this;
     this.prepare();
     this.hand?.apply(now_ms);
-    const { history, hand } = shown;
+    const { history, truth } = shown;
     if (!history) {
       return false;
     }
-    const truth = hand?.truth;
     const current = behind_s !== null || shown.isCurrent(performance.now());
     const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm}`;
     if (seen !== this.seen && shown.layout && this.view) {

@@ -25,22 +25,27 @@ export interface ShownLayout {
 /** Level: how much it matters, and so its colour. */
 export type Level = 'plain' | 'good' | 'warning' | 'bad';
 
-/** What presses on a simulated fingertip: SimulatedFingertip of src/simulated is one. */
+/** What is true of a simulated fingertip, some 30 ms old at most; the pull only where it is known. */
+export interface ShownTruth {
+  readonly contact: boolean;
+  readonly x_mm: number;
+  readonly y_mm: number;
+  readonly force_N: number;
+  readonly qx_N?: number;
+  readonly qy_N?: number;
+}
+
+/** What presses on a simulated fingertip: SimulatedFingertip of src/simulated is one, and
+ * ServedFingertip, whose hand can press only. */
 export interface Hand {
-  readonly objects: readonly { readonly name: string; readonly title: string }[];
-  readonly truth: {
-    readonly contact: boolean;
-    readonly x_mm: number;
-    readonly y_mm: number;
-    readonly force_N: number;
-  };
-  choose(name: string): void;
+  readonly objects?: readonly { readonly name: string; readonly title: string }[];
   press(hand: { x_mm: number; y_mm: number; force_N: number } | null): void;
-  drop(x_mm: number, y_mm: number): void;
-  hold(
+  choose?(name: string): void;
+  drop?(x_mm: number, y_mm: number): void;
+  hold?(
     grip: { x_mm: number; y_mm: number; force_N: number; load_N: number; angle_deg: number } | null,
   ): void;
-  setFriction(friction: number): void;
+  setFriction?(friction: number): void;
 }
 
 /** No frame for so long is shown as a stall, as in the terminal's monitor. */
@@ -67,8 +72,8 @@ export class Shown {
   /** Short: the end of the serial number tells several apart. */
   get name(): string {
     const { info, line, is_replay } = this.fingertip;
-    if (this.hand) {
-      return `simulated ${this.place + 1}`;
+    if (this.truth) {
+      return this.hand?.objects ? `simulated ${this.place + 1}` : line.label;
     }
     return is_replay || !info ? line.label : `fingertip ${info.serial.slice(-4)}`;
   }
@@ -78,8 +83,13 @@ export class Shown {
   }
 
   get hand(): Hand | null {
-    const line = this.fingertip.line as unknown;
-    return line instanceof Object && 'press' in line && 'truth' in line ? (line as Hand) : null;
+    const line = this.fingertip.line as Partial<Hand>;
+    return line.press ? (line as Hand) : null;
+  }
+
+  /** null: it is no simulated one. */
+  get truth(): ShownTruth | null {
+    return (this.fingertip.line as { truth?: ShownTruth }).truth ?? null;
   }
 
   get layout(): ShownLayout | null {

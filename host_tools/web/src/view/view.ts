@@ -299,7 +299,8 @@ export class View {
     write(this.heading, shown.name);
     this.timeline.isReplay = shown.isReplay;
     this.doingsPlace.setAttribute('aria-label', `What to do with ${shown.name}`);
-    this.numbers.show(contact, shown.tangential, shown.location_limit_mm);
+    const truth = this.timeline.behind_s === null ? shown.truth : null;
+    this.numbers.show(contact, shown.tangential, shown.location_limit_mm, truth);
     if (hand && hand.element.parentElement !== this.handPlace) {
       this.handPlace.replaceChildren(hand.element);
     }

@@ -1,0 +1,109 @@
+"""mould.svg and its table of measures: the base plate around the sensors, the skin's mould, and the frame that clamps the skin.
+
+All follows from the sensors' places and the choices below. None of it was made yet.
+"""
+import dataclasses
+
+from geometry import PACKAGE_HIGH_mm, PACKAGE_mm
+from sheet import across, circle, cross, down, rectangle, ruler, sheet, text
+
+RUBBER_mm = 12.0      # above the sensors: the layer of most figures in host_tools/report
+OVERHANG_mm = 9.0     # of rubber beyond the outer sensors: three quarters of its thickness (host_tools/README.md, "Tangential load")
+FLANGE_mm = 5.0       # of the skin, all around, under the frame
+FLANGE_HIGH_mm = 3.0
+SQUEEZED = 0.1        # share of its height that the frame takes from the flange
+HOLE_PLAY_mm = 0.2    # around a sensor
+FRAME_PLAY_mm = 0.3   # around the skin, each side
+RIM_mm = 6.0          # of frame and base plate around the flange, for the screws
+SCREW_mm = 3.2        # hole of an M3
+LID_mm = 3.0          # of the frame above the flange
+WALL_mm = 5.0         # of the mould
+DRAWN_APART_mm = 12.0
+
+
+@dataclasses.dataclass
+class Measures:
+    skin: tuple    # width, length of the rubber that is touched
+    flange: tuple  # with the flange
+    outside: tuple  # of base plate and frame
+    opening: tuple  # of the frame
+    screws: list   # places of the holes
+    hole_mm: float
+    ring_mm: float  # height of the frame's ring around the flange
+    volume_ml: float
+
+
+def measures(sensors):
+    reach = [max(abs(place[axis]) for place in sensors) for axis in (0, 1)]
+    skin = tuple(2 * (mm + OVERHANG_mm) for mm in reach)
+    flange = tuple(mm + 2 * FLANGE_mm for mm in skin)
+    outside = tuple(mm + 2 * RIM_mm for mm in flange)
+    x, y = ((mm + RIM_mm) / 2 for mm in flange)
+    volume_mm3 = skin[0] * skin[1] * (RUBBER_mm - FLANGE_HIGH_mm) + flange[0] * flange[1] * FLANGE_HIGH_mm
+    return Measures(skin, flange, outside, tuple(mm + 2 * FRAME_PLAY_mm for mm in skin), [(sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 0, 1)],
+                    PACKAGE_mm + HOLE_PLAY_mm, FLANGE_HIGH_mm * (1 - SQUEEZED), volume_mm3 / 1000)
+
+
+def table(sensors):
+    """Markdown."""
+    m = measures(sensors)
+    size = "{:g} x {:g} mm".format
+    rows = [("base plate", f"{size(*m.outside)}, {PACKAGE_HIGH_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
+            ("rubber that is touched", f"{size(*m.skin)}, {RUBBER_mm:g} mm thick: {OVERHANG_mm:g} mm beyond the outer sensors"),
+            ("its flange", f"{size(*m.flange)}, {FLANGE_HIGH_mm:g} mm thick, at the sensors"),
+            ("mould of the skin", f"the same hollow, face down, in a block of {size(*(mm + 2 * WALL_mm for mm in m.flange))}, {RUBBER_mm + WALL_mm:g} mm high, open above"),
+            ("rubber in it", f"{m.volume_ml:.0f} ml"),
+            ("frame", f"{size(*m.outside)}; its ring around the flange {m.ring_mm:g} mm high, its lid {LID_mm:g} mm with an opening of {size(*m.opening)}"),
+            ("screws", f"{len(m.screws)} M3, {2 * m.screws[-1][0]:g} mm apart across and {m.screws[-1][1]:g} mm along; holes of {SCREW_mm:g} mm"),
+            ("walls to cast on", f"inside {size(*m.skin)}, {RUBBER_mm:g} mm high, on the base plate")]
+    return "\n".join(["| part | measures |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)]) + "\n"
+
+
+def plate(x, y, m, sensors):
+    lines = [rectangle(x, y, *m.outside), text(x - m.outside[0] / 2, y - m.outside[1] / 2 - 5, "base plate")]
+    lines += [circle(x + sx, y + sy, SCREW_mm) for sx, sy in m.screws]
+    for k, (sx, sy) in enumerate(sensors):
+        lines += [rectangle(x + sx, y - sy, m.hole_mm, m.hole_mm), cross(x + sx, y - sy, 0.6), text(x + sx + 2.2, y - sy - 2, k)]
+    return lines + across(x - m.outside[0] / 2, y - m.outside[1] / 2 - 1.5, m.outside[0], f"{m.outside[0]:g}")
+
+
+def frame(x, y, m):
+    lines = [rectangle(x, y, *m.outside), rectangle(x, y, *m.opening), rectangle(x, y, *(mm + 2 * FRAME_PLAY_mm for mm in m.flange)),
+             text(x - m.outside[0] / 2, y - m.outside[1] / 2 - 5, "frame, from below")]
+    lines += [circle(x + sx, y + sy, SCREW_mm) for sx, sy in m.screws]
+    lines += across(x - m.opening[0] / 2, y - m.opening[1] / 2 + 4, m.opening[0], f"{m.opening[0]:g}")
+    return lines + down(x - m.opening[0] / 2 + 4, y - m.opening[1] / 2, m.opening[1], f"{m.opening[1]:g}")
+
+
+def hollow(x, y, m):
+    outside = tuple(mm + 2 * WALL_mm for mm in m.flange)
+    lines = [rectangle(x, y, *outside), rectangle(x, y, *m.flange), rectangle(x, y, *m.skin),
+             text(x - outside[0] / 2, y - outside[1] / 2 - 5, "mould of the skin, from above")]
+    lines += across(x - m.flange[0] / 2, y - outside[1] / 2 - 1.5, m.flange[0], f"{m.flange[0]:g}")
+    lines += across(x - m.skin[0] / 2, y - m.skin[1] / 2 + 4, m.skin[0], f"{m.skin[0]:g}")
+    return lines + down(x - m.skin[0] / 2 + 4, y - m.skin[1] / 2, m.skin[1], f"{m.skin[1]:g}")
+
+
+def section(x, base_y, m, sensors):
+    """Across the pad, assembled; base_y: the upper side of the base plate."""
+    half, flange, outside = m.skin[0] / 2, m.flange[0] / 2, m.outside[0] / 2
+    lines = [text(x - outside, base_y - RUBBER_mm - 5, "section, assembled: skin, frame, base plate")]
+    lines.append(rectangle(x, base_y + PACKAGE_HIGH_mm / 2, 2 * outside, PACKAGE_HIGH_mm))
+    for sx in sorted({sx for sx, _ in sensors}):
+        lines.append(rectangle(x + sx, base_y + PACKAGE_HIGH_mm / 2, PACKAGE_mm, PACKAGE_HIGH_mm, "cut"))
+    high, low = RUBBER_mm, m.ring_mm
+    lines.append(f'  <path class="cut" d="M{x - flange:g} {base_y:g}v{-low:g}h{flange - half:g}v{low - high:g}h{2 * half:g}v{high - low:g}h{flange - half:g}v{low:g}z"/>')
+    for side in (-1, 1):
+        at = x + side * outside
+        lines.append(f'  <path d="M{at:g} {base_y:g}v{-(low + LID_mm):g}H{x + side * m.opening[0] / 2:g}v{LID_mm:g}H{x + side * (flange + FRAME_PLAY_mm):g}v{low:g}z"/>')
+    lines += down(x + half - 6, base_y - high, high, f"{high:g}") + across(x - half, base_y - high + 3, 2 * half, f"{m.skin[0]:g}")
+    return lines + down(x + outside + 2, base_y - low, low, f"{low:g}")
+
+
+def drawn(sensors):
+    m = measures(sensors)
+    step_x, step_y = m.outside[0] + DRAWN_APART_mm, m.outside[1] + DRAWN_APART_mm + 4
+    lines = plate(0, 0, m, sensors) + frame(step_x, 0, m) + hollow(0, step_y, m) + section(step_x, step_y - 10, m, sensors)
+    lines += ruler(step_x - m.outside[0] / 2, step_y + 14)
+    left, top = -m.outside[0] / 2 - 8, -m.outside[1] / 2 - 10
+    return sheet("Base plate, mould and frame, 1:1", left, top, step_x + m.outside[0] + 16, step_y + m.outside[1] + 16, lines)

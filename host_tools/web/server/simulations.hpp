@@ -1,0 +1,57 @@
+/* Lets the page reach the fingertips of `fingertip simulate`, which no browser finds: their ports are
+ * pseudo-terminals. Simulated ones only; real ones stay the browser's own affair.
+ *
+ *   GET  /simulated                        [{"serial": ..., "hand": true}]; hand: one is obeyed (--mouse)
+ *   GET  /simulated/line?serial=&client=   what the fingertip says, without end. client: 8 to 32
+ *                                          hexadecimal digits of the page's own, new for each
+ *   POST /simulated/line?client=           bytes for the fingertip
+ *   POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or nothing; the answer is
+ *                                          what is true: {"t_us", "x_mm", "y_mm", "force_N", "qx_N",
+ *                                          "qy_N"}, or {} before anything is known
+ *
+ * Requests are those of the page itself: one that another site makes is refused with 403. A client
+ * is gone when its line is, and what its hand pressed is lifted then. Errors are one sentence, of
+ * status 4xx.
+ *
+ * A line takes a thread of the server's as long as it is open; MOST_LINES at a time. */
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+namespace httplib {
+class Server;
+struct Request;
+struct Response;
+} // namespace httplib
+
+namespace fingertip {
+
+class Simulations {
+public:
+  static constexpr std::size_t MOST_LINES = 16;
+
+  Simulations();
+  ~Simulations();
+
+  void serve(httplib::Server &server);
+  /* Whether it is one of the paths above. */
+  static bool is_for(const std::string &path);
+  /* Whether the page itself asks, or no browser. */
+  static bool is_from_page(const httplib::Request &request);
+
+private:
+  class Session;
+
+  void open_line(const httplib::Request &request, httplib::Response &response);
+  void send(const httplib::Request &request, httplib::Response &response);
+  void hand(const httplib::Request &request, httplib::Response &response);
+  std::shared_ptr<Session> session(const httplib::Request &request, httplib::Response &response);
+
+  std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<Session>> sessions_; /* by client */
+};
+
+} // namespace fingertip

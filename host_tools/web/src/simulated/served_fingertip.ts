@@ -1,0 +1,148 @@
+/**
+ * A fingertip of `fingertip simulate` on this computer, which the server of the page, `fingertip
+ * web`, passes on (host_tools/web/server/simulations.hpp). Simulated figures, all of them.
+ */
+import type { Line } from '../line/line';
+
+/** As `fingertip simulate` has it, some 30 ms old. */
+export interface ServedTruth {
+  contact: boolean;
+  x_mm: number;
+  y_mm: number;
+  force_N: number;
+  qx_N: number;
+  qy_N: number;
+}
+
+export interface Served {
+  serial: string;
+  /** A hand is obeyed: it was started with --mouse. */
+  hand: boolean;
+}
+
+const NOTHING: ServedTruth = { contact: false, x_mm: 0, y_mm: 0, force_N: 0, qx_N: 0, qy_N: 0 };
+const ASK_ms = 33;
+
+const at = (path: string, query: Record<string, string> = {}): string => {
+  const url = new URL(path, document.baseURI);
+  Object.entries(query).forEach(([name, value]) => url.searchParams.set(name, value));
+  return url.href;
+};
+
+/** Those that run now. null: this server knows none, now and later. Throws where it does not answer. */
+export async function findServed(): Promise<Served[] | null> {
+  const answer = await fetch(at('simulated'));
+  const isList = answer.ok && (answer.headers.get('content-type') ?? '').startsWith('application/json');
+  return isList ? ((await answer.json()) as Served[]) : null;
+}
+
+export class ServedFingertip implements Line {
+  readonly label: string;
+  truth: ServedTruth = NOTHING;
+  /** A ball of 15 mm, on rubber of 12 mm: where it is, and how hard; null lifts. */
+  readonly press: ((hand: { x_mm: number; y_mm: number; force_N: number } | null) => void) | undefined;
+
+  private readonly client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) =>
+    byte.toString(16).padStart(2, '0'),
+  ).join('');
+  private readonly aborter = new AbortController();
+  private timer: ReturnType<typeof setInterval> | null = null;
+  private asking = false;
+  private command = '';
+
+  constructor(readonly served: Served) {
+    this.label = `simulated ${served.serial.slice(-4)}`;
+    this.press = served.hand
+      ? (hand) => {
+          this.command = hand
+            ? ['press', ...[hand.x_mm, hand.y_mm, hand.force_N].map((value) => value.toFixed(3))].join(' ')
+            : 'lift';
+          void this.ask();
+        }
+      : undefined;
+  }
+
+  async open(
+    receive: (bytes: Uint8Array, at_ms: number) => void,
+    closed: (why: string) => void,
+  ): Promise<void> {
+    const query = { serial: this.served.serial, client: this.client };
+    const answer = await fetch(at('simulated/line', query), { signal: this.aborter.signal });
+    if (!answer.ok || !answer.body) {
+      throw new Error(`the simulated fingertip cannot be reached: ${(await answer.text()).trim()}`);
+    }
+    this.timer = setInterval(() => void this.ask(), ASK_ms);
+    void this.read(answer.body.getReader(), receive, closed);
+  }
+
+  async send(bytes: Uint8Array): Promise<void> {
+    const answer = await this.post('simulated/line', bytes.slice());
+    if (!answer.ok) {
+      throw new Error((await answer.text()).trim());
+    }
+  }
+
+  close(): Promise<void> {
+    this.end();
+    this.aborter.abort();
+    return Promise.resolve();
+  }
+
+  private async read(
+    reader: ReadableStreamDefaultReader<Uint8Array>,
+    receive: (bytes: Uint8Array, at_ms: number) => void,
+    closed: (why: string) => void,
+  ): Promise<void> {
+    try {
+      for (;;) {
+        const { value, done } = await reader.read();
+        if (done) {
+          break;
+        }
+        receive(value, performance.now());
+      }
+    } catch {
+      // The server has ended, or close() was called.
+    }
+    this.end();
+    if (!this.aborter.signal.aborted) {
+      closed('the simulation has ended: start "fingertip simulate" again and it comes back by itself');
+    }
+  }
+
+  private post(path: string, body: BodyInit): Promise<Response> {
+    return fetch(at(path, { client: this.client }), { method: 'POST', body });
+  }
+
+  /** What the hand does, and what is true; one request at a time, so a slow server gets the newest. */
+  private async ask(): Promise<void> {
+    if (this.asking) {
+      return;
+    }
+    this.asking = true;
+    const command = this.command;
+    this.command = '';
+    try {
+      const answer = await this.post('simulated/hand', command);
+      if (answer.ok && this.timer !== null) {
+        const told = (await answer.json()) as Partial<ServedTruth>;
+        const { force_N = 0 } = told;
+        this.truth = { ...NOTHING, ...told, contact: force_N > 0 };
+      }
+    } catch {
+      // The line says that the server has ended.
+    }
+    this.asking = false;
+    if (this.command !== '' && this.timer !== null) {
+      void this.ask();
+    }
+  }
+
+  private end(): void {
+    if (this.timer !== null) {
+      clearInterval(this.timer);
+    }
+    this.timer = null;
+    this.truth = NOTHING;
+  }
+}

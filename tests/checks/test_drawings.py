@@ -1,0 +1,150 @@
+"""What boards/drawing draws: it follows the descriptor and the geometry, as the firmware does, and refuses what cannot be wired.
+
+usage: test_drawings.py HEADERS [unittest arguments]; HEADERS: folder where the build has written <board>/board.h
+"""
+import contextlib
+import copy
+import io
+import json
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "boards/drawing"))
+import draw  # noqa: E402
+import geometry  # noqa: E402
+import mould  # noqa: E402
+import wiring  # noqa: E402
+
+HEADERS = pathlib.Path(sys.argv[1])
+DESCRIPTORS = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in sorted(ROOT.glob("boards/*/board.json"))}
+BY_BUS = {descriptor["bus"]: (name, descriptor) for name, descriptor in DESCRIPTORS.items()}
+
+
+def wired(bus, **wires):
+    name, descriptor = copy.deepcopy(BY_BUS[bus])
+    descriptor["wiring"] |= wires
+    return wiring.board_of(name, descriptor)
+
+
+def pins_drawn(board):
+    """[(GPIO, pin)] of the picture."""
+    found = re.findall(r">GP(\d+)[^<]*</text>\s*<text[^>]*>pin (\d+)<", wiring.drawn(board))
+    return [(int(gpio), int(pin)) for gpio, pin in found]
+
+
+class Wiring(unittest.TestCase):
+    def test_picture_and_table_have_every_wire_of_the_descriptor(self):
+        for bus in BY_BUS:
+            board = wired(bus)
+            drawn = pins_drawn(board)
+            self.assertEqual([gpio for gpio, _ in drawn], wiring.gpios(board), bus)
+            table = wiring.table(board)
+            for gpio, pin in drawn:
+                self.assertIn(f"GP{gpio} (pin {pin})", table)
+
+    def test_the_firmware_has_the_pins_that_are_drawn(self):
+        for bus, (name, _) in BY_BUS.items():
+            board = wired(bus)
+            told = {key.lower(): int(value, 0) for key, value in re.findall(r"BOARD_(\w+) = (\w+),", (HEADERS / name / "board.h").read_text(encoding="utf-8"))}
+            self.assertEqual({key: value if isinstance(value, int) else int(value, 0) for key, value in board.wiring.items()}, told)
+            pins = [gpio for gpio, _ in pins_drawn(board)]
+            for key, gpio in told.items():
+                if key.startswith("pin_"):
+                    self.assertIn(gpio, pins, (name, key))
+
+    def test_a_wire_that_moves_in_the_descriptor_moves_in_both(self):
+        board = wired("multiplexed", pin_sda=12, pin_scl=13, pin_mux_reset_0=18, mux_address_0="0x74")
+        self.assertEqual(pins_drawn(board), [(12, 16), (13, 17), (18, 24), (19, 25), (20, 26), (22, 29)])
+        for text in ("GP12 (pin 16) | SDA", "GP20 (pin 26) | RESET of the TCA9548A of strip 2", "| 1 | 0x75 | 3V3, GND, 3V3 | 0 to 4"):
+            self.assertIn(text, wiring.table(board))
+        self.assertIn("0x76, A2 to A0: 3V3 3V3 GND", wiring.drawn(board))
+        board = wired("parallel", pin_scl=17, pin_sync=28)
+        self.assertEqual(pins_drawn(board)[-2:], [(17, 22), (28, 34)])
+
+    def test_other_counts_of_sensors(self):
+        board = wired("multiplexed", sensor_count=8, sensors_of_strip=4)
+        self.assertEqual(board.strips, 2)
+        self.assertEqual(wiring.drawn(board).count(">MS5840 "), 8)
+        self.assertEqual([count for count, part, _ in wiring.parts(board) if part in ("sensor", "multiplexer", "capacitor")], [8, 2, 10])
+
+    def test_what_it_refuses(self):
+        for words, wires in (("GPIO 5 has two wires", {"pin_sda": 5}), ("a Pico has no pin for GPIO 23", {"pin_sync": 23}),
+                             ("a TCA9548A has 8 channels", {"sensors_of_strip": 9})):
+            with self.assertRaisesRegex(wiring.Unwired, words):
+                wired("multiplexed", **wires)
+        name, descriptor = copy.deepcopy(BY_BUS["parallel"])
+        del descriptor["pull_ups_ohm"]["scl"]
+        with self.assertRaisesRegex(wiring.Unwired, "pull_ups_ohm has no scl; add its resistance"):
+            wiring.board_of(name, descriptor)
+        with self.assertRaisesRegex(wiring.Unwired, "no drawing knows the bus semaphore"):
+            wiring.board_of(name, {**descriptor, "bus": "semaphore"})
+
+    def test_numbers_of_resistors(self):
+        self.assertEqual([draw.yageo(ohm) for ohm in (33, 4.7, 1000, 2200, 3300, 10000)], ["33R", "4R7", "1K", "2K2", "3K3", "10K"])
+
+
+class Pad(unittest.TestCase):
+    def test_the_measures_follow_the_places(self):
+        sensors = geometry.places()
+        m = mould.measures(sensors)
+        wider = mould.measures([(x * 2, y) for x, y in sensors])
+        reach = max(x for x, _ in sensors)
+        for name in ("skin", "flange", "outside", "opening"):
+            self.assertAlmostEqual(getattr(wider, name)[0] - getattr(m, name)[0], 2 * reach)
+            self.assertEqual(getattr(wider, name)[1], getattr(m, name)[1])
+        self.assertNotEqual(mould.drawn(sensors), mould.drawn([(x * 2, y) for x, y in sensors]))
+
+    def test_nothing_is_where_a_screw_is(self):
+        m = mould.measures(geometry.places())
+        for x, y in m.screws:
+            radius = mould.SCREW_mm / 2
+            self.assertTrue(abs(x) - radius > m.flange[0] / 2 + mould.FRAME_PLAY_mm or abs(y) - radius > m.flange[1] / 2 + mould.FRAME_PLAY_mm)
+            self.assertLess(abs(x) + radius, m.outside[0] / 2)
+            self.assertLess(abs(y) + radius, m.outside[1] / 2)
+
+
+class Tree(unittest.TestCase):
+    def setUp(self):
+        holder = tempfile.TemporaryDirectory()
+        self.addCleanup(holder.cleanup)
+        self.tree = pathlib.Path(holder.name)
+        for folder in ("boards", "firmware"):
+            shutil.copytree(ROOT / folder, self.tree / folder)
+
+    def told(self, *argv):
+        err = io.StringIO()
+        with contextlib.redirect_stderr(err):
+            status = draw.main(list(argv), self.tree)
+        return status, err.getvalue()
+
+    def test_says_what_was_not_drawn_again(self):
+        self.assertEqual(self.told("--check"), (0, ""))
+        name, descriptor = copy.deepcopy(BY_BUS["multiplexed"])
+        descriptor["wiring"]["pin_sync"] = 21
+        (self.tree / "boards" / name / "board.json").write_text(json.dumps(descriptor))
+        status, err = self.told("--check")
+        self.assertEqual(status, 1)
+        self.assertEqual([line.split()[0] for line in err.splitlines()], [f"boards/{name}/wiring.svg", f"boards/{name}/README.md"])
+        self.assertEqual(self.told(), (0, ""))
+        self.assertEqual(self.told("--check"), (0, ""))
+        source = self.tree / "firmware/config/geometry.c"
+        source.write_text(source.read_text().replace("{-9, -9", "{-10, -9", 1))
+        status, err = self.told("--check")
+        self.assertEqual([line.split()[0] for line in err.splitlines()], ["boards/placement.svg", "boards/mould.svg", "boards/BUILD.md"])
+
+    def test_a_page_without_a_place(self):
+        page = self.tree / "boards/BUILD.md"
+        page.write_text(page.read_text().replace("<!-- /measures -->", ""))
+        status, err = self.told("--check")
+        self.assertEqual(status, 1)
+        self.assertIn('no place for "measures"', err)
+        self.assertEqual(self.told("--chekc")[0], 2)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[2:]], verbosity=2)
