@@ -15,14 +15,15 @@ import subprocess
 import sys
 import unittest
 
-KERNELS = ["grid", "masked", "general", "tangential", "load"]  # the order of enum fit_bits_kernel
-PRESSES = dict.fromkeys(KERNELS, 10000)  # fit_bits_presses
+KERNELS = ["grid", "masked", "general", "tangential", "load", "shapes"]  # the order of enum fit_bits_kernel
+PRESSES = dict.fromkeys(KERNELS, 10000) | {"shapes": 2000}  # fit_bits_presses
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
 
 
 def presses_in_emulator():
-    return {kernel: min(presses, TOOLS.in_emulator) for kernel, presses in PRESSES.items()} | {"general": 200}
+    return {kernel: min(presses, TOOLS.in_emulator) for kernel, presses in PRESSES.items()} | {
+        "general": 200, "shapes": min(PRESSES["shapes"], TOOLS.in_emulator // 5)}
 
 
 def output_of(*command):
