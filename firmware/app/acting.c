@@ -1,5 +1,6 @@
 #include "app/acting.h"
 
+#include "app/working.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
 
@@ -15,6 +16,16 @@ static float millimetres(uint16_t length_um) {
   return 1e-3f * (float)length_um;
 }
 
+static const struct calibration *with_shape(const struct app *app) {
+  return DEFAULT_USES_SHAPE ? app->calibration : NULL;
+}
+
+void app_set_dip(const struct app *app, struct fit_settings *settings) {
+  const struct calibration *found = with_shape(app);
+  settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
+  settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
+}
+
 void app_use_shape(struct app *app) {
   struct fit_settings *settings = &app->fit_settings;
   bool is_set = app->set_sigma_sd_mm > 0.0f;
@@ -22,13 +33,15 @@ void app_use_shape(struct app *app) {
 #if FT_WITH_TANGENTIAL
   profile = app->pad != NULL;
 #endif
-  const struct calibration *found = DEFAULT_USES_SHAPE && !profile ? app->calibration : NULL;
+  const struct calibration *found = profile ? NULL : with_shape(app);
   settings->prior_sigma_mm =
       is_set ? app->set_sigma_mm : found ? millimetres(found->sigma_um) : 0.0f;
   settings->prior_width_mm =
       is_set ? app->set_sigma_sd_mm : found ? millimetres(found->sigma_sd_um) : 0.0f;
-  settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
-  settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
+  settings->dip_share = settings->dip_sd_mm = 0.0f;
+  if (found) {
+    app_set_dip(app, settings);
+  }
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
 }
 
@@ -41,11 +54,16 @@ static void use_tangential_scales(struct app *app) {
 }
 
 void app_use_pad(struct app *app, const struct pad_profile *pad) {
+  if (!worker_is_free(&app->shapes_worker)) {
+    working_start(app); /* the job has the profile of before */
+  }
   bool acts = pad && fit_pad_init(&app->tangential_job.pad, &app->fit_array, pad) == FT_OK;
+  app->shapes_act = acts && fit_shapes_init(&app->shapes_job.pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
   app_use_shape(app);
   use_tangential_scales(app);
   app->tangential_follows = false;
+  app->shapes_begin = true;
   tangential_reset(&app->tangential_history);
   motion_reset(&app->motion_history);
 }

@@ -62,6 +62,20 @@ void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = tr
   visit("tangential_ratio", Quantity{contact.tangential_ratio, (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0});
   visit("vx_mm_s", Quantity{contact.vx_mm_s, (contact.flags & CONTACT_FLAG_VELOCITY_VALID) != 0});
   visit("vy_mm_s", Quantity{contact.vy_mm_s, (contact.flags & CONTACT_FLAG_VELOCITY_VALID) != 0});
+  visit("shape_age_ms", Quantity{contact.shape_age_ms, (contact.flags & CONTACT_FLAG_SHAPE_VALID) != 0});
+  visit("x1_mm", Quantity{contact.x1_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("y1_mm", Quantity{contact.y1_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("location1_sd_mm", Quantity{contact.location1_sd_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force1_N", Quantity{contact.force1_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force1_sd_N", Quantity{contact.force1_sd_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("x2_mm", Quantity{contact.x2_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("y2_mm", Quantity{contact.y2_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("location2_sd_mm", Quantity{contact.location2_sd_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force2_N", Quantity{contact.force2_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force2_sd_N", Quantity{contact.force2_sd_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("edge_angle_deg", Quantity{contact.edge_angle_deg, (contact.flags & CONTACT_FLAG_EDGE) != 0});
+  visit("edge_angle_sd_deg", Quantity{contact.edge_angle_sd_deg, (contact.flags & CONTACT_FLAG_EDGE) != 0});
+  visit("edge_length_mm", Quantity{contact.edge_length_mm, (contact.flags & CONTACT_FLAG_EDGE) != 0});
 }
 
 template <typename Visitor>
@@ -264,6 +278,8 @@ inline constexpr Flag flags[] = {
     {CONTACT_FLAG_VELOCITY_VALID, "VELOCITY_VALID", false},
     {CONTACT_FLAG_MOVING, "MOVING", false},
     {CONTACT_FLAG_SLIDING, "SLIDING", false},
+    {CONTACT_FLAG_SHAPE_VALID, "SHAPE_VALID", false},
+    {CONTACT_FLAG_EDGE, "EDGE", false},
     {CONTACT_FLAG_LOW_SIGNAL, "LOW_SIGNAL", true},
     {CONTACT_FLAG_FLAT, "FLAT", true},
     {CONTACT_FLAG_UNCERTAIN, "UNCERTAIN", true},
@@ -276,6 +292,8 @@ inline constexpr Flag flags[] = {
     {CONTACT_FLAG_ZERO_DOUBTFUL, "ZERO_DOUBTFUL", true},
     {CONTACT_FLAG_SENSOR_DOUBTFUL, "SENSOR_DOUBTFUL", true},
     {CONTACT_FLAG_TANGENTIAL_LATE, "TANGENTIAL_LATE", true},
+    {CONTACT_FLAG_TWO_CONTACTS, "TWO_CONTACTS", true},
+    {CONTACT_FLAG_SHAPE_UNKNOWN, "SHAPE_UNKNOWN", true},
 };
 
 } // namespace fingertip::words

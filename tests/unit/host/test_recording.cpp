@@ -289,9 +289,11 @@ TEST(Recording, EarlierOnesAreRead) {
     if (packet.type == WIRE_CONTACT) {
       wire_contact &contact = packet.body.contact;
       contact.flags &=
-          ~static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID);
+          ~static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
+                                      CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE);
       contact.qx_N = contact.qy_N = contact.q_sd_N = contact.tangential_ratio = 0;
-      contact.vx_mm_s = contact.vy_mm_s = 0;
+      contact.vx_mm_s = contact.vy_mm_s = contact.shape_age_ms = 0;
+      contact.edge_angle_deg = contact.edge_angle_sd_deg = contact.edge_length_mm = 0;
     }
   }
   record(folder / "r.csv", expected);
@@ -309,7 +311,7 @@ TEST(Recording, EarlierOnesAreRead) {
       if (first == 0) {
         auto at = [&](const char *name) { return std::find(cells.begin(), cells.end(), name); };
         first = static_cast<std::size_t>(at("qx_N") - cells.begin());
-        columns = static_cast<std::size_t>(at("vy_mm_s") - at("qx_N")) + 1;
+        columns = static_cast<std::size_t>(at("edge_length_mm") - at("qx_N")) + 1;
       }
       cells.erase(cells.begin() + static_cast<std::ptrdiff_t>(first),
                   cells.begin() + static_cast<std::ptrdiff_t>(first + columns));
@@ -320,7 +322,7 @@ TEST(Recording, EarlierOnesAreRead) {
     }
     text += line + "\n";
   }
-  EXPECT_EQ(columns, 6u);
+  EXPECT_EQ(columns, 20u);
   write(folder / "earlier.csv", text);
   EXPECT_EQ(frames_of(read_all(folder / "earlier.csv")), frames_of(expected));
 }
