@@ -54,16 +54,12 @@ static void use_tangential_scales(struct app *app) {
 }
 
 void app_use_pad(struct app *app, const struct pad_profile *pad) {
-  if (!worker_is_free(&app->shapes_worker)) {
-    working_start(app); /* the job has the profile of before */
-  }
+  working_forget(app);
   bool acts = pad && fit_pad_init(&app->tangential_job.pad, &app->fit_array, pad) == FT_OK;
   app->shapes_act = acts && fit_shapes_init(&app->shapes_job.pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
   app_use_shape(app);
   use_tangential_scales(app);
-  app->tangential_follows = false;
-  app->shapes_begin = true;
   tangential_reset(&app->tangential_history);
   motion_reset(&app->motion_history);
 }

@@ -180,9 +180,9 @@ static bool is_sensor_doubtful(const struct app *app) {
   return (app->frame.doubtful & app->conditioned.usable) != 0;
 }
 
-static void judge_frame(struct app *app) {
+static struct contact_input input_of(const struct app *app) {
   const struct frame *frame = &app->frame;
-  const struct contact_input input = {
+  return (struct contact_input){
     .t_us = frame->t_us,
     .contact = app->conditioned.contact,
     .tared = app->conditioned.tared,
@@ -198,6 +198,11 @@ static void judge_frame(struct app *app) {
     .tangential = app->tangential,
 #endif
   };
+}
+
+/* What the load changes nothing of. */
+static void judge_fit(struct app *app) {
+  const struct contact_input input = input_of(app);
 #if FT_WITH_FIT
   app->force = contact_weigh(&app->contact_settings, &app->fit);
 #endif
@@ -206,7 +211,12 @@ static void judge_frame(struct app *app) {
 #else
   contact_judge(&input, &app->contact);
 #endif
+}
+
 #if FT_WITH_TANGENTIAL
+static void judge_load(struct app *app) {
+  const struct contact_input input = input_of(app);
+  app->contact.flags |= app->fit.flags & CONTACT_FLAG_UNCERTAIN; /* by now it may be doubted */
   app->tangential_settings.location_sd_limit_mm = app->fit_settings.location_sd_limit_mm;
   tangential_update(&app->tangential_history, &app->tangential_settings, &input, &app->contact,
                     &app->load);
@@ -214,8 +224,8 @@ static void judge_frame(struct app *app) {
                 &app->motion);
   app->contact.flags |= shapes_flags(&app->shapes);
   app->contact.flags |= app->tangential_is_late ? (uint32_t)CONTACT_FLAG_TANGENTIAL_LATE : 0;
-#endif
 }
+#endif
 
 /* A sensor whose supply dipped reads some 17 kPa less until it is reset. What tells that is its
  * temperature, which is to be looked at before the zero gives in (condition.h). */
@@ -247,7 +257,9 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   if (!frame->held) {
     fit_frame(app);
 #if FT_WITH_TANGENTIAL
-    working_estimate(app);
+    working_ask(app);
+    judge_fit(app);
+    working_wait(app);
 #endif
 #if FT_WITH_LOAD_DOUBT
     doubt_load(app);
@@ -260,7 +272,11 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     app->contact.flags |= CONTACT_FLAG_HELD;
     app->contact.flags |= is_sensor_doubtful(app) ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
   } else {
-    judge_frame(app);
+#if FT_WITH_TANGENTIAL
+    judge_load(app);
+#else
+    judge_fit(app);
+#endif
   }
   port_at(CRASH_AT_PACKET);
 #if FT_WITH_FIT

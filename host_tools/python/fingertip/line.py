@@ -683,8 +683,11 @@ CONTACT_COLUMNS = (
     "force_sd_N", "sigma_x_mm", "sigma_y_mm", "width_correlation", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us",
     "total_us")
 TANGENTIAL_COLUMNS = ( # NaN in recordings of before there were any
-    "qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s", "shape_age_ms", "x1_mm", "y1_mm", "location1_sd_mm", "force1_N",
-    "force1_sd_N", "x2_mm", "y2_mm", "location2_sd_mm", "force2_N", "force2_sd_N", "edge_angle_deg", "edge_angle_sd_deg", "edge_length_mm")
+    "qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s")
+SHAPE_COLUMNS = ( # NaN in recordings of before there were any
+    "shape_age_ms", "x1_mm", "y1_mm", "location1_sd_mm", "force1_N", "force1_sd_N", "x2_mm", "y2_mm", "location2_sd_mm", "force2_N",
+    "force2_sd_N", "edge_angle_deg", "edge_angle_sd_deg", "edge_length_mm")
+LATER_COLUMNS = (*TANGENTIAL_COLUMNS, *SHAPE_COLUMNS)
 RAW_COLUMNS = (
     "raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
 INFO_KEYS = (
