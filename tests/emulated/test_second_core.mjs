@@ -13,7 +13,7 @@ import { CrashBench, split } from './harness/crash_bench.mjs';
 const [folder, fingertip, command_frame] = process.argv.slice(2);
 const CONTACT = 0x01;
 // contact_flags.h
-const [HELD, TANGENTIAL_VALID, TANGENTIAL_LATE] = [1 << 6, 1 << 20, 1 << 25];
+const [HELD, TANGENTIAL_VALID, TANGENTIAL_LATE, SHAPE_VALID] = [1 << 6, 1 << 20, 1 << 25, 1 << 26];
 const EVENT_WORKER = 10; // crash.h
 const PRESS_s = 0.6;
 
@@ -55,13 +55,14 @@ class Bench extends CrashBench {
 
 const has = (frames, flag) => frames.filter(([, flags]) => flags & flag).length;
 
-test('core 1 estimates the load of every frame, while core 0 sleeps', () => {
+test('core 1 estimates the load of every frame and says what presses, while core 0 sleeps', () => {
   const bench = new Bench();
   const [second, first] = [bench.second.cycles, bench.machine.chip.core0.cycles];
   bench.run(100);
   const frames = bench.frames();
   assert.ok(frames.length > 125, `${frames.length}`);
   assert.equal(has(frames, TANGENTIAL_VALID), frames.length);
+  assert.equal(has(frames, SHAPE_VALID), frames.length);
   const share = (cycles) => cycles / (0.1 * 125e6);
   assert.ok(share(bench.second.cycles - second) > 0.3, 'it is busy');
   assert.ok(share(bench.machine.chip.core0.cycles - first) < 0.8, 'core 0 sleeps a fifth of the time');
@@ -102,7 +103,7 @@ test('a stack of core 1 that grows into its guard parks it', () => {
   const bench = new Bench();
   bench.until(() => bench.second.isAwake, 10, 'work of core 1');
   bench.received = [];
-  kill(bench, ({ core }) => (core.registers[13] = 0x20040004));
+  kill(bench, ({ core }) => (core.registers[13] = 0x2003fff0));
 });
 
 test('a reset by the watchdog ends core 1, and it is started again; the record tells that it had been late', () => {
