@@ -16,16 +16,6 @@ static float millimetres(uint16_t length_um) {
   return 1e-3f * (float)length_um;
 }
 
-static const struct calibration *with_shape(const struct app *app) {
-  return DEFAULT_USES_SHAPE ? app->calibration : NULL;
-}
-
-void app_set_dip(const struct app *app, struct fit_settings *settings) {
-  const struct calibration *found = with_shape(app);
-  settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
-  settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
-}
-
 void app_use_shape(struct app *app) {
   struct fit_settings *settings = &app->fit_settings;
   bool is_set = app->set_sigma_sd_mm > 0.0f;
@@ -33,15 +23,20 @@ void app_use_shape(struct app *app) {
 #if FT_WITH_TANGENTIAL
   profile = app->pad != NULL;
 #endif
-  const struct calibration *found = profile ? NULL : with_shape(app);
+  const struct calibration *found = DEFAULT_USES_SHAPE ? app->calibration : NULL;
+  const float dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
+  const float dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
+#if FT_WITH_TANGENTIAL
+  app->shapes_dip_share = dip_share;
+  app->shapes_dip_sd_mm = dip_sd_mm;
+#endif
+  found = profile ? NULL : found;
   settings->prior_sigma_mm =
       is_set ? app->set_sigma_mm : found ? millimetres(found->sigma_um) : 0.0f;
   settings->prior_width_mm =
       is_set ? app->set_sigma_sd_mm : found ? millimetres(found->sigma_sd_um) : 0.0f;
-  settings->dip_share = settings->dip_sd_mm = 0.0f;
-  if (found) {
-    app_set_dip(app, settings);
-  }
+  settings->dip_share = profile ? 0.0f : dip_share;
+  settings->dip_sd_mm = profile ? 0.0f : dip_sd_mm;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
 }
 

@@ -12,8 +12,6 @@ void app_use_calibration(struct app *app, const struct calibration *calibration)
  * a profile acts, those of the calibration are left out, for the tangential estimate was judged
  * without them. */
 void app_use_shape(struct app *app);
-/* The calibration's dip alone, whatever else acts; none: 0. */
-void app_set_dip(const struct app *app, struct fit_settings *settings);
 /* Doubts the calibration's force scale by how far the air is from that in which it was found. Now
  * and then; some 20 us. */
 void app_use_air(struct app *app);

@@ -1,6 +1,5 @@
 #include "app/working.h"
 
-#include "app/acting.h"
 #include "port/port.h"
 
 #include <string.h>
@@ -43,7 +42,8 @@ static void set_question(struct app *app, struct shapes_question *question) {
   memcpy(question->pressure_Pa_q10, app->conditioned.pressure_Pa_q10,
          sizeof question->pressure_Pa_q10);
   question->settings = app->fit_settings;
-  app_set_dip(app, &question->settings);
+  question->settings.dip_share = app->shapes_dip_share;
+  question->settings.dip_sd_mm = app->shapes_dip_sd_mm;
   question->fit = app->fit;
   question->force_scale = app->tangential_settings.force_scale;
   question->force_scale_sd = app->tangential_settings.force_scale_sd;
