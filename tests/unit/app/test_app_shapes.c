@@ -157,6 +157,13 @@ static void one_contact_is_one_with_a_load_or_without(void) {
     TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force1_N);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.edge_length_mm);
   }
+  /* A load that is estimated all the same is none of two contacts. */
+  app.shapes_job.report.shape = FIT_SHAPE_TWO;
+  app.frame.t_us += 3700;
+  app_process_frame(&app, app.frame.t_read_us);
+  TEST_ASSERT_TRUE(app.tangential_job.estimate.valid);
+  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID,
+                   CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS, app.contact.flags);
 }
 
 static void what_is_none_of_these_is_warned_of_all_the_time(void) {
@@ -198,6 +205,7 @@ static void each_answer_says_how_old_it_is(void) {
     /* One answer in four is none. */
     TEST_ASSERT_FLOAT_WITHIN(4.0f * frame_ms, 4.5f * frame_ms, contact->shape_age_ms);
   }
+  TEST_ASSERT_TRUE(app.shapes_job.progress != FIT_SHAPES_UNFINISHED);
   TEST_ASSERT_GREATER_OR_EQUAL(FIT_SHAPES_FRAMES, without);
   TEST_ASSERT_LESS_THAN(2 * FIT_SHAPES_FRAMES, without);
 }
