@@ -1,5 +1,6 @@
 /** Scene grasp on pico_parallel, held by a press of its pad: its second core, and what becomes of the frames when that is stopped. */
 import assert from 'node:assert/strict';
+import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
 import { parseScenario } from '../../../host_tools/simulation/emulator/scenario.mjs';
 import { HEADER } from './bench.mjs';
 import { CrashBench, split } from './crash_bench.mjs';
@@ -78,4 +79,28 @@ export function killedAt(folder, tools, count) {
     });
   }
   return { kills, reboots: bench.machine.reboots, lost: bench.lost, bench };
+}
+
+const PAUSE_ms = [25, 2000];
+/** Frames without a load in a row: one that says so, and those that a fresh estimate takes. */
+const WITHOUT_LOAD_MAX = 4;
+
+/** Kills core 1 now and then for so many hours: kills, frames, and what went wrong. */
+export function soaked(folder, tools, hours, seed = 1) {
+  const bench = new SecondCoreBench(folder, tools);
+  const random = new Prng(seed);
+  const end_ms = bench.now_ms + 3.6e6 * hours;
+  const found = { kills: 0, frames: 0, long_without_load: 0 };
+  let without = 0;
+  while (bench.now_ms < end_ms) {
+    bench.run(random.range(...PAUSE_ms));
+    for (const [, flags] of bench.frames()) {
+      found.frames += 1;
+      without = flags & TANGENTIAL_VALID ? 0 : without + 1;
+      found.long_without_load += without === WITHOUT_LOAD_MAX + 1 ? 1 : 0;
+    }
+    bench.second.powerDown();
+    found.kills += 1;
+  }
+  return { ...found, lost: bench.lost, reboots: bench.machine.reboots };
 }
