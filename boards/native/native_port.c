@@ -148,7 +148,8 @@ void port_sleep(void) {
   if (worker.due_us <= next_us) {
     pass_time_to(worker.due_us);
     worker.due_us = UINT64_MAX;
-    worker.serve(worker.context);
+    while (worker.serve(worker.context)) {
+    }
     return;
   }
   if (next_us == UINT64_MAX) {

@@ -1,5 +1,6 @@
 #include "app/acting.h"
 
+#include "app/working.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
 
@@ -22,13 +23,20 @@ void app_use_shape(struct app *app) {
 #if FT_WITH_TANGENTIAL
   profile = app->pad != NULL;
 #endif
-  const struct calibration *found = DEFAULT_USES_SHAPE && !profile ? app->calibration : NULL;
+  const struct calibration *found = DEFAULT_USES_SHAPE ? app->calibration : NULL;
+  const float dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
+  const float dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
+#if FT_WITH_TANGENTIAL
+  app->shapes_dip_share = dip_share;
+  app->shapes_dip_sd_mm = dip_sd_mm;
+#endif
+  found = profile ? NULL : found;
   settings->prior_sigma_mm =
       is_set ? app->set_sigma_mm : found ? millimetres(found->sigma_um) : 0.0f;
   settings->prior_width_mm =
       is_set ? app->set_sigma_sd_mm : found ? millimetres(found->sigma_sd_um) : 0.0f;
-  settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
-  settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
+  settings->dip_share = profile ? 0.0f : dip_share;
+  settings->dip_sd_mm = profile ? 0.0f : dip_sd_mm;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
 }
 
@@ -41,11 +49,12 @@ static void use_tangential_scales(struct app *app) {
 }
 
 void app_use_pad(struct app *app, const struct pad_profile *pad) {
+  working_forget(app);
   bool acts = pad && fit_pad_init(&app->tangential_job.pad, &app->fit_array, pad) == FT_OK;
+  app->shapes_act = acts && fit_shapes_init(&app->shapes_job.pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
   app_use_shape(app);
   use_tangential_scales(app);
-  app->tangential_follows = false;
   tangential_reset(&app->tangential_history);
   motion_reset(&app->motion_history);
 }

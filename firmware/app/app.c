@@ -4,6 +4,7 @@
 #include "app/commands.h"
 #include "app/packets.h"
 #include "app/sync.h"
+#include "app/working.h"
 #include "common/contact_flags.h"
 #include "config/build_info.h"
 #include "config/defaults.h"
@@ -51,31 +52,6 @@ void app_on_event(struct app *app) {
   }
 }
 
-#if FT_WITH_TANGENTIAL
-static bool serve(void *worker) {
-  return worker_serve(worker);
-}
-
-static void start_worker(struct app *app) {
-  port_worker_stop(); /* in whatever it may be at: the job is free */
-  worker_init(&app->worker, tangential_estimate, &app->tangential_job);
-  app->has_worker = port_worker_start(serve, &app->worker);
-}
-
-/* Whether there is one. The processor sleeps meanwhile. */
-static bool wait_for_answer(struct app *app, uint32_t limit_us) {
-  const uint64_t asked_us = port_now_us();
-  uint64_t now_us = asked_us;
-  port_worker_wake();
-  while (!worker_is_free(&app->worker) && now_us - asked_us < limit_us) {
-    port_sleep();
-    now_us = port_now_us();
-  }
-  app->asleep_us += now_us - asked_us;
-  return worker_is_free(&app->worker);
-}
-#endif
-
 void app_start(struct app *app, const struct array_bus *bus) {
   memset(app, 0, sizeof *app);
   const struct scan_settings scan_settings = {
@@ -104,7 +80,8 @@ void app_start(struct app *app, const struct array_bus *bus) {
 #endif
 #if FT_WITH_TANGENTIAL
   app->tangential_job.array = &app->fit_array;
-  start_worker(app);
+  app->shapes_job.array = &app->fit_array;
+  working_start(app);
 #endif
 #if FT_WITH_SLIP
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
@@ -146,36 +123,6 @@ static void fit_frame(struct app *app) {
   if (!(app->fit.flags & CONTACT_FLAG_FIT_VALID)) {
     app->fit_failures++;
   }
-}
-#endif
-
-#if FT_WITH_TANGENTIAL
-static void estimate_tangential_load(struct app *app) {
-  const bool asks = app->pad && app->conditioned.contact;
-  bool answered = false;
-  if (asks) {
-    const uint64_t last_us = app->tangential_job.question.t_us;
-    const bool slow = app->frame.t_us - last_us >= TANGENTIAL_SLOW_us;
-    app->tangential_job.question = (struct tangential_question){
-        .begins = !app->tangential_follows,
-        .saturated = app->frame.saturated,
-        .t_us = app->frame.t_us,
-        .pressure_Pa_q10 = app->conditioned.pressure_Pa_q10,
-        .settings = &app->fit_settings,
-        .fit = &app->fit,
-    };
-    worker_ask(&app->worker);
-    answered = app->has_worker
-                   ? wait_for_answer(app, slow ? TANGENTIAL_SLOW_LATE_us : TANGENTIAL_LATE_us)
-                   : worker_serve(&app->worker);
-    if (!answered) {
-      port_event(CRASH_EVENT_WORKER, 0);
-      start_worker(app);
-    }
-  }
-  app->tangential = answered ? &app->tangential_job.estimate : NULL;
-  app->tangential_is_late = asks && !answered;
-  app->tangential_follows = answered;
 }
 #endif
 
@@ -233,9 +180,9 @@ static bool is_sensor_doubtful(const struct app *app) {
   return (app->frame.doubtful & app->conditioned.usable) != 0;
 }
 
-static void judge_frame(struct app *app) {
+static struct contact_input input_of(const struct app *app) {
   const struct frame *frame = &app->frame;
-  const struct contact_input input = {
+  return (struct contact_input){
     .t_us = frame->t_us,
     .contact = app->conditioned.contact,
     .tared = app->conditioned.tared,
@@ -251,6 +198,11 @@ static void judge_frame(struct app *app) {
     .tangential = app->tangential,
 #endif
   };
+}
+
+/* What the load changes nothing of. */
+static void judge_fit(struct app *app) {
+  const struct contact_input input = input_of(app);
 #if FT_WITH_FIT
   app->force = contact_weigh(&app->contact_settings, &app->fit);
 #endif
@@ -259,15 +211,21 @@ static void judge_frame(struct app *app) {
 #else
   contact_judge(&input, &app->contact);
 #endif
+}
+
 #if FT_WITH_TANGENTIAL
+static void judge_load(struct app *app) {
+  const struct contact_input input = input_of(app);
+  app->contact.flags |= app->fit.flags & CONTACT_FLAG_UNCERTAIN; /* by now it may be doubted */
   app->tangential_settings.location_sd_limit_mm = app->fit_settings.location_sd_limit_mm;
   tangential_update(&app->tangential_history, &app->tangential_settings, &input, &app->contact,
                     &app->load);
   motion_update(&app->motion_history, &app->tangential_settings, &input, &app->contact,
                 &app->motion);
+  app->contact.flags |= shapes_flags(&app->shapes);
   app->contact.flags |= app->tangential_is_late ? (uint32_t)CONTACT_FLAG_TANGENTIAL_LATE : 0;
-#endif
 }
+#endif
 
 /* A sensor whose supply dipped reads some 17 kPa less until it is reset. What tells that is its
  * temperature, which is to be looked at before the zero gives in (condition.h). */
@@ -299,7 +257,9 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   if (!frame->held) {
     fit_frame(app);
 #if FT_WITH_TANGENTIAL
-    estimate_tangential_load(app);
+    working_ask(app);
+    judge_fit(app);
+    working_wait(app);
 #endif
 #if FT_WITH_LOAD_DOUBT
     doubt_load(app);
@@ -312,7 +272,11 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     app->contact.flags |= CONTACT_FLAG_HELD;
     app->contact.flags |= is_sensor_doubtful(app) ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
   } else {
-    judge_frame(app);
+#if FT_WITH_TANGENTIAL
+    judge_load(app);
+#else
+    judge_fit(app);
+#endif
   }
   port_at(CRASH_AT_PACKET);
 #if FT_WITH_FIT
@@ -334,6 +298,10 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   if (app->streams & WIRE_STREAM_RAW) {
     packets_send_raw(app);
   }
+#endif
+#if FT_WITH_TANGENTIAL
+  port_at(CRASH_AT_FIT);
+  working_follow(app);
 #endif
   port_at(CRASH_AT_CONDITION);
   if (!frame->held) {

@@ -13,6 +13,7 @@
 #include "config/capabilities.h"
 #include "contact/contact.h"
 #include "contact/motion.h"
+#include "contact/shapes.h"
 #include "contact/tangential.h"
 #include "fit/fit.h"
 #include "fit/fit_gains.h"
@@ -45,8 +46,26 @@ struct app {
   struct worker worker;                           /* of the job below */
   struct tangential_job tangential_job;
   bool has_worker;         /* a processor of its own; else the main loop serves itself */
+  bool waits_for_load;     /* in this frame; else the next one takes its answer */
+  bool load_is_asked;      /* and not answered yet */
   bool tangential_is_late; /* in this frame */
-  bool tangential_follows; /* the frame before was of the same contact and pad */
+  uint64_t load_asked_us;
+  uint32_t load_limit_us; /* it is waited for so long after that */
+  struct {                /* what it is about, which the frames that follow leave alone */
+    int32_t pressure_Pa_q10[FT_MAX_SENSORS];
+    struct fit_settings settings;
+    struct fit_result fit;
+  } load_of;
+  struct fit_tangential estimate; /* the answer, moved to this frame */
+  bool tangential_follows; /* the question before was of the same contact and pad */
+  struct worker shapes_worker; /* of the job below: the same processor, after the other job */
+  struct shapes_job shapes_job;
+  bool shapes_act;             /* the profile is one that they know */
+  bool shapes_begin;           /* what is asked next is of another contact or pad */
+  struct shapes_report shapes; /* of the contact under way */
+  float shapes_dip_share, shapes_dip_sd_mm; /* the calibration's, which the Gaussian leaves out */
+  uint64_t worked_us;          /* the last frame's time */
+  uint64_t worked_apart_us;    /* between it and the one before */
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif
@@ -71,7 +90,7 @@ struct app {
   struct contact_force force;
 #endif
 #if FT_WITH_TANGENTIAL
-  const struct fit_tangential *tangential; /* NULL: not estimated */
+  const struct fit_tangential *tangential; /* NULL: not estimated; else app->estimate */
   struct tangential_load load;
   struct motion motion;
 #endif

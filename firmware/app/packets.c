@@ -148,6 +148,28 @@ void packets_send_sync(struct app *app, const struct port_sync_edge *edge) {
 }
 #endif
 
+#if FT_WITH_TANGENTIAL
+/* Where its flags are off this is zero. */
+static void put_shape(const struct app *app, struct wire_contact *contact) {
+  const struct shapes_report *shapes = &app->shapes;
+  contact->shape_age_ms =
+      shapes->shape ? 1e-3f * (float)(uint32_t)(app->frame.t_us - shapes->t_us) : 0.0f;
+  contact->x1_mm = shapes->contact[0].x_mm;
+  contact->y1_mm = shapes->contact[0].y_mm;
+  contact->location1_sd_mm = shapes->contact[0].location_sd_mm;
+  contact->force1_N = shapes->contact[0].force_N;
+  contact->force1_sd_N = shapes->contact[0].force_sd_N;
+  contact->x2_mm = shapes->contact[1].x_mm;
+  contact->y2_mm = shapes->contact[1].y_mm;
+  contact->location2_sd_mm = shapes->contact[1].location_sd_mm;
+  contact->force2_N = shapes->contact[1].force_N;
+  contact->force2_sd_N = shapes->contact[1].force_sd_N;
+  contact->edge_angle_deg = shapes->edge_angle_deg;
+  contact->edge_angle_sd_deg = shapes->edge_angle_sd_deg;
+  contact->edge_length_mm = shapes->edge_length_mm;
+}
+#endif
+
 #if FT_WITH_FIT
 void packets_send_contact(struct app *app, const struct wire_stages *stages) {
   struct wire_contact *contact = &app->packet.body.contact;
@@ -182,6 +204,7 @@ void packets_send_contact(struct app *app, const struct wire_stages *stages) {
   }
   contact->vx_mm_s = app->motion.vx_mm_s;
   contact->vy_mm_s = app->motion.vy_mm_s;
+  put_shape(app, contact);
 #endif
   send_packet(app, &wire_contact_layout, app->frame.t_us);
 }

@@ -46,6 +46,15 @@ enum contact_flag {
   /* warning: the second processor did not estimate the tangential load in time: location and
    * force are not corrected for it */
   CONTACT_FLAG_TANGENTIAL_LATE = 1 << 25,
+  /* what presses is known: one contact, unless one of the three below says otherwise */
+  CONTACT_FLAG_SHAPE_VALID = 1 << 26,
+  /* warning: two contacts press, and each has a place and a force: x_mm and y_mm are the place
+   * of neither */
+  CONTACT_FLAG_TWO_CONTACTS = 1 << 27,
+  /* one long contact presses, and its direction and length have values */
+  CONTACT_FLAG_EDGE = 1 << 28,
+  /* warning: what presses is neither one contact nor a long one nor two */
+  CONTACT_FLAG_SHAPE_UNKNOWN = 1 << 29,
 };
 
 #endif

@@ -78,6 +78,10 @@ struct tangential_job {
  * further. So it takes up to FIT_TANGENTIAL_FRAMES steps until an estimate can be reported. */
 #define TANGENTIAL_SLOW_us 4500u
 
+/* Frames nearer to each other than this leave no time to wait for an answer. The one of the frame
+ * before is taken, whose load has changed little since. */
+#define TANGENTIAL_BESIDE_us 1500u
+
 /* A Cortex-M0+ at 125 MHz answers within 320 us, and within 1.6 ms after a slow frame
  * (fit_tangential.h). What takes longer than this is not waited for. */
 #define TANGENTIAL_LATE_us 450u

@@ -101,6 +101,46 @@ FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int
   sums[3] = al;
 }
 
+/* What is left of unknown j of a least squares once those before have been taken from it; of no
+ * use below FIXED_PIVOT_LEAST, where it is not told from them. */
+struct fixed_pivot {
+  int32_t half;        /* the element on the diagonal is 2^28 to 2^30 over 2^(2 half) */
+  int32_t inverse_q14; /* of that element, 2^28 to 1; 0: not told */
+  int32_t own, over;   /* right-hand side, Q15, and over the element, Q14 */
+};
+#define FIXED_PIVOT_LEAST (1 << 18) /* 2^-12 */
+
+/* Takes from the unknowns after j what j explains: L D L^T with a power of two between the factors,
+ * of 16 bits each. matrix: the lower half, rows of `words`; column j and right[j] stay as they are.
+ * over: the elements of L below j, Q14. What j explains of the square of the residual is
+ * own over 2. */
+FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j,
+                                                int32_t *right, int32_t *over) {
+  struct fixed_pivot pivot = {0, 0, 0, 0};
+  int32_t element = matrix[j * words + j];
+  if (element < FIXED_PIVOT_LEAST) {
+    for (int i = j + 1; i < count; i++) {
+      over[i] = 0;
+    }
+    return pivot;
+  }
+  pivot.half = element >> 30 ? 0 : (30 - fixed_bits((uint32_t)element)) >> 1;
+  int32_t down = 15 - pivot.half, round = 1 << down >> 1;
+  pivot.inverse_q14 = port_divide((1 << 29) - 1, (element * (1 << (2 * pivot.half))) >> 15);
+  pivot.own = fixed_clamp((right[j] + round) >> down, -(1 << 15), 1 << 15);
+  pivot.over = (pivot.own * pivot.inverse_q14 + (1 << 14)) >> 15;
+  for (int i = j + 1; i < count; i++) {
+    int32_t *row = matrix + i * words;
+    int32_t twice = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15) * 2; /* Q16 */
+    over[i] = (twice * pivot.inverse_q14 + (1 << 15)) >> 16;
+    right[i] -= twice * pivot.over;
+    for (int k = j + 1; k <= i; k++) {
+      row[k] -= twice * over[k];
+    }
+  }
+  return pivot;
+}
+
 /* numerator / denominator in Q26 from two divisions, for denominator >= 2^13 and a quotient of at
  * most 16. The remainder is exact modulo 2^32, and it is small. */
 FIXED_INLINE int32_t fixed_div_q26(int32_t numerator, int32_t denominator) {

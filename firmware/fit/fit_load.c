@@ -37,7 +37,6 @@ _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 /* Square of the largest coefficient that counts: Q / F of 1, which is what friction holds. */
 #define TRACE_MOST ((struct scaled){19389, -22})
 
-#define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less is not told from others */
 #define X_MAX_Q12 (1 << 15)   /* 8 sigma */
 #define READING_BITS 15
 #define ERROR_MAX_Q4 ((1 << 18) - 1)
@@ -224,30 +223,12 @@ static void take_products(struct fit_load_look *look) {
   take_products_6(look);
 }
 
-/* Takes from the unknowns after j what j explains, L D L^T with a power of two between the factors,
- * of 16 bits each; returns what it explains of the square of the residual. An unknown that is not
- * told from those before explains nothing more. */
+/* What the unknown explains of the square of the residual. */
 static NOINLINE int32_t eliminate(struct fit_load_look *look, int j) {
-  int32_t pivot = look->matrix[j][j];
-  if (pivot < PIVOT_LEAST) {
-    return 0;
-  }
-  int32_t half = pivot >> 30 ? 0 : (30 - fixed_bits((uint32_t)pivot)) >> 1;
-  int32_t down = 15 - half, round = 1 << down >> 1;
-  int32_t inverse_q14 = port_divide((1 << 29) - 1, (pivot * (1 << (2 * half))) >> 15);
-  int32_t right = fixed_clamp((look->right[j] + round) >> down, -(1 << 15), 1 << 15);
-  int32_t right_over = (right * inverse_q14 + (1 << 14)) >> 15; /* Q14, as the next */
-  int32_t over_pivot[UNKNOWNS];
-  for (int i = j + 1; i < UNKNOWNS; i++) {
-    int32_t *row = look->matrix[i];
-    int32_t element = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15); /* Q15 */
-    over_pivot[i] = (element * inverse_q14 + (1 << 14)) >> 15;
-    for (int k = j + 1; k <= i; k++) {
-      row[k] -= element * over_pivot[k] * 2;
-    }
-    look->right[i] -= element * right_over * 2;
-  }
-  return right * right_over * 2;
+  int32_t over[UNKNOWNS];
+  struct fixed_pivot pivot =
+      fixed_eliminate(look->matrix[0], UNKNOWNS, UNKNOWNS, j, look->right, over);
+  return pivot.own * pivot.over * 2;
 }
 
 /* The square of the trace's coefficients beyond what they are by chance, 0 where there is none. */
@@ -257,7 +238,8 @@ static NOINLINE struct scaled trace_of(struct fit_load_look *look) {
   for (int j = 0; j < UNKNOWNS; j++) {
     left -= eliminate(look, j);
   }
-  if (look->matrix[PULL_X][PULL_X] < PIVOT_LEAST || look->matrix[PULL_Y][PULL_Y] < PIVOT_LEAST) {
+  if (look->matrix[PULL_X][PULL_X] < FIXED_PIVOT_LEAST ||
+      look->matrix[PULL_Y][PULL_Y] < FIXED_PIVOT_LEAST) {
     return none;
   }
   struct scaled pivot_x = fit_scaled_from(look->matrix[PULL_X][PULL_X], -2 * look->q[PULL_X]);

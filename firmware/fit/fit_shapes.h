@@ -31,6 +31,10 @@
 /* With fewer sensors there are hardly more readings than unknowns. */
 #define FIT_SHAPES_SENSORS 12
 
+/* A frame is done in so many parts, a model each, for a processor that has other work between
+ * them. */
+#define FIT_SHAPES_PARTS 3
+
 #define FIT_SHAPES_FRAMES 13
 #define FIT_SHAPES_PENALTY 8
 #define FIT_SHAPES_PAIR_PENALTY 6
@@ -67,7 +71,9 @@ struct fit_shapes_state {
   struct fit_shapes_at at[3];
   int32_t fit_x_q20, fit_y_q20; /* where the Gaussian was */
   int32_t sum_q20;              /* of the readings, in the unit of amplitude */
+  int32_t chi_square_q8[FIT_SHAPES_PARTS]; /* of each model in the frame under way */
   uint8_t frames;
+  uint8_t part; /* of the frame under way: which is next */
 };
 
 /* The normal equations of a step, and then the factors of their matrix. */
@@ -113,5 +119,18 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
                 const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                 const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result);
+
+/* The same in parts: call it with the same readings, fit and settings until the frame is done. */
+enum fit_shapes_progress {
+  FIT_SHAPES_UNFINISHED,
+  FIT_SHAPES_STEPPED,  /* the frame is done, and the result of one before stands */
+  FIT_SHAPES_ANSWERED, /* the frame is done, and the result is of it */
+};
+enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad,
+                                         const int32_t *pressure_Pa_q10,
+                                         const struct fit_settings *settings,
+                                         const struct fit_result *fit,
+                                         struct fit_shapes_state *state,
+                                         struct fit_shapes_result *result);
 
 #endif

@@ -12,7 +12,7 @@
 
 #include <stdint.h>
 
-#define WIRE_VERSION 7
+#define WIRE_VERSION 8
 
 enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 825 };
 
@@ -156,6 +156,23 @@ struct wire_contact {
   /* VELOCITY_VALID */
   float vx_mm_s; /* velocity of the contact along x */
   float vy_mm_s; /* velocity of the contact along y */
+  /* SHAPE_VALID */
+  float shape_age_ms; /* what follows is of the frame that came so long before this one */
+  /* TWO_CONTACTS */
+  float x1_mm; /* location of the stronger of two contacts, as x_mm */
+  float y1_mm; /* as y_mm */
+  float location1_sd_mm; /* predicted radial standard deviation of this location */
+  float force1_N; /* force of the stronger of two contacts */
+  float force1_sd_N; /* its predicted standard deviation, with that of the force scale */
+  float x2_mm; /* location of the weaker of two contacts, as x_mm */
+  float y2_mm; /* as y_mm */
+  float location2_sd_mm; /* predicted radial standard deviation of this location */
+  float force2_N; /* force of the weaker of two contacts */
+  float force2_sd_N; /* its predicted standard deviation, with that of the force scale */
+  /* EDGE */
+  float edge_angle_deg; /* direction of a long contact, from x towards y, -90 to 90 */
+  float edge_angle_sd_deg; /* its predicted standard deviation */
+  float edge_length_mm; /* length of the line that presses evenly */
 };
 
 /* The readings of one frame, without the gains of a calibration. The header's time is that of

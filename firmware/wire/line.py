@@ -71,6 +71,7 @@ class Body:
         self.fields = [Field(line, wanted) for line in table["fields"]]
         self.keys = table.get("keys")
         self.columns = table.get("columns")
+        self.sets = table.get("later", {})
         self.lists = table.get("lists", [])
 
     def field(self, name):
@@ -125,9 +126,14 @@ class Line:
         return [field.name for field in self.packets["contact"].fields if field.group == "stages"]
 
     def later(self):
-        """Columns that are not in recordings of before."""
+        """Columns that are not in recordings of before: {set: fields}."""
         contact = self.packets["contact"]
-        return [field for field in contact.fields if field.name not in contact.columns and field.name != "frame"]
+        sets, name = {each: [] for each in contact.sets}, None
+        for field in contact.fields:
+            if field.name not in contact.columns and field.name != "frame":
+                name = next((each for each, first in contact.sets.items() if first == field.name), name)
+                sets[name].append(field)
+        return sets
 
 
 # ---- C
@@ -317,11 +323,20 @@ def line_fields_hpp(line):
             return f'  visit("{field.name}", Quantity{{contact.{field.member}, (contact.flags & CONTACT_FLAG_{field.when[1]}) != 0}});'
         return f'  visit("{field.name}", contact.{field.member});'
 
-    lines += ["/* Recordings of before have no columns for what comes after has_tangential. */", "template <typename Visitor>",
-              "void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = true) {", "  wire_contact &contact = packet.body.contact;"]
+    later = line.later()
+    lines += ["/* Sets of columns that came later, one after the other; a recording has so many of them. */", f"inline constexpr int LATER_SETS = {len(later)};", "",
+              "/* Flags of columns that one with so many of these sets has not. */", "inline constexpr std::uint32_t flags_beyond(int sets) {",
+              "  std::uint32_t flags = 0;"]
+    for number, fields in enumerate(later.values()):
+        flags = " | ".join(f"CONTACT_FLAG_{name}" for name in dict.fromkeys(field.when[1] for field in fields))
+        lines.append(f"  flags |= sets > {number} ? 0u : static_cast<std::uint32_t>({flags});")
+    lines += ["  return flags;", "}", "", "template <typename Visitor>",
+              "void visit_contact(Visitor &visit, wire_packet &packet, int sets = LATER_SETS) {", "  wire_contact &contact = packet.body.contact;"]
     for name in contact.columns:
         lines.append('  visit("sequence", packet.sequence);' if name == "sequence" else visit_contact(contact.field(name)))
-    lines += ["  if (!has_tangential) {", "    return;", "  }", *map(visit_contact, line.later()), "}", ""]
+    for number, fields in enumerate(later.values()):
+        lines += [f"  if (sets == {number}) {{", "    return;", "  }", *map(visit_contact, fields)]
+    lines += ["}", ""]
     lines += ["template <typename Visitor>", "void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {",
               "  wire_raw &raw = packet.body.raw;", '  visit("raw_sequence", packet.sequence);']
     for field in raw.fields:
@@ -442,7 +457,8 @@ def line_py(line):
     lines += line_settings.python_settings(line)
     contact, raw = line.packets["contact"], line.packets["raw"]
     lines += ["# Columns of recordings, and what their comments have of an info packet.", py_tuple("STAGES", line.stages()[:-1]), py_tuple("CONTACT_COLUMNS", contact.columns),
-              py_tuple("TANGENTIAL_COLUMNS", [field.name for field in line.later()], "NaN in recordings of before there were any"),
+              *(py_tuple(f"{name}_COLUMNS", [field.name for field in fields], "NaN in recordings of before there were any") for name, fields in line.later().items()),
+              "LATER_COLUMNS = (" + ", ".join(f"*{name}_COLUMNS" for name in line.later()) + ")",
               py_tuple("RAW_COLUMNS", ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"]),
               py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]), "", ""]
     lines += ["class ContactQuantities:", '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""', "", "    __slots__ = ()", "    contact: Contact"]
@@ -494,7 +510,7 @@ def contact_msg(line):
     for flag in line.flags:
         lines.append(said(f"uint32 {flag['name']}={1 << flag['bit']}", "warning: " * bool(flag.get("warning")) + flag["text"]))
     lines.append(said(f"uint32 WARNINGS={line.warnings()}", "all of them"))
-    lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [of(field) for field in line.later()]
+    lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [of(field) for fields in line.later().values() for field in fields]
     lines += ["", said("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
     lines += [of(field) for field in raw.fields if field.kind == "u32" and field.name != "frame"]
     return [*lines, said("float64 temperature_degc", "mean of the sensors; 0 until measured"),

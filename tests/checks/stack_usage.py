@@ -132,7 +132,8 @@ def set_frames(functions, frames):
             f.frame = f.pushed
 
 
-def resolve_indirect_calls(functions, path):
+def resolve_indirect_calls(functions, path, among=None):
+    """Of these functions; among: all that there are, where these are some of them."""
     table = {}
     with open(path) as file:
         for number, line in enumerate(file, 1):
@@ -142,7 +143,7 @@ def resolve_indirect_calls(functions, path):
                 if not colon or not callees.split():
                     fail(f"{path}:{number}: write CALLER: CALLEE...")
                 table[caller] = callees.split()
-    by_name = {name: f for f in functions.values() for name in f.names}
+    by_name = {name: f for f in (among or functions).values() for name in f.names}
     for f in functions.values():
         if not f.indirect_at:
             continue
@@ -184,8 +185,10 @@ def worst_of(names, functions, limit, indirect):
     for name in names:
         if name not in by_name:
             fail(f"the image has no function {name}")
-        used = reachable(by_name[name], set())
-        resolve_indirect_calls({f.start: f for f in used}, indirect)
+        resolved = set()
+        while fresh := reachable(by_name[name], set()) - resolved:
+            resolve_indirect_calls({f.start: f for f in fresh}, indirect, functions)
+            resolved |= fresh
         size, chain = worst(by_name[name])
         print(f"{size:5}  {chain_text(chain)}")
         if limit is not None and size > limit:

@@ -9,13 +9,13 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools
 
 import numpy as np  # noqa: E402
 from fingertip import BadValueError, InputError, read_recording, wire  # noqa: E402
-from fingertip.line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, SETTINGS, TANGENTIAL_COLUMNS  # noqa: E402
+from fingertip.line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, SETTINGS  # noqa: E402
 from fingertip.lines import shortest  # noqa: E402
 from fingertip.recording import info_metadata  # noqa: E402
 from fingertip.settings import setting_commands  # noqa: E402
 
 FLAG_OF = {name: int(field.when[1]) for name, field in wire.layout_of(wire.Contact) if field.when and field.code == "f"}
-CONTACT = (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS)
+CONTACT = (*CONTACT_COLUMNS, *LATER_COLUMNS)
 KINDS = (("holds several", "several"), ("no fingertip", "no such"), ("format .* is unknown", "other format"),
          (r":1: no recording|no recording of a fingertip|no MCAP file", "no recording"),
          (r":\d+: |damaged|torn|no header line|missing", "damaged"))

@@ -16,7 +16,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/ecosystem"), str(ROOT / "host_tool
 import bags  # noqa: E402
 import mcap.writer  # noqa: E402
 from fingertip import RecordingWriter, wire  # noqa: E402
-from fingertip.line import TANGENTIAL_COLUMNS, Flag  # noqa: E402
+from fingertip.line import LATER_COLUMNS, SHAPE_COLUMNS, Flag  # noqa: E402
 from fingertip.mcap_recording import CONTACT_TYPE, LINE_TYPE  # noqa: E402
 from fingertip.ros_messages import decode, encode, schema_of  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
@@ -173,8 +173,9 @@ def csv_cases(corpus, name, text, devices):
     add("unknown_column", [line + (",colour" if at == header else ",1" if line[:1].isdigit() else "") for at, line in enumerate(lines)])
     add("renamed_column", [line.replace("force_N", "force") if at == header else line for at, line in enumerate(lines)])
     add("column_missing", without_columns(lines, ["q_sd_N"]))
-    add("earlier", without_columns(lines, TANGENTIAL_COLUMNS))
-    add("earlier_flags", without_columns([without_flags(lines[header], line) if line[:1].isdigit() else line for line in lines], TANGENTIAL_COLUMNS))
+    add("earlier", without_columns(lines, LATER_COLUMNS))
+    add("before_shapes", without_columns(lines, SHAPE_COLUMNS))
+    add("earlier_flags", without_columns([without_flags(lines[header], line) if line[:1].isdigit() else line for line in lines], LATER_COLUMNS))
     add("sensors_14", without_columns(lines, ["s14_Pa", "tare14_Pa", "s0_Pa", "tare0_Pa"]))
     add("row_longer", [*lines[:row], lines[row] + ",", *lines[row + 1:]])
     add("row_shorter", [*lines[:row], lines[row].rsplit(",", 1)[0], *lines[row + 1:]])

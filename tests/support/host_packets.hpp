@@ -25,7 +25,8 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   contact.frame = frame;
   contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                   CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID |
-                  CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID;
+                  CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
+                  CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
   contact.sensors_used = 0x7FFF;
   contact.x_mm = 0.1f + static_cast<float>(frame % 10);
   contact.y_mm = -3.3333333f;
@@ -45,6 +46,10 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   contact.tangential_ratio = 0.29999998f;
   contact.vx_mm_s = 123.45678f;
   contact.vy_mm_s = -0.007f;
+  contact.shape_age_ms = 2.296f;
+  contact.edge_angle_deg = -37.123456f;
+  contact.edge_angle_sd_deg = 0.7f;
+  contact.edge_length_mm = 18.25f;
   contact.stages = {2501, 3206, 1449, 23, 6918, 30, 14127};
   return packet;
 }

@@ -27,9 +27,19 @@ struct Quantity {
 
 inline constexpr std::size_t RAW_COLUMNS = 6; /* without those of the sensors */
 
-/* Recordings of before have no columns for what comes after has_tangential. */
+/* Sets of columns that came later, one after the other; a recording has so many of them. */
+inline constexpr int LATER_SETS = 2;
+
+/* Flags of columns that one with so many of these sets has not. */
+inline constexpr std::uint32_t flags_beyond(int sets) {
+  std::uint32_t flags = 0;
+  flags |= sets > 0 ? 0u : static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID);
+  flags |= sets > 1 ? 0u : static_cast<std::uint32_t>(CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_EDGE);
+  return flags;
+}
+
 template <typename Visitor>
-void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = true) {
+void visit_contact(Visitor &visit, wire_packet &packet, int sets = LATER_SETS) {
   wire_contact &contact = packet.body.contact;
   visit("sequence", packet.sequence);
   visit("flags", contact.flags);
@@ -53,7 +63,7 @@ void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = tr
   visit("fit_us", contact.stages.fit_us);
   visit("contact_us", contact.stages.contact_us);
   visit("total_us", contact.stages.total_us);
-  if (!has_tangential) {
+  if (sets == 0) {
     return;
   }
   visit("qx_N", Quantity{contact.qx_N, (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0});
@@ -62,6 +72,23 @@ void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = tr
   visit("tangential_ratio", Quantity{contact.tangential_ratio, (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0});
   visit("vx_mm_s", Quantity{contact.vx_mm_s, (contact.flags & CONTACT_FLAG_VELOCITY_VALID) != 0});
   visit("vy_mm_s", Quantity{contact.vy_mm_s, (contact.flags & CONTACT_FLAG_VELOCITY_VALID) != 0});
+  if (sets == 1) {
+    return;
+  }
+  visit("shape_age_ms", Quantity{contact.shape_age_ms, (contact.flags & CONTACT_FLAG_SHAPE_VALID) != 0});
+  visit("x1_mm", Quantity{contact.x1_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("y1_mm", Quantity{contact.y1_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("location1_sd_mm", Quantity{contact.location1_sd_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force1_N", Quantity{contact.force1_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force1_sd_N", Quantity{contact.force1_sd_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("x2_mm", Quantity{contact.x2_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("y2_mm", Quantity{contact.y2_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("location2_sd_mm", Quantity{contact.location2_sd_mm, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force2_N", Quantity{contact.force2_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("force2_sd_N", Quantity{contact.force2_sd_N, (contact.flags & CONTACT_FLAG_TWO_CONTACTS) != 0});
+  visit("edge_angle_deg", Quantity{contact.edge_angle_deg, (contact.flags & CONTACT_FLAG_EDGE) != 0});
+  visit("edge_angle_sd_deg", Quantity{contact.edge_angle_sd_deg, (contact.flags & CONTACT_FLAG_EDGE) != 0});
+  visit("edge_length_mm", Quantity{contact.edge_length_mm, (contact.flags & CONTACT_FLAG_EDGE) != 0});
 }
 
 template <typename Visitor>
@@ -264,6 +291,8 @@ inline constexpr Flag flags[] = {
     {CONTACT_FLAG_VELOCITY_VALID, "VELOCITY_VALID", false},
     {CONTACT_FLAG_MOVING, "MOVING", false},
     {CONTACT_FLAG_SLIDING, "SLIDING", false},
+    {CONTACT_FLAG_SHAPE_VALID, "SHAPE_VALID", false},
+    {CONTACT_FLAG_EDGE, "EDGE", false},
     {CONTACT_FLAG_LOW_SIGNAL, "LOW_SIGNAL", true},
     {CONTACT_FLAG_FLAT, "FLAT", true},
     {CONTACT_FLAG_UNCERTAIN, "UNCERTAIN", true},
@@ -276,6 +305,8 @@ inline constexpr Flag flags[] = {
     {CONTACT_FLAG_ZERO_DOUBTFUL, "ZERO_DOUBTFUL", true},
     {CONTACT_FLAG_SENSOR_DOUBTFUL, "SENSOR_DOUBTFUL", true},
     {CONTACT_FLAG_TANGENTIAL_LATE, "TANGENTIAL_LATE", true},
+    {CONTACT_FLAG_TWO_CONTACTS, "TWO_CONTACTS", true},
+    {CONTACT_FLAG_SHAPE_UNKNOWN, "SHAPE_UNKNOWN", true},
 };
 
 } // namespace fingertip::words

@@ -246,7 +246,7 @@ void McapLineSink::begin() {
   }
   if (auto columns = columns_of(header); columns && is_joint_header == joint_) {
     sensor_count_ = columns->sensor_count;
-    has_tangential_ = columns->has_tangential;
+    sets_ = columns->sets;
     has_rows_ = true;
   }
   clock_ = LogClock(value("started_utc"), value("started_device_us"));
@@ -347,7 +347,7 @@ bool McapLineSink::put_row(const std::string &text) {
       }
       row.device = static_cast<std::uint32_t>(*device);
     }
-    RowPackets packets = parse_row(cells, sensor_count_, has_tangential_);
+    RowPackets packets = parse_row(cells, sensor_count_, sets_);
     row.contact = packets.contact;
     row.raw = packets.raw;
   } catch (const Damage &) {
@@ -355,7 +355,7 @@ bool McapLineSink::put_row(const std::string &text) {
   }
   std::string as_written = joint_ ? joint_cells(row.device, *row.time_us) : "";
   as_written += row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr,
-                         sensor_count_, has_tangential_);
+                         sensor_count_, sets_);
   if (as_written != text) {
     return false;
   }
@@ -410,7 +410,7 @@ bool McapLineSource::next(Line &line) {
           auto columns =
               columns_of(line.text.substr(joint_header ? std::string(JOINT_COLUMNS).size() : 0));
           sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
-          has_tangential_ = !columns || columns->has_tangential;
+          sets_ = columns ? columns->sets : LATER_SETS;
           has_header_ = true;
         }
       } else {
@@ -442,7 +442,7 @@ bool McapLineSource::next(Line &line) {
 std::string McapLineSource::text_of(const ros::Row &row) const {
   return (joint_ ? joint_cells(row.device, *row.time_us) : "") +
          row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr,
-                  sensor_count_, has_tangential_);
+                  sensor_count_, sets_);
 }
 
 LineSource::Place McapLineSource::place() {

@@ -142,20 +142,20 @@ struct PairReader {
   }
 };
 
-inline std::string header_text(std::uint8_t sensor_count, bool has_tangential = true) {
+inline std::string header_text(std::uint8_t sensor_count, int sets = LATER_SETS) {
   wire_packet packet;
   std::memset(&packet, 0, sizeof packet);
   Namer namer;
-  visit_contact(namer, packet, has_tangential);
+  visit_contact(namer, packet, sets);
   visit_raw(namer, packet, sensor_count);
   return "t_us,frame" + namer.text;
 }
 
-inline std::size_t contact_columns(bool has_tangential = true) {
+inline std::size_t contact_columns(int sets = LATER_SETS) {
   wire_packet packet;
   std::memset(&packet, 0, sizeof packet);
   Namer namer;
-  visit_contact(namer, packet, has_tangential);
+  visit_contact(namer, packet, sets);
   return static_cast<std::size_t>(std::count(namer.text.begin(), namer.text.end(), ','));
 }
 
@@ -166,16 +166,16 @@ struct RowPackets {
 
 /* From t_us on. */
 inline std::string row_text(const wire_packet *contact, const wire_packet *raw,
-                            std::uint8_t sensor_count, bool has_tangential = true) {
+                            std::uint8_t sensor_count, int sets = LATER_SETS) {
   const wire_packet &any = contact ? *contact : *raw;
   std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
   RowWriter writer;
   writer.text = std::to_string(any.t_us) + "," + std::to_string(frame);
   if (contact) {
     wire_packet copy = *contact;
-    visit_contact(writer, copy, has_tangential);
+    visit_contact(writer, copy, sets);
   } else {
-    writer.text += std::string(contact_columns(has_tangential), ',');
+    writer.text += std::string(contact_columns(sets), ',');
   }
   if (raw) {
     wire_packet copy = *raw;
@@ -187,9 +187,9 @@ inline std::string row_text(const wire_packet *contact, const wire_packet *raw,
 }
 
 /* Back. Throws Damage. */
-inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, bool has_tangential) {
+inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, int sets) {
   auto cells = split(text, ',');
-  std::size_t contact_count = contact_columns(has_tangential);
+  std::size_t contact_count = contact_columns(sets);
   std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count};
   if (cells.size() != 2 + contact_count + raw_count) {
     throw Damage{std::to_string(cells.size()) + " columns where the header has " +
@@ -210,10 +210,9 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, bo
     packet.type = WIRE_CONTACT;
     packet.t_us = t_us;
     RowReader reader{cells, 2};
-    visit_contact(reader, packet, has_tangential);
+    visit_contact(reader, packet, sets);
     packet.body.contact.frame = frame;
-    constexpr std::uint32_t later = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID;
-    if (!has_tangential && packet.body.contact.flags & later) {
+    if (packet.body.contact.flags & flags_beyond(sets)) {
       throw Damage{"its flags tell of columns that are not there"};
     }
   }
@@ -238,18 +237,19 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, bo
 /* The columns of a header, from t_us on. */
 struct Columns {
   std::uint8_t sensor_count;
-  bool has_tangential;
+  int sets; /* of those that came later */
 };
 inline std::optional<Columns> columns_of(const std::string &header) {
   auto columns = static_cast<std::size_t>(std::count(header.begin(), header.end(), ',')) + 1;
-  bool has_tangential = header.find(",qx_N,") != std::string::npos;
-  std::size_t fixed_columns = 2 + contact_columns(has_tangential) + RAW_COLUMNS;
-  std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
-  if (sensors > FT_MAX_SENSORS ||
-      header != header_text(static_cast<std::uint8_t>(sensors), has_tangential)) {
-    return std::nullopt;
+  for (int sets = LATER_SETS; sets >= 0; sets--) {
+    std::size_t fixed_columns = 2 + contact_columns(sets) + RAW_COLUMNS;
+    std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
+    if (sensors <= FT_MAX_SENSORS &&
+        header == header_text(static_cast<std::uint8_t>(sensors), sets)) {
+      return Columns{static_cast<std::uint8_t>(sensors), sets};
+    }
   }
-  return Columns{static_cast<std::uint8_t>(sensors), has_tangential};
+  return std::nullopt;
 }
 
 } // namespace fingertip::recording

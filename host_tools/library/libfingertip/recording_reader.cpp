@@ -158,7 +158,7 @@ void RecordingReader::read_line(const std::string &text) {
       throw Damage{"unknown header"};
     }
     sensor_count_ = columns->sensor_count;
-    has_tangential_ = columns->has_tangential;
+    sets_ = columns->sets;
     header_seen_ = true;
   }
 }
@@ -363,7 +363,7 @@ void RecordingReader::choose_device(const std::string &serials) {
 
 void RecordingReader::read_row(std::string_view text, std::uint32_t device,
                                std::optional<double> time_us) {
-  RowPackets row = parse_row(text, sensor_count_, has_tangential_);
+  RowPackets row = parse_row(text, sensor_count_, sets_);
   for (const auto &packet : {row.contact, row.raw}) {
     if (packet) {
       items_.push_back({Item::Kind::packet, *packet, "", time_us, device});

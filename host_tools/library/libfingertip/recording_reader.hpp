@@ -85,7 +85,7 @@ private:
   std::optional<LineStatistics> end_statistics_;
   Metadata recorder_metadata_;
   std::uint8_t sensor_count_ = 0;
-  bool has_tangential_ = true; /* its columns */
+  int sets_ = 0; /* of columns that came later, as the header says */
   bool joint_ = false;         /* of several fingertips */
   bool all_ = false;           /* of them are read */
   bool begun_ = false;

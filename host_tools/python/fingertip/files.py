@@ -39,7 +39,7 @@ import numpy.typing as npt
 from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
-from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, Flag
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag
 from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
 from .recorded import Rows, counts_of, judge_key, packet_of
 
@@ -57,7 +57,7 @@ SLIP_SPEED_mm_s = 10.0
 
 TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip")
 OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in any order
-RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS)
+RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS)
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING, WARNINGS = map(int, (
     Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP, Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_FROM_TOUCH, Flag.VELOCITY_VALID, Flag.MOVING,
@@ -235,7 +235,7 @@ class Recording:
         self.metadata = metadata
         first = len(names) - 2 * sensors
         self.columns = {name: table[:, i] for i, name in enumerate(names[:first])}
-        missing = set(TANGENTIAL_COLUMNS).difference(self.columns)
+        missing = set(LATER_COLUMNS).difference(self.columns)
         self.columns |= {name: np.full(len(table), math.nan) for name in missing}
         self.sensors_Pa = table[:, first:first + sensors]
         self.tare_Pa = table[:, first + sensors:first + 2 * sensors]

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-VERSION = 7
+VERSION = 8
 SENSORS_MAX = 32
 MAX_FRAME_BYTES = 846  # longer is damage
 LOADER_MAGIC = 0x746F6F42
@@ -56,9 +56,13 @@ class Flag(enum.IntFlag):
     MOVING = 1 << 23  #: the speed of the contact is above the threshold
     SLIDING = 1 << 24  #: the contact moves beyond what the load explains, however slowly
     TANGENTIAL_LATE = 1 << 25  #: warning: the second processor did not estimate the tangential load in time: location and force are not corrected for it
+    SHAPE_VALID = 1 << 26  #: what presses is known: one contact, unless one of the three below says otherwise
+    TWO_CONTACTS = 1 << 27  #: warning: two contacts press, and each has a place and a force: x_mm and y_mm are the place of neither
+    EDGE = 1 << 28  #: one long contact presses, and its direction and length have values
+    SHAPE_UNKNOWN = 1 << 29  #: warning: what presses is neither one contact nor a long one nor two
 
 
-WARNINGS = Flag(0x207FF00)
+WARNINGS = Flag(0x2A07FF00)
 """The numbers are there, but deserve less trust: look at these before you use them."""
 
 
@@ -240,6 +244,34 @@ class Contact(NamedTuple):
     """velocity of the contact along x"""
     vy_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
     """velocity of the contact along y"""
+    shape_age_ms: Annotated[float, Wire("f", when=("flags", Flag.SHAPE_VALID), absent=math.nan)]
+    """what follows is of the frame that came so long before this one"""
+    x1_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """location of the stronger of two contacts, as x_mm"""
+    y1_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """as y_mm"""
+    location1_sd_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """predicted radial standard deviation of this location"""
+    force1_N: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """force of the stronger of two contacts"""
+    force1_sd_N: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """its predicted standard deviation, with that of the force scale"""
+    x2_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """location of the weaker of two contacts, as x_mm"""
+    y2_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """as y_mm"""
+    location2_sd_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """predicted radial standard deviation of this location"""
+    force2_N: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """force of the weaker of two contacts"""
+    force2_sd_N: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
+    """its predicted standard deviation, with that of the force scale"""
+    edge_angle_deg: Annotated[float, Wire("f", when=("flags", Flag.EDGE), absent=math.nan)]
+    """direction of a long contact, from x towards y, -90 to 90"""
+    edge_angle_sd_deg: Annotated[float, Wire("f", when=("flags", Flag.EDGE), absent=math.nan)]
+    """its predicted standard deviation"""
+    edge_length_mm: Annotated[float, Wire("f", when=("flags", Flag.EDGE), absent=math.nan)]
+    """length of the line that presses evenly"""
 
 
 class Raw(NamedTuple):
@@ -652,6 +684,10 @@ CONTACT_COLUMNS = (
     "total_us")
 TANGENTIAL_COLUMNS = ( # NaN in recordings of before there were any
     "qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s")
+SHAPE_COLUMNS = ( # NaN in recordings of before there were any
+    "shape_age_ms", "x1_mm", "y1_mm", "location1_sd_mm", "force1_N", "force1_sd_N", "x2_mm", "y2_mm", "location2_sd_mm", "force2_N",
+    "force2_sd_N", "edge_angle_deg", "edge_angle_sd_deg", "edge_length_mm")
+LATER_COLUMNS = (*TANGENTIAL_COLUMNS, *SHAPE_COLUMNS)
 RAW_COLUMNS = (
     "raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
 INFO_KEYS = (
@@ -760,6 +796,76 @@ class ContactQuantities:
         """Velocity of the contact along y."""
         return self.contact.vy_mm_s
 
+    @property
+    def shape_age_ms(self) -> float:
+        """What follows is of the frame that came so long before this one."""
+        return self.contact.shape_age_ms
+
+    @property
+    def x1_mm(self) -> float:
+        """Location of the stronger of two contacts, as x_mm."""
+        return self.contact.x1_mm
+
+    @property
+    def y1_mm(self) -> float:
+        """As y_mm."""
+        return self.contact.y1_mm
+
+    @property
+    def location1_sd_mm(self) -> float:
+        """Predicted radial standard deviation of this location."""
+        return self.contact.location1_sd_mm
+
+    @property
+    def force1_N(self) -> float:
+        """Force of the stronger of two contacts."""
+        return self.contact.force1_N
+
+    @property
+    def force1_sd_N(self) -> float:
+        """Its predicted standard deviation, with that of the force scale."""
+        return self.contact.force1_sd_N
+
+    @property
+    def x2_mm(self) -> float:
+        """Location of the weaker of two contacts, as x_mm."""
+        return self.contact.x2_mm
+
+    @property
+    def y2_mm(self) -> float:
+        """As y_mm."""
+        return self.contact.y2_mm
+
+    @property
+    def location2_sd_mm(self) -> float:
+        """Predicted radial standard deviation of this location."""
+        return self.contact.location2_sd_mm
+
+    @property
+    def force2_N(self) -> float:
+        """Force of the weaker of two contacts."""
+        return self.contact.force2_N
+
+    @property
+    def force2_sd_N(self) -> float:
+        """Its predicted standard deviation, with that of the force scale."""
+        return self.contact.force2_sd_N
+
+    @property
+    def edge_angle_deg(self) -> float:
+        """Direction of a long contact, from x towards y, -90 to 90."""
+        return self.contact.edge_angle_deg
+
+    @property
+    def edge_angle_sd_deg(self) -> float:
+        """Its predicted standard deviation."""
+        return self.contact.edge_angle_sd_deg
+
+    @property
+    def edge_length_mm(self) -> float:
+        """Length of the line that presses evenly."""
+        return self.contact.edge_length_mm
+
 
 class BlockQuantities:
     """The quantities of both packets by their names, an array each."""
@@ -790,6 +896,20 @@ class BlockQuantities:
     tangential_ratio: "npt.NDArray[np.float64]"
     vx_mm_s: "npt.NDArray[np.float64]"
     vy_mm_s: "npt.NDArray[np.float64]"
+    shape_age_ms: "npt.NDArray[np.float64]"
+    x1_mm: "npt.NDArray[np.float64]"
+    y1_mm: "npt.NDArray[np.float64]"
+    location1_sd_mm: "npt.NDArray[np.float64]"
+    force1_N: "npt.NDArray[np.float64]"
+    force1_sd_N: "npt.NDArray[np.float64]"
+    x2_mm: "npt.NDArray[np.float64]"
+    y2_mm: "npt.NDArray[np.float64]"
+    location2_sd_mm: "npt.NDArray[np.float64]"
+    force2_N: "npt.NDArray[np.float64]"
+    force2_sd_N: "npt.NDArray[np.float64]"
+    edge_angle_deg: "npt.NDArray[np.float64]"
+    edge_angle_sd_deg: "npt.NDArray[np.float64]"
+    edge_length_mm: "npt.NDArray[np.float64]"
     valid: "npt.NDArray[np.int64]"
     saturated: "npt.NDArray[np.int64]"
     doubtful: "npt.NDArray[np.int64]"

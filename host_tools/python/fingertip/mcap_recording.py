@@ -15,7 +15,7 @@ from typing import Any
 
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS, WARNINGS, Flag
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, WARNINGS, Flag
 from .lines import LineFile, shortest
 from .ros_messages import decode, encode, schema_of
 
@@ -32,8 +32,8 @@ _JUDGED = int(Flag.FIT_VALID | WARNINGS)
 _TANGENTIAL = int(Flag.TANGENTIAL_VALID | Flag.TANGENTIAL_FROM_TOUCH)
 _NOTHING = int(Flag.CONTACT | Flag.TARED | WARNINGS)
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
-_QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name not in _COUNTS]
-_FIRST_RAW = 2 + len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS)
+_QUANTITIES = [name for name in (*CONTACT_COLUMNS, *LATER_COLUMNS) if name not in _COUNTS]
+_FIRST_RAW = 2 + len(CONTACT_COLUMNS) + len(LATER_COLUMNS)
 _FIRST_SENSOR = _FIRST_RAW + len(RAW_COLUMNS)
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(?:\.(\d{3}))?Z")
 
@@ -356,7 +356,7 @@ class McapLines:
 def contact_of(cells: list[str]) -> dict[str, Any]:
     """Cells of a row from t_us on, with all its columns, as the fields of fingertip_msgs/Contact that they hold."""
     row: dict[str, Any] = {"t_us": int(cells[0]), "frame": int(cells[1]), "has_contact": cells[2] != "", "has_raw": cells[_FIRST_RAW] != ""}
-    for name, cell in zip((*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS), cells[2:]):
+    for name, cell in zip((*CONTACT_COLUMNS, *LATER_COLUMNS), cells[2:]):
         row[name.lower()] = int(cell or "0") if name in _COUNTS else float(cell) if cell else math.nan
     for name, cell in zip(RAW_COLUMNS, cells[_FIRST_RAW:]):
         row[name.lower()] = (float(cell) if cell else math.nan) if name == "temperature_degC" else int(cell or "0")
@@ -374,7 +374,7 @@ def _cells_of(row: dict[str, Any], names: list[str]) -> str:
         if name in sensors:
             cells.append(f"{sensors[name]:.4f}")
         elif own is None or (name in RAW_COLUMNS and not row["has_raw"]) or (
-                (name in CONTACT_COLUMNS or name in TANGENTIAL_COLUMNS) and not row["has_contact"]):
+                (name in CONTACT_COLUMNS or name in LATER_COLUMNS) and not row["has_contact"]):
             cells.append("")
         elif name == "temperature_degC":
             cells.append(f"{own:.2f}")

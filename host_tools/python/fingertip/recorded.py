@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from .frames import Q10
 from .line import (
-    CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire)
+    CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire)
 from .wire import layout_of
 
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
@@ -106,11 +106,12 @@ class Rows:
     """The rows under a header, from t_us on. Raises ValueError where it is none."""
 
     def __init__(self, header: str) -> None:
-        self.has_tangential = ",qx_N," in header
-        self._first_raw = 2 + len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS) * self.has_tangential
+        there = tuple(name for columns in (TANGENTIAL_COLUMNS, SHAPE_COLUMNS) if f",{columns[0]}," in header for name in columns)
+        self.later = [name for name in LATER_COLUMNS if name not in there]  # columns that are not there
+        self._first_raw = 2 + len(CONTACT_COLUMNS) + len(there)
         first_sensor = self._first_raw + len(RAW_COLUMNS)
         self.sensors = max(0, (header.count(",") + 1 - first_sensor) // 2)
-        self.names = ["t_us", "frame", *CONTACT_COLUMNS, *(TANGENTIAL_COLUMNS if self.has_tangential else ()), *RAW_COLUMNS,
+        self.names = ["t_us", "frame", *CONTACT_COLUMNS, *there, *RAW_COLUMNS,
                       *(f"s{k}_Pa" for k in range(self.sensors)), *(f"tare{k}_Pa" for k in range(self.sensors))]
         if header != ",".join(self.names) or self.sensors > SENSORS_MAX:
             raise ValueError("wrong header")
@@ -122,7 +123,7 @@ class Rows:
         self._high = np.array([most.get(code) or np.nextafter(_LARGEST[code] + 1.0, 0) for code in self._codes])
         self._low = np.array([-most.get(code, 0.0) for code in self._codes])
         self._untold = 0  # flags of columns that are not there
-        for name in () if self.has_tangential else TANGENTIAL_COLUMNS:
+        for name in self.later:
             when = wires[name].when
             self._untold |= int(when[1]) if when else 0
         whole_columns = [at for at, code in enumerate(self._codes) if code not in "fhi"]

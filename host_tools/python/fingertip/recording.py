@@ -12,14 +12,14 @@ from typing import Any, Protocol
 from .clock import ClockEstimate, host_now_us
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, INFO_KEYS, RAW_COLUMNS, TANGENTIAL_COLUMNS
+from .line import CONTACT_COLUMNS, INFO_KEYS, LATER_COLUMNS, RAW_COLUMNS
 from .lines import LineFile, shortest
 from .mcap_recording import McapLines
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge
 
 LATE_us = 250_000  # rows wait so long for those of others
 CLOCK_LINES_us = 1e6
-_QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name not in ("sequence", "flags")]
+_QUANTITIES = [name for name in (*CONTACT_COLUMNS, *LATER_COLUMNS) if name not in ("sequence", "flags")]
 
 
 def _cell(value: Any) -> str:
@@ -69,7 +69,7 @@ def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | Mca
 
 
 def _header(sensors: int) -> str:
-    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS, *(f"s{k}_Pa" for k in range(sensors)),
+    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS, *(f"s{k}_Pa" for k in range(sensors)),
                      *(f"tare{k}_Pa" for k in range(sensors))])
 
 
@@ -95,7 +95,7 @@ class _PacketLines:
         self._last_us = self._before_us = 0
         self._last_edge: int | None = None
         self._edges = self._edges_missing = 0
-        self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS))
+        self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(LATER_COLUMNS))
         self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * sensors)
 
     @property

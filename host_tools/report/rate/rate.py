@@ -7,7 +7,7 @@
     rate.md      the same to read
     rate.png     the same to look at
 
-In contact on every frame, scene slip, four iterations of the fit from a cold start each time. Fitted frames hold a fit of
+In contact on every frame, scene slip (rows "grasp": scene grasp with a pad's profile), four iterations of the fit from a cold start each time. Fitted frames hold a fit of
 pressures measured for them; the others are held: they repeat the fit before while the sensors measure their temperature.
 Latencies count from the end of the longest conversion that the datasheet allows. A packet is offered when the firmware gives its
 first part to the USB controller, and delivered with its last byte on the wire. Runs are the same bit for bit each time.
@@ -21,6 +21,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import grasp_rate  # noqa: E402
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
 from boards import BOARDS, DESCRIPTORS, PARALLEL, short  # noqa: E402
@@ -33,7 +34,7 @@ GOALS = (
     ("parallel_fps_osr256", ">=", 1250), ("parallel_fps_osr1024", ">=", 410), ("mux_fps_osr256", ">=", 260),
     ("mux_fps_osr1024", ">=", 185), ("latency_parallel_us", "<=", 700), ("idle_sleep_percent", ">=", 80),
     ("contact_sleep_percent", ">=", 40), ("flash_bytes", "<=", 64 * 1024), ("ram_bytes", "<=", 32 * 1024), ("stack_bytes", "<=", 2048),
-    ("raw_flash_bytes", "<=", "half_flash_bytes"), ("dropped", "<=", 0), ("unfitted", "<=", 0))
+    ("raw_flash_bytes", "<=", "half_flash_bytes"), ("dropped", "<=", 0), ("unfitted", "<=", 0), *grasp_rate.GOALS)
 QUICK_OSRS = (256, 1024)
 SHORT_s = 4
 
@@ -126,7 +127,10 @@ def main(argv):
     few = {"scenes": ("raw", "slip"), "boards": BOARDS[:1], "osrs": QUICK_OSRS} if options.quick else {}
     rows = scenes.measure(tools.command_frame, tools.boards / "scenes", steps, **few)
     runs, resting = measure(tools, options, steps)
-    found = judge(figures(runs, resting, rows), GOALS)
+    with tempfile.TemporaryDirectory() as folder:
+        grasp = steps.run_all(grasp_rate.jobs(options.build, options.boards, folder, min(options.seconds, SHORT_s), few.get("boards", BOARDS)))
+        of_grasp = grasp_rate.figures(grasp)
+    found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
     write_json(out / "rate.json", found)
     write_text(out / "rate.md", rate_report.text(found, __doc__.split("\n\n")[-1]))

@@ -16,13 +16,14 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import analysis  # noqa: E402
 import fuzzing  # noqa: E402
 import same_bits  # noqa: E402
+import second_core  # noqa: E402
 import shared_clock  # noqa: E402
 import silicon  # noqa: E402
 import soaking  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
-PARTS = (same_bits, silicon, shared_clock, fuzzing, soaking, analysis)
+PARTS = (same_bits, second_core, silicon, shared_clock, fuzzing, soaking, analysis)
 
 
 def main(argv):

@@ -9,24 +9,13 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/r
 import numpy as np  # noqa: E402
 import scenes  # noqa: E402
 from boards import PARALLEL as BOARD, fit_cycles_of  # noqa: E402
-from emulated import FROM_s, Measurement, Tools, scenario  # noqa: E402
+from emulated import FROM_s, Measurement, scenario  # noqa: E402
 from fingertip.files import TANGENTIAL_VALID, read_recording  # noqa: E402
+from grasp_rate import PAD, GraspTools  # noqa: E402
 from reporting import run  # noqa: E402
 
 OSRS = (256, 1024)
 SECONDS = 6.0
-PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
-
-
-class GraspTools(Tools):
-    """The images of scene grasp instead of the boards' own."""
-
-    def __init__(self, build, boards):
-        super().__init__(build, boards)
-        self.place = scenes.build("grasp", BOARD, self.boards / "scenes")
-
-    def image(self, board, suffix="bin"):
-        return self.place / f"fingertip-{board}.{suffix}" if hasattr(self, "place") else super().image(board, suffix)
 
 
 def measure(build, boards, say):

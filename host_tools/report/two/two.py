@@ -8,8 +8,7 @@
     two.png       the same to look at
 
 Pads and touches are the twin's, with a dip and calibrated; the code that answers is the firmware's own, compiled for the host. No public
-recording has two contacts and their truth, so nothing here was seen on a real pad. Constants were chosen with seed 20000. No image
-runs this code yet.
+recording has two contacts and their truth, so nothing here was seen on a real pad. Constants were chosen with seed 20000.
 """
 import pathlib
 import sys

@@ -11,7 +11,7 @@ DISTANCES_mm = (6, 8, 10, 12, 15, 20)
 def write(found, path):
     lines = [
         "# What presses", "", "Written by `sh cmake/bootstrap.sh report two`. Simulated pads of 12 mm with a dip, calibrated; the firmware's own code,",
-        "which no image runs yet. No public recording has two contacts and their truth.", "", "![Pairs by distance, what touches are called](two.png)", "",
+        "as scene grasp runs it. No public recording has two contacts and their truth.", "", "![Pairs by distance, what touches are called](two.png)", "",
         *goal_table_md(found), ""]
     if "touches" in found:
         lines += [

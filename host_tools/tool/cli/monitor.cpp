@@ -50,9 +50,15 @@ void draw_header(Canvas &canvas, const Area &area, const Model &model, bool alon
 struct Numbers {
   std::optional<std::string> force, force_sd, x, y, location_sd, sigma, peak, residual, slip;
   std::optional<std::string> qx, qy, q_sd, ratio, ratio_sd;
+  std::optional<std::string> stronger, weaker, edge;
   bool doubtful = false;
   std::uint32_t flags = 0;
 };
+
+std::string contact_in_words(float x_mm, float y_mm, float sd_mm, float force_N) {
+  return signed_number(x_mm, 1) + ", " + signed_number(y_mm, 1) + " mm, sd " + number(sd_mm, 2) +
+         "; " + number(force_N, 2) + " N";
+}
 
 Numbers numbers_of(const Model &model) {
   Numbers numbers;
@@ -86,6 +92,17 @@ Numbers numbers_of(const Model &model) {
     if (contact.force_N > 0) {
       numbers.ratio_sd = number(contact.q_sd_N / contact.force_N, 3);
     }
+  }
+  if (contact.flags & CONTACT_FLAG_TWO_CONTACTS) {
+    numbers.stronger = contact_in_words(contact.x1_mm, contact.y1_mm, contact.location1_sd_mm,
+                                        contact.force1_N);
+    numbers.weaker = contact_in_words(contact.x2_mm, contact.y2_mm, contact.location2_sd_mm,
+                                      contact.force2_N);
+  }
+  if (contact.flags & CONTACT_FLAG_EDGE) {
+    numbers.edge = signed_number(contact.edge_angle_deg, 1) + "°, sd " +
+                   number(contact.edge_angle_sd_deg, 1) + "; " +
+                   number(contact.edge_length_mm, 1) + " mm";
   }
   return numbers;
 }
@@ -154,6 +171,12 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
                       int width, const char *unit, bool may_doubt) {
     return draw_quantity(canvas, column, row, {label, value, width, unit, may_doubt && doubtful});
   };
+  auto line = [&](const char *label, const std::optional<std::string> &text) {
+    int column = canvas.text(left, row, label, text_style(FAINT));
+    canvas.text(column, row, first_columns(*text, area.left + area.width - column),
+                text_style(INK));
+    row++;
+  };
   if (area.width < WIDE - 20) {
     quantity(left, "force", numbers.force, 8, "N", true);
     row++;
@@ -182,6 +205,11 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
       canvas.text(left, row + 1, PAD_COMMAND, text_style(WARNING));
       return row + 2;
     }
+    if (numbers.stronger) {
+      line("1 ", numbers.stronger);
+      line("2 ", numbers.weaker);
+      return row;
+    }
     quantity(left + 10, "", numbers.qy, 6, "N", true);
     quantity(left, "q", numbers.qx, 6, "", true);
     row++;
@@ -201,7 +229,10 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
   quantity(left + 11, "peak", numbers.peak, 6, "kPa", true);
   quantity(left + 28, "residual", numbers.residual, 5, "Pa", false);
   row++;
-  if (model.has_pad()) {
+  if (numbers.stronger) {
+    line("1 ", numbers.stronger);
+    line("2 ", numbers.weaker);
+  } else if (model.has_pad()) {
     quantity(left, "qx", numbers.qx, 6, "", true);
     quantity(left + 11, "qy", numbers.qy, 6, "", true);
     quantity(second, "sd", numbers.q_sd, 6, "N", false);
@@ -211,6 +242,9 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     quantity(left + 11, "sd", numbers.ratio_sd, 6, "", false);
     lamps_of_motion(second + 4);
     row++;
+    if (numbers.edge) {
+      line("edge ", numbers.edge);
+    }
   } else if (model.tells_tangential()) {
     canvas.text(left, row, std::string(NO_PAD) + " " + PAD_COMMAND, text_style(WARNING));
     row++;

@@ -188,7 +188,23 @@ void paint_arrow(Picture &picture, const wire_contact &contact, const Arrow &arr
   }
 }
 
-/* The cells of a location's mark: a cross; of a doubtful one a ring that is open on all sides. */
+/* A long contact, as long as it presses. */
+void paint_edge(Picture &picture, const wire_contact &contact) {
+  float angle_rad = contact.edge_angle_deg * 0.017453293f;
+  float along_x = std::cos(angle_rad), along_y = std::sin(angle_rad);
+  for (int row = 0; row < 2 * picture.rows(); row++) {
+    for (int column = 0; column < picture.columns(); column++) {
+      float dx = picture.x_mm(column) - contact.x_mm, dy = picture.y_mm(row) - contact.y_mm;
+      if (std::abs(dx * along_x + dy * along_y) <= 0.5f * contact.edge_length_mm &&
+          std::abs(dx * along_y - dy * along_x) <= 0.5f * picture.pixel_mm()) {
+        picture.paint(column, row, WHITE, UNSURE_PART);
+      }
+    }
+  }
+}
+
+/* The cells of a location's mark: a cross; of a doubtful one a ring that is open on all sides. Two
+ * contacts are two crosses. */
 struct Mark {
   struct Cell {
     int column, row;
@@ -199,7 +215,14 @@ struct Mark {
 
   Mark(const Picture &picture, const wire_contact &contact) {
     int column = picture.column_of(contact.x_mm), row = picture.pixel_row_of(contact.y_mm) / 2;
-    if (warnings_of(contact.flags)) {
+    if (contact.flags & CONTACT_FLAG_TWO_CONTACTS) {
+      colour = WARNING;
+      const float places_mm[2][2] = {{contact.x1_mm, contact.y1_mm}, {contact.x2_mm, contact.y2_mm}};
+      for (const auto &[x_mm, y_mm] : places_mm) {
+        column = picture.column_of(x_mm), row = picture.pixel_row_of(y_mm) / 2;
+        cells.insert(cells.end(), {{column - 1, row, "─"}, {column, row, "┼"}, {column + 1, row, "─"}});
+      }
+    } else if (warnings_of(contact.flags)) {
       colour = WARNING;
       cells = {{column - 2, row, "("},
                {column + 2, row, ")"},
@@ -368,6 +391,9 @@ Area draw_pad(Canvas &canvas, const Area &available, const Model &model) {
   const std::optional<Arrow> arrow = fit ? arrow_of(*fit) : std::nullopt;
   if (fit) {
     paint_fit(picture, model, *fit);
+  }
+  if (fit && (fit->flags & CONTACT_FLAG_EDGE)) {
+    paint_edge(picture, *fit);
   }
   if (arrow) {
     paint_arrow(picture, *fit, *arrow);

@@ -5,6 +5,7 @@
 #include "draw.h"
 #include "fit/fit.h"
 #include "fit/fit_load.h"
+#include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
 
 #include <stdbool.h>
@@ -13,10 +14,12 @@
 #define LAYOUTS 4
 #define PADS 4
 #define FRAMES 4 /* of one contact */
+#define SHAPES_FRAMES (FIT_SHAPES_FRAMES + 2)
 #define ONE_Q16 65536
 
 static struct fit_array layouts[LAYOUTS];
 static struct fit_pad pads[PADS];
+static struct fit_shapes_pad shapes_pad;
 
 static void stop_unless(enum ft_status status) {
   while (status != FT_OK) {
@@ -62,6 +65,8 @@ void fit_bits_init(void) {
     const struct pad_profile profile = layer_of(5.0f * (float)(k + 1));
     stop_unless(fit_pad_init(&pads[k], &layouts[0], &profile));
   }
+  const struct pad_profile profile = layer_of(12.0f);
+  stop_unless(fit_shapes_init(&shapes_pad, &layouts[0], &profile));
 }
 
 /* 2^-z, z in Q16, in Q30: a parabola between the powers, 0.3 % off. */
@@ -110,9 +115,31 @@ static void pull(const struct fit_array *array, int32_t *pressure_Pa_q10) {
   }
 }
 
+/* A press, every other time with a second one, held for as many frames as an answer takes. */
+static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable,
+                               const struct fit_settings *settings, int32_t *pressure_Pa_q10) {
+  struct fit_result fit;
+  struct fit_shapes_state state;
+  struct fit_shapes_result found[SHAPES_FRAMES];
+  memset(&fit, 0, sizeof fit);
+  memset(&state, 0, sizeof state);
+  memset(found, 0, sizeof found);
+  for (int frame = 0; frame < SHAPES_FRAMES; frame++) {
+    struct fit_shapes_result *result = &found[frame];
+    fit_gaussian(array, pressure_Pa_q10, usable, settings, &fit);
+    if (!fit_shapes(array, &shapes_pad, pressure_Pa_q10, settings, &fit, &state, result)) {
+      memset(result, 0xFF, sizeof *result);
+    }
+    for (uint8_t k = 0; k < array->sensor_count; k++) {
+      pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 256 * draw_between(0, 1);
+    }
+  }
+  return crc32_iso_hdlc((const uint8_t *)found, sizeof found) ^
+         crc32_iso_hdlc((const uint8_t *)&state.at, sizeof state.at);
+}
+
 uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
-  (void)kernel;
-  return 10000;
+  return kernel == FIT_BITS_SHAPES ? 2000 : 10000; /* of that many frames each */
 }
 
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
@@ -122,10 +149,11 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
                (kernel == FIT_BITS_LOAD && press % 16 == 1);
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 
+  const bool on_a_pad = kernel == FIT_BITS_TANGENTIAL || kernel == FIT_BITS_SHAPES;
   struct fit_settings settings;
   memset(&settings, 0, sizeof settings);
   settings.iterations = (uint8_t)(press % 4 ? 7 : draw_between(0, 12));
-  settings.noise_Pa_q10 = draw_between(1, (kernel == FIT_BITS_TANGENTIAL ? 4 : 32) * 1024);
+  settings.noise_Pa_q10 = draw_between(1, (on_a_pad ? 4 : 32) * 1024);
   if (kernel == FIT_BITS_GENERAL && press % 5 == 0) {
     settings.n_largest = (uint8_t)draw_between(1, array->sensor_count);
   }
@@ -157,15 +185,22 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
      * its thickness makes of a contact. */
     int32_t any_q16 = draw_between(ONE_Q16, 2 * ONE_Q16);
     int64_t height_q16 = (int64_t)any_q16 << draw_between(0, 7) >> 4;
-    int64_t thickness = press / 4 % PADS + 1; /* 5 mm */
-    draw_press(array,
-               kernel == FIT_BITS_TANGENTIAL ? (int64_t)any_q16 * 7 / (thickness * thickness)
-                                             : height_q16,
-               settings.noise_Pa_q10, pressure_Pa_q10);
+    int64_t thickness = kernel == FIT_BITS_SHAPES ? 2 : press / 4 % PADS + 1; /* 5 mm */
+    if (on_a_pad) {
+      height_q16 = (int64_t)any_q16 * 7 / (thickness * thickness);
+    }
+    draw_press(array, height_q16, settings.noise_Pa_q10, pressure_Pa_q10);
+    if (kernel == FIT_BITS_SHAPES && press % 4 < 2) {
+      int32_t second_Pa_q10[FT_MAX_SENSORS];
+      draw_press(array, height_q16, settings.noise_Pa_q10, second_Pa_q10);
+      for (uint8_t k = 0; k < array->sensor_count; k++) {
+        pressure_Pa_q10[k] = to_int32((int64_t)pressure_Pa_q10[k] + second_Pa_q10[k]);
+      }
+    }
   }
 
   uint32_t usable = UINT32_MAX;
-  const bool pulls = kernel == FIT_BITS_TANGENTIAL || kernel == FIT_BITS_LOAD;
+  const bool pulls = on_a_pad || kernel == FIT_BITS_LOAD;
   if (pulls && press % 16 != 15) {
     pull(array, pressure_Pa_q10);
   }
@@ -177,6 +212,9 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     usable = draw() | draw();
   }
 
+  if (kernel == FIT_BITS_SHAPES) {
+    return bits_of_shapes(array, usable, &settings, pressure_Pa_q10);
+  }
   struct fit_result result;
   memset(&result, 0, sizeof result);
   if (kernel == FIT_BITS_GRID) {

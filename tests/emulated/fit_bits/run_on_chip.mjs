@@ -1,7 +1,8 @@
 #!/usr/bin/env node
 /**
- * usage: run_on_chip.mjs IMAGE.bin KERNEL COUNT: prints the CRC of each of the first COUNT presses as the image
- * fit_bits_rp2040 computes it on the emulated chip; of grasps, after a colon each, the cycles of each step.
+ * usage: run_on_chip.mjs IMAGE.bin KERNEL COUNT [second]: prints the CRC of each of the first COUNT presses as the image
+ * fit_bits_rp2040 computes it on the emulated chip, on its second core if that is said; of grasps, after a colon each, the cycles of each
+ * step.
  */
 import { readFileSync } from 'node:fs';
 import { Chip, Stopped } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
@@ -11,7 +12,7 @@ import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
 const [NEXT_PRESS, START, STOP] = [1, 2, 3];
 const A_MINUTE_ns = 60e9;
 
-const [image, kernel, count] = process.argv.slice(2);
+const [image, kernel, count, core] = process.argv.slice(2);
 const time = new SimulatedTime();
 const report = new Report(() => time.nanos);
 const chip = new Chip(time, report, { serial: new Uint8Array(8) });
@@ -42,7 +43,9 @@ const job = new DataView(chip.sram.buffer, chip.sram.byteOffset + chip.core.regi
 for (let press = 0; press < Number(count); press++) {
   job.setUint32(0, Number(kernel), true);
   job.setUint32(4, press, true);
+  if (core === 'second') job.setUint32(12, 1, true);
   cycles = [];
   untilNextPress();
+  if (core === 'second' && !(chip.second.cycles > 1000)) throw new Error('the second core does nothing');
   process.stdout.write(`${[job.getUint32(8, true).toString(16).padStart(8, '0'), ...cycles].join(':')}\n`);
 }

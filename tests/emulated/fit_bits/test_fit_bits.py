@@ -5,6 +5,7 @@ usage: test_fit_bits.py --host TOOL --m4f ELF --m0 ELF --rp2040 BIN --qemu QEMU 
 Compared with the host build:
 - the Cortex-M4F build, hardware floating point, in QEMU (mps2-an386): all presses, all kernels;
 - the Cortex-M0+ objects of the firmware in the RP2040's emulator: so many presses of the fixed-point kernels, all unless said otherwise;
+- what scene grasp computes on the second core, there, a fifth of the presses;
 - those of float32 take a million cycles a fit there. The emulator does the first 200, and QEMU's Cortex-M0 (microbit),
   which has not the RP2040's divider but needs none for this kernel, does all with the same objects.
 """
@@ -15,14 +16,15 @@ import subprocess
 import sys
 import unittest
 
-KERNELS = ["grid", "masked", "general", "tangential", "load"]  # the order of enum fit_bits_kernel
-PRESSES = dict.fromkeys(KERNELS, 10000)  # fit_bits_presses
+KERNELS = ["grid", "masked", "general", "tangential", "load", "shapes"]  # the order of enum fit_bits_kernel
+PRESSES = dict.fromkeys(KERNELS, 10000) | {"shapes": 2000}  # fit_bits_presses
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
 
 
 def presses_in_emulator():
-    return {kernel: min(presses, TOOLS.in_emulator) for kernel, presses in PRESSES.items()} | {"general": 200}
+    return {kernel: min(presses, TOOLS.in_emulator) for kernel, presses in PRESSES.items()} | {
+        "general": 200, "shapes": min(PRESSES["shapes"], TOOLS.in_emulator // 5)}
 
 
 def output_of(*command):
@@ -37,8 +39,8 @@ def on_host(kernel, count=None):
 
 
 @functools.cache
-def in_emulator(kernel):
-    return output_of(TOOLS.node, FOLDER / "run_on_chip.mjs", TOOLS.rp2040, KERNELS.index(kernel), presses_in_emulator()[kernel])
+def in_emulator(kernel, presses, *core):
+    return output_of(TOOLS.node, FOLDER / "run_on_chip.mjs", TOOLS.rp2040, KERNELS.index(kernel), presses, *core)
 
 
 def in_qemu(machine, image, kernel):
@@ -72,7 +74,14 @@ class SameBits(unittest.TestCase):
     def test_rp2040(self):
         for kernel, count in presses_in_emulator().items():
             with self.subTest(kernel):
-                self.compare(kernel, in_emulator(kernel), count)
+                self.compare(kernel, in_emulator(kernel, count), count)
+
+    def test_second_core_of_the_rp2040(self):
+        """What scene grasp computes there."""
+        for kernel in ("tangential", "shapes"):
+            with self.subTest(kernel):
+                count = max(1, presses_in_emulator()[kernel] // 5)
+                self.compare(kernel, in_emulator(kernel, count, "second"), count)
 
 
 if __name__ == "__main__":

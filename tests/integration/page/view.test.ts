@@ -323,6 +323,18 @@ test('an arrow has a direction only where the load is no noise', () => {
   assert.equal(sceneOf(LAYOUT, contactOf({ ...pull, flags: FITTED }), READINGS, [], null, true).fit?.arrow, null);
 });
 
+test('two contacts are two spots, and a long one has its ends', () => {
+  const two = { x1_mm: -5, y1_mm: 7, location1_sd_mm: 0.25, x2_mm: 4, y2_mm: -2, location2_sd_mm: 0.5 };
+  const both = sceneOf(LAYOUT, contactOf({ ...two, flags: FITTED | Flag.SHAPE_VALID | Flag.TWO_CONTACTS }), READINGS, [], null, true).fit;
+  assert.deepEqual(both?.two, [
+    { x_mm: -5, y_mm: 7, sd_mm: 0.25 },
+    { x_mm: 4, y_mm: -2, sd_mm: 0.5 },
+  ]);
+  assert.ok(both?.doubtful && both.edge === null);
+  const long = sceneOf(LAYOUT, contactOf({ edge_angle_deg: -90, edge_length_mm: 20, flags: FITTED | Flag.SHAPE_VALID | Flag.EDGE }), READINGS, [], null, true).fit;
+  assert.deepEqual([long?.edge?.x_mm.toFixed(3), long?.edge?.y_mm, long?.two, long?.doubtful], ['0.000', -10, [], false]);
+});
+
 test('a moment of the past is the contact of then, its trail that of the second before', () => {
   const history = historyOf(3000, (i) => ({
     force_N: i / 1000,

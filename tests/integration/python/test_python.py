@@ -21,6 +21,7 @@ sys.path.insert(0, str(TOOLS))
 
 from fingertip import Flag, files  # noqa: E402
 from fingertip import plot  # noqa: E402
+from fingertip.line import SHAPE_COLUMNS  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
@@ -253,7 +254,7 @@ class Evaluation(ToolTest):
     def test_rows_without_contact_packet_are_left_out(self):
         def change(row):
             if row["frame"] % 10 == 0:
-                row.update(dict.fromkeys((*files.CONTACT_COLUMNS, *files.TANGENTIAL_COLUMNS), ""))
+                row.update(dict.fromkeys((*files.CONTACT_COLUMNS, *files.LATER_COLUMNS), ""))
             return row
 
         scenario = self.scenario()
@@ -335,7 +336,7 @@ class TrustedRows(ToolTest):
 
 
 class EarlierRecordings(ToolTest):
-    EARLIER = tuple(name for name in files.RECORDING_COLUMNS if name not in files.TANGENTIAL_COLUMNS)
+    EARLIER = tuple(name for name in files.RECORDING_COLUMNS if name not in files.LATER_COLUMNS)
 
     def test_without_the_columns_of_the_tangential_load_they_are_read(self):
         scenario = self.scenario()
@@ -350,6 +351,13 @@ class EarlierRecordings(ToolTest):
         some = files.read_recording(path, columns=("t_us", "frame", "flags", "qx_N"))
         self.assertTrue(np.isnan(some["qx_N"]).all())
         np.testing.assert_array_equal(some["flags"], whole["flags"])
+
+    def test_without_the_columns_of_shapes_they_are_read(self):
+        scenario = self.scenario()
+        names = tuple(name for name in files.RECORDING_COLUMNS if name not in SHAPE_COLUMNS)
+        earlier = files.read_recording(self.recording(scenario, change=lambda row: {**row, "qx_N": 0.5}, columns=names))
+        self.assertTrue((earlier["qx_N"] == 0.5).all())
+        self.assertTrue(np.isnan(earlier["shape_age_ms"]).all() and np.isnan(earlier["edge_length_mm"]).all())
 
     def test_some_of_the_columns_are_no_recording(self):
         path = self.recording(self.scenario(), columns=tuple(name for name in files.RECORDING_COLUMNS if name != "q_sd_N"))

@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
 from fingertip import recorded  # noqa: E402
-from fingertip.line import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS  # noqa: E402
+from fingertip.line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS  # noqa: E402
 
 SENSORS = 2
 ODD = ("", "0", "-0", "5.", ".5", "-.5", "-", "--5", "1.2.3", "5.0", "-5", "1e5", "1e-400", "9" * 40, "18446744073709551615", "18446744073709551616", "4294967295",
@@ -16,7 +16,7 @@ ODD = ("", "0", "-0", "5.", ".5", "-.5", "-", "--5", "1.2.3", "5.0", "-5", "1e5"
 
 
 def header(tangential):
-    names = ["t_us", "frame", *CONTACT_COLUMNS, *(TANGENTIAL_COLUMNS if tangential else ()), *RAW_COLUMNS]
+    names = ["t_us", "frame", *CONTACT_COLUMNS, *(LATER_COLUMNS if tangential else ()), *RAW_COLUMNS]
     return names + [f"s{k}_Pa" for k in range(SENSORS)] + [f"tare{k}_Pa" for k in range(SENSORS)]
 
 

@@ -363,6 +363,80 @@ static void without_an_answer_frames_go_out_with_the_fit_and_say_so(void) {
   TEST_ASSERT_GREATER_THAN(count, native_worker_starts());
 }
 
+/* Frames of our own, so near to each other that none waits: the last one again, its pressures above
+ * the zero in this share of it. */
+static void feed_fast(double share) {
+  static struct frame first;
+  if (share == 0.0) {
+    first = app.frame;
+    return;
+  }
+  app.frame.number++;
+  app.frame.t_us += TANGENTIAL_BESIDE_us / 2;
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    const double zero = app.condition.zero_Pa_q10[k];
+    app.frame.pressure_Pa_q10[k] = (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
+  }
+  app_process_frame(&app, app.frame.t_read_us);
+}
+
+static void fast_frames_take_the_load_of_the_frame_before(void) {
+  for (int processors = 1; processors <= 2; processors++) {
+    tearDown();
+    native_set_worker(processors == 2, 10);
+    setUp();
+    load.qx_N = 1.2;
+    struct wire_packet command = pad_command();
+    store_pad(&command);
+    last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, 0);
+    feed_fast(0.0);
+    for (int i = 0; i < 10; i++) {
+      feed_fast(1.0);
+      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, app.contact.flags);
+    }
+    run_for(1); /* of the question of this frame: its processor answers */
+    const struct fit_tangential before = app.tangential_job.estimate;
+    TEST_ASSERT_TRUE(before.valid);
+    const float force_N = app.fit.force_N;
+    feed_fast(1.25);
+    const float share = app.fit.force_N / force_N;
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.25f, share);
+    TEST_ASSERT_EQUAL_FLOAT(before.force_N * share, app.estimate.force_N);
+    TEST_ASSERT_EQUAL_FLOAT(before.qx_N * share, app.estimate.qx_N);
+    TEST_ASSERT_EQUAL_FLOAT(before.q_sd_N * share, app.estimate.q_sd_N);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.5f, app.load.x_mm);
+    feed_fast(1.25);
+    TEST_ASSERT_FLOAT_WITHIN(0.2f, 6.25f, app.load.force_N);
+    feed_fast(3.0); /* another contact's */
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_VALID, app.contact.flags);
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_LATE, app.contact.flags);
+  }
+}
+
+static void fast_frames_say_that_the_one_before_got_no_answer(void) {
+  tearDown();
+  native_set_worker(true, 10);
+  setUp();
+  struct wire_packet command = pad_command();
+  store_pad(&command);
+  last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, 0);
+  feed_fast(0.0);
+  for (int i = 0; i < 3; i++) {
+    feed_fast(1.0);
+  }
+  native_set_worker(true, UINT64_MAX);
+  feed_fast(1.0); /* asks, and has the answer of the frame before */
+  TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_VALID,
+                   app.contact.flags);
+  const unsigned starts = native_worker_starts();
+  for (int i = 0; i < 4; i++) {
+    feed_fast(1.0);
+    TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE,
+                     app.contact.flags);
+  }
+  TEST_ASSERT_EQUAL(starts + 4, native_worker_starts());
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
@@ -377,6 +451,8 @@ int main(void) {
   RUN_TEST(from_touch_tells_what_changed);
   RUN_TEST(a_held_frame_repeats_the_load);
   RUN_TEST(a_second_processor_gives_the_same_estimates);
+  RUN_TEST(fast_frames_take_the_load_of_the_frame_before);
+  RUN_TEST(fast_frames_say_that_the_one_before_got_no_answer);
   RUN_TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so);
   return UNITY_END();
 }

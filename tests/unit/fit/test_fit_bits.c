@@ -49,6 +49,12 @@ static void test_load(void) {
   assert_kernel(FIT_BITS_LOAD, golden);
 }
 
+static void test_shapes(void) {
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x49751DC8, 0x7DEDB468, 0x2E25B439, 0x598C8D50,
+                                                 0xD7AF6A85, 0x59C8029D, 0xB1FB3C64, 0x90F7F615};
+  assert_kernel(FIT_BITS_SHAPES, golden);
+}
+
 int main(void) {
   UNITY_BEGIN();
   fit_bits_init();
@@ -57,5 +63,6 @@ int main(void) {
   RUN_TEST(test_general);
   RUN_TEST(test_tangential);
   RUN_TEST(test_load);
+  RUN_TEST(test_shapes);
   return UNITY_END();
 }

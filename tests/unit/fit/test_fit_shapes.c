@@ -243,6 +243,75 @@ static void test_thin_rubber_is_refused(void) {
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &array, &thin));
 }
 
+/* Within a thousandth of each limit. */
+static void test_rubber_beyond_the_limits_is_refused(void) {
+  for (int side = -1; side <= 1; side += 2) {
+    const float share = 1.0f + 0.001f * (float)side;
+    const enum ft_status beyond = side > 0 ? FT_ERR_ARGUMENT : FT_OK;
+    struct pad_profile other = profile;
+    other.normal[PAD_NORMAL_TERMS - 1].sd_mm = share * 1.5f * 9.0f;
+    TEST_ASSERT_EQUAL(beyond, fit_shapes_init(&pad, &array, &other));
+    other = profile;
+    other.tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm = share * 4.0f * 9.0f;
+    TEST_ASSERT_EQUAL(beyond, fit_shapes_init(&pad, &array, &other));
+    other = profile;
+    other.normal[0].sd_mm = 9.0f * sqrtf(FIT_SHAPES_VARIANCE_MIN / share);
+    TEST_ASSERT_EQUAL(beyond, fit_shapes_init(&pad, &array, &other));
+  }
+  struct fit_array turned;
+  float x_mm[SENSORS], y_mm[SENSORS];
+  for (int k = 0; k < SENSORS; k++) { /* five columns of three */
+    x_mm[k] = 9.0f * (float)(k / 3 - 2);
+    y_mm[k] = 9.0f * (float)(k % 3 - 1);
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&turned, SENSORS, x_mm, y_mm, 9.0f));
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &turned, &profile));
+}
+
+/* What a frame does in parts is what it does at once, and each ends when it should. */
+static void test_parts_add_up_to_a_frame(void) {
+  struct fit_settings settings = usual(0.015);
+  struct fit_shapes_state whole = {.frames = 0}, parts = {.frames = 0};
+  struct fit_shapes_result of_whole = {FIT_SHAPE_UNDECIDED}, of_parts = {FIT_SHAPE_UNDECIDED};
+  static struct fit_shapes_pad other;
+  TEST_ASSERT_EQUAL(FT_OK, fit_shapes_init(&other, &array, &profile));
+  for (int frame = 0; frame < 3 * FIT_SHAPES_FRAMES; frame++) {
+    struct reading reading = {{0.0}};
+    press(1.0, 8.0, 4.0, 0.0, 0.0, 0.015, &reading);
+    press(-2.0, -6.0, 4.0, 0.0, 0.0, 0.015, &reading);
+    int32_t pressure_Pa_q10[SENSORS];
+    for (int k = 0; k < SENSORS; k++) {
+      pressure_Pa_q10[k] =
+          (int32_t)lround(1024.0 * (reading.Pa[k] + NOISE_Pa * random_between(&noise, -1.7, 1.7)));
+    }
+    struct fit_result fit;
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
+    const bool answers =
+        fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &whole, &of_whole);
+    enum fit_shapes_progress progress;
+    int count = 0;
+    do {
+      progress = fit_shapes_part(&array, &other, pressure_Pa_q10, &settings, &fit, &parts, &of_parts);
+      count++;
+    } while (progress == FIT_SHAPES_UNFINISHED);
+    TEST_ASSERT_EQUAL(frame == 0 ? 2 : FIT_SHAPES_PARTS, count);
+    TEST_ASSERT_EQUAL(answers ? FIT_SHAPES_ANSWERED : FIT_SHAPES_STEPPED, progress);
+    TEST_ASSERT_EQUAL_MEMORY(&whole, &parts, sizeof whole);
+    TEST_ASSERT_EQUAL_MEMORY(&of_whole, &of_parts, sizeof of_whole);
+    const bool steps_only = frame + 1 >= FIT_SHAPES_FRAMES && (frame + 2 - FIT_SHAPES_FRAMES) % 4 == 0;
+    TEST_ASSERT_EQUAL(frame == 0 || (frame + 1 >= FIT_SHAPES_FRAMES && !steps_only), answers);
+  }
+  TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, of_parts.shape);
+  /* Too few sensors amid a frame: it ends there, and the contact is forgotten. */
+  struct fit_result none = {.flags = 0};
+  const int32_t zeros[SENSORS] = {0};
+  TEST_ASSERT_EQUAL(FIT_SHAPES_ANSWERED,
+                    fit_shapes_part(&array, &other, zeros, &settings, &none, &parts, &of_parts));
+  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, of_parts.shape);
+  TEST_ASSERT_EQUAL(0, parts.frames);
+  TEST_ASSERT_EQUAL(0, parts.part);
+}
+
 static void test_garbage_leaves_finite_results(void) {
   struct fit_settings settings = usual(0.05);
   for (int i = 0; i < 400; i++) {
@@ -282,6 +351,8 @@ int main(void) {
   RUN_TEST(test_an_answer_takes_its_frames_and_its_sensors);
   RUN_TEST(test_what_hardly_presses_is_undecided);
   RUN_TEST(test_thin_rubber_is_refused);
+  RUN_TEST(test_rubber_beyond_the_limits_is_refused);
+  RUN_TEST(test_parts_add_up_to_a_frame);
   RUN_TEST(test_garbage_leaves_finite_results);
   return UNITY_END();
 }

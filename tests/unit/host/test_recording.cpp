@@ -281,23 +281,11 @@ TEST(Recording, ThePadIsKeptWithItsChanges) {
   EXPECT_NE(error_of(folder / "four.csv").find("too many values"), std::string::npos);
 }
 
-/* Without the columns of the tangential load, as they were written before there was one. */
-TEST(Recording, EarlierOnesAreRead) {
-  test::TemporaryFolder folder;
-  std::vector<wire_packet> expected = all_kinds();
-  for (wire_packet &packet : expected) {
-    if (packet.type == WIRE_CONTACT) {
-      wire_contact &contact = packet.body.contact;
-      contact.flags &=
-          ~static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID);
-      contact.qx_N = contact.qy_N = contact.q_sd_N = contact.tangential_ratio = 0;
-      contact.vx_mm_s = contact.vy_mm_s = 0;
-    }
-  }
-  record(folder / "r.csv", expected);
-  std::istringstream lines(contents(folder / "r.csv"));
+/* Without the columns from this one to the last, as they were written before there were any. */
+std::string without_columns(const std::string &whole, const char *from, std::size_t &columns) {
+  std::istringstream lines(whole);
   std::string text;
-  std::size_t first = 0, columns = 0;
+  std::size_t first = 0;
   for (std::string line; std::getline(lines, line);) {
     if (line[0] != '#') {
       std::vector<std::string> cells;
@@ -308,8 +296,8 @@ TEST(Recording, EarlierOnesAreRead) {
       }
       if (first == 0) {
         auto at = [&](const char *name) { return std::find(cells.begin(), cells.end(), name); };
-        first = static_cast<std::size_t>(at("qx_N") - cells.begin());
-        columns = static_cast<std::size_t>(at("vy_mm_s") - at("qx_N")) + 1;
+        first = static_cast<std::size_t>(at(from) - cells.begin());
+        columns = static_cast<std::size_t>(at("edge_length_mm") - at(from)) + 1;
       }
       cells.erase(cells.begin() + static_cast<std::ptrdiff_t>(first),
                   cells.begin() + static_cast<std::ptrdiff_t>(first + columns));
@@ -320,9 +308,34 @@ TEST(Recording, EarlierOnesAreRead) {
     }
     text += line + "\n";
   }
-  EXPECT_EQ(columns, 6u);
-  write(folder / "earlier.csv", text);
-  EXPECT_EQ(frames_of(read_all(folder / "earlier.csv")), frames_of(expected));
+  return text;
+}
+
+TEST(Recording, EarlierOnesAreRead) {
+  for (bool tangential : {false, true}) {
+    test::TemporaryFolder folder;
+    std::vector<wire_packet> expected = all_kinds();
+    for (wire_packet &packet : expected) {
+      if (packet.type == WIRE_CONTACT) {
+        wire_contact &contact = packet.body.contact;
+        contact.flags &= ~static_cast<std::uint32_t>(CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE);
+        contact.shape_age_ms = 0;
+        contact.edge_angle_deg = contact.edge_angle_sd_deg = contact.edge_length_mm = 0;
+        if (!tangential) {
+          contact.flags &= ~static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID |
+                                                       CONTACT_FLAG_VELOCITY_VALID);
+          contact.qx_N = contact.qy_N = contact.q_sd_N = contact.tangential_ratio = 0;
+          contact.vx_mm_s = contact.vy_mm_s = 0;
+        }
+      }
+    }
+    record(folder / "r.csv", expected);
+    std::size_t columns = 0;
+    write(folder / "earlier.csv",
+          without_columns(contents(folder / "r.csv"), tangential ? "shape_age_ms" : "qx_N", columns));
+    EXPECT_EQ(columns, tangential ? 14u : 20u);
+    EXPECT_EQ(frames_of(read_all(folder / "earlier.csv")), frames_of(expected));
+  }
 }
 
 TEST(Recording, AKilledRecorderLosesAtMostTheLastFrame) {
@@ -447,7 +460,7 @@ TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
   record(folder / "r.csv", packets);
   std::string text = contents(folder / "r.csv");
   EXPECT_NE(text.find("\n1000,1,1,32,0,,,,,,,,,,,,,0,0,0,0,0,0,0,,,,,,,"), std::string::npos) << text;
-  EXPECT_NE(text.find("\n2000,2,2,5243047,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"),
+  EXPECT_NE(text.find("\n2000,2,2,340787367,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"),
             std::string::npos)
       << text;
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
@@ -461,7 +474,7 @@ TEST(Recording, PressuresWithoutSensorsAreDamage) {
   test::TemporaryFolder folder;
   { RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false, AT_ONCE); }
   std::ofstream(folder / "r.csv", std::ios::app)
-      << "1000,1" << std::string(28, ',') << ",7,0,0,0,0,20.00\n";
+      << "1000,1" << std::string(42, ',') << ",7,0,0,0,0,20.00\n";
   EXPECT_NE(error_of(folder / "r.csv").find("pressures in a recording without sensors"),
             std::string::npos)
       << error_of(folder / "r.csv");

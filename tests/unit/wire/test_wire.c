@@ -16,7 +16,9 @@ static size_t body_length(const struct wire_packet *packet) {
            (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) +
            (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0) +
            (flags & CONTACT_FLAG_TANGENTIAL_VALID ? 16 : 0) +
-           (flags & CONTACT_FLAG_VELOCITY_VALID ? 8 : 0);
+           (flags & CONTACT_FLAG_VELOCITY_VALID ? 8 : 0) +
+           (flags & CONTACT_FLAG_SHAPE_VALID ? 4 : 0) +
+           (flags & CONTACT_FLAG_TWO_CONTACTS ? 40 : 0) + (flags & CONTACT_FLAG_EDGE ? 12 : 0);
   }
   case WIRE_RAW:
     return 23 + 8u * packet->body.raw.sensor_count;
@@ -112,7 +114,9 @@ static void test_quantities_travel_under_their_flags(void) {
     size_t length;
   } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},        {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
                {CONTACT_FLAG_SLIP_VALID, 4},        {CONTACT_FLAG_WIDTHS_VALID, 12},
-               {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8}};
+               {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
+               {CONTACT_FLAG_SHAPE_VALID, 4},       {CONTACT_FLAG_TWO_CONTACTS, 40},
+               {CONTACT_FLAG_EDGE, 12}};
   enum { PARTS = sizeof parts / sizeof parts[0] };
   for (unsigned present = 0; present < 1u << PARTS; present++) {
     struct sampler sampler = {SAMPLE_GREATEST, {12}};
@@ -151,6 +155,14 @@ static void test_quantities_travel_under_their_flags(void) {
     TEST_ASSERT_EQUAL_FLOAT(tangential, contact->tangential_ratio);
     TEST_ASSERT_EQUAL_FLOAT(velocity, contact->vx_mm_s);
     TEST_ASSERT_EQUAL_FLOAT(velocity, contact->vy_mm_s);
+    float two = present & 128 ? FLT_MAX : 0, edge = present & 256 ? FLT_MAX : 0;
+    TEST_ASSERT_EQUAL_FLOAT(present & 64 ? FLT_MAX : 0, contact->shape_age_ms);
+    TEST_ASSERT_EQUAL_FLOAT(two, contact->x1_mm);
+    TEST_ASSERT_EQUAL_FLOAT(two, contact->force1_sd_N);
+    TEST_ASSERT_EQUAL_FLOAT(two, contact->y2_mm);
+    TEST_ASSERT_EQUAL_FLOAT(two, contact->force2_sd_N);
+    TEST_ASSERT_EQUAL_FLOAT(edge, contact->edge_angle_deg);
+    TEST_ASSERT_EQUAL_FLOAT(edge, contact->edge_length_mm);
     TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, contact->stages.total_us);
   }
 }
@@ -254,7 +266,14 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
                      &contact->sigma_y_mm,     &contact->width_correlation,
                      &contact->qx_N,           &contact->qy_N,
                      &contact->q_sd_N,         &contact->tangential_ratio,
-                     &contact->vx_mm_s,        &contact->vy_mm_s};
+                     &contact->vx_mm_s,        &contact->vy_mm_s,
+                     &contact->shape_age_ms, &contact->x1_mm,
+                     &contact->y1_mm, &contact->location1_sd_mm,
+                     &contact->force1_N, &contact->force1_sd_N,
+                     &contact->x2_mm, &contact->y2_mm,
+                     &contact->location2_sd_mm, &contact->force2_N,
+                     &contact->force2_sd_N, &contact->edge_angle_deg,
+                     &contact->edge_angle_sd_deg, &contact->edge_length_mm};
   for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
     assert_float_guarded(WIRE_CONTACT, 26 + 4 * i, fields[i], &packet);
   }

@@ -154,6 +154,29 @@ static void test_contact(void) {
   contact->sigma_x_mm = contact->sigma_y_mm = contact->width_correlation = 0.0f;
   check("contact_press.txt", &packet);
 
+  const struct wire_contact press = *contact;
+  contact->flags |= CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS;
+  contact->shape_age_ms = 1.53125f;
+  contact->x1_mm = -5.25f;
+  contact->y1_mm = 7.5f;
+  contact->location1_sd_mm = 0.09375f;
+  contact->force1_N = 4.5f;
+  contact->force1_sd_N = 0.0625f;
+  contact->x2_mm = 3.75f;
+  contact->y2_mm = -2.125f;
+  contact->location2_sd_mm = 0.1875f;
+  contact->force2_N = 2.25f;
+  contact->force2_sd_N = 0.03125f;
+  check("contact_two.txt", &packet);
+
+  *contact = press;
+  contact->flags |= CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
+  contact->shape_age_ms = 2.296875f;
+  contact->edge_angle_deg = -37.5f;
+  contact->edge_angle_sd_deg = 1.125f;
+  contact->edge_length_mm = 18.25f;
+  check("contact_edge.txt", &packet);
+
   *contact = (struct wire_contact){
       .frame = contact->frame, .flags = CONTACT_FLAG_TARED, .stages = contact->stages};
   check("contact_none.txt", &packet);

@@ -138,6 +138,26 @@ static inline void sample_contact(struct sampler *sampler, struct wire_contact *
     contact->vx_mm_s = sample_f32(sampler);
     contact->vy_mm_s = sample_f32(sampler);
   }
+  if (contact->flags & CONTACT_FLAG_SHAPE_VALID) {
+    contact->shape_age_ms = sample_f32(sampler);
+  }
+  if (contact->flags & CONTACT_FLAG_TWO_CONTACTS) {
+    contact->x1_mm = sample_f32(sampler);
+    contact->y1_mm = sample_f32(sampler);
+    contact->location1_sd_mm = sample_f32(sampler);
+    contact->force1_N = sample_f32(sampler);
+    contact->force1_sd_N = sample_f32(sampler);
+    contact->x2_mm = sample_f32(sampler);
+    contact->y2_mm = sample_f32(sampler);
+    contact->location2_sd_mm = sample_f32(sampler);
+    contact->force2_N = sample_f32(sampler);
+    contact->force2_sd_N = sample_f32(sampler);
+  }
+  if (contact->flags & CONTACT_FLAG_EDGE) {
+    contact->edge_angle_deg = sample_f32(sampler);
+    contact->edge_angle_sd_deg = sample_f32(sampler);
+    contact->edge_length_mm = sample_f32(sampler);
+  }
 }
 
 static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {

@@ -6,7 +6,7 @@ import { Report } from '../../../simulation/emulator/report.mjs';
 
 const rows = readFileSync(new URL('../../../../firmware/fit/kernels.h', import.meta.url), 'utf8').matchAll(/^ +ROW\((\w+),/gm);
 /** In the order of `kernels` in main.c. */
-export const KERNELS = ['nothing', 'fit', 'naive_float', 'naive_double', 'lm_float', 'lm_double', 'tangential', 'load_0', 'load_1', 'load_2', 'load_3', 'load_4', 'load_5', 'gains_of_touch', 'shapes_first', 'shapes', ...[...rows].map((row) => row[1])];
+export const KERNELS = ['nothing', 'fit', 'naive_float', 'naive_double', 'lm_float', 'lm_double', 'tangential', 'load_0', 'load_1', 'load_2', 'load_3', 'load_4', 'load_5', 'gains_of_touch', 'shapes_first_0', 'shapes_first_1', 'shapes_0', 'shapes_1', 'shapes_2', ...[...rows].map((row) => row[1])];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */
 const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, guess: 3, noise_Pa_q10: 4, prior_sigma_mm: 5, prior_width_mm: 6, usable: 7, readings: 8, x_mm: 40, y_mm: 41 };

@@ -107,17 +107,31 @@ static void gains_of_touch(void) {
   fit_gains_learn(&gains, &layout, job.pressure_Pa_q10, &chosen, &contact);
 }
 
-/* The first frame of a contact, and one that ends with an answer, after `fit` of the same readings and
- * the frames before, which are not counted. */
-static void shapes_first(void) {
-  fit_shapes(&layout, &shapes_pad, job.pressure_Pa_q10, &chosen, &contact, &shapes_state,
-             &shapes_result);
-}
+/* The two parts of a contact's first frame, and the parts of one that ends with an answer, on a pad with a dip;
+ * after `fit` of the same readings and what comes before, which is not counted. */
 static void shapes(void) {
-  shapes_first();
+  struct fit_settings settings = chosen;
+  settings.dip_share = 0.0125f;
+  settings.dip_sd_mm = 14.0f;
+  fit_shapes_part(&layout, &shapes_pad, job.pressure_Pa_q10, &settings, &contact, &shapes_state,
+                  &shapes_result);
   job.x_mm = shapes_result.x_mm[0];
   job.y_mm = shapes_result.y_mm[0];
 }
+#define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS)
+#define SHAPES_PART(part)                                                                          \
+  static void shapes_##part(void) {                                                                \
+    shapes();                                                                                      \
+  }
+SHAPES_PART(0)
+SHAPES_PART(1)
+SHAPES_PART(2)
+SHAPES_PART(first_0)
+SHAPES_PART(first_1)
+static void (*const shapes_parts[])(void) = {shapes_first_0, shapes_first_1, shapes_0, shapes_1,
+                                             shapes_2};
+/* Parts before each. */
+static const int shapes_before[] = {0, 1, SHAPES_LATER, SHAPES_LATER + 1, SHAPES_LATER + 2};
 
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
@@ -140,7 +154,8 @@ static void (*const kernels[])(void) = {
     naive_double, lm_float,  lm_double,
     tangential, load_0,    load_1,
     load_2,    load_3,    load_4,
-    load_5,    gains_of_touch, shapes_first, shapes, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+    load_5,    gains_of_touch, shapes_first_0, shapes_first_1, shapes_0,
+    shapes_1,  shapes_2,  FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
@@ -168,11 +183,13 @@ int main(void) {
         tangential();
       }
     }
-    if (kernel == shapes_first || kernel == shapes) {
-      fit();
-      shapes_state = (struct fit_shapes_state){0};
-      for (int frame = 1; kernel == shapes && frame < FIT_SHAPES_FRAMES; frame++) {
-        shapes();
+    for (unsigned part = 0; part < sizeof shapes_before / sizeof shapes_before[0]; part++) {
+      if (kernel == shapes_parts[part]) {
+        fit();
+        shapes_state = (struct fit_shapes_state){0};
+        for (int before = 0; before < shapes_before[part]; before++) {
+          shapes();
+        }
       }
     }
     for (int part = 0; part < FIT_LOAD_PARTS; part++) {

@@ -31,7 +31,7 @@ from fingertip.files import InputError, read_recording, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 
 OSR = 256
-WIRE_VERSION, CALIBRATE, SENSORS = 7, 0x88, 15
+WIRE_VERSION, CALIBRATE, SENSORS = 8, 0x88, 15
 # From one command to the next: an erase of the slowest flash and all that follows.
 INTERVAL_s = 0.6
 # Gains cost time in each frame, so what is compared has them from here on.

@@ -1,9 +1,9 @@
 // two_touches: what the fingertip says of one contact, a long one, one that pulls, and two.
 //
 // The twin's objects press on calibrated pads of 12 mm with a dip, and hold until the firmware's
-// fit_shapes answers. Two contacts are the sum of their pressures. One JSON object on the standard
+// fit_shapes answers, as scene grasp runs it. Two contacts are the sum of their pressures. One JSON object on the standard
 // output: the keys that are judged, and under "touches" the table behind them. The constants of
-// fit_shapes.c were chosen with --seed 20000.
+// fit_shapes were chosen with --seed 20000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
@@ -280,7 +280,9 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
       const Readings base = base_of(array, object, touches, c.load, random);
       const double noise_Pa = draw_noise_Pa(random);
       fit_settings settings = settings_for(pad, noise_Pa);
-      settings.cut_noises = 0; // as where a profile acts
+      settings.cut_noises = 0; // as where a profile acts, and no dip in the Gaussian
+      fit_settings gaussian = settings;
+      gaussian.dip_share = 0.0f;
       settings.dip_share = static_cast<float>(pads[p].shape.dip_share);
       settings.dip_sd_mm = static_cast<float>(pads[p].shape.dip_sd_mm);
       fit_shapes_state state{};
@@ -292,7 +294,7 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
           readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
         }
         fit_result fit;
-        fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &settings, &fit);
+        fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &gaussian, &fit);
         fit_shapes(&array, &shapes, readings.data(), &settings, &fit, &state, &said);
       }
       judged[p * TOUCHES + t] = judge_touch(said, touches);

@@ -1,6 +1,6 @@
 /** written by firmware/wire/line.py from line.toml; change it there. */
 
-export const WIRE_VERSION = 7;
+export const WIRE_VERSION = 8;
 export const LOADER_MAGIC = 0x746f6f42;
 
 export const PacketType = {
@@ -80,6 +80,10 @@ export const Flag = {
   MOVING: 1 << 23,
   SLIDING: 1 << 24,
   TANGENTIAL_LATE: 1 << 25,
+  SHAPE_VALID: 1 << 26,
+  TWO_CONTACTS: 1 << 27,
+  EDGE: 1 << 28,
+  SHAPE_UNKNOWN: 1 << 29,
 } as const;
 /** What an acknowledgement says. */
 export const Result = {
@@ -105,6 +109,8 @@ export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: bo
   { bit: Flag.VELOCITY_VALID, name: 'VELOCITY_VALID', warning: false, meaning: 'the velocity of the contact has values' },
   { bit: Flag.MOVING, name: 'MOVING', warning: false, meaning: 'the contact moves' },
   { bit: Flag.SLIDING, name: 'SLIDING', warning: false, meaning: 'the contact slides, however slowly' },
+  { bit: Flag.SHAPE_VALID, name: 'SHAPE_VALID', warning: false, meaning: 'what presses is known' },
+  { bit: Flag.EDGE, name: 'EDGE', warning: false, meaning: 'one long contact presses' },
   { bit: Flag.LOW_SIGNAL, name: 'LOW_SIGNAL', warning: true, meaning: 'the press is so light that noise matters' },
   { bit: Flag.FLAT, name: 'FLAT', warning: true, meaning: 'pressure without a peak: there is no place' },
   { bit: Flag.UNCERTAIN, name: 'UNCERTAIN', warning: true, meaning: 'the place may be further off than the limit that is set' },
@@ -117,6 +123,8 @@ export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: bo
   { bit: Flag.ZERO_DOUBTFUL, name: 'ZERO_DOUBTFUL', warning: true, meaning: 'the pressure may be a zero that has moved, or rubber that has not let go yet' },
   { bit: Flag.SENSOR_DOUBTFUL, name: 'SENSOR_DOUBTFUL', warning: true, meaning: 'a sensor in use gives reason to doubt it' },
   { bit: Flag.TANGENTIAL_LATE, name: 'TANGENTIAL_LATE', warning: true, meaning: 'the force along the rubber was not computed in time' },
+  { bit: Flag.TWO_CONTACTS, name: 'TWO_CONTACTS', warning: true, meaning: 'two contacts press' },
+  { bit: Flag.SHAPE_UNKNOWN, name: 'SHAPE_UNKNOWN', warning: true, meaning: 'what presses is neither one contact nor a long one nor two' },
 ];
 
 /** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */
@@ -139,6 +147,20 @@ export const CONTACT_FLAG = {
   tangential_ratio: Flag.TANGENTIAL_VALID,
   vx_mm_s: Flag.VELOCITY_VALID,
   vy_mm_s: Flag.VELOCITY_VALID,
+  shape_age_ms: Flag.SHAPE_VALID,
+  x1_mm: Flag.TWO_CONTACTS,
+  y1_mm: Flag.TWO_CONTACTS,
+  location1_sd_mm: Flag.TWO_CONTACTS,
+  force1_N: Flag.TWO_CONTACTS,
+  force1_sd_N: Flag.TWO_CONTACTS,
+  x2_mm: Flag.TWO_CONTACTS,
+  y2_mm: Flag.TWO_CONTACTS,
+  location2_sd_mm: Flag.TWO_CONTACTS,
+  force2_N: Flag.TWO_CONTACTS,
+  force2_sd_N: Flag.TWO_CONTACTS,
+  edge_angle_deg: Flag.EDGE,
+  edge_angle_sd_deg: Flag.EDGE,
+  edge_length_mm: Flag.EDGE,
 } as const;
 export type ContactField = keyof typeof CONTACT_FLAG;
 export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];
@@ -207,6 +229,34 @@ export interface Contact extends Header {
   vx_mm_s: number;
   /** velocity of the contact along y */
   vy_mm_s: number;
+  /** what follows is of the frame that came so long before this one */
+  shape_age_ms: number;
+  /** location of the stronger of two contacts, as x_mm */
+  x1_mm: number;
+  /** as y_mm */
+  y1_mm: number;
+  /** predicted radial standard deviation of this location */
+  location1_sd_mm: number;
+  /** force of the stronger of two contacts */
+  force1_N: number;
+  /** its predicted standard deviation, with that of the force scale */
+  force1_sd_N: number;
+  /** location of the weaker of two contacts, as x_mm */
+  x2_mm: number;
+  /** as y_mm */
+  y2_mm: number;
+  /** predicted radial standard deviation of this location */
+  location2_sd_mm: number;
+  /** force of the weaker of two contacts */
+  force2_N: number;
+  /** its predicted standard deviation, with that of the force scale */
+  force2_sd_N: number;
+  /** direction of a long contact, from x towards y, -90 to 90 */
+  edge_angle_deg: number;
+  /** its predicted standard deviation */
+  edge_angle_sd_deg: number;
+  /** length of the line that presses evenly */
+  edge_length_mm: number;
 }
 /** The readings of one frame, without the gains of a calibration. The header's time is that of the contact packet of the same frame number. */
 export interface Raw extends Header {

@@ -15,6 +15,8 @@ interface Number_ {
   /** Of a simulated fingertip; undefined: not known. */
   readonly truth?: (truth: ShownTruth) => string | undefined;
   readonly tangential?: boolean;
+  /** Shown only where it has a value. */
+  readonly seldom?: boolean;
 }
 
 const sdOf = (of: (contact: ShownContact) => number, digits: number) => (contact: ShownContact) =>
@@ -64,6 +66,25 @@ const NUMBERS: readonly Number_[] = [
     truth: ({ qx_N, qy_N }) =>
       qx_N === undefined || qy_N === undefined ? undefined : `${fixed(qx_N, 2)}, ${fixed(qy_N, 2)}`,
     tangential: true,
+  },
+  {
+    name: 'two',
+    title: 'Two: x, y; force',
+    unit: 'mm, N',
+    valid: Flag.TWO_CONTACTS,
+    value: (contact) =>
+      `${fixed(contact.x1_mm, 1)}, ${fixed(contact.y1_mm, 1)}; ${fixed(contact.force1_N, 1)} · ` +
+      `${fixed(contact.x2_mm, 1)}, ${fixed(contact.y2_mm, 1)}; ${fixed(contact.force2_N, 1)}`,
+    seldom: true,
+  },
+  {
+    name: 'edge',
+    title: 'Edge, length',
+    unit: '°, mm',
+    valid: Flag.EDGE,
+    value: (contact) => `${fixed(contact.edge_angle_deg, 0)}, ${fixed(contact.edge_length_mm, 0)}`,
+    sd: (contact) => `± ${fixed(contact.edge_angle_sd_deg, 1)}`,
+    seldom: true,
   },
 ];
 
@@ -132,7 +153,8 @@ export class Numbers {
       const isTrue = truth?.contact ? number.truth?.(truth) : undefined;
       write(row.truth, isTrue === undefined ? '' : `true ${isTrue}`);
       row.row.classList.toggle('doubtful', there && doubtful);
-      row.row.hidden = number.tangential === true && !tangential;
+      row.row.hidden =
+        number.seldom === true ? !there : number.tangential === true && !tangential;
     }
     for (const { bit, name, lamp } of this.lamps) {
       const on = (flags & bit) !== 0;

@@ -333,6 +333,17 @@ export class PadGl {
     const at = [x_mm, y_mm, 0.1] as const;
     const colour = fit.doubtful ? warning : text;
     const part = fit.doubtful ? 0.6 : 1;
+    if (fit.edge) {
+      const { x_mm: dx, y_mm: dy } = fit.edge;
+      put(this.shafts, [x_mm - dx, y_mm - dy, 0.3, 2 * dx, 2 * dy, 0, 0.3, 0, ...colour, part], true);
+    }
+    for (const spot of fit.two) {
+      flat(this.over, [spot.x_mm, spot.y_mm, 0.1], 1.8, 2, 0.5, 0, warning, 1);
+      flat(this.over, [spot.x_mm, spot.y_mm, 0.1], Math.min(spot.sd_mm, 30), 0, 0.16, 0.22, colour, 0.9 * part);
+    }
+    if (fit.two.length > 0) {
+      return;
+    }
     if (fit.sd_mm > 0) {
       const sd_mm = Math.min(fit.sd_mm, 30);
       flat(this.over, at, sd_mm, 0, 0.16, 0.22, colour, 0.9 * part, 0, fit.doubtful);

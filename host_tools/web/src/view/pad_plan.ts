@@ -99,6 +99,26 @@ export class PadPlan {
     const colour = fit.doubtful ? 'warning' : 'text';
     pen.strokeStyle = pen.fillStyle = palette.css(colour);
     pen.setLineDash(fit.doubtful ? [0.6 * mm, 0.5 * mm] : []);
+    if (fit.edge) {
+      pen.lineWidth = 0.7 * mm;
+      pen.beginPath();
+      pen.moveTo(...at(x_mm - fit.edge.x_mm, y_mm - fit.edge.y_mm));
+      pen.lineTo(...at(x_mm + fit.edge.x_mm, y_mm + fit.edge.y_mm));
+      pen.stroke();
+    }
+    if (fit.two.length > 0) {
+      for (const spot of fit.two) {
+        pen.globalAlpha = 0.25;
+        ring(spot.x_mm, spot.y_mm, spot.sd_mm);
+        pen.fill();
+        pen.globalAlpha = 1;
+        pen.lineWidth = 0.4 * mm;
+        ring(spot.x_mm, spot.y_mm, 1.8);
+        pen.stroke();
+      }
+      pen.setLineDash([]);
+      return;
+    }
     if (fit.sd_mm > 0) {
       pen.globalAlpha = 0.25;
       ring(x_mm, y_mm, fit.sd_mm);

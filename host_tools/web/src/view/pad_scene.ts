@@ -22,6 +22,11 @@ export interface Place {
   y_mm: number;
 }
 
+/** A place and the radius of its standard deviation. */
+export interface Spot extends Place {
+  sd_mm: number;
+}
+
 export interface Arrow {
   along_x: number;
   along_y: number;
@@ -49,6 +54,10 @@ export interface Scene {
     force_low_mm: number;
     force_high_mm: number;
     arrow: Arrow | null;
+    /** Of two contacts, the stronger first, instead of the place of one. */
+    two: Spot[];
+    /** From the place of a long contact to its end. */
+    edge: { x_mm: number; y_mm: number } | null;
   } | null;
   /** Of the last second, oldest first. */
   trail: readonly Place[];
@@ -100,7 +109,21 @@ function fitOf(contact: ShownContact): Scene['fit'] {
     force_low_mm: forceLength(contact.force_N - sd_N),
     force_high_mm: forceLength(contact.force_N + sd_N),
     arrow: contact.flags & Flag.TANGENTIAL_VALID && contact.force_N > 0 ? arrowOf(contact) : null,
+    two:
+      contact.flags & Flag.TWO_CONTACTS
+        ? [
+            { x_mm: contact.x1_mm, y_mm: contact.y1_mm, sd_mm: contact.location1_sd_mm },
+            { x_mm: contact.x2_mm, y_mm: contact.y2_mm, sd_mm: contact.location2_sd_mm },
+          ]
+        : [],
+    edge: contact.flags & Flag.EDGE ? edgeOf(contact) : null,
   };
+}
+
+function edgeOf(contact: ShownContact): { x_mm: number; y_mm: number } {
+  const angle_rad = (contact.edge_angle_deg * Math.PI) / 180;
+  const half_mm = contact.edge_length_mm / 2;
+  return { x_mm: half_mm * Math.cos(angle_rad), y_mm: half_mm * Math.sin(angle_rad) };
 }
 
 function arrowOf(contact: ShownContact): Arrow {

@@ -1,0 +1,60 @@
+/* What the fingertip reports about what presses: one contact, a long one, or two, as fit_shapes.h
+ * tells them apart, in the scales of the pad. */
+#ifndef CONTACT_SHAPES_H
+#define CONTACT_SHAPES_H
+
+#include "fit/fit_shapes.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* All zeros: nothing yet. A quantity that the shape does not have is zero. */
+struct shapes_report {
+  enum fit_shape shape;
+  uint64_t t_us; /* of the frame that it is of */
+  struct shapes_contact { /* of two, the stronger one first */
+    float x_mm, y_mm, location_sd_mm;
+    float force_N, force_sd_N; /* scaled, the scale's standard deviation in the second */
+  } contact[2];
+  float edge_angle_deg, edge_angle_sd_deg; /* -90 to 90, from x towards y */
+  float edge_length_mm;
+};
+
+/* The fit of what presses: a job of worker/worker.h. It holds all that the fit reads, so that the
+ * frames that follow leave it alone. */
+struct shapes_job {
+  const struct fit_array *array;
+  struct fit_shapes_pad pad;
+  struct shapes_question {
+    bool begins;   /* a contact: forget the one before */
+    uint8_t parts; /* to do at most, of those of fit_shapes_part() */
+    uint64_t t_us;
+    int32_t pressure_Pa_q10[FT_MAX_SENSORS];
+    struct fit_settings settings; /* with the pad's dip */
+    struct fit_result fit;        /* of the same readings */
+    float force_scale, force_scale_sd;
+  } question;
+  enum fit_shapes_progress progress; /* UNFINISHED: ask the same again */
+  struct shapes_report report;       /* the answer, once ANSWERED */
+  struct fit_shapes_state state;
+  struct fit_shapes_result result;
+};
+
+/* Frames so far apart have time for all parts of a frame, and for all that an answer takes. */
+#define SHAPES_WHOLE_us 1500u
+#define SHAPES_AT_ONCE_us 15000u
+
+/* A part takes a Cortex-M0+ at 125 MHz so long at most (test emulated.fit_cycles). Where one is
+ * under way, the worker's other job may wait for it. */
+#define SHAPES_PART_us 350u
+
+/* Parts for frames so far apart. */
+uint8_t shapes_parts(uint64_t apart_us);
+
+/* Answers the question of a struct shapes_job. */
+void shapes_estimate(void *job);
+
+/* The flags that the report adds to those of a contact. */
+uint32_t shapes_flags(const struct shapes_report *report);
+
+#endif

@@ -1,0 +1,128 @@
+/* Where the models start in the first frame of a contact. */
+#include "fit/fit_shapes_parts.h"
+
+#include "common/contact_flags.h"
+#include "fit/fit_math.h"
+
+#include <math.h>
+
+static int32_t pitches_q20(float pitches) {
+  return fixed_clamp(fit_fixed(pitches, 20), -PLACE_Y_MAX, PLACE_Y_MAX);
+}
+
+/* Where the pair may be: along the Gaussian's longer axis, equal or three to one either way; or
+ * under the largest reading and where it leaves most. */
+static void set_pair(float x, float y, float dx, float dy, float share, struct fit_shapes_at *at) {
+  at->value[PLACE_X] = pitches_q20(x - share * dx);
+  at->value[PLACE_Y] = pitches_q20(y - share * dy);
+  at->value[SPAN_X] = pitches_q20(dx);
+  at->value[SPAN_Y] = pitches_q20(dy);
+  at->value[BALANCE] = fit_fixed(share, 20);
+}
+
+static NOINLINE void set_pair_by_readings(const struct problem *problem,
+                                          struct fit_shapes_at *at) {
+  const struct readings *readings = &problem->readings;
+  int first = 0, second = -1;
+  int32_t most = 0;
+  struct terms terms;
+  fit_shapes_set_terms(problem, at->value[SPREAD], false, &terms);
+  for (int k = 1; k < NODES; k++) {
+    first = readings->q14[k] > readings->q14[first] ? k : first;
+  }
+  int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1];
+  struct squares squares;
+  struct bell narrow, wide;
+  fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096, &squares);
+  fit_shapes_set_bell(&squares, terms.k_q24[0], &narrow);
+  fit_shapes_set_bell(&squares, terms.k_q24[1], &wide);
+  for (int k = 0; k < NODES; k++) {
+    int32_t e_q15 = (narrow.x_q15[k / ROWS] * narrow.y_q15[k % ROWS]) >> 15;
+    int32_t wide_q15 = (wide.x_q15[k / ROWS] * wide.y_q15[k % ROWS]) >> 15;
+    int32_t s_q14 = (terms.h_q14[0] * e_q15 + terms.h_q14[1] * wide_q15) >> 15;
+    int32_t left = readings->q14[k] - port_divide(readings->q14[first] * s_q14, height_q14);
+    if (left > most) {
+      most = left;
+      second = k;
+    }
+  }
+  if (second < 0) {
+    return;
+  }
+  int32_t both = readings->q14[first] + most;
+  at->value[AMPLITUDE] = port_divide(both << 14, height_q14) << 6;
+  at->value[PLACE_X] = (first / ROWS + second / ROWS - 2 * (COLUMNS / 2)) * (ONE_Q20 / 2);
+  at->value[PLACE_Y] = (first % ROWS + second % ROWS - 2 * (ROWS / 2)) * (ONE_Q20 / 2);
+  at->value[SPAN_X] = (first / ROWS - second / ROWS) * (ONE_Q20 / 2);
+  at->value[SPAN_Y] = (first % ROWS - second % ROWS) * (ONE_Q20 / 2);
+  at->value[BALANCE] = port_divide((readings->q14[first] - most) << 14, both) << 6;
+}
+
+/* Sum of the squares of a pair's residuals, Q16: one with a good start has less. */
+static NOINLINE int32_t residuals_at(const struct problem *problem, struct fit_shapes_at *at) {
+  fit_shapes_round_places(at);
+  fit_shapes_set_rows(problem, TWO, SPAN_X, at, problem->pad->room.equations);
+  int32_t sum_q16 = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t residual_q13 = problem->pad->room.row[k][RESIDUAL] >> 15;
+    sum_q16 += (residual_q13 * residual_q13) >> 10;
+  }
+  return sum_q16;
+}
+
+void fit_shapes_begin(const struct problem *problem, const struct fit_result *fit, int part,
+                      struct fit_shapes_state *state) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  const float per = pad->per_pitch;
+  struct fit_shapes_at at = {{0}};
+  float variance = fit->sigma_mm * fit->sigma_mm * per * per;
+  /* The longer axis: half the difference of its variance to the other's, and its direction. */
+  float half = 0.0f, along_x = 1.0f, along_y = 0.0f;
+  if (fit->flags & CONTACT_FLAG_WIDTHS_VALID) {
+    float sx = fit->sigma_x_mm * per, sy = fit->sigma_y_mm * per;
+    float difference = 0.5f * (sx * sx - sy * sy), slant = fit->width_correlation * sx * sy;
+    half = sqrtf(difference * difference + slant * slant);
+    if (half > 0.0f) {
+      float cosine = difference / half;
+      along_x = sqrtf(fmaxf(0.5f + 0.5f * cosine, 0.0f));
+      along_y = sqrtf(fmaxf(0.5f - 0.5f * cosine, 0.0f));
+      along_y = slant < 0.0f ? -along_y : along_y;
+    }
+  }
+  float excess = fminf(fmaxf(2.0f * half, 0.05f), 2.5f);
+  float widest = pad->widest_mm2 * per * per;
+  float spread = fminf(fmaxf(variance - half - 0.912f * widest, 0.0f), 0.1f);
+  float x = fit->x_mm * per - fit_float(pad->origin_x_q20, -20);
+  float y = fit->y_mm * per - fit_float(pad->origin_y_q20, -20);
+  struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
+  amplitude.exponent += problem->readings.shift - 18;
+  at.value[AMPLITUDE] =
+      fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
+  at.value[SPREAD] = fit_fixed(spread, 20);
+  at.value[PLACE_X] = pitches_q20(x);
+  at.value[PLACE_Y] = pitches_q20(y);
+  state->at[ROUND] = at;
+  float reach = sqrtf(excess);
+  float line = fminf(1.7320508f * reach, 1.4f);
+  at.value[SPAN_X] = pitches_q20(line * along_x);
+  at.value[SPAN_Y] = pitches_q20(line * along_y);
+  state->at[LONG] = at;
+  int32_t *least = &state->chi_square_q8[TWO];
+  *least = part == 0 ? INT32_MAX : *least;
+  for (int start = 2 * part; start < 2 * part + 2; start++) {
+    static const float share[3] = {0.0f, 0.5f, -0.5f};
+    struct fit_shapes_at pair = at;
+    if (start < 3) {
+      float by = share[start] == 0.0f ? reach : 1.1547005f * reach;
+      set_pair(x, y, by * along_x, by * along_y, share[start], &pair);
+    } else {
+      set_pair_by_readings(problem, &pair);
+    }
+    int32_t squares = residuals_at(problem, &pair);
+    if (squares < *least) {
+      *least = squares;
+      state->at[TWO] = pair;
+    }
+  }
+}
+

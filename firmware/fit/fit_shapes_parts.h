@@ -1,0 +1,97 @@
+/* Inside fit_shapes alone: the models, and what its files share.
+ *
+ * The models, lengths in pitches. A blob at d = (dx, dy) from its middle, t its contact's spread:
+ *   s = sum_j share_j V / v_j exp(-d' d / (2 v_j)) - dip,    v_j = V_j + t,  V the widest V_j
+ * and what of a load Q the rubber shows there:
+ *   f = sum_j moment_j V / v_j^2 d exp(-d' d / (2 v_j)),     v_j = V_j + 1.3 t
+ * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight
+ * w_b by lever_b span from the middle.
+ *   round  one blob
+ *   long   three, the nodes of Gauss's quadrature of a line from -span to span
+ *   two    two, by +-span, of weight (1 +- balance) / 2
+ * Forces are 2 pi V A and 2 pi V pull. */
+#ifndef FIT_FIT_SHAPES_PARTS_H
+#define FIT_FIT_SHAPES_PARTS_H
+
+#include "fit/fit_grid_parts.h"
+#include "fit/fit_shapes.h"
+
+enum { ROUND, LONG, TWO, MODELS };
+enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, FAR, SPAN_X, SPAN_Y, BALANCE, PULL_X = 7, PULL_Y };
+#define UNKNOWNS FIT_SHAPES_UNKNOWNS
+#define RESIDUAL UNKNOWNS
+_Static_assert(PULL_Y + 1 == UNKNOWNS, "a column for each");
+_Static_assert(MODELS == FIT_SHAPES_PARTS, "a part for each");
+
+#define ONE_Q20 (1 << 20)
+#define FREEDOM 9 /* readings and priors less the unknowns of two */
+#define PER_SD_MAX_Q4 1024
+
+#define PLACE_X_MAX ((5 << 20) / 2)
+#define PLACE_Y_MAX ((7 << 20) / 2)
+#define AMPLITUDE_MAX ((4 << 20) - 1)
+#define AMPLITUDE_LEAST (1 << 13)
+
+/* A frame's readings, and the dip that takes from them. */
+struct problem {
+  struct fit_shapes_pad *pad;
+  struct readings readings;
+  int32_t base_q22; /* error of a reading of weight 1 */
+  int32_t dip_share_q16, dip_k_q24;
+};
+
+/* Rows of one element each, and their residuals. */
+struct priors {
+  int32_t element_q27[UNKNOWNS], off_q28[UNKNOWNS];
+};
+
+/* What a spread makes of the profile: exponents, heights, and these over v and v^2. */
+struct terms {
+  int32_t k_q24[PAD_NORMAL_TERMS], h_q14[PAD_NORMAL_TERMS], q_q12[PAD_NORMAL_TERMS],
+      s_q8[PAD_NORMAL_TERMS];
+  int32_t pull_k_q24[PAD_TANGENTIAL_TERMS], pull_q12[PAD_TANGENTIAL_TERMS];
+  int32_t dip_k_q24, dip_q14;
+};
+
+/* exp(-d^2 / (2 v)) along both axes, whose products are the bells at the nodes. */
+struct bell {
+  int32_t x_q15[COLUMNS], y_q15[ROWS];
+};
+
+/* d^2 of the nodes along an axis. */
+struct squares {
+  int32_t x_q24[COLUMNS], y_q24[ROWS];
+};
+
+/* fit_shapes_model.c */
+void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pulls,
+                          struct terms *terms);
+void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *squares);
+void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell);
+/* Where a step begins is rounded, which moves the step and not where it ends. */
+void fit_shapes_round_places(struct fit_shapes_at *at);
+/* The weighted rows of a model with so many unknowns, columns Q27 and residual Q28. */
+void fit_shapes_set_rows(const struct problem *problem, int model, int count,
+                         const struct fit_shapes_at *where,
+                         struct fit_shapes_equations *equations);
+
+/* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */
+#define BEGIN_PARTS 2
+void fit_shapes_begin(const struct problem *problem, const struct fit_result *fit, int part,
+                      struct fit_shapes_state *state);
+
+/* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the
+ * priors; chi^2 of both, Q8; and after these, of the model's rows, one damped step. */
+void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
+                               struct priors *priors, struct fit_shapes_equations *equations);
+int32_t fit_shapes_chi_square(const struct problem *problem,
+                              const struct fit_shapes_equations *equations);
+void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors,
+                     struct fit_shapes_at *at);
+
+/* fit_shapes_answer.c. two: where that model is. */
+int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two);
+void fit_shapes_conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
+                         const struct fit_shapes_state *state, struct fit_shapes_result *result);
+
+#endif

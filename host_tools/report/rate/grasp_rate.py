@@ -1,0 +1,71 @@
+"""Scene grasp with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two."""
+import math
+
+import numpy as np
+import scenes
+from boards import BOARDS, PARALLEL, short
+from emulated import FROM_s, Measurement, Tools, distribution, scenario
+from fingertip.files import TANGENTIAL_VALID, read_recording
+from fingertip.line import Flag
+
+PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
+GOALS = (
+    ("grasp_parallel_fps_osr256", ">=", 1305), ("grasp_frames_skipped", "<=", 0), ("grasp_latency_p99_us", "<=", 1000),
+    ("grasp_two_latency_p99_us", "<=", 1500), ("grasp_sleep_percent", ">=", 20))
+TWO_FROM_s = 0.65
+PITCH_mm, SIGMA_mm, PEAK_Pa = 9.0, 5.7, 25000.0
+
+
+class GraspTools(Tools):
+    """The images of scene grasp of a board instead of the boards' own."""
+
+    def __init__(self, build, boards, board=PARALLEL):
+        super().__init__(build, boards)
+        self.place = scenes.build("grasp", board, self.boards / "scenes")
+
+    def image(self, board, suffix="bin"):
+        return self.place / f"fingertip-{board}.{suffix}" if hasattr(self, "place") else super().image(board, suffix)
+
+
+def two_contacts(path, seconds):
+    """A scenario of two presses 18 mm apart."""
+    sensors = [(PITCH_mm * (k // 5 - 1), PITCH_mm * (k % 5 - 2)) for k in range(15)]
+    pressures = [round(sum(PEAK_Pa * math.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / (2 * SIGMA_mm ** 2)) for at_x, at_y in ((2, 10), (-1, -8)))) for x, y in sensors]
+    names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
+    rows = [(0.0, [0] * 15), (TWO_FROM_s, [0] * 15), (TWO_FROM_s + 0.01, pressures), (seconds, pressures)]
+    path.write_text("\n".join(["# fingertip-scenario 1", "# name: two", ",".join(names),
+                                *(",".join(map(str, [f"{t_s:g}", *[0] * 7, *values])) for t_s, values in rows)]) + "\n")
+    return path
+
+
+def share_of(recording, flag, seconds):
+    flags = recording["flags"][recording.has_contact & (recording["t_us"] > recording["t_us"][-1] - 1e6 * seconds)].astype(np.int64)
+    return 100 * float(((flags & int(flag)) != 0).mean())
+
+
+def jobs(build, boards, folder, seconds, on=BOARDS):
+    """{name: (what, measures)} for Steps.run_all."""
+    wander = scenario(folder, "wander", FROM_s + seconds + 1, "grasp-wander")
+    two = two_contacts(wander.with_name("grasp-two.csv"), FROM_s + seconds + 1)
+
+    def one(board, path):
+        tools = GraspTools(build, boards, board)
+        return Measurement(tools, folder, board, 256, path, seconds, commands=[tools.encoded("pad", *PAD)])
+
+    cases = [(short(board), board, wander) for board in on] + [("two", PARALLEL, two)]
+    return {name: (f"scene grasp on {board}, {path.stem}", lambda b=board, p=path: one(b, p)) for name, board, path in cases}
+
+
+def figures(runs):
+    parallel, two = runs[short(PARALLEL)], runs["two"]
+    latency_us, of_two_us = distribution(parallel.offered_us), distribution(two.offered_us)
+    recording = read_recording(f"{parallel.name}.csv")
+    return {
+        **{f"grasp_{name}_fps_osr256": run.fitted_per_s for name, run in runs.items() if name != "two"},
+        **{f"grasp_{name}_latency_median_us": distribution(run.offered_us)["median"] for name, run in runs.items() if name != "two"},
+        "grasp_frames_skipped": max(run.frames_skipped for run in runs.values()), "grasp_dropped": max(run.dropped for run in runs.values()),
+        "grasp_latency_p99_us": latency_us["p99"], "grasp_latency_max_us": latency_us["max"], "grasp_two_latency_p99_us": of_two_us["p99"],
+        "grasp_sleep_percent": parallel.sleep_percent, "grasp_load_percent": share_of(recording, TANGENTIAL_VALID, parallel.seconds),
+        "grasp_shape_percent": share_of(recording, Flag.SHAPE_VALID, parallel.seconds),
+        "grasp_shape_age_ms": float(np.nanmean(recording["shape_age_ms"])),
+    }

@@ -1,0 +1,30 @@
+"""The RP2040's second core, killed at many instants of a frame, in the emulator: tests/emulated/harness/kill_figures.mjs."""
+import json
+import pathlib
+
+from reporting import run
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+KILLS, SOAK_h = 1000, 1
+GOALS = (("core1_killed", ">=", KILLS), ("core1_hangs", "<=", 0), ("core1_frames_lost", "<=", 0), ("core1_unflagged", "<=", 0),
+         ("core1_soak_hours", ">=", SOAK_h), ("core1_soak_lost", "<=", 0), ("core1_soak_hangs", "<=", 0))
+
+
+def measure(build, steps):
+    """A failure does not end it: it is a figure, and reported."""
+    run("ctest", "--test-dir", build, "-R", "^checks.scene_grasp_(configures|builds)$")
+    found = json.loads(run("node", ROOT / "tests/emulated/harness/kill_figures.mjs", build / "scenes/grasp", build / "host_tools/tool/cli/fingertip",
+                           build / "tests/support/command_frame", str(KILLS), str(SOAK_h)))
+    steps.say(f"second core killed {found['core1_killed']} times")
+    return found
+
+
+def text(found):
+    return ["## The second core", "",
+            f"Scene grasp on pico_parallel at OSR 256, pressed and with a profile. Its second core was killed at {found['core1_killed']} instants that are spread over a frame:", "",
+            f"- {found['core1_hangs']} hangs: kills after which the load was not estimated again within 20 ms, or the chip was reset.",
+            f"- {found['core1_frames_lost']} frames lost.",
+            f"- {found['core1_unflagged']} kills that no frame told (TANGENTIAL_LATE), or that a frame told while it had a load. At most {found['core1_late_frames_max']} "
+            f"frames in a row said so, and {found['core1_frames_without_load_max']} had no load.",
+            f"- In {found['core1_soak_hours']} h in which it was killed {found['core1_soak_kills']} times, now and then, {found['core1_soak_lost']} of {found['core1_soak_frames']} frames were "
+            f"lost, and {found['core1_soak_hangs']} times the load stayed away or the chip was reset.", ""]

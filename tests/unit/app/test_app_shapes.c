@@ -1,0 +1,300 @@
+/* What presses, from sensors to packets: one contact, a pulled one, a long one, two, and what is
+ * none of these, on the pad that the profile describes. */
+#include "app/acting.h"
+#include "app_rig.h"
+#include "common/contact_flags.h"
+#include "config/defaults.h"
+#include "support/pad.h"
+
+#define PRESS_us 1500000u
+#define OBJECTS_MAX 40
+
+static struct object {
+  double x_mm, y_mm, force_N;
+} objects[OBJECTS_MAX];
+static unsigned object_count;
+static double load_qx_N;
+static uint64_t ends_us; /* 0: never */
+
+static const uint32_t SHAPES = CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS |
+                               CONTACT_FLAG_EDGE | CONTACT_FLAG_SHAPE_UNKNOWN;
+
+/* By the definition in pad_profile.h, from the middle of the pad. */
+static double field_Pa(double x_mm, double y_mm, uint64_t t_us) {
+  const struct pad_profile pad = pad_of_12_mm();
+  const double t2 = 4.0;
+  double sum = 0.0; /* N/mm^2 */
+  if (ends_us != 0 && t_us >= ends_us && t_us < ends_us + 100000) {
+    return 0.0;
+  }
+  for (unsigned i = 0; i < object_count; i++) {
+    const struct object *object = &objects[i];
+    const double dx = x_mm - object->x_mm, dy = y_mm - object->y_mm, r2 = dx * dx + dy * dy;
+    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+      double v = (double)pad.normal[j].sd_mm * (double)pad.normal[j].sd_mm + t2;
+      sum += object->force_N * (double)pad.normal[j].share / (2 * PI * v) * exp(-r2 / (2 * v));
+    }
+    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+      double v = (double)pad.tangential[j].sd_mm * (double)pad.tangential[j].sd_mm + 1.3 * t2;
+      sum += load_qx_N * dx * (double)pad.tangential[j].moment_mm / (2 * PI * v * v) *
+             exp(-r2 / (2 * v));
+    }
+  }
+  return sum * 1e6;
+}
+
+static void put(double x_mm, double y_mm, double force_N) {
+  objects[object_count++] = (struct object){x_mm, y_mm, force_N};
+}
+
+void setUp(void) {
+  rig_start();
+  world_field_Pa = field_Pa;
+  press.force_N = 1.0; /* it stands where the objects count from */
+  press.from_us = PRESS_us;
+  object_count = 0;
+  load_qx_N = 0.0;
+  ends_us = 0;
+}
+
+void tearDown(void) {
+  rig_end();
+  native_set_worker(false, 0);
+}
+
+/* Until this time, frames as fast as they come, on a calibrated pad with this profile. */
+static void run_until(uint64_t t_us, const struct pad_profile *profile) {
+  native_cdc_open();
+  run_for(300);
+  const struct wire_packet osr = {.type = WIRE_CMD_OSR, .body.cmd_osr = {256}};
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(osr));
+  const struct wire_packet pad = {.type = WIRE_CMD_PAD, .body.cmd_pad = {*profile}};
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(pad));
+  struct wire_packet calibrate = {
+      .type = WIRE_CMD_CALIBRATE,
+      .body.cmd_calibrate.sensor_count = geometry.sensor_count,
+      .body.cmd_calibrate.calibration = {.placements = 20, .force_scale = 1.25f}};
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){1.0f, 0.01f};
+  }
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for((uint32_t)((t_us - port_now_us()) / 1000));
+}
+
+enum { FRAMES_MAX = 600 };
+static struct wire_contact contacts[FRAMES_MAX];
+
+/* Contact packets of the press, and no more than the last of it. */
+static unsigned take_contacts(struct wire_contact *to) {
+  unsigned count = 0;
+  struct wire_packet packet;
+  while (next_packet(&packet) && count < FRAMES_MAX) {
+    if (packet.type == WIRE_CONTACT && packet.body.contact.flags & CONTACT_FLAG_FIT_VALID) {
+      to[count++] = packet.body.contact;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(30, count);
+  return count;
+}
+
+static struct wire_contact last_of_press(void) {
+  const struct pad_profile profile = pad_of_12_mm();
+  run_until(PRESS_us + 250000, &profile);
+  return contacts[take_contacts(contacts) - 1];
+}
+
+static float scale(void) {
+  return 1.25f * pad_of_12_mm().force_ratio;
+}
+
+static void two_contacts_have_their_places_and_forces(void) {
+  put(1.0, 7.0, 3.0);
+  put(-2.0, -7.0, 6.0);
+  const struct wire_contact contact = last_of_press();
+  TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS, contact.flags);
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID, contact.flags);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, -2.0f, contact.x1_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, -7.0f, contact.y1_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, scale() * 6.0f, contact.force1_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, 1.0f, contact.x2_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, 7.0f, contact.y2_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, scale() * 3.0f, contact.force2_N);
+  TEST_ASSERT_TRUE(contact.location1_sd_mm > 0.01f && contact.location1_sd_mm < 0.6f);
+  TEST_ASSERT_TRUE(contact.location2_sd_mm > contact.location1_sd_mm);
+  TEST_ASSERT_TRUE(contact.force1_sd_N > 0.0f && contact.force2_sd_N > 0.0f);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.edge_length_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
+}
+
+static void a_long_contact_has_its_direction(void) {
+  for (int turn = -1; turn <= 1; turn++) {
+    tearDown();
+    setUp();
+    const double angle = turn * 65.0 * PI / 180.0;
+    for (int i = 0; i < OBJECTS_MAX; i++) {
+      double at = 20.0 * ((i + 0.5) / OBJECTS_MAX - 0.5);
+      put(at * cos(angle), at * sin(angle), 8.0 / OBJECTS_MAX);
+    }
+    const struct wire_contact contact = last_of_press();
+    TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE, contact.flags);
+    TEST_ASSERT_FLOAT_WITHIN(2.0f, (float)(turn * 65), contact.edge_angle_deg);
+    TEST_ASSERT_TRUE(contact.edge_angle_sd_deg > 0.05f && contact.edge_angle_sd_deg < 8.0f);
+    TEST_ASSERT_FLOAT_WITHIN(2.0f, 20.0f, contact.edge_length_mm);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force1_N);
+  }
+}
+
+static void one_contact_is_one_with_a_load_or_without(void) {
+  for (int pulled = 0; pulled < 2; pulled++) {
+    tearDown();
+    setUp();
+    put(1.5, -4.0, 5.0);
+    load_qx_N = pulled ? 1.5 : 0.0;
+    const struct wire_contact contact = last_of_press();
+    TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID, contact.flags);
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, contact.flags);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force1_N);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.edge_length_mm);
+  }
+  /* A load that is estimated all the same is none of two contacts. */
+  app.shapes_job.report.shape = FIT_SHAPE_TWO;
+  app.frame.t_us += 3700;
+  app_process_frame(&app, app.frame.t_read_us);
+  TEST_ASSERT_TRUE(app.tangential_job.estimate.valid);
+  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID,
+                   CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS, app.contact.flags);
+}
+
+static void what_is_none_of_these_is_warned_of_all_the_time(void) {
+  put(7.0, -14.0, 4.0);
+  put(-7.0, 0.0, 4.0);
+  put(7.0, 14.0, 4.0);
+  const struct pad_profile profile = pad_of_12_mm();
+  run_until(PRESS_us + 250000, &profile);
+  const unsigned count = take_contacts(contacts);
+  unsigned first = 0;
+  while (first < count && !(contacts[first].flags & CONTACT_FLAG_SHAPE_VALID)) {
+    first++;
+  }
+  TEST_ASSERT_LESS_THAN(count / 2, first);
+  for (unsigned i = first; i < count; i++) {
+    TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN,
+                     contacts[i].flags);
+  }
+}
+
+/* Here each frame has time for all three parts. */
+static void each_answer_says_how_old_it_is(void) {
+  put(0.0, 8.0, 4.0);
+  put(0.0, -8.0, 4.0);
+  const struct pad_profile profile = pad_of_12_mm();
+  run_until(PRESS_us + 250000, &profile);
+  const unsigned count = take_contacts(contacts);
+  const float frame_ms = 0.25f * 1000.0f / (float)count;
+  unsigned without = 0;
+  for (unsigned i = 0; i < count; i++) {
+    const struct wire_contact *contact = &contacts[i];
+    if (!(contact->flags & CONTACT_FLAG_SHAPE_VALID)) {
+      TEST_ASSERT_EQUAL(i, without);
+      TEST_ASSERT_EQUAL_FLOAT(0.0f, contact->shape_age_ms);
+      TEST_ASSERT_EQUAL_FLOAT(0.0f, contact->x1_mm);
+      without++;
+      continue;
+    }
+    /* One answer in four is none. */
+    TEST_ASSERT_FLOAT_WITHIN(1.6f * frame_ms, 2.1f * frame_ms, contact->shape_age_ms);
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL(FIT_SHAPES_FRAMES, without);
+  TEST_ASSERT_LESS_THAN(2 * FIT_SHAPES_FRAMES, without);
+}
+
+/* The next contact is not called what the one before was. */
+static void a_contact_that_ends_is_forgotten(void) {
+  put(0.0, 8.0, 4.0);
+  put(0.0, -8.0, 4.0);
+  ends_us = PRESS_us + 150000;
+  const struct pad_profile profile = pad_of_12_mm();
+  run_until(ends_us + 20000, &profile);
+  take_contacts(contacts);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, app.shapes_job.report.shape);
+  object_count = 0;
+  put(1.0, 2.0, 5.0);
+  run_for(230);
+  const unsigned count = take_contacts(contacts);
+  for (unsigned i = 0; i < count; i++) {
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TWO_CONTACTS, contacts[i].flags);
+  }
+  TEST_ASSERT_BITS_LOW(SHAPES, contacts[0].flags);
+  TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID, contacts[count - 1].flags);
+}
+
+static void rubber_that_is_too_thin_has_no_shapes(void) {
+  put(0.0, 8.0, 4.0);
+  put(0.0, -8.0, 4.0);
+  struct pad_profile thin = pad_of_12_mm();
+  thin.thickness_mm *= 0.5f;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    thin.normal[j].sd_mm *= 0.5f;
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    thin.tangential[j].sd_mm *= 0.5f;
+    thin.tangential[j].moment_mm *= 0.5f;
+  }
+  run_until(PRESS_us + 150000, &thin);
+  const unsigned count = take_contacts(contacts);
+  for (unsigned i = 0; i < count; i++) {
+    TEST_ASSERT_BITS_LOW(SHAPES, contacts[i].flags);
+  }
+}
+
+static void a_second_processor_gives_the_same_answers(void) {
+  static struct wire_contact two[FRAMES_MAX];
+  const struct pad_profile profile = pad_of_12_mm();
+  unsigned counts[2];
+  for (int processors = 1; processors <= 2; processors++) {
+    tearDown();
+    native_set_worker(processors == 2, TANGENTIAL_LATE_us / 4);
+    setUp();
+    put(1.0, 7.0, 3.0);
+    put(-2.0, -7.0, 6.0);
+    run_until(PRESS_us + 250000, &profile);
+    counts[processors - 1] = take_contacts(processors == 1 ? contacts : two);
+  }
+  TEST_ASSERT_TRUE(app.has_worker);
+  TEST_ASSERT_EQUAL(counts[0], counts[1]);
+  for (unsigned i = 0; i < counts[0]; i++) {
+    two[i].stages = contacts[i].stages;
+    TEST_ASSERT_EQUAL_MEMORY(&contacts[i], &two[i], sizeof two[i]);
+  }
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TWO_CONTACTS, two[counts[1] - 1].flags);
+}
+
+static void without_a_second_processor_that_answers_there_are_no_shapes(void) {
+  tearDown();
+  native_set_worker(true, UINT64_MAX);
+  setUp();
+  put(0.0, 8.0, 4.0);
+  put(0.0, -8.0, 4.0);
+  const struct pad_profile profile = pad_of_12_mm();
+  run_until(PRESS_us + 150000, &profile);
+  const unsigned count = take_contacts(contacts);
+  for (unsigned i = 0; i < count; i++) {
+    TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE,
+                     contacts[i].flags);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(two_contacts_have_their_places_and_forces);
+  RUN_TEST(a_long_contact_has_its_direction);
+  RUN_TEST(one_contact_is_one_with_a_load_or_without);
+  RUN_TEST(what_is_none_of_these_is_warned_of_all_the_time);
+  RUN_TEST(each_answer_says_how_old_it_is);
+  RUN_TEST(a_contact_that_ends_is_forgotten);
+  RUN_TEST(rubber_that_is_too_thin_has_no_shapes);
+  RUN_TEST(a_second_processor_gives_the_same_answers);
+  RUN_TEST(without_a_second_processor_that_answers_there_are_no_shapes);
+  return UNITY_END();
+}
