@@ -17,8 +17,8 @@ uint8_t shapes_parts(uint64_t apart_us) {
 /* atan(z) of 0..1 within 1e-5 (Abramowitz and Stegun 4.4.49), the same bits on every machine. */
 static float arc_tangent(float z) {
   const float z2 = z * z;
-  return z * (0.999866f +
-              z2 * (-0.3302995f + z2 * (0.180141f + z2 * (-0.085133f + z2 * 0.0208351f))));
+  return z *
+         (0.999866f + z2 * (-0.3302995f + z2 * (0.180141f + z2 * (-0.085133f + z2 * 0.0208351f))));
 }
 
 /* Of (along_x, along_y), along_x >= 0. */
@@ -68,11 +68,12 @@ void shapes_estimate(void *job) {
     own->progress = fit_shapes_part(own->array, &own->pad, question->pressure_Pa_q10,
                                     &question->settings, &question->fit, &own->state, &own->result);
     parts--;
-    const bool knows = own->progress == FIT_SHAPES_ANSWERED &&
-                       own->result.shape != FIT_SHAPE_UNDECIDED;
-    /* What is begun is ended with the same readings, so the next one begins only if it ends here. */
-    goes_on = own->progress == FIT_SHAPES_UNFINISHED ? parts > 0
-                                                     : parts >= FIT_SHAPES_PARTS && !knows;
+    const bool knows =
+        own->progress == FIT_SHAPES_ANSWERED && own->result.shape != FIT_SHAPE_UNDECIDED;
+    /* What is begun is ended with the same readings, so the next one begins only if it ends here.
+     */
+    goes_on =
+        own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
   } while (goes_on);
   /* What is none of these is looked at from its beginning again, and stays so until it is known. */
   const bool again = own->result.shape == FIT_SHAPE_UNDECIDED && !question->begins &&

@@ -11,7 +11,7 @@
 /* All zeros: nothing yet. A quantity that the shape does not have is zero. */
 struct shapes_report {
   enum fit_shape shape;
-  uint64_t t_us; /* of the frame that it is of */
+  uint64_t t_us;          /* of the frame that it is of */
   struct shapes_contact { /* of two, the stronger one first */
     float x_mm, y_mm, location_sd_mm;
     float force_N, force_sd_N; /* scaled, the scale's standard deviation in the second */

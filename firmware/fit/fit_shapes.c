@@ -1,8 +1,7 @@
-#include "fit/fit_shapes_parts.h"
-
 #include "common/contact_flags.h"
 #include "fit/fit_limits.h"
 #include "fit/fit_math.h"
+#include "fit/fit_shapes_parts.h"
 
 #define MODEL_SD_Q16 262 /* 0.004 of the largest reading */
 /* Readings whose errors are more than 3 % of their unit tell no shapes. */
@@ -23,17 +22,16 @@ static NOINLINE bool weigh(const struct fit_array *array, const struct fit_setti
                            uint32_t used, struct problem *problem) {
   const struct readings *readings = &problem->readings;
   int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, 1 << 18);
-  problem->base_q22 =
-      fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
+  problem->base_q22 = fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
   int sensors = 0;
   for (int k = 0; k < NODES; k++) {
     uint8_t sensor = array->grid.sensor[k];
     problem->pad->room.weight_q12[k] = 0;
     if (used >> sensor & 1) {
-      int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] *
-                                   fixed_size(readings->q14[k]) >> 8);
-      problem->pad->room.weight_q12[k] = port_divide(
-          problem->base_q22 << 8, fixed_longer_leg(problem->base_q22, gain) >> 4);
+      int32_t gain =
+          (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * fixed_size(readings->q14[k]) >> 8);
+      problem->pad->room.weight_q12[k] =
+          port_divide(problem->base_q22 << 8, fixed_longer_leg(problem->base_q22, gain) >> 4);
       sensors++;
     }
   }

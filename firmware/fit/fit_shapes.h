@@ -12,8 +12,8 @@
  *
  * The answer is the model whose chi^2 is the least, in standard deviations that contain noise,
  * gains and the model's own error. Long must beat round by FIT_SHAPES_PENALTY, and two must beat
- * both by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a pair
- * that looks like a long contact is called long, and a long one hardly ever a pair.
+ * both by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a
+ * pair that looks like a long contact is called long, and a long one hardly ever a pair.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
  * missing. NUMERICS.md has the fit itself; host_tools/report/two judges this part. No recording of
@@ -52,13 +52,13 @@ enum fit_shape {
 struct fit_shapes_result {
   enum fit_shape shape;
   float x_mm[2], y_mm[2], force_N[2]; /* the stronger one first; of one contact its middle */
-  float location_sd_mm[2]; /* radial, as in fit_result */
+  float location_sd_mm[2];            /* radial, as in fit_result */
   float force_sd_N[2];
-  float length_mm;              /* ELONGATED: of the line that presses evenly */
-  float along_x, along_y;       /* ELONGATED: its direction, a unit vector, along_x >= 0 */
-  float angle_sd_rad;           /* of that direction */
-  float qx_N, qy_N;             /* PULLED, ELONGATED: tangential force */
-  float chi_square[3];          /* of round, long and two */
+  float length_mm;        /* ELONGATED: of the line that presses evenly */
+  float along_x, along_y; /* ELONGATED: its direction, a unit vector, along_x >= 0 */
+  float angle_sd_rad;     /* of that direction */
+  float qx_N, qy_N;       /* PULLED, ELONGATED: tangential force */
+  float chi_square[3];    /* of round, long and two */
 };
 
 /* The unknowns of one model, in pitches and units of the readings, Q20. */
@@ -69,8 +69,8 @@ struct fit_shapes_at {
 /* State of one contact, from frame to frame. All zeros: the next frame is its first. */
 struct fit_shapes_state {
   struct fit_shapes_at at[3];
-  int32_t fit_x_q20, fit_y_q20; /* where the Gaussian was */
-  int32_t sum_q20;              /* of the readings, in the unit of amplitude */
+  int32_t fit_x_q20, fit_y_q20;            /* where the Gaussian was */
+  int32_t sum_q20;                         /* of the readings, in the unit of amplitude */
   int32_t chi_square_q8[FIT_SHAPES_PARTS]; /* of each model in the frame under way */
   uint8_t frames;
   uint8_t part; /* of the frame under way: which is next */

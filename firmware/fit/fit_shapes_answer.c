@@ -1,8 +1,7 @@
 /* Which model it is, and what that says of places, forces and directions. */
-#include "fit/fit_shapes_parts.h"
-
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_math.h"
+#include "fit/fit_shapes_parts.h"
 
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
 
@@ -12,8 +11,8 @@ static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equ
                                           int32_t a_q20, int second, int32_t b_q20) {
   const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   int32_t w_q10[UNKNOWNS], sum_q13 = 0;
-  int32_t q = equations->q[first] > equations->q[second] ? equations->q[first]
-                                                         : equations->q[second];
+  int32_t q =
+      equations->q[first] > equations->q[second] ? equations->q[first] : equations->q[second];
   int32_t a_q10 = shifted(a_q20, equations->q[first] - q - 10);
   int32_t b_q10 = shifted(b_q20, equations->q[second] - q - 10);
   for (int j = 0; j < equations->count; j++) {
@@ -50,31 +49,28 @@ static float sd_of(struct scaled scale, struct scaled form, struct scaled varian
 }
 
 static NOINLINE void put_two(const struct problem *problem,
-                             const struct fit_shapes_equations *equations,
-                             const int32_t *at, const struct scales *scales,
-                             struct fit_shapes_result *result) {
+                             const struct fit_shapes_equations *equations, const int32_t *at,
+                             const struct scales *scales, struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
   for (int c = 0; c < 2; c++) {
     int32_t sign = (c == 0) == (at[BALANCE] >= 0) ? 1 : -1;
     int32_t share_q20 = (ONE_Q20 + sign * at[BALANCE]) / 2;
     result->x_mm[c] = mm(pad, pad->origin_x_q20 + at[PLACE_X] + sign * at[SPAN_X]);
     result->y_mm[c] = mm(pad, pad->origin_y_q20 + at[PLACE_Y] + sign * at[SPAN_Y]);
-    result->force_N[c] =
-        product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20),
-                                            fit_scaled_from(share_q20, -20)));
+    result->force_N[c] = product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20),
+                                                             fit_scaled_from(share_q20, -20)));
     struct scaled place =
         scaled_add(variance_of(equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
                    variance_of(equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
     result->location_sd_mm[c] = sd_of(scales->pitch, place, scales->variance);
-    struct scaled force = variance_of(equations, AMPLITUDE, share_q20, BALANCE,
-                                      sign * (at[AMPLITUDE] >> 1));
+    struct scaled force =
+        variance_of(equations, AMPLITUDE, share_q20, BALANCE, sign * (at[AMPLITUDE] >> 1));
     result->force_sd_N[c] = sd_of(scales->unit, force, scales->variance);
   }
 }
 
-static NOINLINE void put_line(const struct fit_shapes_equations *equations,
-                              const int32_t *at, const struct scales *scales,
-                              struct fit_shapes_result *result) {
+static NOINLINE void put_line(const struct fit_shapes_equations *equations, const int32_t *at,
+                              const struct scales *scales, struct fit_shapes_result *result) {
   result->shape = FIT_SHAPE_PULLED;
   result->qx_N = product_of(scales->unit, fit_scaled_from(at[PULL_X], -20));
   result->qy_N = product_of(scales->unit, fit_scaled_from(at[PULL_Y], -20));
@@ -86,8 +82,8 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations,
   struct scaled reach = fit_scaled_sqrt(square);
   int32_t ux_q20 = fit_scaled_to_fixed(scaled_div(x, reach), 20);
   int32_t uy_q20 = fit_scaled_to_fixed(scaled_div(y, reach), 20);
-  struct scaled sure = scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20),
-                                  scales->variance);
+  struct scaled sure =
+      scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20), scales->variance);
   sure.mantissa *= FIT_SHAPES_PENALTY;
   if (scaled_sub(square, fit_scaled_short(sure)).mantissa <= 0) {
     return;
@@ -98,14 +94,13 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations,
   result->along_x = fit_float(sign * ux_q20, -20);
   result->along_y = fit_float(sign * uy_q20, -20);
   result->angle_sd_rad =
-      sd_of(fit_grid_reciprocal(reach),
-            variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
+      sd_of(fit_grid_reciprocal(reach), variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20),
+            scales->variance);
 }
 
 static NOINLINE void put_one(const struct problem *problem,
-                             const struct fit_shapes_equations *equations,
-                             const int32_t *at, const struct scales *scales,
-                             struct fit_shapes_result *result) {
+                             const struct fit_shapes_equations *equations, const int32_t *at,
+                             const struct scales *scales, struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
   result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
   result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
@@ -113,8 +108,8 @@ static NOINLINE void put_one(const struct problem *problem,
   struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, PLACE_Y, 0),
                                    variance_of(equations, PLACE_Y, ONE_Q20, PLACE_X, 0));
   result->location_sd_mm[0] = sd_of(scales->pitch, place, scales->variance);
-  result->force_sd_N[0] = sd_of(
-      scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
+  result->force_sd_N[0] =
+      sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
 int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two) {
@@ -144,7 +139,7 @@ static void doubt_place(const struct scales *scales, const int32_t *line, const 
 }
 
 void fit_shapes_conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
-                     const struct fit_shapes_state *state, struct fit_shapes_result *result) {
+                         const struct fit_shapes_state *state, struct fit_shapes_result *result) {
   const struct fit_shapes_equations *equations = &problem->pad->room.equations[best];
   const struct fit_shapes_at *at = &state->at[best];
   const struct fit_shapes_pad *pad = problem->pad;

@@ -1,8 +1,7 @@
 /* Where the models start in the first frame of a contact. */
-#include "fit/fit_shapes_parts.h"
-
 #include "common/contact_flags.h"
 #include "fit/fit_math.h"
+#include "fit/fit_shapes_parts.h"
 
 #include <math.h>
 
@@ -20,8 +19,7 @@ static void set_pair(float x, float y, float dx, float dy, float share, struct f
   at->value[BALANCE] = fit_fixed(share, 20);
 }
 
-static NOINLINE void set_pair_by_readings(const struct problem *problem,
-                                          struct fit_shapes_at *at) {
+static NOINLINE void set_pair_by_readings(const struct problem *problem, struct fit_shapes_at *at) {
   const struct readings *readings = &problem->readings;
   int first = 0, second = -1;
   int32_t most = 0;
@@ -33,7 +31,8 @@ static NOINLINE void set_pair_by_readings(const struct problem *problem,
   int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1];
   struct squares squares;
   struct bell narrow, wide;
-  fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096, &squares);
+  fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096,
+                         &squares);
   fit_shapes_set_bell(&squares, terms.k_q24[0], &narrow);
   fit_shapes_set_bell(&squares, terms.k_q24[1], &wide);
   for (int k = 0; k < NODES; k++) {
@@ -125,4 +124,3 @@ void fit_shapes_begin(const struct problem *problem, const struct fit_result *fi
     }
   }
 }
-

@@ -1,10 +1,10 @@
-/* The rows of the least squares of a model: what it is off by at each sensor, and its derivatives. */
+/* The rows of the least squares of a model: what it is off by at each sensor, and its derivatives.
+ */
+#include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
 
-#include "fit/fit_math.h"
-
-#define FAR_WIDTHS 6.25f    /* FAR: the dip that the recordings of real pads show */
-#define KAPPA_Q14 21299     /* 1.3, as in fit_tangential.c */
+#define FAR_WIDTHS 6.25f /* FAR: the dip that the recordings of real pads show */
+#define KAPPA_Q14 21299  /* 1.3, as in fit_tangential.c */
 #define LOG2E_HALF_FLOAT 0.72134752f
 #define SQUARE_MAX_Q24 (40 << 24)
 
@@ -57,7 +57,7 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
 }
 
 void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pulls,
-                               struct terms *terms) {
+                          struct terms *terms) {
   const struct fit_shapes_pad *pad = problem->pad;
   int32_t heights = 0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
@@ -239,8 +239,8 @@ void fit_shapes_round_places(struct fit_shapes_at *at) {
 }
 
 void fit_shapes_set_rows(const struct problem *problem, int model, int count,
-                              const struct fit_shapes_at *where,
-                              struct fit_shapes_equations *equations) {
+                         const struct fit_shapes_at *where,
+                         struct fit_shapes_equations *equations) {
   struct fit_shapes_pad *pad = problem->pad;
   const int32_t *at = where->value;
   const bool pulls = count > BALANCE && model == LONG;

@@ -72,8 +72,7 @@ void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct be
 void fit_shapes_round_places(struct fit_shapes_at *at);
 /* The weighted rows of a model with so many unknowns, columns Q27 and residual Q28. */
 void fit_shapes_set_rows(const struct problem *problem, int model, int count,
-                         const struct fit_shapes_at *where,
-                         struct fit_shapes_equations *equations);
+                         const struct fit_shapes_at *where, struct fit_shapes_equations *equations);
 
 /* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */
 #define BEGIN_PARTS 2

@@ -1,9 +1,9 @@
 /* One damped Gauss-Newton step of a model. */
 #include "fit/fit_shapes_parts.h"
 
-#define PER_FAR_SD_Q4 1600  /* 1 / 0.01 */
-#define PER_LOAD_SD_Q4 53   /* 1 / 0.3: Q / F of what is held */
-#define DAMPING_SHIFT 6     /* of the diagonal: what readings hardly tell moves slowly */
+#define PER_FAR_SD_Q4 1600 /* 1 / 0.01 */
+#define PER_LOAD_SD_Q4 53  /* 1 / 0.3: Q / F of what is held */
+#define DAMPING_SHIFT 6    /* of the diagonal: what readings hardly tell moves slowly */
 #define SPAN_MAX (3 << 20)
 #define BALANCE_MAX (15 << 16) /* 0.94 */
 #define MOVE_MAX (1 << 18)     /* a quarter of a pitch */
@@ -65,8 +65,7 @@ static void put_prior(int u, int32_t element_q27, int32_t off_q20, struct priors
 }
 
 void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
-                                    struct priors *priors,
-                                    struct fit_shapes_equations *equations) {
+                               struct priors *priors, struct fit_shapes_equations *equations) {
   const struct fit_shapes_pad *pad = problem->pad;
   int32_t base_q23 = problem->base_q22 * 2;
   for (int u = 0; u < UNKNOWNS; u++) {
@@ -152,8 +151,8 @@ static NOINLINE void substitute(const struct fit_shapes_equations *equations, co
   }
 }
 
-static const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0,
-                                           ONE_Q20 / 8,   SPAN_MAX,    SPAN_MAX,    0, 0};
+static const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0, ONE_Q20 / 8,
+                                           SPAN_MAX,      SPAN_MAX,    0,           0};
 
 static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
                                const struct fit_shapes_equations *equations, const int32_t *x_q20,
@@ -192,10 +191,9 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
 }
 
 int32_t fit_shapes_chi_square(const struct problem *problem,
-                             const struct fit_shapes_equations *equations) {
+                              const struct fit_shapes_equations *equations) {
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
-  struct scaled squares =
-      fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
+  struct scaled squares = fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
 }
 

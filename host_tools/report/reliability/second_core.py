@@ -2,6 +2,7 @@
 import json
 import pathlib
 
+from boards import PARALLEL
 from reporting import run
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -21,7 +22,7 @@ def measure(build, steps):
 
 def text(found):
     return ["## The second core", "",
-            f"Scene grasp on pico_parallel at OSR 256, pressed and with a profile. Its second core was killed at {found['core1_killed']} instants that are spread over a frame:", "",
+            f"Scene grasp on {PARALLEL} at OSR 256, pressed and with a profile. Its second core was killed at {found['core1_killed']} instants that are spread over a frame:", "",
             f"- {found['core1_hangs']} hangs: kills after which the load was not estimated again within 20 ms, or the chip was reset.",
             f"- {found['core1_frames_lost']} frames lost.",
             f"- {found['core1_unflagged']} kills that no frame told (TANGENTIAL_LATE), or that a frame told while it had a load. At most {found['core1_late_frames_max']} "

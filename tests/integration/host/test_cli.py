@@ -327,7 +327,7 @@ class ErrorsPeopleMeet(CliTest):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),
-                                     f"fingertip: {self.port}: speaks protocol version {version}, not 7; install "
+                                     f"fingertip: {self.port}: speaks protocol version {version}, not 8; install "
                                      "this tool's firmware with `fingertip flash`, or use the other's tool\n")
 
     def test_cable_pulled(self):

@@ -109,6 +109,8 @@ function session(): DevicePacket[] {
 }
 
 const packets = session();
+/** Between two frames: an event parts the packets of one. */
+const EVENT_AFTER = packets.findIndex(({ type }, i) => i >= 700 && type === PacketType.RAW);
 const EXTRA: [string, string][] = [
   ['recorded_by', 'a test'],
   ['started_utc', '2026-08-05T12:00:00.125Z'],
@@ -119,7 +121,7 @@ function recorded(kind: 'csv' | 'mcap'): Uint8Array {
   const writer = core.newWriter(kind, packets[0] as Info, EXTRA);
   packets.forEach((packet, i) => {
     writer.packet(packet);
-    if (i === 701) {
+    if (i === EVENT_AFTER) {
       writer.event('gone 2026-08-05T12:00:01.000Z');
     }
   });

@@ -9,9 +9,7 @@
 #define PRESS_us 1500000u
 #define OBJECTS_MAX 40
 
-static struct object {
-  double x_mm, y_mm, force_N;
-} objects[OBJECTS_MAX];
+static struct object { double x_mm, y_mm, force_N; } objects[OBJECTS_MAX];
 static unsigned object_count;
 static double load_qx_N;
 static uint64_t ends_us; /* 0: never */

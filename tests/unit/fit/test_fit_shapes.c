@@ -291,14 +291,16 @@ static void test_parts_add_up_to_a_frame(void) {
     enum fit_shapes_progress progress;
     int count = 0;
     do {
-      progress = fit_shapes_part(&array, &other, pressure_Pa_q10, &settings, &fit, &parts, &of_parts);
+      progress =
+          fit_shapes_part(&array, &other, pressure_Pa_q10, &settings, &fit, &parts, &of_parts);
       count++;
     } while (progress == FIT_SHAPES_UNFINISHED);
     TEST_ASSERT_EQUAL(frame == 0 ? 2 : FIT_SHAPES_PARTS, count);
     TEST_ASSERT_EQUAL(answers ? FIT_SHAPES_ANSWERED : FIT_SHAPES_STEPPED, progress);
     TEST_ASSERT_EQUAL_MEMORY(&whole, &parts, sizeof whole);
     TEST_ASSERT_EQUAL_MEMORY(&of_whole, &of_parts, sizeof of_whole);
-    const bool steps_only = frame + 1 >= FIT_SHAPES_FRAMES && (frame + 2 - FIT_SHAPES_FRAMES) % 4 == 0;
+    const bool steps_only =
+        frame + 1 >= FIT_SHAPES_FRAMES && (frame + 2 - FIT_SHAPES_FRAMES) % 4 == 0;
     TEST_ASSERT_EQUAL(frame == 0 || (frame + 1 >= FIT_SHAPES_FRAMES && !steps_only), answers);
   }
   TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, of_parts.shape);

@@ -515,6 +515,36 @@ TEST(Painter, WithoutColourTheLocationIsStillSeen) {
   }
 }
 
+TEST(Monitor, TwoContactsAndEdgesAreShown) {
+  constexpr std::uint32_t flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
+                                  CONTACT_FLAG_TARED | CONTACT_FLAG_SHAPE_VALID;
+  for (int columns : {80, 120}) {
+    Model model = model_of_grasp(true);
+    wire_packet packet = test::make_contact(0, 1000, 1);
+    wire_contact &contact = packet.body.contact;
+    contact.flags = flags | CONTACT_FLAG_TWO_CONTACTS;
+    contact.x1_mm = -5.25f;
+    contact.y1_mm = 7.0f;
+    contact.location1_sd_mm = 0.09f;
+    contact.force1_N = 4.5f;
+    contact.x2_mm = 3.0f;
+    contact.y2_mm = -2.0f;
+    contact.force2_N = 2.25f;
+    model.take(packet);
+    const std::string two = text_of(one(model, columns, 40));
+    EXPECT_NE(two.find("4.50 N"), std::string::npos) << two;
+    EXPECT_NE(two.find("2.25 N"), std::string::npos) << two;
+    packet = test::make_contact(0, 2000, 2);
+    packet.body.contact.flags = flags | CONTACT_FLAG_EDGE;
+    packet.body.contact.edge_angle_deg = -37.5f;
+    packet.body.contact.edge_length_mm = 18.0f;
+    model.take(packet);
+    const std::string edge = text_of(one(model, columns, 40));
+    EXPECT_EQ(edge.find("2.25 N"), std::string::npos) << edge;
+    EXPECT_NE(edge.find("18.0 mm"), std::string::npos) << edge;
+  }
+}
+
 TEST(Painter, InAsciiAnArrowHasAHeadToo) {
   Model model = model_of_grasp(true);
   for (auto [qx_N, qy_N] : {std::pair{1.1f, 1.1f}, {-1.1f, 1.1f}, {-1.1f, -1.1f}, {1.1f, -1.1f}}) {
