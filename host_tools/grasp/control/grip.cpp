@@ -230,7 +230,7 @@ std::uint32_t Grip::hold() {
   const bool slides = hold_.is_sliding();
   const std::uint32_t trouble =
       (felt_.tells_load ? 0u : GRIP_NO_LOAD) |
-      aim(wanted_N, slides ? GripReach::Haste::slides : GripReach::Haste::usual);
+      aim(wanted_N, hold_.goes_on() ? GripReach::Haste::slides : GripReach::Haste::usual);
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : GRIP_HOLDING);
   }

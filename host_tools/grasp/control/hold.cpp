@@ -94,10 +94,11 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
                      felt.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * felt.grip_N;
   const bool was_sliding = sliding_;
   sliding_ = felt.slides && (was_sliding || !felt.tells_load || !(holds || creeps));
+  goes_on_ = sliding_ && (!felt.tells_load || (!holds && felt.speed_mm_s >= fastest_mm_s_));
   if (sliding_) {
     slides_ += was_sliding ? 0 : 1;
     slid_s_ = now_s;
-    if (felt.tells_load && !holds && felt.speed_mm_s >= fastest_mm_s_) {
+    if (goes_on_ && felt.tells_load) {
       friction_.slid(std::max(felt.ratio, FRICTION_LEAST));
       load_.slides_at(felt.load_N, passed_s);
     }
@@ -135,11 +136,11 @@ double GripHold::wants(const GripFelts &felt, double coming_N, const GripSetting
                          : was_loaded_                   ? settings.floor_N
                                                         : settings.start_N;
   double need = std::max(need_N(settings, dead_s), least_N);
-  if (sliding_ && !felt.tells_load) {
+  if (goes_on_ && !felt.tells_load) {
     need = std::max(need, LIKELY * felt.grip_N);
   }
   need = std::min(need, settings.cap_N);
-  if (felt.tells_load && !sliding_) {
+  if (felt.tells_load && !goes_on_) {
     // What was wanted and is not under way is no longer wanted: a load that was expected has not
     // come. What is there decays slowly.
     wanted_N_ = std::min(wanted_N_, coming_N);

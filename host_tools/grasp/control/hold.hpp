@@ -47,6 +47,7 @@ public:
   double load_N() const { return load_.now_N(); }
   bool is_loaded() const { return load_.now_N() > LOADED_N; } // enough to speak of a margin
   bool is_sliding() const { return sliding_; }
+  bool goes_on() const { return goes_on_; } // it slides and does not slow down
   std::uint32_t slides() const { return slides_; }
 
 private:
@@ -67,7 +68,7 @@ private:
   double ratio_ = 0.0;    // smoothed, of what rests
   double lately_ = 0.0;   // the largest within LATELY_s
   double moved_mm_ = 0.0; // and all that is told as one
-  bool begun_ = false, sliding_ = false, has_told_ = false, was_loaded_ = false;
+  bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false;
   std::uint32_t slides_ = 0;
 };
 

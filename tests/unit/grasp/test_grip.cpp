@@ -185,6 +185,24 @@ TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
   EXPECT_LT(world.force_N, 1.65 * before_N);
 }
 
+// A slide is still reported when the object has been caught already. What it asked for and is not
+// under way is given up then.
+TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
+  GripperTraits slow = fine_gripper();
+  slow.latency_s = 0.025;
+  GripWorld world({{"cap", 15.0}}, slow); // each move shows before the next
+  world.grasp();
+  world.pull(2.5, 0.03);
+  const double expected_N = world.report.wanted_N;
+  world.slides = {true, true};
+  for (world.slide_mm_s = 30.0; world.slide_mm_s > 5.0; world.slide_mm_s *= 0.8) {
+    world.run(0.005);
+  }
+  world.run(0.05);
+  EXPECT_EQ(world.report.state, GRIP_SLIPPING);
+  EXPECT_LT(world.report.wanted_N, 0.9 * expected_N);
+}
+
 // Squeezed rubber moves a contact by less than a millimetre, far below what it holds.
 TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
   GripWorld world;
