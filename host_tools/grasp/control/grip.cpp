@@ -189,7 +189,9 @@ std::uint32_t Grip::squeeze() {
   const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
                                       : aim(risen_N, GripReach::Haste::patient);
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
-  const bool there = felt_.low_N >= SQUEEZED * aimed_N && risen_N >= aimed_N;
+  // Or as near to it as a move brings it.
+  const bool nearest = !fixed && felt_.fingers > 0 && reach_.has_come(now_s_, felt_.t_s);
+  const bool there = (felt_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, felt_.t_s);
   const bool over = now_s_ - since_s_ > SQUEEZE_s;
   if (!alone && (((there || capped) && !status_.moving) || over)) {
@@ -224,11 +226,11 @@ std::uint32_t Grip::hold() {
   if (settings_.mode == GRIP_MODE_FIXED) {
     return fixed_.step(felt_, settings_, traits_, now_s_, reach_);
   }
-  const double wanted_N = hold_.wants(felt_, settings_, now_s_, dead_s());
+  const double wanted_N = hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
   const std::uint32_t trouble =
       (felt_.tells_load ? 0u : GRIP_NO_LOAD) |
-      aim(wanted_N, slides ? GripReach::Haste::slides : GripReach::Haste::usual);
+      aim(wanted_N, hold_.goes_on() ? GripReach::Haste::slides : GripReach::Haste::usual);
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : GRIP_HOLDING);
   }

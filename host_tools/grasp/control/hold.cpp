@@ -22,16 +22,11 @@ constexpr double LOADED_s = 0.3; // a load has been steady
 // A reported slide that is slower is a contact that settles, until it has lasted.
 constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
 // What held within so long does not slide at a smaller share of that ratio, unless it has become
-// slick; and then it slides so far.
-constexpr double LATELY_s = 0.2, BEGINS_AT = 0.8, FAR_mm = 1.0;
-// At a smaller share of what held within LATELY_s it holds: squeezed rubber and what has just been
-// caught move a contact so far.
-constexpr double HOLDS_AT = 0.6, NO_SLIDE_mm = 0.5;
-// What slides teaches friction as long as it does not slow down: then the grip holds already.
-constexpr double SLOWS = 0.95;
-// A slide raises the grip at once: by what the ratio says that it slides at, within these limits,
-// or, of an unknown load, by so much, and again after the gripper's answer and so long.
-constexpr double RAISE_LEAST = 1.12, RAISE_MOST = 1.6, RAISE_UNKNOWN = 1.5, AGAIN_s = 0.015;
+// slick; and then it slides so far. Squeezed rubber and what has just been caught move less.
+constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
+// Of what slides and does not slow down: the load is its friction at least, and likely so much of
+// it. A contact that tells no load grips by so much more.
+constexpr double LIKELY = 1.3;
 
 } // namespace
 
@@ -69,10 +64,11 @@ bool GripLoad::is_steady() const {
   return rate_N_s_ * STEADY_s < std::max(STEADY * load_N_, STEADY_N);
 }
 
-void GripLoad::begins_to_slide() {
-  is_known_ = is_steady();
+void GripLoad::slides_at(double load_N, double passed_s) {
+  slow_N_ += std::min(passed_s / MEAN_s, 1.0) * (LIKELY * load_N - slow_N_);
+  load_N_ = std::max(load_N_, slow_N_);
   peak_N_ = std::max(peak_N_, load_N_);
-  rate_N_s_ = is_known_ ? 0.0 : rate_N_s_;
+  rate_N_s_ = 0.0;
 }
 
 void GripHold::begin() {
@@ -85,53 +81,29 @@ double GripHold::need_N(const GripSettings &settings, double dead_s) const {
   return margin * load_N / friction(settings);
 }
 
-void GripHold::slide(const GripFelts &felt, const GripSettings &settings, double now_s,
-                     double dead_s, double passed_s) {
-  const double ratio = std::max(felt.ratio, FRICTION_LEAST);
-  if (!sliding_) {
-    sliding_ = true;
-    slides_++;
-    raised_s_ = now_s;
-    fastest_mm_s_ = slid_mm_ = 0.0;
-    load_.begins_to_slide();
-    const double needed = settings.margin * load_.now_N() / ratio / std::max(felt.grip_N, 0.1);
-    raised_N_ = felt.grip_N * (load_.is_known() ? std::clamp(needed, RAISE_LEAST, RAISE_MOST)
-                                                : RAISE_UNKNOWN);
-  }
-  slid_s_ = now_s;
-  slid_mm_ += felt.speed_mm_s * passed_s;
-  fastest_mm_s_ = std::max(fastest_mm_s_, felt.speed_mm_s);
-  if (felt.speed_mm_s < SLOWS * fastest_mm_s_) {
-    return;
-  }
-  if (felt.load_N + LOAD_NOISE_N >= BEGINS_AT * lately_ * felt.grip_N || slid_mm_ > FAR_mm) {
-    friction_.slid(ratio);
-  }
-  if (now_s - raised_s_ > dead_s + AGAIN_s) {
-    // The gripper has had the time to answer: what still does not hold is more than is known.
-    if (load_.is_known() && felt.grip_N >= 0.95 * need_N(settings, dead_s)) {
-      load_.doubt();
-    }
-    raised_N_ = load_.is_known() ? raised_N_ : std::max(raised_N_, RAISE_UNKNOWN * felt.grip_N);
-    raised_s_ = now_s;
-  }
-}
-
-void GripHold::look(const GripFelts &felt, const GripSettings &settings, double now_s,
-                    double dead_s) {
+void GripHold::look(const GripFelts &felt, const GripSettings &settings, double now_s) {
   const double passed_s = std::clamp(now_s - looked_s_, 0.0, 0.1);
   looked_s_ = now_s;
   still_s_ = felt.slides ? still_s_ : now_s;
   moved_mm_ = felt.slides ? moved_mm_ + felt.speed_mm_s * passed_s : 0.0;
-  const bool creeps = felt.tells_load && felt.speed_mm_s < CREEPS_mm_s &&
-                      now_s - still_s_ < CREEPS_s;
-  const bool holds = felt.tells_load && moved_mm_ < NO_SLIDE_mm &&
-                     felt.load_N + LOAD_NOISE_N < HOLDS_AT * lately_ * felt.grip_N;
-  if (felt.slides && (sliding_ || !(creeps || holds))) {
-    slide(felt, settings, now_s, dead_s, passed_s);
+  // The fastest of late: what is slower slows down.
+  fastest_mm_s_ -= std::min(passed_s / LATELY_s, 1.0) * fastest_mm_s_;
+  fastest_mm_s_ = std::max(fastest_mm_s_, felt.speed_mm_s);
+  const bool creeps = felt.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
+  const bool holds = moved_mm_ < FAR_mm &&
+                     felt.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * felt.grip_N;
+  const bool was_sliding = sliding_;
+  sliding_ = felt.slides && (was_sliding || !felt.tells_load || !(holds || creeps));
+  goes_on_ = sliding_ && (!felt.tells_load || (!holds && felt.speed_mm_s >= fastest_mm_s_));
+  if (sliding_) {
+    slides_ += was_sliding ? 0 : 1;
+    slid_s_ = now_s;
+    if (goes_on_ && felt.tells_load) {
+      friction_.slid(std::max(felt.ratio, FRICTION_LEAST));
+      load_.slides_at(felt.load_N, passed_s);
+    }
     return;
   }
-  sliding_ = false;
   if (!felt.tells_load) {
     return;
   }
@@ -148,8 +120,8 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
   was_loaded_ = was_loaded_ || now_s - steady_s_ > LOADED_s;
 }
 
-double GripHold::wants(const GripFelts &felt, const GripSettings &settings, double now_s,
-                   double dead_s) {
+double GripHold::wants(const GripFelts &felt, double coming_N, const GripSettings &settings,
+                       double now_s, double dead_s) {
   const double passed_s = begun_ ? now_s - now_s_ : 0.0;
   if (!begun_) {
     begun_ = true;
@@ -158,21 +130,25 @@ double GripHold::wants(const GripFelts &felt, const GripSettings &settings, doub
   }
   now_s_ = now_s;
   if (felt.fresh) {
-    look(felt, settings, now_s, dead_s);
+    look(felt, settings, now_s);
   }
   const double least_N = !has_told_ && !felt.tells_load ? settings.blind_N
                          : was_loaded_                   ? settings.floor_N
                                                         : settings.start_N;
   double need = std::max(need_N(settings, dead_s), least_N);
-  need = sliding_ ? std::max(need, raised_N_) : need;
-  need = std::min(need, settings.cap_N);
-  const bool rests = felt.tells_load && !felt.slides &&
-                     (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
-  if (need >= wanted_N_) {
-    wanted_N_ = need;
-  } else if (rests) {
-    wanted_N_ -= (wanted_N_ - need) * (1.0 - std::exp(-settings.decay_1_s * passed_s));
+  if (goes_on_ && !felt.tells_load) {
+    need = std::max(need, LIKELY * felt.grip_N);
   }
+  need = std::min(need, settings.cap_N);
+  if (felt.tells_load && !goes_on_) {
+    // What was wanted and is not under way is no longer wanted: a load that was expected has not
+    // come. What is there decays slowly.
+    wanted_N_ = std::min(wanted_N_, coming_N);
+    const bool rests = !felt.slides && (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
+    const double share = rests ? 1.0 - std::exp(-settings.decay_1_s * passed_s) : 0.0;
+    wanted_N_ -= share * std::max(wanted_N_ - need, 0.0);
+  }
+  wanted_N_ = std::max(wanted_N_, need);
   return wanted_N_;
 }
 

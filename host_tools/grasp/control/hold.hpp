@@ -24,54 +24,51 @@ class GripLoad {
 public:
   // Of a contact that rests. swings: it has been caught, and does so on the rubber.
   void rests(double load_N, double passed_s, bool swings);
-  // From now on it slides.
-  void begins_to_slide();
-  void doubt() { is_known_ = false; }
+  // Of one that slides and does not slow down: it carries no less.
+  void slides_at(double load_N, double passed_s);
 
   double now_N() const { return load_N_; }
   double ahead_N(double seconds) const; // from now
   bool is_steady() const;
-  bool is_known() const { return is_known_; } // of one that slides
 
 private:
   double load_N_ = 0.0, slow_N_ = 0.0, peak_N_ = 0.0, rate_N_s_ = 0.0;
   double swings_s_ = 0.0;
-  bool is_known_ = false;
 };
 
 class GripHold {
 public:
   void begin();
-  // The force that is wanted now. dead_s: from a motion of the object until the gripper moves.
-  double wants(const GripFelts &felt, const GripSettings &settings, double now_s, double dead_s);
+  // The force that is wanted now. coming_N: what the moves under way make. dead_s: from a motion of
+  // the object until the gripper moves.
+  double wants(const GripFelts &felt, double coming_N, const GripSettings &settings, double now_s,
+               double dead_s);
   double friction(const GripSettings &settings) const { return friction_.value(settings.friction); }
   double load_N() const { return load_.now_N(); }
   bool is_loaded() const { return load_.now_N() > LOADED_N; } // enough to speak of a margin
   bool is_sliding() const { return sliding_; }
+  bool goes_on() const { return goes_on_; } // it slides and does not slow down
   std::uint32_t slides() const { return slides_; }
 
 private:
   static constexpr double LOADED_N = 0.15;
 
-  void look(const GripFelts &felt, const GripSettings &settings, double now_s, double dead_s);
-  void slide(const GripFelts &felt, const GripSettings &settings, double now_s, double dead_s,
-             double passed_s);
+  void look(const GripFelts &felt, const GripSettings &settings, double now_s);
   double need_N(const GripSettings &settings, double dead_s) const;
 
   GripFriction friction_;
   GripLoad load_;
-  double wanted_N_ = 0.0, raised_N_ = 0.0;
+  double wanted_N_ = 0.0;
   double now_s_ = 0.0, looked_s_ = 0.0;
   double slid_s_ = 0.0; // the last frame of a slide
-  double raised_s_ = 0.0, fastest_mm_s_ = 0.0;
+  double fastest_mm_s_ = 0.0;
   double still_s_ = 0.0;  // the last frame that told no slide
   double steady_s_ = 0.0; // since when the load is steady
   double was_N_ = 0.0;    // the load, as far as it is remembered
   double ratio_ = 0.0;    // smoothed, of what rests
   double lately_ = 0.0;   // the largest within LATELY_s
-  double slid_mm_ = 0.0;  // how far this slide has gone
   double moved_mm_ = 0.0; // and all that is told as one
-  bool begun_ = false, sliding_ = false, has_told_ = false, was_loaded_ = false;
+  bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false;
   std::uint32_t slides_ = 0;
 };
 

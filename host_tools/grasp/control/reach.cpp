@@ -22,7 +22,7 @@ constexpr double SPACED_s = 0.003;     // widths of the ring
 constexpr double WIDTH_LAGS_s = 0.008; // newer forces tell nothing while the gripper moves
 constexpr double SHOWS_s = 0.02;       // after a move, in the force, whatever the clocks differ by
 constexpr double POLL_SHARE = 0.05;    // that an answer has in the mean
-constexpr double MISSES = 0.2; // of what the least move makes: less may be missing
+constexpr double MISSES = 0.35; // of what the least move makes: less may be missing
 constexpr double NEAR = 0.03;             // of the wanted force: near enough
 constexpr double WEAK = 0.8;              // and too weak, where the cap leaves no room
 constexpr double SHORT_mm = 0.5;           // a move while squeezing
@@ -157,6 +157,10 @@ double GripReach::least_move_N(double force_N) const {
   return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N;
 }
 
+double GripReach::coming_N(const GripFelts &felt, double now_s) const {
+  return rubber_.force_at(coming_mm(now_s), felt.grip_N, width_at(felt.t_s));
+}
+
 double GripReach::last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const {
   const double least_mm =
       rubber_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s), felt.is_alone());
@@ -230,8 +234,9 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
     to_mm = way_mm >= least - 1e-9 ? coming - way_mm : coming;
   } else if (haste != Haste::patient && come && now_N - wanted_N > near_N) {
     const double enough_mm = rubber_.width_for(wanted_N + near_N, low_N, width_mm);
-    const double way_mm = std::min(step_mm * std::floor((enough_mm - coming) / step_mm + 1e-6),
-                                   std::max(step_mm * std::floor(OPENS_mm / step_mm), least));
+    double way_mm = std::min(step_mm * std::floor((enough_mm - coming) / step_mm + 1e-6),
+                             std::max(step_mm * std::floor(OPENS_mm / step_mm), least));
+    way_mm = low_at(coming + least) >= wanted_N ? std::max(way_mm, least) : way_mm;
     to_mm = way_mm >= least - 1e-9 ? coming + way_mm : coming;
   }
   if (to_mm != coming) {

@@ -65,6 +65,8 @@ public:
   double least_mm() const;
   // What that makes of this force, at where the gripper was last sent.
   double least_move_N(double force_N) const;
+  // The grip once it is where it was last sent.
+  double coming_N(const GripFelts &felt, double now_s) const;
   // The last whole step from where it was last sent that keeps the fingertip that feels more below
   // the cap.
   double last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const;
