@@ -10,7 +10,9 @@
     fingertip-V-page.tar.gz               the page, for any server
 
 The same commit gives the same bytes, in whatever folder. Times are that of the commit. What is built stays in FOLDER/.build until the end.
+clang 14 orders some code by addresses in its memory, so compilers run without random ones.
 """
+import ctypes
 import gzip
 import hashlib
 import io
@@ -24,6 +26,13 @@ import sys
 import tarfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
+ADDR_NO_RANDOMIZE = 0x0040000  # linux/personality.h
+
+
+def fix_addresses():
+    """Of this process's children. Where the system refuses it the release is as good, but not the same bytes each time."""
+    if ctypes.CDLL(None, use_errno=True).personality(ADDR_NO_RANDOMIZE) < 0:
+        print("release.py: this system keeps addresses random, so another build of this commit may differ in judges.wasm", file=sys.stderr)
 
 
 def run(*command, **how):
@@ -73,6 +82,7 @@ def main(argv):
     time_s = int(run("git", "log", "-1", "--format=%ct", cwd=ROOT))
     os.environ |= {"SOURCE_DATE_EPOCH": str(time_s), "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONDONTWRITEBYTECODE": "1"}
     os.umask(0o022)
+    fix_addresses()
     name, work = f"fingertip-{version}", out / ".build"
     source = work / name
     work.mkdir(parents=True)
