@@ -59,6 +59,7 @@ public:
   void share(std::chrono::milliseconds longest_wait);
 
   std::size_t count() const { return fingers_.size(); }
+  std::uint32_t rates_set(std::size_t finger) const { return shared_[finger].rates_set; }
   std::int64_t reached_us(std::size_t finger) const { return shared_[finger].reached_us; }
   bool is_there(std::size_t finger) const { return processes_[finger] > 0; }
   bool is_frozen(std::size_t finger) const { return shared_[finger].frozen; }
