@@ -93,16 +93,19 @@ validating::Measured validate_live(const ValidateOptions &options) {
   wire_info info = device.session.info().body.info;
   const std::string name = device.transport->description();
   Rate rate(device.session, info);
-  info = device.session.info().body.info;
+  wire_packet ready = device.session.info();
+  info = ready.body.info;
   calibrating::check_firmware(info, name);
-  Walk walk(info, options.weight_g, options.skin_mm);
   if (!options.serial) {
     std::memset(info.serial, 0, sizeof info.serial);
   }
+  Walk walk(info, options.weight_g, options.skin_mm);
   /* Nothing but what was measured: no port, no place, no name. */
   RecordingWriter writer(options.recording, options.overwrite, &info, info.sensor_count,
                          Metadata{{"recorded_by", "fingertip " FINGERTIP_VERSION}}, true,
                          OutputFile::Appears::at_once);
+  ready.body.info = info;
+  writer.packet(ready);
   Guide guide(options.colour);
   std::int64_t last_frame_us = steady_now_us();
   const auto keep = [&](const std::vector<Step> &begun) {

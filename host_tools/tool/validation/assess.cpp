@@ -163,6 +163,20 @@ private:
       without |= 1u << best;
       card_.fit = std::move(best_fit);
     }
+    for (std::size_t k = 0; k < sensors_ && odd.size() < LOOSE_MAX; k++) {
+      if ((without >> k & 1u) || card_.fit.sensors[k].felt > FELT_FEW) {
+        continue;
+      }
+      if (card_.fit.sensors[k].scatter_share < FOLLOWED_SCATTER) {
+        continue;
+      }
+      MarksFit fit = fit_marks(card_.measured, without | 1u << k);
+      if (fit.sensors[k].scatter_share > LOOSE_SCATTER) {
+        odd.push_back(k);
+        without |= 1u << k;
+        card_.fit = std::move(fit);
+      }
+    }
     std::vector<double> residuals;
     for (std::size_t k = 0; k < sensors_; k++) {
       if (!(without >> k & 1u)) {
@@ -182,7 +196,7 @@ private:
         evidence =
             "feels the same press differently each time: its readings leave the profile that "
             "the others teach by " +
-            percent(card_.fit.sensors[k].residual_share) + " rms, the others by " +
+            percent(card_.fit.sensors[k].residual_share, 1) + " rms, the others by " +
             percent(median(residuals), 1);
       } else if (usual_noise_Pa > 0.0 && noise_Pa > NOISY_OVER_MEDIAN * usual_noise_Pa) {
         evidence = "is noisy with nothing on the pad: " + fixed(noise_Pa, 1) + " Pa, the others " +

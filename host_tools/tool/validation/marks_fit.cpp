@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace fingertip::validating {
@@ -385,16 +386,31 @@ MarksFit Fit::result() const {
     FoundSensor sensor;
     int measured = 0;
     double squares = 0.0, felt = 0.0;
+    std::map<std::size_t, std::vector<double>> of_mark; /* readings over those expected */
     for (int i = 0; i < presses_; i++) {
       measured += is_usable(i, k);
       const double expected = model(value_, i, k, nullptr);
-      sensor.strongest_Pa = std::max(sensor.strongest_Pa, expected);
       if (is_usable(i, k) &&
           expected > FELT_SHARE * value_[of_sensor(k)] * std::exp(value_[LOG_PEAK])) {
         squares += std::pow((reading(i, k) - expected) / expected, 2);
         felt += 1.0;
+        of_mark[measured_.presses[static_cast<std::size_t>(i)].mark].push_back(reading(i, k) /
+                                                                               expected);
       }
     }
+    sensor.felt = static_cast<std::size_t>(felt);
+    double scatter = 0.0, freedom = 0.0;
+    for (const auto &[mark, ratios] : of_mark) {
+      double mean = 0.0;
+      for (double ratio : ratios) {
+        mean += ratio / double(ratios.size());
+      }
+      for (double ratio : ratios) {
+        scatter += (ratio - mean) * (ratio - mean);
+      }
+      freedom += double(ratios.size() - 1);
+    }
+    sensor.scatter_share = freedom > 0.0 ? std::sqrt(scatter / freedom) : 0.0;
     sensor.answers = 2 * measured > presses_;
     sensor.gain = value_[of_sensor(k)];
     sensor.residual_share = felt > 0.0 ? std::sqrt(squares / felt) : 0.0;
