@@ -16,13 +16,14 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import reading  # noqa: E402
 import released  # noqa: E402
 import simulated  # noqa: E402
+import validated  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
 
 def main(argv):
     released.wanted = "--release" in argv
-    return report_of_parts([word for word in argv if word != "--release"], __doc__, "newcomer", (simulated, reading, released))
+    return report_of_parts([word for word in argv if word != "--release"], __doc__, "newcomer", (simulated, validated, reading, released))
 
 
 if __name__ == "__main__":

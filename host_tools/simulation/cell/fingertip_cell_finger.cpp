@@ -174,6 +174,9 @@ private:
     }
     std::uint8_t bytes[NATIVE_CDC_RECEIVE_BYTES];
     if (const std::size_t count = port_.read(bytes, sizeof bytes)) {
+      asks_.feed(bytes, count, [this](const wire_packet &packet) {
+        pressures_.rates_set += packet.type == WIRE_CMD_RATE;
+      });
       asked_.push_back({steady_now_us(), {bytes, bytes + count}});
     }
   }
@@ -205,6 +208,7 @@ private:
   ServedPort port_;
   bool is_open_ = false;
   std::deque<Asked> asked_;
+  Decoder asks_;
   std::vector<std::uint8_t> left_; // of what the firmware has sent
   std::uint64_t device_us_ = 0;
   std::optional<std::int64_t> zero_us_; // host's time of the fingertip's 0

@@ -27,7 +27,9 @@ public:
   // In between straight; before the oldest that is kept, 0.5 s, as then; the same after the newest.
   double at(std::int64_t host_us, std::size_t sensor) const;
 
-  // The other way: up to where its fingertip has got; 0: it has not begun.
+  // The other way: how often a program has set its frame rate.
+  std::atomic<std::uint32_t> rates_set{0};
+  // And up to where its fingertip has got; 0: it has not begun.
   std::atomic<std::int64_t> reached_us{0};
   // Host time at which its own clock was 0.
   std::atomic<std::int64_t> zero_us{0};

@@ -59,6 +59,7 @@ public:
   void share(std::chrono::milliseconds longest_wait);
 
   std::size_t count() const { return fingers_.size(); }
+  std::uint32_t rates_set(std::size_t finger) const { return shared_[finger].rates_set; }
   std::int64_t reached_us(std::size_t finger) const { return shared_[finger].reached_us; }
   // In the fingertip's own time.
   std::int64_t device_us(std::size_t finger, std::int64_t host_us) const {

@@ -5,6 +5,7 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
 #include "simulation/cell/hand_server.hpp"
+#include "simulation/cell/validated.hpp"
 #include "simulation/twin/effects.hpp"
 
 #include <algorithm>
@@ -201,6 +202,54 @@ void press(const PressOptions &options, const Place &place) {
       fingers.look();
     }
     if (options.seconds && time_s >= *options.seconds) {
+      break;
+    }
+  }
+}
+
+void validate(const ValidateHandOptions &options, const Place &place) {
+  FingerProcess process = place.finger(0, 2 * options.seed);
+  process.gain.fill(1.0); // the pad has its own
+  process.parallel_bus = true;
+  ValidatedOptions pad_options;
+  pad_options.weight_g = options.weight_g;
+  pad_options.seed = options.seed;
+  pad_options.cache = options.cache;
+  std::optional<ValidatedPad> pad;
+  pad.emplace(pad_options);
+  Fingers fingers(place, {process});
+  fingers.wait_until_ready();
+  std::printf("ready: %s\n", place.port(SIDES[0]).c_str());
+  std::fflush(stdout);
+  std::uint32_t rates_set = fingers.rates_set(0);
+  std::optional<std::int64_t> began_us;
+  const std::int64_t ready_us = steady_now_us();
+  std::int64_t last_us = 0;
+  while (!interrupted) {
+    fingers.share(ROUND);
+    const std::int64_t now_us = steady_now_us();
+    if (now_us - last_us < ROUND_us) {
+      continue;
+    }
+    last_us = now_us;
+    if (!began_us && fingers.rates_set(0) != rates_set) {
+      began_us = now_us;
+      pad.emplace(pad_options);
+    }
+    Pressures pressures{};
+    if (began_us) {
+      const double time_s = 1e-6 * static_cast<double>(now_us - *began_us);
+      for (std::size_t k = 0; k < SENSORS; k++) {
+        pressures[k] = pad->pressure_Pa(k, time_s);
+      }
+      if (time_s >= pad->plan().back().first) {
+        began_us.reset();
+        rates_set = fingers.rates_set(0);
+      }
+    }
+    fingers.put(now_us, {pressures});
+    fingers.look();
+    if (options.seconds && 1e-6 * static_cast<double>(now_us - ready_us) >= *options.seconds) {
       break;
     }
   }

@@ -22,6 +22,16 @@ struct PressOptions {
 
 constexpr const char *PRESS_FACE = "sphere15"; // a ball of 15 mm, as calibrate asks for
 
+// Instead, a hand that goes through the steps of `fingertip validate` (validated.hpp) whenever a
+// program sets the fingertip's frame rate, as validate does first.
+struct ValidateHandOptions {
+  std::string cache;
+  std::uint64_t seed = 1;
+  double weight_g = 300.0;
+  std::optional<double> seconds;
+};
+void validate(const ValidateHandOptions &options, const Place &place);
+
 // Until a signal comes, or its time is over. Throws Error.
 void press(const PressOptions &options, const Place &place);
 

@@ -45,7 +45,7 @@ std::string tables_for(const std::string &face) {
   return twin::default_cache_directory().string();
 }
 
-void run(const Options &options, bool is_lift) {
+void run(const Options &options, bool is_lift, bool is_validate) {
   if (!options.truth.empty()) {
     check_output(options.truth, options.overwrite);
   }
@@ -72,6 +72,15 @@ void run(const Options &options, bool is_lift) {
     }
     check(one);
     lift(one, Place(options.ports));
+  } else if (is_validate) {
+    ValidateHandOptions one;
+    one.weight_g = options.press.weight_g;
+    one.seed = options.seed;
+    one.cache = cache(PRESS_FACE);
+    if (options.seconds > 0.0) {
+      one.seconds = options.seconds;
+    }
+    validate(one, Place(options.ports));
   } else {
     PressOptions one = options.press;
     both(one);
@@ -114,6 +123,11 @@ int main(int argc, char **argv) {
                    "Obeys lines of standard input (help lists them)")
           ->excludes(press_flag)
           ->excludes(mouse_flag);
+  CLI::Option *validate_flag =
+      app.add_flag("--validate",
+                   "A hand that goes through the steps of `fingertip validate`, when that "
+                   "begins: the weight at each mark of the template, a hold, a rest")
+          ->excludes(press_flag, mouse_flag, lift_flag);
   const auto number = [&](const char *name, double &value, const char *unit, double low,
                           double high, const char *help) {
     return app.add_option(name, value, help)
@@ -229,7 +243,7 @@ int main(int argc, char **argv) {
     options.lift.world.lift_after_s = by_command ? std::nullopt : std::optional(lift_after_s);
     object.base_mm = 40.0;
     options.lift.world.grasp.down_rad = 0.5 * M_PI;
-    run(options, lift_flag->count() > 0);
+    run(options, lift_flag->count() > 0, validate_flag->count() > 0);
     return 0;
   } catch (const Error &error) {
     tell("fingertip", error);

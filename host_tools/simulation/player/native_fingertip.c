@@ -39,6 +39,9 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   array.noise = settings->noise;
   array.world = settings->world;
   array.parallel = settings->parallel_bus;
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    array.absent[k] = settings->absent >> k & 1u;
+  }
   native_set_event_source(bus_next_us, &array);
   port_set_event_handler(on_event, &app);
   app_start(&app, sim_array_bus(&array));

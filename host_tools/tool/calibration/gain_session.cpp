@@ -21,6 +21,21 @@ std::string percent(double share) {
   return fixed(100.0 * share, 1) + " %";
 }
 
+double mean_zero_Pa(const Frame &frame) {
+  double sum_Pa = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < frame.zero_Pa.size(); k++) {
+    sum_Pa += frame.valid >> k & 1u ? frame.zero_Pa[k] : 0.0;
+    count += frame.valid >> k & 1u;
+  }
+  return count > 0.0 ? sum_Pa / count : 0.0;
+}
+
+std::uint16_t micrometres(double length_mm) {
+  return static_cast<std::uint16_t>(std::lround(std::clamp(1000.0 * length_mm, 0.0, 65535.0)));
+}
+
+} // namespace
+
 Array array_of(const wire_info &info) {
   Array array;
   for (int k = 0; k < info.sensor_count; k++) {
@@ -53,21 +68,6 @@ Frame frame_of(const wire_packet &packet) {
   }
   return frame;
 }
-
-double mean_zero_Pa(const Frame &frame) {
-  double sum_Pa = 0.0, count = 0.0;
-  for (std::size_t k = 0; k < frame.zero_Pa.size(); k++) {
-    sum_Pa += frame.valid >> k & 1u ? frame.zero_Pa[k] : 0.0;
-    count += frame.valid >> k & 1u;
-  }
-  return count > 0.0 ? sum_Pa / count : 0.0;
-}
-
-std::uint16_t micrometres(double length_mm) {
-  return static_cast<std::uint16_t>(std::lround(std::clamp(1000.0 * length_mm, 0.0, 65535.0)));
-}
-
-} // namespace
 
 void check_firmware(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_FIT)) {
@@ -153,35 +153,40 @@ std::string GainSession::progress() const {
   return text;
 }
 
-calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_s) const {
-  const Solution &solution = judgement_.solution;
+calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale,
+                           std::uint32_t date_s) {
   calibration made{};
   made.date_s = date_s;
   made.placements = static_cast<std::uint16_t>(solution.kept);
-  made.force_scale = DEFAULT_FORCE_SCALE;
-  made.force_scale_sd = DEFAULT_FORCE_SCALE_SD;
-  if (force_N) {
-    const auto scale = force_scale(array_, placements_, solution, *force_N, shape());
-    if (!scale || scale->scale < static_cast<double>(CALIBRATION_FORCE_SCALE_MIN) ||
-        scale->scale > static_cast<double>(CALIBRATION_FORCE_SCALE_MAX)) {
-      throw Error("the readings are not those of " + fixed(*force_N, 2) + " N: they make " +
-                  fixed(scale ? *force_N / scale->scale : 0.0, 2) +
-                  " N; give the weight that stood on the pad, or none");
-    }
-    made.force_scale = static_cast<float>(scale->scale);
-    made.force_scale_sd = static_cast<float>(scale->sd);
-  }
+  made.force_scale = scale ? static_cast<float>(scale->scale) : DEFAULT_FORCE_SCALE;
+  made.force_scale_sd = scale ? static_cast<float>(scale->sd) : DEFAULT_FORCE_SCALE_SD;
   const Shape found = shape_of(solution);
   made.sigma_um = micrometres(found.sigma_mm);
   made.sigma_sd_um = micrometres(found.sigma_sd_mm);
   made.dip_share_q16 = static_cast<std::uint16_t>(
       std::lround(std::min(65536.0 * found.dip_share, double(CALIBRATION_DIP_SHARE_MAX_Q16))));
   made.dip_sd_um = made.dip_share_q16 > 0 ? micrometres(found.dip_sd_mm) : std::uint16_t(0);
-  made.ambient_kPa = static_cast<std::uint8_t>(std::lround(std::min(1e-3 * ambient_Pa_, 255.0)));
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
     made.sensors[k] = {static_cast<float>(solution.gain[k]),
                        static_cast<float>(solution.reading_sd[k])};
   }
+  return made;
+}
+
+calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_s) const {
+  const Solution &solution = judgement_.solution;
+  std::optional<ForceScale> scale;
+  if (force_N) {
+    scale = force_scale(array_, placements_, solution, *force_N, shape());
+    if (!scale || scale->scale < static_cast<double>(CALIBRATION_FORCE_SCALE_MIN) ||
+        scale->scale > static_cast<double>(CALIBRATION_FORCE_SCALE_MAX)) {
+      throw Error("the readings are not those of " + fixed(*force_N, 2) + " N: they make " +
+                  fixed(scale ? *force_N / scale->scale : 0.0, 2) +
+                  " N; give the weight that stood on the pad, or none");
+    }
+  }
+  calibration made = calibration_of(solution, scale, date_s);
+  made.ambient_kPa = static_cast<std::uint8_t>(std::lround(std::min(1e-3 * ambient_Pa_, 255.0)));
   if (!calibration_is_valid(&made, static_cast<unsigned>(solution.gain.size()))) {
     throw Error("a gain is out of range, which no sensor under rubber has: see that every sensor "
                 "is covered alike");

@@ -14,8 +14,18 @@
 
 namespace fingertip::calibrating {
 
+/* Its sensors; the pitch of a free layout is the distance of the nearest two. */
+Array array_of(const wire_info &info);
+/* Of a raw packet. */
+Frame frame_of(const wire_packet &packet);
+
 /* What a fingertip must be able to do. what: it, for the message. Throws Error. */
 void check_firmware(const wire_info &info, const std::string &what);
+
+/* What a fingertip keeps of a solution; scale: none where the weight is not known. Its own ambient
+ * pressure is not in it. */
+calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale,
+                           std::uint32_t date_s);
 
 class GainSession {
 public:

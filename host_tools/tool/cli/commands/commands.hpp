@@ -18,6 +18,7 @@ void add_serve(CommandLine &line);
 void add_web(CommandLine &line);
 void add_tare(CommandLine &line);
 void add_calibrate(CommandLine &line);
+void add_validate(CommandLine &line);
 void add_pad(CommandLine &line);
 void add_set(CommandLine &line);
 void add_loader(CommandLine &line);

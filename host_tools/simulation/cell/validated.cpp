@@ -1,0 +1,229 @@
+#include "simulation/cell/validated.hpp"
+
+#include "libfingertip/random.hpp"
+#include "simulation/cell/place.hpp"
+#include "simulation/cell/press.hpp"
+
+extern "C" {
+#include "config/geometry.h"
+}
+
+#include <algorithm>
+#include <cmath>
+
+namespace fingertip::cell {
+namespace {
+
+using validating::Step;
+
+enum Stream : std::uint64_t { FAULT = 871, HAND = 872, SHEET = 873 };
+
+constexpr double GRAVITY_N_PER_g = 9.80665e-3, AIR_Pa = 101325.0;
+constexpr double THIN_mm = 8.0, TILT_SHARE = 0.09, LOOSE_SD = 0.2;
+constexpr double DRIFT_MIN_Pa_min = 60.0, DRIFT_MAX_Pa_min = 180.0;
+constexpr std::size_t DRIFTING = 3;
+constexpr double BEGIN_s = 2.0, RESTS_s = 3.0, MOVES_s = 0.15, STANDS_s = 2.0;
+constexpr double SPARE_s = 1.0; // beyond what a step asks for
+// The print lies on the pad so far off, sd each way.
+constexpr double SHEET_SD_mm = 0.7, SHEET_SD_rad = 0.02;
+constexpr double SETTLED_Pa = 10000.0, SETTLED_s = 0.75;
+
+double smooth(double share) {
+  return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
+}
+
+// As the recordings of real strips and grids have them (twin/README.md, effects).
+twin::EffectValues usual_effects() {
+  return twin::parse_effects("gain,relaxation,aftereffect,drift,places,dip,widths");
+}
+
+} // namespace
+
+const std::vector<std::string> &pad_fault_names() {
+  static const std::vector<std::string> names = {"none",         "dead_sensor",  "loose_sensor",
+                                                 "tilted_skin",  "thin_skin",    "drift",
+                                                 "wrong_weight", "swapped_wires"};
+  return names;
+}
+
+ValidatedPad::ValidatedPad(const ValidatedOptions &options)
+    : options_(options),
+      table_(twin::ContactTable::load_or_build(
+          twin::indenter(PRESS_FACE),
+          twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm),
+          options.cache)),
+      weight_N_(GRAVITY_N_PER_g * options.weight_g),
+      rubber_(usual_effects(), SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0),
+      drift_Pa_s_(SENSORS, 0.0), absent_(SENSORS, false), before_Pa_(SENSORS, 0.0),
+      after_Pa_(SENSORS, 0.0) {
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + rubber_.seats()[k].dx_mm);
+    y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + rubber_.seats()[k].dy_mm);
+    wire_.push_back(k);
+  }
+  twin::Pad same(usual_effects(), SENSORS, LAYER_mm, AIR_Pa, options.seed);
+  std::vector<double> settled(SENSORS, 0.0);
+  const std::vector<double> nothing(SENSORS, 0.0), all(SENSORS, SETTLED_Pa);
+  same.report(0.0, nothing, settled);
+  same.report(RESTS_s, nothing, settled);
+  same.report(RESTS_s + MOVES_s, all, settled);
+  same.report(RESTS_s + MOVES_s + SETTLED_s, all, settled);
+  double sum = 0.0;
+  for (double reading : settled) {
+    sum += reading;
+  }
+  for (double reading : settled) {
+    gains_.push_back(reading * double(SENSORS) / sum);
+  }
+  choose_fault();
+  draw_plan();
+  rubber_.report(0.0, nothing, after_Pa_);
+  before_Pa_ = after_Pa_;
+}
+
+void ValidatedPad::choose_fault() {
+  Random random(options_.seed, FAULT, 0);
+  const auto any = [&] {
+    return std::min(static_cast<std::size_t>(random.uniform(0.0, 1.0) * SENSORS), SENSORS - 1);
+  };
+  const double sign = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+  switch (options_.fault) {
+  case PadFault::dead_sensor:
+    faulty_ = {any()};
+    deaf_[faulty_[0]] = 0.0;
+    absent_[faulty_[0]] = options_.seed % 2 == 1;
+    break;
+  case PadFault::loose_sensor:
+    faulty_ = {any()};
+    break;
+  case PadFault::tilted_skin:
+    (random.uniform(0.0, 1.0) < 0.5 ? tilt_x_ : tilt_y_) = sign * TILT_SHARE;
+    break;
+  case PadFault::drift:
+    while (faulty_.size() < DRIFTING) {
+      const std::size_t k = any();
+      if (std::find(faulty_.begin(), faulty_.end(), k) == faulty_.end()) {
+        faulty_.push_back(k);
+        drift_Pa_s_[k] = (random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) *
+                         random.uniform(DRIFT_MIN_Pa_min, DRIFT_MAX_Pa_min) / 60.0;
+      }
+    }
+    break;
+  case PadFault::wrong_weight:
+    weight_N_ *= sign < 0.0 ? 2.0 / 3.0 : 1.5;
+    break;
+  case PadFault::swapped_wires:
+    faulty_ = {any(), any()};
+    while (faulty_[1] == faulty_[0]) {
+      faulty_[1] = any();
+    }
+    std::swap(wire_[faulty_[0]], wire_[faulty_[1]]);
+    std::swap(gains_[faulty_[0]], gains_[faulty_[1]]);
+    break;
+  case PadFault::none:
+  case PadFault::thin_skin:
+    break;
+  }
+  std::sort(faulty_.begin(), faulty_.end());
+}
+
+std::vector<double> ValidatedPad::base_Pa(double x_mm, double y_mm) const {
+  // Of rubber that is thicker by this factor the response is wider by it, and lower by its square.
+  const double width = 1.0 + tilt_x_ * x_mm / static_cast<double>(geometry.x_mm[SENSORS - 1]) +
+                       tilt_y_ * y_mm / static_cast<double>(geometry.y_mm[0]);
+  std::vector<double> base(SENSORS);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double own = width * rubber_.seats()[k].width;
+    base[k] = table_.base_pressure_Pa(weight_N_, (x_mm_[k] - x_mm) / own, (y_mm_[k] - y_mm) / own,
+                                      rubber_.dip_share()) /
+              (width * width);
+  }
+  return base;
+}
+
+void ValidatedPad::draw_plan() {
+  calibrating::Array array;
+  array.pitch_mm = static_cast<double>(geometry.pitch_mm);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    array.x_mm.push_back(static_cast<double>(geometry.x_mm[k]));
+    array.y_mm.push_back(static_cast<double>(geometry.y_mm[k]));
+  }
+  Random sheet(options_.seed, SHEET, 0), hand(options_.seed, HAND, 0);
+  const double shift_x = SHEET_SD_mm * sheet.normal(), shift_y = SHEET_SD_mm * sheet.normal();
+  const double turn = SHEET_SD_rad * sheet.normal();
+  double t_s = BEGIN_s;
+  const auto touch = [&](double x_mm, double y_mm, double stands_s) {
+    t_s += RESTS_s;
+    Touch made{t_s, stands_s, base_Pa(x_mm, y_mm), std::vector<double>(SENSORS, 1.0)};
+    if (options_.fault == PadFault::loose_sensor) {
+      made.share[faulty_[0]] = std::max(1.0 + LOOSE_SD * hand.normal(), 0.1);
+    }
+    touches_.push_back(std::move(made));
+    t_s += MOVES_s + stands_s;
+  };
+  for (const Step &step :
+       validating::steps_of(validating::marks_of(array), options_.weight_g, LAYER_mm)) {
+    plan_.emplace_back(t_s, step);
+    switch (step.kind) {
+    case Step::Kind::empty:
+      t_s += validating::EMPTY_s + SPARE_s;
+      break;
+    case Step::Kind::press: {
+      const double x = step.at.x_mm + options_.hand_sd_mm * hand.normal();
+      const double y = step.at.y_mm + options_.hand_sd_mm * hand.normal();
+      truth_.push_back({std::cos(turn) * x - std::sin(turn) * y + shift_x,
+                        std::sin(turn) * x + std::cos(turn) * y + shift_y, weight_N_});
+      touch(truth_.back().x_mm, truth_.back().y_mm, STANDS_s);
+      t_s += MOVES_s;
+      break;
+    }
+    case Step::Kind::hold:
+      touch(options_.hand_sd_mm * hand.normal(), options_.hand_sd_mm * hand.normal(),
+            validating::HOLD_s + SPARE_s);
+      break; // the rest begins with the lift
+    case Step::Kind::rest:
+      t_s += MOVES_s + validating::REST_s + SPARE_s;
+      break;
+    case Step::Kind::begin:
+    case Step::Kind::take_back:
+    case Step::Kind::end:
+      break;
+    }
+  }
+}
+
+void ValidatedPad::step() {
+  before_Pa_ = after_Pa_;
+  const double t_s = STEP_s * double(++steps_);
+  const auto end_s = [&](const Touch &touch) {
+    return touch.begin_s + 2.0 * MOVES_s + touch.stands_s;
+  };
+  while (touch_ < touches_.size() && t_s > end_s(touches_[touch_])) {
+    touch_++;
+  }
+  std::vector<double> base(SENSORS, 0.0);
+  if (touch_ < touches_.size() && t_s > touches_[touch_].begin_s) {
+    const Touch &touch = touches_[touch_];
+    const double since_s = t_s - touch.begin_s;
+    const double share =
+        smooth(since_s / MOVES_s) - smooth((since_s - MOVES_s - touch.stands_s) / MOVES_s);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      base[k] = share * touch.share[k] * deaf_[k] * touch.base_Pa[k];
+    }
+  }
+  rubber_.report(t_s, base, after_Pa_);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    after_Pa_[k] += drift_Pa_s_[k] * t_s;
+  }
+}
+
+double ValidatedPad::pressure_Pa(std::size_t sensor, double t_s) {
+  while (STEP_s * double(steps_) < t_s) {
+    step();
+  }
+  const double part = std::clamp(double(steps_) - t_s / STEP_s, 0.0, 1.0);
+  const std::size_t k = wire_[sensor];
+  return part * before_Pa_[k] + (1.0 - part) * after_Pa_[k];
+}
+
+} // namespace fingertip::cell

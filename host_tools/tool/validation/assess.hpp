@@ -1,0 +1,78 @@
+/* The figures of a pad's report card, and what is wrong with the pad or with the validation, from
+ * what was measured.
+ *
+ * Findings follow from residuals against the profile that the presses themselves teach
+ * (marks_fit.hpp), not from names of faults. Each bound below lies between what healthy and faulty
+ * pads of the twin show (host_tools/report/newcomer, chosen on seeds 1 to 12 and 201 to 206, judged
+ * on others).
+ * No real pad has been validated yet.
+ */
+#pragma once
+
+#include "tool/calibration/judge.hpp"
+#include "tool/validation/marks_fit.hpp"
+
+#include <string>
+#include <vector>
+
+namespace fingertip::validating {
+
+constexpr double ANSWERS_MIN = 0.5;      /* share of frames; less: the sensor is dead */
+constexpr double ANSWERS_STEADY = 0.995; /* less: it is loose */
+constexpr double FEELS_MIN = 0.3;        /* of the mean gain; less: it feels nothing */
+constexpr double ODD_RESIDUAL = 0.02;    /* rms against the profile; more: some sensor is odd */
+constexpr double LOOSE_RESIDUAL = 0.05;  /* rms against the profile that the others teach */
+/* A sensor at a corner is felt in so few presses that they follow it. It is held against the others
+ * by how far its readings scatter among the presses of one
+ * mark. */
+constexpr std::size_t FELT_FEW = 6;
+constexpr double LOOSE_SCATTER = 0.05;
+constexpr double FOLLOWED_SCATTER = 0.005; /* less while they follow it: they have no need to */
+constexpr double NOISY_OVER_MEDIAN = 4.0;  /* noise */
+constexpr double TILT_MIN = 0.04;          /* the width's change from the middle to an end */
+constexpr double TILT_SDS = 4.0;
+constexpr double THIN_SHARE = 0.85;       /* of the thickness that the user states */
+constexpr double DRIFT_MAX_Pa_min = 40.0; /* a sensor against the median of all */
+/* What an uncalibrated pad reads of the force: the twin's, with the relaxation and the dip of real
+ * ones. */
+constexpr double READS_OF_FORCE = 0.87;
+constexpr double WEIGHT_OFF_MAX = 0.22; /* force by the readings, over the weight, less 1 */
+
+/* Of the solver's standard deviations: what rubber that comes back between presses and zeros that
+ * move add to the gains' errors. Chosen on seeds 1 to 12, 101 to 124 and 501 to 512. */
+constexpr double GAIN_SD_FACTOR = 1.4;
+
+struct Finding {
+  std::string code; /* dead_sensor, loose_sensor, swapped_wires, tilted_skin, thin_skin, drift,
+                       wrong_weight */
+  std::vector<std::size_t> sensors; /* which; empty: the pad as a whole */
+  std::string text;                 /* with the evidence, and what to do: two sentences */
+};
+
+struct Figure {
+  std::string key, says, unit;
+  double value;
+  int digits;
+};
+
+struct Location {    /* of a press */
+  double off_mm;     /* estimate from where it was pressed, the hand's error taken out */
+  double x_mm, y_mm; /* the same, each way */
+};
+
+struct Card {
+  Measured measured;
+  MarksFit fit;
+  calibrating::Judgement judgement;  /* of a calibration from these presses */
+  std::vector<double> gain, gain_sd; /* [sensor] by its number; 0: none */
+  std::vector<Location> locations;   /* as measured.presses; without an estimate off_mm is -1 */
+  bool is_calibrated = false;        /* the fingertip, while it was validated */
+  std::vector<Figure> figures;
+  std::vector<Finding> findings;
+  const Figure *figure(const std::string &key) const;
+};
+
+/* Throws Error where the recording holds no validation, or too little of one. name: of it. */
+Card assess(Measured measured, const std::string &name);
+
+} // namespace fingertip::validating
