@@ -8,8 +8,8 @@
     grasp.png     the same to look at, and a slip that is caught
 
 The controller is the tool's own and the fingertips' code the firmware's; rubber, objects, sensors and grippers are simulated (host_tools/simulation/cell,
-whose headers say what is assumed). The controller's constants were chosen with seeds below 1000; those here are others, and so are the
-pads. What is judged are grasps of all kinds in a world that disagrees with the controller (kinds.py). In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
+whose headers say what is assumed). The controller's constants were chosen with seeds below 1000, 7001 and 9001; those here are others, and so
+are the pads. What is judged are grasps of all kinds in a world that disagrees with the controller (kinds.py). In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
 """
 import json
 import pathlib
