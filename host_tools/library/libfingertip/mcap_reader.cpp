@@ -108,18 +108,11 @@ bool Reader::read_record() {
   return true;
 }
 
-std::string Reader::definition_of(const std::string &type) const {
-  const auto found = definitions_.find(type);
-  return found == definitions_.end() ? "" : found->second;
-}
-
 void Reader::judge(std::uint8_t opcode, std::string_view content, int depth) {
   Fields fields(content);
   if (opcode == SCHEMA) {
     auto id = fields.get<std::uint16_t>();
     schemas_[id] = fields.text();
-    fields.text(); /* encoding */
-    definitions_[schemas_[id]] = fields.text();
   } else if (opcode == CHANNEL) {
     auto id = fields.get<std::uint16_t>();
     auto schema = fields.get<std::uint16_t>();

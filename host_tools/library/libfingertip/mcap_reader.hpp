@@ -39,9 +39,6 @@ public:
 
   /* False at the end. Throws Damage. */
   bool next(Message &message);
-  /* What the file says of the messages of a type; empty where it has none so far. */
-  std::string definition_of(const std::string &type) const;
-
   /* At the end: whether the file breaks off. */
   bool is_torn() const { return torn_; }
 
@@ -66,7 +63,6 @@ private:
   bool torn_ = false;
   bool ended_ = false;
   std::map<std::uint16_t, std::string> schemas_; /* their names */
-  std::map<std::string, std::string> definitions_;
   std::map<std::uint16_t, Channel> channels_;
 };
 

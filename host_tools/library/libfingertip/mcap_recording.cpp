@@ -417,12 +417,9 @@ bool McapLineSource::next(Line &line) {
         auto row = ros::decode_row(message.data);
         if (!row || row->time_us.has_value() != joint_ ||
             (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
-          if (reader_.definition_of(message.type) != ros::schema_of(CONTACT)) {
-            throw Error(ErrorCode::not_a_recording,
-                        path_ + ": holds messages of another version of this tool: convert it to "
-                                "CSV with that one, which this one reads");
-          }
-          throw mcap::Damage("a message on " + printable(message.topic) + " is damaged");
+          throw mcap::Damage("a message on " + printable(message.topic) +
+                             " is damaged, or of another version of this tool, which can convert "
+                             "it to CSV");
         }
         line = {row->number, text_of(*row), false};
       }

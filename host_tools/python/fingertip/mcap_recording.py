@@ -514,7 +514,7 @@ class McapLineReader:
             row = decode(name, data)
             return self._of_row(row) if name == CONTACT_TYPE else self._of_line(row)
         except ValueError as error:
-            return Damaged(f"{self.path}: a damaged message on {topic} ({error}); use --salvage to skip it")
+            return Damaged(f"{self.path}: a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it")
 
     def _of_line(self, row: dict[str, Any]) -> Line:
         text: str = row["text"]
