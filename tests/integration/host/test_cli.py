@@ -29,7 +29,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "simulate", "web", "flash", "rule", "loader"]))
+            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "simulate", "validate", "web", "flash", "rule", "loader"]))
         for command in set(commands) - {"simulate"}:  # whose program is another: test_simulate.py
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
 
@@ -323,7 +323,7 @@ class ErrorsPeopleMeet(CliTest):
                              f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n")
 
     def test_older_or_newer_protocol_version(self):
-        for version in (1, 6, 8):
+        for version in (1, 7, 9):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),

@@ -257,8 +257,8 @@ class Monitor(CliTest):
             self.assertFalse(self.on_terminal_tare(keys, None)[0], keys)
 
     def test_a_recording_that_cannot_be_gives_the_terminal_back(self):
-        pathlib.Path(self.csv).write_text("# fingertip-recording 1\n" + self.header_without_sensors() + "\n# event: then\n1000,1" + 28 * ","
-                                          + ",7,0,0,0,0,20.00\n", encoding="utf-8")
+        pathlib.Path(self.csv).write_text("# fingertip-recording 1\n" + self.header_without_sensors() + "\n# event: then\n1000,1"
+                                          + (len(files.RECORDING_COLUMNS) - 8) * "," + ",7,0,0,0,0,20.00\n", encoding="utf-8")
         output, status, before, after = self.on_terminal("replay", self.csv, until="never", then=b"q")
         self.assertEqual(status, 1)
         self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
@@ -275,7 +275,7 @@ class Monitor(CliTest):
             out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone")
         self.assertNotIn("\x1b", out)
         self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID "
-                         r"TANGENTIAL_VALID VELOCITY_VALID$")
+                         r"TANGENTIAL_VALID VELOCITY_VALID SHAPE_VALID EDGE$")
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[4:]])
