@@ -47,10 +47,10 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
     """{name: (what, measures)} for Steps.run_all."""
     wander = scenario(folder, "wander", FROM_s + seconds + 1, "grasp-wander")
     two = two_contacts(wander.with_name("grasp-two.csv"), FROM_s + seconds + 1)
+    tools = {board: GraspTools(build, boards, board) for board in dict.fromkeys((*on, PARALLEL))}  # built before the jobs, which share them
 
     def one(board, path):
-        tools = GraspTools(build, boards, board)
-        return Measurement(tools, folder, board, 256, path, seconds, commands=[tools.encoded("pad", *PAD)])
+        return Measurement(tools[board], folder, board, 256, path, seconds, commands=[tools[board].encoded("pad", *PAD)])
 
     cases = [(short(board), board, wander) for board in on] + [("two", PARALLEL, two)]
     return {name: (f"scene grasp on {board}, {path.stem}", lambda b=board, p=path: one(b, p)) for name, board, path in cases}
