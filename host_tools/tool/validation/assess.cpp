@@ -13,7 +13,6 @@ namespace {
 
 using calibrating::Placement;
 
-constexpr double GRAVITY_N_PER_g = 9.80665e-3;
 constexpr std::size_t LOOSE_MAX = 3, CANDIDATES = 3;
 
 double median(std::vector<double> values) {
@@ -285,7 +284,7 @@ private:
     return values.size() < 2 ? 0.0 : std::sqrt(squares / double(values.size() - 1));
   }
 
-  double weight_N() const { return GRAVITY_N_PER_g * card_.measured.weight_g; }
+  double weight_N() const { return calibrating::GRAVITY_N_PER_g * card_.measured.weight_g; }
 
   void locate() {
     std::vector<double> off, as_pressed, forces;

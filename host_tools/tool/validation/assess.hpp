@@ -4,8 +4,7 @@
  * Findings follow from residuals against the profile that the presses themselves teach
  * (marks_fit.hpp), not from names of faults. Each bound below lies between what healthy and faulty
  * pads of the twin show (host_tools/report/newcomer, chosen on seeds 1 to 12 and 201 to 206, judged
- * on others).
- * No real pad has been validated yet.
+ * on others). No real pad has been validated yet.
  */
 #pragma once
 
@@ -23,8 +22,7 @@ constexpr double FEELS_MIN = 0.3;        /* of the mean gain; less: it feels not
 constexpr double ODD_RESIDUAL = 0.02;    /* rms against the profile; more: some sensor is odd */
 constexpr double LOOSE_RESIDUAL = 0.05;  /* rms against the profile that the others teach */
 /* A sensor at a corner is felt in so few presses that they follow it. It is held against the others
- * by how far its readings scatter among the presses of one
- * mark. */
+ * by how far its readings scatter among the presses of one mark. */
 constexpr std::size_t FELT_FEW = 6;
 constexpr double LOOSE_SCATTER = 0.05;
 constexpr double FOLLOWED_SCATTER = 0.005; /* less while they follow it: they have no need to */

@@ -14,7 +14,6 @@ namespace {
 constexpr double MAGNIFIED = 5.0; /* errors in the picture of the pad */
 constexpr double ROOM_mm = 6.0;
 constexpr double PACKAGE_mm = 3.3; /* of an MS5840, each way */
-constexpr double GRAVITY_N_PER_g = 9.80665e-3;
 constexpr double PITCH_SAME_mm = 0.05;
 constexpr std::size_t TWIN_SENSORS = 15;
 constexpr double TWIN_PITCH_mm = 9.0;
@@ -185,7 +184,7 @@ private:
 
   void forces() {
     std::vector<double> values = {1.0};
-    const double weight_N = GRAVITY_N_PER_g * card_.measured.weight_g;
+    const double weight_N = calibrating::GRAVITY_N_PER_g * card_.measured.weight_g;
     for (const Press &press : card_.measured.presses) {
       if (press.frames > 0) {
         values.push_back(press.force_N / weight_N);

@@ -114,6 +114,20 @@ TEST(Walk, ATouchBeginsTheEmptyMinuteAgain) {
   EXPECT_EQ(pad.steps.size(), 3u);
 }
 
+/* On thin rubber what comes back after a press rises by more than calibration's LIGHT_Pa. */
+TEST(Walk, RubberThatComesBackIsNoPress) {
+  Pad pad;
+  pad.wait(EMPTY_s + 1.0);
+  pad.pressed_Pa = 5.0 * PRESS_Pa;
+  pad.wait(2.0);
+  pad.pressed_Pa = 0.0;
+  pad.wait(2.0);
+  pad.pressed_Pa = 0.05 * 5.0 * PRESS_Pa;
+  pad.wait(2.0);
+  EXPECT_NE(pad.walk.advice().find("mark 2, turn 1"), std::string::npos) << pad.walk.advice();
+  EXPECT_EQ(pad.walk.finish().presses.size(), 1u);
+}
+
 TEST(Walk, APressIsTakenBackAndAskedForAgain) {
   Pad pad;
   pad.wait(EMPTY_s + 1.0);
