@@ -18,7 +18,7 @@ using validating::Step;
 
 enum Stream : std::uint64_t { FAULT = 871, HAND = 872, SHEET = 873 };
 
-constexpr double GRAVITY_N_PER_g = 9.80665e-3, AIR_Pa = 101325.0;
+constexpr double AIR_Pa = 101325.0;
 constexpr double THIN_mm = 8.0, TILT_SHARE = 0.09, LOOSE_SD = 0.2;
 constexpr double DRIFT_MIN_Pa_min = 60.0, DRIFT_MAX_Pa_min = 180.0;
 constexpr std::size_t DRIFTING = 3;
@@ -52,7 +52,7 @@ ValidatedPad::ValidatedPad(const ValidatedOptions &options)
           twin::indenter(PRESS_FACE),
           twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm),
           options.cache)),
-      weight_N_(GRAVITY_N_PER_g * options.weight_g),
+      weight_N_(calibrating::GRAVITY_N_PER_g * options.weight_g),
       rubber_(usual_effects(), SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0),
       drift_Pa_s_(SENSORS, 0.0), absent_(SENSORS, false), before_Pa_(SENSORS, 0.0),
       after_Pa_(SENSORS, 0.0) {

@@ -68,6 +68,9 @@ struct Placement {
 constexpr double REMEMBERS_FROM = 0.02;
 void remember(std::vector<Placement> &placements);
 
+/* Standard gravity: the force of a weight. */
+constexpr double GRAVITY_N_PER_g = 9.80665e-3;
+
 /* What a session is expected to hold: standard deviations of the priors. */
 struct Assumptions {
   double gain = 0.2;            /* of the log gains: real pads spread by 12 to 22 % */

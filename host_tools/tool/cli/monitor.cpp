@@ -94,15 +94,15 @@ Numbers numbers_of(const Model &model) {
     }
   }
   if (contact.flags & CONTACT_FLAG_TWO_CONTACTS) {
-    numbers.stronger = contact_in_words(contact.x1_mm, contact.y1_mm, contact.location1_sd_mm,
-                                        contact.force1_N);
-    numbers.weaker = contact_in_words(contact.x2_mm, contact.y2_mm, contact.location2_sd_mm,
-                                      contact.force2_N);
+    numbers.stronger =
+        contact_in_words(contact.x1_mm, contact.y1_mm, contact.location1_sd_mm, contact.force1_N);
+    numbers.weaker =
+        contact_in_words(contact.x2_mm, contact.y2_mm, contact.location2_sd_mm, contact.force2_N);
   }
   if (contact.flags & CONTACT_FLAG_EDGE) {
     numbers.edge = signed_number(contact.edge_angle_deg, 1) + "°, sd " +
-                   number(contact.edge_angle_sd_deg, 1) + "; " +
-                   number(contact.edge_length_mm, 1) + " mm";
+                   number(contact.edge_angle_sd_deg, 1) + "; " + number(contact.edge_length_mm, 1) +
+                   " mm";
   }
   return numbers;
 }

@@ -217,10 +217,12 @@ struct Mark {
     int column = picture.column_of(contact.x_mm), row = picture.pixel_row_of(contact.y_mm) / 2;
     if (contact.flags & CONTACT_FLAG_TWO_CONTACTS) {
       colour = WARNING;
-      const float places_mm[2][2] = {{contact.x1_mm, contact.y1_mm}, {contact.x2_mm, contact.y2_mm}};
+      const float places_mm[2][2] = {{contact.x1_mm, contact.y1_mm},
+                                     {contact.x2_mm, contact.y2_mm}};
       for (const auto &[x_mm, y_mm] : places_mm) {
         column = picture.column_of(x_mm), row = picture.pixel_row_of(y_mm) / 2;
-        cells.insert(cells.end(), {{column - 1, row, "─"}, {column, row, "┼"}, {column + 1, row, "─"}});
+        cells.insert(cells.end(),
+                     {{column - 1, row, "─"}, {column, row, "┼"}, {column + 1, row, "─"}});
       }
     } else if (warnings_of(contact.flags)) {
       colour = WARNING;

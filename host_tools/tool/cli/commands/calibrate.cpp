@@ -10,8 +10,6 @@ namespace fingertip {
 
 namespace {
 
-constexpr double GRAVITY_N_PER_g = 9.80665e-3;
-
 double weight_N_from_text(const std::string &option, const std::string &text, double unit_N) {
   constexpr double LIGHTEST_N = 0.1, HEAVIEST_N = 50;
   auto weight = to_double(text);
@@ -43,8 +41,8 @@ void add_calibrate(CommandLine &line) {
                             ->add_option_function<std::string>(
                                 "--weight",
                                 [options](const std::string &text) {
-                                  options->force_N =
-                                      weight_N_from_text("--weight", text, GRAVITY_N_PER_g);
+                                  options->force_N = weight_N_from_text(
+                                      "--weight", text, calibrating::GRAVITY_N_PER_g);
                                 },
                                 "Mass of the weight: then forces are calibrated too")
                             ->type_name("GRAMS");
@@ -68,9 +66,8 @@ void add_calibrate(CommandLine &line) {
           ->type_name("FILE.csv");
   CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
-  CLI::Option *show =
-      command->add_flag("--show", options->show, "Show the fingertip's calibration")
-          ->excludes(weight, force, drag, from, dry_run, yes);
+  CLI::Option *show = command->add_flag("--show", options->show, "Show the fingertip's calibration")
+                          ->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Erase its calibration, after a question")
       ->excludes(weight, force, drag, from, dry_run, show);
   with_colour(command, options->colour);
