@@ -57,15 +57,15 @@ struct app {
     struct fit_result fit;
   } load_of;
   struct fit_tangential estimate; /* the answer, moved to this frame */
-  bool tangential_follows; /* the question before was of the same contact and pad */
-  struct worker shapes_worker; /* of the job below: the same processor, after the other job */
+  bool tangential_follows;        /* the question before was of the same contact and pad */
+  struct worker shapes_worker;    /* of the job below: the same processor, after the other job */
   struct shapes_job shapes_job;
-  bool shapes_act;             /* the profile is one that they know */
-  bool shapes_begin;           /* what is asked next is of another contact or pad */
-  struct shapes_report shapes; /* of the contact under way */
+  bool shapes_act;                          /* the profile is one that they know */
+  bool shapes_begin;                        /* what is asked next is of another contact or pad */
+  struct shapes_report shapes;              /* of the contact under way */
   float shapes_dip_share, shapes_dip_sd_mm; /* the calibration's, which the Gaussian leaves out */
-  uint64_t worked_us;          /* the last frame's time */
-  uint64_t worked_apart_us;    /* between it and the one before */
+  uint64_t worked_us;                       /* the last frame's time */
+  uint64_t worked_apart_us;                 /* between it and the one before */
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif

@@ -24,7 +24,7 @@ constexpr double WIDTH_STALE_s = 0.1;
 // What the fingers go on by after the touch, until the controller knows of it, at most.
 constexpr double OVERSHOOT_mm = 0.4;
 constexpr double APPROACH_LEAST_mm_s = 1.0;
-constexpr double MOVE_s = 0.02; // a move is to take so long, but where the object slides
+constexpr double MOVE_s = 0.02;        // a move is to take so long, but where the object slides
 constexpr double WIDTH_SLACK_mm = 1.0; // of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
 
@@ -149,8 +149,7 @@ void Grip::approach() {
     reach_.first_touch(felt_.t_s);
   }
   const bool presses = felt_.high_N > 0.0;
-  const double least_mm =
-      presses ? std::max(reach_.last_below_cap_mm(felt_, settings_), 0.0) : 0.0;
+  const double least_mm = presses ? std::max(reach_.last_below_cap_mm(felt_, settings_), 0.0) : 0.0;
   const bool no_room = presses && least_mm == reach_.target_mm();
   if (felt_.fingers == 0 || both || no_room || felt_.high_N >= start_force()) {
     reach_.both_touch(felt_.t_s);
@@ -159,8 +158,7 @@ void Grip::approach() {
     return;
   }
   const double speed_mm_s = std::min(settings_.approach_mm_s, OVERSHOOT_mm / dead_s());
-  ramp(least_mm,
-       std::max(speed_mm_s, std::min(APPROACH_LEAST_mm_s, settings_.approach_mm_s)));
+  ramp(least_mm, std::max(speed_mm_s, std::min(APPROACH_LEAST_mm_s, settings_.approach_mm_s)));
   if (status_.moving || reach_.target_mm() != 0.0) {
     stood_s_ = now_s_;
   } else if (now_s_ - stood_s_ > STANDS_s) {
@@ -184,8 +182,7 @@ std::uint32_t Grip::squeeze() {
     reach_.both_touch(felt_.t_s);
   }
   const double from_N = is_blind_ ? settings_.start_N : settings_.touch_N;
-  const double risen_N =
-      from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
+  const double risen_N = from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
   const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
                                       : aim(risen_N, GripReach::Haste::patient);
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
@@ -226,7 +223,8 @@ std::uint32_t Grip::hold() {
   if (settings_.mode == GRIP_MODE_FIXED) {
     return fixed_.step(felt_, settings_, traits_, now_s_, reach_);
   }
-  const double wanted_N = hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
+  const double wanted_N =
+      hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
   const std::uint32_t trouble =
       (felt_.tells_load ? 0u : GRIP_NO_LOAD) |
@@ -316,7 +314,8 @@ void Grip::tell(GripCommand &command) const {
   }
   command.motion = GRIP_MOVE;
   command.speed_mm_s = std::clamp(speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
-  command.force_N = std::clamp(GripReach::LIMIT * settings_.cap_N, traits_.force_min_N, traits_.force_max_N);
+  command.force_N =
+      std::clamp(GripReach::LIMIT * settings_.cap_N, traits_.force_min_N, traits_.force_max_N);
 }
 
 GripReport Grip::report() const {

@@ -9,13 +9,13 @@ namespace {
 
 constexpr double FRICTION_LEAST = 0.08, FRICTION_MOST = 1.5;
 constexpr double LOAD_NOISE_N = 0.06;
-// A load that rises above its latest peak counts as it is, with its rate. Below that it swings on the
-// rubber, or has begun to slide, and its mean counts.
+// A load that rises above its latest peak counts as it is, with its rate. Below that it swings on
+// the rubber, or has begun to slide, and its mean counts.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
-constexpr double AHEAD_N = 3.0; // a rate is believed to add that much, or as much again
+constexpr double AHEAD_N = 3.0;     // a rate is believed to add that much, or as much again
 constexpr double REMEMBERS_s = 1.0; // what a load has been it may be again
-constexpr double SWINGS_s = 0.25; // what was caught swings for so long
-constexpr double HELD_s = 0.015;   // a ratio that held, the mean of so long
+constexpr double SWINGS_s = 0.25;   // what was caught swings for so long
+constexpr double HELD_s = 0.015;    // a ratio that held, the mean of so long
 // A load is steady that changes by less than this share within 0.1 s, or by less than that.
 constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
 constexpr double LOADED_s = 0.3; // a load has been steady
@@ -47,7 +47,8 @@ void GripLoad::rests(double load_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
   const bool rises = load_N >= peak_N_ && !swings;
   swings_s_ = load_N < peak_N_ - 2.0 * LOAD_NOISE_N ? SWINGS_s : swings_s_ - passed_s;
-  rate_N_s_ = rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
+  rate_N_s_ =
+      rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
   slow_N_ += std::min(passed_s / RATE_s, 1.0) * (load_N - slow_N_);
   if (rises) {
     load_N_ = peak_N_ = load_N;
@@ -86,12 +87,12 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
   looked_s_ = now_s;
   still_s_ = felt.slides ? still_s_ : now_s;
   moved_mm_ = felt.slides ? moved_mm_ + felt.speed_mm_s * passed_s : 0.0;
-  // The fastest of late: what is slower slows down.
+  // The fastest within LATELY_s: what is slower slows down.
   fastest_mm_s_ -= std::min(passed_s / LATELY_s, 1.0) * fastest_mm_s_;
   fastest_mm_s_ = std::max(fastest_mm_s_, felt.speed_mm_s);
   const bool creeps = felt.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
-  const bool holds = moved_mm_ < FAR_mm &&
-                     felt.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * felt.grip_N;
+  const bool holds =
+      moved_mm_ < FAR_mm && felt.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * felt.grip_N;
   const bool was_sliding = sliding_;
   sliding_ = felt.slides && (was_sliding || !felt.tells_load || !(holds || creeps));
   goes_on_ = sliding_ && (!felt.tells_load || (!holds && felt.speed_mm_s >= fastest_mm_s_));
@@ -133,7 +134,7 @@ double GripHold::wants(const GripFelts &felt, double coming_N, const GripSetting
     look(felt, settings, now_s);
   }
   const double least_N = !has_told_ && !felt.tells_load ? settings.blind_N
-                         : was_loaded_                   ? settings.floor_N
+                         : was_loaded_                  ? settings.floor_N
                                                         : settings.start_N;
   double need = std::max(need_N(settings, dead_s), least_N);
   if (goes_on_ && !felt.tells_load) {

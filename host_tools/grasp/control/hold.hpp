@@ -67,7 +67,7 @@ private:
   double was_N_ = 0.0;    // the load, as far as it is remembered
   double ratio_ = 0.0;    // smoothed, of what rests
   double lately_ = 0.0;   // the largest within LATELY_s
-  double moved_mm_ = 0.0; // and all that is told as one
+  double moved_mm_ = 0.0; // of what is reported as one slide
   bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false;
   std::uint32_t slides_ = 0;
 };

@@ -2,8 +2,8 @@
 //
 // The object stands on the table between the fingers. Once the grip's force has stood for a while,
 // or by a command, the hand lifts it; disturbances (scene.hpp) come then, planned or by
-// a command, and what happens in a grasp of a kind (kinds.hpp). What slides by less than SLIP_mm at a time has not slipped. An object that slid
-// DROP_mm, or that nothing presses any more, is gone.
+// a command, and what happens in a grasp of a kind (kinds.hpp). What slides by less than SLIP_mm at
+// a time has not slipped. An object that slid DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
 #include "simulation/cell/gripper_motion.hpp"
@@ -56,7 +56,9 @@ public:
 
   Pressures pressures_Pa(std::size_t finger) const;
   // Without a force where nothing is touched.
-  twin::Touch touch(std::size_t finger) const { return is_there_ ? cell_.touch(finger) : twin::Touch{}; }
+  twin::Touch touch(std::size_t finger) const {
+    return is_there_ ? cell_.touch(finger) : twin::Touch{};
+  }
 
   // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
   // With a kind, against all that acts; without, knocks are left out.
@@ -86,7 +88,7 @@ private:
   struct Standing {
     double since_s, force_N;
   };
-  std::optional<Standing> stands_; // the force
+  std::optional<Standing> stands_;     // the force
   std::vector<bool> told_, kind_told_; // of the scene's disturbances and the kind's events: begun
   bool is_there_ = true, is_dropped_ = false, is_crushed_ = false, slips_ = false;
   double time_s_ = 0.0, peak_N_ = 0.0, slid_before_mm_ = 0.0, slipped_s_ = 0.0;

@@ -71,9 +71,9 @@ void HandServer::step() {
 }
 
 void HandServer::come() {
-  for (int client; clients_.size() < MOST_CLIENTS &&
-                   (client = accept4(listening_, nullptr, nullptr,
-                                     SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+  for (int client;
+       clients_.size() < MOST_CLIENTS &&
+       (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
     clients_[client];
   }
 }
@@ -150,8 +150,7 @@ bool HandServer::is_due(std::int64_t host_us) {
 }
 
 void HandServer::tell(std::size_t finger, std::int64_t device_us, const TrueTouch &truth) {
-  std::string line =
-      "truth " + std::string(SIDES[finger]) + " " + std::to_string(device_us);
+  std::string line = "truth " + std::string(SIDES[finger]) + " " + std::to_string(device_us);
   for (const double value : {truth.x_mm, truth.y_mm, truth.force_N, truth.qx_N, truth.qy_N}) {
     line += " " + fixed(value, 4);
   }

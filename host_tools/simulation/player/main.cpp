@@ -368,8 +368,8 @@ int run(int argc, char **argv) {
       ->type_name("PERCENT");
   player->add_option("--serial", play_options.serial, "Serial number of the fingertip")
       ->check([](const std::string &text) {
-        const bool is_one = text.size() == 16 &&
-                            text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
+        const bool is_one =
+            text.size() == 16 && text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
         return is_one ? std::string() : "give 16 hexadecimal digits, as 000000000000B0BB";
       })
       ->type_name("HEX16")

@@ -261,10 +261,9 @@ int run(int argc, char **argv) {
         ->type_name("MM");
   };
 
-  CLI::App *fit = app.add_subcommand(
-      "width",
-      "Width of the Gaussian that fits the pressure under a force best, its share of the force, and "
-      "its peak");
+  CLI::App *fit = app.add_subcommand("width", "Width of the Gaussian that fits the pressure under "
+                                              "a force best, its share of the force, and "
+                                              "its peak");
   with_contact(fit);
   fit->add_option("--force", options.width_force_N, "What presses")
       ->check(CLI::Range(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))

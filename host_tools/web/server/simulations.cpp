@@ -45,7 +45,7 @@ std::vector<Simulated> find_simulated() {
   return all;
 }
 
-/* Of what is true there (simulation/cell/hand_server.hpp); -1: nothing is told. */
+/* Of what is true there (simulation/cell/hand_server.hpp); -1: there is none. */
 int connect_to_truth() {
   const std::string path = simulated_folder() + "/truth";
   sockaddr_un address = {};
@@ -96,8 +96,7 @@ std::optional<std::string> command_of(const std::string &body, const std::string
 /* A client's line, and its hand. */
 class Simulations::Session {
 public:
-  Session(const Simulated &one)
-      : side_(one.side), line_(one.socket), truth_(connect_to_truth()) {}
+  Session(const Simulated &one) : side_(one.side), line_(one.socket), truth_(connect_to_truth()) {}
   ~Session() { close(truth_); }
 
   /* Waits a moment; false: the sink is gone. Ends the sink where the fingertip is. */
@@ -250,7 +249,8 @@ void Simulations::open_line(const httplib::Request &request, httplib::Response &
         });
     return;
   }
-  refuse(response, NOT_FOUND, "no simulated fingertip has this serial number; start fingertip simulate");
+  refuse(response, NOT_FOUND,
+         "no simulated fingertip has this serial number; start fingertip simulate");
 }
 
 std::shared_ptr<Simulations::Session> Simulations::session(const httplib::Request &request,

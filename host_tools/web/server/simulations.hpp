@@ -1,13 +1,12 @@
-/* Lets the page reach the fingertips of `fingertip simulate`, which no browser finds: their ports are
- * pseudo-terminals. Simulated ones only; real ones stay the browser's own affair.
+/* Lets the page reach the fingertips of `fingertip simulate`, which no browser finds: their ports
+ * are pseudo-terminals. Simulated ones only; real ones stay the browser's own affair.
  *
- *   GET  /simulated                        [{"serial": ..., "hand": true}]; hand: one is obeyed (--mouse)
- *   GET  /simulated/line?serial=&client=   what the fingertip says, without end. client: 8 to 32
- *                                          hexadecimal digits of the page's own, new for each
- *   POST /simulated/line?client=           bytes for the fingertip
- *   POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or nothing; the answer is
- *                                          what is true: {"t_us", "x_mm", "y_mm", "force_N", "qx_N",
- *                                          "qy_N"}, or {} before anything is known
+ *   GET  /simulated                        [{"serial": ..., "hand": true}]; hand: one is obeyed
+ * (--mouse) GET  /simulated/line?serial=&client=   what the fingertip says, without end. client: 8
+ * to 32 hexadecimal digits of the page's own, new for each POST /simulated/line?client= bytes for
+ * the fingertip POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or
+ * nothing; the answer is what is true: {"t_us", "x_mm", "y_mm", "force_N", "qx_N", "qy_N"}, or {}
+ * before anything is known
  *
  * Requests are those of the page itself: one that another site makes is refused with 403. A client
  * is gone when its line is, and what its hand pressed is lifted then. Errors are one sentence, of

@@ -375,7 +375,8 @@ static void feed_fast(double share) {
   app.frame.t_us += TANGENTIAL_BESIDE_us / 2;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const double zero = app.condition.zero_Pa_q10[k];
-    app.frame.pressure_Pa_q10[k] = (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
+    app.frame.pressure_Pa_q10[k] =
+        (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
   }
   app_process_frame(&app, app.frame.t_read_us);
 }

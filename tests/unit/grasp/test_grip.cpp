@@ -122,8 +122,7 @@ TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
   world.run(2.0);
   EXPECT_EQ(world.report.state, GRIP_HOLDING);
   expect_share(friction, world.report.friction, 0.1);
-  const double needed_N =
-      world.settings.margin * world.settings.slid * 2.0 / world.report.friction;
+  const double needed_N = world.settings.margin * world.settings.slid * 2.0 / world.report.friction;
   expect_share(needed_N, world.force_N, 0.05);
 }
 
@@ -481,7 +480,8 @@ TEST(Grip, WhatOneFingertipPushedAwayIsNotDropped) {
   EXPECT_EQ(world.report.state, GRIP_HOLDING);
 }
 
-// A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the next.
+// A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the
+// next.
 TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
   for (const double stiffness : {2.0, 2.5}) {
     GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper_traits("2f85"));

@@ -112,10 +112,14 @@ static void test_quantities_travel_under_their_flags(void) {
   static const struct {
     uint32_t flag;
     size_t length;
-  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},        {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
-               {CONTACT_FLAG_SLIP_VALID, 4},        {CONTACT_FLAG_WIDTHS_VALID, 12},
-               {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
-               {CONTACT_FLAG_SHAPE_VALID, 4},       {CONTACT_FLAG_TWO_CONTACTS, 40},
+  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},
+               {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
+               {CONTACT_FLAG_SLIP_VALID, 4},
+               {CONTACT_FLAG_WIDTHS_VALID, 12},
+               {CONTACT_FLAG_TANGENTIAL_VALID, 16},
+               {CONTACT_FLAG_VELOCITY_VALID, 8},
+               {CONTACT_FLAG_SHAPE_VALID, 4},
+               {CONTACT_FLAG_TWO_CONTACTS, 40},
                {CONTACT_FLAG_EDGE, 12}};
   enum { PARTS = sizeof parts / sizeof parts[0] };
   for (unsigned present = 0; present < 1u << PARTS; present++) {
@@ -258,22 +262,38 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
   struct wire_packet packet;
   sample_packet(&sampler, WIRE_CONTACT, &packet);
   struct wire_contact *contact = &packet.body.contact;
-  float *fields[] = {&contact->x_mm,           &contact->y_mm,
-                     &contact->p0_Pa,          &contact->sigma_mm,
-                     &contact->force_N,        &contact->residual_rms_Pa,
-                     &contact->location_sd_mm, &contact->force_sd_N,
-                     &contact->slip_mm,        &contact->sigma_x_mm,
-                     &contact->sigma_y_mm,     &contact->width_correlation,
-                     &contact->qx_N,           &contact->qy_N,
-                     &contact->q_sd_N,         &contact->tangential_ratio,
-                     &contact->vx_mm_s,        &contact->vy_mm_s,
-                     &contact->shape_age_ms, &contact->x1_mm,
-                     &contact->y1_mm, &contact->location1_sd_mm,
-                     &contact->force1_N, &contact->force1_sd_N,
-                     &contact->x2_mm, &contact->y2_mm,
-                     &contact->location2_sd_mm, &contact->force2_N,
-                     &contact->force2_sd_N, &contact->edge_angle_deg,
-                     &contact->edge_angle_sd_deg, &contact->edge_length_mm};
+  float *fields[] = {&contact->x_mm,
+                     &contact->y_mm,
+                     &contact->p0_Pa,
+                     &contact->sigma_mm,
+                     &contact->force_N,
+                     &contact->residual_rms_Pa,
+                     &contact->location_sd_mm,
+                     &contact->force_sd_N,
+                     &contact->slip_mm,
+                     &contact->sigma_x_mm,
+                     &contact->sigma_y_mm,
+                     &contact->width_correlation,
+                     &contact->qx_N,
+                     &contact->qy_N,
+                     &contact->q_sd_N,
+                     &contact->tangential_ratio,
+                     &contact->vx_mm_s,
+                     &contact->vy_mm_s,
+                     &contact->shape_age_ms,
+                     &contact->x1_mm,
+                     &contact->y1_mm,
+                     &contact->location1_sd_mm,
+                     &contact->force1_N,
+                     &contact->force1_sd_N,
+                     &contact->x2_mm,
+                     &contact->y2_mm,
+                     &contact->location2_sd_mm,
+                     &contact->force2_N,
+                     &contact->force2_sd_N,
+                     &contact->edge_angle_deg,
+                     &contact->edge_angle_sd_deg,
+                     &contact->edge_length_mm};
   for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
     assert_float_guarded(WIRE_CONTACT, 26 + 4 * i, fields[i], &packet);
   }
