@@ -8,20 +8,22 @@
 
 #define TICK_SHIFT 6 /* 64 us */
 
-/* Ages of the frames that make a pair. Of the brief ones tried, from 20 to 65 ms in all, this finds
- * slides as soon as any; longer ones still feel the lift that came before. */
+/* Ages of the frames that make a pair, and by how much what the load explains may be wrong over it.
+ * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it feels
+ * the lift that came before, for as long as it reaches back. The brisk one does not: it finds a
+ * slide within a quick lift 10 to 18 ms sooner. Of 312 lifts with a dead travel of 2 mm (seed 211)
+ * half of what BRIEF leaves unexplained, or two thirds of FLOOR_um, let one to two pass for slides.
+ */
 struct pair_spans {
   uint32_t latest_us, gap_end_us, begin_us;
+  int32_t unexplained_um;
 };
-static const struct pair_spans BRIEF = {5000u, 20000u, 50000u};
-static const struct pair_spans SLOW = {40000u, 120000u, 300000u};
-static const struct pair_spans SLOW_LATEST = {40000u, 40000u, 80000u};
+static const struct pair_spans BRISK = {4000u, 8000u, 16000u, 150};
+static const struct pair_spans BRIEF = {5000u, 20000u, 50000u, 200};
+static const struct pair_spans SLOW = {40000u, 120000u, 300000u, 200};
+static const struct pair_spans SLOW_LATEST = {40000u, 40000u, 80000u, 0};
 
-/* Less is no motion; and what the load explains may be wrong by so much. Of 312 lifts with a dead
- * travel of 2 mm (seed 211) half of the latter, or two thirds of the former, let one to two pass
- * for slides. Slides are above both within some ms of each other. */
-#define FLOOR_um 30
-#define UNEXPLAINED_um 200
+#define FLOOR_um 30 /* less is no motion */
 /* Squares, in 1/256, of mm for each 8 mm that the load explains: a load moves the estimated
  * location by up to 0.3 mm for each unit of Q / F on calibrated pads. 1.5 mm is not believed, nor 5
  * times the location's standard deviation, which pads that were never calibrated need. */
@@ -148,7 +150,8 @@ static int32_t squared_doubt(const struct change *change, bool already) {
   return already ? doubt / 4 : doubt;
 }
 
-static bool slides(const struct change *change, int32_t crosstalk_q8, bool already) {
+static bool slides(const struct change *change, const struct pair_spans *spans,
+                   int32_t crosstalk_q8, bool already) {
   int32_t way2 = squared_way(change);
   int32_t load2 = change->load_x_um * change->load_x_um + change->load_y_um * change->load_y_um;
   if (way2 <= squared_doubt(change, already) + (load2 >> 8) * crosstalk_q8) {
@@ -156,7 +159,7 @@ static bool slides(const struct change *change, int32_t crosstalk_q8, bool alrea
   }
   int32_t beyond =
       way2 - change->x_um * change->load_x_um - change->y_um * change->load_y_um; /* times way */
-  int32_t least_um = already ? UNEXPLAINED_um / 2 : UNEXPLAINED_um;
+  int32_t least_um = already ? spans->unexplained_um / 2 : spans->unexplained_um;
   return beyond > 0 && (uint64_t)beyond * (uint32_t)beyond >
                            (uint64_t)(uint32_t)(least_um * least_um) * (uint32_t)way2;
 }
@@ -166,7 +169,7 @@ static bool slides_slowly(const struct motion_history *history, const struct cha
     return false;
   }
   struct change slow = change_of(history, &history->slow, &SLOW);
-  if (!slides(&slow, history->crosstalk_q8, history->sliding) ||
+  if (!slides(&slow, &SLOW, history->crosstalk_q8, history->sliding) ||
       squared_way(&slow) >> STANDS_SHIFT > squared_way(brief) + squared_doubt(brief, false)) {
     return false;
   }
@@ -184,7 +187,11 @@ static bool shows_slide(struct motion_history *history) {
     history->slow_slides = slides_slowly(history, &brief);
     history->stepped = false;
   }
-  return history->slow_slides || slides(&brief, history->crosstalk_q8, history->sliding);
+  if (history->slow_slides || slides(&brief, &BRIEF, history->crosstalk_q8, history->sliding)) {
+    return true;
+  }
+  struct change brisk = change_of(history, &history->brief, &BRISK);
+  return slides(&brisk, &BRISK, history->crosstalk_q8, history->sliding);
 }
 
 /* numerator / denominator in Q10, within 2^-11 of it; denominator > 0. */
