@@ -24,9 +24,10 @@ constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
 // What held within so long does not slide at a smaller share of that ratio, unless it has become
 // slick; and then it slides so far. Squeezed rubber and what has just been caught move less.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
-// Of what slides and does not slow down: the load is its friction at least, and likely so much of
-// it. A contact that tells no load grips by so much more.
-constexpr double LIKELY = 1.3;
+// Of what slides and does not slow down: the load is its friction, and what stops it within so
+// long; it is followed so quickly.
+constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
+constexpr double MORE = 1.3; // of its grip, where what slides tells no load
 
 } // namespace
 
@@ -65,8 +66,9 @@ bool GripLoad::is_steady() const {
   return rate_N_s_ * STEADY_s < std::max(STEADY * load_N_, STEADY_N);
 }
 
-void GripLoad::slides_at(double load_N, double passed_s) {
-  slow_N_ += std::min(passed_s / MEAN_s, 1.0) * (LIKELY * load_N - slow_N_);
+void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
+  const double stops_N = load_N * (1.0 + speed_mm_s / (GRAVITY_mm_s2 * STOPS_s));
+  slow_N_ += std::min(passed_s / FOLLOWS_s, 1.0) * (stops_N - slow_N_);
   load_N_ = std::max(load_N_, slow_N_);
   peak_N_ = std::max(peak_N_, load_N_);
   rate_N_s_ = 0.0;
@@ -101,7 +103,7 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
     slid_s_ = now_s;
     if (goes_on_ && felt.tells_load) {
       friction_.slid(std::max(felt.ratio, FRICTION_LEAST));
-      load_.slides_at(felt.load_N, passed_s);
+      load_.slides_at(felt.load_N, felt.speed_mm_s, passed_s);
     }
     return;
   }
@@ -138,7 +140,7 @@ double GripHold::wants(const GripFelts &felt, double coming_N, const GripSetting
                                                         : settings.start_N;
   double need = std::max(need_N(settings, dead_s), least_N);
   if (goes_on_ && !felt.tells_load) {
-    need = std::max(need, LIKELY * felt.grip_N);
+    need = std::max(need, MORE * felt.grip_N);
   }
   need = std::min(need, settings.cap_N);
   if (felt.tells_load && !goes_on_) {

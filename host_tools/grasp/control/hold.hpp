@@ -24,8 +24,8 @@ class GripLoad {
 public:
   // Of a contact that rests. swings: it has been caught, and does so on the rubber.
   void rests(double load_N, double passed_s, bool swings);
-  // Of one that slides and does not slow down: it carries no less.
-  void slides_at(double load_N, double passed_s);
+  // Of one that slides and does not slow down: it carries no less, and is to be stopped.
+  void slides_at(double load_N, double speed_mm_s, double passed_s);
 
   double now_N() const { return load_N_; }
   double ahead_N(double seconds) const; // from now
