@@ -219,6 +219,11 @@ private:
   std::uint32_t without_followed() {
     std::uint32_t without = dead_;
     const MarksFit all = card_.fit;
+    /* On thin rubber the neighbours feel too little of a press to say what a sensor should read. */
+    const double pitches = card_.measured.array.pitch_mm / all.width_mm;
+    if (std::exp(-0.5 * pitches * pitches) < FELT_SHARE) {
+      return without;
+    }
     double most = LOOSE_SCATTER;
     for (std::size_t k = 0; k < sensors_; k++) {
       if (is_dead(k) || all.sensors[k].felt > FELT_FEW) {
