@@ -9,8 +9,9 @@
     fingertip_tactile-V-...whl            Python
     fingertip-V-page.tar.gz               the page, for any server
 
-The same commit gives the same bytes, in whatever folder. Times are that of the commit. What is built stays in FOLDER/.build until the end.
-clang 14 orders some code by addresses in its memory, so compilers run without random ones.
+The same commit gives the same bytes, in whatever folder. Times are that of the commit. It is built in a temporary folder, which stays there if
+something fails. clang 14 orders the landing pads of wasm32 by addresses in its memory. So compilers run without random ones, and the name of that
+folder is always as long: the names of files are in that memory, too.
 """
 import ctypes
 import gzip
@@ -24,6 +25,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 ADDR_NO_RANDOMIZE = 0x0040000  # linux/personality.h
@@ -33,6 +35,10 @@ def fix_addresses():
     """Of this process's children. Where the system refuses it the release is as good, but not the same bytes each time."""
     if ctypes.CDLL(None, use_errno=True).personality(ADDR_NO_RANDOMIZE) < 0:
         print("release.py: this system keeps addresses random, so another build of this commit may differ in judges.wasm", file=sys.stderr)
+
+
+def work_folder():
+    return pathlib.Path(tempfile.mkdtemp(prefix="fingertip-release-"))
 
 
 def run(*command, **how):
@@ -83,9 +89,9 @@ def main(argv):
     os.environ |= {"SOURCE_DATE_EPOCH": str(time_s), "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONDONTWRITEBYTECODE": "1"}
     os.umask(0o022)
     fix_addresses()
-    name, work = f"fingertip-{version}", out / ".build"
+    out.mkdir(parents=True)
+    name, work = f"fingertip-{version}", work_folder()
     source = work / name
-    work.mkdir(parents=True)
     run("git", "clone", "--quiet", "--shared", "--config", "core.fileMode=true", ROOT, source)
     run("git", "checkout", "--quiet", "--detach", run("git", "rev-parse", "HEAD", cwd=ROOT).decode().strip(), cwd=source)
     # Folders in debug information would change what identifies a program.

@@ -46,6 +46,14 @@ wait_for_port() {
   done
 }
 
+# NAME: a chip that is emulated beside much else boots for many seconds
+wait_for_answer() {
+  for _ in 1 2 3 4 5 6 7 8 9 10; do
+    $tool info --port $out/$1.tty > /dev/null 2>&1 && return
+  done
+  fail "the emulated fingertip does not answer; try again when this machine has less to do"
+}
+
 # FILE KIND OPTION...: what the pad feels
 play() {
   file=$1
@@ -66,6 +74,7 @@ $simulation/player/fingertip_player play $out/placements.csv -o $out/placed.csv 
 emulate calibrating $rubber $out/placements.csv 600 --flash $out/flash.bin
 processes=$!
 wait_for_port calibrating $processes
+wait_for_answer calibrating
 $tool calibrate --port $out/calibrating.tty --from $out/placed.csv --force $weight_N --yes > $out/calibration.txt 2>&1 ||
   { cat $out/calibration.txt >&2; fail "the calibration failed"; }
 sed -n '/^good/p; /^of the placements/,$p' $out/calibration.txt
@@ -84,6 +93,7 @@ wait_for_port raw $raw_process
 
 echo "== a lime slips on two fingertips of the same rubber, at full rate: $rubber was calibrated, $raw never"
 for name in rubber raw; do
+  wait_for_answer $name
   $tool set --port $out/$name.tty osr=256 rate=max > /dev/null || fail "the fingertip cannot be set"
 done
 FINGERTIP_PORT=$out/rubber.tty:$out/raw.tty $tool monitor --device $rubber --device $raw --until-gone --record $out/recording.csv ||

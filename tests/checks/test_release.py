@@ -76,6 +76,14 @@ class Release(Folder):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertTrue("keeps addresses random" in done.stderr or done.stdout == "1\n", done)
 
+    def test_the_folder_of_a_build_has_a_name_as_long_each_time(self):
+        """In folders named `first` and `a_second_one` clang 14 compiled judges.wasm in two ways, without random addresses too."""
+        folders = [release.work_folder() for _ in range(3)]
+        for folder in folders:
+            folder.rmdir()
+        self.assertEqual(len(set(folders)), 3)
+        self.assertEqual(len({len(str(folder)) for folder in folders}), 1)
+
     def test_every_board_in_every_scene(self):
         self.assertLessEqual({"pico_mux", "pico_parallel"}, set(release.boards(ROOT)))
         self.assertEqual(release.scenes(ROOT), ["raw", "press", "slip", "grasp", "paper"])

@@ -11,7 +11,7 @@
  *
  * Unknowns are A, S0, m, h, the slopes w, per sensor g, s, b, per press c and e. Marks are known up
  * to the hand's error, whose sd is learnt from the presses. Robust least squares (Huber) by
- * Levenberg-Marquardt. Some 0.2 s for thirty presses of fifteen sensors. Same input, same bits.
+ * Levenberg-Marquardt. Some 0.2 s for 46 presses of fifteen sensors. Same input, same bits.
  *
  * Twice. First nothing is assumed of the sensors' places. The print lies on the pad shifted and
  * turned by a little: where it lies follows from where the sensors are found, against the layout;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace fingertip::validating {
 namespace {
@@ -12,9 +13,10 @@ namespace {
 constexpr const char *BEGINS = "validate: ";
 constexpr std::array<const char *, 7> KINDS = {"begin", "empty", "press", "take_back",
                                                "hold",  "rest",  "end"};
-constexpr double OUTLINE_SHARE = 0.8; /* outside it too few sensors feel a press */
-constexpr int SHORT_MARKS = 3, LONG_MARKS = 5;
-constexpr std::size_t STRIDE = 7; /* has no divisor in common with their number */
+/* Of the marks sorted by columns, the next one in their order: far from the one before. */
+constexpr std::size_t STRIDE_MIN = 7;
+/* In pitches: how far apart two sensors across a cell of a grid are. */
+constexpr double ACROSS_MIN = 1.2, ACROSS_MAX = 1.6;
 
 double half_millimetres(double length_mm) {
   return 0.5 * std::round(2.0 * length_mm);
@@ -27,27 +29,35 @@ std::string number(double value) {
 } // namespace
 
 std::vector<Mark> marks_of(const calibrating::Array &array) {
-  const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
-  const auto [low, high] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
-  const double half_x = 0.5 * (*right - *left), half_y = 0.5 * (*high - *low);
-  const bool is_long_in_y = half_y >= half_x;
-  const int columns = is_long_in_y ? SHORT_MARKS : LONG_MARKS;
-  const int rows = is_long_in_y ? LONG_MARKS : SHORT_MARKS;
-  const auto along = [](double from, double to, double half, int i, int count) {
-    return half_millimetres(0.5 * (from + to) +
-                            OUTLINE_SHARE * half * (2.0 * i / (count - 1) - 1.0));
-  };
   std::vector<Mark> marks;
-  for (int column = 0; column < columns; column++) {
-    for (int row = rows - 1; row >= 0; row--) {
-      marks.push_back(
-          {along(*left, *right, half_x, column, columns), along(*low, *high, half_y, row, rows)});
+  const auto add = [&](double x_mm, double y_mm) {
+    const Mark mark{half_millimetres(x_mm), half_millimetres(y_mm)};
+    if (std::none_of(marks.begin(), marks.end(), [&](const Mark &other) {
+          return other.x_mm == mark.x_mm && other.y_mm == mark.y_mm;
+        })) {
+      marks.push_back(mark);
+    }
+  };
+  for (std::size_t k = 0; k < array.sensors(); k++) {
+    add(array.x_mm[k], array.y_mm[k]);
+    for (std::size_t j = 0; j < k; j++) {
+      const double pitches =
+          std::hypot(array.x_mm[k] - array.x_mm[j], array.y_mm[k] - array.y_mm[j]) / array.pitch_mm;
+      if (pitches > ACROSS_MIN && pitches < ACROSS_MAX) {
+        add(0.5 * (array.x_mm[k] + array.x_mm[j]), 0.5 * (array.y_mm[k] + array.y_mm[j]));
+      }
     }
   }
-  /* In an order in which each is far from the one before, so that the rubber there is at rest. */
+  std::sort(marks.begin(), marks.end(), [](const Mark &a, const Mark &b) {
+    return a.x_mm != b.x_mm ? a.x_mm < b.x_mm : a.y_mm > b.y_mm;
+  });
+  std::size_t stride = STRIDE_MIN;
+  while (std::gcd(stride, marks.size()) > 1) {
+    stride++;
+  }
   std::vector<Mark> ordered;
   for (std::size_t i = 0; i < marks.size(); i++) {
-    ordered.push_back(marks[i * STRIDE % marks.size()]);
+    ordered.push_back(marks[i * stride % marks.size()]);
   }
   return ordered;
 }

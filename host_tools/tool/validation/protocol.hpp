@@ -6,7 +6,7 @@
  *
  *   # event: validate: begin weight_g=300 skin_mm=12
  *   # event: validate: empty
- *   # event: validate: press mark=1 x_mm=-7 y_mm=14.5      before each press
+ *   # event: validate: press mark=1 x_mm=-9 y_mm=18        before each press
  *   # event: validate: take_back                           the last press does not count
  *   # event: validate: hold
  *   # event: validate: rest
@@ -26,13 +26,17 @@ constexpr double EMPTY_s = 60.0; /* nothing touches the pad */
 constexpr double HOLD_s = 30.0;  /* the weight stands in the middle */
 constexpr double REST_s = 30.0;  /* after it was lifted */
 constexpr double RATE_Hz = 50.0; /* of frames meanwhile: enough, and the recording stays small */
-constexpr std::size_t TURNS = 3; /* presses at each mark, all around, and again */
+constexpr std::size_t TURNS = 2; /* presses at each mark, all around, and again */
 
 struct Mark {
   double x_mm, y_mm; /* in the axes of the board, which the template's own may miss a little */
 };
 
-/* Fifteen within the sensors' outline: three across its short side, five along the long one. */
+/* On each sensor, and in the middle of each cell of four; 23 on the grid of three by five. So each
+ * sensor, at a corner too, has presses in which it reads most, and presses from which its
+ * neighbours say what it should read. In an order in which each mark is far from the one before, so
+ * that the rubber there is at rest. Those on the outer sensors lie one overhang from the rubber's
+ * end. */
 std::vector<Mark> marks_of(const calibrating::Array &array);
 
 struct Step {

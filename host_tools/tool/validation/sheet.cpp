@@ -53,7 +53,7 @@ void draw(const calibrating::Array &array, Pen &pen) {
     pen.line(x - CROSS_mm, y, x + CROSS_mm, y);
     pen.line(x, y - CROSS_mm, x, y + CROSS_mm);
     pen.circle(x, y, 0.5 * RING_mm);
-    pen.text(x + 1.6, y + 1.6, std::to_string(m + 1));
+    pen.text(x + 2.2, y + 0.3, std::to_string(m + 1)); /* above the name of the sensor */
   }
   const Reach reach = reach_of(array);
   const double y = -reach.y + 6.0, left = -0.5 * RULER_mm;

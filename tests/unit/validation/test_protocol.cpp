@@ -9,28 +9,53 @@
 namespace fingertip::validating {
 namespace {
 
-TEST(Protocol, FifteenMarksWithinTheSensorsEachFarFromTheOneBefore) {
+constexpr std::size_t MARKS = 23; // fifteen sensors, and eight cells of four
+
+TEST(Protocol, MarksLieOnEachSensorAndBetweenEachFour) {
   const calibrating::Array array = validation_array();
   const std::vector<Mark> marks = marks_of(array);
-  ASSERT_EQ(marks.size(), 15u);
-  std::set<std::pair<double, double>> places;
-  for (std::size_t m = 0; m < marks.size(); m++) {
-    places.insert({marks[m].x_mm, marks[m].y_mm});
-    EXPECT_LE(std::abs(marks[m].x_mm), 9.0);
-    EXPECT_LE(std::abs(marks[m].y_mm), 18.0);
-    if (m > 0) {
-      EXPECT_GT(std::hypot(marks[m].x_mm - marks[m - 1].x_mm, marks[m].y_mm - marks[m - 1].y_mm),
-                8.5);
+  ASSERT_EQ(marks.size(), MARKS);
+  for (std::size_t k = 0; k < array.sensors(); k++) {
+    std::size_t on = 0, nearest = 0;
+    for (const Mark &mark : marks) {
+      const auto off_mm = [&](std::size_t sensor) {
+        return std::hypot(array.x_mm[sensor] - mark.x_mm, array.y_mm[sensor] - mark.y_mm);
+      };
+      on += off_mm(k) < 0.25;
+      bool is_nearest = true;
+      for (std::size_t j = 0; j < array.sensors(); j++) {
+        is_nearest = is_nearest && off_mm(k) < off_mm(j) + 0.1;
+      }
+      nearest += is_nearest;
     }
+    EXPECT_EQ(on, 1u) << k;
+    EXPECT_GE(nearest, 2u) << k; /* at a corner; 5 in the middle */
   }
-  EXPECT_EQ(places.size(), 15u);
+}
+
+TEST(Protocol, EachMarkIsAnotherAndFarFromTheOneBefore) {
+  for (std::size_t sensors : {15u, 14u, 8u}) {
+    calibrating::Array array = validation_array();
+    array.x_mm.resize(sensors);
+    array.y_mm.resize(sensors);
+    const std::vector<Mark> marks = marks_of(array);
+    std::set<std::pair<double, double>> places;
+    for (std::size_t m = 0; m < marks.size(); m++) {
+      places.insert({marks[m].x_mm, marks[m].y_mm});
+      if (m > 0 && sensors == 15u) {
+        EXPECT_GT(std::hypot(marks[m].x_mm - marks[m - 1].x_mm, marks[m].y_mm - marks[m - 1].y_mm),
+                  2.0 * array.pitch_mm);
+      }
+    }
+    EXPECT_EQ(places.size(), marks.size()) << sensors;
+  }
 }
 
 TEST(Protocol, StepsAreTheSameFromTheirEvents) {
   const std::vector<Step> steps = steps_of(marks_of(validation_array()), 312.5, 11.0);
   EXPECT_EQ(std::count_if(steps.begin(), steps.end(),
                           [](const Step &step) { return step.kind == Step::Kind::press; }),
-            static_cast<std::ptrdiff_t>(15 * TURNS));
+            static_cast<std::ptrdiff_t>(MARKS * TURNS));
   for (const Step &step : steps) {
     const auto read = step_of(event_of(step));
     ASSERT_TRUE(read) << event_of(step);
