@@ -1,5 +1,5 @@
 # The firmware images that the host tests and the demo run, built from here with the cross
-# compiler into build/BOARD.
+# compiler into build/BOARD, of the scene that an image has if nothing else is asked for.
 include(ExternalProject)
 
 set(boards ${FINGERTIP_BOARDS})
@@ -19,6 +19,7 @@ foreach(board IN LISTS FINGERTIP_IMAGES)
     PREFIX ${CMAKE_BINARY_DIR}/image_${board}
     CONFIGURE_COMMAND ${CMAKE_COMMAND} -G Ninja -S ${CMAKE_SOURCE_DIR} -B ${image_dir} -DCMAKE_BUILD_TYPE=Release
       -DCMAKE_TOOLCHAIN_FILE=${CMAKE_SOURCE_DIR}/cmake/toolchain-arm-none-eabi.cmake -DFINGERTIP_BOARD=${board}
+      -DFINGERTIP_SCENE=${FINGERTIP_DEFAULT_SCENE}
     BUILD_COMMAND ${CMAKE_COMMAND} --build ${image_dir} ${image_targets}
     INSTALL_COMMAND ""
     BUILD_ALWAYS ON

@@ -21,11 +21,12 @@ endif()
 # A scene is a named set of capabilities and defaults for one use of the fingertip.
 #   raw    every frame the sensors can give; pressures and tare only
 #   press  every frame; location and force, no slip, no raw packets and no sync pin
-#   slip   every frame; location, force, slip, raw packets, sync pin
-#   grasp  every frame; all there is: tangential load besides
+#   slip   every frame; location, force, slip, raw packets, sync pin: the least latency
+#   grasp  every frame; all there is: tangential load and what presses besides
 #   paper  as slip, in the published setting: 20 Hz, slip by eq. (7) with n = 2
 set(FINGERTIP_SCENES raw press slip grasp paper)
-set(FINGERTIP_SCENE slip CACHE STRING "Scene: one of ${FINGERTIP_SCENES}")
+set(FINGERTIP_DEFAULT_SCENE grasp)
+set(FINGERTIP_SCENE ${FINGERTIP_DEFAULT_SCENE} CACHE STRING "Scene: one of ${FINGERTIP_SCENES}")
 set_property(CACHE FINGERTIP_SCENE PROPERTY STRINGS ${FINGERTIP_SCENES})
 if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
   message(FATAL_ERROR "FINGERTIP_SCENE=${FINGERTIP_SCENE} is unknown; choose one of: ${FINGERTIP_SCENES}")

@@ -38,6 +38,8 @@ static struct {
   bool (*serve)(void *context);
   void *context;
   unsigned starts;
+  void (*begin)(bool (*serve)(void *context), void *context);
+  void (*end)(void);
 } worker = {.due_us = UINT64_MAX};
 
 static _Noreturn void stop(const char *why) {
@@ -48,7 +50,7 @@ static _Noreturn void stop(const char *why) {
 void native_start(bool by_watchdog) {
   memset(&native, 0, sizeof native);
   native.alarm_us = UINT64_MAX;
-  worker.due_us = UINT64_MAX;
+  port_worker_stop();
   worker.starts = 0;
   native.started_by_watchdog = by_watchdog;
 }
@@ -143,13 +145,21 @@ void port_alarm_at_us(uint64_t t_us) {
   native.alarm_us = t_us;
 }
 
+static void serve_all(void) {
+  if (worker.end) {
+    worker.end();
+    return;
+  }
+  while (worker.serve(worker.context)) {
+  }
+}
+
 void port_sleep(void) {
   const uint64_t next_us = next_event_us();
   if (worker.due_us <= next_us) {
     pass_time_to(worker.due_us);
     worker.due_us = UINT64_MAX;
-    while (worker.serve(worker.context)) {
-    }
+    serve_all();
     return;
   }
   if (next_us == UINT64_MAX) {
@@ -171,10 +181,16 @@ unsigned native_worker_starts(void) {
   return worker.starts;
 }
 
+void native_set_worker_thread(void (*begin)(bool (*serve)(void *context), void *context),
+                              void (*end)(void)) {
+  worker.begin = begin;
+  worker.end = end;
+}
+
 bool port_worker_start(bool (*serve)(void *context), void *context) {
+  port_worker_stop();
   worker.serve = serve;
   worker.context = context;
-  worker.due_us = UINT64_MAX;
   worker.starts += worker.exists;
   return worker.exists;
 }
@@ -182,10 +198,16 @@ bool port_worker_start(bool (*serve)(void *context), void *context) {
 void port_worker_wake(void) {
   const uint64_t takes_us = worker.takes_us;
   worker.due_us = takes_us == UINT64_MAX ? UINT64_MAX : native.now_us + takes_us;
+  if (worker.begin && takes_us != UINT64_MAX) {
+    worker.begin(worker.serve, worker.context);
+  }
 }
 
 void port_worker_stop(void) {
   worker.due_us = UINT64_MAX;
+  if (worker.end) {
+    worker.end();
+  }
 }
 
 void port_save_power(bool saving) {

@@ -1,7 +1,7 @@
-"""The images of the scenes raw and press in the emulator: a packet has no field of what is off, and no command brings it back; that of
-grasp tells the tangential load in every frame and keeps up.
+"""The images of the scenes raw, press and slip in the emulator: a packet has no field of what is off, and no command brings it back; the
+board's own, of scene grasp, tells the tangential load in every frame. It keeps up, and so does slip.
 
-usage: test_scenes.py --scenes FOLDER --fingertip TOOL --command_frame PROGRAM --node NODE
+usage: test_scenes.py --scenes FOLDER --image FILE.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
 import argparse
 import pathlib
@@ -41,9 +41,9 @@ class Run:
                   (1.7, encoded("--sequence", "5", "health")), *extra]
         script.sort()
         pathlib.Path(path("script")).write_text("".join(f"{t_s} {what}\n" for t_s, what in script))
-        image = pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
+        image = TOOLS.image if scene == "grasp" else pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
         done = subprocess.run(
-            [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", BOARD, "--image", str(image), "--scenario", path("scenario"),
+            [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", BOARD, "--image", image, "--scenario", path("scenario"),
              "--host-script", path("script"), "--capture", path("ftr"), "--seconds", "1.8"], capture_output=True, text=True)
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
@@ -85,20 +85,29 @@ class Scenes(unittest.TestCase):
         self.assertEqual(self.press.body_bytes[INFO], {INFO_BYTES + OF_FIT[INFO]})
         self.assertEqual(self.press.body_bytes[HEALTH], {HEALTH_BYTES + OF_FIT[HEALTH]})
 
-    def test_grasp_tells_the_tangential_load_in_every_frame(self):
-        """At the fastest."""
+    def at_the_fastest(self, scene):
+        """With a pad's profile, if it takes one: the recording, and which of its rows are of the last 0.9 s."""
         extra = [(0.455, encoded("--sequence", "6", "osr", "256")), (0.5, encoded("--sequence", "7", "pad", "12", "0"))]
-        grasp = Run(self.folder.name, "grasp", "contact", extra)
-        self.assertEqual({name: grasp.acks[name] for name in ("6", "7")}, {"6": "0", "7": "0"})
-        recording = grasp.recording
-        self.assertEqual(recording.metadata["scene"], "grasp")
+        run = Run(self.folder.name, scene, "contact", extra)
+        self.assertEqual({name: run.acks[name] for name in ("6", "7")}, {"6": "0", "7": "0" if scene == "grasp" else UNKNOWN_COMMAND})
+        recording = run.recording
+        self.assertEqual(recording.metadata["scene"], scene)
         late = recording["t_us"] > recording["t_us"][-1] - 900e3
-        self.assertTrue(recording.flag(files.TANGENTIAL_VALID)[late].all())
         t_us = recording["t_us"][late]
         self.assertGreater((len(t_us) - 1) / (t_us[-1] - t_us[0]) * 1e6, 1250)
         frames = recording["frame"][late]
         self.assertEqual(int(frames[-1] - frames[0]), len(frames) - 1)
         self.assertEqual(recording.health()[-1]["frames_skipped"], 0)
+        return recording, late
+
+    def test_slip_keeps_up_without_a_load(self):
+        recording, late = self.at_the_fastest("slip")
+        self.assertTrue(recording.flag(files.FIT_VALID)[late].all())
+        self.assertFalse(recording.flag(files.TANGENTIAL_VALID | int(Flag.SHAPE_VALID)).any())
+
+    def test_grasp_tells_the_tangential_load_in_every_frame(self):
+        recording, late = self.at_the_fastest("grasp")
+        self.assertTrue(recording.flag(files.TANGENTIAL_VALID)[late].all())
         # What presses is known by then, and of a frame not long before.
         self.assertTrue(recording.flag(int(Flag.SHAPE_VALID))[late].all())
         self.assertLess(recording["shape_age_ms"][late].max(), 10)
@@ -111,7 +120,7 @@ class Scenes(unittest.TestCase):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    for argument in ("scenes", "fingertip", "command_frame", "node"):
+    for argument in ("scenes", "image", "fingertip", "command_frame", "node"):
         parser.add_argument(f"--{argument}", required=True)
     _, rest = parser.parse_known_args(namespace=TOOLS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

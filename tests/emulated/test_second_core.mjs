@@ -1,6 +1,6 @@
 /**
  * The image of scene grasp with its second core: it estimates the load; killed, faulted or run into its stack's guard it costs
- * no frame, the frames say so, and it is started again.
+ * no frame, the frames say so, and it is started again. It sleeps while the USB bus does.
  *
  * usage: test_second_core.mjs FOLDER_OF_IMAGE FINGERTIP COMMAND_FRAME
  */
@@ -62,6 +62,29 @@ test('a stack of core 1 that grows into its guard parks it', () => {
   bench.received = [];
   kill(bench, ({ core }) => (core.registers[13] = 0x2003fff0));
 });
+
+for (const [when, isSo] of [['sleeps', (second) => !second.isAwake], ['works', (second) => second.isAwake]]) {
+  test(`a USB suspend while core 1 ${when}: both cores sleep, and go on after the resume`, () => {
+    const bench = newBench();
+    const { host, chip, client } = bench.machine;
+    bench.until(() => isSo(bench.second), 20, 'such a moment');
+    host.suspend();
+    bench.run(20);
+    const before = [bench.second.cycles, chip.core0.cycles];
+    bench.run(100);
+    assert.equal(bench.second.cycles, before[0], 'core 1 sleeps with the bus');
+    assert.ok(chip.core0.cycles - before[1] < 0.02 * 0.1 * 12e6, 'and core 0 nearly always');
+    host.resume();
+    bench.run(30);
+    [bench.received, bench.last] = [[], null];
+    client.write(bench.encoded('stream', 'contact'));
+    bench.run(50);
+    const frames = bench.frames();
+    assert.ok(frames.length > 50, `${frames.length}`);
+    assert.deepEqual([has(frames, TANGENTIAL_LATE), has(frames, TANGENTIAL_VALID)], [0, frames.length]);
+    assert.deepEqual([bench.machine.reboots, bench.lost, bench.second.state], [0, 0, 'runs']);
+  });
+}
 
 test('a reset by the watchdog ends core 1, and it is started again; the record tells that it had been late', () => {
   const bench = newBench();

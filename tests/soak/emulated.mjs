@@ -9,10 +9,11 @@ import { InputError } from '../../host_tools/simulation/emulator/errors.mjs';
 import { parseFaults } from '../../host_tools/simulation/emulator/faults.mjs';
 import { Machine } from '../../host_tools/simulation/emulator/machine.mjs';
 
-const USAGE = `usage: emulated.mjs --image FILE.bin --board NAME --soak PROGRAM [--seed N] [--seconds S] [--show FROM_s TO_s]
+const USAGE = `usage: emulated.mjs --image FILE.bin --board NAME --soak PROGRAM [--seed N] [--seconds S] [--show FROM_s TO_s] [--steady]
 
 One episode of a soak: runs the image on the emulated board while PROGRAM, fingertip_soak, says what is felt, what goes
 wrong and what the host sends (emulated_plant.hpp). The same bit for bit each time. Prints PROGRAM's JSON object.
+--steady: nothing goes wrong, and the clock crosses 2^32 us in the middle.
 
 Exit: as PROGRAM; 2 wrong usage.`;
 
@@ -21,7 +22,7 @@ const LATE = { start_crystal_weak: 'crystal_weak', start_crystal_dead: 'crystal_
 const OFF_NS = 5e6;
 
 class Bench {
-  constructor({ image, board, seed }) {
+  constructor({ image, board, seed, uptime_us }) {
     this.Board = findBoard(board);
     this.rows = [];
     this.events = [];
@@ -32,7 +33,7 @@ class Bench {
     this.asleep = 0;
     const stimulus = { at_ns: (sensor, t_ns) => this.#felt(sensor, t_ns) };
     const machine = new Machine({
-      image: readFileSync(image), Board: this.Board, scenario: stimulus, seed, fastEnumeration: true, allowWatchdog: true,
+      image: readFileSync(image), Board: this.Board, scenario: stimulus, seed, uptime_us, fastEnumeration: true, allowWatchdog: true,
       onData: (bytes) => {
         this.#look();
         this.events.push(['bytes', this.#now_us(), Buffer.from(bytes).toString('hex')]);
@@ -142,7 +143,7 @@ async function main(argv) {
       args: argv, strict: true, allowPositionals: true,
       options: {
         image: { type: 'string' }, board: { type: 'string' }, soak: { type: 'string' }, seed: { type: 'string', default: '1' },
-        seconds: { type: 'string', default: '60' }, show: { type: 'string' }, help: { type: 'boolean' },
+        seconds: { type: 'string', default: '60' }, show: { type: 'string' }, steady: { type: 'boolean' }, help: { type: 'boolean' },
       },
     }));
   } catch (error) {
@@ -152,14 +153,14 @@ async function main(argv) {
   for (const name of ['image', 'board', 'soak']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
   const seed = Number(values.seed);
   if (!Number.isInteger(seed) || seed < 1 || seed > 1e9) throw new InputError(`--seed "${values.seed}" is not a whole number from 1 to 1000000000`);
-  const show = values.show === undefined ? [] : ['--show', values.show, ...positionals];
-  const child = spawn(values.soak, ['--emulated', values.board, '--seed', `${seed}`, '--seconds', values.seconds, ...show], { stdio: ['pipe', 'pipe', 'inherit'] });
+  const more = [...(values.show === undefined ? [] : ['--show', values.show, ...positionals]), ...(values.steady ? ['--steady'] : [])];
+  const child = spawn(values.soak, ['--emulated', values.board, '--seed', `${seed}`, '--seconds', values.seconds, ...more], { stdio: ['pipe', 'pipe', 'inherit'] });
   const ended = new Promise((resolve, reject) => {
     child.on('error', (error) => reject(new InputError(`${values.soak}: cannot be run (${error.code})`)));
     child.on('close', (code, signal) => resolve(signal ? 1 : code));
   });
   child.stdin.on('error', () => {}); // what it did not read shows in how it ended
-  const bench = new Bench({ image: values.image, board: values.board, seed });
+  const bench = new Bench({ image: values.image, board: values.board, seed, uptime_us: values.steady ? 2 ** 32 - 5e5 * Number(values.seconds) : undefined });
   for await (const line of createInterface({ input: child.stdout })) {
     const said = JSON.parse(line);
     if (said.to_us === undefined) {

@@ -83,10 +83,16 @@ std::uint64_t Judge::bench_us(std::uint64_t device_us) const {
 void Judge::begin_life(std::uint64_t t_us) {
   close(t_us);
   zero_us_ = static_cast<double>(t_us);
+  began_us_ = 0;
   last_answer_us_ = last_frame_us_ = raw_us_ = 0;
   contact_frame_.reset();
   raw_frame_.reset();
   health_of_life_.reset();
+}
+
+void Judge::set_clock_zero(double t_us) {
+  zero_us_ = t_us;
+  began_us_ = std::max(0.0, -t_us);
 }
 
 void Judge::open(std::uint64_t) {
@@ -138,6 +144,7 @@ void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t 
 void Judge::count_sequence(std::uint64_t t_us, const wire_packet &packet) {
   const std::uint16_t gap =
       sequence_ ? static_cast<std::uint16_t>(packet.sequence - *sequence_ - 1) : 0;
+  figures_.wraps += sequence_ && packet.sequence < *sequence_ && gap < 0x8000;
   sequence_ = packet.sequence;
   session_missing_ += gap;
   figures_.missing += gap;
@@ -241,6 +248,8 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
          text("stages of frame %u add up to %u us, not %u", contact.frame, sum, s.total_us));
   }
   const std::uint32_t flags = contact.flags;
+  figures_.loads += (flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+  figures_.late += (flags & CONTACT_FLAG_TANGENTIAL_LATE) != 0;
   if (flags & CONTACT_FLAG_HELD) {
     return; // it repeats the frame before
   }
@@ -279,7 +288,8 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
       wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame,
                        static_cast<double>(contact.force_N)));
     } else if (truth.peak_Pa >= FELT_Pa) {
-      if (error_mm > LOCATION_BOUND_mm || share > FORCE_BOUND_SHARE) {
+      const double allowed_mm = allowed_sds_ * static_cast<double>(contact.location_sd_mm);
+      if (error_mm > std::max(LOCATION_BOUND_mm, allowed_mm) || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
                          "mm, sensors %04x, sd %.2f mm",
                          contact.frame, flags, error_mm, static_cast<double>(contact.force_N),
@@ -345,7 +355,7 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
          text("%u packets sent and %u dropped before the one with number %u", health.packets_sent,
               health.packets_dropped, packet.sequence));
   }
-  const double uptime_s = 1e-6 * static_cast<double>(packet.t_us);
+  const double uptime_s = 1e-6 * (static_cast<double>(packet.t_us) - began_us_);
   if (health.uptime_s > uptime_s || health.uptime_s < uptime_s - UPTIME_LAG_s) {
     find("time", t_us, text("uptime %u s at %.3f s", health.uptime_s, uptime_s));
   }

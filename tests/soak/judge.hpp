@@ -50,6 +50,9 @@ struct Figures {
   std::uint64_t readings = 0; // valid and not doubtful, of tared frames without a warning
   std::uint64_t missing = 0;  // packets
   std::uint64_t skipped = 0;  // frames
+  std::uint64_t loads = 0;    // frames with a tangential load
+  std::uint64_t late = 0;     // and those that say that theirs was late
+  std::uint64_t wraps = 0;    // of the sequence numbers
   std::uint64_t answered = 0; // commands
   std::uint64_t excused = 0;  // wrong frames and readings after what nothing can tell
   std::uint64_t time = 0, loss = 0, damaged = 0, answer = 0, wrong = 0; // findings
@@ -62,8 +65,8 @@ public:
 
   // The chip starts: by power, or by a reset. All times are the bench's.
   void begin_life(std::uint64_t t_us);
-  // When the device's clock was 0.
-  void set_clock_zero(double t_us) { zero_us_ = t_us; }
+  // When the device's clock was 0; before the bench began, too.
+  void set_clock_zero(double t_us);
   // The host can hear from now on, or hears no more.
   void open(std::uint64_t t_us);
   void close(std::uint64_t t_us);
@@ -75,6 +78,10 @@ public:
   // The supply of a sensor dipped, which a pad that moves hides until its next temperature
   // (readings.h): wrong readings, not frames, are counted apart.
   void excuse_readings_until(std::uint64_t t_us) { readings_excused_until_us_ = t_us; }
+
+  // A location may be off by so many of its own standard deviations, besides the bound: of millions
+  // of frames the noise takes some further than two.
+  void allow_standard_deviations(double count) { allowed_sds_ = count; }
 
   // Counts good frames again.
   void expect_recovery() { good_in_a_row_ = 0; }
@@ -126,7 +133,7 @@ private:
   std::vector<Finding> findings_;
 
   // Of a life
-  double zero_us_ = 0;
+  double zero_us_ = 0, began_us_ = 0; // began_us_: what the clock showed at first
   std::uint64_t last_answer_us_ = 0, last_frame_us_ = 0; // device time
   std::optional<std::uint32_t> contact_frame_, raw_frame_;
   std::uint64_t raw_us_ = 0;
@@ -142,6 +149,7 @@ private:
   std::map<std::uint16_t, Question> asked_;
 
   std::uint64_t show_from_us_ = 0, show_to_us_ = 0;
+  double allowed_sds_ = 0;
   std::uint64_t excused_until_us_ = 0, readings_excused_until_us_ = 0;
   unsigned good_in_a_row_ = 0;
   std::uint64_t good_since_us_ = 0, last_frame_heard_us_ = 0;

@@ -36,11 +36,12 @@ void soak_firmware_cut_sensors(void) {
   }
 }
 
-void soak_firmware_start(uint64_t elapsed_us) {
+void soak_firmware_start(uint64_t elapsed_us, uint64_t clock_us) {
   sim_array_restart_bus(&array, elapsed_us);
   while (port_flash_poll()) { /* a flash goes on while the chip is in reset */
   }
   native_start(false);
+  native_set_time(clock_us);
   native_cdc_reset();
   native_set_event_source(bus_next_us, &array);
   port_set_event_handler(on_event, &app);

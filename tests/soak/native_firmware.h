@@ -19,9 +19,9 @@ void soak_firmware_power_sensors(uint64_t seed);
 /* Their supply fails and comes back. */
 void soak_firmware_cut_sensors(void);
 
-/* The chip starts, at its time 0, so long after its last start; flash and sensors are as they are.
- */
-void soak_firmware_start(uint64_t elapsed_us);
+/* The chip starts, its clock at clock_us, so long after its last start; flash and sensors are as
+ * they are. */
+void soak_firmware_start(uint64_t elapsed_us, uint64_t clock_us);
 
 /* Device time. */
 enum native_end soak_firmware_run_until(uint64_t t_us);

@@ -39,27 +39,29 @@ const std::vector<Target> FAULTS = {
 
 struct Bench {
   const World *world;
-  std::uint64_t started_us;
+  std::uint64_t zero_us;
 } bench;
 
 double pressure_Pa(void *, unsigned sensor, std::uint64_t t_us) {
-  return bench.world->pressure_Pa(sensor, bench.started_us + t_us);
+  return bench.world->pressure_Pa(sensor, bench.zero_us + t_us);
 }
 
 double temperature_degC(void *, unsigned, std::uint64_t t_us) {
-  return bench.world->temperature_degC(bench.started_us + t_us);
+  return bench.world->temperature_degC(bench.zero_us + t_us);
 }
 
 } // namespace
 
-NativePlant::NativePlant(const World &world, std::uint64_t seed)
+NativePlant::NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us,
+                         bool has_line_each)
     : world_(world), random_{seed * 2 + 0xB0A2D} {
   native_flash_reset(seed);
   soak_firmware_power_sensors(seed);
   struct sim_array *array = soak_firmware_array();
   array->noise = 1;
+  array->parallel = has_line_each;
   array->world = {nullptr, pressure_Pa, temperature_degC};
-  start(0, nullptr);
+  start(0, clock_us, nullptr);
 }
 
 NativePlant::~NativePlant() {
@@ -70,12 +72,12 @@ const std::vector<Target> &NativePlant::faults() const {
   return FAULTS;
 }
 
-void NativePlant::start(std::uint64_t t_us, Judge *judge) {
-  const std::uint64_t elapsed_us = t_us - started_us_;
-  started_us_ = t_us;
-  bench = {&world_, t_us};
+void NativePlant::start(std::uint64_t t_us, std::uint64_t clock_us, Judge *judge) {
+  const std::uint64_t elapsed_us = t_us - zero_us_;
+  zero_us_ = t_us - clock_us;
+  bench = {&world_, zero_us_};
   has_power_ = true;
-  soak_firmware_start(elapsed_us);
+  soak_firmware_start(elapsed_us, clock_us);
   if (judge) {
     judge->begin_life(t_us);
   }
@@ -166,7 +168,7 @@ void NativePlant::act(const Change &change, Judge &judge) {
         soak_firmware_cut_sensors();
       }
     } else {
-      start(change.t_us, &judge);
+      start(change.t_us, 0, &judge);
       native_cdc_suspend(asleep_ > 0);
       native_cdc_stall(stalled_ > 0);
     }
@@ -185,7 +187,7 @@ void NativePlant::run_firmware(std::uint64_t t_us) {
   if (!has_power_ || t_us <= now_us_) {
     return;
   }
-  switch (soak_firmware_run_until(t_us - started_us_)) {
+  switch (soak_firmware_run_until(t_us - zero_us_)) {
   case NATIVE_PANIC:
     ended_ = "panic";
     break;

@@ -14,7 +14,10 @@ namespace soak {
 
 class NativePlant : public Plant {
 public:
-  NativePlant(const World &world, std::uint64_t seed);
+  // The chip's clock shows clock_us at the first start, and 0 at later ones. has_line_each: a data
+  // line for each sensor, as pico_parallel has, instead of multiplexers.
+  NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us = 0,
+              bool has_line_each = false);
   ~NativePlant() override;
   NativePlant(const NativePlant &) = delete;
   NativePlant &operator=(const NativePlant &) = delete;
@@ -33,7 +36,7 @@ private:
     Fault fault;
     bool begins;
   };
-  void start(std::uint64_t t_us, Judge *judge);
+  void start(std::uint64_t t_us, std::uint64_t clock_us, Judge *judge);
   void run_firmware(std::uint64_t t_us);
   void act(const Change &change, Judge &judge);
   void listen(std::uint64_t t_us, Judge &judge);
@@ -43,7 +46,7 @@ private:
   struct random random_;
   std::vector<Change> changes_; // by time
   std::vector<std::uint8_t> to_send_;
-  std::uint64_t started_us_ = 0, now_us_ = 0;
+  std::uint64_t zero_us_ = 0, now_us_ = 0; // when the chip's clock was 0, modulo 2^64
   bool has_power_ = true, open_ = false;
   int closed_ = 0, asleep_ = 0, stalled_ = 0; // by so many faults
   std::string ended_;

@@ -6,7 +6,8 @@
                                                                    same images and programs, whatever commit, included
     soak.py --build build/host --boards build --kinds native --episodes 3 --seconds 30 --seed 1    the same each time
 
-Kinds: native (boards/native in one process), pico_mux, pico_parallel (emulated). What is found is kept in build/soak/findings, named and
+Kinds: native (boards/native in one process), pico_mux, pico_parallel (emulated). steady_native and steady_pico_parallel: nothing goes wrong,
+at the highest rate with a pad's profile, over a wrap of the clock's 32 bits; natively with the second processor as a thread. What is found is kept in build/soak/findings, named and
 told with the command that does it again; every episode is a line of build/soak/results.jsonl. Exit status 1 if there is any finding.
 """
 import argparse
@@ -26,9 +27,10 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 EMULATED = ("pico_mux", "pico_parallel")
 KINDS = (*EMULATED, "native")
-EPISODE_s = {"native": 600, "pico_mux": 60, "pico_parallel": 60}
+STEADY = {"steady_native": "native", "steady_pico_parallel": "pico_parallel"}
+EPISODE_s = {"native": 600, "pico_mux": 60, "pico_parallel": 60, "steady_native": 3600, "steady_pico_parallel": 600}
 COUNTS = ("hangs", "wrong_unflagged", "uncounted_losses", "disorder")
-SUMS = ("seconds", "bouts", "frames", "unwarned", "at_rest", "readings", "missing", "skipped", "answered", "excused", *COUNTS)
+SUMS = ("seconds", "bouts", "frames", "unwarned", "at_rest", "readings", "missing", "skipped", "answered", "excused", "loads", "late", "sequence_wraps", *COUNTS)
 WORST = ("worst_mm", "worst_force", "worst_Pa")
 COMMIT = re.compile(rb"fingertip-git=[0-9a-z]+\+?\0")  # write_build_info.cmake
 # No machine is too slow for an episode in this; one that takes longer hangs.
@@ -43,7 +45,8 @@ class Soak:
     def __init__(self, build, boards, out, kinds):
         self.out = out
         self.program = build / "tests/soak/fingertip_soak"
-        self.images = {board: boards / board / f"fingertip-{board}.bin" for board in EMULATED if board in kinds}
+        self.images = {board: boards / board / f"fingertip-{board}.bin" for board in EMULATED
+                       if board in [STEADY.get(kind, kind) for kind in kinds]}
         for path in (self.program, *self.images.values()):
             if not path.is_file():
                 raise Stop(f"{path}: is not there; build it: cmake --preset host && cmake --build --preset host")
@@ -57,14 +60,15 @@ class Soak:
                 subprocess.run(["objcopy", "-O", "binary", "--only-section=.text", "--only-section=.rodata", "--only-section=.data", self.program,
                                 stripped.name], check=True)
                 parts = [pathlib.Path(stripped.name).read_bytes()]
-        if kind in self.images:
-            parts.append(self.images[kind].read_bytes())
+        if STEADY.get(kind, kind) in self.images:
+            parts.append(self.images[STEADY.get(kind, kind)].read_bytes())
         return hashlib.sha256(b"".join(COMMIT.sub(b"", part) for part in parts)).hexdigest()[:16]
 
     def command(self, kind, seed, seconds):
-        if kind == "native":
-            return [self.program, "--seed", seed, "--seconds", seconds]
-        return ["node", HERE / "emulated.mjs", "--image", self.images[kind], "--board", kind, "--soak", self.program, "--seed", seed, "--seconds", seconds]
+        board, how = STEADY.get(kind, kind), ["--seed", seed, "--seconds", seconds, *(["--steady"] if kind in STEADY else [])]
+        if board == "native":
+            return [self.program, *how]
+        return ["node", HERE / "emulated.mjs", "--image", self.images[board], "--board", board, "--soak", self.program, *how]
 
     def episode(self, kind, seed, seconds):
         call = [str(part) for part in self.command(kind, seed, seconds)]
@@ -118,7 +122,7 @@ def summary(results):
     found = {"soak_hours_emulated": round(hours(results, *EMULATED), 3), "soak_hours_native": round(hours(results, "native"), 3)}
     found |= {name: sum(result[name] for result in results) for name in COUNTS}
     found["soak"] = []
-    for kind in KINDS:
+    for kind in (*KINDS, *(kind for kind in STEADY if any(result["kind"] == kind for result in results))):
         own = [result for result in results if result["kind"] == kind]
         row = {"bench": kind, "episodes": len(own)} | {name: sum(result[name] for result in own) for name in SUMS}
         row |= {name: max((result[name] for result in own), default=0) for name in WORST}
@@ -126,7 +130,7 @@ def summary(results):
         found["soak"].append(row)
     recovery = {}
     for result in results:
-        bench = "native" if result["kind"] == "native" else "emulated"
+        bench = "native" if STEADY.get(result["kind"], result["kind"]) == "native" else "emulated"
         for fault, one in result["recovery"].items():
             row = recovery.setdefault(fault, {"fault": fault, "native_bouts": 0, "native_worst_s": None, "emulated_bouts": 0, "emulated_worst_s": None})
             row[f"{bench}_bouts"] += one["bouts"]
@@ -140,7 +144,7 @@ def summary(results):
 
 def tell(result):
     counts = ", ".join(f"{result[name]} {name}" for name in COUNTS if result[name])
-    print(f"{result['kind']:13s} seed {result['seed']:<10d} {result['seconds']:7.1f} s in {result['wall_s']:7.1f} s  {result['bouts']:4d} bouts "
+    print(f"{result['kind']:20s} seed {result['seed']:<10d} {result['seconds']:7.1f} s in {result['wall_s']:7.1f} s  {result['bouts']:4d} bouts "
           f"{result['frames']:7d} frames{'  FOUND ' + counts if result['findings'] else ''}", flush=True)
 
 
@@ -175,7 +179,7 @@ def main(argv):
     how.add_argument("--hours", type=float, metavar="H", help="by the wall; Ctrl-C ends it sooner")
     how.add_argument("--least", type=float, nargs=2, metavar=("EMULATED_H", "NATIVE_H"), help="hours of device time")
     how.add_argument("--episodes", type=int, metavar="N", help="of each kind")
-    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS, metavar="KIND")
+    parser.add_argument("--kinds", nargs="+", choices=(*KINDS, *STEADY), default=KINDS, metavar="KIND")
     parser.add_argument("--seconds", type=float, metavar="S", help="of an episode (default: 600 native, 60 emulated)")
     parser.add_argument("--seed", type=int, metavar="N", help="of the first episode (default: another one each time; with --least 1)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="episodes at a time (default: %(default)s)")

@@ -1,6 +1,7 @@
 #include "storm.hpp"
 
 #include "libfingertip/command.hpp"
+#include "pad/profile.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -15,6 +16,9 @@ constexpr std::uint64_t STARTS_WITHIN_us = 3000000;
 // A host that hears nothing asks again.
 constexpr std::uint64_t ASK_AGAIN_us = 200000;
 constexpr std::uint64_t FIRST_ASK_us = 10000;
+// Of a steady one. The first frames come after the tare.
+constexpr double PAD_mm = 12;
+constexpr std::uint64_t FRAMES_FROM_us = 2000000, FRAME_WITHIN_us = 100000;
 
 // So long a wrong frame may follow inverted bits: until the next temperature but one.
 constexpr std::uint64_t EXCUSED_us = 5000000;
@@ -228,6 +232,13 @@ void Storm::begin_bout() {
   judge_.set_scene(scene_);
 }
 
+void Storm::set_for_most_frames() {
+  streams_ = WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
+  write(fingertip::command_osr(256));
+  write(fingertip::command_rate_mHz(0));
+  write(fingertip::command_pad(fingertip::pad::profile_over_own_sensors({PAD_mm})));
+}
+
 // What the host says.
 void Storm::talk() {
   const bool open = plant_.port_is_open();
@@ -241,6 +252,9 @@ void Storm::talk() {
   }
   if (now_us_ >= ask_at_us_) {
     if (!has_asked_ || now_us_ > judge_.last_frame_us() + ASK_AGAIN_us) {
+      if (steady_ && !has_asked_) {
+        set_for_most_frames();
+      }
       write(fingertip::command_stream(streams_));
       has_asked_ = true;
     }
@@ -270,6 +284,10 @@ bool Storm::over() {
   if (plant_.unasked_starts() > unasked_starts_) {
     unasked_starts_ = plant_.unasked_starts();
     hang("it restarted by itself, in or after " + kind_);
+  }
+  if (steady_ && now_us_ > FRAMES_FROM_us && now_us_ > judge_.last_frame_us() + FRAME_WITHIN_us) {
+    hang("no frame for 0.1 s");
+    return true;
   }
   return false;
 }
@@ -302,7 +320,7 @@ void Storm::run_to(std::uint64_t end_us) {
         hang("no good frames within 20 s of " + kind_);
         return;
       }
-    } else if (now_us_ >= next_us_) {
+    } else if (!steady_ && now_us_ >= next_us_) {
       begin_bout();
     }
   }

@@ -27,6 +27,8 @@ class Storm {
 public:
   Storm(Plant &plant, World &world, Judge &judge, std::uint64_t seed);
 
+  // No bouts: the host sets the highest rate and the profile of a 12 mm pad, and frames must come.
+  void keep_steady() { steady_ = true; }
   // Until bench time `end_us`, or something ends it: see ended(). Findings are the judge's.
   void run_to(std::uint64_t end_us);
   std::uint64_t now_us() const { return now_us_; }
@@ -43,6 +45,7 @@ private:
   void write_garbage();
   void write_some_command();
   void write_something_to_store();
+  void set_for_most_frames();
   void talk();
   bool over();
 
@@ -56,6 +59,7 @@ private:
 
   // The host
   std::uint16_t sequence_ = 0;
+  bool steady_ = false;
   std::uint8_t streams_ = 7;
   bool was_open_ = false, has_asked_ = false;
   std::uint64_t ask_at_us_ = 0;

@@ -53,6 +53,13 @@ class Soak(unittest.TestCase):
         self.assertEqual((found["hangs"], found["wrong_unflagged"], found["worst_recovery_s"]), (0, 0, 7))
         self.assertEqual(found["recovery"], [{"fault": "garbage", "native_bouts": 6, "native_worst_s": 7, "emulated_bouts": 0, "emulated_worst_s": None}])
 
+    def test_a_steady_one_is_of_its_bench(self):
+        self.program('found["frames"] = 7 if "--steady" in sys.argv else 1')
+        _, found = self.soak("--kinds", "steady_native", "--episodes", 1, "--seed", 1)
+        rows = {row["bench"]: row for row in found["soak"]}
+        self.assertEqual((rows["steady_native"]["frames"], rows["steady_native"]["seconds"], rows["native"]["episodes"]), (7, 3600, 0))
+        self.assertEqual(found["recovery"][0]["native_bouts"], 2)
+
     def test_what_is_found_is_kept_with_the_command_that_does_it_again(self):
         self.program('found |= {"wrong_unflagged": 4, "findings": ["wrong at 3 s: frame 7"]} if seed == "2" else {}')
         done, found = self.soak("--kinds", "native", "--episodes", 3, "--seed", 1)
@@ -81,12 +88,14 @@ class Soak(unittest.TestCase):
         _, found = self.soak("--kinds", "native", "--episodes", 1, "--seed", 1)
         cuts = {"power_cuts": 3, "power_cuts_not_started": 1, "power_cuts_wrong_values": 0, "power_cut_kinds": [{"board": "pico_mux", "cut": "erase", "cuts": 3}],
                 "power_cut_findings": ["erase cut at 1 ms: it did not stream again"]}
-        found = {**found, "soak_findings": ["native, seed 9: hang"], **cuts}
+        steady = {"steady": [{"bench": "native", "frames": 4711, "late": 2}], "steady_native_s": 3600, "steady_findings": 1, "steady_what": ["steady_native, seed 1: late"],
+                  "steady_lost": 0, "steady_late": 2}
+        found = {**found, "soak_findings": ["native, seed 9: hang"], **cuts, **steady}
         judged = judge(found, soaking.GOALS)["goals"]
         self.assertEqual([name for name, goal in judged.items() if not goal["met"]],
-                         ["soak_hours_emulated", "soak_hours_native", "power_cuts", "power_cuts_not_started"])
+                         ["soak_hours_emulated", "soak_hours_native", "power_cuts", "power_cuts_not_started", "steady_findings", "steady_late"])
         text = "\n".join(soaking.text(found))
-        for what in ("native, seed 9: hang", "erase cut at 1 ms", "| garbage | 2 |", "| pico_mux | erase | 3 |"):
+        for what in ("native, seed 9: hang", "erase cut at 1 ms", "| garbage | 2 |", "| native | 4711 |", "steady_native, seed 1: late", "| pico_mux | erase | 3 |"):
             self.assertIn(what, text)
 
 

@@ -1,12 +1,11 @@
-"""One grasp whose fingertips are two emulated boards with the release image of scene grasp: what happened when, in emulated time."""
+"""One grasp whose fingertips are two emulated boards with the release image: what happened when, in emulated time."""
 import json
 import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/report/rate"), str(ROOT / "host_tools/python")]
-import scenes  # noqa: E402
-from boards import PARALLEL as BOARD  # noqa: E402
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from boards import PARALLEL as BOARD, image_of  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from reporting import run  # noqa: E402
 from tables import table_md, text_of  # noqa: E402
@@ -32,8 +31,7 @@ def grasp(node, image, world, tables, *options):
 
 
 def measure(build, boards, tables):
-    image = scenes.build("grasp", BOARD, pathlib.Path(boards) / "scenes") / f"fingertip-{BOARD}.bin"
-    found = grasp("node", image, program(build), tables)
+    found = grasp("node", image_of(boards, BOARD), program(build), tables)
     slip = found["slip"] or {}
     return {"emulated_reaction_ms": slip.get("reaction_ms"), "emulated_sent_ms": slip.get("sent_ms"), "emulated_slid_mm": found["slid_mm"],
             "emulated_dropped": found["dropped"], "emulated_grasp": found}

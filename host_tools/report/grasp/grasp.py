@@ -138,7 +138,7 @@ def main(argv):
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help="1000 or more; default %(default)s")
     parser.add_argument("--usual", action="store_true", help="a fifth of the grasps")
     parser.add_argument("--grasps", type=int, metavar="N", help="of each row")
-    parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="where scene grasp is built, in scenes/; default %(default)s")
+    parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="folder of the boards' builds; default %(default)s")
     parser.add_argument("--no-emulated", action="store_true", help="without the grasp of two emulated fingertips")
     options = parser.parse_args(argv)
     if options.seed in CHOSE:

@@ -1,8 +1,7 @@
-"""Scene grasp with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two."""
+"""The release images, of scene grasp, with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two."""
 import math
 
 import numpy as np
-import scenes
 from boards import BOARDS, PARALLEL, short
 from emulated import FROM_s, Measurement, Tools, distribution, scenario
 from fingertip.files import TANGENTIAL_VALID, read_recording
@@ -14,17 +13,6 @@ GOALS = (
     ("grasp_two_latency_p99_us", "<=", 1500), ("grasp_sleep_percent", ">=", 20))
 TWO_FROM_s = 0.65
 PITCH_mm, SIGMA_mm, PEAK_Pa = 9.0, 5.7, 25000.0
-
-
-class GraspTools(Tools):
-    """The images of scene grasp of a board instead of the boards' own."""
-
-    def __init__(self, build, boards, board=PARALLEL):
-        super().__init__(build, boards)
-        self.place = scenes.build("grasp", board, self.boards / "scenes")
-
-    def image(self, board, suffix="bin"):
-        return self.place / f"fingertip-{board}.{suffix}" if hasattr(self, "place") else super().image(board, suffix)
 
 
 def two_contacts(path, seconds):
@@ -47,10 +35,10 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
     """{name: (what, measures)} for Steps.run_all."""
     wander = scenario(folder, "wander", FROM_s + seconds + 1, "grasp-wander")
     two = two_contacts(wander.with_name("grasp-two.csv"), FROM_s + seconds + 1)
-    tools = {board: GraspTools(build, boards, board) for board in dict.fromkeys((*on, PARALLEL))}  # built before the jobs, which share them
+    tools = Tools(build, boards)
 
     def one(board, path):
-        return Measurement(tools[board], folder, board, 256, path, seconds, commands=[tools[board].encoded("pad", *PAD)])
+        return Measurement(tools, folder, board, 256, path, seconds, commands=[tools.encoded("pad", *PAD)])
 
     cases = [(short(board), board, wander) for board in on] + [("two", PARALLEL, two)]
     return {name: (f"scene grasp on {board}, {path.stem}", lambda b=board, p=path: one(b, p)) for name, board, path in cases}

@@ -16,7 +16,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from boards import BOARDS  # noqa: E402
-from emulated import CLOCK_Hz, CONVERSION_us, scenario  # noqa: E402
+from emulated import CLOCK_Hz, CONVERSION_us, Tools, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from reporting import Steps, run, write_json  # noqa: E402
 from tables import table_md  # noqa: E402
@@ -37,6 +37,18 @@ def build(scene, board, folder):
         "-DCMAKE_BUILD_TYPE=Release", f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}")
     run("cmake", "--build", place, "--target", f"fingertip-{board}", "-j", "1")
     return place
+
+
+class SceneTools(Tools):
+    """The images of a scene instead of the boards' own; builds them."""
+
+    def __init__(self, build_folder, boards, scene):
+        super().__init__(build_folder, boards)
+        self.scene = scene
+        self.places = {board: build(scene, board, self.boards / "scenes") for board in BOARDS}
+
+    def image(self, board, suffix="bin"):
+        return self.places[board] / f"fingertip-{board}.{suffix}" if hasattr(self, "places") else super().image(board, suffix)
 
 
 def sizes(place, board):

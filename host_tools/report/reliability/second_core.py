@@ -2,7 +2,7 @@
 import json
 import pathlib
 
-from boards import PARALLEL
+from boards import PARALLEL, image_of
 from reporting import run
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -13,8 +13,7 @@ GOALS = (("core1_killed", ">=", KILLS), ("core1_hangs", "<=", 0), ("core1_frames
 
 def measure(build, steps):
     """A failure does not end it: it is a figure, and reported."""
-    run("ctest", "--test-dir", build, "-R", "^checks.scene_grasp_(configures|builds)$")
-    found = json.loads(run("node", ROOT / "tests/emulated/harness/kill_figures.mjs", build / "scenes/grasp", build / "host_tools/tool/cli/fingertip",
+    found = json.loads(run("node", ROOT / "tests/emulated/harness/kill_figures.mjs", image_of(build.parent, PARALLEL).parent, build / "host_tools/tool/cli/fingertip",
                            build / "tests/support/command_frame", str(KILLS), str(SOAK_h)))
     steps.say(f"second core killed {found['core1_killed']} times")
     return found

@@ -26,6 +26,9 @@ MARGIN = 1.05
 
 
 class Tools:
+    """The boards' own images. scene: theirs (cmake/options.cmake)."""
+    scene = "grasp"
+
     def __init__(self, build, boards):
         self.fingertip = pathlib.Path(build) / "host_tools/tool/cli/fingertip"
         self.command_frame = pathlib.Path(build) / "tests/support/command_frame"
@@ -118,7 +121,9 @@ class Measurement:
         self.sleep_percent = 100 * (1 - self.cycles / ((emulated["emulated_s"] - before["emulated_s"]) * CLOCK_Hz))
         run(tools.fingertip, "replay", f"{name}.ftr", "--to-csv", f"{name}.csv")
         recording = read_recording(f"{name}.csv")
-        self.scene, self.iterations = recording.metadata["scene"], int(recording.metadata["fit_iterations"])
+        if recording.metadata["scene"] != tools.scene:
+            raise InputError(f"{tools.image(board)}: is of scene {recording.metadata['scene']}, not {tools.scene}; {TO_BUILD}")
+        self.iterations = int(recording.metadata["fit_iterations"])
         zero_us = emulated["device_time_zero_s"] * 1e6
         self._rates(recording, recording.has_contact & (recording["t_us"] >= FROM_s * 1e6 - zero_us))
         self._losses(recording)

@@ -8,10 +8,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/report/rate"), str(ROOT / "host_tools/python")]
 import numpy as np  # noqa: E402
 import scenes  # noqa: E402
-from boards import PARALLEL as BOARD, fit_cycles_of  # noqa: E402
-from emulated import FROM_s, Measurement, scenario  # noqa: E402
+from boards import PARALLEL as BOARD, fit_cycles_of, image_of  # noqa: E402
+from emulated import FROM_s, Measurement, Tools, scenario  # noqa: E402
 from fingertip.files import TANGENTIAL_VALID, read_recording  # noqa: E402
-from grasp_rate import PAD, GraspTools  # noqa: E402
+from grasp_rate import PAD  # noqa: E402
 from reporting import run  # noqa: E402
 
 OSRS = (256, 1024)
@@ -19,8 +19,8 @@ SECONDS = 6.0
 
 
 def measure(build, boards, say):
-    tools = GraspTools(build, boards)
-    sizes = scenes.sizes(tools.place, BOARD)
+    tools = Tools(build, boards)
+    sizes = scenes.sizes(image_of(boards, BOARD).parent, BOARD)
     found = {"chip_flash_bytes": sizes["flash_bytes"], "chip_ram_bytes": sizes["ram_bytes"], "chip_stack_bytes": sizes["stack_bytes"]}
     with tempfile.TemporaryDirectory() as folder:
         path = scenario(folder, "wander", FROM_s + SECONDS + 1)

@@ -73,12 +73,12 @@ void check_firmware(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_FIT)) {
     throw Error(
         what + ": its firmware (scene " + text_field(info.scene) +
-        ") computes no locations, so there is nothing to calibrate; flash one of scene slip");
+        ") computes no locations, so there is nothing to calibrate; flash one of scene grasp");
   }
   if (!(info.capabilities & WIRE_CAPABILITY_RAW_STREAM)) {
     throw Error(
         what + ": its firmware (scene " + text_field(info.scene) +
-        ") sends no pressures; flash one of scene slip, calibrate, and go back if you like: "
+        ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: "
         "the calibration stays");
   }
   if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * FRAME_RATE_MIN_Hz) {

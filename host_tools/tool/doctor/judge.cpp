@@ -515,7 +515,7 @@ private:
           rest.sensors.empty() ? "not measured: no readings came"
                                : "not measured: " + count(readings, "reading") + " are too few",
           !(facts_.info->capabilities & WIRE_CAPABILITY_RAW_STREAM)
-              ? "this firmware streams none; use scene slip or raw"
+              ? "this firmware streams none; use scene grasp or raw"
               : "measure longer, with --seconds");
     } else {
       noisy = noise();

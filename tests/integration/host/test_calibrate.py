@@ -160,7 +160,7 @@ class Live(CalibrateTest):
 
     def test_what_cannot_be_calibrated_is_told(self):
         for options, reason in (
-                (("capabilities=3",), "sends no pressures; flash one of scene slip"),
+                (("capabilities=3",), "sends no pressures; flash one of scene grasp"),
                 (("capabilities=4",), "computes no locations"),
                 (("absent=3",), "sensors do not answer: 3; mend their wiring"),
                 (("version=3",), "version")):

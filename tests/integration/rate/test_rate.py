@@ -14,6 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools/report/rate"))
 import rate  # noqa: E402, adds the path of the next
 import emulated  # noqa: E402
+import scenes  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 FIGURES = (
@@ -96,7 +97,7 @@ class Rate(unittest.TestCase):
 
     def test_the_same_again(self):
         """Emulated cycles and times, to the last one."""
-        tools = emulated.Tools(OPTIONS.build, OPTIONS.boards)
+        tools = scenes.SceneTools(OPTIONS.build, OPTIONS.boards, "slip")
         path = emulated.scenario(self.folder, "wander", 4)
 
         def measured(name):

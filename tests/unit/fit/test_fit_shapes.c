@@ -1,6 +1,7 @@
 /* One contact, a long one, one that pulls, two, and what is none of these. */
 #include "common/contact_flags.h"
 #include "fit/fit_shapes.h"
+#include "fit/fit_shapes_parts.h"
 #include "support/grid.h"
 #include "support/pad.h"
 #include "support/random.h"
@@ -268,6 +269,95 @@ static void test_rubber_beyond_the_limits_is_refused(void) {
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &turned, &profile));
 }
 
+/* The penalty is in units of what the pair leaves unexplained, and of one at the least. */
+static void test_a_pair_must_explain_more_than_its_penalty(void) {
+  static const int32_t unexplained[] = {0, FREEDOM << 8, (4 * FREEDOM) << 8};
+  static const int32_t units[] = {1, 1, 4};
+  const int32_t apart[UNKNOWNS] = {[SPAN_X] = ONE_Q20 / 2, [SPAN_Y] = ONE_Q20 / 2};
+  for (int i = 0; i < 3; i++) {
+    const int32_t limit = unexplained[i] + units[i] * (FIT_SHAPES_PAIR_PENALTY << 8);
+    for (int model = ROUND; model <= LONG; model++) { /* the better of the two counts */
+      int32_t chi_square_q8[MODELS] = {limit + 4096, limit + 4096, unexplained[i]};
+      chi_square_q8[model] = limit;
+      TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(chi_square_q8, apart));
+      chi_square_q8[model] = limit + 1;
+      TEST_ASSERT_EQUAL(TWO, fit_shapes_best(chi_square_q8, apart));
+    }
+  }
+}
+
+static void test_a_pair_is_further_apart_than_half_a_pitch(void) {
+  const int32_t chi_square_q8[MODELS] = {1 << 20, 1 << 20, 0};
+  const int32_t quarter = ONE_Q20 / 4, step = ONE_Q20 / 1024;
+  const int32_t near[][2] = {{quarter, 0}, {0, -quarter}, {quarter / 2, quarter / 2}};
+  const int32_t far[][2] = {{quarter + step, 0}, {0, -quarter - step}, {quarter, quarter / 2}};
+  for (int i = 0; i < 3; i++) {
+    const int32_t of_near[UNKNOWNS] = {[SPAN_X] = near[i][0], [SPAN_Y] = near[i][1]};
+    const int32_t of_far[UNKNOWNS] = {[SPAN_X] = far[i][0], [SPAN_Y] = far[i][1]};
+    TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(chi_square_q8, of_near));
+    TEST_ASSERT_EQUAL(TWO, fit_shapes_best(chi_square_q8, of_far));
+  }
+}
+
+static void test_a_long_contact_must_explain_more_than_its_penalty(void) {
+  const int32_t together[UNKNOWNS] = {0};
+  const int32_t limit = FIT_SHAPES_PENALTY << 8;
+  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){limit + 5, 5, 0}, together));
+  TEST_ASSERT_EQUAL(LONG, fit_shapes_best((const int32_t[MODELS]){limit + 6, 5, 0}, together));
+}
+
+/* 256 Pa where the largest reading, of 1000 Pa, is 0.98 of a unit. */
+static void test_a_sum_that_no_contact_has_begins_again(void) {
+  const struct fit_settings settings = usual(0.0);
+  const struct fit_result fit = {.flags = CONTACT_FLAG_FIT_VALID, .used = ALL};
+  static const int32_t sums_Pa[][2] = {{256, 256}, {262, 262}, {262, 250}, {250, 262}};
+  for (int i = 0; i < 4; i++) {
+    struct fit_shapes_state state = {.frames = 0};
+    struct fit_shapes_result result;
+    for (int frame = 0; frame < 2; frame++) {
+      int32_t pressure_Pa_q10[SENSORS] = {[7] = 1000 << 10};
+      pressure_Pa_q10[0] = (sums_Pa[i][frame] - 1000) * 1024;
+      TEST_ASSERT_EQUAL(frame == 0 || i > 1, fit_shapes(&array, &pad, pressure_Pa_q10, &settings,
+                                                        &fit, &state, &result));
+    }
+    TEST_ASSERT_EQUAL(i > 1 ? 1 : 2, state.frames);
+  }
+}
+
+/* Against the largest reading: four times as much, or a quarter, is another contact's. */
+static void test_a_sum_that_jumps_begins_again(void) {
+  const struct fit_settings settings = usual(0.0);
+  const struct fit_result fit = {.flags = CONTACT_FLAG_FIT_VALID, .used = ALL};
+  static const int32_t others_Pa[] = {207, 222}; /* beside 1000 Pa: 3.9 and 4.1 times that */
+  for (int i = 0; i < 2; i++) {
+    for (int falls = 0; falls < 2; falls++) {
+      struct fit_shapes_state state = {.frames = 0};
+      struct fit_shapes_result result;
+      for (int frame = 0; frame < 2; frame++) {
+        int32_t pressure_Pa_q10[SENSORS];
+        for (int k = 0; k < SENSORS; k++) {
+          pressure_Pa_q10[k] = k == 7 ? 1000 << 10 : frame != falls ? others_Pa[i] << 10 : 0;
+        }
+        fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+      }
+      TEST_ASSERT_EQUAL(i == 0 ? 2 : 1, state.frames);
+    }
+  }
+}
+
+static void test_what_has_no_fit_or_no_noise_is_no_frame(void) {
+  const int32_t pressure_Pa_q10[SENSORS] = {[6] = 900 << 10, [7] = 1000 << 10, [8] = 900 << 10};
+  for (int i = 0; i < 3; i++) {
+    struct fit_settings settings = usual(0.0);
+    settings.noise_Pa_q10 = i == 1 ? 0 : 1;
+    const struct fit_result fit = {.flags = i == 2 ? 0 : CONTACT_FLAG_FIT_VALID, .used = ALL};
+    struct fit_shapes_state state = {.frames = 0};
+    struct fit_shapes_result result;
+    fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+    TEST_ASSERT_EQUAL(i == 0, state.frames);
+  }
+}
+
 /* What a frame does in parts is what it does at once, and each ends when it should. */
 static void test_parts_add_up_to_a_frame(void) {
   struct fit_settings settings = usual(0.015);
@@ -354,6 +444,12 @@ int main(void) {
   RUN_TEST(test_what_hardly_presses_is_undecided);
   RUN_TEST(test_thin_rubber_is_refused);
   RUN_TEST(test_rubber_beyond_the_limits_is_refused);
+  RUN_TEST(test_a_pair_must_explain_more_than_its_penalty);
+  RUN_TEST(test_a_pair_is_further_apart_than_half_a_pitch);
+  RUN_TEST(test_a_long_contact_must_explain_more_than_its_penalty);
+  RUN_TEST(test_a_sum_that_no_contact_has_begins_again);
+  RUN_TEST(test_a_sum_that_jumps_begins_again);
+  RUN_TEST(test_what_has_no_fit_or_no_noise_is_no_frame);
   RUN_TEST(test_parts_add_up_to_a_frame);
   RUN_TEST(test_garbage_leaves_finite_results);
   return UNITY_END();
