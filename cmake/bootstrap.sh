@@ -162,14 +162,18 @@ if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; 
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
 fi
 
+mkdir -p build
+judges=
 if { [ "$job" = test ] || [ "$job" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
-  say "fetching the judges with pip"
-  /usr/bin/python3 -m venv --clear build/venv
-  build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt
-  cp tests/requirements.txt build/venv/.installed-requirements
+  say "fetching the judges with pip, while the rest is built"
+  {
+    /usr/bin/python3 -m venv --clear build/venv &&
+      build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt &&
+      cp tests/requirements.txt build/venv/.installed-requirements
+  } > build/judges.log 2>&1 &
+  judges=$!
 fi
 
-mkdir -p build
 configure() {
   cmake --preset "$@" > build/configure.log 2>&1 || { cat build/configure.log >&2; exit 1; }
 }
@@ -202,6 +206,10 @@ case $job in
     cmake --build --preset host
     ;;
 esac
+[ -z "$judges" ] || wait "$judges" || {
+  cat build/judges.log >&2
+  exit 1
+}
 
 case $1 in
   demo)
@@ -210,7 +218,8 @@ case $1 in
     exec sh host_tools/demo/demo.sh $stay
     ;;
   web) exec build/host/host_tools/tool/cli/fingertip web ;;
-  test) exec ctest --preset host -j "$(nproc)" ${2:+-L "^$2\$"} ;;
+  # One more than there are processors: tests in real time wait most of theirs.
+  test) exec ctest --preset host -j "$(($(nproc) + 1))" ${2:+-L "^$2\$"} ;;
   soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
   report) exec /usr/bin/python3 host_tools/report/shared/parts.py "${2:-report}" ${folder:+"$folder"} ;;
 esac

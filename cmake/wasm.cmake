@@ -25,7 +25,7 @@ ExternalProject_Add(web_wasm_modules
   BUILD_BYPRODUCTS ${wasm_modules})
 add_custom_command(OUTPUT ${FINGERTIP_WEB_WASM_DIR}/objects.bin
   COMMAND ${CMAKE_COMMAND} -E make_directory ${FINGERTIP_WEB_WASM_DIR}
-  COMMAND web_tables ${FINGERTIP_WEB_WASM_DIR}/objects.bin ${CMAKE_BINARY_DIR}/host_tools/web/tables/cache
+  COMMAND web_tables ${FINGERTIP_WEB_WASM_DIR}/objects.bin ${CMAKE_BINARY_DIR}/contact_tables
   DEPENDS web_tables VERBATIM)
 add_custom_target(web_wasm ALL DEPENDS ${FINGERTIP_WEB_WASM_DIR}/objects.bin)
 add_dependencies(web_wasm web_wasm_modules)

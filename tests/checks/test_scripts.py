@@ -139,6 +139,17 @@ class Bootstrap(Folder):
         for versions in ({}, {"cmake": "3.100.0-rc1", "node": "22.1.0"}, {"cmake": "4.0", "node": "18.0.0"}):
             self.assertEqual(self.up_to_npm(**versions).returncode, 33)
 
+    def test_judges_that_cannot_be_fetched_end_it_before_the_tests(self):
+        for path, content in (("host_tools/simulation/emulator/package-lock.json", "{}"), ("host_tools/simulation/emulator/node_modules/.installed-lock", "{}"),
+                              ("tests/requirements.txt", "./absent\n"), ("bin/ctest", "#!/bin/sh\necho tested\n")):
+            (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (self.folder / path).write_text(content)
+        (self.folder / "bin/ctest").chmod(0o755)
+        done = self.up_to_npm(job=("test",))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("absent", done.stderr)
+        self.assertNotIn("tested", done.stdout)
+
 
 class BootstrapReport(Folder):
     """bootstrap.sh report with a stand-in for each program that it calls."""

@@ -58,7 +58,7 @@ class Doctor(unittest.TestCase):
                             "--scenario", scenario or self.at_rest, "--sensor", sensor, "--faults", plan, "--seconds", "3600", "--fast-enumeration")
         return port
 
-    def examine(self, port, *arguments, system="with_rule", seconds=2):
+    def examine(self, port, *arguments, system="with_rule", seconds=1):
         """The findings that are not well."""
         doctor = self.world.start_tool("doctor", "--port", port, "--json", "--seconds", seconds, "--root", self.folder / system, *arguments)
         out, err = doctor.communicate()
@@ -88,7 +88,7 @@ class Doctor(unittest.TestCase):
             port = self.plug_in(board)
             for osr in (256, 8192):
                 self.world.tool("set", "--port", port, f"osr={osr}")
-                self.assertEqual(self.examine(port), [], (board, osr))
+                self.assertEqual(self.examine(port, seconds=2), [], (board, osr))
 
     def test_sensors_that_are_not_those_of_the_image(self):
         found = self.only(self.examine(self.plug_in(BOARDS[0], sensor="ms5837_30ba")), "sensors", "bad")
@@ -113,7 +113,7 @@ class Doctor(unittest.TestCase):
                                r"from app_run\+0x[0-9a-f]+ \(.*\), in the main loop, taking readings, [01]\.[0-9]. s after its start; before that: ")
         self.assertEqual(self.result["crash"]["place"], "scan_take+0x0")
         # and without names that are of another image
-        text = self.only(self.examine(port, "--elf", self.elf("pico_mux"), seconds=1), "crash", "bad")["text"]
+        text = self.only(self.examine(port, "--elf", self.elf("pico_mux")), "crash", "bad")["text"]
         self.assertIn("is of other firmware: no names", text)
         self.assertEqual(self.result["crash"]["place"], "")
 
@@ -154,14 +154,14 @@ class Doctor(unittest.TestCase):
 
     def test_a_bad_prom(self):
         for board in BOARDS:
-            findings = self.examine(self.plug_in(board, [{"type": "sensor_prom_bit", "sensor": 3}]))
+            findings = self.examine(self.plug_in(board, [{"type": "sensor_prom_bit", "sensor": 3}]), seconds=2)
             finding = self.only(findings, "prom", "bad")
             self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [3])
             self.assertEqual({finding["check"] for finding in findings}, {"prom"})
 
     def test_a_noisy_sensor(self):
         for board in BOARDS:
-            findings = self.examine(self.plug_in(board, [{"type": "sensor_noisy", "sensor": 11}]))
+            findings = self.examine(self.plug_in(board, [{"type": "sensor_noisy", "sensor": 11}]), seconds=2)
             finding = self.only(findings, "noise", "bad")
             self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [11])
             self.assertLessEqual({finding["check"] for finding in findings}, {"noise", "zero"})
@@ -189,7 +189,7 @@ class Doctor(unittest.TestCase):
         self.assertIn("NACKs/s", self.only(findings, "bus", "warn")["text"])
 
     def test_a_missing_rule(self):
-        findings = self.examine(self.plug_in("pico_mux"), system="without_rule", seconds=1)
+        findings = self.examine(self.plug_in("pico_mux"), system="without_rule")
         self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("rule", "warn")])
         self.assertIn("fingertip rule | sudo tee", findings[0]["advice"])
 

@@ -52,8 +52,8 @@ STALL_LIMIT_s = 1.0
 UNREAD_s, READ_AFTERWARDS_bytes = 5, 100_000
 ECHOED_s = 4
 BEAT_s = 0.02
-SERIAL_CYCLES = 12
-LIBUSB_CYCLES = 8
+SERIAL_CYCLES = 6
+LIBUSB_CYCLES = 4
 # Seconds on the wall until something hangs.
 PATIENCE_s = 300
 STREAM_LIMIT_s = 600

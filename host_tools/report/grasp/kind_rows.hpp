@@ -3,7 +3,7 @@
 
 #include "simulation/cell/kind_trial.hpp"
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace fingertip::grasp {

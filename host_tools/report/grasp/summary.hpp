@@ -3,7 +3,7 @@
 
 #include "grasp/trials.hpp"
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace fingertip::grasp {
 

@@ -2,7 +2,7 @@
 // Exit status: 0 done; 1 something went wrong, said in one line; 2 wrong usage.
 #include "libfingertip/text.hpp"
 #include "report/reference/dataset.hpp"
-#include "report/reference/options.hpp"
+#include "report/reference/whole_number.hpp"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

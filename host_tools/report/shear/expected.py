@@ -12,7 +12,6 @@ import json
 import pathlib
 import subprocess
 import sys
-import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
@@ -26,8 +25,7 @@ BEGIN, END = "<!--expected-->", "<!--/expected-->"
 
 def rows_of(program):
     """{(pad, load): row}"""
-    with tempfile.TemporaryDirectory(prefix="fingertip-") as cache:
-        done = subprocess.run([program, "--only", "pads", "--pads", str(PADS), "--cache", cache], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    done = subprocess.run([program, "--only", "pads", "--pads", str(PADS)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     if done.returncode:
         raise InputError(f"{program} failed: {done.stderr.strip()[-300:]}")
     rows = {row["case"]: row for row in json.loads(done.stdout)["by_pad_and_load"]}

@@ -113,7 +113,7 @@ def run_suite(build, only, machine):
     with tempfile.TemporaryDirectory(prefix="suite-", dir=build) as folder, machine(folder):  # on the disk that the tests are on
         result = os.path.join(folder, "result.xml")
         begun_s = time.monotonic()
-        done = subprocess.run(["ctest", "--test-dir", build, "-j", str(os.cpu_count()), "--output-junit", result, "--test-output-truncation", "head",
+        done = subprocess.run(["ctest", "--test-dir", build, "-j", str(os.cpu_count() + 1), "--output-junit", result, "--test-output-truncation", "head",
                                *(["-L", f"^{only}$"] if only else [])], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         seconds = time.monotonic() - begun_s
         if not os.path.exists(result):

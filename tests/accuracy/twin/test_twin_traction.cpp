@@ -3,7 +3,7 @@
 #include "simulation/twin/best_gaussian.hpp"
 #include "simulation/twin/traction_table.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -25,7 +25,7 @@ from pymodbus.server import ModbusSerialServer
 
 FINGERTIP, CELL_GRIPPER = sys.argv[1:3]
 # Of one answer: a machine that is held up for less fails nothing.
-PATIENCE_s = 20
+PATIENCE_s = 300
 PATIENT = ("--timeout", "10000")  # the tool's most
 scservo_sdk.port_handler.LATENCY_TIMER = 1000 * PATIENCE_s
 

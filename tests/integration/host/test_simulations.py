@@ -20,7 +20,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools
 from fingertip import wire  # noqa: E402
 from fingertip.line import AskInfo  # noqa: E402
 
-PATIENCE_s = 60
+PATIENCE_s = 300
 LEFT, RIGHT = "00000000000CE110", "00000000000CE111"
 ONE, OTHER = "0123456789abcdef", "fedcba9876543210"
 

@@ -20,7 +20,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools
 from fingertip.version import __version__  # noqa: E402
 
 TOOLS = argparse.Namespace()
-PATIENCE_s = 60
+PATIENCE_s = 300
 FILES = {"index.html": ("text/html; charset=utf-8", f'<meta name="fingertip-version" content="{__version__}">'.encode()),
          "app.js": ("text/javascript; charset=utf-8", b"0;"),
          "app.css": ("text/css; charset=utf-8", b"a{}"), "assets/simulated.wasm": ("application/wasm", b"\0asm\1\0\0\0"),

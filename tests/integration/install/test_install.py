@@ -16,7 +16,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 EXAMPLE = ROOT / "host_tools/library/libfingertip/example"
 TOOLS = argparse.Namespace()
-PATIENCE_s = 60
+PATIENCE_s = 300
 PUBLIC = {"clock.hpp", "clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "fingertip.h", "line_source.hpp", "names.hpp",
           "packet_fields.hpp", "packet_file.hpp", "recording_reader.hpp", "session.hpp", "transport.hpp", "wire.hpp",
           "common/calibration.h", "common/contact_flags.h", "common/crash.h", "common/limits.h", "common/pad_profile.h", "common/status.h",

@@ -29,7 +29,7 @@ import fingertip  # noqa: E402
 from fingertip import Flag, Frame, wire  # noqa: E402
 from fingertip.clock import NO_CLOCK  # noqa: E402
 
-PATIENCE_s = 60
+PATIENCE_s = 300
 SERIALS = {"left": "AAAAAAAAAAAAAAA1", "right": "AAAAAAAAAAAAAAA2"}
 TRUSTED = Flag.CONTACT | Flag.FIT_VALID | Flag.TARED | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID
 PRETENDED = '''

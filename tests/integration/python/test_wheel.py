@@ -15,7 +15,7 @@ import zipfile
 FAKE_DEVICE = os.path.abspath(sys.argv[1])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
-PATIENCE_s = 120
+PATIENCE_s = 300
 
 
 def run(*call, **options):

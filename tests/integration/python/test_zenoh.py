@@ -25,7 +25,7 @@ sys.path.insert(0, str(PACKAGE))
 from fingertip import errors, network, read_recording, recorder, wire  # noqa: E402
 from fingertip.mcap_recording import McapLineReader  # noqa: E402
 
-PATIENCE_s = 60
+PATIENCE_s = 300
 
 
 def a_packet(number, t_us=0, frame=0):

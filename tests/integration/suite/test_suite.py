@@ -13,7 +13,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools/report/suite"))
 import suite  # noqa: E402
 
-PATIENCE_s = 60
+PATIENCE_s = 300
 PROJECT = """
 cmake_minimum_required(VERSION 3.25)
 project(small LANGUAGES NONE)

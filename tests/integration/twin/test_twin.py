@@ -13,7 +13,7 @@ import unittest
 
 TWIN, TABLES, PLAYER = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-PATIENCE_s = 60
+PATIENCE_s = 300
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
 from real_time import RealTime  # noqa: E402

@@ -11,8 +11,8 @@ using namespace fingertip;
 namespace {
 
 Bytes body_of(std::size_t length, int pattern) {
-  Bytes packet(WIRE_HEADER_BYTES + length);
-  packet[0] = WIRE_VERSION;
+  Bytes packet{WIRE_VERSION};
+  packet.resize(WIRE_HEADER_BYTES + length);
   for (std::size_t i = 0; i < length; i++) {
     packet[WIRE_HEADER_BYTES + i] = static_cast<std::uint8_t>(pattern == 0   ? 0
                                                               : pattern == 1 ? 0xAA

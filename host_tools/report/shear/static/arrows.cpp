@@ -1,6 +1,7 @@
 #include "shear/static/tables.hpp"
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace fingertip::shear {
 

@@ -9,6 +9,7 @@
 #include "report/reference/options.hpp"
 #include "shear/static/tables.hpp"
 
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 namespace {

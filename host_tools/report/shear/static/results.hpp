@@ -5,7 +5,7 @@
 #include "truth/fit/statistics.hpp"
 
 #include <functional>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

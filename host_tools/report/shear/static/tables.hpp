@@ -4,7 +4,7 @@
 
 #include "shear/static/bench.hpp"
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace fingertip::shear {
 
