@@ -2,6 +2,7 @@
 
 #include "common/contact_flags.h"
 #include "fit/fit_grid_parts.h"
+#include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 
 #include <string.h>
@@ -92,6 +93,9 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
  * after hundreds. */
 #define UNTOLD_MOST 6
 
+#define LOG2E_HALF_FLOAT 0.72134752f
+#define DIP_SD_LEAST 0.25f /* of the unit: the narrowest that a term may be */
+
 #define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less stays where it is */
 
 /* What of the readings is kept from step to step. */
@@ -101,6 +105,8 @@ struct problem {
   int32_t base_q22;  /* standard deviation of a reading of weight 1, of the unit of readings */
   int32_t noise_q22; /* the same */
   int32_t by_gains_q12; /* share of the readings' variances that is their gains', mean */
+  /* The dip: its depth in the height of the model's middle, 0: none; log2(e) / (2 sd^2). */
+  int32_t dip_share_q16, dip_bend_q22;
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
   int32_t spread_prior_q26, long_prior_q26;
 };
@@ -250,6 +256,7 @@ struct term {
   int32_t x_q28[COLUMNS]; /* with the strength */
   int32_t y_q30[ROWS];
   int32_t over_q11, over_square_q7; /* 1 / v, at most 16, and its square */
+  int32_t height_q28;               /* the strength over v, or over v^2 */
 };
 
 /* d' d / (2 v) in Q22 and powers of 2, along one axis: bend (i pitch - place)^2, exactly a parabola
@@ -282,6 +289,7 @@ NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
     height_q24 = fixed_mul_q26(height_q24, inverse_q22) * 16; /* moment V0 / v^2 */
   }
   int32_t height_q28 = fixed_clamp(height_q24, 0, (2 << 24) - 1) * 16;
+  term->height_q28 = height_q28;
   int32_t bend_q26 = fixed_mul_q26(inverse_q22, LOG2E_HALF_Q26);
   int32_t by_square = fixed_mul_q26(bend_q26, pad->pitch_square_q26);
   set_exponentials(bend_q26, by_square, COLUMNS, &axes[0], term->x_q28);
@@ -357,6 +365,31 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
     node->sums.f1_q12 = rounded(f1, 13);
     node->sums.f2_q22 = f2;
   } while (++node != end);
+}
+
+/* Takes the dip from the model: a share of the height in the contact's middle, in a Gaussian about
+ * it. The dip is in the column of the amplitude; it is so wide that those of place and spread do
+ * without. */
+NOINLINE static void take_dip(const struct problem *problem, const struct term *terms,
+                              const struct parabola *axes, int32_t amplitude_q13,
+                              struct fit_tangential_room *room) {
+  int32_t x_q30[COLUMNS], y_q30[ROWS];
+  int32_t bend_q22 = problem->dip_bend_q22;
+  int32_t by_square = fixed_mul_q26(bend_q22, problem->pad->pitch_square_q26);
+  set_exponentials(bend_q22, by_square, COLUMNS, &axes[0], x_q30);
+  set_exponentials(bend_q22, by_square, ROWS, &axes[1], y_q30);
+  int32_t depth_q28 = 0;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    depth_q28 += fixed_mul_16(terms[j].height_q28, problem->dip_share_q16);
+  }
+  for (int i = 0, n = 0; i < COLUMNS; i++) {
+    int32_t column_q28 = product(depth_q28, x_q30[i], 30);
+    for (int k = 0; k < ROWS; k++, n++) {
+      int32_t dip_q28 = scaled_by(product(column_q28, y_q30[k], 30), room->weight_q12[n], 12);
+      room->node[n].sums.s0_q14 -= rounded(dip_q28, 14);
+      room->residual[n] += scaled_by(dip_q28, amplitude_q13, 16) >> 1;
+    }
+  }
 }
 
 /* Ends the residuals of five nodes and sets their columns of the place and the spread. With
@@ -445,6 +478,9 @@ NOINLINE static void linearise(const struct problem *problem,
     set_terms(problem, terms, i, &off_x[i], off_y, origin.amplitude_q13, room);
   }
   set_sums(terms, room->node);
+  if (problem->dip_share_q16 != 0) {
+    take_dip(problem, terms, axes, origin.amplitude_q13, room);
+  }
   for (int i = 0; i < COLUMNS; i++) {
     union fit_tangential_node *node = &room->node[i * ROWS];
     set_moving(&off_x[i], off_y, &origin, node, &room->residual[i * ROWS]);
@@ -963,6 +999,17 @@ NOINLINE static void conclude(const struct problem *problem,
   result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 
+static void set_dip(const struct fit_settings *settings, struct problem *problem) {
+  problem->dip_share_q16 = 0;
+  if (fit_has_dip(settings)) {
+    const float per_unit = (float)problem->pad->per_unit_q30 * (1.0f / 1073741824.0f);
+    const float sd = settings->dip_sd_mm * per_unit;
+    problem->dip_share_q16 = fit_fixed(settings->dip_share, 16);
+    problem->dip_bend_q22 =
+        fit_fixed(LOG2E_HALF_FLOAT / (sd > DIP_SD_LEAST ? sd * sd : DIP_SD_LEAST * DIP_SD_LEAST), 22);
+  }
+}
+
 static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
   int32_t base_q26 = base_q22 * 16;
   return base_q26 / 2 >= sd_q26 ? 2 * ONE_Q26 : fixed_div_q26(base_q26, sd_q26) | 1;
@@ -975,8 +1022,11 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   *result = (struct fit_tangential){0};
   struct problem problem;
   problem.pad = pad;
+  set_dip(settings, &problem);
+  struct fit_settings of_readings = *settings;
+  of_readings.dip_share = 0.0f; /* readings without room for a dip */
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
-      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
+      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, &of_readings, &problem.readings) ||
       !weigh(array, settings, fit->used, &problem, &pad->room)) {
     state->steps = 0;
     return;
