@@ -93,8 +93,8 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
  * after hundreds. */
 #define UNTOLD_MOST 6
 
-#define LOG2E_HALF_FLOAT 0.72134752f
-#define DIP_SD_LEAST 0.25f /* of the unit: the narrowest that a term may be */
+#define DIP_SD_LEAST_Q13 (1 << 11) /* the narrowest that a term may be */
+#define DIP_SD_MOST_Q13 (1 << 15)
 
 #define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less stays where it is */
 
@@ -367,27 +367,42 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
   } while (++node != end);
 }
 
+/* The dip's Gaussian along an axis within 0.3 %, as set_exponentials has the terms'. */
+NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes,
+                                  const struct parabola *axis, int32_t *value_q15) {
+  uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q22, axis->square_q26) + Z_LEAST_Q22;
+  int32_t slope = fixed_mul_q26(bend_q22, axis->by_pitch_q26) * 2;
+  for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
+    value_q15[k] =
+        exp2_rough(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope)) >> 15;
+  }
+}
+
 /* Takes the dip from the model: a share of the height in the contact's middle, in a Gaussian about
  * it. The dip is in the column of the amplitude; it is so wide that those of place and spread do
  * without. */
 NOINLINE static void take_dip(const struct problem *problem, const struct term *terms,
                               const struct parabola *axes, int32_t amplitude_q13,
                               struct fit_tangential_room *room) {
-  int32_t x_q30[COLUMNS], y_q30[ROWS];
+  int32_t x_q15[COLUMNS], y_q15[ROWS];
   int32_t bend_q22 = problem->dip_bend_q22;
   int32_t by_square = fixed_mul_q26(bend_q22, problem->pad->pitch_square_q26);
-  set_exponentials(bend_q22, by_square, COLUMNS, &axes[0], x_q30);
-  set_exponentials(bend_q22, by_square, ROWS, &axes[1], y_q30);
-  int32_t depth_q28 = 0;
+  set_dip_axis(bend_q22, by_square, COLUMNS, &axes[0], x_q15);
+  set_dip_axis(bend_q22, by_square, ROWS, &axes[1], y_q15);
+  int32_t height_q27 = 0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    depth_q28 += fixed_mul_16(terms[j].height_q28, problem->dip_share_q16);
+    height_q27 += terms[j].height_q28 >> 1;
   }
-  for (int i = 0, n = 0; i < COLUMNS; i++) {
-    int32_t column_q28 = product(depth_q28, x_q30[i], 30);
-    for (int k = 0; k < ROWS; k++, n++) {
-      int32_t dip_q28 = scaled_by(product(column_q28, y_q30[k], 30), room->weight_q12[n], 12);
-      room->node[n].sums.s0_q14 -= rounded(dip_q28, 14);
-      room->residual[n] += scaled_by(dip_q28, amplitude_q13, 16) >> 1;
+  int32_t depth_q17 = fixed_mul_16(height_q27, problem->dip_share_q16) >> 10;
+  int32_t lack_q16 = (depth_q17 * amplitude_q13) >> 14; /* with the amplitude */
+  const int32_t *weight_q12 = room->weight_q12;
+  int32_t *residual = room->residual;
+  union fit_tangential_node *node = room->node;
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int k = 0; k < ROWS; k++, node++) {
+      int32_t bell_q15 = (((x_q15[i] * y_q15[k]) >> 15) * *weight_q12++) >> 12;
+      node->sums.s0_q14 -= (bell_q15 * depth_q17) >> 18;
+      *residual++ += (bell_q15 * lack_q16) >> 7;
     }
   }
 }
@@ -1002,11 +1017,10 @@ NOINLINE static void conclude(const struct problem *problem,
 static void set_dip(const struct fit_settings *settings, struct problem *problem) {
   problem->dip_share_q16 = 0;
   if (fit_has_dip(settings)) {
-    const float per_unit = (float)problem->pad->per_unit_q30 * (1.0f / 1073741824.0f);
-    const float sd = settings->dip_sd_mm * per_unit;
+    int32_t sd_q20 = fixed_mul_q30(fit_fixed(settings->dip_sd_mm, 20), problem->pad->per_unit_q30);
+    int32_t sd_q13 = fixed_clamp(sd_q20 >> 7, DIP_SD_LEAST_Q13, DIP_SD_MOST_Q13);
     problem->dip_share_q16 = fit_fixed(settings->dip_share, 16);
-    problem->dip_bend_q22 =
-        fit_fixed(LOG2E_HALF_FLOAT / (sd > DIP_SD_LEAST ? sd * sd : DIP_SD_LEAST * DIP_SD_LEAST), 22);
+    problem->dip_bend_q22 = fixed_div_q26(LOG2E_HALF_Q26 >> 4, sd_q13 * sd_q13);
   }
 }
 
