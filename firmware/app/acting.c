@@ -45,6 +45,10 @@ static void use_tangential_scales(struct app *app) {
   if (app->pad) {
     tangential_use(&app->tangential_settings, app->pad, &app->contact_settings,
                    app->calibration != NULL);
+    if (app->calibration && app->shapes_dip_share > 0.0f) {
+      tangential_use_dip(&app->tangential_settings, app->shapes_dip_share, app->shapes_dip_sd_mm,
+                         millimetres(app->calibration->sigma_um));
+    }
   }
 }
 

@@ -84,6 +84,8 @@ static void ask_for_load(struct app *app) {
   memcpy(app->load_of.pressure_Pa_q10, app->conditioned.pressure_Pa_q10,
          sizeof app->load_of.pressure_Pa_q10);
   app->load_of.settings = app->fit_settings;
+  app->load_of.settings.dip_share = app->shapes_dip_share;
+  app->load_of.settings.dip_sd_mm = app->shapes_dip_sd_mm;
   app->load_of.fit = app->fit;
   app->tangential_job.question = (struct tangential_question){
       .begins = !app->tangential_follows,

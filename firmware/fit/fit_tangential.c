@@ -2,6 +2,7 @@
 
 #include "common/contact_flags.h"
 #include "fit/fit_grid_parts.h"
+#include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 
 #include <string.h>
@@ -92,6 +93,9 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
  * after hundreds. */
 #define UNTOLD_MOST 6
 
+#define DIP_SD_LEAST_Q13 (1 << 11) /* the narrowest that a term may be */
+#define DIP_SD_MOST_Q13 (1 << 15)
+
 #define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less stays where it is */
 
 /* What of the readings is kept from step to step. */
@@ -101,6 +105,8 @@ struct problem {
   int32_t base_q22;  /* standard deviation of a reading of weight 1, of the unit of readings */
   int32_t noise_q22; /* the same */
   int32_t by_gains_q12; /* share of the readings' variances that is their gains', mean */
+  /* The dip: its depth in the height of the model's middle, 0: none; log2(e) / (2 sd^2). */
+  int32_t dip_share_q16, dip_bend_q22;
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
   int32_t spread_prior_q26, long_prior_q26;
 };
@@ -250,6 +256,7 @@ struct term {
   int32_t x_q28[COLUMNS]; /* with the strength */
   int32_t y_q30[ROWS];
   int32_t over_q11, over_square_q7; /* 1 / v, at most 16, and its square */
+  int32_t height_q28;               /* the strength over v, or over v^2 */
 };
 
 /* d' d / (2 v) in Q22 and powers of 2, along one axis: bend (i pitch - place)^2, exactly a parabola
@@ -282,6 +289,7 @@ NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
     height_q24 = fixed_mul_q26(height_q24, inverse_q22) * 16; /* moment V0 / v^2 */
   }
   int32_t height_q28 = fixed_clamp(height_q24, 0, (2 << 24) - 1) * 16;
+  term->height_q28 = height_q28;
   int32_t bend_q26 = fixed_mul_q26(inverse_q22, LOG2E_HALF_Q26);
   int32_t by_square = fixed_mul_q26(bend_q26, pad->pitch_square_q26);
   set_exponentials(bend_q26, by_square, COLUMNS, &axes[0], term->x_q28);
@@ -357,6 +365,46 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
     node->sums.f1_q12 = rounded(f1, 13);
     node->sums.f2_q22 = f2;
   } while (++node != end);
+}
+
+/* The dip's Gaussian along an axis within 0.3 %, as set_exponentials has the terms'. */
+NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes,
+                                  const struct parabola *axis, int32_t *value_q15) {
+  uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q22, axis->square_q26) + Z_LEAST_Q22;
+  int32_t slope = fixed_mul_q26(bend_q22, axis->by_pitch_q26) * 2;
+  for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
+    value_q15[k] =
+        exp2_rough(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope)) >> 15;
+  }
+}
+
+/* Takes the dip from the model: a share of the height in the contact's middle, in a Gaussian about
+ * it. The dip is in the column of the amplitude; it is so wide that those of place and spread do
+ * without. */
+NOINLINE static void take_dip(const struct problem *problem, const struct term *terms,
+                              const struct parabola *axes, int32_t amplitude_q13,
+                              struct fit_tangential_room *room) {
+  int32_t x_q15[COLUMNS], y_q15[ROWS];
+  int32_t bend_q22 = problem->dip_bend_q22;
+  int32_t by_square = fixed_mul_q26(bend_q22, problem->pad->pitch_square_q26);
+  set_dip_axis(bend_q22, by_square, COLUMNS, &axes[0], x_q15);
+  set_dip_axis(bend_q22, by_square, ROWS, &axes[1], y_q15);
+  int32_t height_q27 = 0;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    height_q27 += terms[j].height_q28 >> 1;
+  }
+  int32_t depth_q17 = fixed_mul_16(height_q27, problem->dip_share_q16) >> 10;
+  int32_t lack_q16 = (depth_q17 * amplitude_q13) >> 14; /* with the amplitude */
+  const int32_t *weight_q12 = room->weight_q12;
+  int32_t *residual = room->residual;
+  union fit_tangential_node *node = room->node;
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int k = 0; k < ROWS; k++, node++) {
+      int32_t bell_q15 = (((x_q15[i] * y_q15[k]) >> 15) * *weight_q12++) >> 12;
+      node->sums.s0_q14 -= (bell_q15 * depth_q17) >> 18;
+      *residual++ += (bell_q15 * lack_q16) >> 7;
+    }
+  }
 }
 
 /* Ends the residuals of five nodes and sets their columns of the place and the spread. With
@@ -445,6 +493,9 @@ NOINLINE static void linearise(const struct problem *problem,
     set_terms(problem, terms, i, &off_x[i], off_y, origin.amplitude_q13, room);
   }
   set_sums(terms, room->node);
+  if (problem->dip_share_q16 != 0) {
+    take_dip(problem, terms, axes, origin.amplitude_q13, room);
+  }
   for (int i = 0; i < COLUMNS; i++) {
     union fit_tangential_node *node = &room->node[i * ROWS];
     set_moving(&off_x[i], off_y, &origin, node, &room->residual[i * ROWS]);
@@ -963,6 +1014,16 @@ NOINLINE static void conclude(const struct problem *problem,
   result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 
+static void set_dip(const struct fit_settings *settings, struct problem *problem) {
+  problem->dip_share_q16 = 0;
+  if (fit_has_dip(settings)) {
+    int32_t sd_q20 = fixed_mul_q30(fit_fixed(settings->dip_sd_mm, 20), problem->pad->per_unit_q30);
+    int32_t sd_q13 = fixed_clamp(sd_q20 >> 7, DIP_SD_LEAST_Q13, DIP_SD_MOST_Q13);
+    problem->dip_share_q16 = fit_fixed(settings->dip_share, 16);
+    problem->dip_bend_q22 = fixed_div_q26(LOG2E_HALF_Q26 >> 4, sd_q13 * sd_q13);
+  }
+}
+
 static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
   int32_t base_q26 = base_q22 * 16;
   return base_q26 / 2 >= sd_q26 ? 2 * ONE_Q26 : fixed_div_q26(base_q26, sd_q26) | 1;
@@ -975,8 +1036,11 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   *result = (struct fit_tangential){0};
   struct problem problem;
   problem.pad = pad;
+  set_dip(settings, &problem);
+  struct fit_settings of_readings = *settings;
+  of_readings.dip_share = 0.0f; /* readings without room for a dip */
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
-      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
+      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, &of_readings, &problem.readings) ||
       !weigh(array, settings, fit->used, &problem, &pad->room)) {
     state->steps = 0;
     return;

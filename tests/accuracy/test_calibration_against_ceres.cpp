@@ -12,12 +12,13 @@ using test::KnownPad;
 
 namespace {
 
-constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 7; // log gain, dx, dy, o, d, r, b
+constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 7, // log gain, dx, dy, o, d, r, b
+    PROFILE_UNKNOWNS = 7;
 
-// One reading. Blocks: the sensor's, the profile's (log peak, log width, m, q1, q2), the
+// One reading. Blocks: the sensor's, the profile's (log peak, log width, m, q1, q2, h, log B), the
 // placement's (x, y, e, w, q1, q2).
 struct ReadingCost {
-  double x_mm, y_mm, reading_Pa, sd_Pa, tau, earlier_Pa, dip_mm;
+  double x_mm, y_mm, reading_Pa, sd_Pa, tau, earlier_Pa;
   template <typename T>
   bool operator()(const T *sensor, const T *profile, const T *placement, T *residual) const {
     const T u = x_mm + sensor[1] - placement[0], v = y_mm + sensor[2] - placement[1];
@@ -28,7 +29,7 @@ struct ReadingCost {
     const T narrow = exp(-square / (2.0 * NARROW * NARROW * width * width));
     const T value = exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
                     ((1.0 - profile[2]) * wide + profile[2] * narrow -
-                     profile[5] * exp(-square / (2.0 * dip_mm * dip_mm)));
+                     profile[5] * exp(-square / (2.0 * exp(2.0 * profile[6]))));
     const T model = value + sensor[3] + sensor[4] * tau - sensor[5] * earlier_Pa;
     residual[0] = (reading_Pa - model) / sd_Pa;
     return true;
@@ -77,7 +78,9 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
     sensor.fill(0.0);
     sensor[0] = 0.05 * start.normal();
   }
-  std::array<double, 6> profile{std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0};
+  const double dip_mm = DIP_PITCHES * array.pitch_mm;
+  std::array<double, PROFILE_UNKNOWNS> profile{
+      std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0, std::log(dip_mm)};
   std::vector<std::array<double, 6>> own(placements.size());
   ceres::Problem problem;
   const double first_s = placements.front().t_s, last_s = placements.back().t_s;
@@ -99,9 +102,8 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
       const double earlier = placements[i].earlier_Pa[k] * now / (now + REMEMBERS_FROM * peak_Pa);
       const double tau = 2.0 * (placements[i].t_s - first_s) / (last_s - first_s) - 1.0;
       problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, 6, 6>(
-              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier,
-                              DIP_PITCHES * array.pitch_mm}),
+          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, PROFILE_UNKNOWNS, 6>(
+              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier}),
           huber, sensors[k].data(), profile.data(), own[i].data());
     }
     add_prior<6>(problem, own[i].data(), 2, 0.0, solution.spread.force, huber);
@@ -118,11 +120,12 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
       add_prior<SENSOR_UNKNOWNS>(problem, sensor.data(), at, 0.0, sds[at]);
     }
   }
-  add_prior<6>(problem, profile.data(), 0, std::log(near_Pa), assumed.peak);
-  add_prior<6>(problem, profile.data(), 2, assumed.mixing, assumed.mixing_sd);
-  add_prior<6>(problem, profile.data(), 3, 0.0, assumed.ellipse_of_all);
-  add_prior<6>(problem, profile.data(), 4, 0.0, assumed.ellipse_of_all);
-  add_prior<6>(problem, profile.data(), 5, 0.0, assumed.dip);
+  add_prior<PROFILE_UNKNOWNS>(problem, profile.data(), 0, std::log(near_Pa), assumed.peak);
+  add_prior<PROFILE_UNKNOWNS>(problem, profile.data(), 2, assumed.mixing, assumed.mixing_sd);
+  add_prior<PROFILE_UNKNOWNS>(problem, profile.data(), 3, 0.0, assumed.ellipse_of_all);
+  add_prior<PROFILE_UNKNOWNS>(problem, profile.data(), 4, 0.0, assumed.ellipse_of_all);
+  add_prior<PROFILE_UNKNOWNS>(problem, profile.data(), 5, 0.0, assumed.dip);
+  add_prior<PROFILE_UNKNOWNS>(problem, profile.data(), 6, std::log(dip_mm), assumed.dip_log_sd);
 
   ceres::Solver::Options options;
   options.max_num_iterations = 500;

@@ -35,6 +35,7 @@ GOALS = (
     ("ratio_error_p50", "<=", 0.02), ("ratio_error_p95", "<=", 0.05), ("vector_error_p50", "<=", 0.02), ("vector_error_p95", "<=", 0.05),
     ("direction_p90_deg", "<=", 5), ("location_loaded_median_mm", "<=", 0.17), ("location_price_mm", "<=", 0.01), ("equal_ratio_error_p50", "<=", 0.01),
     ("equal_ratio_error_p95", "<=", 0.03), ("equal_location_loaded_mm", "<=", 0.06), ("elongated_false_percent", "<=", 1), ("raw_beyond_2sd_percent", "<=", 10),
+    ("dip_ratio_error_p50", "<=", 0.02), ("dip_ratio_error_p95", "<=", 0.05), ("cast_ratio_error_p50", "<=", 0.02), ("cast_ratio_error_p95", "<=", 0.05),
     ("learned_ratio_error_p50", "<=", 0.02), ("learned_ratio_error_p95", "<=", 0.05), ("told_wrong_said_percent", ">=", 90), ("told_right_said_percent", "<=", 5),
     ("screw_ratio", "<=", 0.02), ("screw_change_p95", "<=", 0.02), ("increment_error_p50_13mm", "<=", 0.05), ("increment_error_p50_9mm", "<=", 0.05),
     ("zero_error_p50_own_tables", "<=", 0.03), ("lift_false_slides", "<=", 0), ("slide_found_percent", ">=", 97), ("slide_latency_p95_ms", "<=", 25),

@@ -20,6 +20,8 @@ OVER = (
      "valid and claiming more than 0.05 and more than two standard deviations"),
     ("elongated_false_surely_percent", "those that claim more than 2.8 standard deviations, which 98 % of a normal distribution in the plane stay below"),
     ("learned_ratio_error_p50, _p95", "the usual touches with the profile of the thickness that each of 20 calibrations found"),
+    ("dip_*", "Q/F = 0.3 on pads of 10 % gain spread whose rubber has the twin's dip of 5 %, calibrated as they are; a pull has no dip of its own"),
+    ("cast_*", "the same on pads like real arrays: gains of 20 %, dip of 5 %, sensors 0.1 mm off their places and 3.5 % apart in width"),
     ("told_wrong_said_percent", "calibrations that say so where 15 % less or more than the true thickness is set; told_right_said_percent: where the true one is"),
     ("raw_beyond_2sd_percent", "Q = 0 on pads of 10 % that were never calibrated: the share with an estimate that reads a pull beyond two of its q_sd_N"),
     ("elongated_false_unflagged_percent", "those of `elongated_false_percent` that the Gaussian fit does not flag as elongated"),
@@ -45,6 +47,9 @@ TABLES = {
     "by_place": ("By place", "Q/F = 0.3. Inner: half a pitch inside the outer sensors (|x| <= 4.5 mm, |y| <= 13.5 mm); border: within half a pitch of one "
                  "outer row of them; corner: of two."),
     "where_misses_lie": ("Where the misses lie", "Q/F = 0.3, by object and place."),
+    "by_cast": ("Pads with a dip", "By what is cast: pads without a dip, with one of 5 %, and like real arrays (gains of 20 %, dip of 5 %, sensors 0.1 mm off their "
+                "places and 3.5 % apart in width). Each calibrated as it is; the same touches. The estimate has the dip that the calibration found. It has neither the "
+                "sensors' places nor their widths, which the calibration finds and the fingertip does not keep: they are what pads like real ones lose by."),
     "by_object": ("By object", ""), "elongated": ("Elongated objects without a load", ""), "by_force": ("By force", "Q/F = 0.3."),
     "light_touches": ("Light touches", ""), "by_osr": ("By oversampling", "Q/F = 0.3."),
     "by_sensors": ("Sensors missing", "Q/F = 0.3; which are missing is drawn for each touch."),

@@ -107,6 +107,7 @@ Unknowns Model::first_guess() const {
       std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
   first.global[layout.log_width()] = std::log(median(widths));
   first.global[layout.mixing()] = assumed_.mixing;
+  first.global[layout.dip_width()] = std::log(DIP_PITCHES);
   return first;
 }
 
@@ -122,13 +123,15 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
   const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
   const double strength = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
-  const double dip_mm = DIP_PITCHES * array_.pitch_mm, dip_per = 0.5 / (dip_mm * dip_mm);
+  const double dip_mm = array_.pitch_mm * std::exp(g[layout.dip_width()]);
+  const double dip_per = 0.5 / (dip_mm * dip_mm);
   const double h = g[layout.dip()];
   const double dip = std::exp(-dip_per * square);
   const double value = strength * ((1.0 - m) * wide + m * narrow - h * dip);
   const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
   const double by_square = core_by_square + strength * h * dip * dip_per;
   const double by_log_width = -2.0 * square * core_by_square;
+  const double by_dip_width = -2.0 * square * strength * h * dip * dip_per;
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
   Reading r;
@@ -147,10 +150,21 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
                            layout.ellipse(0),
                            layout.ellipse(1),
                            layout.dip(),
+                           layout.dip_width(),
                            layout.own_width(k)};
-  const double by[TOUCHED] = {value,       value, by_log_width, strength * (narrow - wide),
-                              by_u,        by_v,  1.0,          tau,
-                              -earlier_Pa, by_q1, by_q2,        -strength * dip,
+  const double by[TOUCHED] = {value,
+                              value,
+                              by_log_width,
+                              strength * (narrow - wide),
+                              by_u,
+                              by_v,
+                              1.0,
+                              tau,
+                              -earlier_Pa,
+                              by_q1,
+                              by_q2,
+                              -strength * dip,
+                              by_dip_width,
                               by_log_width};
   std::copy(at, at + TOUCHED, r.at);
   std::copy(by, by + TOUCHED, r.by);
@@ -183,6 +197,9 @@ std::pair<double, double> Model::prior(int at) const {
   }
   if (at == layout.dip()) {
     return {0.0, assumed_.dip};
+  }
+  if (at == layout.dip_width()) {
+    return {std::log(DIP_PITCHES), assumed_.dip_log_sd};
   }
   if (at < layout.dx(0)) {
     return {0.0, at < layout.ellipse(0) ? 0.0 : assumed_.ellipse_of_all};

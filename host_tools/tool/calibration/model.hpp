@@ -13,7 +13,7 @@
 namespace fingertip::calibrating {
 
 constexpr int LOCAL = 6;  /* x, y, e, w, q1, q2 */
-constexpr int COMMON = 6; /* log A, log s, m, q1, q2 of all, h */
+constexpr int COMMON = 7; /* log A, log s, m, q1, q2 of all, h, log of B in pitches */
 using Local = Eigen::Matrix<double, LOCAL, 1>;
 using LocalSquare = Eigen::Matrix<double, LOCAL, LOCAL>;
 
@@ -31,9 +31,10 @@ struct Layout {
   int own_width(int k) const { return 6 * sensors + COMMON + k; }
   int ellipse(int which) const { return sensors + 3 + which; }
   int dip() const { return sensors + 5; }
+  int dip_width() const { return sensors + 6; }
   int size() const { return 7 * sensors + COMMON; }
 };
-constexpr int TOUCHED = 13; /* global unknowns that a reading depends on */
+constexpr int TOUCHED = 14; /* global unknowns that a reading depends on */
 
 struct Unknowns {
   Eigen::VectorXd global;

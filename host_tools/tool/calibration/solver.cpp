@@ -99,6 +99,7 @@ void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
   global[layout.ellipse(0)] = solution.ellipse_of_all[0];
   global[layout.ellipse(1)] = solution.ellipse_of_all[1];
   global[layout.dip()] = solution.dip;
+  global[layout.dip_width()] = std::log(solution.dip_pitches);
   for (std::size_t i = 0; i < model.placements().size(); i++) {
     const Fitted &fitted = solution.placements[i];
     optimiser.kept[i] = fitted.kept;
@@ -277,13 +278,14 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   }
   solution.dip = global[layout.dip()];
   solution.dip_sd = std::sqrt(std::max(covariance(layout.dip(), layout.dip()), 0.0));
+  solution.dip_pitches = std::exp(global[layout.dip_width()]);
   const auto near = [&](double mixing) {
-    return nearest(mixing, solution.dip, DIP_PITCHES * array.pitch_mm / solution.width_mm);
+    return nearest(mixing, solution.dip, solution.dip_pitches * array.pitch_mm / solution.width_mm);
   };
   const auto [width, dip_share] = near(solution.mixing);
   solution.sigma_mm = solution.width_mm * width;
   solution.dip_share = std::max(dip_share, 0.0);
-  solution.dip_sd_mm = DIP_PITCHES * array.pitch_mm;
+  solution.dip_sd_mm = solution.dip_pitches * array.pitch_mm;
   /* By the width and the mixing, which go against each other. */
   constexpr double STEP = 0.05;
   const double by_mixing =

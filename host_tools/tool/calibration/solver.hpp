@@ -3,14 +3,14 @@
  * The same weight on the same rounded foot is set down at places that are not measured. Then every
  * placement presses with the same force and, on a pad of one thickness, with the same profile; what
  * differs between a reading and that profile at its distance is the sensor's. With placement i at
- * (x, y), its squared distance R from sensor k, c = NARROW and B = DIP_PITCHES pitches,
+ * (x, y), its squared distance R from sensor k and c = NARROW,
  *
  *   reading = g_k A exp(e - 2 w) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2)
  *                                 - h exp(-R / 2 B^2)] + o_k + d_k tau - r_k M,
  *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
  *   M = sum over earlier placements of what rubber has not let go of yet (remember)
  *
- * One profile for all: peak A, width s and mixing m are fitted along, so nothing need be known of
+ * One profile for all: peak A, widths s and B and mixing m are fitted along, so nothing need be known of
  * the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the pressure
  * under spheres and flat ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and 10 N),
  * where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force, 2 pi A s^2.
@@ -89,6 +89,11 @@ struct Assumptions {
   double reading_share = 0.003; /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
   double dip = 0.05;                    /* of h: 0.05 on real pads, 0 on the twin's */
+  /* Of log B. So narrow because zeros and a model that is off look like another width where the
+   * readings tell little: with 0.05 and more, places and forces on the recording of
+   * host_tools/report/real that chooses are worse. Readings that tell it move it all the same: the
+   * dip of the twin's pads is 1.6 pitches wide, and is found within some per cent. */
+  double dip_log_sd = 0.03;
   /* Of log A from that of what a strong placement reads, which was near a sensor: without it a
    * narrow peak that is far from every sensor explains a few placements as well. */
   double peak = 0.15;
@@ -96,9 +101,9 @@ struct Assumptions {
 
 /* Width of the narrow part of the profile over that of the wide one. */
 constexpr double NARROW = 0.64;
-/* Standard deviation of the dip's Gaussian, in pitches: about as wide as the array can still tell
- * from zeros that were off. As the assumed spread of forces, chosen on the recording of
- * host_tools/report/real that chooses. */
+/* Standard deviation B of the dip's Gaussian that is expected, in pitches: about as wide as the
+ * array can still tell from zeros that were off. As the assumed spread of forces, chosen on the
+ * recording of host_tools/report/real that chooses. */
 constexpr double DIP_PITCHES = 2.3;
 /* An own width b takes b R / S^2 of a reading. The readings that tell where a contact is have
  * R / S^2 of 1 to 2. */
@@ -138,6 +143,7 @@ struct Solution {
   double peak_Pa = 0.0; /* A, of a sensor of mean gain */
   double width_mm = 0.0, mixing = 0.0;
   double dip = 0.0, dip_sd = 0.0; /* h */
+  double dip_pitches = 0.0;       /* B */
   /* Of the firmware's model that is nearest to the profile: one Gaussian less a dip. */
   double sigma_mm = 0.0, sigma_sd_mm = 0.0, dip_share = 0.0, dip_sd_mm = 0.0;
   std::vector<Fitted> placements; /* as given */

@@ -253,7 +253,7 @@ private:
     std::vector<std::pair<double, double>> curve;
     for (double r = 0.0; r <= 30.0; r += 0.5) {
       const auto gauss = [&](double sd) { return std::exp(-0.5 * r * r / (sd * sd)); };
-      const double dip_sd = calibrating::DIP_PITCHES * card_.measured.array.pitch_mm;
+      const double dip_sd = solution.dip_sd_mm;
       curve.push_back({r, (1.0 - solution.mixing) * gauss(solution.width_mm) +
                               solution.mixing * gauss(calibrating::NARROW * solution.width_mm) -
                               solution.dip * gauss(dip_sd)});

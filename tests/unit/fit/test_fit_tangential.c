@@ -21,6 +21,8 @@ static struct fit_array array;
 static struct fit_pad pad;
 static struct pad_profile profile;
 static struct fit_settings settings;
+static double dip_share; /* of the rubber */
+#define DIP_SD_mm 15.0
 
 struct contact {
   double x_mm, y_mm, force_N, qx_N, qy_N, spread_mm2;
@@ -57,6 +59,7 @@ void setUp(void) {
   settings.iterations = 4;
   settings.noise_Pa_q10 = 2048;
   fit_set_errors(&settings, 0.005f, 0.0065f);
+  dip_share = 0.0;
 }
 
 void tearDown(void) {}
@@ -74,6 +77,12 @@ static double pressure_Pa(const struct contact *contact, double x_mm, double y_m
     sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)profile.tangential[j].moment_mm /
            (v * v) * exp(-(dx * dx + dy * dy) / (2 * v));
   }
+  double middle = 0.0, r2 = dx * dx + dy * dy;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    double v = pow((double)profile.normal[j].sd_mm, 2) + contact->spread_mm2;
+    middle += contact->force_N * (double)profile.normal[j].share / v;
+  }
+  sum -= dip_share * middle * exp(-r2 / (2 * DIP_SD_mm * DIP_SD_mm));
   return 1e6 * sum / 6.283185307179586;
 }
 
@@ -171,6 +180,14 @@ static void test_pads_of_5_to_20_mm(void) {
 static void test_sensors_missing(void) {
   judge_pad(12.0, ALL & ~(1 << 7), 0.05, 0.005, 290, 0);
   judge_pad(12.0, ALL & ~(1 << 0 | 1 << 13), 0.05, 0.005, 290, 0);
+}
+
+static void test_a_dip_that_is_known_is_in_the_model(void) {
+  dip_share = 0.05;
+  settings.dip_share = 0.05f;
+  settings.dip_sd_mm = (float)DIP_SD_mm;
+  judge_pad(12.0, ALL, 0.03, 0.003, 280, 0);
+  judge_pad(12.0, ALL & ~(1 << 7), 0.05, 0.005, 280, 0);
 }
 
 static void expect_none(const int32_t *readings, uint32_t usable) {
@@ -572,6 +589,7 @@ int main(void) {
   RUN_TEST(test_contacts_of_the_model_are_found);
   RUN_TEST(test_pads_of_5_to_20_mm);
   RUN_TEST(test_sensors_missing);
+  RUN_TEST(test_a_dip_that_is_known_is_in_the_model);
   RUN_TEST(test_too_few_sensors_give_nothing);
   RUN_TEST(test_no_fit_gives_nothing);
   RUN_TEST(test_two_contacts_give_nothing);

@@ -77,9 +77,13 @@ static const struct pad_profile profile = {
     .tangential_scale = 1.0f,
 };
 
-/* After `fit` of the same readings and the frames before, which are not counted. */
+/* On a pad with a dip, after `fit` of the same readings and the frames before, which are not
+ * counted. */
 static void tangential(void) {
-  fit_tangential_load(&layout, &pad, job.pressure_Pa_q10, &chosen, &contact, &tangential_state,
+  struct fit_settings settings = chosen;
+  settings.dip_share = 0.0125f;
+  settings.dip_sd_mm = 14.0f;
+  fit_tangential_load(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state,
                       &tangential_result);
   job.x_mm = tangential_result.x_mm;
   job.y_mm = tangential_result.y_mm;

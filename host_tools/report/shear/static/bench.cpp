@@ -8,14 +8,24 @@ extern "C" {
 #include "ms58xx/ms58xx.h"
 }
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <stdexcept>
 
 namespace fingertip::shear {
 
 namespace {
+
+// In turn, each with the scale that a known weight tells.
+PadOf weighed(std::vector<KnownPad> pads, double layer_mm, Objects &objects) {
+  const Object &sphere15 = objects.on(layer_mm, "sphere15");
+  Fingertip fingertip(profile_of(layer_mm));
+  for (KnownPad &pad : pads) {
+    pad = fingertip.weighed(pad, sphere15);
+  }
+  return [pads = std::move(pads)](std::size_t pad) { return pads[pad % pads.size()]; };
+}
 
 bool is_on_array(double x_mm, double y_mm) {
   return std::abs(x_mm) <= 9.0 && std::abs(y_mm) <= 18.0;
@@ -67,13 +77,22 @@ Case Bench::usual() {
 }
 
 PadOf Bench::calibrated_on(double layer_mm) {
-  const Object &sphere15 = objects.on(layer_mm, "sphere15");
-  Fingertip fingertip(profile_of(layer_mm));
-  const auto known = std::make_shared<std::vector<KnownPad>>();
+  std::vector<KnownPad> pads;
   for (const truth::Pad &pad : calibrations) {
-    known->push_back(fingertip.weighed(pad, sphere15));
+    pads.push_back({pad, {}});
   }
-  return [known](std::size_t pad) { return (*known)[pad % known->size()]; };
+  return weighed(std::move(pads), layer_mm, objects);
+}
+
+PadOf Bench::calibrated_as(const truth::PadOptions &kind) {
+  std::vector<KnownPad> pads;
+  for (const truth::Calibrated &session :
+       truth::calibrations_of({kind}, options.pads, options.seed, options.cache)) {
+    Cast cast{session.dip_share, {}};
+    std::copy(session.seats.begin(), session.seats.end(), cast.seats.begin());
+    pads.push_back({truth::calibrated_pad(session), {}, session.shape, cast});
+  }
+  return weighed(std::move(pads), LAYER_mm, objects);
 }
 
 std::size_t Bench::units(const Case &c) const {
@@ -114,7 +133,8 @@ Results Bench::run(const std::string &table, const Case &c, const pad_profile *t
       Judged &j = judged[unit * TOUCHES + t];
       j.truth = draw(c, fingertip.array(), random);
       j.object = random.next() % c.objects.size();
-      const Readings base = base_Pa(fingertip.array(), *c.objects[j.object], j.truth, c.block);
+      const Readings base = base_Pa(fingertip.array(), *c.objects[j.object], j.truth, c.block,
+                                    pad.cast);
       const std::uint32_t usable = truth::choose_sensors(c.sensors, errors);
       // Without a positive reading among the sensors in use there is nothing to judge.
       t += fingertip.feel(base, pad, noise_Pa(c.osr), usable, errors, j.said);

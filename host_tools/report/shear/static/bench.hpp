@@ -54,6 +54,8 @@ struct Bench {
   Case usual();
   // Calibrated pads under rubber of this thickness.
   PadOf calibrated_on(double layer_mm);
+  // Calibrated as they are, on LAYER_mm.
+  PadOf calibrated_as(const truth::PadOptions &pads);
   std::size_t units(const Case &c) const;
   twin::Touch draw(const Case &c, const fit_array &array, Random &random) const;
   // Cases of one table draw the same touches.

@@ -22,23 +22,24 @@ constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--only pads]
                         "  --seed S     of pads and touches, 20221015 by default\n"
                         "  --pads N     pads of each case, 1500 by default; a fifth for some\n"
                         "  --only pads  only by pad and load, and by place\n"
+                        "  --only cast  only pads like those that are cast\n"
                         "  --cache DIR  folder of the contact tables\n";
 
 ordered_json measure(const Options &options) {
   ordered_json out;
   out["shear_seed"] = options.seed;
   out["shear_pads"] = options.pads;
-  if (!options.only.empty() && options.only != "pads") {
-    throw std::runtime_error("--only " + options.only + " is no table; give pads");
+  if (!options.only.empty() && options.only != "pads" && options.only != "cast") {
+    throw std::runtime_error("--only " + options.only + " is no table; give pads or cast");
   }
   Bench bench(options);
   if (!options.only.empty()) {
-    judge_pads(bench, out);
+    options.only == "pads" ? judge_pads(bench, out) : judge_cast(bench, out);
     return out;
   }
   for (const auto judge :
        {judge_pads, judge_objects, judge_elongated, judge_limits, judge_thickness, judge_learned,
-        judge_bounds, judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
+        judge_cast, judge_bounds, judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
     judge(bench, out);
   }
   return out;

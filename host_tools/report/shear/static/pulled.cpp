@@ -38,7 +38,7 @@ pad_profile profile_of(double thickness_mm) {
 }
 
 Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
-                 const twin::BlockTable *block) {
+                 const twin::BlockTable *block, const Cast &cast) {
   Readings base{};
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
@@ -49,10 +49,12 @@ Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch
   const twin::BlockTable::Load added{touch.force_N, touch.pull_x_N, touch.pull_y_N,
                                      object.pressure.contact_radius_mm(touch.force_N)};
   for (std::size_t k = 0; k < SENSORS; k++) {
-    const double dx = pitch_mm * static_cast<double>(array.x[k]) - touch.x_mm;
-    const double dy = pitch_mm * static_cast<double>(array.y[k]) - touch.y_mm;
+    const twin::Pad::Seat &seat = cast.seats[k];
+    const double x_mm = pitch_mm * static_cast<double>(array.x[k]) + seat.dx_mm;
+    const double y_mm = pitch_mm * static_cast<double>(array.y[k]) + seat.dy_mm;
+    const double dx = (x_mm - touch.x_mm) / seat.width, dy = (y_mm - touch.y_mm) / seat.width;
     const double along = c * dx + s * dy, across = c * dy - s * dx;
-    base[k] = object.pressure.base_pressure_Pa(touch.force_N, along, across);
+    base[k] = object.pressure.base_pressure_Pa(touch.force_N, along, across, cast.dip_share);
     if (pulls) {
       base[k] += object.traction.base_pressure_Pa(load, along, across);
     }
@@ -75,6 +77,9 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   const truth::Pad &pad = known.pad;
   fit_settings settings = truth::settings_for(pad, noise_Pa);
   settings.cut_noises = 0; // as where a profile acts
+  fit_settings of_load = settings;
+  of_load.dip_share = static_cast<float>(known.shape.dip_share);
+  of_load.dip_sd_mm = static_cast<float>(known.shape.dip_sd_mm);
   fit_result fit;
   fit_tangential found{};
   fit_tangential_state state{};
@@ -92,7 +97,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
     }
     found = {};
     if (tangential_is_worthwhile(&fit, saturated)) {
-      fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &state, &found);
+      fit_tangential_load(&array_, &fit_pad_, readings.data(), &of_load, &fit, &state, &found);
     } else {
       state = {};
     }
@@ -101,6 +106,10 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   scales.force_scale = static_cast<float>(known.force_scale.value_or(1.0));
   tangential_settings published{};
   tangential_use(&published, &profile_, &scales, known.force_scale.has_value());
+  if (known.shape.dip_share > 0.0) {
+    tangential_use_dip(&published, of_load.dip_share, of_load.dip_sd_mm,
+                       static_cast<float>(known.shape.sigma_mm));
+  }
   published.tangential_scale_sd = 0.0F; // the scales are exact here
   contact_input input{};
   input.contact = true;
@@ -133,7 +142,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   return true;
 }
 
-KnownPad Fingertip::weighed(const truth::Pad &pad, const Object &sphere15) {
+KnownPad Fingertip::weighed(KnownPad pad, const Object &sphere15) {
   constexpr double STEP_mm = 4.5;
   Random none(0, 0, 0);
   std::vector<double> scales;
@@ -145,11 +154,13 @@ KnownPad Fingertip::weighed(const truth::Pad &pad, const Object &sphere15) {
     Said said;
     // A noise of nothing is none that the fit takes.
     constexpr double QUIET_Pa = 0.1;
-    if (feel(base_Pa(array_, sphere15, touch), {pad, {}}, QUIET_Pa, ALL_SENSORS, none, said)) {
+    if (feel(base_Pa(array_, sphere15, touch, nullptr, pad.cast), pad, QUIET_Pa, ALL_SENSORS, none,
+             said)) {
       scales.push_back(touch.force_N / said.gaussian_force_N);
     }
   }
-  return {pad, truth::quantile(scales, 0.5)};
+  pad.force_scale = truth::quantile(scales, 0.5);
+  return pad;
 }
 
 } // namespace fingertip::shear

@@ -51,9 +51,16 @@ constexpr std::uint32_t ALL_SENSORS = (1u << SENSORS) - 1u;
 // Of a pad of this thickness without end.
 pad_profile profile_of(double thickness_mm);
 
+// How cast rubber and its sensors differ from a bonded layer over places on a grid: the twin's
+// effects dip, places and widths. A pull has no dip.
+struct Cast {
+  double dip_share = 0.0;
+  std::array<twin::Pad::Seat, SENSORS> seats{};
+};
+
 // On the base, Pa; block: the pad that ends, nullptr if it does not.
 Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
-                 const twin::BlockTable *block = nullptr);
+                 const twin::BlockTable *block = nullptr, const Cast &cast = {});
 
 // What the firmware publishes, in the scales of its calibration: the corrected location and force
 // where the estimate is valid, and the Gaussian's.
@@ -68,6 +75,8 @@ struct Said {
 struct KnownPad {
   truth::Pad pad;
   std::optional<double> force_scale; // force over 2 pi p0 sigma^2; of a calibrated pad only
+  calibrating::Shape shape{};        // that the calibration found
+  Cast cast{};
 };
 
 // The fit and the estimate as the firmware runs them, with one pad's profile. Copies share nothing.
@@ -82,7 +91,7 @@ public:
             Random &random, Said &said);
   // With the scale that a known weight tells: a sphere of 15 mm under 3 N at nine places around the
   // middle, the median of them.
-  KnownPad weighed(const truth::Pad &pad, const Object &sphere15);
+  KnownPad weighed(KnownPad pad, const Object &sphere15);
 
 private:
   fit_array array_;

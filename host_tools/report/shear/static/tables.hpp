@@ -14,6 +14,7 @@ void judge_elongated(Bench &bench, nlohmann::ordered_json &out);
 void judge_limits(Bench &bench, nlohmann::ordered_json &out);
 void judge_thickness(Bench &bench, nlohmann::ordered_json &out);
 void judge_learned(Bench &bench, nlohmann::ordered_json &out);
+void judge_cast(Bench &bench, nlohmann::ordered_json &out);
 void judge_bounds(Bench &bench, nlohmann::ordered_json &out);
 void judge_rubber(Bench &bench, nlohmann::ordered_json &out);
 void judge_screws(Bench &bench, nlohmann::ordered_json &out);

@@ -40,9 +40,6 @@ constexpr std::size_t JUDGED_EVERY = 2; // the tool does it after each placement
 constexpr double RAW_GAIN_SD = 0.10;    // of a pad never calibrated
 constexpr double NOISE_Pa = 5.0;
 enum Stream : std::uint64_t { TAP_PLACES = 401 };
-// As real arrays are; and each of gains and dip alone.
-constexpr PadOptions LIKE_REAL{20.0, 0.0, 0.1, 5.0, 3.5};
-constexpr PadOptions GAINS_20{20.0}, DIP{10.0, 0.0, 0.0, 5.0};
 
 struct Options {
   std::uint64_t seed = 20000;

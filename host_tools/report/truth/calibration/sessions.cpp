@@ -253,7 +253,9 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
                         judgement.solution.reading_sd,
                         scale->scale,
                         scale->sd,
-                        calibrating::shape_of(judgement.solution)};
+                        calibrating::shape_of(judgement.solution),
+                        pad.rubber().dip_share(),
+                        pad.rubber().seats()};
         for (std::size_t k = 0; k < truth.size(); k++) {
           left.remaining_gain.push_back(truth[k] / judgement.solution.gain[k]);
         }

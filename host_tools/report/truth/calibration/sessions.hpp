@@ -28,6 +28,10 @@ struct PadOptions {
       nullptr; // of rubber that ends; of sensors that are in their places
 };
 
+// As real arrays are (host_tools/report/real); and each of gains and dip alone.
+constexpr PadOptions LIKE_REAL{20.0, 0.0, 0.1, 5.0, 3.5};
+constexpr PadOptions GAINS_20{20.0}, DIP{10.0, 0.0, 0.0, 5.0};
+
 // Fifteen sensors under a layer, over time. What touches it is a table of the twin.
 class SessionPad {
 public:
@@ -44,6 +48,8 @@ public:
   // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors'
   // mean.
   std::vector<double> settled_gains() const;
+
+  const twin::Pad &rubber() const { return pad_; }
 
 private:
   void report(double after_s, double share);
@@ -102,11 +108,13 @@ private:
 };
 
 // What a calibration left: true over estimated gains, what the solver says of their sds, and the
-// response that it found.
+// response that it found. And how the pad is.
 struct Calibrated {
   std::vector<double> remaining_gain, gain_sd; // [sensor]
   double force_scale, force_scale_sd;
   calibrating::Shape shape;
+  double dip_share;
+  std::vector<twin::Pad::Seat> seats; // [sensor]
 };
 // Of a good session of thirty placements on a pad of its own, until one is accepted.
 Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::uint64_t seed);

@@ -21,7 +21,6 @@ constexpr double GAIN_SIGMAS_MAX = 3.0; // as the twin's pads
 constexpr double EDGE_mm = 0.4;         // as the twin's cylinders
 constexpr double CALIBRATED_LAYER_mm = 12.0;
 constexpr std::size_t SESSIONS_MAX = 100, PADS_PER_SESSION = 10;
-constexpr PadOptions SESSION_PADS[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}};
 
 double normal_within_limit(Random &random) {
   for (;;) {
@@ -89,15 +88,27 @@ Pad calibrated_pad(const Calibrated &session) {
   return pad;
 }
 
+std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, std::size_t judged,
+                                        std::uint64_t seed,
+                                        const std::filesystem::path &cache_directory) {
+  const Feet feet(CALIBRATED_LAYER_mm, cache_directory);
+  std::vector<Calibrated> sessions(
+      std::clamp<std::size_t>(judged / PADS_PER_SESSION, 1, SESSIONS_MAX));
+  const std::uint64_t stream = stream_of("calibrated sessions");
+  twin::in_parallel(sessions.size(), [&](std::size_t i) {
+    sessions[i] =
+        calibrated_session(feet, kinds[i % kinds.size()], Random(seed, stream, i).next());
+  });
+  return sessions;
+}
+
 CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
                                const std::filesystem::path &cache_directory) {
-  const Feet feet(CALIBRATED_LAYER_mm, cache_directory);
-  CalibratedPads pads(std::clamp<std::size_t>(judged / PADS_PER_SESSION, 1, SESSIONS_MAX));
-  const std::uint64_t stream = stream_of("calibrated sessions");
-  twin::in_parallel(pads.size(), [&](std::size_t i) {
-    const PadOptions &kind = SESSION_PADS[i % std::size(SESSION_PADS)];
-    pads[i] = calibrated_pad(calibrated_session(feet, kind, Random(seed, stream, i).next()));
-  });
+  CalibratedPads pads;
+  for (const Calibrated &session : calibrations_of({{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}}, judged,
+                                                   seed, cache_directory)) {
+    pads.push_back(calibrated_pad(session));
+  }
   return pads;
 }
 

@@ -56,9 +56,14 @@ Pad raw_pad(double spread, double told, Random &random);
 // accepted.
 Pad calibrated_pad(const Calibrated &session);
 
-using CalibratedPads = std::vector<Pad>;
 // One for every ten pads that are judged, a hundred at most: a calibration each, which so many
-// pads have in turn. Half of them are of pads whose sensors relax by 9 to 26 % and sit 0.1 mm (sd)
+// pads have in turn. The kinds of pads take turns.
+std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, std::size_t judged,
+                                        std::uint64_t seed,
+                                        const std::filesystem::path &cache_directory);
+
+using CalibratedPads = std::vector<Pad>;
+// What such calibrations left of the gains. Half of them are of pads whose sensors relax by 9 to 26 % and sit 0.1 mm (sd)
 // off.
 CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
                                const std::filesystem::path &cache_directory);
