@@ -295,7 +295,7 @@ class Demo(Folder):
 
     def test_a_monitor_that_fails(self):
         self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor('case $1 in set | calibrate) ;; *) exit 3 ;; esac')
+        self.monitor('case $1 in set | calibrate | info) ;; *) exit 3 ;; esac')
         self.assert_fails("the monitor ended with an error", "ready")
 
     def test_a_calibration_that_fails(self):

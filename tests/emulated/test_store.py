@@ -108,7 +108,8 @@ class Store(unittest.TestCase):
         self.assertTrue(10 < power["brought"] < power["cuts"] - 10, power)
         quiet, storing, slowly = (found["flash"][name] for name in ("quiet", "storing", "storing_slowly"))
         self.assertEqual((quiet["stored"], storing["stored"], slowly["stored"]), (0, 3, 3))
-        self.assertEqual(quiet["frames"], storing["frames"])
+        # None is lost or skipped; the last may still be on its way at the end.
+        self.assertLessEqual(abs(quiet["frames"] - storing["frames"]), 1)
         for run_of in (storing, slowly):
             self.assertLess(abs(run_of["latency_us"]["median"] - quiet["latency_us"]["median"]), 3)
             # The main loop looks after the store beside the frames, and for a load, 41 us at most. 35 us are measured.

@@ -62,8 +62,8 @@ class FromRecording(CalibrateTest):
         before, after = re.search(r"location off by +([\d.]+) mm +([\d.]+) mm", out).groups()
         self.assertLess(float(after), 0.5 * float(before))
         scale, sd = re.search(r"force scale +1\.000 +(\d\.\d+) +sd (\d\.\d+)", out).groups()
-        # 1.09 for a fit that does not know how wide the contact is; a known width holds 2 % more of the force.
-        self.assertAlmostEqual(float(scale) * mean_gain, 1.07, delta=0.02)
+        # The volume of the Gaussian is 9 % less than the force.
+        self.assertAlmostEqual(float(scale) * mean_gain, 1.09, delta=0.02)
         self.assertLess(float(sd), 0.03)
         out, _ = self.calibrate("--from", recording, "--dry-run", "--weight", "306")
         self.assertAlmostEqual(float(re.search(r"force scale +1\.000 +(\d\.\d+)", out)[1]), float(scale), delta=0.005)
