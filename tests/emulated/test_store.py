@@ -112,8 +112,8 @@ class Store(unittest.TestCase):
         self.assertLessEqual(abs(quiet["frames"] - storing["frames"]), 1)
         for run_of in (storing, slowly):
             self.assertLess(abs(run_of["latency_us"]["median"] - quiet["latency_us"]["median"]), 3)
-            # The main loop looks after the store beside the frames, and for a load, 41 us at most. 35 us are measured.
-            self.assertLess(run_of["latency_us"]["p99"] - quiet["latency_us"]["p99"], 41)
+            # The main loop looks after the store beside the frames, for a load, and for the second processor. 48 us are measured.
+            self.assertLess(run_of["latency_us"]["p99"] - quiet["latency_us"]["p99"], 54)
 
 
 if __name__ == "__main__":
