@@ -42,7 +42,8 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --wait-open          power on only when the pseudo-terminal was opened
   --pace real|wall|fast
                        real: never faster than the clock on the wall, a lag is dropped (default with --pty and
-                       --usbredir); wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
+                       --usbredir). While a client of the pseudo-terminal does not take what waits for it, emulated time
+                       waits too, 2 s at most; wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
                        a client writes arrives at the time of its writing, answers never come early, a lag is caught
                        up and delays them, and the report has the largest of each second on the wall (wall_lag_s);
                        fast: as fast as possible
@@ -275,7 +276,8 @@ async function run(options) {
     const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     if (stepped) runStepped(machine, stepped, end_ns);
     else for (;;) {
-      while (usbredir?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
+      const reader = usbredir ?? (options.pace === 'real' ? pty : null);
+      while (reader?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
       let target = Math.min(end_ns, machine.time.nanos + slice_ns);
       if (options.pace === 'wall') {
         target = Math.min(end_ns, Math.max(target, Math.min(wall_ns(), machine.time.nanos + WALL_CATCH_UP_NS)));

@@ -14,6 +14,8 @@ import { InputError, inWords } from '../errors.mjs';
 
 const PYTHON = '/usr/bin/python3';
 const WINDOW = 16384;
+/** A client that takes nothing for longer does not mean to. */
+const READER_GRACE_MS = 2000;
 
 export class PtyPort {
   static start(link) {
@@ -29,6 +31,7 @@ export class PtyPort {
     this.failure = null;
     this.cdc = null;
     this.outstanding = 0;
+    this.full_ms = null;
     this.received = Buffer.alloc(0);
     this.early = [];
     this.baud = null;
@@ -108,6 +111,16 @@ export class PtyPort {
   #taken(count) {
     this.outstanding = Math.max(0, this.outstanding - count);
     if (this.outstanding < WINDOW) this.cdc?.setBlocked(false);
+  }
+
+  /** A client of a busy machine has not taken what waits for it yet. */
+  waitsForReader(now_ms) {
+    if (!this.isOpen || this.outstanding < WINDOW) {
+      this.full_ms = null;
+      return false;
+    }
+    this.full_ms ??= now_ms;
+    return now_ms - this.full_ms < READER_GRACE_MS;
   }
 
   /** Give the client up to a second to take what was sent. */
