@@ -279,7 +279,7 @@ private:
         continue;
       }
       card_.gain[k] = solution.gain[place];
-      card_.gain_sd[k] = GAIN_SD_FACTOR * solution.gain_sd[place];
+      card_.gain_sd[k] = solution.gain_sd[place];
       spread.push_back(std::log(card_.gain[k]));
       sds.push_back(card_.gain_sd[k]);
       if (card_.is_calibrated) {

@@ -40,10 +40,6 @@ constexpr double DRIFT_MAX_Pa_min = 40.0; /* a sensor against the median of all 
 constexpr double READS_OF_FORCE = 0.87;
 constexpr double WEIGHT_OFF_MAX = 0.22; /* force by the readings, over the weight, less 1 */
 
-/* Of the solver's standard deviations: presses on the sensors say more of the gains than the solver
- * takes them to. Chosen on seeds 1 to 6. */
-constexpr double GAIN_SD_FACTOR = 0.85;
-
 struct Finding {
   std::string code; /* dead_sensor, loose_sensor, swapped_wires, tilted_skin, thin_skin, drift,
                        wrong_weight */
