@@ -35,7 +35,7 @@ emulate() {
   name=$1 serial=$2 scenario=$3 length=$4
   shift 4
   node host_tools/simulation/emulator/main.mjs --board "$board" --image "build/$board/fingertip-$board.bin" \
-    --serial "$serial" --scenario "$scenario" --seconds "$length" --pty $out/$name.tty --wait-open "$@" > $out/$name.log 2>&1 &
+    --serial "$serial" --scenario "$scenario" --seconds "$length" --pty $out/$name.tty --wait-open --wait-reader "$@" > $out/$name.log 2>&1 &
 }
 
 # NAME PROCESS

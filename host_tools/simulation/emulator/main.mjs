@@ -40,10 +40,10 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
 
   --pty LINK           serve the CDC port as a pseudo-terminal, LINK is a symbolic link to it
   --wait-open          power on only when the pseudo-terminal was opened
+  --wait-reader        while a client of the pseudo-terminal does not take what lies ready, emulated time waits, 2 s at most
   --pace real|wall|fast
                        real: never faster than the clock on the wall, a lag is dropped (default with --pty and
-                       --usbredir). While a client of the pseudo-terminal does not take what waits for it, emulated time
-                       waits too, 2 s at most; wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
+                       --usbredir); wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
                        a client writes arrives at the time of its writing, answers never come early, a lag is caught
                        up and delays them, and the report has the largest of each second on the wall (wall_lag_s);
                        fast: as fast as possible
@@ -79,7 +79,7 @@ const OPTIONS = {
   seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
   revision: { type: 'string', default: '2' }, flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
-  pty: { type: 'string' }, stepped: { type: 'boolean' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
+  pty: { type: 'string' }, stepped: { type: 'boolean' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, 'wait-reader': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'sync-strobe': { type: 'string' }, 'sync-log': { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
   vcd: { type: 'string' }, 'vcd-from': { type: 'string', default: '0' }, 'vcd-to': { type: 'string' }, 'rise-ns': { type: 'string' },
   report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
@@ -138,6 +138,7 @@ function parseOptions(argv) {
   if (values.stepped && values.pace !== 'fast') throw new InputError('--stepped has no --pace: time passes as its program asks');
   if (values.pace === 'wall' && values.usbredir) throw new InputError('--pace wall and --usbredir exclude each other');
   if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
+  if (values['wait-reader'] && !values.pty) throw new InputError('--wait-reader needs --pty');
   return values;
 }
 
@@ -276,7 +277,7 @@ async function run(options) {
     const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     if (stepped) runStepped(machine, stepped, end_ns);
     else for (;;) {
-      const reader = usbredir ?? (options.pace === 'real' ? pty : null);
+      const reader = usbredir ?? (options['wait-reader'] ? pty : null);
       while (reader?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
       let target = Math.min(end_ns, machine.time.nanos + slice_ns);
       if (options.pace === 'wall') {
