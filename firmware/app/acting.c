@@ -27,8 +27,8 @@ void app_use_shape(struct app *app) {
   const float dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
   const float dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
 #if FT_WITH_TANGENTIAL
-  app->shapes_dip_share = dip_share;
-  app->shapes_dip_sd_mm = dip_sd_mm;
+  app->dip_share = dip_share;
+  app->dip_sd_mm = dip_sd_mm;
 #endif
   found = profile ? NULL : found;
   settings->prior_sigma_mm =
@@ -45,8 +45,8 @@ static void use_tangential_scales(struct app *app) {
   if (app->pad) {
     tangential_use(&app->tangential_settings, app->pad, &app->contact_settings,
                    app->calibration != NULL);
-    if (app->calibration && app->shapes_dip_share > 0.0f) {
-      tangential_use_dip(&app->tangential_settings, app->shapes_dip_share, app->shapes_dip_sd_mm,
+    if (app->calibration && app->dip_share > 0.0f) {
+      tangential_use_dip(&app->tangential_settings, app->dip_share, app->dip_sd_mm,
                          millimetres(app->calibration->sigma_um));
     }
   }

@@ -182,13 +182,17 @@ static bool is_sensor_doubtful(const struct app *app) {
 
 static struct contact_input input_of(const struct app *app) {
   const struct frame *frame = &app->frame;
-  return (struct contact_input) {
-    .t_us = frame->t_us, .contact = app->conditioned.contact, .tared = app->conditioned.tared,
-    .zero_doubtful = app->conditioned.zero_doubtful, .sensor_doubtful = is_sensor_doubtful(app),
+  return (struct contact_input){
+    .t_us = frame->t_us,
+    .contact = app->conditioned.contact,
+    .tared = app->conditioned.tared,
+    .zero_doubtful = app->conditioned.zero_doubtful,
+    .sensor_doubtful = is_sensor_doubtful(app),
     .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
     .saturated = frame->saturated,
 #if FT_WITH_FIT
-    .fit = app->conditioned.contact ? &app->fit : NULL, .calibrated = app->calibration != NULL,
+    .fit = app->conditioned.contact ? &app->fit : NULL,
+    .calibrated = app->calibration != NULL,
 #endif
 #if FT_WITH_TANGENTIAL
     .tangential = app->tangential,

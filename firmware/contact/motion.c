@@ -10,8 +10,7 @@
 
 /* Ages of the frames that make a pair, and by how much what the load explains may be wrong over it.
  * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it feels
- * the lift that came before, for as long as it reaches back. The brisk one does not: it finds a
- * slide within a quick lift 10 to 18 ms sooner. Of 312 lifts with a dead travel of 2 mm (seed 211)
+ * the lift that came before, for as long as it reaches back. The brisk one does not. Of 312 lifts with a dead travel of 2 mm (seed 211)
  * half of what BRIEF leaves unexplained, or two thirds of FLOOR_um, let one to two pass for slides.
  */
 struct pair_spans {

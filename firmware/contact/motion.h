@@ -11,10 +11,10 @@
  * from an earlier span of time to the latest. Location and load are means over the same frames, so
  * that no course of a load makes an elastic contact slide.
  *
- * There are three pairs of spans. The brief one shows a slide of 7 mm/s or more. The brisk one shows
- * one of 15 mm/s or more sooner, and within a lift: it does not reach back to where the load still
- * rose. The slow one is for a creep of 1 mm/s or more. It counts only as long as the contact still
- * moves.
+ * There are three pairs of spans. The brief one shows a slide of 7 mm/s or more. The brisk one
+ * shows one of 15 mm/s or more sooner, and within a lift: it does not reach back to where the load
+ * still rose. The slow one is for a creep of 1 mm/s or more. It counts only as long as the contact
+ * still moves.
  *
  * Limits: a contact that rolls moves without a load as a sliding one does. So does one carried
  * along by an object that is held elsewhere too. Friction that rises with a slide by more than 1 /

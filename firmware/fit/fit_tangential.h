@@ -13,10 +13,10 @@
  * Elongation is in the model because a long contact looks like a pulled one to a fit without it. A
  * prior holds it near round. Where a calibration has found the dip around a contact
  * (fit_settings), the model has it too: without, a dip of 5 % reads as a pull of 0.4 of the force.
- * An estimate that is clearly long, or leaves a residual that the model
- * does not explain, is not reported. Readings count by their noise, gain error and model error.
- * Fixed point, the same bits on every machine, any sensors missing. NUMERICS.md has the derivation,
- * the conditioning and the limits.
+ * An estimate that is clearly long, or leaves a residual that the model does not explain, is not
+ * reported. Readings count by their noise, gain error and model error. Fixed point, the same bits
+ * on every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the
+ * limits.
  *
  * At most 40 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *

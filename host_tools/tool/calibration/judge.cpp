@@ -3,7 +3,6 @@
 extern "C" {
 #include "common/contact_flags.h"
 #include "fit/fit.h"
-#include "fit/fit_limits.h"
 }
 
 #include <algorithm>
@@ -52,12 +51,6 @@ double median(std::vector<double> values) {
 double rms_beyond(const std::vector<double> &values, const std::vector<double> &sds) {
   const double all = rms(values), chance = rms(sds);
   return std::sqrt(std::max(all * all - chance * chance, 0.0));
-}
-
-/* Of the peak: what the dip's model is off by looks like zeros that were off. The firmware takes
- * it for as much. */
-double dip_as_offset(const Solution &solution) {
-  return static_cast<double>(FIT_DIP_ERROR) * solution.dip;
 }
 
 /* Rms of e about its mean, of placements within the array: beyond it a force is extrapolated, and
@@ -357,9 +350,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     j.ellipse = std::hypot(of_all, s.spread.ellipse);
     j.force_share = force_share(array, s);
     j.kept_share = double(s.kept) / double(placements.size());
-    const double offset = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
-    j.offset_share =
-        std::sqrt(std::max(offset * offset - dip_as_offset(s) * dip_as_offset(s), 0.0));
+    j.offset_share = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
     j.drift_share = rms_beyond(s.drift_Pa, s.drift_sd_Pa) / s.peak_Pa;
   }
   if (placements.size() >= EVIDENCE_MIN && !j.silent.empty()) {

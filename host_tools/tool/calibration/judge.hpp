@@ -32,8 +32,7 @@ constexpr double FORCE_SPREAD_MAX = 0.065; /* rms of e within the array: one wei
 constexpr double ELLIPSE_MAX = 0.05;       /* rms of q1, q2 beyond their sds: a round foot. Lying
                                               cylinders of 6 by 12 mm have 0.053 and more, balls
                                               0.031 at most (truth_calibration, seed 20000) */
-constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros, beyond what
-                                              the dip may be off by (FIT_DIP_ERROR) */
+constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros */
 constexpr double DRIFT_MAX = 0.006;        /* the same, from first to last placement */
 constexpr double POSITION_MAX_mm = 0.5;    /* rms: sensors where the layout says */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */

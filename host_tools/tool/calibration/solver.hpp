@@ -10,10 +10,11 @@
  *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
  *   M = sum over earlier placements of what rubber has not let go of yet (remember)
  *
- * One profile for all: peak A, widths s and B and mixing m are fitted along, so nothing need be known of
- * the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the pressure
- * under spheres and flat ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and 10 N),
- * where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force, 2 pi A s^2.
+ * One profile for all: peak A, widths s and B and mixing m are fitted along, so nothing need be
+ * known of the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the
+ * pressure under spheres and flat ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and
+ * 10 N), where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force,
+ * 2 pi A s^2.
  * Cast rubber has a dip (h) around that: -1 to -2 % of the peak three to five widths away, on every
  * pad of host_tools/report/real; bonded rubber in the twin has none.
  *

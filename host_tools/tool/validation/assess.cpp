@@ -126,8 +126,9 @@ private:
   }
 
   /* A loose sensor pulls at the profile, at the places of the presses and so at its neighbours'
-   * residuals. So the oddest are left out one after the other. Those are loose without the last of
-   * which the rest fits much better. */
+   * residuals. So the oddest are left out one after the other, as long as the rest then fits much
+   * better. Those of them are loose that feel the same press differently each time. One that is odd
+   * by the same each time lies elsewhere, or is wider. */
   void find_loose() {
     if (dead_ != 0) {
       card_.fit = fit_marks(card_.measured, dead_);
@@ -164,7 +165,7 @@ private:
         continue;
       } else if (card_.measured.answered[k] < ANSWERS_STEADY) {
         evidence = "answered in " + percent(card_.measured.answered[k], 1) + " of the frames only";
-      } else if (without >> k & 1u) {
+      } else if ((without >> k & 1u) && card_.fit.sensors[k].scatter_share > LOOSE_SCATTER) {
         evidence =
             "feels the same press differently each time: its readings leave the profile that "
             "the others teach by " +

@@ -11,6 +11,7 @@ import { join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { OutputFile } from '../../../host_tools/simulation/emulator/output_file.mjs';
+import { PtyPort } from '../../../host_tools/simulation/emulator/port/pty_port.mjs';
 import { build, HEADER } from './bench.mjs';
 
 const MAIN = fileURLToPath(new URL('../../../host_tools/simulation/emulator/main.mjs', import.meta.url));
@@ -95,6 +96,7 @@ for (const [name, args, message] of [
   ['a pace beside steps', ['--image', image, ...base, '--stepped', '--pace', 'real'], /^error: --stepped has no --pace/],
   ['two ports', ['--image', image, ...base, '--stepped', '--pty', 'x'], /^error: --pty and --stepped exclude each other\n$/],
   ['steps that no program asks for', ['--image', image, ...base, '--stepped'], /^error: the program on standard input is gone\n$/],
+  ['a reader without a port', ['--image', image, ...base, '--wait-reader'], /^error: --wait-reader needs --pty\n$/],
   ['report nowhere', ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'], /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/],
   ['bad scenario', ['--image', image, '--board', 'pico_mux', '--scenario', image], /^error: .*:1: not a scenario/],
 ]) {
@@ -249,6 +251,17 @@ test('pseudo-terminal: a client that does not read stops the stream, loses nothi
   const before = packets.slice(0, paused).reduce((sum, packet) => sum + packet[3], 0);
   // The window of 16 KiB, sixteen reads under way, and what the kernel holds of a terminal's bytes.
   assert.ok(before >= 16384 && before <= 16384 + 16 * 128 + 65536, `${before} bytes were taken for a client that did not read`);
+});
+
+test('pseudo-terminal: a client that has not taken what lies ready is waited for, 2 s at most', () => {
+  const port = Object.assign(Object.create(PtyPort.prototype), { isOpen: true, outstanding: 16384, full_ms: null });
+  assert.deepEqual([0, 1999, 2000, 9000].map((ms) => port.waitsForReader(ms)), [true, true, false, false]);
+  port.outstanding--;
+  assert.equal(port.waitsForReader(9001), false);
+  port.outstanding++;
+  assert.deepEqual([9002, 11002].map((ms) => port.waitsForReader(ms)), [true, false]);
+  port.isOpen = false;
+  assert.equal(port.waitsForReader(20000), false);
 });
 
 test('pseudo-terminal: bytes for a client that left do not reach the next one', async () => {

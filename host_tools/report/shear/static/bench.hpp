@@ -24,6 +24,18 @@ inline const std::vector<std::string> SEVEN{"sphere6",   "sphere15",    "cylinde
 // How the load came: under a constant normal force, together with it, or until all slides.
 enum class History { held, together, slides };
 
+struct Load {
+  const char *name;
+  double share; // Q/F
+  History history;
+};
+constexpr Load LOADS[] = {{"0", 0.0, History::held},
+                          {"0.1", 0.1, History::held},
+                          {"0.3", SHARE, History::held},
+                          {"0.3, risen with the force", SHARE, History::together},
+                          {"0.45", 0.45, History::held},
+                          {"0.5, sliding", FRICTION, History::slides}};
+
 using PadOf = std::function<KnownPad(std::size_t)>;
 
 struct Case {

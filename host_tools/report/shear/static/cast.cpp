@@ -15,18 +15,8 @@ void judge_cast(Bench &bench, ordered_json &out) {
                         {"10 % and a dip, calibrated", "dip_", bench.calibrated_as(truth::DIP)},
                         {"like real ones, calibrated", "cast_",
                          bench.calibrated_as(truth::LIKE_REAL)}};
-  struct Load {
-    const char *name;
-    double share;
-    History history;
-  };
-  const Load loads[] = {{"0", 0.0, History::held},
-                        {"0.1", 0.1, History::held},
-                        {"0.3", SHARE, History::held},
-                        {"0.45", 0.45, History::held},
-                        {"0.5, sliding", FRICTION, History::slides}};
   for (const Kind &kind : kinds) {
-    for (const Load &load : loads) {
+    for (const Load &load : LOADS) {
       Case c = bench.usual();
       c.pad = kind.pad;
       c.share = load.share;
@@ -38,7 +28,7 @@ void judge_cast(Bench &bench, ordered_json &out) {
       row["load"] = load.share;
       out["by_cast"].push_back(row);
       const std::string prefix = kind.prefix;
-      if (!prefix.empty() && load.share == SHARE) {
+      if (!prefix.empty() && load.share == SHARE && load.history == History::held) {
         for (const char *key :
              {"valid_percent", "ratio_error_p50", "ratio_error_p95", "vector_error_p50",
               "vector_error_p95", "direction_p90_deg", "q_cover_1sd", "q_cover_2sd"}) {

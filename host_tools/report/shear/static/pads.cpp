@@ -78,17 +78,8 @@ void judge_pads(Bench &bench, ordered_json &out) {
                         {"10 %, calibrated", bench.calibrated},
                         {"5 %, not calibrated", bench.raw5},
                         {"10 %, not calibrated", bench.raw10}};
-  struct Load {
-    const char *name;
-    double share;
-    History history;
-  };
-  const Load loads[] = {
-      {"0", 0.0, History::held},     {"0.1", 0.1, History::held},
-      {"0.3", 0.3, History::held},   {"0.3, risen with the force", 0.3, History::together},
-      {"0.45", 0.45, History::held}, {"0.5, sliding", FRICTION, History::slides}};
   for (const Kind &kind : kinds) {
-    for (const Load &load : loads) {
+    for (const Load &load : LOADS) {
       Case c = bench.usual();
       c.pad = kind.pad;
       c.share = load.share;
