@@ -32,6 +32,13 @@ struct fit_array {
   struct fit_grid_shape grid;
 };
 
+/* Of a sensor, beside its gain: how far it is from its place in the array, and how much wider than
+ * the others it feels a contact. */
+struct fit_own {
+  int16_t off_x_q15, off_y_q15; /* pitches */
+  int16_t wider_q15;            /* log of its width over theirs */
+};
+
 struct fit_settings {
   uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 4 come as near to the truth as more
                            do, 7 bring 99.9 % of observable presses within 1 um of the optimum */
@@ -50,6 +57,9 @@ struct fit_settings {
    * dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not cut then. None unless the share is above 0 and at most
    * FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
   float dip_share, dip_sd_mm;
+  /* [sensor] or NULL: not known. Before the last two of three and more iterations, each reading is
+   * corrected by it to first order, by at most half of what the model has there. */
+  const struct fit_own *own;
   /* Other errors that the standard deviations contain. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
   uint16_t

@@ -407,6 +407,22 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
   own->force += shape_force * shape_force * strength * strength;
 }
 
+/* As fit_grid_take_own_out. */
+static void take_own_out(const struct fit_own *own, const struct parameters *at,
+                         struct samples *samples) {
+  const float inverse = 1.0f / (at->sigma * at->sigma);
+  for (int k = 0; k < samples->count; k++) {
+    const struct fit_own *one = &own[samples->sensor[k]];
+    float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
+    float wider = (1.0f / 32768.0f) * (float)one->wider_q15;
+    float along_x = wider * x - (1.0f / 32768.0f) * (float)one->off_x_q15;
+    float along_y = wider * y - (1.0f / 32768.0f) * (float)one->off_y_q15;
+    float share = clamp(inverse * (along_x * x + along_y * y), -FIT_OWN_SHARE_MAX, FIT_OWN_SHARE_MAX);
+    float e = fit_exp2_negative((x * x + y * y) * (0.5f * LOG2_E * inverse));
+    samples->p[k] -= at->p0 * e * share;
+  }
+}
+
 /* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
  * sensor that does not belong to the others, or -1. */
 static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
@@ -475,6 +491,9 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   }
   int left = settings->iterations;
   do {
+    if (settings->own && left == FIT_OWN_ITERATIONS && left < settings->iterations) {
+      take_own_out(settings->own, &theta, &samples);
+    }
     squares = linearise(array, &samples, prior, &dip, &theta, &normal);
     before = theta;
     deficient = factorise(&normal);

@@ -651,6 +651,23 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   state->y = fixed_clamp(y, grid->y_min + ONE_Q26 / 2, grid->y_max - ONE_Q26 / 2);
 }
 
+/* The dip, and the sensors' own: what of the readings is not the model's. */
+static NOINLINE void take_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                              const struct fit_settings *settings, const struct state *state,
+                              const struct moments *m, const struct fit_system *system, int left,
+                              struct readings *readings) {
+  const bool dip = readings->dip_share.mantissa != 0;
+  const int32_t rise_q22 = fit_grid_rise(system->at.height, m->x.offset, m->y.offset);
+  if (dip) {
+    fit_grid_take_dip_out(array, pressure_Pa_q10, state, system->amplitude_q28, rise_q22, readings);
+  }
+  if (settings->own && (left == FIT_OWN_ITERATIONS || (dip && left < FIT_OWN_ITERATIONS))) {
+    const int32_t peak_q28 =
+        fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
+    fit_grid_take_own_out(array, settings, UINT32_MAX, state, peak_q28, readings);
+  }
+}
+
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
@@ -668,9 +685,8 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   int left = settings->iterations;
   int coarse = left - COARSE_ITERATIONS;
   do {
-    if (readings.dip_share.mantissa != 0 && left < settings->iterations) {
-      fit_grid_take_dip_out(array, pressure_Pa_q10, &state, system.amplitude_q28,
-                            fit_grid_rise(system.at.height, m.x.offset, m.y.offset), &readings);
+    if (left < settings->iterations) {
+      take_out(array, pressure_Pa_q10, settings, &state, &m, &system, left, &readings);
     }
     system.at = state;
     evaluate(&readings, left > coarse && left > FINE_ITERATIONS, &m, &system);

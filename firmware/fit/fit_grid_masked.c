@@ -723,6 +723,11 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
   int left = settings->iterations;
   do {
     bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
+    if (settings->own && left == FIT_OWN_ITERATIONS && left < settings->iterations) {
+      const int32_t peak_q28 =
+          fit_grid_peak(system.amplitude_q28, system.rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
+      fit_grid_take_own_out(array, settings, usable, &state, peak_q28, &readings);
+    }
     system.at.x = state.x;
     system.at.y = state.y;
     system.at.height = state.height;
@@ -771,6 +776,12 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   c.cross = c.skew_x = c.skew_y = 0;
   if (readings.dip_share.mantissa != 0) {
     fit_grid_take_below_zero(array, pressure_Pa_q10, usable, &readings);
+  }
+  if (settings->own) {
+    const int32_t peak_q28 = fit_scaled_to_fixed(
+        scaled_mul(fit_grid_scaled(result->p0_Pa), fit_scaled_from(1024, readings.shift - 28)), 28);
+    fit_grid_take_own_out(array, settings, usable, &system.at,
+                          fixed_clamp(peak_q28, 0, FIT_OWN_PEAK_MAX_Q28), &readings);
   }
   evaluate(&readings, FINE, &c, &system);
 

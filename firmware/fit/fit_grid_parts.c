@@ -94,7 +94,7 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   return true;
 }
 
-#define DIP_RISE_MAX_Q22 (20 << 22) /* the depth is at its limit long before */
+#define RISE_MAX_Q22 (20 << 22) /* what it is for is at its limit long before */
 
 static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t height) {
   for (int i = 0; i < nodes; i++) {
@@ -103,16 +103,21 @@ static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t h
   }
 }
 
+int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share,
+                      int32_t most_q28) {
+  /* 2^rise is 2^-(1 - its fraction) and a power of two. */
+  rise_q22 = fixed_clamp(rise_q22, 0, RISE_MAX_Q22);
+  int32_t fraction = exp2_negative((uint32_t)((1 << 22) - (rise_q22 & 0x3FFFFF)));
+  struct scaled rise = fit_scaled_from(fraction, (rise_q22 >> 22) + 1 - 30);
+  struct scaled peak = scaled_mul(scaled_mul(rise, fit_scaled_from(amplitude_q28, -28)), share);
+  return fixed_clamp(fit_scaled_to_fixed(peak, 28), 0, most_q28);
+}
+
 int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at,
                      int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28, struct dip *dip) {
   set_dip(dip->x, COLUMNS, COLUMNS / 2, at->x, height);
   set_dip(dip->y, ROWS, ROWS / 2, at->y, height);
-  /* 2^rise is 2^-(1 - its fraction) and a power of two. */
-  rise_q22 = fixed_clamp(rise_q22, 0, DIP_RISE_MAX_Q22);
-  int32_t fraction = exp2_negative((uint32_t)((1 << 22) - (rise_q22 & 0x3FFFFF)));
-  struct scaled rise = fit_scaled_from(fraction, (rise_q22 >> 22) + 1 - 30);
-  struct scaled depth = scaled_mul(scaled_mul(rise, fit_scaled_from(amplitude_q28, -28)), share);
-  return fixed_clamp(fit_scaled_to_fixed(depth, 28), 0, most_q28);
+  return fit_grid_peak(amplitude_q28, rise_q22, share, most_q28);
 }
 
 void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
@@ -128,6 +133,41 @@ void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressur
     for (int j = 0; j < ROWS; j++) {
       int k = i * ROWS + j;
       set_reading(readings, k, pressure_Pa_q10[sensor[k]], fixed_mul_q30(column, dip.y[j]));
+    }
+  }
+}
+
+#define TWO_LN2_Q30 1488522236
+#define OWN_SHARE_MAX_Q15 ((int32_t)(FIT_OWN_SHARE_MAX * 32768.0f))
+
+/* A Gaussian that is wider by b and whose sensor is off by o is, d from the contact to its place in
+ * the array, larger by (b d - o)' d / sigma^2 of itself. */
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings,
+                           uint32_t usable, const struct state *at, int32_t peak_q28,
+                           struct readings *readings) {
+  const uint8_t *sensor = array->grid.sensor;
+  struct dip bell;
+  set_dip(bell.x, COLUMNS, COLUMNS / 2, at->x, at->height);
+  set_dip(bell.y, ROWS, ROWS / 2, at->y, at->height);
+  const int32_t inverse_q26 = fixed_mul_q30(at->height, TWO_LN2_Q30); /* 1 / sigma^2 */
+  for (int i = 0, k = 0; i < COLUMNS; i++) {
+    int32_t x_q12 = ((i - COLUMNS / 2) * ONE_Q26 - at->x) >> 14;
+    int32_t column_q28 = fixed_mul_q30(peak_q28, bell.x[i]);
+    for (int j = 0; j < ROWS; j++, k++) {
+      int32_t bell_q28 = fixed_mul_q30(column_q28, bell.y[j]);
+      if (bell_q28 == 0 || !(usable >> sensor[k] & 1)) {
+        continue;
+      }
+      const struct fit_own *own = &settings->own[sensor[k]];
+      int32_t y_q12 = ((j - ROWS / 2) * ONE_Q26 - at->y) >> 14;
+      int32_t along_x_q13 = ((own->wider_q15 * x_q12) >> 14) - (own->off_x_q15 >> 2);
+      int32_t along_y_q13 = ((own->wider_q15 * y_q12) >> 14) - (own->off_y_q15 >> 2);
+      int32_t square_q24 = ((along_x_q13 * x_q12) >> 1) + ((along_y_q13 * y_q12) >> 1);
+      int32_t share_q15 = fixed_clamp(fixed_mul_q32(inverse_q26, square_q24) >> 3,
+                                      -OWN_SHARE_MAX_Q15, OWN_SHARE_MAX_Q15);
+      int32_t value = readings->q28[k] - fixed_mul_16(bell_q28, share_q15) * 2;
+      readings->q28[k] = value;
+      readings->q14[k] = (value + (1 << 13)) >> 14;
     }
   }
 }

@@ -24,6 +24,7 @@
 #define LOG2E_HALF_Q26 48408813
 
 #define LOG2E_HALF ((struct scaled){23637, -15})
+#define ONE ((struct scaled){1 << 14, -14})
 
 /* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1; where there is
  * a dip, half of that, so that what it takes finds room. */
@@ -106,6 +107,17 @@ int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at
 /* Adds the dip to the readings of a full rectangle. */
 void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                            const struct state *at, int32_t amplitude_q28, int32_t rise_q22,
+                           struct readings *readings);
+
+/* The model at the centre, where it is amplitude 2^rise: at most most_q28. */
+int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share,
+                      int32_t most_q28);
+
+/* Corrects the readings of the usable sensors by what is their own (fit_settings), about a contact
+ * of this peak. */
+#define FIT_OWN_PEAK_MAX_Q28 (1 << 30)
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings,
+                           uint32_t usable, const struct state *at, int32_t peak_q28,
                            struct readings *readings);
 
 /* Readings below zero as they are, where fit_grid_take_readings took them as zero. */

@@ -20,6 +20,12 @@
 #define FIT_LOW_SIGNAL_SIGMA 20 /* noise standard deviations in the largest reading */
 #define FIT_HUGE 1e9f           /* stands for: nothing is known */
 
+/* The sensors' own (struct fit_own) is taken from the readings before so many of the last
+ * iterations: by then the contact is known well enough, and the last step tells whether the fit has
+ * settled. It is of first order, so it changes no reading by more than this share of the model. */
+#define FIT_OWN_ITERATIONS 2
+#define FIT_OWN_SHARE_MAX 0.5f
+
 /* A sensor is an outlier if its studentised residual, in standard deviations of the others',
  * exceeds FIT_OUTLIER, and leaving it out brings the residuals below the share FIT_OUTLIER_GAIN.
  * The fit looks for one only after it has settled with residuals that are rough and no noise. */

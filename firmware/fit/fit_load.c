@@ -47,6 +47,7 @@ _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 
 #define DIP_PER_MAX_Q26 (1 << 29) /* 8 */
 #define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
+#define OWN_MAX_Q12 ((int32_t)(FIT_OWN_SHARE_MAX * 4096.0f))
 
 static void set_dip(const struct fit_settings *settings, const struct fit_result *result,
                     struct fit_load_look *look) {
@@ -75,9 +76,9 @@ FIXED_INLINE int32_t in_sigmas(float at, int32_t from_q16, int32_t per_sigma_q12
   return fixed_clamp(fixed_mul_16(off_q16, per_sigma_q12), -X_MAX_Q12 + 1, X_MAX_Q12 - 1);
 }
 
-/* What a sensor's row holds before it is one: its place from the contact, its reading of p0, and
- * what its gain makes of its error. */
-enum { AT_X_Q12, AT_Y_Q12, READING_Q18, GAIN_Q4 };
+/* What a sensor's row holds before it is one: its place from the contact, its reading of p0, what
+ * its gain makes of its error, and what is its own (fit.h), zeros where that is not known. */
+enum { AT_X_Q12, AT_Y_Q12, READING_Q18, GAIN_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q15 };
 
 /* False: there is nothing to be seen in so few or such readings. */
 static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
@@ -118,6 +119,13 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
     (*row)[READING_Q18] = shifted(reading * per_p0.mantissa, per_p0.exponent + shift - 10 + 18);
     (*row)[GAIN_Q4] =
         (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_size(reading)) >> 12);
+    (*row)[OFF_X_Q12] = (*row)[OFF_Y_Q12] = (*row)[WIDER_Q15] = 0;
+    if (settings->own) {
+      const struct fit_own *own = &settings->own[k];
+      (*row)[OFF_X_Q12] = fixed_mul_16(per_sigma_q12, own->off_x_q15) * 2;
+      (*row)[OFF_Y_Q12] = fixed_mul_16(per_sigma_q12, own->off_y_q15) * 2;
+      (*row)[WIDER_Q15] = own->wider_q15;
+    }
     row++;
   }
   return true;
@@ -135,6 +143,10 @@ static NOINLINE void set_row(struct fit_load_look *look, int32_t *row) {
     int32_t dip_q12 = exp2_rough((uint32_t)z_dip) >> 18;
     reading_q18 += (look->dip_q18 * dip_q12) >> 12;
   }
+  int32_t along_x_q12 = ((row[WIDER_Q15] * x) >> 15) - row[OFF_X_Q12];
+  int32_t along_y_q12 = ((row[WIDER_Q15] * y) >> 15) - row[OFF_Y_Q12];
+  int32_t own_q12 = ((along_x_q12 * x) >> 12) + ((along_y_q12 * y) >> 12);
+  reading_q18 -= (e_q18 * fixed_clamp(own_q12, -OWN_MAX_Q12, OWN_MAX_Q12)) >> 12;
   int32_t weight_q12 = port_divide(look->base_q4 << 12, error_q4);
   int32_t residual_q18 = fixed_clamp(reading_q18 - e_q18, -(1 << 18), 1 << 18);
   row[HEIGHT] = e_q18 * weight_q12;

@@ -50,7 +50,11 @@ static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
   return fixed_mul_q28(fixed_clamp(fit_fixed(mm, 20), -(1 << 29), 1 << 29), pad->per_pitch_q28);
 }
 
-static void set_dip(const struct fit_settings *settings, struct problem *problem) {
+/* What a calibration knows of the pad. */
+static void set_known(const struct fit_array *array, const struct fit_settings *settings,
+                      struct problem *problem) {
+  problem->own = settings->own;
+  problem->sensor = array->grid.sensor;
   problem->dip_share_q16 = 0;
   problem->dip_k_q24 = 1 << 24;
   if (fit_has_dip(settings)) {
@@ -148,7 +152,7 @@ static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10,
       !weigh(array, settings, fit->used, problem)) {
     return false;
   }
-  set_dip(settings, problem);
+  set_known(array, settings, problem);
   return true;
 }
 

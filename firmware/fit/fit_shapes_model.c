@@ -174,6 +174,8 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
   set_rough_bell(&squares, terms->dip_k_q24, &dip);
   int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
   int32_t half_q13 = blob->lever_q14 > 0 ? amplitude_q13 : -amplitude_q13;
+  const struct fit_own *own = problem->own;
+  const uint8_t *sensor = problem->sensor;
   int32_t *row = problem->pad->room.row[0];
   for (int i = 0; i < COLUMNS; i++) {
     int32_t dx_q12 = (i - COLUMNS / 2) * 4096 - blob->x_q12;
@@ -197,6 +199,12 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
       row[PLACE_Y] += along_y;
       row[SPREAD] += (((square_q10 * (w_q23 >> 15)) >> 7) - g_q12) * a_q13 >> 10;
       row[RESIDUAL] -= a_q13 * s_q15;
+      if (own) {
+        const struct fit_own *one = &own[*sensor++];
+        int32_t own_x_q12 = ((one->wider_q15 * dx_q12) >> 15) - (one->off_x_q15 >> 3);
+        int32_t own_y_q12 = ((one->wider_q15 * dy_q12) >> 15) - (one->off_y_q15 >> 3);
+        row[RESIDUAL] -= (along_x * own_x_q12 + along_y * own_y_q12) * 2;
+      }
       if (model != ROUND) {
         row[SPAN_X] += (along_x * (blob->lever_q14 >> 2)) >> 12;
         row[SPAN_Y] += (along_y * (blob->lever_q14 >> 2)) >> 12;

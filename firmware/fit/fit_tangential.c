@@ -107,6 +107,8 @@ struct problem {
   int32_t by_gains_q12; /* share of the readings' variances that is their gains', mean */
   /* The dip: its depth in the height of the model's middle, 0: none; log2(e) / (2 sd^2). */
   int32_t dip_share_q16, dip_bend_q22;
+  const struct fit_own *own; /* [sensor] or NULL */
+  const uint8_t *sensor;     /* [node] */
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
   int32_t spread_prior_q26, long_prior_q26;
 };
@@ -447,6 +449,27 @@ NOINLINE static void set_moving(const struct offset *x, const struct offset *y,
   } while (++node != end);
 }
 
+/* Takes from the residuals what is the sensors' own. A sensor that is off by o and feels all wider
+ * by b reads what the model has at d + o - b d, so that the columns of the place tell how much more
+ * it is. */
+NOINLINE static void take_own(const struct problem *problem, const struct offset *x,
+                              const struct offset *y, struct fit_tangential_room *room) {
+  const int32_t pitch_q12 = problem->pad->pitch_q26 >> (26 - PLACE_Q);
+  const uint8_t *sensor = problem->sensor;
+  const union fit_tangential_node *node = room->node;
+  int32_t *residual = room->residual;
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int k = 0; k < ROWS; k++, node++) {
+      const struct fit_own *own = &problem->own[*sensor++];
+      int32_t along_x_q12 = (own->wider_q15 * x[i].d_q12 - own->off_x_q15 * pitch_q12) >> 15;
+      int32_t along_y_q12 = (own->wider_q15 * y[k].d_q12 - own->off_y_q15 * pitch_q12) >> 15;
+      int32_t more_q22 = (node->column[PLACE_X] >> 4) * along_x_q12 +
+                         (node->column[PLACE_Y] >> 4) * along_y_q12;
+      *residual++ -= more_q22 * 4;
+    }
+  }
+}
+
 /* The columns of the unknowns that the model is linear in; that of the amplitude is s0. */
 NOINLINE static void set_still(const struct offset *x, const struct offset *y,
                                union fit_tangential_node *node) {
@@ -500,6 +523,9 @@ NOINLINE static void linearise(const struct problem *problem,
     union fit_tangential_node *node = &room->node[i * ROWS];
     set_moving(&off_x[i], off_y, &origin, node, &room->residual[i * ROWS]);
     set_still(&off_x[i], off_y, node);
+  }
+  if (problem->own) {
+    take_own(problem, off_x, off_y, room);
   }
 }
 
@@ -1014,7 +1040,11 @@ NOINLINE static void conclude(const struct problem *problem,
   result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 
-static void set_dip(const struct fit_settings *settings, struct problem *problem) {
+/* What a calibration knows of the pad. */
+static void set_known(const struct fit_array *array, const struct fit_settings *settings,
+                      struct problem *problem) {
+  problem->own = settings->own;
+  problem->sensor = array->grid.sensor;
   problem->dip_share_q16 = 0;
   if (fit_has_dip(settings)) {
     int32_t sd_q20 = fixed_mul_q30(fit_fixed(settings->dip_sd_mm, 20), problem->pad->per_unit_q30);
@@ -1036,7 +1066,7 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   *result = (struct fit_tangential){0};
   struct problem problem;
   problem.pad = pad;
-  set_dip(settings, &problem);
+  set_known(array, settings, &problem);
   struct fit_settings of_readings = *settings;
   of_readings.dip_share = 0.0f; /* readings without room for a dip */
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||

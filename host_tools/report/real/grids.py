@@ -98,19 +98,19 @@ def ask(program, array, jobs):
     return json.loads(done.stdout)["results"]
 
 
-def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0), **settings):
+def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0), own=(), **settings):
     """prior: sigma, its standard deviation, mm; dip: its share, its sd, mm; NaN in readings: that sensor is missing. settings: others of real_fit."""
     sensors = readings.shape[1]
     return {
         "kind": "fit", "presses": [[None if np.isnan(one) else one for one in press] for press in readings.tolist()], "noise_Pa": NOISE_PA,
         "gain": [1.0] * sensors if gain is None else gain, "gain_sd": [RAW_GAIN_SD] * sensors if gain_sd is None else gain_sd,
-        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1], "dip_share": dip[0], "dip_sd_mm": dip[1], **settings}
+        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1], "dip_share": dip[0], "dip_sd_mm": dip[1], "own": list(own), **settings}
 
 
 def stored_job(readings, stored, **settings):
     """With what a calibration leaves in the fingertip."""
     return fit_job(readings, stored["gain"], stored["gain_sd"], (stored["prior_sigma_mm"], stored["prior_width_mm"]),
-                   (stored["dip_share"], stored["dip_sd_mm"]), **settings)
+                   (stored["dip_share"], stored["dip_sd_mm"]), stored["own"], **settings)
 
 
 def calibration_job(readings, every_s=EVERY_S):

@@ -5,14 +5,14 @@
 //
 //   job {"kind": "fit", "presses": [[reading_Pa of each sensor, null: missing]], "noise_Pa",
 //        "gain": [sensor], "gain_sd": [sensor], "prior_sigma_mm", "prior_width_mm", "dip_share",
-//        "dip_sd_mm", "iterations" and "cut_noises", by default as the firmware is built}
+//        "dip_sd_mm", "own": [[off_x_mm, off_y_mm, wider] of each sensor, or none], "iterations" and "cut_noises", by default as the firmware is built}
 //     -> {"x_mm", "y_mm", "sigma_mm", "force_N", "location_sd_mm", "flags": [press each]}, 0 without a fit
 //   job {"kind": "pace", "fits": [jobs of the kind fit], "passes": n}
 //     -> {"us": [job]}, of one press, in the quickest of n passes in which the jobs take turns
 //   job {"kind": "calibrate", "presses": as above, "noise_Pa", "every_s": from one to the next}
 //     -> {"state": "good" | "more" | "refused", "reason", "solved", "width_mm", "residual_share",
 //         "stored": {"gain", "gain_sd", "prior_sigma_mm", "prior_width_mm", "dip_share",
-//         "dip_sd_mm"}}; stored: what the tool would leave in the fingertip were it good
+//         "dip_sd_mm", "own"}}; stored: what the tool would leave in the fingertip were it good
 //
 // Exit status: 0 done; 1 something went wrong, said in one line.
 #include "tool/calibration/judge.hpp"
@@ -53,6 +53,7 @@ std::uint8_t or_built(const json &job, const char *setting, int built) {
 struct Prepared {
   fit_array array;
   fit_settings settings;
+  std::vector<fit_own> own; /* that of the settings */
   std::vector<std::array<std::int32_t, FT_MAX_SENSORS>> pressure_Pa_q10; /* [press] */
   std::vector<std::uint32_t> usable;                                     /* [press] */
 };
@@ -74,6 +75,12 @@ Prepared prepare(const Array &layout, const json &job) {
   settings.cut_noises = or_built(job, "cut_noises", DEFAULT_CUT_NOISES);
   settings.dip_share = static_cast<float>(job.at("dip_share").get<double>());
   settings.dip_sd_mm = static_cast<float>(job.at("dip_sd_mm").get<double>());
+  Shape shape;
+  for (const json &own : job.at("own")) {
+    shape.own.push_back({own.at(0).get<double>(), own.at(1).get<double>(), own.at(2).get<double>()});
+  }
+  made.own = own_of(layout, shape);
+  settings.own = made.own.empty() ? nullptr : made.own.data();
   const auto gain = job.at("gain").get<std::vector<double>>();
   const auto gain_sd = job.at("gain_sd").get<std::vector<double>>();
   for (std::size_t k = 0; k < layout.sensors(); k++) {
@@ -166,6 +173,10 @@ json calibrate(const Array &layout, const json &job) {
   stored["prior_width_mm"] = shape.sigma_sd_mm;
   stored["dip_share"] = shape.dip_share;
   stored["dip_sd_mm"] = shape.dip_sd_mm;
+  stored["own"] = json::array();
+  for (const Own &own : shape.own) {
+    stored["own"].push_back({own.off_x_mm, own.off_y_mm, own.wider});
+  }
   said["state"] = states[static_cast<int>(judgement.state)];
   said["reason"] = name_of(judgement.reason);
   said["solved"] = solution.solved;

@@ -274,7 +274,7 @@ Evidence against(const Judgement &j) {
 
 /* The firmware's fit to a placement. */
 struct FirmwareFit {
-  FirmwareFit(const Array &array, const Shape &shape) {
+  FirmwareFit(const Array &array, const Shape &shape) : own(own_of(array, shape)) {
     std::vector<float> x, y;
     for (std::size_t k = 0; k < array.sensors(); k++) {
       x.push_back(static_cast<float>(array.x_mm[k]));
@@ -288,6 +288,7 @@ struct FirmwareFit {
     settings.prior_width_mm = static_cast<float>(shape.sigma_sd_mm);
     settings.dip_share = static_cast<float>(shape.dip_share);
     settings.dip_sd_mm = static_cast<float>(shape.dip_sd_mm);
+    settings.own = own.empty() ? nullptr : own.data();
   }
   std::optional<fit_result> operator()(const Placement &placement,
                                        const std::vector<double> &gain) {
@@ -308,6 +309,7 @@ struct FirmwareFit {
   /* As many as any setting of the firmware needs; a mean of many frames has hardly any noise. */
   static constexpr std::uint8_t ITERATIONS = 10;
   static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
+  std::vector<fit_own> own;
   fit_array of{};
   fit_settings settings{};
   bool usable_array = false;
@@ -389,9 +391,25 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 }
 
 Shape shape_of(const Solution &solution) {
-  return {solution.sigma_mm,
-          std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
-          solution.dip_share, solution.dip_sd_mm};
+  Shape shape{solution.sigma_mm,
+              std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
+              solution.dip_share, solution.dip_sd_mm};
+  for (std::size_t k = 0; k < solution.own_width.size(); k++) {
+    shape.own.push_back({solution.dx_mm[k], solution.dy_mm[k], solution.own_width[k]});
+  }
+  return shape;
+}
+
+std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
+  const auto q15 = [](double value) {
+    return static_cast<std::int16_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0)));
+  };
+  std::vector<fit_own> made;
+  for (const Own &own : shape.own) {
+    made.push_back({q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm),
+                    q15(own.wider)});
+  }
+  return made;
 }
 
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,

@@ -17,6 +17,8 @@
 #include <optional>
 #include <string>
 
+struct fit_own;
+
 namespace fingertip::calibrating {
 
 constexpr double SHAPE_SD_WANTED = 0.015;  /* largest sd of a gain outside the gauge */
@@ -82,11 +84,17 @@ struct Judgement {
 Judgement judge(const Array &array, const std::vector<Placement> &placements, bool last);
 
 /* What the fingertip's fit is told of the pad's response, see fit.h; zeros: nothing. */
+struct Own {
+  double off_x_mm = 0.0, off_y_mm = 0.0, wider = 0.0; /* of one sensor; wider: log */
+};
 struct Shape {
   double sigma_mm = 0.0, sigma_sd_mm = 0.0; /* a prior */
   double dip_share = 0.0, dip_sd_mm = 0.0;
+  std::vector<Own> own = {}; /* [sensor] */
 };
 Shape shape_of(const Solution &solution);
+/* As the fit takes it: [sensor], or nothing. */
+std::vector<fit_own> own_of(const Array &array, const Shape &shape);
 
 /* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains, half a
  * second to a second after the weight was down. Rubber that relaxes reads more before and less

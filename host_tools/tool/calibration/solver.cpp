@@ -256,8 +256,10 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   for (int k = 0; k < layout.sensors; k++) {
     solution.gain.push_back(std::exp(global[k]) / mean);
     solution.gain_sd.push_back(std::sqrt(std::max(of_gains(k, k), 0.0)));
-    solution.reading_sd.push_back(
-        std::hypot(solution.gain_sd.back(), OWN_WIDTH_SQUARE * solution.spread.own_width));
+    const int width = layout.own_width(k);
+    const double reading = of_gains(k, k) + 2.0 * OWN_WIDTH_SQUARE * covariance(k, width) +
+                           OWN_WIDTH_SQUARE * OWN_WIDTH_SQUARE * covariance(width, width);
+    solution.reading_sd.push_back(std::sqrt(std::max(reading, of_gains(k, k))));
     solution.shape_sd.push_back(std::sqrt(std::max(of_shape(k, k), 0.0)));
     solution.offset_Pa.push_back(global[layout.offset(k)]);
     solution.drift_Pa.push_back(2.0 * global[layout.drift(k)]);

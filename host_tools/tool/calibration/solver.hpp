@@ -132,8 +132,8 @@ struct Solution {
   bool solved = false;                     /* else too few placements or readings for any of it */
   std::vector<double> gain;                /* [sensor] relative to their mean */
   std::vector<double> gain_sd;             /* relative */
-  std::vector<double> reading_sd;          /* of a reading after this: gain_sd and the own widths'
-                                              (OWN_WIDTH_SQUARE), which the firmware does not know */
+  std::vector<double> reading_sd;          /* of a reading after this: gain_sd, and what of the
+                                              own width (OWN_WIDTH_SQUARE) is not known */
   std::vector<double> shape_sd;            /* the part of gain_sd outside the gauge */
   std::vector<double> offset_Pa, drift_Pa; /* o, and 2 d: from first to last placement */
   std::vector<double> offset_sd_Pa, drift_sd_Pa;

@@ -433,6 +433,97 @@ static void beyond_the_sensors_the_dip_tells_the_place(void) {
   TEST_ASSERT_TRUE_MESSAGE(apart <= PRESSES / 25, text);
 }
 
+/* Up to 0.16 mm each way, and 5 % of the width. */
+static void draw_own(struct random *random, struct fit_own *own) {
+  for (int k = 0; k < SENSORS; k++) {
+    own[k].off_x_q15 = (int16_t)random_between(random, -600.0, 600.0);
+    own[k].off_y_q15 = (int16_t)random_between(random, -600.0, 600.0);
+    own[k].wider_q15 = (int16_t)random_between(random, -1638.0, 1638.0);
+  }
+}
+
+/* Sensors that are off their places and feel a contact wider, on a pad without a dip and with one. */
+static void what_is_the_sensors_own_is_taken_out_alike_in_all(void) {
+  struct random random = {80};
+  float worst = 0.0f, apart = 0.0f, unknown = 0.0f;
+  int sooner = 0, rough = 0;
+  for (int i = 0; i < 400; i++) {
+    struct fit_own own[SENSORS];
+    draw_own(&random, own);
+    double half_x = 4.5 * (COLUMNS - 1), half_y = 4.5 * (ROWS - 1);
+    double x = 1.5 + random_between(&random, -half_x, half_x);
+    double y = -0.25 + random_between(&random, -half_y, half_y);
+    double sigma = random_between(&random, 5.2, 7.0), sd = 3.0 * sigma, share = i % 2 ? 0.02 : 0.0;
+    for (int k = 0; k < SENSORS; k++) {
+      double dx = (double)x_mm[k] + (double)PITCH_mm * own[k].off_x_q15 / 32768.0 - x;
+      double dy = (double)y_mm[k] + (double)PITCH_mm * own[k].off_y_q15 / 32768.0 - y;
+      double square = dx * dx + dy * dy, wide = sigma * exp(own[k].wider_q15 / 32768.0);
+      double p = exp(-square / (2 * wide * wide)) - share * exp(-square / (2 * sd * sd));
+      readings[k] = (int32_t)nearbyint(1024.0 * (3e4 * p + 2.0 * random_normal(&random)));
+    }
+    struct fit_settings settings = {.iterations = 8,
+                                    .noise_Pa_q10 = 2048,
+                                    .prior_sigma_mm = (float)sigma,
+                                    .prior_width_mm = 0.1f,
+                                    .dip_share = (float)share,
+                                    .dip_sd_mm = (float)sd};
+    struct fit_result plain, grid, masked, general;
+    fit_grid(&array, readings, &settings, &plain);
+    settings.own = own;
+    fit_grid(&array, readings, &settings, &grid);
+    fit_grid_masked(&array, readings, ALL, &settings, &masked);
+    fit_general(&array, readings, ALL, &settings, &general);
+    unknown += off_mm(&plain, x, y) / 400.0f;
+    worst = fmaxf(worst, fmaxf(off_mm(&grid, x, y), off_mm(&general, x, y)));
+    apart = fmaxf(apart, fmaxf(off_mm(&general, (double)grid.x_mm, (double)grid.y_mm),
+                               off_mm(&masked, (double)grid.x_mm, (double)grid.y_mm)));
+    rough += grid.residual_rms_Pa > 0.5f * plain.residual_rms_Pa;
+    settings.iterations = 2; /* too few to know the contact before it */
+    struct fit_result early, without;
+    fit_grid_masked(&array, readings, ALL, &settings, &early);
+    settings.own = NULL;
+    fit_grid_masked(&array, readings, ALL, &settings, &without);
+    sooner += memcmp(&early, &without, sizeof early) != 0;
+  }
+  char text[120];
+  snprintf(text, sizeof text, "off %.3f mm, unknown %.3f, kernels apart %.3f; %d rough, %d sooner",
+           (double)worst, (double)unknown, (double)apart, rough, sooner);
+  TEST_ASSERT_TRUE_MESSAGE(unknown > 0.1f, text);
+  TEST_ASSERT_TRUE_MESSAGE(worst < 0.08f, text);
+  TEST_ASSERT_TRUE_MESSAGE(apart < 0.03f, text);
+  TEST_ASSERT_TRUE_MESSAGE(rough < 40, text);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(0, sooner, text);
+}
+
+/* A sensor that feels a contact much wider is no outlier to a fit that knows it. */
+#define WIDER 0.1
+static void a_sensor_that_is_known_to_differ_is_no_outlier(void) {
+  struct random random = {81};
+  int left_out[2] = {0};
+  for (int i = 0; i < 200; i++) {
+    struct fit_own own[SENSORS] = {{0}};
+    int other = (int)random_below(&random, SENSORS);
+    own[other].wider_q15 = (int16_t)(WIDER * 32768.0);
+    double x = 1.5 + random_between(&random, -4.0, 4.0), y = -0.25 + random_between(&random, -4.0, 4.0);
+    for (int k = 0; k < SENSORS; k++) {
+      double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y, wide = k == other ? 6.0 * exp(WIDER) : 6.0;
+      readings[k] = (int32_t)nearbyint(
+          1024.0 * 3e4 * exp(-(dx * dx + dy * dy) / (2 * wide * wide)));
+    }
+    struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 2048};
+    for (int known = 0; known < 2; known++) {
+      struct fit_result result;
+      settings.own = known ? own : NULL;
+      fit_gaussian(&array, readings, ALL, &settings, &result);
+      left_out[known] += result.used != ALL;
+    }
+  }
+  char text[60];
+  snprintf(text, sizeof text, "left out %d, known %d", left_out[0], left_out[1]);
+  TEST_ASSERT_TRUE_MESSAGE(left_out[0] >= 10, text);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(0, left_out[1], text);
+}
+
 static void readings_below_zero_count_as_zero(void) {
   struct random random = {78};
   const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4};
@@ -525,6 +616,14 @@ static void any_bits_give_finite_results(void) {
       settings.dip_share = FIT_DIP_SHARE_MAX / (float)(1 + random_below(&random, 9));
       settings.dip_sd_mm = 0.01f + (float)random_below(&random, 100);
     }
+    struct fit_own own[SENSORS];
+    if (random_below(&random, 2)) {
+      for (int k = 0; k < SENSORS; k++) {
+        own[k] = (struct fit_own){(int16_t)random_u32(&random), (int16_t)random_u32(&random),
+                                  (int16_t)random_u32(&random)};
+      }
+      settings.own = own;
+    }
     struct fit_result result;
     bool masked = random_below(&random, 2);
     if (masked) {
@@ -561,6 +660,8 @@ int main(void) {
   RUN_TEST(a_prior_leaves_what_is_uncertain_so);
   RUN_TEST(a_known_dip_is_added_back_alike_in_all);
   RUN_TEST(beyond_the_sensors_the_dip_tells_the_place);
+  RUN_TEST(what_is_the_sensors_own_is_taken_out_alike_in_all);
+  RUN_TEST(a_sensor_that_is_known_to_differ_is_no_outlier);
   RUN_TEST(readings_below_zero_count_as_zero);
   RUN_TEST(warnings_are_given);
   RUN_TEST(any_bits_give_finite_results);

@@ -229,6 +229,39 @@ static void test_what_is_no_fit_stays_as_it_is(void) {
   }
 }
 
+/* Sensors that feel a contact wider or narrower by 6 % at most, and are off by 0.16 mm. */
+static void test_what_is_the_sensors_own_is_no_load(void) {
+  int loads[2] = {0}; /* unknown, known */
+  for (int i = 0; i < 200; i++) {
+    struct fit_own own[SENSORS];
+    int32_t pressure_Pa_q10[SENSORS];
+    double x_mm = random_between(&noise, -9.0, 9.0), y_mm = random_between(&noise, -18.0, 18.0);
+    for (int k = 0; k < SENSORS; k++) {
+      own[k] = (struct fit_own){(int16_t)random_between(&noise, -600, 600),
+                                (int16_t)random_between(&noise, -600, 600),
+                                (int16_t)random_between(&noise, -2000, 2000)};
+      double sigma_mm = 6.0 * exp(own[k].wider_q15 / 32768.0);
+      double dx = 9.0 * (k / 5 - 1 + own[k].off_x_q15 / 32768.0) - x_mm;
+      double dy = 9.0 * (k % 5 - 2 + own[k].off_y_q15 / 32768.0) - y_mm;
+      pressure_Pa_q10[k] =
+          (int32_t)lround(1024.0 * 2e4 * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm)));
+    }
+    for (int known = 0; known < 2; known++) {
+      struct fit_settings settings = usual();
+      fit_set_errors(&settings, 0.002f, 0.0065f);
+      settings.own = known ? own : NULL;
+      struct fit_load load = {0};
+      struct fit_result result;
+      hold(&load, pressure_Pa_q10, ALL, &settings, &result);
+      loads[known] += load.known && load.ratio > 0.1f;
+    }
+  }
+  char text[60];
+  snprintf(text, sizeof text, "of 200 loads: %d, known %d", loads[0], loads[1]);
+  TEST_ASSERT_GREATER_OR_EQUAL_INT_MESSAGE(20, loads[0], text);
+  TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(4, loads[1], text);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_a_load_is_part_of_the_error);
@@ -236,6 +269,7 @@ int main(void) {
   RUN_TEST(test_before_the_first_look_a_load_is_assumed);
   RUN_TEST(test_a_look_does_not_mix_frames);
   RUN_TEST(test_a_dip_that_is_known_is_no_load);
+  RUN_TEST(test_what_is_the_sensors_own_is_no_load);
   RUN_TEST(test_sensors_may_be_missing);
   RUN_TEST(test_few_sensors_see_no_load);
   RUN_TEST(test_what_is_no_fit_stays_as_it_is);

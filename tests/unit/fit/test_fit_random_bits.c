@@ -187,6 +187,14 @@ static struct input draw(uint32_t number) {
     settings->dip_share = any ? any_float(&random) : (float)random_between(&random, 0.0, 0.1);
     settings->dip_sd_mm = any ? any_float(&random) : (float)random_between(&random, 1.0, 100.0);
   }
+  if (random_below(&random, 4) == 0) {
+    static struct fit_own own[FT_MAX_SENSORS];
+    for (int k = 0; k < FT_MAX_SENSORS; k++) {
+      own[k] = (struct fit_own){(int16_t)random_u32(&random), (int16_t)random_u32(&random),
+                                (int16_t)random_u32(&random)};
+    }
+    settings->own = own;
+  }
   switch (random_below(&random, 4)) {
   case 0:
     settings->prior_sigma_mm = any_float(&random);

@@ -22,6 +22,7 @@ static struct fit_pad pad;
 static struct pad_profile profile;
 static struct fit_settings settings;
 static double dip_share; /* of the rubber */
+static struct fit_own own[15];
 #define DIP_SD_mm 15.0
 
 struct contact {
@@ -60,6 +61,7 @@ void setUp(void) {
   settings.noise_Pa_q10 = 2048;
   fit_set_errors(&settings, 0.005f, 0.0065f);
   dip_share = 0.0;
+  memset(own, 0, sizeof own);
 }
 
 void tearDown(void) {}
@@ -86,10 +88,15 @@ static double pressure_Pa(const struct contact *contact, double x_mm, double y_m
   return 1e6 * sum / 6.283185307179586;
 }
 
+/* A sensor that feels all wider by a factor reads what is nearer by it. */
 static void read_contact(const struct contact *contact, int32_t *readings) {
   for (int k = 0; k < SENSORS; k++) {
-    double p_Pa =
-        pressure_Pa(contact, (double)(array.x[k] * PITCH_mm), (double)(array.y[k] * PITCH_mm));
+    double x_mm = (double)(array.x[k] * PITCH_mm), y_mm = (double)(array.y[k] * PITCH_mm);
+    double nearer = exp(-own[k].wider_q15 / 32768.0);
+    x_mm += (double)PITCH_mm * own[k].off_x_q15 / 32768.0;
+    y_mm += (double)PITCH_mm * own[k].off_y_q15 / 32768.0;
+    double p_Pa = pressure_Pa(contact, contact->x_mm + nearer * (x_mm - contact->x_mm),
+                              contact->y_mm + nearer * (y_mm - contact->y_mm));
     readings[k] = (int32_t)lround(1024.0 * p_Pa);
   }
 }
@@ -188,6 +195,18 @@ static void test_a_dip_that_is_known_is_in_the_model(void) {
   settings.dip_sd_mm = (float)DIP_SD_mm;
   judge_pad(12.0, ALL, 0.03, 0.003, 280, 0);
   judge_pad(12.0, ALL & ~(1 << 7), 0.05, 0.005, 280, 0);
+}
+
+static void test_what_is_the_sensors_own_is_taken_out(void) {
+  struct random random = {UINT64_C(7)};
+  for (int k = 0; k < SENSORS; k++) {
+    own[k].off_x_q15 = (int16_t)random_between(&random, -600, 600); /* 0.16 mm */
+    own[k].off_y_q15 = (int16_t)random_between(&random, -600, 600);
+    own[k].wider_q15 = (int16_t)random_between(&random, -1600, 1600); /* 5 % */
+  }
+  settings.own = own;
+  judge_pad(12.0, ALL, 0.08, 0.01, 260, 0);
+  judge_pad(12.0, ALL & ~(1 << 7), 0.1, 0.015, 260, 0);
 }
 
 static void expect_none(const int32_t *readings, uint32_t usable) {
@@ -590,6 +609,7 @@ int main(void) {
   RUN_TEST(test_pads_of_5_to_20_mm);
   RUN_TEST(test_sensors_missing);
   RUN_TEST(test_a_dip_that_is_known_is_in_the_model);
+  RUN_TEST(test_what_is_the_sensors_own_is_taken_out);
   RUN_TEST(test_too_few_sensors_give_nothing);
   RUN_TEST(test_no_fit_gives_nothing);
   RUN_TEST(test_two_contacts_give_nothing);

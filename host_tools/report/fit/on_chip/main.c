@@ -31,7 +31,8 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
   } while (0)
 
 static struct fit_array layout;
-static struct fit_settings chosen;
+static struct fit_own own[FT_MAX_SENSORS];
+static struct fit_settings chosen = {.own = own};
 static struct fit_result contact;
 static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
@@ -167,6 +168,9 @@ int main(void) {
       fit_pad_init(&pad, &layout, &profile) != FT_OK ||
       fit_shapes_init(&shapes_pad, &layout, &profile) != FT_OK) {
     port_panic();
+  }
+  for (int k = 0; k < FT_MAX_SENSORS; k++) { /* 0.1 mm, 4 % */
+    own[k] = (struct fit_own){364, -364, (int16_t)(k % 2 ? 1311 : -1311)};
   }
   for (;;) {
     CALL_DEBUGGER(CALL_NEXT_JOB);

@@ -77,6 +77,8 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   const truth::Pad &pad = known.pad;
   fit_settings settings = truth::settings_for(pad, noise_Pa);
   settings.cut_noises = 0; // as where a profile acts
+  const std::vector<fit_own> own = calibrating::own_of(truth::session_array(), known.shape);
+  settings.own = own.empty() ? nullptr : own.data();
   fit_settings of_load = settings;
   of_load.dip_share = static_cast<float>(known.shape.dip_share);
   of_load.dip_sd_mm = static_cast<float>(known.shape.dip_sd_mm);

@@ -274,6 +274,8 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
       throw std::runtime_error("the firmware refuses the pad's profile");
     }
     const Pad pad = c.exact ? perfect_pad() : pads[p].gains;
+    const std::vector<fit_own> own =
+        c.exact ? std::vector<fit_own>{} : calibrating::own_of(session_array(), pads[p].shape);
     for (std::size_t t = 0; t < TOUCHES; t++) {
       const shear::Object &object = *c.objects[random.next() % c.objects.size()];
       const std::vector<Touch> touches = draw_touches(array, c, random);
@@ -281,6 +283,7 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
       const double noise_Pa = draw_noise_Pa(random);
       fit_settings settings = settings_for(pad, noise_Pa);
       settings.cut_noises = 0; // as where a profile acts, and no dip in the Gaussian
+      settings.own = own.empty() ? nullptr : own.data();
       fit_settings gaussian = settings;
       gaussian.dip_share = 0.0f;
       settings.dip_share = static_cast<float>(pads[p].shape.dip_share);
