@@ -12,6 +12,10 @@
 struct sensor_calibration {
   float gain;    /* sensitivity relative to the pad's mean: pressure = reading / gain */
   float gain_sd; /* relative standard deviation */
+  /* Of the sensor from its place in the layout, and the log of the width in which it feels a
+   * contact over that of the others, 1/32768; positive: wider. Zeros: not known, none. */
+  int16_t off_x_um, off_y_um;
+  int16_t wider_q15;
 };
 
 struct calibration {
@@ -33,6 +37,8 @@ struct calibration {
 #define CALIBRATION_GAIN_MIN 0.25f
 #define CALIBRATION_GAIN_MAX 4.0f
 #define CALIBRATION_GAIN_SD_MAX 0.5f /* from 0 */
+#define CALIBRATION_OFF_MAX_um 2000   /* to both sides */
+#define CALIBRATION_WIDER_MAX_Q15 9830 /* to both sides: 0.3 */
 #define CALIBRATION_FORCE_SCALE_MIN 0.1f
 #define CALIBRATION_FORCE_SCALE_MAX 10.0f
 #define CALIBRATION_FORCE_SCALE_SD_MAX 1.0f /* from 0 */

@@ -11,7 +11,8 @@
 #define MARK UINT32_C(0)
 
 enum {
-  VERSION = 3,
+  VERSION = 4,
+  VERSION_WITHOUT_PLACES = 3,
   VERSION_WITHOUT_SHAPE = 2,
   VERSION_WITHOUT_PROFILE = 1,
   /* In a slot */
@@ -22,9 +23,6 @@ enum {
   GENERATION_AT = 12,
   CRC_AT = 16,
   PAYLOAD_AT = 20,
-  SEALED_AT = STORE_SLOT_BYTES - 8,
-  FINAL_AT = STORE_SLOT_BYTES - 4,
-  MAX_PAYLOAD = SEALED_AT - PAYLOAD_AT,
   /* In a payload */
   HAS_CALIBRATION = 1 << 0,
   HAS_SETTINGS = 1 << 1,
@@ -34,23 +32,39 @@ enum {
   SETTINGS_BYTES = 24,
   PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
   SHAPE_BYTES = 9,
+  PLACE_BYTES = 6, /* of each sensor */
   /* A slot that does not hold what was written is given up; so often in a row is a flash that
      fails. */
   MAX_ATTEMPTS = 3,
 };
-_Static_assert((int)STORE_RECORD_BYTES == (int)SEALED_AT &&
-                   MAX_PAYLOAD >=
-                       CALIBRATION_AT + 14 + 8 * FT_MAX_SENSORS + SETTINGS_BYTES + PROFILE_BYTES +
-                       SHAPE_BYTES,
-               "a record fits into its slot");
+#define RECORD_BYTES(sensors)                                                                      \
+  (PAYLOAD_AT + CALIBRATION_AT + 14 + (8 + PLACE_BYTES) * (sensors) + SETTINGS_BYTES +             \
+   PROFILE_BYTES + SHAPE_BYTES)
+_Static_assert(RECORD_BYTES(STORE_SENSORS_OF_SHORT_SLOT) <= STORE_SHORT_SLOT_BYTES - 8 &&
+                   RECORD_BYTES(FT_MAX_SENSORS) <= STORE_RECORD_BYTES &&
+                   (int)STORE_RECORD_BYTES <= STORE_LONG_SLOT_BYTES - 8,
+               "a record fits into its slot and into the buffer");
 
 /* The longest erase of a sector takes 400 ms (W25Q16JV), and the longest write of a page 3 ms. */
 #define STEP_MAX_us 1000000u
 
 static const uint8_t mark[4] = {0, 0, 0, 0};
 
-static uint32_t slot_address(unsigned sector, unsigned slot) {
-  return sector * PORT_FLASH_SECTOR_BYTES + slot * STORE_SLOT_BYTES;
+static uint32_t slot_address(const struct store *store, unsigned sector, unsigned slot) {
+  return sector * PORT_FLASH_SECTOR_BYTES + slot * store->slot_bytes;
+}
+
+static unsigned slots_of(const struct store *store) {
+  return PORT_FLASH_SECTOR_BYTES / store->slot_bytes;
+}
+
+/* The two marks at the end of a slot. */
+static unsigned sealed_at(const struct store *store) {
+  return store->slot_bytes - 8u;
+}
+
+static unsigned final_at(const struct store *store) {
+  return store->slot_bytes - 4u;
 }
 
 static uint32_t read_u32(uint32_t at) {
@@ -91,8 +105,7 @@ static void get_floats(const uint8_t *at, void *to, size_t offset, unsigned coun
   }
 }
 
-#define FLOATS_OF_SENSOR 2
-_Static_assert(sizeof(struct sensor_calibration) == FLOATS_OF_SENSOR * sizeof(float) &&
+_Static_assert(offsetof(struct sensor_calibration, gain_sd) == sizeof(float) &&
                    offsetof(struct calibration, force_scale_sd) ==
                        offsetof(struct calibration, force_scale) + sizeof(float) &&
                    offsetof(struct store_settings, location_limit_mm) ==
@@ -103,14 +116,20 @@ static void put_calibration(uint8_t *at, const struct calibration *calibration, 
   at = put_u32(at, calibration->date_s);
   at = put_u16(at, calibration->placements);
   put_floats(at, calibration, offsetof(struct calibration, force_scale), 2);
-  put_floats(at + 8, calibration->sensors, 0, FLOATS_OF_SENSOR * count);
+  at += 8;
+  for (unsigned k = 0; k < count; k++) {
+    put_floats(at + 8 * k, &calibration->sensors[k], 0, 2);
+  }
 }
 
 static void get_calibration(const uint8_t *at, struct calibration *calibration, unsigned count) {
   calibration->date_s = bytes_get_u32(at);
   calibration->placements = bytes_get_u16(at + 4);
   get_floats(at + 6, calibration, offsetof(struct calibration, force_scale), 2);
-  get_floats(at + 14, calibration->sensors, 0, FLOATS_OF_SENSOR * count);
+  at += 14;
+  for (unsigned k = 0; k < count; k++) {
+    get_floats(at + 8 * k, &calibration->sensors[k], 0, 2);
+  }
 }
 
 static void put_shape(uint8_t *at, const struct calibration *calibration) {
@@ -127,6 +146,24 @@ static void get_shape(const uint8_t *at, struct calibration *calibration) {
   calibration->dip_share_q16 = bytes_get_u16(at + 4);
   calibration->dip_sd_um = bytes_get_u16(at + 6);
   calibration->ambient_kPa = at[8];
+}
+
+static void put_places(uint8_t *at, const struct calibration *calibration, unsigned count) {
+  for (unsigned k = 0; k < count; k++) {
+    const struct sensor_calibration *sensor = &calibration->sensors[k];
+    at = put_u16(at, (uint16_t)sensor->off_x_um);
+    at = put_u16(at, (uint16_t)sensor->off_y_um);
+    at = put_u16(at, (uint16_t)sensor->wider_q15);
+  }
+}
+
+static void get_places(const uint8_t *at, struct calibration *calibration, unsigned count) {
+  for (unsigned k = 0; k < count; k++, at += PLACE_BYTES) {
+    struct sensor_calibration *sensor = &calibration->sensors[k];
+    sensor->off_x_um = (int16_t)bytes_get_u16(at);
+    sensor->off_y_um = (int16_t)bytes_get_u16(at + 2);
+    sensor->wider_q15 = (int16_t)bytes_get_u16(at + 4);
+  }
 }
 
 static void put_settings(uint8_t *at, const struct store_settings *settings) {
@@ -166,7 +203,8 @@ static void make_record(struct store *store, const struct parts *parts) {
   bytes_put_u32(store->record + BEGUN_AT, MARK);
   unsigned settings_at = CALIBRATION_AT + calibration_bytes(store->sensor_count);
   unsigned shape_at = settings_at + SETTINGS_BYTES + PROFILE_BYTES;
-  unsigned length = shape_at + SHAPE_BYTES;
+  unsigned places_at = shape_at + SHAPE_BYTES;
+  unsigned length = places_at + PLACE_BYTES * store->sensor_count;
   memset(payload, 0, length);
   payload[0] = (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) |
                          (parts->settings ? HAS_SETTINGS : 0) | (parts->profile ? HAS_PROFILE : 0));
@@ -174,6 +212,7 @@ static void make_record(struct store *store, const struct parts *parts) {
   if (parts->calibration) {
     put_calibration(payload + CALIBRATION_AT, parts->calibration, store->sensor_count);
     put_shape(payload + shape_at, parts->calibration);
+    put_places(payload + places_at, parts->calibration, store->sensor_count);
   }
   if (parts->settings) {
     put_settings(payload + settings_at, parts->settings);
@@ -214,7 +253,9 @@ static bool take_record(struct store *store) {
   const unsigned settings_at = CALIBRATION_AT + calibration_bytes(store->sensor_count);
   const unsigned profile_at = settings_at + SETTINGS_BYTES;
   const unsigned shape_at = profile_at + PROFILE_BYTES;
-  const unsigned expected = version == VERSION                   ? shape_at + SHAPE_BYTES
+  const unsigned places_at = shape_at + SHAPE_BYTES;
+  const unsigned expected = version == VERSION ? places_at + PLACE_BYTES * store->sensor_count
+                            : version == VERSION_WITHOUT_PLACES  ? places_at
                             : version == VERSION_WITHOUT_SHAPE   ? shape_at
                             : version == VERSION_WITHOUT_PROFILE ? profile_at
                                                                  : 0;
@@ -225,8 +266,11 @@ static bool take_record(struct store *store) {
   if (payload[0] & HAS_CALIBRATION) {
     struct calibration *calibration = &content->calibration;
     get_calibration(payload + CALIBRATION_AT, calibration, store->sensor_count);
-    if (version == VERSION) {
+    if (version >= VERSION_WITHOUT_PLACES) {
       get_shape(payload + shape_at, calibration);
+    }
+    if (version == VERSION) {
+      get_places(payload + places_at, calibration, store->sensor_count);
     }
     content->has_calibration = calibration_is_valid(calibration, store->sensor_count);
     if (!content->has_calibration) {
@@ -250,7 +294,9 @@ static bool take_record(struct store *store) {
 
 /* Reads the record of a slot into the buffer, as it is at this moment. False: it is damaged. */
 static bool load_record(struct store *store, unsigned sector, unsigned slot) {
-  const uint32_t address = slot_address(sector, slot);
+  const uint32_t address = slot_address(store, sector, slot);
+  const unsigned room =
+      sealed_at(store) < STORE_RECORD_BYTES ? sealed_at(store) : (unsigned)STORE_RECORD_BYTES;
   uint8_t *record = store->record;
   store->record_length = PAYLOAD_AT;
   for (unsigned at = MAGIC_AT; at < store->record_length;) {
@@ -260,7 +306,7 @@ static bool load_record(struct store *store, unsigned sector, unsigned slot) {
     at += count;
     if (at == PAYLOAD_AT && left == count) { /* the head: now the length is known */
       unsigned length = bytes_get_u16(record + LENGTH_AT);
-      if (bytes_get_u32(record + MAGIC_AT) != MAGIC || length > MAX_PAYLOAD ||
+      if (bytes_get_u32(record + MAGIC_AT) != MAGIC || length > room - PAYLOAD_AT ||
           bytes_get_u32(record + GENERATION_AT) == 0) {
         return false;
       }
@@ -288,22 +334,24 @@ struct sector {
   bool is_final;       /* and marked so, and no slot is used behind it */
   bool lost;           /* behind the newest good record stands one that was sealed */
   bool first_is_bad;   /* the first slot is used and not good */
+  bool is_earlier;     /* it holds good records of a version before this one */
 };
 
-static struct sector read_sector(struct store *store, unsigned number) {
+static struct sector read_slots(struct store *store, unsigned number) {
   struct sector sector = {.sure_slot = STORE_SLOTS};
-  for (unsigned i = 0; i < STORE_SLOTS; i++) {
-    const uint32_t address = slot_address(number, i);
+  for (unsigned i = 0; i < slots_of(store); i++) {
+    const uint32_t address = slot_address(store, number, i);
     if (read_u32(address + BEGUN_AT) == ERASED) {
       continue;
     }
-    bool sealed = read_u32(address + SEALED_AT) == MARK;
+    bool sealed = read_u32(address + sealed_at(store)) == MARK;
     bool good = load_record(store, number, i);
     sector.used = (uint8_t)(i + 1);
-    sector.is_final = good && sealed && read_u32(address + FINAL_AT) == MARK;
+    sector.is_final = good && sealed && read_u32(address + final_at(store)) == MARK;
     bool was_record = sealed && bytes_get_u32(store->record + MAGIC_AT) == MAGIC;
     sector.lost = !good && (sector.lost || was_record);
     if (good) {
+      sector.is_earlier |= bytes_get_u16(store->record + VERSION_AT) < VERSION;
       sector.generation = bytes_get_u32(store->record + GENERATION_AT);
       if (!is_older(sector.generation, store->generation)) { /* now: it need not read so again */
         store->generation = sector.generation;
@@ -317,21 +365,39 @@ static struct sector read_sector(struct store *store, unsigned number) {
   return sector;
 }
 
+/* Before VERSION all arrays had short slots. Such a sector is read, and counts as full. */
+static struct sector read_sector(struct store *store, unsigned number) {
+  const uint16_t slot_bytes = store->slot_bytes;
+  if (slot_bytes != STORE_SHORT_SLOT_BYTES) {
+    store->slot_bytes = STORE_SHORT_SLOT_BYTES;
+    struct sector sector = read_slots(store, number);
+    store->slot_bytes = slot_bytes;
+    if (sector.is_earlier) {
+      sector.used = STORE_SLOTS;
+      return sector;
+    }
+  }
+  return read_slots(store, number);
+}
+
 void store_init(struct store *store, uint8_t sensor_count) {
   memset(store, 0, sizeof *store);
   store->sensor_count = sensor_count;
+  store->slot_bytes = sensor_count <= STORE_SENSORS_OF_SHORT_SLOT ? STORE_SHORT_SLOT_BYTES
+                                                                  : STORE_LONG_SLOT_BYTES;
   const struct sector sectors[PORT_FLASH_SECTORS] = {read_sector(store, 0), read_sector(store, 1)};
   store->sector = is_older(sectors[0].generation, sectors[1].generation);
   const struct sector *current = &sectors[store->sector];
   const struct sector *other = &sectors[!store->sector];
   store->next_slot = current->used;
   store->sure_slot = current->sure_slot;
+  store->sure_slot_bytes = current->is_earlier ? STORE_SHORT_SLOT_BYTES : store->slot_bytes;
   store->other_is_quiet = !other->first_is_bad;
   if (current->generation == 0) {
     /* The first record of all was cut short, and perhaps what was to settle that. */
     store->damaged = current->lost || other->lost;
     store->must_settle =
-        !store->damaged && current->used > 0 && current->used < STORE_SLOTS && other->used == 0;
+        !store->damaged && current->used > 0 && current->used < slots_of(store) && other->used == 0;
     return;
   }
   if (current->lost) {
@@ -349,7 +415,7 @@ static void begin_step(struct store *store, enum store_step step, uint64_t now_u
 }
 
 static uint32_t to_address(const struct store *store) {
-  return slot_address(store->to_sector, store->to_slot);
+  return slot_address(store, store->to_sector, store->to_slot);
 }
 
 static void program_mark(const struct store *store, unsigned at) {
@@ -377,14 +443,16 @@ static void begin_write(struct store *store, uint64_t now_us) {
   store->to_sector = store->sector;
   store->to_slot = store->next_slot;
   store->to_generation = store->generation;
-  bool fits = store->generation != 0 && store->next_slot < STORE_SLOTS && store->other_is_quiet;
+  bool fits = store->generation != 0 && store->next_slot < slots_of(store) &&
+              store->other_is_quiet;
   if (fits) {
     store->next_slot++;
     begin_slot(store, now_us);
   } else if (store->sure_slot < STORE_SLOTS) {
     /* The seal of what remains may have been cut short itself: made good before the other goes. */
-    port_flash_program(slot_address(store->sector, store->sure_slot) + SEALED_AT, mark,
-                       sizeof mark);
+    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES +
+                           (store->sure_slot + 1u) * store->sure_slot_bytes - 8,
+                       mark, sizeof mark);
     begin_step(store, STORE_SECURE, now_us);
     store->to_sector = !store->sector;
     store->to_slot = 0;
@@ -419,6 +487,7 @@ static enum ft_status finish_write(struct store *store) {
   store->next_slot = store->to_slot + 1;
   store->generation = store->to_generation;
   store->sure_slot = store->to_slot;
+  store->sure_slot_bytes = store->slot_bytes;
   store->other_is_quiet = true;
   store->damaged = false;
   store->must_settle = false;
@@ -491,17 +560,17 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
       return try_again(store, now_us);
     }
     if (store->at == store->record_length) {
-      program_mark(store, SEALED_AT);
+      program_mark(store, sealed_at(store));
       begin_step(store, STORE_SEAL, now_us);
     }
     break;
   case STORE_SEAL:
-    program_mark(store, FINAL_AT);
+    program_mark(store, final_at(store));
     begin_step(store, STORE_END, now_us);
     break;
   default:
-    if (read_u32(to_address(store) + SEALED_AT) != MARK ||
-        read_u32(to_address(store) + FINAL_AT) != MARK) {
+    if (read_u32(to_address(store) + sealed_at(store)) != MARK ||
+        read_u32(to_address(store) + final_at(store)) != MARK) {
       return try_again(store, now_us);
     }
     return finish_write(store);

@@ -2,13 +2,13 @@
  * with. If the power fails at any moment, the old or the new content remains, never a mixture and
  * never nothing.
  *
- * The flash is a log. A sector holds eight slots. A record is all that is kept. It goes into the
- * next free slot, or into the first of the other sector once that is erased. The newest undamaged
- * record counts. A slot holds, in this order, each by a write of its own:
+ * The flash is a log. A sector holds eight slots of 512 bytes, or four of 1024 if the array has 19
+ * sensors or more. A record is all that is kept. It goes into the next free slot, or into the first of the other sector once that is erased. The newest undamaged
+ * record counts. A slot of 512 bytes holds, in this order, each by a write of its own:
  *
  *     0    u32  begun: 0. From now on the slot is used, whatever it holds
  *     4    u32  magic 0x74665346
- *     8    u16  version 3; 1 and 2 are read too
+ *     8    u16  version 4; 1 to 3 are read too
  *     10   u16  length of the payload
  *     12   u32  generation: one more than that of the other sector when this one was erased; after
  *               2^32 - 1 comes 1
@@ -23,8 +23,10 @@
  * rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32 location limit
  * mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as in its command,
  * 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma, its sd, the dip's
- * share and sd, u8 kPa; as in its command, which has them before the sensors. Later versions keep
- * the slot as it is and change the payload.
+ * share and sd, u8 kPa; as in its command, which has them before the sensors. Version 4 has one more
+ * part at the end: of each sensor i16 i16 i16, its place and width, as in the command; 6 n bytes.
+ * Before it, 512 bytes were enough for all arrays. A sector with such a record has slots of 512
+ * bytes and counts as full. Later versions keep the slot as it is and change the payload.
  *
  * Bits whose change was cut short may read differently each time. So a record that is not final may
  * be there today and gone tomorrow, or the other way round. When start-up meets one, it writes the
@@ -64,9 +66,11 @@ struct store_content {
 };
 
 enum {
-  STORE_SLOT_BYTES = 512,
-  STORE_SLOTS = PORT_FLASH_SECTOR_BYTES / STORE_SLOT_BYTES,
-  STORE_RECORD_BYTES = STORE_SLOT_BYTES - 8, /* with the mark before it, without those behind it */
+  STORE_SHORT_SLOT_BYTES = 512,
+  STORE_LONG_SLOT_BYTES = 1024,
+  STORE_SENSORS_OF_SHORT_SLOT = 18,                                    /* with more it is long */
+  STORE_SLOTS = PORT_FLASH_SECTOR_BYTES / STORE_SHORT_SLOT_BYTES,      /* at most */
+  STORE_RECORD_BYTES = 700, /* with the mark before it, without those behind it */
 };
 
 enum store_step {
@@ -87,14 +91,16 @@ struct store {
   bool damaged;
 
   uint8_t sensor_count;
+  uint16_t slot_bytes;
   uint8_t step;     /* enum store_step */
   uint8_t attempts; /* that have failed */
 
   /* The log. The current sector holds the newest record, if there is any. */
   uint8_t sector;
-  uint8_t next_slot;   /* of the current sector; STORE_SLOTS: it is full */
+  uint8_t next_slot;   /* of the current sector; none that there is: it is full */
   uint32_t generation; /* of the current sector; 0: there is no record */
   uint8_t sure_slot;   /* of the current sector: a sealed record; STORE_SLOTS: none */
+  uint16_t sure_slot_bytes;
   bool other_is_quiet; /* the other sector holds nothing that may turn into a newer record */
   bool must_settle;    /* what was decided at start-up has to be written once more */
 

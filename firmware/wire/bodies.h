@@ -12,9 +12,9 @@
 
 #include <stdint.h>
 
-#define WIRE_VERSION 8
+#define WIRE_VERSION 9
 
-enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 825 };
+enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 1017 };
 
 enum wire_type {
   /* device to host */
@@ -324,8 +324,9 @@ struct wire_cmd_loader {
   uint32_t magic; /* 0x746F6F42, so that a stray byte never reboots a fingertip */
 };
 
-/* Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, scale 0.1 to 10, its
- * standard deviation 0 to 1. It acts from the first frame after the acknowledgement. */
+/* Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, sensors up to 2000
+ * um from their places and wider or narrower by up to 9830/32768, scale 0.1 to 10, its standard
+ * deviation 0 to 1. It acts from the first frame after the acknowledgement. */
 struct wire_cmd_calibrate {
   uint8_t sensor_count; /* that of the fingertip */
   struct calibration calibration; /* as in info */

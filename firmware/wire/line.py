@@ -32,8 +32,9 @@ class Field:
         kind, _, times = line["type"].partition(" ")
         self.kind, self.times = kind, int(times or 1)
         self.pair = line.get("of")
-        self.twos = line.get("twos")
-        self.each_sensor = bool(self.pair or self.twos)
+        self.each = line.get("each")
+        self.keys = line.get("keys", self.each)
+        self.per_sensor = len(self.pair or self.each or ())
         self.when = tuple(line["when"].split(".")) if "when" in line else None
         self.group = line.get("group")
         self.text = line.get("text", "")
@@ -48,13 +49,13 @@ class Field:
         """As PROTOCOL.md has it."""
         if self.is_struct:
             return self.kind.replace("_", " ")
-        if self.each_sensor:
-            return f"n x ({self.kind} {self.kind})"
+        if self.per_sensor:
+            return f"n x ({' '.join([self.kind] * self.per_sensor)})"
         return {"text": "text 16", "n": "u8"}.get(self.kind, self.kind) + (f" x {self.times}" if self.times > 1 else "")
 
     @property
     def names_text(self):
-        return ", ".join(self.pair or self.twos or [self.name])
+        return ", ".join(self.pair or self.each or [self.name])
 
 
 class Body:
@@ -107,7 +108,7 @@ class Line:
         """Bytes, with all that a body can hold."""
         def size(fields):
             return sum(size(self.structs[field.kind].fields) if field.is_struct else self.text_bytes if field.kind == "text"
-                       else BYTES[field.kind] * field.times * (2 * self.sensors_max if field.each_sensor else 1) for field in fields)
+                       else BYTES[field.kind] * field.times * (field.per_sensor * self.sensors_max or 1) for field in fields)
 
         return max(size(body.fields) for body in (*self.packets.values(), *self.commands.values()))
 
@@ -273,8 +274,8 @@ def runs_of(body, line, when=None, prefix=""):
             continue
         if field.pair:
             run = ("F32_PAIRS" if field.kind == "f32" else "PAIRS", 1, prefix + field.pair[0], condition)
-        elif field.twos:
-            run = ("F32_TWOS", 1, member, condition)
+        elif field.each:
+            run = (f"SENSORS_{KINDS[field.kind]}", field.per_sensor, f"{member}[0].{field.each[0]}", condition)
         else:
             run = (KINDS[field.kind], field.times, member, condition)
         if runs and runs[-1][0] == run[0] and runs[-1][3] == condition and run[0] in ("BYTES", "TEXTS", "U16", "U32", "F32"):
@@ -359,9 +360,9 @@ def line_fields_hpp(line):
     lines += visitor("info", info, map(info.field, info.keys), "wire_info")
     calibration, pad = line.structs["calibration"], line.structs["pad_profile"]
     lines += ["/* What there is only of a calibrated fingertip: numbers, and lists with one for each sensor. */"]
-    lines += visitor("calibration", calibration, [field for field in calibration.fields if not field.twos], "struct calibration")
-    lines += ["struct SensorList {", "  const char *name;", "  float sensor_calibration::*value;", "};", "inline constexpr SensorList sensor_lists[] = {",
-              *(f'    {{"{name}s", &sensor_calibration::{name}}},' for name in next(field.twos for field in calibration.fields if field.twos)), "};", "",
+    lines += visitor("calibration", calibration, [field for field in calibration.fields if not field.each], "struct calibration")
+    lines += ["template <typename Visitor> void visit_sensor_lists(Visitor &visit) {",
+              *(f'  visit("{key}", &sensor_calibration::{name});' for field in calibration.fields if field.each for key, name in zip(field.keys, field.each, strict=True)), "}", "",
               "/* What there is only where a pad's profile is stored: numbers, and lists with one for each term. */"]
     lines += visitor("pad", pad, [field for field in pad.fields if field.key.startswith("pad_")], "pad_profile")
     lines += ["struct PadList {", "  const char *name;", "  std::size_t terms;", "  float &(*value)(pad_profile &pad, std::size_t term);", "};",
@@ -390,9 +391,9 @@ def py_wire(field, line):
         return f'Annotated[{kind}{" | None" if field.when else ""}, Wire("{kind}"{when})]'
     code = STRUCT_CODES[field.kind]
     base = {"f32": "float", "text": "str"}.get(field.kind, "int")
-    if field.times > 1 or field.each_sensor:
+    if field.times > 1 or field.per_sensor:
         base = f"tuple[{base}, ...]"
-    said = f'"{code}"' + (f", {field.times}" if field.times > 1 else "") + (", 2, each_sensor=True" if field.each_sensor else "")
+    said = f'"{code}"' + (f", {field.times}" if field.times > 1 else "") + (f", {field.per_sensor}, each_sensor=True" if field.per_sensor else "")
     if field.when:
         absent = "math.nan" if field.kind == "f32" else "0" if field.when[0] == "flags" else None
         base += "" if absent else " | None"
@@ -417,12 +418,10 @@ def py_class(body, line):
     if not body.fields:
         lines.pop()
     for field in body.fields:
-        names = field.pair or field.twos
-        if names and field.kind == "f32":
-            plural = "s" if field.twos else ""
-            for i, name in enumerate(names):
-                lines += ["", "    @property", f"    def {name}{plural}(self) -> tuple[float, ...]:", '        """Of each sensor."""',
-                          f"        return self.{field.python}[{i}::2]"]
+        names = field.keys or (field.pair if field.kind == "f32" else None) or ()
+        for i, name in enumerate(names):
+            lines += ["", "    @property", f"    def {name}(self) -> tuple[{'float' if field.kind == 'f32' else 'int'}, ...]:", '        """Of each sensor."""',
+                      f"        return self.{field.python}[{i}::{field.per_sensor}]"]
     return [*lines, "", ""]
 
 

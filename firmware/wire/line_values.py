@@ -18,8 +18,8 @@ def values_of(body, line, where, part=""):
             values += values_of(line.structs[field.kind], line, member, field.kind)
         elif field.pair:
             values += [Value(name, field.kind, f"{where}.{name}", per_sensor=True, text=field.text) for name in field.pair]
-        elif field.twos:
-            values += [Value(name, field.kind, f"{member}[0].{name}", per_sensor=True, stride=4 * len(field.twos), text=field.text) for name in field.twos]
+        elif field.each:
+            values += [Value(name, field.kind, f"{member}[0].{name}", per_sensor=True, stride="sizeof(sensor_calibration)", text=field.text) for name in field.each]
         else:
             # Two names would be there twice: those of the header. A part's own are those that recordings have.
             name = field.key if field.key != field.name else field.python if field.name in ("sequence", "t_us") else f"pad_{field.name}" if part == "pad_profile" else field.name

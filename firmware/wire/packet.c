@@ -17,7 +17,9 @@ enum kind {
   F32,
   PAIRS,     /* of 32 bits: for each sensor an element of each of two arrays behind one another */
   F32_PAIRS, /* the same */
-  F32_TWOS,  /* for each sensor two behind one another */
+  /* For each sensor so many as the count says, of members behind one another of one struct each */
+  SENSORS_F32,
+  SENSORS_U16,
   WHEN,      /* no field: the next run is there if bit `count` of this word is set */
 };
 struct run {
@@ -39,7 +41,12 @@ struct wire_layout {
                                             name##_runs}
 static const struct run no_runs[1]; /* NULL has no end to go to */
 #define EMPTY_LAYOUT(name, type) const struct wire_layout name##_layout = {type, 0, no_runs}
-_Static_assert(sizeof(struct sensor_calibration) == 2 * sizeof(float), "F32_TWOS");
+_Static_assert(offsetof(struct sensor_calibration, gain_sd) == 4 &&
+                   offsetof(struct sensor_calibration, off_y_um) ==
+                       offsetof(struct sensor_calibration, off_x_um) + 2 &&
+                   offsetof(struct sensor_calibration, wider_q15) ==
+                       offsetof(struct sensor_calibration, off_x_um) + 4,
+               "SENSORS_F32, SENSORS_U16");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.raw.pressure_Pa_q10) +
                            4 * FT_MAX_SENSORS &&
@@ -181,8 +188,6 @@ static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, u
     return true;
   case F32_PAIRS:
     return put_pairs(writer, field, count);
-  case F32_TWOS:
-    return put_u32(writer, field, 2 * count);
   default:
     put_bytes(writer, field, count);
     return true;
@@ -229,8 +234,6 @@ static bool get_run(const uint8_t *at, uint8_t kind, uint8_t *field, unsigned co
     return get_u32(at, field, count, false);
   case F32_PAIRS:
     return get_u32(at, field, 2 * count, true);
-  case F32_TWOS:
-    return get_u32(at, field, 2 * count, false);
   default:
     memcpy(field, at, count);
     return true;
@@ -245,6 +248,20 @@ static bool is_left_out(const struct run *when, const uint8_t *field) {
 
 static bool is_sensor_count(uint8_t count) {
   return count >= 1 && count <= FT_MAX_SENSORS;
+}
+
+/* A run as so many of a simpler one, each for a sensor. */
+struct repeat {
+  uint8_t kind;
+  uint8_t count;
+  uint8_t times;
+};
+
+static inline struct repeat repeat_of(const struct run *run, uint8_t sensor_count) {
+  if (run->kind >= SENSORS_F32) {
+    return (struct repeat){run->kind == SENSORS_F32 ? F32 : U16, run->count, sensor_count};
+  }
+  return (struct repeat){run->kind, run->kind >= PAIRS ? sensor_count : run->count, 1};
 }
 
 /* False: a value is refused. */
@@ -264,8 +281,11 @@ static bool put_body(const struct wire_layout *layout, const uint8_t *packet,
         return false;
       }
     }
-    if (!put_run(writer, run->kind, field, run->kind >= PAIRS ? sensor_count : run->count)) {
-      return false;
+    struct repeat repeat = repeat_of(run, sensor_count);
+    for (; repeat.times > 0; repeat.times--, field += sizeof(struct sensor_calibration)) {
+      if (!put_run(writer, repeat.kind, field, repeat.count)) {
+        return false;
+      }
     }
   }
   return true;
@@ -275,7 +295,7 @@ static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_
                                         [SENSOR_COUNT] = 1, [U16] = 2,
                                         [U32] = 4,          [U64] = 8,
                                         [F32] = 4,          [PAIRS] = 8,
-                                        [F32_PAIRS] = 8,    [F32_TWOS] = 8};
+                                        [F32_PAIRS] = 8};
 
 /* False: a value is refused, or the body has another length. */
 static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length,
@@ -288,15 +308,17 @@ static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t
       run += is_left_out(run, field);
       continue;
     }
-    unsigned count = run->kind >= PAIRS ? sensor_count : run->count;
-    size_t bytes = count * bytes_of_kind[run->kind];
-    if (length < bytes || !get_run(at, run->kind, field, count)) {
-      return false;
+    struct repeat repeat = repeat_of(run, sensor_count);
+    size_t bytes = repeat.count * bytes_of_kind[repeat.kind];
+    for (; repeat.times > 0; repeat.times--, field += sizeof(struct sensor_calibration)) {
+      if (length < bytes || !get_run(at, repeat.kind, field, repeat.count)) {
+        return false;
+      }
+      at += bytes;
+      length -= bytes;
     }
-    at += bytes;
-    length -= bytes;
     if (run->kind == SENSOR_COUNT) {
-      sensor_count = *field;
+      sensor_count = packet[run->offset];
       if (!is_sensor_count(sensor_count)) {
         return false;
       }

@@ -111,7 +111,7 @@ class Generator(unittest.TestCase):
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):
         described = line.Line(ROOT / "firmware/wire/line.toml")
-        self.assertEqual(described.longest_frame(), 12 + (136 + 16 * 32 + 177) + 4 + 3 + 2)  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
+        self.assertEqual(described.longest_frame(), 12 + (136 + 22 * 32 + 177) + 4 + 4 + 2)  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
         self.assertIn(f"longer than {described.longest_frame()} bytes is damage", (ROOT / PAGE).read_text(encoding="utf-8"))
 
     def test_what_is_there_twice_is_refused(self):

@@ -4,9 +4,10 @@
 #include "native/native_flash.h"
 #include "store/store.h"
 
-enum { SENSORS = 3, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
+enum { PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
 
 static struct store store;
+static uint8_t sensors; /* 3, or 20: they have long slots */
 static uint64_t now_us;
 
 static bool is_same(const struct store_content *a, const struct store_content *b) {
@@ -21,7 +22,7 @@ static bool is_same(const struct store_content *a, const struct store_content *b
 static void check_content(void) {
   static const struct store_content none;
   struct store_content content = store.content;
-  FUZZ_CHECK(!content.has_calibration || calibration_is_valid(&content.calibration, SENSORS));
+  FUZZ_CHECK(!content.has_calibration || calibration_is_valid(&content.calibration, sensors));
   FUZZ_CHECK(content.has_calibration ||
              memcmp(&content.calibration, &none.calibration, sizeof none.calibration) == 0);
   FUZZ_CHECK(content.has_settings ||
@@ -44,7 +45,7 @@ static enum ft_status finish(void) {
 
 static void start(void) {
   native_flash_power_up();
-  store_init(&store, SENSORS);
+  store_init(&store, sensors);
   check_content();
 }
 
@@ -54,9 +55,12 @@ static enum ft_status begin_change(struct fuzz_input *input, struct store_conten
   const uint8_t kind = fuzz_u8(input);
   struct calibration calibration = {
       .date_s = fuzz_u8(input), .placements = 20, .force_scale = 1.0f};
-  for (int k = 0; k < SENSORS; k++) {
-    calibration.sensors[k] =
-        (struct sensor_calibration){0.5f + (float)fuzz_u8(input) / 255.0f, 0.1f};
+  for (int k = 0; k < sensors; k++) {
+    struct sensor_calibration *sensor = &calibration.sensors[k];
+    sensor->gain = 0.5f + (float)fuzz_u8(input) / 255.0f;
+    sensor->gain_sd = 0.1f;
+    sensor->off_x_um = sensor->wider_q15 = fuzz_u8(input);
+    sensor->off_y_um = (int16_t)-sensor->off_x_um;
   }
   struct store_settings settings = {
       .rate_mHz = fuzz_u32(input), .osr = fuzz_u16(input), .slip_threshold_mm = 1.0f};
@@ -124,11 +128,12 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
   struct fuzz_input input = {bytes, bytes + length};
   const uint16_t seed = fuzz_u16(&input);
   const uint32_t generation = seed & 1 ? 1 : UINT32_MAX - 1;
+  sensors = seed & 2 ? 20 : 3;
   native_flash_reset(seed);
   now_us = 0;
   bool ours = true;
   for (uint8_t records = fuzz_u8(&input) % 8; records > 0; records--) {
-    fuzz_put_record(&input, generation, SENSORS);
+    fuzz_put_record(&input, generation, sensors);
     ours = false;
   }
   start();

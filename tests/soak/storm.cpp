@@ -138,7 +138,7 @@ void Storm::write_something_to_store() {
   calibration.force_scale = 1;
   calibration.force_scale_sd = 0.02f;
   for (unsigned k = 0; k < SENSORS; k++) {
-    calibration.sensors[k] = {1.0f, 0.01f};
+    calibration.sensors[k] = {1.0f, 0.01f, 0, 0, 0};
   }
   switch (random_below(r, 4)) {
   case 0:

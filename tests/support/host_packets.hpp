@@ -80,7 +80,9 @@ inline calibration make_calibration() {
   made.force_scale_sd = 0.021f;
   for (int k = 0; k < 15; k++) {
     made.sensors[k] = {0.86f + 0.02f * static_cast<float>(k),
-                       0.008f + 0.0001f * static_cast<float>(k)};
+                       0.008f + 0.0001f * static_cast<float>(k),
+                       static_cast<std::int16_t>(100 * k - 700), static_cast<std::int16_t>(-20 * k),
+                       static_cast<std::int16_t>(1000 - 300 * k)};
   }
   return made;
 }

@@ -175,14 +175,13 @@ template <typename Visitor> void visit_calibration(Visitor &visit, struct calibr
   visit("calibration_ambient_kPa", calibration.ambient_kPa);
 }
 
-struct SensorList {
-  const char *name;
-  float sensor_calibration::*value;
-};
-inline constexpr SensorList sensor_lists[] = {
-    {"gains", &sensor_calibration::gain},
-    {"gain_sds", &sensor_calibration::gain_sd},
-};
+template <typename Visitor> void visit_sensor_lists(Visitor &visit) {
+  visit("gains", &sensor_calibration::gain);
+  visit("gain_sds", &sensor_calibration::gain_sd);
+  visit("off_x_um", &sensor_calibration::off_x_um);
+  visit("off_y_um", &sensor_calibration::off_y_um);
+  visit("wider_q15", &sensor_calibration::wider_q15);
+}
 
 /* What there is only where a pad's profile is stored: numbers, and lists with one for each term. */
 template <typename Visitor> void visit_pad(Visitor &visit, pad_profile &pad) {

@@ -60,9 +60,11 @@ std::uint64_t shifted_ns(std::uint64_t ns, double by_us) {
 }
 
 bool is_list(const std::string &key) {
-  auto is_it = [&](const auto &each) { return key == each.name; };
-  return std::any_of(std::begin(sensor_lists), std::end(sensor_lists), is_it) ||
-         std::any_of(std::begin(pad_lists), std::end(pad_lists), is_it);
+  bool of_sensors = false;
+  auto visit = [&](const char *name, auto) { of_sensors = of_sensors || key == name; };
+  visit_sensor_lists(visit);
+  return of_sensors || std::any_of(std::begin(pad_lists), std::end(pad_lists),
+                                   [&](const auto &each) { return key == each.name; });
 }
 
 bool begins_with(const std::string &text, const char *begin) {
@@ -71,7 +73,8 @@ bool begins_with(const std::string &text, const char *begin) {
 
 bool is_of_calibration(const std::string &key) {
   return begins_with(key, "calibration_") || begins_with(key, "force_scale") ||
-         begins_with(key, "gain") || begins_with(key, "pad_");
+         begins_with(key, "gain") || begins_with(key, "off_") || begins_with(key, "wider_") ||
+         begins_with(key, "pad_");
 }
 
 /* "# key: value" taken apart; nothing of other lines. */

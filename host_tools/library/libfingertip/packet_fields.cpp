@@ -52,9 +52,10 @@ Metadata info_metadata(const wire_info &info) {
     PairWriter of_calibration;
     visit_calibration(of_calibration, copy.calibration);
     pairs.insert(pairs.end(), of_calibration.pairs.begin(), of_calibration.pairs.end());
-    for (const SensorList &each : sensor_lists) {
-      list(each.name, [&](std::size_t k) { return info.calibration.sensors[k].*each.value; });
-    }
+    auto visit = [&](const char *name, auto member) {
+      list(name, [&](std::size_t k) { return info.calibration.sensors[k].*member; });
+    };
+    visit_sensor_lists(visit);
   }
   if (info.stored & WIRE_STORED_PAD) {
     PairWriter of_pad;

@@ -311,13 +311,13 @@ void RecordingReader::read_info_field(wire_info &info, const std::string &key, c
     read_list([&](std::size_t k) -> float & { return info.y_mm[k]; });
   } else {
     bool known = false;
-    for (const SensorList &each : sensor_lists) {
-      if (key == each.name) {
+    auto visit_list = [&](const char *name, auto member) {
+      if (key == name) {
         known = true;
-        read_list(
-            [&](std::size_t k) -> float & { return info.calibration.sensors[k].*each.value; });
+        read_list([&](std::size_t k) -> auto & { return info.calibration.sensors[k].*member; });
       }
-    }
+    };
+    visit_sensor_lists(visit_list);
     for (const PadList &each : pad_lists) {
       if (key == each.name) {
         known = true;

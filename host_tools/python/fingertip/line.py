@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-VERSION = 8
+VERSION = 9
 SENSORS_MAX = 32
-MAX_FRAME_BYTES = 846  # longer is damage
+MAX_FRAME_BYTES = 1039  # longer is damage
 LOADER_MAGIC = 0x746F6F42
 
 
@@ -128,6 +128,10 @@ class Calibration(NamedTuple):
     """air in which the force scale was found; 0: not known"""
     gains_and_sds: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
     """of each sensor: gain, and its relative standard deviation"""
+    places_and_widths: Annotated[tuple[int, ...], Wire("h", 3, each_sensor=True)]
+    """of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of
+    the others, 1/32768; zeros: not known
+    """
 
     @property
     def gains(self) -> tuple[float, ...]:
@@ -138,6 +142,21 @@ class Calibration(NamedTuple):
     def gain_sds(self) -> tuple[float, ...]:
         """Of each sensor."""
         return self.gains_and_sds[1::2]
+
+    @property
+    def off_x_um(self) -> tuple[int, ...]:
+        """Of each sensor."""
+        return self.places_and_widths[0::3]
+
+    @property
+    def off_y_um(self) -> tuple[int, ...]:
+        """Of each sensor."""
+        return self.places_and_widths[1::3]
+
+    @property
+    def wider_q15(self) -> tuple[int, ...]:
+        """Of each sensor."""
+        return self.places_and_widths[2::3]
 
 
 class PadProfile(NamedTuple):
@@ -526,8 +545,8 @@ class Loader(NamedTuple):
 
 
 class StoreCalibration(NamedTuple):
-    """Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, scale 0.1 to 10, its standard deviation 0 to 1. It acts
-    from the first frame after the acknowledgement.
+    """Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, sensors up to 2000 um from their places and wider or
+    narrower by up to 9830/32768, scale 0.1 to 10, its standard deviation 0 to 1. It acts from the first frame after the acknowledgement.
     """
 
     sensors: Annotated[int, Wire("n")]

@@ -107,7 +107,7 @@ private:
     told.force_scale_sd = FORCE_SCALE_SD;
     for (std::size_t k = 0; k < SENSORS; k++) {
       told.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())),
-                         static_cast<float>(sd)};
+                         static_cast<float>(sd), 0, 0, 0};
     }
     order(command_calibrate(told, SENSORS));
   }

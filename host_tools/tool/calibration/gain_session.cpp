@@ -34,6 +34,11 @@ std::uint16_t micrometres(double length_mm) {
   return static_cast<std::uint16_t>(std::lround(std::clamp(1000.0 * length_mm, 0.0, 65535.0)));
 }
 
+std::int16_t to_both_sides(double value, int greatest) {
+  return static_cast<std::int16_t>(
+      std::lround(std::clamp(value, double(-greatest), double(greatest))));
+}
+
 } // namespace
 
 Array array_of(const wire_info &info) {
@@ -168,7 +173,10 @@ calibration calibration_of(const Solution &solution, const std::optional<ForceSc
   made.dip_sd_um = made.dip_share_q16 > 0 ? micrometres(found.dip_sd_mm) : std::uint16_t(0);
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
     made.sensors[k] = {static_cast<float>(solution.gain[k]),
-                       static_cast<float>(solution.reading_sd[k])};
+                       static_cast<float>(solution.reading_sd[k]),
+                       to_both_sides(1e3 * solution.dx_mm[k], CALIBRATION_OFF_MAX_um),
+                       to_both_sides(1e3 * solution.dy_mm[k], CALIBRATION_OFF_MAX_um),
+                       to_both_sides(32768.0 * solution.own_width[k], CALIBRATION_WIDER_MAX_Q15)};
   }
   return made;
 }

@@ -175,9 +175,13 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
       session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N),
                     static_cast<std::uint32_t>(date_s));
   std::vector<float> gain, gain_sd;
+  std::vector<int> off_x_um, off_y_um, wider_q15;
   for (std::size_t k = 0; k < session->array().sensors(); k++) {
     gain.push_back(made.sensors[k].gain);
     gain_sd.push_back(made.sensors[k].gain_sd);
+    off_x_um.push_back(made.sensors[k].off_x_um);
+    off_y_um.push_back(made.sensors[k].off_y_um);
+    wider_q15.push_back(made.sensors[k].wider_q15);
   }
   Json json;
   json.begin().name("calibration").begin();
@@ -190,7 +194,9 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   json.field("dip_share_q16", static_cast<double>(made.dip_share_q16));
   json.field("dip_sd_um", static_cast<double>(made.dip_sd_um));
   json.field("ambient_kPa", static_cast<double>(made.ambient_kPa));
-  json.name("gain").list(gain).name("gain_sd").list(gain_sd).end();
+  json.name("gain").list(gain).name("gain_sd").list(gain_sd);
+  json.name("off_x_um").list(off_x_um).name("off_y_um").list(off_y_um);
+  json.name("wider_q15").list(wider_q15).end();
   tell_scatter(json, "before", session->scatter(false));
   tell_scatter(json, "after", session->scatter(true));
   tell(json.end());

@@ -71,6 +71,9 @@ test('fields have the values that the vectors name', () => {
   assert.equal(info.git_hash, '0123456789ab+');
   assert.deepEqual([...info.gain], [0.875, 1.125]);
   assert.deepEqual([...info.gain_sd], [0.0078125, 0.015625]);
+  assert.deepEqual([...info.off_x_um], [250, -2000]);
+  assert.deepEqual([...info.off_y_um], [-125, 2000]);
+  assert.deepEqual([...info.wider_q15], [1638, -9830]);
   assert.deepEqual([...info.x_mm], [-4.5, 4.5]);
   assert.equal(info.pad_edge_force[2], 0.0390625);
   assert.ok(raw?.type === PacketType.RAW);

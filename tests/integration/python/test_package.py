@@ -138,7 +138,9 @@ class Codec(Folder):
         self.assertEqual((contact.x_mm, contact.y_mm, contact.force_N, contact.slip_mm, contact.qx_N, contact.vy_mm_s, contact.fit_us),
                          (-4.5, 12.25, 1.5, 0.375, -0.4375, 2.25, 2760))
         self.assertTrue(math.isnan(found["contact_none"].body.x_mm) and math.isnan(found["contact"].body.qx_N))
-        self.assertEqual(found["info"].body.calibration.gains, (0.875, 1.125))
+        calibration = found["info"].body.calibration
+        self.assertEqual((calibration.gains, calibration.gain_sds), ((0.875, 1.125), (0.0078125, 0.015625)))
+        self.assertEqual((calibration.off_x_um, calibration.off_y_um, calibration.wider_q15), ((250, -2000), (-125, 2000), (1638, -9830)))
         self.assertEqual((found["info"].body.serial, found["info"].body.x_mm, found["info"].body.firmware), ("E66058388347A12C", (-4.5, 4.5), (1, 2, 3)))
         self.assertIsNone(found["info_raw"].body.slip_window_ms)
         self.assertEqual((found["command_slip"].body, found["command_slip"].t_us), (wire.SetSlip(0.75, 100), 0x1122334455667788))

@@ -170,7 +170,8 @@ static struct wire_packet calibrate_command(void) {
   body->calibration = (struct calibration){
       .date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    body->calibration.sensors[k] = (struct sensor_calibration){0.8f + 0.02f * (float)k, 0.01f};
+    body->calibration.sensors[k] = (struct sensor_calibration){
+        .gain = 0.8f + 0.02f * (float)k, .gain_sd = 0.01f};
   }
   return command;
 }
@@ -487,6 +488,20 @@ static void a_calibration_out_of_range_is_refused(void) {
     struct wire_packet command = good;
     memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad[i].offset, &bad[i].value,
            sizeof bad[i].value);
+    TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
+  }
+  static const struct {
+    size_t offset;
+    int16_t value;
+  } bad_places[] = {
+      {offsetof(struct calibration, sensors[0].off_x_um), -2001},
+      {offsetof(struct calibration, sensors[14].off_y_um), 2001},
+      {offsetof(struct calibration, sensors[7].wider_q15), 9831},
+  };
+  for (size_t i = 0; i < sizeof bad_places / sizeof bad_places[0]; i++) {
+    struct wire_packet command = good;
+    memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad_places[i].offset,
+           &bad_places[i].value, sizeof bad_places[i].value);
     TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
   }
   struct wire_packet other = good;

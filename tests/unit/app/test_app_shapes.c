@@ -73,7 +73,7 @@ static void run_until(uint64_t t_us, const struct pad_profile *profile) {
       .body.cmd_calibrate.sensor_count = geometry.sensor_count,
       .body.cmd_calibrate.calibration = {.placements = 20, .force_scale = 1.25f}};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){1.0f, 0.01f};
+    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
   }
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
   start_streams(WIRE_STREAM_CONTACT);

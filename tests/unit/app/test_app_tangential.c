@@ -259,7 +259,7 @@ static void a_calibration_and_the_scale_of_the_profile_act(void) {
   calibrate.body.cmd_calibrate.calibration =
       (struct calibration){.placements = 20, .force_scale = 1.25f, .force_scale_sd = 0.0f};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){1.0f, 0.01f};
+    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
   }
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
   struct wire_contact contact =

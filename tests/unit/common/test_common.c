@@ -153,6 +153,23 @@ static void test_calibrations_are_in_their_ranges(void) {
     }
     *ranges[i].value = was;
   }
+  const struct {
+    int16_t *value;
+    int16_t greatest;
+  } both_sides[] = {{&calibration.sensors[0].off_x_um, 2000},
+                    {&calibration.sensors[14].off_y_um, 2000},
+                    {&calibration.sensors[7].wider_q15, 9830}};
+  for (size_t i = 0; i < sizeof both_sides / sizeof both_sides[0]; i++) {
+    for (int side = -1; side <= 1; side += 2) {
+      *both_sides[i].value = (int16_t)(side * both_sides[i].greatest);
+      TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
+      *both_sides[i].value = (int16_t)(side * (both_sides[i].greatest + 1));
+      TEST_ASSERT_FALSE(calibration_is_valid(&calibration, 15));
+      *both_sides[i].value = side > 0 ? INT16_MAX : INT16_MIN;
+      TEST_ASSERT_FALSE(calibration_is_valid(&calibration, 15));
+    }
+    *both_sides[i].value = 0;
+  }
   static const struct {
     uint16_t sigma_um, sigma_sd_um, dip_share_q16, dip_sd_um;
     bool valid;
@@ -166,7 +183,7 @@ static void test_calibrations_are_in_their_ranges(void) {
     calibration.dip_sd_um = shapes[i].dip_sd_um;
     TEST_ASSERT_EQUAL(shapes[i].valid, calibration_is_valid(&calibration, 15));
   }
-  calibration.sensors[15].gain = NAN; /* of no sensor */
+  calibration.sensors[15] = (struct sensor_calibration){NAN, NAN, 2001, 2001, 9831}; /* of no sensor */
   TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
 }
 

@@ -237,12 +237,15 @@ TEST(Recording, TheCalibrationIsKeptWithItsChanges) {
   calibrated.body.info.calibration = test::make_calibration();
   wire_packet again = calibrated, erased = test::make_info(5, 6);
   again.body.info.calibration.sensors[14].gain_sd = 0.125f;
+  again.body.info.calibration.sensors[14].off_x_um = -2000;
+  again.body.info.calibration.sensors[14].wider_q15 = 9830;
   again.body.info.calibration.force_scale = 0.9375f;
   erased.body.info.stored = WIRE_STORED_SETTINGS;
   std::vector<wire_packet> packets = {calibrated, test::make_contact(2, 3, 1), again, erased, again};
   record(folder / "r.csv", packets);
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
   EXPECT_NE(contents(folder / "r.csv").find("\n# gains: 0.86 0.88 "), std::string::npos);
+  EXPECT_NE(contents(folder / "r.csv").find("\n# off_x_um: -700 -600 "), std::string::npos);
 }
 
 TEST(Recording, EdgesAtTheSyncPinAreKeptAndCounted) {

@@ -15,11 +15,18 @@ enum { SENSORS = 15, UPDATES = 2000, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 
 static struct store store;
 static struct random random;
 static uint64_t now_us;
+static uint8_t sensors;
+
+/* A new fingertip of so many. */
+static void begin_with(uint8_t count) {
+  sensors = count;
+  native_flash_reset(7);
+  store_init(&store, sensors);
+}
 
 void setUp(void) {
   random = (struct random){2026};
-  native_flash_reset(7);
-  store_init(&store, SENSORS);
+  begin_with(SENSORS);
 }
 
 void tearDown(void) {}
@@ -35,9 +42,13 @@ static struct calibration some_calibration(void) {
   calibration.dip_share_q16 = (uint16_t)(1 + random_below(&random, 6000));
   calibration.dip_sd_um = (uint16_t)(1 + random_below(&random, 60000));
   calibration.ambient_kPa = (uint8_t)random_below(&random, 256);
-  for (int k = 0; k < SENSORS; k++) {
-    calibration.sensors[k] = (struct sensor_calibration){(float)random_between(&random, 0.7, 1.3),
-                                                         (float)random_between(&random, 0.0, 0.1)};
+  for (int k = 0; k < sensors; k++) {
+    struct sensor_calibration *sensor = &calibration.sensors[k];
+    sensor->gain = (float)random_between(&random, 0.7, 1.3);
+    sensor->gain_sd = (float)random_between(&random, 0.0, 0.1);
+    sensor->off_x_um = (int16_t)((int)random_below(&random, 4001) - 2000);
+    sensor->off_y_um = (int16_t)((int)random_below(&random, 4001) - 2000);
+    sensor->wider_q15 = (int16_t)((int)random_below(&random, 19661) - 9830);
   }
   return calibration;
 }
@@ -147,7 +158,7 @@ static enum ft_status finish(void) {
 
 static void restart(void) {
   native_flash_power_up();
-  store_init(&store, SENSORS);
+  store_init(&store, sensors);
 }
 
 static void a_new_fingertip_keeps_nothing(void) {
@@ -184,12 +195,11 @@ static void what_was_put_is_there_after_a_restart(void) {
   }
 }
 
-/* Power lost at every step of ten thousand changes, and once more while start-up mends what that
- * has left: what is there is what was or what was to be, and stays so once it has been mended. */
-static void power_may_be_lost_at_any_step(void) {
-  struct store_content before = {0};
+/* Power lost at every step of so many changes, and once more while start-up mends what that has
+ * left: what is there is what was or what was to be, and stays so once it has been mended. */
+static void lose_power_at_any_step(unsigned updates, struct store_content before) {
   unsigned long cuts = 0, new_ones = 0;
-  for (int update = 0; update < UPDATES; update++) {
+  for (unsigned update = 0; update < updates; update++) {
     const struct native_flash start = native_flash;
     struct change change = some_change();
     struct store_content after = changed(&before, &change);
@@ -240,8 +250,17 @@ static void power_may_be_lost_at_any_step(void) {
       before = is(&then) ? then : before;
     }
   }
-  TEST_ASSERT_GREATER_THAN_UINT(8ul * UPDATES, cuts);
-  TEST_ASSERT_GREATER_THAN_UINT(UPDATES, new_ones);
+  TEST_ASSERT_GREATER_THAN_UINT(8ul * updates, cuts);
+  TEST_ASSERT_GREATER_THAN_UINT(updates, new_ones);
+}
+
+static void power_may_be_lost_at_any_step(void) {
+  lose_power_at_any_step(UPDATES, (struct store_content){0});
+}
+
+static void power_may_be_lost_with_the_largest_array(void) {
+  begin_with(FT_MAX_SENSORS);
+  lose_power_at_any_step(UPDATES / 4, (struct store_content){0});
 }
 
 /* The same of changes one after another without a restart between, over both sectors and back. */
@@ -323,7 +342,7 @@ static void damage_is_told_and_nothing_is_used(void) {
   static const struct store_content nothing;
   keep_something();
   const struct native_flash whole = native_flash;
-  for (uint32_t at = 2 * STORE_SLOT_BYTES + 8; at < 2 * STORE_SLOT_BYTES + 249; at++) {
+  for (uint32_t at = 2 * STORE_SHORT_SLOT_BYTES + 8; at < 2 * STORE_SHORT_SLOT_BYTES + 458; at++) {
     native_flash = whole;
     native_flash.bytes[at] ^= (uint8_t)(1u << at % 8);
     const struct native_flash damaged = native_flash;
@@ -344,7 +363,7 @@ static void damage_is_told_and_nothing_is_used(void) {
 
 static void forgetting_mends_damage(void) {
   keep_something();
-  native_flash.bytes[2 * STORE_SLOT_BYTES + 100] ^= 1;
+  native_flash.bytes[2 * STORE_SHORT_SLOT_BYTES + 100] ^= 1;
   restart();
   TEST_ASSERT_TRUE(store.damaged);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, NULL));
@@ -365,18 +384,22 @@ static void alter_record(uint32_t at, uint16_t value) {
   bytes_put_u32(record + 16, ~crc);
 }
 
+/* Of a payload of version 3, without the places of the sensors. */
+#define LENGTH_OF_3(sensors) (4 + 14 + 8 * (sensors) + 24 + PROFILE_BYTES + 9)
+enum { LENGTH_3 = LENGTH_OF_3(SENSORS) };
+
 static void what_another_firmware_wrote_is_left_alone(void) {
   struct calibration calibration = some_calibration();
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   const struct native_flash ours = native_flash;
-  alter_record(8, 3); /* as it was: the bytes are where the header says */
+  alter_record(8, 4); /* as it was: the bytes are where the header says */
   TEST_ASSERT_EQUAL_MEMORY(&ours, &native_flash, sizeof ours);
   static const struct {
     uint32_t at;
     uint16_t value;
-  } others[] = {{8, 1},   {8, 2},    {8, 4},    {8, UINT16_MAX}, {20, 14 << 8 | 1},
-                {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}};
+  } others[] = {{8, 1},  {8, 2},   {8, 3},   {8, 5},   {8, UINT16_MAX}, {20, 14 << 8 | 1},
+                {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}, {20 + LENGTH_3, 2001}};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     native_flash = ours;
     alter_record(others[i].at, others[i].value);
@@ -397,7 +420,8 @@ static void generations_go_round(void) {
     struct store_content kept = keep_something();
     alter_record(12, (uint16_t)generation);
     alter_record(14, (uint16_t)(generation >> 16));
-    memset(native_flash.bytes + STORE_SLOT_BYTES, 0xFF, NATIVE_FLASH_BYTES - STORE_SLOT_BYTES);
+    memset(native_flash.bytes + STORE_SHORT_SLOT_BYTES, 0xFF,
+           NATIVE_FLASH_BYTES - STORE_SHORT_SLOT_BYTES);
     for (int i = 0; i < 3 * STORE_SLOTS; i++) {
       restart();
       finish();
@@ -413,15 +437,70 @@ static void generations_go_round(void) {
   }
 }
 
+/* As the firmware before them knew it. */
+static void forget_places(struct calibration *calibration) {
+  for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    struct sensor_calibration *sensor = &calibration->sensors[k];
+    sensor->off_x_um = sensor->off_y_um = sensor->wider_q15 = 0;
+  }
+}
+
+/* As the firmware before the sensors' places wrote it, without their bytes. */
+static void records_of_version_3_are_read(void) {
+  struct store_content kept = keep_something();
+  begin_with(SENSORS);
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  memset(native_flash.bytes + 20 + LENGTH_3, 0xFF, 6 * SENSORS);
+  alter_record(8, 3);
+  alter_record(10, LENGTH_3);
+  restart();
+  TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+  kept.has_settings = kept.has_profile = false;
+  memset(&kept.settings, 0, sizeof kept.settings);
+  memset(&kept.profile, 0, sizeof kept.profile);
+  forget_places(&kept.calibration);
+  TEST_ASSERT_TRUE(is(&kept));
+}
+
+/* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as
+ * it wrote them: the last counts, and the next goes into the other sector, whenever power is lost. */
+static void short_slots_of_the_largest_array_are_read(void) {
+  enum { SLOT = STORE_SHORT_SLOT_BYTES, LENGTH = LENGTH_OF_3(FT_MAX_SENSORS) };
+  for (unsigned records = 1; records <= STORE_SLOTS; records++) {
+    uint8_t earlier[STORE_SLOTS * SLOT];
+    memset(earlier, 0xFF, sizeof earlier);
+    struct store_content kept = {0};
+    for (unsigned i = 0; i < records; i++) {
+      begin_with(FT_MAX_SENSORS);
+      kept.has_calibration = true;
+      kept.calibration = some_calibration();
+      TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
+      TEST_ASSERT_EQUAL(FT_OK, finish());
+      alter_record(8, 3);
+      alter_record(10, LENGTH);
+      memcpy(earlier + i * SLOT, native_flash.bytes, 20 + LENGTH);
+      memset(earlier + (i + 1) * SLOT - 8, 0, 8);
+    }
+    begin_with(FT_MAX_SENSORS);
+    memcpy(native_flash.bytes, earlier, sizeof earlier);
+    forget_places(&kept.calibration);
+    restart();
+    TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+    TEST_ASSERT_TRUE(is(&kept));
+    TEST_ASSERT_EQUAL_MEMORY(earlier, native_flash.bytes, sizeof earlier);
+    lose_power_at_any_step(12, kept);
+  }
+}
+
 /* As the firmware before the calibration's shape wrote it, without its bytes. */
 static void records_of_version_2_are_read(void) {
   struct store_content kept = keep_something();
-  native_flash_reset(7);
-  store_init(&store, SENSORS);
+  begin_with(SENSORS);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   enum { LENGTH_2 = 4 + 14 + 8 * SENSORS + 24 + 177 };
-  memset(native_flash.bytes + 20 + LENGTH_2, 0xFF, 9);
+  memset(native_flash.bytes + 20 + LENGTH_2, 0xFF, 9 + 6 * SENSORS);
   alter_record(8, 2);
   alter_record(10, LENGTH_2);
   restart();
@@ -435,6 +514,7 @@ static void records_of_version_2_are_read(void) {
   read.dip_share_q16 = kept.calibration.dip_share_q16;
   read.dip_sd_um = kept.calibration.dip_sd_um;
   read.ambient_kPa = kept.calibration.ambient_kPa;
+  forget_places(&kept.calibration);
   TEST_ASSERT_EQUAL_MEMORY(&kept.calibration, &read, sizeof read);
 }
 
@@ -445,16 +525,16 @@ static void records_of_version_1_are_read(void) {
   kept.calibration.sigma_um = kept.calibration.sigma_sd_um = 0;
   kept.calibration.dip_share_q16 = kept.calibration.dip_sd_um = 0;
   kept.calibration.ambient_kPa = 0;
-  native_flash_reset(7);
-  store_init(&store, SENSORS);
+  forget_places(&kept.calibration);
+  begin_with(SENSORS);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &kept.settings));
   TEST_ASSERT_EQUAL(FT_OK, finish());
-  memcpy(native_flash.bytes, native_flash.bytes + STORE_SLOT_BYTES, STORE_SLOT_BYTES);
-  memset(native_flash.bytes + STORE_SLOT_BYTES, 0xFF, STORE_SLOT_BYTES);
+  memcpy(native_flash.bytes, native_flash.bytes + STORE_SHORT_SLOT_BYTES, STORE_SHORT_SLOT_BYTES);
+  memset(native_flash.bytes + STORE_SHORT_SLOT_BYTES, 0xFF, STORE_SHORT_SLOT_BYTES);
   enum { LENGTH_1 = 4 + 14 + 8 * SENSORS + 24 };
-  memset(native_flash.bytes + 20 + LENGTH_1, 0xFF, 69);
+  memset(native_flash.bytes + 20 + LENGTH_1, 0xFF, PROFILE_BYTES + 9 + 6 * SENSORS);
   alter_record(8, 1);
   alter_record(10, LENGTH_1);
   kept.has_profile = false;
@@ -512,8 +592,8 @@ static void slots_that_do_not_hold_what_is_written_are_given_up(void) {
     struct store_content kept = keep_something();
     for (int slot = 0; slot < bad; slot++) {
       uint32_t at = store.sector * PORT_FLASH_SECTOR_BYTES;
-      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * STORE_SLOT_BYTES + 100],
-             0, 4);
+      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * store.slot_bytes + 100], 0,
+             4);
     }
     struct calibration other = some_calibration();
     TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &other));
@@ -538,24 +618,25 @@ static void a_flash_that_does_not_answer_is_not_waited_for(void) {
   TEST_ASSERT_EQUAL(FT_ERR_TIMEOUT, store_poll(&store, now_us));
 }
 
-/* A record of the most sensors takes two pages. */
-static void the_largest_array_fits(void) {
-  store_init(&store, FT_MAX_SENSORS);
-  struct calibration calibration = some_calibration();
-  for (int k = SENSORS; k < FT_MAX_SENSORS; k++) {
-    calibration.sensors[k] = (struct sensor_calibration){1.0f + 0.001f * (float)k, 0.01f};
-  }
-  const struct pad_profile profile = some_profile();
-  for (int i = 0; i < 20; i++) {
-    calibration.date_s++;
-    TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &profile));
-    TEST_ASSERT_EQUAL(FT_OK, finish());
-    TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
-    TEST_ASSERT_EQUAL(FT_OK, finish());
-    native_flash_power_up();
-    store_init(&store, FT_MAX_SENSORS);
-    TEST_ASSERT_EQUAL_MEMORY(&calibration, &store.content.calibration, sizeof calibration);
-    TEST_ASSERT_EQUAL_MEMORY(&profile, &store.content.profile, PROFILE_BYTES);
+/* A record of the most sensors takes three pages; the most that fit into a short slot, and one
+ * more. */
+static void large_arrays_fit(void) {
+  static const uint8_t counts[] = {STORE_SENSORS_OF_SHORT_SLOT, STORE_SENSORS_OF_SHORT_SLOT + 1,
+                                   FT_MAX_SENSORS};
+  for (size_t n = 0; n < sizeof counts; n++) {
+    begin_with(counts[n]);
+    struct calibration calibration = some_calibration();
+    const struct pad_profile profile = some_profile();
+    for (int i = 0; i < 20; i++) {
+      calibration.date_s++;
+      TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &profile));
+      TEST_ASSERT_EQUAL(FT_OK, finish());
+      TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
+      TEST_ASSERT_EQUAL(FT_OK, finish());
+      restart();
+      TEST_ASSERT_EQUAL_MEMORY(&calibration, &store.content.calibration, sizeof calibration);
+      TEST_ASSERT_EQUAL_MEMORY(&profile, &store.content.profile, PROFILE_BYTES);
+    }
   }
 }
 
@@ -569,12 +650,15 @@ int main(void) {
   RUN_TEST(generations_go_round);
   RUN_TEST(records_of_version_1_are_read);
   RUN_TEST(records_of_version_2_are_read);
+  RUN_TEST(records_of_version_3_are_read);
+  RUN_TEST(short_slots_of_the_largest_array_are_read);
   RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
   RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
   RUN_TEST(slots_that_do_not_hold_what_is_written_are_given_up);
   RUN_TEST(a_flash_that_does_not_answer_is_not_waited_for);
-  RUN_TEST(the_largest_array_fits);
+  RUN_TEST(large_arrays_fit);
   RUN_TEST(power_may_be_lost_at_any_step);
+  RUN_TEST(power_may_be_lost_with_the_largest_array);
   RUN_TEST(power_may_be_lost_amid_many_changes);
   RUN_TEST(power_may_come_and_go);
   return UNITY_END();

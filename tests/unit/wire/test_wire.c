@@ -27,7 +27,7 @@ static size_t body_length(const struct wire_packet *packet) {
     return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
            (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) +
            (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) + 8u * info->sensor_count +
-           (info->stored & WIRE_STORED_CALIBRATION ? 23 + 8u * info->sensor_count : 0) +
+           (info->stored & WIRE_STORED_CALIBRATION ? 23 + 14u * info->sensor_count : 0) +
            (info->stored & WIRE_STORED_PAD ? 177 : 0);
   }
   case WIRE_HEALTH:
@@ -50,7 +50,7 @@ static size_t body_length(const struct wire_packet *packet) {
   case WIRE_CMD_PRIOR:
     return 8;
   case WIRE_CMD_CALIBRATE:
-    return 24 + 8u * packet->body.cmd_calibrate.sensor_count;
+    return 24 + 14u * packet->body.cmd_calibrate.sensor_count;
   case WIRE_CMD_PAD:
     return 177;
   case WIRE_CMD_OSR:
@@ -250,7 +250,7 @@ static void assert_pad_guarded(uint8_t type, size_t body_offset, struct pad_prof
 
 /* PROTOCOL.md says how long a frame may be. */
 static void test_the_longest_frame_is_as_documented(void) {
-  TEST_ASSERT_EQUAL(846, WIRE_MAX_FRAME_BYTES);
+  TEST_ASSERT_EQUAL(1039, WIRE_MAX_FRAME_BYTES);
   struct sampler sampler = {SAMPLE_GREATEST, {16}};
   struct wire_packet packet;
   sample_packet(&sampler, WIRE_INFO, &packet);
@@ -310,7 +310,7 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
     assert_float_guarded(WIRE_INFO, 352 + 4 * i, settings[i], &packet);
   }
   assert_calibration_guarded(WIRE_INFO, 369, &info->calibration, &packet);
-  assert_pad_guarded(WIRE_INFO, 648, &info->pad, &packet);
+  assert_pad_guarded(WIRE_INFO, 840, &info->pad, &packet);
   sample_packet(&sampler, WIRE_CMD_CALIBRATE, &packet);
   assert_calibration_guarded(WIRE_CMD_CALIBRATE, 1, &packet.body.cmd_calibrate.calibration,
                              &packet);

@@ -212,7 +212,7 @@ static struct calibration calibration_of_two(void) {
       .dip_share_q16 = 3277,
       .dip_sd_um = 13954,
       .ambient_kPa = 101,
-      .sensors = {{0.875f, 0.0078125f}, {1.125f, 0.015625f}},
+      .sensors = {{0.875f, 0.0078125f, 250, -125, 1638}, {1.125f, 0.015625f, -2000, 2000, -9830}},
   };
 }
 

@@ -56,6 +56,10 @@ static inline int32_t sample_i32(struct sampler *sampler) {
   }
 }
 
+static inline int16_t sample_i16(struct sampler *sampler) {
+  return (int16_t)(sample_i32(sampler) >> 16);
+}
+
 /* Finite: the extremes, the smallest denormal, -0 and random bits. */
 static inline float sample_f32(struct sampler *sampler) {
   switch (sampler->kind) {
@@ -166,7 +170,7 @@ static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
   raw->valid = sample_u32(sampler);
   raw->saturated = sample_u32(sampler);
   raw->doubtful = sample_u32(sampler);
-  raw->temperature_cC = (int16_t)(sample_i32(sampler) >> 16);
+  raw->temperature_cC = sample_i16(sampler);
   raw->sensor_count = sample_sensor_count(sampler);
   for (int k = 0; k < raw->sensor_count; k++) {
     raw->pressure_Pa_q10[k] = sample_i32(sampler);
@@ -188,6 +192,11 @@ static inline void sample_calibration(struct sampler *sampler, unsigned sensor_c
   for (unsigned k = 0; k < sensor_count; k++) {
     calibration->sensors[k].gain = sample_f32(sampler);
     calibration->sensors[k].gain_sd = sample_f32(sampler);
+  }
+  for (unsigned k = 0; k < sensor_count; k++) {
+    calibration->sensors[k].off_x_um = sample_i16(sampler);
+    calibration->sensors[k].off_y_um = sample_i16(sampler);
+    calibration->sensors[k].wider_q15 = sample_i16(sampler);
   }
 }
 

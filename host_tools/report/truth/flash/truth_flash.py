@@ -31,7 +31,7 @@ from fingertip.files import InputError, read_recording, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 
 OSR = 256
-WIRE_VERSION, CALIBRATE, SENSORS = 8, 0x88, 15
+WIRE_VERSION, CALIBRATE, SENSORS = 9, 0x88, 15
 # From one command to the next: an erase of the slowest flash and all that follows.
 INTERVAL_s = 0.6
 # Gains cost time in each frame, so what is compared has them from here on.
@@ -51,6 +51,7 @@ def stuffed(packet):
 def calibrate_frame(number):
     body = struct.pack("<BIHffHHHHB", SENSORS, 1785931200 + number, 30, 1 + 0.001 * number, 0.02, 5552, 60, 3277, 13954, 101)
     body += b"".join(struct.pack("<ff", 0.9 + 0.01 * ((k + number) % 20), 0.01) for k in range(SENSORS))
+    body += b"".join(struct.pack("<hhh", 10 * k, -10 * ((k + number) % 20), 100 * k) for k in range(SENSORS))
     packet = struct.pack("<BBHQ", WIRE_VERSION, CALIBRATE, number, 0) + body
     return stuffed(packet + struct.pack("<I", zlib.crc32(packet))).hex()
 

@@ -76,6 +76,9 @@ export interface GainResult {
     ambient_kPa: number;
     gain: number[];
     gain_sd: number[];
+    off_x_um: number[];
+    off_y_um: number[];
+    wider_q15: number[];
   };
   /** How far the firmware's fit scatters over the placements without the calibration, and with it. */
   before: Scatter;

@@ -1,6 +1,6 @@
 /** written by firmware/wire/line.py from line.toml; change it there. */
 
-export const WIRE_VERSION = 8;
+export const WIRE_VERSION = 9;
 export const LOADER_MAGIC = 0x746f6f42;
 
 export const PacketType = {
@@ -351,6 +351,12 @@ export interface Info extends Header {
   gain: Float64Array;
   /** of each sensor: gain, and its relative standard deviation */
   gain_sd: Float64Array;
+  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of the others, 1/32768; zeros: not known */
+  off_x_um: Float64Array;
+  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of the others, 1/32768; zeros: not known */
+  off_y_um: Float64Array;
+  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of the others, 1/32768; zeros: not known */
+  wider_q15: Float64Array;
   /** of the rubber */
   pad_thickness_mm: number;
   /** of the rubber beyond the outer sensors; 0: not set */
@@ -498,7 +504,7 @@ export type Command =
   | { type: 0x86; }
   | { type: 0x8f; }
   | { type: 0x87; magic: number; }
-  | { type: 0x88; sensor_count: number; calibration_date_s: number; calibration_placements: number; force_scale: number; force_scale_sd: number; calibration_sigma_um: number; calibration_sigma_sd_um: number; calibration_dip_share_q16: number; calibration_dip_sd_um: number; calibration_ambient_kPa: number; gain: ArrayLike<number>; gain_sd: ArrayLike<number>; }
+  | { type: 0x88; sensor_count: number; calibration_date_s: number; calibration_placements: number; force_scale: number; force_scale_sd: number; calibration_sigma_um: number; calibration_sigma_sd_um: number; calibration_dip_share_q16: number; calibration_dip_sd_um: number; calibration_ambient_kPa: number; gain: ArrayLike<number>; gain_sd: ArrayLike<number>; off_x_um: ArrayLike<number>; off_y_um: ArrayLike<number>; wider_q15: ArrayLike<number>; }
   | { type: 0x89; }
   | { type: 0x8a; keep: number; }
   | { type: 0x8b; sigma_mm: number; width_mm: number; }

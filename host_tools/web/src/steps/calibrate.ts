@@ -279,6 +279,9 @@ function confirmGains(
             calibration_ambient_kPa: calibration.ambient_kPa,
             gain: calibration.gain,
             gain_sd: calibration.gain_sd,
+            off_x_um: calibration.off_x_um,
+            off_y_um: calibration.off_y_um,
+            wider_q15: calibration.wider_q15,
           });
           const info = await fingertip.askInfo();
           if (!(info.stored & Stored.CALIBRATION) || info.calibration_date_s !== date_s) {
