@@ -64,8 +64,26 @@ void app_use_pad(struct app *app, const struct pad_profile *pad) {
 }
 #endif
 
+static int32_t q15_pitches(int16_t length_um) {
+  const float q15 = 32.768f / geometry.pitch_mm * (float)length_um;
+  return q15 > 32767.0f ? 32767 : q15 < -32767.0f ? -32767 : (int32_t)q15;
+}
+
+static void use_own(struct app *app, const struct calibration *calibration) {
+  for (unsigned k = 0; calibration && k < geometry.sensor_count; k++) {
+    const struct sensor_calibration *sensor = &calibration->sensors[k];
+    app->own[k] = (struct fit_own){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um),
+                                   sensor->wider_q15};
+  }
+  app->fit_settings.own = DEFAULT_USES_SHAPE && calibration ? app->own : NULL;
+}
+
 void app_use_calibration(struct app *app, const struct calibration *calibration) {
+#if FT_WITH_TANGENTIAL
+  working_forget(app); /* what is asked points to what is written here */
+#endif
   app->calibration = calibration;
+  use_own(app, calibration);
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     float gain = calibration ? calibration->sensors[k].gain : 1.0f;
     float gain_sd = calibration ? calibration->sensors[k].gain_sd : DEFAULT_GAIN_SD;

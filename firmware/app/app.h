@@ -34,6 +34,7 @@ struct app {
 #if FT_WITH_FIT
   struct fit_array fit_array;
   struct fit_settings fit_settings;
+  struct fit_own own[FT_MAX_SENSORS]; /* of the calibration that acts */
   uint32_t fit_failures;
   float set_sigma_mm, set_sigma_sd_mm;   /* to expect of a contact; sd 0: as the calibration says */
   const struct calibration *calibration; /* that acts; NULL: none */

@@ -35,8 +35,8 @@ struct fit_array {
 /* Of a sensor, beside its gain: how far it is from its place in the array, and how much wider than
  * the others it feels a contact. */
 struct fit_own {
-  int16_t off_x_q15, off_y_q15; /* pitches */
-  int16_t wider_q15;            /* log of its width over theirs */
+  int32_t off_x_q15, off_y_q15; /* pitches; within +-1, as the next */
+  int32_t wider_q15;            /* log of its width over theirs */
 };
 
 struct fit_settings {

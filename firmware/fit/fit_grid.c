@@ -685,7 +685,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   int left = settings->iterations;
   int coarse = left - COARSE_ITERATIONS;
   do {
-    if (left < settings->iterations) {
+    if (left < settings->iterations && (readings.dip_share.mantissa != 0 || settings->own)) {
       take_out(array, pressure_Pa_q10, settings, &state, &m, &system, left, &readings);
     }
     system.at = state;

@@ -139,6 +139,26 @@ void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressur
 
 #define TWO_LN2_Q30 1488522236
 #define OWN_SHARE_MAX_Q15 ((int32_t)(FIT_OWN_SHARE_MAX * 32768.0f))
+#define OWN_FAR_Q11 (7 << 11) /* what it makes is at its limit before, or nothing */
+
+/* Of the nodes along an axis: the Gaussian's factor, and from the contact x / sigma^2 per pitch and
+ * x^2 / sigma^2. */
+struct own_axis {
+  int32_t bell_q30[MAX_NODES], slope_q11[MAX_NODES], square_q11[MAX_NODES];
+};
+
+static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height,
+                                  struct own_axis *axis) {
+  const int32_t inverse_q11 = fixed_mul_q30(height, TWO_LN2_Q30) >> 15; /* 1 / sigma^2 */
+  for (int i = 0; i < nodes; i++) {
+    int32_t x_q12 = ((i - nodes / 2) * ONE_Q26 - centre) >> 14;
+    int32_t slope_q11 =
+        fixed_clamp(fixed_mul_16(inverse_q11, x_q12) * 16, -OWN_FAR_Q11, OWN_FAR_Q11);
+    axis->bell_q30[i] = exp2_rough((uint32_t)fixed_mul_q32(height, x_q12 * x_q12) << 4);
+    axis->slope_q11[i] = slope_q11;
+    axis->square_q11[i] = fixed_clamp((x_q12 * slope_q11) >> 12, 0, OWN_FAR_Q11);
+  }
+}
 
 /* A Gaussian that is wider by b and whose sensor is off by o is, d from the contact to its place in
  * the array, larger by (b d - o)' d / sigma^2 of itself. */
@@ -146,28 +166,22 @@ void fit_grid_take_own_out(const struct fit_array *array, const struct fit_setti
                            uint32_t usable, const struct state *at, int32_t peak_q28,
                            struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
-  struct dip bell;
-  set_dip(bell.x, COLUMNS, COLUMNS / 2, at->x, at->height);
-  set_dip(bell.y, ROWS, ROWS / 2, at->y, at->height);
-  const int32_t inverse_q26 = fixed_mul_q30(at->height, TWO_LN2_Q30); /* 1 / sigma^2 */
+  struct own_axis x, y;
+  set_own_axis(COLUMNS, at->x, at->height, &x);
+  set_own_axis(ROWS, at->y, at->height, &y);
   for (int i = 0, k = 0; i < COLUMNS; i++) {
-    int32_t x_q12 = ((i - COLUMNS / 2) * ONE_Q26 - at->x) >> 14;
-    int32_t column_q28 = fixed_mul_q30(peak_q28, bell.x[i]);
+    int32_t column_q28 = fixed_mul_q30(peak_q28, x.bell_q30[i]);
     for (int j = 0; j < ROWS; j++, k++) {
-      int32_t bell_q28 = fixed_mul_q30(column_q28, bell.y[j]);
-      if (bell_q28 == 0 || !(usable >> sensor[k] & 1)) {
-        continue;
-      }
       const struct fit_own *own = &settings->own[sensor[k]];
-      int32_t y_q12 = ((j - ROWS / 2) * ONE_Q26 - at->y) >> 14;
-      int32_t along_x_q13 = ((own->wider_q15 * x_q12) >> 14) - (own->off_x_q15 >> 2);
-      int32_t along_y_q13 = ((own->wider_q15 * y_q12) >> 14) - (own->off_y_q15 >> 2);
-      int32_t square_q24 = ((along_x_q13 * x_q12) >> 1) + ((along_y_q13 * y_q12) >> 1);
-      int32_t share_q15 = fixed_clamp(fixed_mul_q32(inverse_q26, square_q24) >> 3,
-                                      -OWN_SHARE_MAX_Q15, OWN_SHARE_MAX_Q15);
-      int32_t value = readings->q28[k] - fixed_mul_16(bell_q28, share_q15) * 2;
-      readings->q28[k] = value;
-      readings->q14[k] = (value + (1 << 13)) >> 14;
+      int32_t more_q26 = own->wider_q15 * (x.square_q11[i] + y.square_q11[j]) -
+                         own->off_x_q15 * x.slope_q11[i] - own->off_y_q15 * y.slope_q11[j];
+      int32_t share_q15 = fixed_clamp(more_q26 >> 11, -OWN_SHARE_MAX_Q15, OWN_SHARE_MAX_Q15);
+      if (usable >> sensor[k] & 1) {
+        int32_t bell_q15 = fixed_mul_q30(column_q28, y.bell_q30[j]) >> 13;
+        int32_t value = readings->q28[k] - ((bell_q15 * share_q15) >> 2);
+        readings->q28[k] = value;
+        readings->q14[k] = (value + (1 << 13)) >> 14;
+      }
     }
   }
 }

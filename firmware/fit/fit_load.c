@@ -122,8 +122,8 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
     (*row)[OFF_X_Q12] = (*row)[OFF_Y_Q12] = (*row)[WIDER_Q15] = 0;
     if (settings->own) {
       const struct fit_own *own = &settings->own[k];
-      (*row)[OFF_X_Q12] = fixed_mul_16(per_sigma_q12, own->off_x_q15) * 2;
-      (*row)[OFF_Y_Q12] = fixed_mul_16(per_sigma_q12, own->off_y_q15) * 2;
+      (*row)[OFF_X_Q12] = (per_sigma_q12 * own->off_x_q15) >> 15;
+      (*row)[OFF_Y_Q12] = (per_sigma_q12 * own->off_y_q15) >> 15;
       (*row)[WIDER_Q15] = own->wider_q15;
     }
     row++;

@@ -53,8 +53,14 @@ static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
 /* What a calibration knows of the pad. */
 static void set_known(const struct fit_array *array, const struct fit_settings *settings,
                       struct problem *problem) {
-  problem->own = settings->own;
-  problem->sensor = array->grid.sensor;
+  problem->own = NULL;
+  if (settings->own) {
+    struct fit_own *own = problem->pad->room.own;
+    problem->own = own;
+    for (int k = 0; k < NODES; k++) {
+      own[k] = settings->own[array->grid.sensor[k]];
+    }
+  }
   problem->dip_share_q16 = 0;
   problem->dip_k_q24 = 1 << 24;
   if (fit_has_dip(settings)) {

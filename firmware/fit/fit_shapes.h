@@ -102,6 +102,7 @@ struct fit_shapes_pad {
     struct fit_shapes_equations equations[3]; /* of each model */
     int32_t column[FIT_SHAPES_UNKNOWNS + 1][FIT_SHAPES_NODES];
     int32_t weight_q12[FIT_SHAPES_NODES];
+    struct fit_own own[FIT_SHAPES_NODES];
   } room;
 };
 

@@ -175,7 +175,6 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
   int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
   int32_t half_q13 = blob->lever_q14 > 0 ? amplitude_q13 : -amplitude_q13;
   const struct fit_own *own = problem->own;
-  const uint8_t *sensor = problem->sensor;
   int32_t *row = problem->pad->room.row[0];
   for (int i = 0; i < COLUMNS; i++) {
     int32_t dx_q12 = (i - COLUMNS / 2) * 4096 - blob->x_q12;
@@ -199,11 +198,9 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
       row[PLACE_Y] += along_y;
       row[SPREAD] += (((square_q10 * (w_q23 >> 15)) >> 7) - g_q12) * a_q13 >> 10;
       row[RESIDUAL] -= a_q13 * s_q15;
-      if (own) {
-        const struct fit_own *one = &own[*sensor++];
-        int32_t own_x_q12 = ((one->wider_q15 * dx_q12) >> 15) - (one->off_x_q15 >> 3);
-        int32_t own_y_q12 = ((one->wider_q15 * dy_q12) >> 15) - (one->off_y_q15 >> 3);
-        row[RESIDUAL] -= (along_x * own_x_q12 + along_y * own_y_q12) * 2;
+      if (own) { /* the log of a width, times what moves the model with it */
+        int32_t grows_q15 = (((g_q12 * square_q10) >> 10) * a_q13) >> 10;
+        row[RESIDUAL] -= (grows_q15 >> 2) * own++->wider_q15;
       }
       if (model != ROUND) {
         row[SPAN_X] += (along_x * (blob->lever_q14 >> 2)) >> 12;
@@ -265,10 +262,16 @@ void fit_shapes_set_rows(const struct problem *problem, int model, int count,
     add_pull(problem, &terms, at);
   }
   uint32_t size = 0;
-  int32_t *residual = &pad->room.row[0][RESIDUAL];
-  for (int k = 0; k < NODES; k++, residual += UNKNOWNS + 1) {
-    *residual = fixed_clamp(*residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];
-    size |= fixed_size(*residual);
+  int32_t *row = pad->room.row[0];
+  for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
+    int32_t residual = row[RESIDUAL];
+    if (problem->own) { /* what a sensor reads that is off its place */
+      const struct fit_own *own = &problem->own[k];
+      residual += (row[PLACE_X] >> 2) * own->off_x_q15 + (row[PLACE_Y] >> 2) * own->off_y_q15;
+    }
+    residual = fixed_clamp(residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];
+    row[RESIDUAL] = residual;
+    size |= fixed_size(residual);
   }
   equations->residual_size = size;
 }

@@ -38,8 +38,7 @@ struct problem {
   struct readings readings;
   int32_t base_q22; /* error of a reading of weight 1 */
   int32_t dip_share_q16, dip_k_q24;
-  const struct fit_own *own; /* [sensor] or NULL */
-  const uint8_t *sensor;     /* [node] */
+  const struct fit_own *own; /* [node] or NULL */
 };
 
 /* Rows of one element each, and their residuals. */

@@ -456,16 +456,17 @@ NOINLINE static void take_own(const struct problem *problem, const struct offset
                               const struct offset *y, struct fit_tangential_room *room) {
   const int32_t pitch_q12 = problem->pad->pitch_q26 >> (26 - PLACE_Q);
   const uint8_t *sensor = problem->sensor;
-  const union fit_tangential_node *node = room->node;
+  const int32_t *column = room->node[0].column;
   int32_t *residual = room->residual;
   for (int i = 0; i < COLUMNS; i++) {
-    for (int k = 0; k < ROWS; k++, node++) {
+    const int32_t x_q12 = x[i].d_q12;
+    const struct offset *along = y;
+    for (int32_t *end = residual + ROWS; residual != end; column += UNKNOWNS, along++) {
       const struct fit_own *own = &problem->own[*sensor++];
-      int32_t along_x_q12 = (own->wider_q15 * x[i].d_q12 - own->off_x_q15 * pitch_q12) >> 15;
-      int32_t along_y_q12 = (own->wider_q15 * y[k].d_q12 - own->off_y_q15 * pitch_q12) >> 15;
-      int32_t more_q22 = (node->column[PLACE_X] >> 4) * along_x_q12 +
-                         (node->column[PLACE_Y] >> 4) * along_y_q12;
-      *residual++ -= more_q22 * 4;
+      int32_t wider_q15 = own->wider_q15;
+      int32_t more_x_q12 = (wider_q15 * x_q12 - own->off_x_q15 * pitch_q12) >> 15;
+      int32_t more_y_q12 = (wider_q15 * along->d_q12 - own->off_y_q15 * pitch_q12) >> 15;
+      *residual++ -= (column[PLACE_X] >> 2) * more_x_q12 + (column[PLACE_Y] >> 2) * more_y_q12;
     }
   }
 }

@@ -402,7 +402,7 @@ Shape shape_of(const Solution &solution) {
 
 std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
   const auto q15 = [](double value) {
-    return static_cast<std::int16_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0)));
+    return static_cast<std::int32_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0)));
   };
   std::vector<fit_own> made;
   for (const Own &own : shape.own) {

@@ -170,9 +170,9 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   struct fit_own own[FT_MAX_SENSORS];
   if (press % 7 == 2) {
     for (int k = 0; k < FT_MAX_SENSORS; k++) {
-      own[k].off_x_q15 = (int16_t)draw_between(-2000, 2000);
-      own[k].off_y_q15 = (int16_t)draw_between(-2000, 2000);
-      own[k].wider_q15 = (int16_t)draw_between(-9000, 9000);
+      own[k].off_x_q15 = draw_between(-2000, 2000);
+      own[k].off_y_q15 = draw_between(-2000, 2000);
+      own[k].wider_q15 = draw_between(-9000, 9000);
     }
     settings.own = own;
   }

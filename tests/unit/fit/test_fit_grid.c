@@ -436,9 +436,9 @@ static void beyond_the_sensors_the_dip_tells_the_place(void) {
 /* Up to 0.16 mm each way, and 5 % of the width. */
 static void draw_own(struct random *random, struct fit_own *own) {
   for (int k = 0; k < SENSORS; k++) {
-    own[k].off_x_q15 = (int16_t)random_between(random, -600.0, 600.0);
-    own[k].off_y_q15 = (int16_t)random_between(random, -600.0, 600.0);
-    own[k].wider_q15 = (int16_t)random_between(random, -1638.0, 1638.0);
+    own[k].off_x_q15 = (int32_t)random_between(random, -600.0, 600.0);
+    own[k].off_y_q15 = (int32_t)random_between(random, -600.0, 600.0);
+    own[k].wider_q15 = (int32_t)random_between(random, -1638.0, 1638.0);
   }
 }
 
@@ -503,7 +503,7 @@ static void a_sensor_that_is_known_to_differ_is_no_outlier(void) {
   for (int i = 0; i < 200; i++) {
     struct fit_own own[SENSORS] = {{0}};
     int other = (int)random_below(&random, SENSORS);
-    own[other].wider_q15 = (int16_t)(WIDER * 32768.0);
+    own[other].wider_q15 = (int32_t)(WIDER * 32768.0);
     double x = 1.5 + random_between(&random, -4.0, 4.0), y = -0.25 + random_between(&random, -4.0, 4.0);
     for (int k = 0; k < SENSORS; k++) {
       double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y, wide = k == other ? 6.0 * exp(WIDER) : 6.0;
@@ -594,6 +594,10 @@ static void warnings_are_given(void) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_LOW_SIGNAL, result.flags);
 }
 
+static int32_t any_q15(struct random *random) {
+  return (int32_t)random_below(random, 65535) - 32767;
+}
+
 static void any_bits_give_finite_results(void) {
   struct random random = {21};
   for (int i = 0; i < 200000; i++) {
@@ -619,8 +623,7 @@ static void any_bits_give_finite_results(void) {
     struct fit_own own[SENSORS];
     if (random_below(&random, 2)) {
       for (int k = 0; k < SENSORS; k++) {
-        own[k] = (struct fit_own){(int16_t)random_u32(&random), (int16_t)random_u32(&random),
-                                  (int16_t)random_u32(&random)};
+        own[k] = (struct fit_own){any_q15(&random), any_q15(&random), any_q15(&random)};
       }
       settings.own = own;
     }

@@ -237,9 +237,9 @@ static void test_what_is_the_sensors_own_is_no_load(void) {
     int32_t pressure_Pa_q10[SENSORS];
     double x_mm = random_between(&noise, -9.0, 9.0), y_mm = random_between(&noise, -18.0, 18.0);
     for (int k = 0; k < SENSORS; k++) {
-      own[k] = (struct fit_own){(int16_t)random_between(&noise, -600, 600),
-                                (int16_t)random_between(&noise, -600, 600),
-                                (int16_t)random_between(&noise, -2000, 2000)};
+      own[k] = (struct fit_own){(int32_t)random_between(&noise, -600, 600),
+                                (int32_t)random_between(&noise, -600, 600),
+                                (int32_t)random_between(&noise, -2000, 2000)};
       double sigma_mm = 6.0 * exp(own[k].wider_q15 / 32768.0);
       double dx = 9.0 * (k / 5 - 1 + own[k].off_x_q15 / 32768.0) - x_mm;
       double dy = 9.0 * (k % 5 - 2 + own[k].off_y_q15 / 32768.0) - y_mm;

@@ -160,6 +160,10 @@ static float any_float(struct random *random) {
   return value;
 }
 
+static int32_t any_q15(struct random *random) {
+  return (int32_t)random_below(random, 65535) - 32767;
+}
+
 static struct input draw(uint32_t number) {
   struct random random = {SEED + number * UINT64_C(0x9E3779B97F4A7C15)};
   random_u64(&random);
@@ -190,8 +194,7 @@ static struct input draw(uint32_t number) {
   if (random_below(&random, 4) == 0) {
     static struct fit_own own[FT_MAX_SENSORS];
     for (int k = 0; k < FT_MAX_SENSORS; k++) {
-      own[k] = (struct fit_own){(int16_t)random_u32(&random), (int16_t)random_u32(&random),
-                                (int16_t)random_u32(&random)};
+      own[k] = (struct fit_own){any_q15(&random), any_q15(&random), any_q15(&random)};
     }
     settings->own = own;
   }

@@ -125,9 +125,9 @@ static void test_what_is_the_sensors_own_is_taken_out(void) {
   int round = 0, pairs = 0;
   for (int i = 0; i < 100; i++) {
     for (int k = 0; k < SENSORS; k++) {
-      own[k] = (struct fit_own){(int16_t)random_between(&noise, -600, 600),
-                                (int16_t)random_between(&noise, -600, 600),
-                                (int16_t)random_between(&noise, -2000, 2000)};
+      own[k] = (struct fit_own){(int32_t)random_between(&noise, -600, 600),
+                                (int32_t)random_between(&noise, -600, 600),
+                                (int32_t)random_between(&noise, -2000, 2000)};
     }
     struct reading reading = {{0.0}};
     double x = random_between(&noise, -6.0, 6.0);

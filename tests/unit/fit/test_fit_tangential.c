@@ -200,9 +200,9 @@ static void test_a_dip_that_is_known_is_in_the_model(void) {
 static void test_what_is_the_sensors_own_is_taken_out(void) {
   struct random random = {UINT64_C(7)};
   for (int k = 0; k < SENSORS; k++) {
-    own[k].off_x_q15 = (int16_t)random_between(&random, -600, 600); /* 0.16 mm */
-    own[k].off_y_q15 = (int16_t)random_between(&random, -600, 600);
-    own[k].wider_q15 = (int16_t)random_between(&random, -1600, 1600); /* 5 % */
+    own[k].off_x_q15 = (int32_t)random_between(&random, -600, 600); /* 0.16 mm */
+    own[k].off_y_q15 = (int32_t)random_between(&random, -600, 600);
+    own[k].wider_q15 = (int32_t)random_between(&random, -1600, 1600); /* 5 % */
   }
   settings.own = own;
   judge_pad(12.0, ALL, 0.08, 0.01, 260, 0);

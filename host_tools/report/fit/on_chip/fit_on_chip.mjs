@@ -9,7 +9,7 @@ const rows = readFileSync(new URL('../../../../firmware/fit/kernels.h', import.m
 export const KERNELS = ['nothing', 'fit', 'naive_float', 'naive_double', 'lm_float', 'lm_double', 'tangential', 'load_0', 'load_1', 'load_2', 'load_3', 'load_4', 'load_5', 'gains_of_touch', 'shapes_first_0', 'shapes_first_1', 'shapes_0', 'shapes_1', 'shapes_2', ...[...rows].map((row) => row[1])];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */
-const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, guess: 3, noise_Pa_q10: 4, prior_sigma_mm: 5, prior_width_mm: 6, usable: 7, readings: 8, x_mm: 40, y_mm: 41 };
+const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, guess: 3, noise_Pa_q10: 4, prior_sigma_mm: 5, prior_width_mm: 6, usable: 7, own: 8, readings: 9, x_mm: 41, y_mm: 42 };
 const GUESSES = ['log_linear', 'maximum', 'centroid'];
 
 /** One chip that runs fit_cycles.bin. */
@@ -47,7 +47,7 @@ export class Bench {
   }
 
   /** @returns {{cycles, x_mm, y_mm}} of one fit */
-  run({ kernel, iterations = 0, n_largest = 0, guess = 'log_linear', noise_Pa_q10 = 1, prior_sigma_mm = 0, prior_width_mm = 0, usable = 0, readings = [] }) {
+  run({ kernel, iterations = 0, n_largest = 0, guess = 'log_linear', noise_Pa_q10 = 1, prior_sigma_mm = 0, prior_width_mm = 0, usable = 0, own = false, readings = [] }) {
     const { chip } = this;
     const at = chip.core.registers[0] - 0x20000000;
     const view = new DataView(chip.sram.buffer, chip.sram.byteOffset + at);
@@ -60,6 +60,7 @@ export class Bench {
     view.setFloat32(4 * FIELDS.prior_sigma_mm, prior_sigma_mm, true);
     view.setFloat32(4 * FIELDS.prior_width_mm, prior_width_mm, true);
     put(FIELDS.usable, usable);
+    put(FIELDS.own, own ? 1 : 0);
     readings.forEach((value, k) => put(FIELDS.readings + k, value));
     this.#untilNextJob();
     return { cycles: this.cycles - (this.overhead ?? 0), x_mm: view.getFloat32(4 * FIELDS.x_mm, true), y_mm: view.getFloat32(4 * FIELDS.y_mm, true) };

@@ -11,6 +11,8 @@
 #include "fit/kernels.h"
 #include "port/port.h"
 
+#include <stddef.h>
+
 /* Words of 32 bits, in this order, as fit_on_chip.mjs writes and reads them. */
 static struct {
   uint32_t kernel; /* index into kernels */
@@ -18,6 +20,7 @@ static struct {
   int32_t noise_Pa_q10;
   float prior_sigma_mm, prior_width_mm;
   uint32_t usable;
+  uint32_t own; /* 1: the sensors have one (fit.h) */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS];
   float x_mm, y_mm; /* the answer */
 } job;
@@ -32,7 +35,7 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
 
 static struct fit_array layout;
 static struct fit_own own[FT_MAX_SENSORS];
-static struct fit_settings chosen = {.own = own};
+static struct fit_settings chosen;
 static struct fit_result contact;
 static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
@@ -169,8 +172,8 @@ int main(void) {
       fit_shapes_init(&shapes_pad, &layout, &profile) != FT_OK) {
     port_panic();
   }
-  for (int k = 0; k < FT_MAX_SENSORS; k++) { /* 0.1 mm, 4 % */
-    own[k] = (struct fit_own){364, -364, (int16_t)(k % 2 ? 1311 : -1311)};
+  for (int k = 0; k < FT_MAX_SENSORS; k++) { /* so little that it spoils no press */
+    own[k] = (struct fit_own){12, -12, k % 2 ? 40 : -40};
   }
   for (;;) {
     CALL_DEBUGGER(CALL_NEXT_JOB);
@@ -183,6 +186,7 @@ int main(void) {
     chosen.noise_Pa_q10 = job.noise_Pa_q10;
     chosen.prior_sigma_mm = job.prior_sigma_mm;
     chosen.prior_width_mm = job.prior_width_mm;
+    chosen.own = job.own ? own : NULL;
     void (*kernel)(void) = kernels[job.kernel];
     if (kernel == tangential) {
       fit();
