@@ -36,8 +36,8 @@ struct calibration {
 /* Ranges. Cast pads spread by 5 to 10 %; a gain beyond these is no sensor under rubber. */
 #define CALIBRATION_GAIN_MIN 0.25f
 #define CALIBRATION_GAIN_MAX 4.0f
-#define CALIBRATION_GAIN_SD_MAX 0.5f /* from 0 */
-#define CALIBRATION_OFF_MAX_um 2000   /* to both sides */
+#define CALIBRATION_GAIN_SD_MAX 0.5f   /* from 0 */
+#define CALIBRATION_OFF_MAX_um 2000    /* to both sides */
 #define CALIBRATION_WIDER_MAX_Q15 9830 /* to both sides: 0.3 */
 #define CALIBRATION_FORCE_SCALE_MIN 0.1f
 #define CALIBRATION_FORCE_SCALE_MAX 10.0f

@@ -383,8 +383,8 @@ static struct sector read_sector(struct store *store, unsigned number) {
 void store_init(struct store *store, uint8_t sensor_count) {
   memset(store, 0, sizeof *store);
   store->sensor_count = sensor_count;
-  store->slot_bytes = sensor_count <= STORE_SENSORS_OF_SHORT_SLOT ? STORE_SHORT_SLOT_BYTES
-                                                                  : STORE_LONG_SLOT_BYTES;
+  store->slot_bytes =
+      sensor_count <= STORE_SENSORS_OF_SHORT_SLOT ? STORE_SHORT_SLOT_BYTES : STORE_LONG_SLOT_BYTES;
   const struct sector sectors[PORT_FLASH_SECTORS] = {read_sector(store, 0), read_sector(store, 1)};
   store->sector = is_older(sectors[0].generation, sectors[1].generation);
   const struct sector *current = &sectors[store->sector];
@@ -443,8 +443,7 @@ static void begin_write(struct store *store, uint64_t now_us) {
   store->to_sector = store->sector;
   store->to_slot = store->next_slot;
   store->to_generation = store->generation;
-  bool fits = store->generation != 0 && store->next_slot < slots_of(store) &&
-              store->other_is_quiet;
+  bool fits = store->generation != 0 && store->next_slot < slots_of(store) && store->other_is_quiet;
   if (fits) {
     store->next_slot++;
     begin_slot(store, now_us);

@@ -3,8 +3,9 @@
  * never nothing.
  *
  * The flash is a log. A sector holds eight slots of 512 bytes, or four of 1024 if the array has 19
- * sensors or more. A record is all that is kept. It goes into the next free slot, or into the first of the other sector once that is erased. The newest undamaged
- * record counts. A slot of 512 bytes holds, in this order, each by a write of its own:
+ * sensors or more. A record is all that is kept. It goes into the next free slot, or into the first
+ * of the other sector once that is erased. The newest undamaged record counts. A slot of 512 bytes
+ * holds, in this order, each by a write of its own:
  *
  *     0    u32  begun: 0. From now on the slot is used, whatever it holds
  *     4    u32  magic 0x74665346
@@ -20,13 +21,13 @@
  * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u8 sync pin (a
  * setting, and 0 in the records of firmware without one), u8 0. Then the calibration as in its
  * command, without its n: 14 + 8 n bytes, zeros where there is none. Then the other settings: u32
- * rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32 location limit
- * mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as in its command,
- * 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma, its sd, the dip's
- * share and sd, u8 kPa; as in its command, which has them before the sensors. Version 4 has one more
- * part at the end: of each sensor i16 i16 i16, its place and width, as in the command; 6 n bytes.
- * Before it, 512 bytes were enough for all arrays. A sector with such a record has slots of 512
- * bytes and counts as full. Later versions keep the slot as it is and change the payload.
+ * rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32 location
+ * limit mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as in its
+ * command, 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma, its sd,
+ * the dip's share and sd, u8 kPa; as in its command, which has them before the sensors. Version 4
+ * has one more part at the end: of each sensor i16 i16 i16, its place and width, as in the command;
+ * 6 n bytes. Before it, 512 bytes were enough for all arrays. A sector with such a record has slots
+ * of 512 bytes and counts as full. Later versions keep the slot as it is and change the payload.
  *
  * Bits whose change was cut short may read differently each time. So a record that is not final may
  * be there today and gone tomorrow, or the other way round. When start-up meets one, it writes the
@@ -68,8 +69,8 @@ struct store_content {
 enum {
   STORE_SHORT_SLOT_BYTES = 512,
   STORE_LONG_SLOT_BYTES = 1024,
-  STORE_SENSORS_OF_SHORT_SLOT = 18,                                    /* with more it is long */
-  STORE_SLOTS = PORT_FLASH_SECTOR_BYTES / STORE_SHORT_SLOT_BYTES,      /* at most */
+  STORE_SENSORS_OF_SHORT_SLOT = 18,                               /* with more it is long */
+  STORE_SLOTS = PORT_FLASH_SECTOR_BYTES / STORE_SHORT_SLOT_BYTES, /* at most */
   STORE_RECORD_BYTES = 700, /* with the mark before it, without those behind it */
 };
 

@@ -459,7 +459,9 @@ def line_py(line):
               *(py_tuple(f"{name}_COLUMNS", [field.name for field in fields], "NaN in recordings of before there were any") for name, fields in line.later().items()),
               "LATER_COLUMNS = (" + ", ".join(f"*{name}_COLUMNS" for name in line.later()) + ")",
               py_tuple("RAW_COLUMNS", ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"]),
-              py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]), "", ""]
+              py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]),
+              "# Of a calibration, one value for each sensor, and struct's code of it.",
+              "SENSOR_LISTS = {" + ", ".join(f'"{key}": "{STRUCT_CODES[field.kind]}"' for field in line.structs["calibration"].fields if field.each for key in field.keys) + "}", "", ""]
     lines += ["class ContactQuantities:", '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""', "", "    __slots__ = ()", "    contact: Contact"]
     for field in contact.fields:
         if field.when:

@@ -20,7 +20,7 @@ enum kind {
   /* For each sensor so many as the count says, of members behind one another of one struct each */
   SENSORS_F32,
   SENSORS_U16,
-  WHEN,      /* no field: the next run is there if bit `count` of this word is set */
+  WHEN, /* no field: the next run is there if bit `count` of this word is set */
 };
 struct run {
   uint8_t kind;

@@ -9,7 +9,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools
 
 import numpy as np  # noqa: E402
 from fingertip import BadValueError, InputError, read_recording, wire  # noqa: E402
-from fingertip.line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, SETTINGS  # noqa: E402
+from fingertip.line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SETTINGS  # noqa: E402
 from fingertip.lines import shortest  # noqa: E402
 from fingertip.recording import info_metadata  # noqa: E402
 from fingertip.settings import setting_commands  # noqa: E402
@@ -52,20 +52,20 @@ def info_of(metadata):
         return " ".join(str(int(word)) if re.fullmatch("-?[0-9]+", word) else shortest(float(word)) for word in text.split())
 
     stored = int(metadata.get("stored", "0"))
-    known = {key for key in KNOWN_KEYS if not (key.startswith(("calibration_", "force_scale", "gain")) and not stored & 1)
+    known = {key for key in KNOWN_KEYS if not ((key.startswith(("calibration_", "force_scale")) or key in SENSOR_LISTS) and not stored & 1)
              and not (key.startswith("pad_") and not stored & 16)}
     nothing = {"serial": "", "board": "", "scene": "", "git": "", "firmware": "0.0.0"}
     found = []
     for key in filter(known.__contains__, KNOWN_KEYS):
         text = plain(key, metadata.get(key, nothing.get(key, "0")))
-        if key in ("x_mm", "y_mm", "gains", "gain_sds"):
+        if key in ("x_mm", "y_mm", *SENSOR_LISTS):
             text = " ".join([*(text.split() if key in metadata else ()), *["0"] * SENSORS_MAX][:int(metadata["sensors"])])
         found.append([key, text])
     return found
 
 
 def some_info():
-    calibration = wire.Calibration(0, 0, 1, 0, 0, 0, 0, 0, 0, 30 * (1.0,))
+    calibration = wire.Calibration(0, 0, 1, 0, 0, 0, 0, 0, 0, 30 * (1.0,), 45 * (0,))
     pad = wire.PadProfile(*(field.times * (0.0,) if field.times > 1 else 0 for _, field in wire.layout_of(wire.PadProfile)))
     return wire.Info((0, 0, 0), 15, 31, "", "", "", "", 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 30 * (0.0,), 0.0, 0.0, 0.0, 0, 17, calibration, pad)
 

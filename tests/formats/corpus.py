@@ -133,7 +133,8 @@ COMMENTS = {
     "packet_two_blanks": "# packet: ack  sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4",
     "event": "# event: back", "event_not_utf8": "# event: \udcff", "sensors_word": "# sensors: many", "rate_word": "# rate_mHz: abc", "rate_beyond": "# rate_mHz: 4294967296",
     "osr_negative": "# osr: -5", "many_x": "# x_mm: " + " ".join(["1"] * 33), "x_word": "# x_mm: 1 b", "x_two_blanks": "# x_mm: 1  2", "x_none": "# x_mm: ",
-    "gain_nan": "# gains: nan", "pad_word": "# pad_thickness_mm: thick", "pad_list": "# pad_shares: 1 2 3", "pad_touch": "# pad_from_touch: 256", "date": "# calibration_date_s: x",
+    "gain_nan": "# gains: nan", "off_beyond": "# off_x_um: 1 -32769", "off_part": "# wider_q15: 1.5",
+    "off_least": "# off_y_um: -32768 32767", "pad_word": "# pad_thickness_mm: thick", "pad_list": "# pad_shares: 1 2 3", "pad_touch": "# pad_from_touch: 256", "date": "# calibration_date_s: x",
     "firmware_two": "# firmware: 1.2", "firmware_large": "# firmware: 1.2.256", "serial_umlaut": "# serial: \u00e4", "serial_long": "# serial: 0123456789abcdefg",
     "end_word": "# end: reason", "end_blank": "# end: frames=1 ", "end_number": "# end: reason=x frames=many", "slash": "# 0/note: x", "prior_beyond": "# prior_sigma_mm: 1e39",
 }

@@ -73,8 +73,7 @@ bool begins_with(const std::string &text, const char *begin) {
 
 bool is_of_calibration(const std::string &key) {
   return begins_with(key, "calibration_") || begins_with(key, "force_scale") ||
-         begins_with(key, "gain") || begins_with(key, "off_") || begins_with(key, "wider_") ||
-         begins_with(key, "pad_");
+         begins_with(key, "pad_") || is_list(key);
 }
 
 /* "# key: value" taken apart; nothing of other lines. */

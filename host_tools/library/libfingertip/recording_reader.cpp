@@ -269,7 +269,8 @@ void RecordingReader::read_end(std::string_view text) {
   end_statistics_ = statistics;
 }
 
-void RecordingReader::read_info_field(wire_info &info, const std::string &key, const std::string &value) {
+void RecordingReader::read_info_field(wire_info &info, const std::string &key,
+                                      const std::string &value) {
   auto copy_text = [&](char *field) {
     if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
       throw Damage{key + " is no printable ASCII"};

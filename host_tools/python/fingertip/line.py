@@ -712,6 +712,8 @@ RAW_COLUMNS = (
 INFO_KEYS = (
     "sensors", "capabilities", "rate_mHz", "measured_rate_mHz", "osr", "temperature_interval_ms", "slip_threshold_mm", "slip_window_ms",
     "fit_iterations", "streams", "pitch_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "sync", "stored")
+# Of a calibration, one value for each sensor, and struct's code of it.
+SENSOR_LISTS = {"gains": "f", "gain_sds": "f", "off_x_um": "h", "off_y_um": "h", "wider_q15": "h"}
 
 
 class ContactQuantities:

@@ -15,7 +15,7 @@ from typing import Any
 
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, WARNINGS, Flag
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, WARNINGS, Flag
 from .lines import LineFile, shortest
 from .ros_messages import decode, encode, schema_of
 
@@ -200,11 +200,11 @@ class _Device:
     def calibration(self) -> str:
         """What there is of gains, force scale and pad, as JSON; nothing without."""
         found = [f'"{key}": ' + (f'[{", ".join(value.split())}]' if key in _LISTS else value) for key, value in self.keys.items()
-                 if key.startswith(("calibration_", "force_scale", "gain", "pad_"))]
+                 if key.startswith(("calibration_", "force_scale", "pad_")) or key in SENSOR_LISTS]
         return "{" + ", ".join([f'"serial": "{self.serial}"', *found]) + "}" if found else ""
 
 
-_LISTS = {"gains", "gain_sds", "pad_shares", "pad_sds_mm", "pad_moments_mm", "pad_moment_sds_mm",
+_LISTS = {*SENSOR_LISTS, "pad_shares", "pad_sds_mm", "pad_moments_mm", "pad_moment_sds_mm",
           *(f"pad_edge_{name}" for name in ("ratio_x", "ratio_y", "gain_x", "gain_y", "place_x_mm", "place_y_mm", "pull_x_mm", "pull_y_mm", "force"))}
 
 

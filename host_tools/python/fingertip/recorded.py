@@ -10,17 +10,19 @@ import numpy.typing as npt
 
 from .frames import Q10
 from .line import (
-    CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire)
+    CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile,
+    SyncEdge, Wire)
 from .wire import layout_of
 
-_LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
+_LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
+_LEAST = {"h": -2**15}  # of the others 0
 _WHOLE = re.compile("-?[0-9]+")
 _NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _BINARY32 = 2.0**-150, 2.0**128 - 2.0**103  # not above the first it becomes 0, from the second on infinite
 _BINARY64 = 0.0, math.inf
 _PAD_LISTS = {"pad_shares": 2, "pad_sds_mm": 2, "pad_moments_mm": 3, "pad_moment_sds_mm": 3,
               **{f"pad_{name}": 3 for name in PadProfile._fields if name.startswith("edge_")}}
-_LISTS = {**dict.fromkeys(("x_mm", "y_mm", "gains", "gain_sds"), SENSORS_MAX), **_PAD_LISTS}
+_LISTS = {**dict.fromkeys(("x_mm", "y_mm", *SENSOR_LISTS), SENSORS_MAX), **_PAD_LISTS}
 _SCALARS = {prefix + name: wire.code for body, prefix in ((Info, ""), (Calibration, ""), (PadProfile, "pad_")) for name, wire in layout_of(body)
             if wire.code in "BnHIf" and wire.times == 1}
 _SCALARS |= {f"calibration_{name}": _SCALARS.pop(name) for name in ("date_s", "placements")}
@@ -33,7 +35,7 @@ def whole(name: str, cell: str, code: str) -> int:
     """A whole number of struct's code. Raises ValueError."""
     if not _WHOLE.fullmatch(cell) or (code == "Q" and cell[0] == "-"):
         raise ValueError(f'{name} is "{cell}"')
-    if not 0 <= int(cell) <= _LARGEST[code]:
+    if not _LEAST.get(code, 0) <= int(cell) <= _LARGEST[code]:
         raise ValueError(f"{name} is out of range")
     return int(cell)
 
@@ -70,7 +72,10 @@ def judge_key(key: str, value: str) -> None:
         if len(words) > _LISTS[key]:
             raise ValueError(f"{key} has too many values")
         for word in words:
-            number(key, word, _BINARY32)
+            if SENSOR_LISTS.get(key) == "h":
+                whole(key, word, "h")
+            else:
+                number(key, word, _BINARY32)
     elif key in _SCALARS:
         if _SCALARS[key] == "f":
             number(key, value, _BINARY32)

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from .clock import ClockEstimate, host_now_us
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, INFO_KEYS, LATER_COLUMNS, RAW_COLUMNS
+from .line import CONTACT_COLUMNS, INFO_KEYS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
 from .lines import LineFile, shortest
 from .mcap_recording import McapLines
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge
@@ -42,7 +42,7 @@ def _calibration_metadata(calibration: Calibration) -> dict[str, str]:
             "force_scale": _number(calibration.force_scale), "force_scale_sd": _number(calibration.force_scale_sd),
             **{f"calibration_{name}": str(getattr(calibration, name))
                for name in ("sigma_um", "sigma_sd_um", "dip_share_q16", "dip_sd_um", "ambient_kPa")},
-            "gains": _list(calibration.gains), "gain_sds": _list(calibration.gain_sds)}
+            **{name: _list(getattr(calibration, name)) for name in SENSOR_LISTS}}
 
 
 def _pad_metadata(pad: PadProfile) -> dict[str, str]:

@@ -69,7 +69,8 @@ def some_packets(seed, frames):
         return float(np.float32(prng.choice((0.0, -1e-9, 3.25, 1e6, prng.gauss(0, 10)))))
 
     xy_mm = tuple(float(value) for k in range(15) for value in (9 * (k // 5 - 1), 9 * (k % 5 - 2)))
-    calibration = wire.Calibration(1700000000, 20, 1.5, 0.01, 5552, 60, 3277, 13954, 101, tuple(1 + k / 100 for k in range(30)))
+    calibration = wire.Calibration(1700000000, 20, 1.5, 0.01, 5552, 60, 3277, 13954, 101, tuple(1 + k / 100 for k in range(30)),
+                                   tuple(50 * k - 1000 for k in range(45)))
     info = wire.Info((1, 2, 3), 15, 31, "abc", "board", "grasp", f"{seed:04d}ABCD", 400000, 399000, 256, 500, 3, 7, 100, 0.75, 9.0, xy_mm, 3.1, 0.5,
                      0.6, 1, 1, calibration, None)
     yield wire.Packet(0, 1000, info)

@@ -30,10 +30,11 @@ std::string shape_text(const calibration &calibration) {
 void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
   constexpr int HALF = 10;
   constexpr double PER_MARK = 0.02;
-  const bool has_places = std::any_of(
-      calibration.sensors, calibration.sensors + sensor_count, [](const sensor_calibration &sensor) {
-        return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
-      });
+  const bool has_places =
+      std::any_of(calibration.sensors, calibration.sensors + sensor_count,
+                  [](const sensor_calibration &sensor) {
+                    return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
+                  });
   std::printf("\nsensor    gain    sd %%%s   -20 %%      mean      +20 %%\n",
               has_places ? "  off by x, y mm  wider by %" : "");
   for (int k = 0; k < sensor_count; k++) {

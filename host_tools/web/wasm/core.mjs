@@ -8,7 +8,7 @@ const ERR_VALUE = -2;
 const CSV = 0;
 const MCAP = 1;
 const INFO = 0x03;
-// Of some hundred packets; one has 320 at most.
+// Of some hundred packets; one has 416 at most.
 const VALUES = 8192;
 const BYTES = 1 << 16;
 const TEXT_BYTES = 512;

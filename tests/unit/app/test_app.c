@@ -170,8 +170,8 @@ static struct wire_packet calibrate_command(void) {
   body->calibration = (struct calibration){
       .date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    body->calibration.sensors[k] = (struct sensor_calibration){
-        .gain = 0.8f + 0.02f * (float)k, .gain_sd = 0.01f};
+    body->calibration.sensors[k] =
+        (struct sensor_calibration){.gain = 0.8f + 0.02f * (float)k, .gain_sd = 0.01f};
   }
   return command;
 }
@@ -315,7 +315,8 @@ static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
   ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
   ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
   ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
-  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz, "it was not kept");
+  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz,
+                                   "it was not kept");
 
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
   ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});

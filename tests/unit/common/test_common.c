@@ -183,7 +183,8 @@ static void test_calibrations_are_in_their_ranges(void) {
     calibration.dip_sd_um = shapes[i].dip_sd_um;
     TEST_ASSERT_EQUAL(shapes[i].valid, calibration_is_valid(&calibration, 15));
   }
-  calibration.sensors[15] = (struct sensor_calibration){NAN, NAN, 2001, 2001, 9831}; /* of no sensor */
+  calibration.sensors[15] =
+      (struct sensor_calibration){NAN, NAN, 2001, 2001, 9831}; /* of no sensor */
   TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
 }
 

@@ -398,8 +398,9 @@ static void what_another_firmware_wrote_is_left_alone(void) {
   static const struct {
     uint32_t at;
     uint16_t value;
-  } others[] = {{8, 1},  {8, 2},   {8, 3},   {8, 5},   {8, UINT16_MAX}, {20, 14 << 8 | 1},
-                {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}, {20 + LENGTH_3, 2001}};
+  } others[] = {
+      {8, 1},   {8, 2},    {8, 3},    {8, 5},       {8, UINT16_MAX},      {20, 14 << 8 | 1},
+      {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}, {20 + LENGTH_3, 2001}};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     native_flash = ours;
     alter_record(others[i].at, others[i].value);
@@ -464,7 +465,8 @@ static void records_of_version_3_are_read(void) {
 }
 
 /* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as
- * it wrote them: the last counts, and the next goes into the other sector, whenever power is lost. */
+ * it wrote them: the last counts, and the next goes into the other sector, whenever power is lost.
+ */
 static void short_slots_of_the_largest_array_are_read(void) {
   enum { SLOT = STORE_SHORT_SLOT_BYTES, LENGTH = LENGTH_OF_3(FT_MAX_SENSORS) };
   for (unsigned records = 1; records <= STORE_SLOTS; records++) {
@@ -592,8 +594,8 @@ static void slots_that_do_not_hold_what_is_written_are_given_up(void) {
     struct store_content kept = keep_something();
     for (int slot = 0; slot < bad; slot++) {
       uint32_t at = store.sector * PORT_FLASH_SECTOR_BYTES;
-      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * store.slot_bytes + 100], 0,
-             4);
+      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * store.slot_bytes + 100],
+             0, 4);
     }
     struct calibration other = some_calibration();
     TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &other));

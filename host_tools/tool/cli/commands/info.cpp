@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <string_view>
 
 namespace fingertip {
 
@@ -37,8 +38,11 @@ int info(const Choice &choice) {
   wire_info info = device.session.info().body.info;
   wire_health health = device.session.health().body.health;
   Metadata pairs = info_metadata(info);
+  /* print_gains has them. */
   auto is_of_sensors = [](const std::pair<std::string, std::string> &pair) {
-    return pair.first == "gains" || pair.first == "gain_sds";
+    static constexpr std::string_view names[] = {"gains", "gain_sds", "off_x_um", "off_y_um",
+                                                 "wider_q15"};
+    return std::find(std::begin(names), std::end(names), pair.first) != std::end(names);
   };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_of_sensors), pairs.end());
   pairs.insert(pairs.begin(), {"port", printable(device.transport->description())});

@@ -4,7 +4,7 @@
  */
 import { Capability, PacketType, Stored, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { loadJudges, type GainSession, type Judges, type PullSession } from '../judges/judges';
+import { loadJudges, type GainResult, type GainSession, type Judges, type PullSession } from '../judges/judges';
 import { Dialog, field, make, makeButton } from './dialog';
 
 const GRAVITY_m_s2 = 9.80665;
@@ -257,7 +257,7 @@ function confirmGains(
       `A usual contact: sigma ${(calibration.sigma_um / 1000).toFixed(2)} mm, sd ${(calibration.sigma_sd_um / 1000).toFixed(2)} mm; ` +
         `dip around it ${((100 * calibration.dip_share_q16) / 65536).toFixed(1)} % of its peak.`,
     ),
-    make('p', {}, `Gains: ${calibration.gain.map((gain) => gain.toFixed(3)).join(' ')}`),
+    sensorTable(calibration),
   );
   dialog.say('Store it in the fingertip?');
   dialog.choose([
@@ -293,6 +293,33 @@ function confirmGains(
       true,
     ),
   ]);
+}
+
+/** A row for each sensor. */
+function sensorTable(calibration: GainResult['calibration']): HTMLElement {
+  const signed = (value: number, digits: number) =>
+    `${value < 0 ? '\u2212' : '+'}${Math.abs(value).toFixed(digits)}`;
+  const heads = ['sensor', 'gain', 'sd, %', 'off by x, mm', 'y, mm', 'wider by, %'];
+  return make(
+    'table',
+    {},
+    make('caption', {}, 'Of the sensors: gain, how far off its place, how much wider it feels a contact'),
+    make('tr', {}, ...heads.map((head) => make('th', { scope: 'col' }, head))),
+    ...calibration.gain.map((gain, k) =>
+      make(
+        'tr',
+        {},
+        make('th', { scope: 'row' }, String(k)),
+        ...[
+          gain.toFixed(3),
+          (100 * calibration.gain_sd[k]!).toFixed(1),
+          signed(calibration.off_x_um[k]! / 1000, 2),
+          signed(calibration.off_y_um[k]! / 1000, 2),
+          signed(100 * Math.expm1(calibration.wider_q15[k]! / 32768), 1),
+        ].map((text) => make('td', {}, text)),
+      ),
+    ),
+  );
 }
 
 async function pulls(
