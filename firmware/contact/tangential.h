@@ -89,7 +89,7 @@ struct tangential_job {
  * before is taken, whose load has changed little since. */
 #define TANGENTIAL_BESIDE_us 1500u
 
-/* A Cortex-M0+ at 125 MHz answers within 320 us, and within 1.6 ms after a slow frame
+/* A Cortex-M0+ at 125 MHz answers within 330 us, and within 1.6 ms after a slow frame
  * (fit_tangential.h). What takes longer than this is not waited for. */
 #define TANGENTIAL_LATE_us 450u
 #define TANGENTIAL_SLOW_LATE_us 2250u

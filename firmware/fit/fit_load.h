@@ -26,7 +26,7 @@
 /* Q / F that is usual in a gripper. */
 #define FIT_LOAD_USUAL 0.2f
 
-/* Parts of a look: with fifteen sensors none takes more than 5500 cycles on a Cortex-M0+, nor all
+/* Parts of a look: with fifteen sensors none takes more than 5800 cycles on a Cortex-M0+, nor all
  * more than 25 000 (test emulated.fit_cycles). */
 #define FIT_LOAD_PARTS 6
 

@@ -18,7 +18,7 @@
  * on every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the
  * limits.
  *
- * At most 40 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
+ * At most 41 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
  * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards
  * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet. */

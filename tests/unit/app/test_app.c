@@ -254,6 +254,9 @@ static void a_calibration_tells_the_fit_the_pads_shape(void) {
   calibration->sigma_sd_um = 60;
   calibration->dip_share_q16 = 3277;
   calibration->dip_sd_um = 13954;
+  calibration->sensors[3].off_x_um = 90; /* a hundredth of a pitch */
+  calibration->sensors[3].off_y_um = -180;
+  calibration->sensors[14].wider_q15 = -1311;
   calibration->force_scale_sd = 0.01f;
   calibration->ambient_kPa = 101;
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
@@ -261,6 +264,10 @@ static void a_calibration_tells_the_fit_the_pads_shape(void) {
   TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.fit_settings.dip_share);
   TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
+  TEST_ASSERT_INT_WITHIN(1, 328, app.fit_settings.own[3].off_x_q15);
+  TEST_ASSERT_INT_WITHIN(1, -655, app.fit_settings.own[3].off_y_q15);
+  TEST_ASSERT_EQUAL_INT(-1311, app.fit_settings.own[14].wider_q15);
+  TEST_ASSERT_EQUAL_INT(0, app.fit_settings.own[14].off_x_q15);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, get_info().prior_width_mm);
   run_for(1100);
   TEST_ASSERT_FLOAT_WITHIN(0.003f, 0.01f, app.contact_settings.force_scale_sd);
@@ -282,6 +289,7 @@ static void a_calibration_tells_the_fit_the_pads_shape(void) {
                     ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.dip_share);
+  TEST_ASSERT_NULL(app.fit_settings.own);
 }
 
 static void a_calibration_outlives_power(void) {
