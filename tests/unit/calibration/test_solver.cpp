@@ -1,4 +1,5 @@
 #include "support/placements.hpp"
+#include "tool/calibration/gain_session.hpp"
 #include "tool/calibration/solver.hpp"
 
 #include <algorithm>
@@ -191,6 +192,24 @@ TEST(Solver, own_widths_are_found_and_pass_for_no_gains) {
       EXPECT_NEAR(readings_within_one / all, 0.68, 0.12);
     }
   }
+}
+
+/* In the units of the record, and within its ranges. */
+TEST(Solver, the_record_holds_where_each_sensor_is_and_how_wide) {
+  Solution s;
+  s.sigma_mm = 5.5;
+  s.gain = {1.02, 0.98};
+  s.reading_sd = {0.01, 0.02};
+  s.dx_mm = {0.1234, -5.0};
+  s.dy_mm = {-0.05, 2.5};
+  s.own_width = {-0.05, 0.9};
+  const calibration made = calibration_of(s, std::nullopt, 7);
+  EXPECT_EQ(made.sensors[0].off_x_um, 123);
+  EXPECT_EQ(made.sensors[0].off_y_um, -50);
+  EXPECT_EQ(made.sensors[0].wider_q15, -1638);
+  EXPECT_EQ(made.sensors[1].off_x_um, -CALIBRATION_OFF_MAX_um);
+  EXPECT_EQ(made.sensors[1].off_y_um, CALIBRATION_OFF_MAX_um);
+  EXPECT_EQ(made.sensors[1].wider_q15, CALIBRATION_WIDER_MAX_Q15);
 }
 
 TEST(Solver, more_placements_tell_more) {
