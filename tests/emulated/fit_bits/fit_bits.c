@@ -168,11 +168,12 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   }
 
   struct fit_own own[FT_MAX_SENSORS];
-  if (press % 7 == 2) {
+  if (press % 7 == 2) { /* on a pad so little that an estimate is still reported */
+    const int32_t most_q15 = on_a_pad ? 300 : 9000;
     for (int k = 0; k < FT_MAX_SENSORS; k++) {
-      own[k].off_x_q15 = draw_between(-2000, 2000);
-      own[k].off_y_q15 = draw_between(-2000, 2000);
-      own[k].wider_q15 = draw_between(-9000, 9000);
+      own[k].off_x_q15 = draw_between(-most_q15 / 4, most_q15 / 4);
+      own[k].off_y_q15 = draw_between(-most_q15 / 4, most_q15 / 4);
+      own[k].wider_q15 = draw_between(-most_q15, most_q15);
     }
     settings.own = own;
   }

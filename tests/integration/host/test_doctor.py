@@ -51,7 +51,7 @@ class DoctorTest(CliTest):
         self.plug_in("version=3")
         verdict, text = self.finding("protocol")
         self.assertEqual(verdict, "bad")
-        self.assertIn("speaks protocol version 3, not 8; install this tool's firmware", text)
+        self.assertIn("speaks protocol version 3, not 9; install this tool's firmware", text)
 
     def test_another_firmware_version(self):
         self.plug_in("firmware=0.0.9")

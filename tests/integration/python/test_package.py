@@ -517,7 +517,7 @@ class Commands(DeviceTest):
             self.assertTrue(next(iter(tip)).frame)
 
     def test_no_answer_and_another_version(self):
-        with self.device("version=4"), self.assertRaisesRegex(fingertip.OtherVersionError, "speaks protocol version 4, not 8"):
+        with self.device("version=4"), self.assertRaisesRegex(fingertip.OtherVersionError, "speaks protocol version 4, not 9"):
             Fingertip(self.port)
         with mock.patch.object(device, "ANSWER_TIMEOUT_s", 0.2), self.device("mute=1"):
             self.assertRaisesRegex(fingertip.NoAnswerError, "no answer to AskInfo", Fingertip, self.port)
