@@ -3,11 +3,10 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
-#include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/thickness.hpp"
-#include "tool/calibration/gain_session.hpp"
+#include "tool/calibration/from_recording.hpp"
 #include "tool/cli/calibrate_device.hpp"
 #include "tool/cli/calibrate_drag.hpp"
 #include "tool/cli/calibrate_view.hpp"
@@ -77,40 +76,11 @@ void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
   });
 }
 
-/* Of the fingertip that the recording is of. */
-GainSession work_from(const CalibrateOptions &options, wire_info &info) {
-  RecordingReader reader(options.from, false, options.choice.device);
-  std::optional<GainSession> work;
-  bool pressures = false;
-  while (auto item = reader.next()) {
-    if (item->kind != RecordingReader::Item::Kind::packet) {
-      continue;
-    }
-    if (item->packet.type == WIRE_INFO && !work) {
-      info = item->packet.body.info;
-      work.emplace(info);
-    } else if (work) {
-      pressures = pressures || item->packet.type == WIRE_RAW;
-      if (work->take(item->packet)) {
-        const Placement &found = work->placements().back();
-        std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n",
-                    work->placements().size(), found.t_s,
-                    1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
-      }
-    }
-  }
-  if (!work || !pressures) {
-    throw Error(printable(options.from) + ": has no pressures to calibrate from; record with a "
-                                          "firmware that sends them (fingertip info: raw)");
-  }
-  work->judge(true);
-  return std::move(*work);
-}
-
-void refuse_unless_good(const Judgement &judgement) {
-  if (judgement.state != Judgement::State::good) {
-    throw Error("not calibrated: " + judgement.text);
-  }
+void show_placement(const GainSession &session) {
+  const Placement &found = session.placements().back();
+  std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(),
+              found.t_s,
+              1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
 }
 
 int show(const CalibrateOptions &options) {
@@ -175,15 +145,16 @@ int calibrate(const CalibrateOptions &options) {
     work.emplace(device->info());
     work_live(*device, *work, options.colour);
   } else {
-    wire_info info{};
-    work.emplace(work_from(options, info));
-    refuse_unless_good(work->judgement());
+    calibrating::Recorded recorded =
+        calibrating::session_from(options.from, options.choice.device, show_placement);
+    work.emplace(std::move(recorded.session));
+    calibrating::refuse_unless_good(work->judgement());
     if (!options.dry_run) {
       device.emplace(options);
-      device->check_is(info, options.from);
+      device->check_is(recorded.info, options.from);
     }
   }
-  refuse_unless_good(work->judgement());
+  calibrating::refuse_unless_good(work->judgement());
   const std::time_t now_s = std::chrono::system_clock::to_time_t(wall_now());
   const calibration made = work->made(options.force_N, static_cast<std::uint32_t>(now_s));
   print_result(*work, made, options.force_N);
