@@ -106,18 +106,22 @@ struct CalibrateOptions {
 // As fingertip calibrate --from does it: the thickness that is found makes the pad's profile.
 int calibrate(const CalibrateOptions &options) {
   check_output(options.commands, options.replace);
-  const auto [info, session] = calibrating::session_from(options.placements, {}, {});
+  auto [info, session] = calibrating::session_from(options.placements, {}, {});
   calibrating::refuse_unless_good(session.judgement());
-  const calibration made = session.made(options.force_N, CALIBRATED_s);
+  calibration made = session.made(options.force_N, CALIBRATED_s);
+  const auto for_profile = pad::thickness_for_profile(info, made);
+  if (for_profile) {
+    session.expect_profile();
+    made = session.made(options.force_N, CALIBRATED_s);
+  }
   OutputFile file(options.commands, options.replace, OutputFile::Appears::when_finished);
   const auto write = [&](const wire_packet &packet) {
     const std::vector<std::uint8_t> frame = frame_bytes(packet);
     file.append(frame.data(), frame.size());
   };
   write(command_calibrate(made, info.sensor_count));
-  const auto found = pad::thickness_of(made);
-  if ((info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && found && pad::profile_suits(*found)) {
-    write(command_pad(pad::profile_of({found->shown_mm()}, info)));
+  if (for_profile) {
+    write(command_pad(pad::profile_of({for_profile->shown_mm()}, info)));
   }
   file.finish();
   return 0;

@@ -114,56 +114,65 @@ int erase(const CalibrateOptions &options) {
 
 /* A fingertip that estimates the tangential load needs the thickness. Where the user has set one,
  * this says whether it is the one found. Else the pad's profile follows from the one found. */
-void use_thickness(CalibratedDevice &device, const calibration &made) {
+void use_thickness(CalibratedDevice &device, const calibration &made,
+                   const std::optional<pad::Thickness> &for_profile) {
   const wire_info &info = device.info();
   const auto found = pad::thickness_of(made);
-  if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL) || !found) {
-    return;
-  }
-  if (info.stored & WIRE_STORED_PAD) {
+  if (for_profile) {
+    device.write(pad::profile_of({for_profile->shown_mm()}, info));
+    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
+                "rubber ends\n",
+                fixed(for_profile->mm, 1).c_str());
+  } else if ((info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && (info.stored & WIRE_STORED_PAD) &&
+             found) {
     const std::string other =
         pad::disagreement(*found, static_cast<double>(info.pad.thickness_mm));
     if (!other.empty()) {
       std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n",
                    other.c_str());
     }
-  } else if (pad::profile_suits(*found)) {
-    device.write(pad::profile_of({found->shown_mm()}, info));
-    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
-                "rubber ends\n",
-                fixed(found->mm, 1).c_str());
   }
 }
 
 int calibrate(const CalibrateOptions &options) {
   std::optional<CalibratedDevice> device;
   std::optional<GainSession> work;
+  wire_info info{};
   if (options.from.empty()) {
     device.emplace(options);
     calibrating::check_firmware(device->info(), device->name());
     device->check_sensors();
     work.emplace(device->info());
     work_live(*device, *work, options.colour);
+    info = device->info();
   } else {
     calibrating::Recorded recorded =
         calibrating::session_from(options.from, options.choice.device, show_placement);
     work.emplace(std::move(recorded.session));
+    info = recorded.info;
     calibrating::refuse_unless_good(work->judgement());
     if (!options.dry_run) {
       device.emplace(options);
-      device->check_is(recorded.info, options.from);
+      device->check_is(info, options.from);
+      info = device->info();
     }
   }
   calibrating::refuse_unless_good(work->judgement());
   const std::time_t now_s = std::chrono::system_clock::to_time_t(wall_now());
-  const calibration made = work->made(options.force_N, static_cast<std::uint32_t>(now_s));
+  const auto date_s = static_cast<std::uint32_t>(now_s);
+  calibration made = work->made(options.force_N, date_s);
+  const auto for_profile = pad::thickness_for_profile(info, made);
+  if (for_profile || (info.stored & WIRE_STORED_PAD)) {
+    work->expect_profile();
+    made = work->made(options.force_N, date_s);
+  }
   print_result(*work, made, options.force_N);
   if (!device) {
     return 0;
   }
   ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
   device->write(made);
-  use_thickness(*device, made);
+  use_thickness(*device, made, for_profile);
   std::printf("calibrated: it acts from now on\n");
   return 0;
 }
