@@ -64,7 +64,8 @@ GOALS = (
     ("samples", ">=", 40000), ("seconds", "<=", 300), ("h12_gain0_median_mm", "<=", 0.12), ("h12_gain10_median_mm", "<=", 0.40),
     ("h12_dip_median_mm", "<=", 0.40), ("h12_dip_calibrated_median_mm", "<=", 0.13), ("dip_calibrated_bad_unflagged_percent", "<=", 0.1),
     ("force_mape_scaled_gain0_percent", "<=", 0.5), ("force_mape_scaled_gain10_percent", "<=", 3.5),
-    ("force_mape_dip_calibrated_percent", "<=", 2), ("h6_prior_p99_mm", "<=", 1.5), ("h6_bad_unflagged_percent", "<=", 0.5), ("saturated_median_mm", "<=", 0.1), ("emulated_frames_different", "<=", 0))
+    ("force_mape_dip_calibrated_percent", "<=", 2), ("h6_prior_p99_mm", "<=", 1.5),
+    ("h6_bad_unflagged_percent", "<=", 0.5), ("saturated_median_mm", "<=", 0.1), ("emulated_frames_different", "<=", 0))
 
 
 def calibrated_with(case):
