@@ -22,7 +22,7 @@ usage() {
   echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
-  echo "  test quick    build what the quick tests need and run them: about a minute once built" >&2
+  echo "  test quick    build what the quick tests need and run them: about half a minute once built" >&2
   echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser or linux" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp, and what fuzzers, storms of faults and mutation find; some hours" >&2

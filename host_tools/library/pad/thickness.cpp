@@ -87,6 +87,14 @@ bool profile_suits(const Thickness &thickness) {
   return thickness.mm >= THINNEST_mm && thickness.mm <= static_cast<double>(PAD_THICKNESS_MAX_mm);
 }
 
+std::optional<Thickness> thickness_for_profile(const wire_info &info,
+                                               const calibration &calibration) {
+  const auto found = thickness_of(calibration);
+  const bool wants =
+      (info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && !(info.stored & WIRE_STORED_PAD);
+  return wants && found && profile_suits(*found) ? found : std::nullopt;
+}
+
 std::string text_of(const Thickness &thickness) {
   return fixed(thickness.mm, 1) + " mm, sd " + fixed(thickness.sd_mm, 1);
 }

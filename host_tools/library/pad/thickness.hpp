@@ -34,6 +34,11 @@ constexpr double THINNEST_mm = 9.0;
 // Whether a tangential load is estimated well enough on rubber so thick.
 bool profile_suits(const Thickness &thickness);
 
+// The thickness whose profile a fingertip gets with its calibration. None: it has a profile, it
+// estimates no tangential load, or the rubber does not suit.
+std::optional<Thickness> thickness_for_profile(const wire_info &info,
+                                               const calibration &calibration);
+
 // "12.1 mm, sd 0.5"
 std::string text_of(const Thickness &thickness);
 

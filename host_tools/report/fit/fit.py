@@ -218,6 +218,8 @@ def write_table_md(path, rows, found):
              f"{number(found['shipped_p99_9_um'])} um with the firmware's four (`{BUILT}`), where {found['shipped_above_100um']} presses are "
              f"more than 100 um away. At most {max(found['shipped_bad_unflagged_percent_per_set'].values()):.2g} % of a set's presses are then "
              "more than 1 mm from the truth without a warning.", "",
+             "The presses have no dip and the fit is not told of one: these figures say how near the arithmetic comes to the optimum of its own model. What a",
+             "dip and the fit that knows it do to the distance from the truth is in the parts `truth`, `validation` and, on real rubber, `real`.", "",
              *goal_table_md(found)]
     cells = [[row["kernel"], row["variant"], row.get("cycles_median", ""), number(row.get("ms"), 3), number(row["host_us"], 3),
               *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),

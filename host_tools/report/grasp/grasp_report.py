@@ -25,7 +25,9 @@ the fingertips' code the firmware's. Nothing was checked on hardware.
 In the twin's cell, each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 stands on a table; the gripper closes, holds, lifts it within 0.1 to 1 s; then come up to
 two of: 30 to 150 % more mass is poured in, the hand jerks by 2 to 9 m/s2, a knock of 0.03 to 0.12 m/s, friction falls by 20 to 45 %. What would take more than
 15 N to hold at its worst is not drawn. The rubber relaxes by 9 to 26 % in 8 s, each fingertip's force is off by 5 % (sd), gains are those after a
-calibration. Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
+calibration. This rubber has no dip, though cast rubber has one: what a dip does to the load that a fingertip estimates is in the part `shear` (`dip_*`), to
+location and force in `truth` and `validation`. The kinds below are judged without readings: there a fingertip says force and load with an error that is drawn.
+Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
 what a turning object takes of the friction. Force told: the mean of what both fingertips say; taken for: what the controller reckons with,
 of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
 0.5 s, by what the fingertips say. A limit cycle: the commanded width turns four times or more in the last half of a hold."""

@@ -8,10 +8,12 @@
 #include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
+#include "library/pad/thickness.hpp"
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/repeat.h"
 #include "simulation/player/scenario.hpp"
 #include "tool/advice.hpp"
+#include "tool/calibration/from_recording.hpp"
 
 extern "C" {
 #include "native/native_cdc.h"
@@ -22,16 +24,19 @@ extern "C" {
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <optional>
 namespace fingertip {
 namespace {
 
 // Small enough that the queue of the line, 4096 bytes, does not fill up at any rate.
 constexpr std::uint64_t SLICE_us = 5000;
+constexpr std::uint64_t FIRST_us = 100000; // for each of the first commands
 constexpr double SECONDS_MAX = 24 * 3600;
+constexpr std::uint32_t CALIBRATED_s = 1767225600; // 2026-01-01: the same bytes every day
 
 struct PlayOptions {
-  std::string scenario, recording, raw_bytes, commands, serial = "0000000000000001";
+  std::string scenario, recording, raw_bytes, commands, first, serial = "0000000000000001";
   std::string osr = "1024", rate = "max", slip_threshold, slip_window;
   double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
   std::uint64_t seed = 1;
@@ -68,6 +73,60 @@ private:
   std::vector<std::uint8_t> bytes_;
 };
 
+// The file's bytes go to the decoder. Throws Error where it cannot be read.
+void feed_file(const std::string &path, Decoder &decoder,
+               const std::function<void(const wire_packet &)> &on_packet) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw Error(path + ": cannot read (" + std::strerror(errno) + ")");
+  }
+  char bytes[4096];
+  while (file.read(bytes, sizeof bytes) || file.gcount() > 0) {
+    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes),
+                 static_cast<std::size_t>(file.gcount()), on_packet);
+  }
+}
+
+std::vector<wire_packet> commands_in(const std::string &path) {
+  std::vector<wire_packet> commands;
+  Decoder decoder;
+  feed_file(path, decoder, [&](const wire_packet &packet) { commands.push_back(packet); });
+  if (commands.empty()) {
+    throw Error(path + ": holds no commands; make it with fingertip_player calibrate");
+  }
+  return commands;
+}
+
+struct CalibrateOptions {
+  std::string placements, commands;
+  double force_N = 0.0;
+  bool replace = false;
+};
+
+// As fingertip calibrate --from does it: the thickness that is found makes the pad's profile.
+int calibrate(const CalibrateOptions &options) {
+  check_output(options.commands, options.replace);
+  auto [info, session] = calibrating::session_from(options.placements, {}, {});
+  calibrating::refuse_unless_good(session.judgement());
+  calibration made = session.made(options.force_N, CALIBRATED_s);
+  const auto for_profile = pad::thickness_for_profile(info, made);
+  if (for_profile) {
+    session.expect_profile();
+    made = session.made(options.force_N, CALIBRATED_s);
+  }
+  OutputFile file(options.commands, options.replace, OutputFile::Appears::when_finished);
+  const auto write = [&](const wire_packet &packet) {
+    const std::vector<std::uint8_t> frame = frame_bytes(packet);
+    file.append(frame.data(), frame.size());
+  };
+  write(command_calibrate(made, info.sensor_count));
+  if (for_profile) {
+    write(command_pad(pad::profile_of({for_profile->shown_mm()}, info)));
+  }
+  file.finish();
+  return 0;
+}
+
 int play(const PlayOptions &options) {
   // Everything that can be wrong is, before anything takes time.
   std::vector<wire_packet> wanted;
@@ -94,6 +153,8 @@ int play(const PlayOptions &options) {
       pad->edges = pad::edges_of(*pad, pad::own_sensors(), twin::default_cache_directory());
     }
   }
+  const std::vector<wire_packet> first =
+      options.first.empty() ? std::vector<wire_packet>() : commands_in(options.first);
   for (const std::string *path : {&options.recording, &options.raw_bytes, &options.commands}) {
     if (!path->empty()) {
       check_output(*path, options.replace);
@@ -117,6 +178,12 @@ int play(const PlayOptions &options) {
   }
   native_cdc_open();
   Commands commands;
+  std::uint64_t begin_us = 0;
+  for (const wire_packet &command : first) {
+    commands.send(command);
+    begin_us += FIRST_us;
+    native_fingertip_run_until(begin_us);
+  }
   for (const wire_packet &command : wanted) {
     commands.send(command);
   }
@@ -163,7 +230,7 @@ int play(const PlayOptions &options) {
     progress.emplace("playing " + scenario.name(), ProgressBar::Lines::tenths);
   }
   const auto end_us = static_cast<std::uint64_t>(1e6 * seconds);
-  for (std::uint64_t t_us = SLICE_us;; t_us += SLICE_us) {
+  for (std::uint64_t t_us = begin_us + SLICE_us;; t_us += SLICE_us) {
     if (!native_fingertip_run_until(t_us < end_us ? t_us : end_us)) {
       throw Error("the firmware ended itself at " + std::to_string(t_us) + " us");
     }
@@ -286,18 +353,9 @@ private:
 };
 
 int repeat_capture(const RepeatOptions &options) {
-  std::ifstream file(options.capture, std::ios::binary);
-  if (!file) {
-    throw Error(options.capture + ": cannot read (" + std::strerror(errno) + ")");
-  }
   Decoder decoder;
   Repeater repeater;
-  char bytes[4096];
-  while (file.read(bytes, sizeof bytes) || file.gcount() > 0) {
-    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes),
-                 static_cast<std::size_t>(file.gcount()),
-                 [&](const wire_packet &packet) { repeater.packet(packet); });
-  }
+  feed_file(options.capture, decoder, [&](const wire_packet &packet) { repeater.packet(packet); });
   const Repeated &r = repeater.result();
   if (decoder.statistics().dropped_packets > 0 || decoder.statistics().crc_errors > 0) {
     throw Error(options.capture + ": packets are missing (" + decoder.statistics().text() +
@@ -358,6 +416,10 @@ int run(int argc, char **argv) {
       ->type_name("MM")
       ->needs(pad);
   player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
+  player
+      ->add_option("--first", play_options.first,
+                   "Commands that it is sent first, of fingertip_player calibrate")
+      ->type_name("FILE");
   player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
       ->check(CLI::Range(0.0, 1000.0))
       ->type_name("FACTOR");
@@ -388,6 +450,23 @@ int run(int argc, char **argv) {
       ->type_name("FILE");
   player->add_flag("--quiet", play_options.quiet, "No progress");
 
+  CalibrateOptions calibrate_options;
+  CLI::App *calibrater = app.add_subcommand(
+      "calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
+                   "commands that bring what it found: play --first");
+  calibrater
+      ->add_option("placements", calibrate_options.placements, "Recording of them, with --raw")
+      ->required()
+      ->type_name("FILE.csv");
+  calibrater->add_option("--force", calibrate_options.force_N, "That weight, N")
+      ->required()
+      ->check(CLI::Range(0.1, 100.0))
+      ->type_name("N");
+  calibrater->add_option("-o,--output", calibrate_options.commands, "The commands")
+      ->required()
+      ->type_name("FILE");
+  calibrater->add_flag("--overwrite", calibrate_options.replace, "Replace a file that exists");
+
   RepeatOptions repeat_options;
   CLI::App *repeater = app.add_subcommand(
       "repeat",
@@ -404,7 +483,9 @@ int run(int argc, char **argv) {
   } catch (const CLI::ParseError &error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  return *player ? play(play_options) : repeat_capture(repeat_options);
+  return *player       ? play(play_options)
+         : *calibrater ? calibrate(calibrate_options)
+                       : repeat_capture(repeat_options);
 }
 
 } // namespace

@@ -42,6 +42,9 @@ public:
   /* "12 placements, gains known to 3.1 % of 1.5 %" */
   std::string progress() const;
 
+  /* A pad's profile will act beside the calibration, though the info packet had none. The fit is
+   * then given no shape, so the force's scale is that of a Gaussian without a dip. */
+  void expect_profile() { has_profile_ = true; }
   /* The calibration for the fingertip; date_s: Unix time. Of a good judgement. Throws Error where
    * the readings are not those of force_N, or a gain is none. */
   calibration made(std::optional<double> force_N, std::uint32_t date_s) const;

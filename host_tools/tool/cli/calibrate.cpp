@@ -3,11 +3,10 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
-#include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/thickness.hpp"
-#include "tool/calibration/gain_session.hpp"
+#include "tool/calibration/from_recording.hpp"
 #include "tool/cli/calibrate_device.hpp"
 #include "tool/cli/calibrate_drag.hpp"
 #include "tool/cli/calibrate_view.hpp"
@@ -77,40 +76,11 @@ void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
   });
 }
 
-/* Of the fingertip that the recording is of. */
-GainSession work_from(const CalibrateOptions &options, wire_info &info) {
-  RecordingReader reader(options.from, false, options.choice.device);
-  std::optional<GainSession> work;
-  bool pressures = false;
-  while (auto item = reader.next()) {
-    if (item->kind != RecordingReader::Item::Kind::packet) {
-      continue;
-    }
-    if (item->packet.type == WIRE_INFO && !work) {
-      info = item->packet.body.info;
-      work.emplace(info);
-    } else if (work) {
-      pressures = pressures || item->packet.type == WIRE_RAW;
-      if (work->take(item->packet)) {
-        const Placement &found = work->placements().back();
-        std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n",
-                    work->placements().size(), found.t_s,
-                    1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
-      }
-    }
-  }
-  if (!work || !pressures) {
-    throw Error(printable(options.from) + ": has no pressures to calibrate from; record with a "
-                                          "firmware that sends them (fingertip info: raw)");
-  }
-  work->judge(true);
-  return std::move(*work);
-}
-
-void refuse_unless_good(const Judgement &judgement) {
-  if (judgement.state != Judgement::State::good) {
-    throw Error("not calibrated: " + judgement.text);
-  }
+void show_placement(const GainSession &session) {
+  const Placement &found = session.placements().back();
+  std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(),
+              found.t_s,
+              1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
 }
 
 int show(const CalibrateOptions &options) {
@@ -144,55 +114,65 @@ int erase(const CalibrateOptions &options) {
 
 /* A fingertip that estimates the tangential load needs the thickness. Where the user has set one,
  * this says whether it is the one found. Else the pad's profile follows from the one found. */
-void use_thickness(CalibratedDevice &device, const calibration &made) {
+void use_thickness(CalibratedDevice &device, const calibration &made,
+                   const std::optional<pad::Thickness> &for_profile) {
   const wire_info &info = device.info();
   const auto found = pad::thickness_of(made);
-  if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL) || !found) {
-    return;
-  }
-  if (info.stored & WIRE_STORED_PAD) {
+  if (for_profile) {
+    device.write(pad::profile_of({for_profile->shown_mm()}, info));
+    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
+                "rubber ends\n",
+                fixed(for_profile->mm, 1).c_str());
+  } else if ((info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && (info.stored & WIRE_STORED_PAD) &&
+             found) {
     const std::string other =
         pad::disagreement(*found, static_cast<double>(info.pad.thickness_mm));
     if (!other.empty()) {
       std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n",
                    other.c_str());
     }
-  } else if (pad::profile_suits(*found)) {
-    device.write(pad::profile_of({found->shown_mm()}, info));
-    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
-                "rubber ends\n",
-                fixed(found->mm, 1).c_str());
   }
 }
 
 int calibrate(const CalibrateOptions &options) {
   std::optional<CalibratedDevice> device;
   std::optional<GainSession> work;
+  wire_info info{};
   if (options.from.empty()) {
     device.emplace(options);
     calibrating::check_firmware(device->info(), device->name());
     device->check_sensors();
     work.emplace(device->info());
     work_live(*device, *work, options.colour);
+    info = device->info();
   } else {
-    wire_info info{};
-    work.emplace(work_from(options, info));
-    refuse_unless_good(work->judgement());
+    calibrating::Recorded recorded =
+        calibrating::session_from(options.from, options.choice.device, show_placement);
+    work.emplace(std::move(recorded.session));
+    info = recorded.info;
+    calibrating::refuse_unless_good(work->judgement());
     if (!options.dry_run) {
       device.emplace(options);
       device->check_is(info, options.from);
+      info = device->info();
     }
   }
-  refuse_unless_good(work->judgement());
+  calibrating::refuse_unless_good(work->judgement());
   const std::time_t now_s = std::chrono::system_clock::to_time_t(wall_now());
-  const calibration made = work->made(options.force_N, static_cast<std::uint32_t>(now_s));
+  const auto date_s = static_cast<std::uint32_t>(now_s);
+  calibration made = work->made(options.force_N, date_s);
+  const auto for_profile = pad::thickness_for_profile(info, made);
+  if (for_profile || (info.stored & WIRE_STORED_PAD)) {
+    work->expect_profile();
+    made = work->made(options.force_N, date_s);
+  }
   print_result(*work, made, options.force_N);
   if (!device) {
     return 0;
   }
   ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
   device->write(made);
-  use_thickness(*device, made);
+  use_thickness(*device, made, for_profile);
   std::printf("calibrated: it acts from now on\n");
   return 0;
 }

@@ -25,9 +25,6 @@ constexpr double ODD_RESIDUAL = 0.008;
 /* How many times smaller the largest residual is once the loose sensors teach nothing. Up to 1.9
  * where there is none, 3.3 at least where there is one. */
 constexpr double FITS_BETTER = 2.5;
-/* How far the readings of a sensor that is left out scatter among the presses of one mark: up to
- * 0.023 where it is not loose, 0.079 at least where it is. */
-constexpr double LOOSE_SCATTER = 0.05;
 /* So few presses reach a sensor at a corner that the fit may move them so that they follow it. Then
  * nothing is odd, and it is left out to see. */
 constexpr std::size_t FELT_FEW = 8;

@@ -33,6 +33,32 @@ constexpr int STEPS = 40, HAND_TURNS = 4;
 constexpr double CAUCHY_mm = 1.0; /* a sensor found further off hardly says where the print lies */
 constexpr int ALIGN_TURNS = 30;
 
+struct Felt {
+  double ratio;    /* the reading over the expected one */
+  double variance; /* of the expected one, by what is not known of the press, as a share */
+};
+
+/* The scatter among the presses of one mark that what is not known of the presses does not explain.
+ * Where a neighbour is dead, some presses are hardly known: each counts by how well it would show a
+ * scatter of LOOSE_SCATTER. */
+double scatter_of(const std::map<std::size_t, std::vector<Felt>> &of_mark) {
+  double unexplained = 0.0, weights = 0.0;
+  for (const auto &[mark, presses] : of_mark) {
+    const double count = double(presses.size());
+    double mean = 0.0;
+    for (const Felt &press : presses) {
+      mean += press.ratio / count;
+    }
+    for (const Felt &press : presses) {
+      const double weight = std::pow(press.variance + LOOSE_SCATTER * LOOSE_SCATTER, -2.0);
+      unexplained +=
+          weight * (std::pow(press.ratio - mean, 2) - press.variance * (1.0 - 1.0 / count));
+      weights += weight * (1.0 - 1.0 / count);
+    }
+  }
+  return weights > 0.0 ? std::sqrt(std::max(unexplained / weights, 0.0)) : 0.0;
+}
+
 /* First with sensors anywhere, in the print's axes; then, seated, with sensors at their places in
  * the layout's axes, but for what hands and solder do, and the print shifted and turned. */
 class Fit {
@@ -298,6 +324,19 @@ private:
     hand_mm_ = std::max(std::sqrt(0.5 * sum / presses_), HAND_MIN_mm);
   }
 
+  /* Of what a sensor is expected to read, by what is not known of the press; by: as model() has it.
+   */
+  double variance_of_press(int i, const double *by) const {
+    double variance = 0.0;
+    for (int a = 0; a < OF_PRESS; a++) {
+      for (int b = 0; b < OF_PRESS; b++) {
+        variance += by[COMMON + OF_SENSOR + a] * by[COMMON + OF_SENSOR + b] *
+                    covariance_(of_press(i) + a, of_press(i) + b);
+      }
+    }
+    return variance;
+  }
+
   void align(MarksFit &fit) const;
   void place(MarksFit &fit) const;
 
@@ -386,31 +425,21 @@ MarksFit Fit::result() const {
     FoundSensor sensor;
     int measured = 0;
     double squares = 0.0, felt = 0.0;
-    std::map<std::size_t, std::vector<double>> of_mark; /* readings over those expected */
+    std::map<std::size_t, std::vector<Felt>> of_mark;
     for (int i = 0; i < presses_; i++) {
       measured += is_usable(i, k);
-      const double expected = model(value_, i, k, nullptr);
+      double by[TOUCHED];
+      const double expected = model(value_, i, k, by);
       if (is_usable(i, k) &&
           expected > FELT_SHARE * value_[of_sensor(k)] * std::exp(value_[LOG_PEAK])) {
         squares += std::pow((reading(i, k) - expected) / expected, 2);
         felt += 1.0;
-        of_mark[measured_.presses[static_cast<std::size_t>(i)].mark].push_back(reading(i, k) /
-                                                                               expected);
+        of_mark[measured_.presses[static_cast<std::size_t>(i)].mark].push_back(
+            {reading(i, k) / expected, variance_of_press(i, by) / (expected * expected)});
       }
     }
     sensor.felt = static_cast<std::size_t>(felt);
-    double scatter = 0.0, freedom = 0.0;
-    for (const auto &[mark, ratios] : of_mark) {
-      double mean = 0.0;
-      for (double ratio : ratios) {
-        mean += ratio / double(ratios.size());
-      }
-      for (double ratio : ratios) {
-        scatter += (ratio - mean) * (ratio - mean);
-      }
-      freedom += double(ratios.size() - 1);
-    }
-    sensor.scatter_share = freedom > 0.0 ? std::sqrt(scatter / freedom) : 0.0;
+    sensor.scatter_share = scatter_of(of_mark);
     sensor.answers = 2 * measured > presses_;
     sensor.gain = value_[of_sensor(k)];
     sensor.residual_share = felt > 0.0 ? std::sqrt(squares / felt) : 0.0;

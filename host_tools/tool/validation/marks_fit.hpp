@@ -39,7 +39,8 @@ struct FoundSensor {
   double residual_share = 0.0;   /* rms of what the picture leaves, of its own readings that are at
                                     least FELT_SHARE of the strongest */
   double scatter_share = 0.0; /* of the same readings over the expected ones, sd among the presses
-                                 of one mark: what the picture itself is off by is not in it */
+                                 of one mark: what the picture itself is off by is not in it, nor
+                                 what is not known of where and how hard each press was */
   std::size_t felt = 0;       /* presses in which it was expected to read at least that */
 };
 
@@ -62,6 +63,9 @@ struct MarksFit {
 };
 
 constexpr double FELT_SHARE = 0.2;
+/* A sensor that is left out is loose if its scatter_share is more: up to 0.025 where it is not loose,
+ * with a dead neighbour too, 0.069 at least where it is (seeds as assess.hpp has them). */
+constexpr double LOOSE_SCATTER = 0.04;
 constexpr double FEELS_NOTHING = 0.2; /* less gain than this counts in no mean */
 constexpr double SWAPPED_PITCHES = 0.5;
 constexpr std::size_t MARKS_MIN = 6;

@@ -92,10 +92,10 @@ class FromARecording(ValidateTest):
         self.assertGreater(len(re.findall(r"<td class=\"n\">[0-9.-]+ to ", page)), 15)  # the twin's figures stand beside
 
     def test_faults_are_found_with_their_sensors(self):
-        # loose: along an edge, at a corner, at a corner where the presses follow it; thin: where presses follow a sensor that is not loose;
-        # drift: beside a sensor that is odd by the same each time
-        for fault, seed in (("dead_sensor", 32), ("dead_sensor", 33), ("loose_sensor", 32), ("loose_sensor", 38), ("loose_sensor", 890),
-                            ("tilted_skin", 32), ("thin_skin", 852), ("drift", 945), ("wrong_weight", 32), ("swapped_wires", 32)):
+        # dead: where the presses beside it are hardly known; loose: along an edge, at a corner, at a corner where the presses follow it; thin:
+        # where presses follow a sensor that is not loose; drift: beside a sensor that is odd by the same each time
+        for fault, seed in (("dead_sensor", 32), ("dead_sensor", 33), ("dead_sensor", 953), ("loose_sensor", 32), ("loose_sensor", 38),
+                            ("loose_sensor", 890), ("tilted_skin", 32), ("thin_skin", 852), ("drift", 945), ("wrong_weight", 32), ("swapped_wires", 32)):
             with self.subTest(fault=fault, seed=seed):
                 truth = self.recorded("--fault", fault, "--seed", str(seed))
                 said, out = self.carded()

@@ -161,6 +161,15 @@ class Player(unittest.TestCase):
         self.assertIn("5 to 20 mm", self.refused("play", self.scenario, *out, "--pad", "3"))
         self.assertIn("belong together", self.refused("play", self.scenario, *out, "--slip-window", "50"))
 
+    def test_what_calibrates_nothing_is_refused(self):
+        out = ("--force", "3", "-o", self.folder / "found.commands")
+        self.assertIn("has no pressures to calibrate from", self.refused("calibrate", self.play("contact.csv", "--seconds", "2"), *out))
+        self.assertIn("not calibrated: ", self.refused("calibrate", self.play("pressures.csv", "--seconds", "2", "--raw"), *out))
+        self.assertIn("holds no commands; make it with fingertip_player calibrate",
+                      self.refused("play", self.scenario, "-o", self.folder / "never.csv", "--first", self.scenario))
+        for path in (out[-1], self.folder / "never.csv"):
+            self.assertFalse(path.exists())
+
     def capture(self, name, *commands):
         if not OPTIONS.image:
             self.skipTest("no firmware image in this build")

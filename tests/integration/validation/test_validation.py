@@ -54,11 +54,25 @@ class Validation(unittest.TestCase):
         self.assertLess(self.found["saturated_median_mm"], 0.1)
 
     def test_a_stiff_pad_needs_its_width_where_few_sensors_feel(self):
-        stiff = {(row["margin_mm"], row["prior"]): row for row in self.found["stiff"] if row["gain"] == 0}
+        stiff = {(row["margin_mm"], row["prior"]): row for row in self.found["stiff"] if row["case"] == "gain0"}
         self.assertLess(stiff[0, False]["bad_percent"], 2)
         self.assertGreater(stiff[4.5, False]["bad_percent"], 5)
         self.assertLess(stiff[4.5, True]["bad_percent"], 0.5 * stiff[4.5, False]["bad_percent"])
         self.assertLess(stiff[4.5, True]["bad_unflagged_percent"], 0.5)
+
+    def test_a_dip_costs_until_a_calibration_finds_it(self):
+        trust = {row["case"]: row for row in self.found["taps_trust"]}
+        self.assertGreater(trust["dip"]["warned_percent"], 3 * trust["gain10"]["warned_percent"])
+        self.assertLess(trust["dip calibrated"]["warned_percent"], 0.5 * trust["dip"]["warned_percent"])
+        self.assertGreater(self.found["force_scale_dip"], 1.1 * self.found["force_scale_gain10"])
+        self.assertLess(self.found["force_mape_dip_calibrated_percent"], 2)
+        self.assertLess(self.found["h12_dip_calibrated_median_mm"], 0.13)
+        self.assertLess(self.found["h12_dip_calibrated_median_mm"], 0.5 * self.found["h12_dip_median_mm"])
+        stiff = {(row["margin_mm"], row["case"], row["prior"]): row for row in self.found["stiff"]}
+        self.assertGreater(stiff[4.5, "dip", False]["median_mm"], 1.5 * stiff[4.5, "gain10", False]["median_mm"])
+        self.assertEqual({row["case"] for row in self.found["force"]}, {"gain0", "gain10", "dip", "gain10 calibrated", "dip calibrated"})
+        self.assertGreater(self.found["slip_success_dip_percent"], 85)
+        self.assertGreater(self.found["calibrated_pads"], 5)
 
     def test_unequal_sensors_cost_most(self):
         budget = {row["effect"]: row["median_mm"] for row in self.found["budget"]}

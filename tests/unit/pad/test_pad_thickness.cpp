@@ -46,6 +46,22 @@ TEST(PadThickness, OneSetWrongBy15PercentIsSaid) {
   }
 }
 
+TEST(PadThickness, AProfileFollowsWhereAFingertipWantsOne) {
+  wire_info info{};
+  info.capabilities = WIRE_CAPABILITY_TANGENTIAL;
+  calibration made{};
+  made.sigma_um = 5500;
+  made.sigma_sd_um = 60;
+  EXPECT_TRUE(pad::thickness_for_profile(info, made));
+  info.stored = WIRE_STORED_PAD;
+  EXPECT_FALSE(pad::thickness_for_profile(info, made));
+  info = {};
+  EXPECT_FALSE(pad::thickness_for_profile(info, made));
+  info.capabilities = WIRE_CAPABILITY_TANGENTIAL;
+  made.sigma_um = 2900; /* some 6 mm of rubber */
+  EXPECT_FALSE(pad::thickness_for_profile(info, made));
+}
+
 TEST(PadThickness, AWiderResponseIsThickerRubber) {
   double before_mm = 0.0;
   for (double sigma_mm = 2.0; sigma_mm < 12.0; sigma_mm += 0.5) {

@@ -1,0 +1,221 @@
+"""Scenarios written by twin, played with fingertip_player through the firmware's own code, and read. For validation.py.
+
+A calibrated pad is calibrated as a user does it: a weight is set down on it, `fingertip calibrate` judges the recording, and
+the player is sent what it finds. A session that is refused is followed by another, with other places. A pad on which all are
+refused has no calibrated rows.
+"""
+import concurrent.futures
+import csv
+import dataclasses
+import json
+import pathlib
+import subprocess
+import sys
+import time
+
+import numpy as np
+from boards import MULTIPLEXED, TO_BUILD, image_of
+from fingertip.files import FIT_VALID, InputError, read_recording
+from reporting import run
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+
+PAPER_RATE_Hz = 20
+FORCE_MIN_N = 1.0
+STIFF_LAYER_mm = 6
+PRIOR_WIDTH_mm = 0.5
+SECONDS_MIN = 40  # of a scenario that is made shorter: one contact of each kind at least
+WEIGHT_FOOT = "sphere15"  # of twin scenario placements
+WEIGHT_N, SESSION_s, SESSION_RATE_Hz, SESSIONS_MAX = 3, 200, 50, 5  # of a calibration
+OTHER_PLACES = 1000  # added to a seed: the same pad, other places
+
+
+class Progress:
+    def __init__(self, total):
+        self.start_s = time.monotonic()
+        self.total, self.done = total, 0
+
+    def step(self, what):
+        self.done += 1
+        elapsed_s = time.monotonic() - self.start_s
+        text = f"{elapsed_s:5.0f} s  scenario {self.done} of {self.total}: {what}"
+        if sys.stdout.isatty():
+            print(f"\r{text:<78}", end="\n" if self.done == self.total else "", flush=True)
+        elif self.done % 10 == 0 or self.done == self.total:
+            print(text, flush=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    what: str  # what it is played for
+    kind: str
+    indenter: str
+    case: object = 0  # what is varied: the gain spread in percent, or something else
+    seconds: float = 150
+    effects: str = ""
+    margin_mm: float = None
+    pad: int = 1
+    layer_mm: float = 12
+    prior: bool = False
+    calibrated: str = None  # with these effects, before; None: never
+    noise: int = 1
+    rate: object = PAPER_RATE_Hz
+    raw: bool = False
+    options: tuple = ()  # more of twin scenario
+
+    def __str__(self):
+        return f"{self.what}, {self.indenter}, {self.case}" + (f", pad {self.pad}" if self.pad > 1 else "")
+
+
+def session_of(scenario):
+    return scenario.layer_mm, scenario.calibrated, scenario.pad
+
+
+class Played:
+    """Arrays over the frames of one scenario: time_s, truth and what was said; phases: rows of the truth file."""
+
+    def __init__(self, scenario, recording, truth):
+        # The truth columns only: t_s, contact, x_mm, y_mm, force_N, (p0, sigma), slip
+        table = np.loadtxt(scenario, delimiter=",", comments=["#", "t_s"], usecols=(0, 1, 2, 3, 4, 7), ndmin=2)
+        said = read_recording(recording)
+        rows = said.has_contact
+        self.time_s = said["t_us"][rows] * 1e-6
+        self.flags = said["flags"][rows].astype(np.int64)
+        at = [np.interp(self.time_s, table[:, 0], table[:, i]) for i in range(1, 6)]
+        self.touched = at[0] > 1 - 1e-9
+        self.x_mm, self.y_mm, self.force_N = at[1:4]
+        self.slips = at[4] > 0.5
+        self.said = {name: said[name][rows] for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")}
+        if said.sensors_Pa.shape[1]:
+            self.above_Pa = (said.sensors_Pa - said.tare_Pa)[rows]
+        with open(truth, newline="", encoding="utf-8") as file:
+            self.phases = list(csv.DictReader(line for line in file if not line.startswith("#")))
+        self.sample = self.touched & ((self.flags & FIT_VALID) != 0)
+        self.located = self.sample & (self.force_N >= FORCE_MIN_N)
+        self.error_mm = np.hypot(self.said["x_mm"] - self.x_mm, self.said["y_mm"] - self.y_mm)
+
+
+class Workshop:
+    """Scenarios are written, played and read; the files go, the arrays stay."""
+
+    def __init__(self, options, out):
+        tools = pathlib.Path(options.build) / "host_tools"
+        self.twin, self.player = tools / "simulation/twin/twin", tools / "simulation/player/fingertip_player"
+        self.command_frame = pathlib.Path(options.build) / "tests/support/command_frame"
+        for tool in (self.twin, self.player, self.command_frame):
+            if not tool.exists():
+                raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
+        self.image, self.seed, self.scale = image_of(options.boards, MULTIPLEXED), options.seed, options.scale
+        self.tables = pathlib.Path(options.tables or out / "contact_tables")
+        self.work = out / "validation_work"
+        self.work.mkdir(parents=True, exist_ok=True)
+        self.indenters = set(options.indenters.split(",")) if options.indenters else None
+        self.pads = options.pads
+        self.scenarios, self.played, self.gaussians = [], {}, []
+        self.sessions, self.refused = {}, 0  # (layer, effects, pad): what a session that was accepted found, commands for the player
+
+    def add(self, what, kind, indenter, **more):
+        """Nothing if its indenter is not among those asked for."""
+        if self.indenters is None or indenter in self.indenters:
+            self.scenarios.append(Scenario(what, kind, indenter, **more))
+
+    def add_on_pads(self, what, kind, indenter, seconds, effects, **more):
+        """Unequal sensors are drawn again for each pad, the presses too: one pad's luck is not what the spread costs."""
+        pads = self.pads_with(effects)
+        for pad in range(1, pads + 1):
+            self.add(what, kind, indenter, seconds=seconds / pads, pad=pad, effects=effects, **more)
+
+    def pads_with(self, effects):
+        return self.pads if any(name in effects for name in ("gain", "all", "widths", "places")) else 1
+
+    def build_tables(self):
+        """And the Gaussian that comes closest to each pressure on the base."""
+        pairs = sorted({(scenario.indenter, scenario.layer_mm) for scenario in self.scenarios})
+        feet = {(WEIGHT_FOOT, scenario.layer_mm) for scenario in self.scenarios if scenario.calibrated is not None}
+        print(f"        contact tables: {len(pairs)} (the first time some five minutes)", flush=True)
+        for layer_mm in sorted({layer for _, layer in pairs}):
+            names = ",".join(sorted({name for name, layer in feet.union(pairs) if layer == layer_mm}))
+            done = subprocess.run([str(self.twin), "tables", "--indenter", names, "--layer", str(layer_mm), "--cache", str(self.tables)],
+                                  stdout=subprocess.DEVNULL)
+            if done.returncode != 0:
+                raise InputError("twin tables failed; see above")
+        for indenter, layer_mm in pairs:
+            said = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)
+            self.gaussians.append({"indenter": indenter, "layer_mm": layer_mm} | {
+                name: float(value) for name, value in (word.split("=") for word in said.split())})
+
+    @property
+    def prior_sigma_mm(self):
+        """Of the stiff layer: the mean over what presses there, for a prior does not know which it will be."""
+        return float(np.mean([g["sigma_mm"] for g in self.gaussians if g["layer_mm"] == STIFF_LAYER_mm]))
+
+    def calibrate(self, layer_mm, effects, pad):
+        """The first session on this pad that is accepted, or None, and how many were refused."""
+        path = self.work / f"session-{layer_mm}-{effects}-{pad}.csv"
+        recording, commands, seed = path.with_suffix(".recording.csv"), path.with_suffix(".commands"), self.seed + pad - 1
+        for refused in range(SESSIONS_MAX):
+            run(self.twin, "scenario", "placements", "--layer", layer_mm, "--effects", effects or "none", "--seed", seed + OTHER_PLACES * refused,
+                "--pad", seed, "--force", WEIGHT_N, "--seconds", SESSION_s, "--cache", self.tables, "-o", path, "--overwrite")
+            run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", SESSION_RATE_Hz, "--raw", "--seed", seed)
+            said = subprocess.run([str(self.player), "calibrate", recording, "--force", str(WEIGHT_N), "-o", commands], capture_output=True, text=True)
+            if said.returncode == 0:
+                return commands, refused
+            if "not calibrated: " not in said.stderr:
+                raise InputError(said.stderr.strip())
+        return None, SESSIONS_MAX
+
+    def play_one(self, scenario):
+        name = f"scenario{self.scenarios.index(scenario)}"
+        path, recording = self.work / f"{name}.csv", self.work / f"{name}.recording.csv"
+        seed = self.seed + scenario.pad - 1
+        run(self.twin, "scenario", scenario.kind, "--indenter", scenario.indenter, "--layer", scenario.layer_mm, "--effects", scenario.effects or "none",
+            "--seed", seed, "--seconds", min(scenario.seconds, max(SECONDS_MIN, scenario.seconds * self.scale)), "--cache", self.tables,
+            "-o", path, "--overwrite", *(() if scenario.margin_mm is None else ("--margin", scenario.margin_mm)), *scenario.options)
+        run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", scenario.rate, "--noise", scenario.noise,
+            "--seed", seed, *(("--raw",) if scenario.raw else ()),
+            *(("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()),
+            *(() if scenario.calibrated is None else ("--first", self.sessions[session_of(scenario)])))
+        played = Played(path, recording, path.with_suffix(".truth.csv"))
+        for file in (path, path.with_suffix(".truth.csv"), recording):
+            file.unlink()
+        return played
+
+    def play_all(self):
+        wanted = list(dict.fromkeys(session_of(scenario) for scenario in self.scenarios if scenario.calibrated is not None))
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            print(f"        calibrations: {len(wanted)} pads", flush=True)
+            for session, (commands, refused) in zip(wanted, pool.map(lambda session: self.calibrate(*session), wanted)):
+                self.sessions[session] = commands
+                self.refused += refused
+            self.scenarios = [one for one in self.scenarios if one.calibrated is None or self.sessions[session_of(one)]]
+            progress = Progress(len(self.scenarios))
+            running = {pool.submit(self.play_one, scenario): scenario for scenario in self.scenarios}
+            for done in concurrent.futures.as_completed(running):
+                self.played[running[done]] = done.result()
+                progress.step(running[done])
+        return time.monotonic() - progress.start_s
+
+    def emulate(self, effects, seconds):
+        """The image on the emulated chip plays a scenario; its contact packets computed here from its pressures."""
+        if not self.image.exists():
+            raise InputError(f"{self.image} is not there; {TO_BUILD}")
+        scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
+        run(self.twin, "scenario", "taps", "--indenter", "sphere6", "--layer", 12, "--effects", effects, "--seconds", seconds, "--seed",
+            self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
+        commands = [run(self.command_frame, *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
+        script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", MULTIPLEXED, "--image", self.image, "--scenario", scenario,
+            "--host-script", script, "--capture", capture, "--fast-enumeration")
+        return json.loads(run(self.player, "repeat", capture))
+
+    def select(self, what, **wanted):
+        """What was played for it, those scenarios only that have these members."""
+        return [self.played[scenario] for scenario in self.scenarios
+                if scenario.what == what and all(getattr(scenario, name) == value for name, value in wanted.items())]
+
+    def first(self, what, **wanted):
+        return next(iter(self.select(what, **wanted)), None)
+
+    def pads_of(self, what, **wanted):
+        """The same for each pad."""
+        return [played for pad in range(1, self.pads + 1) if (played := self.select(what, pad=pad, **wanted))]
