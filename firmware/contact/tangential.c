@@ -107,13 +107,18 @@ static float inverse(int32_t factor_q20) {
   return fit_float(fixed_div_q26(1 << 26, factor_q20 * 64), -26);
 }
 
+/* A value over a force, at most 4 of it. */
+static int32_t per_force_q26(float value_N, int32_t force_N_q24) {
+  int32_t up = 28 - fixed_bits((uint32_t)force_N_q24);
+  int32_t force = shifted(force_N_q24, up); /* of many bits for the division */
+  return fixed_div_q26(fixed_clamp(shifted(fit_fixed(value_N, 24), up), -4 * force, 4 * force),
+                       force);
+}
+
 /* Q / F along one axis without what the pad's ends add, all of which is odd. */
 static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_q20,
                          int32_t gain_q20) {
-  int32_t up = 28 - fixed_bits((uint32_t)force_N_q24);
-  int32_t force = shifted(force_N_q24, up); /* of many bits for the division */
-  int32_t told_q26 = fixed_div_q26(
-      fixed_clamp(shifted(fit_fixed(tangential_N, 24), up), -4 * force, 4 * force), force);
+  int32_t told_q26 = per_force_q26(tangential_N, force_N_q24);
   int32_t own_q26 = told_q26 - fixed_clamp(added_q20, -FACTOR_MAX_Q20 / 4, FACTOR_MAX_Q20 / 4) * 64;
   return fixed_div_q26(fixed_clamp(own_q26, -RATIO_MAX_Q26, RATIO_MAX_Q26), gain_q20 * 64);
 }
@@ -155,6 +160,79 @@ static bool without_edges(const struct tangential_settings *settings,
   return true;
 }
 
+#define NOINLINE __attribute__((noinline)) /* saves flash; cycles hardly count here */
+
+NOINLINE static struct scaled sum_of(struct scaled a, struct scaled b) {
+  return short_of(scaled_add(a, b));
+}
+
+NOINLINE static struct scaled quotient_of(struct scaled a, struct scaled b) {
+  return scaled_div(short_of(a), short_of(b));
+}
+
+/* (a^2 + b^2) / 2^(2 q) */
+NOINLINE static struct scaled squares_of(int32_t a, int32_t b, int32_t q) {
+  const struct scaled x = scaled_from(a, -q), y = scaled_from(b, -q);
+  return sum_of(scaled_mul(x, x), scaled_mul(y, y));
+}
+
+/* Whether anything pulls, Q14: 2^14 surely. A contact is as likely pulled as not, and what pulls
+ * has the standard deviation USUAL along each axis. The estimate's own variance is itself an
+ * estimate, of fifteen readings less eight unknowns: so its errors are Student's t of 6 degrees of
+ * freedom, in the plane. */
+#define USUAL_SQUARE_Q26 671089 /* 0.1^2 */
+#define SURE_SDS 16
+#define RATIO_SD_MIN_Q26 (1 << 16)
+#define RATIO_SURE_Q26 (1 << 26)
+static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q26) {
+  const struct scaled one = {1 << 14, -14}, per_6 = {21845, -17};
+  const struct scaled usual = {USUAL_SQUARE_Q26 >> 6, 6 - 26};
+  uint32_t x = fixed_size(ratio_x_q26), y = fixed_size(ratio_y_q26), size = x > y ? x : y;
+  if (size >= RATIO_SURE_Q26 || size >= (uint32_t)sd_q26 * SURE_SDS) {
+    return 1 << 14;
+  }
+  const struct scaled variance = squares_of(sd_q26, 0, 26);
+  const struct scaled share = quotient_of(variance, sum_of(variance, usual));
+  struct scaled far = quotient_of(squares_of(ratio_x_q26, ratio_y_q26, 26), variance);
+  far = scaled_mul(far, per_6);
+  struct scaled step = quotient_of(sum_of(one, far), sum_of(one, scaled_mul(far, share)));
+  step = scaled_mul(step, step);
+  const struct scaled odds = scaled_mul(share, scaled_mul(step, step));
+  return scaled_to_fixed(quotient_of(odds, sum_of(one, odds)), 14);
+}
+
+/* The place is the mean of that of a contact that is pulled as estimated and of one that is not,
+ * each by how likely it is. The standard deviation has what lies between the two. */
+static void weigh_load(struct fit_tangential *found) {
+  int32_t force_N_q24 = fit_fixed(found->force_N, 24);
+  force_N_q24 = force_N_q24 < FORCE_MIN_N_Q24 ? FORCE_MIN_N_Q24 : force_N_q24;
+  const int32_t ratio_x_q26 = per_force_q26(found->qx_N, force_N_q24);
+  const int32_t ratio_y_q26 = per_force_q26(found->qy_N, force_N_q24);
+  int32_t sd_q26 = per_force_q26(found->q_sd_N, force_N_q24);
+  sd_q26 = sd_q26 < RATIO_SD_MIN_Q26 ? RATIO_SD_MIN_Q26 : sd_q26;
+  const int32_t pulled = pulled_q14(ratio_x_q26, ratio_y_q26, sd_q26);
+  const int32_t not_pulled = (1 << 14) - pulled;
+  if (not_pulled == 0) {
+    return;
+  }
+  const int32_t *moved = found->moved_q20_mm;
+  const int32_t dx_q20 = fixed_mul_q26(ratio_x_q26, moved[0]);
+  const int32_t dy_q20 = fixed_mul_q26(ratio_y_q26, moved[1]);
+  found->x_mm = fit_float(fit_fixed(found->x_mm, 20) - fixed_mul_16(dx_q20, not_pulled) * 4, -20);
+  found->y_mm = fit_float(fit_fixed(found->y_mm, 20) - fixed_mul_16(dy_q20, not_pulled) * 4, -20);
+  struct scaled variance = squares_of(fit_fixed(found->location_sd_mm, 20), 0, 20);
+  const struct scaled least = {variance.mantissa, variance.exponent - 4};
+  struct scaled of_load = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
+  of_load.mantissa = -of_load.mantissa;
+  const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
+  const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
+  variance = sum_of(variance, scaled_mul(sum_of(between, of_load), share));
+  const bool small =
+      sum_of(variance, (struct scaled){-least.mantissa, least.exponent}).mantissa < 0;
+  const struct scaled root = scaled_sqrt(small ? least : variance);
+  found->location_sd_mm = fit_float(root.mantissa, root.exponent);
+}
+
 /* Of the first touch; whether it stands. */
 static bool settle_zero(struct tangential_history *history, uint64_t t_us, float x, float y) {
   if (history->count == 0) {
@@ -186,6 +264,7 @@ void tangential_update(struct tangential_history *history,
       !without_edges(settings, input->tangential, &mended)) {
     return;
   }
+  weigh_load(&mended);
   float qx_N = found->qx_N, qy_N = found->qy_N;
   if (settings->from_touch) {
     if (!settle_zero(history, input->t_us, qx_N / found->force_N, qy_N / found->force_N)) {

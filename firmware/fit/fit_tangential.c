@@ -939,9 +939,9 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
 }
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
- * diagonal of the inverse matrix. */
+ * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
 static struct scaled variance_of(const struct fit_tangential_room *room,
-                                 const struct outcome *outcome, int u) {
+                                 const struct outcome *outcome, int u, int pull, int32_t *with_pull_q8) {
   const struct solution *solution = &outcome->solution;
   int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
   int32_t sum_q11 = 0;
@@ -954,7 +954,19 @@ static struct scaled variance_of(const struct fit_tangential_room *room,
     w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);
     sum_q11 += (((w * w) >> 9) * (solution->inverse_q13[k] >> 6)) >> 3;
   }
+  if (with_pull_q8) {
+    *with_pull_q8 = w_q8[pull];
+  }
   return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
+}
+
+/* How far the place moves for a change of Q / F along the same axis, if the other unknowns follow:
+ * from its row of the inverse of L, 2^half of it. length: with the amplitude. */
+static int32_t moved_q20(const struct outcome *outcome, struct scaled length, int axis,
+                         int32_t with_pull_q8) {
+  int32_t q = outcome->column_q[PLACE_X + axis] - outcome->column_q[PULL_X + axis] -
+              outcome->solution.half[PULL_X + axis] - 8;
+  return shifted(with_pull_q8 * length.mantissa, q + length.exponent + 20);
 }
 
 static bool exceeds(struct scaled a, struct scaled b) {
@@ -969,8 +981,8 @@ static bool is_elongated(const struct fit_tangential_room *room, const struct ou
     return false;
   }
   const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 2048.0f), -12};
-  struct scaled twice =
-      scaled_add(variance_of(room, outcome, STRETCH), variance_of(room, outcome, SLANT));
+  struct scaled twice = scaled_add(variance_of(room, outcome, STRETCH, 0, NULL),
+                                   variance_of(room, outcome, SLANT, 0, NULL));
   return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
@@ -1011,11 +1023,12 @@ NOINLINE static void conclude(const struct problem *problem,
   }
   variance = scaled_mul(variance, fit_scaled_from(misfit_q16, -16));
   variance = fit_scaled_short(scaled_mul(variance, pad->thin));
-  struct scaled pulls =
-      scaled_add(variance_of(room, outcome, PULL_X), variance_of(room, outcome, PULL_Y));
+  int32_t x_q8, y_q8;
+  struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL),
+                                   variance_of(room, outcome, PULL_Y, 0, NULL));
   pulls.exponent -= 1;
-  struct scaled place =
-      scaled_add(variance_of(room, outcome, PLACE_X), variance_of(room, outcome, PLACE_Y));
+  struct scaled place = scaled_add(variance_of(room, outcome, PLACE_X, PULL_X, &x_q8),
+                                   variance_of(room, outcome, PLACE_Y, PULL_Y, &y_q8));
   struct scaled pull_sd = root_of_product(pulls, variance);
   const struct scaled most = {(int32_t)(FIT_TANGENTIAL_SD_MAX * 32768.0f), -15};
   if (exceeds(pull_sd, scaled_mul(most, amplitude))) {
@@ -1036,8 +1049,11 @@ NOINLINE static void conclude(const struct problem *problem,
   struct scaled noise = fit_scaled_from(problem->noise_q22, -22);
   result->location_noise_mm =
       composed(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
-  result->force_sd_N =
-      composed(scaled_mul(unit, root_of_product(variance_of(room, outcome, AMPLITUDE), variance)));
+  struct scaled height = variance_of(room, outcome, AMPLITUDE, 0, NULL);
+  result->force_sd_N = composed(scaled_mul(unit, root_of_product(height, variance)));
+  struct scaled moved = scaled_mul(length, amplitude);
+  result->moved_q20_mm[0] = moved_q20(outcome, moved, 0, x_q8);
+  result->moved_q20_mm[1] = moved_q20(outcome, moved, 1, y_q8);
   result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 

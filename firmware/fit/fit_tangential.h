@@ -100,6 +100,8 @@ struct fit_tangential {
   float force_N, force_sd_N;               /* normal force */
   float qx_N, qy_N;                        /* of the object on the rubber, along x and y */
   float q_sd_N;                            /* standard deviation of either */
+  int32_t moved_q20_mm[2]; /* how far along x the place would lie elsewhere if qx / force were larger
+                              by 1, and along y of qy; what moves across is a tenth of that */
   bool elongated; /* the contact is not round, whatever the Gaussian makes of its load */
 };
 

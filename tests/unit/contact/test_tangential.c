@@ -1,6 +1,7 @@
 #include "common/contact_flags.h"
 #include "contact/tangential.h"
 #include "support/pad.h"
+#include "support/random.h"
 
 #include <math.h>
 #include <string.h>
@@ -69,6 +70,82 @@ static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
   TEST_ASSERT_EQUAL_FLOAT(-1.0f, load.qy_N);
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.04f, 0.04f, load.q_sd_N);
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.3125f, 0.3125f, load.ratio); /* 1.25 of 4 N */
+}
+
+#define MOVED_mm 3.5
+
+static void use_moved(void) {
+  found.moved_q20_mm[0] = found.moved_q20_mm[1] = (int32_t)(MOVED_mm * 1048576.0);
+}
+
+/* A load of 0.1 either way is usual; one that the estimate hardly sees is likely none. */
+static void a_small_load_may_be_none_and_the_place_knows_it(void) {
+  use_moved();
+  found.location_sd_mm = 0.25f;
+  found.q_sd_N = 0.2f; /* 0.05 of the force */
+  found.qy_N = 0.0f;
+  double before = 0.0;
+  for (int i = 0; i <= 40; i++) {
+    found.qx_N = 0.05f * (float)i;
+    update(0);
+    double whole_mm = MOVED_mm * (double)found.qx_N / 4.0; /* to where nothing pulls */
+    double way_mm = 2.5 - (double)load.x_mm;
+    double share = i == 0 ? 1.0 : way_mm / whole_mm;
+    TEST_ASSERT_EQUAL_FLOAT(-7.0f, load.y_mm);
+    TEST_ASSERT_EQUAL_FLOAT(found.qx_N, load.qx_N); /* the load itself is as estimated */
+    TEST_ASSERT_TRUE(share >= 0.0 && share <= 1.0);
+    TEST_ASSERT_TRUE(i < 2 || share <= before + 1e-3);
+    TEST_ASSERT_TRUE(i > 2 || share > 0.7);   /* half a standard deviation */
+    TEST_ASSERT_TRUE(i < 32 || share < 0.03); /* eight */
+    before = share;
+  }
+  TEST_ASSERT_TRUE(load.location_sd_mm > 0.25f && load.location_sd_mm < 0.35f);
+}
+
+/* Half of the contacts are pulled, by 0.1 of the force along each axis. Errors of the load and of
+ * the place go together, and their standard deviation is known as well as 15 readings less 8
+ * unknowns tell it. */
+static void places_are_nearer_than_with_any_load_or_none(void) {
+  enum { CONTACTS = 20000 };
+  const double sd = 0.03, own_mm = 0.05, force_N = 4.0;
+  struct random random = {UINT64_C(0x6C6F6164)};
+  use_moved();
+  double mean = 0.0, as_estimated = 0.0, of_none = 0.0, said = 0.0;
+  int within = 0, within_2 = 0;
+  for (int i = 0; i < CONTACTS; i++) {
+    double square = 0.0;
+    for (int k = 0; k < 6; k++) {
+      square += pow(random_normal(&random), 2) / 6.0;
+    }
+    double told = sd * sqrt(square), q[2], off_mm[2], none_mm[2];
+    int pulled = i % 2;
+    for (int axis = 0; axis < 2; axis++) {
+      double error = sd * random_normal(&random);
+      q[axis] = pulled * 0.1 * random_normal(&random) + error;
+      off_mm[axis] = MOVED_mm * error + own_mm * random_normal(&random);
+      none_mm[axis] = off_mm[axis] - MOVED_mm * q[axis];
+    }
+    found.qx_N = (float)(q[0] * force_N);
+    found.qy_N = (float)(q[1] * force_N);
+    found.q_sd_N = (float)(told * force_N);
+    double sd_mm = told / sd * sqrt(2.0 * (pow(MOVED_mm * sd, 2) + own_mm * own_mm));
+    found.location_sd_mm = (float)sd_mm;
+    found.x_mm = (float)off_mm[0];
+    found.y_mm = (float)off_mm[1];
+    update(0);
+    double off = hypot((double)load.x_mm, (double)load.y_mm);
+    mean += off * off / CONTACTS;
+    as_estimated += (pow(off_mm[0], 2) + pow(off_mm[1], 2)) / CONTACTS;
+    of_none += (pow(none_mm[0], 2) + pow(none_mm[1], 2)) / CONTACTS;
+    said += pow((double)load.location_sd_mm, 2) / CONTACTS;
+    within += off < (double)load.location_sd_mm;
+    within_2 += off < 2.0 * (double)load.location_sd_mm;
+  }
+  TEST_ASSERT_TRUE(mean < 0.8 * as_estimated);
+  TEST_ASSERT_TRUE(mean < 0.2 * of_none);
+  TEST_ASSERT_DOUBLE_WITHIN(0.25 * mean, mean, said);
+  TEST_ASSERT_INT_WITHIN(CONTACTS / 10, CONTACTS * 66 / 100, within);
+  TEST_ASSERT_INT_WITHIN(CONTACTS / 30, CONTACTS * 96 / 100, within_2);
 }
 
 static void use_edges(const struct pad_edges *edges) {
@@ -339,6 +416,8 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(an_estimate_that_is_not_there_says_nothing);
   RUN_TEST(an_estimate_passes_as_it_is_with_scales_of_one);
+  RUN_TEST(a_small_load_may_be_none_and_the_place_knows_it);
+  RUN_TEST(places_are_nearer_than_with_any_load_or_none);
   RUN_TEST(edges_are_taken_back);
   RUN_TEST(a_load_that_edges_hide_is_not_told);
   RUN_TEST(scales_and_their_uncertainties_enter);

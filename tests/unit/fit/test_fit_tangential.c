@@ -209,12 +209,44 @@ static void test_what_is_the_sensors_own_is_taken_out(void) {
   judge_pad(12.0, ALL & ~(1 << 7), 0.1, 0.015, 260, 0);
 }
 
+static const struct contact usual = {2.0, 3.0, 5.0, 0.5, -0.3, 4.0};
+
+/* moved_q20_mm: noise that makes a load seem larger moves the place by so much. */
+static void test_place_and_load_err_together_as_is_said(void) {
+  enum { TIMES = 1000 };
+  struct random random = {SEED};
+  int32_t exact[SENSORS], readings[SENSORS];
+  fit_set_errors(&settings, 0.0f, 0.0065f);
+  read_contact(&usual, exact);
+  struct fit_tangential at = estimate(exact, ALL);
+  double by[2][2] = {{0}}, square[2] = {0}; /* sums over q_i x_j, and over q_i^2 */
+  for (int n = 0; n < TIMES; n++) {
+    for (int k = 0; k < SENSORS; k++) {
+      readings[k] = exact[k] + (int32_t)random_between(&random, -60000, 60000);
+    }
+    struct fit_tangential found = estimate(readings, ALL);
+    TEST_ASSERT_TRUE(found.valid);
+    double q[2] = {(double)((found.qx_N - at.qx_N) / at.force_N),
+                   (double)((found.qy_N - at.qy_N) / at.force_N)};
+    double moved[2] = {(double)(found.x_mm - at.x_mm), (double)(found.y_mm - at.y_mm)};
+    for (int i = 0; i < 2; i++) {
+      square[i] += q[i] * q[i];
+      by[i][0] += q[i] * moved[0];
+      by[i][1] += q[i] * moved[1];
+    }
+  }
+  for (int i = 0; i < 2; i++) {
+    double said_mm = at.moved_q20_mm[i] / 1048576.0;
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, by[i][i] / square[i], said_mm);
+    TEST_ASSERT_TRUE(fabs(said_mm) > 2.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.5, 0.0, by[i][1 - i] / square[i]);
+  }
+}
+
 static void expect_none(const int32_t *readings, uint32_t usable) {
   struct fit_tangential found = estimate(readings, usable);
   TEST_ASSERT_TRUE(is_zero(&found));
 }
-
-static const struct contact usual = {2.0, 3.0, 5.0, 0.5, -0.3, 4.0};
 
 static void test_too_few_sensors_give_nothing(void) {
   int32_t readings[SENSORS];
@@ -610,6 +642,7 @@ int main(void) {
   RUN_TEST(test_sensors_missing);
   RUN_TEST(test_a_dip_that_is_known_is_in_the_model);
   RUN_TEST(test_what_is_the_sensors_own_is_taken_out);
+  RUN_TEST(test_place_and_load_err_together_as_is_said);
   RUN_TEST(test_too_few_sensors_give_nothing);
   RUN_TEST(test_no_fit_gives_nothing);
   RUN_TEST(test_two_contacts_give_nothing);

@@ -9,6 +9,7 @@
 #include "report/reference/options.hpp"
 #include "shear/static/tables.hpp"
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -18,23 +19,27 @@ using namespace fingertip;
 using namespace fingertip::shear;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--only pads] [--cache DIR]\n"
+constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--only TABLE] [--cache DIR]\n"
                         "  --seed S     of pads and touches, 20221015 by default\n"
                         "  --pads N     pads of each case, 1500 by default; a fifth for some\n"
                         "  --only pads  only by pad and load, and by place\n"
                         "  --only cast  only pads like those that are cast\n"
+                        "  --only objects  only by object\n"
                         "  --cache DIR  folder of the contact tables\n";
 
 ordered_json measure(const Options &options) {
   ordered_json out;
   out["shear_seed"] = options.seed;
   out["shear_pads"] = options.pads;
-  if (!options.only.empty() && options.only != "pads" && options.only != "cast") {
-    throw std::runtime_error("--only " + options.only + " is no table; give pads or cast");
+  const std::map<std::string, void (*)(Bench &, ordered_json &)> tables{
+      {"pads", judge_pads}, {"cast", judge_cast}, {"objects", judge_objects}};
+  const auto only = tables.find(options.only);
+  if (!options.only.empty() && only == tables.end()) {
+    throw std::runtime_error("--only " + options.only + " is no table; give pads, cast or objects");
   }
   Bench bench(options);
   if (!options.only.empty()) {
-    options.only == "pads" ? judge_pads(bench, out) : judge_cast(bench, out);
+    only->second(bench, out);
     return out;
   }
   for (const auto judge :

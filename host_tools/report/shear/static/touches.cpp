@@ -25,6 +25,7 @@ void judge_objects(Bench &bench, ordered_json &out) {
     names.push_back(one.name);
   }
   names.insert(names.end(), {"cube15", "cylinder6x12", "edge20"});
+  double price_mm = -HUGE_VAL;
   for (const std::string &name : names) {
     for (const double share : {0.0, SHARE}) {
       Case c = bench.usual();
@@ -36,8 +37,11 @@ void judge_objects(Bench &bench, ordered_json &out) {
       row["object"] = name;
       row["load"] = share;
       out["by_object"].push_back(row);
+      const double with_mm = row["location_p50_mm"], without_mm = row["location_without_p50_mm"];
+      price_mm = share > 0.0 ? price_mm : std::max(price_mm, with_mm - without_mm);
     }
   }
+  out["location_price_worst_mm"] = price_mm;
   bench.progress("objects");
 }
 
