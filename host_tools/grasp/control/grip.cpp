@@ -137,6 +137,12 @@ void Grip::ramp(double to_mm, double speed_mm_s) {
 }
 
 void Grip::approach() {
+  if (reach_.goes_round()) {
+    if (reach_.comes_round(now_s_, felt_.t_s)) {
+      enter(GRIP_SQUEEZE);
+    }
+    return;
+  }
   const bool blind = felt_.fingers == 0 && felt_.touches == 0;
   if (blind || now_s_ > seconds(status_) + WIDTH_STALE_s) {
     ramped_s_ = now_s_;
@@ -190,6 +196,12 @@ std::uint32_t Grip::squeeze() {
   const bool nearest = !fixed && felt_.fingers > 0 && reach_.has_come(now_s_, felt_.t_s);
   const bool there = (felt_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, felt_.t_s);
+  if (nearest && (capped || there) && felt_.low_N < SQUEEZED * aimed_N &&
+      reach_.may_go_round(felt_, settings_, now_s_)) {
+    reach_.go_round(now_s_);
+    enter(GRIP_APPROACH);
+    return trouble;
+  }
   const bool over = now_s_ - since_s_ > SQUEEZE_s;
   if (!alone && (((there || capped) && !status_.moving) || over)) {
     if (!fixed && !is_blind_ && !felt_.tells_load) {

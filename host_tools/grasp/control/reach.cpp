@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace fingertip {
 
@@ -9,13 +10,15 @@ namespace {
 
 // Layers of 12 mm under spheres of 6 to 30 mm, 1 to 10 N (host_tools/simulation/twin).
 constexpr double EXPONENT = 1.6;
-// Than what is known, where a cap is to hold; and where one fingertip presses alone, whose rubber
-// the moves of both do not teach.
+// Where a cap is to hold: than what the moves have shown; than the mean rubber, where one fingertip
+// presses alone, whose rubber the moves of both do not teach.
 constexpr double STIFFER = 1.2, ALONE_STIFFER = 1.6;
+constexpr double RELAXED = 1.1; // an elastic force over what is left of it
 // Both pads, at the force of a touch; less is not told from nothing.
 constexpr double TOUCHED_mm = 0.3;
 constexpr double LEAST_N = 0.05;
 // What is learnt: from moves that make so much, by so large a share, within these limits.
+constexpr double TEACHES = 0.1; // and of the bound by such a share of the force
 constexpr double TEACHES_N = 0.15, LEARNS = 0.5, LEAST_STEEP = 0.4, MOST_STEEP = 3.0;
 
 constexpr double SPACED_s = 0.003;     // widths of the ring
@@ -25,7 +28,7 @@ constexpr double POLL_SHARE = 0.05;    // that an answer has in the mean
 constexpr double MISSES = 0.35; // of what the least move makes: less may be missing
 constexpr double NEAR = 0.03;             // of the wanted force: near enough
 constexpr double WEAK = 0.8;              // and too weak, where the cap leaves no room
-constexpr double SHORT_mm = 0.5;           // a move while squeezing
+constexpr double SHORT_mm = 0.5;          // a short move
 constexpr double OPENS_mm = 0.3;           // at once
 // Of a fingertip's force, below the cap. UNCERTAIN contacts report far more than the force is off;
 // chosen with cylinders of fingertip_grasp_trials, seed 1.
@@ -40,24 +43,29 @@ double indentation_mm(double width_mm, double touch_mm) {
   return std::max(touch_mm + TOUCHED_mm - width_mm, TOUCHED_mm);
 }
 
+// One pad's indentation at this force, by a power law.
+double way_to_mm(double force_N, double at_1_mm_N, double exponent) {
+  return std::pow(force_N / at_1_mm_N, 1.0 / exponent);
+}
+
+// Its force at 1 mm, where this way made one force of the other.
+double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double exponent) {
+  // Ways of all such laws have one ratio.
+  const double unit_mm = way_to_mm(to_N, 1.0, exponent) - way_to_mm(from_N, 1.0, exponent);
+  return std::pow(unit_mm / way_mm, exponent);
+}
+
 } // namespace
 
-void GripRubber::begin(double first_width_mm) {
+void GripRubber::begin(double width_mm) {
   *this = GripRubber();
-  first_mm_ = both_mm_ = first_width_mm;
+  both_mm_ = width_mm;
 }
 
 double GripRubber::force_at(double to_mm, double force_N, double from_mm) const {
   const double grown = indentation_mm(to_mm, both_mm_) / indentation_mm(from_mm, both_mm_);
   return std::max(0.0, force_N + std::max(force_N, LEAST_N) * (std::pow(grown, EXPONENT) - 1.0) *
                                      (to_mm < from_mm ? closing_ : opening_));
-}
-
-double GripRubber::width_below(double cap_N, double force_N, double from_mm, bool alone) const {
-  const double steep = (alone ? ALONE_STIFFER : STIFFER) * closing_;
-  const double share = (cap_N - force_N) / std::max(force_N, LEAST_N) / steep;
-  const double grown = std::pow(std::max(1.0 + share, 0.0), 1.0 / EXPONENT);
-  return from_mm - (grown - 1.0) * indentation_mm(from_mm, alone ? first_mm_ : both_mm_);
 }
 
 double GripRubber::width_for(double wanted_N, double force_N, double from_mm) const {
@@ -87,6 +95,41 @@ void GripRubber::learn(double force_N, double width_mm) {
   pair_mm_ = width_mm;
 }
 
+void GripBound::begin(double width_mm) {
+  *this = GripBound();
+  first_mm_ = width_mm;
+}
+
+double GripBound::width_below(double cap_N, double force_N, double from_mm, bool alone) const {
+  if (alone) {
+    const double share = (cap_N - force_N) / std::max(force_N, LEAST_N) / ALONE_STIFFER;
+    const double grown = std::pow(std::max(1.0 + share, 0.0), 1.0 / EXPONENT);
+    return from_mm - (grown - 1.0) * indentation_mm(from_mm, first_mm_);
+  }
+  double room_mm = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < EXPONENTS.size(); i++) {
+    const double elastic_N = RELAXED * force_N;
+    const double most_N = std::max(elastic_N + cap_N - force_N, 0.0);
+    room_mm = std::min(room_mm, way_to_mm(most_N, at_1_mm_N_[i], EXPONENTS[i]) -
+                                    way_to_mm(elastic_N, at_1_mm_N_[i], EXPONENTS[i]));
+  }
+  return from_mm - 2.0 * room_mm;
+}
+
+void GripBound::learn(double force_N, double width_mm) {
+  const double way_mm = 0.5 * (pair_mm_ - width_mm), made_N = force_N - pair_N_;
+  if (pair_N_ > 0.0 && way_mm > 1e-6) {
+    if (made_N < std::max(TEACHES_N, TEACHES * force_N)) {
+      return; // a way of many small moves teaches too
+    }
+    for (std::size_t i = 0; i < EXPONENTS.size(); i++) {
+      at_1_mm_N_[i] = STIFFER * shown_at_1_mm_N(pair_N_, force_N, way_mm, EXPONENTS[i]);
+    }
+  }
+  pair_N_ = force_N;
+  pair_mm_ = width_mm;
+}
+
 void GripReach::take(const GripperStatus &status, double silent_s) {
   const double t_s = 1e-6 * static_cast<double>(status.host_us);
   if (is_heard_) {
@@ -100,6 +143,7 @@ void GripReach::take(const GripperStatus &status, double silent_s) {
   } else {
     poll_s_ = traits_.poll_s;
   }
+  stood_s_ = is_heard_ && !status_.moving ? stood_s_ : t_s;
   status_ = status;
   is_heard_ = true;
   const double before_s = widths_[(newest_ + widths_.size() - 1) % widths_.size()].t_s;
@@ -138,6 +182,15 @@ bool GripReach::has_come(double now_s, double frame_s) const {
   return stands(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
 }
 
+bool GripReach::rests(double now_s, double frame_s) const {
+  return has_come(now_s, frame_s) && frame_s > stood_s_;
+}
+
+void GripReach::first_touch(double t_s) {
+  rubber_.begin(width_at(t_s));
+  bound_.begin(width_at(t_s));
+}
+
 // Where it is going to be. Where it stands, it makes no move that is shorter than its deadband.
 double GripReach::coming_mm(double now_s) const {
   const bool stays = stands(now_s) &&
@@ -163,7 +216,7 @@ double GripReach::coming_N(const GripFelts &felt, double now_s) const {
 
 double GripReach::last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const {
   const double least_mm =
-      rubber_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s), felt.is_alone());
+      bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s), felt.is_alone());
   const double steps = std::floor((target_mm_ - least_mm) / traits_.step_mm);
   return target_mm_ - std::max(steps, 0.0) * traits_.step_mm;
 }
@@ -183,6 +236,33 @@ double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSett
   return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
 }
 
+bool GripReach::may_go_round(const GripFelts &felt, const GripSettings &settings,
+                             double now_s) const {
+  const double room_mm = coming_mm(now_s) - bound_.width_below(settings.cap_N, most_N(felt),
+                                                               width_at(felt.t_s), false);
+  return !limits_itself(settings) && least_mm() > traits_.step_mm && !felt.is_alone() &&
+         !felt.over && room_mm > traits_.step_mm;
+}
+
+void GripReach::go_round(double now_s) {
+  goes_round_ = true;
+  round_mm_ = coming_mm(now_s) - traits_.step_mm;
+  target_mm_ = coming_mm(now_s) + least_mm();
+  aimed_s_ = now_s;
+}
+
+bool GripReach::comes_round(double now_s, double frame_s) {
+  if (!rests(now_s, frame_s)) {
+    return false;
+  }
+  goes_round_ = target_mm_ != round_mm_;
+  if (goes_round_) {
+    target_mm_ = round_mm_;
+    aimed_s_ = now_s;
+  }
+  return !goes_round_;
+}
+
 std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt,
                          const GripSettings &settings, double now_s) {
   std::uint32_t trouble = 0;
@@ -195,11 +275,16 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
     return trouble; // forces of widths that are not known yet
   }
   const double width_mm = width_at(felt.t_s), coming = coming_mm(now_s);
+  const bool rested = rests(now_s, felt.t_s);
   if (come) {
     rubber_.learn(felt.grip_N, width_mm);
   }
+  if (limits_itself(settings) ? come : rested) {
+    felt.low_N > settings.touch_N && !felt.is_alone() ? bound_.learn(felt.grip_N, width_mm)
+                                                      : bound_.forget_pair();
+  }
   // Nor does a gripper that cannot keep the cap itself add a move to one that does not show yet.
-  if ((haste == Haste::patient || !limits_itself(settings)) && !come) {
+  if (!(limits_itself(settings) ? haste != Haste::patient || come : rested)) {
     return trouble;
   }
   const double low_N = haste == Haste::patient ? felt.low_N : felt.grip_N;
@@ -222,13 +307,15 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
                                      : way_mm;
     way_mm = std::max(way_mm, least);
     const double room_mm =
-        coming - rubber_.width_below(settings.cap_N, most_N(felt), width_mm, felt.is_alone());
+        coming - bound_.width_below(settings.cap_N, most_N(felt), width_mm, felt.is_alone());
     if (way_mm > room_mm) {
-      // What is held too weakly gets the least move all the same, if the gripper's own limit keeps
-      // it below the cap.
+      // What is held too weakly gets a short move all the same, if the gripper's own limit keeps it
+      // below the cap.
       const bool too_weak = !felt.is_alone() && (exact || now_N < WEAK * wanted_N);
-      way_mm = step_mm * std::floor(room_mm / step_mm);
-      way_mm = too_weak && limits_itself(settings) ? std::max(way_mm, least) : way_mm;
+      const double short_mm = too_weak && limits_itself(settings)
+                                  ? std::max(least, step_mm * std::floor(SHORT_mm / step_mm))
+                                  : 0.0;
+      way_mm = std::min(way_mm, std::max(step_mm * std::floor(room_mm / step_mm), short_mm));
       trouble |= GRIP_AT_CAP;
     }
     to_mm = way_mm >= least - 1e-9 ? coming - way_mm : coming;

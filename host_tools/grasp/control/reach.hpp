@@ -15,25 +15,44 @@ namespace fingertip {
 class GripRubber {
 public:
   // One fingertip touches; both do.
-  void begin(double first_width_mm);
+  void begin(double width_mm);
   void both_touch(double width_mm) { both_mm_ = width_mm; }
   double both_mm() const { return both_mm_; }
   // The force at another width, from what it is at this one.
   double force_at(double to_mm, double force_N, double from_mm) const;
   // The width for another force.
   double width_for(double wanted_N, double force_N, double from_mm) const;
-  // The least width at which a fingertip stays below the cap, on the stiffest rubber. alone: the
-  // other does not touch.
-  double width_below(double cap_N, double force_N, double from_mm, bool alone) const;
   // A pair of force and width, both at rest.
   void learn(double force_N, double width_mm);
   void forget_pair() { has_pair_ = false; }
 
 private:
-  double first_mm_ = 0.0, both_mm_ = 0.0;
+  double both_mm_ = 0.0;
   double closing_ = 1.0, opening_ = 1.3; // steeper than the power law by so much
   bool has_pair_ = false;
   double pair_N_ = 0.0, pair_mm_ = 0.0;
+};
+
+// The most force that a move may make, on the stiffest contact that what has been seen allows. No
+// touch has to be known for it: of two power laws, a flat and a steep one, the stiffer counts.
+class GripBound {
+public:
+  // Force of one pad at 1 mm of indentation, before a move of both has shown it: of 12 mm of rubber
+  // under what rounds it least, and a fifth between two pads.
+  static constexpr double EXPECTED_N = 5.5;
+  static constexpr std::array<double, 2> EXPONENTS = {1.3, 1.9};
+
+  void begin(double width_mm); // one fingertip touches
+  // The least width at which a fingertip stays below the cap. alone: the other does not touch.
+  double width_below(double cap_N, double force_N, double from_mm, bool alone) const;
+  // Force and width at rest, both fingertips touch.
+  void learn(double force_N, double width_mm);
+  void forget_pair() { pair_N_ = 0.0; }
+
+private:
+  double first_mm_ = 0.0;
+  std::array<double, 2> at_1_mm_N_ = {EXPECTED_N, EXPECTED_N};
+  double pair_N_ = 0.0, pair_mm_ = 0.0; // 0: none
 };
 
 class GripReach {
@@ -51,13 +70,18 @@ public:
   // Where it was last sent.
   double target_mm() const { return target_mm_; }
   void send(double width_mm) { target_mm_ = width_mm; }
-  void stop() { target_mm_ = status_.width_mm; }
+  void stop() {
+    target_mm_ = status_.width_mm;
+    goes_round_ = false;
+  }
   // What was sent last has been made, and a frame since then tells of it.
   bool has_come(double now_s, double frame_s) const;
+  // And the gripper's own answers say that it stood when the frame was measured.
+  bool rests(double now_s, double frame_s) const;
   bool stands(double now_s) const;
 
   // One fingertip touches; both do. t_s: of the frames that tell it.
-  void first_touch(double t_s) { rubber_.begin(width_at(t_s)); }
+  void first_touch(double t_s);
   void both_touch(double t_s) { rubber_.both_touch(width_at(t_s)); }
   void approach_ends(double now_s) { aimed_s_ = now_s; } // it is still under way
   double touch_width_mm() const { return rubber_.both_mm(); }
@@ -83,6 +107,15 @@ public:
   std::uint32_t aim(double wanted_N, Haste haste, const GripFelts &felt,
                     const GripSettings &settings, double now_s);
 
+  // Going round: a single step where the least move has several, back by the least move and on to
+  // there. Only with nothing lifted. May: only the fingertips keep the cap, and it has room for
+  // that.
+  bool may_go_round(const GripFelts &felt, const GripSettings &settings, double now_s) const;
+  void go_round(double now_s);
+  bool goes_round() const { return goes_round_; }
+  // Goes on with it; true once it stands there.
+  bool comes_round(double now_s, double frame_s);
+
 private:
   double coming_mm(double now_s) const;
   // Its own limit of force can be set to the cap.
@@ -91,10 +124,14 @@ private:
   GripperTraits traits_;
   GripperStatus status_;
   GripRubber rubber_;
+  GripBound bound_;
   bool is_heard_ = false;
   double target_mm_ = 0.0;
   double aimed_s_ = 0.0; // when it last changed for a force
   double poll_s_ = 0.0;
+  double stood_s_ = 0.0; // of the first answer that it stands, since it last moved
+  bool goes_round_ = false;
+  double round_mm_ = 0.0; // where to
   struct Width {
     double t_s, width_mm;
   };

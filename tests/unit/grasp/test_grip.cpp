@@ -188,7 +188,7 @@ TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
 // under way is given up then.
 TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
   GripperTraits slow = fine_gripper();
-  slow.latency_s = 0.025;
+  slow.latency_s = 0.05;
   GripWorld world({{"cap", 15.0}}, slow); // each move shows before the next
   world.grasp();
   world.pull(2.5, 0.03);
@@ -493,6 +493,41 @@ TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
     world.slide(0.6, 30.0, 0.5);
     world.run(0.3);
     EXPECT_LT(world.peak_N, 4.0) << stiffness;
+  }
+}
+
+// A gripper of which the least move is two steps, and the cap has no room for two: it goes back by
+// those and on by three. Before that the grip is far too weak.
+TEST(Grip, GoesRoundWhereTheCapHasRoomForAStepAndNotForTheLeastMove) {
+  GripWorld world({{"cap", 2.4}, {"start", 1.0}, {"floor", 0.75}}, gripper_traits("2f85"));
+  const double count_mm = world.traits.step_mm;
+  world.stiffness = 4.0;
+  // Pressed in by 0.3 mm a pad at a count: 0.58 N; a count more makes 1.3 N, two 2.2 N.
+  world.object_mm = 107.0 * count_mm + 0.6;
+  world.grasp();
+  EXPECT_NEAR(world.width_mm, 106.0 * count_mm, 1e-6);
+  EXPECT_GT(world.force_N, 0.8 * world.settings.start_N);
+  EXPECT_LT(world.peak_N, 0.7 * world.settings.cap_N);
+}
+
+// How stiff the contact is, moves show that begin and end with both fingertips on the object.
+TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
+  for (const double stiffness : {2.0, 3.5, 5.5}) {
+    for (const double power : {1.3, 1.6, 1.9}) {
+      for (double touch_mm = 0.0; touch_mm < 0.75; touch_mm += 0.05) {
+        GripWorld world({{"cap", 2.4}, {"start", 1.0}, {"floor", 0.75}}, gripper_traits("2f85"));
+        world.stiffness = stiffness;
+        world.power = power;
+        world.delay_s = 0.02;
+        world.gain = {0.93, 0.93};
+        world.object_mm = 40.0 + touch_mm;
+        world.grasp();
+        world.pull(0.6, 0.3);
+        world.run(0.5);
+        EXPECT_LE(world.peak_N, 2.4) << stiffness << " " << power << " " << touch_mm;
+        EXPECT_GE(world.force_N, 0.75) << stiffness << " " << power << " " << touch_mm;
+      }
+    }
   }
 }
 
