@@ -150,8 +150,9 @@ export class StrictCore extends CortexM0Core {
   /** True if an exception is pending that ends WFI: enabled, and of higher priority than the running one. */
   somethingPending() {
     if (this.pendingNMI || this.pendingSystick || this.pendingPendSV || this.pendingSVCall) return true;
-    const active = this.exceptionPriority(this.IPSR);
     const pending = this.pendingInterrupts & this.enabledInterrupts;
+    if (pending === 0) return false;
+    const active = this.exceptionPriority(this.IPSR);
     for (let priority = 0; priority < active; priority++) {
       if (pending & this.interruptPriorities[priority]) return true;
     }
