@@ -133,28 +133,31 @@ struct Shape {
   Index x, y, z;
 };
 
-// Fields [x + nx (y + ny z)].
-void along_x(const Matrix &by, const Shape &from, const Vector &in, Vector &out) {
-  out.resize(by.rows() * from.y * from.z);
-  Eigen::Map<Matrix>(out.data(), by.rows(), from.y * from.z).noalias() =
+// Fields [x + nx (y + ny z)]: multiplied along one axis, and added to what is there if said.
+void along_x(const Matrix &by, const Shape &from, const Vector &in, Vector &out, bool add) {
+  if (!add) {
+    out.setZero(by.rows() * from.y * from.z);
+  }
+  Eigen::Map<Matrix>(out.data(), by.rows(), from.y * from.z).noalias() +=
       by * Eigen::Map<const Matrix>(in.data(), from.x, from.y * from.z);
 }
 
-void along_y(const Matrix &by, const Shape &from, const Vector &in, Vector &out, double factor,
-             bool add) {
+void along_y(const Matrix &by, const Shape &from, const Vector &in, Vector &out, bool add) {
   if (!add) {
     out.setZero(from.x * by.rows() * from.z);
   }
   for (Index z = 0; z < from.z; z++) {
     Eigen::Map<Matrix>(out.data() + z * from.x * by.rows(), from.x, by.rows()).noalias() +=
-        factor * Eigen::Map<const Matrix>(in.data() + z * from.x * from.y, from.x, from.y) *
-        by.transpose();
+        Eigen::Map<const Matrix>(in.data() + z * from.x * from.y, from.x, from.y) * by.transpose();
   }
 }
 
-void along_z(const Matrix &by, const Shape &from, const Vector &in, Vector &out, double factor) {
+void along_z(const Matrix &by, const Shape &from, const Vector &in, Vector &out, bool add) {
+  if (!add) {
+    out.setZero(from.x * from.y * by.rows());
+  }
   Eigen::Map<Matrix>(out.data(), from.x * from.y, by.rows()).noalias() +=
-      factor * Eigen::Map<const Matrix>(in.data(), from.x * from.y, from.z) * by.transpose();
+      Eigen::Map<const Matrix>(in.data(), from.x * from.y, from.z) * by.transpose();
 }
 
 using Field = std::array<Vector, 3>;
@@ -227,42 +230,33 @@ public:
   }
 
 private:
-  // Virtual work: lame div v div u + 2 strain(v) . strain(u), shear modulus 1.
+  // Virtual work: lame div v div u + 2 strain(v) . strain(u), shear modulus 1. What the slopes of a
+  // component along one axis do to the two others is computed once for both.
   void apply(const Field &in, Field &out) const {
+    Vector g[3], h[3];
     for (std::size_t c = 0; c < 3; c++) {
       out[c] = diagonal_[c].cwiseProduct(in[c]);
+      along(c, gx_.transpose(), gy_.transpose(), gz_.transpose(), in[c], shape(c), g[c], false);
+      along(c, hx_.transpose(), hy_.transpose(), gz_, in[c], shape(c), h[c], false);
     }
-    Vector half;
-    const auto x_then_y = [&](const Matrix &by_x, const Matrix &by_y, std::size_t from,
-                              std::size_t to, double factor) {
-      const Shape s = shape(from);
-      along_x(by_x, s, in[from], half);
-      along_y(by_y, {by_x.rows(), s.y, s.z}, half, out[to], factor, true);
-    };
-    const auto x_then_z = [&](const Matrix &by_x, const Matrix &by_z, std::size_t from,
-                              std::size_t to, double factor) {
-      const Shape s = shape(from);
-      along_x(by_x, s, in[from], half);
-      along_z(by_z, {by_x.rows(), s.y, s.z}, half, out[to], factor);
-    };
-    const auto y_then_z = [&](const Matrix &by_y, const Matrix &by_z, std::size_t from,
-                              std::size_t to, double factor) {
-      const Shape s = shape(from);
-      along_y(by_y, s, in[from], half, 1.0, false);
-      along_z(by_z, {s.x, by_y.rows(), s.z}, half, out[to], factor);
-    };
-    x_then_y(gx_, gy_.transpose(), 1, 0, lame_);
-    x_then_y(hx_, hy_.transpose(), 1, 0, 1.0);
-    x_then_y(gx_.transpose(), gy_, 0, 1, lame_);
-    x_then_y(hx_.transpose(), hy_, 0, 1, 1.0);
-    x_then_z(gx_, gz_.transpose(), 2, 0, lame_);
-    x_then_z(hx_, gz_, 2, 0, 1.0);
-    x_then_z(gx_.transpose(), gz_, 0, 2, lame_);
-    x_then_z(hx_.transpose(), gz_.transpose(), 0, 2, 1.0);
-    y_then_z(gy_, gz_.transpose(), 2, 1, lame_);
-    y_then_z(hy_, gz_, 2, 1, 1.0);
-    y_then_z(gy_.transpose(), gz_, 1, 2, lame_);
-    y_then_z(hy_.transpose(), gz_.transpose(), 1, 2, 1.0);
+    const Shape between{x_of(1).stiffness.size(), y_of(0).stiffness.size(), z_.stiffness.size()};
+    for (std::size_t c = 0; c < 3; c++) {
+      const std::size_t a = (c + 1) % 3, b = (c + 2) % 3;
+      along(c, gx_, gy_, gz_, lame_ * (g[a] + g[b]), between, out[c], true);
+      along(c, hx_, hy_, gz_.transpose(), h[a] + h[b], between, out[c], true);
+    }
+  }
+
+  // Along the axis of the component, by the matrix of that axis.
+  static void along(std::size_t c, const Matrix &by_x, const Matrix &by_y, const Matrix &by_z,
+                    const Vector &in, const Shape &from, Vector &out, bool add) {
+    if (c == 0) {
+      along_x(by_x, from, in, out, add);
+    } else if (c == 1) {
+      along_y(by_y, from, in, out, add);
+    } else {
+      along_z(by_z, from, in, out, add);
+    }
   }
 
   double lame_;

@@ -1,6 +1,7 @@
 #include "block_fem.hpp"
 #include "library/pad/block_table.hpp"
 #include "simulation/twin/contact_table.hpp"
+#include "simulation/twin/scenarios.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +13,6 @@ namespace fingertip::twin {
 namespace {
 
 const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
-const std::vector<Place> SENSORS{{0, 0}, {0, 9}, {0, 18}, {9, 0}, {9, 9}, {9, 18}};
 constexpr double FIELD_STEP_mm = 0.5;
 const BlockGrid COARSE{5, 8.0, 0.7, 0.04, 3.0};
 
@@ -169,21 +169,17 @@ std::pair<double, double> off_and_size(const std::vector<BlockAnswer> &a,
 }
 
 TEST(TwinBlock, SettlesAsElementsGrowSmaller) {
-  struct Case {
-    double thickness_mm, overhang_mm, allowed;
-  };
-  for (const Case &one : {Case{12.0, 9.0, 1e-4}, Case{12.0, 4.5, 5e-4}}) {
-    const Block block = around(one.thickness_mm, one.overhang_mm);
-    const std::vector<Place> places{{9, 18}};
-    const Eigen::Vector3d peak = LayerField{block.layer, 0.0}.peak();
-    const auto fine = solve_block(block, places, FIELD_STEP_mm, {7, 6.0, 0.5, 0.008, 3.0});
-    const auto [usual, size] = off_and_size(solve_block(block, places, FIELD_STEP_mm), fine, peak);
-    const double coarse =
-        off_and_size(solve_block(block, places, FIELD_STEP_mm, COARSE), fine, peak).first;
-    EXPECT_LT(usual, one.allowed) << one.overhang_mm << " mm";
-    EXPECT_GT(coarse, 2.0 * usual) << one.overhang_mm << " mm";
-    EXPECT_GT(size, 0.3) << one.overhang_mm << " mm";
-  }
+  // The nearer the ends, the more there is to settle.
+  const Block block = around(12.0, 4.5);
+  const std::vector<Place> places{{9, 18}};
+  const Eigen::Vector3d peak = LayerField{block.layer, 0.0}.peak();
+  const auto fine = solve_block(block, places, FIELD_STEP_mm, {7, 6.0, 0.5, 0.008, 3.0});
+  const auto [usual, size] = off_and_size(solve_block(block, places, FIELD_STEP_mm), fine, peak);
+  const double coarse =
+      off_and_size(solve_block(block, places, FIELD_STEP_mm, COARSE), fine, peak).first;
+  EXPECT_LT(usual, 5e-4);
+  EXPECT_GT(coarse, 2.0 * usual);
+  EXPECT_GT(size, 0.3);
 }
 
 TEST(TwinBlock, TendsToTheLayerWithoutEnd) {
@@ -218,14 +214,14 @@ TEST(TwinBlock, TendsToTheLayerWithoutEnd) {
 TEST(TwinBlock, TheBaseCarriesForceAndMoment) {
   const double half_mm = 9.0, thickness_mm = 6.0, strip_mm = 0.75, near_mm = 0.3;
   const Block block{silicone(thickness_mm), half_mm, half_mm};
-  constexpr double POINT[3] = {0.2386191860831969, 0.6612093864662645, 0.9324695142031521};
-  constexpr double WEIGHT[3] = {0.4679139345726910, 0.3607615730481386, 0.1713244923791704};
+  constexpr double POINT[2] = {0.3399810435848563, 0.8611363115940526};
+  constexpr double WEIGHT[2] = {0.6521451548625461, 0.3478548451374538};
   std::vector<std::pair<double, double>> line{
       {half_mm - near_mm, std::pow(strip_mm, 0.6) / 0.6 * std::pow(near_mm, 0.4)}};
   const double from = std::sqrt(strip_mm), to = std::sqrt(half_mm);
-  for (std::size_t q = 0; q < 6; q++) {
-    const double root = 0.5 * (from + to) + (q < 3 ? -0.5 : 0.5) * POINT[q % 3] * (to - from);
-    line.emplace_back(half_mm - root * root, root * (to - from) * WEIGHT[q % 3]);
+  for (std::size_t q = 0; q < 4; q++) {
+    const double root = 0.5 * (from + to) + (q < 2 ? -0.5 : 0.5) * POINT[q % 2] * (to - from);
+    line.emplace_back(half_mm - root * root, root * (to - from) * WEIGHT[q % 2]);
   }
   // The block is square: what is at y, x of a load at y, x is at x, y turned over.
   std::vector<Place> places;
@@ -291,15 +287,19 @@ TEST(TwinBlock, FourPointsStandForTheContact) {
                           Case{"cube6", 6.0, 0.011, 0.04}}) {
     const double force_N = 8.0;
     const Place middle{9.0, 18.0};
+    const std::vector<Place> sensors = sensor_places();
     const Block block = around(12.0, one.overhang_mm);
-    const BlockTable table = BlockTable::load_or_build(block, SENSORS, CACHE);
+    const BlockTable table = BlockTable::load_or_build(block, sensors, CACHE);
     const double radius_mm = ContactTable::load_or_build(indenter(one.name), block.layer, CACHE)
                                  .contact_radius_mm(force_N);
     const Grid grid{192, 0.25};
     const Contact contact = ContactSolver(indenter(one.name), block.layer, grid).solve(force_N);
     const Eigen::Vector3d peak = LayerField{block.layer, 0.0}.peak();
     double off = 0.0, of_middle = 0.0;
-    for (std::size_t k = 0; k < SENSORS.size(); k++) {
+    for (std::size_t k = 0; k < sensors.size(); k++) {
+      if (sensors[k].x_mm < 0.0 || sensors[k].y_mm < 0.0) {
+        continue; // a mirror of another
+      }
       for (int c = 0; c < 3; c++) {
         const auto added = [&](double radius, double dx, double dy) {
           return 1e-6 * table.added_Pa(k, {double(c == 2), double(c == 0), double(c == 1), radius},

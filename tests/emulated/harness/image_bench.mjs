@@ -45,7 +45,7 @@ export class ImageBench {
 
   run(ms) {
     const { machine } = this;
-    assert.ok(machine.run(machine.time.nanos + ms * 1e6), `${machine.endReason} ${machine.result.warnings}`);
+    if (!machine.run(machine.time.nanos + ms * 1e6)) assert.fail(`${machine.endReason} ${machine.result.warnings}`);
   }
 
   /** Runs until `what()`; the time. */

@@ -7,9 +7,11 @@
  */
 
 /** UM10204 table 10, fast mode, ns. tVD;DAT may be longer by what SCL stays low beyond tLOW. */
-export const FAST_MODE = {
-  tHD_STA: 600, tLOW: 1300, tHIGH: 600, tSU_STA: 600, tSU_DAT: 100, tSU_STO: 600, tBUF: 1300, tVD_DAT: 900, period: 2500, tr: 300,
-};
+const FAST_MODE = { tHD_STA: 600, tLOW: 1300, tHIGH: 600, tSU_STA: 600, tSU_DAT: 100, tSU_STO: 600, tBUF: 1300, tVD_DAT: 900, period: 2500 };
+const NAMES = Object.keys(FAST_MODE);
+const LIMITS_NS = Float64Array.from(Object.values(FAST_MODE));
+/** By number, since they are judged at every clock of every line. */
+export const [HD_STA, LOW, HIGH, SU_STA, SU_DAT, SU_STO, BUF, VD_DAT, PERIOD] = NAMES.keys();
 
 /** Of emulated time, which is kept in floating point. */
 const SLACK_NS = 1e-3;
@@ -20,26 +22,30 @@ export class TimingCheck {
     this.report = report;
     this.name = name;
     this.messages = new Map();
-    /** Shortest seen of each, longest of tVD_DAT. */
-    this.extremes = {};
+    this.seen_ns = new Float64Array(NAMES.length).fill(NaN);
     /** Something is wrong on purpose: what happens is not the controller's fault. */
     this.excused = false;
   }
 
+  /** By name: of what was seen, the shortest, of tVD_DAT the longest. */
+  get extremes() {
+    return Object.fromEntries(NAMES.map((name, what) => [name, this.seen_ns[what]]).filter(([, value_ns]) => !Number.isNaN(value_ns)));
+  }
+
   atLeast(what, value_ns) {
     if (this.excused) return;
-    if (!(value_ns >= this.extremes[what])) this.extremes[what] = value_ns;
-    if (value_ns < FAST_MODE[what] - SLACK_NS) this.#warn(what, value_ns, 'at least');
+    if (!(value_ns >= this.seen_ns[what])) this.seen_ns[what] = value_ns;
+    if (value_ns < LIMITS_NS[what] - SLACK_NS) this.#warn(what, value_ns, 'at least');
   }
 
   atMost(what, value_ns) {
     if (this.excused) return;
-    if (!(value_ns <= this.extremes[what])) this.extremes[what] = value_ns;
-    if (value_ns > FAST_MODE[what] + SLACK_NS) this.#warn(what, value_ns, 'at most');
+    if (!(value_ns <= this.seen_ns[what])) this.seen_ns[what] = value_ns;
+    if (value_ns > LIMITS_NS[what] + SLACK_NS) this.#warn(what, value_ns, 'at most');
   }
 
   #warn(what, value_ns, bound) {
-    if (!this.messages.has(what)) this.messages.set(what, `${this.name}: ${what} is ${value_ns.toFixed(0)} ns; fast mode allows ${bound} ${FAST_MODE[what]} ns`);
+    if (!this.messages.has(what)) this.messages.set(what, `${this.name}: ${NAMES[what]} is ${value_ns.toFixed(0)} ns; fast mode allows ${bound} ${LIMITS_NS[what]} ns`);
     this.report.warn('i2c', this.messages.get(what));
   }
 }
@@ -89,7 +95,7 @@ export class I2cLine {
   sclFell(t_ns) {
     this.sclHigh = false;
     this.sclFell_ns = t_ns;
-    if (this.started_ns > this.sclRose_ns) this.check.atLeast('tHD_STA', t_ns - this.started_ns);
+    if (this.started_ns > this.sclRose_ns) this.check.atLeast(HD_STA, t_ns - this.started_ns);
     this.target.clock();
     this.#shift(t_ns);
   }
@@ -142,10 +148,10 @@ export class I2cLine {
     this.sclHigh = true;
     this.sclRose_ns = t_ns;
     if (this.phase === 'idle') return;
-    this.check.atLeast('tSU_DAT', t_ns - this.rise_ns.scl - this.sdaChanged_ns);
+    this.check.atLeast(SU_DAT, t_ns - this.rise_ns.scl - this.sdaChanged_ns);
     if (this.sdaChanged_ns > this.sclFell_ns) {
-      const stretched_ns = Math.max(0, t_ns - this.rise_ns.scl - this.sclFell_ns - FAST_MODE.tLOW);
-      this.check.atMost('tVD_DAT', this.sdaChanged_ns - this.sclFell_ns - stretched_ns);
+      const stretched_ns = Math.max(0, t_ns - this.rise_ns.scl - this.sclFell_ns - LIMITS_NS[LOW]);
+      this.check.atMost(VD_DAT, this.sdaChanged_ns - this.sclFell_ns - stretched_ns);
     }
     this.byte = (this.byte << 1) | (this.sdaHigh ? 1 : 0);
     this.bits += 1;
@@ -158,11 +164,11 @@ export class I2cLine {
     this.sdaChanged_ns = t_ns;
     if (!this.sclHigh) return;
     if (this.phase === 'idle') {
-      this.check.atLeast('tBUF', t_ns - this.stopped_ns); // still excused where a fault's end made the STOP
+      this.check.atLeast(BUF, t_ns - this.stopped_ns); // still excused where a fault's end made the STOP
       if (controllerPulls && !this.faults) this.check.excused = false;
     } else {
       this.#mustBeBetweenBytes('START');
-      this.check.atLeast('tSU_STA', t_ns - this.sclRose_ns);
+      this.check.atLeast(SU_STA, t_ns - this.sclRose_ns);
     }
     this.#finish(t_ns);
     this.started_ns = t_ns;
@@ -176,7 +182,7 @@ export class I2cLine {
     this.sdaHigh = true;
     this.sdaChanged_ns = t_ns;
     if (!this.sclHigh) return;
-    this.check.atLeast('tSU_STO', t_ns - this.rise_ns.sda - this.sclRose_ns);
+    this.check.atLeast(SU_STO, t_ns - this.rise_ns.sda - this.sclRose_ns);
     if (this.phase !== 'idle') this.#mustBeBetweenBytes('STOP');
     this.#finish(t_ns);
     this.stopped_ns = t_ns;

@@ -8,7 +8,7 @@
  */
 import { Prng } from '../prng.mjs';
 import { I2cTarget } from './i2c_bus.mjs';
-import { I2cLine, TimingCheck } from './i2c_line.mjs';
+import { HIGH, I2cLine, LOW, PERIOD, TimingCheck } from './i2c_line.mjs';
 import { Ms5840 } from './ms5840.mjs';
 
 /** Time from release to 0.7 VDD over the time from 0.3 to 0.7 VDD, of a line that charges through a resistor. */
@@ -66,7 +66,7 @@ export class ParallelBoard {
     this.sclRose_ns = -Infinity;
   }
 
-  /** By name, as in FAST_MODE: the shortest (tVD_DAT: longest) of all lines. */
+  /** By name, as in TimingCheck: the shortest (tVD_DAT: longest) of all lines. */
   get times_ns() {
     const times = { ...this.sclCheck.extremes };
     for (const { check } of this.lines) {
@@ -196,15 +196,15 @@ export class ParallelBoard {
 
   #sclFell(now) {
     if (!this.sclFaults && now - this.sclRose_ns > QUIET_NS) this.sclCheck.excused = false;
-    this.sclCheck.atLeast('tHIGH', now - this.sclRose_ns);
-    this.sclCheck.atLeast('period', now - this.sclFell_ns);
+    this.sclCheck.atLeast(HIGH, now - this.sclRose_ns);
+    this.sclCheck.atLeast(PERIOD, now - this.sclFell_ns);
     this.sclFell_ns = now;
     for (const line of this.lines) line.sclFell(now);
     this.#sensorsWill(now);
   }
 
   #sclRose(now) {
-    this.sclCheck.atLeast('tLOW', now - this.rise_ns.scl - this.sclFell_ns);
+    this.sclCheck.atLeast(LOW, now - this.rise_ns.scl - this.sclFell_ns);
     this.sclRose_ns = now;
     const { chip } = this.low;
     for (let k = 0; k < this.lines.length; k++) this.lines[k].sclRose(now, ((chip >>> k) & 1) === 1);

@@ -297,16 +297,10 @@ export class Chip extends RP2040 {
     }
   }
 
-  /** In a turn of this core. */
-  execute(core, action) {
+  /** From now on this core executes. */
+  takeTurn(core) {
     this.core = core;
     this.sio.use(core.id);
-    try {
-      action();
-    } finally {
-      this.core = this.core0;
-      this.sio.use(0);
-    }
   }
 
   /** SEV. */

@@ -2,8 +2,8 @@
  * The Cortex-M0+ of rp2040js, made strict and faster.
  *
  * - Memory: any unaligned access, any store to flash or ROM and any address without a device fails the run.
- * - Frequent instructions execute in an own decoder (same results and cycles, checked against the original
- *   by a test); everything else goes to rp2040js.
+ * - Frequent instructions execute in an own decoder, instructions.mjs (same results and cycles, checked against the
+ *   original by a test); everything else goes to rp2040js.
  * - Cycles follow the Cortex-M0+ Technical Reference Manual where rp2040js is short: PUSH with lr and POP
  *   with pc cost one more, exception entry 15 and exception return 13.
  * - WFI with PRIMASK set wakes without entering the handler, and does not sleep if an enabled interrupt is
@@ -11,12 +11,11 @@
  * - SEV sets the event register of both cores, and ends their WFE (B1.5.18).
  */
 import { RP2040 } from 'rp2040js';
+import { bitCount, execute, RAM_BASE, RAM_BYTES } from './instructions.mjs';
 import { MemoryFault, Mpu } from './mpu.mjs';
 
-export { RP2040 };
+export { RAM_BASE, RAM_BYTES, RP2040 };
 
-export const RAM_BASE = 0x20000000;
-export const RAM_BYTES = 264 * 1024;
 export const FLASH_BASE = 0x10000000;
 export const FLASH_BYTES = 2 * 1024 * 1024;
 
@@ -151,8 +150,9 @@ export class StrictCore extends CortexM0Core {
   /** True if an exception is pending that ends WFI: enabled, and of higher priority than the running one. */
   somethingPending() {
     if (this.pendingNMI || this.pendingSystick || this.pendingPendSV || this.pendingSVCall) return true;
-    const active = this.exceptionPriority(this.IPSR);
     const pending = this.pendingInterrupts & this.enabledInterrupts;
+    if (pending === 0) return false;
+    const active = this.exceptionPriority(this.IPSR);
     for (let priority = 0; priority < active; priority++) {
       if (pending & this.interruptPriorities[priority]) return true;
     }
@@ -173,19 +173,14 @@ export class StrictCore extends CortexM0Core {
     return this.chip.busRead(pc & ~1, 2);
   }
 
-  setNZ(result) {
-    this.N = result < 0;
-    this.Z = result === 0;
-  }
-
-  /** a + b + carry on 32-bit integers; subtraction is a + ~b + 1. */
-  addFlags(a, b, carry) {
-    const result = (a + b + carry) | 0;
-    this.N = result < 0;
-    this.Z = result === 0;
-    this.C = ((a & b) | ((a | b) & ~result)) < 0;
-    this.V = ((a ^ result) & (b ^ result)) < 0;
-    return result;
+  /** What `execute` kept in variables: N is negative < 0, Z is zero === 0, V is overflow < 0. */
+  keep(pc, cycles, negative, zero, carry, overflow) {
+    this.signed[15] = pc;
+    this.cycles = cycles;
+    this.N = negative < 0;
+    this.Z = zero === 0;
+    this.C = carry !== 0;
+    this.V = overflow < 0;
   }
 
   /** Cycles beyond the first of a load or store. */
@@ -201,405 +196,162 @@ export class StrictCore extends CortexM0Core {
 
   /** Execute until `stop` cycles, sleep, or `time.earliestChanged`. */
   execute(stop, time) {
+    execute(this, stop, time);
+  }
+
+  /** An instruction at pc that is not one of `execute`'s, or whose access is not one to SRAM. */
+  executeOther(op) {
     const r = this.signed;
-    const ram16 = this.ram16;
-    while (this.cycles < stop && !this.waiting && !time.earliestChanged) {
-      if (this.interruptsUpdated && this.checkForInterrupts()) this.waiting = false;
-      const pc = r[15];
-      const offset = (pc - RAM_BASE) >>> 0;
-      const op = offset < this.codeBytes ? ram16[offset >>> 1] : this.fetch(pc);
-      let cycles = 1;
-      switch (op >>> 11) {
-        case 0: { // LSLS immediate
-          const shift = (op >>> 6) & 31;
-          const value = r[(op >>> 3) & 7];
-          if (shift) this.C = ((value >>> (32 - shift)) & 1) === 1;
-          const result = value << shift;
-          r[op & 7] = result;
-          this.setNZ(result | 0);
-          break;
-        }
-        case 1: { // LSRS immediate
-          const shift = (op >>> 6) & 31;
-          const value = r[(op >>> 3) & 7];
-          this.C = ((value >>> (shift ? shift - 1 : 31)) & 1) === 1;
-          const result = shift ? value >>> shift : 0;
-          r[op & 7] = result;
-          this.setNZ(result | 0);
-          break;
-        }
-        case 2: { // ASRS immediate
-          const shift = (op >>> 6) & 31;
-          const value = r[(op >>> 3) & 7];
-          this.C = ((value >>> (shift ? shift - 1 : 31)) & 1) === 1;
-          const result = (value | 0) >> (shift || 31);
-          r[op & 7] = result;
-          this.setNZ(result);
-          break;
-        }
-        case 3: { // ADDS, SUBS register or 3-bit immediate
-          const operand = (op >>> 6) & 7;
-          const b = op & 0x400 ? operand : r[operand];
-          const a = r[(op >>> 3) & 7];
-          r[op & 7] = op & 0x200 ? this.addFlags(a, ~b, 1) : this.addFlags(a, b, 0);
-          break;
-        }
-        case 4: // MOVS
-          r[(op >>> 8) & 7] = op & 0xff;
-          this.N = false;
-          this.Z = (op & 0xff) === 0;
-          break;
-        case 5: // CMP
-          this.addFlags(r[(op >>> 8) & 7], ~(op & 0xff), 1);
-          break;
-        case 6: { // ADDS 8-bit immediate
-          const d = (op >>> 8) & 7;
-          r[d] = this.addFlags(r[d], op & 0xff, 0);
-          break;
-        }
-        case 7: { // SUBS 8-bit immediate
-          const d = (op >>> 8) & 7;
-          r[d] = this.addFlags(r[d], ~(op & 0xff), 1);
-          break;
-        }
-        case 8: {
-          if (op & 0x400) {
-            const kind = (op >>> 8) & 3;
-            const d = (op & 7) | ((op >>> 4) & 8);
-            const s = (op >>> 3) & 15;
-            const value = s === 15 ? pc + 4 : r[s];
-            if (kind === 3 || (d === 15 && kind !== 2)) {
-              this.slow(op);
-              continue;
-            }
-            if (kind === 1) this.addFlags(d === 15 ? pc + 4 : r[d], ~value, 1);
-            else if (d === 15) {
-              r[15] = value & ~1;
-              this.cycles += 2;
-              continue;
-            } else {
-              const result = kind === 2 ? value : r[d] + value;
-              r[d] = d === 13 ? result & ~3 : result;
-            }
+    const pc = r[15];
+    let cycles = 1;
+    switch (op >>> 11) {
+      case 9: { // LDR literal
+        const address = ((pc + 4) & ~3) + ((op & 0xff) << 2);
+        cycles += this.accessCycles(address, false);
+        r[(op >>> 8) & 7] = this.readUint32(address);
+        break;
+      }
+      case 10:
+      case 11: { // register offset
+        const address = (r[(op >>> 3) & 7] + r[(op >>> 6) & 7]) >>> 0;
+        const t = op & 7;
+        const kind = (op >>> 9) & 7;
+        cycles += this.accessCycles(address, kind < 3);
+        switch (kind) {
+          case 0:
+            this.writeUint32(address, r[t]);
             break;
-          }
-          const d = op & 7;
-          const m = r[(op >>> 3) & 7];
-          const a = r[d];
-          switch ((op >>> 6) & 15) {
-            case 0:
-              r[d] = a & m;
-              this.setNZ(a & m);
-              break;
-            case 1:
-              r[d] = a ^ m;
-              this.setNZ(a ^ m);
-              break;
-            case 2: { // LSLS register
-              const shift = m & 0xff;
-              if (shift) this.C = shift > 32 ? false : ((shift === 32 ? a : a >>> (32 - shift)) & 1) === 1;
-              const result = shift > 31 ? 0 : a << shift;
-              r[d] = result;
-              this.setNZ(result | 0);
-              break;
-            }
-            case 3: { // LSRS register
-              const shift = m & 0xff;
-              if (shift) this.C = shift > 32 ? false : ((a >>> (shift - 1)) & 1) === 1;
-              const result = shift > 31 ? 0 : a >>> shift;
-              r[d] = result;
-              this.setNZ(result | 0);
-              break;
-            }
-            case 4: { // ASRS register
-              const shift = Math.min(m & 0xff, 32);
-              if (shift) this.C = ((a >>> Math.min(shift - 1, 31)) & 1) === 1;
-              const result = (a | 0) >> Math.min(shift, 31);
-              r[d] = result;
-              this.setNZ(result);
-              break;
-            }
-            case 5:
-              r[d] = this.addFlags(a, m, this.C ? 1 : 0);
-              break;
-            case 6:
-              r[d] = this.addFlags(a, ~m >>> 0, this.C ? 1 : 0);
-              break;
-            case 7: { // RORS
-              const shift = m & 0xff;
-              const turn = shift & 31;
-              const result = turn ? (a >>> turn) | (a << (32 - turn)) : a | 0;
-              if (shift) this.C = result < 0;
-              r[d] = result;
-              this.setNZ(result);
-              break;
-            }
-            case 8:
-              this.setNZ(a & m);
-              break;
-            case 9:
-              r[d] = this.addFlags(0, ~m, 1);
-              break;
-            case 10:
-              this.addFlags(a, ~m, 1);
-              break;
-            case 11:
-              this.addFlags(a, m, 0);
-              break;
-            case 12:
-              r[d] = a | m;
-              this.setNZ(a | m);
-              break;
-            case 13: {
-              const result = Math.imul(a, m);
-              r[d] = result;
-              this.setNZ(result);
-              break;
-            }
-            case 14:
-              r[d] = a & ~m;
-              this.setNZ(a & ~m);
-              break;
-            default:
-              r[d] = ~m;
-              this.setNZ(~m);
-          }
-          break;
+          case 1:
+            this.writeUint16(address, r[t]);
+            break;
+          case 2:
+            this.writeUint8(address, r[t]);
+            break;
+          case 3:
+            r[t] = (this.readUint8(address) << 24) >> 24;
+            break;
+          case 4:
+            r[t] = this.readUint32(address);
+            break;
+          case 5:
+            r[t] = this.readUint16(address);
+            break;
+          case 6:
+            r[t] = this.readUint8(address);
+            break;
+          default:
+            r[t] = (this.readUint16(address) << 16) >> 16;
         }
-        case 9: { // LDR literal
-          const address = ((pc + 4) & ~3) + ((op & 0xff) << 2);
-          cycles += this.accessCycles(address, false);
-          r[(op >>> 8) & 7] = this.readUint32(address);
-          break;
-        }
-        case 10:
-        case 11: { // register offset
-          const address = (r[(op >>> 3) & 7] + r[(op >>> 6) & 7]) >>> 0;
-          const t = op & 7;
-          const kind = (op >>> 9) & 7;
-          cycles += this.accessCycles(address, kind < 3);
-          switch (kind) {
-            case 0:
-              this.writeUint32(address, r[t]);
-              break;
-            case 1:
-              this.writeUint16(address, r[t]);
-              break;
-            case 2:
-              this.writeUint8(address, r[t]);
-              break;
-            case 3:
-              r[t] = (this.readUint8(address) << 24) >> 24;
-              break;
-            case 4:
-              r[t] = this.readUint32(address);
-              break;
-            case 5:
-              r[t] = this.readUint16(address);
-              break;
-            case 6:
-              r[t] = this.readUint8(address);
-              break;
-            default:
-              r[t] = (this.readUint16(address) << 16) >> 16;
-          }
-          break;
-        }
-        case 12: {
-          const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
-          cycles += this.accessCycles(address, true);
-          this.writeUint32(address, r[op & 7]);
-          break;
-        }
-        case 13: {
-          const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
-          cycles += this.accessCycles(address, false);
-          r[op & 7] = this.readUint32(address);
-          break;
-        }
-        case 14: {
-          const address = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f)) >>> 0;
-          cycles += this.accessCycles(address, true);
-          this.writeUint8(address, r[op & 7]);
-          break;
-        }
-        case 15: {
-          const address = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f)) >>> 0;
-          cycles += this.accessCycles(address, false);
-          r[op & 7] = this.readUint8(address);
-          break;
-        }
-        case 16: {
-          const address = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e)) >>> 0;
-          cycles += this.accessCycles(address, true);
-          this.writeUint16(address, r[op & 7]);
-          break;
-        }
-        case 17: {
-          const address = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e)) >>> 0;
-          cycles += this.accessCycles(address, false);
-          r[op & 7] = this.readUint16(address);
-          break;
-        }
-        case 18: {
-          const address = r[13] + ((op & 0xff) << 2);
-          cycles += this.accessCycles(address, true);
-          this.writeUint32(address, r[(op >>> 8) & 7]);
-          break;
-        }
-        case 19: {
-          const address = r[13] + ((op & 0xff) << 2);
-          cycles += this.accessCycles(address, false);
-          r[(op >>> 8) & 7] = this.readUint32(address);
-          break;
-        }
-        case 20: // ADR
-          r[(op >>> 8) & 7] = ((pc + 4) & ~3) + ((op & 0xff) << 2);
-          break;
-        case 21: // ADD register, sp, immediate
-          r[(op >>> 8) & 7] = r[13] + ((op & 0xff) << 2);
-          break;
-        case 22:
-        case 23: {
-          const kind = (op >>> 8) & 15;
-          if (kind === 0) r[13] += op & 0x80 ? -((op & 0x7f) << 2) : (op & 0x7f) << 2;
-          else if (kind === 2) {
-            const value = r[(op >>> 3) & 7];
-            const which = (op >>> 6) & 3;
-            r[op & 7] = which === 0 ? (value << 16) >> 16 : which === 1 ? (value << 24) >> 24 : which === 2 ? value & 0xffff : value & 0xff;
-          } else if (kind === 4 || kind === 5) { // PUSH
-            const count = bitCount(op & 0x1ff);
-            let address = r[13] - 4 * count;
-            const top = address;
-            for (let i = 0; i < 8; i++) {
-              if (!((op >>> i) & 1)) continue;
-              this.writeUint32(address, r[i]);
-              address += 4;
-            }
-            if (op & 0x100) this.writeUint32(address, r[14]);
-            r[13] = top;
-            cycles += count;
-          } else if (kind === 12) { // POP without pc
-            let address = r[13];
-            for (let i = 0; i < 8; i++) {
-              if (!((op >>> i) & 1)) continue;
-              r[i] = this.readUint32(address);
-              address += 4;
-              cycles += 1;
-            }
-            r[13] = address;
-          } else {
-            this.slow(op);
-            continue;
-          }
-          break;
-        }
-        case 24: { // STMIA
-          const n = (op >>> 8) & 7;
-          let address = r[n];
+        break;
+      }
+      case 12: {
+        const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
+        cycles += this.accessCycles(address, true);
+        this.writeUint32(address, r[op & 7]);
+        break;
+      }
+      case 13: {
+        const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
+        cycles += this.accessCycles(address, false);
+        r[op & 7] = this.readUint32(address);
+        break;
+      }
+      case 14: {
+        const address = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f)) >>> 0;
+        cycles += this.accessCycles(address, true);
+        this.writeUint8(address, r[op & 7]);
+        break;
+      }
+      case 15: {
+        const address = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f)) >>> 0;
+        cycles += this.accessCycles(address, false);
+        r[op & 7] = this.readUint8(address);
+        break;
+      }
+      case 16: {
+        const address = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e)) >>> 0;
+        cycles += this.accessCycles(address, true);
+        this.writeUint16(address, r[op & 7]);
+        break;
+      }
+      case 17: {
+        const address = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e)) >>> 0;
+        cycles += this.accessCycles(address, false);
+        r[op & 7] = this.readUint16(address);
+        break;
+      }
+      case 18: {
+        const address = r[13] + ((op & 0xff) << 2);
+        cycles += this.accessCycles(address, true);
+        this.writeUint32(address, r[(op >>> 8) & 7]);
+        break;
+      }
+      case 19: {
+        const address = r[13] + ((op & 0xff) << 2);
+        cycles += this.accessCycles(address, false);
+        r[(op >>> 8) & 7] = this.readUint32(address);
+        break;
+      }
+      case 22:
+      case 23: {
+        const kind = (op >>> 8) & 15;
+        if (kind === 4 || kind === 5) { // PUSH
+          const count = bitCount(op & 0x1ff);
+          let address = r[13] - 4 * count;
+          const top = address;
           for (let i = 0; i < 8; i++) {
             if (!((op >>> i) & 1)) continue;
             this.writeUint32(address, r[i]);
             address += 4;
-            cycles += 1;
           }
-          r[n] = address;
-          break;
-        }
-        case 25: { // LDMIA
-          const n = (op >>> 8) & 7;
-          let address = r[n];
+          if (op & 0x100) this.writeUint32(address, r[14]);
+          r[13] = top;
+          cycles += count;
+        } else if (kind === 12) { // POP without pc
+          let address = r[13];
           for (let i = 0; i < 8; i++) {
             if (!((op >>> i) & 1)) continue;
             r[i] = this.readUint32(address);
             address += 4;
             cycles += 1;
           }
-          if (!((op >>> n) & 1)) r[n] = address;
-          break;
-        }
-        case 26:
-        case 27: { // B conditional
-          let taken;
-          switch ((op >>> 8) & 15) {
-            case 0:
-              taken = this.Z;
-              break;
-            case 1:
-              taken = !this.Z;
-              break;
-            case 2:
-              taken = this.C;
-              break;
-            case 3:
-              taken = !this.C;
-              break;
-            case 4:
-              taken = this.N;
-              break;
-            case 5:
-              taken = !this.N;
-              break;
-            case 6:
-              taken = this.V;
-              break;
-            case 7:
-              taken = !this.V;
-              break;
-            case 8:
-              taken = this.C && !this.Z;
-              break;
-            case 9:
-              taken = !this.C || this.Z;
-              break;
-            case 10:
-              taken = this.N === this.V;
-              break;
-            case 11:
-              taken = this.N !== this.V;
-              break;
-            case 12:
-              taken = this.N === this.V && !this.Z;
-              break;
-            case 13:
-              taken = this.N !== this.V || this.Z;
-              break;
-            default:
-              this.slow(op);
-              continue;
-          }
-          if (taken) {
-            r[15] = pc + 4 + ((op << 24) >> 23);
-            this.cycles += 2;
-            continue;
-          }
-          break;
-        }
-        case 28: // B
-          r[15] = pc + 4 + ((op << 21) >> 20);
-          this.cycles += 2;
-          continue;
-        case 30: { // BL
-          const low = this.fetch(pc + 2);
-          if ((low & 0xd000) !== 0xd000) {
-            this.slow(op);
-            continue;
-          }
-          const sign = (op << 21) >> 31;
-          const i1 = ~((low >>> 13) ^ sign) & 1;
-          const i2 = ~((low >>> 11) ^ sign) & 1;
-          r[14] = (pc + 4) | 1;
-          r[15] = pc + 4 + ((sign << 24) | (i1 << 23) | (i2 << 22) | ((op & 0x3ff) << 12) | ((low & 0x7ff) << 1));
-          this.cycles += 3;
-          continue;
-        }
-        default:
+          r[13] = address;
+        } else {
           this.slow(op);
-          continue;
+          return;
+        }
+        break;
       }
-      r[15] = pc + 2;
-      this.cycles += cycles;
+      case 24: { // STMIA
+        const n = (op >>> 8) & 7;
+        let address = r[n];
+        for (let i = 0; i < 8; i++) {
+          if (!((op >>> i) & 1)) continue;
+          this.writeUint32(address, r[i]);
+          address += 4;
+          cycles += 1;
+        }
+        r[n] = address;
+        break;
+      }
+      case 25: { // LDMIA
+        const n = (op >>> 8) & 7;
+        let address = r[n];
+        for (let i = 0; i < 8; i++) {
+          if (!((op >>> i) & 1)) continue;
+          r[i] = this.readUint32(address);
+          address += 4;
+          cycles += 1;
+        }
+        if (!((op >>> n) & 1)) r[n] = address;
+        break;
+      }
+      default:
+        this.slow(op);
+        return;
     }
+    r[15] = pc + 2;
+    this.cycles += cycles;
   }
 
   /** One instruction by rp2040js, whose SEV does nothing. */
@@ -609,12 +361,6 @@ export class StrictCore extends CortexM0Core {
     else if (op === SEV) this.chip.sendEvent();
     else if (op === WFE || op === WFI) this.waitsForEvent = op === WFE;
   }
-}
-
-function bitCount(bits) {
-  let count = 0;
-  for (let b = bits; b; b &= b - 1) count += 1;
-  return count;
 }
 
 const NEVER = Object.freeze({ earliestChanged: false });

@@ -145,21 +145,22 @@ export class SecondCore {
     const { core, chip } = this;
     const { time } = chip;
     const now_ns = time.nanos;
-    const cycles = Math.floor((now_ns - this.at_ns) / time.ns_per_cycle + 1e-6);
-    if (core.waiting) core.checkForInterrupts();
-    if (core.waiting || cycles < 1) {
-      if (core.waiting) this.at_ns = now_ns;
+    if (core.waiting && !core.checkForInterrupts()) {
+      this.at_ns = now_ns;
       return;
     }
+    const cycles = Math.floor((now_ns - this.at_ns) / time.ns_per_cycle + 1e-6);
+    if (cycles < 1) return;
     const before = core.cycles;
-    chip.execute(core, () => {
-      try {
-        core.execute(before + cycles, TO_ITS_END);
-      } catch (error) {
-        if (!(error instanceof MemoryFault)) throw error;
-        core.hardFault();
-      }
-    });
+    chip.takeTurn(core);
+    try {
+      core.execute(before + cycles, TO_ITS_END);
+    } catch (error) {
+      if (!(error instanceof MemoryFault)) throw error;
+      core.hardFault();
+    } finally {
+      chip.takeTurn(chip.core0);
+    }
     this.at_ns = core.waiting ? now_ns : this.at_ns + (core.cycles - before) * time.ns_per_cycle;
   }
 }
