@@ -162,12 +162,18 @@ static bool without_edges(const struct tangential_settings *settings,
 
 #define NOINLINE __attribute__((noinline)) /* saves flash; cycles hardly count here */
 
-NOINLINE static struct scaled sum_of(struct scaled a, struct scaled b) {
-  return short_of(scaled_add(a, b));
+/* Packed, so that arguments and result go in registers. */
+NOINLINE static uint64_t packed_sum(uint64_t a, uint64_t b) {
+  return scaled_pack(short_of(scaled_add(scaled_unpack(a), scaled_unpack(b))));
 }
-
-NOINLINE static struct scaled quotient_of(struct scaled a, struct scaled b) {
-  return scaled_div(short_of(a), short_of(b));
+NOINLINE static uint64_t packed_quotient(uint64_t a, uint64_t b) {
+  return scaled_pack(scaled_div(short_of(scaled_unpack(a)), short_of(scaled_unpack(b))));
+}
+FIXED_INLINE struct scaled sum_of(struct scaled a, struct scaled b) {
+  return scaled_unpack(packed_sum(scaled_pack(a), scaled_pack(b)));
+}
+FIXED_INLINE struct scaled quotient_of(struct scaled a, struct scaled b) {
+  return scaled_unpack(packed_quotient(scaled_pack(a), scaled_pack(b)));
 }
 
 /* (a^2 + b^2) / 2^(2 q) */

@@ -90,7 +90,7 @@ TEST(Command, CarriesItsValue) {
 TEST(Command, BytesOnTheLine) {
   // COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand.
   EXPECT_EQ(hex(frame_bytes(command_tare())), "0309810101010101010101010105e56f837300");
-  EXPECT_EQ(hex(frame_bytes(command_erase_pad())), "03098e01010101010101010567e2ebc300");
+  EXPECT_EQ(hex(frame_bytes(command_erase_pad())), "03098e0101010101010101010567e2ebc300");
   wire_packet timed = command_osr(8192);
   timed.sequence = 258;
   timed.t_us = 1;
