@@ -156,9 +156,9 @@ class PicoParallel(unittest.TestCase):
             self.assert_nothing_is_wrong_and_unflagged(run)
 
     def test_temperatures_that_are_wrong_are_not_used(self):
-        plan = [{"type": "sensor_d2_corrupt", "sensor": 3, "from_s": 1.0, "to_s": 5.0}]
+        plan = [{"type": "sensor_d2_corrupt", "sensor": sensor, "from_s": 1.0, "to_s": 5.0} for sensor in (3, 8, 12)]
         run = Run(self.folder.name, "temperatures", self.truth, 7.0, 256, plan)
-        self.assertGreater(run.doubtful[run.between(1.6, 5.0)].mean(), 0.02)  # one is some 0.1 s of 3.4 s; nine bits of 24 make more than 1 degC
+        self.assertGreater(run.doubtful[run.between(1.6, 5.0)].mean(), 0.02)  # one is some 0.1 s of 3.4 s; nine bits of 24 make more than 1 degC, of a sensor alone at times in none
         self.assertFalse(run.doubtful[run.between(0.5, 1.0) | run.between(6.0, 7.0)].any())
         self.assertGreater((run.valid[run.between(1.0, 7.0)] == ALL).mean(), 0.98)
         good = ~run.doubtful

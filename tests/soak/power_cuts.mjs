@@ -32,10 +32,10 @@ const OFF_MS = 3;
 /** Before the first step of a write and behind its last. */
 const MARGIN_NS = 0.3e6;
 const PAUSE_NS = 2e6;
-const SETTLED_MS = 130;
+const SETTLED_MS = 200;
 const START_LIMIT_MS = 1000;
 /** More than the answers. */
-const STREAMS_BYTES = 450;
+const STREAMS_BYTES = 600;
 const KINDS = ['write', 'erase', 'mend', 'start', 'reset'];
 
 class Cutter {
@@ -147,7 +147,11 @@ class Cutter {
         begun += what === 'begins' ? 1 : 0;
       };
       machine.client.write(this.update[NEW]);
-      while (begun < 4) this.run(machine, 0.1);
+      const end_ns = machine.time.nanos + START_LIMIT_MS * 1e6;
+      while (begun < 4) {
+        if (machine.time.nanos > end_ns) throw new Error('the update is not written');
+        this.run(machine, 0.1);
+      }
       this.run(machine, 0.3);
       machine.memory.cutPower();
       const torn = this.keep(machine);
