@@ -1,5 +1,6 @@
 #include "grasp/settings.hpp"
 
+#include "grasp/control/reach.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
 
@@ -17,9 +18,6 @@ constexpr const char *FIXED = "fixed";
 // A breaking force as shares of itself: no closer, for pads differ and forces are known to a tenth.
 constexpr double CAP = 0.8, START = 0.33, FLOOR = 0.25;
 constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
-
-// Force of the stiffest contact that is expected, at 1 mm of indentation, and its power.
-constexpr double STIFF_N = 5.0, STIFF_POWER = 1.4;
 
 [[noreturn]] void impossible(const std::string &text) {
   throw Error(ErrorCode::bad_value, text);
@@ -145,7 +143,7 @@ GripSettings settings_for(const GripperTraits &traits,
   const double least_mm =
       traits.step_mm *
       std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
-  const double step_N = STIFF_N * std::pow(0.5 * least_mm, STIFF_POWER);
+  const double step_N = GripBound::first_N(least_mm);
   if (step_N > cap_N) {
     impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) +
                " mm, may press with " + fixed(step_N, 1) + " N, and the cap is " +

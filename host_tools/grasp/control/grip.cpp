@@ -138,7 +138,7 @@ void Grip::ramp(double to_mm, double speed_mm_s) {
 
 void Grip::approach() {
   if (reach_.goes_round()) {
-    if (reach_.comes_round(now_s_, felt_.t_s)) {
+    if (felt_.fingers > 0 && reach_.comes_round(now_s_, felt_.t_s)) {
       enter(GRIP_SQUEEZE);
     }
     return;
@@ -196,6 +196,7 @@ std::uint32_t Grip::squeeze() {
   const bool nearest = !fixed && felt_.fingers > 0 && reach_.has_come(now_s_, felt_.t_s);
   const bool there = (felt_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, felt_.t_s);
+  // A step further than its least moves bring it, where that is far too little.
   if (nearest && (capped || there) && felt_.low_N < SQUEEZED * aimed_N &&
       reach_.may_go_round(felt_, settings_, now_s_)) {
     reach_.go_round(now_s_);

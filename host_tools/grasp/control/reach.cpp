@@ -10,15 +10,14 @@ namespace {
 
 // Layers of 12 mm under spheres of 6 to 30 mm, 1 to 10 N (host_tools/simulation/twin).
 constexpr double EXPONENT = 1.6;
-// Where a cap is to hold: than what the moves have shown; than the mean rubber, where one fingertip
-// presses alone, whose rubber the moves of both do not teach.
-constexpr double STIFFER = 1.2, ALONE_STIFFER = 1.6;
-constexpr double RELAXED = 1.1; // an elastic force over what is left of it
+constexpr double STIFFER = 1.2; // than what the moves have shown, where a cap is to hold
+// An elastic force over what relaxation has left of it: a move adds to the elastic one.
+constexpr double RELAXED = 1.1;
 // Both pads, at the force of a touch; less is not told from nothing.
 constexpr double TOUCHED_mm = 0.3;
 constexpr double LEAST_N = 0.05;
 // What is learnt: from moves that make so much, by so large a share, within these limits.
-constexpr double TEACHES = 0.1; // and of the bound by such a share of the force
+constexpr double TEACHES = 0.1; // of the force: the bound learns from no less
 constexpr double TEACHES_N = 0.15, LEARNS = 0.5, LEAST_STEEP = 0.4, MOST_STEEP = 3.0;
 
 constexpr double SPACED_s = 0.003;     // widths of the ring
@@ -48,9 +47,8 @@ double way_to_mm(double force_N, double at_1_mm_N, double exponent) {
   return std::pow(force_N / at_1_mm_N, 1.0 / exponent);
 }
 
-// Its force at 1 mm, where this way made one force of the other.
+// Its force at 1 mm, if this way turned one force into the other.
 double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double exponent) {
-  // Ways of all such laws have one ratio.
   const double unit_mm = way_to_mm(to_N, 1.0, exponent) - way_to_mm(from_N, 1.0, exponent);
   return std::pow(unit_mm / way_mm, exponent);
 }
@@ -95,17 +93,15 @@ void GripRubber::learn(double force_N, double width_mm) {
   pair_mm_ = width_mm;
 }
 
-void GripBound::begin(double width_mm) {
-  *this = GripBound();
-  first_mm_ = width_mm;
+double GripBound::first_N(double way_mm) {
+  double most_N = 0.0;
+  for (const double exponent : EXPONENTS) {
+    most_N = std::max(most_N, EXPECTED_N * std::pow(0.5 * way_mm, exponent));
+  }
+  return most_N;
 }
 
-double GripBound::width_below(double cap_N, double force_N, double from_mm, bool alone) const {
-  if (alone) {
-    const double share = (cap_N - force_N) / std::max(force_N, LEAST_N) / ALONE_STIFFER;
-    const double grown = std::pow(std::max(1.0 + share, 0.0), 1.0 / EXPONENT);
-    return from_mm - (grown - 1.0) * indentation_mm(from_mm, first_mm_);
-  }
+double GripBound::width_below(double cap_N, double force_N, double from_mm) const {
   double room_mm = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < EXPONENTS.size(); i++) {
     const double elastic_N = RELAXED * force_N;
@@ -188,7 +184,7 @@ bool GripReach::rests(double now_s, double frame_s) const {
 
 void GripReach::first_touch(double t_s) {
   rubber_.begin(width_at(t_s));
-  bound_.begin(width_at(t_s));
+  bound_ = GripBound();
 }
 
 // Where it is going to be. Where it stands, it makes no move that is shorter than its deadband.
@@ -215,8 +211,7 @@ double GripReach::coming_N(const GripFelts &felt, double now_s) const {
 }
 
 double GripReach::last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const {
-  const double least_mm =
-      bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s), felt.is_alone());
+  const double least_mm = bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
   const double steps = std::floor((target_mm_ - least_mm) / traits_.step_mm);
   return target_mm_ - std::max(steps, 0.0) * traits_.step_mm;
 }
@@ -238,8 +233,8 @@ double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSett
 
 bool GripReach::may_go_round(const GripFelts &felt, const GripSettings &settings,
                              double now_s) const {
-  const double room_mm = coming_mm(now_s) - bound_.width_below(settings.cap_N, most_N(felt),
-                                                               width_at(felt.t_s), false);
+  const double room_mm =
+      coming_mm(now_s) - bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
   return !limits_itself(settings) && least_mm() > traits_.step_mm && !felt.is_alone() &&
          !felt.over && room_mm > traits_.step_mm;
 }
@@ -279,6 +274,8 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
   if (come) {
     rubber_.learn(felt.grip_N, width_mm);
   }
+  // A gripper that limits itself does not wait until a move has ended: the bound is not all that
+  // keeps it below the cap.
   if (limits_itself(settings) ? come : rested) {
     felt.low_N > settings.touch_N && !felt.is_alone() ? bound_.learn(felt.grip_N, width_mm)
                                                       : bound_.forget_pair();
@@ -306,8 +303,7 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
     way_mm = haste == Haste::patient ? std::min(way_mm, step_mm * std::floor(SHORT_mm / step_mm))
                                      : way_mm;
     way_mm = std::max(way_mm, least);
-    const double room_mm =
-        coming - bound_.width_below(settings.cap_N, most_N(felt), width_mm, felt.is_alone());
+    const double room_mm = coming - bound_.width_below(settings.cap_N, most_N(felt), width_mm);
     if (way_mm > room_mm) {
       // What is held too weakly gets a short move all the same, if the gripper's own limit keeps it
       // below the cap.

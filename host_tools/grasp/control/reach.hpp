@@ -24,7 +24,6 @@ public:
   double width_for(double wanted_N, double force_N, double from_mm) const;
   // A pair of force and width, both at rest.
   void learn(double force_N, double width_mm);
-  void forget_pair() { has_pair_ = false; }
 
 private:
   double both_mm_ = 0.0;
@@ -37,20 +36,23 @@ private:
 // touch has to be known for it: of two power laws, a flat and a steep one, the stiffer counts.
 class GripBound {
 public:
-  // Force of one pad at 1 mm of indentation, before a move of both has shown it: of 12 mm of rubber
-  // under what rounds it least, and a fifth between two pads.
+  // Force of one pad at 1 mm of indentation before a move of both has shown it: round objects on
+  // 12 mm of rubber make 2 to 5 N, and one pad of two may be a tenth stiffer.
   static constexpr double EXPECTED_N = 5.5;
   static constexpr std::array<double, 2> EXPONENTS = {1.3, 1.9};
 
-  void begin(double width_mm); // one fingertip touches
-  // The least width at which a fingertip stays below the cap. alone: the other does not touch.
-  double width_below(double cap_N, double force_N, double from_mm, bool alone) const;
-  // Force and width at rest, both fingertips touch.
+  // The most that a first move makes of both pads from where they touch.
+  static double first_N(double way_mm);
+
+  // The least width at which a fingertip stays below the cap, whether or not the other touches: a
+  // pad takes half of the way, or less where the object gives.
+  double width_below(double cap_N, double force_N, double from_mm) const;
+  // Force and width at rest, while both fingertips touch. A move that begins before they do shows a
+  // contact softer than it is.
   void learn(double force_N, double width_mm);
   void forget_pair() { pair_N_ = 0.0; }
 
 private:
-  double first_mm_ = 0.0;
   std::array<double, 2> at_1_mm_N_ = {EXPECTED_N, EXPECTED_N};
   double pair_N_ = 0.0, pair_mm_ = 0.0; // 0: none
 };
@@ -107,9 +109,9 @@ public:
   std::uint32_t aim(double wanted_N, Haste haste, const GripFelts &felt,
                     const GripSettings &settings, double now_s);
 
-  // Going round: a single step where the least move has several, back by the least move and on to
-  // there. Only with nothing lifted. May: only the fingertips keep the cap, and it has room for
-  // that.
+  // Going round: a gripper whose least move is several steps gets one step further by two moves,
+  // back by the least one and then on by that and a step. Only before anything is lifted.
+  // may_go_round: only the fingertips keep the cap, and it has room for the step.
   bool may_go_round(const GripFelts &felt, const GripSettings &settings, double now_s) const;
   void go_round(double now_s);
   bool goes_round() const { return goes_round_; }

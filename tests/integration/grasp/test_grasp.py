@@ -194,8 +194,11 @@ class Course(GraspTest):
         with self.cell():
             process = self.start("-o", self.csv, "--open-width", "45")
             self.until_state(process, "holding")
+            self.world.sleep(0.137)  # anywhere between two of its lines
+            asked_s = self.world.now_s
             process.send_signal(signal.SIGINT)
             lines = self.told(process, "Ctrl-C: the width stays; again: opens slowly")
+            self.assertLessEqual(self.world.now_s - asked_s, 0.1)
             self.assertIn(" s  still ", lines[-1])  # with the first line that tells of it
             width = self.steady()[0]
             self.tell("load 5")

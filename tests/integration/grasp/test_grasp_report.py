@@ -14,7 +14,7 @@ options = dict(zip(sys.argv[1::2], sys.argv[2::2]))
 still = options.get("--mode", "").startswith("still")
 row = {"gripper": options["--gripper"], "grasps": int(options.get("--count", 1)), "peak_p95_N": 15.0}
 if still:
-    row |= {"settle_p50_s": 0.4, "settle_p95_s": 1.0, "never_settled_percent": 0.0, "rms_p50_percent": 1.0, "limit_cycles": 1}
+    row |= {"settle_p50_s": 1.4 if options["--gripper"] == "sts3215" else 0.4, "settle_p95_s": 1.0, "never_settled_percent": 0.0, "rms_p50_percent": 1.0, "limit_cycles": 1}
 else:
     row |= {"drops_percent": 4.0 if options.get("--effect") == "0" else 0.5, "margin_p50": 2.0, "margin_p5": 1.2, "margin_p95": 3.0, "force_told_p50": 1.0, "force_taken_p50": 0.95, "slips": 2, "unanswered": 1,
             "reaction_p50_ms": 30.0, "reaction_p95_ms": None, "disturbance_slip_p95_mm": 1.0}
