@@ -12,7 +12,7 @@ import unittest
 # (key, least, most): what a full run finds, with room for a fortieth of its pads.
 LIMITS = (
     ("ratio_error_p50", 0.005, 0.014), ("ratio_error_p95", 0.02, 0.05), ("vector_error_p50", 0.01, 0.023), ("vector_error_p95", 0.03, 0.065),
-    ("direction_p90_deg", 3, 7), ("location_loaded_median_mm", 0.05, 0.1), ("location_loaded_without_mm", 0.95, 1.1), ("location_price_mm", -0.09, -0.02),
+    ("direction_p90_deg", 3, 7.5), ("location_loaded_median_mm", 0.05, 0.1), ("location_loaded_without_mm", 0.95, 1.1), ("location_price_mm", -0.09, -0.02),
     ("equal_ratio_error_p50", 0.005, 0.011), ("equal_vector_error_p50", 0.01, 0.018), ("equal_location_loaded_mm", 0.04, 0.075), ("valid_percent", 91, 100),
     ("q_cover_1sd", 65, 92), ("q_cover_2sd", 96, 100), ("location_cover_1sd", 60, 88), ("location_cover_2sd", 92, 100), ("force_p50_percent", 0.1, 0.6),
     ("force_without_p50_percent", 1, 2.2), ("screw_ratio", 0.005, 0.02), ("screw_change_p95", 0.001, 0.012), ("increment_error_p50_13mm", 0.03, 0.06),
@@ -20,7 +20,7 @@ LIMITS = (
     ("increment_error_p50_own_tables_9mm", 0.01, 0.03), ("elongated_false_unflagged_percent", 0, 2), ("elongated_false_percent", 0, 2), ("raw_beyond_2sd_percent", 0, 10),
     ("learned_ratio_error_p50", 0.005, 0.02), ("learned_ratio_error_p95", 0.02, 0.06), ("learned_valid_percent", 88, 100), ("told_wrong_said_percent", 90, 100),
     ("told_right_said_percent", 0, 5))
-PADS = ("--pads", "40")
+PADS = ("--pads", "40", "--few")  # the objects on each other thickness take seconds to solve
 
 
 def run(*options):
@@ -73,14 +73,14 @@ class ShearStatic(unittest.TestCase):
         zero = {row["overhang_mm"]: row["zero_error_p50"] for row in self.found["by_overhang"] if (row["told"], row["place"]) == ("thickness", "anywhere")}
         self.assertEqual([zero[mm] for mm in sorted(zero, reverse=True)], sorted(zero.values()))
         told = self.rows("by_thickness", "case")
-        self.assertLess(told["15 mm, told 15 mm, Q/F 0"]["vector_error_p50"], 0.6 * told["15 mm, told 16.5 mm, Q/F 0"]["vector_error_p50"])
+        self.assertLess(told["12 mm, told 12 mm, Q/F 0"]["vector_error_p50"], 0.6 * told["12 mm, told 13.2 mm, Q/F 0"]["vector_error_p50"])
         rubber = self.rows("by_rubber", "case")
         at = "{}, 10 s after the load"
         self.assertLess(rubber[at.format("none")]["vector_error_p50"], 0.5 * rubber[at.format("relaxation, calibrated")]["vector_error_p50"])
         self.assertLess(rubber[at.format("relaxation, calibrated")]["vector_error_p50"], rubber[at.format("relaxation")]["vector_error_p50"])
 
     def test_the_same_seed_gives_the_same_and_another_another(self):
-        texts = [run("--pads", "4", "--seed", seed).stdout for seed in ("3", "3", "4")]
+        texts = [run("--pads", "4", "--few", "--seed", seed).stdout for seed in ("3", "3", "4")]
         self.assertEqual(texts[0], texts[1])
         self.assertNotEqual(texts[0], texts[2])
 

@@ -171,8 +171,8 @@ class Guest:
         self.process = subprocess.Popen(
             [QEMU, "-M", "pc", "-accel", "tcg", "-m", "256", "-display", "none", "-monitor", "none", "-no-reboot",
              "-nic", "none", "-kernel", kernel / "vmlinux", "-initrd", initramfs,
-             # The last three: a machine that is given no time for a second or two is not ill.
-             "-append", "console=ttyS0 quiet panic=-1 mitigations=off nokaslr "
+             # From no_timer_check on: a machine that is given no time for a second or two is not ill.
+             "-append", "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check "
                         "tsc=nowatchdog nowatchdog rcupdate.rcu_cpu_stall_suppress=1",
              "-serial", f"file:{self.folder / 'console.log'}", "-serial", f"unix:{port},server=off",
              "-device", "qemu-xhci",

@@ -46,14 +46,14 @@ PACKETS = 4000
 SHARED_PACKETS = 1000  # of the two streams
 STREAM_s = 12  # 2 packets for each of 207 frames a second, and what the two streams do not share
 PARALLEL_STREAM_s = 2
-PAIR_s, PAIR_RATE_Hz = 4, 50
+PAIR_s, PAIR_RATE_Hz = 2, 50
 STALL_LIMIT_s = 1.0
 # Kernel and device hold 70 KiB for a reader, less than 2 s of the stream.
 UNREAD_s, READ_AFTERWARDS_bytes = 5, 100_000
 ECHOED_s = 4
 BEAT_s = 0.02
-SERIAL_CYCLES = 6
-LIBUSB_CYCLES = 4
+SERIAL_CYCLES = 3
+LIBUSB_CYCLES = 2
 # Seconds on the wall until something hangs.
 PATIENCE_s = 300
 STREAM_LIMIT_s = 600

@@ -13,6 +13,7 @@ namespace fingertip::shear {
 struct Options {
   std::string cache = FINGERTIP_TABLES_DIR, only;
   std::uint64_t seed = 20221015, pads = 1500;
+  bool few = false; // thicknesses: LAYER_mm alone
 };
 
 constexpr double LAYER_mm = 12.0, FRICTION = 0.5, SHARE = 0.3;

@@ -19,12 +19,13 @@ using namespace fingertip;
 using namespace fingertip::shear;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--only TABLE] [--cache DIR]\n"
+constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--only TABLE] [--few] [--cache DIR]\n"
                         "  --seed S     of pads and touches, 20221015 by default\n"
                         "  --pads N     pads of each case, 1500 by default; a fifth for some\n"
                         "  --only pads  only by pad and load, and by place\n"
                         "  --only cast  only pads like those that are cast\n"
                         "  --only objects  only by object\n"
+                        "  --few        no pads of other thicknesses than 12 mm\n"
                         "  --cache DIR  folder of the contact tables\n";
 
 ordered_json measure(const Options &options) {
@@ -58,6 +59,7 @@ int main(int argc, char **argv) {
                                 {{"--cache", &options.cache},
                                  {"--only", &options.only},
                                  {"--seed", nullptr, &options.seed},
-                                 {"--pads", nullptr, &options.pads}},
+                                 {"--pads", nullptr, &options.pads},
+                                 {"--few", nullptr, nullptr, &options.few}},
                                 HELP, [&] { return measure(options); });
 }

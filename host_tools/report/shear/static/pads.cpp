@@ -135,7 +135,10 @@ void judge_pads(Bench &bench, ordered_json &out) {
 }
 
 void judge_thickness(Bench &bench, ordered_json &out) {
-  for (const double layer_mm : {5.0, 6.0, 9.0, 12.0, 15.0, 20.0}) {
+  const std::vector<double> layers_mm =
+      bench.options.few ? std::vector<double>{LAYER_mm}
+                        : std::vector<double>{5.0, 6.0, 9.0, LAYER_mm, 15.0, 20.0};
+  for (const double layer_mm : layers_mm) {
     const PadOf pads = bench.calibrated_on(layer_mm);
     for (const double told : {1.0, 1.1, 0.9}) {
       const double told_mm = told * layer_mm;
