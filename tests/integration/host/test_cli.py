@@ -323,7 +323,7 @@ class ErrorsPeopleMeet(CliTest):
                              f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n")
 
     def test_older_or_newer_protocol_version(self):
-        for version in (1, 7, 9):
+        for version in (1, 8, 10):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),
