@@ -10,8 +10,9 @@
 
 /* Ages of the frames that make a pair, and by how much what the load explains may be wrong over it.
  * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it feels
- * the lift that came before, for as long as it reaches back. The brisk one does not. Of 312 lifts with a dead travel of 2 mm (seed 211)
- * half of what BRIEF leaves unexplained, or two thirds of FLOOR_um, let one to two pass for slides.
+ * the lift that came before, for as long as it reaches back. The brisk one does not. Of 312 lifts
+ * with a dead travel of 2 mm (seed 211) half of what BRIEF leaves unexplained, or two thirds of
+ * FLOOR_um, let one to two pass for slides.
  */
 struct pair_spans {
   uint32_t latest_us, gap_end_us, begin_us;

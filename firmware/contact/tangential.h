@@ -45,7 +45,9 @@ struct tangential_history {
   float zero_x, zero_y; /* Q / F */
 };
 
-/* All zeros unless TANGENTIAL_VALID. */
+/* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as
+ * estimated and of one that nothing pulls, each by how likely it is: a small load may be none, and
+ * chance loads would move it. location_sd_mm has what lies between the two. */
 struct tangential_load {
   float x_mm, y_mm, location_sd_mm;
   float force_N, force_sd_N;

@@ -417,7 +417,8 @@ static void take_own_out(const struct fit_own *own, const struct parameters *at,
     float wider = (1.0f / 32768.0f) * (float)one->wider_q15;
     float along_x = wider * x - (1.0f / 32768.0f) * (float)one->off_x_q15;
     float along_y = wider * y - (1.0f / 32768.0f) * (float)one->off_y_q15;
-    float share = clamp(inverse * (along_x * x + along_y * y), -FIT_OWN_SHARE_MAX, FIT_OWN_SHARE_MAX);
+    float share = inverse * (along_x * x + along_y * y);
+    share = clamp(share, -FIT_OWN_SHARE_MAX, FIT_OWN_SHARE_MAX);
     float e = fit_exp2_negative((x * x + y * y) * (0.5f * LOG2_E * inverse));
     samples->p[k] -= at->p0 * e * share;
   }
@@ -491,7 +492,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   }
   int left = settings->iterations;
   do {
-    if (settings->own && left == FIT_OWN_ITERATIONS && left < settings->iterations) {
+    if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
       take_own_out(settings->own, &theta, &samples);
     }
     squares = linearise(array, &samples, prior, &dip, &theta, &normal);

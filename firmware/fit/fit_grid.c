@@ -661,7 +661,9 @@ static NOINLINE void take_out(const struct fit_array *array, const int32_t *pres
   if (dip) {
     fit_grid_take_dip_out(array, pressure_Pa_q10, state, system->amplitude_q28, rise_q22, readings);
   }
-  if (settings->own && (left == FIT_OWN_ITERATIONS || (dip && left < FIT_OWN_ITERATIONS))) {
+  /* In place, but the dip's readings are new each time. */
+  if (fit_has_own(settings) &&
+      (dip ? left <= FIT_OWN_ITERATIONS : left == FIT_OWN_ITERATIONS)) {
     const int32_t peak_q28 =
         fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
     fit_grid_take_own_out(array, settings, UINT32_MAX, state, peak_q28, readings);
@@ -685,7 +687,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   int left = settings->iterations;
   int coarse = left - COARSE_ITERATIONS;
   do {
-    if (left < settings->iterations && (readings.dip_share.mantissa != 0 || settings->own)) {
+    if (left < settings->iterations && (readings.dip_share.mantissa != 0 || fit_has_own(settings))) {
       take_out(array, pressure_Pa_q10, settings, &state, &m, &system, left, &readings);
     }
     system.at = state;

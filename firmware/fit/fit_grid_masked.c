@@ -723,7 +723,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
   int left = settings->iterations;
   do {
     bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
-    if (settings->own && left == FIT_OWN_ITERATIONS && left < settings->iterations) {
+    if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
       const int32_t peak_q28 =
           fit_grid_peak(system.amplitude_q28, system.rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
       fit_grid_take_own_out(array, settings, usable, &state, peak_q28, &readings);

@@ -108,6 +108,12 @@ static inline bool fit_has_dip(const struct fit_settings *settings) {
          bytes_from_f32(settings->dip_share) - 1u < bytes_from_f32(FIT_DIP_SHARE_MAX);
 }
 
+/* With so few iterations that the contact is not known before the last of them, the readings stay.
+ */
+static inline bool fit_has_own(const struct fit_settings *settings) {
+  return settings->own && settings->iterations > FIT_OWN_ITERATIONS;
+}
+
 /* Where sensors are far apart for the width, those beside the contact feel little but the dip. Then
  * it belongs into the derivatives; elsewhere it is enough to add it to the readings. */
 static inline bool fit_steps_want_dip(const struct fit_array *array,

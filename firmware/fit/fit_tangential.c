@@ -941,7 +941,8 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
  * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
 static struct scaled variance_of(const struct fit_tangential_room *room,
-                                 const struct outcome *outcome, int u, int pull, int32_t *with_pull_q8) {
+                                 const struct outcome *outcome, int u, int pull,
+                                 int32_t *with_pull_q8) {
   const struct solution *solution = &outcome->solution;
   int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
   int32_t sum_q11 = 0;

@@ -38,7 +38,7 @@ of each kind are in `host_tools/simulation/cell/kinds.cpp`. Only SLIDING is comp
 Dropped: slid by 22 mm in all, or never held. Need: what just holds by static friction. A catch: a slide of 0.3 mm or more that ended, with a need of 1.5 N
 or more. Hunting: the commanded width turns by 0.05 mm or more, half a time a second or more often, in the 4 s after the last disturbance. Over the cap: a true
 force of either pad. First grip over 2x: the mean force before the lift over twice the start force. An egg breaks at 25 N, a strawberry at 5 N, a cup at
-3 N; each is held with its preset. What the tool refuses before it moves (a crisp of 1.5 N in a 2F-85) is in no row. The oracle is told the true load, friction and stiffness, and has the same frames, gripper and least move: a bar that it
+3 N; each is held with its preset. What the tool refuses before it moves (a crisp of 1.5 N in a 2F-85) is in no row. The oracle knows the true load, friction and stiffness, and has the same frames, gripper and least move: a bar that it
 meets is one that the gripper allows."""
 COLUMNS = {"row": "kinds", "gripper": "gripper", "controller": "controller", "grasps": "grasps", "drops_percent": "dropped, %", "margin_p50": "margin: p50",
            "margin_p95": "p95", "catches": "catches", "peak_over_need_p50": "peak over need: p50", "peak_over_need_p95": "p95 ", "slid_p50_mm": "slid, mm: p50",

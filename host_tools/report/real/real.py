@@ -74,9 +74,11 @@ def judge_grid(program, one, path):
     solved = [one for one in calibrations if one["solved"]]
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
     fits = grids.ask(program, grid, [
-        job for one in solved for job in (grids.stored_job(readings, one["stored"]), grids.stored_job(torn, one["stored"]))])
-    felt = [grids.Felt(answer, xy) for answer in fits[0::2]]
-    missing = [grids.Felt(answer, torn_xy) for answer in fits[1::2]]
+        job for one in solved for job in (
+            grids.stored_job(readings, one["stored"]), grids.stored_job(torn, one["stored"]), grids.stored_job(readings, {**one["stored"], "own": []}))])
+    felt = [grids.Felt(answer, xy) for answer in fits[0::3]]
+    missing = [grids.Felt(answer, torn_xy) for answer in fits[1::3]]
+    by_gains = [grids.Felt(answer, xy) for answer in fits[2::3]]
     raw_felt, shipped_felt = grids.Felt(raw, xy), grids.Felt(shipped, xy)
     all_inside, all_outside = np.tile(inside, len(felt)), np.tile(outside, len(felt))
     before = float(np.median(raw_felt.error_mm[inside]))
@@ -91,6 +93,7 @@ def judge_grid(program, one, path):
     if felt:
         found["calibrated"] = grids.Felt.joined(felt).figures(all_inside, all_outside)
         found["calibrated"]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt]))
+        found["by_gains_inside_p50_mm"] = grids.quantile(np.concatenate([each.error_mm[inside] for each in by_gains]), 0.5)
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
     shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None,
              "to_pace": [(program, grid, readings[inside], xy[inside], one["stored"]) for one in accepted]}
@@ -118,6 +121,7 @@ def judge_grids(program, source, here):
     for name in ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "silent_percent", "warned_percent", "cover_1sd_percent", "outside_p50_mm",
                  "force_scatter_percent"):
         figures[f"cal_{name}"] = mean_of(rows, "calibrated", name)
+    figures["cal_by_gains_inside_p50_mm"] = mean_of(rows, "by_gains_inside_p50_mm")  # without the sensors' own places and widths
     figures["cal_cover_1sd_most_percent"] = figures["cal_cover_1sd_percent"]
     figures["sessions_accepted_percent"] = 100 * sum(row["accepted"] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
     figures["worse_after_accept"] = sum(row["worse_after_accept"] for row in rows) if rows else None

@@ -203,7 +203,10 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
 }
 
 Shape GainSession::shape() const {
-  Shape shape = has_profile_ ? Shape{} : shape_of(judgement_.solution);
+  Shape shape = shape_of(judgement_.solution);
+  if (has_profile_) { // the firmware's Gaussian then has nothing of it but the sensors' own
+    shape = {0.0, 0.0, 0.0, 0.0, std::move(shape.own)};
+  }
   if (prior_.sigma_sd_mm > 0.0) {
     shape.sigma_mm = prior_.sigma_mm;
     shape.sigma_sd_mm = prior_.sigma_sd_mm;

@@ -43,7 +43,7 @@ public:
   std::string progress() const;
 
   /* A pad's profile will act beside the calibration, though the info packet had none. The fit is
-   * then given no shape, so the force's scale is that of a Gaussian without a dip. */
+   * then given the sensors' own alone, so the force's scale is that of a Gaussian without a dip. */
   void expect_profile() { has_profile_ = true; }
   /* The calibration for the fingertip; date_s: Unix time. Of a good judgement. Throws Error where
    * the readings are not those of force_N, or a gain is none. */

@@ -83,10 +83,12 @@ struct Judgement {
 /* last: there will be no more placements, so what is not good is refused. */
 Judgement judge(const Array &array, const std::vector<Placement> &placements, bool last);
 
-/* What the fingertip's fit is told of the pad's response, see fit.h; zeros: nothing. */
+/* Of one sensor: how far it lies from its place, and the log of the width in which it feels a
+ * contact, over that of the others. */
 struct Own {
-  double off_x_mm = 0.0, off_y_mm = 0.0, wider = 0.0; /* of one sensor; wider: log */
+  double off_x_mm = 0.0, off_y_mm = 0.0, wider = 0.0;
 };
+/* What the fingertip's fit gets of the pad's response, see fit.h; zeros: nothing. */
 struct Shape {
   double sigma_mm = 0.0, sigma_sd_mm = 0.0; /* a prior */
   double dip_share = 0.0, dip_sd_mm = 0.0;
