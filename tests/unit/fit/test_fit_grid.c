@@ -477,6 +477,12 @@ static void what_is_the_sensors_own_is_taken_out_alike_in_all(void) {
     apart = fmaxf(apart, fmaxf(off_mm(&general, (double)grid.x_mm, (double)grid.y_mm),
                                off_mm(&masked, (double)grid.x_mm, (double)grid.y_mm)));
     rough += grid.residual_rms_Pa > 0.5f * plain.residual_rms_Pa;
+    struct fit_result lacking[2]; /* what is the own of a missing sensor changes nothing */
+    for (int other = 0; other < 2; other++) {
+      own[0].wider_q15 = 3000 * other;
+      fit_grid_masked(&array, readings, ALL & ~UINT32_C(1), &settings, &lacking[other]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&lacking[0], &lacking[1], sizeof lacking[0]);
     settings.iterations = 2; /* too few to know the contact before it */
     struct fit_result early[3], without[3];
     fit_grid(&array, readings, &settings, &early[0]);
@@ -521,6 +527,31 @@ static void a_sensor_that_is_known_to_differ_is_no_outlier(void) {
   snprintf(text, sizeof text, "left out %d, known %d", left_out[0], left_out[1]);
   TEST_ASSERT_TRUE_MESSAGE(left_out[0] >= 10, text);
   TEST_ASSERT_EQUAL_INT_MESSAGE(0, left_out[1], text);
+}
+
+/* Nor does what is known of all sensors hide one that is an outlier. */
+static void an_outlier_is_found_among_sensors_that_differ(void) {
+  struct random random = {82};
+  enum { PRESSES = 400 };
+  int found = 0, others = 0;
+  for (int i = 0; i < PRESSES; i++) {
+    struct fit_own own[SENSORS];
+    draw_own(&random, own);
+    double x = 1.5 + random_between(&random, -4.0, 4.0);
+    double y = -0.25 + random_between(&random, -4.0, 4.0);
+    press_cast(x, y, 6.0, 0.0, 1.0, own, &random);
+    int outlier = (int)random_below(&random, SENSORS);
+    readings[outlier] += 5000 * 1024;
+    struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 2048, .own = own};
+    struct fit_result result;
+    fit_gaussian(&array, readings, ALL, &settings, &result);
+    found += result.used == (ALL & ~(UINT32_C(1) << outlier));
+    others += result.used != ALL && (result.used >> outlier & 1);
+  }
+  char text[60];
+  snprintf(text, sizeof text, "of %d found %d, others %d", PRESSES, found, others);
+  TEST_ASSERT_TRUE_MESSAGE(found > PRESSES * 6 / 10, text);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(0, others, text);
 }
 
 static void readings_below_zero_count_as_zero(void) {
@@ -664,6 +695,7 @@ int main(void) {
   RUN_TEST(beyond_the_sensors_the_dip_tells_the_place);
   RUN_TEST(what_is_the_sensors_own_is_taken_out_alike_in_all);
   RUN_TEST(a_sensor_that_is_known_to_differ_is_no_outlier);
+  RUN_TEST(an_outlier_is_found_among_sensors_that_differ);
   RUN_TEST(readings_below_zero_count_as_zero);
   RUN_TEST(warnings_are_given);
   RUN_TEST(any_bits_give_finite_results);
