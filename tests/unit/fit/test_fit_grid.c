@@ -345,7 +345,8 @@ static void a_prior_leaves_what_is_uncertain_so(void) {
   TEST_ASSERT_GREATER_THAN_INT(500, compared);
 }
 
-/* A contact of 30 kPa on rubber with a dip, felt with 2 Pa of noise by sensors that have this own. */
+/* A contact of 30 kPa on rubber with a dip, felt with 2 Pa of noise by sensors that have this own.
+ */
 static void press_cast(double x, double y, double sigma, double share, double sd,
                        const struct fit_own *own, struct random *random) {
   for (int k = 0; k < SENSORS; k++) {
@@ -447,7 +448,8 @@ static void beyond_the_sensors_the_dip_tells_the_place(void) {
   TEST_ASSERT_TRUE_MESSAGE(apart <= PRESSES / 25, text);
 }
 
-/* Sensors that are off their places and feel a contact wider, on a pad without a dip and with one. */
+/* Sensors that are off their places and feel a contact wider, on a pad without a dip and with one.
+ */
 static void what_is_the_sensors_own_is_taken_out_alike_in_all(void) {
   struct random random = {80};
   float worst = 0.0f, apart = 0.0f, unknown = 0.0f;

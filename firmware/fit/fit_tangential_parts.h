@@ -1,0 +1,116 @@
+/* Inside fit_tangential alone: what its files share.
+ *
+ * The model of a reading, lengths in units of twice the widest normal term's standard deviation,
+ * d = (dx, dy) from the contact to the sensor:
+ *   m = sum over the normal terms of     (A + E / v^2) share V0 / v exp(-d' d / (2 v))
+ *     + sum over the tangential terms of (Bx dx + By dy) moment V0 / V^2 exp(-d' d / (2 V))
+ *   E = e1 (dx^2 - dy^2) / 2 + e2 dx dy
+ * with v and V the terms' variances and t, or KAPPA t, of the contact's own, and V0 the widest
+ * normal term's, so that the forces are 2 pi V0 A and 2 pi V0 B. E is what a contact's longer and
+ * shorter axis make of its pressure, to first order.
+ * The order of the unknowns: those that the others determine least come last. The tangential force
+ * follows from the remainder of their columns. */
+#ifndef FIT_FIT_TANGENTIAL_PARTS_H
+#define FIT_FIT_TANGENTIAL_PARTS_H
+
+#include "fit/fit_grid_parts.h"
+#include "fit/fit_tangential.h"
+
+enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKNOWNS };
+
+#define SPREAD_LEAST_Q15 9830 /* 0.3 of the narrowest normal term's variance: as much below 0 */
+#define SPREAD_MOST_Q26 (ONE_Q26 / 2) /* 2 V0 */
+#define LONG_MAX_Q26 (ONE_Q26 / 4 - 1)
+#define AMPLITUDE_MAX_Q24 ((4 << 24) - (1 << 11))
+#define PULL_MAX_Q24 (2 << 24)
+
+/* Where a step begins is rounded, which moves the step and not where it ends: so that what residual
+ * and Jacobian have of it is exact in 16 bits, distances from sensors too, whose pitch is such a
+ * number. */
+#define PLACE_Q 12
+#define HEIGHT_Q 13 /* of A and B */
+#define LONG_Q 17   /* of e1 and e2 */
+
+/* What of the readings is kept from step to step. */
+struct problem {
+  const struct fit_pad *pad;
+  struct readings readings;
+  int32_t base_q22;     /* standard deviation of a reading of weight 1, of the unit of readings */
+  int32_t noise_q22;    /* the same */
+  int32_t by_gains_q12; /* share of the readings' variances that is their gains', mean */
+  /* The dip: its depth in the height of the model's middle, 0: none; log2(e) / (2 sd^2). */
+  int32_t dip_share_q16, dip_bend_q22;
+  const struct fit_own *own; /* [sensor] or NULL */
+  const uint8_t *sensor;     /* [node] */
+  /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
+  int32_t spread_prior_q26, long_prior_q26;
+};
+
+/* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between
+ * the factors, 2^half about 1 / sqrt(pivot), so that both have all of their 16 bits: below the
+ * diagonal L / 2^half, Q14; above it D L 2^half, Q15. A direction whose pivot is below PIVOT_LEAST
+ * takes no step. */
+struct solution {
+  int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
+  int32_t half[UNKNOWNS];
+  int32_t inverse_q13[UNKNOWNS]; /* of pivot 4^half, 1 to 4 */
+  int32_t explained_q30;         /* what the step takes from the square sum of the residuals */
+};
+
+/* What the last step leaves for judging it. */
+struct outcome {
+  struct solution solution;
+  int32_t column_q[UNKNOWNS]; /* a column's integer is its value times 2^q */
+  struct scaled misfit;       /* chi^2 in units of the base's square */
+  bool at_bound;
+  int32_t length_q14; /* see take_step */
+};
+
+/* The least t. */
+FIXED_INLINE int32_t spread_least(const struct fit_pad *pad) {
+  return -fixed_mul_16(pad->variance_q26[0], SPREAD_LEAST_Q15) * 2;
+}
+
+/* Three quarters of a pitch beyond the outer nodes, for an even number of them beyond those on the
+ * origin's far side too. */
+FIXED_INLINE int32_t reach(const struct fit_pad *pad, int32_t nodes) {
+  return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2);
+}
+
+/* a * b / 2^shift, 16 < shift <= 32, from three 16-bit products, for |a|, |b| <= 2^30: error below
+ * 1 + 2^(32 - shift) units. */
+FIXED_INLINE int32_t product(int32_t a, int32_t b, int shift) {
+  int32_t a_high = a >> 16, a_low = (uint16_t)a;
+  int32_t b_high = b >> 16, b_low = (uint16_t)b;
+  return a_high * b_high * (1 << (32 - shift)) +
+         ((a_high * b_low + a_low * b_high) >> (shift - 16));
+}
+
+/* The same with the fourth product: error below 2 units. */
+FIXED_INLINE int32_t whole_product(int32_t a, int32_t b, int shift) {
+  uint32_t low = (uint32_t)(uint16_t)a * (uint16_t)b;
+  return product(a, b, shift) + (int32_t)(shift < 32 ? low >> shift : 0);
+}
+
+/* a * b / 2^shift, shift <= 16, for |b| < 2^15, from two: error below one unit. */
+FIXED_INLINE int32_t scaled_by(int32_t a, int32_t b, int shift) {
+  return (a >> 16) * b * (1 << (16 - shift)) + (((int32_t)(uint16_t)a * b) >> shift);
+}
+
+/* value / 2^shift to the nearest. */
+FIXED_INLINE int32_t rounded(int32_t value, int shift) {
+  return (value + (1 << (shift - 1))) >> shift;
+}
+
+/* fit_tangential_model.c: residuals and columns of the model there, with the weights. column_q: Qs
+ * in which it leaves the columns. */
+extern const uint8_t fit_tangential_column_q[UNKNOWNS];
+void fit_tangential_linearise(const struct problem *problem,
+                              const struct fit_tangential_unknowns *at,
+                              struct fit_tangential_room *room);
+
+/* fit_tangential_step.c: one Gauss-Newton step from there. */
+void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at,
+                            struct fit_tangential_room *room, struct outcome *outcome);
+
+#endif

@@ -1,0 +1,286 @@
+/* One Gauss-Newton step: the normal equations with the priors, their solution, and its limits. */
+#include "fit/fit_tangential_parts.h"
+
+#include <string.h>
+
+/* The rows that priors add: of SPREAD, STRETCH and SLANT, each alone in its own. */
+struct priors {
+  int32_t row_q26[UNKNOWNS];
+  int32_t residual[UNKNOWNS]; /* Q24, then as the residuals */
+};
+
+static void set_priors(const struct problem *problem, const struct fit_tangential_unknowns *at,
+                       struct priors *priors) {
+  memset(priors, 0, sizeof *priors);
+  priors->row_q26[SPREAD] = problem->spread_prior_q26;
+  priors->row_q26[STRETCH] = priors->row_q26[SLANT] = problem->long_prior_q26;
+  priors->residual[SPREAD] =
+      fixed_mul_q28(problem->pad->spread_q26 - at->t_q26, problem->spread_prior_q26);
+  priors->residual[STRETCH] = fixed_mul_q28(-at->e1_q26, problem->long_prior_q26);
+  priors->residual[SLANT] = fixed_mul_q28(-at->e2_q26, problem->long_prior_q26);
+}
+
+/* Brings residuals to 14 bits; returns their Q less one. */
+NOINLINE static int32_t normalise_residuals(int32_t *residual, struct priors *priors) {
+  uint32_t largest = 1;
+  for (int k = 0; k < NODES; k++) {
+    largest |= fixed_size(residual[k]);
+  }
+  for (int u = SPREAD; u <= SLANT; u++) {
+    largest |= fixed_size(priors->residual[u]);
+  }
+  /* What rounding carries over counts as a bit more. */
+  int32_t shift = fixed_bits(largest + (largest >> 8)) - 14;
+  int32_t down = shift > 0 ? shift : 0, up = shift < 0 ? -shift : 0;
+  int32_t half = (1 << down) >> 1;
+  for (int k = 0; k < NODES; k++) {
+    residual[k] = ((residual[k] + half) >> down) * (1 << up);
+  }
+  for (int u = SPREAD; u <= SLANT; u++) {
+    priors->residual[u] = ((priors->residual[u] + half) >> down) * (1 << up);
+  }
+  return 24 - shift - 1;
+}
+
+/* The normal equations, each unknown scaled so that its diagonal element is 2^28 .. 2^30. */
+struct equations {
+  int32_t right_q26[UNKNOWNS];
+  int32_t column_q[UNKNOWNS]; /* a column's integer is its value times 2^q */
+  int32_t scale[UNKNOWNS];
+};
+
+/* Over a column, whose elements are UNKNOWNS apart. */
+NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
+  const int32_t *end = column + NODES * UNKNOWNS;
+  do {
+    largest |=
+        fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) | fixed_size(column[2 * UNKNOWNS]);
+    column += 3 * UNKNOWNS;
+  } while (column != end);
+  return largest;
+}
+
+/* Divides a column by 2^shift; gives its square sum, and adds its products with the residuals. */
+NOINLINE static int32_t shift_column(int32_t *column, const int32_t *residual, int32_t shift,
+                                     int32_t *right) {
+  const int32_t *end = residual + NODES;
+  int32_t own = 0, other = *right, half = (1 << shift) >> 1;
+  do {
+    _Pragma("GCC unroll 3") for (int k = 0; k < 3; k++) {
+      int32_t value = (column[k * UNKNOWNS] + half) >> shift;
+      column[k * UNKNOWNS] = value;
+      other += value * residual[k];
+      own += value * value;
+    }
+    column += 3 * UNKNOWNS;
+    residual += 3;
+  } while (residual != end);
+  *right = other;
+  return own;
+}
+_Static_assert(NODES % 3 == 0, "three at a time");
+
+/* Brings a column to 13 bits at most, and its prior with it. */
+NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26,
+                                      int32_t prior_residual, struct equations *equations) {
+  int32_t *column = &room->node[0].column[u];
+  int32_t q = fit_tangential_column_q[u];
+  uint32_t largest = column_size(column, fixed_size(prior_q26) >> (26 - q));
+  int32_t shift = fixed_bits(largest + (largest >> 8)) - 13;
+  shift = shift < 0 ? 0 : shift; /* fewer bits of a column so small, which is no pad's */
+  q -= shift;
+  int32_t row = shifted(prior_q26, q - 26);
+  int32_t right = row * prior_residual;
+  int32_t own = shift_column(column, room->residual, shift, &right) + row * row;
+  int32_t scale = (30 - fixed_bits((uint32_t)own)) >> 1;
+  scale = scale > 2 ? 2 : scale;
+  equations->scale[u] = scale;
+  equations->column_q[u] = q + scale;
+  equations->right_q26[u] = right >> (5 - scale);
+  room->matrix[u][u] = own * (1 << (2 * scale));
+}
+
+/* Every pair of the first seven unknowns is a, a + 1, a + 2 or a + 3 modulo 7 of one a. */
+_Static_assert(UNKNOWNS == 8, "every pair is in one of these");
+#define SUM_PRODUCTS(a)                                                                            \
+  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                    \
+    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7,      \
+                       ((a) + 2) % 7, ((a) + 3) % 7);                                              \
+  }
+SUM_PRODUCTS(0)
+SUM_PRODUCTS(1)
+SUM_PRODUCTS(2)
+SUM_PRODUCTS(3)
+SUM_PRODUCTS(4)
+SUM_PRODUCTS(5)
+SUM_PRODUCTS(6)
+
+static void form(struct fit_tangential_room *room, const int32_t *scale) {
+  static void (*const sum[UNKNOWNS - 1])(const int32_t *, int32_t *) = {
+      sum_products_0, sum_products_1, sum_products_2, sum_products_3,
+      sum_products_4, sum_products_5, sum_products_6};
+  for (int a = 0; a < UNKNOWNS - 1; a++) {
+    int32_t sums[4];
+    sum[a](room->node[0].column, sums);
+    int32_t up = scale[a];
+    for (int k = 0, b = a; k < 3; k++) {
+      b = b == UNKNOWNS - 2 ? 0 : b + 1;
+      room->matrix[a > b ? a : b][a > b ? b : a] = sums[k] * (1 << (up + scale[b]));
+    }
+    room->matrix[UNKNOWNS - 1][a] = sums[3] * (1 << (up + scale[UNKNOWNS - 1]));
+  }
+}
+
+/* Longest step of the place, and of t in the narrowest term's variance. */
+#define MOVE_MAX_Q26 (ONE_Q26 * 3 / 8)
+
+#define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less stays where it is */
+
+#define STEP_MAX_Q20 (1 << 26)
+
+/* a - b modulo 2^32: rounding may take what a matrix that is nearly singular leaves anywhere. */
+FIXED_INLINE int32_t less(int32_t a, uint32_t b) {
+  return (int32_t)((uint32_t)a - b);
+}
+
+/* Takes from column j of the matrix what the unknowns before j explain. */
+FIXED_INLINE void reduce(int32_t matrix[UNKNOWNS][UNKNOWNS], int j) {
+  int32_t *row = matrix[UNKNOWNS - 1];
+  do {
+    uint32_t sum = 0;
+    _Pragma("GCC unroll 8") for (int k = 0; k < j; k++) {
+      sum += (uint32_t)(row[k] * matrix[k][j]);
+    }
+    row[j] = less(row[j], sum << 1);
+    row -= UNKNOWNS;
+  } while (row != matrix[j - 1]);
+}
+
+NOINLINE static void take_pivot(int32_t matrix[UNKNOWNS][UNKNOWNS], int32_t j, int32_t right_q26,
+                                int32_t *y_q26, struct solution *solution) {
+  int32_t *own = matrix[j];
+  uint32_t known = 0;
+  for (int32_t k = 0; k < j; k++) {
+    known += (uint32_t)scaled_by(y_q26[k], own[k], 14);
+  }
+  int32_t y = fixed_clamp(less(right_q26, known), -(1 << 26), 1 << 26);
+  int32_t pivot = own[j];
+  if (pivot < PIVOT_LEAST) {
+    for (int32_t i = j + 1; i < UNKNOWNS; i++) {
+      matrix[j][i] = matrix[i][j] = 0;
+    }
+    y_q26[j] = solution->step_q20[j] = 0;
+    solution->half[j] = 6;
+    solution->inverse_q13[j] = 1 << 13;
+    return;
+  }
+  int32_t up = 30 - fixed_bits((uint32_t)pivot);
+  up = up < 0 ? 0 : up;
+  int32_t inverse = port_divide((1 << 29) - 1, pivot >> (15 - up)); /* 2^14 .. 2^15 */
+  int32_t half = up >> 1, odd = up & 1;
+  int32_t down = 15 - half, round = 1 << down >> 1;
+  int32_t *column = own + j;
+  for (int32_t i = j + 1; i < UNKNOWNS; i++) {
+    column += UNKNOWNS;
+    int32_t element = fixed_clamp((*column + round) >> down, -INT16_MAX, INT16_MAX);
+    own[i] = element;
+    *column = rounded(element * inverse, 15 - odd);
+  }
+  int32_t z_q20 = shifted(fixed_mul_16(y, inverse), up - 4);
+  solution->step_q20[j] = z_q20 = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
+  solution->half[j] = half;
+  solution->inverse_q13[j] = (inverse << odd) >> 1;
+  solution->explained_q30 += (y >> 11) * (fixed_clamp(z_q20, -(1 << 20), 1 << 20) >> 5);
+  y_q26[j] = shifted(y, half);
+}
+
+NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q26,
+                           struct solution *solution) {
+  int32_t y_q26[UNKNOWNS]; /* 2^half of it */
+  solution->explained_q30 = 0;
+  take_pivot(matrix, 0, right_q26[0], y_q26, solution);
+  _Pragma("GCC unroll 8") for (int j = 1; j < UNKNOWNS; j++) {
+    reduce(matrix, j);
+    take_pivot(matrix, j, right_q26[j], y_q26, solution);
+  }
+  for (int i = UNKNOWNS - 2; i >= 0; i--) {
+    uint32_t known = 0;
+    for (int k = i + 1; k < UNKNOWNS; k++) {
+      known += (uint32_t)scaled_by(solution->step_q20[k], matrix[k][i], 14);
+    }
+    int32_t z_q20 = solution->step_q20[i] - shifted((int32_t)known, solution->half[i]);
+    solution->step_q20[i] = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
+  }
+}
+
+static int32_t clamp_told(int32_t value, int32_t low, int32_t high, bool *at_bound) {
+  *at_bound = *at_bound || value < low || value > high;
+  return fixed_clamp(value, low, high);
+}
+
+/* |value| / limit in Q14, at most 2^17. */
+static int32_t in_limits(int32_t value, int32_t limit) {
+  uint32_t size = fixed_size(value);
+  int32_t coarse = limit >> 14;
+  return size > (uint32_t)limit * 8 ? 1 << 17 : port_divide((int32_t)size, coarse < 1 ? 1 : coarse);
+}
+
+/* Returns how long the step is, Q14 of the longest that is taken. */
+NOINLINE static int32_t take_step(const struct problem *problem, const struct outcome *outcome,
+                                  int32_t residual_q, struct fit_tangential_unknowns *at,
+                                  bool *at_bound) {
+  const struct fit_pad *pad = problem->pad;
+  int32_t move[UNKNOWNS];
+  for (int u = 0; u < UNKNOWNS; u++) {
+    int32_t q = u == AMPLITUDE || u >= PULL_X ? 24 : 26;
+    move[u] = shifted(outcome->solution.step_q20[u], outcome->column_q[u] - residual_q - 20 + q);
+  }
+  int32_t narrow = pad->variance_q26[0] + at->t_q26;
+  int32_t most = 0;
+  for (int u = PLACE_X; u <= SPREAD; u++) {
+    int32_t share = in_limits(move[u], u <= PLACE_Y ? MOVE_MAX_Q26 : narrow >> 1);
+    most = share > most ? share : most;
+  }
+  if (most > 1 << 14) {
+    int32_t share_q15 = port_divide(1 << 29, most);
+    for (int u = 0; u < UNKNOWNS; u++) {
+      move[u] = fixed_mul_16(move[u], share_q15 >> 1) * 4;
+    }
+  }
+  *at_bound = false;
+  at->x_q26 =
+      clamp_told(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
+  at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -reach(pad, ROWS), reach(pad, ROWS), at_bound);
+  at->amplitude_q24 =
+      clamp_told(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
+  at->pull_x_q24 = clamp_told(at->pull_x_q24 + move[PULL_X], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
+  at->pull_y_q24 = clamp_told(at->pull_y_q24 + move[PULL_Y], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
+  at->t_q26 = fixed_clamp(at->t_q26 + move[SPREAD], spread_least(pad), SPREAD_MOST_Q26);
+  at->e1_q26 = clamp_told(at->e1_q26 + move[STRETCH], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
+  at->e2_q26 = clamp_told(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
+  return most;
+}
+
+void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at,
+                            struct fit_tangential_room *room, struct outcome *outcome) {
+  struct priors priors;
+  struct equations equations;
+  fit_tangential_linearise(problem, at, room);
+  set_priors(problem, at, &priors);
+  int32_t residual_q = normalise_residuals(room->residual, &priors);
+  for (int u = 0; u < UNKNOWNS; u++) {
+    normalise_column(room, u, priors.row_q26[u], priors.residual[u], &equations);
+    outcome->column_q[u] = equations.column_q[u];
+  }
+  form(room, equations.scale);
+  solve(room->matrix, equations.right_q26, &outcome->solution);
+  int32_t squares = -outcome->solution.explained_q30;
+  for (int k = 0; k < NODES; k++) {
+    squares += (room->residual[k] * room->residual[k]) >> 2;
+  }
+  for (int u = SPREAD; u <= SLANT; u++) {
+    squares += (priors.residual[u] * priors.residual[u]) >> 2;
+  }
+  outcome->misfit = fit_scaled_from(squares > 0 ? squares : 0, -2 * residual_q);
+  outcome->length_q14 = take_step(problem, outcome, residual_q, at, &outcome->at_bound);
+}
