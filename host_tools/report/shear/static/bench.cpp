@@ -88,9 +88,7 @@ PadOf Bench::calibrated_as(const truth::PadOptions &kind) {
   std::vector<KnownPad> pads;
   for (const truth::Calibrated &session :
        truth::calibrations_of({kind}, options.pads, options.seed, options.cache)) {
-    Cast cast{session.dip_share, {}};
-    std::copy(session.seats.begin(), session.seats.end(), cast.seats.begin());
-    pads.push_back({truth::calibrated_pad(session), {}, session.shape, cast});
+    pads.push_back({truth::calibrated_pad(session), {}, session.shape, cast_of(session)});
   }
   return weighed(std::move(pads), LAYER_mm, objects);
 }

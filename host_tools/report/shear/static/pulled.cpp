@@ -37,6 +37,12 @@ pad_profile profile_of(double thickness_mm) {
   return pad::profile_over_own_sensors({thickness_mm});
 }
 
+Cast cast_of(const truth::Calibrated &session) {
+  Cast cast{session.dip_share, {}};
+  std::copy(session.seats.begin(), session.seats.end(), cast.seats.begin());
+  return cast;
+}
+
 Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
                  const twin::BlockTable *block, const Cast &cast) {
   Readings base{};

@@ -58,6 +58,8 @@ struct Cast {
   std::array<twin::Pad::Seat, SENSORS> seats{};
 };
 
+Cast cast_of(const truth::Calibrated &session);
+
 // On the base, Pa; block: the pad that ends, nullptr if it does not.
 Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
                  const twin::BlockTable *block = nullptr, const Cast &cast = {});

@@ -48,6 +48,7 @@ struct Options {
 struct DippedPad {
   Pad gains;
   calibrating::Shape shape;
+  shear::Cast cast;
 };
 
 enum class Towards { any, along, across }; // the pad's longer side, and its shorter one
@@ -209,7 +210,7 @@ std::vector<DippedPad> dipped_pads(const Options &options) {
     kind.misplaced_mm = i % 2 == 0 ? 0.0 : 0.1;
     const std::uint64_t seed = Random(options.seed, stream, i).next();
     const Calibrated session = calibrated_session(feet, kind, seed);
-    pads[i] = {calibrated_pad(session), session.shape};
+    pads[i] = {calibrated_pad(session), session.shape, shear::cast_of(session)};
   });
   return pads;
 }
@@ -241,23 +242,19 @@ std::vector<Touch> draw_touches(const fit_array &array, const Case &c, Random &r
 }
 
 Readings base_of(const fit_array &array, const shear::Object &object,
-                 const std::vector<Touch> &touches, double load, Random &random) {
+                 const std::vector<Touch> &touches, double load, const shear::Cast &cast,
+                 Random &random) {
   Readings base{};
   const double direction = random.uniform(0.0, 2.0 * M_PI);
-  const double pitch_mm = static_cast<double>(array.pitch_mm);
   for (const Touch &touch : touches) {
     const double load_N = load * touch.force_N;
-    const twin::TractionTable::Load pull{
-        touch.force_N, twin::stuck_force_N(touch.force_N, load_N, FRICTION),
-        load_N * std::cos(direction), load_N * std::sin(direction)};
-    const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
+    const Readings felt = shear::base_Pa(
+        array, object,
+        {touch.force_N, touch.x_mm, touch.y_mm, touch.angle_rad, load_N * std::cos(direction),
+         load_N * std::sin(direction), twin::stuck_force_N(touch.force_N, load_N, FRICTION)},
+        nullptr, cast);
     for (std::size_t k = 0; k < SENSORS; k++) {
-      const double dx = pitch_mm * static_cast<double>(array.x[k]) - touch.x_mm;
-      const double dy = pitch_mm * static_cast<double>(array.y[k]) - touch.y_mm;
-      const double along = c * dx + s * dy, across = c * dy - s * dx;
-      base[k] +=
-          object.pressure.base_pressure_Pa(touch.force_N, along, across, 0.01 * DIP_PERCENT);
-      base[k] += load > 0.0 ? object.traction.base_pressure_Pa(pull, along, across) : 0.0;
+      base[k] += felt[k];
     }
   }
   return base;
@@ -276,10 +273,11 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
     const Pad pad = c.exact ? perfect_pad() : pads[p].gains;
     const std::vector<fit_own> own =
         c.exact ? std::vector<fit_own>{} : calibrating::own_of(session_array(), pads[p].shape);
+    const shear::Cast cast = c.exact ? shear::Cast{pads[p].cast.dip_share, {}} : pads[p].cast;
     for (std::size_t t = 0; t < TOUCHES; t++) {
       const shear::Object &object = *c.objects[random.next() % c.objects.size()];
       const std::vector<Touch> touches = draw_touches(array, c, random);
-      const Readings base = base_of(array, object, touches, c.load, random);
+      const Readings base = base_of(array, object, touches, c.load, cast, random);
       const double noise_Pa = draw_noise_Pa(random);
       fit_settings settings = settings_for(pad, noise_Pa);
       settings.cut_noises = 0; // as where a profile acts, and no dip in the Gaussian
