@@ -1,0 +1,449 @@
+#include "scan_bench.h"
+
+#include <string.h>
+
+static void test_zero_reading_voids_the_next_one_too(void) {
+  skip_frames(5);
+  fake.zero_next = DISTURBED_BIT; /* of the conversion that runs now */
+  skip_frames(1);
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+  skip_frames(1);
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+  skip_frames(1);
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_UINT32(2, value_of(&scan.counters.zero_readings));
+  TEST_ASSERT_EQUAL_UINT32(2, value_of(&scan.counters.frames_incomplete));
+  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* no reason for a reset */
+}
+
+static void test_zeros_for_ever_do_not_wedge(void) {
+  skip_frames(3);
+  for (int i = 0; i < 1000; i++) {
+    fake.zero_next = ALL;
+    next_frame();
+    TEST_ASSERT_EQUAL_HEX32(0, frame.valid);
+  }
+  run_until(now_us + 1100000);
+  assert_good_frame(ALL);
+}
+
+/* A sensor that lost its reset answers 0 for ever: the second 0 in a row costs its admission, and
+ * it is reset within a second. */
+static void test_two_zeros_in_a_row_lead_to_a_reset(void) {
+  run_until(3000000);
+  for (int i = 0; i < 2; i++) {
+    TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+    fake.zero_next = DISTURBED_BIT;
+    next_frame();
+  }
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.present));
+  next_frame(); /* its conversion has already begun */
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+  next_frame();
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+  assert_good_frame(ALL);
+}
+
+/* A sensor that missed two reads before all were reset restarts: one more does not cost its
+ * admission, as the third in a row would. */
+static void test_what_was_missed_before_a_reset_does_not_count_after_it(void) {
+  const uint32_t other = 1u << (SENSORS - 1);
+  run_until(3000000);
+  fake.zero_next = other;
+  next_frame();
+  fake.answering = ALL & ~DISTURBED_BIT;
+  fake.zero_next = other;
+  next_frame();
+  next_frame(); /* the last one before the reset */
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~other, value_of(&scan.admitted));
+  fake.answering = ALL;
+  while (count_entries(0x1E, FAKE_COMMAND) < 2 || scan.state != SCAN_WAIT_CONVERSION) {
+    step();
+  }
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  fake.answering = ALL & ~DISTURBED_BIT;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  fake.answering = ALL;
+  skip_frames(5);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+}
+
+static void test_sensor_stops_and_comes_back(void) {
+  skip_frames(10);
+  fake.answering = ALL & ~DISTURBED_BIT;
+  skip_frames(2);
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.present));
+  run_until(now_us + 5000000);
+  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* the others run undisturbed */
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+
+  /* Another part takes its place: its PROM is read before its readings count. */
+  fake.prom[DISTURBED].word[1] = 40000;
+  fake.prom[DISTURBED].word[0] &= 0x0FFF;
+  fake.prom[DISTURBED].word[0] |= (uint16_t)(ms58xx_prom_crc4(&fake.prom[DISTURBED]) << 12);
+  fake.answering = ALL;
+  for (int i = 0; i < 50; i++) {
+    next_frame();
+    uint32_t valid = frame.valid;
+    TEST_ASSERT_TRUE(valid == ALL || valid == (ALL & ~DISTURBED_BIT));
+    assert_good_frame(valid);
+  }
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+}
+
+/* A part that took another's place has no temperature yet when its first one reads 0: until the
+ * next one its pressures are invalid, not computed with what belonged to the other. */
+static void test_replaced_sensor_waits_for_its_own_temperature(void) {
+  run_until(3000000);
+  fake.answering = ALL & ~DISTURBED_BIT;
+  skip_frames(3);
+  fake.prom[DISTURBED] = fake.prom[SENSORS - 1];
+  fake.d2[DISTURBED] += 500000;
+  fake.answering = ALL;
+  while (count_entries(0x1E, FAKE_COMMAND) < 2 || !scan.conversion->is_temperature ||
+         scan.state != SCAN_WAIT_CONVERSION) {
+    step();
+  }
+  fake.zero_next = DISTURBED_BIT;
+  uint64_t asked_us = now_us;
+  for (int i = 0; value_of(&scan.counters.zero_readings) < 3 && now_us < asked_us + 90000; i++) {
+    next_frame();
+    assert_good_frame(ALL & ~DISTURBED_BIT);
+    TEST_ASSERT_EQUAL_HEX32(i == 0 ? DISTURBED_BIT : 0, frame.renewed);
+  }
+  skip_to_temperature();
+  TEST_ASSERT_LESS_THAN_UINT64(asked_us + 120000, now_us);
+  skip_frames(2);
+  assert_good_frame(ALL & ~DISTURBED_BIT); /* it is 17 degC warmer than all others, and so again */
+  run_until(now_us + 4000000);
+  TEST_ASSERT_EQUAL_INT(4, count_entries(0x1E, FAKE_COMMAND));
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, frame.doubtful);
+}
+
+/* Minutes may have passed, and the pad be warmer: no frame is computed with what was before. */
+static void test_sensor_that_was_away_gets_a_new_temperature(void) {
+  run_until(3000000);
+  skip_to_temperature();
+  skip_frames(2);
+  int16_t mean_cC = frame.temperature_cC;
+  fake.answering = ALL & ~DISTURBED_BIT;
+  skip_frames(2);
+  fake.d2[DISTURBED] += 200000; /* some 7 degC */
+  skip_to_temperature();
+  skip_frames(2);
+  TEST_ASSERT_INT16_WITHIN(1, mean_cC, frame.temperature_cC); /* of those that are here */
+  fake.answering = ALL;
+  do {
+    next_frame();
+    assert_good_frame(frame.valid);
+  } while (frame.valid != ALL);
+  TEST_ASSERT_GREATER_THAN_INT16(mean_cC + 30, frame.temperature_cC);
+  TEST_ASSERT_EQUAL_INT(0, (int)value_of(&scan.counters.bus_recoveries));
+
+  fake.recovery_is = FT_ERR_STUCK;
+  fake.fail_at = 0;
+  run_until(now_us + 1000000);
+  for (uint8_t k = 0; k < SENSORS; k++) {
+    fake.d2[k] -= 200000;
+  }
+  fake.recovery_is = FT_OK;
+  uint64_t freed_us = now_us;
+  do {
+    next_frame();
+    assert_good_frame(frame.valid);
+  } while (frame.valid != ALL);
+  TEST_ASSERT_LESS_THAN_UINT64(freed_us + 2500000, now_us);
+}
+
+/* A sensor with a loose contact, silent for 20 ms ten times a second, must not cost the others more
+ * than 5 % of the time for its admissions. */
+static void test_flickering_sensor_costs_the_others_little(void) {
+  while (now_us < 10000000) {
+    fake.answering = now_us % 100000 < 20000 ? ALL & ~DISTURBED_BIT : ALL;
+    step();
+  }
+  const int without = 10000000 / (FAKE_COMMAND_us + FAKE_READ_us + 2278);
+  TEST_ASSERT_GREATER_THAN_INT(10, count_entries(0x1E, FAKE_COMMAND));
+  TEST_ASSERT_GREATER_THAN_INT(without * 94 / 100, frames);
+}
+
+/* Where only a branch acknowledges a command, the reading after one that is missing may be old. */
+static void test_single_nacks_cost_the_frames_they_touch(void) {
+  for (int single = 0; single < 2; single++) {
+    next_case(&usual);
+    bus.answers_are_single = single != 0;
+    skip_frames(3);
+    for (uint32_t n = 1; n < 30; n++) {
+      skip_frames(2);
+      uint32_t before = value_of(&scan.counters.frames_incomplete);
+      fake.answering = ALL & ~DISTURBED_BIT;
+      next_frame();
+      TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+      fake.answering = ALL;
+      skip_frames(4);
+      assert_good_frame(ALL);
+      TEST_ASSERT_LESS_OR_EQUAL_UINT32(before + (single ? 1 : 2),
+                                       value_of(&scan.counters.frames_incomplete));
+    }
+    TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
+  }
+}
+
+/* Three in a row cost the admission, and it comes back at once. */
+static void test_silence_for_three_readings_leads_to_a_reset(void) {
+  run_until(1000000);
+  fake.answering = ALL & ~DISTURBED_BIT;
+  skip_frames(2);
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  fake.answering = ALL;
+  skip_frames(2);
+  next_frame();
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+}
+
+/* It acknowledged the command and has nothing to tell: its supply has failed. */
+static void test_zero_after_an_acknowledged_command_leads_to_a_reset(void) {
+  bus.answers_are_single = true;
+  run_until(1000000);
+  fake.zero_next = DISTURBED_BIT;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  skip_frames(2);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+  assert_good_frame(ALL);
+}
+
+static void test_timeout_leads_to_recovery_and_admission(void) {
+  skip_frames(10);
+  int before = fake.logged;
+  fake.fail_at = 0;
+  skip_frames(3);
+  int at = before;
+  while (fake.log[at].operation != FAKE_RECOVERY) {
+    TEST_ASSERT_LESS_THAN_INT(fake.logged, ++at);
+  }
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, fake.log[at - 1].status);
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(fake.log[at].end_us + fake_conversion_us(0x44),
+                                      fake.log[at + 1].start_us);
+  assert_entry(assert_admission(at + 1, 1), FAKE_COMMAND, 0x54);
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_timeouts));
+  TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_recoveries));
+}
+
+static void test_failure_at_any_operation_is_survived(void) {
+  static const enum ft_status failures[] = {FT_ERR_TIMEOUT, FT_ERR_STUCK, FT_ERR_ARGUMENT};
+  for (int which = 0; which < 3; which++) {
+    for (int at = 0; at < 60; at++) {
+      next_case(&usual);
+      fake.fail_at = at;
+      fake.fail_with = failures[which];
+      run_until(400000);
+      TEST_ASSERT_EQUAL_INT(-1, fake.fail_at);
+      assert_good_frame(ALL);
+      TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+      TEST_ASSERT_EQUAL_INT(1, count_entries(0, FAKE_RECOVERY));
+    }
+  }
+}
+
+static void test_stuck_bus_is_tried_ever_more_rarely(void) {
+  skip_frames(3);
+  fake.recovery_is = FT_ERR_STUCK;
+  fake.fail_at = 0;
+  run_until(now_us + 5000000);
+  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.present));
+  static const uint64_t delays_ms[] = {10, 20, 40, 80, 160, 320, 640, 1000, 1000};
+  int at = find_entry(0, 0, FAKE_RECOVERY);
+  for (size_t i = 0; i < sizeof delays_ms / sizeof delays_ms[0]; i++, at++) {
+    assert_entry(at + 1, FAKE_RECOVERY, 0);
+    TEST_ASSERT_EQUAL_UINT64(delays_ms[i] * 1000, fake.log[at + 1].start_us - fake.log[at].end_us);
+  }
+  fake.recovery_is = FT_OK;
+  run_until(now_us + 1100000);
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.present));
+  /* Freed once, the next time begins with the short delay. */
+  fake.recovery_is = FT_ERR_STUCK;
+  fake.fail_at = 0;
+  at = fake.logged;
+  run_until(now_us + 50000);
+  at = find_entry(at, 0, FAKE_RECOVERY);
+  TEST_ASSERT_EQUAL_UINT64(10000, fake.log[at + 1].start_us - fake.log[at].end_us);
+}
+
+/* Recovery itself may run into a timeout: not for the bus to spin on. */
+static void test_failing_recoveries_are_bounded(void) {
+  skip_frames(3);
+  fake.recovery_is = FT_ERR_TIMEOUT;
+  fake.fail_at = 0;
+  run_until(now_us + 1000000);
+  fake.recovery_is = FT_OK;
+  run_until(now_us + 1100000);
+  assert_good_frame(ALL);
+}
+
+static void test_refused_starts_are_survived(void) {
+  skip_frames(3);
+  fake.refuse_starts = true;
+  run_until(now_us + 1000000);
+  fake.refuse_starts = false;
+  run_until(now_us + 200000);
+  assert_good_frame(ALL);
+}
+
+/* What a sensor that lost count of the clocks sends ends in ones. A pressure of all ones that comes
+ * again is beyond what the sensor can say, which is a measurement. */
+static void test_readings_that_break_off_are_invalid(void) {
+  bus.answers_are_single = true;
+  skip_frames(3);
+  uint32_t d1[SENSORS];
+  memcpy(d1, fake.d1, sizeof d1);
+  fake.d1[DISTURBED] = (d1[DISTURBED] & 0xFF0000) | 0xFFFF;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+  TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_nacks));
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+  TEST_ASSERT_EQUAL_UINT32(2, value_of(&scan.counters.bus_nacks));
+  fake.d1[DISTURBED] -= 1000;
+  next_frame();
+  assert_good_frame(ALL);
+  fake.d1[DISTURBED] += 1000; /* by chance */
+  next_frame();
+  assert_good_frame(ALL);
+  fake.d1[DISTURBED] = d1[DISTURBED];
+  for (int k = 0; k < 3; k++) {
+    fake.d1[k] |= 0xFF; /* by chance */
+  }
+  next_frame();
+  assert_good_frame(ALL);
+  fake.d1[10] |= 0xFF;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~0x407u, frame.valid);
+  TEST_ASSERT_EQUAL_UINT32(6, value_of(&scan.counters.bus_nacks));
+  for (int k = 0; k < SENSORS; k++) {
+    fake.d1[k] = 0xFFFFFF;
+  }
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(0, frame.valid);
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.saturated);
+}
+
+/* A sensor that hears no command to read sends ones, and has its result still: the next one may be
+ * that. */
+static void test_ones_of_a_branch_void_the_next_reading_too(void) {
+  skip_frames(3);
+  uint32_t d1 = fake.d1[DISTURBED];
+  fake.d1[DISTURBED] = 0xFFFFFF;
+  next_frame();
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+  fake.d1[DISTURBED] = d1;
+  next_frame();
+  assert_good_frame(ALL & ~DISTURBED_BIT);
+  next_frame();
+  assert_good_frame(ALL);
+}
+
+/* Events that come early or for nothing change nothing. */
+static void test_spurious_calls_change_nothing(void) {
+  struct random random = {32};
+  while (now_us < 500000) {
+    uint64_t wake_us = scan_step(&scan, now_us);
+    if (scan_take(&scan, &frame)) {
+      frames++;
+      assert_good_frame(ALL);
+    }
+    now_us += 1 + random_below(&random, 100);
+    now_us = now_us > wake_us + 30 ? wake_us + 30 : now_us;
+  }
+  TEST_ASSERT_GREATER_THAN_INT(80, frames);
+  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
+}
+
+static void test_random_faults_are_survived(void) {
+  for (uint64_t seed = 1; seed <= 20; seed++) {
+    next_case(&usual);
+    struct random random = {seed};
+    int steps = 0;
+    while (now_us < 5000000) {
+      switch (random_below(&random, 400)) {
+      case 0:
+        fake.answering = random_u32(&random) & ALL;
+        break;
+      case 1:
+        fake.zero_next = random_u32(&random) & ALL;
+        break;
+      case 2:
+        fake.fail_at = (int)random_below(&random, 10);
+        fake.fail_with = random_below(&random, 2) ? FT_ERR_TIMEOUT : FT_ERR_STUCK;
+        break;
+      case 3:
+        fake.recovery_is = random_below(&random, 2) ? FT_OK : FT_ERR_STUCK;
+        break;
+      case 4:
+        taking = random_below(&random, 2);
+        break;
+      case 5:
+        scan_set_rate_mHz(&scan, random_below(&random, 2000001));
+        break;
+      case 6:
+        TEST_ASSERT_EQUAL_INT(FT_OK,
+                              scan_set_osr(&scan, (uint16_t)(256u << random_below(&random, 6))));
+        break;
+      case 7:
+        fake.misread_prom = random_u32(&random) & ALL;
+        fake.misread_passes = (int)random_below(&random, 4);
+        break;
+      default:
+        break;
+      }
+      step();
+      steps++;
+    }
+    TEST_ASSERT_LESS_THAN_INT(5 * 20000 + 1000, steps); /* at most one call in 50 us */
+    fake.answering = ALL;
+    fake.fail_at = -1;
+    fake.recovery_is = FT_OK;
+    fake.misread_passes = 0;
+    taking = true;
+    scan_set_rate_mHz(&scan, 0);
+    run_until(now_us + 20000000);
+    assert_good_frame(ALL);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_zero_reading_voids_the_next_one_too);
+  RUN_TEST(test_zeros_for_ever_do_not_wedge);
+  RUN_TEST(test_two_zeros_in_a_row_lead_to_a_reset);
+  RUN_TEST(test_what_was_missed_before_a_reset_does_not_count_after_it);
+  RUN_TEST(test_sensor_stops_and_comes_back);
+  RUN_TEST(test_replaced_sensor_waits_for_its_own_temperature);
+  RUN_TEST(test_sensor_that_was_away_gets_a_new_temperature);
+  RUN_TEST(test_flickering_sensor_costs_the_others_little);
+  RUN_TEST(test_single_nacks_cost_the_frames_they_touch);
+  RUN_TEST(test_silence_for_three_readings_leads_to_a_reset);
+  RUN_TEST(test_zero_after_an_acknowledged_command_leads_to_a_reset);
+  RUN_TEST(test_timeout_leads_to_recovery_and_admission);
+  RUN_TEST(test_failure_at_any_operation_is_survived);
+  RUN_TEST(test_stuck_bus_is_tried_ever_more_rarely);
+  RUN_TEST(test_failing_recoveries_are_bounded);
+  RUN_TEST(test_refused_starts_are_survived);
+  RUN_TEST(test_readings_that_break_off_are_invalid);
+  RUN_TEST(test_ones_of_a_branch_void_the_next_reading_too);
+  RUN_TEST(test_spurious_calls_change_nothing);
+  RUN_TEST(test_random_faults_are_survived);
+  return UNITY_END();
+}

@@ -1,0 +1,266 @@
+#include "scan_bench.h"
+
+static void test_temperature_that_is_asked_for_comes_soon(void) {
+  run_until(10000000); /* the interval has grown to its longest */
+  const int before = count_entries(0x54, FAKE_COMMAND);
+  run_until(now_us + 300000);
+  const int without = count_entries(0x54, FAKE_COMMAND) - before;
+  scan_ask_temperature(&scan);
+  run_until(now_us + 130000);
+  TEST_ASSERT_LESS_OR_EQUAL_INT(1, without);
+  TEST_ASSERT_EQUAL_INT(before + without + 1, count_entries(0x54, FAKE_COMMAND));
+}
+
+static void test_temperature_of_all_ones_is_no_reading(void) {
+  next_frame();
+  skip_to_temperature();
+  uint32_t d2 = fake.d2[DISTURBED];
+  fake.d2[DISTURBED] = 0xFFFFFF;
+  skip_frames(3);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x54, FAKE_COMMAND));
+  fake.d2[DISTURBED] = d2;
+  assert_good_frame(ALL);
+}
+
+static void test_zero_temperature_keeps_the_last_and_is_repeated_soon(void) {
+  next_frame();
+  skip_to_temperature();
+  uint32_t d2 = fake.d2[DISTURBED];
+  fake.zero_next = DISTURBED_BIT;
+  fake.d2[DISTURBED] += 20000; /* must not show before a good reading of it */
+  next_frame();
+  TEST_ASSERT_TRUE(frame.held);
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+  next_frame();
+  uint32_t next_d2 = fake.d2[DISTURBED];
+  fake.d2[DISTURBED] = d2;
+  assert_good_frame(ALL);
+  fake.d2[DISTURBED] = next_d2;
+  uint64_t asked_us = now_us;
+  skip_to_temperature();
+  TEST_ASSERT_LESS_THAN_UINT64(asked_us + 110000, now_us);
+  skip_frames(2);
+  assert_good_frame(ALL);
+}
+
+/* A flipped bit: the pressures keep the temperature before it. A jump that stays is believed. */
+static void test_jump_of_the_temperature_must_be_confirmed(void) {
+  next_frame();
+  skip_to_temperature();
+  uint32_t d2 = fake.d2[DISTURBED];
+  fake.d2[DISTURBED] = d2 ^ 0x80000;
+  skip_frames(2);
+  fake.d2[DISTURBED] = d2;
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, frame.doubtful);
+  uint64_t asked_us = now_us;
+  skip_to_temperature(); /* asked again soon */
+  TEST_ASSERT_LESS_THAN_UINT64(asked_us + 110000, now_us);
+  skip_frames(2);
+  assert_good_frame(ALL);
+  asked_us = now_us;
+  skip_to_temperature(); /* and then as ever */
+  TEST_ASSERT_UINT64_WITHIN(15000, asked_us + 490000, now_us);
+  skip_frames(2);
+  assert_good_frame(ALL);
+
+  skip_to_temperature();
+  fake.d2[DISTURBED] = d2 + 60000; /* 2 degC: may be */
+  skip_frames(2);
+  fake.d2[DISTURBED] = d2;
+  assert_good_frame(ALL);
+  fake.d2[DISTURBED] = d2 + 60000;
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, frame.doubtful);
+  skip_to_temperature();
+  skip_frames(2);
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
+}
+
+/* Two temperatures that agree with each other and with no other sensor: it has lost its state. Its
+ * reset makes it the sensor it was. */
+static void test_sensor_that_tells_another_temperature_is_reset(void) {
+  run_until(3000000);
+  skip_to_temperature();
+  uint32_t d1 = fake.d1[DISTURBED];
+  uint32_t d2 = fake.d2[DISTURBED];
+  fake.d2[DISTURBED] = d2 ^ 0x80000;
+  next_frame();
+  TEST_ASSERT_TRUE(frame.held);
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, frame.doubtful); /* which goes out with the held frame */
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, frame.doubtful);
+  skip_to_temperature();
+  fake.d1[DISTURBED] = d1 / 8 * 9;
+  while (count_entries(0x1E, FAKE_COMMAND) == 1) {
+    next_frame();
+    TEST_ASSERT_TRUE(frame.held || frame.valid == (ALL & ~DISTURBED_BIT));
+  }
+  fake.d1[DISTURBED] = d1;
+  fake.d2[DISTURBED] = d2;
+  skip_frames(3);
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.renewed); /* its zero still holds */
+  run_until(now_us + 10000000);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+}
+
+/* A supply that dips once does so twice: what it says amid a reset is not what it says for good. */
+static void test_sensor_that_loses_its_state_again_amid_a_reset_is_reset_again(void) {
+  run_until(3000000);
+  const uint32_t d1 = fake.d1[DISTURBED];
+  const uint32_t d2 = fake.d2[DISTURBED];
+  fake.d2[DISTURBED] = d2 / 16 * 15;
+  skip_to_temperature();
+  fake.d1[DISTURBED] = d1 / 16 * 15;
+  while (count_entries(0x1E, FAKE_COMMAND) < 3) {
+    next_frame();
+    TEST_ASSERT_TRUE(frame.held || !(frame.valid & ~frame.doubtful & DISTURBED_BIT));
+  }
+  fake.d1[DISTURBED] = d1;
+  fake.d2[DISTURBED] = d2;
+  skip_frames(3);
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
+}
+
+/* One that comes back wrong again and again is reset ever more rarely. */
+static void test_incurable_sensor_is_reset_ever_more_rarely(void) {
+  run_until(3000000);
+  fake.d1[DISTURBED] = 1000000; /* below zero */
+  run_until(now_us + 32000000);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+  TEST_ASSERT_EQUAL_INT32(0, frame.pressure_Pa_q10[DISTURBED]);
+  TEST_ASSERT_INT_WITHIN(1, 1 + 7, count_entries(0x1E, FAKE_COMMAND)); /* 0 1 3 7 15 23 31 s */
+  TEST_ASSERT_EQUAL_UINT32(2 * (uint32_t)(count_entries(0x1E, FAKE_COMMAND) - 1) + 2,
+                           value_of(&scan.counters.implausible_readings));
+  fake.d1[DISTURBED] = fake.d1[DISTURBED + 1];
+  run_until(now_us + 9000000);
+  assert_good_frame(ALL);
+}
+
+/* At most one frame in twenty: that frame comes in its turn, at its time, with the pressures of the
+ * one before. */
+static void test_temperature_takes_the_place_of_a_frame(void) {
+  static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
+  for (size_t i = 0; i < 6; i++) {
+    struct scan_settings settings = usual;
+    settings.osr = osrs[i];
+    next_case(&settings);
+    skip_frames(2);
+    struct frame last = frame;
+    uint64_t begun_us = now_us;
+    int held = 0;
+    int all = 0;
+    uint64_t period_us = 0;
+    for (; now_us < begun_us + 5000000; all++) {
+      fake.d1[DISTURBED] += 10;
+      next_frame();
+      TEST_ASSERT_EQUAL_UINT32(last.number + 1, frame.number);
+      if (period_us == 0) {
+        period_us = frame.t_us - last.t_us;
+      }
+      TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_us - last.t_us);
+      TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_begin_us - last.t_begin_us);
+      TEST_ASSERT_EQUAL_INT32(ms58xx_find_osr(osrs[i])->noise_Pa_q10, frame.noise_Pa_q10);
+      if (frame.held) {
+        held++;
+        TEST_ASSERT_EQUAL_HEX32(last.valid, frame.valid);
+        TEST_ASSERT_EQUAL_INT32_ARRAY(last.pressure_Pa_q10, frame.pressure_Pa_q10, FT_MAX_SENSORS);
+      } else {
+        TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+        TEST_ASSERT_NOT_EQUAL(last.pressure_Pa_q10[DISTURBED], frame.pressure_Pa_q10[DISTURBED]);
+      }
+      last = frame;
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(3, held);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(5, held);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(all, 20 * held);
+    TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.frames_skipped));
+  }
+}
+
+static uint64_t to_next_temperature_us(void) {
+  uint64_t from_us = now_us;
+  skip_frames(2);
+  skip_to_temperature();
+  return now_us - from_us;
+}
+
+/* 0.2 degC/s on one sensor alone. */
+static void warm_up(uint64_t until_us) {
+  while (now_us < until_us) {
+    uint64_t from_us = now_us;
+    next_frame();
+    fake.d2[DISTURBED] += (uint32_t)((now_us - from_us) * 6 / 1000);
+  }
+}
+
+static void test_temperature_is_read_less_often_while_it_stands_still(void) {
+  run_until(6000000);
+  skip_to_temperature();
+  TEST_ASSERT_UINT64_WITHIN(10000, LONGEST_INTERVAL_us, to_next_temperature_us());
+  TEST_ASSERT_UINT64_WITHIN(10000, LONGEST_INTERVAL_us, to_next_temperature_us());
+
+  uint64_t begun_us = now_us;
+  warm_up(begun_us + LONGEST_INTERVAL_us + 2000000);
+  int before = count_entries(0x54, FAKE_COMMAND);
+  warm_up(now_us + 3000000);
+  TEST_ASSERT_INT_WITHIN(1, 6, count_entries(0x54, FAKE_COMMAND) - before);
+
+  skip_to_temperature();
+  to_next_temperature_us();
+  to_next_temperature_us();
+  TEST_ASSERT_GREATER_THAN_UINT64(950000, to_next_temperature_us());
+}
+
+/* A requested rate leaves pauses: there no frame is held, and the temperature is fresh. */
+static void test_temperature_fits_into_the_pauses(void) {
+  static const uint32_t rates_mHz[] = {75000, 20000, 1000, 100};
+  for (size_t i = 0; i < sizeof rates_mHz / sizeof rates_mHz[0]; i++) {
+    struct scan_settings settings = usual;
+    settings.rate_mHz = rates_mHz[i];
+    next_case(&settings);
+    const uint64_t period_us = 1000000000u / rates_mHz[i];
+    skip_frames(2);
+    uint64_t last_us = frame.t_begin_us;
+    while (now_us < 31000000) {
+      next_frame();
+      TEST_ASSERT_FALSE(frame.held);
+      TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_begin_us - last_us);
+      last_us = frame.t_begin_us;
+    }
+    int at = 0;
+    int temperatures = count_entries(0x54, FAKE_COMMAND);
+    for (int n = 0; n < temperatures; n++) {
+      int next = find_entry(at, 0x54, FAKE_COMMAND);
+      TEST_ASSERT_LESS_THAN_UINT64(7000, fake.log[next + 2].start_us - fake.log[next].start_us);
+      if (n > 4) {
+        uint64_t interval_us = fake.log[next].start_us - fake.log[at - 1].start_us;
+        TEST_ASSERT_UINT64_WITHIN(period_us + 10000,
+                                  (LONGEST_INTERVAL_us + period_us - 1) / period_us * period_us,
+                                  interval_us);
+      }
+      at = next + 1;
+    }
+    TEST_ASSERT_GREATER_THAN_INT(3, temperatures);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_temperature_that_is_asked_for_comes_soon);
+  RUN_TEST(test_temperature_of_all_ones_is_no_reading);
+  RUN_TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon);
+  RUN_TEST(test_jump_of_the_temperature_must_be_confirmed);
+  RUN_TEST(test_sensor_that_tells_another_temperature_is_reset);
+  RUN_TEST(test_sensor_that_loses_its_state_again_amid_a_reset_is_reset_again);
+  RUN_TEST(test_incurable_sensor_is_reset_ever_more_rarely);
+  RUN_TEST(test_temperature_takes_the_place_of_a_frame);
+  RUN_TEST(test_temperature_is_read_less_often_while_it_stands_still);
+  RUN_TEST(test_temperature_fits_into_the_pauses);
+  return UNITY_END();
+}
