@@ -1,0 +1,211 @@
+#include "condition_bench.h"
+
+/* Where a strong press was meanwhile, it may be what remains of that. */
+static void test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    frame.pressure_Pa_q10[3] += 3000 * Pa;
+    watch_s(60, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+    frame.pressure_Pa_q10[11] += 30000 * Pa;
+    watch_s(5, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+    frame.pressure_Pa_q10[11] -= 30000 * Pa;
+    watch_s(120, 0, 0);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 120, contact_s);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    frame.pressure_Pa_q10[3] += 3000 * Pa;
+    watch_s(5, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+  }
+}
+
+static void press_in_steps(int32_t from, int32_t to, float seconds) {
+  int count = frames_in(seconds);
+  for (int i = 1; i <= count; i++) {
+    press(from + (to - from) / count * i);
+    run(1);
+  }
+}
+
+/* Held, a touch that the band lets in part into the zero comes out of the band: what the zero took
+ * stays in doubt, and a strong press on it is none. */
+static void test_a_touch_that_a_zero_took_part_of_stays_in_doubt(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    press_in_steps(0, 47000 * Pa, 0.2f);
+    run_s(4);
+    press_in_steps(47000 * Pa, 0, 0.1f);
+    run_s(1.2f);
+    press_in_steps(0, 5100 * Pa, 0.15f);
+    watch_s(0.7f, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    watch_s(6, 0, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_LESS_THAN_INT32(4000 * Pa, conditioned.peak_Pa_q10);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    press_in_steps(5100 * Pa, 15000 * Pa, 0.2f);
+    run_s(1);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+    press_in_steps(15000 * Pa, 47000 * Pa, 0.2f);
+    run_s(1);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+    press_in_steps(47000 * Pa, 5100 * Pa, 0.2f);
+    run_s(0.1f);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+    press(0);
+    run_s(5);
+    press_in_steps(0, 20000 * Pa, 0.1f);
+    run_s(1);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+  }
+}
+
+/* What the end of a release feels is no remainder. */
+static void test_presses_in_quick_succession_move_no_zero(void) {
+  static const float falls_s[] = {0.05f, 0.1f, 0.2f, 0.4f};
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (size_t j = 0; j < sizeof falls_s / sizeof falls_s[0]; j++) {
+      begin_calm(periods_us[i]);
+      int32_t worst = 0;
+      for (int touches = 0; touches < 10; touches++) {
+        press_in_steps(0, 20000 * Pa, 0.1f);
+        run_s(0.2f);
+        press_in_steps(20000 * Pa, 0, falls_s[j]);
+        run_s(0.1f);
+        int32_t off = condition.zero_Pa_q10[7] - AMBIENT;
+        worst = off > worst ? off : worst;
+      }
+      TEST_ASSERT_LESS_THAN_INT32(20 * Pa, worst);
+    }
+  }
+}
+
+/* Sensors that felt nothing stand off by a share of what others felt. */
+static void test_far_sensors_stand_off_too(void) {
+  begin_calm(4854);
+  frame.pressure_Pa_q10[7] = AMBIENT + 20000 * Pa;
+  run_s(5);
+  fill(AMBIENT);
+  frame.pressure_Pa_q10[12] = AMBIENT + 500 * Pa;
+  watch_s(60, 0, 0);
+  TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+  TEST_ASSERT_FALSE(conditioned.contact);
+}
+
+/* A contact that is no stronger than the drift of its time is in doubt, and followed slowly. */
+static void test_weak_contact_for_long_is_in_doubt(void) {
+  begin_calm(17544);
+  frame.pressure_Pa_q10[7] += 300 * Pa;
+  watch_s(600, 0, 0);
+  TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+  run_s(900);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+  run_s(1000);
+  TEST_ASSERT_FALSE(conditioned.contact);
+  TEST_ASSERT_INT32_WITHIN(Pa, AMBIENT + 300 * Pa, condition.zero_Pa_q10[7]);
+}
+
+/* A zero that wanders makes a weak contact on it doubtful. */
+static void test_contact_on_a_wandering_zero_is_in_doubt(void) {
+  for (int wanders = 0; wanders <= 1; wanders++) {
+    begin_calm(17544);
+    for (int i = 0; i < 3; i++) {
+      frame.pressure_Pa_q10[7] += 20000 * Pa;
+      run_s(5);
+      frame.pressure_Pa_q10[7] -= (wanders ? 19700 : 20000) * Pa;
+      run_s(15);
+    }
+    run_s(60);
+    frame.pressure_Pa_q10[7] += 350 * Pa;
+    run(1);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_EQUAL(wanders, conditioned.zero_doubtful);
+    run_s(1);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_EQUAL(wanders, conditioned.zero_doubtful);
+  }
+}
+
+/* Some real sensors creep by 10 Pa/s for minutes: more than the zero may follow. */
+static void test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not(void) {
+  for (int p = 0; p < FAST_PERIODS; p++) {
+    begin_calm(periods_us[p]);
+    watch_s(60, 10.0f, 1 << 3);
+    TEST_ASSERT_GREATER_THAN(30.0f, contact_s);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 0.0f, unflagged_s);
+    watch_s(60, 0.0f, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 0.0f, unflagged_s);
+    int32_t crept = frame.pressure_Pa_q10[3];
+    press(3000 * 1024);
+    frame.pressure_Pa_q10[3] += crept - AMBIENT;
+    run_s(0.2f);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    run_s((float)SENSORS * 0.064f);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+
+    begin_calm(periods_us[p]);
+    watch_s(30, 100.0f, 1 << 7); /* 0.02 N/s on 12 mm of rubber */
+    TEST_ASSERT_GREATER_THAN(25.0f, contact_s);
+    TEST_ASSERT_FLOAT_WITHIN(1.5f, 0.0f, unflagged_s - contact_s);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+  }
+}
+
+/* Wrong zeros may make a contact, so the wait has an end. */
+static void test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends(void) {
+  begin_calm(4854);
+  press(20000 * Pa);
+  run_s(0.5f);
+  frame.renewed = 1u << 8;
+  run(1);
+  frame.renewed = 0;
+  run_s(9.5f);
+  TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  watch_s(5, 0, 0);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+  press(0);
+  run(2 + ZERO_TARE_FRAMES);
+  TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
+  press(20000 * Pa);
+  run_s(0.5f);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+}
+
+/* A zero taken under a press would be off by it. */
+static void test_one_sensor_is_not_tared_in_a_contact(void) {
+  begin_calm(4854);
+  press(20000 * Pa);
+  run_s(0.5f);
+  frame.renewed = 1u << 8;
+  run(1);
+  frame.renewed = 0;
+  run_s(5);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_FALSE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 8), conditioned.usable);
+  press(0);
+  run(2 + ZERO_TARE_FRAMES);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
+  TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt);
+  RUN_TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt);
+  RUN_TEST(test_presses_in_quick_succession_move_no_zero);
+  RUN_TEST(test_far_sensors_stand_off_too);
+  RUN_TEST(test_weak_contact_for_long_is_in_doubt);
+  RUN_TEST(test_contact_on_a_wandering_zero_is_in_doubt);
+  RUN_TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not);
+  RUN_TEST(test_one_sensor_is_not_tared_in_a_contact);
+  RUN_TEST(test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends);
+  return UNITY_END();
+}

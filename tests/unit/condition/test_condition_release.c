@@ -1,0 +1,143 @@
+#include "condition_bench.h"
+
+/* Ten minutes with drift: five seconds later the zero is right, and there was no phantom. */
+static void test_zero_recovers_after_a_long_contact(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (int sign = -1; sign <= 1; sign += 2) {
+      begin(periods_us[i]);
+      run_s(1);
+      press(1000 * Pa);
+      watch_s(600, 0.22f * (float)sign, ALL);
+      for (int k = 0; k < SENSORS; k++) {
+        frame.pressure_Pa_q10[k] -= (int32_t)(bump(k) * 1000.0f * Pa);
+      }
+      watch_s(5, 0.22f * (float)sign, ALL);
+      TEST_ASSERT_TRUE(unflagged_s < 0.1f);
+      TEST_ASSERT_FALSE(conditioned.contact);
+      for (int k = 0; k < SENSORS; k++) {
+        TEST_ASSERT_INT32_WITHIN(30 * Pa, 0, conditioned.pressure_Pa_q10[k]);
+      }
+    }
+  }
+}
+
+static void test_what_rubber_does_after_a_release_is_no_contact(void) {
+  static const float shares[] = {-0.15f, -0.09f, -0.03f, 0.004f, 0.03f, 0.08f};
+  static const float times_s[] = {0.5f, 2, 10};
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (size_t s = 0; s < sizeof shares / sizeof shares[0]; s++) {
+      for (size_t t = 0; t < 3; t++) {
+        begin_calm(periods_us[i]);
+        press(20000 * Pa);
+        run_s(5);
+        release(shares[s], times_s[t], 40);
+        TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+        TEST_ASSERT_TRUE(contact_s < 6);
+        int32_t left = conditioned.pressure_Pa_q10[7];
+        TEST_ASSERT_INT32_WITHIN(60 * Pa, 0, left);
+        /* The next press is what it is. */
+        fill(AMBIENT);
+        frame.pressure_Pa_q10[7] += (int32_t)(shares[s] * 400) * Pa; /* nothing of it is left */
+        frame.pressure_Pa_q10[7] += 8000 * Pa;
+        run_s(0.5f);
+        TEST_ASSERT_TRUE(conditioned.contact);
+        TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+        TEST_ASSERT_INT32_WITHIN(400 * Pa, 8000 * Pa, conditioned.peak_Pa_q10);
+      }
+    }
+  }
+}
+
+/* What stays for good is taken up, and said to be. */
+static void test_a_force_left_after_a_release_is_flagged(void) {
+  static const float shares[] = {0.03f, 0.06f, 0.1f};
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (size_t s = 0; s < 3; s++) {
+      begin_calm(periods_us[i]);
+      press(20000 * Pa);
+      run_s(5);
+      float flagged_s = 0;
+      press((int32_t)(shares[s] * 20000) * Pa);
+      run_s(0.2f);
+      for (int j = 0; j < 59; j++) {
+        run_s(1);
+        flagged_s += conditioned.zero_doubtful ? 1 : 0;
+      }
+      TEST_ASSERT_EQUAL_FLOAT(59, flagged_s);
+    }
+    /* More than an eighth is a contact without doubt. */
+    begin_calm(periods_us[i]);
+    press(20000 * Pa);
+    run_s(5);
+    press(3000 * Pa);
+    watch_s(60, 0, 0);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 60, unflagged_s);
+    TEST_ASSERT_INT32_WITHIN(700 * Pa, 3000 * Pa, conditioned.peak_Pa_q10);
+  }
+}
+
+static void test_press_after_a_release_is_not_taken_for_a_remainder(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    press(20000 * Pa);
+    run_s(5);
+    press(0);
+    run_s(3);
+    TEST_ASSERT_FALSE(conditioned.contact);
+    press(800 * Pa); /* within the band: in doubt, but not eaten */
+    watch_s(2, 0, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+    TEST_ASSERT_INT32_WITHIN(100 * Pa, 800 * Pa, conditioned.peak_Pa_q10);
+    press(0);
+    run_s(1);
+    press(2000 * Pa);
+    watch_s(5, 0, 0);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 5, unflagged_s);
+    TEST_ASSERT_INT32_WITHIN(100 * Pa, 2000 * Pa, conditioned.peak_Pa_q10);
+  }
+}
+
+/* What the zero comes back to after a certain press is the zero: no force is left there twice. */
+static void test_a_press_proves_the_zero_that_it_leaves(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (int more = 0; more <= 1; more++) {
+      begin_calm(periods_us[i]);
+      press(20000 * Pa);
+      run_s(5);
+      press(600 * Pa);
+      run_s(10);
+      TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+      TEST_ASSERT_FALSE(conditioned.contact);
+      press(20000 * Pa);
+      run_s(5);
+      TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+      press((more ? 1200 : 600) * Pa);
+      run_s(3);
+      TEST_ASSERT_FALSE(conditioned.contact);
+      TEST_ASSERT_EQUAL(more, conditioned.zero_doubtful);
+    }
+    begin_calm(periods_us[i]); /* A press that is in doubt itself proves nothing. */
+    press(20000 * Pa);
+    run_s(5);
+    press(600 * Pa);
+    run_s(10);
+    press(2000 * Pa);
+    watch_s(5, 0, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    press(600 * Pa);
+    run_s(3);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_zero_recovers_after_a_long_contact);
+  RUN_TEST(test_what_rubber_does_after_a_release_is_no_contact);
+  RUN_TEST(test_a_force_left_after_a_release_is_flagged);
+  RUN_TEST(test_press_after_a_release_is_not_taken_for_a_remainder);
+  RUN_TEST(test_a_press_proves_the_zero_that_it_leaves);
+  return UNITY_END();
+}
