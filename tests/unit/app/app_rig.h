@@ -134,6 +134,15 @@ static inline bool next_of_type(uint8_t type, struct wire_packet *packet) {
   return false;
 }
 
+static inline struct wire_contact newest_contact(void) {
+  struct wire_packet packet;
+  struct wire_contact newest = {0};
+  while (next_of_type(WIRE_CONTACT, &packet)) {
+    newest = packet.body.contact;
+  }
+  return newest;
+}
+
 /* Sends a command and returns the result of its acknowledgement; storing takes longer than others.
  */
 static inline uint8_t ask(struct wire_packet command) {

@@ -1,0 +1,317 @@
+/* The app of scene slip: commands and hosts that fail, health, crashes and what is told of them. */
+#include "app/packets.h"
+#include "app_rig.h"
+#include "common/bytes.h"
+#include "common/contact_flags.h"
+#include "common/crc32.h"
+#include "config/build_info.h"
+
+void setUp(void) {
+  rig_start();
+}
+
+void tearDown(void) {
+  rig_end();
+}
+
+static void damage_is_counted_and_unknown_commands_are_answered(void) {
+  native_cdc_open();
+  run_for(300);
+  static const uint8_t echo[] = {5, 'h', 'e', 'l', 'l', 0, 'x', 0, 0, 0};
+  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(echo, sizeof echo));
+  run_for(50);
+
+  /* A command of a later version, type 0xF0 without a body; COBS by hand. */
+  uint8_t raw[16] = {WIRE_VERSION, 0xF0};
+  bytes_put_u32(raw + 12, crc32_iso_hdlc(raw, 12));
+  uint8_t coded[20];
+  size_t out = 1, code_at = 0;
+  for (int i = 0; i < 16; i++) {
+    if (raw[i]) {
+      coded[out++] = raw[i];
+    } else {
+      coded[code_at] = (uint8_t)(out - code_at);
+      code_at = out++;
+    }
+  }
+  coded[code_at] = (uint8_t)(out - code_at);
+  coded[out++] = 0;
+  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(coded, out));
+  run_for(50);
+  struct wire_packet packet;
+  TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
+  TEST_ASSERT_EQUAL_HEX8(0xF0, packet.body.ack.command);
+  TEST_ASSERT_EQUAL_UINT8(WIRE_RESULT_UNKNOWN_COMMAND, packet.body.ack.result);
+  TEST_ASSERT_EQUAL_UINT32(3, get_health().commands_rejected);
+}
+
+static void closing_the_port_ends_the_streams(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_CONTACT);
+  native_cdc_close();
+  run_for(100);
+  struct wire_packet packet;
+  while (next_packet(&packet)) {
+  }
+  wire_receiver_init(&receiver, wire_all_layouts);
+  native_cdc_open();
+  run_for(200);
+  TEST_ASSERT_FALSE(next_packet(&packet));
+}
+
+static void a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  native_cdc_stall(true);
+  run_for(5000);
+  native_cdc_stall(false);
+  run_for(100);
+  struct wire_packet packet;
+  bool first = true;
+  uint16_t expected = 0;
+  uint32_t missing = 0;
+  while (next_packet(&packet)) { /* asserts that no frame is damaged */
+    if (!first) {
+      missing += (uint16_t)(packet.sequence - expected);
+    }
+    first = false;
+    expected = (uint16_t)(packet.sequence + 1);
+  }
+  struct wire_health health = get_health();
+  TEST_ASSERT_GREATER_THAN_UINT32(1000, health.packets_dropped);
+  TEST_ASSERT_EQUAL_UINT32(health.packets_dropped, missing);
+}
+
+static void health_comes_each_second(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_HEALTH);
+  run_for(5000);
+  struct wire_packet packet;
+  int count = 0;
+  while (next_of_type(WIRE_HEALTH, &packet)) {
+    count++;
+    TEST_ASSERT_EQUAL_HEX32(0x7FFF, packet.body.health.sensors_present);
+    TEST_ASSERT_EQUAL_UINT32(0, packet.body.health.frames_incomplete);
+  }
+  TEST_ASSERT_INT_WITHIN(1, 5, count);
+}
+
+static void the_loader_is_reached_by_command_and_by_touch(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
+                    ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {0}}));
+  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(200));
+  TEST_ASSERT_EQUAL(
+      WIRE_RESULT_DONE,
+      ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}}));
+  TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
+
+  setUp();
+  native_cdc_open();
+  run_for(300);
+  native_cdc_request_loader();
+  TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
+}
+
+static struct crash_record get_crash(void) {
+  struct wire_packet packet;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_CRASH}));
+  TEST_ASSERT_TRUE(next_of_type(WIRE_CRASH, &packet));
+  return packet.body.crash;
+}
+
+static void the_last_crash_is_told_when_asked_for(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(CRASH_NONE, get_crash().kind);
+  struct crash_record crash = {.kind = CRASH_PANIC, .pc = 0x20000100, .t_us = 7000000};
+  native_set_last_crash(&crash);
+  TEST_ASSERT_EQUAL(CRASH_PANIC, get_crash().kind);
+  TEST_ASSERT_EQUAL_HEX32(0x20000100, get_crash().pc);
+  TEST_ASSERT_EQUAL_UINT64(7000000, get_crash().t_us);
+  crash.kind = CRASH_NONE;
+  native_set_last_crash(&crash);
+}
+
+static void what_happens_is_noted_for_the_record_of_a_crash(void) {
+  uint8_t detail;
+  native_cdc_open();
+  run_for(300);
+  get_health();
+  TEST_ASSERT_EQUAL(CRASH_EVENT_COMMAND, native_last_event(&detail));
+  TEST_ASSERT_EQUAL_HEX8(WIRE_CMD_HEALTH, detail);
+  native_cdc_close();
+  run_for(30);
+  TEST_ASSERT_EQUAL(CRASH_EVENT_CLOSED, native_last_event(&detail));
+  native_cdc_open();
+  ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}});
+  TEST_ASSERT_EQUAL(CRASH_EVENT_STORED, native_last_event(&detail));
+  TEST_ASSERT_EQUAL(0, detail);
+}
+
+static void more_failures_in_a_second_than_a_byte_holds_are_noted_as_255(void) {
+  uint8_t detail;
+  run_for(1500);
+  static const struct {
+    uint32_t failures;
+    uint8_t noted;
+  } cases[] = {{5, 5}, {254, 254}, {255, 255}, {256, 255}, {300, 255}};
+  for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    atomic_fetch_add(&app.scan.counters.bus_timeouts, cases[i].failures);
+    run_for(1200);
+    TEST_ASSERT_EQUAL(CRASH_EVENT_BUS, native_last_event(&detail));
+    TEST_ASSERT_EQUAL_UINT8(cases[i].noted, detail);
+  }
+}
+
+static void at_the_slowest_rate_the_watchdog_is_fed(void) {
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
+  run_for(25000);
+}
+
+/* In the frame that is held for the temperature already, and until a temperature says otherwise. */
+/* Two supplies dip at once, so that neither steps alone: the temperatures tell it before the zeros
+ * give in, half a second later. */
+static void test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in(void) {
+  run_for(8000);
+  while (array.command >> 4 != 5) { /* the next temperature would come in two seconds */
+    native_run_until(port_now_us() + 50, main_round, &app);
+  }
+  run_for(50);
+  const int32_t zero_Pa_q10 = app.condition.zero_Pa_q10[7];
+  sim_ms5840_brown_out(&array.sensor[7]);
+  sim_ms5840_brown_out(&array.sensor[9]);
+  run_for(100);
+  TEST_ASSERT_FALSE(app.conditioned.tared);
+  TEST_ASSERT_TRUE(array.sensor[7].untrimmed);
+  run_for(400);
+  TEST_ASSERT_FALSE(array.sensor[7].untrimmed);
+  run_for(200);
+  TEST_ASSERT_TRUE(app.conditioned.tared);
+  TEST_ASSERT_INT32_WITHIN(20 * 1024, zero_Pa_q10, app.condition.zero_Pa_q10[7]);
+  TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.frame.valid);
+}
+
+static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
+  press.force_N = 5.0;
+  press.from_us = 700000;
+  native_cdc_open();
+  run_for(600);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  run_for(200);
+  struct wire_packet packet;
+  while (array.command >> 4 != 5) {
+    native_run_until(port_now_us() + 50, main_round, &app);
+  }
+  while (next_packet(&packet)) {
+  }
+  array.fault = (struct sim_fault){
+      .kind = SIM_FAULT_FLIP, .transfer = array.transfers + 1 + 7, .mask = 0x80000};
+  run_for(80);
+  int held = 0;
+  int doubtful = 0;
+  while (next_packet(&packet)) {
+    if (packet.type == WIRE_CONTACT) {
+      held += (packet.body.contact.flags & CONTACT_FLAG_HELD) != 0;
+      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_FIT_VALID,
+                            packet.body.contact.flags);
+    } else {
+      const bool holds = packet.body.raw.flags & CONTACT_FLAG_HELD;
+      TEST_ASSERT_EQUAL_HEX32(holds ? 0 : 1 << 7, packet.body.raw.doubtful);
+      doubtful += !holds;
+    }
+  }
+  TEST_ASSERT_EQUAL(1, held);
+  TEST_ASSERT_GREATER_THAN(10, doubtful);
+  run_for(60);
+  while (next_packet(&packet)) {
+  }
+  run_for(60);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
+  do {
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SENSOR_DOUBTFUL, packet.body.contact.flags);
+  } while (next_of_type(WIRE_CONTACT, &packet));
+}
+
+static void test_stages_end_at_what_fits(void) {
+  TEST_ASSERT_EQUAL_UINT16(0, saturate_u16(0));
+  TEST_ASSERT_EQUAL_UINT16(65534, saturate_u16(65534));
+  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(65535));
+  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(65536));
+  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(UINT64_MAX));
+}
+
+static void test_uptime_keeps_the_rest_of_each_second(void) {
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1300}});
+  run_for(100000);
+  const uint32_t now_s = (uint32_t)(port_now_us() / 1000000u);
+  TEST_ASSERT_UINT32_WITHIN(2, now_s, get_health().uptime_s);
+}
+
+static void test_whether_the_watchdog_struck_is_told(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(0, get_health().watchdog_resets);
+  native_start(true);
+  native_set_event_source(next_event_us, &array);
+  port_set_event_handler(on_event, &app);
+  sim_array_init(&array, geometry.sensor_count, 1);
+  array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
+  native_cdc_reset();
+  app_start(&app, sim_array_bus(&array));
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(1, get_health().watchdog_resets);
+}
+
+/* USB 2.0, 9.6.1: bcdDevice is 0xJJMN. */
+static void test_the_port_tells_the_version(void) {
+  const uint8_t *version = build_info.version;
+  TEST_ASSERT_EQUAL_HEX16(version[0] * 256 + version[1] * 16 + version[2],
+                          native_cdc_identity()->device_version_bcd);
+}
+
+static void test_what_is_being_stored_is_told(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet keep = {.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}};
+  struct wire_packet info = {.type = WIRE_CMD_INFO};
+  send_packet(&keep);
+  send_packet(&info);
+  run_for(10);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_INFO, &info));
+  TEST_ASSERT_TRUE(info.body.info.stored & WIRE_STORED_WRITING);
+  run_for(500);
+  while (next_packet(&info)) {
+  }
+  TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_WRITING);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(damage_is_counted_and_unknown_commands_are_answered);
+  RUN_TEST(closing_the_port_ends_the_streams);
+  RUN_TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap);
+  RUN_TEST(health_comes_each_second);
+  RUN_TEST(the_loader_is_reached_by_command_and_by_touch);
+  RUN_TEST(the_last_crash_is_told_when_asked_for);
+  RUN_TEST(what_happens_is_noted_for_the_record_of_a_crash);
+  RUN_TEST(more_failures_in_a_second_than_a_byte_holds_are_noted_as_255);
+  RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
+  RUN_TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in);
+  RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);
+  RUN_TEST(test_stages_end_at_what_fits);
+  RUN_TEST(test_uptime_keeps_the_rest_of_each_second);
+  RUN_TEST(test_whether_the_watchdog_struck_is_told);
+  RUN_TEST(test_the_port_tells_the_version);
+  RUN_TEST(test_what_is_being_stored_is_told);
+  return UNITY_END();
+}
