@@ -123,3 +123,23 @@ TEST(GripReach, AFrameOfAMovingGripperShowsNothing) {
     EXPECT_EQ(bench.room_mm(), room_as_shown_mm()) << stood_s;
   }
 }
+
+// A gripper that moves tells its width to a step only. Where a slide slows down, nothing less is
+// added to the move under way; a load that rises is answered at once.
+TEST(GripReach, NothingLessThanAStepIsAddedToAMoveThatCatchesASlide) {
+  for (const bool slides : {true, false}) {
+    Bench bench;
+    bench.settings.cap_N = 30.0; // the gripper limits itself, so it need not wait for a move
+    bench.feel();
+    bench.send(2);
+    bench.answer(bench.width_mm + 0.5, true, 0.1);
+    bench.felt.slides = slides;
+    bench.felt.t_s = bench.t_s - 0.006;
+    const double sent_mm = bench.reach.target_mm();
+    const double comes_N = bench.reach.coming_N(bench.felt, bench.t_s);
+    const double step_N = 0.5 * bench.reach.least_move_N(comes_N);
+    bench.reach.aim(comes_N + 0.6 * step_N, GripReach::Haste::usual, bench.felt, bench.settings,
+                    bench.t_s);
+    EXPECT_EQ(bench.reach.target_mm() < sent_mm, !slides);
+  }
+}
