@@ -5,7 +5,8 @@
 // Of the positions that the gripper can reach it takes the one whose mean squared error over the
 // rest of the hold is least, by what the weaker fingertip says. It goes there at once, or round
 // (back by the least move, and on by that and a step) where that is worth what the way costs. It
-// has the others' gripper, and moves only after its last move shows in the frames, as ours does.
+// has the others' gripper, and moves only after its last move shows in the frames, as ours does. It
+// plans no second move: with fine steps, which follow the rubber, others do better.
 #pragma once
 
 #include "simulation/cell/trial.hpp"
