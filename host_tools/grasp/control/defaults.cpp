@@ -13,7 +13,7 @@ GripSettings default_settings(const GripperTraits &traits) {
   const double dead_s = traits.latency_s + traits.poll_s + 0.01;
   settings.gains.ki_mm_Ns = std::clamp(0.06 / dead_s, 0.3, 4.0);
   settings.start_N = 4.0 + 1.5 * traits.step_mm; // what a step may miss
-  settings.floor_N = 1.5 + 1.0 * traits.step_mm;
+  settings.floor_N = 1.5; // no step is added: an opening leaves what is wanted
   settings.margin = 1.2 + 3.0 * traits.latency_s;
   return settings;
 }

@@ -27,6 +27,9 @@ constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
 // Of what slides and does not slow down: the load is its friction, and what stops it within so
 // long; it is followed so quickly.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
+// Friction falls by less than this as a slide quickens. So what slides carries more once its grip has
+// grown by so much, and what does not has been caught.
+constexpr double GROWN = 1.4;
 constexpr double MORE = 1.3; // of its grip, where what slides tells no load
 
 } // namespace
@@ -102,7 +105,16 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
     slides_ += was_sliding ? 0 : 1;
     slid_s_ = now_s;
     if (goes_on_ && felt.tells_load) {
-      friction_.slid(std::max(felt.ratio, FRICTION_LEAST));
+      // The ratio of what has been caught is no friction.
+      const bool grown = was_sliding && felt.grip_N > GROWN * going_N_;
+      const bool caught = grown && felt.load_N < going_load_N_;
+      if (!caught) {
+        friction_.slid(std::max(felt.ratio, FRICTION_LEAST));
+      }
+      if (!was_sliding || (grown && !caught)) {
+        going_N_ = felt.grip_N;
+        going_load_N_ = felt.load_N;
+      }
       load_.slides_at(felt.load_N, felt.speed_mm_s, passed_s);
     }
     return;

@@ -62,6 +62,7 @@ private:
   double now_s_ = 0.0, looked_s_ = 0.0;
   double slid_s_ = 0.0; // the last frame of a slide
   double fastest_mm_s_ = 0.0;
+  double going_N_ = 0.0, going_load_N_ = 0.0; // grip and load of a slide, as its friction was seen
   double still_s_ = 0.0;  // the last frame that told no slide
   double steady_s_ = 0.0; // since when the load is steady
   double was_N_ = 0.0;    // the load, as far as it is remembered

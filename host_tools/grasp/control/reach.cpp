@@ -293,9 +293,10 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
   const double near_N = NEAR * wanted_N;
   // What tells no load will not tell a slide either.
   const bool exact = haste == Haste::slides || !felt.tells_load;
-  // An opening that does not show yet is not taken back for less than a step.
-  const bool opens = !come && target_mm_ > width_mm;
-  const double misses_N = exact ? near_N : std::max(near_N, (opens ? 1.0 : MISSES) * closes_N);
+  // An opening that does not show yet is not taken back for less than a step, nor is a move added to
+  // where what slides slows down already.
+  const bool waits = !come && (target_mm_ > width_mm || felt.slides);
+  const double misses_N = exact ? near_N : std::max(near_N, (waits ? 1.0 : MISSES) * closes_N);
   double to_mm = coming;
   if (now_N < wanted_N - misses_N) {
     const double enough_mm = rubber_.width_for(wanted_N - misses_N, low_N, width_mm);

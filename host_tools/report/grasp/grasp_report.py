@@ -31,6 +31,9 @@ Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
 what a turning object takes of the friction. Force told: the mean of what both fingertips say; taken for: what the controller reckons with,
 of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
 0.5 s, by what the fingertips say. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
+FIRM = """Set forces of 8 N and more. The oracle knows the true force, how it follows the width and how the rubber is going to relax. Of the positions that
+the gripper can reach it takes the one whose mean squared error over the rest of the hold is least, and it moves no more often than ours may. It plans no
+second move, so it shows what is possible, and is no least bound. Ours, by the same rule as in a lift, prefers too much to too little."""
 PARTS = {"by_object": "By object", "by_friction": "By friction", "by_mass": "By mass", "by_disturbance": "By disturbance"}
 
 
@@ -45,7 +48,7 @@ def write(found, path):
     lines = ["# Grasps", "", *ABOUT.split("\n"), "", "![Drops, grip, reaction, a slip that is caught](grasp.png)", "", *goal_table_md(found), "",
              "## By kind", "", *kinds.text(found), "## In the twin's cell, by gripper, mode and rate", "", *rows_md(moving, COLUMNS), "", "## Set forces", "", *rows_md(still, STILL), ""]
     if "by_set" in found:
-        lines += ["Of those held for 12 s, by the set force:", "", *rows_md(found["by_set"], STILL), ""]
+        lines += [*firm_of(found), "", "Of those held for 12 s, by the set force:", "", *rows_md(found["by_set"], STILL), ""]
     for name, title in PARTS.items():
         if name in found:
             lines += [f"## {title}", "", "Round objects, 410 frames a second.", "", *rows_md(found[name], COLUMNS), ""]
@@ -53,6 +56,13 @@ def write(found, path):
     if "emulated_grasp" in found:
         lines += ["## With the release image", "", *emulated_grasp.text(found["emulated_grasp"])]
     write_text(path, "\n".join(lines))
+
+
+def firm_of(found):
+    """What is asked of set forces of 8 N and more, what is possible, and what ours does."""
+    rows = [[gripper, found["goals"][f"hold_rms_percent_{called}"]["goal"], text_of(found.get(f"hold_rms_possible_percent_{called}"), 3),
+             text_of(found[f"hold_rms_percent_{called}"], 3)] for gripper, (called, _) in GRIPPERS.items()]
+    return [*FIRM.split("\n"), "", *table_md(("gripper", "rms error asked, %", "possible: the oracle's", "ours"), rows)]
 
 
 def tidy(axes, title, label):

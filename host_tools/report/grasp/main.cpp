@@ -22,7 +22,8 @@ using nlohmann::ordered_json;
 constexpr char HELP[] =
     "usage: fingertip_grasp_trials [options]\n"
     "  --gripper NAME    a model that `fingertip gripper list` names (usual: the first), or ideal\n"
-    "  --mode NAME       hold (usual), fixed; still, still-fixed: on the table, no lift\n"
+    "  --mode NAME       hold (usual), fixed; on the table, no lift: still, still-fixed,\n"
+    "                    still-oracle: knows the true force, stiffness and relaxation\n"
     "  --objects NAME    round (usual: balls and cylinders), balls, cylinders, faces, flats; or\n"
     "                    faces of the twin, split by commas\n"
     "  --rate HZ         frames of a fingertip a second, 410; above 600 at OSR 256, else 1024\n"

@@ -1,6 +1,7 @@
 #include "grasp/trials.hpp"
 
 #include "grasp/settings.hpp"
+#include "grasp/still_oracle.hpp"
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/table_file.hpp"
@@ -101,7 +102,7 @@ Set::Set(const SetOptions &options)
       gripper_(gripper_mechanics(options.gripper)) {
   if (options.mode != "hold" && options.mode != "fixed" && !is_still()) {
     throw std::runtime_error("there is no mode \"" + options.mode +
-                             "\"; choose one of: hold fixed still still-fixed");
+                             "\"; choose one of: hold fixed still still-fixed still-oracle");
   }
   if (!(options.rate_Hz >= 1.0 && options.rate_Hz <= 1600.0)) {
     throw std::runtime_error("a fingertip gives 1 to 1600 frames a second");
@@ -132,14 +133,14 @@ Trial Set::trial(std::uint64_t n) const {
   }
   trial.still_s = is_still() ? options_.still_s : 0.0;
   trial.set_N = settings(n).set_N;
-  trial.set_of_smaller = options_.mode == "still";
+  trial.set_of_smaller = options_.mode != "still-fixed";
   return trial;
 }
 
 GripSettings Set::settings(std::uint64_t n) const {
   GripSettings settings = settings_for(gripper_.traits, settings_of(options_.settings));
-  const bool holds = options_.mode == "hold" || options_.mode == "still";
-  settings.mode = holds ? GRIP_MODE_HOLD : GRIP_MODE_FIXED;
+  const bool fixed = options_.mode == "fixed" || options_.mode == "still-fixed";
+  settings.mode = fixed ? GRIP_MODE_FIXED : GRIP_MODE_HOLD;
   if (is_still()) {
     settings.set_N = Random(options_.seed, SET, n).log_uniform(2.0, 15.0);
     settings.start_N = settings.floor_N = settings.blind_N = settings.set_N;
@@ -149,8 +150,16 @@ GripSettings Set::settings(std::uint64_t n) const {
 
 Outcome Set::run(std::uint64_t n, const std::function<void(const Moment &)> &trace) const {
   const Trial one = trial(n);
+  const Face &face = all_.at(one.scene.face);
+  if (options_.mode == "still-oracle") {
+    StillOracle oracle(one, face);
+    return run_trial(one, face, oracle, [&](const Moment &moment) {
+      oracle.see(moment);
+      trace ? trace(moment) : void();
+    });
+  }
   CoreController controller(settings(n), gripper_.traits);
-  return run_trial(one, all_.at(one.scene.face), controller, trace);
+  return run_trial(one, face, controller, trace);
 }
 
 std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count,

@@ -20,7 +20,7 @@ std::map<std::string, double> settings_of(const std::string &changes);
 
 struct SetOptions {
   std::string gripper = gripper_models().front().model; // of gripper_mechanics()
-  std::string mode = "hold";     // hold, fixed, or still, still-fixed: on the table, no lift
+  std::string mode = "hold";     // hold, fixed, or still, still-fixed, still-oracle: on the table, no lift
   std::string objects = "round"; // of cell::faces_of(), or faces split by commas
   std::string settings;          // of the controller: name=value, split by commas
   double rate_Hz = 410.0;        // above 600 at OSR 256, else 1024

@@ -48,6 +48,11 @@ class GraspTrials(unittest.TestCase):
         self.assertEqual(sum(row["grasps"] for row in found["by_set"].values()), 4)
         self.assertNotIn("drops_percent", found)
 
+    def test_what_the_grippers_steps_allow_is_better_than_ours(self):
+        rms = {mode: trials("--mode", mode, "--count", "24", "--gripper", "2f85", "--seed", "3")["by_set"]["8 N and more"]["rms_p50_percent"]
+               for mode in ("still", "still-oracle")}
+        self.assertLess(rms["still-oracle"], 0.8 * rms["still"])
+
     def test_a_trace_has_a_value_for_each_moment(self):
         found = json.loads(run("--objects", "sphere15", "--gripper", "ideal", "--trace", "2").stdout)
         lengths = {len(values) for values in found["series"].values()}

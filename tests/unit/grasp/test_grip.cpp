@@ -109,6 +109,35 @@ TEST(Grip, LearnsFrictionWhileItSlides) {
   expect_share(0.7 * held, world.report.friction, 0.05);
 }
 
+// What slides carries more as its grip grows. What carries less has been caught, though the slide is
+// still reported: its ratio is no friction.
+TEST(GripHold, WhatHasBeenCaughtTeachesNoFriction) {
+  for (const double load_N : {1.5, 4.0}) {
+    const GripSettings settings;
+    GripHold hold;
+    hold.begin();
+    GripFelts felt;
+    felt.fresh = felt.tells_load = true;
+    double now_s = 1.0;
+    const auto frames = [&](double grip_N, double carries_N, double speed_mm_s) {
+      felt.slides = speed_mm_s > 0.0;
+      felt.speed_mm_s = speed_mm_s;
+      felt.grip_N = grip_N;
+      felt.load_N = carries_N;
+      felt.ratio = carries_N / grip_N;
+      for (int i = 0; i < 20; i++) {
+        now_s += 2.4e-3;
+        hold.wants(felt, grip_N, settings, now_s, 0.04);
+      }
+    };
+    frames(5.0, 1.5, 0.0);
+    frames(5.0, 2.0, 40.0);
+    ASSERT_NEAR(hold.friction(settings), 0.4, 1e-9);
+    frames(12.0, load_N, 50.0);
+    EXPECT_NEAR(hold.friction(settings), load_N < 2.0 ? 0.4 : load_N / 12.0, 1e-9) << load_N;
+  }
+}
+
 TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
   GripWorld world;
   world.grasp();
