@@ -66,6 +66,7 @@ void add_validate(CommandLine &line) {
                           ->add_option("--pull", options->pulling.weight_g,
                                        "Mass that pulls the standing weight sideways, by a level "
                                        "thread over a pulley, in the end: a third of --weight")
+                          ->check(CLI::Range(10.0, 1000.0))
                           ->excludes(sheet)
                           ->type_name("GRAMS");
   CLI::Option *height = command
