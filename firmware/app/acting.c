@@ -24,19 +24,14 @@ void app_use_shape(struct app *app) {
   profile = app->pad != NULL;
 #endif
   const struct calibration *found = DEFAULT_USES_SHAPE ? app->calibration : NULL;
-  const float dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
-  const float dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
-#if FT_WITH_TANGENTIAL
-  app->dip_share = dip_share;
-  app->dip_sd_mm = dip_sd_mm;
-#endif
-  found = profile ? NULL : found;
+  /* Beside a profile contacts may be of any width: its estimate tells a wide one from a pull. */
+  const bool knows = found && !profile;
   settings->prior_sigma_mm =
-      is_set ? app->set_sigma_mm : found ? millimetres(found->sigma_um) : 0.0f;
+      is_set ? app->set_sigma_mm : knows ? millimetres(found->sigma_um) : 0.0f;
   settings->prior_width_mm =
-      is_set ? app->set_sigma_sd_mm : found ? millimetres(found->sigma_sd_um) : 0.0f;
-  settings->dip_share = profile ? 0.0f : dip_share;
-  settings->dip_sd_mm = profile ? 0.0f : dip_sd_mm;
+      is_set ? app->set_sigma_sd_mm : knows ? millimetres(found->sigma_sd_um) : 0.0f;
+  settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
+  settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
 }
 
@@ -45,10 +40,6 @@ static void use_tangential_scales(struct app *app) {
   if (app->pad) {
     tangential_use(&app->tangential_settings, app->pad, &app->contact_settings,
                    app->calibration != NULL);
-    if (app->calibration && app->dip_share > 0.0f) {
-      tangential_use_dip(&app->tangential_settings, app->dip_share, app->dip_sd_mm,
-                         millimetres(app->calibration->sigma_um));
-    }
   }
 }
 

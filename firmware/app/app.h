@@ -64,7 +64,6 @@ struct app {
   bool shapes_act;                          /* the profile is one that they know */
   bool shapes_begin;                        /* what is asked next is of another contact or pad */
   struct shapes_report shapes;              /* of the contact under way */
-  float dip_share, dip_sd_mm;               /* the calibration's, which the Gaussian leaves out */
   uint64_t worked_us;                       /* the last frame's time */
   uint64_t worked_apart_us;                 /* between it and the one before */
   struct tangential_history tangential_history;

@@ -42,8 +42,6 @@ static void set_question(struct app *app, struct shapes_question *question) {
   memcpy(question->pressure_Pa_q10, app->conditioned.pressure_Pa_q10,
          sizeof question->pressure_Pa_q10);
   question->settings = app->fit_settings;
-  question->settings.dip_share = app->dip_share;
-  question->settings.dip_sd_mm = app->dip_sd_mm;
   question->fit = app->fit;
   question->force_scale = app->tangential_settings.force_scale;
   question->force_scale_sd = app->tangential_settings.force_scale_sd;
@@ -84,8 +82,6 @@ static void ask_for_load(struct app *app) {
   memcpy(app->load_of.pressure_Pa_q10, app->conditioned.pressure_Pa_q10,
          sizeof app->load_of.pressure_Pa_q10);
   app->load_of.settings = app->fit_settings;
-  app->load_of.settings.dip_share = app->dip_share;
-  app->load_of.settings.dip_sd_mm = app->dip_sd_mm;
   app->load_of.fit = app->fit;
   app->tangential_job.question = (struct tangential_question){
       .begins = !app->tangential_follows,

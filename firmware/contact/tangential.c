@@ -7,15 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-void tangential_use_dip(struct tangential_settings *tangential, float share, float sd_mm,
-                        float sigma_mm) {
-  const float dip = sd_mm * sd_mm, sum = dip + sigma_mm * sigma_mm;
-  const float wide = sum > 0.0f ? dip / sum : 0.0f;
-  const float ratio = 1.0f - 4.0f * share * wide * wide;
-  tangential->force_scale *= ratio;
-  tangential->force_scale_sd *= ratio;
-}
-
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
                     const struct contact_settings *settings, bool calibrated) {
   /* A calibration's scale was found with 2 pi p0 sigma^2, of which the estimate's force is no

@@ -20,13 +20,6 @@ struct tangential_settings {
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
-/* Of a calibrated pad, after tangential_use: the calibration's force scale was found with a Gaussian
- * without a dip, which on a pad with one is narrower and lower. sigma_mm: of the Gaussian beside the
- * dip (calibration.h). The Gaussian nearest to both, by least squares over the plane and to first
- * order in the share, has 1 - 4 share (q / (1 + q))^2 of 2 pi p0 sigma^2, q = (sd / sigma)^2. */
-void tangential_use_dip(struct tangential_settings *tangential, float share, float sd_mm,
-                        float sigma_mm);
-
 /* The scales of this profile, with the calibration whose scales are in settings or, if it is not
  * calibrated, without one. */
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,

@@ -460,9 +460,9 @@ static NOINLINE void add_shape_moves(const struct moments *m, const struct moves
 
 /* And of the profile's tail, which is off everywhere at once. */
 static NOINLINE void add_tail_moves(const struct moments *m, const struct moves *moves,
-                                   const struct readings *readings,
-                                   const struct fit_system *system, int32_t gain_shift,
-                                   struct shape *shape) {
+                                    const struct readings *readings,
+                                    const struct fit_system *system, int32_t gain_shift,
+                                    struct shape *shape) {
   struct dip dip;
   const int32_t depth_q28 =
       fit_grid_dip(readings->dip_height, TAIL_ERROR, &system->at, 1 << 28, system->rise_q22,
@@ -656,14 +656,11 @@ static NOINLINE void take_out(const struct fit_array *array, const int32_t *pres
                               const struct fit_settings *settings, const struct state *state,
                               const struct moments *m, const struct fit_system *system, int left,
                               struct readings *readings) {
-  const bool dip = readings->dip_share.mantissa != 0;
   const int32_t rise_q22 = fit_grid_rise(system->at.height, m->x.offset, m->y.offset);
-  if (dip) {
+  if (readings->dip_share.mantissa != 0) {
     fit_grid_take_dip_out(array, pressure_Pa_q10, state, system->amplitude_q28, rise_q22, readings);
   }
-  /* In place, but the dip's readings are new each time. */
-  if (fit_has_own(settings) &&
-      (dip ? left <= FIT_OWN_ITERATIONS : left == FIT_OWN_ITERATIONS)) {
+  if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
     const int32_t peak_q28 =
         fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
     fit_grid_take_own_out(array, settings, UINT32_MAX, state, peak_q28, readings);
@@ -686,8 +683,10 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   system.cross = 0;
   int left = settings->iterations;
   int coarse = left - COARSE_ITERATIONS;
+  const int last = left > FIT_OWN_ITERATIONS ? FIT_OWN_ITERATIONS : 1; /* that takes out */
   do {
-    if (left < settings->iterations && (readings.dip_share.mantissa != 0 || fit_has_own(settings))) {
+    if (left < settings->iterations && left >= last &&
+        (readings.dip_share.mantissa != 0 || fit_has_own(settings))) {
       take_out(array, pressure_Pa_q10, settings, &state, &m, &system, left, &readings);
     }
     system.at = state;

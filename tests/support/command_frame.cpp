@@ -4,15 +4,17 @@
 // usage: command_frame [--sequence N] COMMAND [ARGS]
 //
 // COMMAND: stream none|contact,raw,health; tare; tare-force; rate HZ|max; osr N; slip THRESHOLD_MM
-// WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the calibration); pad
-// THICKNESS_MM OVERHANG_MM; pad-from-touch, with the same; erase-pad; sync MODE|off; info; health;
-// crash; loader
+// WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; calibrate SIGMA_MM DIP_PERCENT; erase
+// (the calibration); pad THICKNESS_MM OVERHANG_MM; pad-from-touch, with the same; erase-pad; sync
+// MODE|off; info; health; crash; loader
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <functional>
@@ -31,6 +33,29 @@ wire_packet pad_of(const std::string &thickness, const std::string &overhang, bo
                 "\" must be numbers; give thickness and overhang of the rubber, mm");
   }
   return command_pad(pad::profile_over_own_sensors({*thickness_mm, *overhang_mm, from_touch}));
+}
+
+/* Of fifteen sensors that are alike. */
+wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
+  constexpr std::uint8_t SENSORS = 15;
+  const auto sigma_mm = to_double(sigma), dip_percent = to_double(dip);
+  if (!sigma_mm || !dip_percent) {
+    throw Error("\"" + sigma + "\" and \"" + dip +
+                "\" must be numbers; give a contact's width, mm, and its dip, %");
+  }
+  calibration made{};
+  made.date_s = 1785931200;
+  made.placements = 20;
+  made.force_scale = 1.0F;
+  made.force_scale_sd = 0.01F;
+  made.sigma_um = static_cast<std::uint16_t>(std::lround(1e3 * *sigma_mm));
+  made.sigma_sd_um = static_cast<std::uint16_t>(std::lround(10.0 * *sigma_mm));
+  made.dip_share_q16 = static_cast<std::uint16_t>(std::lround(655.36 * *dip_percent));
+  made.dip_sd_um =
+      static_cast<std::uint16_t>(made.dip_share_q16 ? std::lround(2500.0 * *sigma_mm) : 0);
+  made.ambient_kPa = 101;
+  std::fill(made.sensors, made.sensors + SENSORS, sensor_calibration{1.0F, 0.01F, 0, 0, 0});
+  return command_calibrate(made, SENSORS);
 }
 
 /* Of settings that travel in one command. */
@@ -71,6 +96,8 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"sync", {1, "sync MODE|off", [&] { return command_of({"sync=" + word(1)}); }}},
       {"keep", {0, "keep", [] { return command_keep(true); }}},
       {"forget", {0, "forget", [] { return command_keep(false); }}},
+      {"calibrate",
+       {2, "calibrate SIGMA_MM DIP_PERCENT", [&] { return calibration_of(word(1), word(2)); }}},
       {"erase", {0, "erase", command_erase_calibration}},
       {"pad", {2, "pad THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), false); }}},
       {"pad-from-touch",

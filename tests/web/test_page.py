@@ -2,7 +2,7 @@
 
 usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures] [unittest arguments]
 
-With --pictures Looks writes the reference pictures again: look at them. Exit status 77: there is no such browser here, or it may get no ports.
+With --pictures Looks writes the reference pictures again, and that of the manual: look at them. Exit status 77: there is no such browser here, or it may get no ports.
 
 real time: a browser, whose fingertips are on pseudo-terminals.
 """
@@ -32,6 +32,8 @@ SERIALS = ("E660583883265A01", "E660583883265A02")
 FORCE_N = 3.0
 REPEATED = 5
 REFERENCES = pathlib.Path(__file__).parent / "pictures"
+MANUALS = pathlib.Path(__file__).parents[2] / "host_tools/web/page.png"  # in host_tools/README.md
+MANUALS_STEPS = 5  # the same: the object hangs
 MOMENT_STEPS = 8  # of half a second before the end of the recording: the lime slips
 COUNT_MESSAGES = """
 import collections, json, sys
@@ -345,24 +347,28 @@ class Looks(PageTest):
 
     LIMIT = 11  # of what one place in a hundred exceeds: other fonts 4 (with serifs) to 10.5 (of one width), no traces 24 in their part, no colours 45, no pad 57
     SIZES = {"light": (1120, 760), "dark": (1120, 760), "phone": (390, 780)}
+    MANUALS_SIZE = (1120, 820)
 
-    def paused(self):
-        """A page that shows the same moment of the same recording of a lime that slips: simulated."""
-        recording = self.folder / "lime.csv"
+    def recorded(self, name, scenario, *options):
+        recording = self.folder / name
         if not recording.exists():
-            scenario = self.scenario("slip", "--indenter", "lime", "--gain", 10, "--seconds", 12)
-            run(OPTIONS.build / "host_tools/simulation/player/fingertip_player", "play", scenario, "-o", recording, "--quiet")
+            run(OPTIONS.build / "host_tools/simulation/player/fingertip_player", "play", scenario, "-o", recording, "--quiet", *options)
+        return recording
+
+    def paused(self, recording=None, steps=MOMENT_STEPS):
+        """A page that shows the same moment of the same recording; without one: of a lime that slips, simulated."""
+        recording = recording or self.recorded("lime.csv", self.scenario("slip", "--indenter", "lime", "--gain", 10, "--seconds", 12))
         page = self.open(before=TEN_TIMES, width=1120, height=760)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")
         page.call("DOM.focus", nodeId=page.call("DOM.querySelector", nodeId=page.call("DOM.getDocument")["root"]["nodeId"], selector="main")["nodeId"])
         page.key(" ", "Space")
-        for _ in range(MOMENT_STEPS):
+        for _ in range(steps):
             page.key("ArrowLeft")
         return page
 
     def shown(self, page, name):
-        page.size(*self.SIZES[name])
+        page.size(*self.SIZES.get(name, self.MANUALS_SIZE))
         page.media(prefers_color_scheme="dark" if name == "dark" else "light")
         before = None
         for _ in range(40):  # until it stands still
@@ -371,7 +377,7 @@ class Looks(PageTest):
             if now == before:
                 break
             before = now
-        return pictures.half(pictures.read(now))
+        return pictures.read(now)
 
     def apart(self, page, found):
         """From the picture in light colours: of all that is shown, or of the traces alone, which are thin lines in a part of it."""
@@ -383,7 +389,7 @@ class Looks(PageTest):
     def test_it_looks_as_it_did(self):
         page = self.paused()
         for name in self.SIZES:
-            found = self.shown(page, name)
+            found = pictures.half(self.shown(page, name))
             reference = REFERENCES / f"{name}.png"
             if OPTIONS.pictures:
                 pictures.write(reference, found)
@@ -395,9 +401,20 @@ class Looks(PageTest):
         for what, hide in (("the pad", "document.querySelector('.pad-picture').style.opacity = 0"), ("the traces", "document.querySelector('.traces').style.opacity = 0"),
                            ("the colours", "document.documentElement.style.filter = 'grayscale(1)'")):
             page.run(hide)
-            self.assertGreater(self.apart(page, self.shown(page, "light")), self.LIMIT, what)
+            self.assertGreater(self.apart(page, pictures.half(self.shown(page, "light"))), self.LIMIT, what)
             page.run("document.querySelectorAll('[style*=opacity]').forEach(each => each.style.opacity = '')")
 
+
+    def test_the_manuals_picture(self):
+        """What the boards' default scene shows of a fingertip that knows its pad: a pull beside force and place."""
+        lift = self.scenario("lift", "--seconds", 20, "--force", 6, "--tangential", "0.35,-40", "--gain", 2, "--seed", 5)
+        page = self.paused(self.recorded("pulled.csv", lift, "--pad", 12, "--rate", 200), MANUALS_STEPS)
+        self.assertRegex(page.run("document.body.innerText"), r"Pull")
+        found = self.shown(page, "manual")
+        if OPTIONS.pictures:
+            pictures.write(MANUALS, found)
+            return
+        self.assertLess(pictures.difference(pictures.half(found), pictures.half(pictures.read(str(MANUALS)))), self.LIMIT)
 
     def test_a_pause_follows_the_window(self):
         """The flags, which are drawn with the page's own pen, as the plots."""

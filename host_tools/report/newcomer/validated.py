@@ -25,7 +25,10 @@ TABLE = ROOT / "host_tools/tool/validation/twin_says.inc"
 FAULTS = ("dead_sensor", "loose_sensor", "tilted_skin", "thin_skin", "drift", "wrong_weight", "swapped_wires")
 # The bounds of tool/validation were chosen on seeds 1 to 12, 101 to 124, 201 to 206 and 501 to 512. Other seeds showed what was wrong with
 # earlier ones: 403, 815, 852, 853, 874, 890, 945 and 953.
-HEALTHY_SEEDS, FAULTY_SEEDS, TABLE_SEEDS = range(701, 721), range(961, 966), range(301, 321)
+HEALTHY_SEEDS, FAULTY_SEEDS, TABLE_SEEDS, PULL_SEEDS = range(701, 721), range(961, 966), range(301, 321), range(721, 731)
+PULL = ("--pull", "100")  # of 300 g
+# Of a fingertip that knows its pad: on rubber as its profile has it, and with the errors of real pads.
+PLAIN, LIKE_REAL = ("--known-pad", "--plain", *PULL), ("--known-pad", *PULL)
 WORKERS = 2
 # Of a standard deviation that is honest: these shares of the errors are within one and within two of it, percent.
 WITHIN_1, WITHIN_2 = (60, 80), (90, 100)
@@ -33,11 +36,11 @@ GOALS = (("validate_location_error_percent_off", "<=", 10), ("validate_gain_sd_h
          ("validate_false_findings", "<=", 0))
 
 
-def session(build, cache, folder, fault, seed, calibrated):
+def session(build, cache, folder, fault, seed, calibrated, options=()):
     """(what the card says, what is true) of one pad."""
-    name = f"{fault}-{seed}-{calibrated}"
+    name = "".join((f"{fault}-{seed}-{calibrated}", *options))
     recording, figures, truth = (pathlib.Path(folder) / f"{name}{kind}" for kind in (".csv", ".card.json", ".truth.json"))
-    for command in ([build / PAD, "-o", recording, "--truth", truth, "--fault", fault, "--seed", str(seed), "--cache", cache] + ["--calibrated"] * calibrated,
+    for command in ([build / PAD, "-o", recording, "--truth", truth, "--fault", fault, "--seed", str(seed), "--cache", cache] + ["--calibrated"] * calibrated + list(options),
                     [build / TOOL, "validate", "--from", recording, "--figures", figures]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
@@ -47,7 +50,7 @@ def session(build, cache, folder, fault, seed, calibrated):
 
 
 def sessions(build, jobs):
-    """jobs: (fault, seed, calibrated). In their order: each with what session gives."""
+    """jobs: (fault, seed, calibrated), and options of the pad. In their order: each with what session gives."""
     for program in (TOOL, PAD):
         if not (build / program).exists():
             raise InputError(f"{build / program} is not there; build it: cmake --build --preset host")
@@ -80,6 +83,22 @@ def is_found(fault, card, truth):
     return any(finding["finding"] == fault and set(truth["faulty"]) <= set(finding["sensors"]) for finding in card["findings"])
 
 
+def pulls(build, steps):
+    """Figures of the pulls, by pads of which the fingertip knows the profile."""
+    plain = sessions(build, [("none", seed, True, PLAIN) for seed in PULL_SEEDS])
+    real = sessions(build, [("none", seed, True, LIKE_REAL) for seed in PULL_SEEDS])
+    steps.say(f"{len(plain) + len(real)} pads pulled")
+    off = [one["figures"]["pull_over_thread"] - 1 for _, (one, _) in plain]
+    moved = [one["figures"]["pull_moves_mm"] - truth["pulls"][0]["way_mm"] for _, (one, truth) in plain]
+    found = [sum(pull["frames"] > 0 for pull in one["pulls"]) for _, (one, _) in real]
+    seen = [len(one["pulls"]) for _, (one, _) in plain + real]
+    return {"validate_pull_pads": len(plain), "validate_pulls_seen_percent": round(100 * sum(seen) / sum(len(truth["pulls"]) for _, (_, truth) in plain + real)),
+            "validate_pull_off_percent": round(100 * statistics.median(map(abs, off)), 1),
+            "validate_pull_location_off_mm": round(statistics.median(map(abs, moved)), 3),
+            "validate_pull_way_mm": round(statistics.median(truth["pulls"][0]["way_mm"] for _, (_, truth) in plain), 3),
+            "validate_pull_like_real_estimated_percent": round(100 * sum(found) / sum(len(truth["pulls"]) for _, (_, truth) in real))}
+
+
 def measure(build, steps):
     healthy = sessions(build, [("none", seed, calibrated) for calibrated in (False, True) for seed in HEALTHY_SEEDS])
     steps.say(f"{len(healthy)} healthy pads validated")
@@ -100,7 +119,7 @@ def measure(build, steps):
             "validate_gain_within_1_sd_percent": round(within[0], 1), "validate_gain_within_2_sd_percent": round(within[1], 1),
             "validate_gain_sd_honest": int(WITHIN_1[0] <= within[0] <= WITHIN_1[1] and WITHIN_2[0] <= within[1] <= WITHIN_2[1]),
             "validate_finds": sum(count == 0 for count in missed.values()), "validate_missed": sum(missed.values()),
-            "validate_false_findings": sum(false)}
+            "validate_false_findings": sum(false), **pulls(build, steps)}
 
 
 def text(found):
@@ -111,16 +130,25 @@ def text(found):
             "`validate_location_error_percent_off`: how far the card's error of the location is from the true one, median over the healthy pads. "
             f"`validate_gain_sd_honest`: {WITHIN_1[0]} to {WITHIN_1[1]} % of the gains' errors are within one standard deviation, and {WITHIN_2[0]} % or more "
             "within two. `validate_finds`: of the seven faults, those that the card finds on every pad that has them, with the right sensors. "
-            "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.", ""]
+            "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.", "",
+            f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ in their gains alone, and of as many with all the errors of real pads, each "
+            "calibrated and with its profile. On the first `validate_pull_off_percent` is how far the pull found is from that of the thread, and "
+            "`validate_pull_location_off_mm` how far the way of the location is from the ball's own, which is `validate_pull_way_mm`; medians. On the second "
+            "the firmware mostly says that it does not know: `validate_pull_like_real_estimated_percent` of the pulls are estimated. A pulley's friction is "
+            "left out.", ""]
 
 
 def table(build):
     rows = []
     for calibrated in (False, True):
         found = {}
-        for _, (card, _) in sessions(build, [("none", seed, calibrated) for seed in TABLE_SEEDS]):
+        for _, (card, _) in sessions(build, [("none", seed, calibrated, PULL) for seed in TABLE_SEEDS]):
             for key, value in card["figures"].items():
                 found.setdefault(key, []).append(value)
+        for _, (card, _) in sessions(build, [("none", seed, True, PLAIN) for seed in TABLE_SEEDS] if calibrated else []):
+            for key, value in card["figures"].items():
+                if key.startswith("pull_"):
+                    found.setdefault(key, []).append(value)
         for key, values in sorted(found.items()):
             cuts = statistics.quantiles(values, n=20, method="inclusive")
             low, middle, high = (f"{value:.3f}" for value in (cuts[0], statistics.median(values), cuts[-1]))

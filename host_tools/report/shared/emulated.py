@@ -101,11 +101,11 @@ class Measurement:
     """
 
     def __init__(self, tools, folder, board, osr, path, seconds, commands=()):
-        """commands: encoded, sent as soon as it streams."""
+        """commands: encoded, sent as soon as it streams and the one before is stored."""
         base = pathlib.Path(folder) / f"{board}-{osr}-{path.stem}"
         script = base.with_suffix(".script")
         script.write_text(f"0.45 dtr 1\n0.452 {tools.encoded('info')}\n0.455 {tools.encoded('osr', osr)}\n"
-                          f"0.46 {tools.encoded('stream', 'contact,health')}\n" + "".join(f"0.465 {command}\n" for command in commands))
+                          f"0.46 {tools.encoded('stream', 'contact,health')}\n" + "".join(f"{0.465 + 0.09 * n:.3f} {command}\n" for n, command in enumerate(commands)))
 
         def emulate(name, until_s):
             to = f"{base}.{name}"

@@ -213,6 +213,7 @@ void validate(const ValidateHandOptions &options, const Place &place) {
   process.parallel_bus = true;
   ValidatedOptions pad_options;
   pad_options.weight_g = options.weight_g;
+  pad_options.pulling = options.pulling;
   pad_options.seed = options.seed;
   pad_options.cache = options.cache;
   std::optional<ValidatedPad> pad;

@@ -24,7 +24,7 @@ struct Options {
   std::string ports, cache, truth, kind;
   PressOptions press;
   LiftOptions lift;
-  double gain_spread = 0.0, seconds = 0.0;
+  double gain_spread = 0.0, seconds = 0.0, pull_g = 0.0;
   std::uint64_t seed = 1;
   bool overwrite = false;
 };
@@ -75,6 +75,7 @@ void run(const Options &options, bool is_lift, bool is_validate) {
   } else if (is_validate) {
     ValidateHandOptions one;
     one.weight_g = options.press.weight_g;
+    one.pulling.weight_g = options.pull_g;
     one.seed = options.seed;
     one.cache = cache(PRESS_FACE);
     if (options.seconds > 0.0) {
@@ -128,6 +129,12 @@ int main(int argc, char **argv) {
                    "A hand that goes through the steps of `fingertip validate`, when that "
                    "begins: the weight at each mark of the template, a hold, a rest")
           ->excludes(press_flag, mouse_flag, lift_flag);
+  app.add_option("--pull", options.pull_g,
+                 "The hand of --validate pulls in the end, by so much on a thread, as that of "
+                 "`fingertip validate --pull`")
+      ->needs(validate_flag)
+      ->check(CLI::Range(10.0, 1000.0))
+      ->type_name("GRAMS");
   const auto number = [&](const char *name, double &value, const char *unit, double low,
                           double high, const char *help) {
     return app.add_option(name, value, help)

@@ -23,7 +23,10 @@ constexpr double THIN_mm = 8.0, TILT_SHARE = 0.09, LOOSE_SD = 0.2;
 constexpr double DRIFT_MIN_Pa_min = 60.0, DRIFT_MAX_Pa_min = 180.0;
 constexpr std::size_t DRIFTING = 3;
 constexpr double BEGIN_s = 2.0, RESTS_s = 3.0, MOVES_s = 0.15, STANDS_s = 2.0;
-constexpr double SPARE_s = 1.0; // beyond what a step asks for
+constexpr double PULLS_AFTER_s = 3.0, PULLS_s = 0.5, PULLED_s = 3.0;
+constexpr double FRICTION = 0.8;   // of the ball on rubber
+constexpr double AIM_SD_deg = 2.0; // of the thread
+constexpr double SPARE_s = 1.0;    // beyond what a step asks for
 // The print lies on the pad so far off, sd each way.
 constexpr double SHEET_SD_mm = 0.7, SHEET_SD_rad = 0.02;
 constexpr double SETTLED_Pa = 10000.0, SETTLED_s = 0.75;
@@ -32,12 +35,11 @@ double smooth(double share) {
   return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
 }
 
-// As the recordings of real strips and grids have them (twin/README.md, effects).
+} // namespace
+
 twin::EffectValues usual_effects() {
   return twin::parse_effects("gain,relaxation,aftereffect,drift,places,dip,widths");
 }
-
-} // namespace
 
 const std::vector<std::string> &pad_fault_names() {
   static const std::vector<std::string> names = {"none",         "dead_sensor",  "loose_sensor",
@@ -48,12 +50,10 @@ const std::vector<std::string> &pad_fault_names() {
 
 ValidatedPad::ValidatedPad(const ValidatedOptions &options)
     : options_(options),
-      table_(twin::ContactTable::load_or_build(
-          twin::indenter(PRESS_FACE),
-          twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm),
-          options.cache)),
+      layer_(twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm)),
+      table_(twin::ContactTable::load_or_build(twin::indenter(PRESS_FACE), layer_, options.cache)),
       weight_N_(calibrating::GRAVITY_N_PER_g * options.weight_g),
-      rubber_(usual_effects(), SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0),
+      rubber_(options.effects, SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0),
       drift_Pa_s_(SENSORS, 0.0), absent_(SENSORS, false), before_Pa_(SENSORS, 0.0),
       after_Pa_(SENSORS, 0.0) {
   for (std::size_t k = 0; k < SENSORS; k++) {
@@ -61,7 +61,7 @@ ValidatedPad::ValidatedPad(const ValidatedOptions &options)
     y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + rubber_.seats()[k].dy_mm);
     wire_.push_back(k);
   }
-  twin::Pad same(usual_effects(), SENSORS, LAYER_mm, AIR_Pa, options.seed);
+  twin::Pad same(options.effects, SENSORS, LAYER_mm, AIR_Pa, options.seed);
   std::vector<double> settled(SENSORS, 0.0);
   const std::vector<double> nothing(SENSORS, 0.0), all(SENSORS, SETTLED_Pa);
   same.report(0.0, nothing, settled);
@@ -76,6 +76,9 @@ ValidatedPad::ValidatedPad(const ValidatedOptions &options)
     gains_.push_back(reading * double(SENSORS) / sum);
   }
   choose_fault();
+  if (options_.pulling.weight_g > 0.0) {
+    traction_.emplace(table_, layer_);
+  }
   draw_plan();
   rubber_.report(0.0, nothing, after_Pa_);
   before_Pa_ = after_Pa_;
@@ -127,16 +130,47 @@ void ValidatedPad::choose_fault() {
   std::sort(faulty_.begin(), faulty_.end());
 }
 
+// Of rubber that is thicker by this factor the response is wider by it, and lower by its square.
+double ValidatedPad::width_at(double x_mm, double y_mm) const {
+  return 1.0 + tilt_x_ * x_mm / static_cast<double>(geometry.x_mm[SENSORS - 1]) +
+         tilt_y_ * y_mm / static_cast<double>(geometry.y_mm[0]);
+}
+
 std::vector<double> ValidatedPad::base_Pa(double x_mm, double y_mm) const {
-  // Of rubber that is thicker by this factor the response is wider by it, and lower by its square.
-  const double width = 1.0 + tilt_x_ * x_mm / static_cast<double>(geometry.x_mm[SENSORS - 1]) +
-                       tilt_y_ * y_mm / static_cast<double>(geometry.y_mm[0]);
+  const double width = width_at(x_mm, y_mm);
   std::vector<double> base(SENSORS);
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double own = width * rubber_.seats()[k].width;
     base[k] = table_.base_pressure_Pa(weight_N_, (x_mm_[k] - x_mm) / own, (y_mm_[k] - y_mm) / own,
                                       rubber_.dip_share()) /
               (width * width);
+  }
+  return base;
+}
+
+// Of a sphere on a half-space under a load that rises to this: Mindlin, "Compliance of elastic
+// bodies in contact", J. Appl. Mech. 16, 1949.
+double ValidatedPad::way_mm(double pull_N) const {
+  const double shear_modulus_MPa = 1e-6 * layer_.youngs_modulus_Pa / (2.0 * (1.0 + layer_.poisson));
+  const double slide_mm = 3.0 * (2.0 - layer_.poisson) * FRICTION * weight_N_ /
+                          (16.0 * shear_modulus_MPa * table_.contact_radius_mm(weight_N_));
+  return slide_mm * (1.0 - std::pow(1.0 - pull_N / (FRICTION * weight_N_), 2.0 / 3.0));
+}
+
+std::vector<double> ValidatedPad::pulled_Pa(double x_mm, double y_mm, const TruePull &pull) const {
+  const double angle_rad = pull.toward_deg * M_PI / 180.0;
+  const double along_x = std::cos(angle_rad), along_y = std::sin(angle_rad);
+  const double at_x_mm = x_mm + pull.way_mm * along_x, at_y_mm = y_mm + pull.way_mm * along_y;
+  const double tilts_mm = options_.pulling.height_mm * pull.pull_N / weight_N_;
+  std::vector<double> base = base_Pa(at_x_mm + tilts_mm * along_x, at_y_mm + tilts_mm * along_y);
+  const double width = width_at(at_x_mm, at_y_mm);
+  const twin::TractionLoad load{weight_N_, twin::stuck_force_N(weight_N_, pull.pull_N, FRICTION),
+                                pull.pull_N * along_x, pull.pull_N * along_y};
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double own = width * rubber_.seats()[k].width;
+    base[k] +=
+        traction_->base_pressure_Pa(load, (x_mm_[k] - at_x_mm) / own, (y_mm_[k] - at_y_mm) / own) /
+        (width * width);
   }
   return base;
 }
@@ -161,8 +195,8 @@ void ValidatedPad::draw_plan() {
     touches_.push_back(std::move(made));
     t_s += MOVES_s + stands_s;
   };
-  for (const Step &step :
-       validating::steps_of(validating::marks_of(array), options_.weight_g, LAYER_mm)) {
+  for (const Step &step : validating::steps_of(validating::marks_of(array), options_.weight_g,
+                                               LAYER_mm, options_.pulling)) {
     plan_.emplace_back(t_s, step);
     switch (step.kind) {
     case Step::Kind::empty:
@@ -181,6 +215,17 @@ void ValidatedPad::draw_plan() {
       touch(options_.hand_sd_mm * hand.normal(), options_.hand_sd_mm * hand.normal(),
             validating::HOLD_s + SPARE_s);
       break; // the rest begins with the lift
+    case Step::Kind::pull: {
+      const double pull_N = calibrating::GRAVITY_N_PER_g * options_.pulling.weight_g;
+      true_pulls_.push_back(
+          {step.toward_deg + AIM_SD_deg * hand.normal(), pull_N, weight_N_, way_mm(pull_N)});
+      const double x_mm = options_.hand_sd_mm * hand.normal();
+      const double y_mm = options_.hand_sd_mm * hand.normal();
+      touch(x_mm, y_mm, PULLS_AFTER_s + PULLS_s + PULLED_s);
+      touches_.back().pulled_Pa = pulled_Pa(x_mm, y_mm, true_pulls_.back());
+      t_s += MOVES_s;
+      break;
+    }
     case Step::Kind::rest:
       t_s += MOVES_s + validating::REST_s + SPARE_s;
       break;
@@ -207,8 +252,13 @@ void ValidatedPad::step() {
     const double since_s = t_s - touch.begin_s;
     const double share =
         smooth(since_s / MOVES_s) - smooth((since_s - MOVES_s - touch.stands_s) / MOVES_s);
+    const double pulled =
+        touch.pulled_Pa.empty() ? 0.0 : smooth((since_s - MOVES_s - PULLS_AFTER_s) / PULLS_s);
     for (std::size_t k = 0; k < SENSORS; k++) {
-      base[k] = share * touch.share[k] * deaf_[k] * touch.base_Pa[k];
+      const double base_Pa =
+          touch.base_Pa[k] +
+          (pulled > 0.0 ? pulled * (touch.pulled_Pa[k] - touch.base_Pa[k]) : 0.0);
+      base[k] = share * touch.share[k] * deaf_[k] * base_Pa;
     }
   }
   rubber_.report(t_s, base, after_Pa_);

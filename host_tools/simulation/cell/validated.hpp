@@ -1,14 +1,15 @@
 // A hand that leads the steps of `fingertip validate` on a simulated pad: an empty minute, a weight
-// on a ball at the marks of the template, a hold, a rest. With the errors of real pads, and with
-// one fault of those that the card is to find.
+// on a ball at the marks of the template, a hold, a rest, and pulls where they are wanted. With the
+// errors of real pads, and with one fault of those that the card is to find.
 #pragma once
 
 #include "simulation/cell/face.hpp"
-#include "simulation/twin/contact_table.hpp"
 #include "simulation/twin/effects.hpp"
+#include "simulation/twin/traction_table.hpp"
 #include "tool/validation/protocol.hpp"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,10 +27,15 @@ enum class PadFault {
 };
 const std::vector<std::string> &pad_fault_names(); // in this order
 
+// As the recordings of real strips and grids have them (twin/README.md, effects).
+twin::EffectValues usual_effects();
+
 struct ValidatedOptions {
   PadFault fault = PadFault::none;
   double weight_g = 300.0; // as stated
   double hand_sd_mm = 0.3; // from the marks, each way
+  validating::Pulling pulling = {};
+  twin::EffectValues effects = usual_effects();
   std::uint64_t seed = 1;
   std::filesystem::path cache;
 };
@@ -50,6 +56,12 @@ public:
   const std::vector<Truth> &presses() const {
     return truth_;
   } // as in the plan; the hold is not there
+  // A pull that the rubber shears under: the ball moves by way_mm along it. The thread's moment
+  // moves what presses, and not what pulls, by the thread's height times the pull over the weight.
+  struct TruePull {
+    double toward_deg, pull_N, force_N, way_mm;
+  };
+  const std::vector<TruePull> &pulls() const { return true_pulls_; }
   // What a reading from 0.5 to 1 s after a placement is multiplied by, over the sensors' mean.
   const std::vector<double> &gains() const { return gains_; }        // [sensor]
   const std::vector<std::size_t> &faulty() const { return faulty_; } // sensors
@@ -58,17 +70,23 @@ public:
 private:
   struct Touch {
     double begin_s, stands_s;
-    std::vector<double> base_Pa; // [sensor], under the whole weight
-    std::vector<double> share;   // [sensor] of it that a loose one feels
+    std::vector<double> base_Pa;        // [sensor], under the whole weight
+    std::vector<double> share;          // [sensor] of it that a loose one feels
+    std::vector<double> pulled_Pa = {}; // [sensor] the same when it is pulled; empty: it is not
   };
   void choose_fault();
   void draw_plan();
   void step();
   std::vector<double> base_Pa(double x_mm, double y_mm) const;
+  std::vector<double> pulled_Pa(double x_mm, double y_mm, const TruePull &pull) const;
+  double width_at(double x_mm, double y_mm) const;
+  double way_mm(double pull_N) const;
 
   static constexpr double STEP_s = 0.005;
   ValidatedOptions options_;
+  twin::Layer layer_;
   twin::ContactTable table_;
+  std::optional<twin::TractionTable> traction_;
   double weight_N_;
   twin::Pad rubber_;
   std::vector<double> x_mm_, y_mm_;
@@ -79,6 +97,7 @@ private:
   std::vector<std::pair<double, validating::Step>> plan_;
   std::vector<Touch> touches_;
   std::vector<Truth> truth_;
+  std::vector<TruePull> true_pulls_;
   std::size_t touch_ = 0; // the next or present one
   std::int64_t steps_ = 0;
   std::vector<double> before_Pa_, after_Pa_; // [sensor] at the last two steps

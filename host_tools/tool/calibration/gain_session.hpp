@@ -42,8 +42,8 @@ public:
   /* "12 placements, gains known to 3.1 % of 1.5 %" */
   std::string progress() const;
 
-  /* A pad's profile will act beside the calibration, though the info packet had none. The fit is
-   * then given the sensors' own alone, so the force's scale is that of a Gaussian without a dip. */
+  /* A pad's profile will act beside the calibration, though the info packet had none. The fit then
+   * assumes no width of a contact, and the force's scale is of such a fit. */
   void expect_profile() { has_profile_ = true; }
   /* The calibration for the fingertip; date_s: Unix time. Of a good judgement. Throws Error where
    * the readings are not those of force_N, or a gain is none. */
@@ -62,7 +62,7 @@ private:
 
   Array array_;
   Shape prior_;      /* that the user has set */
-  bool has_profile_; /* a pad's profile acts: the fit is told no shape */
+  bool has_profile_; /* a pad's profile acts: no width is assumed */
   double ambient_Pa_ = 0.0; /* the mean zero at the last placement */
   PlacementFinder finder_;
   std::vector<Placement> placements_;

@@ -55,7 +55,7 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
     for (int k = 0; k < n; k++) {
       if (placements[i].usable >> k & 1u) {
         const double left = (placements[i].reading_Pa[std::size_t(k)] -
-                             model.reading(global, locals[i], k, t, model.earlier(i, k)).model) /
+                             model.reading(global, locals[i], k, t, placements[i].earlier_Pa[std::size_t(k)]).model) /
                             model.expected_sd(placements[i], k);
         misfit += huber(left * left);
         readings += 1.0;

@@ -122,12 +122,15 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   const double m = g[layout.mixing()];
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
   const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
-  const double strength = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
+  const double full = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
   const double dip_mm = array_.pitch_mm * std::exp(g[layout.dip_width()]);
   const double dip_per = 0.5 / (dip_mm * dip_mm);
   const double h = g[layout.dip()];
   const double dip = std::exp(-dip_per * square);
-  const double value = strength * ((1.0 - m) * wide + m * narrow - h * dip);
+  const double felt = full * ((1.0 - m) * wide + m * narrow - h * dip);
+  const Hidden hidden = hidden_by(g[layout.memory(k)] * earlier_Pa, felt);
+  const double left = 1.0 - hidden.by_felt;
+  const double strength = left * full, value = left * felt;
   const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
   const double by_square = core_by_square + strength * h * dip * dip_per;
   const double by_log_width = -2.0 * square * core_by_square;
@@ -135,8 +138,7 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
   Reading r;
-  r.model =
-      value + g[layout.offset(k)] + g[layout.drift(k)] * tau - g[layout.memory(k)] * earlier_Pa;
+  r.model = felt - hidden.Pa + g[layout.offset(k)] + g[layout.drift(k)] * tau;
   const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
   const int at[TOUCHED] = {k,
                            layout.log_peak(),
@@ -160,7 +162,7 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
                               by_v,
                               1.0,
                               tau,
-                              -earlier_Pa,
+                              -hidden.by_remembered * earlier_Pa,
                               by_q1,
                               by_q2,
                               -strength * dip,
@@ -170,11 +172,6 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   std::copy(by, by + TOUCHED, r.by);
   r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
   return r;
-}
-
-double Model::earlier(std::size_t i, int k) const {
-  const double now_Pa = std::max(placements_[i].reading_Pa[std::size_t(k)], 0.0);
-  return placements_[i].earlier_Pa[std::size_t(k)] * now_Pa / (now_Pa + REMEMBERS_FROM * peak_Pa_);
 }
 
 double Model::expected_sd(const Placement &placement, double reading_Pa) const {

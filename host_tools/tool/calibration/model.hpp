@@ -61,7 +61,6 @@ public:
   Unknowns first_guess() const;
   Reading reading(const Eigen::VectorXd &g, const Local &l, int k, double tau,
                   double earlier_Pa) const;
-  double earlier(std::size_t i, int k) const;
   double tau(const Placement &placement) const { return (placement.t_s - middle_s_) / half_s_; }
   double expected_sd(const Placement &placement, double reading_Pa) const;
   double expected_sd(const Placement &placement, int k) const {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 namespace fingertip::calibrating {
@@ -36,34 +37,75 @@ MatrixXd gauge(const Array &array) {
   return MatrixXd(qr.householderQ()).leftCols(qr.rank());
 }
 
-/* The firmware's model nearest to the profile: one Gaussian less a dip. By least squares over the
- * plane; products of Gaussians have closed integrals. */
+/* A sum of Gaussians about the contact, by their widths; of infinite width: what is the same all
+ * over. */
+struct Bells {
+  std::vector<std::pair<double, double>> bells; /* height, width */
+};
+
+/* The mean product over the sensors: seen from contacts on the array they lie about as a Gaussian
+ * of the width reach does. */
+double overlap(const Bells &a, const Bells &b, double reach) {
+  double sum = 0.0;
+  for (const auto &[height, width] : a.bells) {
+    for (const auto &[other_height, other_width] : b.bells) {
+      sum += height * other_height /
+             (1.0 / (width * width) + 1.0 / (other_width * other_width) + 1.0 / (reach * reach));
+    }
+  }
+  return sum;
+}
+
+/* What is found, as the firmware has it: the Gaussian nearest to the response, and a dip. A dip is
+ * what the response has less than a layer's own profile: that, the offset that all sensors share and
+ * a wide dip look alike, so the response is taken as they make it together. */
 struct Nearest {
   double width = 1.0; /* of the Gaussian, over that of the wide part, as all widths here */
   double dip = 0.0;   /* of its amplitude */
 };
-Nearest nearest(double mixing, double dip, double dip_width) {
-  const auto overlap = [](double a, double b) { return a * a * b * b / (a * a + b * b); };
-  const auto profile = [&](double b) {
-    return (1.0 - mixing) * overlap(1.0, b) + mixing * overlap(NARROW, b) -
-           dip * overlap(dip_width, b);
-  };
-  Nearest best;
-  double most = 0.0;
-  for (double width = NARROW; width <= 1.2; width += 0.002) {
-    const double own = overlap(width, width), of_dip = overlap(dip_width, dip_width);
-    const double cross = overlap(width, dip_width);
-    const double with = profile(width), with_dip = profile(dip_width);
+Nearest nearest(const Bells &response, double dip_width, double reach) {
+  const Bells dip{{{1.0, dip_width}}};
+  const double of_dip = overlap(dip, dip, reach), with_dip = overlap(response, dip, reach);
+  double most = 0.0, depth = 0.0;
+  constexpr double STEP = 0.002, WIDEST = 1.3;
+  for (double width = NARROW; width <= WIDEST; width += STEP) {
+    const Bells layer{{{1.0 - LAYER_MIXING, width}, {LAYER_MIXING, NARROW * width}}};
+    const double own = overlap(layer, layer, reach), cross = overlap(layer, dip, reach);
+    const double with = overlap(response, layer, reach);
     const double determinant = own * of_dip - cross * cross;
     const double peak = (of_dip * with - cross * with_dip) / determinant;
-    const double depth = (cross * with - own * with_dip) / determinant;
-    const double explained = peak * with - depth * with_dip;
+    const double less = (cross * with - own * with_dip) / determinant;
+    const double explained = peak * with - less * with_dip;
     if (explained > most) {
       most = explained;
-      best = {width, depth / peak};
+      depth = std::max(less, 0.0);
+    }
+  }
+  Bells core = response;
+  core.bells.emplace_back(depth, dip_width);
+  Nearest best;
+  most = 0.0;
+  for (double width = NARROW; width <= WIDEST; width += STEP) {
+    const Bells gaussian{{{1.0, width}}};
+    const double own = overlap(gaussian, gaussian, reach), with = overlap(core, gaussian, reach);
+    if (with * with > most * own) {
+      most = with * with / own;
+      best = {width, depth * own / with};
     }
   }
   return best;
+}
+
+/* Of a sensor from a contact along an axis, where contacts lie as the sensors do. */
+double reach_mm(const Array &array) {
+  double squares = 0.0;
+  for (const std::vector<double> *axis : {&array.x_mm, &array.y_mm}) {
+    const double mean = std::accumulate(axis->begin(), axis->end(), 0.0) / double(axis->size());
+    for (const double place_mm : *axis) {
+      squares += (place_mm - mean) * (place_mm - mean) / double(axis->size());
+    }
+  }
+  return std::sqrt(squares); /* half of it by axis, twice for both */
 }
 
 /* Of the log gains less their mean, given that of all global unknowns. */
@@ -126,6 +168,18 @@ double Solution::worst_shape_sd() const {
                           : *std::max_element(shape_sd.begin(), shape_sd.end());
 }
 
+Hidden hidden_by(double remembered_Pa, double felt_Pa) {
+  if (remembered_Pa <= 0.0) {
+    return {remembered_Pa, 1.0, 0.0};
+  }
+  if (felt_Pa <= 0.0) {
+    return {0.0, 0.0, 0.0};
+  }
+  const double ratio = felt_Pa / remembered_Pa, square = 1.0 + ratio * ratio;
+  const double root = 1.0 / std::sqrt(square), by_felt = root / square;
+  return {felt_Pa * root, by_felt * ratio * ratio * ratio, by_felt};
+}
+
 void remember(std::vector<Placement> &placements) {
   for (std::size_t i = 0; i < placements.size(); i++) {
     if (!placements[i].earlier_Pa.empty()) {
@@ -179,7 +233,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
         if (placements[i].usable >> k & 1u) {
           const double left =
               placements[i].reading_Pa[std::size_t(k)] -
-              model.reading(global, local, k, model.tau(placements[i]), model.earlier(i, k)).model;
+              model.reading(global, local, k, model.tau(placements[i]), placements[i].earlier_Pa[std::size_t(k)]).model;
           const double expected = model.expected_sd(placements[i], k);
           left_squares += left * left;
           misfit += left * left / (expected * expected);
@@ -281,8 +335,14 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   solution.dip = global[layout.dip()];
   solution.dip_sd = std::sqrt(std::max(covariance(layout.dip(), layout.dip()), 0.0));
   solution.dip_pitches = std::exp(global[layout.dip_width()]);
+  const double dip_width = solution.dip_pitches * array.pitch_mm / solution.width_mm;
+  const double offset = global.segment(layout.offset(0), layout.sensors).mean() / peak_Pa;
   const auto near = [&](double mixing) {
-    return nearest(mixing, solution.dip, solution.dip_pitches * array.pitch_mm / solution.width_mm);
+    return nearest({{{1.0 - mixing, 1.0},
+                     {mixing, NARROW},
+                     {-solution.dip, dip_width},
+                     {offset, std::numeric_limits<double>::infinity()}}},
+                   dip_width, reach_mm(array) / solution.width_mm);
   };
   const auto [width, dip_share] = near(solution.mixing);
   solution.sigma_mm = solution.width_mm * width;

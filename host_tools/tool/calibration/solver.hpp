@@ -63,11 +63,15 @@ struct Placement {
 
 /* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,
  * (exp(-age / 10 s) + 20 exp(-age / 1 s)) of its reading: two times and their proportion after two
- * seconds of standing, as in the holds of a real strip (twin/effects.hpp). It acts in proportion to
- * how much of the peak the sensor feels now (half at REMEMBERS_FROM of it): a sensor that feels
- * nothing can not be below that. */
-constexpr double REMEMBERS_FROM = 0.02;
+ * seconds of standing, as in the holds of a real strip (twin/effects.hpp). What is left of them
+ * hides at most what the sensor feels now. */
 void remember(std::vector<Placement> &placements);
+/* Of what is felt, with its derivatives: the less of both, rounded off where they are alike. What
+ * was remembered the other way round stands above what is felt, and hides nothing. */
+struct Hidden {
+  double Pa, by_remembered, by_felt;
+};
+Hidden hidden_by(double remembered_Pa, double felt_Pa);
 
 /* Standard gravity: the force of a weight. */
 constexpr double GRAVITY_N_PER_g = 9.80665e-3;
@@ -102,6 +106,8 @@ struct Assumptions {
 
 /* Width of the narrow part of the profile over that of the wide one. */
 constexpr double NARROW = 0.64;
+/* m of the profile of a bonded layer of 12 mm under a foot of 15 mm (pad/profile.hpp). */
+constexpr double LAYER_MIXING = 0.22;
 /* Standard deviation B of the dip's Gaussian that is expected, in pitches: about as wide as the
  * array can still tell from zeros that were off. As the assumed spread of forces, chosen on the
  * recording of host_tools/report/real that chooses. */

@@ -57,20 +57,34 @@ nlohmann::json json_of(const Card &card) {
   for (std::size_t i = 0; i < card.measured.presses.size(); i++) {
     const validating::Press &press = card.measured.presses[i];
     presses.push_back({{"mark", press.mark + 1},
-                       {"frames", press.frames},
-                       {"x_mm", press.x_mm},
-                       {"y_mm", press.y_mm},
-                       {"force_N", press.force_N},
-                       {"warned", press.warned},
+                       {"frames", press.estimate.frames},
+                       {"x_mm", press.estimate.x_mm},
+                       {"y_mm", press.estimate.y_mm},
+                       {"force_N", press.estimate.force_N},
+                       {"warned", press.estimate.warned},
                        {"off_mm", card.locations[i].off_mm},
                        {"pressed_x_mm", card.fit.presses[i].x_mm},
                        {"pressed_y_mm", card.fit.presses[i].y_mm}});
+  }
+  nlohmann::json pulls = nlohmann::json::array();
+  for (const validating::Pulled &pulled : card.measured.pulls) {
+    pulls.push_back({{"toward_deg", pulled.toward_deg},
+                     {"rest_x_mm", pulled.rest.x_mm},
+                     {"rest_y_mm", pulled.rest.y_mm},
+                     {"x_mm", pulled.pull.x_mm},
+                     {"y_mm", pulled.pull.y_mm},
+                     {"force_N", pulled.pull.force_N},
+                     {"frames", pulled.pull.pull_frames},
+                     {"qx_N", pulled.pull.qx_N - pulled.rest.qx_N},
+                     {"qy_N", pulled.pull.qy_N - pulled.rest.qy_N}});
   }
   return {{"figures", figures},
           {"findings", findings},
           {"presses", presses},
           {"gain", card.gain},
           {"gain_sd", card.gain_sd},
+          {"pulls", pulls},
+          {"pull_note", card.pull_note},
           {"calibrated", card.is_calibrated},
           {"calibration", card.judgement.text}};
 }
@@ -88,6 +102,9 @@ void print(const Card &card) {
   }
   std::printf("%s\n",
               card.findings.empty() ? "\nnothing is wrong that this validation can see" : "");
+  if (!card.pull_note.empty()) {
+    std::printf("%s\n", card.pull_note.c_str());
+  }
   for (const validating::Finding &finding : card.findings) {
     std::printf("%s: %s\n", finding.code.c_str(), finding.text.c_str());
   }

@@ -4,6 +4,7 @@
 
 #include "libfingertip/connection.hpp"
 #include "tool/cli/terminal.hpp"
+#include "tool/validation/protocol.hpp"
 
 #include <string>
 
@@ -12,6 +13,7 @@ namespace fingertip {
 struct ValidateOptions {
   Choice choice;
   double weight_g = 0.0, skin_mm = 12.0;
+  validating::Pulling pulling;
   std::string card;      /* HTML */
   std::string figures;   /* JSON; empty: none */
   std::string recording; /* that is kept, of what is measured live */

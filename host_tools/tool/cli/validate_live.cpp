@@ -8,6 +8,7 @@
 #include "tool/calibration/gain_session.hpp"
 #include "tool/cli/device.hpp"
 #include "tool/cli/ink.hpp"
+#include "tool/validation/pull_figures.hpp"
 #include "tool/validation/walk.hpp"
 
 #include <algorithm>
@@ -56,7 +57,7 @@ public:
     canvas.text(2, 5, std::string(static_cast<std::size_t>(done), '='), text_style(GOOD));
     canvas.text(2 + done, 5, std::string(static_cast<std::size_t>(bar - done), '-'),
                 text_style(RULE));
-    canvas.text(2, screen_->rows() - 1, "q quit   u take the last press back", text_style(FAINT));
+    canvas.text(2, screen_->rows() - 1, "q quit   u take the last one back", text_style(FAINT));
     screen_->draw(canvas);
   }
   std::optional<Key> key() { return screen_ ? screen_->key() : std::nullopt; }
@@ -96,10 +97,14 @@ validating::Measured validate_live(const ValidateOptions &options) {
   wire_packet ready = device.session.info();
   info = ready.body.info;
   calibrating::check_firmware(info, name);
+  if (const std::string why = validating::why_no_pull(info);
+      options.pulling.weight_g > 0.0 && !why.empty()) {
+    std::fprintf(stderr, "fingertip: %s\n", why.c_str());
+  }
   if (!options.serial) {
     std::memset(info.serial, 0, sizeof info.serial);
   }
-  Walk walk(info, options.weight_g, options.skin_mm);
+  Walk walk(info, options.weight_g, options.skin_mm, options.pulling);
   /* Nothing but what was measured: no port, no place, no name. */
   RecordingWriter writer(options.recording, options.overwrite, &info, info.sensor_count,
                          Metadata{{"recorded_by", "fingertip " FINGERTIP_VERSION}}, true,

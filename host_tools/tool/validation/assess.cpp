@@ -68,6 +68,7 @@ public:
     weigh();
     look_at_rest();
     look_at_hold();
+    look_at_pulls();
     return std::move(card_);
   }
 
@@ -323,16 +324,16 @@ private:
       const Press &press = card_.measured.presses[i];
       const FoundPress &found = card_.fit.presses[i];
       Location location{-1.0, 0.0, 0.0};
-      if (press.frames > 0) {
-        location.x_mm = press.x_mm - found.x_mm;
-        location.y_mm = press.y_mm - found.y_mm;
+      if (press.estimate.frames > 0) {
+        location.x_mm = press.estimate.x_mm - found.x_mm;
+        location.y_mm = press.estimate.y_mm - found.y_mm;
         const double square = location.x_mm * location.x_mm + location.y_mm * location.y_mm;
         location.off_mm = std::sqrt(std::max(square, 0.0));
         off.push_back(location.off_mm);
-        as_pressed.push_back(
-            std::hypot(press.x_mm - found.mark_x_mm, press.y_mm - found.mark_y_mm));
-        forces.push_back(press.force_N / weight_N());
-        warned += press.warned;
+        as_pressed.push_back(std::hypot(press.estimate.x_mm - found.mark_x_mm,
+                                        press.estimate.y_mm - found.mark_y_mm));
+        forces.push_back(press.estimate.force_N / weight_N());
+        warned += press.estimate.warned;
         of_mark.resize(std::max(of_mark.size(), press.mark + 1));
         of_mark[press.mark].push_back(i);
       }
@@ -507,6 +508,12 @@ private:
         figure(keys[a], says[a], "%", 100.0 * most, 1);
       }
     }
+  }
+
+  void look_at_pulls() {
+    PullFigures pulls = pull_figures(card_.measured);
+    card_.figures.insert(card_.figures.end(), pulls.figures.begin(), pulls.figures.end());
+    card_.pull_note = std::move(pulls.note);
   }
 
   const std::size_t sensors_;

@@ -10,6 +10,7 @@
 
 #include "tool/calibration/judge.hpp"
 #include "tool/validation/marks_fit.hpp"
+#include "tool/validation/pull_figures.hpp"
 
 #include <string>
 #include <vector>
@@ -45,12 +46,6 @@ struct Finding {
   std::string text;                 /* with the evidence, and what to do: two sentences */
 };
 
-struct Figure {
-  std::string key, says, unit;
-  double value;
-  int digits;
-};
-
 struct Location {    /* of a press */
   double off_mm;     /* estimate from where it was pressed, the hand's error taken out */
   double x_mm, y_mm; /* the same, each way */
@@ -64,6 +59,7 @@ struct Card {
   std::vector<Location> locations;   /* as measured.presses; without an estimate off_mm is -1 */
   bool is_calibrated = false;        /* the fingertip, while it was validated */
   std::vector<Figure> figures;
+  std::string pull_note; /* pull_figures.hpp */
   std::vector<Finding> findings;
   const Figure *figure(const std::string &key) const;
 };

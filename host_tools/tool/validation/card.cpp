@@ -15,6 +15,7 @@ constexpr double MAGNIFIED = 5.0; /* errors in the picture of the pad */
 constexpr double ROOM_mm = 6.0;
 constexpr double PACKAGE_mm = 3.3; /* of an MS5840, each way */
 constexpr double PITCH_SAME_mm = 0.05;
+constexpr double BLIND_REACH_mm = 3.0, PULL_REACH = 0.6; /* of the picture of pulls */
 constexpr std::size_t TWIN_SENSORS = 15;
 constexpr double TWIN_PITCH_mm = 9.0;
 
@@ -26,6 +27,7 @@ const char *const STYLE =
     ".6rem;border-bottom:1px solid #ddd;vertical-align:top}"
     "td.n,th.n{text-align:right;white-space:nowrap}.faint{color:#60626b}"
     ".find{border-left:4px solid #c62828;padding:.2rem .8rem;margin:.5rem 0;background:#fdecea}"
+    ".note{border-left:4px solid #999;padding:.2rem .8rem;margin:.5rem 0}"
     ".good{border-left:4px solid #2e7d32;padding:.2rem .8rem;margin:.5rem 0;background:#e9f5ea}"
     ".pictures{display:flex;flex-wrap:wrap;gap:1.2rem}figure{margin:0;max-width:100%}figcaption{"
     "max-width:28rem;font-size:.9rem;color:#444}"
@@ -78,6 +80,7 @@ public:
     profile();
     empty();
     hold();
+    pulls();
     text_ += "</div>\n";
     notes();
     return text_ + "</html>\n";
@@ -113,6 +116,9 @@ private:
     for (const Finding &finding : card_.findings) {
       text_ += "<p class=\"find\">" + escaped(finding.text) + "</p>\n";
     }
+    if (!card_.pull_note.empty()) {
+      text_ += "<p class=\"note\">" + escaped(card_.pull_note) + "</p>\n";
+    }
     if (!card_.measured.ended) {
       text_ += "<p class=\"find\">The validation was not led to its end: some figures are "
                "missing.</p>\n";
@@ -126,6 +132,26 @@ private:
            std::abs(measured.skin_mm - TWIN_SKIN_mm) <= TWIN_SKIN_OFF_mm;
   }
 
+  bool is_pulled_as_twin() const {
+    const auto &pulls = card_.measured.pulls;
+    return !pulls.empty() && std::abs(pulls.back().pulling.weight_g / card_.measured.weight_g -
+                                      TWIN_PULL) < TWIN_PULL_OFF;
+  }
+
+  std::string about_twin() const {
+    if (!is_like_twin()) {
+      return "The twin was asked only for 12 mm of rubber over fifteen sensors 9 mm apart.";
+    }
+    std::string text = "The twin is the project's simulation: healthy pads of 12 mm, with the "
+                       "errors that recordings of real pads show, validated in the same way. No "
+                       "real pad has been compared with it yet.";
+    if (card_.figure("pull_true") != nullptr) {
+      text += " Beside a pull that is found stand pads whose sensors differ in their gains alone: "
+              "on those with all errors the simulated fingertip mostly estimates no pull.";
+    }
+    return text;
+  }
+
   void figures() {
     const std::vector<bool> numbers = {false, true, true, true};
     text_ += "<h2>Figures</h2>\n<table>\n" +
@@ -134,20 +160,14 @@ private:
       const auto shown = [&](double value) {
         return fixed(value, figure.digits) + (figure.unit.empty() ? "" : " " + figure.unit);
       };
-      const auto twin = is_like_twin() ? twin_says(figure.key, card_.is_calibrated) : std::nullopt;
+      const bool is_compared =
+          is_like_twin() && (figure.key.rfind("pull_", 0) != 0 || is_pulled_as_twin());
+      const auto twin = is_compared ? twin_says(figure.key, card_.is_calibrated) : std::nullopt;
       text_ += row({escaped(figure.says), shown(figure.value), twin ? shown(twin->middle) : "",
                     twin ? fixed(twin->low, figure.digits) + " to " + shown(twin->high) : ""},
                    numbers, "td");
     }
-    text_ +=
-        "</table>\n<p class=\"faint\">" +
-        std::string(
-            is_like_twin()
-                ? "The twin is the project's simulation: healthy pads of 12 mm, with the errors "
-                  "that recordings of real pads show, validated in the same way. No real "
-                  "pad has been compared with it yet."
-                : "The twin was asked only for 12 mm of rubber over fifteen sensors 9 mm apart.") +
-        "</p>\n";
+    text_ += "</table>\n<p class=\"faint\">" + about_twin() + "</p>\n";
   }
 
   void pad() {
@@ -173,7 +193,7 @@ private:
         const double to_x = press.x_mm + MAGNIFIED * location.x_mm,
                      to_y = press.y_mm + MAGNIFIED * location.y_mm;
         plot.line({{press.x_mm, press.y_mm}, {to_x, to_y}},
-                  card_.measured.presses[i].warned ? "red" : "ours");
+                  card_.measured.presses[i].estimate.warned ? "red" : "ours");
       }
     }
     picture(
@@ -186,8 +206,8 @@ private:
     std::vector<double> values = {1.0};
     const double weight_N = calibrating::GRAVITY_N_PER_g * card_.measured.weight_g;
     for (const Press &press : card_.measured.presses) {
-      if (press.frames > 0) {
-        values.push_back(press.force_N / weight_N);
+      if (press.estimate.frames > 0) {
+        values.push_back(press.estimate.force_N / weight_N);
       }
     }
     const double count = double(card_.measured.presses.size());
@@ -196,8 +216,9 @@ private:
     plot.line({{0.0, 1.0}, {count + 1.0, 1.0}}, "grey");
     for (std::size_t i = 0; i < card_.measured.presses.size(); i++) {
       const Press &press = card_.measured.presses[i];
-      if (press.frames > 0) {
-        plot.dot(double(i + 1), press.force_N / weight_N, 3.0, press.warned ? "open" : "dot");
+      if (press.estimate.frames > 0) {
+        plot.dot(double(i + 1), press.estimate.force_N / weight_N, 3.0,
+                 press.estimate.warned ? "open" : "dot");
       }
     }
     picture(plot, "Force of each press", "Open: with a warning. The dashed line is the weight.");
@@ -303,6 +324,40 @@ private:
             "Readings above those before the touch, summed.");
   }
 
+  void pulls() {
+    if (card_.figure("pull_true") == nullptr && card_.figure("pull_blind_true") == nullptr) {
+      return;
+    }
+    const bool is_blind = card_.figure("pull_true") == nullptr;
+    const double reach = is_blind ? BLIND_REACH_mm : PULL_REACH;
+    Plot plot(330, 330, {-reach, reach}, {-reach, reach},
+              is_blind ? "location against the rest, x, mm" : "pull over force, x",
+              is_blind ? "y, mm" : "y", true);
+    for (const Pulled &pulled : card_.measured.pulls) {
+      const Estimate &rest = pulled.rest, &pull = pulled.pull;
+      if (rest.frames == 0 || pull.frames == 0) {
+        continue;
+      }
+      if (is_blind) {
+        plot.line({{0.0, 0.0}, {pull.x_mm - rest.x_mm, pull.y_mm - rest.y_mm}}, "ours");
+        continue;
+      }
+      const double share = pulled.pulling.weight_g / card_.measured.weight_g;
+      const double angle = pulled.toward_deg * M_PI / 180.0;
+      plot.dot(share * std::cos(angle), share * std::sin(angle), 5.0, "mark");
+      if (rest.pull_frames > 0 && pull.pull_frames > 0) {
+        plot.line({{rest.qx_N / rest.force_N, rest.qy_N / rest.force_N},
+                   {pull.qx_N / pull.force_N, pull.qy_N / pull.force_N}},
+                  pull.warned ? "red" : "ours");
+      }
+    }
+    picture(plot, "The pulls",
+            is_blind
+                ? "Lines: how each pull moves the location. The fingertip estimates no pull."
+                : "Lines: the pull that is found, from the rest before to each pull; red where "
+                  "the fingertip warned. Circles: the pull of the thread.");
+  }
+
   void notes() {
     text_ += "<h2>How to read it</h2>\n"
              "<p>The location's error is the distance from the fingertip's estimate to where the "
@@ -315,7 +370,17 @@ private:
              "<p>The hand's error is taken out of location and repeatability. The figure \"from "
              "the marks themselves\" has "
              "it. A press is read from half a second to a second after it stood.</p>\n"
-             "<p>Not measured here: other forces, other objects, pulls, temperature.</p>\n";
+             "<p>" +
+             std::string(card_.measured.pulls_asked > 0
+                             ? "A pull is the change from the rest before it. The moment of the "
+                               "thread is taken out of the location. The weight itself moves by "
+                               "some tenths of a millimetre as the rubber shears: that is left in, "
+                               "and in the twin's. A pulley with friction pulls less than hangs on "
+                               "it.</p>\n<p>Not measured here: other forces, other objects, "
+                               "temperature."
+                             : "Not measured here: other forces, other objects, pulls, "
+                               "temperature.") +
+             "</p>\n";
   }
 
   const Card &card_;

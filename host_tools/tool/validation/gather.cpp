@@ -1,7 +1,7 @@
 #include "tool/validation/gather.hpp"
 
-#include "libfingertip/names.hpp"
 #include "tool/calibration/gain_session.hpp"
+#include "tool/validation/median.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace fingertip::validating {
 namespace {
 
-constexpr double KEEPS_s = 2.0;      /* of contacts */
+constexpr double KEEPS_s = 3.0;      /* of contacts */
 constexpr double HALF_READ_s = 0.25; /* of a placement's readings, about its time */
 constexpr double BEFORE_s = 1.0, BEFORE_TOUCH_s = 0.15;
 constexpr double EARLY_s = 1.0, HALF_MEAN_s = 0.5;
@@ -19,12 +19,6 @@ constexpr double TENTH_s = 0.1, HELD_MIN_s = 5.0;
  * force, and a press 0.8 at least (newcomer_validated --fault thin_skin --seed 403). */
 constexpr double SAME_WEIGHT = 0.2;
 constexpr double LIFTING_s = 0.2; /* the weight may lighten before it shows as lifted */
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double felt_Pa(const calibrating::Placement &placement) {
   double sum_Pa = 0.0;
@@ -39,31 +33,7 @@ bool is_same_weight(const calibrating::Placement &placement, const std::vector<P
   for (const Press &press : before) {
     felt.push_back(felt_Pa(press.placement));
   }
-  return felt.empty() || felt_Pa(placement) >= SAME_WEIGHT * median(felt);
-}
-
-/* The fingertip's estimates in the half second of the readings. */
-void add_estimates(Press &press, const std::deque<wire_packet> &contacts) {
-  std::vector<double> x, y, force;
-  std::size_t warned = 0;
-  for (const wire_packet &packet : contacts) {
-    const double t_s = 1e-6 * static_cast<double>(packet.t_us);
-    const wire_contact &contact = packet.body.contact;
-    if (std::abs(t_s - press.placement.t_s) <= HALF_READ_s &&
-        (contact.flags & CONTACT_FLAG_FIT_VALID)) {
-      x.push_back(static_cast<double>(contact.x_mm));
-      y.push_back(static_cast<double>(contact.y_mm));
-      force.push_back(static_cast<double>(contact.force_N));
-      warned += (contact.flags & warning_flags()) != 0;
-    }
-  }
-  press.frames = x.size();
-  if (!x.empty()) {
-    press.x_mm = median(x);
-    press.y_mm = median(y);
-    press.force_N = median(force);
-    press.warned = 2 * warned > x.size();
-  }
+  return felt.empty() || felt_Pa(placement) >= SAME_WEIGHT * upper_median(felt);
 }
 
 } // namespace
@@ -77,6 +47,8 @@ Gatherer::Gatherer(const wire_info &info)
 void Gatherer::step(const Step &step) {
   if (step_.kind == Step::Kind::empty) {
     finish_empty();
+  } else if (step_.kind == Step::Kind::rest) {
+    finish_hold();
   }
   switch (step.kind) {
   case Step::Kind::begin:
@@ -84,7 +56,9 @@ void Gatherer::step(const Step &step) {
     measured_.skin_mm = step.skin_mm;
     break;
   case Step::Kind::take_back:
-    if (!measured_.presses.empty()) {
+    if (step_.kind == Step::Kind::pull) {
+      measured_.pulls.resize(std::max<std::size_t>(measured_.pulls.size(), 1) - 1);
+    } else if (!measured_.presses.empty()) {
       measured_.presses.pop_back();
     }
     return; /* the step is what it was */
@@ -93,6 +67,10 @@ void Gatherer::step(const Step &step) {
     rows_.clear();
     touched_.reset();
     released_.reset();
+    break;
+  case Step::Kind::pull:
+    measured_.pulls_asked++;
+    pull_watch_ = PullWatch();
     break;
   case Step::Kind::end:
     measured_.ended = true;
@@ -106,7 +84,7 @@ void Gatherer::step(const Step &step) {
 }
 
 void Gatherer::packet(const wire_packet &packet) {
-  has_pressed_ = false;
+  has_done_ = false;
   if (packet.type == WIRE_CONTACT) {
     contacts_.push_back(packet);
     while (contacts_.front().t_us + static_cast<std::uint64_t>(1e6 * KEEPS_s) < packet.t_us) {
@@ -135,9 +113,17 @@ void Gatherer::raw(const wire_packet &packet) {
     press.mark = step_.mark;
     press.at = step_.at;
     press.placement = std::move(*found);
-    add_estimates(press, contacts_);
+    press.estimate = estimate_of(contacts_, press.placement.t_s - HALF_READ_s,
+                                 press.placement.t_s + HALF_READ_s);
     measured_.presses.push_back(std::move(press));
-    has_pressed_ = true;
+    has_done_ = true;
+  } else if (step_.kind == Step::Kind::pull) {
+    const bool is_free = finder_.state() == calibrating::PlacementFinder::State::resting;
+    if (pull_watch_.take(frame, is_free, contacts_)) {
+      measured_.pulls.push_back(
+          {step_.toward_deg, step_.pulling, pull_watch_.rest(), pull_watch_.pull()});
+      has_done_ = true;
+    }
   } else if (step_.kind == Step::Kind::empty || step_.kind == Step::Kind::hold ||
              step_.kind == Step::Kind::rest) {
     rows_.push_back({frame.t_s, frame.valid, frame.pressure_Pa});
@@ -276,7 +262,7 @@ void Gatherer::finish_hold() {
 Measured Gatherer::finish() {
   if (step_.kind == Step::Kind::empty) {
     finish_empty();
-  } else {
+  } else if (!measured_.hold) {
     finish_hold();
   }
   for (std::size_t frames : valid_frames_) {

@@ -4,9 +4,9 @@
 #include "libfingertip/wire.hpp"
 #include "tool/calibration/placements.hpp"
 #include "tool/validation/protocol.hpp"
+#include "tool/validation/pull_watch.hpp"
 
 #include <array>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,10 +17,13 @@ struct Press {
   std::size_t mark = 0;
   Mark at{0.0, 0.0}; /* of the mark */
   calibrating::Placement placement;
-  /* What the fingertip estimated meanwhile, medians of the half second; 0 frames: nothing. */
-  std::size_t frames = 0;
-  double x_mm = 0.0, y_mm = 0.0, force_N = 0.0;
-  bool warned = false; /* most of these frames */
+  Estimate estimate; /* what the fingertip estimated meanwhile, in half a second */
+};
+
+struct Pulled {
+  double toward_deg = 0.0;
+  Pulling pulling;
+  Estimate rest, pull; /* before, and under it */
 };
 
 struct Empty {
@@ -50,6 +53,8 @@ struct Measured {
   std::vector<Press> presses;
   std::optional<Empty> empty;
   std::optional<Hold> hold;
+  std::size_t pulls_asked = 0;
+  std::vector<Pulled> pulls;
   std::vector<double> answered; /* [sensor] share of all frames in which it gave a reading */
   std::size_t frames = 0;
   bool ended = false; /* the last step was done */
@@ -60,8 +65,9 @@ public:
   explicit Gatherer(const wire_info &info);
   void packet(const wire_packet &packet);
   void step(const Step &step);
-  /* The press that the last packet completed; it counts if the step is one of press. */
-  bool has_pressed() const { return has_pressed_; }
+  /* Whether the last packet completed the press or the pull that the step asks for. */
+  bool has_done() const { return has_done_; }
+  const PullWatch &pull_watch() const { return pull_watch_; }
   const calibrating::PlacementFinder &finder() const { return finder_; }
   double step_s() const { return last_s_ - step_s_; } /* since the step began, device time */
   /* Since the present hold began, or since it ended; 0: neither. */
@@ -87,12 +93,13 @@ private:
   Measured measured_;
   calibrating::PlacementFinder finder_;
   Step step_{Step::Kind::end};
-  bool has_pressed_ = false;
+  bool has_done_ = false;
   double last_s_ = 0.0, step_s_ = 0.0;
   std::vector<std::size_t> valid_frames_;
   std::vector<Row> rows_; /* of the empty minute, or from the hold on */
-  std::deque<wire_packet> contacts_;
+  Contacts contacts_;
   std::optional<double> touched_, released_;
+  PullWatch pull_watch_;
 };
 
 } // namespace fingertip::validating

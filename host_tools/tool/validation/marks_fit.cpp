@@ -177,14 +177,13 @@ private:
     const double dx = v[p] - v[s + 1], dy = v[p + 1] - v[s + 2], square = dx * dx + dy * dy;
     const double own = 1.0 / (width * width), narrow = own / (NARROW * NARROW);
     const double outer = std::exp(-2.0 * v[DIP_WIDTH]);
-    const double felt_now = std::max(reading(i, k), 0.0);
-    const double earlier = placement(i).earlier_Pa[static_cast<std::size_t>(k)] * felt_now /
-                           (felt_now + calibrating::REMEMBERS_FROM * peak_Pa_);
     const double a = std::exp(-0.5 * square * own), b = std::exp(-0.5 * square * narrow);
     const double c = std::exp(-0.5 * square * outer);
     const double profile = (1.0 - v[MIXING]) * a + v[MIXING] * b - v[DIP] * c;
-    const double height = std::exp(v[LOG_PEAK] + v[p + 2]);
-    const double scale = v[s] * height;
+    const double earlier = placement(i).earlier_Pa[static_cast<std::size_t>(k)];
+    const double full = std::exp(v[LOG_PEAK] + v[p + 2]), felt = v[s] * full * profile;
+    const calibrating::Hidden hidden = calibrating::hidden_by(v[s + 4] * earlier, felt);
+    const double height = (1.0 - hidden.by_felt) * full, scale = v[s] * height;
     if (by) {
       /* profile by the square of the distance, and by the log of the width */
       const double by_square =
@@ -201,12 +200,12 @@ private:
       by[COMMON + 1] = -2.0 * scale * by_square * dx;
       by[COMMON + 2] = -2.0 * scale * by_square * dy;
       by[COMMON + 3] = scale * by_width;
-      by[COMMON + 4] = -earlier;
+      by[COMMON + 4] = -hidden.by_remembered * earlier;
       by[COMMON + OF_SENSOR] = 2.0 * scale * by_square * dx;
       by[COMMON + OF_SENSOR + 1] = 2.0 * scale * by_square * dy;
       by[COMMON + OF_SENSOR + 2] = scale * profile;
     }
-    return scale * profile - v[s + 4] * earlier;
+    return felt - hidden.Pa;
   }
 
   double sd_of(int i, int k) const {

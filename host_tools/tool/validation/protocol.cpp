@@ -11,8 +11,8 @@ namespace fingertip::validating {
 namespace {
 
 constexpr const char *BEGINS = "validate: ";
-constexpr std::array<const char *, 7> KINDS = {"begin", "empty", "press", "take_back",
-                                               "hold",  "rest",  "end"};
+constexpr std::array<const char *, 8> KINDS = {"begin", "empty", "press", "take_back",
+                                               "hold",  "rest",  "pull",  "end"};
 /* Of the marks sorted by columns, the next one in their order: far from the one before. */
 constexpr std::size_t STRIDE_MIN = 7;
 /* In pitches: how far apart two sensors across a cell of a grid are. */
@@ -69,6 +69,10 @@ std::string event_of(const Step &step) {
   } else if (step.kind == Step::Kind::press) {
     text += " mark=" + std::to_string(step.mark + 1) + " x_mm=" + number(step.at.x_mm) +
             " y_mm=" + number(step.at.y_mm);
+  } else if (step.kind == Step::Kind::pull) {
+    text += " toward_deg=" + number(step.toward_deg) +
+            " weight_g=" + number(step.pulling.weight_g) +
+            " height_mm=" + number(step.pulling.height_mm);
   }
   return text;
 }
@@ -102,20 +106,31 @@ std::optional<Step> step_of(const std::string &event) {
     } else if (key == "y_mm") {
       step.at.y_mm = *value;
     } else if (key == "weight_g") {
-      step.weight_g = *value;
+      (step.kind == Step::Kind::pull ? step.pulling.weight_g : step.weight_g) = *value;
     } else if (key == "skin_mm") {
       step.skin_mm = *value;
+    } else if (key == "toward_deg") {
+      step.toward_deg = *value;
+    } else if (key == "height_mm") {
+      step.pulling.height_mm = *value;
     } else {
       known--;
     }
   }
   const bool is_whole = step.kind == Step::Kind::press   ? known == 3
+                        : step.kind == Step::Kind::pull  ? known == 3 && step.pulling.weight_g > 0.0
                         : step.kind == Step::Kind::begin ? step.weight_g > 0.0 && step.skin_mm > 0.0
                                                          : true;
   return is_whole ? std::optional<Step>(step) : std::nullopt;
 }
 
-std::vector<Step> steps_of(const std::vector<Mark> &marks, double weight_g, double skin_mm) {
+std::string way_of(double toward_deg) {
+  static const char *const WAYS[] = {"+x", "+y", "-x", "-y"};
+  return WAYS[static_cast<std::size_t>(std::lround(toward_deg / 90.0)) % std::size(WAYS)];
+}
+
+std::vector<Step> steps_of(const std::vector<Mark> &marks, double weight_g, double skin_mm,
+                           const Pulling &pulling) {
   Step begin{Step::Kind::begin};
   begin.weight_g = weight_g;
   begin.skin_mm = skin_mm;
@@ -125,9 +140,17 @@ std::vector<Step> steps_of(const std::vector<Mark> &marks, double weight_g, doub
       steps.push_back({Step::Kind::press, m, marks[m]});
     }
   }
-  for (Step::Kind kind : {Step::Kind::hold, Step::Kind::rest, Step::Kind::end}) {
-    steps.push_back({kind});
+  steps.push_back({Step::Kind::hold});
+  steps.push_back({Step::Kind::rest});
+  for (double toward_deg : PULLS_TOWARD_deg) {
+    if (pulling.weight_g > 0.0) {
+      Step pull{Step::Kind::pull};
+      pull.toward_deg = toward_deg;
+      pull.pulling = pulling;
+      steps.push_back(pull);
+    }
   }
+  steps.push_back({Step::Kind::end});
   return steps;
 }
 

@@ -68,6 +68,11 @@ void draw(const calibrating::Array &array, Pen &pen) {
   pen.line(-1.0, top - 2.0, 0.0, top);
   pen.line(1.0, top - 2.0, 0.0, top);
   pen.text(1.5, top - 2.0, "+y");
+  const double right = reach.x - 3.0;
+  pen.line(right - 8.0, 0.0, right, 0.0);
+  pen.line(right - 2.0, -1.0, right, 0.0);
+  pen.line(right - 2.0, 1.0, right, 0.0);
+  pen.text(right - 3.0, 1.5, "+x");
 }
 
 class SvgPen : public Pen {

@@ -12,6 +12,10 @@ namespace fingertip::validating {
 constexpr double TWIN_SKIN_mm = 12.0;
 /* A pad whose skin is so much thicker or thinner is still compared. */
 constexpr double TWIN_SKIN_OFF_mm = 2.0;
+/* Figures of a pull that is estimated are those of pads whose sensors differ in their gains alone,
+ * calibrated and with their profile: on the others the firmware mostly estimates none.
+ * Pulled by so much of the weight; a pad that is pulled by so much more or less is compared. */
+constexpr double TWIN_PULL = 1.0 / 3.0, TWIN_PULL_OFF = 0.05;
 
 struct TwinSays {
   const char *key; /* of the figure */

@@ -17,15 +17,15 @@ std::string seconds_left(double all_s, double done_s) {
 
 } // namespace
 
-Walk::Walk(const wire_info &info, double weight_g, double skin_mm)
+Walk::Walk(const wire_info &info, double weight_g, double skin_mm, const Pulling &pulling)
     : marks_(marks_of(calibrating::array_of(info)).size()), gatherer_(info) {
-  steps_ = steps_of(marks_of(calibrating::array_of(info)), weight_g, skin_mm);
+  steps_ = steps_of(marks_of(calibrating::array_of(info)), weight_g, skin_mm, pulling);
 }
 
 void Walk::begin(std::vector<Step> &begun) {
   begun.push_back(steps_[next_++]);
   gatherer_.step(begun.back());
-  is_pressed_ = false;
+  is_taken_ = false;
 }
 
 std::vector<Step> Walk::take(const wire_packet &packet) {
@@ -42,7 +42,7 @@ std::vector<Step> Walk::take(const wire_packet &packet) {
   if (packet.type != WIRE_RAW) {
     return begun; /* a frame is whole with its readings */
   }
-  is_pressed_ = is_pressed_ || gatherer_.has_pressed();
+  is_taken_ = is_taken_ || gatherer_.has_done();
   const bool is_free = gatherer_.finder().state() == Finder::State::resting;
   bool is_over = false;
   switch (now().kind) {
@@ -50,7 +50,8 @@ std::vector<Step> Walk::take(const wire_packet &packet) {
     is_over = gatherer_.step_s() >= EMPTY_s && is_free;
     break;
   case Step::Kind::press:
-    is_over = is_pressed_ && is_free;
+  case Step::Kind::pull:
+    is_over = is_taken_ && is_free;
     break;
   case Step::Kind::hold:
     is_over = gatherer_.touched_s() >= HOLD_s;
@@ -75,8 +76,9 @@ std::vector<Step> Walk::take_back() {
     return begun;
   }
   /* The last that was taken: of this step, or of the one before. */
-  const std::size_t last = is_pressed_ ? next_ - 1 : next_ - 2;
-  if (now().kind != Step::Kind::press || steps_[last].kind != Step::Kind::press) {
+  const std::size_t last = is_taken_ ? next_ - 1 : next_ - 2;
+  const Step::Kind kind = now().kind;
+  if ((kind != Step::Kind::press && kind != Step::Kind::pull) || steps_[last].kind != kind) {
     return begun;
   }
   begun.push_back({Step::Kind::take_back});
@@ -84,6 +86,23 @@ std::vector<Step> Walk::take_back() {
   next_ = last;
   begin(begun);
   return begun;
+}
+
+std::string Walk::pull_advice() const {
+  const std::string thread = "its thread slack towards " + way_of(now().toward_deg);
+  switch (gatherer_.pull_watch().state()) {
+  case PullWatch::State::free:
+    return "set the weight down in the middle, " + thread;
+  case PullWatch::State::settling:
+    return "let it stand, " + thread;
+  case PullWatch::State::resting:
+    return "pull: hang the other weight on the thread towards " + way_of(now().toward_deg);
+  case PullWatch::State::pulled:
+    return "let it hang still";
+  case PullWatch::State::taken:
+    break;
+  }
+  return "taken: lift it";
 }
 
 std::string Walk::advice() const {
@@ -97,7 +116,7 @@ std::string Walk::advice() const {
     return is_free ? "leave it alone: " + seconds_left(EMPTY_s, gatherer_.step_s())
                    : "take off what touches it: the empty minute begins again";
   case Step::Kind::press: {
-    if (is_pressed_) {
+    if (is_taken_) {
       return "taken: lift it";
     }
     if (finder.state() == Finder::State::settling) {
@@ -119,6 +138,8 @@ std::string Walk::advice() const {
     return gatherer_.released_s() > 0.0
                ? "leave it alone: " + seconds_left(REST_s, gatherer_.released_s())
                : "lift it";
+  case Step::Kind::pull:
+    return pull_advice();
   case Step::Kind::begin:
   case Step::Kind::take_back:
   case Step::Kind::end:

@@ -11,11 +11,12 @@ namespace fingertip::validating {
 
 class Walk {
 public:
-  Walk(const wire_info &info, double weight_g, double skin_mm);
+  Walk(const wire_info &info, double weight_g, double skin_mm, const Pulling &pulling = {});
 
   /* The steps that begin after this packet, in order, for the recording. */
   std::vector<Step> take(const wire_packet &packet);
-  /* The last press does not count, and is asked for again; none: there is none to take back. */
+  /* The last press or pull does not count, and is asked for again; none: there is none to take
+   * back. */
   std::vector<Step> take_back();
 
   bool is_done() const { return next_ == steps_.size(); }
@@ -26,11 +27,12 @@ public:
 
 private:
   void begin(std::vector<Step> &begun);
+  std::string pull_advice() const;
   const Step &now() const { return steps_[next_ - 1]; }
 
   std::vector<Step> steps_;
   std::size_t next_ = 0, marks_;
-  bool is_pressed_ = false; /* the present step's press was taken */
+  bool is_taken_ = false; /* the present step's press or pull was */
   Gatherer gatherer_;
 };
 

@@ -46,10 +46,10 @@ class ValidateTest(CliTest):
 
 class Live(ValidateTest):
     def test_from_the_first_step_to_the_card(self):
-        process = self.world.start([SIMULATE, "--cache", TABLES, "--validate", "--seed", "3"], env=self.environment)
+        process = self.world.start([SIMULATE, "--cache", TABLES, "--validate", "--pull", "100", "--seed", "3"], env=self.environment)
         self.assertTrue(process.readline().startswith("ready: "))
         before = self.run_cli("info", "--port", "sim:")[0]
-        tool = self.start("validate", "--port", "sim:", "--weight", "300", "--record", self.csv, "-o", self.card)
+        tool = self.start("validate", "--port", "sim:", "--weight", "300", "--pull", "100", "--record", self.csv, "-o", self.card)
         out, err = tool.communicate(limit_s=600)
         self.assertEqual((tool.returncode, err), (0, ""))
         after = self.run_cli("info", "--port", "sim:")[0]
@@ -58,11 +58,13 @@ class Live(ValidateTest):
         process.send_signal(signal.SIGINT)
         process.communicate()
         for words in ("leave it alone", "set the weight down on mark 1, turn 1 of 2", "set the weight down on mark 23, turn 2 of 2", "lift it",
+                      "set the weight down in the middle, its thread slack towards +x", "hang the other weight on the thread towards -y",
                       "location off by, median", "nothing is wrong that this validation can see"):
             self.assertIn(words, out)
         # the recording holds what was measured, and the card can be made from it again
         recording = self.read(self.csv)
         self.assertEqual(recording.count("# event: validate: press "), 46)
+        self.assertEqual(recording.count("# event: validate: pull "), 4)
         for private in (SERIAL, socket.gethostname(), self.folder, "sim", "port", "started"):
             self.assertNotIn(private, re.sub("(?m)^[^#].*$", "", recording), private)
         if len(getpass.getuser()) > 4:
@@ -102,6 +104,49 @@ class FromARecording(ValidateTest):
                 self.assertEqual([(one["finding"], one["sensors"]) for one in said["findings"]], [(fault, truth["faulty"])])
                 self.assertIn(f"{fault}: ", out)
                 self.assertIn('class="find"', self.read(self.card))
+
+    def test_pulls_are_what_is_true(self):
+        for height_mm in ("0", "5"):
+            with self.subTest(height_mm=height_mm):
+                truth = self.recorded("--seed", "31", "--calibrated", "--known-pad", "--plain", "--pull", "90", "--thread-height", height_mm)
+                said, out = self.carded()
+                figures = said["figures"]
+                self.assertEqual(len(said["pulls"]), 4)
+                self.assertAlmostEqual(figures["pull_true"], 0.3)
+                self.assertAlmostEqual(figures["pull_over_thread"], 1, delta=0.08)
+                aim_deg = [true["toward_deg"] - one["toward_deg"] for true, one in zip(truth["pulls"], said["pulls"])]
+                self.assertLess(figures["pull_direction_deg"], math.sqrt(statistics.mean(off * off for off in aim_deg)) + 3)
+                self.assertAlmostEqual(figures["pull_moves_mm"], truth["pulls"][0]["way_mm"], delta=0.1)
+                self.assertEqual(said["pull_note"], "")
+                self.assertIn("pull found over that of the thread", out)
+        page = self.read(self.card)
+        self.assertEqual(page.count("<figure>"), 7)
+        self.assertRegex(page, r"pull found over that of the thread, mean of the pulls</td><td class=\"n\">[0-9.]+</td><td class=\"n\">[0-9.]+</td>")
+
+    def test_what_estimates_no_pull_says_so(self):
+        self.recorded("--seed", "31", "--calibrated", "--pull", "100")
+        said, out = self.carded()
+        self.assertGreater(said["figures"]["pull_blind_moves_mm"], 0.5)
+        self.assertNotIn("pull_over_thread", said["figures"])
+        self.assertIn("does not know its pad", out)
+        self.assertIn("does not know its pad", self.read(self.card))
+        # scene slip
+        recording = self.read(self.csv)
+        capabilities = int(re.search(r"(?m)^# capabilities: (\d+)$", recording).group(1))
+        tangential = 1 << 3  # WIRE_CAPABILITY_TANGENTIAL
+        self.assertTrue(capabilities & tangential)
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.write(re.sub(r"(?m)^# capabilities: .*$", f"# capabilities: {capabilities - tangential}", recording.replace("# scene: grasp", "# scene: slip")))
+        self.assertIn("Scene slip estimates no pull", self.carded()[1])
+
+    def test_a_pull_that_was_not_done_is_not_seen(self):
+        self.recorded("--seed", "31")
+        recording = self.read(self.csv)
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.write(recording.replace("# event: validate: rest\n", "# event: validate: rest\n# event: validate: pull toward_deg=0 weight_g=100 height_mm=2\n"))
+        said, out = self.carded()
+        self.assertEqual(said["pulls"], [])
+        self.assertIn("No pull was seen: let the weight stand for two seconds", out)
 
     def test_the_same_recording_makes_the_same_card(self):
         self.recorded("--seed", "34", "--calibrated")
@@ -147,7 +192,9 @@ class Template(ValidateTest):
 
     def test_usage(self):
         for options, words in (([], "give -o CARD.html, or --template"), (["-o", "c.html"], "give --weight GRAMS, or --from"),
-                               (["-o", "c.html", "--weight", "300"], "give --record FILE.csv"), (["--template", "a.pdf", "--weight", "300"], "excludes")):
+                               (["-o", "c.html", "--weight", "300"], "give --record FILE.csv"), (["--template", "a.pdf", "--weight", "300"], "excludes"),
+                               (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "20"], "is 0.07 of the weight; give --pull from 45 to 150 grams"),
+                               (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--thread-height", "3"], "pull")):
             self.assertIn(words, self.error("validate", *options, status=2))
 
 

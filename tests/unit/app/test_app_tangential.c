@@ -191,8 +191,8 @@ static void a_profile_outlives_power_until_it_is_erased(void) {
   TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.fit_settings.cut_noises);
 }
 
-/* The tangential estimate was judged on fits that know neither. */
-static void a_profile_keeps_the_calibrations_shape_from_the_fit(void) {
+/* The Gaussian is where the estimate begins, and what is left where there is none. */
+static void beside_a_profile_the_fit_has_the_dip_and_assumes_no_width(void) {
   native_cdc_open();
   run_for(300);
   struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE};
@@ -208,14 +208,11 @@ static void a_profile_keeps_the_calibrations_shape_from_the_fit(void) {
     calibrate.body.cmd_calibrate.calibration.sensors[k].gain = 1.0f;
   }
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
-  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
-  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
   struct wire_packet command = pad_command();
   store_pad(&command);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
-  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.dip_sd_mm);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
-  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.fit_settings.dip_share);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
 }
 
 static void a_profile_out_of_range_is_refused(void) {
@@ -445,7 +442,7 @@ int main(void) {
   RUN_TEST(a_load_that_is_not_estimated_is_part_of_the_error);
   RUN_TEST(touches_tell_the_gains_of_a_pad_without_a_calibration);
   RUN_TEST(a_profile_outlives_power_until_it_is_erased);
-  RUN_TEST(a_profile_keeps_the_calibrations_shape_from_the_fit);
+  RUN_TEST(beside_a_profile_the_fit_has_the_dip_and_assumes_no_width);
   RUN_TEST(a_profile_out_of_range_is_refused);
   RUN_TEST(a_stored_profile_out_of_range_does_not_act);
   RUN_TEST(a_calibration_and_the_scale_of_the_profile_act);

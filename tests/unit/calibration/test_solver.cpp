@@ -21,6 +21,29 @@ double rms_error(const std::vector<double> &gain, const std::vector<double> &tru
   return std::sqrt(sum / static_cast<double>(truth.size()));
 }
 
+double bell(double r_mm, double sd_mm) {
+  return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm));
+}
+
+/* Presses of one foot whose response over the distance is this, of its peak. */
+template <typename Response> Solution solve_presses(const KnownPad &pad, Response response) {
+  auto placements = good_session(pad, 24, 6);
+  Random random(6, 2, 0);
+  for (Placement &placement : placements) {
+    const double x = random.uniform(pad.array.x_mm.front(), pad.array.x_mm.back());
+    const double y = random.uniform(pad.array.y_mm.front(), pad.array.y_mm.back());
+    for (std::size_t k = 0; k < 15; k++) {
+      const double r_mm = std::hypot(pad.array.x_mm[k] - x, pad.array.y_mm[k] - y);
+      placement.reading_Pa[k] = pad.gain[k] * KnownPad::PEAK_Pa * response(r_mm) + random.normal();
+    }
+  }
+  return solve(pad.array, placements);
+}
+
+double layer(double r_mm, double wide_mm) {
+  return (1.0 - LAYER_MIXING) * bell(r_mm, wide_mm) + LAYER_MIXING * bell(r_mm, NARROW * wide_mm);
+}
+
 } // namespace
 
 TEST(Solver, finds_gains_places_and_the_profile) {
@@ -30,7 +53,7 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   ASSERT_TRUE(s.solved);
   // The pad's profile is not of the solver's family. It passes in part for a spread of the forces,
   // and so for gains: some 1 % of either.
-  EXPECT_LT(rms_error(s.gain, pad.gain), 0.012);
+  EXPECT_LT(rms_error(s.gain, pad.gain), 0.014);
   EXPECT_NEAR(std::accumulate(s.gain.begin(), s.gain.end(), 0.0), 15.0, 1e-9);
   EXPECT_NEAR(s.peak_Pa / KnownPad::PEAK_Pa, 1.0, 0.02);
   EXPECT_EQ(s.kept, 30u);
@@ -50,24 +73,10 @@ TEST(Solver, finds_gains_places_and_the_profile) {
 
 /* A dip narrower than the expected one, as the twin's pads have it. */
 TEST(Solver, finds_the_width_of_the_dip) {
-  constexpr double WIDE_mm = 5.8, MIXING = 0.2, DIP = 0.05, DIP_mm = 14.3;
+  constexpr double DIP = 0.05, DIP_mm = 14.3;
   const KnownPad pad(6);
-  const auto bell = [](double r_mm, double sd_mm) {
-    return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm));
-  };
-  auto placements = good_session(pad, 24, 6);
-  Random random(6, 3, 0);
-  for (Placement &placement : placements) {
-    const double x = random.uniform(pad.array.x_mm.front(), pad.array.x_mm.back());
-    const double y = random.uniform(pad.array.y_mm.front(), pad.array.y_mm.back());
-    for (std::size_t k = 0; k < 15; k++) {
-      const double r_mm = std::hypot(pad.array.x_mm[k] - x, pad.array.y_mm[k] - y);
-      const double felt = (1.0 - MIXING) * bell(r_mm, WIDE_mm) +
-                          MIXING * bell(r_mm, NARROW * WIDE_mm) - DIP * bell(r_mm, DIP_mm);
-      placement.reading_Pa[k] = pad.gain[k] * KnownPad::PEAK_Pa * felt + random.normal();
-    }
-  }
-  const Solution s = solve(pad.array, placements);
+  const Solution s =
+      solve_presses(pad, [](double r_mm) { return layer(r_mm, 5.8) - DIP * bell(r_mm, DIP_mm); });
   ASSERT_TRUE(s.solved);
   EXPECT_NEAR(s.dip_sd_mm / DIP_mm, 1.0, 0.05);
   EXPECT_NEAR(s.dip / DIP, 1.0, 0.1);
@@ -76,47 +85,42 @@ TEST(Solver, finds_the_width_of_the_dip) {
 /* The firmware gets its own model, a Gaussian less a dip: the one nearest to the pad's profile, and
  * not the parts that the solver found. */
 TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
-  constexpr double WIDE_mm = 4.0, MIXING = 0.25, DIP = 0.03;
+  constexpr double WIDE_mm = 5.9, DIP = 0.05, DIP_mm = 14.4;
   const KnownPad pad(6);
-  const double dip_mm = DIP_PITCHES * pad.array.pitch_mm;
-  const auto bell = [](double r_mm, double sd_mm) {
-    return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm));
-  };
-  const auto profile = [&](double r_mm) {
-    return (1.0 - MIXING) * bell(r_mm, WIDE_mm) + MIXING * bell(r_mm, NARROW * WIDE_mm) -
-           DIP * bell(r_mm, dip_mm);
-  };
-  auto placements = good_session(pad, 24, 6);
-  Random random(6, 2, 0);
-  for (Placement &placement : placements) {
-    const double x = random.uniform(pad.array.x_mm.front(), pad.array.x_mm.back());
-    const double y = random.uniform(pad.array.y_mm.front(), pad.array.y_mm.back());
-    for (std::size_t k = 0; k < 15; k++) {
-      const double r_mm = std::hypot(pad.array.x_mm[k] - x, pad.array.y_mm[k] - y);
-      placement.reading_Pa[k] = pad.gain[k] * KnownPad::PEAK_Pa * profile(r_mm) + random.normal();
-    }
-  }
-  const Solution s = solve(pad.array, placements);
+  const Solution s = solve_presses(
+      pad, [](double r_mm) { return layer(r_mm, WIDE_mm) - DIP * bell(r_mm, DIP_mm); });
   ASSERT_TRUE(s.solved);
-  EXPECT_NEAR(s.dip / DIP, 1.0, 0.05);
-  EXPECT_NEAR(s.dip_sd_mm / dip_mm, 1.0, 0.01);
-  // What is left of the profile over the plane, at the best amplitude.
-  const auto left = [&](double sigma_mm, double dip_share) {
+  EXPECT_NEAR(s.dip_sd_mm / DIP_mm, 1.0, 0.07);
+  /* What the Gaussian leaves of the layer, seen from contacts all over the array: sensors lie 6 and
+   * 12 mm (rms) from its middle along the axes. */
+  const double reach_mm = std::hypot(9.0 * std::sqrt(2.0 / 3.0), 9.0 * std::sqrt(2.0));
+  double peak = 0.0;
+  const auto left = [&](double sigma_mm) {
     double with = 0.0, own = 0.0, all = 0.0;
     for (double r_mm = 0.05; r_mm < 100.0; r_mm += 0.1) {
-      const double model = bell(r_mm, sigma_mm) - dip_share * bell(r_mm, dip_mm);
-      with += r_mm * profile(r_mm) * model;
-      own += r_mm * model * model;
-      all += r_mm * profile(r_mm) * profile(r_mm);
+      const double weight = r_mm * bell(r_mm, reach_mm), of_layer = layer(r_mm, WIDE_mm);
+      with += weight * of_layer * bell(r_mm, sigma_mm);
+      own += weight * bell(r_mm, sigma_mm) * bell(r_mm, sigma_mm);
+      all += weight * of_layer * of_layer;
     }
+    peak = with / own;
     return all - with * with / own;
   };
-  const double least = left(s.sigma_mm, s.dip_share);
-  EXPECT_LT(least, left(s.sigma_mm * 1.02, s.dip_share));
-  EXPECT_LT(least, left(s.sigma_mm * 0.98, s.dip_share));
-  EXPECT_LT(least, left(s.sigma_mm, s.dip_share + 0.0015));
-  EXPECT_LT(least, left(s.sigma_mm, s.dip_share - 0.0015));
-  EXPECT_LT(least, left(s.sigma_mm, s.dip));
+  const double least = left(s.sigma_mm);
+  EXPECT_NEAR(s.dip_share / (DIP / peak), 1.0, 0.09);
+  EXPECT_LT(least, left(s.sigma_mm * 1.02));
+  EXPECT_LT(least, left(s.sigma_mm * 0.98));
+}
+
+/* Far from a contact on a wide layer it presses a little. That is found as zeros that were off and
+ * a wide dip, which together are none. */
+TEST(Solver, what_presses_far_away_makes_no_dip) {
+  const KnownPad pad(6);
+  const Solution s = solve_presses(
+      pad, [](double r_mm) { return layer(r_mm, 5.9) + 0.005 * (1.0 - bell(r_mm, 20.0)); });
+  ASSERT_TRUE(s.solved);
+  EXPECT_GT(s.dip, 0.003);
+  EXPECT_LT(s.dip_share, 0.001);
 }
 
 /* A tilt alone is what touches of unknown strength do not tell. */
@@ -275,9 +279,8 @@ TEST(Solver, tells_memory_from_gain) {
   std::vector<Placement> felt = placements;
   for (Placement &placement : felt) {
     for (std::size_t k = 0; k < 15; k++) {
-      const double share =
-          placement.reading_Pa[k] / (placement.reading_Pa[k] + REMEMBERS_FROM * KnownPad::PEAK_Pa);
-      placement.reading_Pa[k] -= memory[k] * placement.earlier_Pa[k] * std::max(share, 0.0);
+      placement.reading_Pa[k] -=
+          std::min(memory[k] * placement.earlier_Pa[k], std::max(placement.reading_Pa[k], 0.0));
     }
   }
   const Solution s = solve(pad.array, felt);

@@ -227,15 +227,6 @@ static void a_calibration_scales_what_its_force_scale_was_found_with(void) {
   TEST_ASSERT_FALSE(settings.from_touch);
 }
 
-/* 1 - 4 0.05 (6.25 / 7.25)^2 = 0.8514 */
-static void a_dip_is_in_the_scale(void) {
-  settings.force_scale = 1.25f;
-  settings.force_scale_sd = 0.04f;
-  tangential_use_dip(&settings, 0.05f, 15.0f, 6.0f);
-  TEST_ASSERT_FLOAT_WITHIN(1e-4f, 1.25f * 0.85137f, settings.force_scale);
-  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.04f * 0.85137f, settings.force_scale_sd);
-}
-
 static void uncertain_speaks_of_the_corrected_location(void) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN));
   found.elongated = true;
@@ -422,7 +413,6 @@ int main(void) {
   RUN_TEST(a_load_that_edges_hide_is_not_told);
   RUN_TEST(scales_and_their_uncertainties_enter);
   RUN_TEST(a_calibration_scales_what_its_force_scale_was_found_with);
-  RUN_TEST(a_dip_is_in_the_scale);
   RUN_TEST(uncertain_speaks_of_the_corrected_location);
   RUN_TEST(from_touch_takes_the_first_100_ms_for_none);
   RUN_TEST(a_new_contact_has_a_zero_of_its_own);

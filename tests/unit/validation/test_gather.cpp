@@ -9,7 +9,7 @@ namespace fingertip::validating {
 namespace {
 
 constexpr double FRAME_s = 0.02, AIR_Pa = 101325.0, DRIFT_Pa_min = 30.0, PRESS_Pa = 8000.0;
-constexpr std::size_t DRIFTS = 3;
+constexpr std::size_t DRIFTS = 3, PULLED_ON = 8;
 
 wire_info info_of() {
   wire_info info{};
@@ -26,7 +26,7 @@ wire_info info_of() {
 /* Leads a walk: whatever touches is put on and off by the test. */
 class Pad {
 public:
-  Pad() : walk(info_of(), 300.0, 12.0) {}
+  explicit Pad(const Pulling &pulling = {}) : walk(info_of(), 300.0, 12.0, pulling) {}
 
   void wait(double seconds) {
     for (double end_s = t_s_ + seconds; t_s_ < end_s; t_s_ += FRAME_s) {
@@ -38,6 +38,7 @@ public:
       raw.valid = (1u << raw.sensor_count) - 1u;
       for (std::size_t k = 0; k < raw.sensor_count; k++) {
         double pressure_Pa = AIR_Pa + pressed_Pa / (1.0 + double(k)) + left_Pa;
+        pressure_Pa += k == PULLED_ON ? pulled * pressed_Pa : 0.0;
         pressure_Pa += k == DRIFTS ? DRIFT_Pa_min * t_s_ / 60.0 : 0.0;
         pressure_Pa += frame_ % 2 ? 2.0 : -2.0; // noise: 2 Pa rms
         raw.pressure_Pa_q10[k] = static_cast<std::int32_t>(std::llround(1024.0 * pressure_Pa));
@@ -59,6 +60,7 @@ public:
   Walk walk;
   std::vector<Step> steps;
   double pressed_Pa = 0.0, left_Pa = 0.0;
+  double pulled = 0.0; // of the press, which one sensor feels besides
 
 private:
   double t_s_ = 1.0;
@@ -127,6 +129,75 @@ TEST(Walk, RubberThatComesBackIsNoPress) {
   pad.wait(2.0);
   EXPECT_NE(pad.walk.advice().find("mark 2, turn 1"), std::string::npos) << pad.walk.advice();
   EXPECT_EQ(pad.walk.finish().presses.size(), 1u);
+}
+
+/* Leads a walk to its first pull. */
+void go_to_pulls(Pad &pad) {
+  pad.wait(EMPTY_s + 1.0);
+  for (std::size_t i = 0; i < marks_of(validation_array()).size() * TURNS; i++) {
+    pad.press(2.0);
+  }
+  pad.press(HOLD_s + 1.0);
+  pad.wait(REST_s + 1.0);
+}
+
+TEST(Walk, APullIsAskedForAlongEachWay) {
+  Pad pad({100.0, 2.0});
+  go_to_pulls(pad);
+  for (const char *way : {"+x", "+y", "-x", "-y"}) {
+    EXPECT_EQ(pad.walk.advice(),
+              std::string("set the weight down in the middle, its thread slack towards ") + way);
+    pad.pressed_Pa = PRESS_Pa;
+    pad.wait(1.0);
+    EXPECT_EQ(pad.walk.advice(), std::string("let it stand, its thread slack towards ") + way);
+    pad.wait(2.0);
+    EXPECT_EQ(pad.walk.advice(),
+              std::string("pull: hang the other weight on the thread towards ") + way);
+    pad.pulled = 0.2;
+    pad.wait(0.5);
+    EXPECT_EQ(pad.walk.advice(), "let it hang still");
+    pad.wait(1.5);
+    EXPECT_EQ(pad.walk.advice(), "taken: lift it");
+    pad.pressed_Pa = pad.pulled = 0.0;
+    pad.wait(2.0);
+  }
+  ASSERT_TRUE(pad.walk.is_done());
+  const Measured measured = pad.walk.finish();
+  EXPECT_TRUE(measured.ended);
+  ASSERT_TRUE(measured.hold);
+  EXPECT_NEAR(measured.hold->held_s, HOLD_s + 1.0, 0.5);
+  EXPECT_EQ(measured.pulls_asked, 4u);
+  ASSERT_EQ(measured.pulls.size(), 4u);
+  EXPECT_EQ(measured.pulls[3].toward_deg, 270.0);
+  EXPECT_EQ(measured.pulls[3].pulling.weight_g, 100.0);
+}
+
+TEST(Walk, AWeightThatStandsOrFadesIsNoPull) {
+  Pad pad({100.0, 2.0});
+  go_to_pulls(pad);
+  pad.press(10.0);
+  pad.pressed_Pa = PRESS_Pa;
+  pad.wait(3.0);
+  pad.pressed_Pa = 0.8 * PRESS_Pa;
+  pad.wait(10.0);
+  pad.pressed_Pa = 0.0;
+  pad.wait(2.0);
+  EXPECT_FALSE(pad.walk.is_done());
+  EXPECT_TRUE(pad.walk.finish().pulls.empty());
+}
+
+TEST(Walk, APullIsTakenBackAndAskedForAgain) {
+  Pad pad({100.0, 2.0});
+  go_to_pulls(pad);
+  EXPECT_TRUE(pad.walk.take_back().empty()); // the rest before is no press
+  pad.pressed_Pa = PRESS_Pa;
+  pad.wait(3.0);
+  pad.pulled = 0.2;
+  pad.wait(2.0);
+  ASSERT_EQ(pad.walk.take_back().size(), 2u);
+  const Measured measured = pad.walk.finish();
+  EXPECT_TRUE(measured.pulls.empty());
+  EXPECT_EQ(measured.presses.size(), marks_of(validation_array()).size() * TURNS);
 }
 
 TEST(Walk, APressIsTakenBackAndAskedForAgain) {

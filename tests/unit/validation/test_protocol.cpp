@@ -52,7 +52,9 @@ TEST(Protocol, EachMarkIsAnotherAndFarFromTheOneBefore) {
 }
 
 TEST(Protocol, StepsAreTheSameFromTheirEvents) {
-  const std::vector<Step> steps = steps_of(marks_of(validation_array()), 312.5, 11.0);
+  const std::vector<Step> steps = steps_of(marks_of(validation_array()), 312.5, 11.0, {104.5, 1.5});
+  EXPECT_EQ(steps.size(),
+            steps_of(marks_of(validation_array()), 312.5, 11.0).size() + PULLS_TOWARD_deg.size());
   EXPECT_EQ(std::count_if(steps.begin(), steps.end(),
                           [](const Step &step) { return step.kind == Step::Kind::press; }),
             static_cast<std::ptrdiff_t>(MARKS * TURNS));
@@ -65,13 +67,18 @@ TEST(Protocol, StepsAreTheSameFromTheirEvents) {
     EXPECT_EQ(read->at.y_mm, step.at.y_mm);
     EXPECT_EQ(read->weight_g, step.weight_g);
     EXPECT_EQ(read->skin_mm, step.skin_mm);
+    EXPECT_EQ(read->toward_deg, step.toward_deg);
+    EXPECT_EQ(read->pulling.weight_g, step.pulling.weight_g);
+    EXPECT_TRUE(step.kind != Step::Kind::pull || read->pulling.height_mm == 1.5);
   }
 }
 
 TEST(Protocol, OtherEventsAreNoSteps) {
-  for (const char *text : {"gone 2026-01-01", "validate: dance", "validate: press mark=1 x_mm=3",
-                           "validate: press mark=0 x_mm=1 y_mm=", "validate: begin",
-                           "validate:hold", "validate: begin weight_g=0 skin_mm=12", ""}) {
+  for (const char *text :
+       {"gone 2026-01-01", "validate: dance", "validate: press mark=1 x_mm=3",
+        "validate: press mark=0 x_mm=1 y_mm=", "validate: begin", "validate:hold",
+        "validate: begin weight_g=0 skin_mm=12", "validate: pull toward_deg=0 height_mm=2",
+        "validate: pull toward_deg=0 weight_g=0 height_mm=2", ""}) {
     EXPECT_FALSE(step_of(text)) << text;
   }
 }

@@ -4,7 +4,9 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/recording.hpp"
+#include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
+#include "library/pad/thickness.hpp"
 #include "simulation/cell/place.hpp"
 #include "simulation/cell/validated.hpp"
 #include "simulation/player/native_fingertip.h"
@@ -31,12 +33,12 @@ constexpr std::uint32_t DATE_s = 1767225600;
 constexpr std::uint64_t SLICE_us = 5'000, COMMAND_us = 100'000;
 constexpr std::size_t PLACEMENTS = 20; // of a calibration
 // Of the pad that is validated: the same seed draws the same one.
-constexpr truth::PadOptions LIKE_REAL{10.0, 17.5, 0.1, 5.0, 3.5};
+constexpr truth::PadOptions LIKE_REAL{10.0, 17.5, 0.1, 5.0, 3.5}, PLAIN{10.0};
 
 struct Options {
   ValidatedOptions pad;
   std::string recording, truth, fault = "none";
-  bool calibrated = false, overwrite = false;
+  bool calibrated = false, knows_pad = false, plain = false, overwrite = false;
 };
 
 class Play {
@@ -98,7 +100,7 @@ private:
   // As `fingertip calibrate --weight` makes it of the healthy pad, some day before.
   void calibrate() {
     const truth::Feet feet(LAYER_mm, options_.pad.cache);
-    truth::SessionPad pad(LIKE_REAL, LAYER_mm, options_.pad.seed);
+    truth::SessionPad pad(options_.plain ? PLAIN : LIKE_REAL, LAYER_mm, options_.pad.seed);
     truth::Session session(feet, truth::SessionKind::good, options_.pad.seed, PLACEMENTS);
     const calibrating::Array array = truth::session_array();
     std::vector<calibrating::Placement> placements;
@@ -111,13 +113,17 @@ private:
         wanted = calibrating::next_place(array, placements, solution);
       }
     }
-    send(
-        command_calibrate(calibrating::calibration_of(
-                              solution,
-                              calibrating::force_scale(array, placements, solution, truth::WEIGHT_N,
-                                                       calibrating::shape_of(solution)),
-                              DATE_s),
-                          SENSORS));
+    calibrating::Shape shape = calibrating::shape_of(solution);
+    if (options_.knows_pad) { // as GainSession::expect_profile has it
+      shape = {0.0, 0.0, 0.0, 0.0, std::move(shape.own)};
+      const pad::Thickness thickness = pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);
+      send(command_pad(pad::profile_over_own_sensors({thickness.shown_mm()})));
+    }
+    send(command_calibrate(
+        calibrating::calibration_of(
+            solution, calibrating::force_scale(array, placements, solution, truth::WEIGHT_N, shape),
+            DATE_s),
+        SENSORS));
   }
 
   void run_to(std::uint64_t t_us) {
@@ -162,10 +168,17 @@ void keep_truth(const Options &options, const ValidatedPad &pad) {
   nlohmann::json truth = {{"fault", options.fault},
                           {"faulty", pad.faulty()},
                           {"gains", pad.gains()},
-                          {"presses", nlohmann::json::array()}};
+                          {"presses", nlohmann::json::array()},
+                          {"pulls", nlohmann::json::array()}};
   for (const ValidatedPad::Truth &press : pad.presses()) {
     truth["presses"].push_back(
         {{"x_mm", press.x_mm}, {"y_mm", press.y_mm}, {"force_N", press.force_N}});
+  }
+  for (const ValidatedPad::TruePull &pull : pad.pulls()) {
+    truth["pulls"].push_back({{"toward_deg", pull.toward_deg},
+                              {"pull_N", pull.pull_N},
+                              {"force_N", pull.force_N},
+                              {"way_mm", pull.way_mm}});
   }
   OutputFile file(options.truth, options.overwrite, OutputFile::Appears::when_finished);
   const std::string text = truth.dump(1) + "\n";
@@ -190,7 +203,20 @@ int run(int argc, char **argv) {
   app.add_option("--seed", options.pad.seed, "Of the pad, its fault and the hand")
       ->type_name("N")
       ->capture_default_str();
-  app.add_flag("--calibrated", options.calibrated, "The fingertip was calibrated before");
+  CLI::Option *calibrated =
+      app.add_flag("--calibrated", options.calibrated, "The fingertip was calibrated before");
+  app.add_flag("--known-pad", options.knows_pad,
+               "The calibration set the pad's profile, so that pulls are estimated")
+      ->needs(calibrated);
+  app.add_flag("--plain", options.plain,
+               "Rubber as its profile has it: sensors' gains differ, and nothing else");
+  app.add_option("--pull", options.pad.pulling.weight_g, "Pulls in the end, by so much on a thread")
+      ->check(CLI::Range(10.0, 1000.0))
+      ->type_name("GRAMS");
+  app.add_option("--thread-height", options.pad.pulling.height_mm, "Of the thread above the rubber")
+      ->check(CLI::Range(0.0, 10.0))
+      ->type_name("MM")
+      ->capture_default_str();
   app.add_option("--hand", options.pad.hand_sd_mm, "The hand misses the marks by so much, each way")
       ->check(CLI::Range(0.0, 3.0))
       ->type_name("MM")
@@ -209,6 +235,9 @@ int run(int argc, char **argv) {
   const auto &names = pad_fault_names();
   options.pad.fault =
       static_cast<PadFault>(std::find(names.begin(), names.end(), options.fault) - names.begin());
+  if (options.plain) {
+    options.pad.effects = twin::parse_effects("gain");
+  }
   ValidatedPad pad(options.pad);
   Play play(options, pad);
   play.run();

@@ -47,9 +47,8 @@ Bench::Bench(const Options &given)
   if (options.pads == 0) {
     throw std::runtime_error("--pads needs at least one pad");
   }
-  calibrations = truth::calibrated_pads(options.pads, options.seed, options.cache);
+  calibrated = calibrated_as(truth::USUAL_PADS);
   progress("calibrations");
-  calibrated = calibrated_on(LAYER_mm);
   equal = [](std::size_t) { return KnownPad{truth::perfect_pad(), {}}; };
   const auto spread = [seed = options.seed](double sd, double told) {
     return [seed, sd, told](std::size_t pad) {
@@ -78,16 +77,17 @@ Case Bench::usual() {
 
 PadOf Bench::calibrated_on(double layer_mm) {
   std::vector<KnownPad> pads;
-  for (const truth::Pad &pad : calibrations) {
+  for (const truth::Pad &pad :
+       truth::calibrated_pads(options.pads, options.seed, options.cache)) {
     pads.push_back({pad, {}});
   }
   return weighed(std::move(pads), layer_mm, objects);
 }
 
-PadOf Bench::calibrated_as(const truth::PadOptions &kind) {
+PadOf Bench::calibrated_as(const std::vector<truth::PadOptions> &kinds) {
   std::vector<KnownPad> pads;
   for (const truth::Calibrated &session :
-       truth::calibrations_of({kind}, options.pads, options.seed, options.cache)) {
+       truth::calibrations_of(kinds, options.pads, options.seed, options.cache)) {
     pads.push_back({truth::calibrated_pad(session), {}, session.shape, cast_of(session)});
   }
   return weighed(std::move(pads), LAYER_mm, objects);

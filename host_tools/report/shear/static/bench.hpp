@@ -65,10 +65,10 @@ struct Bench {
   std::vector<const Object *> on(double layer_mm, const std::vector<std::string> &names);
   // The seven objects on calibrated pads.
   Case usual();
-  // Calibrated pads under rubber of this thickness.
+  // What calibrations left of the gains, alone, under rubber of this thickness.
   PadOf calibrated_on(double layer_mm);
-  // Calibrated as they are, on LAYER_mm.
-  PadOf calibrated_as(const truth::PadOptions &pads);
+  // Calibrated as they are, on LAYER_mm; the kinds take turns.
+  PadOf calibrated_as(const std::vector<truth::PadOptions> &kinds);
   std::size_t units(const Case &c) const;
   twin::Touch draw(const Case &c, const fit_array &array, Random &random) const;
   // Cases of one table draw the same touches.
@@ -78,7 +78,6 @@ struct Bench {
   Options options;
   Objects objects;
   pad_profile profile;
-  truth::CalibratedPads calibrations;
   PadOf equal, calibrated, raw5, raw10;
 };
 

@@ -12,9 +12,9 @@ void judge_cast(Bench &bench, ordered_json &out) {
     PadOf pad;
   };
   const Kind kinds[] = {{"10 %, calibrated", "", bench.calibrated},
-                        {"10 % and a dip, calibrated", "dip_", bench.calibrated_as(truth::DIP)},
+                        {"10 % and a dip, calibrated", "dip_", bench.calibrated_as({truth::DIP})},
                         {"like real ones, calibrated", "cast_",
-                         bench.calibrated_as(truth::LIKE_REAL)}};
+                         bench.calibrated_as({truth::LIKE_REAL})}};
   for (const Kind &kind : kinds) {
     for (const Load &load : LOADS) {
       Case c = bench.usual();

@@ -85,9 +85,8 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   settings.cut_noises = 0; // as where a profile acts
   const std::vector<fit_own> own = calibrating::own_of(truth::session_array(), known.shape);
   settings.own = own.empty() ? nullptr : own.data();
-  fit_settings of_load = settings;
-  of_load.dip_share = static_cast<float>(known.shape.dip_share);
-  of_load.dip_sd_mm = static_cast<float>(known.shape.dip_sd_mm);
+  settings.dip_share = static_cast<float>(known.shape.dip_share);
+  settings.dip_sd_mm = static_cast<float>(known.shape.dip_sd_mm);
   fit_result fit;
   fit_tangential found{};
   fit_tangential_state state{};
@@ -105,7 +104,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
     }
     found = {};
     if (tangential_is_worthwhile(&fit, saturated)) {
-      fit_tangential_load(&array_, &fit_pad_, readings.data(), &of_load, &fit, &state, &found);
+      fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &state, &found);
     } else {
       state = {};
     }
@@ -114,10 +113,6 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   scales.force_scale = static_cast<float>(known.force_scale.value_or(1.0));
   tangential_settings published{};
   tangential_use(&published, &profile_, &scales, known.force_scale.has_value());
-  if (known.shape.dip_share > 0.0) {
-    tangential_use_dip(&published, of_load.dip_share, of_load.dip_sd_mm,
-                       static_cast<float>(known.shape.sigma_mm));
-  }
   published.tangential_scale_sd = 0.0F; // the scales are exact here
   contact_input input{};
   input.contact = true;

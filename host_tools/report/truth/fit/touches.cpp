@@ -105,8 +105,7 @@ std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, st
 CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
                                const std::filesystem::path &cache_directory) {
   CalibratedPads pads;
-  for (const Calibrated &session : calibrations_of({{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}}, judged,
-                                                   seed, cache_directory)) {
+  for (const Calibrated &session : calibrations_of(USUAL_PADS, judged, seed, cache_directory)) {
     pads.push_back(calibrated_pad(session));
   }
   return pads;

@@ -280,10 +280,8 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
       const Readings base = base_of(array, object, touches, c.load, cast, random);
       const double noise_Pa = draw_noise_Pa(random);
       fit_settings settings = settings_for(pad, noise_Pa);
-      settings.cut_noises = 0; // as where a profile acts, and no dip in the Gaussian
+      settings.cut_noises = 0; // as where a profile acts
       settings.own = own.empty() ? nullptr : own.data();
-      fit_settings gaussian = settings;
-      gaussian.dip_share = 0.0f;
       settings.dip_share = static_cast<float>(pads[p].shape.dip_share);
       settings.dip_sd_mm = static_cast<float>(pads[p].shape.dip_sd_mm);
       fit_shapes_state state{};
@@ -295,7 +293,7 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
           readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
         }
         fit_result fit;
-        fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &gaussian, &fit);
+        fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &settings, &fit);
         fit_shapes(&array, &shapes, readings.data(), &settings, &fit, &state, &said);
       }
       judged[p * TOUCHES + t] = judge_touch(said, touches);

@@ -4,6 +4,8 @@
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/usage.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 namespace fingertip {
@@ -24,6 +26,15 @@ int validate(const ValidateOptions &options) {
   }
   if (options.from.empty() && options.recording.empty()) {
     throw WrongUsage("no place for the recording; give --record FILE.csv");
+  }
+  const double share = options.pulling.weight_g / std::max(options.weight_g, 1.0);
+  if (options.pulling.weight_g > 0.0 &&
+      (share < validating::PULL_SHARE_MIN || share > validating::PULL_SHARE_MAX)) {
+    throw WrongUsage("a pull of " + fixed(options.pulling.weight_g, 0) + " g is " +
+                     fixed(share, 2) + " of the weight; give --pull from " +
+                     fixed(std::ceil(validating::PULL_SHARE_MIN * options.weight_g), 0) + " to " +
+                     fixed(std::floor(validating::PULL_SHARE_MAX * options.weight_g), 0) +
+                     " grams, so that it shows and the weight does not slide");
   }
   return run_validate(options);
 }
@@ -51,6 +62,19 @@ void add_validate(CommandLine &line) {
           ->excludes(sheet)
           ->capture_default_str()
           ->type_name("MM");
+  CLI::Option *pull = command
+                          ->add_option("--pull", options->pulling.weight_g,
+                                       "Mass that pulls the standing weight sideways, by a level "
+                                       "thread over a pulley, in the end: a third of --weight")
+                          ->excludes(sheet)
+                          ->type_name("GRAMS");
+  CLI::Option *height = command
+                            ->add_option("--thread-height", options->pulling.height_mm,
+                                         "Of that thread above the rubber")
+                            ->check(CLI::Range(0.0, 10.0))
+                            ->needs(pull)
+                            ->capture_default_str()
+                            ->type_name("MM");
   CLI::Option *record =
       command
           ->add_option(
@@ -63,7 +87,7 @@ void add_validate(CommandLine &line) {
       command->add_flag("--serial", options->serial, "Keep the serial number in the recording")
           ->excludes(sheet);
   command->add_option("--from", options->from, "Make the card from a recording that validate kept")
-      ->excludes(sheet, weight, skin, record, serial)
+      ->excludes(sheet, weight, skin, pull, height, record, serial)
       ->type_name("FILE.csv");
   command->add_option("-o,--output", options->card, "The card, a page with pictures")
       ->excludes(sheet)
