@@ -39,6 +39,18 @@ class TwoTouches(unittest.TestCase):
                 self.assertEqual(row["undecided"], 0)
                 self.assertLessEqual(row["two_and_right"], row["two"])
 
+    def test_what_is_possible(self):
+        rows = {row["case"]: row for row in self.found["touches"]}
+        self.assertNotIn("possible", rows["round"])
+        for name, row in rows.items():
+            if name.startswith("two"):
+                with self.subTest(name):
+                    self.assertLessEqual(row["possible"], row["possible_rubber_known"])
+        self.assertLess(rows["two, 8 mm, 1:1"]["possible"], 50)
+        self.assertGreater(rows["two, 20 mm, 1:1"]["possible"], 99)
+        self.assertEqual(self.found["two_possible_percent_8mm"], rows["two, 8 mm, 1:1"]["possible"])
+        self.assertEqual(self.found["two_possible_rubber_known_percent_12mm"], rows["two, 12 mm, 1:1"]["possible_rubber_known"])
+
     def test_round_touches_are_one_and_far_pairs_two(self):
         rows = {row["case"]: row for row in self.found["touches"]}
         self.assertGreater(rows["round"]["one"], 98)

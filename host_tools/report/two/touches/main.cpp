@@ -8,6 +8,7 @@
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
 #include "truth/fit/statistics.hpp"
+#include "two/touches/bound.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -18,6 +19,7 @@ extern "C" {
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,6 +39,9 @@ constexpr double LAYER_mm = 12.0, DIP_PERCENT = 1.25, FRICTION = 0.5, LOAD = 0.3
 constexpr int TOUCHES = 20;         // of each pad, in each case
 constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within these
 constexpr double BAD_mm = 1.0;
+constexpr two::Right RIGHT{NEAR_mm, FORCE_SHARE, 0.002}; // and as often a long contact called two
+constexpr std::size_t BOUNDED = 2;    // touches of each pad whose bounds are computed
+constexpr double MODEL_SHARE = 0.004; // of the largest reading, as NUMERICS.md has it
 constexpr double WEAKER_MIN_N = 2.0, WEAKER_MAX_N = 5.0;
 constexpr double DEGREES = 180.0 / M_PI;
 
@@ -70,6 +75,10 @@ struct Judged {
   double force;     // relative error of the sum
   double angle_deg; // of a long contact or the line through two
   bool pair, silent;
+  struct Bounds {
+    two::PairBound of_model, rubber_known;
+  };
+  std::optional<Bounds> bounds; // of some of the pairs
 };
 
 double distance(const Touch &touch, float x_mm, float y_mm) {
@@ -172,12 +181,30 @@ double chi_square_median(const std::vector<Judged> &judged, int model) {
   });
 }
 
+// What no judge of these pairs does better than: of each the smaller of its two limits, in percent.
+void put_bounds(const std::vector<Judged> &judged, ordered_json &row) {
+  double of_model = 0.0, rubber_known = 0.0, pairs = 0.0;
+  for (const Judged &j : judged) {
+    if (j.bounds) {
+      const auto [model, known] = *j.bounds;
+      of_model += std::min(model.placed, model.told);
+      rubber_known += std::min(known.placed, known.told);
+      pairs += 1.0;
+    }
+  }
+  if (pairs > 0.0) {
+    row["possible"] = percent(of_model, pairs);
+    row["possible_rubber_known"] = percent(rubber_known, pairs);
+  }
+}
+
 ordered_json row_of(const std::string &name, const std::vector<Judged> &judged) {
   const auto off = [](const Judged &j) { return j.off_mm; };
   const auto angle = [](const Judged &j) { return j.angle_deg; };
   std::vector<Judged> placed;
   std::copy_if(judged.begin(), judged.end(), std::back_inserter(placed), has_place);
-  return {{"case", name},
+  ordered_json row{
+          {"case", name},
           {"touches", judged.size()},
           {"one", share(judged, is<FIT_SHAPE_ROUND>)},
           {"pulled", share(judged, is<FIT_SHAPE_PULLED>)},
@@ -197,6 +224,8 @@ ordered_json row_of(const std::string &name, const std::vector<Judged> &judged) 
           {"chi_square_one", chi_square_median(judged, 0)},
           {"chi_square_long", chi_square_median(judged, 1)},
           {"chi_square_two", chi_square_median(judged, 2)}};
+  put_bounds(judged, row);
+  return row;
 }
 
 std::vector<DippedPad> dipped_pads(const Options &options) {
@@ -260,6 +289,16 @@ Readings base_of(const fit_array &array, const shear::Object &object,
   return base;
 }
 
+Judged::Bounds bounds_of(const two::Rubber &rubber, const std::vector<Touch> &touches,
+                         two::ReadingErrors errors, Random &random) {
+  two::Unknowns<two::PAIR> pair;
+  pair << touches[0].x_mm, touches[0].y_mm, touches[0].force_N, touches[1].x_mm, touches[1].y_mm,
+      touches[1].force_N;
+  const two::PairBound known = two::bound_of(rubber, pair, errors, RIGHT, random);
+  errors.model_share = MODEL_SHARE;
+  return {two::bound_of(rubber, pair, errors, RIGHT, random), known};
+}
+
 std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const Options &options) {
   const fit_array array = firmware_array();
   const pad_profile profile = shear::profile_of(LAYER_mm);
@@ -298,7 +337,13 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
         fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &gaussian, &fit);
         fit_shapes(&array, &shapes, readings.data(), &settings, &fit, &state, &said);
       }
-      judged[p * TOUCHES + t] = judge_touch(said, touches);
+      Judged &found = judged[p * TOUCHES + t] = judge_touch(said, touches);
+      if (found.pair && t < BOUNDED) {
+        Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
+        found.bounds = bounds_of({array, profile, object, cast.dip_share}, touches,
+                                 {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0},
+                                 draws);
+      }
     }
   });
   std::fprintf(stderr, "two_touches: %s\n", c.name.c_str());
@@ -366,6 +411,14 @@ ordered_json judge(const Options &options) {
     key("two_right_percent_8mm", "two, 8 mm, 1:1", "two_and_right");
     key("two_right_percent_12mm", "two, 12 mm, 1:1", "two_and_right");
     key("two_right_percent_10mm_3to1", "two, 10 mm, 3:1", "two_and_right");
+    for (const char *possible : {"possible", "possible_rubber_known"}) {
+      const auto of = [&](const char *apart, const char *of_case) {
+        key((std::string("two_") + possible + "_percent_" + apart).c_str(), of_case, possible);
+      };
+      of("8mm", "two, 8 mm, 1:1");
+      of("12mm", "two, 12 mm, 1:1");
+      of("10mm_3to1", "two, 10 mm, 3:1");
+    }
     key("edge_angle_p50_deg_20mm", "edge20", "angle_p50_deg");
     key("edge_angle_p50_deg_10mm", "edge10", "angle_p50_deg");
   }
