@@ -37,7 +37,7 @@
 
 #define FIT_SHAPES_FRAMES 13
 #define FIT_SHAPES_PENALTY 8
-#define FIT_SHAPES_PAIR_PENALTY 6
+#define FIT_SHAPES_PAIR_PENALTY 10
 
 enum fit_shape {
   FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */

@@ -50,8 +50,8 @@ static void test_load(void) {
 }
 
 static void test_shapes(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x0E090E37, 0x0A11CFFA, 0x29D11F0E, 0x4C09A00C,
-                                                 0x63A7A746, 0x2FC61742, 0x5119F742, 0x22C7866F};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x853BD49B, 0x8ACCB6E3, 0x3DABB0FA, 0x32F28E53,
+                                                 0xC22DE80F, 0x8D76B0ED, 0xED886D93, 0xDDB32F97};
   assert_kernel(FIT_BITS_SHAPES, golden);
 }
 

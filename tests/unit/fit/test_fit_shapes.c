@@ -189,7 +189,7 @@ static void test_two_have_their_places_and_forces(void) {
     struct reading reading = {{0.0}};
     double dip = i % 2 ? 0.015 : 0.0, angle = random_between(&noise, 0.25 * PI, 0.75 * PI);
     double x[2], y[2], force[2];
-    double half = random_between(&noise, 6.5, 9.0);
+    double half = random_between(&noise, 7.5, 9.0);
     double middle_x = random_between(&noise, -2.0, 2.0);
     double middle_y = random_between(&noise, -8.0, 8.0);
     for (int c = 0; c < 2; c++) {
@@ -207,6 +207,30 @@ static void test_two_have_their_places_and_forces(void) {
       TEST_ASSERT_TRUE(result.location_sd_mm[c] > 0.01f && result.location_sd_mm[c] < 1.0f);
       TEST_ASSERT_TRUE(result.force_sd_N[c] > 0.0f);
     }
+  }
+}
+
+/* Readings off by 0.45 % of the largest, about as much as the model may be. */
+static void test_what_a_pair_leaves_unexplained_widens_its_errors(void) {
+  struct reading reading = {{0.0}};
+  press(-2.0, 9.0, 4.0, 0.0, 0.0, 0.0, &reading);
+  press(1.0, -9.0, 5.0, 0.0, 0.0, 0.0, &reading);
+  const struct fit_shapes_result exact = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, exact.shape);
+  TEST_ASSERT_TRUE(exact.chi_square[2] < 3.0f);
+  double largest = 0.0;
+  for (int k = 0; k < SENSORS; k++) {
+    largest = fmax(largest, reading.Pa[k]);
+  }
+  for (int k = 0; k < SENSORS; k++) {
+    reading.Pa[k] += (k % 2 ? 0.0045 : -0.0045) * largest;
+  }
+  const struct fit_shapes_result off = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, off.shape);
+  TEST_ASSERT_TRUE(off.chi_square[2] > 4.0f && off.chi_square[2] < (float)FREEDOM);
+  for (int c = 0; c < 2; c++) {
+    const float wider = off.location_sd_mm[c] / exact.location_sd_mm[c];
+    TEST_ASSERT_FLOAT_WITHIN(0.12f, sqrtf(off.chi_square[2] / 3.0f), wider);
   }
 }
 
@@ -473,6 +497,7 @@ int main(void) {
   RUN_TEST(test_a_pull_is_no_pair);
   RUN_TEST(test_a_line_has_its_length_and_direction);
   RUN_TEST(test_two_have_their_places_and_forces);
+  RUN_TEST(test_what_a_pair_leaves_unexplained_widens_its_errors);
   RUN_TEST(test_a_short_pair_is_a_long_contact_not_one);
   RUN_TEST(test_three_are_none_of_these);
   RUN_TEST(test_what_moves_is_followed);
