@@ -30,9 +30,9 @@ def write(found, path):
             "of two limits, touch by touch: the Cramer-Rao bound of places and forces, and the likelihood ratio of the pair to the nearest long",
             "contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).", "",
             "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
-            "or long, from the middle of the forces. `silent`: off by more than 1 mm, or one called two, or two called one, with a standard deviation",
-            "below 0.6 mm and no shape that says so. `exact gains`: a pad whose gains are known without error. `along` and `across`: the pad's longer",
-            "and shorter side, within 45 degrees.", "", *table_of_dicts_md(found["touches"]), ""]
+            "or long, from the middle of the forces. `silent`: what the packet shows is off by more than 1 mm, or is one for two, or",
+            "two for one, with a standard deviation below 0.6 mm and no shape that says so. `warned`: the standard deviation is above that. `exact gains`:",
+            "a pad whose gains are known without error. `along` and `across`: the pad's longer and shorter side, within 45 degrees.", "", *table_of_dicts_md(found["touches"]), ""]
     write_text(path, "\n".join(lines))
 
 
