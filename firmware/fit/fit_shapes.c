@@ -3,9 +3,13 @@
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
 
-#define MODEL_SD_Q16 262 /* 0.004 of the largest reading */
+#define MODEL_SD_Q16 131 /* 0.002 of the largest reading */
 /* Readings whose errors are more than 3 % of their unit tell no shapes. */
 #define BASE_MAX_Q22 (1 << 17)
+/* Of the diagonal: what readings hardly tell moves slowly from the first guess. The matrix that
+ * answers has hardly any, since it would hide how little they tell from the standard deviations. */
+#define DAMPING_SHIFT 6
+#define LAST_DAMPING_SHIFT 10
 #define LOG2E_HALF_FLOAT 0.72134752f
 /* Frames of a contact, counted from 1. The load joins its model once the line has settled: both at
  * once lose their way at the border. After the last frame, which steps only, comes the first that
@@ -108,6 +112,7 @@ static void set_residuals(const struct problem *problem, int model, struct fit_s
   fit_shapes_round_places(at);
   fit_shapes_set_rows(problem, model, early ? BALANCE : unknowns_of[model], at, equations);
   fit_shapes_form_residuals(problem, at->value, priors, equations);
+  priors->damping_shift = state->frames < FIRST_ANSWER ? DAMPING_SHIFT : LAST_DAMPING_SHIFT;
   state->chi_square_q8[model] = fit_shapes_chi_square(problem, equations);
 }
 

@@ -10,10 +10,11 @@
  * frame of a contact chooses where they start. So the cost is fixed, and a contact at rest has its
  * answer after FIT_SHAPES_FRAMES frames.
  *
- * The answer is the model whose chi^2 is the least, in standard deviations that contain noise,
- * gains and the model's own error. Long must beat round by FIT_SHAPES_PENALTY, and two must beat
- * both by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a
- * pair that looks like a long contact is called long, and a long one hardly ever a pair.
+ * The answer compares chi^2, in standard deviations that contain noise, gains and the model's own
+ * error. How large these errors really are is unknown, and the residuals tell it. So a model with
+ * more unknowns is chosen where it makes chi^2 + 14 less by a third. A pair that looks like a long
+ * contact is called long, and a long one hardly ever a pair. What the other models say of the place
+ * is part of location_sd_mm, by how likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
  * missing. NUMERICS.md has the fit itself; host_tools/report/two judges this part. No recording of
@@ -36,8 +37,6 @@
 #define FIT_SHAPES_PARTS 3
 
 #define FIT_SHAPES_FRAMES 13
-#define FIT_SHAPES_PENALTY 8
-#define FIT_SHAPES_PAIR_PENALTY 6
 
 enum fit_shape {
   FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */

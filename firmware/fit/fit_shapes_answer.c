@@ -3,6 +3,13 @@
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
 
+#include <math.h>
+
+/* Errors are some times what is stated of them. How many times is not known; that it is once counts
+ * as so many readings. With unknown errors the likelihood of a model falls as a power of
+ * chi^2 + ERRORS_STATED. */
+#define ERRORS_STATED 14
+#define LINE_SURE 8             /* variances: a line whose square is less is a pull */
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the
@@ -84,7 +91,7 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations, cons
   int32_t uy_q20 = fit_scaled_to_fixed(scaled_div(y, reach), 20);
   struct scaled sure =
       scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20), scales->variance);
-  sure.mantissa *= FIT_SHAPES_PENALTY;
+  sure.mantissa *= LINE_SURE;
   if (scaled_sub(square, fit_scaled_short(sure)).mantissa <= 0) {
     return;
   }
@@ -112,30 +119,59 @@ static NOINLINE void put_one(const struct problem *problem,
       sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
-int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two) {
-  int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
-  /* Residuals larger than their errors are no more than that: the penalty is in their unit. */
-  int32_t unit_q8 = port_divide(pair, FREEDOM);
-  int32_t pair_q8 = FIT_SHAPES_PAIR_PENALTY * (unit_q8 > 1 << 8 ? unit_q8 : 1 << 8);
-  int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
-  bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
-  if (apart && pair < (round < line ? round : line) - pair_q8) {
-    return TWO;
-  }
-  return line < round - (FIT_SHAPES_PENALTY << 8) ? LONG : ROUND;
+/* More unknowns must make the sum of chi^2 and ERRORS_STATED less by a third. */
+static bool explains_more(int32_t chi_square_q8, int32_t than_q8) {
+  return than_q8 - chi_square_q8 > (chi_square_q8 >> 1) + (ERRORS_STATED << 7);
 }
 
-/* What a pair that explains the readings nearly as well would have as its middle of the forces adds
- * to the error of a long contact's place. */
-static void doubt_place(const struct scales *scales, const int32_t *line, const int32_t *pair,
-                        struct fit_shapes_result *result) {
-  int32_t balance = pair[BALANCE] >> 6;
-  int32_t dx_q20 = pair[PLACE_X] + fixed_mul_16(pair[SPAN_X], balance) * 4 - line[PLACE_X];
-  int32_t dy_q20 = pair[PLACE_Y] + fixed_mul_16(pair[SPAN_Y], balance) * 4 - line[PLACE_Y];
-  struct scaled dx = fit_scaled_from(dx_q20, -20), dy = fit_scaled_from(dy_q20, -20);
-  struct scaled off = fit_scaled_sqrt(scaled_add(scaled_mul(dx, dx), scaled_mul(dy, dy)));
-  result->location_sd_mm[0] =
-      fit_quadrature(result->location_sd_mm[0], 1.0f, product_of(scales->pitch, off), 1.0f);
+int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two) {
+  int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
+  int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
+  bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
+  if (apart && explains_more(pair, round < line ? round : line)) {
+    return TWO;
+  }
+  return explains_more(line, round) ? LONG : ROUND;
+}
+
+/* The middle of a model's forces. */
+static void put_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
+  int32_t balance_q14 = model == TWO ? at[BALANCE] >> 6 : 0;
+  middle_q20[0] = at[PLACE_X] + fixed_mul_16(at[SPAN_X], balance_q14) * 4;
+  middle_q20[1] = at[PLACE_Y] + fixed_mul_16(at[SPAN_Y], balance_q14) * 4;
+}
+
+/* The other models may be right: how far their middles are, by how likely they are, adds to the
+ * errors of the places. Where chi^2 is above ERRORS_STATED none of the models may be, and the
+ * errors grow with it. */
+static void doubt_places(const struct problem *problem, int best, const int32_t *chi_square_q8,
+                         const struct fit_shapes_state *state, struct fit_shapes_result *result) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  float total = 1.0f, square_mm2[2] = {0.0f, 0.0f};
+  for (int m = 0; m < MODELS; m++) {
+    int32_t middle_q20[2];
+    if (m == best) {
+      continue;
+    }
+    float likely = fit_float(chi_square_q8[best] + (ERRORS_STATED << 8), 0) /
+                   fit_float(chi_square_q8[m] + (ERRORS_STATED << 8), 0);
+    likely *= likely;
+    likely *= likely;
+    likely *= likely;
+    put_middle(m, state->at[m].value, middle_q20);
+    total += likely;
+    for (int c = 0; c < (best == TWO ? 2 : 1); c++) {
+      float x_mm = mm(pad, pad->origin_x_q20 + middle_q20[0]) - result->x_mm[c];
+      float y_mm = mm(pad, pad->origin_y_q20 + middle_q20[1]) - result->y_mm[c];
+      square_mm2[c] += likely * (x_mm * x_mm + y_mm * y_mm);
+    }
+  }
+  const float usual = (float)(ERRORS_STATED << 8), found = (float)chi_square_q8[best];
+  const float times = found > usual ? found / usual : 1.0f;
+  for (int c = 0; c < 2; c++) {
+    result->location_sd_mm[c] =
+        fit_quadrature(times, result->location_sd_mm[c], times, sqrtf(square_mm2[c] / total));
+  }
 }
 
 void fit_shapes_conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
@@ -154,14 +190,12 @@ void fit_shapes_conclude(const struct problem *problem, int best, const int32_t 
   if (best == TWO) {
     result->shape = FIT_SHAPE_TWO;
     put_two(problem, equations, at->value, &scales, result);
-    return;
+  } else {
+    result->shape = FIT_SHAPE_ROUND;
+    put_one(problem, equations, at->value, &scales, result);
   }
-  result->shape = FIT_SHAPE_ROUND;
-  put_one(problem, equations, at->value, &scales, result);
   if (best == LONG) {
     put_line(equations, at->value, &scales, result);
-    if (chi_square_q8[TWO] < chi_square_q8[LONG] + (FIT_SHAPES_PENALTY << 8)) {
-      doubt_place(&scales, at->value, state->at[TWO].value, result);
-    }
   }
+  doubt_places(problem, best, chi_square_q8, state, result);
 }

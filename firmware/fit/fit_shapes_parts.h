@@ -44,6 +44,7 @@ struct problem {
 /* Rows of one element each, and their residuals. */
 struct priors {
   int32_t element_q27[UNKNOWNS], off_q28[UNKNOWNS];
+  int damping_shift;
 };
 
 /* What a spread makes of the profile: exponents, heights, and these over v and v^2. */

@@ -3,7 +3,6 @@
 
 #define PER_FAR_SD_Q4 1600 /* 1 / 0.01 */
 #define PER_LOAD_SD_Q4 53  /* 1 / 0.3: Q / F of what is held */
-#define DAMPING_SHIFT 6    /* of the diagonal: what readings hardly tell moves slowly */
 #define SPAN_MAX (3 << 20)
 #define BALANCE_MAX (15 << 16) /* 0.94 */
 #define MOVE_MAX (1 << 18)     /* a quarter of a pitch */
@@ -217,11 +216,12 @@ static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equa
 
 /* Factors of the damped matrix; right: of the step that it asks for. */
 static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t spread,
-                               const struct fit_shapes_pad *pad, int32_t *right) {
+                               const struct fit_shapes_pad *pad, int damping_shift,
+                               int32_t *right) {
   hold_spread(pad, equations, spread);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
-    equations->matrix[u][u] += equations->matrix[u][u] >> DAMPING_SHIFT;
+    equations->matrix[u][u] += equations->matrix[u][u] >> damping_shift;
   }
   eliminate(equations, right);
 }
@@ -231,7 +231,7 @@ void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors 
   struct fit_shapes_equations *equations = &pad->room.equations[model];
   int32_t right[UNKNOWNS], x_q20[UNKNOWNS] = {0};
   form(pad, priors, equations);
-  factorise(equations, at->value[SPREAD], pad, right);
+  factorise(equations, at->value[SPREAD], pad, priors->damping_shift, right);
   substitute(equations, right, x_q20);
   take_step(pad, model, equations, x_q20, at);
 }

@@ -9,7 +9,7 @@ import unittest
 
 # (key, least, most): what a full run finds on seed 40000, with room for a tenth of its pads.
 FOUND = (
-    ("two_right_percent_12mm", 86, 100), ("two_right_percent_10mm_3to1", 76, 100), ("one_called_two_percent", 0, 1.5), ("edge_angle_p50_deg_20mm", 0, 1.5),
+    ("two_right_percent_12mm", 82, 100), ("two_right_percent_10mm_3to1", 72, 100), ("one_called_two_percent", 0, 1), ("edge_angle_p50_deg_20mm", 0, 1.5),
     ("edge_angle_p50_deg_10mm", 0, 3), ("silent_over_1mm_percent", 0, 2.5))
 
 
@@ -38,11 +38,24 @@ class TwoTouches(unittest.TestCase):
                 self.assertAlmostEqual(called, 100, places=6)
                 self.assertEqual(row["undecided"], 0)
                 self.assertLessEqual(row["two_and_right"], row["two"])
+                self.assertLessEqual(row["silent"] + row["warned"], 100)
+
+    def test_what_is_possible(self):
+        rows = {row["case"]: row for row in self.found["touches"]}
+        self.assertNotIn("possible", rows["round"])
+        for name, row in rows.items():
+            if name.startswith("two"):
+                with self.subTest(name):
+                    self.assertLessEqual(row["possible"], row["possible_rubber_known"])
+        self.assertLess(rows["two, 8 mm, 1:1"]["possible"], 50)
+        self.assertGreater(rows["two, 20 mm, 1:1"]["possible"], 99)
+        self.assertEqual(self.found["two_possible_percent_8mm"], rows["two, 8 mm, 1:1"]["possible"])
+        self.assertEqual(self.found["two_possible_rubber_known_percent_12mm"], rows["two, 12 mm, 1:1"]["possible_rubber_known"])
 
     def test_round_touches_are_one_and_far_pairs_two(self):
         rows = {row["case"]: row for row in self.found["touches"]}
         self.assertGreater(rows["round"]["one"], 98)
-        self.assertLess(rows["round"]["off_p95_mm"], 0.4)
+        self.assertLess(rows["round"]["off_p95_mm"], 0.7)
         self.assertGreater(rows["two, 20 mm, 1:1"]["two_and_right"], 95)
         self.assertGreater(rows["two, 8 mm, 1:1"]["long"] + rows["two, 8 mm, 1:1"]["two"], 98)
 

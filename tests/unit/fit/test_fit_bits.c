@@ -50,8 +50,8 @@ static void test_load(void) {
 }
 
 static void test_shapes(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x287CD870, 0x28C518C6, 0xD6B4F539, 0x428D725C,
-                                                 0xE02D6CB0, 0x28CB1F70, 0x81D6A151, 0xBD5E1671};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x9175C74B, 0xAFA57398, 0xD875ADBE, 0x257FADB9,
+                                                 0x13B1C143, 0x02B1BF51, 0x824F61F9, 0xD09CEC0C};
   assert_kernel(FIT_BITS_SHAPES, golden);
 }
 

@@ -304,13 +304,16 @@ static void test_rubber_beyond_the_limits_is_refused(void) {
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &turned, &profile));
 }
 
-/* The penalty is in units of what the pair leaves unexplained, and of one at the least. */
-static void test_a_pair_must_explain_more_than_its_penalty(void) {
+/* chi^2 + 14 must fall by a third: from 7 + 1.5 times what stays unexplained. */
+static int32_t limit_q8(int32_t unexplained_q8) {
+  return unexplained_q8 * 3 / 2 + (7 << 8);
+}
+
+static void test_a_pair_must_explain_a_third_more(void) {
   static const int32_t unexplained[] = {0, FREEDOM << 8, (4 * FREEDOM) << 8};
-  static const int32_t units[] = {1, 1, 4};
   const int32_t apart[UNKNOWNS] = {[SPAN_X] = ONE_Q20 / 2, [SPAN_Y] = ONE_Q20 / 2};
   for (int i = 0; i < 3; i++) {
-    const int32_t limit = unexplained[i] + units[i] * (FIT_SHAPES_PAIR_PENALTY << 8);
+    const int32_t limit = limit_q8(unexplained[i]);
     for (int model = ROUND; model <= LONG; model++) { /* the better of the two counts */
       int32_t chi_square_q8[MODELS] = {limit + 4096, limit + 4096, unexplained[i]};
       chi_square_q8[model] = limit;
@@ -334,11 +337,10 @@ static void test_a_pair_is_further_apart_than_half_a_pitch(void) {
   }
 }
 
-static void test_a_long_contact_must_explain_more_than_its_penalty(void) {
-  const int32_t together[UNKNOWNS] = {0};
-  const int32_t limit = FIT_SHAPES_PENALTY << 8;
-  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){limit + 5, 5, 0}, together));
-  TEST_ASSERT_EQUAL(LONG, fit_shapes_best((const int32_t[MODELS]){limit + 6, 5, 0}, together));
+static void test_a_long_contact_must_explain_a_third_more(void) {
+  const int32_t together[UNKNOWNS] = {0}, line = FREEDOM << 8, limit = limit_q8(line);
+  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){limit, line, 0}, together));
+  TEST_ASSERT_EQUAL(LONG, fit_shapes_best((const int32_t[MODELS]){limit + 1, line, 0}, together));
 }
 
 /* 256 Pa where the largest reading, of 1000 Pa, is 0.98 of a unit. */
@@ -480,9 +482,9 @@ int main(void) {
   RUN_TEST(test_what_hardly_presses_is_undecided);
   RUN_TEST(test_thin_rubber_is_refused);
   RUN_TEST(test_rubber_beyond_the_limits_is_refused);
-  RUN_TEST(test_a_pair_must_explain_more_than_its_penalty);
+  RUN_TEST(test_a_pair_must_explain_a_third_more);
   RUN_TEST(test_a_pair_is_further_apart_than_half_a_pitch);
-  RUN_TEST(test_a_long_contact_must_explain_more_than_its_penalty);
+  RUN_TEST(test_a_long_contact_must_explain_a_third_more);
   RUN_TEST(test_a_sum_that_no_contact_has_begins_again);
   RUN_TEST(test_a_sum_that_jumps_begins_again);
   RUN_TEST(test_what_has_no_fit_or_no_noise_is_no_frame);

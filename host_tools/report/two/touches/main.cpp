@@ -1,16 +1,18 @@
 // two_touches: what the fingertip says of one contact, a long one, one that pulls, and two.
 //
 // The twin's objects press on calibrated pads of 12 mm with a dip, and hold until the firmware's
-// fit_shapes answers, as scene grasp runs it. Two contacts are the sum of their pressures. One JSON object on the standard
-// output: the keys that are judged, and under "touches" the table behind them. The constants of
-// fit_shapes were chosen with --seed 20000.
+// fit_shapes answers, as scene grasp runs it. Two contacts are the sum of their pressures. One JSON
+// object on the standard output: the keys that are judged, and under "touches" the table behind
+// them. The constants of fit_shapes were chosen with the seeds 20000 and 30000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
 #include "truth/fit/statistics.hpp"
+#include "two/touches/bound.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
+#include "fit/fit_load.h"
 #include "fit/fit_shapes.h"
 }
 
@@ -18,6 +20,7 @@ extern "C" {
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,6 +40,9 @@ constexpr double LAYER_mm = 12.0, DIP_PERCENT = 1.25, FRICTION = 0.5, LOAD = 0.3
 constexpr int TOUCHES = 20;         // of each pad, in each case
 constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within these
 constexpr double BAD_mm = 1.0;
+constexpr two::Right RIGHT{NEAR_mm, FORCE_SHARE, 0.002}; // and as often a long contact called two
+constexpr std::size_t BOUNDED = 1;    // touches of each pad whose bounds are computed
+constexpr double MODEL_SHARE = 0.004; // of the largest reading, as NUMERICS.md has it
 constexpr double WEAKER_MIN_N = 2.0, WEAKER_MAX_N = 5.0;
 constexpr double DEGREES = 180.0 / M_PI;
 
@@ -64,12 +70,16 @@ struct Case {
 
 struct Judged {
   fit_shapes_result said;
-  // Of one contact its place; of two the worse place, or, where the answer is one, its place from
-  // the middle of the forces; and what the answer says of that.
+  // What the packet shows, and its standard deviation. Of two the worse place; of one contact the
+  // place that the load's estimate or the Gaussian has, for a pair from the middle of the forces.
   double off_mm, off_sd_mm;
   double force;     // relative error of the sum
   double angle_deg; // of a long contact or the line through two
   bool pair, silent;
+  struct Bounds {
+    two::PairBound of_model, rubber_known;
+  };
+  std::optional<Bounds> bounds; // of some of the pairs
 };
 
 double distance(const Touch &touch, float x_mm, float y_mm) {
@@ -83,7 +93,13 @@ double angle_deg(const fit_shapes_result &said, double angle_rad) {
   return DEGREES * std::abs(std::remainder(off, M_PI));
 }
 
-Judged judge_touch(const fit_shapes_result &said, const std::vector<Touch> &touches) {
+// Where the packet shows one contact.
+struct Shown {
+  float x_mm, y_mm, location_sd_mm;
+};
+
+Judged judge_touch(const fit_shapes_result &said, const Shown &shown,
+                   const std::vector<Touch> &touches) {
   Judged judged{};
   judged.said = said;
   judged.pair = touches.size() == 2;
@@ -115,10 +131,12 @@ Judged judge_touch(const fit_shapes_result &said, const std::vector<Touch> &touc
       middle.x_mm += touch.x_mm * touch.force_N / force_N;
       middle.y_mm += touch.y_mm * touch.force_N / force_N;
     }
-    judged.off_mm = distance(middle, said.x_mm[0], said.y_mm[0]);
-    judged.off_sd_mm = std::max(sd_mm(0), sd_mm(1));
+    judged.off_mm = distance(middle, shown.x_mm, shown.y_mm);
+    judged.off_sd_mm = static_cast<double>(shown.location_sd_mm);
     if (said.shape == FIT_SHAPE_TWO) { // of one contact: the nearer place
-      judged.off_mm = std::min(judged.off_mm, distance(middle, said.x_mm[1], said.y_mm[1]));
+      judged.off_mm = std::min(distance(middle, said.x_mm[0], said.y_mm[0]),
+                               distance(middle, said.x_mm[1], said.y_mm[1]));
+      judged.off_sd_mm = std::max(sd_mm(0), sd_mm(1));
     }
   }
   if (said.shape == FIT_SHAPE_ELONGATED) {
@@ -166,10 +184,31 @@ bool has_place(const Judged &j) {
   return j.said.shape != FIT_SHAPE_NONE && j.said.shape != FIT_SHAPE_UNDECIDED;
 }
 
+bool is_warned(const Judged &j) {
+  return has_place(j) && j.off_sd_mm > static_cast<double>(FIT_LOCATION_SD_LIMIT_mm);
+}
+
 double chi_square_median(const std::vector<Judged> &judged, int model) {
   return quantile_where(judged, 0.5, has_place, [model](const Judged &j) {
     return static_cast<double>(j.said.chi_square[model]);
   });
+}
+
+// What no judge of these pairs does better than: of each the smaller of its two limits, in percent.
+void put_bounds(const std::vector<Judged> &judged, ordered_json &row) {
+  double of_model = 0.0, rubber_known = 0.0, pairs = 0.0;
+  for (const Judged &j : judged) {
+    if (j.bounds) {
+      const auto [model, known] = *j.bounds;
+      of_model += std::min(model.placed, model.told);
+      rubber_known += std::min(known.placed, known.told);
+      pairs += 1.0;
+    }
+  }
+  if (pairs > 0.0) {
+    row["possible"] = percent(of_model, pairs);
+    row["possible_rubber_known"] = percent(rubber_known, pairs);
+  }
 }
 
 ordered_json row_of(const std::string &name, const std::vector<Judged> &judged) {
@@ -177,26 +216,29 @@ ordered_json row_of(const std::string &name, const std::vector<Judged> &judged) 
   const auto angle = [](const Judged &j) { return j.angle_deg; };
   std::vector<Judged> placed;
   std::copy_if(judged.begin(), judged.end(), std::back_inserter(placed), has_place);
-  return {{"case", name},
-          {"touches", judged.size()},
-          {"one", share(judged, is<FIT_SHAPE_ROUND>)},
-          {"pulled", share(judged, is<FIT_SHAPE_PULLED>)},
-          {"long", share(judged, is<FIT_SHAPE_ELONGATED>)},
-          {"two", share(judged, is<FIT_SHAPE_TWO>)},
-          {"none", share(judged, is<FIT_SHAPE_NONE>)},
-          {"undecided", share(judged, is<FIT_SHAPE_UNDECIDED>)},
-          {"two_and_right", share(judged, is_right)},
-          {"silent", share(judged, [](const Judged &j) { return j.silent; })},
-          {"off_p50_mm", quantile_where(judged, 0.5, has_place, off)},
-          {"off_p95_mm", quantile_where(judged, 0.95, has_place, off)},
-          {"within_1sd", share(placed, [](const Judged &j) { return j.off_mm <= j.off_sd_mm; })},
-          {"within_2sd",
-           share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
-          {"angle_p50_deg", quantile_where(judged, 0.5, is<FIT_SHAPE_ELONGATED>, angle)},
-          {"angle_p90_deg", quantile_where(judged, 0.9, is<FIT_SHAPE_ELONGATED>, angle)},
-          {"chi_square_one", chi_square_median(judged, 0)},
-          {"chi_square_long", chi_square_median(judged, 1)},
-          {"chi_square_two", chi_square_median(judged, 2)}};
+  ordered_json row{
+      {"case", name},
+      {"touches", judged.size()},
+      {"one", share(judged, is<FIT_SHAPE_ROUND>)},
+      {"pulled", share(judged, is<FIT_SHAPE_PULLED>)},
+      {"long", share(judged, is<FIT_SHAPE_ELONGATED>)},
+      {"two", share(judged, is<FIT_SHAPE_TWO>)},
+      {"none", share(judged, is<FIT_SHAPE_NONE>)},
+      {"undecided", share(judged, is<FIT_SHAPE_UNDECIDED>)},
+      {"two_and_right", share(judged, is_right)},
+      {"silent", share(judged, [](const Judged &j) { return j.silent; })},
+      {"warned", share(judged, is_warned)},
+      {"off_p50_mm", quantile_where(judged, 0.5, has_place, off)},
+      {"off_p95_mm", quantile_where(judged, 0.95, has_place, off)},
+      {"within_1sd", share(placed, [](const Judged &j) { return j.off_mm <= j.off_sd_mm; })},
+      {"within_2sd", share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
+      {"angle_p50_deg", quantile_where(judged, 0.5, is<FIT_SHAPE_ELONGATED>, angle)},
+      {"angle_p90_deg", quantile_where(judged, 0.9, is<FIT_SHAPE_ELONGATED>, angle)},
+      {"chi_square_one", chi_square_median(judged, 0)},
+      {"chi_square_long", chi_square_median(judged, 1)},
+      {"chi_square_two", chi_square_median(judged, 2)}};
+  put_bounds(judged, row);
+  return row;
 }
 
 std::vector<DippedPad> dipped_pads(const Options &options) {
@@ -260,6 +302,16 @@ Readings base_of(const fit_array &array, const shear::Object &object,
   return base;
 }
 
+Judged::Bounds bounds_of(const two::Rubber &rubber, const std::vector<Touch> &touches,
+                         two::ReadingErrors errors, Random &random) {
+  two::Unknowns<two::PAIR> pair;
+  pair << touches[0].x_mm, touches[0].y_mm, touches[0].force_N, touches[1].x_mm, touches[1].y_mm,
+      touches[1].force_N;
+  const two::PairBound known = two::bound_of(rubber, pair, errors, RIGHT, random);
+  errors.model_share = MODEL_SHARE;
+  return {two::bound_of(rubber, pair, errors, RIGHT, random), known};
+}
+
 std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const Options &options) {
   const fit_array array = firmware_array();
   const pad_profile profile = shear::profile_of(LAYER_mm);
@@ -274,6 +326,12 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
     const std::vector<fit_own> own =
         c.exact ? std::vector<fit_own>{} : calibrating::own_of(session_array(), pads[p].shape);
     const shear::Cast cast = c.exact ? shear::Cast{pads[p].cast.dip_share, {}} : pads[p].cast;
+    shear::KnownPad known{pad, {}, pads[p].shape, cast};
+    if (c.exact) {
+      known.shape.own.clear();
+    }
+    shear::Fingertip load_estimate(profile);
+    Random of_load(options.seed, stream_of("load, " + c.name), p);
     for (std::size_t t = 0; t < TOUCHES; t++) {
       const shear::Object &object = *c.objects[random.next() % c.objects.size()];
       const std::vector<Touch> touches = draw_touches(array, c, random);
@@ -286,17 +344,33 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
       settings.dip_sd_mm = static_cast<float>(pads[p].shape.dip_sd_mm);
       fit_shapes_state state{};
       fit_shapes_result said{};
+      fit_result fit{};
+      fit_load doubt{};
       for (int frame = 0; frame < FIT_SHAPES_FRAMES; frame++) {
         std::array<std::int32_t, SENSORS> readings{};
         for (std::size_t k = 0; k < SENSORS; k++) {
           const double reading_Pa = pad.gain[k] * base[k] + noise_Pa * random.normal();
           readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
         }
-        fit_result fit;
         fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &settings, &fit);
         fit_shapes(&array, &shapes, readings.data(), &settings, &fit, &state, &said);
+        fit_load_follow(&doubt, &array, readings.data(), &settings, &fit);
       }
-      judged[p * TOUCHES + t] = judge_touch(said, touches);
+      fit_load_widen(&doubt, &array, &settings, &fit);
+      Shown shown{fit.x_mm, fit.y_mm, fit.location_sd_mm};
+      shear::Said loaded{};
+      if (load_estimate.feel(base, known, noise_Pa, shear::ALL_SENSORS, of_load, loaded) &&
+          loaded.valid) {
+        shown = {static_cast<float>(loaded.x_mm), static_cast<float>(loaded.y_mm),
+                 static_cast<float>(loaded.location_sd_mm)};
+      }
+      Judged &found = judged[p * TOUCHES + t] = judge_touch(said, shown, touches);
+      if (found.pair && t < BOUNDED) {
+        Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
+        found.bounds = bounds_of({array, profile, object, cast.dip_share}, touches,
+                                 {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0},
+                                 draws);
+      }
     }
   });
   std::fprintf(stderr, "two_touches: %s\n", c.name.c_str());
@@ -364,6 +438,14 @@ ordered_json judge(const Options &options) {
     key("two_right_percent_8mm", "two, 8 mm, 1:1", "two_and_right");
     key("two_right_percent_12mm", "two, 12 mm, 1:1", "two_and_right");
     key("two_right_percent_10mm_3to1", "two, 10 mm, 3:1", "two_and_right");
+    for (const char *possible : {"possible", "possible_rubber_known"}) {
+      const auto of = [&](const char *apart, const char *of_case) {
+        key((std::string("two_") + possible + "_percent_" + apart).c_str(), of_case, possible);
+      };
+      of("8mm", "two, 8 mm, 1:1");
+      of("12mm", "two, 12 mm, 1:1");
+      of("10mm_3to1", "two, 10 mm, 3:1");
+    }
     key("edge_angle_p50_deg_20mm", "edge20", "angle_p50_deg");
     key("edge_angle_p50_deg_10mm", "edge10", "angle_p50_deg");
   }
