@@ -50,7 +50,7 @@ SETS = {
     "still_fixed": ("the same force by eq. (5) and (6)", ("--mode", "still-fixed")),
     "still_oracle": ("the same force by an oracle", ("--mode", "still-oracle")),
 }
-COARSE = "2f85"  # of the others' steps the bar of a set force is met without an oracle
+COARSE = next(iter(GRIPPERS))  # has the coarsest steps
 BY_SET = {"still": "ours", "still_oracle": "oracle"}
 GRASPS, GRASPS_MINUTE = 300, 60
 USUAL, USUAL_MINUTE = 60, 10
@@ -119,7 +119,7 @@ def measure(options):
                 if name == "still":
                     found |= {f"settle_s_{called}": firm.get("settle_p50_s"), f"hold_rms_percent_{called}": firm.get("rms_p50_percent")}
                 else:
-                    found["hold_rms_possible_percent_2f85"] = firm.get("rms_p50_percent")
+                    found[f"hold_rms_possible_percent_{called}"] = firm.get("rms_p50_percent")
                 found.setdefault("by_set", []).extend({"gripper": gripper, "about": BY_SET[name], "set_force": key, **value}
                                                       for key, value in all_of_it["by_set"].items())
             if name == "hold":
