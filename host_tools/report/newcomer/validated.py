@@ -134,7 +134,7 @@ def text(found):
             f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ in their gains alone, and of as many with all the errors of real pads, each "
             "calibrated and with its profile. On the first `validate_pull_off_percent` is how far the pull found is from that of the thread, and "
             "`validate_pull_location_off_mm` how far the way of the location is from the ball's own, which is `validate_pull_way_mm`; medians. On the second "
-            "the firmware mostly says that it does not know: `validate_pull_like_real_estimated_percent` of the pulls are estimated. A pulley's friction is "
+            "the firmware does not estimate each: `validate_pull_like_real_estimated_percent` of the pulls are estimated. A pulley's friction is "
             "left out.", ""]
 
 

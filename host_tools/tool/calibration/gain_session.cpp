@@ -205,7 +205,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
 Shape GainSession::shape() const {
   Shape shape = shape_of(judgement_.solution);
   if (has_profile_) {
-    shape.sigma_mm = shape.sigma_sd_mm = 0.0;
+    shape = beside_profile(std::move(shape));
   }
   if (prior_.sigma_sd_mm > 0.0) {
     shape.sigma_mm = prior_.sigma_mm;

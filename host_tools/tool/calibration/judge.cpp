@@ -400,6 +400,11 @@ Shape shape_of(const Solution &solution) {
   return shape;
 }
 
+Shape beside_profile(Shape shape) {
+  shape.sigma_mm = shape.sigma_sd_mm = 0.0;
+  return shape;
+}
+
 std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
   const auto q15 = [](double value) {
     return static_cast<std::int32_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0)));

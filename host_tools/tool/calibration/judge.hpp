@@ -95,6 +95,8 @@ struct Shape {
   std::vector<Own> own = {}; /* [sensor] */
 };
 Shape shape_of(const Solution &solution);
+/* What of it the firmware's fit has where a pad's profile acts: it assumes no width then. */
+Shape beside_profile(Shape shape);
 /* As the fit takes it: [sensor], or nothing. */
 std::vector<fit_own> own_of(const Array &array, const Shape &shape);
 

@@ -114,8 +114,8 @@ private:
       }
     }
     calibrating::Shape shape = calibrating::shape_of(solution);
-    if (options_.knows_pad) { // as GainSession::expect_profile has it
-      shape = {0.0, 0.0, 0.0, 0.0, std::move(shape.own)};
+    if (options_.knows_pad) {
+      shape = calibrating::beside_profile(std::move(shape));
       const pad::Thickness thickness = pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);
       send(command_pad(pad::profile_over_own_sensors({thickness.shown_mm()})));
     }
