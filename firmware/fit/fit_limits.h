@@ -21,8 +21,9 @@
 #define FIT_HUGE 1e9f           /* stands for: nothing is known */
 
 /* The sensors' own (struct fit_own) is taken from the readings before so many of the last
- * iterations: by then the contact is known well enough, and the last step tells whether the fit has
- * settled. It is of first order, so it changes no reading by more than this share of the model. */
+ * iterations, and the dip not later: by then the contact is known well enough, and the last step
+ * tells whether the fit has settled. The own is of first order, so it changes no reading by more
+ * than this share of the model. */
 #define FIT_OWN_ITERATIONS 2
 #define FIT_OWN_SHARE_MAX 0.5f
 

@@ -1,5 +1,5 @@
 // A controller of a set force on a grasp that nothing pulls, to compare with: what the gripper's
-// steps and the relaxing rubber allow. It is told what no controller knows: the true force, how it
+// steps and the relaxing rubber allow. It has what no controller knows: the true force, how it
 // follows the width, and how the rubber is going to relax.
 //
 // Of the positions that the gripper can reach it takes the one whose mean squared error over the

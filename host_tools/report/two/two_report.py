@@ -26,7 +26,7 @@ def write(found, path):
         lines += [
             *table_md(("pairs", "asked", "possible, rubber known", "possible, model known", "right"), possible_rows(found)), "",
             "`possible`: what no judge does better than on such pads, be it with the rubber's response known exactly, or with a model that is off by",
-            "0.004 of the largest reading at each sensor, as the firmware states of its own. Noise and the gains' errors are in both. It is the smaller",
+            "0.002 of the largest reading at each sensor, as the firmware states of its own. Noise and the gains' errors are in both. It is the smaller",
             "of two limits, touch by touch: the Cramer-Rao bound of places and forces, and the likelihood ratio of the pair to the nearest long",
             "contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).", "",
             "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",

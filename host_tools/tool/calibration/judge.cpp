@@ -411,8 +411,8 @@ std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
   };
   std::vector<fit_own> made;
   for (const Own &own : shape.own) {
-    made.push_back({q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm),
-                    q15(own.wider)});
+    made.push_back(
+        {q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm), q15(own.wider)});
   }
   return made;
 }

@@ -103,9 +103,10 @@ double Optimiser::cost(const Unknowns &unknowns) const {
     const double t = model_.tau(placements_[i]);
     for (int k = 0; kept[i] && k < model_.layout.sensors; k++) {
       if (placements_[i].usable >> k & 1u) {
-        const double r = (placements_[i].reading_Pa[std::size_t(k)] -
-                          model_.reading(g, l[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]).model) /
-                         model_.expected_sd(placements_[i], k);
+        const double r =
+            (placements_[i].reading_Pa[std::size_t(k)] -
+             model_.reading(g, l[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]).model) /
+            model_.expected_sd(placements_[i], k);
         sum += huber(r * r);
       }
     }
@@ -142,7 +143,8 @@ void Optimiser::assemble() {
       if (!(placements_[i].usable >> k & 1u)) {
         continue;
       }
-      const Reading r = model_.reading(at.global, at.locals[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]);
+      const Reading r =
+          model_.reading(at.global, at.locals[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]);
       const double per = 1.0 / model_.expected_sd(placements_[i], k);
       const double left = (placements_[i].reading_Pa[std::size_t(k)] - r.model) * per;
       const double weight = huber_weight(left * left) * per;

@@ -57,8 +57,8 @@ double overlap(const Bells &a, const Bells &b, double reach) {
 }
 
 /* What is found, as the firmware has it: the Gaussian nearest to the response, and a dip. A dip is
- * what the response has less than a layer's own profile: that, the offset that all sensors share and
- * a wide dip look alike, so the response is taken as they make it together. */
+ * what the response has less than a layer's own profile: that, the offset that all sensors share
+ * and a wide dip look alike, so the response is taken as they make it together. */
 struct Nearest {
   double width = 1.0; /* of the Gaussian, over that of the wide part, as all widths here */
   double dip = 0.0;   /* of its amplitude */
@@ -231,9 +231,11 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
       double left_squares = 0.0, misfit = 0.0, count = 0.0;
       for (int k = 0; k < layout.sensors; k++) {
         if (placements[i].usable >> k & 1u) {
-          const double left =
-              placements[i].reading_Pa[std::size_t(k)] -
-              model.reading(global, local, k, model.tau(placements[i]), placements[i].earlier_Pa[std::size_t(k)]).model;
+          const double left = placements[i].reading_Pa[std::size_t(k)] -
+                              model
+                                  .reading(global, local, k, model.tau(placements[i]),
+                                           placements[i].earlier_Pa[std::size_t(k)])
+                                  .model;
           const double expected = model.expected_sd(placements[i], k);
           left_squares += left * left;
           misfit += left * left / (expected * expected);

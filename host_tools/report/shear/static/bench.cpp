@@ -77,8 +77,7 @@ Case Bench::usual() {
 
 PadOf Bench::calibrated_on(double layer_mm) {
   std::vector<KnownPad> pads;
-  for (const truth::Pad &pad :
-       truth::calibrated_pads(options.pads, options.seed, options.cache)) {
+  for (const truth::Pad &pad : truth::calibrated_pads(options.pads, options.seed, options.cache)) {
     pads.push_back({pad, {}});
   }
   return weighed(std::move(pads), layer_mm, objects);
@@ -131,8 +130,8 @@ Results Bench::run(const std::string &table, const Case &c, const pad_profile *t
       Judged &j = judged[unit * TOUCHES + t];
       j.truth = draw(c, fingertip.array(), random);
       j.object = random.next() % c.objects.size();
-      const Readings base = base_Pa(fingertip.array(), *c.objects[j.object], j.truth, c.block,
-                                    pad.cast);
+      const Readings base =
+          base_Pa(fingertip.array(), *c.objects[j.object], j.truth, c.block, pad.cast);
       const std::uint32_t usable = truth::choose_sensors(c.sensors, errors);
       // Without a positive reading among the sensors in use there is nothing to judge.
       t += fingertip.feel(base, pad, noise_Pa(c.osr), usable, errors, j.said);

@@ -37,8 +37,8 @@ Ended touch_twice(const Bench &bench, const Case &c, const pad_profile &profile)
       first.force_N = first.stuck_N = random.uniform(FIRST_MIN_N, FIRST_MAX_N);
       const auto feel = [&](const twin::Touch &touch) {
         Judged j{touch, 0, {}};
-        fingertip.feel(base_Pa(fingertip.array(), object, touch, c.block, pad.cast), pad, noise_Pa(c.osr),
-                       ALL_SENSORS, random, j.said);
+        fingertip.feel(base_Pa(fingertip.array(), object, touch, c.block, pad.cast), pad,
+                       noise_Pa(c.osr), ALL_SENSORS, random, j.said);
         return j;
       };
       const Judged begun = feel(first);

@@ -124,8 +124,8 @@ void judge_screws(Bench &bench, ordered_json &out) {
         }
         const twin::Touch now = act.tracks[0].at(0.5 * (phase.begin_s + phase.end_s) - act.begin_s);
         Said said{};
-        fingertip.feel(base_Pa(fingertip.array(), object, now, nullptr, pad.cast), pad, noise_Pa(1024), ALL_SENSORS,
-                       random, said);
+        fingertip.feel(base_Pa(fingertip.array(), object, now, nullptr, pad.cast), pad,
+                       noise_Pa(1024), ALL_SENSORS, random, said);
         if (phase.name == "hold") {
           before = said;
         } else if (said.valid && before.valid) {
@@ -182,8 +182,8 @@ void judge_taps(Bench &bench, ordered_json &out) {
           for (double t_s = 0.0; t_s < act.end_s - act.begin_s; t_s += 1.0 / RATE_Hz) {
             Judged j{act.tracks[0].at(t_s), i / PADS, {}};
             if (j.truth.force_N >= LEAST_N &&
-                fingertip.feel(base_Pa(fingertip.array(), object, j.truth, nullptr, pad.cast), pad, noise_Pa(1024),
-                               ALL_SENSORS, random, j.said)) {
+                fingertip.feel(base_Pa(fingertip.array(), object, j.truth, nullptr, pad.cast), pad,
+                               noise_Pa(1024), ALL_SENSORS, random, j.said)) {
               found[i].push_back(j);
             }
           }

@@ -42,7 +42,7 @@ constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within the
 constexpr double BAD_mm = 1.0;
 constexpr two::Right RIGHT{NEAR_mm, FORCE_SHARE, 0.002}; // and as often a long contact called two
 constexpr std::size_t BOUNDED = 1;    // touches of each pad whose bounds are computed
-constexpr double MODEL_SHARE = 0.004; // of the largest reading, as NUMERICS.md has it
+constexpr double MODEL_SHARE = 0.002; // of the largest reading, as the firmware states of its own
 constexpr double WEAKER_MIN_N = 2.0, WEAKER_MAX_N = 5.0;
 constexpr double DEGREES = 180.0 / M_PI;
 
