@@ -11,12 +11,13 @@
 /* Prior of both elongations. */
 #define ELONGATION_SD_mm2 3.0f
 
-/* Of chi^2, as standard deviations count it. Independent model errors of MODEL_SD are more than
- * layers make of smooth contacts. So a small chi^2 takes from the variance what is the model's and
- * the noise's; of what is the gains' it leaves so much, for these are what they are. A half covers
- * as it should on pads of 1.5, 5 and 10 % (seed 1 of shear_static's touches). */
+/* Variances are those of the errors as told, times chi^2 over its degrees of freedom: fifteen
+ * readings less some seven unknowns. Independent model errors of MODEL_SD are more than layers make
+ * of smooth contacts. So a small chi^2 takes from the variance what is the model's and the noise's;
+ * of what is the gains' it leaves so much, for these are what they are. A half covers as it should
+ * on pads of 1.5, 5 and 10 % (seed 1 of shear_static's touches). */
 #define GAINS_SHIFT 1
-#define MISFIT_SHIFT 4 /* 1 / 16 */
+#define MISFIT_SHIFT 3 /* 1 / 8 */
 #define MISFIT_LEAST_Q16 6554
 
 /* A layer thinner than the pitch shows less of its shape than the residuals tell: standard
