@@ -33,8 +33,7 @@ enum {
   PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
   SHAPE_BYTES = 9,
   PLACE_BYTES = 6, /* of each sensor */
-  /* A slot that does not hold what was written is given up; so often in a row is a flash that
-     fails. */
+  /* A flash whose erased slots do not hold what is written so often in a row fails. */
   MAX_ATTEMPTS = 3,
 };
 #define RECORD_BYTES(sensors)                                                                      \
@@ -472,8 +471,9 @@ static enum ft_status fail(struct store *store, enum ft_status why) {
   return why;
 }
 
-/* In the next slot. */
+/* A slot that did not hold what was written was not erased: the next attempt is in one that is. */
 static enum ft_status try_again(struct store *store, uint64_t now_us) {
+  store->next_slot = STORE_SLOTS;
   if (++store->attempts == MAX_ATTEMPTS) {
     return fail(store, FT_ERR_CRC);
   }

@@ -33,8 +33,9 @@
  * be there today and gone tomorrow, or the other way round. When start-up meets one, it writes the
  * content that it chose once more, behind it. A mark is all zeros, so writing it again repairs one
  * that was cut short. Before `begun` is whole no other bit of the slot is touched, and a slot
- * without it is free. A sector is erased only while the other one holds a record whose seal is
- * whole, or if all its own records were cut short.
+ * without it is free. If it does not hold what is written, the other sector is erased and taken. A
+ * sector is erased only while the other one holds a record whose seal is whole, or if all its own
+ * records were cut short.
  *
  * Main context only. Nothing waits: store_poll() takes a write one short step further. */
 #ifndef STORE_STORE_H

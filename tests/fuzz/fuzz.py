@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Runs the fuzz targets, which `cmake --preset fuzz && cmake --build --preset fuzz` makes.
 
-    fuzz.py --build build/fuzz --runs 1000 wire      the corpus, and so many runs from a fixed seed: the same each time
+    fuzz.py --build build/fuzz --runs 1000 wire      the seeds, and what a fixed walk makes of them: the same each time
     fuzz.py --build build/fuzz --seconds 300         all targets, two at a time, each for its share of the time
     fuzz.py --build build/fuzz --hours 8             the same, in rounds of ten minutes, each from where the last one ended
 
@@ -97,8 +97,16 @@ class Target:
         seeds = [path.read_bytes() for path in sorted((HERE / "corpus" / self.name).glob("*"))] + list(vector_seeds(self.name))
         return seeds or [random.Random(seed).randbytes(64 << seed) for seed in range(4)]
 
-    def run(self, findings, grown, limit, seed, bulk):
-        """limit: of libFuzzer, "-runs=N" or "-max_total_time=S". grown: a folder that keeps what is new, or None."""
+    def libfuzzer(self, max_len, seconds, seed, bulk, folder, new, given):
+        call = [self.program, f"-max_total_time={seconds}", f"-seed={seed}", f"-max_len={max_len}", f"-timeout={HANGS_s}", f"-artifact_prefix={folder}/"]
+        if "dict" in self.options:
+            call.append(f"-dict={self.options['dict']}")
+        if bulk:
+            call.append("-len_control=0")
+        return [*call, new, given]
+
+    def run(self, findings, seed, runs=None, seconds=None, grown=None, bulk=False):
+        """So many runs, the same each time (fuzz.c), or libFuzzer for so long. grown: a folder that keeps what is new, or None."""
         with tempfile.TemporaryDirectory(prefix="fingertip-fuzz-") as folder:
             folder = pathlib.Path(folder)
             given, new, count = folder / "given", grown or folder / "new", folder / "count"
@@ -111,23 +119,22 @@ class Target:
                 seeds.append(bulk_seed(self.name, seeds, max_len // 2))
             for i, data in enumerate(seeds):
                 (given / f"{i:03d}").write_bytes(data)
-            call = [self.program, limit, f"-seed={seed}", f"-max_len={max_len}", f"-timeout={HANGS_s}", "-print_final_stats=1",
-                    f"-artifact_prefix={folder}/", new, given]
-            if "dict" in self.options:
-                call.insert(1, f"-dict={self.options['dict']}")
-            if bulk:
-                call.insert(1, "-len_control=0")
+            running = folder / "running"
+            call = ([self.program, "walk", runs, max_len, seed, running, *sorted(given.iterdir())] if runs else
+                    self.libfuzzer(max_len, seconds, seed, bulk, folder, new, given))
             begun_s = time.monotonic()
             done = subprocess.run([str(part) for part in call], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                   env={**os.environ, "FINGERTIP_FUZZ_COUNT": str(count), "UBSAN_OPTIONS": "print_stacktrace=1"})
             said = done.stderr.decode("utf-8", "replace")
-            runs, size = struct.unpack("<QQ", count.read_bytes()) if count.exists() else (0, 0)
+            done_runs, size, length = struct.unpack("<QQQ", count.read_bytes()) if count.exists() else (0, 0, 0)
             covered = re.findall(r"cov: (\d+)", said)
-            result = {"target": self.name, "seconds": round(time.monotonic() - begun_s, 1), "runs": runs, "bytes": size,
+            result = {"target": self.name, "seconds": round(time.monotonic() - begun_s, 1), "runs": done_runs, "bytes": size,
                       "edges": int(covered[-1]) if covered else 0, "seed": seed, "crashes": 0, "sanitizer_findings": 0}
             if done.returncode not in (0, INTERRUPTED):
                 kind = "sanitizer_findings" if any(word in said for word in SANITIZERS) else "crashes"
                 result[kind] = 1
+                if running.exists():
+                    (folder / "crash-walk").write_bytes(running.read_bytes()[:length])
                 self.tell_finding(findings, folder, said)
             return result
 
@@ -165,8 +172,9 @@ def round_of(targets, jobs, one):
             for future in concurrent.futures.as_completed([pool.submit(one, target) for target in targets]):
                 result = future.result()
                 found = result["crashes"] + result["sanitizer_findings"]
-                print(f"{result['target']:10s} {result['runs']:10d} runs {result['bytes']:12d} bytes {result['edges']:6d} edges "
-                      f"{result['seconds']:7.1f} s  seed {result['seed']}{'  FOUND' if found else ''}", flush=True)
+                edges = f" {result['edges']:6d} edges" if result["edges"] else ""
+                print(f"{result['target']:10s} {result['runs']:10d} runs {result['bytes']:12d} bytes{edges} {result['seconds']:7.1f} s  "
+                      f"seed {result['seed']}{'  FOUND' if found else ''}", flush=True)
                 yield result
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -204,7 +212,7 @@ def main(argv):
         options.seed = TEST_SEED if options.runs is not None else int(time.time()) % 2**31
     results = []
     if options.runs is not None:
-        results += round_of(targets, options.jobs, lambda target: target.run(findings, None, f"-runs={options.runs}", options.seed, False))
+        results += round_of(targets, options.jobs, lambda target: target.run(findings, options.seed, runs=options.runs))
     else:
         total_s = options.seconds if options.seconds is not None else 3600 * options.hours
         end_s, seed = time.monotonic() + total_s, options.seed
@@ -213,7 +221,7 @@ def main(argv):
                 own_s = max(1, round(min(left_s, ROUND_s) * min(options.jobs, len(targets)) / len(targets)))
                 bulk = options.seconds is not None
                 results += round_of(targets, options.jobs, lambda target: target.run(
-                    findings, None if bulk else build / "corpus" / target.name, f"-max_total_time={own_s}", seed, bulk))
+                    findings, seed, seconds=own_s, grown=None if bulk else build / "corpus" / target.name, bulk=bulk))
                 seed += 1
                 if bulk:
                     break
