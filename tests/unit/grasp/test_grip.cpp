@@ -745,8 +745,8 @@ TEST(Grip, ALoadIsExpectedToRiseByNoMoreThanAShareOfIt) {
   world.delay_s = 0.03;
   world.grasp();
   double most = 0.0;
-  for (int i = 0; i < 80; i++) {
-    world.pull(0.2 * (i + 1), 1e-3);
+  for (int i = 0; i < 60; i++) {
+    world.pull(0.3 * (i + 1), 1e-3);
     if (world.report.load_N > 7.0) {
       const double steady_N = world.settings.margin * world.report.load_N / world.report.friction;
       most = std::max(most, world.report.wanted_N / steady_N);
