@@ -199,6 +199,7 @@ class Template(ValidateTest):
         for options, words in (([], "give -o CARD.html, or --template"), (["-o", "c.html"], "give --weight GRAMS, or --from"),
                                (["-o", "c.html", "--weight", "300"], "give --record FILE.csv"), (["--template", "a.pdf", "--weight", "300"], "excludes"),
                                (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "20"], "is 0.07 of the weight; give --pull from 45 to 150 grams"),
+                               (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "5"], '--pull takes 10 to 1000 grams, not "5"; see fingertip validate --help'),
                                (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--thread-height", "3"], "pull")):
             self.assertIn(words, self.error("validate", *options, status=2))
 
