@@ -214,6 +214,16 @@ static void judge_fit(struct app *app) {
 }
 
 #if FT_WITH_TANGENTIAL
+static void judge_shapes(struct app *app) {
+  const bool has_load = (app->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+  app->contact.flags |= shapes_flags(&app->shapes);
+  app->place = shapes_locate(&app->shapes, &app->fit, has_load ? &app->load : NULL);
+  app->contact.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAIN;
+  if (app->place.location_sd_mm > app->fit_settings.location_sd_limit_mm) {
+    app->contact.flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+}
+
 static void judge_load(struct app *app) {
   const struct contact_input input = input_of(app);
   app->contact.flags |= app->fit.flags & CONTACT_FLAG_UNCERTAIN; /* by now it may be doubted */
@@ -222,7 +232,7 @@ static void judge_load(struct app *app) {
                     &app->load);
   motion_update(&app->motion_history, &app->tangential_settings, &input, &app->contact,
                 &app->motion);
-  app->contact.flags |= shapes_flags(&app->shapes);
+  judge_shapes(app);
   app->contact.flags |= app->tangential_is_late ? (uint32_t)CONTACT_FLAG_TANGENTIAL_LATE : 0;
 }
 #endif

@@ -92,6 +92,7 @@ struct app {
 #if FT_WITH_TANGENTIAL
   const struct fit_tangential *tangential; /* NULL: not estimated; else app->estimate */
   struct tangential_load load;
+  struct shapes_place place; /* of the packet */
   struct motion motion;
 #endif
   struct contact_result contact;
