@@ -201,6 +201,27 @@ static void what_is_none_of_these_is_warned_of_all_the_time(void) {
   }
 }
 
+/* Frames that come fast keep what a search for an outlier found; slow ones have time for their own.
+ */
+static void a_search_for_an_outlier_is_of_fast_frames(void) {
+  put(1.5, -4.0, 5.0);
+  last_of_press();
+  app.fit_watch = (struct fit_watch){.usable = app.conditioned.usable,
+                                     .left_out = 1,
+                                     .frames = 9,
+                                     .residual_rms_Pa = app.fit.residual_rms_Pa,
+                                     .force_N = app.fit.force_N};
+  app.frame.t_us += 765;
+  app_process_frame(&app, app.frame.t_read_us);
+  TEST_ASSERT_EQUAL(8, app.fit_watch.frames);
+  TEST_ASSERT_EQUAL_HEX32(app.conditioned.usable & ~UINT32_C(1), app.fit.used);
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_MASKED, app.contact.flags);
+  app.frame.t_us += 3700;
+  app_process_frame(&app, app.frame.t_read_us);
+  TEST_ASSERT_EQUAL_HEX32(app.conditioned.usable, app.fit.used);
+  TEST_ASSERT_EQUAL(0, app.fit_watch.left_out);
+}
+
 /* Here each frame has time for all three parts. */
 static void each_answer_says_how_old_it_is(void) {
   put(0.0, 8.0, 4.0);
@@ -309,6 +330,7 @@ int main(void) {
   RUN_TEST(a_long_contact_is_where_its_line_has_the_middle);
   RUN_TEST(one_contact_is_one_with_a_load_or_without);
   RUN_TEST(what_is_none_of_these_is_warned_of_all_the_time);
+  RUN_TEST(a_search_for_an_outlier_is_of_fast_frames);
   RUN_TEST(each_answer_says_how_old_it_is);
   RUN_TEST(a_contact_that_ends_is_forgotten);
   RUN_TEST(rubber_that_is_too_thin_has_no_shapes);
