@@ -3,7 +3,8 @@
 // The twin's objects press on calibrated pads of 12 mm with a dip, and hold until the firmware's
 // fit_shapes answers, as scene grasp runs it. Two contacts are the sum of their pressures. One JSON
 // object on the standard output: the keys that are judged, and under "touches" the table behind
-// them. The constants of fit_shapes were chosen with the seeds 20000 and 30000.
+// them. The constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of
+// shapes_locate with 50000 and 60000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
