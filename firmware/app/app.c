@@ -21,15 +21,17 @@
 #define ZERO_LASTS_us 60000000u
 /* Frames so far apart leave time for all parts of fit_load.h, and for fit_gains.h. */
 #define LOOK_AT_ONCE_us 4500u
+/* Frames so far apart have time for a search for an outlier in each. */
+#define WATCH_APART_us 2000u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
 #define SHARED_PITCH_mm 9.0f
 
 #if FT_WITH_FIT_GENERAL
 #define INIT_FIT_ARRAY fit_array_init
-#define FIT fit_gaussian
+#define FIT fit_gaussian_follow
 #else
 #define INIT_FIT_ARRAY fit_array_init_grid
-#define FIT fit_gaussian_grid
+#define FIT fit_gaussian_grid_follow
 _Static_assert(DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERAL");
 #endif
 
@@ -113,13 +115,18 @@ void app_start(struct app *app, const struct array_bus *bus) {
 
 #if FT_WITH_FIT
 static void fit_frame(struct app *app) {
+  const uint32_t t_us = (uint32_t)app->frame.t_us;
+  if (!app->conditioned.contact || t_us - app->fit_frame_us >= WATCH_APART_us) {
+    memset(&app->fit_watch, 0, sizeof app->fit_watch);
+  }
+  app->fit_frame_us = t_us;
   if (!app->conditioned.contact) {
     memset(&app->fit, 0, sizeof app->fit);
     return;
   }
   app->fit_settings.noise_Pa_q10 = app->frame.noise_Pa_q10;
   FIT(&app->fit_array, app->conditioned.pressure_Pa_q10, app->conditioned.usable,
-      &app->fit_settings, &app->fit);
+      &app->fit_settings, &app->fit_watch, &app->fit);
   if (!(app->fit.flags & CONTACT_FLAG_FIT_VALID)) {
     app->fit_failures++;
   }
@@ -214,6 +221,16 @@ static void judge_fit(struct app *app) {
 }
 
 #if FT_WITH_TANGENTIAL
+static void judge_shapes(struct app *app) {
+  const bool has_load = (app->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+  app->contact.flags |= shapes_flags(&app->shapes);
+  app->place = shapes_locate(&app->shapes, &app->fit, has_load ? &app->load : NULL);
+  app->contact.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAIN;
+  if (app->place.location_sd_mm > app->fit_settings.location_sd_limit_mm) {
+    app->contact.flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+}
+
 static void judge_load(struct app *app) {
   const struct contact_input input = input_of(app);
   app->contact.flags |= app->fit.flags & CONTACT_FLAG_UNCERTAIN; /* by now it may be doubted */
@@ -222,7 +239,7 @@ static void judge_load(struct app *app) {
                     &app->load);
   motion_update(&app->motion_history, &app->tangential_settings, &input, &app->contact,
                 &app->motion);
-  app->contact.flags |= shapes_flags(&app->shapes);
+  judge_shapes(app);
   app->contact.flags |= app->tangential_is_late ? (uint32_t)CONTACT_FLAG_TANGENTIAL_LATE : 0;
 }
 #endif

@@ -35,6 +35,8 @@ struct app {
   struct fit_array fit_array;
   struct fit_settings fit_settings;
   struct fit_own own[FT_MAX_SENSORS]; /* of the calibration that acts */
+  struct fit_watch fit_watch;         /* of the contact under way */
+  uint32_t fit_frame_us;              /* the last frame's time */
   uint32_t fit_failures;
   float set_sigma_mm, set_sigma_sd_mm;   /* to expect of a contact; sd 0: as the calibration says */
   const struct calibration *calibration; /* that acts; NULL: none */
@@ -92,6 +94,7 @@ struct app {
 #if FT_WITH_TANGENTIAL
   const struct fit_tangential *tangential; /* NULL: not estimated; else app->estimate */
   struct tangential_load load;
+  struct shapes_place place; /* of the packet */
   struct motion motion;
 #endif
   struct contact_result contact;

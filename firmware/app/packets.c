@@ -192,9 +192,6 @@ void packets_send_contact(struct app *app, const struct wire_stages *stages) {
 #if FT_WITH_TANGENTIAL
   if (app->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
     const struct tangential_load *load = &app->load;
-    contact->x_mm = load->x_mm;
-    contact->y_mm = load->y_mm;
-    contact->location_sd_mm = load->location_sd_mm;
     contact->force_N = load->force_N;
     contact->force_sd_N = load->force_sd_N;
     contact->qx_N = load->qx_N;
@@ -202,6 +199,9 @@ void packets_send_contact(struct app *app, const struct wire_stages *stages) {
     contact->q_sd_N = load->q_sd_N;
     contact->tangential_ratio = load->ratio;
   }
+  contact->x_mm = app->place.x_mm;
+  contact->y_mm = app->place.y_mm;
+  contact->location_sd_mm = app->place.location_sd_mm;
   contact->vx_mm_s = app->motion.vx_mm_s;
   contact->vy_mm_s = app->motion.vy_mm_s;
   put_shape(app, contact);

@@ -54,6 +54,14 @@ static void put_report(const struct shapes_question *question,
     report->edge_angle_sd_deg = DEGREES_PER_RAD * result->angle_sd_rad;
     report->edge_length_mm = result->length_mm;
   }
+  if (result->shape == FIT_SHAPE_ROUND) {
+    report->doubt = fmaxf(result->chi_square[0] / (float)FIT_SHAPES_ERRORS, 1.0f);
+  }
+  if (result->shape == FIT_SHAPE_PULLED || result->shape == FIT_SHAPE_ELONGATED) {
+    report->middle = (struct shapes_middle){.from_fit_x_mm = result->x_mm[0] - question->fit.x_mm,
+                                            .from_fit_y_mm = result->y_mm[0] - question->fit.y_mm,
+                                            .location_sd_mm = result->location_sd_mm[0]};
+  }
 }
 
 void shapes_estimate(void *job) {
@@ -81,6 +89,27 @@ void shapes_estimate(void *job) {
   if (own->progress == FIT_SHAPES_ANSWERED && !again) {
     put_report(question, &own->result, &own->report);
   }
+}
+
+struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
+                                  const struct tangential_load *load) {
+  const struct shapes_middle *middle = &report->middle;
+  const float x_mm = fit->x_mm + middle->from_fit_x_mm, y_mm = fit->y_mm + middle->from_fit_y_mm;
+  if (!load && middle->location_sd_mm > 0.0f) {
+    return (struct shapes_place){x_mm, y_mm, middle->location_sd_mm};
+  }
+  struct shapes_place place = {fit->x_mm, fit->y_mm, fit->location_sd_mm};
+  if (load) {
+    place = (struct shapes_place){load->x_mm, load->y_mm, load->location_sd_mm};
+  }
+  if (report->shape == FIT_SHAPE_ROUND) {
+    place.location_sd_mm *= report->doubt;
+  } else if (report->shape == FIT_SHAPE_ELONGATED) {
+    const float dx_mm = fabsf(x_mm - place.x_mm), dy_mm = fabsf(y_mm - place.y_mm);
+    place.location_sd_mm =
+        fit_quadrature(1.0f, place.location_sd_mm, 1.0f, fit_quadrature(1.0f, dx_mm, 1.0f, dy_mm));
+  }
+  return place;
 }
 
 uint32_t shapes_flags(const struct shapes_report *report) {

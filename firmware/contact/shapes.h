@@ -3,6 +3,7 @@
 #ifndef CONTACT_SHAPES_H
 #define CONTACT_SHAPES_H
 
+#include "contact/tangential.h"
 #include "fit/fit_shapes.h"
 
 #include <stdbool.h>
@@ -18,6 +19,10 @@ struct shapes_report {
   } contact[2];
   float edge_angle_deg, edge_angle_sd_deg; /* -90 to 90, from x towards y */
   float edge_length_mm;
+  float doubt;           /* ROUND: chi^2 over FIT_SHAPES_ERRORS, at least 1 */
+  struct shapes_middle { /* pulled or long: from the Gaussian's place in the same frame */
+    float from_fit_x_mm, from_fit_y_mm, location_sd_mm;
+  } middle;
 };
 
 /* The fit of what presses: a job of worker/worker.h. It holds all that the fit reads, so that the
@@ -53,6 +58,19 @@ uint8_t shapes_parts(uint64_t apart_us);
 
 /* Answers the question of a struct shapes_job. */
 void shapes_estimate(void *job);
+
+/* The one place of a contact. */
+struct shapes_place {
+  float x_mm, y_mm, location_sd_mm;
+};
+
+/* Where the contact is, of which the report and the fit are. The load's estimate has the place, and
+ * where there is none (load NULL), the Gaussian. But the Gaussian knows no load, and neither knows
+ * a length. So a long or pulled contact without an estimate is where its shape has the middle,
+ * moved as the Gaussian has moved since. Of a long one with an estimate, what lies between the two
+ * is part of the standard deviation. That of a round one grows where its shape leaves residuals. */
+struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
+                                  const struct tangential_load *load);
 
 /* The flags that the report adds to those of a contact. */
 uint32_t shapes_flags(const struct shapes_report *report);

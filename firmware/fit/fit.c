@@ -158,16 +158,15 @@ void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd
 /* Fits once more without the outlier, if there is one. */
 static void leave_outlier_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                               uint32_t usable, const struct fit_settings *settings,
-                              struct fit_result *result) {
+                              struct fit_result *without, struct fit_result *result) {
   int outlier = fit_grid_outlier(array, pressure_Pa_q10, usable, settings, result);
   if (outlier < 0) {
     return;
   }
-  struct fit_result without;
   usable &= ~(UINT32_C(1) << outlier);
-  bool rough = fit_grid_masked(array, pressure_Pa_q10, usable, settings, &without);
-  if (fit_outlier_gone(settings, result, &without, rough, array->pitch_mm)) {
-    *result = without;
+  bool rough = fit_grid_masked(array, pressure_Pa_q10, usable, settings, without);
+  if (fit_outlier_gone(settings, result, without, rough, array->pitch_mm)) {
+    *result = *without;
   }
 }
 
@@ -176,20 +175,61 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
     rough = fits;                                                                                  \
   } else
 
-void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                       uint32_t usable, const struct fit_settings *settings,
-                       struct fit_result *result) {
+/* Whether the residuals look like an outlier. */
+static bool fit_grid_once(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                          uint32_t usable, const struct fit_settings *settings,
+                          struct fit_result *result) {
+  const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  bool rough = false;
+  FIT_GRID_KERNELS(TAKE_GRID_IF_IT_SUITS) {}
+  return rough;
+}
+
+static bool has_grown(const struct fit_watch *watch, const struct fit_result *result) {
+  return watch->frames < FIT_WATCH_FRAMES - FIT_WATCH_LEAST &&
+         2.0f * result->residual_rms_Pa * watch->force_N >
+             3.0f * watch->residual_rms_Pa * result->force_N;
+}
+
+void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                              uint32_t usable, const struct fit_settings *settings,
+                              struct fit_watch *watch, struct fit_result *result) {
   if (settings->noise_Pa_q10 < 1) {
     *result = (struct fit_result){0};
     return;
   }
-  uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-  usable &= all;
-  bool rough = false;
-  FIT_GRID_KERNELS(TAKE_GRID_IF_IT_SUITS) {}
-  if (rough) {
-    leave_outlier_out(array, pressure_Pa_q10, usable, settings, result);
+  usable &= UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  if (watch->usable != usable) {
+    watch->usable = usable;
+    watch->frames = 0;
   }
+  const uint32_t left_out = watch->frames > 0 ? watch->left_out : 0;
+  const bool rough = fit_grid_once(array, pressure_Pa_q10, usable & ~left_out, settings, result);
+  if (watch->frames > 0) {
+    watch->frames--;
+    if (!rough || !has_grown(watch, result)) {
+      return;
+    }
+    if (left_out) { /* the next frame looks at all sensors */
+      watch->frames = 0;
+      return;
+    }
+  }
+  if (rough) {
+    leave_outlier_out(array, pressure_Pa_q10, usable, settings, &watch->without, result);
+    watch->left_out = usable & ~result->used;
+    watch->frames = FIT_WATCH_FRAMES;
+    watch->residual_rms_Pa = result->residual_rms_Pa;
+    watch->force_N = result->force_N;
+  }
+}
+
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                       uint32_t usable, const struct fit_settings *settings,
+                       struct fit_result *result) {
+  struct fit_watch none;
+  none.usable = none.frames = 0;
+  fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, &none, result);
 }
 
 #define TAKE_IF_IT_SUITS(name, suits, fits)                                                         \
@@ -197,14 +237,22 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
     fits;                                                                                          \
   } else
 
-void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                  const struct fit_settings *settings, struct fit_result *result) {
+void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                         uint32_t usable, const struct fit_settings *settings,
+                         struct fit_watch *watch, struct fit_result *result) {
   bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
   if ((is_grid(array) && !some) || settings->noise_Pa_q10 < 1) {
-    fit_gaussian_grid(array, pressure_Pa_q10, usable, settings, result);
+    fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, watch, result);
     return;
   }
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   usable &= all;
   FIT_OTHER_KERNELS(TAKE_IF_IT_SUITS) {}
+}
+
+void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                  const struct fit_settings *settings, struct fit_result *result) {
+  struct fit_watch none;
+  none.usable = none.frames = 0;
+  fit_gaussian_follow(array, pressure_Pa_q10, usable, settings, &none, result);
 }

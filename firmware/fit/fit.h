@@ -126,6 +126,32 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
                        uint32_t usable, const struct fit_settings *settings,
                        struct fit_result *result);
 
+/* What frames that follow each other keep of the search for an outlier. A sensor that is broken
+ * stays broken, and a pad that the model fits roughly does so in each frame. So what the search
+ * found stands for FIT_WATCH_FRAMES frames of the same sensors: an outlier is left out at once, and
+ * where there was none, none is looked for. Before, only residuals that have grown by half of what
+ * they were, relative to the force, begin another search, and not in the first FIT_WATCH_LEAST
+ * frames. So at most one frame in FIT_WATCH_LEAST + 1 takes as long as a search, and where the
+ * contact is the same one in FIT_WATCH_FRAMES + 1 (NUMERICS.md has the cycles). All zeros: nothing
+ * found yet, as in the first frame of a contact. */
+#define FIT_WATCH_FRAMES 128
+#define FIT_WATCH_LEAST 8
+struct fit_watch {
+  uint32_t usable;   /* of these sensors */
+  uint32_t left_out; /* bitmap of at most one */
+  uint16_t frames;   /* that it still stands for */
+  float residual_rms_Pa, force_N;
+  struct fit_result without; /* room of a search */
+};
+
+/* fit_gaussian and fit_gaussian_grid for frames that follow each other. */
+void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                         uint32_t usable, const struct fit_settings *settings,
+                         struct fit_watch *watch, struct fit_result *result);
+void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                              uint32_t usable, const struct fit_settings *settings,
+                              struct fit_watch *watch, struct fit_result *result);
+
 /* sqrt((a b)^2 + (c d)^2) within 0.1 %, for standard deviations: some 800 cycles less than in soft
  * float, and the same bits everywhere. All are finite and not negative; at most 1e9. */
 float fit_quadrature(float a, float b, float c, float d);

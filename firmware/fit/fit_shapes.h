@@ -38,6 +38,11 @@
 
 #define FIT_SHAPES_FRAMES 13
 
+/* Errors are some times what is stated of them. How many times is not known; that it is once counts
+ * as so many readings. With unknown errors the likelihood of a model falls as a power of
+ * chi^2 + FIT_SHAPES_ERRORS. Where chi^2 is above it, the model itself may be wrong. */
+#define FIT_SHAPES_ERRORS 14
+
 enum fit_shape {
   FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */
   FIT_SHAPE_ROUND,

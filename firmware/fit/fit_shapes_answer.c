@@ -5,10 +5,6 @@
 
 #include <math.h>
 
-/* Errors are some times what is stated of them. How many times is not known; that it is once counts
- * as so many readings. With unknown errors the likelihood of a model falls as a power of
- * chi^2 + ERRORS_STATED. */
-#define ERRORS_STATED 14
 #define LINE_SURE 8             /* variances: a line whose square is less is a pull */
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
 
@@ -119,9 +115,9 @@ static NOINLINE void put_one(const struct problem *problem,
       sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
-/* More unknowns must make the sum of chi^2 and ERRORS_STATED less by a third. */
+/* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by a third. */
 static bool explains_more(int32_t chi_square_q8, int32_t than_q8) {
-  return than_q8 - chi_square_q8 > (chi_square_q8 >> 1) + (ERRORS_STATED << 7);
+  return than_q8 - chi_square_q8 > (chi_square_q8 >> 1) + (FIT_SHAPES_ERRORS << 7);
 }
 
 int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two) {
@@ -142,7 +138,7 @@ static void put_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
 }
 
 /* The other models may be right: how far their middles are, by how likely they are, adds to the
- * errors of the places. Where chi^2 is above ERRORS_STATED none of the models may be, and the
+ * errors of the places. Where chi^2 is above FIT_SHAPES_ERRORS none of the models may be, and the
  * errors grow with it. */
 static void doubt_places(const struct problem *problem, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result) {
@@ -153,8 +149,8 @@ static void doubt_places(const struct problem *problem, int best, const int32_t 
     if (m == best) {
       continue;
     }
-    float likely = fit_float(chi_square_q8[best] + (ERRORS_STATED << 8), 0) /
-                   fit_float(chi_square_q8[m] + (ERRORS_STATED << 8), 0);
+    float likely = fit_float(chi_square_q8[best] + (FIT_SHAPES_ERRORS << 8), 0) /
+                   fit_float(chi_square_q8[m] + (FIT_SHAPES_ERRORS << 8), 0);
     likely *= likely;
     likely *= likely;
     likely *= likely;
@@ -166,7 +162,7 @@ static void doubt_places(const struct problem *problem, int best, const int32_t 
       square_mm2[c] += likely * (x_mm * x_mm + y_mm * y_mm);
     }
   }
-  const float usual = (float)(ERRORS_STATED << 8), found = (float)chi_square_q8[best];
+  const float usual = (float)(FIT_SHAPES_ERRORS << 8), found = (float)chi_square_q8[best];
   const float times = found > usual ? found / usual : 1.0f;
   for (int c = 0; c < 2; c++) {
     result->location_sd_mm[c] =

@@ -3,8 +3,14 @@
 #include "libfingertip/text.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
 #include <memory>
+#include <regex>
+#include <set>
 #include <string>
+#include <vector>
 
 namespace fingertip {
 
@@ -30,9 +36,88 @@ std::string wrapped(const std::string &line, std::size_t columns, std::size_t in
   return lines + text;
 }
 
-/* No word is cut by a terminal of 80 columns. */
+/* What CLI11 says of a value: "GRAMS:FLOAT in [50 - 2000]", "TEXT:{csv,mcap}", "FILE.csv". */
+struct Values {
+  std::string word, unit, allowed; /* GRAMS, grams, "50 to 2000"; or empty */
+};
+
+std::string number_text(const std::string &text) {
+  char *end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  char plain[64];
+  std::snprintf(plain, sizeof plain, "%.10g", value);
+  return *end != '\0' ? text : plain;
+}
+
+Values values_of(const CLI::Option &option) {
+  static const std::regex RANGE("(.*):(FLOAT|INT) in \\[(.*) - (.*)\\]");
+  static const std::regex CHOICE("(.*):\\{(.*)\\}");
+  static const std::map<std::string, std::string> UNITS = {
+      {"GRAMS", "grams"}, {"MM", "mm"}, {"KG", "kg"}, {"S", "seconds"}, {"N/MM", "N/mm"}};
+  const std::string text = option.get_type_name();
+  std::smatch found;
+  if (std::regex_match(text, found, RANGE)) {
+    const auto unit = UNITS.find(found[1]);
+    return {found[1],
+            unit != UNITS.end()                      ? unit->second
+            : found[1] == "N" && found[2] == "FLOAT" ? "newtons"
+                                                     : "",
+            number_text(found[3]) + " to " + number_text(found[4])};
+  }
+  if (std::regex_match(text, found, CHOICE)) {
+    std::string allowed = std::regex_replace(found[2].str(), std::regex(","), ", ");
+    const std::size_t last = allowed.rfind(", ");
+    if (last != std::string::npos) {
+      allowed.replace(last, 2, " or ");
+    }
+    return {found[1] == "TEXT" ? "NAME" : found[1].str(), "", allowed};
+  }
+  return {text == "TEXT" ? "NAME" : text, "", ""};
+}
+
+std::string names_of(const std::set<CLI::Option *> &options) {
+  std::string names;
+  for (const CLI::Option *option : options) {
+    names += (names.empty() ? "" : ", ") + option->get_name();
+  }
+  return names;
+}
+
+/* No word is cut by a terminal of 80 columns; ranges, defaults and what excludes what in words. */
 class HelpFormatter : public CLI::Formatter {
 public:
+  std::string make_option_opts(const CLI::Option *option) const override {
+    if (option->get_type_size() == 0) {
+      return "";
+    }
+    return " " + values_of(*option).word +
+           (option->get_expected_max() == CLI::detail::expected_max_vector_size ? " ..." : "");
+  }
+
+  std::string make_option_desc(const CLI::Option *option) const override {
+    std::string text = option->get_description();
+    std::vector<std::string> more;
+    if (option->get_type_size() != 0) {
+      const Values values = values_of(*option);
+      if (!values.allowed.empty()) {
+        more.push_back(values.allowed + (values.unit.empty() ? "" : " " + values.unit));
+      }
+      if (!option->get_default_str().empty()) {
+        more.push_back("default " + option->get_default_str());
+      }
+    }
+    if (!option->get_needs().empty()) {
+      more.push_back("only with " + names_of(option->get_needs()));
+    }
+    if (!option->get_excludes().empty()) {
+      more.push_back("not with " + names_of(option->get_excludes()));
+    }
+    for (std::size_t i = 0; i < more.size(); i++) {
+      text += (i ? "; " : " (") + more[i];
+    }
+    return text + (more.empty() ? "" : ")");
+  }
+
   std::string make_help(const CLI::App *app, std::string name,
                         CLI::AppFormatMode mode) const override {
     std::string help = CLI::Formatter::make_help(app, name, mode);
@@ -46,6 +131,12 @@ public:
   }
 };
 
+/* Of "Value 5 not in range 10 to 1000" and "x not in {a,b}". */
+std::string refused_value(const std::string &text) {
+  const std::string after = text.rfind("Value ", 0) == 0 ? text.substr(6) : text;
+  return after.substr(0, after.find(" not in "));
+}
+
 /* What CLI11 says, as people say it. */
 std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
   std::string text = error.what();
@@ -57,6 +148,22 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
     /* Its name is the command's. It tells the words from the last to the first. */
     const std::string first = text.substr(text.rfind(' ') + 1);
     return "\"" + first + (first[0] == '-' ? "\" is no option of it" : "\" is one word too many");
+  }
+  if (kind == "ValidationError") {
+    std::vector<const CLI::App *> commands = {failed};
+    for (const CLI::App *command : failed->get_subcommands()) {
+      commands.push_back(command);
+    }
+    for (const CLI::App *command : commands) {
+      for (const CLI::Option *option : command->get_options()) {
+        const Values values = values_of(*option);
+        if (!values.allowed.empty() && text.rfind(option->get_name() + ": ", 0) == 0) {
+          return option->get_name() + " takes " + values.allowed +
+                 (values.unit.empty() ? "" : " " + values.unit) + ", not \"" +
+                 refused_value(text.substr(option->get_name().size() + 2)) + "\"";
+        }
+      }
+    }
   }
   if (kind == "RequiredError") {
     for (const CLI::App *command : failed->get_subcommands()) {

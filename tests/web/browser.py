@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import time
 
-PATIENCE_s = 240
+PATIENCE_s = 1200
 BINARIES = ("/usr/lib/chromium/chromium",)
 POLICY_FOLDER = "/etc/chromium"
 # nothing of the browser's own on the network; WebGL in software, as where there is no graphics processor

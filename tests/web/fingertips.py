@@ -9,7 +9,7 @@ import subprocess
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PATIENCE_s = 300  # ends what hangs
+PATIENCE_s = 1200  # ends what hangs
 USB_ID = "1209:0001"  # as in cmake/options.cmake
 
 
@@ -57,7 +57,7 @@ class Bench(contextlib.ExitStack):
         """tests/support/fake_device.cpp, with its options."""
         port = browser.ports / f"{usb_id}:{serial}"
         return self._until_there(self._start(
-            self._tools.build / "tests/support/fake_device", port, f"serial={serial}", *options, stdout=subprocess.DEVNULL), port)
+            self._tools.build / "tests/support/fake_device", port, f"serial={serial}", f"life={PATIENCE_s}", *options, stdout=subprocess.DEVNULL), port)
 
     def simulated(self, runtime, *options):
         """`fingertip simulate`, which a page served with the same runtime folder finds."""

@@ -27,6 +27,7 @@ constexpr double APPROACH_LEAST_mm_s = 1.0;
 constexpr double MOVE_s = 0.02;        // a move is to take so long, but where the object slides
 constexpr double WIDTH_SLACK_mm = 1.0; // of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
+constexpr double ONLY_HELD_s = 1.0; // nothing has pulled for so long
 
 double seconds(const GripperStatus &status) {
   return 1e-6 * static_cast<double>(status.host_us);
@@ -172,10 +173,11 @@ void Grip::approach() {
   }
 }
 
-std::uint32_t Grip::aim(double wanted_N, GripReach::Haste haste) {
-  wanted_N_ = std::min(wanted_N, settings_.cap_N);
-  return (wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) |
-         reach_.aim(wanted_N_, haste, felt_, settings_, now_s_);
+std::uint32_t Grip::aim(const GripAim &aim) {
+  GripAim below = aim;
+  wanted_N_ = below.wanted_N = std::min(aim.wanted_N, settings_.cap_N);
+  return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) |
+         reach_.aim(below, felt_, settings_, now_s_);
 }
 
 std::uint32_t Grip::squeeze() {
@@ -189,17 +191,20 @@ std::uint32_t Grip::squeeze() {
   }
   const double from_N = is_blind_ ? settings_.start_N : settings_.touch_N;
   const double risen_N = from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
-  const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
-                                      : aim(risen_N, GripReach::Haste::patient);
+  const std::uint32_t trouble =
+      fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
+            : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
   // Or as near to it as a move brings it.
   const bool nearest = !fixed && felt_.fingers > 0 && reach_.has_come(now_s_, felt_.t_s);
   const bool there = (felt_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, felt_.t_s);
-  // A step further than its least moves bring it, where that is far too little.
-  if (nearest && (capped || there) && felt_.low_N < SQUEEZED * aimed_N &&
-      reach_.may_go_round(felt_, settings_, now_s_)) {
-    reach_.go_round(now_s_);
+  // A step nearer than its least moves bring it: to a set force, or where it is far too weak.
+  const bool may_round = nearest && (capped || there);
+  if (may_round &&
+      (settings_.sets_force() ? reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)
+                              : felt_.low_N < SQUEEZED * aimed_N &&
+                                    reach_.goes_round_closer(felt_, settings_, now_s_))) {
     enter(GRIP_APPROACH);
     return trouble;
   }
@@ -220,8 +225,9 @@ std::uint32_t Grip::squeeze() {
 
 std::uint32_t Grip::make_ready() {
   const bool fixed = settings_.mode == GRIP_MODE_FIXED;
-  const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
-                                      : aim(start_force(), GripReach::Haste::patient);
+  const std::uint32_t trouble =
+      fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
+            : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
   if (now_s_ - since_s_ >= READY_s && fingers_[0].has_zero() && fingers_[1].has_zero()) {
     for (GripFinger &finger : fingers_) {
       finger.end_zero();
@@ -239,9 +245,19 @@ std::uint32_t Grip::hold() {
   const double wanted_N =
       hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
-  const std::uint32_t trouble =
-      (felt_.tells_load ? 0u : GRIP_NO_LOAD) |
-      aim(wanted_N, hold_.goes_on() ? GripReach::Haste::slides : GripReach::Haste::usual);
+  std::uint32_t trouble = felt_.tells_load ? 0u : GRIP_NO_LOAD;
+  // The rubber has relaxed, and a step brings it nearer to a force that is only held. Without a
+  // load it may have been lifted.
+  const bool only_held = hold_.is_set() && felt_.tells_load && now_s_ - since_s_ > ONLY_HELD_s;
+  if (!only_held) {
+    reach_.leave_round();
+  }
+  if (reach_.goes_round()) {
+    reach_.comes_round(now_s_, felt_.t_s);
+  } else if (!only_held || !reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)) {
+    trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual,
+                    hold_.is_set()});
+  }
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : GRIP_HOLDING);
   }

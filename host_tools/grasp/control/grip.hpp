@@ -102,7 +102,7 @@ private:
   std::uint32_t squeeze();
   std::uint32_t make_ready();
   std::uint32_t hold();
-  std::uint32_t aim(double wanted_N, GripReach::Haste haste);
+  std::uint32_t aim(const GripAim &aim);
   void ramp(double to_mm, double speed_mm_s);
   double dead_s() const;
   double start_force() const;

@@ -12,7 +12,7 @@ constexpr double LOAD_NOISE_N = 0.06;
 // A load that rises above its latest peak counts as it is, with its rate. Below that it swings on
 // the rubber, or has begun to slide, and its mean counts.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
-constexpr double AHEAD_N = 3.0;     // a rate is believed to add that much, or as much again
+constexpr double AHEAD_N = 2.5, AHEAD = 0.8; // a rate is believed to add that much, or such a share
 constexpr double REMEMBERS_s = 1.0; // what a load has been it may be again
 constexpr double SWINGS_s = 0.25;   // what was caught swings for so long
 constexpr double HELD_s = 0.015;    // a ratio that held, the mean of so long
@@ -62,7 +62,7 @@ void GripLoad::rests(double load_N, double passed_s, bool swings) {
 }
 
 double GripLoad::ahead_N(double seconds) const {
-  return load_N_ + std::min(rate_N_s_ * seconds, std::max(load_N_, AHEAD_N));
+  return load_N_ + std::min(rate_N_s_ * seconds, std::max(AHEAD * load_N_, AHEAD_N));
 }
 
 bool GripLoad::is_steady() const {
@@ -155,6 +155,7 @@ double GripHold::wants(const GripFelts &felt, double coming_N, const GripSetting
     need = std::max(need, MORE * felt.grip_N);
   }
   need = std::min(need, settings.cap_N);
+  is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;
   if (felt.tells_load && !goes_on_) {
     // What was wanted and is not under way is no longer wanted: a load that was expected has not
     // come. What is there decays slowly.

@@ -44,6 +44,7 @@ public:
   double wants(const GripFelts &felt, double coming_N, const GripSettings &settings, double now_s,
                double dead_s);
   double friction(const GripSettings &settings) const { return friction_.value(settings.friction); }
+  bool is_set() const { return is_set_; } // nothing pulls at a set force
   double load_N() const { return load_.now_N(); }
   bool is_loaded() const { return load_.now_N() > LOADED_N; } // enough to speak of a margin
   bool is_sliding() const { return sliding_; }
@@ -69,7 +70,8 @@ private:
   double ratio_ = 0.0;    // smoothed, of what rests
   double lately_ = 0.0;   // the largest within LATELY_s
   double moved_mm_ = 0.0; // of what is reported as one slide
-  bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false;
+  bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false,
+       is_set_ = false;
   std::uint32_t slides_ = 0;
 };
 

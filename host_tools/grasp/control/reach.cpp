@@ -29,6 +29,10 @@ constexpr double NEAR = 0.03;             // of the wanted force: near enough
 constexpr double WEAK = 0.8;              // and too weak, where the cap leaves no room
 constexpr double SHORT_mm = 0.5;          // a short move
 constexpr double OPENS_mm = 0.3;           // at once
+// A set force may be off by so many steps: by more than half of one, or it goes to and fro. Going
+// round it keeps so much of it, and does so no more often in a grasp.
+constexpr double OFF = 0.65, KEEPS = 0.25;
+constexpr int ROUNDS = 4;
 // Of a fingertip's force, below the cap. UNCERTAIN contacts report far more than the force is off;
 // chosen with cylinders of fingertip_grasp_trials, seed 1.
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
@@ -185,6 +189,7 @@ bool GripReach::rests(double now_s, double frame_s) const {
 void GripReach::first_touch(double t_s) {
   rubber_.begin(width_at(t_s));
   bound_ = GripBound();
+  rounds_ = 0;
 }
 
 // Where it is going to be. Where it stands, it makes no move that is shorter than its deadband.
@@ -231,19 +236,54 @@ double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSett
   return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
 }
 
-bool GripReach::may_go_round(const GripFelts &felt, const GripSettings &settings,
-                             double now_s) const {
-  const double room_mm =
-      coming_mm(now_s) - bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
-  return !limits_itself(settings) && least_mm() > traits_.step_mm && !felt.is_alone() &&
-         !felt.over && room_mm > traits_.step_mm;
+double GripReach::steps_off(double wanted_N, double force_N, double from_mm,
+                            double coming_mm) const {
+  return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
 }
 
-void GripReach::go_round(double now_s) {
+bool GripReach::may_go_round(const GripFelts &felt) const {
+  return least_mm() > traits_.step_mm && !felt.is_alone() && !felt.over;
+}
+
+double GripReach::room_mm(const GripFelts &felt, const GripSettings &settings,
+                          double coming_mm) const {
+  return coming_mm - bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
+}
+
+void GripReach::go_round(double to_mm, double now_s) {
+  const double coming = coming_mm(now_s);
   goes_round_ = true;
-  round_mm_ = coming_mm(now_s) - traits_.step_mm;
-  target_mm_ = coming_mm(now_s) + least_mm();
+  round_mm_ = to_mm;
+  target_mm_ = std::max(coming, to_mm) + least_mm();
   aimed_s_ = now_s;
+}
+
+bool GripReach::goes_round_closer(const GripFelts &felt, const GripSettings &settings,
+                                  double now_s) {
+  const double coming = coming_mm(now_s);
+  const bool goes = !limits_itself(settings) && may_go_round(felt) &&
+                    room_mm(felt, settings, coming) > traits_.step_mm;
+  goes ? go_round(coming - traits_.step_mm, now_s) : void();
+  return goes;
+}
+
+bool GripReach::goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings,
+                              double now_s) {
+  if (!may_go_round(felt) || rounds_ >= ROUNDS || !rests(now_s, felt.t_s)) {
+    return false;
+  }
+  const double coming = coming_mm(now_s), width_mm = width_at(felt.t_s);
+  const double off = steps_off(set_N, felt.low_N, width_mm, coming);
+  const double to_mm = coming - std::copysign(traits_.step_mm, off);
+  const double widest_mm = std::max(coming, to_mm) + least_mm();
+  const bool has_room = off < 0.0 || room_mm(felt, settings, coming) > traits_.step_mm;
+  if (std::abs(off) < OFF || !has_room ||
+      rubber_.force_at(widest_mm, felt.low_N, width_mm) < KEEPS * set_N) {
+    return false;
+  }
+  rounds_++;
+  go_round(to_mm, now_s);
+  return true;
 }
 
 bool GripReach::comes_round(double now_s, double frame_s) {
@@ -258,8 +298,23 @@ bool GripReach::comes_round(double now_s, double frame_s) {
   return !goes_round_;
 }
 
-std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt,
-                         const GripSettings &settings, double now_s) {
+// Whole steps to the position whose force is nearest. Less than the least move is left to going
+// round, or where that is not possible to the least move.
+double GripReach::nearest_steps(double off, double least_mm, bool may_round) const {
+  const double least = std::round(least_mm / traits_.step_mm);
+  const double steps = std::abs(off) > OFF ? std::round(off) : 0.0;
+  if (std::abs(steps) >= least) {
+    return steps;
+  }
+  const bool worth = std::abs(off) > 0.5 * least + OFF - 0.5;
+  return worth && !(may_round && rounds_ < ROUNDS) ? std::copysign(least, off) : 0.0;
+}
+
+std::uint32_t GripReach::aim(const GripAim &aim, const GripFelts &felt,
+                             const GripSettings &settings, double now_s) {
+  const double wanted_N = aim.wanted_N;
+  const Haste haste = aim.haste;
+  const bool nearest = aim.nearest;
   std::uint32_t trouble = 0;
   if (felt.fingers == 0 || !knows(felt.t_s)) {
     return trouble;
@@ -284,7 +339,7 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
   if (!(limits_itself(settings) ? haste != Haste::patient || come : rested)) {
     return trouble;
   }
-  const double low_N = haste == Haste::patient ? felt.low_N : felt.grip_N;
+  const double low_N = nearest || haste == Haste::patient ? felt.low_N : felt.grip_N;
   const auto low_at = [&](double to_mm) { return rubber_.force_at(to_mm, low_N, width_mm); };
   const double now_N = low_at(coming), step_mm = traits_.step_mm;
   const bool standing = std::abs(coming - status_.width_mm) < 1e-6;
@@ -297,14 +352,18 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
   // where what slides slows down already.
   const bool waits = !come && (target_mm_ > width_mm || felt.slides);
   const double misses_N = exact ? near_N : std::max(near_N, (waits ? 1.0 : MISSES) * closes_N);
+  const auto off = [&](double force_N) { return steps_off(force_N, low_N, width_mm, coming); };
+  const bool may_round = felt.tells_load || haste == Haste::patient;
+  const double near_steps =
+      std::abs(now_N - wanted_N) > near_N ? nearest_steps(off(wanted_N), least, may_round) : 0.0;
+  const bool closes = nearest ? near_steps > 0.0 : now_N < wanted_N - misses_N;
   double to_mm = coming;
-  if (now_N < wanted_N - misses_N) {
-    const double enough_mm = rubber_.width_for(wanted_N - misses_N, low_N, width_mm);
-    double way_mm = step_mm * std::ceil((coming - enough_mm) / step_mm - 1e-6);
+  if (closes) {
+    double way_mm = step_mm * (nearest ? near_steps : std::ceil(off(wanted_N - misses_N) - 1e-6));
     way_mm = haste == Haste::patient ? std::min(way_mm, step_mm * std::floor(SHORT_mm / step_mm))
                                      : way_mm;
     way_mm = std::max(way_mm, least);
-    const double room_mm = coming - bound_.width_below(settings.cap_N, most_N(felt), width_mm);
+    const double room_mm = this->room_mm(felt, settings, coming);
     if (way_mm > room_mm) {
       // What is held too weakly gets a short move all the same, if the gripper's own limit keeps it
       // below the cap.
@@ -317,10 +376,10 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
     }
     to_mm = way_mm >= least - 1e-9 ? coming - way_mm : coming;
   } else if (haste != Haste::patient && come && now_N - wanted_N > near_N) {
-    const double enough_mm = rubber_.width_for(wanted_N + near_N, low_N, width_mm);
-    double way_mm = std::min(step_mm * std::floor((enough_mm - coming) / step_mm + 1e-6),
+    double way_mm = std::min(step_mm * std::floor(1e-6 - off(wanted_N + near_N)),
                              std::max(step_mm * std::floor(OPENS_mm / step_mm), least));
     way_mm = low_at(coming + least) >= wanted_N ? std::max(way_mm, least) : way_mm;
+    way_mm = nearest ? -step_mm * near_steps : way_mm;
     to_mm = way_mm >= least - 1e-9 ? coming + way_mm : coming;
   }
   if (to_mm != coming) {

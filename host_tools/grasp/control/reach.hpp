@@ -57,8 +57,21 @@ private:
   double pair_N_ = 0.0, pair_mm_ = 0.0; // 0: none
 };
 
+// What a gripper is to reach.
+struct GripAim {
+  enum class Haste {
+    patient, // closes only, by short moves, each after the last one shows
+    usual,
+    slides, // at once
+  };
+  double wanted_N; // of a fingertip
+  Haste haste;
+  bool nearest = false; // as near to it as moves come: a set force. Else enough of it
+};
+
 class GripReach {
 public:
+  using Haste = GripAim::Haste;
   // Of the cap: the gripper's own limit.
   static constexpr double LIMIT = 0.97;
 
@@ -100,26 +113,30 @@ public:
   double allowed(double width_mm, const GripFelts &felt, const GripSettings &settings,
                  std::uint32_t &trouble) const;
 
-  enum class Haste {
-    patient, // closes only, by short moves, each after the last one shows
-    usual,
-    slides,  // at once
-  };
   // Sends it to where the force is what is wanted. Troubles: which cap keeps it from that.
-  std::uint32_t aim(double wanted_N, Haste haste, const GripFelts &felt,
-                    const GripSettings &settings, double now_s);
+  std::uint32_t aim(const GripAim &aim, const GripFelts &felt, const GripSettings &settings,
+                    double now_s);
 
   // Going round: a gripper whose least move is several steps gets one step further by two moves,
-  // back by the least one and then on by that and a step. Only before anything is lifted.
-  // may_go_round: only the fingertips keep the cap, and it has room for the step.
-  bool may_go_round(const GripFelts &felt, const GripSettings &settings, double now_s) const;
-  void go_round(double now_s);
+  // back and on again. Only while nothing pulls. True: it does.
+  // Closer, where only the fingertips keep the cap, and it has room for the step.
+  bool goes_round_closer(const GripFelts &felt, const GripSettings &settings, double now_s);
+  // Either way, where that is nearer to this force. On the way it keeps some of it.
+  bool goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings,
+                     double now_s);
   bool goes_round() const { return goes_round_; }
+  void leave_round() { goes_round_ = false; }
   // Goes on with it; true once it stands there.
   bool comes_round(double now_s, double frame_s);
 
 private:
   double coming_mm(double now_s) const;
+  // Steps to this force, more are closing; force_N is that of from_mm.
+  double steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const;
+  bool may_go_round(const GripFelts &felt) const;
+  void go_round(double to_mm, double now_s);
+  double room_mm(const GripFelts &felt, const GripSettings &settings, double coming_mm) const;
+  double nearest_steps(double off, double least_mm, bool may_round) const;
   // Its own limit of force can be set to the cap.
   bool limits_itself(const GripSettings &settings) const;
 
@@ -134,6 +151,7 @@ private:
   double stood_s_ = 0.0; // of the first answer that it stands, since it last moved
   bool goes_round_ = false;
   double round_mm_ = 0.0; // where to
+  int rounds_ = 0;
   struct Width {
     double t_s, width_mm;
   };

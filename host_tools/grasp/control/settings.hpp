@@ -41,6 +41,9 @@ struct GripSettings {
   double slid = 1.05;    // and so much of that since it has slid: it will again
   double decay_1_s = 5.0; // decay of a grip that is too large, share of it a second
   double rest_s = 0.3;    // no sooner after a slide
+  // The same grip at the start, later and without a load: a set force. As long as nothing pulls,
+  // the nearest that the gripper reaches is held, and not the least that is enough.
+  bool sets_force() const { return start_N == floor_N && start_N == blind_N; }
 };
 
 GripSettings default_settings(const GripperTraits &traits);

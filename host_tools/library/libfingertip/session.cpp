@@ -65,7 +65,11 @@ void Session::take(const wire_packet &packet) {
     auto attempt = static_cast<std::uint16_t>(ack.sequence - awaited_first_sequence_);
     auto attempts = static_cast<std::uint16_t>(sequence_ - awaited_first_sequence_);
     if (awaited_command_ && ack.command == awaited_command_ && attempt < attempts) {
-      ack_ = ack;
+      if (attempt > 0 && ack.result == WIRE_RESULT_NOT_NOW) {
+        repeat_refused_ = true;
+      } else {
+        ack_ = ack;
+      }
     }
   } else if (awaited_answer_ && packet.type == awaited_answer_ && ack_) {
     answer_ = packet;
@@ -98,7 +102,12 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
   awaited_first_sequence_ = sequence_;
   ack_.reset();
   answer_.reset();
+  repeat_refused_ = false;
   std::uint64_t version_errors = statistics().version_errors;
+  const auto refused = [&](std::uint8_t result) {
+    return Error(refusal_code(result),
+                 "the fingertip refused \"" + name + "\": " + result_text(result));
+  };
   for (int attempt = 0; attempt < policy.attempts; attempt++) {
     send(command);
     if (attempt > 0) {
@@ -115,8 +124,7 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
         throw Gone(transport_.description() + ": vanished before it answered \"" + name + "\"");
       }
       if (ack_ && ack_->result != WIRE_RESULT_DONE) {
-        throw Error(refusal_code(ack_->result),
-                    "the fingertip refused \"" + name + "\": " + result_text(ack_->result));
+        throw refused(ack_->result);
       }
       if (ack_ && (answer_ || answer_type == 0)) {
         awaited_command_ = 0;
@@ -130,6 +138,9 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
                                                 std::to_string(decoder_.other_version()) +
                                                 ", not " + std::to_string(WIRE_VERSION));
     }
+  }
+  if (repeat_refused_) {
+    throw refused(WIRE_RESULT_NOT_NOW);
   }
   throw Error(ErrorCode::no_answer, transport_.description() + ": no answer to \"" + name + "\"");
 }

@@ -97,6 +97,7 @@ private:
   std::uint8_t awaited_answer_ = 0;
   std::uint16_t awaited_first_sequence_ = 0;
   std::optional<wire_ack> ack_;
+  bool repeat_refused_ = false; // not possible now: the attempt before may be under way
   std::optional<wire_packet> answer_;
 };
 

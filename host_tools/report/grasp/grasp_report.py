@@ -33,7 +33,7 @@ of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or mo
 0.5 s, by what the fingertips say. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
 FIRM = """Set forces of 8 N and more. The oracle knows the true force, how it follows the width and how the rubber is going to relax. Of the positions that
 the gripper can reach it takes the one whose mean squared error over the rest of the hold is least, and it moves no more often than ours may. It plans no
-second move, so it shows what is possible, and is no least bound. Ours, by the same rule as in a lift, prefers too much to too little."""
+second move, so it shows what is possible, and is no least bound. Ours does not know how the rubber is going to relax."""
 PARTS = {"by_object": "By object", "by_friction": "By friction", "by_mass": "By mass", "by_disturbance": "By disturbance"}
 
 

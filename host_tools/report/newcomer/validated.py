@@ -131,11 +131,11 @@ def text(found):
             f"`validate_gain_sd_honest`: {WITHIN_1[0]} to {WITHIN_1[1]} % of the gains' errors are within one standard deviation, and {WITHIN_2[0]} % or more "
             "within two. `validate_finds`: of the seven faults, those that the card finds on every pad that has them, with the right sensors. "
             "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.", "",
-            f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ in their gains alone, and of as many with all the errors of real pads, each "
-            "calibrated and with its profile. On the first `validate_pull_off_percent` is how far the pull found is from that of the thread, and "
-            "`validate_pull_location_off_mm` how far the way of the location is from the ball's own, which is `validate_pull_way_mm`; medians. On the second "
-            "the firmware does not estimate each: `validate_pull_like_real_estimated_percent` of the pulls are estimated. A pulley's friction is "
-            "left out.", ""]
+            f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ only in their gains, and of as many with all the errors of real pads. Each is "
+            "calibrated and knows its profile. On the first, `validate_pull_off_percent` says how far the pull that the card finds differs from the thread's. "
+            "`validate_pull_location_off_mm` says how far the movement of the location differs from that of the ball, which is `validate_pull_way_mm`. Both are "
+            "medians. On the second, the firmware does not estimate every pull, but `validate_pull_like_real_estimated_percent` of them. The pulley has no "
+            "friction here.", ""]
 
 
 def table(build):

@@ -60,7 +60,7 @@ def long_table(rows):
 
 def short_table(rows):
     straight, pulled = rows[CALIBRATED, STRAIGHT], rows[CALIBRATED, PULLED]
-    return table(["off by, simulated", "never calibrated", "calibrated", "and pulled", "scene `grasp`"], [
+    return table(["off by, simulated", "`slip`, never calibrated", "`slip`, calibrated", "`slip`, and pulled", "`grasp`, and pulled"], [
         ["location", mm(rows[RAW, STRAIGHT]["location_without_p50_mm"]), *(mm(row["location_without_p50_mm"]) for row in (straight, pulled)), mm(pulled["location_p50_mm"])],
         ["force", percent(rows[RAW, STRAIGHT]["force_without_p50_percent"]), *(percent(row["force_without_p50_percent"]) for row in (straight, pulled)),
          percent(pulled["force_p50_percent"])],

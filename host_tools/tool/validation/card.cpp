@@ -372,10 +372,11 @@ private:
              "it. A press is read from half a second to a second after it stood.</p>\n"
              "<p>" +
              std::string(card_.measured.pulls_asked > 0
-                             ? "A pull is the change from the rest before it. The moment of the "
-                               "thread is taken out of the location. The weight itself moves by "
-                               "some tenths of a millimetre as the rubber shears: that is left in, "
-                               "and in the twin's. A pulley with friction pulls less than hangs on "
+                             ? "A pull is the change from the rest before it. The thread pulls "
+                               "above the rubber, and the card corrects the location for that. The "
+                               "weight itself moves by some tenths of a millimetre as the rubber "
+                               "shears. The card does not correct for this, here or in the twin's "
+                               "figures. A pulley with friction pulls less than the mass on "
                                "it.</p>\n<p>Not measured here: other forces, other objects, "
                                "temperature."
                              : "Not measured here: other forces, other objects, pulls, "

@@ -4,8 +4,8 @@
  * The pull that is found is the change from the rest before it, over the force that the fingertip
  * reports then. The pull of the thread is its weight over the weight that stands, if the pulley has
  * no friction. A thread h above the rubber tilts the weight by its moment, so the contact's centre
- * moves by h times the pull's share of the force: that is taken out of the location. The object's
- * own way, some tenths of a millimetre by which the rubber shears, is left in.
+ * moves by h times the pull's share of the force: the card corrects the location for that. It does
+ * not correct for some tenths of a millimetre by which the object itself moves as the rubber shears.
  */
 #pragma once
 

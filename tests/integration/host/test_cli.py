@@ -76,6 +76,7 @@ class Usage(CliTest):
                 self.assertLessEqual(len(line), 80, (command, line))
             words = page.split()
             self.assertIn("Usage:", words)
+            self.assertNotRegex(page, r"FLOAT|INT|TEXT| in \[", command)  # the library's own words
         self.assertIn("slip_window=MS (5 to 1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none", " ".join(pages["set"].split()))
 
     def test_the_help_of_grasp_knows_what_its_errors_know(self):

@@ -112,11 +112,15 @@ class Usage(SimulateTest):
     def test_help_fits_into_80_columns(self):
         page = self.run_simulate("--help", status=0)[0]
         self.assertIn("Usage: fingertip simulate", page)
+        self.assertNotRegex(page, r"FLOAT|INT|TEXT| in \[")
+        self.assertIn("--mass KG Its mass (0.001 to 10 kg; default 0.3; only with --lift; not with --kind)", " ".join(page.split()))
         self.assertLessEqual(max(map(len, page.splitlines())), 80)
 
     def test_wrong_usage(self):
         for options, problem in ((["--bogus"], '"--bogus" is no option of it'), (["--lift", "--press"], "--press excludes --lift"),
-                                 (["--mass", "1"], "--mass requires --lift"), (["--fingertips", "3"], "--fingertips: Value 3 not in range 1 to 2")):
+                                 (["--mass", "1"], "--mass requires --lift"), (["--fingertips", "3"], '--fingertips takes 1 to 2, not "3"'),
+                                 (["--lift", "--mass", "x"], '--mass takes 0.001 to 10 kg, not "x"'), (["--lift", "--crushes", "0"], '--crushes takes 0.1 to 1000000 newtons, not "0"'),
+                                 (["--lift", "--gripper", "hand"], '--gripper takes 2f85, 2f140, hande or sts3215, not "hand"')):
             self.assertEqual(self.run_simulate(*options, status=2), ("", f"fingertip: {problem}; see fingertip simulate --help\n"))
 
 

@@ -16,6 +16,7 @@ import {
 import { Bench } from '../../../host_tools/web/src/model/bench';
 import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
 import { FLAGS, WARNING_FLAGS } from '../../../host_tools/web/src/model/flags';
+import { PATIENCE } from '../../../host_tools/web/src/model/patience';
 import { History } from '../../../host_tools/web/src/model/history';
 import { commandsFor } from '../../../host_tools/web/src/steps/settings';
 import { core } from './library';
@@ -44,6 +45,12 @@ class SpokenLine implements Line {
   /** Version of the protocol that it speaks. */
   version: number = WIRE_VERSION;
   silent = false;
+  /** Answers only once it has heard so many commands more, and then the first of them. */
+  hears = 1;
+  /** Says meanwhile that the repeats are not possible now. */
+  refuses_repeats = false;
+  /** So many of the packets that follow an acknowledgement do not arrive. */
+  loses = 0;
   device_us = 5_000_000;
   sequence = 0;
   receive: (bytes: Uint8Array, at_ms: number) => void = () => undefined;
@@ -92,30 +99,45 @@ class SpokenLine implements Line {
     if (command === PacketType.CMD_STREAM) {
       this.streams = packet[12]!;
     }
+    if (--this.hears > 0) {
+      if (this.refuses_repeats && this.first) {
+        queueMicrotask(() => this.acknowledge(command, view, Result.NOT_NOW));
+      }
+      this.first ??= () => this.answer(command, view);
+      return Promise.resolve();
+    }
+    queueMicrotask(this.first ?? (() => this.answer(command, view)));
+    this.first = null;
+    return Promise.resolve();
+  }
+
+  private first: (() => void) | null = null;
+
+  private acknowledge(command: number, view: DataView, result: number): void {
+    this.say({
+      type: PacketType.ACK,
+      command,
+      result,
+      command_sequence: view.getUint16(2, true),
+      host_time_us: Number(view.getBigUint64(4, true)),
+    });
+  }
+
+  private answer(command: number, view: DataView): void {
     const asks: Record<number, string> = {
       [PacketType.CMD_INFO]: 'info_grasp',
       [PacketType.CMD_HEALTH]: 'health',
       [PacketType.CMD_CRASH]: 'crash',
     };
     const name = asks[command];
-    const result = name ? Result.DONE : this.result;
-    queueMicrotask(() => {
-      this.say({
-        type: PacketType.ACK,
-        command,
-        result,
-        command_sequence: view.getUint16(2, true),
-        host_time_us: Number(view.getBigUint64(4, true)),
-      });
-      if (name) {
-        const decoder = core.newDecoder();
-        decoder.feed(Uint8Array.of(0), () => undefined);
-        decoder.feed(vector(name).frame, (answer: DevicePacket) =>
-          this.say({ ...answer, t_us: this.device_us, ...(this.serial && { serial: this.serial }) }),
-        );
-      }
-    });
-    return Promise.resolve();
+    this.acknowledge(command, view, name ? Result.DONE : this.result);
+    if (name && --this.loses < 0) {
+      const decoder = core.newDecoder();
+      decoder.feed(Uint8Array.of(0), () => undefined);
+      decoder.feed(vector(name).frame, (answer: DevicePacket) =>
+        this.say({ ...answer, t_us: this.device_us, ...(this.serial && { serial: this.serial }) }),
+      );
+    }
   }
 }
 
@@ -176,6 +198,27 @@ test('refusals and questions: what a command is answered', async () => {
   assert.equal(fingertip.crash?.stuck, 5);
   await fingertip.close();
   await assert.rejects(fingertip.tare(), /not connected/);
+});
+
+test('an answer to the first try is one, however late; a packet that was lost is asked for again', async () => {
+  const [fingertip, line] = await opened();
+  const usual = { ...PATIENCE };
+  try {
+    Object.assign(PATIENCE, { tries: 3, answer_ms: 1 });
+    line.hears = 3;
+    await fingertip.tare();
+    line.hears = 3;
+    line.refuses_repeats = true;
+    await fingertip.tare();
+    line.loses = 2;
+    assert.equal((await fingertip.askHealth()).type, PacketType.HEALTH);
+    assert.ok(line.loses < 0);
+    Object.assign(PATIENCE, { tries: 2 });
+    line.loses = 1e6;
+    await assert.rejects(fingertip.askHealth(), /no answer came; try again/);
+  } finally {
+    Object.assign(PATIENCE, usual);
+  }
 });
 
 test('the cable is pulled amid a command: it fails at once, with words; another line has it back', async () => {

@@ -143,6 +143,25 @@ static void a_long_contact_has_its_direction(void) {
   }
 }
 
+/* Partly beyond the sensors, where the Gaussian does not know it. */
+static void a_long_contact_is_where_its_line_has_the_middle(void) {
+  for (int i = 0; i < OBJECTS_MAX; i++) {
+    double at = 20.0 * ((i + 0.5) / OBJECTS_MAX - 0.5);
+    put(5.0 + 0.8 * at, -13.0 + 0.6 * at, 8.0 / OBJECTS_MAX);
+  }
+  const struct wire_contact contact = last_of_press();
+  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_UNCERTAIN,
+                   CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE, contact.flags);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, 5.0f, contact.x_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, -13.0f, contact.y_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm + app.shapes.middle.from_fit_x_mm, contact.x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.y_mm + app.shapes.middle.from_fit_y_mm, contact.y_mm);
+  TEST_ASSERT_TRUE(fabsf(app.shapes.middle.from_fit_x_mm) > 0.3f);
+  TEST_ASSERT_TRUE(contact.location_sd_mm > 0.1f);
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_UNCERTAIN, app.fit.flags);
+  TEST_ASSERT_TRUE(app.fit.location_sd_mm > 4.0f * contact.location_sd_mm);
+}
+
 static void one_contact_is_one_with_a_load_or_without(void) {
   for (int pulled = 0; pulled < 2; pulled++) {
     tearDown();
@@ -180,6 +199,27 @@ static void what_is_none_of_these_is_warned_of_all_the_time(void) {
     TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN,
                      contacts[i].flags);
   }
+}
+
+/* Frames that come fast keep what a search for an outlier found; slow ones have time for their own.
+ */
+static void a_search_for_an_outlier_is_of_fast_frames(void) {
+  put(1.5, -4.0, 5.0);
+  last_of_press();
+  app.fit_watch = (struct fit_watch){.usable = app.conditioned.usable,
+                                     .left_out = 1,
+                                     .frames = 9,
+                                     .residual_rms_Pa = app.fit.residual_rms_Pa,
+                                     .force_N = app.fit.force_N};
+  app.frame.t_us += 765;
+  app_process_frame(&app, app.frame.t_read_us);
+  TEST_ASSERT_EQUAL(8, app.fit_watch.frames);
+  TEST_ASSERT_EQUAL_HEX32(app.conditioned.usable & ~UINT32_C(1), app.fit.used);
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_MASKED, app.contact.flags);
+  app.frame.t_us += 3700;
+  app_process_frame(&app, app.frame.t_read_us);
+  TEST_ASSERT_EQUAL_HEX32(app.conditioned.usable, app.fit.used);
+  TEST_ASSERT_EQUAL(0, app.fit_watch.left_out);
 }
 
 /* Here each frame has time for all three parts. */
@@ -287,8 +327,10 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(two_contacts_have_their_places_and_forces);
   RUN_TEST(a_long_contact_has_its_direction);
+  RUN_TEST(a_long_contact_is_where_its_line_has_the_middle);
   RUN_TEST(one_contact_is_one_with_a_load_or_without);
   RUN_TEST(what_is_none_of_these_is_warned_of_all_the_time);
+  RUN_TEST(a_search_for_an_outlier_is_of_fast_frames);
   RUN_TEST(each_answer_says_how_old_it_is);
   RUN_TEST(a_contact_that_ends_is_forgotten);
   RUN_TEST(rubber_that_is_too_thin_has_no_shapes);

@@ -50,7 +50,7 @@ public:
     felt.high_N = high_N;
     felt.grip_N = low_N < 0.7 * high_N ? low_N : 0.5 * (low_N + high_N);
     felt.tells_load = true;
-    reach.aim(0.1, GripReach::Haste::patient, felt, settings, t_s);
+    reach.aim({0.1, GripAim::Haste::patient}, felt, settings, t_s);
   }
   void feel() { feel(pad_N(width_mm), pad_N(width_mm)); }
   // How far it may close now.
@@ -138,8 +138,8 @@ TEST(GripReach, NothingLessThanAStepIsAddedToAMoveThatCatchesASlide) {
     const double sent_mm = bench.reach.target_mm();
     const double comes_N = bench.reach.coming_N(bench.felt, bench.t_s);
     const double step_N = 0.5 * bench.reach.least_move_N(comes_N);
-    bench.reach.aim(comes_N + 0.6 * step_N, GripReach::Haste::usual, bench.felt, bench.settings,
-                    bench.t_s);
+    const double wanted_N = comes_N + 0.6 * step_N;
+    bench.reach.aim({wanted_N, GripAim::Haste::usual}, bench.felt, bench.settings, bench.t_s);
     EXPECT_EQ(bench.reach.target_mm() < sent_mm, !slides);
   }
 }

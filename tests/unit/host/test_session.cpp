@@ -91,6 +91,26 @@ TEST(Session, TakesALateAnswerToAnEarlierAttempt) {
   EXPECT_EQ(line.commands.size(), 2u);
 }
 
+TEST(Session, ARepeatThatIsRefusedWhileTheFirstIsObeyedIsNoRefusal) {
+  for (bool first_is_obeyed : {true, false}) {
+    FakeTransport line;
+    line.on_command = [&](const wire_packet &command) {
+      if (line.commands.size() > 1) {
+        line.say(test::make_ack(1, 5000, command.type, WIRE_RESULT_NOT_NOW, command.sequence,
+                                command.t_us));
+      }
+      if (line.commands.size() == 3 && first_is_obeyed) {
+        const wire_packet &first = line.commands[0];
+        line.say(test::make_ack(1, 5000, first.type, WIRE_RESULT_DONE, first.sequence, first.t_us));
+      }
+    };
+    Session session(line);
+    EXPECT_EQ(error_of([&] { session.command(command_keep(true), QUICK); }).find("refused"),
+              first_is_obeyed ? std::string::npos : 14);
+    EXPECT_EQ(line.commands.size(), 3u);
+  }
+}
+
 TEST(Session, AnswersToOthersDoNotCount) {
   FakeTransport line;
   line.on_command = [&](const wire_packet &command) {

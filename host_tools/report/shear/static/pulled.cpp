@@ -6,7 +6,6 @@
 
 extern "C" {
 #include "common/contact_flags.h"
-#include "contact/tangential.h"
 #include "ms58xx/ms58xx.h"
 }
 
@@ -127,6 +126,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   said.gaussian_x_mm = static_cast<double>(fit.x_mm);
   said.gaussian_y_mm = static_cast<double>(fit.y_mm);
   said.gaussian_force_N = known.force_scale.value_or(1.0) * static_cast<double>(fit.force_N);
+  said.load = load;
   said.valid = (result.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
   if (said.valid) {
     said.force_N = static_cast<double>(load.force_N);

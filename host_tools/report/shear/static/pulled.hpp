@@ -12,7 +12,7 @@
 
 extern "C" {
 #include "common/pad_profile.h"
-#include "fit/fit_tangential.h"
+#include "contact/tangential.h"
 }
 
 #include <filesystem>
@@ -72,6 +72,7 @@ struct Said {
   double x_mm, y_mm, location_sd_mm, force_N;
   double qx, qy, q_sd; // per normal force
   double gaussian_x_mm, gaussian_y_mm, gaussian_force_N;
+  tangential_load load; // as the packet has it, if valid
 };
 
 struct KnownPad {

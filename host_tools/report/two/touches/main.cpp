@@ -3,7 +3,8 @@
 // The twin's objects press on calibrated pads of 12 mm with a dip, and hold until the firmware's
 // fit_shapes answers, as scene grasp runs it. Two contacts are the sum of their pressures. One JSON
 // object on the standard output: the keys that are judged, and under "touches" the table behind
-// them. The constants of fit_shapes were chosen with the seeds 20000 and 30000.
+// them. The constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of
+// shapes_locate with 50000 and 60000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
@@ -12,8 +13,8 @@
 
 extern "C" {
 #include "common/contact_flags.h"
+#include "contact/shapes.h"
 #include "fit/fit_load.h"
-#include "fit/fit_shapes.h"
 }
 
 #include <algorithm>
@@ -70,8 +71,8 @@ struct Case {
 
 struct Judged {
   fit_shapes_result said;
-  // What the packet shows, and its standard deviation. Of two the worse place; of one contact the
-  // place that the load's estimate or the Gaussian has, for a pair from the middle of the forces.
+  // What the packet shows, and its standard deviation. Of two the worse place; of one contact its
+  // place (shapes_locate), for a pair from the middle of the forces.
   double off_mm, off_sd_mm;
   double force;     // relative error of the sum
   double angle_deg; // of a long contact or the line through two
@@ -93,12 +94,7 @@ double angle_deg(const fit_shapes_result &said, double angle_rad) {
   return DEGREES * std::abs(std::remainder(off, M_PI));
 }
 
-// Where the packet shows one contact.
-struct Shown {
-  float x_mm, y_mm, location_sd_mm;
-};
-
-Judged judge_touch(const fit_shapes_result &said, const Shown &shown,
+Judged judge_touch(const fit_shapes_result &said, const shapes_place &shown,
                    const std::vector<Touch> &touches) {
   Judged judged{};
   judged.said = said;
@@ -318,8 +314,9 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
   std::vector<Judged> judged(pads.size() * TOUCHES);
   twin::in_parallel(pads.size(), [&](std::size_t p) {
     Random random(options.seed, stream_of(c.name), p);
-    fit_shapes_pad shapes;
-    if (fit_shapes_init(&shapes, &array, &profile) != FT_OK) {
+    shapes_job shapes{};
+    shapes.array = &array;
+    if (fit_shapes_init(&shapes.pad, &array, &profile) != FT_OK) {
       throw std::runtime_error("the firmware refuses the pad's profile");
     }
     const Pad pad = c.exact ? perfect_pad() : pads[p].gains;
@@ -342,29 +339,31 @@ std::vector<Judged> run(const Case &c, const std::vector<DippedPad> &pads, const
       settings.own = own.empty() ? nullptr : own.data();
       settings.dip_share = static_cast<float>(pads[p].shape.dip_share);
       settings.dip_sd_mm = static_cast<float>(pads[p].shape.dip_sd_mm);
-      fit_shapes_state state{};
-      fit_shapes_result said{};
-      fit_result fit{};
+      auto &question = shapes.question;
+      question = {};
+      question.parts = FIT_SHAPES_PARTS;
+      question.settings = settings;
+      fit_result &fit = question.fit;
       fit_load doubt{};
       for (int frame = 0; frame < FIT_SHAPES_FRAMES; frame++) {
-        std::array<std::int32_t, SENSORS> readings{};
+        question.begins = frame == 0;
+        auto &readings = question.pressure_Pa_q10;
         for (std::size_t k = 0; k < SENSORS; k++) {
           const double reading_Pa = pad.gain[k] * base[k] + noise_Pa * random.normal();
           readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
         }
-        fit_gaussian_grid(&array, readings.data(), shear::ALL_SENSORS, &settings, &fit);
-        fit_shapes(&array, &shapes, readings.data(), &settings, &fit, &state, &said);
-        fit_load_follow(&doubt, &array, readings.data(), &settings, &fit);
+        fit_gaussian_grid(&array, readings, shear::ALL_SENSORS, &settings, &fit);
+        shapes_estimate(&shapes);
+        fit_load_follow(&doubt, &array, readings, &settings, &fit);
       }
       fit_load_widen(&doubt, &array, &settings, &fit);
-      Shown shown{fit.x_mm, fit.y_mm, fit.location_sd_mm};
       shear::Said loaded{};
-      if (load_estimate.feel(base, known, noise_Pa, shear::ALL_SENSORS, of_load, loaded) &&
-          loaded.valid) {
-        shown = {static_cast<float>(loaded.x_mm), static_cast<float>(loaded.y_mm),
-                 static_cast<float>(loaded.location_sd_mm)};
-      }
-      Judged &found = judged[p * TOUCHES + t] = judge_touch(said, shown, touches);
+      const bool has_load =
+          load_estimate.feel(base, known, noise_Pa, shear::ALL_SENSORS, of_load, loaded) &&
+          loaded.valid;
+      const shapes_place shown =
+          shapes_locate(&shapes.report, &fit, has_load ? &loaded.load : nullptr);
+      Judged &found = judged[p * TOUCHES + t] = judge_touch(shapes.result, shown, touches);
       if (found.pair && t < BOUNDED) {
         Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
         found.bounds = bounds_of({array, profile, object, cast.dip_share}, touches,

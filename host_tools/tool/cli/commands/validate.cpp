@@ -64,14 +64,14 @@ void add_validate(CommandLine &line) {
           ->type_name("MM");
   CLI::Option *pull = command
                           ->add_option("--pull", options->pulling.weight_g,
-                                       "Mass that pulls the standing weight sideways, by a level "
-                                       "thread over a pulley, in the end: a third of --weight")
+                                       "Also measure pulls: mass on a level thread, over a "
+                                       "pulley, that pulls the weight; a third of --weight")
                           ->check(CLI::Range(10.0, 1000.0))
                           ->excludes(sheet)
                           ->type_name("GRAMS");
   CLI::Option *height = command
                             ->add_option("--thread-height", options->pulling.height_mm,
-                                         "Of that thread above the rubber")
+                                         "Height of that thread above the rubber")
                             ->check(CLI::Range(0.0, 10.0))
                             ->needs(pull)
                             ->capture_default_str()

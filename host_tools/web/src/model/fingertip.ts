@@ -22,6 +22,7 @@ import {
   type Raw,
 } from '../line/line_facts';
 import { History } from './history';
+import { PATIENCE } from './patience';
 
 /** opening: until its info came. live: it streams. silent: nothing for a while, though the line is
  * open. closed: by the page, or it left; `why` says so. */
@@ -44,10 +45,6 @@ export class OtherFingertip extends Error {}
  * and raw packets are overwritten by the next. */
 export type PacketTap = (packet: DevicePacket, frame: () => Uint8Array<ArrayBuffer>) => void;
 
-const ANSWER_ms = 1000;
-/** Of what is written to the flash first: within half a second, and a margin. */
-const STORED_ms = 3000;
-const TRIES = 3;
 const SILENT_ms = 1500;
 const CLOCK_EVERY_ms = 1000;
 /** Versions of the protocol that ever were. */
@@ -59,7 +56,6 @@ interface Waiting {
   sent_us: number;
   done: (ack: Ack) => void;
   failed: (error: Error) => void;
-  timer: ReturnType<typeof setTimeout>;
 }
 
 let fingertips_made = 0;
@@ -193,29 +189,20 @@ export class Fingertip {
     await line.close();
   }
 
-  /** Sends a command and waits for its acknowledgement; asks again where an answer is missing.
-   * Rejects with CommandError. */
-  async command(command: Command, tries = TRIES): Promise<Ack> {
+  /** Sends a command and waits for its acknowledgement; sends it again where none comes. Rejects with
+   * CommandError where it is refused, with Error where nothing answers. */
+  async command(command: Command, tries = PATIENCE.tries): Promise<Ack> {
     if (this.is_replay) {
       throw new CommandError('this is a replay: it takes no commands', null);
     }
-    for (;;) {
-      tries--;
-      try {
-        const ack = await this.exchange(command);
-        if (ack.result !== Result.DONE) {
-          throw new CommandError(
-            `${core.commandName(command.type)}: ${core.resultText(ack.result)}`,
-            ack.result,
-          );
-        }
-        return ack;
-      } catch (error) {
-        if (error instanceof CommandError || tries <= 0) {
-          throw error;
-        }
-      }
+    const ack = await this.exchange(command, tries);
+    if (ack.result !== Result.DONE) {
+      throw new CommandError(
+        `${core.commandName(command.type)}: ${core.resultText(ack.result)}`,
+        ack.result,
+      );
     }
+    return ack;
   }
 
   /** Streams, of those that this firmware has. */
@@ -260,16 +247,19 @@ export class Fingertip {
     const queue = this.awaited.get(answer) ?? [];
     this.awaited.set(answer, [...queue, take]);
     try {
-      await this.command({ type: command });
-      return await Promise.race([
-        came,
-        new Promise<never>((_, failed) =>
-          setTimeout(
-            () => failed(new CommandError(`${core.commandName(command)}: no answer came`, null)),
-            ANSWER_ms,
-          ),
-        ),
-      ]);
+      for (let tries = PATIENCE.tries; tries > 0; tries--) {
+        await this.command({ type: command });
+        let timer;
+        const late = new Promise<null>((done) => {
+          timer = setTimeout(() => done(null), PATIENCE.answer_ms);
+        });
+        const packet = await Promise.race([came, late]);
+        clearTimeout(timer);
+        if (packet) {
+          return packet;
+        }
+      }
+      throw new CommandError(`${core.commandName(command)}: no answer came; try again`, null);
     } finally {
       this.awaited.set(
         answer,
@@ -310,58 +300,81 @@ export class Fingertip {
   /** 0: whatever is there does not speak any version of the protocol. */
   private async otherVersion(): Promise<number> {
     for (let version = OLDEST_VERSION; version < WIRE_VERSION + 3; version++) {
-      if (this.decoder.other_version !== 0 || this.state === 'closed') {
-        break;
-      }
       if (version !== WIRE_VERSION) {
         await this.line.send(core.infoFrameOfVersion(version));
-        await new Promise((done) => setTimeout(done, 100));
       }
+    }
+    const until_ms = performance.now() + PATIENCE.version_ms;
+    while (
+      this.decoder.other_version === 0 &&
+      (this.state as FingertipState) !== 'closed' &&
+      performance.now() < until_ms
+    ) {
+      await new Promise((done) => setTimeout(done, 20));
     }
     return this.decoder.other_version;
   }
 
-  private exchange(command: Command): Promise<Ack> {
+  private exchange(command: Command, tries: number): Promise<Ack> {
     if (this.state === 'closed') {
       return Promise.reject(new CommandError('the fingertip is not connected', null));
     }
-    const sequence = this.sequence++ & 0xffff;
-    const sent_us = Math.round(performance.now() * 1000);
-    const bytes = core.encode({ ...command, sequence, t_us: sent_us });
     const is_stored =
       (command.type >= PacketType.CMD_CALIBRATE && command.type <= PacketType.CMD_KEEP) ||
       command.type === PacketType.CMD_PAD ||
       command.type === PacketType.CMD_ERASE_PAD;
     return new Promise((done, failed) => {
-      const name = core.commandName(command.type);
-      const waiting: Waiting = {
-        command: command.type,
-        sequence,
-        sent_us,
-        done,
-        failed,
-        timer: setTimeout(
-          () => {
-            this.forget(waiting);
-            failed(
-              new Error(
-                `${name}: the fingertip does not answer; unplug it and plug it in again`,
-              ),
-            );
-          },
-          is_stored ? STORED_ms : ANSWER_ms,
-        ),
+      const sent: Waiting[] = [];
+      let refused: Ack | null = null;
+      let timer: ReturnType<typeof setTimeout>;
+      const end = (): void => {
+        clearTimeout(timer);
+        sent.forEach((each) => this.forget(each));
       };
-      this.waiting.push(waiting);
-      this.line.send(bytes).catch((error: unknown) => {
-        this.forget(waiting);
-        failed(error instanceof Error ? error : new Error(String(error)));
-      });
+      const fail = (error: Error): void => {
+        end();
+        failed(error);
+      };
+      const send = (): void => {
+        if (sent.length >= tries && refused) {
+          end();
+          done(refused);
+          return;
+        }
+        if (sent.length >= tries) {
+          const name = core.commandName(command.type);
+          fail(new Error(`${name}: the fingertip does not answer; unplug it and plug it in again`));
+          return;
+        }
+        const sequence = this.sequence++ & 0xffff;
+        const sent_us = Math.round(performance.now() * 1000);
+        const waiting: Waiting = {
+          command: command.type,
+          sequence,
+          sent_us,
+          done: (ack) => {
+            // Not possible now: the try before may be under way.
+            if (ack.result === Result.NOT_NOW && waiting !== sent[0]) {
+              refused = ack;
+              return;
+            }
+            end();
+            done(ack);
+          },
+          failed: fail,
+        };
+        sent.push(waiting);
+        this.waiting.push(waiting);
+        timer = setTimeout(send, is_stored ? PATIENCE.stored_ms : PATIENCE.answer_ms);
+        this.line
+          .send(core.encode({ ...command, sequence, t_us: sent_us }))
+          .catch((error: unknown) => fail(error instanceof Error ? error : new Error(String(error))));
+      };
+      send();
     });
   }
 
   private forget(waiting: Waiting): void {
-    clearTimeout(waiting.timer);
     const at = this.waiting.indexOf(waiting);
     if (at >= 0) {
       this.waiting.splice(at, 1);
@@ -427,7 +440,6 @@ export class Fingertip {
       (each) => each.command === ack.command && each.sequence === ack.command_sequence,
     );
     if (waiting && waiting.sent_us === ack.host_time_us) {
-      this.forget(waiting);
       this.clock.add({
         sent_us: waiting.sent_us,
         received_us: this.heard_ms * 1000,
@@ -457,7 +469,6 @@ export class Fingertip {
     this.state = 'closed';
     this.why = why;
     for (const waiting of [...this.waiting]) {
-      this.forget(waiting);
       waiting.failed(new CommandError(why, null));
     }
     this.changed();

@@ -4,12 +4,11 @@
  */
 import { Capability, PacketType, Stored, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
+import { PATIENCE } from '../model/patience';
 import { loadJudges, type GainResult, type GainSession, type Judges, type PullSession } from '../judges/judges';
 import { Dialog, field, make, makeButton } from './dialog';
 
 const GRAVITY_m_s2 = 9.80665;
-/** Without a frame. */
-const PATIENCE_ms = 5000;
 
 /** null: unknown. Throws Error, a sentence. */
 function forceOf(grams: string): number | null {
@@ -78,7 +77,7 @@ function follow(
           done(false);
         } else if (fingertip.state === 'closed') {
           throw new Error('it vanished; nothing was written, plug it in and try again');
-        } else if (performance.now() - last_ms > PATIENCE_ms) {
+        } else if (performance.now() - last_ms > PATIENCE.frame_ms) {
           throw new Error('it sends no frames; see "Doctor"');
         } else if (!show()) {
           stop();

@@ -1,13 +1,12 @@
 /** Doctor: the tool's own checks and sentences (host_tools/tool/doctor), over ten seconds at rest. */
 import { PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
+import { PATIENCE } from '../model/patience';
 import { loadJudges, type Finding } from '../judges/judges';
 import { PAGE_VERSION } from './app';
 import { Dialog, make, makeButton } from './dialog';
 
 const SECONDS = 10;
-/** Without a frame; the slowest rate is one in ten seconds. */
-const SILENT_ms = 12_000;
 const VERDICTS = { ok: 'fine', warn: 'look', bad: 'wrong' };
 
 export function examine(fingertip: Fingertip): void {
@@ -93,7 +92,7 @@ async function findingsOf(
     await askCrash();
     const before = { ...fingertip.counts };
     measuring = true;
-    while (examination.seconds() < SECONDS && performance.now() - last_ms < SILENT_ms) {
+    while (examination.seconds() < SECONDS && performance.now() - last_ms < PATIENCE.slow_frame_ms) {
       await new Promise((done) => setTimeout(done, 100));
       if (stopped()) {
         return [];

@@ -3,6 +3,7 @@
 import { CoreError, core } from '../core';
 import { LOADER_MAGIC, PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
+import { PATIENCE } from '../model/patience';
 import { download } from '../recording/output';
 import type { App } from './app';
 import { Dialog, field, make, makeButton } from './dialog';
@@ -26,7 +27,6 @@ async function imageOf(file: File): Promise<Image> {
   }
 }
 
-const BACK_ms = 30_000;
 const LOADER_BAUD = 1200;
 
 const STEPS = [
@@ -122,7 +122,7 @@ export function flash(app: App, fingertip: Fingertip): void {
   }
 
   async function comesBack(wanted: Image): Promise<void> {
-    const until_ms = performance.now() + BACK_ms;
+    const until_ms = performance.now() + PATIENCE.back_ms;
     while (performance.now() < until_ms && !dialog.is_closed) {
       await new Promise((done) => setTimeout(done, 200));
       const { info, state } = fingertip;

@@ -1,11 +1,9 @@
 /** Tare: measures the zero of every sensor. Refused in contact, and then explained. */
 import { Flag, Result, Stored } from '../line/line_facts';
 import { CommandError, type Fingertip } from '../model/fingertip';
+import { PATIENCE } from '../model/patience';
 import type { App } from './app';
 import { Dialog, make, makeButton, wordsOf } from './dialog';
-
-/** At the slowest rate it takes three frames of 10 s. */
-const TARED_ms = 35_000;
 
 export async function tare(app: App, fingertip: Fingertip, force = false): Promise<void> {
   try {
@@ -33,7 +31,7 @@ function tared(fingertip: Fingertip): Promise<void> {
     const timer = setTimeout(() => {
       stop();
       failed(new Error('no frame came back tared; see "Doctor"'));
-    }, TARED_ms);
+    }, PATIENCE.tared_ms);
     const stop = (): void => {
       clearTimeout(timer);
       end();

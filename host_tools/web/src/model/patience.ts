@@ -1,0 +1,27 @@
+/**
+ * How long the page waits for what may never come. A page whose time a test owns waits as long as
+ * `fingertipPatience` says: some of these, set before the page starts.
+ */
+const USUAL = {
+  /** Of a command, answer_ms apart. An answer to any of them is one. */
+  tries: 3,
+  answer_ms: 1000,
+  /** Where the firmware first writes its flash: within half a second, and a margin. */
+  stored_ms: 3000,
+  /** For a sign of another version of the protocol. */
+  version_ms: 1000,
+  /** Without a frame, while calibrating. */
+  frame_ms: 5000,
+  /** Without a frame, while examining; the slowest rate is one in ten seconds. */
+  slow_frame_ms: 12_000,
+  /** A tare: at the slowest rate it takes three frames of 10 s. */
+  tared_ms: 35_000,
+  /** Until a fingertip has restarted with new firmware. */
+  back_ms: 30_000,
+};
+
+declare global {
+  var fingertipPatience: Partial<typeof USUAL> | undefined;
+}
+
+export const PATIENCE = { ...USUAL, ...globalThis.fingertipPatience };

@@ -1,0 +1,74 @@
+/* The one place of a contact: the Gaussian's, the load's or its shape's. */
+#include "contact/shapes.h"
+#include "unity.h"
+
+static struct shapes_report report;
+static struct fit_result fit;
+static struct tangential_load load;
+
+void setUp(void) {
+  report = (struct shapes_report){.shape = FIT_SHAPE_UNDECIDED};
+  fit = (struct fit_result){.x_mm = 2.0f, .y_mm = -5.0f, .location_sd_mm = 0.3f};
+  load = (struct tangential_load){.x_mm = 4.0f, .y_mm = -8.0f, .location_sd_mm = 0.4f};
+}
+
+void tearDown(void) {}
+
+static void has_middle(enum fit_shape shape) {
+  report.shape = shape;
+  report.middle = (struct shapes_middle){-1.0f, 0.5f, 0.2f};
+}
+
+static void is_at(float x_mm, float y_mm, float sd_mm, const struct tangential_load *of) {
+  const struct shapes_place place = shapes_locate(&report, &fit, of);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, x_mm, place.x_mm);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, y_mm, place.y_mm);
+  TEST_ASSERT_FLOAT_WITHIN(2e-3f * sd_mm, sd_mm, place.location_sd_mm);
+}
+
+static void what_presses_is_where_the_load_or_the_Gaussian_has_it(void) {
+  static const enum fit_shape shapes[] = {FIT_SHAPE_UNDECIDED, FIT_SHAPE_TWO, FIT_SHAPE_NONE};
+  for (unsigned i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+    report.shape = shapes[i];
+    is_at(2.0f, -5.0f, 0.3f, NULL);
+    is_at(4.0f, -8.0f, 0.4f, &load);
+  }
+}
+
+static void without_a_load_a_long_or_pulled_contact_is_where_its_shape_has_it(void) {
+  static const enum fit_shape shapes[] = {FIT_SHAPE_PULLED, FIT_SHAPE_ELONGATED};
+  for (unsigned i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+    has_middle(shapes[i]);
+    is_at(1.0f, -4.5f, 0.2f, NULL);
+    fit.y_mm += 0.25f;
+    is_at(1.0f, -4.25f, 0.2f, NULL);
+    fit.y_mm -= 0.25f;
+  }
+}
+
+static void what_the_load_and_a_long_shape_differ_by_is_part_of_the_error(void) {
+  has_middle(FIT_SHAPE_ELONGATED);
+  is_at(4.0f, -8.0f, 4.62709f, &load); /* 0.4, 3 and 3.5 mm */
+  load.x_mm = 0.0f;
+  is_at(0.0f, -8.0f, 3.66197f, &load); /* 0.4, 1 and 3.5 mm */
+  report.shape = FIT_SHAPE_PULLED;     /* the load's estimate knows that */
+  is_at(0.0f, -8.0f, 0.4f, &load);
+}
+
+static void what_a_round_shape_leaves_is_doubt(void) {
+  report.shape = FIT_SHAPE_ROUND;
+  report.doubt = 1.0f;
+  is_at(2.0f, -5.0f, 0.3f, NULL);
+  report.doubt = 2.5f;
+  is_at(2.0f, -5.0f, 0.75f, NULL);
+  is_at(4.0f, -8.0f, 1.0f, &load);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(what_presses_is_where_the_load_or_the_Gaussian_has_it);
+  RUN_TEST(without_a_load_a_long_or_pulled_contact_is_where_its_shape_has_it);
+  RUN_TEST(what_the_load_and_a_long_shape_differ_by_is_part_of_the_error);
+  RUN_TEST(what_a_round_shape_leaves_is_doubt);
+  return UNITY_END();
+}
