@@ -97,6 +97,9 @@ public:
   std::string make_option_desc(const CLI::Option *option) const override {
     std::string text = option->get_description();
     std::vector<std::string> more;
+    if (option->get_required()) {
+      more.push_back("required");
+    }
     if (option->get_type_size() != 0) {
       const Values values = values_of(*option);
       if (!values.allowed.empty()) {

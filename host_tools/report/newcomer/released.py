@@ -22,9 +22,14 @@ def differing(one, other):
     return sorted(name for name in one.keys() | other.keys() if one.get(name) != other.get(name))
 
 
+def last_commit():
+    return subprocess.run(["git", "-C", ROOT, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout
+
+
 def measure(_, steps):
     if not wanted:
         return {"release_differs": None, "release_files": None, "release_that_differ": None}
+    commit = last_commit()
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         found = []
         for name in ("first", "a_second_one"):
@@ -34,6 +39,8 @@ def measure(_, steps):
             if done.returncode != 0:
                 raise InputError(done.stderr.strip())
             found.append(sums(out))
+            if last_commit() != commit:
+                raise InputError("a commit was made between the two releases, which are of the last one; run again and commit when it is done")
             steps.say(f"a release of {len(found[-1])} files")
     differ = differing(*found)
     return {"release_differs": len(differ), "release_files": len(found[0]), "release_that_differ": differ}

@@ -22,7 +22,7 @@ Exit: 0 done; 1 the image failed or warned; 2 wrong usage or input.`;
 
 /** Function that begins a stage in the main loop, and the stage. */
 const STAGES = {
-  scan_take: 'take', condition_frame: 'condition', condition_follow: 'condition', fit_gaussian: 'fit', fit_gaussian_grid: 'fit', contact_update: 'contact', contact_judge: 'contact', wire_encode: 'encode',
+  scan_take: 'take', condition_frame: 'condition', condition_follow: 'condition', fit_gaussian_follow: 'fit', fit_gaussian_grid_follow: 'fit', contact_update: 'contact', contact_judge: 'contact', wire_encode: 'encode',
   cdc_write: 'queue', cdc_read: 'commands', wire_receive: 'commands',
 };
 /** Interrupt number and its stage. */

@@ -163,7 +163,7 @@ class Install(RealPort, CliTest):
         self.assertEqual(complete("fingertip")("mon"), ["monitor"])
         self.assertIn("--transport", complete("fingertip", "info")("--"))
         self.assertEqual(complete("fingertip", "info", "--transport")("s"), ["socket", "serial"])
-        models = re.search(r"--gripper MODEL REQUIRED +(.*)", self.run_cli("grasp", "--help")[0])[1].split(", ")
+        models = re.search(r"--gripper MODEL +(.*) \(required\)", self.run_cli("grasp", "--help")[0])[1].split(", ")
         self.assertEqual(complete("fingertip", "grasp", "--gripper")(""), models)
         self.environment["FINGERTIP_PORT"] = self.port
         with self.device("serial=AAAA"):

@@ -178,7 +178,7 @@ class Page(unittest.TestCase):
         self.assertEqual(shown.row("dropped"), ["dropped", "", "<= 0", "not measured", "emulated"])
         self.assertEqual(shown.row("flash_bytes")[4], "read from the image")
         words = "".join(shown.words)
-        self.assertRegex(words, r"Rate, latency and cost: 8 met, 10 missed \(parallel_fps_osr256, .*, unfitted, .*\), 1 not measured \(dropped\)")
+        self.assertRegex(words, r"Rate, latency and cost: 9 met, 11 missed \(parallel_fps_osr256, .*, unfitted, .*\), 1 not measured \(dropped\)")
 
     def test_how_and_from_which_command(self):
         every = self.write_all()
