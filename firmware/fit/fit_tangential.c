@@ -11,7 +11,7 @@
 /* Prior of both elongations. */
 #define ELONGATION_SD_mm2 3.0f
 
-/* Variances are those of the errors as told, times chi^2 over its degrees of freedom: fifteen
+/* Variances are those of the errors as stated, times chi^2 over its degrees of freedom: fifteen
  * readings less some seven unknowns. Independent model errors of MODEL_SD are more than layers make
  * of smooth contacts. So a small chi^2 takes from the variance what is the model's and the noise's;
  * of what is the gains' it leaves so much, for these are what they are. A half covers as it should
