@@ -263,7 +263,9 @@ bool GripReach::goes_round_closer(const GripFelts &felt, const GripSettings &set
   const double coming = coming_mm(now_s);
   const bool goes = !limits_itself(settings) && may_go_round(felt) &&
                     room_mm(felt, settings, coming) > traits_.step_mm;
-  goes ? go_round(coming - traits_.step_mm, now_s) : void();
+  if (goes) {
+    go_round(coming - traits_.step_mm, now_s);
+  }
   return goes;
 }
 
