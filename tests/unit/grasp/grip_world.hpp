@@ -184,4 +184,8 @@ private:
   bool moves_ = false;
 };
 
+inline void expect_share(double expected, double found, double share) {
+  EXPECT_NEAR(found, expected, share * expected);
+}
+
 } // namespace fingertip::test

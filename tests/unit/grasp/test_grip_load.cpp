@@ -1,0 +1,210 @@
+// What the load, its friction and slides make of the wanted force.
+#include "grip_world.hpp"
+
+using namespace fingertip;
+using test::fine_gripper;
+using test::expect_share;
+using test::GripWorld;
+
+TEST(Grip, FollowsTheLoadAndFallsToTheFloorThen) {
+  GripWorld world;
+  world.grasp();
+  world.pull(3.0, 0.3);
+  world.run(1.5);
+  const double needed_N = world.settings.margin * 3.0 / world.report.friction;
+  expect_share(needed_N, world.force_N, 0.08);
+  expect_share(3.0, world.report.load_N, 0.05);
+  expect_share(world.settings.margin, world.report.margin, 0.12);
+  world.pull(0.3, 0.5);
+  world.run(2.5);
+  expect_share(world.settings.floor_N, world.force_N, 0.15);
+}
+
+TEST(Grip, AMarginIsToldOnlyWhereThereIsALoad) {
+  GripWorld world;
+  world.grasp();
+  world.load_N = 0.05;
+  world.run(0.5);
+  EXPECT_EQ(world.report.margin, 0.0);
+}
+
+TEST(Grip, WhatPullsBeforeCountsAsNone) {
+  GripWorld world;
+  world.load_N = 0.4;
+  world.grasp();
+  world.run(1.0);
+  EXPECT_LT(world.report.load_N, 0.05);
+}
+
+// A slide is learnt from as it goes on: its friction is that of motion, not the larger one of rest.
+TEST(Grip, LearnsFrictionWhileItSlides) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.5, 0.3);
+  world.run(0.5);
+  const double held = world.load_N / world.force_N;
+  world.slide(0.95 * held, 10.0, 0.01);
+  world.slide(0.7 * held, 40.0, 0.06);
+  EXPECT_EQ(world.report.slides, 1u);
+  expect_share(0.7 * held, world.report.friction, 0.05);
+}
+
+// What slides carries more as its grip grows. What carries less has been caught, though the slide is
+// still reported: its ratio is no friction.
+TEST(GripHold, WhatHasBeenCaughtTeachesNoFriction) {
+  for (const double load_N : {1.5, 4.0}) {
+    const GripSettings settings;
+    GripHold hold;
+    hold.begin();
+    GripFelts felt;
+    felt.fresh = felt.tells_load = true;
+    double now_s = 1.0;
+    const auto frames = [&](double grip_N, double carries_N, double speed_mm_s) {
+      felt.slides = speed_mm_s > 0.0;
+      felt.speed_mm_s = speed_mm_s;
+      felt.grip_N = grip_N;
+      felt.load_N = carries_N;
+      felt.ratio = carries_N / grip_N;
+      for (int i = 0; i < 20; i++) {
+        now_s += 2.4e-3;
+        hold.wants(felt, grip_N, settings, now_s, 0.04);
+      }
+    };
+    frames(5.0, 1.5, 0.0);
+    frames(5.0, 2.0, 40.0);
+    ASSERT_NEAR(hold.friction(settings), 0.4, 1e-9);
+    frames(12.0, load_N, 50.0);
+    EXPECT_NEAR(hold.friction(settings), load_N < 2.0 ? 0.4 : load_N / 12.0, 1e-9) << load_N;
+  }
+}
+
+TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.0, 0.3);
+  world.run(1.0);
+  const double before_N = world.force_N, friction = 0.8 * 2.0 / before_N;
+  world.slide(friction, 20.0, 0.03);
+  EXPECT_EQ(world.report.state, GRIP_SLIPPING);
+  EXPECT_GT(world.force_N, 1.05 * before_N);
+  world.load_N = 2.0;
+  world.run(2.0);
+  EXPECT_EQ(world.report.state, GRIP_HOLDING);
+  expect_share(friction, world.report.friction, 0.1);
+  const double needed_N = world.settings.margin * world.settings.slid * 2.0 / world.report.friction;
+  expect_share(needed_N, world.force_N, 0.05);
+}
+
+// A load that stood still before a slide may have grown since: what slides and does not slow down
+// carries its friction at least, however small the load was before.
+TEST(Grip, ASlideThatGoesOnTellsALargerLoad) {
+  GripWorld world;
+  world.grasp();
+  world.pull(0.8, 0.3);
+  world.run(1.0);
+  const double before_N = world.force_N;
+  for (double speed_mm_s = 20.0; speed_mm_s < 60.0; speed_mm_s += 1.0) {
+    world.slide(0.6, speed_mm_s, 0.01);
+  }
+  EXPECT_GT(world.force_N, 2.5 * before_N);
+}
+
+// A load that rises fast is expected to go on. Where it does not, the grip that was wanted for it
+// is given up before the gripper has made it.
+TEST(Grip, WhatWasExpectedAndHasNotComeIsNotPursued) {
+  GripperTraits slow = fine_gripper();
+  slow.latency_s = 0.025;
+  GripWorld world({{"cap", 15.0}}, slow); // each move shows before the next
+  world.grasp();
+  world.pull(2.0, 0.03);
+  const double expected_N = world.report.wanted_N;
+  world.run(0.1);
+  const double needed_N = world.settings.margin * 2.0 / world.report.friction;
+  ASSERT_GT(expected_N, 1.4 * needed_N);
+  EXPECT_LT(world.report.wanted_N, 1.1 * needed_N);
+  EXPECT_LT(world.peak_N, 0.85 * expected_N);
+}
+
+// The tangential force of a sliding contact is its friction, no load: it does not feed itself.
+TEST(Grip, ASteadyLoadIsNotWhatSlides) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.0, 0.3);
+  world.run(1.0);
+  const double friction = 0.7 * 2.0 / world.force_N;
+  const double needed_N = world.settings.margin * world.settings.slid * 2.0 / friction;
+  world.slide(friction, 30.0, 0.02);
+  world.load_N = 2.0;
+  world.run(0.05);
+  EXPECT_LT(world.peak_N, 1.3 * needed_N);
+}
+
+// Nor does one that slows down: it is caught already.
+TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
+  GripWorld world;
+  world.grasp();
+  world.pull(1.5, 0.05);
+  const double friction = world.load_N / world.force_N, before_N = world.force_N;
+  world.slide(friction, 30.0, 0.015);
+  for (double speed_mm_s = 28.0; speed_mm_s > 10.0; speed_mm_s *= 0.9) {
+    world.slide(friction, speed_mm_s, 0.005); // and the slide slows down
+  }
+  EXPECT_GT(world.force_N, 1.2 * before_N);
+  EXPECT_LT(world.force_N, 1.65 * before_N);
+}
+
+// A slide is still reported when the object has been caught already. What it asked for and is not
+// under way is given up then.
+TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
+  GripperTraits slow = fine_gripper();
+  slow.latency_s = 0.05;
+  GripWorld world({{"cap", 15.0}}, slow); // each move shows before the next
+  world.grasp();
+  world.pull(2.5, 0.03);
+  const double expected_N = world.report.wanted_N;
+  world.slides = {true, true};
+  for (world.slide_mm_s = 30.0; world.slide_mm_s > 5.0; world.slide_mm_s *= 0.8) {
+    world.run(0.005);
+  }
+  world.run(0.05);
+  EXPECT_EQ(world.report.state, GRIP_SLIPPING);
+  EXPECT_LT(world.report.wanted_N, 0.9 * expected_N);
+}
+
+// Squeezed rubber moves a contact by less than a millimetre, far below what it holds.
+TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.0, 0.3);
+  world.run(1.0);
+  const double held = world.load_N / world.force_N;
+  world.slide(0.4 * held, 9.0, 0.07);
+  EXPECT_EQ(world.report.slides, 0u);
+  world.load_N = 2.0;
+  world.run(0.3);
+  world.slide(0.4 * held, 9.0, 0.13);
+  EXPECT_EQ(world.report.slides, 1u);
+}
+
+// What has held more a moment ago does not slide at less, unless it moves far.
+TEST(Grip, WhatHeldMoreAMomentAgoTeachesNothing) {
+  GripWorld world;
+  world.grasp();
+  world.pull(3.5, 0.2);
+  const double before = world.report.friction;
+  world.slide(0.3 * before, 6.0, 0.02);
+  EXPECT_GE(world.report.friction, before);
+}
+
+// What tells no load will tell no slide either.
+TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
+  for (double stiffness = 4.0; stiffness < 12.0; stiffness += 0.5) {
+    GripWorld world({}, gripper_traits("2f85"));
+    world.keeps_limit = true;
+    world.stiffness = stiffness;
+    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+    world.grasp();
+    EXPECT_GT(world.force_N, 0.97 * world.settings.blind_N) << stiffness;
+    EXPECT_LT(world.peak_N, world.settings.cap_N) << stiffness;
+  }
+}
