@@ -233,7 +233,6 @@ static void judge_shapes(struct app *app) {
 
 static void judge_load(struct app *app) {
   const struct contact_input input = input_of(app);
-  app->contact.flags |= app->fit.flags & CONTACT_FLAG_UNCERTAIN; /* by now it may be doubted */
   app->tangential_settings.location_sd_limit_mm = app->fit_settings.location_sd_limit_mm;
   tangential_update(&app->tangential_history, &app->tangential_settings, &input, &app->contact,
                     &app->load);

@@ -58,9 +58,8 @@ static void put_report(const struct shapes_question *question,
     report->doubt = fmaxf(result->chi_square[0] / (float)FIT_SHAPES_ERRORS, 1.0f);
   }
   if (result->shape == FIT_SHAPE_PULLED || result->shape == FIT_SHAPE_ELONGATED) {
-    report->middle = (struct shapes_middle){.from_fit_x_mm = result->x_mm[0] - question->fit.x_mm,
-                                            .from_fit_y_mm = result->y_mm[0] - question->fit.y_mm,
-                                            .location_sd_mm = result->location_sd_mm[0]};
+    report->from_fit_x_mm = result->x_mm[0] - question->fit.x_mm;
+    report->from_fit_y_mm = result->y_mm[0] - question->fit.y_mm;
   }
 }
 
@@ -93,19 +92,16 @@ void shapes_estimate(void *job) {
 
 struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
                                   const struct tangential_load *load) {
-  const struct shapes_middle *middle = &report->middle;
-  const float x_mm = fit->x_mm + middle->from_fit_x_mm, y_mm = fit->y_mm + middle->from_fit_y_mm;
-  if (!load && middle->location_sd_mm > 0.0f) {
-    return (struct shapes_place){x_mm, y_mm, middle->location_sd_mm};
-  }
   struct shapes_place place = {fit->x_mm, fit->y_mm, fit->location_sd_mm};
   if (load) {
     place = (struct shapes_place){load->x_mm, load->y_mm, load->location_sd_mm};
   }
+  const bool is_pulled = report->shape == FIT_SHAPE_PULLED;
   if (report->shape == FIT_SHAPE_ROUND) {
     place.location_sd_mm *= report->doubt;
-  } else if (report->shape == FIT_SHAPE_ELONGATED) {
-    const float dx_mm = fabsf(x_mm - place.x_mm), dy_mm = fabsf(y_mm - place.y_mm);
+  } else if (report->shape == FIT_SHAPE_ELONGATED || (is_pulled && !load)) {
+    const float dx_mm = fabsf(fit->x_mm + report->from_fit_x_mm - place.x_mm);
+    const float dy_mm = fabsf(fit->y_mm + report->from_fit_y_mm - place.y_mm);
     place.location_sd_mm =
         fit_quadrature(1.0f, place.location_sd_mm, 1.0f, fit_quadrature(1.0f, dx_mm, 1.0f, dy_mm));
   }

@@ -19,10 +19,9 @@ struct shapes_report {
   } contact[2];
   float edge_angle_deg, edge_angle_sd_deg; /* -90 to 90, from x towards y */
   float edge_length_mm;
-  float doubt;           /* ROUND: chi^2 over FIT_SHAPES_ERRORS, at least 1 */
-  struct shapes_middle { /* pulled or long: from the Gaussian's place in the same frame */
-    float from_fit_x_mm, from_fit_y_mm, location_sd_mm;
-  } middle;
+  float doubt;                        /* ROUND: chi^2 over FIT_SHAPES_ERRORS, at least 1 */
+  float from_fit_x_mm, from_fit_y_mm; /* pulled or long: the middle, from the Gaussian's place in
+                                         the same frame */
 };
 
 /* The fit of what presses: a job of worker/worker.h. It holds all that the fit reads, so that the
@@ -64,11 +63,12 @@ struct shapes_place {
   float x_mm, y_mm, location_sd_mm;
 };
 
-/* Where the contact is, of which the report and the fit are. The load's estimate has the place, and
- * where there is none (load NULL), the Gaussian. But the Gaussian knows no load, and neither knows
- * a length. So a long or pulled contact without an estimate is where its shape has the middle,
- * moved as the Gaussian has moved since. Of a long one with an estimate, what lies between the two
- * is part of the standard deviation. That of a round one grows where its shape leaves residuals. */
+/* Where the contact is, of which the report and the fit are: the load's estimate has the place, and
+ * where there is none (load NULL), the Gaussian. But neither knows a length, nor the Gaussian a
+ * load. So of a long contact, and of a pulled one without an estimate, what lies between that place
+ * and the middle that the shape has is part of the standard deviation. It is not the place: rubber
+ * that relaxes makes a round object look long or pulled, with its middle further off. The standard
+ * deviation of a round contact grows where its shape leaves residuals. */
 struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
                                   const struct tangential_load *load);
 

@@ -16,7 +16,8 @@ void tearDown(void) {}
 
 static void has_middle(enum fit_shape shape) {
   report.shape = shape;
-  report.middle = (struct shapes_middle){-1.0f, 0.5f, 0.2f};
+  report.from_fit_x_mm = -1.0f;
+  report.from_fit_y_mm = 0.5f;
 }
 
 static void is_at(float x_mm, float y_mm, float sd_mm, const struct tangential_load *of) {
@@ -35,13 +36,13 @@ static void what_presses_is_where_the_load_or_the_Gaussian_has_it(void) {
   }
 }
 
-static void without_a_load_a_long_or_pulled_contact_is_where_its_shape_has_it(void) {
+static void what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_the_error(void) {
   static const enum fit_shape shapes[] = {FIT_SHAPE_PULLED, FIT_SHAPE_ELONGATED};
   for (unsigned i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
     has_middle(shapes[i]);
-    is_at(1.0f, -4.5f, 0.2f, NULL);
-    fit.y_mm += 0.25f;
-    is_at(1.0f, -4.25f, 0.2f, NULL);
+    is_at(2.0f, -5.0f, 1.15758f, NULL); /* 0.3, 1 and 0.5 mm */
+    fit.y_mm += 0.25f;                  /* both move */
+    is_at(2.0f, -4.75f, 1.15758f, NULL);
     fit.y_mm -= 0.25f;
   }
 }
@@ -67,7 +68,7 @@ static void what_a_round_shape_leaves_is_doubt(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(what_presses_is_where_the_load_or_the_Gaussian_has_it);
-  RUN_TEST(without_a_load_a_long_or_pulled_contact_is_where_its_shape_has_it);
+  RUN_TEST(what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_the_error);
   RUN_TEST(what_the_load_and_a_long_shape_differ_by_is_part_of_the_error);
   RUN_TEST(what_a_round_shape_leaves_is_doubt);
   return UNITY_END();

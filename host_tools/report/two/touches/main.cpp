@@ -4,7 +4,7 @@
 // fit_shapes answers, as scene grasp runs it. Two contacts are the sum of their pressures. One JSON
 // object on the standard output: the keys that are judged, and under "touches" the table behind
 // them. The constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of
-// shapes_locate with 50000 and 60000.
+// shapes_locate were tried with 50000 and 60000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
