@@ -120,7 +120,7 @@ class Target:
             for i, data in enumerate(seeds):
                 (given / f"{i:03d}").write_bytes(data)
             running = folder / "running"
-            call = ([self.program, "walk", runs, max_len, seed, running, *sorted(given.iterdir())] if runs else
+            call = ([self.program, "walk", runs, max_len, seed, running, *sorted(given.iterdir())] if runs is not None else
                     self.libfuzzer(max_len, seconds, seed, bulk, folder, new, given))
             begun_s = time.monotonic()
             done = subprocess.run([str(part) for part in call], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,

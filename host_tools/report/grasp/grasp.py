@@ -8,8 +8,8 @@
     grasp.png     the same to look at, and a slip that is caught
 
 The controller is the tool's own and the fingertips' code the firmware's; rubber, objects, sensors and grippers are simulated (host_tools/simulation/cell,
-whose headers say what is assumed). The controller's constants were chosen with seeds below 1000, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001 and 15101; those here are others, and so
-are the pads. What is judged are grasps of all kinds in a world that disagrees with the controller (kinds.py). In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
+whose headers say what is assumed). The controller's constants were chosen with other seeds (--seed refuses them) and
+other pads. What is judged are grasps of all kinds in a world that disagrees with the controller (kinds.py). In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
 """
 import json
 import pathlib
@@ -28,7 +28,7 @@ from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
 SEED = 5001  # seen by no choice of a constant
-CHOSE = (*range(1000), 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101)
+CHOSE = (7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101)  # and all below 1000
 # In the twin's cell: a set force of 8 to 15 N is there within so long, and held so well.
 LIMITS = {"settle_s": 1.2, "hold_rms_percent": 5}
 GOALS = kinds.GOALS + tuple((f"{name}_{called}", "<=", limit) for name, limit in LIMITS.items() for called in kinds.CALLED.values()) + (
@@ -150,8 +150,8 @@ def main(argv):
     parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="folder of the boards' builds; default %(default)s")
     parser.add_argument("--no-emulated", action="store_true", help="without the grasp of two emulated fingertips")
     options = parser.parse_args(argv)
-    if options.seed in CHOSE:
-        raise InputError("seeds below 1000, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001 and 15101 are those that constants were chosen by")
+    if options.seed < 1000 or options.seed in CHOSE:
+        raise InputError(f"constants were chosen by seeds below 1000 and by {', '.join(map(str, CHOSE))}: give another --seed")
     if options.grasps is not None and options.grasps < 1:
         raise InputError("--grasps needs 1 or more")
     if not options.no_emulated:
