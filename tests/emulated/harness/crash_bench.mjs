@@ -54,7 +54,17 @@ export class CrashBench extends ImageBench {
   }
 }
 
-/** The packets on a line (PROTOCOL.md), header first; their CRC is not looked at here. */
+/** CRC-32/ISO-HDLC. */
+function crc32(bytes) {
+  let crc = ~0;
+  for (const byte of bytes) {
+    crc ^= byte;
+    for (let bit = 0; bit < 8; bit++) crc = (crc >>> 1) ^ (crc & 1 ? 0xedb88320 : 0);
+  }
+  return ~crc >>> 0;
+}
+
+/** The whole packets on a line (PROTOCOL.md), header first. One that a suspend or a reset has cut has a wrong CRC, and is left out. */
 export function split(bytes) {
   const packets = [];
   for (let from = 0, at; (at = bytes.indexOf(0, from)) >= 0; from = at + 1) {
@@ -65,7 +75,8 @@ export function split(bytes) {
       i += code;
       if (code < 255 && i < at) out.push(0);
     }
-    if (out.length) packets.push(Buffer.from(out));
+    const packet = Buffer.from(out);
+    if (packet.length > 4 && crc32(packet.subarray(0, -4)) === packet.readUInt32LE(packet.length - 4)) packets.push(packet);
   }
   return packets;
 }
