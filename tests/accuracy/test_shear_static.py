@@ -14,7 +14,7 @@ LIMITS = (
     ("ratio_error_p50", 0.005, 0.014), ("ratio_error_p95", 0.02, 0.05), ("vector_error_p50", 0.01, 0.023), ("vector_error_p95", 0.03, 0.065),
     ("direction_p90_deg", 3, 7.5), ("location_loaded_median_mm", 0.05, 0.1), ("location_loaded_without_mm", 0.95, 1.1), ("location_price_mm", -0.09, -0.02),
     ("equal_ratio_error_p50", 0.005, 0.011), ("equal_vector_error_p50", 0.01, 0.018), ("equal_location_loaded_mm", 0.04, 0.075), ("valid_percent", 91, 100),
-    ("q_cover_1sd", 65, 98), ("q_cover_2sd", 96, 100), ("location_cover_1sd", 60, 88), ("location_cover_2sd", 92, 100), ("force_p50_percent", 0.1, 0.6),
+    ("q_cover_1sd", 65, 98), ("q_cover_2sd", 96, 100), ("location_cover_1sd", 60, 92), ("location_cover_2sd", 92, 100), ("force_p50_percent", 0.1, 0.6),
     ("force_without_p50_percent", 1, 2.2), ("screw_ratio", 0.005, 0.02), ("screw_change_p95", 0.001, 0.012), ("increment_error_p50_13mm", 0.03, 0.06),
     ("increment_error_p50_9mm", 0.015, 0.045), ("zero_error_p50_9mm", 0.1, 0.18), ("zero_error_p50_own_tables", 0.01, 0.036),
     ("increment_error_p50_own_tables_9mm", 0.01, 0.03), ("elongated_false_unflagged_percent", 0, 2), ("elongated_false_percent", 0, 2), ("raw_beyond_2sd_percent", 0, 10),
