@@ -384,8 +384,11 @@ Wanted next_place(const Array &array, const std::vector<Placement> &given, const
   const double step = 0.5 * array.pitch_mm;
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
   const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
-  for (double x = *left; x <= *right + 1e-6; x += step) {
-    for (double y = *bottom; y <= *top + 1e-6; y += step) {
+  const double inset = INSET_PITCHES * array.pitch_mm;
+  const double in_x = std::min(inset, 0.25 * (*right - *left));
+  const double in_y = std::min(inset, 0.25 * (*top - *bottom));
+  for (double x = *left + in_x; x <= *right - in_x + 1e-6; x += step) {
+    for (double y = *bottom + in_y; y <= *top - in_y + 1e-6; y += step) {
       x_mm.push_back(x);
       y_mm.push_back(y);
     }

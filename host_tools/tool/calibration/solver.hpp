@@ -181,6 +181,12 @@ Solution solve_from(const Array &array, const std::vector<Placement> &placements
 /* The log gains with their mean, tilt and bowl taken out. */
 std::vector<double> outside_gauge(const Array &array, const std::vector<double> &gain);
 
+/* How far inside the outer sensors a place is asked for. Right above them a foot stands where the
+ * rubber may end, which no profile of one thickness explains. On pads that end 6 mm beyond, what is
+ * asked for there leaves a location error of 0.25 mm (median) and 0.48 (p95), half a pitch inside
+ * 0.21 and 0.37; on wide pads nothing changes (truth_calibration --seed 30000 --pads 160). */
+constexpr double INSET_PITCHES = 0.5;
+
 /* Where a placement more would lower the largest shape_sd most: a place on the array, in steps of
  * half a pitch. */
 struct Wanted {
