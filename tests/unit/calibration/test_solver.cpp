@@ -337,6 +337,8 @@ TEST(Solver, wants_the_place_that_tells_most) {
     const Solution s = solve(pad.array, placements);
     const Wanted wanted = next_place(pad.array, placements, s);
     EXPECT_GE(bare * wanted.y_mm, 9.0);
+    EXPECT_LE(bare * wanted.y_mm, 13.5); /* half a pitch inside the outer sensors */
+    EXPECT_LE(std::abs(wanted.x_mm), 4.5);
     EXPECT_LT(wanted.worst_shape_sd, s.worst_shape_sd());
     auto asked = placements, elsewhere = placements;
     asked.push_back(pad.place({wanted.x_mm, wanted.y_mm}, 60.0, random));
@@ -348,5 +350,6 @@ TEST(Solver, wants_the_place_that_tells_most) {
   const Wanted first = next_place(pad.array, {}, Solution{});
   EXPECT_NEAR(std::hypot(first.x_mm, first.y_mm), 0.0, 1e-9);
   const Wanted second = next_place(pad.array, {pad.place({0.0, 0.0}, 0.0, random)}, Solution{});
-  EXPECT_GT(std::hypot(second.x_mm, second.y_mm), 15.0);
+  EXPECT_NEAR(std::abs(second.x_mm), 4.5, 1e-9);
+  EXPECT_NEAR(std::abs(second.y_mm), 13.5, 1e-9);
 }
