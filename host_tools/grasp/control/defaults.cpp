@@ -13,8 +13,9 @@ GripSettings default_settings(const GripperTraits &traits) {
   const double dead_s = traits.latency_s + traits.poll_s + 0.01;
   settings.gains.ki_mm_Ns = std::clamp(0.06 / dead_s, 0.3, 4.0);
   settings.start_N = 4.0 + 1.5 * traits.step_mm; // what a step may miss
-  settings.floor_N = 1.5 + 1.0 * traits.step_mm;
-  settings.margin = 1.2 + 3.0 * traits.latency_s;
+  // A coarse step makes more than enough, in the mean.
+  settings.floor_N = std::max(1.2 - 0.8 * traits.step_mm, 0.5);
+  settings.margin = std::max(1.05 + 11.0 * traits.latency_s - 0.45 * traits.step_mm, 1.0);
   return settings;
 }
 

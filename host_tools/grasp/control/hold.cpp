@@ -12,8 +12,11 @@ constexpr double LOAD_NOISE_N = 0.06;
 // A load that rises above its latest peak counts as it is, with its rate. Below that it swings on
 // the rubber, or has begun to slide, and its mean counts.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
-constexpr double AHEAD_N = 2.5, AHEAD = 0.8; // a rate is believed to add that much, or such a share
+constexpr double AHEAD_N = 2.0, AHEAD = 0.65; // a rate is believed to add that much, or such a share
 constexpr double REMEMBERS_s = 1.0; // what a load has been it may be again
+// Where frames come later than SOON_s a push or a slide is answered late, so the grip is stronger
+// beforehand: for each second more, and no more than LATEST_s.
+constexpr double SOON_s = 0.01, LATEST_s = 0.04, MARGIN_1_s = 12.0, FLOOR_N_s = 28.0;
 constexpr double SWINGS_s = 0.25;   // what was caught swings for so long
 constexpr double HELD_s = 0.015;    // a ratio that held, the mean of so long
 // A load is steady that changes by less than this share within 0.1 s, or by less than that.
@@ -31,6 +34,10 @@ constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
 // grown by so much, and what does not has been caught.
 constexpr double GROWN = 1.4;
 constexpr double MORE = 1.3; // of its grip, where what slides tells no load
+
+double late_s(double delay_s) {
+  return std::clamp(delay_s - SOON_s, 0.0, LATEST_s);
+}
 
 } // namespace
 
@@ -81,10 +88,10 @@ void GripHold::begin() {
   *this = GripHold();
 }
 
-double GripHold::need_N(const GripSettings &settings, double dead_s) const {
+double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
   const double load_N = sliding_ ? load_.now_N() : std::max(load_.ahead_N(dead_s), was_N_);
-  const double margin = settings.margin * (slides_ > 0 ? settings.slid : 1.0);
-  return margin * load_N / friction(settings);
+  const double margin = settings.margin + MARGIN_1_s * late_s(delay_s);
+  return (slides_ > 0 ? settings.slid : 1.0) * margin * load_N / friction(settings);
 }
 
 void GripHold::look(const GripFelts &felt, const GripSettings &settings, double now_s) {
@@ -148,9 +155,9 @@ double GripHold::wants(const GripFelts &felt, double coming_N, const GripSetting
     look(felt, settings, now_s);
   }
   const double least_N = !has_told_ && !felt.tells_load ? settings.blind_N
-                         : was_loaded_                  ? settings.floor_N
+                         : was_loaded_ ? settings.floor_N + FLOOR_N_s * late_s(felt.delay_s)
                                                         : settings.start_N;
-  double need = std::max(need_N(settings, dead_s), least_N);
+  double need = std::max(need_N(settings, felt.delay_s, dead_s), least_N);
   if (goes_on_ && !felt.tells_load) {
     need = std::max(need, MORE * felt.grip_N);
   }

@@ -55,7 +55,7 @@ private:
   static constexpr double LOADED_N = 0.15;
 
   void look(const GripFelts &felt, const GripSettings &settings, double now_s);
-  double need_N(const GripSettings &settings, double dead_s) const;
+  double need_N(const GripSettings &settings, double delay_s, double dead_s) const;
 
   GripFriction friction_;
   GripLoad load_;
