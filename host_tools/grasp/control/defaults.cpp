@@ -14,8 +14,8 @@ GripSettings default_settings(const GripperTraits &traits) {
   settings.gains.ki_mm_Ns = std::clamp(0.06 / dead_s, 0.3, 4.0);
   settings.start_N = 4.0 + 1.5 * traits.step_mm; // what a step may miss
   // A coarse step makes more than enough, in the mean.
-  settings.floor_N = std::max(1.2 - 0.8 * traits.step_mm, 0.5);
-  settings.margin = std::max(1.05 + 11.0 * traits.latency_s - 0.45 * traits.step_mm, 1.0);
+  settings.floor_N = std::max(1.3 - 1.1 * traits.step_mm, 0.5);
+  settings.margin = std::max(1.05 + 11.0 * traits.latency_s - 0.5 * traits.step_mm, 1.0);
   return settings;
 }
 

@@ -11,7 +11,7 @@
 namespace fingertip::grasp {
 
 // Opening by less is still holding: a grip that was raised too far comes down.
-constexpr double OPENS_mm = 1.0;
+constexpr double OPENS_mm = 1.2;
 struct FaultTrial {
   std::string fault, state, gripper, object;
   cell::Trial trial;

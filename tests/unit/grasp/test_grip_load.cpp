@@ -149,8 +149,8 @@ TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
   for (double speed_mm_s = 28.0; speed_mm_s > 10.0; speed_mm_s *= 0.9) {
     world.slide(friction, speed_mm_s, 0.005); // and the slide slows down
   }
-  EXPECT_GT(world.force_N, 1.2 * before_N);
-  EXPECT_LT(world.force_N, 1.65 * before_N);
+  EXPECT_GT(world.force_N, 1.05 * before_N);
+  EXPECT_LT(world.force_N, 1.5 * before_N);
 }
 
 // A slide is still reported when the object has been caught already. What it asked for and is not
