@@ -154,8 +154,9 @@ double GripHold::wants(const GripFelts &felt, double coming_N, const GripSetting
   if (felt.fresh) {
     look(felt, settings, now_s);
   }
+  const double late_N = settings.sets_force() ? 0.0 : FLOOR_N_s * late_s(felt.delay_s);
   const double least_N = !has_told_ && !felt.tells_load ? settings.blind_N
-                         : was_loaded_ ? settings.floor_N + FLOOR_N_s * late_s(felt.delay_s)
+                         : was_loaded_                  ? settings.floor_N + late_N
                                                         : settings.start_N;
   double need = std::max(need_N(settings, felt.delay_s, dead_s), least_N);
   if (goes_on_ && !felt.tells_load) {
