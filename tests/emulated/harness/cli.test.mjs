@@ -109,12 +109,12 @@ for (const [name, args, message] of [
 }
 
 const LIMIT_s = 300;
-/** Of a client: its terminal, raw. A client that hangs is ended. */
+/** Of a client: its terminal, raw, with all that has come already. A client that hangs is ended. */
 const OPEN = `
 import os, signal, sys, tty
 signal.alarm(${LIMIT_s})
 fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-tty.setraw(fd)
+tty.setraw(fd, tty.TCSANOW)
 `;
 /** And told on stdin that the board is there. */
 const OPEN_EARLY = `${OPEN}sys.stdin.readline()
