@@ -127,13 +127,15 @@ void Grip::ramp(double to_mm, double speed_mm_s) {
     reach_.stop();
     ramped_s_ = now_s_;
   }
-  const double passed_s = std::min(now_s_ - ramped_s_, RAMP_s);
+  // A slow one takes longer than that for a step.
+  const double most_s = std::max(RAMP_s, traits_.step_mm / speed_mm_s);
+  const double passed_s = std::min(now_s_ - ramped_s_, most_s);
   const double steps = std::floor(speed_mm_s * passed_s / traits_.step_mm + 1e-9);
   if (steps < 1.0) {
     return;
   }
   const double made_mm = steps * traits_.step_mm;
-  ramped_s_ = now_s_ - ramped_s_ > RAMP_s ? now_s_ : ramped_s_ + made_mm / speed_mm_s;
+  ramped_s_ = now_s_ - ramped_s_ > most_s ? now_s_ : ramped_s_ + made_mm / speed_mm_s;
   reach_.send(reach_.target_mm() + std::clamp(to_mm - reach_.target_mm(), -made_mm, made_mm));
 }
 

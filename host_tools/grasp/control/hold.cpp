@@ -12,13 +12,14 @@ constexpr double LOAD_NOISE_N = 0.06;
 // A load that rises above its latest peak counts as it is, with its rate. Below that it swings on
 // the rubber, or has begun to slide, and its mean counts.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
-constexpr double AHEAD_N = 2.0, AHEAD = 0.65; // a rate is believed to add that much, or such a share
+// A rate is believed to add that much, or such a share.
+constexpr double AHEAD_N = 2.0, AHEAD = 0.65;
 constexpr double REMEMBERS_s = 1.0; // what a load has been it may be again
 // Where frames come later than SOON_s a push or a slide is answered late, so the grip is stronger
 // beforehand: for each second more, and no more than LATEST_s.
 constexpr double SOON_s = 0.01, LATEST_s = 0.04, MARGIN_1_s = 12.0, FLOOR_N_s = 28.0;
-constexpr double SWINGS_s = 0.25;   // what was caught swings for so long
-constexpr double HELD_s = 0.015;    // a ratio that held, the mean of so long
+constexpr double SWINGS_s = 0.25; // what was caught swings for so long
+constexpr double HELD_s = 0.015;  // a ratio that held, the mean of so long
 // A load is steady that changes by less than this share within 0.1 s, or by less than that.
 constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
 constexpr double LOADED_s = 0.3; // a load has been steady
@@ -30,8 +31,8 @@ constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
 // Of what slides and does not slow down: the load is its friction, and what stops it within so
 // long; it is followed so quickly.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
-// Friction falls by less than this as a slide quickens. So what slides carries more once its grip has
-// grown by so much, and what does not has been caught.
+// Friction falls by less than this as a slide quickens. So what slides carries more once its grip
+// has grown by so much, and what does not has been caught.
 constexpr double GROWN = 1.4;
 constexpr double MORE = 1.3; // of its grip, where what slides tells no load
 

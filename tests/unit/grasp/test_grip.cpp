@@ -32,6 +32,22 @@ TEST(Grip, ApproachesAtItsSpeedAndSlowerWhereFramesComeLate) {
   }
 }
 
+// However long a step takes at that speed.
+TEST(Grip, ACoarseGripperApproachesWhereFramesComeVeryLate) {
+  GripperTraits coarse = test::fine_gripper();
+  coarse.step_mm = 85.0 / 227;
+  coarse.latency_s = 0.025;
+  for (const double delay_s : {0.08, 0.2}) {
+    GripWorld world({}, coarse);
+    world.delay_s = delay_s;
+    world.grip.request(GRIP_REQUEST_GRASP);
+    world.run(2.0 + delay_s);
+    const double speed_mm_s = (60.0 - world.width_mm) / 2.0, dead_s = delay_s + 0.026;
+    EXPECT_GT(speed_mm_s, 0.5 * 0.4 / dead_s);
+    EXPECT_LT(speed_mm_s, 1.2 * 0.4 / dead_s);
+  }
+}
+
 TEST(Grip, ApproachEndsWhereNothingIs) {
   GripWorld world;
   world.object_mm = 0.0;
