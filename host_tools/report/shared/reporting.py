@@ -90,7 +90,9 @@ def finish(found, options, files):
     --picture, too. Exit status."""
     out = pathlib.Path(options.output)
     if options.picture:
-        shutil.copyfile(out / next(name for name in files if name.endswith(".png")), options.picture)
+        picture = out / next(name for name in files if name.endswith(".png"))
+        if picture.resolve() != pathlib.Path(options.picture).resolve():
+            shutil.copyfile(picture, options.picture)
     print_goals(found)
     print(f"report: {', '.join(str(out / name) for name in files)}")
     print(f"page: {page.write(out)}")
