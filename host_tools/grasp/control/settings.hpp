@@ -34,10 +34,10 @@ struct GripSettings {
   double control_s = 0.01; // between two steps of eq. (6)
   // hold
   double start_N = 3.0;  // grip before anything pulls
-  double floor_N = 1.0;  // and the least once the load is known
+  double floor_N = 1.0;  // and the least once the load is known; with late frames more (hold.cpp)
   double blind_N = 12.0; // grip where no load can be estimated, reached before anything pulls
   double friction = 0.5; // until a slide, or a load that does not slide, shows better
-  double margin = 1.3;   // grip over load / friction,
+  double margin = 1.3;   // grip over load / friction; with late frames more,
   double slid = 1.05;    // and so much of that since it has slid: it will again
   double decay_1_s = 5.0; // decay of a grip that is too large, share of it a second
   double rest_s = 0.3;    // no sooner after a slide

@@ -24,6 +24,7 @@ ROWS = {
     "slick": (("--kind", "slick"), True),
     "fragile": (("--kind", "fragile"), True),
     "usual, 40 ms later": (("--kind", "usual", "--later", "40"), False),
+    "rough, 40 ms later": (("--kind", "rough", "--later", "40"), False),
     "usual": (("--kind", "usual"), False),
     "rough": (("--kind", "rough"), False),
     "gentle": (("--kind", "gentle"), False),

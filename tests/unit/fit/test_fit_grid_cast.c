@@ -22,6 +22,16 @@ static void press_cast(double x, double y, double sigma, double share, double sd
 }
 static const struct fit_own no_own[SENSORS];
 
+/* What a calibration knows of such a pad. */
+static struct fit_settings of_cast(double sigma, double share, double sd) {
+  return (struct fit_settings){.iterations = 8,
+                               .noise_Pa_q10 = 2048,
+                               .prior_sigma_mm = (float)sigma,
+                               .prior_width_mm = 0.1f,
+                               .dip_share = (float)share,
+                               .dip_sd_mm = (float)sd};
+}
+
 /* Up to 0.16 mm each way, and 5 % of the width. */
 static void draw_own(struct random *random, struct fit_own *own) {
   for (int k = 0; k < SENSORS; k++) {
@@ -87,12 +97,7 @@ static void beyond_the_sensors_the_dip_tells_the_place(void) {
     double y = -0.25 + random_between(&random, -half_y, half_y);
     double sigma = random_between(&random, 2.8, 3.6), sd = sd_per_sigma * sigma;
     press_cast(x, y, sigma, share, sd, no_own, &random);
-    struct fit_settings settings = {.iterations = 8,
-                                    .noise_Pa_q10 = 2048,
-                                    .prior_sigma_mm = (float)sigma,
-                                    .prior_width_mm = 0.1f,
-                                    .dip_share = (float)share,
-                                    .dip_sd_mm = (float)sd};
+    struct fit_settings settings = of_cast(sigma, share, sd);
     struct fit_result found, wide, general;
     fit_gaussian(&array, readings, ALL, &settings, &found);
     fit_grid(&array, readings, &settings, &wide);
@@ -125,12 +130,7 @@ static void what_is_the_sensors_own_is_taken_out_alike_in_all(void) {
     double y = -0.25 + random_between(&random, -half_y, half_y);
     double sigma = random_between(&random, 5.2, 7.0), sd = 3.0 * sigma, share = i % 2 ? 0.02 : 0.0;
     press_cast(x, y, sigma, share, sd, own, &random);
-    struct fit_settings settings = {.iterations = 8,
-                                    .noise_Pa_q10 = 2048,
-                                    .prior_sigma_mm = (float)sigma,
-                                    .prior_width_mm = 0.1f,
-                                    .dip_share = (float)share,
-                                    .dip_sd_mm = (float)sd};
+    struct fit_settings settings = of_cast(sigma, share, sd);
     struct fit_result plain, grid, masked, general;
     fit_grid(&array, readings, &settings, &plain);
     settings.own = own;
