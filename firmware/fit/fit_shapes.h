@@ -8,12 +8,13 @@
  * Each has an unknown spread, and a broad term that holds what the profile and the dip are off by.
  * Each takes one damped Gauss-Newton step a frame, from where the frame before ended. The first
  * frame of a contact chooses where they start. So the cost is fixed, and a contact at rest has its
- * answer after FIT_SHAPES_FRAMES frames.
+ * answer after FIT_SHAPES_FRAMES frames, and then in every other one, which does not step.
  *
  * The answer compares chi^2, in standard deviations that contain noise, gains and the model's own
  * error. How large these errors really are is unknown, and the residuals tell it. So a model with
- * more unknowns is chosen where it makes chi^2 + 14 less by a third. A pair that looks like a long
- * contact is called long, and a long one hardly ever a pair. What the other models say of the place
+ * more unknowns is chosen where it makes chi^2 + 14 less by 3/11. A pair that looks like a long
+ * contact is called long, unless that is longer than hardly anything is, and a long one hardly ever
+ * a pair. What the other models say of the place
  * is part of location_sd_mm, by how likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
@@ -36,7 +37,7 @@
  * them. */
 #define FIT_SHAPES_PARTS 3
 
-#define FIT_SHAPES_FRAMES 13
+#define FIT_SHAPES_FRAMES 23
 
 /* Errors are some times what is stated of them. How many times is not known; that it is once counts
  * as so many readings. With unknown errors the likelihood of a model falls as a power of
@@ -80,6 +81,15 @@ struct fit_shapes_state {
   uint8_t part; /* of the frame under way: which is next */
 };
 
+/* A frame's readings, and the dip that takes from them, for all of its parts. */
+struct fit_shapes_frame {
+  int32_t q28[FIT_SHAPES_NODES], q14[FIT_SHAPES_NODES]; /* in grid order, the largest 0.5 to 1 */
+  int32_t shift;                                        /* Q28 = 1/1024 Pa times 2^shift */
+  int32_t base_q22;                                     /* error of a reading of weight 1 */
+  int32_t dip_share_q16, dip_k_q24;
+  bool has_own;
+};
+
 /* The normal equations of a step, and then the factors of their matrix. */
 struct fit_shapes_equations {
   int count; /* of the unknowns */
@@ -102,6 +112,7 @@ struct fit_shapes_pad {
   float force_unit_N; /* normal force of amplitude 1 at 1 Pa */
   float widest_mm2;   /* variance of the widest normal term */
   struct {
+    struct fit_shapes_frame frame;
     int32_t row[FIT_SHAPES_NODES][FIT_SHAPES_UNKNOWNS + 1];
     struct fit_shapes_equations equations[3]; /* of each model */
     int32_t column[FIT_SHAPES_UNKNOWNS + 1][FIT_SHAPES_NODES];
@@ -117,7 +128,7 @@ struct fit_shapes_pad {
 enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
                                const struct pad_profile *profile);
 
-/* Whether the result is of this frame. Where it is not, the one before stands: one frame in four
+/* Whether the result is of this frame. Where it is not, the one before stands: every other frame
  * only steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
  * settings: its dip is the pad's, and cut_noises 0. */
 bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
@@ -125,7 +136,8 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
                 const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result);
 
-/* The same in parts: call it with the same readings, fit and settings until the frame is done. */
+/* The same in parts: call it with the same pad, readings, fit and settings until the frame is done.
+ */
 enum fit_shapes_progress {
   FIT_SHAPES_UNFINISHED,
   FIT_SHAPES_STEPPED,  /* the frame is done, and the result of one before stands */

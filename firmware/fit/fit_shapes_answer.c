@@ -7,6 +7,7 @@
 
 #define LINE_SURE 8             /* variances: a line whose square is less is a pull */
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
+#define LONGEST_HALF_Q10 1408   /* of 11/4 pitches: hardly anything that presses is longer */
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the
  * readings. */
@@ -115,16 +116,27 @@ static NOINLINE void put_one(const struct problem *problem,
       sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
-/* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by a third. */
+/* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by three elevenths. */
 static bool explains_more(int32_t chi_square_q8, int32_t than_q8) {
-  return than_q8 - chi_square_q8 > (chi_square_q8 >> 1) + (FIT_SHAPES_ERRORS << 7);
+  return than_q8 - chi_square_q8 > (3 * (chi_square_q8 + (FIT_SHAPES_ERRORS << 8))) >> 3;
 }
 
-int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two) {
+static int32_t span_square_q20(const struct fit_shapes_at *at) {
+  int32_t x_q10 = at->value[SPAN_X] >> 10, y_q10 = at->value[SPAN_Y] >> 10;
+  return x_q10 * x_q10 + y_q10 * y_q10;
+}
+
+/* Hardly anything that presses is longer than that, and a pair that looks so explains as well. */
+static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
+  return chi_square_q8 - than_q8 < (than_q8 + (FIT_SHAPES_ERRORS << 8)) >> 3;
+}
+
+int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at) {
   int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
-  int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
-  bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
-  if (apart && explains_more(pair, round < line ? round : line)) {
+  bool is_apart = span_square_q20(&at[TWO]) > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
+  bool is_longest = span_square_q20(&at[LONG]) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10;
+  bool is_no_line = is_longest ? explains_as_well(pair, line) : explains_more(pair, line);
+  if (is_apart && explains_more(pair, round) && is_no_line) {
     return TWO;
   }
   return explains_more(line, round) ? LONG : ROUND;
@@ -175,13 +187,13 @@ void fit_shapes_conclude(const struct problem *problem, int best, const int32_t 
   const struct fit_shapes_equations *equations = &problem->pad->room.equations[best];
   const struct fit_shapes_at *at = &state->at[best];
   const struct fit_shapes_pad *pad = problem->pad;
-  struct scaled base = fit_scaled_from(problem->base_q22, -22);
+  struct scaled base = fit_scaled_from(problem->frame->base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
   if (chi_square_q8[best] > FREEDOM << 8) {
     variance = scaled_mul(variance, fit_scaled_from(port_divide(chi_square_q8[best], FREEDOM), -8));
   }
   struct scaled unit = fit_grid_scaled(pad->force_unit_N);
-  unit.exponent += 18 - problem->readings.shift;
+  unit.exponent += 18 - problem->frame->shift;
   const struct scales scales = {unit, fit_scaled_short(variance), fit_grid_scaled(pad->pitch_mm)};
   if (best == TWO) {
     result->shape = FIT_SHAPE_TWO;

@@ -20,7 +20,7 @@ static void set_pair(float x, float y, float dx, float dy, float share, struct f
 }
 
 static NOINLINE void set_pair_by_readings(const struct problem *problem, struct fit_shapes_at *at) {
-  const struct readings *readings = &problem->readings;
+  const struct fit_shapes_frame *readings = problem->frame;
   int first = 0, second = -1;
   int32_t most = 0;
   struct terms terms;
@@ -94,7 +94,7 @@ void fit_shapes_begin(const struct problem *problem, const struct fit_result *fi
   float x = fit->x_mm * per - fit_float(pad->origin_x_q20, -20);
   float y = fit->y_mm * per - fit_float(pad->origin_y_q20, -20);
   struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
-  amplitude.exponent += problem->readings.shift - 18;
+  amplitude.exponent += problem->frame->shift - 18;
   at.value[AMPLITUDE] =
       fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
   at.value[SPREAD] = fit_fixed(spread, 20);

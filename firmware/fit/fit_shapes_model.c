@@ -69,8 +69,8 @@ void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pul
     terms->s_q8[j] = port_divide(terms->q_q12[j] << 14, v_q26 >> 8);
     heights += terms->h_q14[j];
   }
-  terms->dip_q14 = fixed_mul_16(problem->dip_share_q16, heights);
-  terms->dip_k_q24 = problem->dip_k_q24;
+  terms->dip_q14 = fixed_mul_16(problem->frame->dip_share_q16, heights);
+  terms->dip_k_q24 = problem->frame->dip_k_q24;
   for (int j = 0; pulls && j < PAD_TANGENTIAL_TERMS; j++) {
     int32_t v_q26 = pad->pull_variance_q26[j] + fixed_mul_16(t_q20 * 64, KAPPA_Q14) * 4;
     int32_t over_q26 = fixed_div_q26(pad->pull_strength_q26[j] >> 2, v_q26 >> 2);
@@ -80,8 +80,9 @@ void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pul
 }
 
 static int set_blobs(int model, const int32_t *at, struct blob *blob) {
-  static const int32_t weight_q14[3] = {7282, 4551, 4551}, lever_q14[3] = {0, 12691, -12691};
-  int count = model == ROUND ? 1 : model == LONG ? 3 : 2;
+  static const int32_t weight_q14[4] = {5342, 5342, 2850, 2850},
+                       lever_q14[4] = {5570, -5570, 14109, -14109};
+  int count = model == ROUND ? 1 : model == LONG ? 4 : 2;
   for (int b = 0; b < count; b++) {
     if (model == TWO) {
       int32_t sign = b == 0 ? 1 : -1;
@@ -139,7 +140,12 @@ static NOINLINE void set_far(const struct problem *problem, int model, const str
   struct bell bell, other;
   const int32_t k_q24 = problem->pad->far_k_q24;
   int32_t first_q13 = at[AMPLITUDE] >> 7, second_q13 = 0;
-  fit_shapes_set_squares(blob[0].x_q12, blob[0].y_q12, &squares);
+  int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
+  if (model == TWO) {
+    x_q12 = blob[0].x_q12;
+    y_q12 = blob[0].y_q12;
+  }
+  fit_shapes_set_squares(x_q12, y_q12, &squares);
   set_rough_bell(&squares, k_q24, &bell);
   other = bell;
   if (model == TWO) {
@@ -150,7 +156,7 @@ static NOINLINE void set_far(const struct problem *problem, int model, const str
   }
   int32_t far_q16 = at[FAR] >> 4;
   int32_t *row = problem->pad->room.row[0];
-  const int32_t *reading_q28 = problem->readings.q28;
+  const int32_t *reading_q28 = problem->frame->q28;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t x_q13 = (first_q13 * bell.x_q15[i]) >> 15;
     int32_t other_x_q13 = (second_q13 * other.x_q15[i]) >> 15;
@@ -250,7 +256,7 @@ void fit_shapes_set_rows(const struct problem *problem, int model, int count,
   const int32_t *at = where->value;
   const bool pulls = count > BALANCE && model == LONG;
   struct terms terms;
-  struct blob blob[3];
+  struct blob blob[4];
   fit_shapes_set_terms(problem, at[SPREAD], pulls, &terms);
   int blobs = set_blobs(model, at, blob);
   equations->count = count;

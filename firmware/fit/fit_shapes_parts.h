@@ -7,7 +7,7 @@
  * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight
  * w_b by lever_b span from the middle.
  *   round  one blob
- *   long   three, the nodes of Gauss's quadrature of a line from -span to span
+ *   long   four, the nodes of Gauss's quadrature of a line from -span to span
  *   two    two, by +-span, of weight (1 +- balance) / 2
  * Forces are 2 pi V A and 2 pi V pull. */
 #ifndef FIT_FIT_SHAPES_PARTS_H
@@ -32,19 +32,15 @@ _Static_assert(MODELS == FIT_SHAPES_PARTS, "a part for each");
 #define AMPLITUDE_MAX ((4 << 20) - 1)
 #define AMPLITUDE_LEAST (1 << 13)
 
-/* A frame's readings, and the dip that takes from them. */
 struct problem {
   struct fit_shapes_pad *pad;
-  struct readings readings;
-  int32_t base_q22; /* error of a reading of weight 1 */
-  int32_t dip_share_q16, dip_k_q24;
+  const struct fit_shapes_frame *frame;
   const struct fit_own *own; /* [node] or NULL */
 };
 
 /* Rows of one element each, and their residuals. */
 struct priors {
   int32_t element_q27[UNKNOWNS], off_q28[UNKNOWNS];
-  int damping_shift;
 };
 
 /* What a spread makes of the profile: exponents, heights, and these over v and v^2. */
@@ -82,16 +78,19 @@ void fit_shapes_begin(const struct problem *problem, const struct fit_result *fi
                       struct fit_shapes_state *state);
 
 /* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the
- * priors; chi^2 of both, Q8; and after these, of the model's rows, one damped step. */
+ * priors; chi^2 of both, Q8; and after these, of the model's rows, one damped step, or the factors
+ * of the matrix that answers. */
 void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
                                struct priors *priors, struct fit_shapes_equations *equations);
 int32_t fit_shapes_chi_square(const struct problem *problem,
                               const struct fit_shapes_equations *equations);
 void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors,
                      struct fit_shapes_at *at);
+void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors,
+                          const struct fit_shapes_at *at);
 
-/* fit_shapes_answer.c. two: where that model is. */
-int fit_shapes_best(const int32_t *chi_square_q8, const int32_t *two);
+/* fit_shapes_answer.c. at: where each model is. */
+int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at);
 void fit_shapes_conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result);
 

@@ -6,6 +6,11 @@
 #define SPAN_MAX (3 << 20)
 #define BALANCE_MAX (15 << 16) /* 0.94 */
 #define MOVE_MAX (1 << 18)     /* a quarter of a pitch */
+/* Of the diagonal. What readings hardly tell moves slowly: with less, noise drives it far, where
+ * the readings are no longer linear in it. The matrix that answers has hardly any, since it would
+ * hide how little they tell from the standard deviations. */
+#define STEP_DAMPING_SHIFT 6
+#define ANSWER_DAMPING_SHIFT 10
 
 /* Columns are at most 2 pitches or units of the readings, in Q(27 - COLUMN_SHIFT). */
 #define COLUMN_MAX ((1 << 16) - 1)
@@ -66,7 +71,7 @@ static void put_prior(int u, int32_t element_q27, int32_t off_q20, struct priors
 void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
                                struct priors *priors, struct fit_shapes_equations *equations) {
   const struct fit_shapes_pad *pad = problem->pad;
-  int32_t base_q23 = problem->base_q22 * 2;
+  int32_t base_q23 = problem->frame->base_q22 * 2;
   for (int u = 0; u < UNKNOWNS; u++) {
     priors->element_q27[u] = priors->off_q28[u] = 0;
   }
@@ -191,7 +196,7 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
 
 int32_t fit_shapes_chi_square(const struct problem *problem,
                               const struct fit_shapes_equations *equations) {
-  struct scaled base = fit_scaled_from(problem->base_q22, -22);
+  struct scaled base = fit_scaled_from(problem->frame->base_q22, -22);
   struct scaled squares = fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
 }
@@ -231,7 +236,15 @@ void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors 
   struct fit_shapes_equations *equations = &pad->room.equations[model];
   int32_t right[UNKNOWNS], x_q20[UNKNOWNS] = {0};
   form(pad, priors, equations);
-  factorise(equations, at->value[SPREAD], pad, priors->damping_shift, right);
+  factorise(equations, at->value[SPREAD], pad, STEP_DAMPING_SHIFT, right);
   substitute(equations, right, x_q20);
   take_step(pad, model, equations, x_q20, at);
+}
+
+void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors,
+                          const struct fit_shapes_at *at) {
+  struct fit_shapes_equations *equations = &pad->room.equations[model];
+  int32_t right[UNKNOWNS];
+  form(pad, priors, equations);
+  factorise(equations, at->value[SPREAD], pad, ANSWER_DAMPING_SHIFT, right);
 }

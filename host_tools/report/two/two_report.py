@@ -32,7 +32,8 @@ def write(found, path):
             "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
             "or long, from the middle of the forces. `silent`: what the packet shows is off by more than 1 mm, or is one for two, or",
             "two for one, with a standard deviation below 0.6 mm and no shape that says so. `warned`: the standard deviation is above that. `exact gains`:",
-            "a pad whose gains are known without error. `along` and `across`: the pad's longer and shorter side, within 45 degrees.", "", *table_of_dicts_md(found["touches"]), ""]
+            "a pad whose gains are known without error. `along` and `across`: the pad's longer and shorter side, within 45 degrees. `first`: in the first answer;",
+            "all else when the touch has been held for a while. The worse of the two is judged. Edges of 24 mm and more are not.", "", *table_of_dicts_md(found["touches"]), ""]
     write_text(path, "\n".join(lines))
 
 

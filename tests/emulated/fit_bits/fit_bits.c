@@ -120,7 +120,7 @@ static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable,
                                const struct fit_settings *settings, int32_t *pressure_Pa_q10) {
   struct fit_result fit;
   struct fit_shapes_state state;
-  struct fit_shapes_result found[SHAPES_FRAMES];
+  static struct fit_shapes_result found[SHAPES_FRAMES];
   memset(&fit, 0, sizeof fit);
   memset(&state, 0, sizeof state);
   memset(found, 0, sizeof found);

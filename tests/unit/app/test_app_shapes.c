@@ -164,17 +164,27 @@ static void a_long_contact_doubts_its_place_by_what_its_line_has(void) {
                    hypotf(app.shapes.from_fit_x_mm, app.shapes.from_fit_y_mm));
 }
 
+/* Noise may make a pull look like a short line, now and then. */
 static void one_contact_is_one_with_a_load_or_without(void) {
+  const struct pad_profile profile = pad_of_12_mm();
   for (int pulled = 0; pulled < 2; pulled++) {
     tearDown();
     setUp();
     put(1.5, -4.0, 5.0);
     load_qx_N = pulled ? 1.5 : 0.0;
-    const struct wire_contact contact = last_of_press();
-    TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID, contact.flags);
-    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, contact.flags);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force1_N);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.edge_length_mm);
+    run_until(PRESS_us + 250000, &profile);
+    const unsigned count = take_contacts(contacts);
+    unsigned valid = 0, lines = 0;
+    for (unsigned i = 0; i < count; i++) {
+      valid += (contacts[i].flags & CONTACT_FLAG_SHAPE_VALID) != 0;
+      lines += (contacts[i].flags & CONTACT_FLAG_EDGE) != 0;
+      TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_SHAPE_UNKNOWN,
+                           contacts[i].flags);
+      TEST_ASSERT_EQUAL_FLOAT(0.0f, contacts[i].force1_N);
+    }
+    TEST_ASSERT_GREATER_THAN(count / 3, valid);
+    TEST_ASSERT_LESS_OR_EQUAL(pulled ? valid / 4 : 0, lines);
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, contacts[count - 1].flags);
   }
   /* A load that is estimated all the same is none of two contacts. */
   app.shapes_job.report.shape = FIT_SHAPE_TWO;
@@ -242,7 +252,7 @@ static void each_answer_says_how_old_it_is(void) {
       without++;
       continue;
     }
-    /* One answer in four is none. */
+    /* Every other frame answers. */
     TEST_ASSERT_FLOAT_WITHIN(1.6f * frame_ms, 2.1f * frame_ms, contact->shape_age_ms);
   }
   TEST_ASSERT_GREATER_OR_EQUAL(FIT_SHAPES_FRAMES, without);

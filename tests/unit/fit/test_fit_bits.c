@@ -50,8 +50,8 @@ static void test_load(void) {
 }
 
 static void test_shapes(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x9175C74B, 0xAFA57398, 0xD875ADBE, 0x257FADB9,
-                                                 0x13B1C143, 0x02B1BF51, 0x824F61F9, 0xD09CEC0C};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x956B0D1D, 0xE2EC116B, 0xA4BE782D, 0x7F58D577,
+                                                 0x57E87A5C, 0x5E80A6AD, 0xDF85D47C, 0x301FE244};
   assert_kernel(FIT_BITS_SHAPES, golden);
 }
 

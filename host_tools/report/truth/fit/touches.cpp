@@ -40,6 +40,9 @@ const twin::Indenter &indenter_of(const std::string &name) {
       {"edge10", "", Shape::roller, 2, 10, 0, EDGE_mm, 0},
       {"cylinder6x12", "", Shape::roller, 6, 12, 0, EDGE_mm, 0},
       {"edge20", "", Shape::roller, 2, 20, 0, EDGE_mm, 0},
+      {"edge24", "", Shape::roller, 2, 24, 0, EDGE_mm, 0},
+      {"edge30", "", Shape::roller, 2, 30, 0, EDGE_mm, 0},
+      {"edge36", "", Shape::roller, 2, 36, 0, EDGE_mm, 0},
       {"cube15", "", Shape::flat_square, 15, 15, 0, EDGE_mm, 0},
   };
   const auto found =
