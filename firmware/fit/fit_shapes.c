@@ -73,6 +73,8 @@ static NOINLINE void set_known(const struct fit_array *array, const struct fit_s
   }
 }
 
+/* The models move and grow as the Gaussian does. Of what it is not the model, its place is unsure:
+ * what that explains is no movement. */
 static void follow(const struct problem *problem, const struct fit_result *fit,
                    struct fit_shapes_state *state, int32_t sum_q20) {
   const struct fit_shapes_pad *pad = problem->pad;
@@ -83,13 +85,18 @@ static void follow(const struct problem *problem, const struct fit_result *fit,
     state->frames = 0;
   }
   if (state->frames > 0) {
+    int32_t dx_q20 = x - state->fit_x_q20, dy_q20 = y - state->fit_y_q20;
+    int32_t sd_q20 = place_q20(pad, fit->location_sd_mm);
+    if (fixed_longer_leg((int32_t)fixed_size(dx_q20), (int32_t)fixed_size(dy_q20)) <= sd_q20) {
+      dx_q20 = dy_q20 = 0;
+    }
     int32_t share_q13 = fixed_clamp(port_divide(sum_q20, state->sum_q20 >> 13), 0, INT16_MAX);
     for (int m = 0; m < MODELS; m++) {
       int32_t *value = state->at[m].value;
       value[AMPLITUDE] = shifted(fixed_mul_16(value[AMPLITUDE], share_q13), 3);
       value[AMPLITUDE] = fixed_clamp(value[AMPLITUDE], AMPLITUDE_LEAST, AMPLITUDE_MAX);
-      value[PLACE_X] += x - state->fit_x_q20;
-      value[PLACE_Y] += y - state->fit_y_q20;
+      value[PLACE_X] += dx_q20;
+      value[PLACE_Y] += dy_q20;
       value[PLACE_X] = fixed_clamp(value[PLACE_X], -PLACE_X_MAX, PLACE_X_MAX);
       value[PLACE_Y] = fixed_clamp(value[PLACE_Y], -PLACE_Y_MAX, PLACE_Y_MAX);
       if (m == LONG) {

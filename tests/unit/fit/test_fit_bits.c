@@ -50,8 +50,8 @@ static void test_load(void) {
 }
 
 static void test_shapes(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x956B0D1D, 0xE2EC116B, 0xA4BE782D, 0x7F58D577,
-                                                 0x57E87A5C, 0x5E80A6AD, 0xDF85D47C, 0x301FE244};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x11BBA34F, 0xE8BB99CB, 0xF2F85FB7, 0xC1A3F9AE,
+                                                 0x865DA4D1, 0x59E28C70, 0xE399E74E, 0xE8E2DC4D};
   assert_kernel(FIT_BITS_SHAPES, golden);
 }
 

@@ -244,6 +244,21 @@ static void test_two_have_their_places_and_forces(void) {
   }
 }
 
+/* Where its Gaussian moves from frame to frame, the pair itself does not. */
+static void test_a_pair_that_rests_is_not_moved(void) {
+  for (int i = 0; i < 200; i++) {
+    struct reading reading = {{0.0}};
+    double x = random_between(&noise, -6.0, 6.0), y = random_between(&noise, -6.0, 6.0);
+    press(x, y + 10.0, 2.0, 0.0, 0.0, 0.0, &reading);
+    press(x - 3.0, y - 10.0, 2.0, 0.0, 0.0, 0.0, &reading);
+    for (int k = 0; k < SENSORS; k++) { /* gains */
+      reading.Pa[k] *= 1.0 + 0.01 * random_between(&noise, -1.7, 1.7);
+    }
+    struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, result.shape);
+  }
+}
+
 static void test_a_short_pair_is_a_long_contact_not_one(void) {
   struct reading reading = {{0.0}};
   press(3.0, 1.0, 4.0, 0.0, 0.0, 0.0, &reading);
@@ -532,6 +547,7 @@ int main(void) {
   RUN_TEST(test_a_line_may_be_as_long_as_the_array);
   RUN_TEST(test_models_stay_where_they_have_settled);
   RUN_TEST(test_two_have_their_places_and_forces);
+  RUN_TEST(test_a_pair_that_rests_is_not_moved);
   RUN_TEST(test_a_short_pair_is_a_long_contact_not_one);
   RUN_TEST(test_three_are_none_of_these);
   RUN_TEST(test_what_moves_is_followed);
