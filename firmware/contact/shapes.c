@@ -9,9 +9,9 @@
 #define DEGREES_PER_RAD 57.29578f
 
 uint8_t shapes_parts(uint64_t apart_us) {
-  return apart_us >= SHAPES_AT_ONCE_us ? FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS
-         : apart_us >= SHAPES_WHOLE_us ? FIT_SHAPES_PARTS
-                                       : 1;
+  const uint8_t most = FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
+  const uint64_t parts = apart_us / SHAPES_APART_us;
+  return parts < FIT_SHAPES_PARTS ? 1 : parts < most ? (uint8_t)parts : most;
 }
 
 /* atan(z) of 0..1 within 1e-5 (Abramowitz and Stegun 4.4.49), the same bits on every machine. */

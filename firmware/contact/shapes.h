@@ -44,15 +44,13 @@ struct shapes_job {
   struct fit_shapes_result result;
 };
 
-/* Frames so far apart have time for all parts of a frame, and for all that an answer takes. */
-#define SHAPES_WHOLE_us 1500u
-#define SHAPES_AT_ONCE_us 15000u
-
 /* A part takes a Cortex-M0+ at 125 MHz so long at most (test emulated.fit_cycles). Where one is
  * under way, the worker's other job may wait for it. */
 #define SHAPES_PART_us 350u
 
-/* Parts for frames so far apart. */
+/* Parts for frames so far apart: one, or as many as have this time each, from a whole frame to all
+ * that the first answer takes. The load has what is left. */
+#define SHAPES_APART_us 500u
 uint8_t shapes_parts(uint64_t apart_us);
 
 /* Answers the question of a struct shapes_job. */
