@@ -65,7 +65,6 @@ static NOINLINE void set_known(const struct fit_array *array, const struct fit_s
     pad->room.own[k] = settings->own[array->grid.sensor[k]];
   }
   frame->dip_share_q16 = 0;
-  frame->dip_k_q24 = 1 << 24;
   if (fit_has_dip(settings)) {
     float sd = settings->dip_sd_mm * pad->per_pitch;
     frame->dip_share_q16 = fit_fixed(settings->dip_share, 16);

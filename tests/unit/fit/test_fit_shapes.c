@@ -259,6 +259,34 @@ static void test_a_pair_that_rests_is_not_moved(void) {
   }
 }
 
+/* The same contact becomes one of another shape. */
+static void test_what_a_shape_does_not_have_is_zero(void) {
+  struct fit_settings settings = usual(0.0);
+  struct fit_shapes_state state = {.frames = 0};
+  struct fit_shapes_result result = {FIT_SHAPE_UNDECIDED};
+  for (int frame = 0; frame < 4 * FIT_SHAPES_FRAMES; frame++) {
+    const double half = frame < FIT_SHAPES_FRAMES ? 8.0 : frame < 60 ? 0.2 * (59 - frame) : 0.0;
+    struct reading reading = {{0.0}};
+    press(0.0, half, 4.0, 0.0, 0.0, 0.0, &reading);
+    press(0.0, -half, 4.0, 0.0, 0.0, 0.0, &reading);
+    int32_t pressure_Pa_q10[SENSORS];
+    for (int k = 0; k < SENSORS; k++) {
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * reading.Pa[k]);
+    }
+    struct fit_result fit;
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
+    fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+    if (frame == FIT_SHAPES_FRAMES - 1) {
+      TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, result.shape);
+      TEST_ASSERT_TRUE(result.force_N[1] > 3.0f);
+    }
+  }
+  TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, result.shape);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.force_N[1]);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.y_mm[1]);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.length_mm);
+}
+
 static void test_a_short_pair_is_a_long_contact_not_one(void) {
   struct reading reading = {{0.0}};
   press(3.0, 1.0, 4.0, 0.0, 0.0, 0.0, &reading);
@@ -548,6 +576,7 @@ int main(void) {
   RUN_TEST(test_models_stay_where_they_have_settled);
   RUN_TEST(test_two_have_their_places_and_forces);
   RUN_TEST(test_a_pair_that_rests_is_not_moved);
+  RUN_TEST(test_what_a_shape_does_not_have_is_zero);
   RUN_TEST(test_a_short_pair_is_a_long_contact_not_one);
   RUN_TEST(test_three_are_none_of_these);
   RUN_TEST(test_what_moves_is_followed);
