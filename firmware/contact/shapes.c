@@ -2,6 +2,7 @@
 
 #include "common/contact_flags.h"
 #include "fit/fit_math.h"
+#include "port/divide.h"
 
 #include <math.h>
 #include <string.h>
@@ -10,8 +11,11 @@
 
 uint8_t shapes_parts(uint64_t apart_us) {
   const uint8_t most = FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
-  const uint64_t parts = apart_us / SHAPES_APART_us;
-  return parts < FIT_SHAPES_PARTS ? 1 : parts < most ? (uint8_t)parts : most;
+  if (apart_us >= most * SHAPES_APART_us) {
+    return most;
+  }
+  const int32_t parts = port_divide((int32_t)apart_us, SHAPES_APART_us);
+  return parts < FIT_SHAPES_PARTS ? 1 : (uint8_t)parts;
 }
 
 /* atan(z) of 0..1 within 1e-5 (Abramowitz and Stegun 4.4.49), the same bits on every machine. */
