@@ -118,7 +118,7 @@ static NOINLINE void put_one(const struct problem *problem,
 
 /* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by three elevenths. */
 static bool explains_more(int32_t chi_square_q8, int32_t than_q8) {
-  return than_q8 - chi_square_q8 > (3 * (chi_square_q8 + (FIT_SHAPES_ERRORS << 8))) >> 3;
+  return than_q8 - chi_square_q8 > 3 * ((chi_square_q8 + (FIT_SHAPES_ERRORS << 8)) >> 3);
 }
 
 static int32_t span_square_q20(const struct fit_shapes_at *at) {

@@ -383,7 +383,7 @@ static void test_rubber_beyond_the_limits_is_refused(void) {
 
 /* chi^2 + 14 must fall by 3/11: from 11/8 of it. */
 static int32_t limit_q8(int32_t unexplained_q8) {
-  return unexplained_q8 + 3 * (unexplained_q8 + (FIT_SHAPES_ERRORS << 8)) / 8;
+  return unexplained_q8 + 3 * ((unexplained_q8 + (FIT_SHAPES_ERRORS << 8)) / 8);
 }
 
 static void test_a_pair_must_explain_more_than_a_round_and_a_long_contact(void) {
@@ -433,6 +433,12 @@ static void test_a_pair_is_further_apart_than_half_a_pitch(void) {
     TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(chi_square_q8, of_near));
     TEST_ASSERT_EQUAL(TWO, fit_shapes_best(chi_square_q8, of_far));
   }
+}
+
+static void test_what_no_model_explains_at_all_is_no_pair(void) {
+  const struct fit_shapes_at apart[MODELS] = {[TWO] = {{[SPAN_X] = ONE_Q20 / 2}}};
+  const int32_t most = 1 << 30; /* chi^2 is no larger */
+  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){most, most, most}, apart));
 }
 
 static void test_a_long_contact_must_explain_more_than_a_round_one(void) {
@@ -587,6 +593,7 @@ int main(void) {
   RUN_TEST(test_a_pair_must_explain_more_than_a_round_and_a_long_contact);
   RUN_TEST(test_a_pair_that_looks_too_long_may_explain_a_little_less);
   RUN_TEST(test_a_pair_is_further_apart_than_half_a_pitch);
+  RUN_TEST(test_what_no_model_explains_at_all_is_no_pair);
   RUN_TEST(test_a_long_contact_must_explain_more_than_a_round_one);
   RUN_TEST(test_a_sum_that_no_contact_has_begins_again);
   RUN_TEST(test_a_sum_that_jumps_begins_again);
