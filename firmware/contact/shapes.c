@@ -11,10 +11,12 @@
 
 uint8_t shapes_parts(uint64_t apart_us) {
   const uint8_t most = FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
-  if (apart_us >= most * SHAPES_APART_us) {
+  const uint32_t load_us =
+      apart_us < TANGENTIAL_SLOW_us ? TANGENTIAL_LATE_us : TANGENTIAL_SLOW_LATE_us;
+  if (apart_us >= load_us + most * SHAPES_PART_us) {
     return most;
   }
-  const int32_t parts = port_divide((int32_t)apart_us, SHAPES_APART_us);
+  const int32_t parts = port_divide((int32_t)apart_us - (int32_t)load_us, SHAPES_PART_us);
   return parts < FIT_SHAPES_PARTS ? 1 : (uint8_t)parts;
 }
 

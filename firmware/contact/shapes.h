@@ -48,9 +48,8 @@ struct shapes_job {
  * under way, the worker's other job may wait for it. */
 #define SHAPES_PART_us 350u
 
-/* Parts for frames so far apart: one, or as many as have this time each, from a whole frame to all
- * that the first answer takes. The load has what is left. */
-#define SHAPES_APART_us 500u
+/* Parts for frames so far apart: one, or as many as there is time for beside the load's job, from a
+ * whole frame to all that the first answer takes. */
 uint8_t shapes_parts(uint64_t apart_us);
 
 /* Answers the question of a struct shapes_job. */

@@ -74,9 +74,8 @@ static NOINLINE void set_known(const struct fit_array *array, const struct fit_s
 
 /* The models move and grow as the Gaussian does. Of what it is not the model, its place is unsure:
  * what that explains is no movement. */
-static void follow(const struct problem *problem, const struct fit_result *fit,
+static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fit,
                    struct fit_shapes_state *state, int32_t sum_q20) {
-  const struct fit_shapes_pad *pad = problem->pad;
   int32_t x = place_q20(pad, fit->x_mm) - pad->origin_x_q20;
   int32_t y = place_q20(pad, fit->y_mm) - pad->origin_y_q20;
   if (state->frames > 0 && (sum_q20 < 1 << 18 || state->sum_q20 < 1 << 18 ||
@@ -109,24 +108,24 @@ static void follow(const struct problem *problem, const struct fit_result *fit,
   state->sum_q20 = sum_q20;
 }
 
-static void set_residuals(const struct problem *problem, int model, struct fit_shapes_state *state,
+static void set_residuals(struct fit_shapes_pad *pad, int model, struct fit_shapes_state *state,
                           struct priors *priors) {
-  struct fit_shapes_equations *equations = &problem->pad->room.equations[model];
+  struct fit_shapes_equations *equations = &pad->room.equations[model];
   const bool early = model == LONG && state->frames < FIRST_WITH_LOAD;
   struct fit_shapes_at *at = &state->at[model];
   fit_shapes_round_places(at);
-  fit_shapes_set_rows(problem, model, early ? BALANCE : unknowns_of[model], at, equations);
-  fit_shapes_form_residuals(problem, at->value, priors, equations);
-  state->chi_square_q8[model] = fit_shapes_chi_square(problem, equations);
+  fit_shapes_set_rows(pad, model, early ? BALANCE : unknowns_of[model], at, equations);
+  fit_shapes_form_residuals(pad, at->value, priors, equations);
+  state->chi_square_q8[model] = fit_shapes_chi_square(pad, equations);
 }
 
-static void advance(const struct problem *problem, int model, struct fit_shapes_state *state) {
+static void advance(struct fit_shapes_pad *pad, int model, struct fit_shapes_state *state) {
   struct priors priors;
-  set_residuals(problem, model, state, &priors);
+  set_residuals(pad, model, state, &priors);
   if (state->frames == FIRST_ANSWER) {
-    fit_shapes_factorise(problem->pad, model, &priors, &state->at[model]);
+    fit_shapes_factorise(pad, model, &priors, &state->at[model]);
   } else {
-    fit_shapes_step(problem->pad, model, &priors, &state->at[model]);
+    fit_shapes_step(pad, model, &priors, &state->at[model]);
   }
 }
 
@@ -137,7 +136,7 @@ static enum fit_shapes_progress forget(struct fit_shapes_state *state,
   return FIT_SHAPES_ANSWERED;
 }
 
-static enum fit_shapes_progress answer(const struct problem *problem,
+static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad,
                                        struct fit_shapes_state *state,
                                        struct fit_shapes_result *result) {
   int best = fit_shapes_best(state->chi_square_q8, state->at);
@@ -149,7 +148,7 @@ static enum fit_shapes_progress answer(const struct problem *problem,
     result->shape = FIT_SHAPE_NONE;
     state->frames = 0;
   } else {
-    fit_shapes_conclude(problem, best, state->chi_square_q8, state, result);
+    fit_shapes_conclude(pad, best, state->chi_square_q8, state, result);
   }
   return FIT_SHAPES_ANSWERED;
 }
@@ -174,17 +173,15 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
                                          const struct fit_result *fit,
                                          struct fit_shapes_state *state,
                                          struct fit_shapes_result *result) {
-  const struct fit_shapes_frame *frame = &pad->room.frame;
   const bool first = state->part == 0;
   if (first && !take(array, pressure_Pa_q10, settings, fit, pad)) {
     return forget(state, result);
   }
-  const struct problem problem = {pad, frame, frame->has_own ? pad->room.own : NULL};
   if (first) {
-    follow(&problem, fit, state, sum_of(frame));
+    follow(pad, fit, state, sum_of(&pad->room.frame));
   }
   if (state->frames == 0) {
-    fit_shapes_begin(&problem, fit, state->part, state);
+    fit_shapes_begin(pad, fit, state->part, state);
     if (++state->part < BEGIN_PARTS) {
       return FIT_SHAPES_UNFINISHED;
     }
@@ -196,12 +193,12 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
     state->frames = state->frames == LAST_FRAME ? FIRST_ANSWER : state->frames + 1;
   }
   /* The answer costs as much as two parts, so the shortest is the last. */
-  advance(&problem, MODELS - 1 - state->part, state);
+  advance(pad, MODELS - 1 - state->part, state);
   if (++state->part < FIT_SHAPES_PARTS) {
     return FIT_SHAPES_UNFINISHED;
   }
   state->part = 0;
-  return state->frames == FIRST_ANSWER ? answer(&problem, state, result) : FIT_SHAPES_STEPPED;
+  return state->frames == FIRST_ANSWER ? answer(pad, state, result) : FIT_SHAPES_STEPPED;
 }
 
 bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,

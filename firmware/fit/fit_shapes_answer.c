@@ -7,7 +7,8 @@
 
 #define LINE_SURE 8             /* variances: a line whose square is less is a pull */
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
-#define LONGEST_HALF_Q10 1408   /* of 11/4 pitches: hardly anything that presses is longer */
+#define LONGEST_HALF_Q10 1408   /* of 11/4 pitches: a longer line is rarer than a pair */
+                                 */
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the
  * readings. */
@@ -52,10 +53,9 @@ static float sd_of(struct scaled scale, struct scaled form, struct scaled varian
   return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
 
-static NOINLINE void put_two(const struct problem *problem,
+static NOINLINE void put_two(const struct fit_shapes_pad *pad,
                              const struct fit_shapes_equations *equations, const int32_t *at,
                              const struct scales *scales, struct fit_shapes_result *result) {
-  const struct fit_shapes_pad *pad = problem->pad;
   for (int c = 0; c < 2; c++) {
     int32_t sign = (c == 0) == (at[BALANCE] >= 0) ? 1 : -1;
     int32_t share_q20 = (ONE_Q20 + sign * at[BALANCE]) / 2;
@@ -102,10 +102,9 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations, cons
             scales->variance);
 }
 
-static NOINLINE void put_one(const struct problem *problem,
+static NOINLINE void put_one(const struct fit_shapes_pad *pad,
                              const struct fit_shapes_equations *equations, const int32_t *at,
                              const struct scales *scales, struct fit_shapes_result *result) {
-  const struct fit_shapes_pad *pad = problem->pad;
   result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
   result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
   result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
@@ -126,7 +125,7 @@ static int32_t span_square_q20(const struct fit_shapes_at *at) {
   return x_q10 * x_q10 + y_q10 * y_q10;
 }
 
-/* Hardly anything that presses is longer than that, and a pair that looks so explains as well. */
+/* Where the line is long, the pair may leave a little more. */
 static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
   return chi_square_q8 - than_q8 < (than_q8 + (FIT_SHAPES_ERRORS << 8)) >> 3;
 }
@@ -152,9 +151,8 @@ static void put_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
 /* The other models may be right: how far their middles are, by how likely they are, adds to the
  * errors of the places. Where chi^2 is above FIT_SHAPES_ERRORS none of the models may be, and the
  * errors grow with it. */
-static void doubt_places(const struct problem *problem, int best, const int32_t *chi_square_q8,
+static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result) {
-  const struct fit_shapes_pad *pad = problem->pad;
   float total = 1.0f, square_mm2[2] = {0.0f, 0.0f};
   for (int m = 0; m < MODELS; m++) {
     int32_t middle_q20[2];
@@ -182,28 +180,27 @@ static void doubt_places(const struct problem *problem, int best, const int32_t 
   }
 }
 
-void fit_shapes_conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
+void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result) {
-  const struct fit_shapes_equations *equations = &problem->pad->room.equations[best];
+  const struct fit_shapes_equations *equations = &pad->room.equations[best];
   const struct fit_shapes_at *at = &state->at[best];
-  const struct fit_shapes_pad *pad = problem->pad;
-  struct scaled base = fit_scaled_from(problem->frame->base_q22, -22);
+  struct scaled base = fit_scaled_from(pad->room.frame.base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
   if (chi_square_q8[best] > FREEDOM << 8) {
     variance = scaled_mul(variance, fit_scaled_from(port_divide(chi_square_q8[best], FREEDOM), -8));
   }
   struct scaled unit = fit_grid_scaled(pad->force_unit_N);
-  unit.exponent += 18 - problem->frame->shift;
+  unit.exponent += 18 - pad->room.frame.shift;
   const struct scales scales = {unit, fit_scaled_short(variance), fit_grid_scaled(pad->pitch_mm)};
   if (best == TWO) {
     result->shape = FIT_SHAPE_TWO;
-    put_two(problem, equations, at->value, &scales, result);
+    put_two(pad, equations, at->value, &scales, result);
   } else {
     result->shape = FIT_SHAPE_ROUND;
-    put_one(problem, equations, at->value, &scales, result);
+    put_one(pad, equations, at->value, &scales, result);
   }
   if (best == LONG) {
     put_line(equations, at->value, &scales, result);
   }
-  doubt_places(problem, best, chi_square_q8, state, result);
+  doubt_places(pad, best, chi_square_q8, state, result);
 }

@@ -19,12 +19,13 @@ static void set_pair(float x, float y, float dx, float dy, float share, struct f
   at->value[BALANCE] = fit_fixed(share, 20);
 }
 
-static NOINLINE void set_pair_by_readings(const struct problem *problem, struct fit_shapes_at *at) {
-  const struct fit_shapes_frame *readings = problem->frame;
+static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad,
+                                          struct fit_shapes_at *at) {
+  const struct fit_shapes_frame *readings = &pad->room.frame;
   int first = 0, second = -1;
   int32_t most = 0;
   struct terms terms;
-  fit_shapes_set_terms(problem, at->value[SPREAD], false, &terms);
+  fit_shapes_set_terms(pad, at->value[SPREAD], false, &terms);
   for (int k = 1; k < NODES; k++) {
     first = readings->q14[k] > readings->q14[first] ? k : first;
   }
@@ -58,20 +59,19 @@ static NOINLINE void set_pair_by_readings(const struct problem *problem, struct 
 }
 
 /* Sum of the squares of a pair's residuals, Q16: one with a good start has less. */
-static NOINLINE int32_t residuals_at(const struct problem *problem, struct fit_shapes_at *at) {
+static NOINLINE int32_t residuals_at(struct fit_shapes_pad *pad, struct fit_shapes_at *at) {
   fit_shapes_round_places(at);
-  fit_shapes_set_rows(problem, TWO, SPAN_X, at, problem->pad->room.equations);
+  fit_shapes_set_rows(pad, TWO, SPAN_X, at, pad->room.equations);
   int32_t sum_q16 = 0;
   for (int k = 0; k < NODES; k++) {
-    int32_t residual_q13 = problem->pad->room.row[k][RESIDUAL] >> 15;
+    int32_t residual_q13 = pad->room.row[k][RESIDUAL] >> 15;
     sum_q16 += (residual_q13 * residual_q13) >> 10;
   }
   return sum_q16;
 }
 
-void fit_shapes_begin(const struct problem *problem, const struct fit_result *fit, int part,
+void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part,
                       struct fit_shapes_state *state) {
-  const struct fit_shapes_pad *pad = problem->pad;
   const float per = pad->per_pitch;
   struct fit_shapes_at at = {{0}};
   float variance = fit->sigma_mm * fit->sigma_mm * per * per;
@@ -94,7 +94,7 @@ void fit_shapes_begin(const struct problem *problem, const struct fit_result *fi
   float x = fit->x_mm * per - fit_float(pad->origin_x_q20, -20);
   float y = fit->y_mm * per - fit_float(pad->origin_y_q20, -20);
   struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
-  amplitude.exponent += problem->frame->shift - 18;
+  amplitude.exponent += pad->room.frame.shift - 18;
   at.value[AMPLITUDE] =
       fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
   at.value[SPREAD] = fit_fixed(spread, 20);
@@ -115,9 +115,9 @@ void fit_shapes_begin(const struct problem *problem, const struct fit_result *fi
       float by = share[start] == 0.0f ? reach : 1.1547005f * reach;
       set_pair(x, y, by * along_x, by * along_y, share[start], &pair);
     } else {
-      set_pair_by_readings(problem, &pair);
+      set_pair_by_readings(pad, &pair);
     }
-    int32_t squares = residuals_at(problem, &pair);
+    int32_t squares = residuals_at(pad, &pair);
     if (squares < *least) {
       *least = squares;
       state->at[TWO] = pair;

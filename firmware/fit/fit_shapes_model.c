@@ -3,6 +3,8 @@
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
 
+#include <stddef.h>
+
 #define FAR_WIDTHS 6.25f /* FAR: the dip that the recordings of real pads show */
 #define KAPPA_Q14 21299  /* 1.3, as in fit_tangential.c */
 #define LOG2E_HALF_FLOAT 0.72134752f
@@ -56,9 +58,8 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   return FT_OK;
 }
 
-void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pulls,
+void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls,
                           struct terms *terms) {
-  const struct fit_shapes_pad *pad = problem->pad;
   int32_t heights = 0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
     int32_t v_q26 = pad->variance_q26[j] + t_q20 * 64;
@@ -69,8 +70,8 @@ void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pul
     terms->s_q8[j] = port_divide(terms->q_q12[j] << 14, v_q26 >> 8);
     heights += terms->h_q14[j];
   }
-  terms->dip_q14 = fixed_mul_16(problem->frame->dip_share_q16, heights);
-  terms->dip_k_q24 = problem->frame->dip_k_q24;
+  terms->dip_q14 = fixed_mul_16(pad->room.frame.dip_share_q16, heights);
+  terms->dip_k_q24 = pad->room.frame.dip_k_q24;
   for (int j = 0; pulls && j < PAD_TANGENTIAL_TERMS; j++) {
     int32_t v_q26 = pad->pull_variance_q26[j] + fixed_mul_16(t_q20 * 64, KAPPA_Q14) * 4;
     int32_t over_q26 = fixed_div_q26(pad->pull_strength_q26[j] >> 2, v_q26 >> 2);
@@ -134,11 +135,11 @@ static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24
 }
 
 /* Begins the rows: the readings, and the broad term about the middle, of a pair about both. */
-static NOINLINE void set_far(const struct problem *problem, int model, const struct blob *blob,
+static NOINLINE void set_far(struct fit_shapes_pad *pad, int model, const struct blob *blob,
                              const int32_t *at) {
   struct squares squares;
   struct bell bell, other;
-  const int32_t k_q24 = problem->pad->far_k_q24;
+  const int32_t k_q24 = pad->far_k_q24;
   int32_t first_q13 = at[AMPLITUDE] >> 7, second_q13 = 0;
   int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
   if (model == TWO) {
@@ -155,8 +156,8 @@ static NOINLINE void set_far(const struct problem *problem, int model, const str
     set_rough_bell(&squares, k_q24, &other);
   }
   int32_t far_q16 = at[FAR] >> 4;
-  int32_t *row = problem->pad->room.row[0];
-  const int32_t *reading_q28 = problem->frame->q28;
+  int32_t *row = pad->room.row[0];
+  const int32_t *reading_q28 = pad->room.frame.q28;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t x_q13 = (first_q13 * bell.x_q15[i]) >> 15;
     int32_t other_x_q13 = (second_q13 * other.x_q15[i]) >> 15;
@@ -170,7 +171,7 @@ static NOINLINE void set_far(const struct problem *problem, int model, const str
 }
 
 /* Adds a blob to the rows, whose elements are Q15 (RESIDUAL Q28). */
-static NOINLINE void add_blob(const struct problem *problem, const struct terms *terms, int model,
+static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *terms, int model,
                               const struct blob *blob, int32_t amplitude_q13) {
   struct squares squares;
   struct bell narrow, wide, dip;
@@ -180,8 +181,8 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
   set_rough_bell(&squares, terms->dip_k_q24, &dip);
   int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
   int32_t half_q13 = blob->lever_q14 > 0 ? amplitude_q13 : -amplitude_q13;
-  const struct fit_own *own = problem->own;
-  int32_t *row = problem->pad->room.row[0];
+  const struct fit_own *own = pad->room.frame.has_own ? pad->room.own : NULL;
+  int32_t *row = pad->room.row[0];
   for (int i = 0; i < COLUMNS; i++) {
     int32_t dx_q12 = (i - COLUMNS / 2) * 4096 - blob->x_q12;
     for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
@@ -219,7 +220,7 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
   }
 }
 
-static NOINLINE void add_pull(const struct problem *problem, const struct terms *terms,
+static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *terms,
                               const int32_t *at) {
   struct squares squares;
   struct bell bell[PAD_TANGENTIAL_TERMS];
@@ -229,7 +230,7 @@ static NOINLINE void add_pull(const struct problem *problem, const struct terms 
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     fit_shapes_set_bell(&squares, terms->pull_k_q24[j], &bell[j]);
   }
-  int32_t *row = problem->pad->room.row[0];
+  int32_t *row = pad->room.row[0];
   for (int i = 0; i < COLUMNS; i++) {
     for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
       int32_t f_q27 = 0;
@@ -249,30 +250,29 @@ void fit_shapes_round_places(struct fit_shapes_at *at) {
   }
 }
 
-void fit_shapes_set_rows(const struct problem *problem, int model, int count,
+void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count,
                          const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations) {
-  struct fit_shapes_pad *pad = problem->pad;
   const int32_t *at = where->value;
   const bool pulls = count > BALANCE && model == LONG;
   struct terms terms;
   struct blob blob[4];
-  fit_shapes_set_terms(problem, at[SPREAD], pulls, &terms);
+  fit_shapes_set_terms(pad, at[SPREAD], pulls, &terms);
   int blobs = set_blobs(model, at, blob);
   equations->count = count;
-  set_far(problem, model, blob, at);
+  set_far(pad, model, blob, at);
   for (int b = 0; b < blobs; b++) {
-    add_blob(problem, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
+    add_blob(pad, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
   }
   if (pulls) {
-    add_pull(problem, &terms, at);
+    add_pull(pad, &terms, at);
   }
   uint32_t size = 0;
   int32_t *row = pad->room.row[0];
   for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
     int32_t residual = row[RESIDUAL];
-    if (problem->own) { /* what a sensor reads that is off its place */
-      const struct fit_own *own = &problem->own[k];
+    if (pad->room.frame.has_own) { /* what a sensor reads that is off its place */
+      const struct fit_own *own = &pad->room.own[k];
       residual += (row[PLACE_X] >> 2) * own->off_x_q15 + (row[PLACE_Y] >> 2) * own->off_y_q15;
     }
     residual = fixed_clamp(residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];

@@ -32,12 +32,6 @@ _Static_assert(MODELS == FIT_SHAPES_PARTS, "a part for each");
 #define AMPLITUDE_MAX ((4 << 20) - 1)
 #define AMPLITUDE_LEAST (1 << 13)
 
-struct problem {
-  struct fit_shapes_pad *pad;
-  const struct fit_shapes_frame *frame;
-  const struct fit_own *own; /* [node] or NULL */
-};
-
 /* Rows of one element each, and their residuals. */
 struct priors {
   int32_t element_q27[UNKNOWNS], off_q28[UNKNOWNS];
@@ -62,27 +56,27 @@ struct squares {
 };
 
 /* fit_shapes_model.c */
-void fit_shapes_set_terms(const struct problem *problem, int32_t t_q20, bool pulls,
+void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls,
                           struct terms *terms);
 void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *squares);
 void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell);
 /* Where a step begins is rounded, which moves the step and not where it ends. */
 void fit_shapes_round_places(struct fit_shapes_at *at);
 /* The weighted rows of a model with so many unknowns, columns Q27 and residual Q28. */
-void fit_shapes_set_rows(const struct problem *problem, int model, int count,
+void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count,
                          const struct fit_shapes_at *where, struct fit_shapes_equations *equations);
 
 /* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */
 #define BEGIN_PARTS 2
-void fit_shapes_begin(const struct problem *problem, const struct fit_result *fit, int part,
+void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part,
                       struct fit_shapes_state *state);
 
 /* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the
  * priors; chi^2 of both, Q8; and after these, of the model's rows, one damped step, or the factors
  * of the matrix that answers. */
-void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
-                               struct priors *priors, struct fit_shapes_equations *equations);
-int32_t fit_shapes_chi_square(const struct problem *problem,
+void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, struct priors *priors,
+                               struct fit_shapes_equations *equations);
+int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad,
                               const struct fit_shapes_equations *equations);
 void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors,
                      struct fit_shapes_at *at);
@@ -91,7 +85,7 @@ void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct pr
 
 /* fit_shapes_answer.c. at: where each model is. */
 int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at);
-void fit_shapes_conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
+void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result);
 
 #endif

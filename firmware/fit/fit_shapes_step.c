@@ -68,10 +68,9 @@ static void put_prior(int u, int32_t element_q27, int32_t off_q20, struct priors
   priors->off_q28[u] = (element_q27 >> 12) * (off_q20 >> 4) >> 3;
 }
 
-void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
-                               struct priors *priors, struct fit_shapes_equations *equations) {
-  const struct fit_shapes_pad *pad = problem->pad;
-  int32_t base_q23 = problem->frame->base_q22 * 2;
+void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, struct priors *priors,
+                               struct fit_shapes_equations *equations) {
+  int32_t base_q23 = pad->room.frame.base_q22 * 2;
   for (int u = 0; u < UNKNOWNS; u++) {
     priors->element_q27[u] = priors->off_q28[u] = 0;
   }
@@ -87,7 +86,7 @@ void fit_shapes_form_residuals(const struct problem *problem, const int32_t *at,
   for (int u = SPREAD; u < equations->count; u++) {
     size |= fixed_size(priors->off_q28[u]);
   }
-  equations->residual_square = put_residuals(problem->pad, size, equations);
+  equations->residual_square = put_residuals(pad, size, equations);
   int32_t shift = 28 - equations->q[RESIDUAL];
   for (int u = SPREAD; u < equations->count; u++) {
     int32_t residual = priors->off_q28[u] >> shift;
@@ -194,9 +193,9 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
   }
 }
 
-int32_t fit_shapes_chi_square(const struct problem *problem,
+int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad,
                               const struct fit_shapes_equations *equations) {
-  struct scaled base = fit_scaled_from(problem->frame->base_q22, -22);
+  struct scaled base = fit_scaled_from(pad->room.frame.base_q22, -22);
   struct scaled squares = fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
 }

@@ -164,7 +164,7 @@ static void a_long_contact_doubts_its_place_by_what_its_line_has(void) {
                    hypotf(app.shapes.from_fit_x_mm, app.shapes.from_fit_y_mm));
 }
 
-/* Noise may make a pull look like a short line, now and then. */
+/* Noise makes one pull of six look like a short line (two.json: round, Q/F 0.3). */
 static void one_contact_is_one_with_a_load_or_without(void) {
   const struct pad_profile profile = pad_of_12_mm();
   for (int pulled = 0; pulled < 2; pulled++) {

@@ -1,10 +1,9 @@
 // two_touches: what the fingertip says of one contact, a long one, one that pulls, and two.
 //
 // The twin's objects press on calibrated pads of 12 mm with a dip, and hold still while the
-// firmware's fit_shapes answers, as scene grasp runs it: its first answer and one after that many
-// frames more are looked at. Two contacts are the sum of their pressures. One JSON
-// object on the standard output: the keys that are judged, and under "touches" the table behind
-// them. The constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of
+// firmware's fit_shapes answers, as scene grasp runs it. What it says first is looked at, and what
+// it says HELD_FRAMES later. Two contacts are the sum of their pressures. One JSON object on the
+// standard output: the keys that are judged, and under "touches" the table behind them. The constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of
 // shapes_locate were tried with 50000 and 60000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
@@ -39,10 +38,10 @@ constexpr char HELP[] = "usage: two_touches [--seed S] [--pads N] [--cache DIR]\
                         "  --cache DIR  folder of the contact tables\n";
 
 constexpr double LAYER_mm = 12.0, DIP_PERCENT = 1.25, FRICTION = 0.5, LOAD = 0.3;
-constexpr int TOUCHES = 20;                        // of each pad, in each case
+constexpr int TOUCHES = 20;         // of each pad, in each case
 constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within these
 constexpr double BAD_mm = 1.0;
-constexpr int HELD_FRAMES = 40;                          // after the first answer
+constexpr int HELD_FRAMES = 40; // after the first answer
 constexpr two::Right RIGHT{NEAR_mm, FORCE_SHARE, 0.002}; // and as often a long contact called two
 constexpr std::size_t BOUNDED = 1;    // touches of each pad whose bounds are computed
 constexpr double MODEL_SHARE = 0.002; // of the largest reading, as the firmware states of its own
@@ -277,7 +276,7 @@ std::vector<Touch> draw_touches(const fit_array &array, const Case &c, Random &r
   for (;;) {
     Touch other = touches[0] = draw_touch(array, random);
     double direction = random.uniform(-0.25 * M_PI, 0.25 * M_PI);
-    direction = c.towards == Towards::any      ? 4.0 * direction
+    direction = c.towards == Towards::any       ? 4.0 * direction
                 : c.towards == Towards::across ? direction
                                                : direction + 0.5 * M_PI;
     other.x_mm += c.apart_mm * std::cos(direction);
@@ -386,9 +385,9 @@ Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &op
       Judged &found = answers.held[p * TOUCHES + t];
       if (found.pair && t < BOUNDED) {
         Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
-        found.bounds =
-            bounds_of({array, profile, object, cast.dip_share}, touches,
-                      {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0}, draws);
+        found.bounds = bounds_of({array, profile, object, cast.dip_share}, touches,
+                                 {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0},
+                                 draws);
       }
     }
   });
