@@ -8,7 +8,6 @@
 #define LINE_SURE 8             /* variances: a line whose square is less is a pull */
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
 #define LONGEST_HALF_Q10 1408   /* of 11/4 pitches: a longer line is rarer than a pair */
-                                 */
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the
  * readings. */

@@ -36,7 +36,7 @@ print(json.dumps(row))
 KINDS = '''
 import json, sys
 options = dict(zip(sys.argv[1::2], sys.argv[2::2]))
-print(json.dumps({"kind": options["--kind"], "gripper": options["--gripper"], "controller": options["--controller"], "later_ms": 0, "seed": 5001, "grasps": int(options["--count"]),
+print(json.dumps({"kind": options["--kind"], "gripper": options["--gripper"], "controller": options["--controller"], "later_ms": 0, "seed": 27001, "grasps": int(options["--count"]),
                   "drops_percent": 2.0 if options["--kind"] == "slick" else 0.9 if options["--kind"] == "usual,rough" else 0.0, "never_held": 0, "margin_p50": 2.1, "margin_p95": 5.0,
                   "catches": 10, "peak_over_need_p50": 1.9, "peak_over_need_p95": 3.0, "peak_over_3_percent": 5.0, "slid_p50_mm": 0.0, "slid_p95_mm": 5.0, "reaction_p50_ms": 40.0,
                   "hunting_percent": 1.0, "crushed_percent": 0.0, "over_cap": 1 if options["--kind"] == "gentle" else 0, "first_grip_over_2x_percent": 0.2, "held_p50_s": 1.3, "step_us": 1.0}))
