@@ -85,12 +85,12 @@ const PAUSE_ms = [25, 2000];
 /** Frames without a load in a row: one that says so, and those that a fresh estimate takes. */
 const WITHOUT_LOAD_MAX = 4;
 
-/** Kills core 1 now and then for so many hours: kills, frames, and what went wrong. */
-export function soaked(folder, tools, hours, seed = 1) {
+/** Kills core 1 now and then for so many hours: frames, and what went wrong. */
+export function soaked(folder, tools, hours, seed) {
   const bench = new SecondCoreBench(folder, tools);
   const random = new Prng(seed);
   const end_ms = bench.now_ms + 3.6e6 * hours;
-  const found = { kills: 0, frames: 0, long_without_load: 0 };
+  const found = { hours, kills: 0, frames: 0, long_without_load: 0 };
   let without = 0;
   while (bench.now_ms < end_ms) {
     bench.run(random.range(...PAUSE_ms));
