@@ -139,7 +139,7 @@ static enum fit_shapes_progress forget(struct fit_shapes_state *state,
 static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad,
                                        struct fit_shapes_state *state,
                                        struct fit_shapes_result *result) {
-  int best = fit_shapes_best(state->chi_square_q8, state->at);
+  int best = fit_shapes_best(pad, state->chi_square_q8, state->at);
   *result = (struct fit_shapes_result){0};
   for (int m = 0; m < MODELS; m++) {
     result->chi_square[m] = fit_float(state->chi_square_q8[m], -8);

@@ -12,10 +12,11 @@
  *
  * The answer compares chi^2, in standard deviations that contain noise, gains and the model's own
  * error. How large these errors really are is unknown, and the residuals tell it. So a model with
- * more unknowns is chosen where it makes chi^2 + 14 less by 3/11. A pair that looks like a long
- * contact is called long, and a long one hardly ever a pair. Beyond 2.75 pitches, where pairs
- * across the array look like lines, a pair counts as the likelier; so some longer edges are called
- * two. What the other models say of the place is part of location_sd_mm, by how likely they are.
+ * more unknowns is chosen where it makes chi^2 + 14 less by a quarter. Two are two bodies: apart,
+ * without overlap, on the array. A pair that looks like a long contact is called long, and a long
+ * one hardly ever a pair. Beyond 2.75 pitches, where pairs across the array look like lines, a pair
+ * counts as the likelier; so some longer edges are called two. What the other models say of the
+ * place is part of location_sd_mm, by how likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
  * missing. NUMERICS.md has the fit itself; host_tools/report/two judges this part. No recording of

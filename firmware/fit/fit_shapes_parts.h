@@ -84,7 +84,8 @@ void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct pr
                           const struct fit_shapes_at *at);
 
 /* fit_shapes_answer.c. at: where each model is. */
-int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at);
+int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8,
+                    const struct fit_shapes_at *at);
 void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result);
 

@@ -386,9 +386,9 @@ static void test_rubber_beyond_the_limits_is_refused(void) {
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &turned, &profile));
 }
 
-/* chi^2 + 14 must fall by 3/11: from 11/8 of it. */
+/* chi^2 + 14 must fall by a quarter. */
 static int32_t limit_q8(int32_t unexplained_q8) {
-  return unexplained_q8 + 3 * ((unexplained_q8 + (FIT_SHAPES_ERRORS << 8)) / 8);
+  return 4 * (unexplained_q8 + (FIT_SHAPES_ERRORS << 8)) / 3 - (FIT_SHAPES_ERRORS << 8);
 }
 
 static void test_a_pair_must_explain_more_than_a_round_and_a_long_contact(void) {
@@ -400,9 +400,9 @@ static void test_a_pair_must_explain_more_than_a_round_and_a_long_contact(void) 
     for (int model = ROUND; model <= LONG; model++) { /* the better of the two counts */
       int32_t chi_square_q8[MODELS] = {limit + 4096, limit + 4096, unexplained[i]};
       chi_square_q8[model] = limit;
-      TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(chi_square_q8, apart));
+      TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, apart));
       chi_square_q8[model] = limit + 1;
-      TEST_ASSERT_EQUAL(TWO, fit_shapes_best(chi_square_q8, apart));
+      TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, apart));
     }
   }
 }
@@ -415,12 +415,15 @@ static void test_a_pair_that_looks_too_long_may_explain_a_little_less(void) {
     const int32_t line = FREEDOM << 8, most = line + (line + (FIT_SHAPES_ERRORS << 8)) / 8;
     at[LONG] = (struct fit_shapes_at){{0}};
     at[LONG].value[axis] = half;
-    TEST_ASSERT_EQUAL(LONG, fit_shapes_best((const int32_t[MODELS]){1 << 20, line, line}, at));
+    TEST_ASSERT_EQUAL(LONG,
+                      fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, line}, at));
     at[LONG].value[axis] = -half - step;
-    TEST_ASSERT_EQUAL(TWO, fit_shapes_best((const int32_t[MODELS]){1 << 20, line, most - 1}, at));
-    TEST_ASSERT_EQUAL(LONG, fit_shapes_best((const int32_t[MODELS]){1 << 20, line, most}, at));
+    TEST_ASSERT_EQUAL(TWO,
+                      fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, most - 1}, at));
+    TEST_ASSERT_EQUAL(LONG,
+                      fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, most}, at));
     /* What a round contact explains is none. */
-    TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){line, line, line}, at));
+    TEST_ASSERT_EQUAL(ROUND, fit_shapes_best(&pad, (const int32_t[MODELS]){line, line, line}, at));
   }
 }
 
@@ -434,22 +437,66 @@ static void test_a_pair_is_further_apart_than_half_a_pitch(void) {
         [TWO] = {{[SPAN_X] = near[i][0], [SPAN_Y] = near[i][1]}}};
     const struct fit_shapes_at of_far[MODELS] = {
         [TWO] = {{[SPAN_X] = far[i][0], [SPAN_Y] = far[i][1]}}};
-    TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(chi_square_q8, of_near));
-    TEST_ASSERT_EQUAL(TWO, fit_shapes_best(chi_square_q8, of_far));
+    TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, of_near));
+    TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, of_far));
+  }
+}
+
+static void test_a_pair_does_not_overlap(void) {
+  const int32_t chi_square_q8[MODELS] = {1 << 20, 1 << 20, 0};
+  const int32_t half = 3 * (ONE_Q20 / 8), touching = 9 * (ONE_Q20 / 64) / 5; /* spread */
+  struct fit_shapes_at at[MODELS] = {[TWO] = {{[SPAN_X] = half, [SPREAD] = touching}}};
+  TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
+  at[TWO].value[SPREAD] = touching + 1;
+  TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
+}
+
+static void test_a_pair_is_on_the_array(void) {
+  const int32_t chi_square_q8[MODELS] = {1 << 20, 1 << 20, 0};
+  const int32_t half = ONE_Q20 / 2, beside[2] = {ONE_Q20 + half, 2 * ONE_Q20 + half};
+  for (int axis = 0; axis < 2; axis++) {
+    for (int sign = -1; sign <= 1; sign += 2) {
+      for (int side = -1; side <= 1; side += 2) {
+        struct fit_shapes_at at[MODELS] = {[TWO] = {{0}}};
+        at[TWO].value[SPAN_X + axis] = side * half;
+        at[TWO].value[PLACE_X + axis] = sign * (beside[axis] - half - 1);
+        TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
+        at[TWO].value[PLACE_X + axis] += 3 * sign;
+        TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
+      }
+    }
+  }
+}
+
+static void test_a_pair_of_no_spread_must_explain_more(void) {
+  struct fit_shapes_at at[MODELS] = {[TWO] = {{[SPAN_X] = ONE_Q20 / 2}}};
+  const int32_t pair = FREEDOM << 8, limit = limit_q8(pair), doubted = limit_q8(pair + (8 << 8));
+  at[TWO].value[SPREAD] = pad.spread_least_q20 + 256;
+  TEST_ASSERT_EQUAL(TWO,
+                    fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, limit + 1, pair}, at));
+  at[TWO].value[SPREAD] = pad.spread_least_q20 + 255;
+  for (int model = ROUND; model <= LONG; model++) {
+    int32_t chi_square_q8[MODELS] = {doubted + 4096, doubted + 4096, pair};
+    chi_square_q8[model] = doubted;
+    TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
+    chi_square_q8[model] = doubted + 1;
+    TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
   }
 }
 
 static void test_what_no_model_explains_at_all_is_no_pair(void) {
   const struct fit_shapes_at apart[MODELS] = {[TWO] = {{[SPAN_X] = ONE_Q20 / 2}}};
   const int32_t most = 1 << 30; /* chi^2 is no larger */
-  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){most, most, most}, apart));
+  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best(&pad, (const int32_t[MODELS]){most, most, most}, apart));
 }
 
 static void test_a_long_contact_must_explain_more_than_a_round_one(void) {
   const struct fit_shapes_at together[MODELS] = {{{0}}};
   const int32_t line = FREEDOM << 8, limit = limit_q8(line);
-  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best((const int32_t[MODELS]){limit, line, 0}, together));
-  TEST_ASSERT_EQUAL(LONG, fit_shapes_best((const int32_t[MODELS]){limit + 1, line, 0}, together));
+  TEST_ASSERT_EQUAL(ROUND,
+                    fit_shapes_best(&pad, (const int32_t[MODELS]){limit, line, 0}, together));
+  TEST_ASSERT_EQUAL(LONG,
+                    fit_shapes_best(&pad, (const int32_t[MODELS]){limit + 1, line, 0}, together));
 }
 
 /* 256 Pa where the largest reading, of 1000 Pa, is 0.98 of a unit. */
@@ -597,6 +644,9 @@ int main(void) {
   RUN_TEST(test_a_pair_must_explain_more_than_a_round_and_a_long_contact);
   RUN_TEST(test_a_pair_that_looks_too_long_may_explain_a_little_less);
   RUN_TEST(test_a_pair_is_further_apart_than_half_a_pitch);
+  RUN_TEST(test_a_pair_does_not_overlap);
+  RUN_TEST(test_a_pair_is_on_the_array);
+  RUN_TEST(test_a_pair_of_no_spread_must_explain_more);
   RUN_TEST(test_what_no_model_explains_at_all_is_no_pair);
   RUN_TEST(test_a_long_contact_must_explain_more_than_a_round_one);
   RUN_TEST(test_a_sum_that_no_contact_has_begins_again);
