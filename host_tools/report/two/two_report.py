@@ -11,8 +11,9 @@ PAIRS = {"8 mm, 1:1": "8mm", "12 mm, 1:1": "12mm", "10 mm, 3:1": "10mm_3to1"}
 
 
 def possible_rows(found):
-    """(pair, asked, possible with the rubber known, possible with the model, found), percent."""
-    kinds = ("two_possible_rubber_known_percent", "two_possible_percent", "two_right_percent")
+    """(pair, asked, possible with the rubber known, with models of rising errors, found), percent."""
+    kinds = ("two_possible_rubber_known_percent", "two_possible_model_quartered_percent", "two_possible_model_halved_percent", "two_possible_percent",
+             "two_right_percent")
     return [(pair, found["goals"][f"two_right_percent_{end}"]["goal"], *(text_of(found[f"{kind}_{end}"], 3) for kind in kinds))
             for pair, end in PAIRS.items()]
 
@@ -24,11 +25,11 @@ def write(found, path):
         *goal_table_md(found), ""]
     if "touches" in found:
         lines += [
-            *table_md(("pairs", "asked", "possible, rubber known", "possible, model known", "right"), possible_rows(found)), "",
+            *table_md(("pairs", "asked", "possible, rubber known", "model off by 0.0005", "by 0.001", "by 0.002", "right"), possible_rows(found)), "",
             "`possible`: what no judge does better than on such pads, be it with the rubber's response known exactly, or with a model that is off by",
-            "0.002 of the largest reading at each sensor, as the firmware states of its own. Noise and the gains' errors are in both. It is the smaller",
-            "of two limits, touch by touch: the Cramer-Rao bound of places and forces, and the likelihood ratio of the pair to the nearest long",
-            "contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).", "",
+            "so much of the largest reading at each sensor: 0.002, as the firmware states of its own, half or a quarter of it. Noise and the gains'",
+            "errors are in all. It is the smaller of two limits, touch by touch: the Cramer-Rao bound of places and forces, and the likelihood ratio",
+            "of the pair to the nearest long contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).", "",
             "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
             "or long, from the middle of the forces. `silent`: what the packet shows is off by more than 1 mm, or is one for two, or",
             "two for one, with a standard deviation below 0.6 mm and no shape that says so. `warned`: the standard deviation is above that. `exact gains`:",

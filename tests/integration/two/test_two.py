@@ -13,7 +13,8 @@ ROWS = [{"case": f"two, {apart} mm, {ratio}", **CALLED, "two_and_right": 59.0, "
 
 class Two(ReportOfPrograms):
     NAME, FOUND = "two", {"touches": {"two_right_percent_8mm": 59.0, "one_called_two_percent": 0.1, "touches": ROWS,
-                                 **{f"two_possible_{kind}_{pair}": 61.25 for kind in ("percent", "rubber_known_percent") for pair in ("8mm", "12mm", "10mm_3to1")}}}
+                                 **{f"two_possible_{kind}_{pair}": 61.25 for kind in ("percent", "model_halved_percent", "model_quartered_percent", "rubber_known_percent")
+                                    for pair in ("8mm", "12mm", "10mm_3to1")}}}
 
     def test_figures_are_judged_and_written(self):
         done = self.run_tool("--parts", "touches")
@@ -24,7 +25,7 @@ class Two(ReportOfPrograms):
         self.assertIsNone(verdicts["cycles_core1_max"])
         text = (self.out / "two.md").read_text()
         self.assertIn("| two_right_percent_8mm | 59 | >= 90 | MISSED |", text)
-        self.assertIn("| 8 mm, 1:1 | >= 90 | 61.2 | 61.2 | 59 |", text)
+        self.assertIn("| 8 mm, 1:1 | >= 90 | 61.2 | 61.2 | 61.2 | 61.2 | 59 |", text)
         self.assertIn("| two, 12 mm, 3:1 |", text)
         self.assertEqual((self.out / "two.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(self.run_tool("--parts", "touches", "--check").returncode, 1)

@@ -3,8 +3,9 @@
 // The twin's objects press on calibrated pads of 12 mm with a dip, and hold still while the
 // firmware's fit_shapes answers, as scene grasp runs it. What it says first is looked at, and what
 // it says HELD_FRAMES later. Two contacts are the sum of their pressures. One JSON object on the
-// standard output: the keys that are judged, and under "touches" the table behind them. The constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of
-// shapes_locate were tried with 50000 and 60000.
+// standard output: the keys that are judged, and under "touches" the table behind them. The
+// constants of fit_shapes were chosen with the seeds 20000 and 30000, the rules of shapes_locate
+// were tried with 50000 and 60000.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
 #include "shear/static/pulled.hpp"
@@ -18,8 +19,10 @@ extern "C" {
 }
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -38,13 +41,22 @@ constexpr char HELP[] = "usage: two_touches [--seed S] [--pads N] [--cache DIR]\
                         "  --cache DIR  folder of the contact tables\n";
 
 constexpr double LAYER_mm = 12.0, DIP_PERCENT = 1.25, FRICTION = 0.5, LOAD = 0.3;
-constexpr int TOUCHES = 20;         // of each pad, in each case
+constexpr int TOUCHES = 20;                        // of each pad, in each case
 constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within these
 constexpr double BAD_mm = 1.0;
-constexpr int HELD_FRAMES = 40; // after the first answer
+constexpr int HELD_FRAMES = 40;                          // after the first answer
 constexpr two::Right RIGHT{NEAR_mm, FORCE_SHARE, 0.002}; // and as often a long contact called two
-constexpr std::size_t BOUNDED = 1;    // touches of each pad whose bounds are computed
-constexpr double MODEL_SHARE = 0.002; // of the largest reading, as the firmware states of its own
+constexpr std::size_t BOUNDED = 1; // touches of each pad whose bounds are computed
+// What a judge's model is off by, of the largest reading: as the firmware states of its own, half
+// and a quarter of it, and nothing.
+struct JudgeOf {
+  const char *possible;
+  double model_share;
+};
+constexpr JudgeOf JUDGES[] = {{"possible", 0.002},
+                              {"possible_model_halved", 0.001},
+                              {"possible_model_quartered", 0.0005},
+                              {"possible_rubber_known", 0.0}};
 constexpr double WEAKER_MIN_N = 2.0, WEAKER_MAX_N = 5.0;
 constexpr double DEGREES = 180.0 / M_PI;
 
@@ -79,9 +91,7 @@ struct Judged {
   double force;     // relative error of the sum
   double angle_deg; // of a long contact or the line through two
   bool pair, silent;
-  struct Bounds {
-    two::PairBound of_model, rubber_known;
-  };
+  using Bounds = std::array<two::PairBound, std::size(JUDGES)>;
   std::optional<Bounds> bounds; // of some of the pairs
 };
 
@@ -194,18 +204,18 @@ double chi_square_median(const std::vector<Judged> &judged, int model) {
 
 // What no judge of these pairs does better than: of each the smaller of its two limits, in percent.
 void put_bounds(const std::vector<Judged> &judged, ordered_json &row) {
-  double of_model = 0.0, rubber_known = 0.0, pairs = 0.0;
-  for (const Judged &j : judged) {
-    if (j.bounds) {
-      const auto [model, known] = *j.bounds;
-      of_model += std::min(model.placed, model.told);
-      rubber_known += std::min(known.placed, known.told);
-      pairs += 1.0;
+  for (std::size_t judge = 0; judge < std::size(JUDGES); judge++) {
+    double found = 0.0, pairs = 0.0;
+    for (const Judged &j : judged) {
+      if (j.bounds) {
+        const two::PairBound &bound = (*j.bounds)[judge];
+        found += std::min(bound.placed, bound.told);
+        pairs += 1.0;
+      }
     }
-  }
-  if (pairs > 0.0) {
-    row["possible"] = percent(of_model, pairs);
-    row["possible_rubber_known"] = percent(rubber_known, pairs);
+    if (pairs > 0.0) {
+      row[JUDGES[judge].possible] = percent(found, pairs);
+    }
   }
 }
 
@@ -276,7 +286,7 @@ std::vector<Touch> draw_touches(const fit_array &array, const Case &c, Random &r
   for (;;) {
     Touch other = touches[0] = draw_touch(array, random);
     double direction = random.uniform(-0.25 * M_PI, 0.25 * M_PI);
-    direction = c.towards == Towards::any       ? 4.0 * direction
+    direction = c.towards == Towards::any      ? 4.0 * direction
                 : c.towards == Towards::across ? direction
                                                : direction + 0.5 * M_PI;
     other.x_mm += c.apart_mm * std::cos(direction);
@@ -310,13 +320,17 @@ Readings base_of(const fit_array &array, const shear::Object &object,
 }
 
 Judged::Bounds bounds_of(const two::Rubber &rubber, const std::vector<Touch> &touches,
-                         two::ReadingErrors errors, Random &random) {
+                         two::ReadingErrors errors, const Random &random) {
   two::Unknowns<two::PAIR> pair;
   pair << touches[0].x_mm, touches[0].y_mm, touches[0].force_N, touches[1].x_mm, touches[1].y_mm,
       touches[1].force_N;
-  const two::PairBound known = two::bound_of(rubber, pair, errors, RIGHT, random);
-  errors.model_share = MODEL_SHARE;
-  return {two::bound_of(rubber, pair, errors, RIGHT, random), known};
+  Judged::Bounds bounds;
+  for (std::size_t judge = 0; judge < std::size(JUDGES); judge++) {
+    errors.model_share = JUDGES[judge].model_share;
+    Random same = random;
+    bounds[judge] = two::bound_of(rubber, pair, errors, RIGHT, same);
+  }
+  return bounds;
 }
 
 Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &options) {
@@ -384,10 +398,10 @@ Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &op
       }
       Judged &found = answers.held[p * TOUCHES + t];
       if (found.pair && t < BOUNDED) {
-        Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
-        found.bounds = bounds_of({array, profile, object, cast.dip_share}, touches,
-                                 {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0},
-                                 draws);
+        const Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
+        found.bounds =
+            bounds_of({array, profile, object, cast.dip_share}, touches,
+                      {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0}, draws);
       }
     }
   });
@@ -466,9 +480,10 @@ ordered_json judge(const Options &options) {
     right("two_right_percent_8mm", "two, 8 mm, 1:1");
     right("two_right_percent_12mm", "two, 12 mm, 1:1");
     right("two_right_percent_10mm_3to1", "two, 10 mm, 3:1");
-    for (const char *possible : {"possible", "possible_rubber_known"}) {
+    for (const JudgeOf &judge : JUDGES) {
       const auto of = [&](const char *apart, const char *of_case) {
-        key((std::string("two_") + possible + "_percent_" + apart).c_str(), of_case, possible);
+        key((std::string("two_") + judge.possible + "_percent_" + apart).c_str(), of_case,
+            judge.possible);
       };
       of("8mm", "two, 8 mm, 1:1");
       of("12mm", "two, 12 mm, 1:1");
