@@ -40,6 +40,7 @@ from fingertip.files import InputError, check_output, run_tool, write_bytes, wri
 PATIENCE_s = 120
 SPEED = "8"  # times the recorded one, to save time
 STEPS_PER_s = 12  # of a monitor that replays, at least: so it shows each step of a picture that moves
+SLOWEST = 1 / 64  # of the speed that is tried first: a busy machine shows fewer steps a second
 WIDTH, HEIGHT, BACKGROUND, FOREGROUND = moving.WIDTH, moving.HEIGHT, moving.BACKGROUND, moving.FOREGROUND
 
 
@@ -81,6 +82,17 @@ def screens_at(command, columns, rows, times_s):
 
 def screen_at(command, columns, rows, at_s):
     return screens_at(command, columns, rows, [at_s])[0]
+
+
+def each_screen_at(replay, columns, rows, times_s, speed):
+    """A screen of its own at each of these times: replayed more slowly as long as steps are missing."""
+    least = speed * SLOWEST
+    while speed >= least:
+        found = screens_at([*replay, "--speed", f"{speed:g}"], columns, rows, times_s)
+        if len({id(screen) for screen in found}) == len(times_s):
+            return found
+        speed /= 2
+    raise InputError("this machine is too busy to show each step; give a longer --every")
 
 
 def shapes(column, row, cell):
@@ -149,14 +161,13 @@ def main(argv):
     if moves and not (options.every > 0 and options.until > options.at):
         raise InputError("--until has to be later than --at, and --every more than 0")
     check_output(options.output, options.recording)
-    speed = f"{options.every * STEPS_PER_s:g}" if moves else SPEED
-    command = [options.tool, "replay", os.path.relpath(options.recording), "--speed", speed, *(["--device", options.device] if options.device else [])]
+    replay = [options.tool, "replay", os.path.relpath(options.recording), *(["--device", options.device] if options.device else [])]
     columns, rows = int(size[1]), int(size[2])
     if moves:
         times_s = [options.at + i * options.every for i in range(1 + int((options.until - options.at) / options.every))]
-        write_bytes(options.output, moving.png(screens_at(command, columns, rows, times_s), options.every))
+        write_bytes(options.output, moving.png(each_screen_at(replay, columns, rows, times_s, options.every * STEPS_PER_s), options.every))
     else:
-        write_text(options.output, svg(screen_at(command, columns, rows, options.at)))
+        write_text(options.output, svg(screen_at([*replay, "--speed", SPEED], columns, rows, options.at)))
     return 0
 
 

@@ -78,6 +78,12 @@ class ReplayPull(unittest.TestCase):
         self.assertEqual(len(set(frames)), 7)  # a lift: each differs
         self.assertLess(out.stat().st_size, 1e6)
 
+    def test_each_step_is_shown_where_the_replay_was_too_quick(self):
+        self.shown()
+        replay, times_s = [FINGERTIP, "replay", str(folder / ".csv")], [1, 1.5, 2, 2.5]
+        self.assertLess(len(set(map(id, picture.screens_at([*replay, "--speed", "96"], 100, 30, times_s)))), 4)
+        self.assertEqual(len(set(map(id, picture.each_screen_at(replay, 100, 30, times_s, 96)))), 4)
+
     def test_pictures_that_cannot_be(self):
         for words, said in ((("-o", "p.png"), "ends in .svg; with --until one that ends in .png"), (("-o", "p.png", "--at", "3", "--until", "2"), "later than --at"),
                             (("-o", "p.svg", "--until", "2"), "ends in .png")):
