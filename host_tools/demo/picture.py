@@ -38,14 +38,16 @@ import moving  # noqa: E402
 from fingertip.files import InputError, check_output, run_tool, write_bytes, write_text  # noqa: E402
 
 PATIENCE_s = 120
-SPEED = "8"  # times the recorded one, to save time
+SPEED = 8  # times the recorded one, to save time
 STEPS_PER_s = 12  # of a monitor that replays, at least: so it shows each step of a picture that moves
-SLOWEST = 1 / 64  # of the speed that is tried first: a busy machine shows fewer steps a second
+SLOWEST = 1 / 16  # times the recorded speed: a busy machine shows fewer steps a second
+TENTH_s = 0.1  # in which the monitor's last line tells the time
+NEAR_s = 0.5  # of one screen to the time that was asked for
 WIDTH, HEIGHT, BACKGROUND, FOREGROUND = moving.WIDTH, moving.HEIGHT, moving.BACKGROUND, moving.FOREGROUND
 
 
 def screens_at(command, columns, rows, times_s):
-    """The screen as soon as it says that it is at each of these times, which rise."""
+    """The screen as soon as it says that it is at each of these times, which rise; and how late the latest was, s."""
     pid, terminal = pty.fork()
     if pid == 0:
         time.sleep(0.1)  # until the terminal has its size
@@ -54,7 +56,7 @@ def screens_at(command, columns, rows, times_s):
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
     screen = pyte.Screen(columns, rows)
     stream = pyte.ByteStream(screen)
-    found, end = [], time.monotonic() + PATIENCE_s
+    found, late_s, end = [], 0.0, time.monotonic() + PATIENCE_s
     try:
         while time.monotonic() < end:
             if not select.select([terminal], [], [], 0.1)[0]:
@@ -66,33 +68,33 @@ def screens_at(command, columns, rows, times_s):
             for part in re.split(rb"(?<=\x1b\[\?2026l)", output):
                 stream.feed(part)
                 told = re.search(r"at (\d+\.\d) s of ", screen.display[-1])
-                if not part.endswith(b"\x1b[?2026l") or not told or float(told.group(1)) < times_s[len(found)]:
+                if not part.endswith(b"\x1b[?2026l") or not told:
                     continue
-                found.append(copy.deepcopy(screen))
-                while len(found) < len(times_s) and float(told.group(1)) >= times_s[len(found)]:
-                    found.append(found[-1])
+                tenths = round(float(told.group(1)) / TENTH_s)
+                while len(found) < len(times_s) and tenths >= round(times_s[len(found)] / TENTH_s):
+                    late_s = max(late_s, TENTH_s * (tenths - round(times_s[len(found)] / TENTH_s)))
+                    found.append(copy.deepcopy(screen))
                 if len(found) == len(times_s):
                     os.write(terminal, b"q")
-                    return found
+                    return found, late_s
     finally:
         os.close(terminal)
         os.waitpid(pid, 0)
     raise InputError(f"the monitor never came to {times_s[len(found)]:g} s; its last line: {screen.display[-1].strip()}")
 
 
-def screen_at(command, columns, rows, at_s):
-    return screens_at(command, columns, rows, [at_s])[0]
-
-
-def each_screen_at(replay, columns, rows, times_s, speed):
-    """A screen of its own at each of these times: replayed more slowly as long as steps are missing."""
-    least = speed * SLOWEST
-    while speed >= least:
-        found = screens_at([*replay, "--speed", f"{speed:g}"], columns, rows, times_s)
-        if len({id(screen) for screen in found}) == len(times_s):
+def replayed(replay, columns, rows, times_s, near_s, speed):
+    """A screen for each of these times, none later by near_s: more slowly where the machine is too busy for that."""
+    while speed >= SLOWEST:
+        found, late_s = screens_at([*replay, "--speed", f"{speed:g}"], columns, rows, times_s)
+        if late_s < near_s - TENTH_s / 2:
             return found
         speed /= 2
-    raise InputError("this machine is too busy to show each step; give a longer --every")
+    raise InputError(f"this machine is too busy to show each time within {near_s:g} s")
+
+
+def screen_at(replay, columns, rows, at_s):
+    return replayed(replay, columns, rows, [at_s], NEAR_s, SPEED)[0]
 
 
 def shapes(column, row, cell):
@@ -158,16 +160,16 @@ def main(argv):
     moves = options.until is not None
     if not options.output.endswith(".png" if moves else ".svg"):
         raise InputError(f"{options.output}: give a name that ends in .svg; with --until one that ends in .png")
-    if moves and not (options.every > 0 and options.until > options.at):
-        raise InputError("--until has to be later than --at, and --every more than 0")
+    if moves and not (options.every >= TENTH_s and options.until > options.at):
+        raise InputError("--until has to be later than --at, and --every at least 0.1")
     check_output(options.output, options.recording)
     replay = [options.tool, "replay", os.path.relpath(options.recording), *(["--device", options.device] if options.device else [])]
     columns, rows = int(size[1]), int(size[2])
     if moves:
         times_s = [options.at + i * options.every for i in range(1 + int((options.until - options.at) / options.every))]
-        write_bytes(options.output, moving.png(each_screen_at(replay, columns, rows, times_s, options.every * STEPS_PER_s), options.every))
+        write_bytes(options.output, moving.png(replayed(replay, columns, rows, times_s, options.every, options.every * STEPS_PER_s), options.every))
     else:
-        write_text(options.output, svg(screen_at([*replay, "--speed", SPEED], columns, rows, options.at)))
+        write_text(options.output, svg(screen_at(replay, columns, rows, options.at)))
     return 0
 
 

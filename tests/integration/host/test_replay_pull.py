@@ -32,7 +32,7 @@ class ReplayPull(unittest.TestCase):
         recording = folder / f"{'_'.join(pad)}.csv"
         if not recording.exists():
             subprocess.run([PLAYER, "play", scenario, "-o", recording, "--raw", "--rate", "100", "--quiet", *pad], check=True)
-        lines = picture.screen_at([FINGERTIP, "replay", str(recording), "--speed", "8"], 120, 40, at_s).display
+        lines = picture.screen_at([FINGERTIP, "replay", str(recording)], 120, 40, at_s).display
         return "\n".join(lines[:-1])  # without the keys
 
     def numbers(self, text):
@@ -78,14 +78,18 @@ class ReplayPull(unittest.TestCase):
         self.assertEqual(len(set(frames)), 7)  # a lift: each differs
         self.assertLess(out.stat().st_size, 1e6)
 
-    def test_each_step_is_shown_where_the_replay_was_too_quick(self):
+    def test_what_the_replay_was_too_quick_for_is_shown_more_slowly(self):
         self.shown()
-        replay, times_s = [FINGERTIP, "replay", str(folder / ".csv")], [1, 1.5, 2, 2.5]
-        self.assertLess(len(set(map(id, picture.screens_at([*replay, "--speed", "96"], 100, 30, times_s)))), 4)
-        self.assertEqual(len(set(map(id, picture.each_screen_at(replay, 100, 30, times_s, 96)))), 4)
+        replay, times_s = [FINGERTIP, "replay", str(folder / ".csv")], [round(1 + 0.1 * i, 1) for i in range(6)]
+        self.assertGreater(picture.screens_at([*replay, "--speed", "96"], 100, 30, times_s)[1], 0.1)
+        shown = picture.replayed(replay, 100, 30, times_s, 0.1, 96)
+        self.assertEqual([re.search(r"at (\d+\.\d) s of ", screen.display[-1])[1] for screen in shown], [f"{at_s:.1f}" for at_s in times_s])
+        with self.assertRaisesRegex(picture.InputError, "too busy to show each time within 0 s"):
+            picture.replayed(replay, 100, 30, [0.2], 0, 1)
 
     def test_pictures_that_cannot_be(self):
         for words, said in ((("-o", "p.png"), "ends in .svg; with --until one that ends in .png"), (("-o", "p.png", "--at", "3", "--until", "2"), "later than --at"),
+                            (("-o", "p.png", "--until", "2", "--every", "0.05"), "--every at least 0.1"),
                             (("-o", "p.svg", "--until", "2"), "ends in .png")):
             with self.assertRaisesRegex(picture.InputError, said):
                 picture.main(["lift.csv", *words])
