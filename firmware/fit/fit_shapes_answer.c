@@ -8,7 +8,7 @@
 #define LINE_SURE 8               /* variances: a line whose square is less is a pull */
 #define SEPARATION_HALF_Q10 256   /* of half a pitch: nearer pairs are long contacts */
 #define BESIDE_Q20 (1 << 19)      /* half a pitch */
-#define HERTZ 5                   /* square of a ball's contact radius over its spread */
+#define SQUARE 3                  /* half a square's side, squared, over its spread */
 #define LEAST_SPREAD_CHI_SQUARE 8 /* no contact has that */
 #define LONGEST_HALF_Q10 1408     /* of 11/4 pitches: a longer line is rarer than a pair */
 
@@ -134,13 +134,14 @@ static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
 }
 
 /* Two contacts are apart and do not overlap, and both are on the array or hardly beside it. A pair
- * that is otherwise explains a wide contact, or what the models of a pull are off by. */
+ * that is otherwise explains a wide contact, or what the models of a pull are off by. Of squares,
+ * discs (4) and balls (5), squares of the same spread overlap last. */
 static bool can_be_two(const struct fit_shapes_at *pair) {
   const int32_t *at = pair->value, square_q20 = span_square_q20(pair);
   uint32_t reach_x = fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]);
   uint32_t reach_y = fixed_size(at[PLACE_Y]) + fixed_size(at[SPAN_Y]);
   return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 &&
-         square_q20 > HERTZ * at[SPREAD] && reach_x < COLUMNS / 2 * ONE_Q20 + BESIDE_Q20 &&
+         square_q20 > SQUARE * at[SPREAD] && reach_x < COLUMNS / 2 * ONE_Q20 + BESIDE_Q20 &&
          reach_y < ROWS / 2 * ONE_Q20 + BESIDE_Q20;
 }
 
@@ -149,7 +150,7 @@ int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_
   int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
   bool is_longest = span_square_q20(&at[LONG]) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10;
   /* A point's spread is 0, and the least is far from that. */
-  bool is_narrow = at[TWO].value[SPREAD] < pad->spread_least_q20 + 256;
+  bool is_narrow = fit_shapes_is_narrowest(pad, at[TWO].value[SPREAD]);
   int32_t doubted = pair + (is_narrow ? LEAST_SPREAD_CHI_SQUARE << 8 : 0);
   bool is_no_line = is_longest ? explains_as_well(pair, line) : explains_more(doubted, line);
   if (can_be_two(&at[TWO]) && explains_more(doubted, round) && is_no_line) {

@@ -66,6 +66,11 @@ void fit_shapes_round_places(struct fit_shapes_at *at);
 void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count,
                          const struct fit_shapes_at *where, struct fit_shapes_equations *equations);
 
+/* Whether a spread is at its least, but for what fit_shapes_round_places makes of it. */
+static inline bool fit_shapes_is_narrowest(const struct fit_shapes_pad *pad, int32_t spread_q20) {
+  return spread_q20 < pad->spread_least_q20 + 256;
+}
+
 /* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */
 #define BEGIN_PARTS 2
 void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part,

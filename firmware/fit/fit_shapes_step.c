@@ -205,7 +205,7 @@ int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad,
 static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations,
                         int32_t spread) {
   int32_t right = equations->right[SPREAD];
-  if (!((spread < pad->spread_least_q20 + 256 && right < 0) ||
+  if (!((fit_shapes_is_narrowest(pad, spread) && right < 0) ||
         (spread > pad->spread_most_q20 - 256 && right > 0))) {
     return;
   }

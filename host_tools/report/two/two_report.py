@@ -34,7 +34,8 @@ def write(found, path):
             "or long, from the middle of the forces. `silent`: what the packet shows is off by more than 1 mm, or is one for two, or",
             "two for one, with a standard deviation below 0.6 mm and no shape that says so. `warned`: the standard deviation is above that. `exact gains`:",
             "a pad whose gains are known without error. `along` and `across`: the pad's longer and shorter side, within 45 degrees. `first`: in the first answer;",
-            "all else when the touch has been held for a while. The worse of the two is judged. Edges of 24 mm and more are not.", "", *table_of_dicts_md(found["touches"]), ""]
+            "all else when the touch has been held for a while. The worse of the two is judged. Edges of 24 mm and more and pairs of cubes are not.", "",
+            *table_of_dicts_md(found["touches"]), ""]
     write_text(path, "\n".join(lines))
 
 

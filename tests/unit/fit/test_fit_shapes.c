@@ -444,10 +444,10 @@ static void test_a_pair_is_further_apart_than_half_a_pitch(void) {
 
 static void test_a_pair_does_not_overlap(void) {
   const int32_t chi_square_q8[MODELS] = {1 << 20, 1 << 20, 0};
-  const int32_t half = 3 * (ONE_Q20 / 8), touching = 9 * (ONE_Q20 / 64) / 5; /* spread */
-  struct fit_shapes_at at[MODELS] = {[TWO] = {{[SPAN_X] = half, [SPREAD] = touching}}};
+  const int32_t half = 3 * (ONE_Q20 / 8), touching = 9 * (ONE_Q20 / 64) / 3; /* spread */
+  struct fit_shapes_at at[MODELS] = {[TWO] = {{[SPAN_X] = half, [SPREAD] = touching - 1}}};
   TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
-  at[TWO].value[SPREAD] = touching + 1;
+  at[TWO].value[SPREAD] = touching;
   TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, at));
 }
 

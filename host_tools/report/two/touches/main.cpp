@@ -440,6 +440,11 @@ ordered_json judge(const Options &options) {
       cases.push_back({name + (ratio > 1.0 ? "3:1" : "1:1"), ball, double(apart_mm), ratio});
     }
   }
+  const auto cube = named({"cube6"}); // of all, it reaches furthest for its spread
+  for (const double ratio : {1.0, 3.0}) {
+    cases.push_back({std::string("two, 8 mm, ") + (ratio > 1.0 ? "3:1" : "1:1") + ", cubes", cube,
+                     8.0, ratio, 0.0, false, Towards::any, true});
+  }
   for (const int apart_mm : {8, 10, 12}) {
     const std::string name = "two, " + std::to_string(apart_mm) + " mm, 1:1, ";
     cases.push_back({name + "exact gains", ball, double(apart_mm), 1.0, 0.0, true});
