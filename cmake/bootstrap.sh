@@ -108,6 +108,7 @@ LIST
 LIST
   case $1 in test | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
+clang-format-14 clang-format-14
 cppcheck cppcheck
 openssl openssl
 /bin/ip iproute2

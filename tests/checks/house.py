@@ -18,7 +18,12 @@ page_codec_lines    lines of the page in the folders of line and recordings, but
                     numbers out of bytes
 longest_file        lines of the longest source; firmware/fit and condition apart
 readme_words        words of README.md, the first screen
-product_lines       lines of sources and texts, firmware and boards too; no limit, for people
+product_lines       lines of sources (C, C++, Python, JavaScript, TypeScript) outside of tests/
+test_lines          the same in tests/
+private_words       words and phrases of this house that PRIVATE_WORDS replaces, in product files, CHANGELOG.md apart
+unformatted_files   sources that their formatter would change, by build/report/formatting.json if it is there
+longest_function_lines  lines of the longest function of firmware/ and boards/
+app_ifs             conditional blocks (#if) in the source of firmware/app that has most, the list of stages apart
 """
 import argparse
 import ast
@@ -31,10 +36,30 @@ import tomllib
 
 # figure: what it shall be, and what it may be until then. The second only ever falls.
 LIMITS = {"files_per_board": (8, 8), "files_per_gripper": (5, 5), "files_per_field": (6, 6), "files_per_setting": (6, 6), "rooms": (9, 9), "circles": (0, 0),
-          "format_disagreements": (0, 0), "page_codec_lines": (0, 0), "longest_file": (700, 700), "readme_words": (600, 600)}
+          "format_disagreements": (0, 0), "page_codec_lines": (0, 0), "longest_file": (700, 700), "readme_words": (600, 600),
+          "product_lines": (105000, 125000), "test_lines": (62000, 76000), "private_words": (150, 6000), "unformatted_files": (0, 0),
+          "longest_function_lines": (60, 100), "app_ifs": (1, 27)}
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
+CODE = {".c", ".h", ".cpp", ".hpp", ".py", ".js", ".mjs", ".ts", ".mts"}
+STAGES = "firmware/app/stages.c"  # lists the stages of each scene
+# Words that readers from elsewhere do not know in this sense, and what the field writes instead.
+PRIVATE_WORDS = {
+    r"tells?|told": "reports, indicates, states, configures",
+    r"says?|said": "states, reports",
+    r"felt|feels": "measured, sensed",
+    r"so[ _](?:many|long|much)": "N frames, by its name",
+    r"stands?|stood": "is",
+    r"looks|looked": "samples, updates",
+    r"acts": "is applied",
+    r"what[ _]presses": "contact shape",
+    r"plays": "scenario",
+    r"(?:goes|comes|go|come)[ _]round": "cycles",
+    r"owes?|owed": "await",
+    r"bells|nearest_pairs|ears|keeper|thrown": "what is in it",
+    r"anew|heed|whoever|likewise|nobody|of[ _]late": "again, use, who, also, no one, recently",
+}
 WRITTEN = re.compile(r"[Ww]ritten by |[Gg]enerated by ")
 # A field that is told and computed by few, so that each file that names it is one more to change.
 PROBE = "vy_mm_s"
@@ -45,17 +70,44 @@ OUT_OF_BYTES = re.compile(r"^.*\b(?:DataView|[gs]et(?:Big)?(?:Uint|Int|Float)\d+
 NO_CODEC = {"line.ts", "serial_line.ts", "line_facts.ts", "output.ts", "recorder.ts", "replay_line.ts"}  # they ask, and show
 
 
-def product(root):
-    """{path: text} of what people write, tests apart."""
+def written(root, endings):
+    """{path: text} of what people write, with these endings."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, check=True).stdout.decode().split("\0")
     found = {}
     for name in filter(None, listed):
         path = root / name
-        if name.startswith("tests/") or path.suffix not in TEXTS or path.name.endswith("-lock.json") or not path.is_file():
+        if path.suffix not in endings or path.name.endswith("-lock.json") or not path.is_file():
             continue
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8", errors="replace")
         if not WRITTEN.search(text[:text.find("\n")]):
             found[name] = text
+    return found
+
+
+def product(root):
+    """{path: text} of what people write, tests apart."""
+    return {name: text for name, text in written(root, TEXTS).items() if not name.startswith("tests/")}
+
+
+def private_words(files):
+    """{path: how many private words} of those that have any. A name counts by its parts: told_frames, toldFrames."""
+    pattern = re.compile("|".join(rf"(?<![A-Za-z])(?i:{each})(?![a-z])" for each in PRIVATE_WORDS))
+    counts = {name: len(pattern.findall(text)) for name, text in files.items() if name != "CHANGELOG.md"}
+    return {name: count for name, count in counts.items() if count}
+
+
+def function_lines(text):
+    """[(name, lines)] of the functions of formatted C: each begins at the left edge and ends with a brace there."""
+    lines = text.split("\n")
+    found, begin = [], None
+    for at, line in enumerate(lines):
+        if begin is None and line.endswith(") {"):
+            begin = at
+            while begin > 0 and lines[begin - 1] and not re.match(r"[#/}]|.*[;*/}]$", lines[begin - 1]):
+                begin -= 1
+        elif begin is not None and line.startswith("}"):
+            found.append((lines[begin].split("(")[0], at - begin + 1))
+            begin = None
     return found
 
 
@@ -134,8 +186,26 @@ def measure(root):
     longest = max(lengths, key=lengths.get)
     figures["longest_file"] = lengths[longest]
     figures["readme_words"] = len(files.get("README.md", "").split())
-    figures["product_lines"] = sum(text.count("\n") for text in files.values())
+    code = written(root, CODE)
+    figures["product_lines"] = sum(text.count("\n") for name, text in code.items() if not name.startswith("tests/"))
+    figures["test_lines"] = sum(text.count("\n") for name, text in code.items() if name.startswith("tests/"))
+    words = private_words(files)
+    figures["private_words"] = sum(words.values())
+    functions = {name: max((lines for _, lines in function_lines(text)), default=0) for name, text in code.items()
+                 if name.startswith(("firmware/", "boards/")) and name.endswith((".c", ".h"))}
+    slowest = max(functions, key=functions.get)
+    figures["longest_function_lines"] = functions[slowest]
+    ifs = {name: len(re.findall(r"^\s*#\s*if", text, re.M)) for name, text in code.items() if name.startswith("firmware/app/") and name.endswith(".c") and name != STAGES}
+    most = max(ifs, key=ifs.get)
+    figures["app_ifs"] = ifs[most]
+    found |= {"product_lines": ("all", []), "test_lines": ("all", []), "longest_function_lines": (slowest, [slowest]), "app_ifs": (most, [most]),
+              "private_words": ("all", sorted(words, key=words.get, reverse=True)[:8])}
     found |= {"page_codec_lines": ("all", codec), "longest_file": (longest, [longest]), "readme_words": ("all", ["README.md"])}
+    formatting = root / "build/report/formatting.json"
+    if formatting.exists():
+        unformatted = json.loads(formatting.read_text(encoding="utf-8"))["unformatted"]
+        figures["unformatted_files"] = len(unformatted)
+        found["unformatted_files"] = ("all", unformatted)
     formats = root / "build/report/formats.json"
     if formats.exists():
         disagreements = json.loads(formats.read_text(encoding="utf-8"))["disagreements"]

@@ -31,6 +31,14 @@ class House(unittest.TestCase):
             (root / "b.c").write_text("int b_do(int x) {\n  return a_do(x);\n}\n")
             self.assertEqual(house.circle(house.call_needs(root)), ["a", "b"])
 
+    def test_a_private_word_counts_alone_and_as_part_of_a_name(self):
+        files = {"a.c": "told_frames; toldFrames; untold; what presses", "b.md": "a retelling", "CHANGELOG.md": "it says"}
+        self.assertEqual(house.private_words(files), {"a.c": 3})
+
+    def test_lines_of_a_function_include_its_head_of_several_lines(self):
+        text = "static int a(int x,\n             int y) {\n  return x;\n}\n\nstruct s s = {\n  1,\n  2,\n};\n\nvoid b(void) {\n}\n"
+        self.assertEqual(house.function_lines(text), [("static int a", 4), ("void b", 2)])
+
     def test_more_than_may_be_fails(self):
         figures = {name: may for name, (_, may) in house.LIMITS.items()}
         self.assertEqual(house.judged(figures), [])
