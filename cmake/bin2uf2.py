@@ -8,6 +8,7 @@ page is padded with zeros. The image has no holes, which the loader gets wrong (
 After its page each block holds "CRC " and the CRC-32 of all pages, which the loader does not look at and
 `fingertip flash` does.
 """
+
 import struct
 import sys
 import zlib
@@ -30,8 +31,8 @@ def main():
     with open(sys.argv[2], "wb") as file:
         for number, page in enumerate(pages):
             head = struct.pack(
-                "<8I", 0x0A324655, 0x9E5D5157, FLAG_FAMILY_PRESENT, FLASH_BASE + number * PAGE,
-                PAGE, number, len(pages), FAMILY_RP2040)
+                "<8I", 0x0A324655, 0x9E5D5157, FLAG_FAMILY_PRESENT, FLASH_BASE + number * PAGE, PAGE, number, len(pages), FAMILY_RP2040
+            )
             file.write((head + page + check).ljust(508, b"\0") + struct.pack("<I", 0x0AB16F30))
 
 

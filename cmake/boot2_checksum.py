@@ -6,6 +6,7 @@ usage: boot2_checksum.py INPUT.bin OUTPUT.bin
 RP2040 datasheet 2.8.1.3.1: CRC-32 with polynomial 0x04c11db7, start 0xffffffff, nothing reflected,
 no final inversion, over the first 252 bytes; stored in the last four, little-endian.
 """
+
 import sys
 
 SIZE = 256

@@ -13,6 +13,7 @@ The same commit gives the same bytes, in whatever folder. Times are that of the 
 something fails. clang 14 orders the landing pads of wasm32 by addresses in its memory. So compilers run without random ones, and the name of that
 folder is always as long: the names of files are in that memory, too.
 """
+
 import ctypes
 import gzip
 import hashlib
@@ -102,15 +103,35 @@ def main(argv):
         for scene in scenes(source):
             print(f"firmware: {board}, {scene}", flush=True)
             build = work / f"{board}-{scene}"
-            run("cmake", "-G", "Ninja", "-S", source, "-B", build, "-DCMAKE_BUILD_TYPE=Release", f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}",
-                f"-DCMAKE_TOOLCHAIN_FILE={source}/cmake/toolchain-arm-none-eabi.cmake")
+            run(
+                "cmake",
+                "-G",
+                "Ninja",
+                "-S",
+                source,
+                "-B",
+                build,
+                "-DCMAKE_BUILD_TYPE=Release",
+                f"-DFINGERTIP_BOARD={board}",
+                f"-DFINGERTIP_SCENE={scene}",
+                f"-DCMAKE_TOOLCHAIN_FILE={source}/cmake/toolchain-arm-none-eabi.cmake",
+            )
             run("cmake", "--build", build, "--target", f"fingertip-{board}")
             shutil.copy(build / f"fingertip-{board}.uf2", out / f"{name}-{board}-{scene}.uf2")
 
     print("tool, library and page", flush=True)
     build = source / "build/host"
-    run("cmake", "--preset", "host", "-DBUILD_TESTING=OFF", "-DFINGERTIP_WEB=ON", "-DFINGERTIP_IMAGES=", f"-DCMAKE_C_FLAGS={flags}",
-        f"-DCMAKE_CXX_FLAGS={flags}", cwd=source)
+    run(
+        "cmake",
+        "--preset",
+        "host",
+        "-DBUILD_TESTING=OFF",
+        "-DFINGERTIP_WEB=ON",
+        "-DFINGERTIP_IMAGES=",
+        f"-DCMAKE_C_FLAGS={flags}",
+        f"-DCMAKE_CXX_FLAGS={flags}",
+        cwd=source,
+    )
     run("cmake", "--build", build)
     (out / f"{name}-page.tar.gz").write_bytes(packed(folder_as_tar(build / "host_tools/web/page", f"{name}-page", time_s)))
     run("cpack", "--config", build / "CPackConfig.cmake", "-B", work / "packages")

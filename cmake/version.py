@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 """The version number stands in CMakeLists.txt, project VERSION. Packages that others build from their own files carry a copy of it.
 
-    version.py            writes the copies
-    version.py --check    fails if one differs, or if CHANGELOG.md does not begin with this version
-    version.py --print    prints it
+version.py            writes the copies
+version.py --check    fails if one differs, or if CHANGELOG.md does not begin with this version
+version.py --print    prints it
 """
+
 import pathlib
 import re
 import sys
@@ -13,8 +14,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 # Where each copy is, and what stands before it: between quotation marks, at its first place in the file.
 COPIES = [("host_tools/python/fingertip/version.py", r"__version__ = "), ("host_tools/python/lerobot/pyproject.toml", r"\nversion = ")]
 for folder in ("host_tools/web", "host_tools/simulation/emulator"):
-    COPIES += [(f"{folder}/package.json", r'\n  "version": '), (f"{folder}/package-lock.json", r'\n  "version": '),
-               (f"{folder}/package-lock.json", r'"": {\n      "name": "[a-z-]*",\n      "version": ')]
+    COPIES += [
+        (f"{folder}/package.json", r'\n  "version": '),
+        (f"{folder}/package-lock.json", r'\n  "version": '),
+        (f"{folder}/package-lock.json", r'"": {\n      "name": "[a-z-]*",\n      "version": '),
+    ]
 CHANGE = re.compile(r"^## \[(\d+\.\d+\.\d+)\]", re.M)
 
 
@@ -44,7 +48,9 @@ def main(argv, root=ROOT):
         sys.exit(f"version.py: {', '.join(wrong)} are not of version {number}; run python3 cmake/version.py")
     newest = CHANGE.search((root / "CHANGELOG.md").read_text(encoding="utf-8"))
     if argv and (not newest or newest[1] != number):
-        sys.exit(f"version.py: CHANGELOG.md begins with version {newest[1] if newest else 'none'}, not with {number}; write down what changed")
+        sys.exit(
+            f"version.py: CHANGELOG.md begins with version {newest[1] if newest else 'none'}, not with {number}; write down what changed"
+        )
     return 0
 
 

@@ -1,14 +1,15 @@
 #!/usr/bin/python3
 """Draws all pictures and tables of the boards that follow from the boards' descriptors and the sensors' geometry.
 
-    draw.py            writes them
-    draw.py --check    says which of them are not what would be written
+draw.py            writes them
+draw.py --check    says which of them are not what would be written
 
-    boards/<board>/wiring.svg                  from board.json
-    boards/<board>/README.md, wiring and parts from board.json and parts.json
-    boards/placement.svg, boards/mould.svg     at 1:1, from firmware/config/geometry.c
-    boards/BUILD.md, measures                  the same as a table
+boards/<board>/wiring.svg                  from board.json
+boards/<board>/README.md, wiring and parts from board.json and parts.json
+boards/placement.svg, boards/mould.svg     at 1:1, from firmware/config/geometry.c
+boards/BUILD.md, measures                  the same as a table
 """
+
 import json
 import pathlib
 import re

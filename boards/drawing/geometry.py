@@ -1,4 +1,5 @@
 """The sensors' places, as the firmware has them (firmware/config/geometry.c)."""
+
 import json
 import pathlib
 import subprocess

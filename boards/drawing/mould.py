@@ -2,32 +2,33 @@
 
 All follows from the sensors' places and the choices below. None of it was made yet.
 """
+
 import dataclasses
 
 from geometry import PACKAGE_HIGH_mm, PACKAGE_mm
 from sheet import across, circle, cross, down, rectangle, ruler, sheet, text
 
-RUBBER_mm = 12.0      # above the sensors: the layer of most figures in host_tools/report
-OVERHANG_mm = 9.0     # of rubber beyond the outer sensors: three quarters of its thickness (host_tools/README.md, "Tangential load")
-FLANGE_mm = 5.0       # of the skin, all around, under the frame
+RUBBER_mm = 12.0  # above the sensors: the layer of most figures in host_tools/report
+OVERHANG_mm = 9.0  # of rubber beyond the outer sensors: three quarters of its thickness (host_tools/README.md, "Tangential load")
+FLANGE_mm = 5.0  # of the skin, all around, under the frame
 FLANGE_HIGH_mm = 3.0
-SQUEEZED = 0.1        # share of its height that the frame takes from the flange
-HOLE_PLAY_mm = 0.2    # around a sensor
-FRAME_PLAY_mm = 0.3   # around the skin, each side
-RIM_mm = 6.0          # of frame and base plate around the flange, for the screws
-SCREW_mm = 3.2        # hole of an M3
-LID_mm = 3.0          # of the frame above the flange
-WALL_mm = 5.0         # of the mould
+SQUEEZED = 0.1  # share of its height that the frame takes from the flange
+HOLE_PLAY_mm = 0.2  # around a sensor
+FRAME_PLAY_mm = 0.3  # around the skin, each side
+RIM_mm = 6.0  # of frame and base plate around the flange, for the screws
+SCREW_mm = 3.2  # hole of an M3
+LID_mm = 3.0  # of the frame above the flange
+WALL_mm = 5.0  # of the mould
 DRAWN_APART_mm = 12.0
 
 
 @dataclasses.dataclass
 class Measures:
-    skin: tuple    # width, length of the rubber that is touched
+    skin: tuple  # width, length of the rubber that is touched
     flange: tuple  # with the flange
     outside: tuple  # of base plate and frame
     opening: tuple  # of the frame
-    screws: list   # places of the holes
+    screws: list  # places of the holes
     hole_mm: float
     ring_mm: float  # height of the frame's ring around the flange
     volume_ml: float
@@ -40,22 +41,41 @@ def measures(sensors):
     outside = tuple(mm + 2 * RIM_mm for mm in flange)
     x, y = ((mm + RIM_mm) / 2 for mm in flange)
     volume_mm3 = skin[0] * skin[1] * (RUBBER_mm - FLANGE_HIGH_mm) + flange[0] * flange[1] * FLANGE_HIGH_mm
-    return Measures(skin, flange, outside, tuple(mm + 2 * FRAME_PLAY_mm for mm in skin), [(sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 0, 1)],
-                    PACKAGE_mm + HOLE_PLAY_mm, FLANGE_HIGH_mm * (1 - SQUEEZED), volume_mm3 / 1000)
+    return Measures(
+        skin,
+        flange,
+        outside,
+        tuple(mm + 2 * FRAME_PLAY_mm for mm in skin),
+        [(sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 0, 1)],
+        PACKAGE_mm + HOLE_PLAY_mm,
+        FLANGE_HIGH_mm * (1 - SQUEEZED),
+        volume_mm3 / 1000,
+    )
 
 
 def table(sensors):
     """Markdown."""
     m = measures(sensors)
     size = "{:g} x {:g} mm".format
-    rows = [("base plate", f"{size(*m.outside)}, {PACKAGE_HIGH_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
-            ("rubber that is touched", f"{size(*m.skin)}, {RUBBER_mm:g} mm thick: {OVERHANG_mm:g} mm beyond the outer sensors"),
-            ("its flange", f"{size(*m.flange)}, {FLANGE_HIGH_mm:g} mm thick, at the sensors"),
-            ("mould of the skin", f"the same hollow, face down, in a block of {size(*(mm + 2 * WALL_mm for mm in m.flange))}, {RUBBER_mm + WALL_mm:g} mm high, open above"),
-            ("rubber in it", f"{m.volume_ml:.0f} ml"),
-            ("frame", f"{size(*m.outside)}; its ring around the flange {m.ring_mm:g} mm high, its lid {LID_mm:g} mm with an opening of {size(*m.opening)}"),
-            ("screws", f"{len(m.screws)} M3, {2 * m.screws[-1][0]:g} mm apart across and {m.screws[-1][1]:g} mm along; holes of {SCREW_mm:g} mm"),
-            ("walls to cast on", f"inside {size(*m.skin)}, {RUBBER_mm:g} mm high, on the base plate")]
+    rows = [
+        ("base plate", f"{size(*m.outside)}, {PACKAGE_HIGH_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
+        ("rubber that is touched", f"{size(*m.skin)}, {RUBBER_mm:g} mm thick: {OVERHANG_mm:g} mm beyond the outer sensors"),
+        ("its flange", f"{size(*m.flange)}, {FLANGE_HIGH_mm:g} mm thick, at the sensors"),
+        (
+            "mould of the skin",
+            f"the same hollow, face down, in a block of {size(*(mm + 2 * WALL_mm for mm in m.flange))}, {RUBBER_mm + WALL_mm:g} mm high, open above",
+        ),
+        ("rubber in it", f"{m.volume_ml:.0f} ml"),
+        (
+            "frame",
+            f"{size(*m.outside)}; its ring around the flange {m.ring_mm:g} mm high, its lid {LID_mm:g} mm with an opening of {size(*m.opening)}",
+        ),
+        (
+            "screws",
+            f"{len(m.screws)} M3, {2 * m.screws[-1][0]:g} mm apart across and {m.screws[-1][1]:g} mm along; holes of {SCREW_mm:g} mm",
+        ),
+        ("walls to cast on", f"inside {size(*m.skin)}, {RUBBER_mm:g} mm high, on the base plate"),
+    ]
     return "\n".join(["| part | measures |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)]) + "\n"
 
 
@@ -68,8 +88,12 @@ def plate(x, y, m, sensors):
 
 
 def frame(x, y, m):
-    lines = [rectangle(x, y, *m.outside), rectangle(x, y, *m.opening), rectangle(x, y, *(mm + 2 * FRAME_PLAY_mm for mm in m.flange)),
-             text(x - m.outside[0] / 2, y - m.outside[1] / 2 - 5, "frame, from below")]
+    lines = [
+        rectangle(x, y, *m.outside),
+        rectangle(x, y, *m.opening),
+        rectangle(x, y, *(mm + 2 * FRAME_PLAY_mm for mm in m.flange)),
+        text(x - m.outside[0] / 2, y - m.outside[1] / 2 - 5, "frame, from below"),
+    ]
     lines += [circle(x + sx, y + sy, SCREW_mm) for sx, sy in m.screws]
     lines += across(x - m.opening[0] / 2, y - m.opening[1] / 2 + 4, m.opening[0], f"{m.opening[0]:g}")
     return lines + down(x - m.opening[0] / 2 + 4, y - m.opening[1] / 2, m.opening[1], f"{m.opening[1]:g}")
@@ -77,8 +101,12 @@ def frame(x, y, m):
 
 def hollow(x, y, m):
     outside = tuple(mm + 2 * WALL_mm for mm in m.flange)
-    lines = [rectangle(x, y, *outside), rectangle(x, y, *m.flange), rectangle(x, y, *m.skin),
-             text(x - outside[0] / 2, y - outside[1] / 2 - 5, "mould of the skin, from above")]
+    lines = [
+        rectangle(x, y, *outside),
+        rectangle(x, y, *m.flange),
+        rectangle(x, y, *m.skin),
+        text(x - outside[0] / 2, y - outside[1] / 2 - 5, "mould of the skin, from above"),
+    ]
     lines += across(x - m.flange[0] / 2, y - outside[1] / 2 - 1.5, m.flange[0], f"{m.flange[0]:g}")
     lines += across(x - m.skin[0] / 2, y - m.skin[1] / 2 + 4, m.skin[0], f"{m.skin[0]:g}")
     return lines + down(x - m.skin[0] / 2 + 4, y - m.skin[1] / 2, m.skin[1], f"{m.skin[1]:g}")
@@ -92,10 +120,14 @@ def section(x, base_y, m, sensors):
     for sx in sorted({sx for sx, _ in sensors}):
         lines.append(rectangle(x + sx, base_y + PACKAGE_HIGH_mm / 2, PACKAGE_mm, PACKAGE_HIGH_mm, "cut"))
     high, low = RUBBER_mm, m.ring_mm
-    lines.append(f'  <path class="cut" d="M{x - flange:g} {base_y:g}v{-low:g}h{flange - half:g}v{low - high:g}h{2 * half:g}v{high - low:g}h{flange - half:g}v{low:g}z"/>')
+    lines.append(
+        f'  <path class="cut" d="M{x - flange:g} {base_y:g}v{-low:g}h{flange - half:g}v{low - high:g}h{2 * half:g}v{high - low:g}h{flange - half:g}v{low:g}z"/>'
+    )
     for side in (-1, 1):
         at = x + side * outside
-        lines.append(f'  <path d="M{at:g} {base_y:g}v{-(low + LID_mm):g}H{x + side * m.opening[0] / 2:g}v{LID_mm:g}H{x + side * (flange + FRAME_PLAY_mm):g}v{low:g}z"/>')
+        lines.append(
+            f'  <path d="M{at:g} {base_y:g}v{-(low + LID_mm):g}H{x + side * m.opening[0] / 2:g}v{LID_mm:g}H{x + side * (flange + FRAME_PLAY_mm):g}v{low:g}z"/>'
+        )
     lines += down(x + half - 6, base_y - high, high, f"{high:g}") + across(x - half, base_y - high + 3, 2 * half, f"{m.skin[0]:g}")
     return lines + down(x + outside + 2, base_y - low, low, f"{low:g}")
 

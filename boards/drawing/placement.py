@@ -1,4 +1,5 @@
 """placement.svg: where the sensors sit."""
+
 from geometry import PACKAGE_mm
 from sheet import RULER_mm, cross, rectangle, ruler, sheet, text
 

@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 """The table in boards/BUILD.md of what hardness and thickness of the rubber do, computed by the twin.
 
-    rubber.py TWIN            writes it; TWIN: build/host/host_tools/simulation/twin/twin
-    rubber.py TWIN --check    says whether it is what would be written
+rubber.py TWIN            writes it; TWIN: build/host/host_tools/simulation/twin/twin
+rubber.py TWIN --check    says whether it is what would be written
 """
+
 import math
 import pathlib
 import subprocess
@@ -23,8 +24,25 @@ RANGE_kPa = 100  # above the ambient: to the sensor's extended range, 2 bar (fir
 
 def width(twin, cache, thick_mm, shore_a):
     """(sigma_mm, force_N at which the peak leaves the sensors' range)"""
-    out = subprocess.run([twin, "width", "--indenter", "sphere15", "--layer", str(thick_mm), "--shore", str(shore_a), "--force", str(FORCE_N), "--cache", cache],
-                         check=True, stdout=subprocess.PIPE, text=True).stdout
+    out = subprocess.run(
+        [
+            twin,
+            "width",
+            "--indenter",
+            "sphere15",
+            "--layer",
+            str(thick_mm),
+            "--shore",
+            str(shore_a),
+            "--force",
+            str(FORCE_N),
+            "--cache",
+            cache,
+        ],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
+    ).stdout
     found = {name: float(value) for name, value in (word.split("=") for word in out.split())}
     return found["sigma_mm"], FORCE_N * RANGE_kPa / found["peak_kPa"]
 
@@ -34,7 +52,11 @@ def table(twin):
     with tempfile.TemporaryDirectory() as cache:
         for name, shore_a in RUBBERS:
             cells = [width(twin, cache, mm, shore_a) for mm in THICK_mm]
-            text.append(f"| {shore_a} | {name} | " + " | ".join(f"{sigma_mm:.1f} mm, to {math.floor(force_N)} N" for sigma_mm, force_N in cells) + " |")
+            text.append(
+                f"| {shore_a} | {name} | "
+                + " | ".join(f"{sigma_mm:.1f} mm, to {math.floor(force_N)} N" for sigma_mm, force_N in cells)
+                + " |"
+            )
     return "\n".join(text) + "\n"
 
 

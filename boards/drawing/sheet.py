@@ -1,7 +1,10 @@
 """An SVG at 1:1: one unit is one millimetre, and a ruler shows whether the print has its size."""
+
 RULER_mm = 50
-STYLE = ("text { font: 2.2px sans-serif } path, rect, circle { stroke: #000; stroke-width: 0.15; fill: none } "
-         ".measure { stroke: #1f5fa8 } .blue { fill: #1f5fa8 } .cut { fill: #e8e8e8 }")
+STYLE = (
+    "text { font: 2.2px sans-serif } path, rect, circle { stroke: #000; stroke-width: 0.15; fill: none } "
+    ".measure { stroke: #1f5fa8 } .blue { fill: #1f5fa8 } .cut { fill: #e8e8e8 }"
+)
 
 
 def number(value):
@@ -29,26 +32,40 @@ def cross(x, y, arm):
 
 def across(x, y, width, words):
     """A measure from x to x + width."""
-    return [f'  <path class="measure" d="M{number(x)} {number(y - 1)}v2M{number(x)} {number(y)}h{number(width)}m0 -1v2"/>',
-            text(x + width / 2, y - 0.8, words, "blue", "middle")]
+    return [
+        f'  <path class="measure" d="M{number(x)} {number(y - 1)}v2M{number(x)} {number(y)}h{number(width)}m0 -1v2"/>',
+        text(x + width / 2, y - 0.8, words, "blue", "middle"),
+    ]
 
 
 def down(x, y, height, words):
     """A measure from y to y + height."""
-    return [f'  <path class="measure" d="M{number(x - 1)} {number(y)}h2M{number(x)} {number(y)}v{number(height)}m-1 0h2"/>',
-            text(x + 1.2, y + height / 2 + 0.8, words, "blue")]
+    return [
+        f'  <path class="measure" d="M{number(x - 1)} {number(y)}h2M{number(x)} {number(y)}v{number(height)}m-1 0h2"/>',
+        text(x + 1.2, y + height / 2 + 0.8, words, "blue"),
+    ]
 
 
 def ruler(x, y):
     ticks = "".join(f"M{number(x + mm)} {number(y)}v{-2 if mm % 10 == 0 else -1}" for mm in range(RULER_mm + 1))
-    return [f'  <path d="M{number(x)} {number(y)}h{RULER_mm}{ticks}"/>',
-            text(x, y + 3, f"{RULER_mm} mm: measure this line before you use the print")]
+    return [
+        f'  <path d="M{number(x)} {number(y)}h{RULER_mm}{ticks}"/>',
+        text(x, y + 3, f"{RULER_mm} mm: measure this line before you use the print"),
+    ]
 
 
 def sheet(title, left, top, width, height, lines):
-    return "\n".join([
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(width)}mm" height="{number(height)}mm" '
-        f'viewBox="{number(left)} {number(top)} {number(width)} {number(height)}" role="img" aria-label="{title}">',
-        f"  <title>{title}</title>", f"  <style>{STYLE}</style>",
-        f'  <rect x="{number(left)}" y="{number(top)}" width="{number(width)}" height="{number(height)}" style="fill: #fff; stroke: none"/>',
-        *lines, "</svg>"]) + "\n"
+    return (
+        "\n".join(
+            [
+                f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(width)}mm" height="{number(height)}mm" '
+                f'viewBox="{number(left)} {number(top)} {number(width)} {number(height)}" role="img" aria-label="{title}">',
+                f"  <title>{title}</title>",
+                f"  <style>{STYLE}</style>",
+                f'  <rect x="{number(left)}" y="{number(top)}" width="{number(width)}" height="{number(height)}" style="fill: #fff; stroke: none"/>',
+                *lines,
+                "</svg>",
+            ]
+        )
+        + "\n"
+    )

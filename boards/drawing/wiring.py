@@ -1,4 +1,5 @@
 """A board's wires, from its descriptor (boards/README.md): as rows of a table, as parts to order, and as wiring.svg."""
+
 import dataclasses
 import math
 
@@ -48,7 +49,9 @@ def board_of(name, descriptor):
     if missing:
         raise Unwired(f"boards/{name}/board.json: pull_ups_ohm has no {missing[0]}; add its resistance in ohms")
     if board.bus == "multiplexed" and board.wiring["sensors_of_strip"] > MUX_CHANNELS:
-        raise Unwired(f"boards/{name}/board.json: {board.wiring['sensors_of_strip']} sensors of a strip, and a TCA9548A has {MUX_CHANNELS} channels")
+        raise Unwired(
+            f"boards/{name}/board.json: {board.wiring['sensors_of_strip']} sensors of a strip, and a TCA9548A has {MUX_CHANNELS} channels"
+        )
     used = gpios(board)
     for gpio in used:
         if f"GP{gpio}" not in pico.PINS:
@@ -60,8 +63,11 @@ def board_of(name, descriptor):
 
 def gpios(board):
     w = board.wiring
-    own = list(range(board.sensors)) + [w["pin_scl"]] if board.bus == "parallel" else \
-        [w["pin_sda"], w["pin_scl"], *(board.reset_gpio(s) for s in range(board.strips))]
+    own = (
+        list(range(board.sensors)) + [w["pin_scl"]]
+        if board.bus == "parallel"
+        else [w["pin_sda"], w["pin_scl"], *(board.reset_gpio(s) for s in range(board.strips))]
+    )
     return own + ([w["pin_sync"]] if "pin_sync" in w else [])
 
 
@@ -97,13 +103,18 @@ def table(board):
         rows.append((gpio_cell([w["pin_scl"]]), f"SCL (pad {pads['SCL']}) of all sensors"))
         all_parts = "all sensors"
     else:
-        rows = [(gpio_cell([w["pin_sda"]]), f"SDA of the {board.strips} TCA9548A"), (gpio_cell([w["pin_scl"]]), f"SCL of the {board.strips} TCA9548A")]
+        rows = [
+            (gpio_cell([w["pin_sda"]]), f"SDA of the {board.strips} TCA9548A"),
+            (gpio_cell([w["pin_scl"]]), f"SCL of the {board.strips} TCA9548A"),
+        ]
         rows += [(gpio_cell([board.reset_gpio(s)]), f"RESET of the TCA9548A of strip {s}") for s in range(board.strips)]
         all_parts = "all parts"
     if "pin_sync" in w:
         rows.append((gpio_cell([w["pin_sync"]]), SYNC))
-    rows += [(f"3V3 OUT (pin {pico.pin('3V3')})", f"VDD of {all_parts} (sensors: pad {pads['VDD']}), pull-ups"),
-             (f"GND (pins {listed(pico.grounds())})", f"GND of {all_parts} (sensors: pad {pads['GND']})")]
+    rows += [
+        (f"3V3 OUT (pin {pico.pin('3V3')})", f"VDD of {all_parts} (sensors: pad {pads['VDD']}), pull-ups"),
+        (f"GND (pins {listed(pico.grounds())})", f"GND of {all_parts} (sensors: pad {pads['GND']})"),
+    ]
     page = "| from | to |\n|---|---|\n" + cells(rows) + "\n"
     if board.bus == "parallel":
         return page
@@ -122,8 +133,12 @@ def parts(board):
         found += [(board.sensors, ohm["sda"], "pull-up of each SDA"), (1, ohm["scl"], "pull-up of SCL")]
         capacitors = board.sensors
     else:
-        found += [(board.strips, "multiplexer", ""), (2, ohm["bus"], "pull-ups of SDA and SCL"), (2 * board.sensors, ohm["channel"], "pull-ups of each channel"),
-                  (board.strips, ohm["reset"], "pull-up of each RESET, which holds it while the Pico starts")]
+        found += [
+            (board.strips, "multiplexer", ""),
+            (2, ohm["bus"], "pull-ups of SDA and SCL"),
+            (2 * board.sensors, ohm["channel"], "pull-ups of each channel"),
+            (board.strips, ohm["reset"], "pull-up of each RESET, which holds it while the Pico starts"),
+        ]
         capacitors = board.sensors + board.strips
     return found + [(capacitors, "capacitor", "at each part's VDD")]
 
@@ -169,14 +184,28 @@ def gpio(y, number, right, label=""):
 
 def picture(board, width, height, lines):
     title = f"Wiring of board {board.name}"
-    return "\n".join([f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" aria-label="{title}">',
-                      f"  <title>{title}</title>", f"  <defs>{PULL_UP}</defs>", f"  <style>{STYLE}</style>",
-                      f'  <rect width="{width}" height="{height}" fill="#fff"/>', *lines, "</svg>"]) + "\n"
+    return (
+        "\n".join(
+            [
+                f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" aria-label="{title}">',
+                f"  <title>{title}</title>",
+                f"  <defs>{PULL_UP}</defs>",
+                f"  <style>{STYLE}</style>",
+                f'  <rect width="{width}" height="{height}" fill="#fff"/>',
+                *lines,
+                "</svg>",
+            ]
+        )
+        + "\n"
+    )
 
 
 def supply(x, y):
-    return [text(x, y, f"VDD of all parts: 3V3 (pin {pico.pin('3V3')})", "small"), text(x, y + 16, f"GND of all parts: pins {listed(pico.grounds())}", "small"),
-            text(x, y + 32, "100 nF at each VDD", "small")]
+    return [
+        text(x, y, f"VDD of all parts: 3V3 (pin {pico.pin('3V3')})", "small"),
+        text(x, y + 16, f"GND of all parts: pins {listed(pico.grounds())}", "small"),
+        text(x, y + 32, "100 nF at each VDD", "small"),
+    ]
 
 
 def drawn_parallel(board):
@@ -186,21 +215,43 @@ def drawn_parallel(board):
     scl_y = rows[-1] + ROW
     sync_y = scl_y + ROW
     ohm = board.pull_ups_ohm
-    lines = [f'  <rect class="chip" x="30" y="40" width="150" height="{sync_y - 40 + 24}" rx="8"/>', text(46, 62, "Raspberry Pi Pico", "title")]
+    lines = [
+        f'  <rect class="chip" x="30" y="40" width="150" height="{sync_y - 40 + 24}" rx="8"/>',
+        text(46, 62, "Raspberry Pi Pico", "title"),
+    ]
     for k, y in enumerate(rows):
-        lines += gpio(y, k, right) + [path("wire", f"M{right} {y}H{at_sensor}"), node(pull_x, y), f'  <use href="#pullup" x="{pull_x}" y="{y}"/>']
-        lines += sensor(at_sensor, y, k) + [path("scl", f"M{at_sensor + SENSOR_WIDTH} {y}H{scl_x}"), node(scl_x, y, "dot"), text(420, y - 6, f"SDA {k}", "small")]
+        lines += gpio(y, k, right) + [
+            path("wire", f"M{right} {y}H{at_sensor}"),
+            node(pull_x, y),
+            f'  <use href="#pullup" x="{pull_x}" y="{y}"/>',
+        ]
+        lines += sensor(at_sensor, y, k) + [
+            path("scl", f"M{at_sensor + SENSOR_WIDTH} {y}H{scl_x}"),
+            node(scl_x, y, "dot"),
+            text(420, y - 6, f"SDA {k}", "small"),
+        ]
     lines += gpio(scl_y, board.wiring["pin_scl"], right)
-    lines += [path("scl", f"M{right} {scl_y}H{scl_x}V{top}"), node(pull_x, scl_y, "dot"), f'  <use href="#pullup" x="{pull_x}" y="{scl_y}"/>',
-              text(420, scl_y - 6, "SCL, to all sensors", "small"), path("rail", f"M{pull_x + 18} 40V{scl_y - 23}"),
-              text(pull_x + 24, 50, f"3V3 (pin {pico.pin('3V3')}), also VDD of every sensor"), text(pull_x + 28, 78, f"{ohms(ohm['sda'])} each", "small"),
-              text(pull_x + 28, scl_y - 10, ohms(ohm["scl"]), "small")]
+    lines += [
+        path("scl", f"M{right} {scl_y}H{scl_x}V{top}"),
+        node(pull_x, scl_y, "dot"),
+        f'  <use href="#pullup" x="{pull_x}" y="{scl_y}"/>',
+        text(420, scl_y - 6, "SCL, to all sensors", "small"),
+        path("rail", f"M{pull_x + 18} 40V{scl_y - 23}"),
+        text(pull_x + 24, 50, f"3V3 (pin {pico.pin('3V3')}), also VDD of every sensor"),
+        text(pull_x + 28, 78, f"{ohms(ohm['sda'])} each", "small"),
+        text(pull_x + 28, scl_y - 10, ohms(ohm["scl"]), "small"),
+    ]
     if "pin_sync" in board.wiring:
-        lines += gpio(sync_y, board.wiring["pin_sync"], right) + [path("reset", f"M{right} {sync_y}H240"), text(248, sync_y + 4, "sync, to a camera", "small")]
+        lines += gpio(sync_y, board.wiring["pin_sync"], right) + [
+            path("reset", f"M{right} {sync_y}H240"),
+            text(248, sync_y + 4, "sync, to a camera", "small"),
+        ]
     for strip in range(board.strips):
         of = board.sensors_of(strip)
-        lines += [f'  <path d="M700 {rows[of[0]] - 10}h6v{rows[of[-1]] - rows[of[0]] + 20}h-6" fill="none" stroke="#555"/>',
-                  text(710, (rows[of[0]] + rows[of[-1]]) // 2 + 4, f"strip {strip}", "small")]
+        lines += [
+            f'  <path d="M700 {rows[of[0]] - 10}h6v{rows[of[-1]] - rows[of[0]] + 20}h-6" fill="none" stroke="#555"/>',
+            text(710, (rows[of[0]] + rows[of[-1]]) // 2 + 4, f"strip {strip}", "small"),
+        ]
     return picture(board, 760, sync_y + 70, lines + supply(420, sync_y + 20))
 
 
@@ -211,31 +262,55 @@ def drawn_multiplexed(board):
     tops = [50 + (deep + 34) * strip for strip in range(board.strips)]
     sda_y, scl_y, reset_y = 140, 170, [240 + 24 * strip for strip in range(board.strips)]
     sync_y = reset_y[-1] + 30
-    lines = [f'  <rect class="chip" x="20" y="80" width="140" height="{sync_y - 80 + 20}" rx="8"/>', text(34, 104, "Raspberry Pi Pico", "title")]
+    lines = [
+        f'  <rect class="chip" x="20" y="80" width="140" height="{sync_y - 80 + 20}" rx="8"/>',
+        text(34, 104, "Raspberry Pi Pico", "title"),
+    ]
     lines += gpio(sda_y, w["pin_sda"], right, "SDA") + gpio(scl_y, w["pin_scl"], right, "SCL")
-    lines += [path("wire", f"M{right} {sda_y}H{sda_x}"), path("scl", f"M{right} {scl_y}H{scl_x}"), node(sda_x, sda_y), node(scl_x, scl_y, "dot"),
-              path("wire", f"M{sda_x} {tops[0] + 40}V{max(tops[-1] + 40, sda_y)}"), path("scl", f"M{scl_x} {tops[0] + 62}V{max(tops[-1] + 62, scl_y)}")]
+    lines += [
+        path("wire", f"M{right} {sda_y}H{sda_x}"),
+        path("scl", f"M{right} {scl_y}H{scl_x}"),
+        node(sda_x, sda_y),
+        node(scl_x, scl_y, "dot"),
+        path("wire", f"M{sda_x} {tops[0] + 40}V{max(tops[-1] + 40, sda_y)}"),
+        path("scl", f"M{scl_x} {tops[0] + 62}V{max(tops[-1] + 62, scl_y)}"),
+    ]
     for x, y, kind in ((185, sda_y, "node"), (215, scl_y, "dot")):
         lines += [node(x, y, kind), f'  <use href="#pullup" x="{x}" y="{y}"/>', path("rail", f"M{x + 18} {y - 23}V70")]
     lines += [text(178, 62, f"3V3 (pin {pico.pin('3V3')})"), text(166, scl_y + 18, f"{ohms(ohm['bus'])} each", "small")]
     for strip, top in enumerate(tops):
         lines += gpio(reset_y[strip], board.reset_gpio(strip), right, f"RESET {strip}")
         elbow = 330 - 11 * strip
-        lines += [path("reset", f"M{right} {reset_y[strip]}H{elbow}V{top + 92}H{mux_x}"), text(mux_x + 12, top - 6, "TCA9548A", "title"),
-                  text(mux_x + 84, top - 6, f"0x{board.mux_address(strip):02x}, A2 to A0: {' '.join(levels(board, strip))}", "small"),
-                  f'  <rect class="chip" x="{mux_x}" y="{top}" width="{mux_width}" height="{deep}" rx="6"/>']
+        lines += [
+            path("reset", f"M{right} {reset_y[strip]}H{elbow}V{top + 92}H{mux_x}"),
+            text(mux_x + 12, top - 6, "TCA9548A", "title"),
+            text(mux_x + 84, top - 6, f"0x{board.mux_address(strip):02x}, A2 to A0: {' '.join(levels(board, strip))}", "small"),
+            f'  <rect class="chip" x="{mux_x}" y="{top}" width="{mux_width}" height="{deep}" rx="6"/>',
+        ]
         for label, y in (("SDA", 44), ("SCL", 66), ("RESET", 96)):
             lines.append(text(mux_x + 6, top + y, label, "small"))
-        lines += [path("wire", f"M{sda_x} {top + 40}H{mux_x}"),
-                  node(sda_x, top + 40), path("scl", f"M{scl_x} {top + 62}H{mux_x}"), node(scl_x, top + 62, "dot"),
-                  text(at_sensor + 10, top - 6, f"2 x {ohms(ohm['channel'])} per channel", "small"), text(700, top + deep // 2, f"strip {strip}", "small")]
+        lines += [
+            path("wire", f"M{sda_x} {top + 40}H{mux_x}"),
+            node(sda_x, top + 40),
+            path("scl", f"M{scl_x} {top + 62}H{mux_x}"),
+            node(scl_x, top + 62, "dot"),
+            text(at_sensor + 10, top - 6, f"2 x {ohms(ohm['channel'])} per channel", "small"),
+            text(700, top + deep // 2, f"strip {strip}", "small"),
+        ]
         for channel, k in enumerate(board.sensors_of(strip)):
             y = top + 14 + pitch * channel
-            lines += [text(mux_x + mux_width - 6, y + 4, f"SD{channel} SC{channel}", "small", end=True), path("wire", f"M{mux_x + mux_width} {y - 3}H{at_sensor}"),
-                      path("scl", f"M{mux_x + mux_width} {y + 3}H{at_sensor}"), *sensor(at_sensor, y, k)]
+            lines += [
+                text(mux_x + mux_width - 6, y + 4, f"SD{channel} SC{channel}", "small", end=True),
+                path("wire", f"M{mux_x + mux_width} {y - 3}H{at_sensor}"),
+                path("scl", f"M{mux_x + mux_width} {y + 3}H{at_sensor}"),
+                *sensor(at_sensor, y, k),
+            ]
     lines.append(text(34, sync_y + 40, f"each RESET also {ohms(ohm['reset'])} to 3V3", "small"))
     if "pin_sync" in w:
-        lines += gpio(sync_y, w["pin_sync"], right, "sync") + [path("reset", f"M{right} {sync_y}H200"), text(206, sync_y + 4, "camera", "small")]
+        lines += gpio(sync_y, w["pin_sync"], right, "sync") + [
+            path("reset", f"M{right} {sync_y}H200"),
+            text(206, sync_y + 4, "camera", "small"),
+        ]
     return picture(board, 760, max(tops[-1] + deep, sync_y + 100) + 20, lines + supply(34, sync_y + 60))
 
 

@@ -87,8 +87,7 @@ static void cut_power(void) {
   if (state.operation == PROGRAM) {
     for (size_t i = 0; i < state.length; i++) {
       uint32_t at = state.at + (uint32_t)i;
-      cut_bits(at, (native_flash.bytes[at] | native_flash.unstable[at]) & (uint8_t)~state.bytes[i],
-               0, progress);
+      cut_bits(at, (native_flash.bytes[at] | native_flash.unstable[at]) & (uint8_t)~state.bytes[i], 0, progress);
     }
   } else if (state.operation == ERASE) {
     /* All bits are programmed first, then all are erased. */
@@ -142,8 +141,7 @@ uint64_t native_flash_steps(void) {
   return state.steps;
 }
 
-static void begin(enum operation operation, uint32_t at, const uint8_t *bytes, size_t length,
-                  unsigned polls) {
+static void begin(enum operation operation, uint32_t at, const uint8_t *bytes, size_t length, unsigned polls) {
   if (state.operation != NONE && !state.dead) {
     stop("an operation begins while another one is under way");
   }

@@ -181,8 +181,7 @@ unsigned native_worker_starts(void) {
   return worker.starts;
 }
 
-void native_set_worker_thread(void (*begin)(bool (*serve)(void *context), void *context),
-                              void (*end)(void)) {
+void native_set_worker_thread(void (*begin)(bool (*serve)(void *context), void *context), void (*end)(void)) {
   worker.begin = begin;
   worker.end = end;
 }

@@ -60,9 +60,8 @@ static double gaussian(struct sim_array *array) {
 }
 
 static double temperature_at(const struct sim_array *array, unsigned k, uint64_t t_us) {
-  return array->world.temperature_degC
-             ? array->world.temperature_degC(array->world.context, k, t_us)
-             : ROOM_TEMPERATURE_degC;
+  return array->world.temperature_degC ? array->world.temperature_degC(array->world.context, k, t_us)
+                                       : ROOM_TEMPERATURE_degC;
 }
 
 static uint32_t d2_at(const struct sim_array *array, unsigned k, uint64_t t_us, double error_degC) {
@@ -76,19 +75,16 @@ static uint32_t measure(void *context, int type, unsigned osr, uint64_t t_us) {
   struct sim_array *array = context;
   const unsigned k = array->measured_sensor;
   if (type == 2) {
-    const double error_degC =
-        array->noise > 0 ? array->noise * sim_ms5840_noise_degC(osr) * gaussian(array) : 0;
+    const double error_degC = array->noise > 0 ? array->noise * sim_ms5840_noise_degC(osr) * gaussian(array) : 0;
     const uint32_t d2 = d2_at(array, k, t_us, error_degC);
-    const bool wrong =
-        array->wrong_temperature_share > 0 && uniform(array) < array->wrong_temperature_share;
+    const bool wrong = array->wrong_temperature_share > 0 && uniform(array) < array->wrong_temperature_share;
     return wrong ? d2 ^ UINT32_C(1) << random_u64(array) % 24 : d2;
   }
   if (array->d1[k] != 0) {
     return array->d1[k];
   }
-  double pressure_Pa = array->world.pressure_Pa
-                           ? array->world.pressure_Pa(array->world.context, k, t_us)
-                           : STANDARD_PRESSURE_Pa;
+  double pressure_Pa =
+      array->world.pressure_Pa ? array->world.pressure_Pa(array->world.context, k, t_us) : STANDARD_PRESSURE_Pa;
   if (array->noise > 0) {
     pressure_Pa += array->noise * sim_ms5840_noise_Pa(osr) * gaussian(array);
   }
@@ -156,8 +152,7 @@ static bool is_alive(struct sim_array *array, unsigned k) {
 
 static void note_early(struct sim_array *array, unsigned k, uint64_t t_us) {
   const struct sim_ms5840 *sensor = &array->sensor[k];
-  const bool disturbs =
-      array->command == 0x00 || array->command >> 4 == 4 || array->command >> 4 == 5;
+  const bool disturbs = array->command == 0x00 || array->command >> 4 == 4 || array->command >> 4 == 5;
   if (disturbs && sensor->converting && t_us < sensor->busy_until_us) {
     array->early_reads++;
   }
@@ -203,8 +198,7 @@ static void read_one(struct sim_array *array, unsigned k, uint64_t t_us) {
   }
   if (acknowledged) {
     note_early(array, k, t_us);
-    acknowledged = sim_ms5840_read(&array->sensor[k], array->command, array->result.bytes[k],
-                                   array->byte_count, t_us);
+    acknowledged = sim_ms5840_read(&array->sensor[k], array->command, array->result.bytes[k], array->byte_count, t_us);
   }
   if (!acknowledged) {
     array->result.nacks++;
@@ -216,8 +210,7 @@ static void read_one(struct sim_array *array, unsigned k, uint64_t t_us) {
 
 static void begin_transfer(struct sim_array *array, uint64_t t_us) {
   array->transfers++;
-  const uint32_t broadcast_us =
-      array->parallel ? SIM_ARRAY_PARALLEL_BROADCAST_us : SIM_ARRAY_BROADCAST_us;
+  const uint32_t broadcast_us = array->parallel ? SIM_ARRAY_PARALLEL_BROADCAST_us : SIM_ARRAY_BROADCAST_us;
   const uint32_t read_us = array->parallel ? SIM_ARRAY_PARALLEL_READ_us : SIM_ARRAY_READ_us;
   array->transfer_end_us = t_us + (array->operation == SIM_ARRAY_COMMAND ? broadcast_us : read_us);
   array->hangs = strikes(array, SIM_FAULT_TIMEOUT) || strikes(array, SIM_FAULT_STUCK);
@@ -226,8 +219,8 @@ static void begin_transfer(struct sim_array *array, uint64_t t_us) {
   }
 }
 
-static enum ft_status start(struct sim_array *array, enum sim_array_operation operation,
-                            uint8_t command, uint8_t byte_count, uint64_t now_us) {
+static enum ft_status start(struct sim_array *array, enum sim_array_operation operation, uint8_t command,
+                            uint8_t byte_count, uint64_t now_us) {
   if (array->operation != SIM_ARRAY_IDLE) {
     return FT_ERR_BUSY;
   }
@@ -246,8 +239,7 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
   return start(context, SIM_ARRAY_COMMAND, command, 0, now_us);
 }
 
-static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
-                                 uint64_t now_us) {
+static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count, uint64_t now_us) {
   if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES) {
     return FT_ERR_ARGUMENT;
   }
@@ -298,16 +290,14 @@ static enum ft_status advance(struct sim_array *array, uint64_t now_us) {
   return now_us >= array->transfer_end_us + SIM_ARRAY_TIMEOUT_us ? FT_ERR_TIMEOUT : FT_PENDING;
 }
 
-static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result,
-                           uint64_t *wake_us) {
+static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us) {
   struct sim_array *array = context;
   if (array->operation == SIM_ARRAY_IDLE) {
     return FT_ERR_ARGUMENT;
   }
   const enum ft_status status = advance(array, now_us);
   if (status == FT_PENDING) {
-    *wake_us = array->transfer_end_us +
-               (array->operation == SIM_ARRAY_RECOVERY ? 0 : SIM_ARRAY_TIMEOUT_us);
+    *wake_us = array->transfer_end_us + (array->operation == SIM_ARRAY_RECOVERY ? 0 : SIM_ARRAY_TIMEOUT_us);
     return FT_PENDING;
   }
   array->operation = SIM_ARRAY_IDLE;
@@ -330,7 +320,6 @@ const struct array_bus *sim_array_bus(struct sim_array *array) {
 }
 
 uint64_t sim_array_next_event_us(const struct sim_array *array) {
-  return array->operation == SIM_ARRAY_IDLE || array->hangs || array->needs_recovery
-             ? UINT64_MAX
-             : array->transfer_end_us;
+  return array->operation == SIM_ARRAY_IDLE || array->hangs || array->needs_recovery ? UINT64_MAX
+                                                                                     : array->transfer_end_us;
 }

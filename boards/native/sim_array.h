@@ -57,13 +57,12 @@ struct sim_array {
   /* The test's, at any time */
   struct sim_fault fault;
   struct sim_world world;
-  double noise;                /* times the datasheet's; 0 = none */
-  uint32_t d1[FT_MAX_SENSORS]; /* [sensor] code instead of the world's pressure; 0 = none */
-  uint32_t d2[FT_MAX_SENSORS]; /* [sensor] code instead of the world's temperature; 0 = none */
-  double nack_share; /* of the reads of one sensor: not acknowledged, at random. The bus does not
-                        ask again */
-  double
-      wrong_temperature_share; /* of the temperatures of one sensor: one bit inverted, at random */
+  double noise;                   /* times the datasheet's; 0 = none */
+  uint32_t d1[FT_MAX_SENSORS];    /* [sensor] code instead of the world's pressure; 0 = none */
+  uint32_t d2[FT_MAX_SENSORS];    /* [sensor] code instead of the world's temperature; 0 = none */
+  double nack_share;              /* of the reads of one sensor: not acknowledged, at random. The bus does not
+                                     ask again */
+  double wrong_temperature_share; /* of the temperatures of one sensor: one bit inverted, at random */
   struct sim_ms5840 sensor[FT_MAX_SENSORS];
   bool absent[FT_MAX_SENSORS]; /* [sensor] not fitted */
   bool parallel;               /* a data line for each sensor, no multiplexers */
@@ -76,12 +75,7 @@ struct sim_array {
   /* Private */
   struct array_bus bus;
   uint8_t sensor_count;
-  enum sim_array_operation {
-    SIM_ARRAY_IDLE,
-    SIM_ARRAY_COMMAND,
-    SIM_ARRAY_READ,
-    SIM_ARRAY_RECOVERY
-  } operation;
+  enum sim_array_operation { SIM_ARRAY_IDLE, SIM_ARRAY_COMMAND, SIM_ARRAY_READ, SIM_ARRAY_RECOVERY } operation;
   uint8_t command, byte_count, next_sensor;
   uint64_t transfer_end_us;
   bool hangs; /* the transfer under way never ends */

@@ -13,7 +13,7 @@ static const struct {
   double noise_Pa, noise_degC;
 } rows[] = {
 #if SIM_SENSOR_MS5837_30BA
-    {256, 600, 157.0, 0.012}, {512, 1170, 84.0, 0.009}, {1024, 2280, 54.0, 0.006},
+    {256, 600, 157.0, 0.012},  {512, 1170, 84.0, 0.009},  {1024, 2280, 54.0, 0.006},
     {2048, 4540, 38.0, 0.004}, {4096, 9040, 28.0, 0.003}, {8192, 18080, 20.0, 0.002},
 #else
     {256, 560, 11.0, 0.012},  {512, 1100, 6.2, 0.009},  {1024, 2170, 3.9, 0.006},
@@ -87,16 +87,15 @@ static void settle(struct sim_ms5840 *sensor, uint64_t t_us) {
 }
 
 static bool is_read_command(uint8_t command) {
-  return command == READ_ADC ||
-         (command >= READ_PROM && command < READ_PROM + 2 * SIM_MS5840_PROM_WORDS);
+  return command == READ_ADC || (command >= READ_PROM && command < READ_PROM + 2 * SIM_MS5840_PROM_WORDS);
 }
 
 static bool is_resetting(const struct sim_ms5840 *sensor, uint64_t t_us) {
   return !sensor->converting && t_us < sensor->busy_until_us;
 }
 
-bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us,
-                        sim_ms5840_measure *measure, void *context) {
+bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us, sim_ms5840_measure *measure,
+                        void *context) {
   settle(sensor, t_us);
   if (is_resetting(sensor, t_us)) {
     return false;
@@ -129,8 +128,7 @@ bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_u
   return is_read_command(command);
 }
 
-bool sim_ms5840_read(struct sim_ms5840 *sensor, uint8_t command, uint8_t *bytes, unsigned count,
-                     uint64_t t_us) {
+bool sim_ms5840_read(struct sim_ms5840 *sensor, uint8_t command, uint8_t *bytes, unsigned count, uint64_t t_us) {
   settle(sensor, t_us);
   if (is_resetting(sensor, t_us) || !is_read_command(command)) {
     return false;
@@ -172,13 +170,13 @@ static struct compensation compensate(const uint16_t *prom, uint32_t d2) {
   const double dt = d2 - c5 * 256.0;
   const double first = 2000.0 + floor(dt * c6 / 8388608.0);
   struct compensation c = {
-      .temperature = first,
+    .temperature = first,
 #if SIM_SENSOR_MS5837_30BA
-      .offset = c2 * 65536.0 + floor(c4 * dt / 128.0),
-      .sensitivity = c1 * 32768.0 + floor(c3 * dt / 256.0),
+    .offset = c2 * 65536.0 + floor(c4 * dt / 128.0),
+    .sensitivity = c1 * 32768.0 + floor(c3 * dt / 256.0),
 #else
-      .offset = c2 * 131072.0 + floor(c4 * dt / 64.0),
-      .sensitivity = c1 * 65536.0 + floor(c3 * dt / 128.0),
+    .offset = c2 * 131072.0 + floor(c4 * dt / 64.0),
+    .sensitivity = c1 * 65536.0 + floor(c3 * dt / 128.0),
 #endif
   };
   const double below = first - 2000.0;
@@ -215,8 +213,7 @@ double sim_ms5840_temperature_degC(const uint16_t *prom, uint32_t d2) {
 
 double sim_ms5840_pressure_Pa(const uint16_t *prom, uint32_t d1, uint32_t d2) {
   const struct compensation c = compensate(prom, d2);
-  return PRESSURE_COUNT_Pa *
-         floor((floor(d1 * c.sensitivity / 2097152.0) - c.offset) / PRESSURE_DIVISOR);
+  return PRESSURE_COUNT_Pa * floor((floor(d1 * c.sensitivity / 2097152.0) - c.offset) / PRESSURE_DIVISOR);
 }
 
 uint32_t sim_ms5840_d2(const uint16_t *prom, double temperature_degC) {

@@ -197,8 +197,7 @@ static void advance(struct mux_bus *bus) {
 }
 
 static bool is_moving(const struct mux_bus *bus) {
-  return (bus->operation == MUX_BUS_COMMAND || bus->operation == MUX_BUS_READ) && !bus->failed &&
-         !bus->ended;
+  return (bus->operation == MUX_BUS_COMMAND || bus->operation == MUX_BUS_READ) && !bus->failed && !bus->ended;
 }
 
 static void on_i2c_event(void *context) {
@@ -267,8 +266,7 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
     bus->recovery_step = MUX_BUS_CLOCK_HIGH;
     break;
   case MUX_BUS_CLOCK_HIGH:
-    bus->recovery_step =
-        bus->recovery_clocks == RECOVERY_CLOCKS ? MUX_BUS_STOP_LOW : MUX_BUS_CLOCK_LOW;
+    bus->recovery_step = bus->recovery_clocks == RECOVERY_CLOCKS ? MUX_BUS_STOP_LOW : MUX_BUS_CLOCK_LOW;
     i2c_line_pull_low(&PINS, I2C_LINE_SCL);
     break;
   case MUX_BUS_STOP_LOW:
@@ -299,8 +297,8 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
   return FT_PENDING;
 }
 
-static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operation, uint8_t command,
-                            uint8_t byte_count, uint64_t now_us) {
+static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operation, uint8_t command, uint8_t byte_count,
+                            uint64_t now_us) {
   if (bus->operation != MUX_BUS_IDLE) {
     return FT_ERR_BUSY;
   }
@@ -327,8 +325,7 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
   return start(context, MUX_BUS_COMMAND, command, 0, now_us);
 }
 
-static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
-                                 uint64_t now_us) {
+static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count, uint64_t now_us) {
   if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES) {
     return FT_ERR_ARGUMENT;
   }
@@ -349,8 +346,7 @@ static enum ft_status start_recovery(void *context, uint64_t now_us) {
   return FT_OK;
 }
 
-static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result,
-                           uint64_t *wake_us) {
+static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us) {
   struct mux_bus *bus = context;
   enum ft_status status;
   if (bus->operation == MUX_BUS_IDLE) {

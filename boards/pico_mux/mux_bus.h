@@ -32,12 +32,7 @@ enum { BOARD_MUX_COUNT = BOARD_SENSOR_COUNT / BOARD_SENSORS_OF_STRIP }; /* one f
 
 /* Private, but caller-owned. */
 struct mux_bus {
-  enum mux_bus_operation {
-    MUX_BUS_IDLE,
-    MUX_BUS_COMMAND,
-    MUX_BUS_READ,
-    MUX_BUS_RECOVERY
-  } operation;
+  enum mux_bus_operation { MUX_BUS_IDLE, MUX_BUS_COMMAND, MUX_BUS_READ, MUX_BUS_RECOVERY } operation;
   uint8_t command;
   uint8_t read_count;
   bool command_sent;
@@ -47,10 +42,10 @@ struct mux_bus {
   uint8_t mux_answers; /* bitmap of multiplexers: acknowledged the last selection */
 
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */
-  uint8_t absent;      /* bitmap of multiplexers: shut, or did not acknowledge in this operation */
-  uint8_t just_opened; /* multiplexer, if the last transaction that ended selected its channels */
-  uint8_t suspect;     /* the one just opened when the bus last stood still, until all goes well */
-  uint8_t shut;        /* bitmap: held in reset until shut_until_us */
+  uint8_t absent;                /* bitmap of multiplexers: shut, or did not acknowledge in this operation */
+  uint8_t just_opened;           /* multiplexer, if the last transaction that ended selected its channels */
+  uint8_t suspect;               /* the one just opened when the bus last stood still, until all goes well */
+  uint8_t shut;                  /* bitmap: held in reset until shut_until_us */
   uint64_t shut_until_us;
   uint32_t shut_us; /* how long the next one is */
 

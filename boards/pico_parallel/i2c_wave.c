@@ -21,12 +21,10 @@ enum {
 };
 _Static_assert(I2C_WAVE_CELLS_WITH_BYTE(0) == AT_BYTES + ACK, "cells of a byte");
 _Static_assert(AT_STOP_OF_COMMAND + 1 == I2C_WAVE_COMMAND_CELLS, "cells of a command");
-_Static_assert(AT_BYTES + ARRAY_BUS_MAX_READ_BYTES * I2C_WAVE_BYTE_CELLS + 1 + FT_READ_STOPS ==
-                   I2C_WAVE_READ_CELLS,
+_Static_assert(AT_BYTES + ARRAY_BUS_MAX_READ_BYTES * I2C_WAVE_BYTE_CELLS + 1 + FT_READ_STOPS == I2C_WAVE_READ_CELLS,
                "cells of a read, made even");
 _Static_assert(1 + RECOVERY_CLOCKS + 2 == I2C_WAVE_RECOVERY_CELLS, "cells of a recovery");
-_Static_assert(I2C_WAVE_COMMAND_CELLS % 2 == 0 && I2C_WAVE_READ_CELLS % 2 == 0 &&
-                   I2C_WAVE_RECOVERY_CELLS % 2 == 0,
+_Static_assert(I2C_WAVE_COMMAND_CELLS % 2 == 0 && I2C_WAVE_READ_CELLS % 2 == 0 && I2C_WAVE_RECOVERY_CELLS % 2 == 0,
                "the player takes pairs of cells");
 
 /* Where the steps of a cell's bit begin: with the low phase before it. */
@@ -130,16 +128,16 @@ static unsigned levels_in_address(const uint16_t *samples) {
 }
 
 /* Exchanges a block of bits between two words. */
-#define EXCHANGE(low, high, bits, mask)                                                            \
-  do {                                                                                             \
-    const uint32_t differ = ((low) >> (bits) ^ (high)) & (mask);                                   \
-    (high) ^= differ;                                                                              \
-    (low) ^= differ << (bits);                                                                     \
+#define EXCHANGE(low, high, bits, mask)                                                                                \
+  do {                                                                                                                 \
+    const uint32_t differ = ((low) >> (bits) ^ (high)) & (mask);                                                       \
+    (high) ^= differ;                                                                                                  \
+    (low) ^= differ << (bits);                                                                                         \
   } while (0)
 
 /* Of two rows of each matrix, the bytes of four sensors: those at first, first + 1 and eight on. */
-static inline __attribute__((always_inline)) void
-put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES], unsigned first) {
+static inline __attribute__((always_inline)) void put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES],
+                                                           unsigned first) {
   const uint32_t differ = (rows >> 1 ^ rows >> 16) & 0x5555u;
   rows ^= differ << 1 ^ differ << 16;
   bytes[first][0] = (uint8_t)rows;
@@ -153,8 +151,7 @@ put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES], unsigned firs
 /* Each sensor's byte gets the bits of its line in eight samples, the highest first: a matrix of
  * 8 x 16 bits is two of 8 x 8 side by side, transposed together by exchanging blocks of 4, 2 and 1
  * bits (Warren, Hacker's Delight, 7-3). Rows are samples, two to a word. */
-uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index,
-                       uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]) {
+uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]) {
   samples += AT_BYTES + index * I2C_WAVE_BYTE_CELLS;
   bytes = (uint8_t(*)[ARRAY_BUS_MAX_READ_BYTES]) & bytes[0][index];
   uint32_t rows10 = samples[7] | (uint32_t)samples[6] << 16;

@@ -59,14 +59,12 @@ void i2c_wave_recovery(uint16_t steps[I2C_WAVE_RECOVERY_STEPS], uint16_t stop_li
 
 /* Gives each sensor its byte with this index. Returns the lines that were high in all of its bits;
  * of those only SCL has to be. About 180 Cortex-M0+ cycles. */
-uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index,
-                       uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]);
+uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]);
 
 struct i2c_reply {
-  uint16_t
-      acknowledged; /* bitmap: acknowledged every byte, and let go of the line where it should */
-  uint16_t held;    /* bitmap of lines that were low without a reason */
-  bool scl_follows; /* SCL was high in every sample that was looked at */
+  uint16_t acknowledged; /* bitmap: acknowledged every byte, and let go of the line where it should */
+  uint16_t held;         /* bitmap of lines that were low without a reason */
+  bool scl_follows;      /* SCL was high in every sample that was looked at */
 };
 
 /* What all the other samples say, with the AND of what i2c_wave_byte() returned for byte_count

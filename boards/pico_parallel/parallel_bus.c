@@ -23,8 +23,7 @@ static unsigned count_bits(unsigned bitmap) {
   return bits;
 }
 
-static void play(struct parallel_bus *bus, const uint16_t *steps, unsigned cell_count,
-                 uint64_t now_us) {
+static void play(struct parallel_bus *bus, const uint16_t *steps, unsigned cell_count, uint64_t now_us) {
   bus->deadline_us = now_us + LONGEST_us;
   wave_player_start(steps, bus->samples, cell_count);
 }
@@ -82,8 +81,7 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
   return FT_OK;
 }
 
-static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
-                                 uint64_t now_us) {
+static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count, uint64_t now_us) {
   struct parallel_bus *bus = context;
   if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES) {
     return FT_ERR_ARGUMENT;
@@ -126,8 +124,7 @@ static enum ft_status start_recovery(void *context, uint64_t now_us) {
  * little is left to do at the end. */
 static void take_bytes(struct parallel_bus *bus, struct array_bus_result *result) {
   const unsigned cells = wave_player_sampled();
-  while (bus->bytes_taken < bus->read_count &&
-         cells >= I2C_WAVE_CELLS_WITH_BYTE(bus->bytes_taken)) {
+  while (bus->bytes_taken < bus->read_count && cells >= I2C_WAVE_CELLS_WITH_BYTE(bus->bytes_taken)) {
     bus->in_bytes &= i2c_wave_byte(bus->samples, bus->bytes_taken, result->bytes);
     bus->bytes_taken++;
   }
@@ -148,9 +145,8 @@ static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *r
   if (is_read) {
     take_bytes(bus, result);
   }
-  const struct i2c_reply reply = is_read
-                                     ? i2c_wave_reply(bus->samples, bus->read_count, bus->in_bytes)
-                                     : i2c_wave_reply(bus->samples, 0, UINT16_MAX);
+  const struct i2c_reply reply = is_read ? i2c_wave_reply(bus->samples, bus->read_count, bus->in_bytes)
+                                         : i2c_wave_reply(bus->samples, 0, UINT16_MAX);
   if (!reply.scl_follows) {
     return FT_ERR_TIMEOUT;
   }
@@ -160,8 +156,7 @@ static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *r
   return FT_OK;
 }
 
-static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result,
-                           uint64_t *wake_us) {
+static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us) {
   struct parallel_bus *bus = context;
   enum ft_status status;
   if (bus->operation == PARALLEL_BUS_IDLE) {

@@ -73,8 +73,7 @@ static void tell_events(struct crash_record *record) {
 }
 
 static uint8_t stuck_parts(uint32_t now_us) {
-  static const uint8_t bits[] = {
-      [PORT_PART_SCAN] = CRASH_STUCK_SCAN, [PORT_PART_USB] = CRASH_STUCK_USB};
+  static const uint8_t bits[] = {[PORT_PART_SCAN] = CRASH_STUCK_SCAN, [PORT_PART_USB] = CRASH_STUCK_USB};
   uint8_t stuck = 0;
   for (unsigned part = 0; part < PORT_PARTS; part++) {
     if (trace.watched[part] && now_us - trace.alive_us[part] > PORT_PART_LIMIT_us)
@@ -101,8 +100,7 @@ _Noreturn void rp2040_take_crash(void) {
   struct crash_record *record = &kept.record;
   memset(record, 0, sizeof *record);
   const uint32_t guard = (uint32_t)(uintptr_t)__stack_guard;
-  const bool is_below =
-      frame->address >= guard && frame->address < (uint32_t)(uintptr_t)__stack_limit;
+  const bool is_below = frame->address >= guard && frame->address < (uint32_t)(uintptr_t)__stack_limit;
   record->kind = frame->vector == VECTOR_PANIC        ? CRASH_PANIC
                  : is_below                           ? CRASH_OVERFLOW
                  : frame->vector == VECTOR_HARD_FAULT ? CRASH_FAULT
@@ -112,8 +110,8 @@ _Noreturn void rp2040_take_crash(void) {
   record->vector = (uint8_t)frame->vector;
   record->activity = trace.activity;
   memcpy(&record->r0, frame, offsetof(struct fault_frame, address));
-  record->sp = frame->address + (uint32_t)offsetof(struct fault_frame, address) +
-               (frame->xpsr & XPSR_STACK_WAS_ODD ? 4 : 0);
+  record->sp =
+      frame->address + (uint32_t)offsetof(struct fault_frame, address) + (frame->xpsr & XPSR_STACK_WAS_ODD ? 4 : 0);
   record->t_us = timer_runs() ? port_now_us() : 0;
   if (record->kind == CRASH_WATCHDOG)
     record->stuck = all_stuck((uint32_t)record->t_us);

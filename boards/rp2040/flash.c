@@ -134,8 +134,8 @@ static void send_slice(void) {
   uint8_t bytes[SLICE_BYTES];
   size_t count = 0;
   for (; count < sizeof bytes && operation.sent < operation.length; operation.sent++)
-    bytes[count++] = operation.sent < HEAD_BYTES ? operation.head[operation.sent]
-                                                 : operation.bytes[operation.sent - HEAD_BYTES];
+    bytes[count++] =
+        operation.sent < HEAD_BYTES ? operation.head[operation.sent] : operation.bytes[operation.sent - HEAD_BYTES];
   if (exchange(bytes, count) != FT_OK)
     operation.sent = operation.length;
 }

@@ -12,8 +12,8 @@
 #define MPU_RASR REG32(0xe000eda0u)
 #define MPU_RASR_NO_ACCESS (1u << 28) /* and no execution */
 #define MPU_RASR_READ_ONLY (6u << 24)
-#define MPU_RASR_NORMAL (1u << 17)                      /* memory, from which code runs */
-#define MPU_RASR_EIGHTHS(count) (0xff00u << (count) & 0xff00u) /* in force: the first of them */
+#define MPU_RASR_NORMAL (1u << 17)                           /* memory, from which code runs */
+#define MPU_RASR_EIGHTHS(count) (0xff00u << (count)&0xff00u) /* in force: the first of them */
 #define MPU_RASR_BYTES(log2) (((log2)-1u) << 1)
 #define MPU_RASR_ENABLE (1u << 0)
 

@@ -62,12 +62,7 @@ static bool is_echoed(uint32_t word) {
 /* As the boot ROM wants it (pico-bootrom-rp2040, bootrom_rt0.S wait_for_vector). */
 static bool launch(void) {
   const uint32_t words[] = {
-      0,
-      0,
-      1,
-      (uint32_t)(uintptr_t)__vectors,
-      (uint32_t)(uintptr_t)__second_stack_top,
-      (uint32_t)(uintptr_t)run,
+      0, 0, 1, (uint32_t)(uintptr_t)__vectors, (uint32_t)(uintptr_t)__second_stack_top, (uint32_t)(uintptr_t)run,
   };
   const unsigned count = sizeof words / sizeof words[0];
   unsigned next = 0;

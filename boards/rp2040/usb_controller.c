@@ -60,9 +60,7 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 #define CONTROL_BITS (USB_BIT(USB_ENDPOINT_IN) | USB_BIT(0))
 
 /* What the controller's interrupt leaves to the service interrupt, masked until then. */
-#define SERVED                                                                                     \
-  (USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |             \
-   USB_INT_DEV_RESUME)
+#define SERVED (USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND | USB_INT_DEV_RESUME)
 
 /* One bit for each endpoint, as in BUFF_STATUS */
 static uint32_t data1;    /* the next packet is DATA1 */
@@ -131,8 +129,7 @@ static void begin_abort(uint8_t endpoint) {
     REG32_SET(USB_EP_ABORT) = bit;
   uint32_t limit_us = is_old ? PACKET_us : ABORT_LIMIT_us;
   uint32_t start_us = TIMER_TIMERAWL;
-  while ((is_old || (REG32(USB_EP_ABORT_DONE) & bit) == 0) &&
-         TIMER_TIMERAWL - start_us < limit_us) {
+  while ((is_old || (REG32(USB_EP_ABORT_DONE) & bit) == 0) && TIMER_TIMERAWL - start_us < limit_us) {
   }
 }
 
@@ -205,8 +202,7 @@ void usb_controller_close_all(void) {
 }
 
 void usb_controller_send(uint8_t endpoint, const uint8_t *bytes, size_t length) {
-  volatile uint32_t *buffer =
-      (volatile uint32_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
+  volatile uint32_t *buffer = (volatile uint32_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
   for (size_t i = 0; i < length; i += 4) {
     uint32_t word;
     memcpy(&word, __builtin_assume_aligned(bytes + i, 4), sizeof word);
@@ -406,8 +402,7 @@ static void on_buffer(uint8_t endpoint) {
   }
   uint8_t packet[USB_MAX_PACKET_BYTES];
   size_t length = USB_BUFFER_CONTROL(endpoint) & USB_BUFFER_LENGTH;
-  const volatile uint8_t *buffer =
-      (const volatile uint8_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
+  const volatile uint8_t *buffer = (const volatile uint8_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
   for (size_t i = 0; i < length && i < sizeof packet; i++)
     packet[i] = buffer[i];
   usb_device_on_received(endpoint, packet, length);

@@ -26,8 +26,8 @@ static const uint16_t program[] = {
 };
 enum { PROGRAM_LENGTH = sizeof program / sizeof program[0] };
 _Static_assert(DELAY(WAVE_STEP3_ns) <= 31, "a delay has five bits");
-_Static_assert(WAVE_STEP0_ns % CYCLE_ns == 0 && WAVE_STEP1_ns % CYCLE_ns == 0 &&
-                   WAVE_STEP2_ns % CYCLE_ns == 0 && WAVE_STEP3_ns % CYCLE_ns == 0,
+_Static_assert(WAVE_STEP0_ns % CYCLE_ns == 0 && WAVE_STEP1_ns % CYCLE_ns == 0 && WAVE_STEP2_ns % CYCLE_ns == 0 &&
+                   WAVE_STEP3_ns % CYCLE_ns == 0,
                "steps are whole cycles");
 
 static unsigned cells; /* of the wave under way */
@@ -35,8 +35,7 @@ static unsigned cells; /* of the wave under way */
 enum ft_status wave_player_open(void) {
   rp2040_irq_disable(RP2040_IRQ_DMA_0);
   resets_assert(RESETS_PIO0 | RESETS_DMA);
-  const enum ft_status status =
-      resets_release(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_PIO0 | RESETS_DMA);
+  const enum ft_status status = resets_release(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_PIO0 | RESETS_DMA);
   if (status != FT_OK) {
     return status;
   }
@@ -48,8 +47,8 @@ enum ft_status wave_player_open(void) {
   PIO_SM0_EXECCTRL(PIO0_BASE) = PIO_EXECCTRL_WRAP(0, PROGRAM_LENGTH - 1);
   PIO_SM0_PINCTRL(PIO0_BASE) = PIO_PINCTRL_OUT(0, LINES) | PIO_PINCTRL_IN(0);
   PIO_SM0_INSTR(PIO0_BASE) = PIO_MOV_PINS_NULL; /* a driven line is low; after the reset none is driven */
-  PIO_SM0_SHIFTCTRL(PIO0_BASE) = PIO_SHIFTCTRL_OUT_RIGHT | PIO_SHIFTCTRL_IN_RIGHT | PIO_SHIFTCTRL_AUTOPULL |
-                       PIO_SHIFTCTRL_AUTOPUSH;
+  PIO_SM0_SHIFTCTRL(PIO0_BASE) =
+      PIO_SHIFTCTRL_OUT_RIGHT | PIO_SHIFTCTRL_IN_RIGHT | PIO_SHIFTCTRL_AUTOPULL | PIO_SHIFTCTRL_AUTOPUSH;
   for (unsigned pin = 0; pin < LINES; pin++) {
     gpio_set_pad(pin, GPIO_PULL_UP);
     gpio_set_function(pin, GPIO_FUNCTION_PIO0);
@@ -70,13 +69,11 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
   DMA_WRITE_ADDR(CHANNEL_SAMPLES) = (uint32_t)(uintptr_t)samples;
   DMA_TRANS_COUNT(CHANNEL_SAMPLES) = cell_count / 2;
   DMA_CTRL_TRIG(CHANNEL_SAMPLES) = DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_WRITE |
-                                   DMA_CTRL_CHAIN_TO(CHANNEL_SAMPLES) |
-                                   DMA_CTRL_TREQ(DMA_DREQ_PIO0_RX0);
+                                   DMA_CTRL_CHAIN_TO(CHANNEL_SAMPLES) | DMA_CTRL_TREQ(DMA_DREQ_PIO0_RX0);
   DMA_READ_ADDR(CHANNEL_STEPS) = (uint32_t)(uintptr_t)steps;
   DMA_WRITE_ADDR(CHANNEL_STEPS) = PIO_TXF0_ADDRESS(PIO0_BASE);
   DMA_TRANS_COUNT(CHANNEL_STEPS) = WAVE_STEPS_PER_CELL * cell_count / 2;
-  DMA_CTRL_TRIG(CHANNEL_STEPS) = DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_READ |
-                                 DMA_CTRL_CHAIN_TO(CHANNEL_STEPS) |
+  DMA_CTRL_TRIG(CHANNEL_STEPS) = DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_READ | DMA_CTRL_CHAIN_TO(CHANNEL_STEPS) |
                                  DMA_CTRL_TREQ(DMA_DREQ_PIO0_TX0) | DMA_CTRL_IRQ_QUIET;
 }
 

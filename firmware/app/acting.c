@@ -26,10 +26,8 @@ void app_use_shape(struct app *app) {
   const struct calibration *found = DEFAULT_USES_SHAPE ? app->calibration : NULL;
   /* Beside a profile contacts may be of any width: its estimate tells a wide one from a pull. */
   const bool knows = found && !profile;
-  settings->prior_sigma_mm =
-      is_set ? app->set_sigma_mm : knows ? millimetres(found->sigma_um) : 0.0f;
-  settings->prior_width_mm =
-      is_set ? app->set_sigma_sd_mm : knows ? millimetres(found->sigma_sd_um) : 0.0f;
+  settings->prior_sigma_mm = is_set ? app->set_sigma_mm : knows ? millimetres(found->sigma_um) : 0.0f;
+  settings->prior_width_mm = is_set ? app->set_sigma_sd_mm : knows ? millimetres(found->sigma_sd_um) : 0.0f;
   settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
   settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
@@ -38,8 +36,7 @@ void app_use_shape(struct app *app) {
 #if FT_WITH_TANGENTIAL
 static void use_tangential_scales(struct app *app) {
   if (app->pad) {
-    tangential_use(&app->tangential_settings, app->pad, &app->contact_settings,
-                   app->calibration != NULL);
+    tangential_use(&app->tangential_settings, app->pad, &app->contact_settings, app->calibration != NULL);
   }
 }
 
@@ -63,8 +60,7 @@ static int32_t q15_pitches(int16_t length_um) {
 static void use_own(struct app *app, const struct calibration *calibration) {
   for (unsigned k = 0; calibration && k < geometry.sensor_count; k++) {
     const struct sensor_calibration *sensor = &calibration->sensors[k];
-    app->own[k] = (struct fit_own){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um),
-                                   sensor->wider_q15};
+    app->own[k] = (struct fit_own){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um), sensor->wider_q15};
   }
   app->fit_settings.own = DEFAULT_USES_SHAPE && calibration ? app->own : NULL;
 }

@@ -68,8 +68,8 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->osr = DEFAULT_OSR;
   app->rate_mHz = DEFAULT_RATE_mHz;
 #if FT_WITH_FIT
-  if (INIT_FIT_ARRAY(&app->fit_array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK) {
+  if (INIT_FIT_ARRAY(&app->fit_array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) !=
+      FT_OK) {
     port_panic();
   }
   app->fit_settings.iterations = DEFAULT_FIT_ITERATIONS;
@@ -125,8 +125,8 @@ static void fit_frame(struct app *app) {
     return;
   }
   app->fit_settings.noise_Pa_q10 = app->frame.noise_Pa_q10;
-  FIT(&app->fit_array, app->conditioned.pressure_Pa_q10, app->conditioned.usable,
-      &app->fit_settings, &app->fit_watch, &app->fit);
+  FIT(&app->fit_array, app->conditioned.pressure_Pa_q10, app->conditioned.usable, &app->fit_settings, &app->fit_watch,
+      &app->fit);
   if (!(app->fit.flags & CONTACT_FLAG_FIT_VALID)) {
     app->fit_failures++;
   }
@@ -150,8 +150,8 @@ static void doubt_load(struct app *app) {
 }
 
 static void learn_gains(struct app *app) {
-  if (fit_gains_learn(&app->learnt_gains, &app->fit_array, app->conditioned.pressure_Pa_q10,
-                      &app->fit_settings, &app->fit)) {
+  if (fit_gains_learn(&app->learnt_gains, &app->fit_array, app->conditioned.pressure_Pa_q10, &app->fit_settings,
+                      &app->fit)) {
     const float gain_sd = fit_gains_sd(&app->learnt_gains);
     for (unsigned k = 0; k < geometry.sensor_count; k++) {
       app->fit_settings.gain_sd_q16[k] = (uint16_t)(65536.0f * gain_sd + 0.5f);
@@ -175,8 +175,8 @@ static void look_for_load(struct app *app) {
         app->gains_due = false;
         continue;
       }
-      fit_load_follow(&app->load_doubt, &app->fit_array, app->conditioned.pressure_Pa_q10,
-                      &app->fit_settings, &app->fit);
+      fit_load_follow(&app->load_doubt, &app->fit_array, app->conditioned.pressure_Pa_q10, &app->fit_settings,
+                      &app->fit);
       app->gains_due = app->load_doubt.part == 0 && !app->calibration;
     }
   }
@@ -189,17 +189,13 @@ static bool is_sensor_doubtful(const struct app *app) {
 
 static struct contact_input input_of(const struct app *app) {
   const struct frame *frame = &app->frame;
-  return (struct contact_input){
-    .t_us = frame->t_us,
-    .contact = app->conditioned.contact,
-    .tared = app->conditioned.tared,
-    .zero_doubtful = app->conditioned.zero_doubtful,
-    .sensor_doubtful = is_sensor_doubtful(app),
+  return (struct contact_input) {
+    .t_us = frame->t_us, .contact = app->conditioned.contact, .tared = app->conditioned.tared,
+    .zero_doubtful = app->conditioned.zero_doubtful, .sensor_doubtful = is_sensor_doubtful(app),
     .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
     .saturated = frame->saturated,
 #if FT_WITH_FIT
-    .fit = app->conditioned.contact ? &app->fit : NULL,
-    .calibrated = app->calibration != NULL,
+    .fit = app->conditioned.contact ? &app->fit : NULL, .calibrated = app->calibration != NULL,
 #endif
 #if FT_WITH_TANGENTIAL
     .tangential = app->tangential,
@@ -234,10 +230,8 @@ static void judge_shapes(struct app *app) {
 static void judge_load(struct app *app) {
   const struct contact_input input = input_of(app);
   app->tangential_settings.location_sd_limit_mm = app->fit_settings.location_sd_limit_mm;
-  tangential_update(&app->tangential_history, &app->tangential_settings, &input, &app->contact,
-                    &app->load);
-  motion_update(&app->motion_history, &app->tangential_settings, &input, &app->contact,
-                &app->motion);
+  tangential_update(&app->tangential_history, &app->tangential_settings, &input, &app->contact, &app->load);
+  motion_update(&app->motion_history, &app->tangential_settings, &input, &app->contact, &app->motion);
   judge_shapes(app);
   app->contact.flags |= app->tangential_is_late ? (uint32_t)CONTACT_FLAG_TANGENTIAL_LATE : 0;
 }

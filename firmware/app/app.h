@@ -63,11 +63,11 @@ struct app {
   bool tangential_follows;        /* the question before was of the same contact and pad */
   struct worker shapes_worker;    /* of the job below: the same processor, after the other job */
   struct shapes_job shapes_job;
-  bool shapes_act;                          /* the profile is one that they know */
-  bool shapes_begin;                        /* what is asked next is of another contact or pad */
-  struct shapes_report shapes;              /* of the contact under way */
-  uint64_t worked_us;                       /* the last frame's time */
-  uint64_t worked_apart_us;                 /* between it and the one before */
+  bool shapes_act;             /* the profile is one that they know */
+  bool shapes_begin;           /* what is asked next is of another contact or pad */
+  struct shapes_report shapes; /* of the contact under way */
+  uint64_t worked_us;          /* the last frame's time */
+  uint64_t worked_apart_us;    /* between it and the one before */
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif

@@ -15,8 +15,7 @@
 #define FAST_TICK_us 1000u
 
 enum {
-  STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0) |
-            WIRE_STREAM_HEALTH,
+  STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0) | WIRE_STREAM_HEALTH,
 };
 
 static const struct wire_layout *const known_commands[] = {WIRE_COMMANDS,
@@ -92,8 +91,7 @@ void commands_set_pace(struct app *app) {
 #if FT_WITH_SYNC
   is_fast = is_fast || sync_is_stamping(app);
 #endif
-  atomic_store_explicit(&app->tick_interval_us, is_fast ? FAST_TICK_us : TICK_us,
-                        memory_order_relaxed);
+  atomic_store_explicit(&app->tick_interval_us, is_fast ? FAST_TICK_us : TICK_us, memory_order_relaxed);
   if (is_fast) { /* the alarm that is armed would come too late */
     port_alarm_at_us(port_now_us());
   }
@@ -285,9 +283,8 @@ static void acknowledge(struct app *app, const struct wire_ack *ack, uint64_t no
 
 /* app->packet holds the command and is used up. */
 static void answer_command(struct app *app, uint64_t now_us) {
-  struct wire_ack ack = {.command = app->packet.type,
-                         .sequence = app->packet.sequence,
-                         .host_time_us = app->packet.t_us};
+  struct wire_ack ack = {
+      .command = app->packet.type, .sequence = app->packet.sequence, .host_time_us = app->packet.t_us};
   port_event(CRASH_EVENT_COMMAND, ack.command);
   int result = obey(app, &app->packet, now_us);
   if (result == LATER) {

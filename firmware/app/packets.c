@@ -9,11 +9,9 @@
 #include <string.h>
 
 enum {
-  CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) |
-                 (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
+  CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) | (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
                  (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) |
-                 (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) |
-                 (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0),
+                 (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) | (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0),
 };
 
 /* Sends app->packet. A sequence number is spent even when the queue is full: the gap tells. */
@@ -97,20 +95,18 @@ void packets_send_health(struct app *app, uint64_t now_us) {
   const struct scan *scan = &app->scan;
   size_t stack_free = port_stack_free_bytes();
   app->packet.body.health = (struct wire_health) {
-    .capabilities = CAPABILITIES, .uptime_s = app->uptime_s,
-    .frames = read_counter(&scan->counters.frames),
+    .capabilities = CAPABILITIES, .uptime_s = app->uptime_s, .frames = read_counter(&scan->counters.frames),
     .frames_incomplete = read_counter(&scan->counters.frames_incomplete),
-    .frames_skipped = read_counter(&scan->counters.frames_skipped),
-    .packets_sent = app->packets_sent, .packets_dropped = app->packets_dropped,
-    .commands_done = app->commands_done, .commands_rejected = app->commands_rejected,
-    .bus_nacks = read_counter(&scan->counters.bus_nacks),
+    .frames_skipped = read_counter(&scan->counters.frames_skipped), .packets_sent = app->packets_sent,
+    .packets_dropped = app->packets_dropped, .commands_done = app->commands_done,
+    .commands_rejected = app->commands_rejected, .bus_nacks = read_counter(&scan->counters.bus_nacks),
     .bus_timeouts = read_counter(&scan->counters.bus_timeouts),
     .bus_recoveries = read_counter(&scan->counters.bus_recoveries),
     .zero_readings = read_counter(&scan->counters.zero_readings),
     .implausible_readings = read_counter(&scan->counters.implausible_readings),
-    .sensors_present = read_counter(&scan->present),
-    .sensors_prom_bad = read_counter(&scan->prom_bad), .watchdog_resets = port_watchdog_resets(),
-    .cpu_busy_permille = app->cpu_busy_permille, .stack_free_bytes = saturate_u16(stack_free),
+    .sensors_present = read_counter(&scan->present), .sensors_prom_bad = read_counter(&scan->prom_bad),
+    .watchdog_resets = port_watchdog_resets(), .cpu_busy_permille = app->cpu_busy_permille,
+    .stack_free_bytes = saturate_u16(stack_free),
 #if FT_WITH_FIT
     .fit_failures = app->fit_failures,
 #endif
@@ -152,8 +148,7 @@ void packets_send_sync(struct app *app, const struct port_sync_edge *edge) {
 /* Where its flags are off this is zero. */
 static void put_shape(const struct app *app, struct wire_contact *contact) {
   const struct shapes_report *shapes = &app->shapes;
-  contact->shape_age_ms =
-      shapes->shape ? 1e-3f * (float)(uint32_t)(app->frame.t_us - shapes->t_us) : 0.0f;
+  contact->shape_age_ms = shapes->shape ? 1e-3f * (float)(uint32_t)(app->frame.t_us - shapes->t_us) : 0.0f;
   contact->x1_mm = shapes->contact[0].x_mm;
   contact->y1_mm = shapes->contact[0].y_mm;
   contact->location1_sd_mm = shapes->contact[0].location_sd_mm;

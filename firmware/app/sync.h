@@ -18,8 +18,7 @@ void sync_follow(struct app *app, uint64_t now_us);
 
 /* The edges are to be looked at each millisecond. */
 static inline bool sync_is_stamping(const struct app *app) {
-  return !app->sync.paused &&
-         (app->sync.mode == PORT_SYNC_IN || app->sync.mode == PORT_SYNC_SECOND);
+  return !app->sync.paused && (app->sync.mode == PORT_SYNC_IN || app->sync.mode == PORT_SYNC_SECOND);
 }
 
 /* Event context, after scan_step: the output of mode frame. */

@@ -39,8 +39,7 @@ static bool wait_for_answer(struct app *app) {
 static void set_question(struct app *app, struct shapes_question *question) {
   question->begins = app->shapes_begin;
   question->t_us = app->frame.t_us;
-  memcpy(question->pressure_Pa_q10, app->conditioned.pressure_Pa_q10,
-         sizeof question->pressure_Pa_q10);
+  memcpy(question->pressure_Pa_q10, app->conditioned.pressure_Pa_q10, sizeof question->pressure_Pa_q10);
   question->settings = app->fit_settings;
   question->fit = app->fit;
   question->force_scale = app->tangential_settings.force_scale;
@@ -79,8 +78,7 @@ static void ask_for_load(struct app *app) {
   const bool slow = app->frame.t_us - last_us >= TANGENTIAL_SLOW_us;
   app->load_limit_us = (slow ? TANGENTIAL_SLOW_LATE_us : TANGENTIAL_LATE_us) +
                        (worker_is_free(&app->shapes_worker) ? 0 : SHAPES_PART_us);
-  memcpy(app->load_of.pressure_Pa_q10, app->conditioned.pressure_Pa_q10,
-         sizeof app->load_of.pressure_Pa_q10);
+  memcpy(app->load_of.pressure_Pa_q10, app->conditioned.pressure_Pa_q10, sizeof app->load_of.pressure_Pa_q10);
   app->load_of.settings = app->fit_settings;
   app->load_of.fit = app->fit;
   app->tangential_job.question = (struct tangential_question){
@@ -108,8 +106,7 @@ static void take_answer(struct app *app) {
     return;
   }
   const float share = then->force_N > 0.0f ? now->force_N / then->force_N : 0.0f;
-  if (!tangential_is_worthwhile(now, app->frame.saturated) || share < LEAST_SHARE ||
-      share > 1.0f / LEAST_SHARE) {
+  if (!tangential_is_worthwhile(now, app->frame.saturated) || share < LEAST_SHARE || share > 1.0f / LEAST_SHARE) {
     memset(found, 0, sizeof *found);
     return;
   }
@@ -143,8 +140,7 @@ void working_ask(struct app *app) {
   app->tangential_is_late = false;
   if (app->load_is_asked && !is_answered(app)) {
     app->tangential_is_late = asks;
-  } else if (asks && app->tangential_follows && !app->waits_for_load &&
-             apart_us < TANGENTIAL_SLOW_us) {
+  } else if (asks && app->tangential_follows && !app->waits_for_load && apart_us < TANGENTIAL_SLOW_us) {
     take_answer(app);
   }
   if (asks) {

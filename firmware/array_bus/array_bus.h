@@ -55,8 +55,7 @@ struct array_bus {
    * FT_ERR_STUCK: recovery did not free the bus; recover again later; a recovery fails in no other
    * way. An operation ends with its
    * first answer other than FT_PENDING; without one, poll answers FT_ERR_ARGUMENT. */
-  enum ft_status (*poll)(void *context, uint64_t now_us, struct array_bus_result *result,
-                         uint64_t *wake_us);
+  enum ft_status (*poll)(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us);
 };
 
 #endif

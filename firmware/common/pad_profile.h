@@ -45,10 +45,10 @@ struct pad_profile {
     float moment_mm, sd_mm; /* the moments add up to about the thickness */
   } tangential[PAD_TANGENTIAL_TERMS];
   float spread_mm2, spread_sd_mm2; /* what to expect of t2 */
-  float force_ratio;      /* 2 pi p0 sigma^2 of a usual contact over its force: what a calibration's
-                             force scale holds of it */
-  float tangential_scale; /* tangential force is this times the profile's */
-  float tangential_scale_sd; /* standard deviation of tangential_scale */
+  float force_ratio;               /* 2 pi p0 sigma^2 of a usual contact over its force: what a calibration's
+                                      force scale holds of it */
+  float tangential_scale;          /* tangential force is this times the profile's */
+  float tangential_scale_sd;       /* standard deviation of tangential_scale */
   struct pad_edges edges;
   uint8_t from_touch; /* 1: the pad's edges spoil the zero, so report the change since the first
                        * touch; 0 */
@@ -56,8 +56,7 @@ struct pad_profile {
 
 /* The values before from_touch, behind one another. */
 #define PAD_EDGE_FLOATS (PAD_EDGE_KINDS * PAD_EDGE_TERMS)
-#define PAD_PROFILE_FLOATS                                                                         \
-  (4 + 2 * PAD_NORMAL_TERMS + 2 * PAD_TANGENTIAL_TERMS + 3 + PAD_EDGE_FLOATS)
+#define PAD_PROFILE_FLOATS (4 + 2 * PAD_NORMAL_TERMS + 2 * PAD_TANGENTIAL_TERMS + 3 + PAD_EDGE_FLOATS)
 
 /* Ranges. */
 #define PAD_THICKNESS_MIN_mm 5.0f

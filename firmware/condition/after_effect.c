@@ -12,8 +12,8 @@
 #define FOLLOW_ms MS(700)
 #define FOLLOW_DOWN_ms MS(100) /* when a force goes at last */
 
-#define KEEP_SHIFT 8   /* share of the memory that the level takes of the remainder in a second, */
-#define CREEP_SHIFT 10 /* of what the remainder does not follow, */
+#define KEEP_SHIFT 8    /* share of the memory that the level takes of the remainder in a second, */
+#define CREEP_SHIFT 10  /* of what the remainder does not follow, */
 #define DRIFTED_SHIFT 3 /* and of what it may have drifted */
 
 /* What drifted in a contact is taken to be up to 0.24 Pa/s of it. */
@@ -42,8 +42,8 @@ void after_effect_fade(struct after_effect_pad *pad, int32_t ms, bool pressed) {
   }
 }
 
-void after_effect_remember(struct after_effect *after, struct after_effect_pad *pad, int32_t ms,
-                           int32_t steady_Pa_q10, bool pressed) {
+void after_effect_remember(struct after_effect *after, struct after_effect_pad *pad, int32_t ms, int32_t steady_Pa_q10,
+                           bool pressed) {
   int32_t memory = faded(after->memory_Pa_q10, ms, MEMORY_ms);
   if (pressed && steady_Pa_q10 > memory) {
     memory = steady_Pa_q10 < Pa_q10(SATURATED_Pa) ? steady_Pa_q10 : Pa_q10(SATURATED_Pa);
@@ -57,8 +57,7 @@ int32_t after_effect_saturate(struct after_effect *after) {
   return Pa_q10(SATURATED_Pa) >> AFTER_EFFECT_BAND_SHIFT;
 }
 
-int32_t after_effect_hold(struct after_effect *after, struct after_effect_pad *pad, int32_t ms,
-                          int32_t steady_Pa_q10) {
+int32_t after_effect_hold(struct after_effect *after, struct after_effect_pad *pad, int32_t ms, int32_t steady_Pa_q10) {
   int32_t steady = steady_Pa_q10 < Pa_q10(SATURATED_Pa) ? steady_Pa_q10 : Pa_q10(SATURATED_Pa);
   int32_t reached = larger(faded(after->reached_Pa_q10, ms, MEMORY_ms), steady);
   after->reached_Pa_q10 = reached;
@@ -66,8 +65,8 @@ int32_t after_effect_hold(struct after_effect *after, struct after_effect_pad *p
   return larger(reached, pad->reached_Pa_q10 >> CROSS_SHIFT) >> AFTER_EFFECT_BAND_SHIFT;
 }
 
-void after_effect_look(const struct after_effect *after, const struct after_effect_pad *pad,
-                       bool fresh, struct after_effect_band *band) {
+void after_effect_look(const struct after_effect *after, const struct after_effect_pad *pad, bool fresh,
+                       struct after_effect_band *band) {
   int32_t memory = larger(after->memory_Pa_q10, pad->memory_Pa_q10 >> CROSS_SHIFT);
   int32_t drifted = pad->drifted_Pa_q10;
   band->fresh = fresh;
@@ -79,10 +78,8 @@ void after_effect_look(const struct after_effect *after, const struct after_effe
   band->pace.keeps = true;
 }
 
-int32_t after_effect_follow(const struct after_effect_band *band, const struct step *step,
-                            int32_t remainder_Pa_q10) {
-  int32_t goal = clamp(step->above_Pa_q10 + remainder_Pa_q10, band->lowest_Pa_q10,
-                       band->highest_Pa_q10);
+int32_t after_effect_follow(const struct after_effect_band *band, const struct step *step, int32_t remainder_Pa_q10) {
+  int32_t goal = clamp(step->above_Pa_q10 + remainder_Pa_q10, band->lowest_Pa_q10, band->highest_Pa_q10);
   int32_t highest = larger(remainder_Pa_q10, 0);
   if ((!band->fresh || step->moves) && goal > highest) {
     goal = highest;

@@ -48,15 +48,14 @@ int32_t after_effect_drift(uint32_t pressed_ms);
 void after_effect_fade(struct after_effect_pad *pad, int32_t ms, bool pressed);
 
 /* steady_Pa_q10: no disturbed reading. */
-void after_effect_remember(struct after_effect *after, struct after_effect_pad *pad, int32_t ms,
-                           int32_t steady_Pa_q10, bool pressed);
+void after_effect_remember(struct after_effect *after, struct after_effect_pad *pad, int32_t ms, int32_t steady_Pa_q10,
+                           bool pressed);
 
 /* Beyond what a sensor can measure. Returns the band. */
 int32_t after_effect_saturate(struct after_effect *after);
 
 /* Of a sensor in a contact. Returns the band of this contact. */
-int32_t after_effect_hold(struct after_effect *after, struct after_effect_pad *pad, int32_t ms,
-                          int32_t steady_Pa_q10);
+int32_t after_effect_hold(struct after_effect *after, struct after_effect_pad *pad, int32_t ms, int32_t steady_Pa_q10);
 
 /* After a contact: what may remain, and how the level takes it over. */
 struct after_effect_band {
@@ -65,11 +64,10 @@ struct after_effect_band {
   struct zero_pace pace;
   bool fresh;
 };
-void after_effect_look(const struct after_effect *after, const struct after_effect_pad *pad,
-                       bool fresh, struct after_effect_band *band);
+void after_effect_look(const struct after_effect *after, const struct after_effect_pad *pad, bool fresh,
+                       struct after_effect_band *band);
 
 /* Follows the reading. Returns the new remainder. */
-int32_t after_effect_follow(const struct after_effect_band *band, const struct step *step,
-                            int32_t remainder_Pa_q10);
+int32_t after_effect_follow(const struct after_effect_band *band, const struct step *step, int32_t remainder_Pa_q10);
 
 #endif

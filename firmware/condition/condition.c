@@ -23,7 +23,7 @@
 #define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600))
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
 #define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* what rubber keeps goes slowly */
-#define CALM_LAG_Pa 2 /* and half a sigma: three sigmas of a mean at the least rate */
+#define CALM_LAG_Pa 2                                 /* and half a sigma: three sigmas of a mean at the least rate */
 
 #define SUM_RANGE (INT32_C(1) << 23) /* of a reading in a mean: 8 kPa */
 
@@ -81,12 +81,10 @@ static void take(struct condition *condition, uint8_t k, int32_t reading) {
 /* Takes the readings of sensors that are tared now, and leaves the bitmap of those that were. In a
  * contact that others feel it waits, but not for ever, for wrong zeros may make it: what is taken
  * then is a guess until the contact ends. */
-static uint32_t tare_sensors(struct condition *condition, const struct frame *frame,
-                             uint32_t readable) {
+static uint32_t tare_sensors(struct condition *condition, const struct frame *frame, uint32_t readable) {
   uint32_t ready = readable;
   uint32_t guesses = condition->gate.pressed ? 0 : condition->guessed;
-  bool is_felt = condition->gate.pressed && !condition->doubt.unsure &&
-                 (readable & ~condition->taring) != 0;
+  bool is_felt = condition->gate.pressed && !condition->doubt.unsure && (readable & ~condition->taring) != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     const struct zero *zero = &condition->sensor[k].zero;
@@ -128,8 +126,7 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
     }
     int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
     if (gains) {
-      above = scaled_by(clamp(above, -STEP_PRESSURE_MAX, STEP_PRESSURE_MAX - 1),
-                        gains->inverse_q16[k]);
+      above = scaled_by(clamp(above, -STEP_PRESSURE_MAX, STEP_PRESSURE_MAX - 1), gains->inverse_q16[k]);
     }
     conditioned->pressure_Pa_q10[k] = above;
     if (above > peak) {
@@ -164,21 +161,19 @@ static int32_t taken_into_zeros(const struct condition *condition, uint32_t usab
   return most;
 }
 
-static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
-                             uint8_t count) {
+static void press_or_release(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
   if (!condition->gate.pressed) {
     after_effect_release(&condition->after, condition->gate.pressed_ms);
     return;
   }
   for (uint8_t k = 0; k < count; k++) {
-    doubt_compare(&condition->sensor[k].doubt, &condition->doubt, k,
-                  conditioned->pressure_Pa_q10[k], condition->gate.open_Pa_q10);
+    doubt_compare(&condition->sensor[k].doubt, &condition->doubt, k, conditioned->pressure_Pa_q10[k],
+                  condition->gate.open_Pa_q10);
     condition->sensor[k].after.reached_Pa_q10 = 0;
     condition->margin_Pa_q10[k] = 0;
   }
   after_effect_press(&condition->after);
-  doubt_press(&condition->doubt, !condition->touched,
-              taken_into_zeros(condition, conditioned->usable, count));
+  doubt_press(&condition->doubt, !condition->touched, taken_into_zeros(condition, conditioned->usable, count));
   condition->calm.snapshots = 0;
 }
 
@@ -195,8 +190,7 @@ static void look_in_contact(struct condition *condition, uint8_t k, int32_t ms, 
 
 /* A sensor that has been below was tared under a press, and so were all others: those that are far
  * below now give in with it, and those on its flanks settle. */
-static void watch_below(struct condition *condition, uint8_t k, int32_t ms, int32_t above_level,
-                        int32_t lowest) {
+static void watch_below(struct condition *condition, uint8_t k, int32_t ms, int32_t above_level, int32_t lowest) {
   bool far;
   bool gives_in = zero_is_below(&condition->sensor[k].zero, ms, lowest - above_level, &far);
   set_bit(&condition->below, k, above_level < lowest);
@@ -225,8 +219,7 @@ static void look_free(struct condition *condition, uint8_t k, const struct step 
     return;
   }
   struct after_effect_band band;
-  after_effect_look(&sensor->after, &condition->after, condition->gate.released_ms < FRESH_ms,
-                    &band);
+  after_effect_look(&sensor->after, &condition->after, condition->gate.released_ms < FRESH_ms, &band);
   int32_t remainder = before - zero->level_Pa_q10;
   int32_t above_level = step->above_Pa_q10 + remainder;
   if (unsure) {
@@ -237,13 +230,11 @@ static void look_free(struct condition *condition, uint8_t k, const struct step 
   }
   int32_t moved = zero_follow(zero, step, &band.pace, &remainder);
   condition->zero_Pa_q10[k] = zero->level_Pa_q10 + remainder;
-  doubt_follow(&sensor->doubt, &condition->doubt, k, step->ms, moved,
-               condition->zero_Pa_q10[k] - before, zero->spread_Pa_q10);
+  doubt_follow(&sensor->doubt, &condition->doubt, k, step->ms, moved, condition->zero_Pa_q10[k] - before,
+               zero->spread_Pa_q10);
   condition->margin_Pa_q10[k] = band.margin_Pa_q10 + zero->spread_Pa_q10;
-  set_bit(&condition->restless, k,
-          size_of(above_level) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
-  watch_below(condition, k, step->ms, above_level,
-              band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
+  set_bit(&condition->restless, k, size_of(above_level) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
+  watch_below(condition, k, step->ms, above_level, band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
 }
 
 static int32_t mean_above(struct condition *condition, uint8_t k, int32_t reading) {
@@ -257,8 +248,8 @@ static int32_t mean_above(struct condition *condition, uint8_t k, int32_t readin
   return above;
 }
 
-static void look_at(struct condition *condition, const struct frame *frame,
-                    const struct conditioned *conditioned, uint8_t k) {
+static void look_at(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
+                    uint8_t k) {
   struct condition_sensor *sensor = &condition->sensor[k];
   uint32_t bit = UINT32_C(1) << k;
   uint32_t gap_ms = condition->now_ms - sensor->looked_ms;
@@ -289,12 +280,10 @@ static void look_at(struct condition *condition, const struct frame *frame,
   sensor->before_Pa_q10 = reading;
   sensor->slow_Pa_q10 += step.rise_Pa_q10;
   /* One disturbed reading is no pressure to remember. */
-  int32_t steady =
-      clamped_difference(reading < before ? reading : before, condition->zero_Pa_q10[k]);
+  int32_t steady = clamped_difference(reading < before ? reading : before, condition->zero_Pa_q10[k]);
   after_effect_remember(&sensor->after, &condition->after, ms, steady, pressed);
   doubt_creep(&sensor->doubt, &step, pressed);
-  doubt_compare(&sensor->doubt, &condition->doubt, k, conditioned->pressure_Pa_q10[k],
-                condition->gate.open_Pa_q10);
+  doubt_compare(&sensor->doubt, &condition->doubt, k, conditioned->pressure_Pa_q10[k], condition->gate.open_Pa_q10);
   step.above_Pa_q10 = mean_above(condition, k, reading);
   if (pressed && !condition->doubt.unsure) {
     look_in_contact(condition, k, ms, steady);
@@ -307,13 +296,10 @@ static void look_at(struct condition *condition, const struct frame *frame,
   look_free(condition, k, &step);
 }
 
-static void watch_calm(struct condition *condition, const struct conditioned *conditioned,
-                       uint8_t count) {
+static void watch_calm(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
   struct zero_snapshot snapshot;
-  bool calm = !condition->gate.pressed && conditioned->tared &&
-              (condition->restless & conditioned->usable) == 0 &&
-              condition->tared_ms >= CALM_AFTER_TARE_ms &&
-              condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
+  bool calm = !condition->gate.pressed && conditioned->tared && (condition->restless & conditioned->usable) == 0 &&
+              condition->tared_ms >= CALM_AFTER_TARE_ms && condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
   if (calm && zero_snapshot_due(&condition->calm, condition->now_ms, &snapshot)) {
     for (uint8_t k = 0; k < count; k++) {
       zero_take_snapshot(&condition->sensor[k].zero, &snapshot);
@@ -321,8 +307,7 @@ static void watch_calm(struct condition *condition, const struct conditioned *co
   }
 }
 
-void condition_follow(struct condition *condition, const struct frame *frame,
-                      const struct conditioned *conditioned) {
+void condition_follow(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned) {
   for (; condition->due_ms >= LOOK_ms; condition->due_ms -= LOOK_ms) {
     uint8_t k = condition->next < frame->sensor_count ? condition->next : 0;
     condition->next = (uint8_t)(k + 1);
@@ -330,8 +315,8 @@ void condition_follow(struct condition *condition, const struct frame *frame,
   }
 }
 
-void condition_frame(struct condition *condition, const struct frame *frame,
-                     const struct condition_gains *gains, struct conditioned *conditioned) {
+void condition_frame(struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
+                     struct conditioned *conditioned) {
   uint32_t now_ms = (uint32_t)(frame->t_us >> 10);
   uint32_t gap_ms = now_ms - condition->now_ms;
   int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
@@ -360,8 +345,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   if (!pressed) {
     sum_up(condition, frame, conditioned->usable);
   }
-  conditioned->contact =
-      pressed || conditioned->peak_Pa_q10 > condition->gate.open_Pa_q10;
+  conditioned->contact = pressed || conditioned->peak_Pa_q10 > condition->gate.open_Pa_q10;
   const struct doubt_view doubt = {
       .usable = conditioned->usable,
       .peak_Pa_q10 = conditioned->peak_Pa_q10,
@@ -379,12 +363,11 @@ void condition_frame(struct condition *condition, const struct frame *frame,
     condition_follow(condition, frame, conditioned);
   }
   if (conditioned->contact && !condition->touched && !pressed) {
-    condition->doubt.before_Pa_q10 =
-        taken_into_zeros(condition, conditioned->usable, frame->sensor_count);
+    condition->doubt.before_Pa_q10 = taken_into_zeros(condition, conditioned->usable, frame->sensor_count);
   }
   condition->touched = conditioned->contact;
-  conditioned->tared = readable != 0 && conditioned->usable == readable &&
-                       (condition->below & conditioned->usable) == 0;
+  conditioned->tared =
+      readable != 0 && conditioned->usable == readable && (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
   conditioned->zero_doubtful = doubt_is_due(&condition->doubt, &doubt);
 }

@@ -64,11 +64,11 @@ struct condition_gains {
 };
 
 struct conditioned {
-  uint32_t usable;     /* bitmap: tared, valid and not saturated */
-  bool tared;          /* every valid sensor is, there is one, and none is far below */
-  bool contact;        /* the gate */
-  bool zero_doubtful;  /* a force and a zero that has moved look alike */
-  int32_t peak_Pa_q10; /* strongest usable reading; 0 when none */
+  uint32_t usable;                         /* bitmap: tared, valid and not saturated */
+  bool tared;                              /* every valid sensor is, there is one, and none is far below */
+  bool contact;                            /* the gate */
+  bool zero_doubtful;                      /* a force and a zero that has moved look alike */
+  int32_t peak_Pa_q10;                     /* strongest usable reading; 0 when none */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor] above the zero, 1/1024 Pa, times 1 / gain (of
                                               at most 524288 Pa); 0 if not usable */
 };
@@ -82,13 +82,12 @@ void condition_tare(struct condition *condition);
 /* Processes one frame, later than the one before by frame->t_us. Do not pass held frames. gains:
  * NULL for sensors that are all alike. Call condition_follow() between two frames. Cost: about 105
  * Cortex-M0+ cycles a sensor in contact, 190 without. */
-void condition_frame(struct condition *condition, const struct frame *frame,
-                     const struct condition_gains *gains, struct conditioned *conditioned);
+void condition_frame(struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
+                     struct conditioned *conditioned);
 
 /* Follows zeros and remembers presses with the frame just processed. In a contact only the frames
  * to come need it, so its answer can be sent before. A second call does nothing. Cost: about 420
  * cycles a sensor, once in 64 ms. */
-void condition_follow(struct condition *condition, const struct frame *frame,
-                      const struct conditioned *conditioned);
+void condition_follow(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned);
 
 #endif

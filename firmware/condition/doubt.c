@@ -31,27 +31,25 @@ void doubt_creep(struct doubt *doubt, const struct step *step, bool pressed) {
   int32_t crept = doubt->crept_Pa_q10;
   crept = pressed ? crept : faded(crept, step->ms, WANDER_ms);
   int32_t most = step->ms << CREEPING_SHIFT;
-  doubt->crept_Pa_q10 =
-      clamp(crept + clamp(step->rise_Pa_q10, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
+  doubt->crept_Pa_q10 = clamp(crept + clamp(step->rise_Pa_q10, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
 }
 
 static int32_t and_half(int32_t value) {
   return value + (value >> 1);
 }
 
-void doubt_compare(const struct doubt *doubt, struct doubt_pad *pad, uint8_t k,
-                   int32_t pressure_Pa_q10, int32_t open_Pa_q10) {
+void doubt_compare(const struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t pressure_Pa_q10,
+                   int32_t open_Pa_q10) {
   set_bit(&pad->firm, k, pressure_Pa_q10 > open_Pa_q10 + and_half(size_of(doubt->wander_Pa_q10)));
   set_bit(&pad->sudden, k, pressure_Pa_q10 > open_Pa_q10 + and_half(doubt->crept_Pa_q10));
 }
 
-void doubt_follow(struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t ms,
-                  int32_t level_moved_Pa_q10, int32_t zero_moved_Pa_q10, int32_t spread_Pa_q10) {
+void doubt_follow(struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t ms, int32_t level_moved_Pa_q10,
+                  int32_t zero_moved_Pa_q10, int32_t spread_Pa_q10) {
   doubt->wander_Pa_q10 = faded(doubt->wander_Pa_q10, ms, WANDER_ms) + level_moved_Pa_q10;
   doubt->taken_Pa_q10 = faded(doubt->taken_Pa_q10, ms, WANDER_ms) + zero_moved_Pa_q10;
   doubt->crept_Pa_q10 = spread_Pa_q10 > 0 ? 0 : doubt->crept_Pa_q10;
-  set_bit(&pad->stands_off, k,
-          larger(doubt->taken_Pa_q10, spread_Pa_q10) > Pa_q10(GATE_OPEN_Pa));
+  set_bit(&pad->stands_off, k, larger(doubt->taken_Pa_q10, spread_Pa_q10) > Pa_q10(GATE_OPEN_Pa));
 }
 
 void doubt_hold(struct doubt *doubt, struct doubt_pad *pad, int32_t ms, int32_t steady_Pa_q10) {
@@ -68,8 +66,7 @@ void doubt_press(struct doubt_pad *pad, bool at_once, int32_t taken_Pa_q10) {
 
 bool doubt_is_unsure(struct doubt_pad *pad, const struct doubt_view *view) {
   pad->unsure = view->pressed && !view->saturated &&
-                (view->guessed || (pad->firm & view->usable) == 0 ||
-                 view->peak_Pa_q10 < view->drift_Pa_q10);
+                (view->guessed || (pad->firm & view->usable) == 0 || view->peak_Pa_q10 < view->drift_Pa_q10);
   return pad->unsure;
 }
 
@@ -78,8 +75,7 @@ bool doubt_is_due(struct doubt_pad *pad, const struct doubt_view *view) {
     pad->sure = false;
     return view->contact || (pad->stands_off & view->usable) != 0;
   }
-  bool stands_out = !pad->unsure && (pad->sudden & view->usable) != 0 &&
-                    view->peak_Pa_q10 >= pad->strong_Pa_q10 &&
+  bool stands_out = !pad->unsure && (pad->sudden & view->usable) != 0 && view->peak_Pa_q10 >= pad->strong_Pa_q10 &&
                     view->peak_Pa_q10 > pad->strongest_Pa_q10 >> AFTER_EFFECT_BAND_SHIFT;
   pad->sure = stands_out && !view->saturated;
   return !stands_out && !view->saturated;

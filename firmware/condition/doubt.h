@@ -60,12 +60,12 @@ void doubt_return(struct doubt *doubt, int32_t below_Pa_q10);
 void doubt_creep(struct doubt *doubt, const struct step *step, bool pressed);
 
 /* Compares what a sensor feels with what it may be. */
-void doubt_compare(const struct doubt *doubt, struct doubt_pad *pad, uint8_t k,
-                   int32_t pressure_Pa_q10, int32_t open_Pa_q10);
+void doubt_compare(const struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t pressure_Pa_q10,
+                   int32_t open_Pa_q10);
 
 /* Free, the zero has moved. spread_Pa_q10: so far it may be off since its tare. */
-void doubt_follow(struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t ms,
-                  int32_t level_moved_Pa_q10, int32_t zero_moved_Pa_q10, int32_t spread_Pa_q10);
+void doubt_follow(struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t ms, int32_t level_moved_Pa_q10,
+                  int32_t zero_moved_Pa_q10, int32_t spread_Pa_q10);
 
 /* In a contact. */
 void doubt_hold(struct doubt *doubt, struct doubt_pad *pad, int32_t ms, int32_t steady_Pa_q10);

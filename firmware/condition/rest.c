@@ -4,8 +4,7 @@
 
 #define INTERVAL_us 2000000u
 
-bool rest_compare(struct rest *rest, const struct frame *frame,
-                  const struct conditioned *conditioned) {
+bool rest_compare(struct rest *rest, const struct frame *frame, const struct conditioned *conditioned) {
   const uint32_t usable = conditioned->usable;
   if (usable == rest->compared && frame->t_us < rest->next_us) {
     return false;

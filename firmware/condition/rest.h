@@ -19,17 +19,14 @@ struct rest {
   uint64_t next_us;  /* the next comparison not before */
 };
 
-bool rest_compare(struct rest *rest, const struct frame *frame,
-                  const struct conditioned *conditioned);
+bool rest_compare(struct rest *rest, const struct frame *frame, const struct conditioned *conditioned);
 
 /* To be called with each frame that is not held. Returns whether .apart may have changed. A sensor
  * beyond its range counts as a contact; if no other feels it, it is the sensor. Cost: 10 Cortex-M0+
  * cycles in a contact, else as of apart_find(), once in two seconds. */
-static inline bool rest_follow(struct rest *rest, const struct frame *frame,
-                               const struct conditioned *conditioned) {
-  const bool touched = conditioned->contact &&
-                       (frame->saturated == 0 ||
-                        conditioned->peak_Pa_q10 >= GATE_OPEN_Pa * 1024);
+static inline bool rest_follow(struct rest *rest, const struct frame *frame, const struct conditioned *conditioned) {
+  const bool touched =
+      conditioned->contact && (frame->saturated == 0 || conditioned->peak_Pa_q10 >= GATE_OPEN_Pa * 1024);
   return !touched && rest_compare(rest, frame, conditioned);
 }
 

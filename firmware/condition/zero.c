@@ -16,7 +16,7 @@
  * 0.31 Pa/s the level is too slow to know the drift after a minute. */
 #define SLEW_SHIFT 1 /* 512 / 1024 Pa in a second */
 #define FOLLOW_ms SECONDS(2)
-#define KEEP_DOWN_SHIFT 2 /* less of a remainder downward: what dipped comes back */
+#define KEEP_DOWN_SHIFT 2      /* less of a remainder downward: what dipped comes back */
 #define DRIFT_FASTEST_q12 1280 /* 0.31 Pa/s */
 
 #define BELOW_ms SECONDS(ZERO_BELOW_s) /* dips come back within it */
@@ -83,8 +83,8 @@ bool zero_settle(struct zero *zero, const struct step *step) {
     goal = left;
   }
   left += part_of(goal - left, share_in(step->ms, SETTLE_ms));
-  bool settled = left < Pa_q10(SETTLED_Pa) + step->noise_Pa_q10 ||
-                 step->now_ms - zero->tare_begun_ms > SETTLE_LONGEST_ms;
+  bool settled =
+      left < Pa_q10(SETTLED_Pa) + step->noise_Pa_q10 || step->now_ms - zero->tare_begun_ms > SETTLE_LONGEST_ms;
   zero->spread_Pa_q10 = settled ? 0 : left;
   return true;
 }

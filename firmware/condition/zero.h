@@ -39,12 +39,12 @@ struct zero {
   int32_t spread_Pa_q10; /* 0: settled */
   int32_t drift_q16;     /* of the level, 1/1024 Pa in 1.024 ms */
   uint16_t drift_rest_q16;
-  uint16_t below_ms;   /* readings have been too far below */
-  int64_t tare_sum;    /* while taring: sum of the readings, */
-  int32_t tare_min;    /* the smallest and the largest */
-  int32_t tare_max;    /* and the time of the first */
+  uint16_t below_ms; /* readings have been too far below */
+  int64_t tare_sum;  /* while taring: sum of the readings, */
+  int32_t tare_min;  /* the smallest and the largest */
+  int32_t tare_max;  /* and the time of the first */
   uint32_t tare_begun_ms;
-  uint8_t tare_left; /* readings still to be averaged */
+  uint8_t tare_left;                       /* readings still to be averaged */
   int32_t snapshot_Pa_q10[ZERO_SNAPSHOTS]; /* of the level, in a calm */
 };
 

@@ -41,8 +41,7 @@
 
 /* Width 0 is no prior. */
 #define DEFAULT_PRIOR_SIGMA_mm (0.001f * FINGERTIP_PRIOR_SIGMA_UM)
-#define DEFAULT_PRIOR_WIDTH_mm                                                                     \
-  (FINGERTIP_PRIOR_SIGMA_UM > 0 ? 0.001f * FINGERTIP_PRIOR_WIDTH_UM : 0.0f)
+#define DEFAULT_PRIOR_WIDTH_mm (FINGERTIP_PRIOR_SIGMA_UM > 0 ? 0.001f * FINGERTIP_PRIOR_WIDTH_UM : 0.0f)
 
 /* Relative standard deviation of a sensor's gain, on a pad that was never calibrated. The gains of
  * a real strip of four barometers under rubber differ by +-10 % (JiannnH/MTL-BaroTactileSensor,

@@ -19,12 +19,10 @@ static bool tells_motion(const struct contact_input *input, uint32_t flags) {
          input->fit->location_noise_mm <= CONTACT_JITTER_MAX_mm;
 }
 
-struct contact_force contact_weigh(const struct contact_settings *settings,
-                                   const struct fit_result *fit) {
+struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit) {
   struct contact_force weighed = {settings->force_scale * fit->force_N, 0.0f};
   if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
-    weighed.force_sd_N = fit_quadrature(settings->force_scale, fit->force_sd_N,
-                                        settings->force_scale_sd, fit->force_N);
+    weighed.force_sd_N = fit_quadrature(settings->force_scale, fit->force_sd_N, settings->force_scale_sd, fit->force_N);
   }
   return weighed;
 }
@@ -57,8 +55,8 @@ void contact_update(struct slip_history *history, const struct contact_settings 
   uint32_t flags = result->flags;
   if (!input->fit || !tells_motion(input, flags)) {
     slip_reset(history);
-  } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm,
-                         settings->slip_window_us, &result->slip_mm)) {
+  } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us,
+                         &result->slip_mm)) {
     flags |= CONTACT_FLAG_SLIP_VALID;
     if (result->slip_mm > settings->slip_threshold_mm) {
       flags |= CONTACT_FLAG_SLIP;

@@ -22,12 +22,12 @@ struct contact_input {
   uint64_t t_us; /* of the frame */
   bool contact;  /* the gate is open */
   bool tared;
-  bool masked;                  /* a sensor is missing or was left out */
-  bool zero_doubtful;           /* see condition.h */
-  bool sensor_doubtful;         /* a sensor in use is doubtful, see frame.h */
-  bool calibrated;              /* gains and force scale of a calibration act */
-  uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
-  const struct fit_result *fit; /* NULL where nothing was fitted */
+  bool masked;                             /* a sensor is missing or was left out */
+  bool zero_doubtful;                      /* see condition.h */
+  bool sensor_doubtful;                    /* a sensor in use is doubtful, see frame.h */
+  bool calibrated;                         /* gains and force scale of a calibration act */
+  uint32_t saturated;                      /* bitmap: left out of the fit for being beyond their range */
+  const struct fit_result *fit;            /* NULL where nothing was fitted */
   const struct fit_tangential *tangential; /* NULL where nothing was estimated */
 };
 
@@ -47,8 +47,7 @@ struct contact_force {
 bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);
 
 /* The force of a fit, scaled; its standard deviation holds that of the scale. */
-struct contact_force contact_weigh(const struct contact_settings *settings,
-                                   const struct fit_result *fit);
+struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit);
 
 /* Without slip. */
 void contact_judge(const struct contact_input *input, struct contact_result *result);

@@ -81,8 +81,7 @@ static uint32_t back_to(const struct motion_ring *ring, uint32_t now_us, uint32_
 }
 
 static bool reaches(const struct motion_ring *ring, uint32_t now_us, uint32_t span_us) {
-  return ring->count == MOTION_ENTRIES ||
-         (ring->count > 1 && age_us(ring, ring->count - 1u, now_us) >= span_us);
+  return ring->count == MOTION_ENTRIES || (ring->count > 1 && age_us(ring, ring->count - 1u, now_us) >= span_us);
 }
 
 /* From one span of time to another. */
@@ -130,11 +129,9 @@ static struct change change_of(const struct motion_history *history, const struc
   change.x_um = um_from_q11(mean_of(now->x, c->x, since) - mean_of(b->x, a->x, before));
   change.y_um = um_from_q11(mean_of(now->y, c->y, since) - mean_of(b->y, a->y, before));
   change.load_x_um =
-      um_from_ratio(mean_of(now->load_x, c->load_x, since) - mean_of(b->load_x, a->load_x, before),
-                    history->scale_q8);
+      um_from_ratio(mean_of(now->load_x, c->load_x, since) - mean_of(b->load_x, a->load_x, before), history->scale_q8);
   change.load_y_um =
-      um_from_ratio(mean_of(now->load_y, c->load_y, since) - mean_of(b->load_y, a->load_y, before),
-                    history->scale_q8);
+      um_from_ratio(mean_of(now->load_y, c->load_y, since) - mean_of(b->load_y, a->load_y, before), history->scale_q8);
   change.variance_um2 = port_divide(mean_of(now->variance, c->variance, since), since) +
                         port_divide(mean_of(b->variance, a->variance, before), before);
   return change;
@@ -150,18 +147,15 @@ static int32_t squared_doubt(const struct change *change, bool already) {
   return already ? doubt / 4 : doubt;
 }
 
-static bool slides(const struct change *change, const struct pair_spans *spans,
-                   int32_t crosstalk_q8, bool already) {
+static bool slides(const struct change *change, const struct pair_spans *spans, int32_t crosstalk_q8, bool already) {
   int32_t way2 = squared_way(change);
   int32_t load2 = change->load_x_um * change->load_x_um + change->load_y_um * change->load_y_um;
   if (way2 <= squared_doubt(change, already) + (load2 >> 8) * crosstalk_q8) {
     return false;
   }
-  int32_t beyond =
-      way2 - change->x_um * change->load_x_um - change->y_um * change->load_y_um; /* times way */
+  int32_t beyond = way2 - change->x_um * change->load_x_um - change->y_um * change->load_y_um; /* times way */
   int32_t least_um = already ? spans->unexplained_um / 2 : spans->unexplained_um;
-  return beyond > 0 && (uint64_t)beyond * (uint32_t)beyond >
-                           (uint64_t)(uint32_t)(least_um * least_um) * (uint32_t)way2;
+  return beyond > 0 && (uint64_t)beyond * (uint32_t)beyond > (uint64_t)(uint32_t)(least_um * least_um) * (uint32_t)way2;
 }
 
 static bool slides_slowly(const struct motion_history *history, const struct change *brief) {
@@ -248,9 +242,8 @@ static bool find_velocity(struct motion_history *history) {
   const uint32_t per_um2 = 4398047u * MOTION_NOISE_SDS * MOTION_NOISE_SDS;
   int32_t least = QUOTIENTS_PER_mm_s * (history->moving ? MOTION_STANDS_mm_s : MOTION_MOVING_mm_s);
   uint32_t v2 = (uint32_t)(vx_q10 * vx_q10) + (uint32_t)(vy_q10 * vy_q10);
-  history->moving =
-      v2 > (uint32_t)(least * least) &&
-      (uint64_t)v2 * (uint32_t)spread > (uint64_t)(now->variance - from->variance) * per_um2;
+  history->moving = v2 > (uint32_t)(least * least) &&
+                    (uint64_t)v2 * (uint32_t)spread > (uint64_t)(now->variance - from->variance) * per_um2;
   return true;
 }
 
@@ -258,8 +251,7 @@ static bool find_velocity(struct motion_history *history) {
 
 /* Enters a load: what it has changed by, over the force of now. The normal force's own scale is in
  * both. Exact over any number of frames of one force. */
-static void follow_load(struct motion_load *load, int32_t tangential_N_q24, int32_t force_N_q12,
-                        bool first) {
+static void follow_load(struct motion_load *load, int32_t tangential_N_q24, int32_t force_N_q12, bool first) {
   if (first) {
     load->remainder = 0;
   } else {
@@ -276,13 +268,12 @@ static int32_t noise_um(const struct fit_tangential *found) {
 }
 
 /* force_N_q12 > 0. */
-static void add(struct motion_history *history, const struct tangential_settings *settings,
-                uint64_t t_us, const struct fit_tangential *found, int32_t force_N_q12) {
+static void add(struct motion_history *history, const struct tangential_settings *settings, uint64_t t_us,
+                const struct fit_tangential *found, int32_t force_N_q12) {
   bool first = history->brief.count == 0;
   history->now.t_us = (uint32_t)t_us;
   history->moments_before[enter(&history->brief, &history->now)] = history->moments;
-  if (history->slow.count == 0 ||
-      age_us(&history->slow, 0, history->now.t_us) >= MOTION_SLOW_STEP_us) {
+  if (history->slow.count == 0 || age_us(&history->slow, 0, history->now.t_us) >= MOTION_SLOW_STEP_us) {
     enter(&history->slow, &history->now);
     history->stepped = true;
   }
@@ -295,10 +286,8 @@ static void add(struct motion_history *history, const struct tangential_settings
   history->now.count++;
   history->now.x += x;
   history->now.y += y;
-  follow_load(&history->load_x, clamped(fit_fixed(found->qx_N, 24), LOAD_MAX_q24), force_N_q12,
-              first);
-  follow_load(&history->load_y, clamped(fit_fixed(found->qy_N, 24), LOAD_MAX_q24), force_N_q12,
-              first);
+  follow_load(&history->load_x, clamped(fit_fixed(found->qx_N, 24), LOAD_MAX_q24), force_N_q12, first);
+  follow_load(&history->load_y, clamped(fit_fixed(found->qy_N, 24), LOAD_MAX_q24), force_N_q12, first);
   history->now.load_x += history->load_x.ratio_q12;
   history->now.load_y += history->load_y.ratio_q12;
   history->now.variance += noise * noise;
@@ -323,13 +312,11 @@ static void judge(struct motion_history *history, uint64_t t_us) {
 }
 
 static bool starts_anew(const struct motion_history *history, const struct contact_input *input) {
-  return history->brief.count > 0 &&
-         (input->fit->used != history->used || input->t_us <= history->newest_us ||
-          input->t_us - history->newest_us > MOTION_PAUSE_us);
+  return history->brief.count > 0 && (input->fit->used != history->used || input->t_us <= history->newest_us ||
+                                      input->t_us - history->newest_us > MOTION_PAUSE_us);
 }
 
-static void tell(const struct motion_history *history, struct contact_result *result,
-                 struct motion *motion) {
+static void tell(const struct motion_history *history, struct contact_result *result, struct motion *motion) {
   if (history->velocity_valid) {
     *motion = history->motion;
     result->flags |= CONTACT_FLAG_VELOCITY_VALID;
@@ -339,8 +326,7 @@ static void tell(const struct motion_history *history, struct contact_result *re
 }
 
 void motion_update(struct motion_history *history, const struct tangential_settings *settings,
-                   const struct contact_input *input, struct contact_result *result,
-                   struct motion *motion) {
+                   const struct contact_input *input, struct contact_result *result, struct motion *motion) {
   const struct fit_tangential *found = input->tangential;
   memset(motion, 0, sizeof *motion);
   if (!input->contact || input->zero_doubtful) {

@@ -75,7 +75,7 @@ struct motion_sums {
 /* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the load
  * grows leaves Q / F as it is, though the rubber gives way. */
 struct motion_load {
-  uint32_t ratio_q12; /* modulo 2^32 */
+  uint32_t ratio_q12;            /* modulo 2^32 */
   int32_t newest_q24, remainder; /* Q as last entered; what is below the integral's last bit */
 };
 
@@ -96,8 +96,8 @@ struct motion {
 
 /* Of all zeros: nothing yet. */
 struct motion_history {
-  struct motion_sums now;                               /* with the newest frame in them */
-  struct motion_moments moments;                        /* the same */
+  struct motion_sums now;        /* with the newest frame in them */
+  struct motion_moments moments; /* the same */
   struct motion_load load_x, load_y;
   struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
   struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
@@ -118,7 +118,6 @@ void motion_reset(struct motion_history *history);
 /* After tangential_update, of the same input: enters the location and adds VELOCITY_VALID, MOVING
  * and SLIDING to result->flags. */
 void motion_update(struct motion_history *history, const struct tangential_settings *settings,
-                   const struct contact_input *input, struct contact_result *result,
-                   struct motion *motion);
+                   const struct contact_input *input, struct contact_result *result, struct motion *motion);
 
 #endif

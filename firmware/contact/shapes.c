@@ -11,8 +11,7 @@
 
 uint8_t shapes_parts(uint64_t apart_us) {
   const uint8_t most = FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
-  const uint32_t load_us =
-      apart_us < TANGENTIAL_SLOW_us ? TANGENTIAL_LATE_us : TANGENTIAL_SLOW_LATE_us;
+  const uint32_t load_us = apart_us < TANGENTIAL_SLOW_us ? TANGENTIAL_LATE_us : TANGENTIAL_SLOW_LATE_us;
   if (apart_us >= load_us + most * SHAPES_PART_us) {
     return most;
   }
@@ -23,32 +22,31 @@ uint8_t shapes_parts(uint64_t apart_us) {
 /* atan(z) of 0..1 within 1e-5 (Abramowitz and Stegun 4.4.49), the same bits on every machine. */
 static float arc_tangent(float z) {
   const float z2 = z * z;
-  return z *
-         (0.999866f + z2 * (-0.3302995f + z2 * (0.180141f + z2 * (-0.085133f + z2 * 0.0208351f))));
+  return z * (0.999866f + z2 * (-0.3302995f + z2 * (0.180141f + z2 * (-0.085133f + z2 * 0.0208351f))));
 }
 
 /* Of (along_x, along_y), along_x >= 0. */
 static float direction_deg(float along_x, float along_y) {
   const float y = fabsf(along_y);
-  float angle_rad = y <= along_x ? arc_tangent(along_x > 0.0f ? y / along_x : 0.0f)
-                                 : 1.5707963f - arc_tangent(along_x / y);
+  float angle_rad =
+      y <= along_x ? arc_tangent(along_x > 0.0f ? y / along_x : 0.0f) : 1.5707963f - arc_tangent(along_x / y);
   return DEGREES_PER_RAD * (along_y < 0.0f ? -angle_rad : angle_rad);
 }
 
-static struct shapes_contact contact_of(const struct shapes_question *question,
-                                        const struct fit_shapes_result *result, int c) {
+static struct shapes_contact contact_of(const struct shapes_question *question, const struct fit_shapes_result *result,
+                                        int c) {
   return (struct shapes_contact){
       .x_mm = result->x_mm[c],
       .y_mm = result->y_mm[c],
       .location_sd_mm = result->location_sd_mm[c],
       .force_N = question->force_scale * result->force_N[c],
-      .force_sd_N = fit_quadrature(question->force_scale, result->force_sd_N[c],
-                                   question->force_scale_sd, result->force_N[c]),
+      .force_sd_N =
+          fit_quadrature(question->force_scale, result->force_sd_N[c], question->force_scale_sd, result->force_N[c]),
   };
 }
 
-static void put_report(const struct shapes_question *question,
-                       const struct fit_shapes_result *result, struct shapes_report *report) {
+static void put_report(const struct shapes_question *question, const struct fit_shapes_result *result,
+                       struct shapes_report *report) {
   memset(report, 0, sizeof *report);
   report->shape = result->shape;
   report->t_us = question->t_us;
@@ -78,15 +76,13 @@ void shapes_estimate(void *job) {
   int parts = question->parts;
   bool goes_on;
   do {
-    own->progress = fit_shapes_part(own->array, &own->pad, question->pressure_Pa_q10,
-                                    &question->settings, &question->fit, &own->state, &own->result);
+    own->progress = fit_shapes_part(own->array, &own->pad, question->pressure_Pa_q10, &question->settings,
+                                    &question->fit, &own->state, &own->result);
     parts--;
-    const bool knows =
-        own->progress == FIT_SHAPES_ANSWERED && own->result.shape != FIT_SHAPE_UNDECIDED;
+    const bool knows = own->progress == FIT_SHAPES_ANSWERED && own->result.shape != FIT_SHAPE_UNDECIDED;
     /* What is begun is ended with the same readings, so the next one begins only if it ends here.
      */
-    goes_on =
-        own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
+    goes_on = own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
   } while (goes_on);
   /* What is none of these is looked at from its beginning again, and stays so until it is known. */
   const bool again = own->result.shape == FIT_SHAPE_UNDECIDED && !question->begins &&
@@ -108,8 +104,7 @@ struct shapes_place shapes_locate(const struct shapes_report *report, const stru
   } else if (report->shape == FIT_SHAPE_ELONGATED || (is_pulled && !load)) {
     const float dx_mm = fabsf(fit->x_mm + report->from_fit_x_mm - place.x_mm);
     const float dy_mm = fabsf(fit->y_mm + report->from_fit_y_mm - place.y_mm);
-    place.location_sd_mm =
-        fit_quadrature(1.0f, place.location_sd_mm, 1.0f, fit_quadrature(1.0f, dx_mm, 1.0f, dy_mm));
+    place.location_sd_mm = fit_quadrature(1.0f, place.location_sd_mm, 1.0f, fit_quadrature(1.0f, dx_mm, 1.0f, dy_mm));
   }
   return place;
 }

@@ -27,8 +27,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
 }
 
 bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) {
-  return (fit->flags & CONTACT_FLAG_FIT_VALID) &&
-         !(fit->flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND)) &&
+  return (fit->flags & CONTACT_FLAG_FIT_VALID) && !(fit->flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND)) &&
          !contact_is_lower_bound(fit, saturated);
 }
 
@@ -48,8 +47,8 @@ void tangential_estimate(void *job) {
   int steps = slow ? FIT_TANGENTIAL_FRAMES : 1;
   course->t_us = question->t_us;
   do {
-    fit_tangential_load(own->array, &own->pad, question->pressure_Pa_q10, question->settings,
-                        question->fit, &course->state, &own->estimate);
+    fit_tangential_load(own->array, &own->pad, question->pressure_Pa_q10, question->settings, question->fit,
+                        &course->state, &own->estimate);
   } while (!own->estimate.valid && --steps > 0);
 }
 
@@ -82,15 +81,13 @@ struct from_middle {
   int32_t u_q26, v_q26, uu_q26, vv_q26;
 };
 
-static int32_t even(const struct tangential_settings *settings, enum edge edge,
-                    const struct from_middle *at) {
+static int32_t even(const struct tangential_settings *settings, enum edge edge, const struct from_middle *at) {
   const int32_t *terms = settings->edges_q20[edge];
   return terms[0] + fixed_mul_q26(terms[1], at->uu_q26) + fixed_mul_q26(terms[2], at->vv_q26);
 }
 
 /* 1 + even. The result shows a load that hides too much of itself. */
-static int32_t factor(const struct tangential_settings *settings, enum edge edge,
-                      const struct from_middle *at) {
+static int32_t factor(const struct tangential_settings *settings, enum edge edge, const struct from_middle *at) {
   return fixed_clamp((1 << 20) + even(settings, edge, at), 0, FACTOR_MAX_Q20);
 }
 
@@ -102,13 +99,11 @@ static float inverse(int32_t factor_q20) {
 static int32_t per_force_q26(float value_N, int32_t force_N_q24) {
   int32_t up = 28 - fixed_bits((uint32_t)force_N_q24);
   int32_t force = shifted(force_N_q24, up); /* of many bits for the division */
-  return fixed_div_q26(fixed_clamp(shifted(fit_fixed(value_N, 24), up), -4 * force, 4 * force),
-                       force);
+  return fixed_div_q26(fixed_clamp(shifted(fit_fixed(value_N, 24), up), -4 * force, 4 * force), force);
 }
 
 /* Q / F along one axis without what the pad's ends add, all of which is odd. */
-static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_q20,
-                         int32_t gain_q20) {
+static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_q20, int32_t gain_q20) {
   int32_t told_q26 = per_force_q26(tangential_N, force_N_q24);
   int32_t own_q26 = told_q26 - fixed_clamp(added_q20, -FACTOR_MAX_Q20 / 4, FACTOR_MAX_Q20 / 4) * 64;
   return fixed_div_q26(fixed_clamp(own_q26, -RATIO_MAX_Q26, RATIO_MAX_Q26), gain_q20 * 64);
@@ -116,29 +111,28 @@ static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_
 
 /* pad_profile.h has the formulas. False: the load shows too little of itself, or there is hardly a
  * force. */
-static bool without_edges(const struct tangential_settings *settings,
-                          const struct fit_tangential *found, struct fit_tangential *mended) {
+static bool without_edges(const struct tangential_settings *settings, const struct fit_tangential *found,
+                          struct fit_tangential *mended) {
   const int32_t least_q20 = (int32_t)(TANGENTIAL_GAIN_MIN * 1048576.0f);
   const int32_t x_q20 = fit_fixed(found->x_mm, 20), y_q20 = fit_fixed(found->y_mm, 20);
-  struct from_middle at = {fixed_mul_q30(x_q20 * 16, UNITS_PER_mm_Q32),
-                           fixed_mul_q30(y_q20 * 16, UNITS_PER_mm_Q32), 0, 0};
+  struct from_middle at = {fixed_mul_q30(x_q20 * 16, UNITS_PER_mm_Q32), fixed_mul_q30(y_q20 * 16, UNITS_PER_mm_Q32), 0,
+                           0};
   at.uu_q26 = fixed_mul_q26(at.u_q26, at.u_q26);
   at.vv_q26 = fixed_mul_q26(at.v_q26, at.v_q26);
   const int32_t gain_x = factor(settings, GAIN_X, &at), gain_y = factor(settings, GAIN_Y, &at);
   const int32_t force = factor(settings, FORCE, &at);
   const int32_t force_N_q24 = fit_fixed(found->force_N, 24);
-  if (gain_x < least_q20 || gain_y < least_q20 || force < least_q20 ||
-      force_N_q24 < FORCE_MIN_N_Q24) {
+  if (gain_x < least_q20 || gain_y < least_q20 || force < least_q20 || force_N_q24 < FORCE_MIN_N_Q24) {
     return false;
   }
-  const int32_t ratio_x = ratio_q26(found->qx_N, force_N_q24,
-                                    fixed_mul_q26(at.u_q26, even(settings, RATIO_X, &at)), gain_x);
-  const int32_t ratio_y = ratio_q26(found->qy_N, force_N_q24,
-                                    fixed_mul_q26(at.v_q26, even(settings, RATIO_Y, &at)), gain_y);
-  const int32_t dx_q20 = fixed_mul_q26(at.u_q26, even(settings, PLACE_X_mm, &at)) +
-                         fixed_mul_q26(ratio_x, even(settings, PULL_X_mm, &at));
-  const int32_t dy_q20 = fixed_mul_q26(at.v_q26, even(settings, PLACE_Y_mm, &at)) +
-                         fixed_mul_q26(ratio_y, even(settings, PULL_Y_mm, &at));
+  const int32_t ratio_x =
+      ratio_q26(found->qx_N, force_N_q24, fixed_mul_q26(at.u_q26, even(settings, RATIO_X, &at)), gain_x);
+  const int32_t ratio_y =
+      ratio_q26(found->qy_N, force_N_q24, fixed_mul_q26(at.v_q26, even(settings, RATIO_Y, &at)), gain_y);
+  const int32_t dx_q20 =
+      fixed_mul_q26(at.u_q26, even(settings, PLACE_X_mm, &at)) + fixed_mul_q26(ratio_x, even(settings, PULL_X_mm, &at));
+  const int32_t dy_q20 =
+      fixed_mul_q26(at.v_q26, even(settings, PLACE_Y_mm, &at)) + fixed_mul_q26(ratio_y, even(settings, PULL_Y_mm, &at));
   const float per_force = inverse(force);
   *mended = *found;
   mended->x_mm = fit_float(x_q20 - dx_q20, -20);
@@ -224,8 +218,7 @@ static void weigh_load(struct fit_tangential *found) {
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
   variance = sum_of(variance, scaled_mul(sum_of(between, of_load), share));
-  const bool small =
-      sum_of(variance, (struct scaled){-least.mantissa, least.exponent}).mantissa < 0;
+  const bool small = sum_of(variance, (struct scaled){-least.mantissa, least.exponent}).mantissa < 0;
   const struct scaled root = scaled_sqrt(small ? least : variance);
   found->location_sd_mm = fit_float(root.mantissa, root.exponent);
 }
@@ -247,10 +240,8 @@ static bool settle_zero(struct tangential_history *history, uint64_t t_us, float
   return history->settled;
 }
 
-void tangential_update(struct tangential_history *history,
-                       const struct tangential_settings *settings,
-                       const struct contact_input *input, struct contact_result *result,
-                       struct tangential_load *load) {
+void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
+                       const struct contact_input *input, struct contact_result *result, struct tangential_load *load) {
   struct fit_tangential mended;
   const struct fit_tangential *found = &mended;
   memset(load, 0, sizeof *load);
@@ -280,8 +271,7 @@ void tangential_update(struct tangential_history *history,
   load->y_mm = found->y_mm;
   load->location_sd_mm = found->location_sd_mm;
   load->force_N = settings->force_scale * found->force_N;
-  load->force_sd_N = fit_quadrature(settings->force_scale, found->force_sd_N,
-                                    settings->force_scale_sd, found->force_N);
+  load->force_sd_N = fit_quadrature(settings->force_scale, found->force_sd_N, settings->force_scale_sd, found->force_N);
   load->qx_N = scale * qx_N;
   load->qy_N = scale * qy_N;
   load->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);

@@ -102,9 +102,7 @@ void tangential_reset(struct tangential_history *history);
  * edges hide so much of a load that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
  * none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
-void tangential_update(struct tangential_history *history,
-                       const struct tangential_settings *settings,
-                       const struct contact_input *input, struct contact_result *result,
-                       struct tangential_load *load);
+void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
+                       const struct contact_input *input, struct contact_result *result, struct tangential_load *load);
 
 #endif

@@ -68,8 +68,7 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
   }
   grid->x_origin = (int32_t)x_origin;
   grid->y_origin = (int32_t)y_origin;
-  grid->force_scale =
-      split(6.28318531e-6f * made->pitch_mm * made->pitch_mm, &grid->force_exponent);
+  grid->force_scale = split(6.28318531e-6f * made->pitch_mm * made->pitch_mm, &grid->force_exponent);
   float settled = FIT_SETTLED_mm / made->pitch_mm * 4194304.0f;
   settled = settled * settled * 0.5f;
   grid->settled_square = settled < 5e8f ? (int32_t)settled : 500000000;
@@ -104,10 +103,9 @@ static void find_line(struct fit_array *made) {
 }
 
 /* Everything but the line. */
-static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
-                                 const float *y_mm, float pitch_mm) {
-  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
-      !(pitch_mm >= 0.01f && pitch_mm <= POSITION_MAX_mm)) {
+static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
+                                 float pitch_mm) {
+  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS || !(pitch_mm >= 0.01f && pitch_mm <= POSITION_MAX_mm)) {
     return FT_ERR_ARGUMENT;
   }
   struct fit_array made = {.sensor_count = sensor_count, .pitch_mm = pitch_mm};
@@ -133,8 +131,8 @@ static bool is_grid(const struct fit_array *array) {
   return array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
 }
 
-enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
-                              const float *y_mm, float pitch_mm) {
+enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
+                              float pitch_mm) {
   enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
   if (status == FT_OK) {
     find_line(array);
@@ -142,8 +140,8 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
   return status;
 }
 
-enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
-                                   const float *y_mm, float pitch_mm) {
+enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
+                                   float pitch_mm) {
   enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
   return status == FT_OK && !is_grid(array) ? FT_ERR_ARGUMENT : status;
 }
@@ -156,9 +154,9 @@ void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd
 }
 
 /* Fits once more without the outlier, if there is one. */
-static void leave_outlier_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              uint32_t usable, const struct fit_settings *settings,
-                              struct fit_result *without, struct fit_result *result) {
+static void leave_outlier_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                              const struct fit_settings *settings, struct fit_result *without,
+                              struct fit_result *result) {
   int outlier = fit_grid_outlier(array, pressure_Pa_q10, usable, settings, result);
   if (outlier < 0) {
     return;
@@ -170,15 +168,14 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
   }
 }
 
-#define TAKE_GRID_IF_IT_SUITS(name, suits, fits)                                                    \
-  if (suits) {                                                                                     \
-    rough = fits;                                                                                  \
+#define TAKE_GRID_IF_IT_SUITS(name, suits, fits)                                                                       \
+  if (suits) {                                                                                                         \
+    rough = fits;                                                                                                      \
   } else
 
 /* Whether the residuals look like an outlier. */
-static bool fit_grid_once(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                          uint32_t usable, const struct fit_settings *settings,
-                          struct fit_result *result) {
+static bool fit_grid_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                          const struct fit_settings *settings, struct fit_result *result) {
   const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   bool rough = false;
   FIT_GRID_KERNELS(TAKE_GRID_IF_IT_SUITS) {}
@@ -187,13 +184,11 @@ static bool fit_grid_once(const struct fit_array *array, const int32_t *pressure
 
 static bool has_grown(const struct fit_watch *watch, const struct fit_result *result) {
   return watch->frames < FIT_WATCH_FRAMES - FIT_WATCH_LEAST &&
-         2.0f * result->residual_rms_Pa * watch->force_N >
-             3.0f * watch->residual_rms_Pa * result->force_N;
+         2.0f * result->residual_rms_Pa * watch->force_N > 3.0f * watch->residual_rms_Pa * result->force_N;
 }
 
-void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              uint32_t usable, const struct fit_settings *settings,
-                              struct fit_watch *watch, struct fit_result *result) {
+void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                              const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result) {
   if (settings->noise_Pa_q10 < 1) {
     *result = (struct fit_result){0};
     return;
@@ -224,22 +219,20 @@ void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pres
   }
 }
 
-void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                       uint32_t usable, const struct fit_settings *settings,
-                       struct fit_result *result) {
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                       const struct fit_settings *settings, struct fit_result *result) {
   struct fit_watch none;
   none.usable = none.frames = 0;
   fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, &none, result);
 }
 
-#define TAKE_IF_IT_SUITS(name, suits, fits)                                                         \
-  if (suits) {                                                                                     \
-    fits;                                                                                          \
+#define TAKE_IF_IT_SUITS(name, suits, fits)                                                                            \
+  if (suits) {                                                                                                         \
+    fits;                                                                                                              \
   } else
 
-void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                         uint32_t usable, const struct fit_settings *settings,
-                         struct fit_watch *watch, struct fit_result *result) {
+void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                         const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result) {
   bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
   if ((is_grid(array) && !some) || settings->noise_Pa_q10 < 1) {
     fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, watch, result);

@@ -26,9 +26,9 @@ struct fit_array {
   uint8_t sensor_count;
   float pitch_mm;
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS]; /* [sensor], pitches */
-  float x_min, x_max, y_min, y_max;  /* box of the location: the array and 1.5 pitches around it */
-  bool is_line;                      /* the sensors lie on x line_x + y line_y = line_offset, and */
-  float line_x, line_y, line_offset; /* (line_x, line_y) is of unit length */
+  float x_min, x_max, y_min, y_max;           /* box of the location: the array and 1.5 pitches around it */
+  bool is_line;                               /* the sensors lie on x line_x + y line_y = line_offset, and */
+  float line_x, line_y, line_offset;          /* (line_x, line_y) is of unit length */
   struct fit_grid_shape grid;
 };
 
@@ -62,9 +62,8 @@ struct fit_settings {
   const struct fit_own *own;
   /* Other errors that the standard deviations contain. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
-  uint16_t
-      model_sd_q16; /* sd of the model's own error, as a share of the largest reading; 0: none */
-  float location_sd_limit_mm; /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
+  uint16_t model_sd_q16;                /* sd of the model's own error, as a share of the largest reading; 0: none */
+  float location_sd_limit_mm;           /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
 #define FIT_PRIOR_WEIGHT 0.01f
@@ -93,21 +92,21 @@ struct fit_result {
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */
   float width_correlation;      /* and its correlation, -1..1: 0 unless it lies aslant */
   uint32_t used;                /* bitmap of the sensors that entered */
-  uint32_t flags; /* of enum contact_flag: FIT_VALID, UNCERTAINTY_VALID, LOW_SIGNAL, FLAT,
-                     UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
+  uint32_t flags;               /* of enum contact_flag: FIT_VALID, UNCERTAINTY_VALID, LOW_SIGNAL, FLAT,
+                                   UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
 
 /* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch outside 0.01..10000 mm, or a
  * position outside +-10000 mm. Arrays more than 2^30 / 2^24 .. 2^23 = 64 to 128 pitches off the
  * origin take the general kernel. */
-enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
-                              const float *y_mm, float pitch_mm);
+enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
+                              float pitch_mm);
 
 /* The same for an image that knows its layout. It takes only the rectangle of FIT_GRID_COLUMNS x
  * FIT_GRID_ROWS nodes that the fixed-point kernels are compiled for. Any other is FT_ERR_ARGUMENT
  * too. Use it with fit_gaussian_grid. */
-enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
-                                   const float *y_mm, float pitch_mm);
+enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
+                                   float pitch_mm);
 
 /* A second fit leaves out a sensor whose reading does not belong to the others' (fit_limits.h).
  * SENSOR_MASKED and `used` show it. The fit looks for one only where residuals are rough, and more
@@ -122,9 +121,8 @@ void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                   const struct fit_settings *settings, struct fit_result *result);
 
 /* The same without the general kernel, so that an image does not hold it: n_largest must be 0. */
-void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                       uint32_t usable, const struct fit_settings *settings,
-                       struct fit_result *result);
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                       const struct fit_settings *settings, struct fit_result *result);
 
 /* What frames that follow each other keep of the search for an outlier. A sensor that is broken
  * stays broken, and a pad that the model fits roughly does so in each frame. So what the search
@@ -145,12 +143,10 @@ struct fit_watch {
 };
 
 /* fit_gaussian and fit_gaussian_grid for frames that follow each other. */
-void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                         uint32_t usable, const struct fit_settings *settings,
-                         struct fit_watch *watch, struct fit_result *result);
-void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              uint32_t usable, const struct fit_settings *settings,
-                              struct fit_watch *watch, struct fit_result *result);
+void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                         const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result);
+void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                              const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result);
 
 /* sqrt((a b)^2 + (c d)^2) within 0.1 %, for standard deviations: some 800 cycles less than in soft
  * float, and the same bits everywhere. All are finite and not negative; at most 1e9. */
@@ -165,8 +161,8 @@ float fit_quadrature(float a, float b, float c, float d);
  * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
  * The former two return whether they have settled with residuals that look like an outlier: rough,
  * and more than noise, gains and model explain. */
-bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-              const struct fit_settings *settings, struct fit_result *result);
+bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+              struct fit_result *result);
 bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                      const struct fit_settings *settings, struct fit_result *result);
 void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

@@ -84,8 +84,8 @@ FIXED_INLINE int32_t fixed_longer_leg(int32_t a, int32_t b) {
 
 /* The products of element a of each row of `words` with elements b, c, d and the last, summed: four
  * in as many registers as a Cortex-M0+ has for them. */
-FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int32_t *sums,
-                                     int words, int a, int b, int c, int d) {
+FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int32_t *sums, int words, int a, int b,
+                                     int c, int d) {
   int32_t ab = 0, ac = 0, ad = 0, al = 0;
   do {
     int32_t own = row[a];
@@ -114,8 +114,8 @@ struct fixed_pivot {
  * of 16 bits each. matrix: the lower half, rows of `words`; column j and right[j] stay as they are.
  * over: the elements of L below j, Q14. What j explains of the square of the residual is
  * own over 2. */
-FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j,
-                                                int32_t *right, int32_t *over) {
+FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j, int32_t *right,
+                                                int32_t *over) {
   struct fixed_pivot pivot = {0, 0, 0, 0};
   int32_t element = matrix[j * words + j];
   if (element < FIXED_PIVOT_LEAST) {
@@ -146,8 +146,7 @@ FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int 
 FIXED_INLINE int32_t fixed_div_q26(int32_t numerator, int32_t denominator) {
   int32_t coarse = denominator >> 13;
   int32_t quotient = port_divide(numerator, coarse);
-  int32_t rest =
-      (int32_t)(((uint32_t)numerator << 13) - (uint32_t)quotient * (uint32_t)denominator);
+  int32_t rest = (int32_t)(((uint32_t)numerator << 13) - (uint32_t)quotient * (uint32_t)denominator);
   return (int32_t)((uint32_t)quotient << 13) + port_divide(rest, coarse);
 }
 
@@ -179,8 +178,7 @@ FIXED_INLINE struct scaled scaled_near(int32_t value, int32_t exponent) {
 
 /* The product of two normalised mantissas keeps 14 of its 15 bits at least. */
 FIXED_INLINE struct scaled scaled_mul(struct scaled a, struct scaled b) {
-  struct scaled result = {(a.mantissa * b.mantissa + (1 << 14)) >> 15,
-                          a.exponent + b.exponent + 15};
+  struct scaled result = {(a.mantissa * b.mantissa + (1 << 14)) >> 15, a.exponent + b.exponent + 15};
   return result;
 }
 

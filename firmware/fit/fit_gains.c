@@ -53,16 +53,14 @@ void fit_gains_lift(struct fit_gains *gains) {
   gains->counted = false;
 }
 
-bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
-                     const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                     const struct fit_result *result) {
+bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                     const struct fit_settings *settings, const struct fit_result *result) {
   const unsigned count = array->sensor_count;
   const float p0_Pa = result->p0_Pa, width = result->sigma_mm / array->pitch_mm;
   const bool rests = fabsf(p0_Pa - gains->p0_Pa) <= REST_SHARE * p0_Pa;
   gains->p0_Pa = p0_Pa;
   if (gains->counted || !rests || array->is_line || count < SENSORS_LEAST ||
-      !(result->flags & CONTACT_FLAG_FIT_VALID) ||
-      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) ||
+      !(result->flags & CONTACT_FLAG_FIT_VALID) || (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) ||
       result->used != (UINT32_C(1) << count) - 1u || width < WIDTH_LEAST || width > WIDTH_MOST) {
     return false;
   }
@@ -93,7 +91,5 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
 
 float fit_gains_sd(const struct fit_gains *gains) {
   const float variance = gains->residual / gains->share;
-  return variance <= SD_LEAST * SD_LEAST ? SD_LEAST
-         : variance >= SD_MOST * SD_MOST ? SD_MOST
-                                         : sqrtf(variance);
+  return variance <= SD_LEAST * SD_LEAST ? SD_LEAST : variance >= SD_MOST * SD_MOST ? SD_MOST : sqrtf(variance);
 }

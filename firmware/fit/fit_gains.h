@@ -39,9 +39,8 @@ void fit_gains_lift(struct fit_gains *gains);
  * once a touch, when p0 is within 2 % of that before. A fit does not count that is at a limit,
  * FLAT, without a sensor of the array, narrow, wide, or whose noise would decide. Costs some 6000
  * cycles on a Cortex-M0+. */
-bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array,
-                     const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                     const struct fit_result *result);
+bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                     const struct fit_settings *settings, const struct fit_result *result);
 
 /* 0.08 to 0.5. */
 float fit_gains_sd(const struct fit_gains *gains);

@@ -185,8 +185,7 @@ static struct parameters guess(const struct samples *samples, int peak) {
 /* At X, Y from the centre: the model of amplitude 1 is e - d, with
  * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and d that of the dip. The row is what its derivatives span,
  * e (1, X, Y, X^2 + Y^2) where there is no dip. Returns d. */
-static float model_row(const struct dip *dip, float sigma, float x, float y,
-                       float row[PARAMETERS]) {
+static float model_row(const struct dip *dip, float sigma, float x, float y, float row[PARAMETERS]) {
   float r2 = x * x + y * y, sigma2 = sigma * sigma;
   float e = fit_exp2_negative(r2 * (0.5f * LOG2_E / sigma2));
   float d = dip->share > 0.0f ? dip->share * fit_exp2_negative(r2 * dip->log2_scale) : 0.0f;
@@ -200,9 +199,8 @@ static float model_row(const struct dip *dip, float sigma, float x, float y,
 
 /* Gives theta the best amplitude for its shape, p0 entering linearly, and sets up the normal
  * equations of the model linearised there. Returns the sum of squared residuals. */
-static float linearise(const struct fit_array *array, const struct samples *samples,
-                       struct prior prior, const struct dip *dip, struct parameters *theta,
-                       struct normal_equations *normal) {
+static float linearise(const struct fit_array *array, const struct samples *samples, struct prior prior,
+                       const struct dip *dip, struct parameters *theta, struct normal_equations *normal) {
   memset(normal, 0, sizeof *normal);
   float row[FT_MAX_SENSORS][PARAMETERS];
   float numerator = 0.0f;
@@ -237,8 +235,7 @@ static float linearise(const struct fit_array *array, const struct samples *samp
 }
 
 /* One Gauss-Newton step; returns the length of its move in pitches. */
-static float step(const struct fit_array *array, struct normal_equations *normal,
-                  struct parameters *theta) {
+static float step(const struct fit_array *array, struct normal_equations *normal, struct parameters *theta) {
   solve(normal, normal->rhs);
   float sigma2 = theta->sigma * theta->sigma;
   float gain = sigma2 / theta->p0;
@@ -259,13 +256,11 @@ static float step(const struct fit_array *array, struct normal_equations *normal
 }
 
 static bool at_bound(const struct fit_array *array, const struct parameters *theta) {
-  return theta->x <= array->x_min || theta->x >= array->x_max || theta->y <= array->y_min ||
-         theta->y >= array->y_max || theta->sigma <= FIT_SIGMA_MIN ||
-         theta->sigma >= FIT_SIGMA_MAX || theta->p0 <= P0_MIN || theta->p0 >= P0_MAX;
+  return theta->x <= array->x_min || theta->x >= array->x_max || theta->y <= array->y_min || theta->y >= array->y_max ||
+         theta->sigma <= FIT_SIGMA_MIN || theta->sigma >= FIT_SIGMA_MAX || theta->p0 <= P0_MIN || theta->p0 >= P0_MAX;
 }
 
-static int32_t largest_reading(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                               uint32_t usable) {
+static int32_t largest_reading(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable) {
   int32_t largest = 0;
   for (uint8_t k = 0; k < array->sensor_count; k++) {
     if ((usable & UINT32_C(1) << k) && pressure_Pa_q10[k] > largest) {
@@ -276,8 +271,8 @@ static int32_t largest_reading(const struct fit_array *array, const int32_t *pre
 }
 
 /* Bitmap of the n largest readings in use; of equal ones, those of lower number. */
-static uint32_t n_largest_of(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                             uint32_t usable, uint8_t n) {
+static uint32_t n_largest_of(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                             uint8_t n) {
   uint32_t chosen = 0;
   for (uint8_t i = 0; i < n && usable; i++) {
     uint32_t best = 0;
@@ -297,8 +292,8 @@ static uint32_t n_largest_of(const struct fit_array *array, const int32_t *press
 
 /* The sensor whose reading does not belong to the others', or -1. theta and the factors are those
  * of the last linearisation, squares its sum of squared residuals. */
-static int outlier_of(const struct samples *samples, const struct dip *dip,
-                      const struct parameters *theta, const struct normal_equations *normal, float squares, int unknowns) {
+static int outlier_of(const struct samples *samples, const struct dip *dip, const struct parameters *theta,
+                      const struct normal_equations *normal, float squares, int unknowns) {
   float worst = 0.0f, second = 0.0f;
   int outlier = -1;
   for (int k = 0; k < samples->count; k++) {
@@ -338,8 +333,8 @@ static float product(const float a[PARAMETERS], const float b[PARAMETERS]) {
 }
 
 /* Leaves matrix^-1 direction, scaled, in `influence`, and returns the quadratic form. */
-static float influence_along(const struct normal_equations *normal, const float *direction,
-                             float scale, float *influence) {
+static float influence_along(const struct normal_equations *normal, const float *direction, float scale,
+                             float *influence) {
   for (int i = 0; i < PARAMETERS; i++) {
     influence[i] = direction[i];
   }
@@ -364,8 +359,8 @@ static void set_influence(const struct fit_array *array, const struct parameters
     along_x[2] = array->line_x;
     along_y[2] = 0.0f;
   }
-  influence->location_form = influence_along(normal, along_x, gain, influence->x) +
-                             influence_along(normal, along_y, gain, influence->y);
+  influence->location_form =
+      influence_along(normal, along_x, gain, influence->x) + influence_along(normal, along_y, gain, influence->y);
 }
 
 /* Variances that the sensors' own errors make; fit_limits.h has the errors. */
@@ -374,9 +369,8 @@ struct own_errors {
   float location, force; /* pitches squared, and share squared */
 };
 
-static void add_own_errors(const struct samples *samples, const struct fit_settings *settings,
-                           const struct dip *dip, const struct parameters *at,
-                           const struct influence *influence, struct own_errors *own) {
+static void add_own_errors(const struct samples *samples, const struct fit_settings *settings, const struct dip *dip,
+                           const struct parameters *at, const struct influence *influence, struct own_errors *own) {
   float inverse = 1.0f / (at->sigma * at->sigma);
   float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
   own->gains = own->location = own->force = 0.0f;
@@ -408,8 +402,7 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
 }
 
 /* As fit_grid_take_own_out. */
-static void take_own_out(const struct fit_own *own, const struct parameters *at,
-                         struct samples *samples) {
+static void take_own_out(const struct fit_own *own, const struct parameters *at, struct samples *samples) {
   const float inverse = 1.0f / (at->sigma * at->sigma);
   for (int k = 0; k < samples->count; k++) {
     const struct fit_own *one = &own[samples->sensor[k]];

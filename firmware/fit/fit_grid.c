@@ -51,8 +51,7 @@
 #define TAIL_ERROR ((struct scaled){31457, -21}) /* FIT_TAIL_ERROR */
 
 /* 1 / n of a constant. */
-#define RECIPROCAL(n)                                                                              \
-  ((struct scaled){(n) >= 8 ? (1 << 18) / (n) : (1 << 15) / (n), (n) >= 8 ? -18 : -15})
+#define RECIPROCAL(n) ((struct scaled){(n) >= 8 ? (1 << 18) / (n) : (1 << 15) / (n), (n) >= 8 ? -18 : -15})
 
 /* One factor of the separable Gaussian, and the polynomials that are orthogonal under its square.
  * p1 = k - mean and p2 = k^2 - k slope + constant, k the node number. */
@@ -78,8 +77,7 @@ struct moments {
   int32_t b_x, b_y; /* those parts of the right-hand side */
 };
 
-FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t centre,
-                               int32_t height) {
+FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t centre, int32_t height) {
   int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
   f->offset = centre - nearest * ONE_Q26;
   /* The exponent relative to the nearest node, k (curvature k - slope) with k counted from there,
@@ -199,8 +197,7 @@ static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t 
 
 /* What the model leaves of the readings, rounded so that its sum has RESIDUAL_SUM_BITS; returns the
  * shift. */
-static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_q28,
-                                     struct readings *readings) {
+static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_q28, struct readings *readings) {
   const struct factor *y = &m->y;
   const int32_t *p = readings->q28;
   int32_t *residual = readings->residual;
@@ -228,8 +225,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
 
 /* The sums of the values against the basis. Each part of it is g along one of the axes at least, so
  * sums over rows and columns do. */
-static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift,
-                             struct fit_system *system) {
+static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift, struct fit_system *system) {
   const struct factor *x = &m->x, *y = &m->y;
   int32_t over_y[COLUMNS] = {0};
   int32_t b2 = 0, b3_y = 0;
@@ -258,8 +254,7 @@ static NOINLINE void project(struct moments *m, const int32_t *values, int32_t s
   m->b_y = b3_y;
 }
 
-FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m,
-                           struct fit_system *system) {
+FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m, struct fit_system *system) {
   const struct state *at = &system->at;
   set_gaussian(&m->x, COLUMNS, COLUMNS / 2, at->x, at->height);
   set_gaussian(&m->y, ROWS, ROWS / 2, at->y, at->height);
@@ -279,14 +274,13 @@ FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moment
   int32_t mass_x = m->x.mass_q26 >> 14, mass_y = m->y.mass_q26 >> 14;
   system->d1 = (struct scaled){(m->x.linear_norm >> 14) * mass_y, 5 - 2 * m->x.linear_q};
   system->d2 = (struct scaled){(m->y.linear_norm >> 14) * mass_x, 5 - 2 * m->y.linear_q};
-  system->d3 = (struct scaled){
-      (m->x.square_norm >> 15) * mass_y + (m->y.square_norm >> 15) * mass_x, 6 - 2 * m->square_q};
+  system->d3 =
+      (struct scaled){(m->x.square_norm >> 15) * mass_y + (m->y.square_norm >> 15) * mass_x, 6 - 2 * m->square_q};
   fit_grid_complete(readings, system);
 }
 
 /* What the result needs besides the system of the last iteration. */
-static NOINLINE void finish(const struct readings *readings, const struct moments *m,
-                            struct fit_system *system) {
+static NOINLINE void finish(const struct readings *readings, const struct moments *m, struct fit_system *system) {
   const struct state *at = &system->at;
   int32_t x = fixed_mul_q26(at->x, at->x - m->x.slope) + m->x.constant;
   int32_t y = fixed_mul_q26(at->y, at->y - m->y.slope) + m->y.constant;
@@ -309,17 +303,14 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
  * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width
  * over the shorter. */
 struct shape {
-  struct scaled wider_x, wider_y, stretch,
-      slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
-  struct scaled
-      noise_form; /* by which the readings' variance gives that of (length of both)^2 / 2 */
+  struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
+  struct scaled noise_form;   /* by which the readings' variance gives that of (length of both)^2 / 2 */
   int32_t x, y, xy, exponent; /* how one unit of each column moves that square, halved */
   uint32_t by_gains;          /* sum over the sensors, as in struct fit_spread */
 };
 
 /* The sum of the residual against e p1(x) q1(y). */
-static struct scaled project_slant(const struct moments *m, const struct readings *readings,
-                                   int32_t residual_shift) {
+static struct scaled project_slant(const struct moments *m, const struct readings *readings, int32_t residual_shift) {
   const int32_t *r = readings->residual;
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
@@ -337,16 +328,12 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
                                  const struct fit_system *system, const struct fit_spread *spread,
                                  struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
-  struct scaled mass_x = fit_scaled_from(x->mass_q26, -26),
-                mass_y = fit_scaled_from(y->mass_q26, -26);
+  struct scaled mass_x = fit_scaled_from(x->mass_q26, -26), mass_y = fit_scaled_from(y->mass_q26, -26);
   int32_t norm_q = 3 - 2 * m->square_q;
-  struct scaled inverse_x =
-      fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->square_norm, norm_q), mass_y));
-  struct scaled inverse_y =
-      fit_grid_reciprocal(scaled_mul(fit_scaled_from(y->square_norm, norm_q), mass_x));
-  struct scaled inverse_xy =
-      fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->linear_norm, 3 - 2 * x->linear_q),
-                                     fit_scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
+  struct scaled inverse_x = fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->square_norm, norm_q), mass_y));
+  struct scaled inverse_y = fit_grid_reciprocal(scaled_mul(fit_scaled_from(y->square_norm, norm_q), mass_x));
+  struct scaled inverse_xy = fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->linear_norm, 3 - 2 * x->linear_q),
+                                                            fit_scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
   struct scaled softness = spread->softness;
   int32_t q = system->residual_shift - 26 - m->square_q;
   struct scaled along_x = scaled_mul(inverse_x, softness);
@@ -357,12 +344,11 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   shape->stretch = fit_scaled_short(scaled_sub(shape->wider_x, shape->wider_y));
   shape->slant = scaled_mul(project_slant(m, readings, system->residual_shift), along_xy);
 
-  struct scaled values[3] = {scaled_mul(shape->stretch, along_x),
-                             scaled_mul(shape->stretch, along_y),
+  struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y),
                              scaled_mul(shape->slant, along_xy)};
-  shape->noise_form = scaled_add(
-      scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
-      scaled_mul(values[2], shape->slant));
+  shape->noise_form =
+      scaled_add(scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
+                 scaled_mul(values[2], shape->slant));
   shape->noise_form = scaled_mul(shape->noise_form, softness);
   values[0].exponent -= m->square_q;
   values[1].exponent -= m->square_q;
@@ -385,12 +371,10 @@ FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
 /* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and
  * -stretch on its diagonal and slant beside it. */
 static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *result) {
-  int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13),
-          slant = fit_scaled_to_fixed(shape->slant, 13);
+  int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13), slant = fit_scaled_to_fixed(shape->slant, 13);
   int32_t wider = fit_scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
   const int32_t most = (int32_t)(FIT_STRETCH_MAX * 8192.0f);
-  if (fixed_size(stretch) > (uint32_t)most || fixed_size(slant) > (uint32_t)most ||
-      fixed_size(wider) > 8192) {
+  if (fixed_size(stretch) > (uint32_t)most || fixed_size(slant) > (uint32_t)most || fixed_size(wider) > 8192) {
     return false;
   }
   int32_t square = (stretch * stretch + slant * slant) >> 13;
@@ -405,8 +389,7 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   struct scaled scale = scaled_mul(fit_scaled_from(growth, -13), fit_grid_scaled(result->sigma_mm));
   struct scaled x = fit_scaled_sqrt(fit_scaled_from(mean + part, -13));
   struct scaled y = fit_scaled_sqrt(fit_scaled_from(mean - part, -13));
-  struct scaled correlation =
-      scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
+  struct scaled correlation = scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
   x = scaled_mul(x, scale);
   y = scaled_mul(y, scale);
   result->sigma_x_mm = fit_float(x.mantissa, x.exponent);
@@ -423,8 +406,8 @@ struct moves {
 };
 
 /* As fit_grid_add_moves, without the room for the moves. */
-static NOINLINE void add_moves(const struct moments *m, const struct moves *moves,
-                               const struct readings *room, uint32_t *by_gains, int32_t *by_shape) {
+static NOINLINE void add_moves(const struct moments *m, const struct moves *moves, const struct readings *room,
+                               uint32_t *by_gains, int32_t *by_shape) {
   const int32_t *errors = room->q14, *shapes = room->residual;
   uint32_t squares = *by_gains;
   int32_t sum = 0;
@@ -442,8 +425,8 @@ static NOINLINE void add_moves(const struct moments *m, const struct moves *move
 }
 
 /* The same for the shape's two columns, of the gains alone. */
-static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves,
-                                     const struct readings *room, struct shape *shape) {
+static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves, const struct readings *room,
+                                     struct shape *shape) {
   const int32_t *errors = room->q14;
   uint32_t squares = 0;
   for (int i = 0; i < COLUMNS; i++) {
@@ -459,14 +442,11 @@ static NOINLINE void add_shape_moves(const struct moments *m, const struct moves
 }
 
 /* And of the profile's tail, which is off everywhere at once. */
-static NOINLINE void add_tail_moves(const struct moments *m, const struct moves *moves,
-                                    const struct readings *readings,
-                                    const struct fit_system *system, int32_t gain_shift,
-                                    struct shape *shape) {
+static NOINLINE void add_tail_moves(const struct moments *m, const struct moves *moves, const struct readings *readings,
+                                    const struct fit_system *system, int32_t gain_shift, struct shape *shape) {
   struct dip dip;
-  const int32_t depth_q28 =
-      fit_grid_dip(readings->dip_height, TAIL_ERROR, &system->at, 1 << 28, system->rise_q22,
-                   (int32_t)(FIT_DIP_DEPTH_MAX * 268435456.0f), &dip);
+  const int32_t depth_q28 = fit_grid_dip(readings->dip_height, TAIL_ERROR, &system->at, 1 << 28, system->rise_q22,
+                                         (int32_t)(FIT_DIP_DEPTH_MAX * 268435456.0f), &dip);
   /* Larger only far beside the array, where the fit is at a limit. */
   const int32_t error = fixed_clamp((depth_q28 >> 12) * (1 << (gain_shift + 1)) / 2, 0, INT16_MAX);
   int32_t sum = 0;
@@ -484,17 +464,15 @@ static NOINLINE void add_tail_moves(const struct moments *m, const struct moves 
 }
 
 /* A coefficient times the linear and one times the square column of an axis. */
-FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, int32_t square,
-                            int32_t *parts) {
+FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, int32_t square, int32_t *parts) {
   UNROLL for (int i = 0; i < nodes; i++) {
     parts[i] = (linear * f->linear[i] + square * (f->square[i] >> 1)) >> 14;
   }
 }
 
 /* What errors of single sensors make of the result. */
-static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
-                                   const struct fit_settings *settings, const struct moments *m,
-                                   const struct fit_system *system, struct readings *room,
+static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
+                                   const struct moments *m, const struct fit_system *system, struct readings *room,
                                    struct fit_spread *spread, struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
   int32_t *moved = room->q28;
@@ -529,25 +507,22 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
 
 /* The flags of the shape that apply. If it is elongated, separate widths would move the location.
  */
-static NOINLINE uint32_t judge_shape(const struct readings *readings,
-                                     const struct fit_settings *settings,
+static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings,
                                      const struct fit_system *system, const struct shape *shape,
                                      struct fit_spread *spread) {
   const struct state *at = &system->at;
   if (at->height > SHAPE_HEIGHT_MAX_Q26) {
     return 0;
   }
-  struct scaled length_square = fit_scaled_short(scaled_add(
-      scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
+  struct scaled length_square =
+      fit_scaled_short(scaled_add(scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
   struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
   struct scaled by_gains = scaled_mul(
-      fit_scaled_from((int32_t)shape->by_gains,
-                      SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
+      fit_scaled_from((int32_t)shape->by_gains, SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
       scaled_mul(spread->amplitude, spread->amplitude));
-  struct scaled variance = fit_scaled_short(
-      scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
-  struct scaled least =
-      scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
+  struct scaled variance =
+      fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
+  struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
   uint32_t flags = 0;
   if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
     flags |= CONTACT_FLAG_ELONGATED;
@@ -569,8 +544,7 @@ static NOINLINE uint32_t judge_shape(const struct readings *readings,
 /* First guess, every sensor there: the marginals weighted by the row and the column of the largest
  * reading are the two factors of the Gaussian, and the logarithm of each a parabola. Leaves the
  * marginal in g and its logarithm, weighted by it, in `weighted` (Q14). */
-static NOINLINE void set_marginal(struct factor *f, const int32_t *marginal, int32_t *weighted,
-                                  int nodes) {
+static NOINLINE void set_marginal(struct factor *f, const int32_t *marginal, int32_t *weighted, int nodes) {
   int32_t largest = 1;
   for (int i = 0; i < nodes; i++) {
     largest = marginal[i] > largest ? marginal[i] : largest;
@@ -604,8 +578,8 @@ static NOINLINE struct scaled ridged(int32_t b, int32_t norm, int32_t q) {
   return scaled_div(scaled_from(b, -14 - q), scaled_add(scaled_from(norm, 3 - 2 * q), GUESS_RIDGE));
 }
 
-static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings,
-                           struct moments *m, struct state *state) {
+static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings, struct moments *m,
+                           struct state *state) {
   const int32_t *p = readings->q14;
   int peak_column = 0, peak_row = 0;
   int32_t peak = p[0];
@@ -632,18 +606,13 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   orthogonalise(m);
 
   /* From the parabola's coefficients: height = -c3, centre = slope / 2 + c1 / (2 height). */
-  struct scaled c1 =
-      ridged(product_of(m->x.linear, weighted_x, COLUMNS), m->x.linear_norm, m->x.linear_q);
-  struct scaled c2 =
-      ridged(product_of(m->y.linear, weighted_y, ROWS), m->y.linear_norm, m->y.linear_q);
-  struct scaled b3 = scaled_from(product_of(m->x.square, weighted_x, COLUMNS) +
-                                     product_of(m->y.square, weighted_y, ROWS),
-                                 -14 - m->square_q);
+  struct scaled c1 = ridged(product_of(m->x.linear, weighted_x, COLUMNS), m->x.linear_norm, m->x.linear_q);
+  struct scaled c2 = ridged(product_of(m->y.linear, weighted_y, ROWS), m->y.linear_norm, m->y.linear_q);
+  struct scaled b3 = scaled_from(
+      product_of(m->x.square, weighted_x, COLUMNS) + product_of(m->y.square, weighted_y, ROWS), -14 - m->square_q);
   struct scaled norm = scaled_from(m->x.square_norm + m->y.square_norm, 3 - 2 * m->square_q);
-  struct scaled height =
-      scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, b3), scaled_add(norm, GUESS_RIDGE));
-  state->height =
-      fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled height = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, b3), scaled_add(norm, GUESS_RIDGE));
+  state->height = fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
   struct scaled half = scaled_div(scaled_from(1, -1), scaled_from(state->height, -26));
   int32_t x = (m->x.slope >> 1) + scaled_to_fixed(scaled_mul(c1, half), 26);
   int32_t y = (m->y.slope >> 1) + scaled_to_fixed(scaled_mul(c2, half), 26);
@@ -653,22 +622,20 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
 
 /* The dip, and the sensors' own: what of the readings is not the model's. */
 static NOINLINE void take_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              const struct fit_settings *settings, const struct state *state,
-                              const struct moments *m, const struct fit_system *system, int left,
-                              struct readings *readings) {
+                              const struct fit_settings *settings, const struct state *state, const struct moments *m,
+                              const struct fit_system *system, int left, struct readings *readings) {
   const int32_t rise_q22 = fit_grid_rise(system->at.height, m->x.offset, m->y.offset);
   if (readings->dip_share.mantissa != 0) {
     fit_grid_take_dip_out(array, pressure_Pa_q10, state, system->amplitude_q28, rise_q22, readings);
   }
   if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
-    const int32_t peak_q28 =
-        fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
+    const int32_t peak_q28 = fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
     fit_grid_take_own_out(array, settings, UINT32_MAX, state, peak_q28, readings);
   }
 }
 
-bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-              const struct fit_settings *settings, struct fit_result *result) {
+bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+              struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   struct readings readings;
   struct moments m;
@@ -685,8 +652,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   int coarse = left - COARSE_ITERATIONS;
   const int last = left > FIT_OWN_ITERATIONS ? FIT_OWN_ITERATIONS : 1; /* that takes out */
   do {
-    if (left < settings->iterations && left >= last &&
-        (readings.dip_share.mantissa != 0 || fit_has_own(settings))) {
+    if (left < settings->iterations && left >= last && (readings.dip_share.mantissa != 0 || fit_has_own(settings))) {
       take_out(array, pressure_Pa_q10, settings, &state, &m, &system, left, &readings);
     }
     system.at = state;
@@ -708,8 +674,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   begin_shape(&readings, &m, &system, &spread, &shape);
   spread_errors(grid, settings, &m, &system, &readings, &spread, &shape);
   uint32_t flags = judge_shape(&readings, settings, &system, &shape, &spread);
-  bool rough =
-      fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
+  bool rough = fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
   if (!(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
     if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&shape, result)) {
       flags &= ~(uint32_t)CONTACT_FLAG_WIDTHS_VALID;

@@ -100,8 +100,8 @@ enum { STEP = sizeof(struct node) / sizeof(int32_t) };
 
 /* Brings a column in Qraw_q to so many bits; returns its norm with the ridge. What is smaller stays
  * as it is, since there is nothing below its last bit. */
-FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q,
-                               const struct ridge *ridge, int32_t *q) {
+FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q, const struct ridge *ridge,
+                               int32_t *q) {
   int32_t shift = fixed_bits(size) - bits;
   int32_t least = raw_q - ridge->finest_q;
   shift = shift < least ? least : shift;
@@ -125,8 +125,7 @@ struct polynomial {
 };
 
 /* The same of the dip, taken from a column. Returns the size with its own. */
-static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node,
-                                  const struct polynomial *p, uint32_t size) {
+static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node, const struct polynomial *p, uint32_t size) {
   for (int i = 0; i < COLUMNS; i++) {
     for (int j = 0; j < ROWS; j++) {
       int32_t value = *column - fixed_mul_16(p->x[i] + p->y[j], node->d >> 15);
@@ -140,9 +139,8 @@ static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node,
 }
 
 /* Column of the model times (along_x[i] + along_y[j]), less the dip times that of `dip`, if any. */
-static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x,
-                             const int32_t *along_y, int32_t q, const struct polynomial *dip,
-                             const struct ridge *ridge, int32_t *column_q) {
+static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x, const int32_t *along_y,
+                             int32_t q, const struct polynomial *dip, const struct ridge *ridge, int32_t *column_q) {
   uint32_t size = 1;
   int32_t *to = column;
   for (int i = 0; i < COLUMNS; i++) {
@@ -163,9 +161,8 @@ static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int
 }
 
 /* Column of the model times along_x[i]. */
-static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x,
-                                     const struct polynomial *dip, const struct ridge *ridge,
-                                     int32_t *column_q) {
+static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x, const struct polynomial *dip,
+                                     const struct ridge *ridge, int32_t *column_q) {
   uint32_t size = 1;
   int32_t *column = &node->p1;
   for (int i = 0; i < COLUMNS; i++) {
@@ -224,8 +221,7 @@ static NOINLINE void set_mean(const struct readings *readings, struct columns *c
     UNROLL_BY(FIT_GRID_MAX_NODES)
     for (int j = 0; j < ROWS; j++) {
       const int32_t y = j - ORIGIN_Y;
-      int32_t weight =
-          ((node->mantissa * node->mantissa) >> (node->shift + MASS_SHIFT)) >> node->shift;
+      int32_t weight = ((node->mantissa * node->mantissa) >> (node->shift + MASS_SHIFT)) >> node->shift;
       sum += weight;
       first_y += y * weight;
       second += y * y * (weight >> 2);
@@ -297,8 +293,7 @@ static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
 
 /* Makes the column orthogonal to the model, and mends its norm. Returns what that took from the
  * polynomial, LINEAR_Q. */
-static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, int32_t q,
-                                    int32_t *norm) {
+static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, int32_t q, int32_t *norm) {
   int32_t sum = 0;
   const int32_t *from = column;
   for (int k = 0; k < NODES; k++) {
@@ -316,8 +311,7 @@ static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, in
 }
 
 /* Columns, norms and factors from the model at the nodes. */
-static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge,
-                                   struct columns *c) {
+static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge, struct columns *c) {
   set_mean(readings, c);
   struct dips dips;
   const struct polynomial *dip1 = NULL, *dip2 = NULL, *dip3 = NULL;
@@ -391,8 +385,8 @@ FIXED_INLINE struct scaled long_norm(int32_t norm, int32_t q) {
 }
 
 /* The system from sums over the columns in Q q. */
-static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3,
-                               int32_t q, struct fit_system *system) {
+static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3, int32_t q,
+                               struct fit_system *system) {
   sum2 -= times_factor(sum1, c->f21);
   sum3 -= times_factor(sum1, c->f31) + times_factor(sum2, c->f32);
   system->b1 = (struct scaled){sum1, -q - c->q1};
@@ -402,8 +396,7 @@ static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t su
   system->d2 = long_norm(c->norm2, c->q2);
   system->d3 = long_norm(c->norm3, c->q3);
   system->mean_x = (c->mean_x + c->lift1) * LINEAR_TO_Q26;
-  system->mean_y =
-      (c->mean_y + c->lift2 + times_q12(c->lift1, c->cross >> COEFFICIENT_SHIFT)) * LINEAR_TO_Q26;
+  system->mean_y = (c->mean_y + c->lift2 + times_q12(c->lift1, c->cross >> COEFFICIENT_SHIFT)) * LINEAR_TO_Q26;
   system->cross = c->cross * LINEAR_TO_Q26;
   system->slope_x = (2 * c->mean_x + c->skew_x) * LINEAR_TO_Q26;
   system->slope_y = (2 * c->mean_y + c->skew_y) * LINEAR_TO_Q26;
@@ -412,8 +405,8 @@ static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t su
 /* First guess: the logarithm of the readings is a paraboloid, fitted with the readings themselves
  * as the weights. The ridge decides where too few of them are large. */
 static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings,
-                           const struct fit_settings *settings, struct columns *c,
-                           struct fit_system *system, struct state *state) {
+                           const struct fit_settings *settings, struct columns *c, struct fit_system *system,
+                           struct state *state) {
   int32_t up = readings->shift > 0 ? readings->shift : 0, down = up - readings->shift;
   int32_t largest = (readings->largest >> down) * (1 << up);
   int32_t noise = settings->noise_Pa_q10 >> down;
@@ -443,10 +436,8 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   eliminate(c, sum1, sum2, sum3, 14 - NORM_SHIFT, system);
   struct scaled c1 = scaled_div(short_of(system->b1), short_of(system->d1));
   struct scaled c2 = scaled_div(short_of(system->b2), short_of(system->d2));
-  struct scaled height =
-      scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, short_of(system->b3)), short_of(system->d3));
-  state->height =
-      fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled height = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, short_of(system->b3)), short_of(system->d3));
+  state->height = fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
   struct scaled half = scaled_div((struct scaled){1 << 14, -15}, scaled_from(state->height, -26));
   c1 = scaled_sub(c1, scaled_mul(c2, scaled_from(system->cross, -26)));
   int32_t x = scaled_to_fixed(scaled_mul(c1, half), 26);
@@ -459,8 +450,8 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
 
 /* One factor of the separable Gaussian as mantissa (Q30, above 0.5) * 2^-shift, relative to the
  * nearest node. Returns the offset of the centre from that node, Q26. */
-static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin,
-                                   int32_t centre, int32_t height) {
+static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin, int32_t centre,
+                                   int32_t height) {
   int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
   int32_t offset = centre - nearest * ONE_Q26;
   /* The exponent, k (curvature k - slope) with k counted from the nearest node, is a parabola by
@@ -482,8 +473,7 @@ static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes,
 
 /* The model at the sensors in use, relative to the power of two of the strongest. Returns log2 of
  * the model at the centre in that unit, Q22. */
-static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
-                                  struct columns *c) {
+static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused, struct columns *c) {
   int32_t factor_x[COLUMNS], factor_y[ROWS], shift_x[COLUMNS], shift_y[ROWS];
   int32_t offset_x = set_factor(factor_x, shift_x, COLUMNS, ORIGIN_X, at->x, at->height);
   int32_t offset_y = set_factor(factor_y, shift_y, ROWS, ORIGIN_Y, at->y, at->height);
@@ -518,12 +508,11 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
   return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
 }
 
-#define DEPTH_MAX_Q28 (1 << 26) /* of the strongest node, which is from a quarter to one */
+#define DEPTH_MAX_Q28 (1 << 26)      /* of the strongest node, which is from a quarter to one */
 #define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
 
 /* The dip at the sensors in use. */
-static NOINLINE void set_dip(const struct readings *readings, const struct fit_system *system,
-                             struct columns *c) {
+static NOINLINE void set_dip(const struct readings *readings, const struct fit_system *system, struct columns *c) {
   const struct state *at = &system->at;
   c->dip = readings->dip_share.mantissa != 0;
   if (!c->dip) {
@@ -534,8 +523,8 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   int32_t narrowness = port_divide(readings->dip_height, at->height >> 12);
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
-  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28,
-                                   system->rise_q22, DEPTH_MAX_Q28, &dip);
+  int32_t depth_q28 =
+      fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
   for (int k = 0; k < NODES; k++) {
     int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
     c->node[k].d = readings->residual[k] == 0 ? fixed_mul_q30(along, dip.y[k % ROWS]) : 0;
@@ -546,8 +535,7 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
 struct column {
   int32_t e, p1, p2, p3;
 };
-FIXED_INLINE void orthogonal_columns(const struct columns *c, const struct node *node,
-                                     struct column *column) {
+FIXED_INLINE void orthogonal_columns(const struct columns *c, const struct node *node, struct column *column) {
   column->e = node->mantissa >> node->shift;
   column->p1 = node->p1;
   column->p2 = node->p2 - times_q12(node->p1, c->f21);
@@ -559,8 +547,7 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
   int32_t b0 = 0, squares = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t r = shifted(c->node[k].e, finer);
-    b0 += c->dip ? fixed_mul_16(r, model_q15(&c->node[k]))
-                 : fixed_mul_16(r, c->node[k].mantissa) >> c->node[k].shift;
+    b0 += c->dip ? fixed_mul_16(r, model_q15(&c->node[k])) : fixed_mul_16(r, c->node[k].mantissa) >> c->node[k].shift;
     r >>= SUM_BITS - 15;
     squares += (r * r) >> NORM_SHIFT;
   }
@@ -571,15 +558,13 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
   int32_t off_x = system->at.x - c->mean_x * LINEAR_TO_Q26;
   int32_t off_y = system->at.y - c->mean_y * LINEAR_TO_Q26;
   int32_t bend = fixed_mul_q28(off_x, off_x) + fixed_mul_q28(off_y, off_y);
-  bend -= fixed_mul_q28(off_x, c->skew_x * LINEAR_TO_Q26) +
-          fixed_mul_q28(off_y, c->skew_y * LINEAR_TO_Q26);
+  bend -= fixed_mul_q28(off_x, c->skew_x * LINEAR_TO_Q26) + fixed_mul_q28(off_y, c->skew_y * LINEAR_TO_Q26);
   bend -= (c->variance + c->lift3) >> (LINEAR_Q - 24);
   system->bend_q24 = fixed_clamp(bend, -(1 << 29), 1 << 29);
 }
 
 /* Adds that of the dip to the error of each reading. */
-static NOINLINE void add_dip_errors(const struct columns *c, struct readings *room,
-                                    struct fit_spread *spread) {
+static NOINLINE void add_dip_errors(const struct columns *c, struct readings *room, struct fit_spread *spread) {
   uint32_t gains = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t error = (c->node[k].d >> 15) * FIT_DIP_ERROR_Q16 >> 8;
@@ -592,9 +577,8 @@ static NOINLINE void add_dip_errors(const struct columns *c, struct readings *ro
 }
 
 /* What errors of single sensors make of the result. The columns are made orthogonal for it. */
-static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
-                                   const struct fit_settings *settings, struct columns *c,
-                                   const struct fit_system *system, struct readings *room,
+static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
+                                   struct columns *c, const struct fit_system *system, struct readings *room,
                                    struct fit_spread *spread) {
   const struct fit_columns_q q = {c->q1, c->q2, c->q3};
   fit_grid_begin_spread(settings, system, &q, spread);
@@ -613,8 +597,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
   }
   const struct node *node = c->node;
   for (int k = 0; k < NODES; k++) {
-    room->q28[k] =
-        (spread->x1 * node[k].p1 + spread->x2 * node[k].p2 + spread->x3 * node[k].p3) >> 15;
+    room->q28[k] = (spread->x1 * node[k].p1 + spread->x2 * node[k].p2 + spread->x3 * node[k].p3) >> 15;
   }
   fit_grid_add_moves(room, &spread->by_gains, &spread->shape_x);
   for (int k = 0; k < NODES; k++) {
@@ -622,9 +605,8 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
   }
   fit_grid_add_moves(room, &spread->by_gains, &spread->shape_y);
   for (int k = 0; k < NODES; k++) {
-    room->q28[k] = (spread->f0 * node[k].e + spread->f1 * node[k].p1 + spread->f2 * node[k].p2 +
-                    spread->f3 * node[k].p3) >>
-                   15;
+    room->q28[k] =
+        (spread->f0 * node[k].e + spread->f1 * node[k].p1 + spread->f2 * node[k].p2 + spread->f3 * node[k].p3) >> 15;
   }
   fit_grid_add_moves(room, &spread->force_by_gains, &spread->shape_force);
   fit_grid_end_spread(settings, system, spread);
@@ -632,13 +614,12 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
 
 enum accuracy { COARSE, FINE, LAST };
 
-static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy,
-                              struct columns *c, struct fit_system *system) {
+static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c,
+                              struct fit_system *system) {
   system->rise_q22 = set_model(&system->at, readings->residual, c);
   set_dip(readings, system, c);
   orthogonalise(readings, &rounding_ridge, c);
-  system->amplitude_q28 =
-      fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
+  system->amplitude_q28 = fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   struct node *node = c->node;
   if (accuracy == COARSE) {
@@ -724,8 +705,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
   do {
     bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
     if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
-      const int32_t peak_q28 =
-          fit_grid_peak(system.amplitude_q28, system.rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
+      const int32_t peak_q28 = fit_grid_peak(system.amplitude_q28, system.rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
       fit_grid_take_own_out(array, settings, usable, &state, peak_q28, &readings);
     }
     system.at.x = state.x;
@@ -746,9 +726,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
 
 /* Q26, towards zero; within what fits. */
 static int32_t q26_of(float value) {
-  return value >= 16.0f    ? INT32_C(1) << 30
-         : value <= -16.0f ? -(INT32_C(1) << 30)
-                           : (int32_t)(value * 67108864.0f);
+  return value >= 16.0f ? INT32_C(1) << 30 : value <= -16.0f ? -(INT32_C(1) << 30) : (int32_t)(value * 67108864.0f);
 }
 
 /* value^2 of the sum of squares, Q15. */
@@ -770,18 +748,17 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   struct fit_system system;
   system.at.x = q26_of(result->x_mm * per_pitch - array->x[origin]);
   system.at.y = q26_of(result->y_mm * per_pitch - array->y[origin]);
-  system.at.height =
-      fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
+  system.at.height = fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
   struct columns c;
   c.cross = c.skew_x = c.skew_y = 0;
   if (readings.dip_share.mantissa != 0) {
     fit_grid_take_below_zero(array, pressure_Pa_q10, usable, &readings);
   }
   if (settings->own) {
-    const int32_t peak_q28 = fit_scaled_to_fixed(
-        scaled_mul(fit_grid_scaled(result->p0_Pa), fit_scaled_from(1024, readings.shift - 28)), 28);
-    fit_grid_take_own_out(array, settings, usable, &system.at,
-                          fixed_clamp(peak_q28, 0, FIT_OWN_PEAK_MAX_Q28), &readings);
+    const int32_t peak_q28 =
+        fit_scaled_to_fixed(scaled_mul(fit_grid_scaled(result->p0_Pa), fit_scaled_from(1024, readings.shift - 28)), 28);
+    fit_grid_take_own_out(array, settings, usable, &system.at, fixed_clamp(peak_q28, 0, FIT_OWN_PEAK_MAX_Q28),
+                          &readings);
   }
   evaluate(&readings, FINE, &c, &system);
 
@@ -797,9 +774,8 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
     int32_t r = shifted(node->e, finer);
     struct column column;
     orthogonal_columns(&c, node, &column);
-    int32_t leverage =
-        share_of(column.e, c.mass, MASS_SHIFT) + share_of(column.p1, c.norm1, NORM_SHIFT) +
-        share_of(column.p2, c.norm2, NORM_SHIFT) + share_of(column.p3, c.norm3, NORM_SHIFT);
+    int32_t leverage = share_of(column.e, c.mass, MASS_SHIFT) + share_of(column.p1, c.norm1, NORM_SHIFT) +
+                       share_of(column.p2, c.norm2, NORM_SHIFT) + share_of(column.p3, c.norm3, NORM_SHIFT);
     int32_t free = 32768 - leverage;
     int32_t without = port_divide(r * r, free < 512 ? 512 : free);
     total += (r * r) >> 15;

@@ -30,8 +30,7 @@ uint64_t fit_packed_float(float value) {
 float fit_quadrature(float a, float b, float c, float d) {
   struct scaled first = scaled_mul(fit_grid_scaled(a), fit_grid_scaled(b));
   struct scaled second = scaled_mul(fit_grid_scaled(c), fit_grid_scaled(d));
-  struct scaled root =
-      fit_scaled_sqrt(scaled_add(scaled_mul(first, first), scaled_mul(second, second)));
+  struct scaled root = fit_scaled_sqrt(scaled_add(scaled_mul(first, first), scaled_mul(second, second)));
   return fit_float(root.mantissa, root.exponent);
 }
 
@@ -52,9 +51,8 @@ FIXED_INLINE void set_reading(struct readings *readings, int k, int32_t value, i
   readings->q14[k] = (value + (1 << 13)) >> 14;
 }
 
-bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                            uint32_t usable, const struct fit_settings *settings,
-                            struct readings *readings) {
+bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                            const struct fit_settings *settings, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   int32_t largest = 0;
   for (int k = 0; k < NODES; k++) {
@@ -86,8 +84,7 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   readings->prior_sigma = readings->prior_weight = readings->prior_sd = (struct scaled){0, 0};
   if (fit_has_prior(settings)) {
     struct scaled width = fit_grid_scaled(settings->prior_width_mm / array->pitch_mm);
-    readings->prior_sd =
-        scaled_mul(fit_grid_scaled(FIT_PRIOR_WEIGHT), scaled_from(readings->largest_q28, -28));
+    readings->prior_sd = scaled_mul(fit_grid_scaled(FIT_PRIOR_WEIGHT), scaled_from(readings->largest_q28, -28));
     readings->prior_sigma = fit_grid_scaled(settings->prior_sigma_mm / array->pitch_mm);
     readings->prior_weight = scaled_div(readings->prior_sd, width);
   }
@@ -103,8 +100,7 @@ static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t h
   }
 }
 
-int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share,
-                      int32_t most_q28) {
+int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share, int32_t most_q28) {
   /* 2^rise is 2^-(1 - its fraction) and a power of two. */
   rise_q22 = fixed_clamp(rise_q22, 0, RISE_MAX_Q22);
   int32_t fraction = exp2_negative((uint32_t)((1 << 22) - (rise_q22 & 0x3FFFFF)));
@@ -113,21 +109,19 @@ int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled sha
   return fixed_clamp(fit_scaled_to_fixed(peak, 28), 0, most_q28);
 }
 
-int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at,
-                     int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28, struct dip *dip) {
+int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28,
+                     int32_t rise_q22, int32_t most_q28, struct dip *dip) {
   set_dip(dip->x, COLUMNS, COLUMNS / 2, at->x, height);
   set_dip(dip->y, ROWS, ROWS / 2, at->y, height);
   return fit_grid_peak(amplitude_q28, rise_q22, share, most_q28);
 }
 
-void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                           const struct state *at, int32_t amplitude_q28, int32_t rise_q22,
-                           struct readings *readings) {
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct state *at,
+                           int32_t amplitude_q28, int32_t rise_q22, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   struct dip dip;
   const int32_t most = readings->largest_q28 >> 2; /* FIT_DIP_DEPTH_MAX */
-  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, amplitude_q28,
-                                   rise_q22, most, &dip);
+  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, amplitude_q28, rise_q22, most, &dip);
   for (int i = 0; i < COLUMNS; i++) {
     int32_t column = fixed_mul_q30(depth_q28, dip.x[i]);
     for (int j = 0; j < ROWS; j++) {
@@ -147,13 +141,11 @@ struct own_axis {
   int32_t bell_q30[MAX_NODES], slope_q11[MAX_NODES], square_q11[MAX_NODES];
 };
 
-static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height,
-                                  struct own_axis *axis) {
+static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height, struct own_axis *axis) {
   const int32_t inverse_q11 = fixed_mul_q30(height, TWO_LN2_Q30) >> 15; /* 1 / sigma^2 */
   for (int i = 0; i < nodes; i++) {
     int32_t x_q12 = ((i - nodes / 2) * ONE_Q26 - centre) >> 14;
-    int32_t slope_q11 =
-        fixed_clamp(fixed_mul_16(inverse_q11, x_q12) * 16, -OWN_FAR_Q11, OWN_FAR_Q11);
+    int32_t slope_q11 = fixed_clamp(fixed_mul_16(inverse_q11, x_q12) * 16, -OWN_FAR_Q11, OWN_FAR_Q11);
     axis->bell_q30[i] = exp2_rough((uint32_t)fixed_mul_q32(height, x_q12 * x_q12) << 4);
     axis->slope_q11[i] = slope_q11;
     axis->square_q11[i] = fixed_clamp((x_q12 * slope_q11) >> 12, 0, OWN_FAR_Q11);
@@ -162,9 +154,8 @@ static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height,
 
 /* A Gaussian that is wider by b and whose sensor is off by o is, d from the contact to its place in
  * the array, larger by (b d - o)' d / sigma^2 of itself. */
-void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings,
-                           uint32_t usable, const struct state *at, int32_t peak_q28,
-                           struct readings *readings) {
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable,
+                           const struct state *at, int32_t peak_q28, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   struct own_axis x, y;
   set_own_axis(COLUMNS, at->x, at->height, &x);
@@ -173,8 +164,8 @@ void fit_grid_take_own_out(const struct fit_array *array, const struct fit_setti
     int32_t column_q28 = fixed_mul_q30(peak_q28, x.bell_q30[i]);
     for (int j = 0; j < ROWS; j++, k++) {
       const struct fit_own *own = &settings->own[sensor[k]];
-      int32_t more_q26 = own->wider_q15 * (x.square_q11[i] + y.square_q11[j]) -
-                         own->off_x_q15 * x.slope_q11[i] - own->off_y_q15 * y.slope_q11[j];
+      int32_t more_q26 = own->wider_q15 * (x.square_q11[i] + y.square_q11[j]) - own->off_x_q15 * x.slope_q11[i] -
+                         own->off_y_q15 * y.slope_q11[j];
       int32_t share_q15 = fixed_clamp(more_q26 >> 11, -OWN_SHARE_MAX_Q15, OWN_SHARE_MAX_Q15);
       if (usable >> sensor[k] & 1) {
         int32_t bell_q15 = fixed_mul_q30(column_q28, y.bell_q30[j]) >> 13;
@@ -186,8 +177,8 @@ void fit_grid_take_own_out(const struct fit_array *array, const struct fit_setti
   }
 }
 
-void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              uint32_t usable, struct readings *readings) {
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                              struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   for (int k = 0; k < NODES; k++) {
     if (usable >> sensor[k] & 1) {

@@ -30,9 +30,9 @@
  * a dip, half of that, so that what it takes finds room. */
 struct readings {
   int32_t q28[NODES], q14[NODES];
-  int32_t residual[NODES];                 /* room for the kernel */
-  int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
-  int32_t largest;                         /* 1/1024 Pa */
+  int32_t residual[NODES]; /* room for the kernel */
+  int32_t shift;           /* Q28 = 1/1024 Pa times 2^shift */
+  int32_t largest;         /* 1/1024 Pa */
   int32_t largest_q28;
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
   struct scaled prior_sd;                  /* of its row, in units of q28 */
@@ -90,9 +90,8 @@ FIXED_INLINE struct scaled fit_scaled_sqrt(struct scaled a) {
 int32_t fit_scaled_to_fixed(struct scaled a, int32_t q);
 
 /* usable: bitmap of the sensors, of which those left out read 0. False: nothing positive. */
-bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                            uint32_t usable, const struct fit_settings *settings,
-                            struct readings *readings);
+bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                            const struct fit_settings *settings, struct readings *readings);
 
 /* The dip's Gaussian, a product as the contact's is: its factors at the nodes, Q30. */
 struct dip {
@@ -101,28 +100,25 @@ struct dip {
 /* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns
  * the dip's depth there, at most most_q28. height: of the dip's Gaussian, Q26; share: its depth, of
  * the contact's. */
-int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at,
-                     int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28, struct dip *dip);
+int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28,
+                     int32_t rise_q22, int32_t most_q28, struct dip *dip);
 
 /* Adds the dip to the readings of a full rectangle. */
-void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                           const struct state *at, int32_t amplitude_q28, int32_t rise_q22,
-                           struct readings *readings);
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct state *at,
+                           int32_t amplitude_q28, int32_t rise_q22, struct readings *readings);
 
 /* The model at the centre, where it is amplitude 2^rise: at most most_q28. */
-int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share,
-                      int32_t most_q28);
+int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share, int32_t most_q28);
 
 /* Corrects the readings of the usable sensors by what is their own (fit_settings), about a contact
  * of this peak. */
 #define FIT_OWN_PEAK_MAX_Q28 (1 << 30)
-void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings,
-                           uint32_t usable, const struct state *at, int32_t peak_q28,
-                           struct readings *readings);
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable,
+                           const struct state *at, int32_t peak_q28, struct readings *readings);
 
 /* Readings below zero as they are, where fit_grid_take_readings took them as zero. */
-void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              uint32_t usable, struct readings *readings);
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                              struct readings *readings);
 
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);

@@ -37,8 +37,8 @@ void fit_grid_add_prior(const struct readings *readings, struct fit_system *syst
 }
 
 /* b / (d stiffness) in Qq, at most 2^30. Near the end b is small, and its last bits decide. */
-FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d,
-                                const struct scaled *stiffness, int32_t q) {
+FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d, const struct scaled *stiffness,
+                                int32_t q) {
   int32_t divisor = ((d->mantissa >> 14) * stiffness->mantissa) >> 13; /* below 2^18 */
   int32_t up = 31 - fixed_bits(fixed_size(b->mantissa) | 1);
   int32_t quotient = port_divide(b->mantissa * (1 << up), divisor < 2 ? 2 : divisor);
@@ -54,8 +54,7 @@ FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d,
 /* With c = b / d / stiffness:
  *   dsigma / sigma = c3,  dx = c1 - cross c2 + (2 x - slope_x) c3,  dy = c2 + (2 y - slope_y) c3.
  */
-void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
-                   struct state *state) {
+void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system, struct state *state) {
   int32_t c1 = step_along(&system->b1, &system->d1, &system->stiffness, 26);
   int32_t c2 = step_along(&system->b2, &system->d2, &system->stiffness, 26);
   int32_t ratio = step_along(&system->b3, &system->d3, &system->stiffness, 28);
@@ -82,10 +81,8 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
   }
   system->move_x_q22 = dx;
   system->move_y_q22 = dy;
-  state->x =
-      fixed_clamp(system->at.x + dx * 16, grid->x_min - OVERSHOOT_Q26, grid->x_max + OVERSHOOT_Q26);
-  state->y =
-      fixed_clamp(system->at.y + dy * 16, grid->y_min - OVERSHOOT_Q26, grid->y_max + OVERSHOOT_Q26);
+  state->x = fixed_clamp(system->at.x + dx * 16, grid->x_min - OVERSHOOT_Q26, grid->x_max + OVERSHOOT_Q26);
+  state->y = fixed_clamp(system->at.y + dy * 16, grid->y_min - OVERSHOOT_Q26, grid->y_max + OVERSHOOT_Q26);
 
   /* height /= (1 + ratio)^2 as height -= height f (2 - f), f = ratio / (1 + ratio): relative
    * precision is enough for f, and it goes to zero smoothly. */
@@ -103,12 +100,11 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
 }
 
 /* Peak at the centre after the step: 30-bit mantissa and exponent, Pa. */
-static int32_t peak_of(const struct readings *readings, const struct fit_system *system,
-                       int32_t *exponent) {
+static int32_t peak_of(const struct readings *readings, const struct fit_system *system, int32_t *exponent) {
   int32_t rise_q22 = fixed_clamp(system->rise_q22, 0, PEAK_RISE_MAX_Q22);
   int32_t up = 30 - fixed_bits((uint32_t)system->amplitude_q28);
-  int32_t peak = fixed_mul_q30(system->amplitude_q28 * (1 << up),
-                               exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
+  int32_t peak =
+      fixed_mul_q30(system->amplitude_q28 * (1 << up), exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
   *exponent = (rise_q22 >> 22) + 1 - up - 10 - readings->shift;
 
   /* The last step's own part, relative: c1 and c2 tilt the model about its mean, c3 bends it. */
@@ -119,8 +115,7 @@ static int32_t peak_of(const struct readings *readings, const struct fit_system 
   int32_t off_x = at->x - system->mean_x;
   int32_t off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, off_x);
   int32_t tilt_q24 = fixed_mul_q32(c1, off_x) + fixed_mul_q32(c2, off_y);
-  int32_t lift_q22 =
-      fixed_clamp(fixed_mul_q32(c3, system->bend_q24) + (tilt_q24 >> 2), -(1 << 21), 1 << 21);
+  int32_t lift_q22 = fixed_clamp(fixed_mul_q32(c3, system->bend_q24) + (tilt_q24 >> 2), -(1 << 21), 1 << 21);
   int32_t growth_q24 = fixed_mul_q32(at->height, lift_q22 * (1 << 8));
   growth_q24 = fixed_mul_16(growth_q24, STIFFNESS_PER_HEIGHT_Q14) * 4;
   /* The amplitude's rounding. */
@@ -148,21 +143,18 @@ FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
 
 /* Raises the inverse of d3 to that by which the variance of a reading gives that of c3: the prior's
  * row varies by a width of its own, not as the readings do. */
-static NOINLINE void widen_for_prior(const struct readings *readings,
-                                     const struct fit_system *system, const struct scaled *variance,
-                                     struct scaled *inverse3) {
+static NOINLINE void widen_for_prior(const struct readings *readings, const struct fit_system *system,
+                                     const struct scaled *variance, struct scaled *inverse3) {
   struct scaled excess = fit_scaled_short(scaled_sub(scaled_square(readings->prior_sd), *variance));
   if (excess.mantissa > 0) {
     struct scaled share = scaled_mul(system->prior_row, *inverse3);
-    struct scaled more =
-        scaled_mul(scaled_mul(excess, scaled_square(share)), fit_grid_reciprocal(*variance));
+    struct scaled more = scaled_mul(scaled_mul(excess, scaled_square(share)), fit_grid_reciprocal(*variance));
     *inverse3 = scaled_add(*inverse3, more);
   }
 }
 
 /* Location, width, peak and force; returns the force. */
-static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid,
-                                         const struct readings *readings,
+static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid, const struct readings *readings,
                                          const struct fit_system *system, const struct state *state,
                                          struct fit_result *result) {
   int32_t x = fixed_clamp(state->x, grid->x_min, grid->x_max);
@@ -184,10 +176,9 @@ static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid,
 }
 
 /* The flags that need no variance. */
-static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid,
-                                  const struct readings *readings,
-                                  const struct fit_settings *settings,
-                                  const struct fit_system *system, const struct state *state) {
+static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid, const struct readings *readings,
+                                  const struct fit_settings *settings, const struct fit_system *system,
+                                  const struct state *state) {
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
@@ -195,10 +186,9 @@ static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid,
   if (state->height <= FLAT_HEIGHT_Q26) {
     flags |= CONTACT_FLAG_FLAT;
   }
-  if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min ||
-      state->y >= grid->y_max || state->height <= HEIGHT_MIN_Q26 ||
-      state->height >= HEIGHT_MAX_Q26 || system->amplitude_q28 <= AMPLITUDE_MIN_Q28 ||
-      system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
+  if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min || state->y >= grid->y_max ||
+      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 ||
+      system->amplitude_q28 <= AMPLITUDE_MIN_Q28 || system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
     flags |= CONTACT_FLAG_AT_BOUND;
   }
   return flags;
@@ -206,26 +196,22 @@ static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid,
 
 /* By what the variance of the readings gives that of the force's share, times the amplitude
  * squared: the mean of the model adds one over its mass. */
-static NOINLINE struct scaled force_form(const struct fit_spread *spread,
-                                         const struct scaled *inverse3) {
+static NOINLINE struct scaled force_form(const struct fit_spread *spread, const struct scaled *inverse3) {
   struct scaled off_x = fit_scaled_from(spread->off_x, -26);
   struct scaled off_y = fit_scaled_from(spread->off_y, -26);
   struct scaled lift = fit_scaled_from(spread->lift_q24, -24);
-  struct scaled form =
-      scaled_add(spread->inverse_mass, scaled_mul(scaled_square(off_x), spread->inverse1));
+  struct scaled form = scaled_add(spread->inverse_mass, scaled_mul(scaled_square(off_x), spread->inverse1));
   form = scaled_add(form, scaled_mul(scaled_square(off_y), spread->inverse2));
   return scaled_add(form, scaled_mul(scaled_square(lift), *inverse3));
 }
 
 /* The same of the location, times the stiffness squared, pitches. */
-static NOINLINE struct scaled location_form(const struct fit_system *system,
-                                            const struct fit_spread *spread,
+static NOINLINE struct scaled location_form(const struct fit_system *system, const struct fit_spread *spread,
                                             const struct scaled *inverse3) {
   int32_t along_x = (2 * system->at.x - system->slope_x) >> 16; /* Q10 */
   int32_t along_y = (2 * system->at.y - system->slope_y) >> 16;
   struct scaled slopes = fit_scaled_from(along_x * along_x + along_y * along_y, -20);
-  struct scaled form =
-      scaled_add(scaled_add(spread->inverse1, spread->inverse2), scaled_mul(slopes, *inverse3));
+  struct scaled form = scaled_add(scaled_add(spread->inverse1, spread->inverse2), scaled_mul(slopes, *inverse3));
   if (system->cross != 0) {
     struct scaled cross = fit_scaled_from(system->cross, -26);
     form = scaled_add(form, scaled_mul(scaled_square(cross), spread->inverse2));
@@ -241,13 +227,12 @@ struct scatter {
   bool misfit, rough, other_model;
 };
 
-static NOINLINE void set_scatter(const struct readings *readings,
-                                 const struct fit_settings *settings,
-                                 const struct fit_system *system, const struct fit_spread *spread,
-                                 int count, struct scatter *scatter, struct fit_result *result) {
+static NOINLINE void set_scatter(const struct readings *readings, const struct fit_settings *settings,
+                                 const struct fit_system *system, const struct fit_spread *spread, int count,
+                                 struct scatter *scatter, struct fit_result *result) {
   struct scaled left = fit_scaled_from(system->b0, system->residual_shift - 38);
-  struct scaled square_sum = scaled_sub(fit_scaled_short(system->square_sum),
-                                        scaled_mul(scaled_square(left), spread->inverse_mass));
+  struct scaled square_sum =
+      scaled_sub(fit_scaled_short(system->square_sum), scaled_mul(scaled_square(left), spread->inverse_mass));
   square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
   struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
   result->residual_rms_Pa = fit_float(rms.mantissa, rms.exponent + 18 - readings->shift);
@@ -257,8 +242,7 @@ static NOINLINE void set_scatter(const struct readings *readings,
                                    fit_scaled_from(readings->largest, readings->shift - 28));
   scatter->all = scaled_add(scatter->noise, scaled_square(model));
   struct scaled amplitude_square = scaled_square(spread->amplitude);
-  struct scaled gains =
-      fit_scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
+  struct scaled gains = fit_scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
   gains = scaled_mul(scaled_mean(gains, count), amplitude_square);
   struct scaled expected = scaled_add(scatter->all, gains);
   struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
@@ -275,8 +259,7 @@ static NOINLINE void set_scatter(const struct readings *readings,
   struct scaled mass = fit_scaled_from(system->mass_q20, -20);
   struct scaled total = scaled_add(scaled_mul(amplitude_square, mass), square_sum);
   scatter->rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
-  scatter->other_model =
-      scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0;
+  scatter->other_model = scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0;
 }
 
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
@@ -293,27 +276,24 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   }
 
   struct scaled pitch = scaled_near(grid->pitch, grid->pitch_exponent - 6);
-  struct scaled form = scaled_mul(location_form(system, spread, &inverse3),
-                                  scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
+  struct scaled form =
+      scaled_mul(location_form(system, spread, &inverse3), scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
   result->location_noise_mm = fit_float(sd.mantissa, sd.exponent);
-  struct scaled move_x =
-      fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
+  struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
   struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
   struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
   apart = scaled_add(scaled_add(spread->location_variance, spread->apart), apart);
   apart = scaled_mul(apart, scaled_square(pitch));
-  sd = flags & CONTACT_FLAG_AT_BOUND
-           ? scaled_mul(BOUND_SD, pitch)
-           : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
+  sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch)
+                                     : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
   result->location_sd_mm = fit_float(sd.mantissa, sd.exponent);
   struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
   if (scaled_sub(sd, limit).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
 
-  form = scaled_mul(force_form(spread, &inverse3),
-                    fit_grid_reciprocal(scaled_square(spread->amplitude)));
+  form = scaled_mul(force_form(spread, &inverse3), fit_grid_reciprocal(scaled_square(spread->amplitude)));
   sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), spread->force_variance));
   sd = scaled_mul(sd, force);
   result->force_sd_N = fit_float(sd.mantissa, sd.exponent);

@@ -71,16 +71,14 @@ void fit_grid_add_prior(const struct readings *readings, struct fit_system *syst
 FIXED_INLINE void fit_grid_complete(const struct readings *readings, struct fit_system *system) {
   uint32_t product = (uint32_t)(system->at.height >> 14) * (uint32_t)(system->amplitude_q28 >> 14);
   int32_t shift = fixed_bits(product) - 14;
-  system->stiffness =
-      (struct scaled){((int32_t)(product >> shift) * STIFFNESS_PER_HEIGHT_Q14) >> 14, shift - 26};
+  system->stiffness = (struct scaled){((int32_t)(product >> shift) * STIFFNESS_PER_HEIGHT_Q14) >> 14, shift - 26};
   if (readings->prior_weight.mantissa != 0) {
     fit_grid_add_prior(readings, system);
   }
 }
 
 /* One Gauss-Newton step of the state. */
-void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
-                   struct state *state);
+void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system, struct state *state);
 
 /* 1 / value; what is not positive counts as the last place. */
 uint64_t fit_packed_reciprocal(struct scaled value);

@@ -23,9 +23,7 @@ int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned)
   int32_t exponent = INT16_MIN;
   for (int i = 0; i < count; i++) {
     uint32_t size = fixed_size(values[i].mantissa);
-    int32_t spare = size >= 1 << 14   ? 0
-                    : size >= 1 << 13 ? 1
-                                      : 2; /* products have 13 bits or more */
+    int32_t spare = size >= 1 << 14 ? 0 : size >= 1 << 13 ? 1 : 2; /* products have 13 bits or more */
     if (size != 0 && values[i].exponent - spare > exponent) {
       exponent = values[i].exponent - spare;
     }
@@ -48,10 +46,8 @@ static void set_down(int32_t *down, int nodes, int origin, int32_t centre, int32
   }
 }
 
-NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
-                                    const struct fit_system *system,
-                                    const struct fit_columns_q *columns,
-                                    struct fit_spread *spread) {
+NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings, const struct fit_system *system,
+                                    const struct fit_columns_q *columns, struct fit_spread *spread) {
   const struct state *at = &system->at;
   spread->inverse_mass = fit_grid_reciprocal(fit_scaled_from(system->mass_q20, -20));
   spread->inverse1 = fit_grid_reciprocal(system->d1);
@@ -115,9 +111,8 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
   spread->by_gains = spread->force_by_gains = 0;
 }
 
-NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid,
-                                  const struct fit_settings *settings, const struct state *at,
-                                  struct readings *room, struct fit_spread *spread) {
+NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
+                                  const struct state *at, struct readings *room, struct fit_spread *spread) {
   int32_t down_x[COLUMNS], down_y[ROWS];
   set_down(down_x, COLUMNS, COLUMNS / 2, at->x, at->height);
   set_down(down_y, ROWS, ROWS / 2, at->y, at->height);
@@ -147,8 +142,7 @@ NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid,
   spread->gains = gains;
 }
 
-NOINLINE void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains,
-                                 int32_t *by_shape) {
+NOINLINE void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains, int32_t *by_shape) {
   const int32_t *moves = room->q28, *errors = room->q14, *shapes = room->residual;
   uint32_t squares = *by_gains;
   int32_t sum = 0;
@@ -162,8 +156,8 @@ NOINLINE void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains
   *by_shape = sum;
 }
 
-NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
-                                  const struct fit_system *system, struct fit_spread *spread) {
+NOINLINE void fit_grid_end_spread(const struct fit_settings *settings, const struct fit_system *system,
+                                  struct fit_spread *spread) {
   const int32_t gains_exponent = SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift;
   uint32_t bend = (uint32_t)settings->model_sd_q16 * (uint32_t)(system->at.height >> 14);
   struct scaled strength = fit_scaled_from((int32_t)(bend >> 1), 1 - 16 - 12);
@@ -177,8 +171,7 @@ NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
   struct scaled sum = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
   sum = scaled_add(sum, fit_scaled_from((int32_t)spread->by_gains, gains_exponent));
   sum = scaled_mul(scaled_mul(sum, spread->amplitude), spread->amplitude);
-  spread->location_variance =
-      (struct scaled){sum.mantissa, sum.exponent + 2 * spread->location_exponent};
+  spread->location_variance = (struct scaled){sum.mantissa, sum.exponent + 2 * spread->location_exponent};
 
   struct scaled force = scaled_mul(fit_scaled_from(spread->shape_force, 0), strength);
   sum = scaled_mul(scaled_mul(force, force), FORCE_SHARE);

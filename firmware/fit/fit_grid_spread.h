@@ -30,7 +30,7 @@ struct fit_spread {
   uint32_t by_gains; /* of the squares of what they make of x and y */
   uint32_t force_by_gains;
   struct scaled location_variance, force_variance; /* of all of this, once it is concluded */
-  struct scaled apart; /* square of how far another shape of the contact would move it, pitches */
+  struct scaled apart;                   /* square of how far another shape of the contact would move it, pitches */
   int32_t shape_x, shape_y, shape_force; /* what the model error's shape makes of these */
 };
 
@@ -50,8 +50,8 @@ void fit_grid_end_spread(const struct fit_settings *settings, const struct fit_s
 /* The readings' room is used for what each sensor does, in the order of the nodes. In: its e (Q15)
  * in q28. Out: the error that its gain makes of its reading in q14, the share of the amplitude
  * times 2^(16 + gain_shift); the model error's shape in residual; both of 15 bits. */
-void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
-                         const struct state *at, struct readings *room, struct fit_spread *spread);
+void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, const struct state *at,
+                         struct readings *room, struct fit_spread *spread);
 
 /* By how much a unit of each reading moves something, 15 bits, in q28: adds what the errors do. */
 void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains, int32_t *by_shape);

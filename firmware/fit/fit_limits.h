@@ -117,8 +117,7 @@ static inline bool fit_has_own(const struct fit_settings *settings) {
 
 /* Where sensors are far apart for the width, those beside the contact feel little but the dip. Then
  * it belongs into the derivatives; elsewhere it is enough to add it to the readings. */
-static inline bool fit_steps_want_dip(const struct fit_array *array,
-                                      const struct fit_settings *settings) {
+static inline bool fit_steps_want_dip(const struct fit_array *array, const struct fit_settings *settings) {
   return fit_has_dip(settings) && fit_has_prior(settings) &&
          settings->prior_sigma_mm < FIT_SHAPE_LEAST * array->pitch_mm;
 }
@@ -135,9 +134,8 @@ static inline int32_t fit_reading(const struct fit_settings *settings, int32_t p
 /* Whether the fit without an outlier is the better one. rough: its residuals still are. An outlier
  * above the others takes the place of a narrow press, and makes others outliers. Then either fit
  * may be the right one. */
-static inline bool fit_outlier_gone(const struct fit_settings *settings,
-                                    const struct fit_result *with, struct fit_result *without,
-                                    bool rough, float pitch_mm) {
+static inline bool fit_outlier_gone(const struct fit_settings *settings, const struct fit_result *with,
+                                    struct fit_result *without, bool rough, float pitch_mm) {
   if (!(without->flags & CONTACT_FLAG_FIT_VALID) ||
       !(without->residual_rms_Pa < FIT_OUTLIER_GAIN * with->residual_rms_Pa)) {
     return false;

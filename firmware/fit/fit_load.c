@@ -19,8 +19,8 @@
 enum { HEIGHT, ALONG_X, ALONG_Y, WIDTH, FAR, PULL_X, PULL_Y, UNKNOWNS };
 _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 
-#define FAR_Q16 10486 /* 1 / 6.25: the variance of the dip that the recordings of real pads show */
-#define PULL_SHIFT 2  /* 1 / 4: the layer's wide terms under the contacts of the twin */
+#define FAR_Q16 10486  /* 1 / 6.25: the variance of the dip that the recordings of real pads show */
+#define PULL_SHIFT 2   /* 1 / 4: the layer's wide terms under the contacts of the twin */
 #define FAR_PER_SD 100 /* FAR_SD 0.01 of p0: half of what layers and cast pads differ by */
 /* Of the model's own error, MODEL_SHARE_SHIFT: a half of model_sd is independent from sensor to
  * sensor. The other unknowns take the rest. */
@@ -37,7 +37,7 @@ _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 /* Square of the largest coefficient that counts: Q / F of 1, which is what friction holds. */
 #define TRACE_MOST ((struct scaled){19389, -22})
 
-#define X_MAX_Q12 (1 << 15)   /* 8 sigma */
+#define X_MAX_Q12 (1 << 15) /* 8 sigma */
 #define READING_BITS 15
 #define ERROR_MAX_Q4 ((1 << 18) - 1)
 #define SIGMA_MIN_Q16 10000 /* pitches; FIT_SIGMA_MIN is above */
@@ -49,25 +49,20 @@ _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 #define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
 #define OWN_MAX_Q12 ((int32_t)(FIT_OWN_SHARE_MAX * 4096.0f))
 
-static void set_dip(const struct fit_settings *settings, const struct fit_result *result,
-                    struct fit_load_look *look) {
+static void set_dip(const struct fit_settings *settings, const struct fit_result *result, struct fit_load_look *look) {
   look->dip_q18 = look->dip_per_q26 = 0;
   if (fit_has_dip(settings)) {
-    struct scaled ratio =
-        scaled_div(fit_grid_scaled(result->sigma_mm), fit_grid_scaled(settings->dip_sd_mm));
+    struct scaled ratio = scaled_div(fit_grid_scaled(result->sigma_mm), fit_grid_scaled(settings->dip_sd_mm));
     look->dip_q18 = fit_fixed(settings->dip_share, 18);
-    look->dip_per_q26 =
-        fixed_clamp(fit_scaled_to_fixed(scaled_mul(ratio, ratio), 26), 0, DIP_PER_MAX_Q26);
+    look->dip_per_q26 = fixed_clamp(fit_scaled_to_fixed(scaled_mul(ratio, ratio), 26), 0, DIP_PER_MAX_Q26);
   }
 }
 
 /* 2^shift: the readings' unit, 1/1024 Pa. */
-static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift,
-                     struct fit_load_look *look) {
+static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift, struct fit_load_look *look) {
   int32_t noise_q4 = fixed_clamp(shifted(settings->noise_Pa_q10, 4 - shift), 1, ERROR_MAX_Q4);
   int32_t model_q4 = (int32_t)((settings->model_sd_q16 * (uint32_t)shifted(largest, -shift)) >> 12);
-  look->base_q4 =
-      fixed_clamp(fixed_longer_leg(noise_q4, model_q4 >> MODEL_SHARE_SHIFT), 1, ERROR_MAX_Q4);
+  look->base_q4 = fixed_clamp(fixed_longer_leg(noise_q4, model_q4 >> MODEL_SHARE_SHIFT), 1, ERROR_MAX_Q4);
 }
 
 /* What is too far off for Q16 is so in both, and counts as the same place. */
@@ -106,8 +101,7 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
   int32_t x_q16 = fit_fixed(result->x_mm * per_pitch, 16);
   int32_t y_q16 = fit_fixed(result->y_mm * per_pitch, 16);
   int32_t sigma_q16 = fit_fixed(result->sigma_mm * per_pitch, 16);
-  int32_t per_sigma_q12 =
-      port_divide(1 << 28, sigma_q16 < SIGMA_MIN_Q16 ? SIGMA_MIN_Q16 : sigma_q16);
+  int32_t per_sigma_q12 = port_divide(1 << 28, sigma_q16 < SIGMA_MIN_Q16 ? SIGMA_MIN_Q16 : sigma_q16);
   int32_t(*row)[WORDS] = look->row;
   for (int k = 0; k < array->sensor_count; k++) {
     if (!(result->used >> k & 1)) {
@@ -117,8 +111,7 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
     (*row)[AT_X_Q12] = in_sigmas(array->x[k], x_q16, per_sigma_q12);
     (*row)[AT_Y_Q12] = in_sigmas(array->y[k], y_q16, per_sigma_q12);
     (*row)[READING_Q18] = shifted(reading * per_p0.mantissa, per_p0.exponent + shift - 10 + 18);
-    (*row)[GAIN_Q4] =
-        (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_size(reading)) >> 12);
+    (*row)[GAIN_Q4] = (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_size(reading)) >> 12);
     (*row)[OFF_X_Q12] = (*row)[OFF_Y_Q12] = (*row)[WIDER_Q15] = 0;
     if (settings->own) {
       const struct fit_own *own = &settings->own[k];
@@ -195,13 +188,12 @@ static NOINLINE void put_products(int a, const int32_t *sums, struct fit_load_lo
 }
 
 _Static_assert(UNKNOWNS == 7, "every pair is in one of these");
-#define TAKE_PRODUCTS(a)                                                                           \
-  static NOINLINE void take_products_##a(struct fit_load_look *look) {                             \
-    int32_t sums[4];                                                                               \
-    const int32_t *row = look->row[0];                                                             \
-    fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7,            \
-                       ((a) + 2) % 7, ((a) + 3) % 7);                                              \
-    put_products((a), sums, look);                                                                 \
+#define TAKE_PRODUCTS(a)                                                                                               \
+  static NOINLINE void take_products_##a(struct fit_load_look *look) {                                                 \
+    int32_t sums[4];                                                                                                   \
+    const int32_t *row = look->row[0];                                                                                 \
+    fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7); \
+    put_products((a), sums, look);                                                                                     \
   }
 TAKE_PRODUCTS(0)
 TAKE_PRODUCTS(1)
@@ -213,8 +205,7 @@ TAKE_PRODUCTS(6)
 
 /* Columns in the room that the sums have, and the diagonal 2^28 .. 2^30. */
 static void scale_columns(struct fit_load_look *look) {
-  int32_t prior_q30 =
-      fit_scaled_to_fixed(scaled_mul(look->base, fit_scaled_from(FAR_PER_SD, 0)), 30);
+  int32_t prior_q30 = fit_scaled_to_fixed(scaled_mul(look->base, fit_scaled_from(FAR_PER_SD, 0)), 30);
   for (int u = 0; u < UNKNOWNS; u++) {
     int32_t own = normalise(look, u, u == FAR ? prior_q30 : 0);
     int32_t up = own >> 30 ? 0 : (30 - fixed_bits((uint32_t)own | 1)) >> 1;
@@ -238,8 +229,7 @@ static void take_products(struct fit_load_look *look) {
 /* What the unknown explains of the square of the residual. */
 static NOINLINE int32_t eliminate(struct fit_load_look *look, int j) {
   int32_t over[UNKNOWNS];
-  struct fixed_pivot pivot =
-      fixed_eliminate(look->matrix[0], UNKNOWNS, UNKNOWNS, j, look->right, over);
+  struct fixed_pivot pivot = fixed_eliminate(look->matrix[0], UNKNOWNS, UNKNOWNS, j, look->right, over);
   return pivot.own * pivot.over * 2;
 }
 
@@ -250,30 +240,25 @@ static NOINLINE struct scaled trace_of(struct fit_load_look *look) {
   for (int j = 0; j < UNKNOWNS; j++) {
     left -= eliminate(look, j);
   }
-  if (look->matrix[PULL_X][PULL_X] < FIXED_PIVOT_LEAST ||
-      look->matrix[PULL_Y][PULL_Y] < FIXED_PIVOT_LEAST) {
+  if (look->matrix[PULL_X][PULL_X] < FIXED_PIVOT_LEAST || look->matrix[PULL_Y][PULL_Y] < FIXED_PIVOT_LEAST) {
     return none;
   }
   struct scaled pivot_x = fit_scaled_from(look->matrix[PULL_X][PULL_X], -2 * look->q[PULL_X]);
   struct scaled pivot_y = fit_scaled_from(look->matrix[PULL_Y][PULL_Y], -2 * look->q[PULL_Y]);
-  struct scaled both = fit_scaled_from(look->matrix[PULL_Y][PULL_X],
-                                       -look->q[PULL_X] - look->q[PULL_Y]);
-  struct scaled right_x =
-      fit_scaled_from(look->right[PULL_X], -look->q[PULL_X] - look->q[RESIDUAL]);
-  struct scaled right_y =
-      fit_scaled_from(look->right[PULL_Y], -look->q[PULL_Y] - look->q[RESIDUAL]);
+  struct scaled both = fit_scaled_from(look->matrix[PULL_Y][PULL_X], -look->q[PULL_X] - look->q[PULL_Y]);
+  struct scaled right_x = fit_scaled_from(look->right[PULL_X], -look->q[PULL_X] - look->q[RESIDUAL]);
+  struct scaled right_y = fit_scaled_from(look->right[PULL_Y], -look->q[PULL_Y] - look->q[RESIDUAL]);
   struct scaled per_x = fit_grid_reciprocal(pivot_x), per_y = fit_grid_reciprocal(pivot_y);
   struct scaled lean = scaled_mul(fit_scaled_short(both), per_x);
   struct scaled y = scaled_mul(right_y, per_y);
-  struct scaled x = fit_scaled_short(
-      scaled_sub(scaled_mul(right_x, per_x), fit_scaled_short(scaled_mul(lean, y))));
+  struct scaled x = fit_scaled_short(scaled_sub(scaled_mul(right_x, per_x), fit_scaled_short(scaled_mul(lean, y))));
   struct scaled square = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
   struct scaled form_x = scaled_add(per_x, scaled_mul(scaled_mul(lean, lean), per_y));
   struct scaled variance = scaled_mul(look->base, look->base);
   /* Residuals that the model does not explain count as errors of the readings. */
   int32_t freedom = look->count - UNKNOWNS;
-  struct scaled found = fit_scaled_from(port_divide(left > 0 ? left : 0, freedom < 1 ? 1 : freedom),
-                                        -2 * look->q[RESIDUAL]);
+  struct scaled found =
+      fit_scaled_from(port_divide(left > 0 ? left : 0, freedom < 1 ? 1 : freedom), -2 * look->q[RESIDUAL]);
   variance = scaled_sub(found, variance).mantissa > 0 ? found : variance;
   struct scaled by_chance = scaled_mul(fit_scaled_short(variance), scaled_add(form_x, per_y));
   by_chance = fit_scaled_short(by_chance);
@@ -286,8 +271,7 @@ static NOINLINE struct scaled trace_of(struct fit_load_look *look) {
 }
 
 static bool is_located(const struct fit_result *result) {
-  return (result->flags & CONTACT_FLAG_FIT_VALID) &&
-         !(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT));
+  return (result->flags & CONTACT_FLAG_FIT_VALID) && !(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT));
 }
 
 void fit_load_begin(struct fit_load *load) {
@@ -295,24 +279,22 @@ void fit_load_begin(struct fit_load *load) {
   load->part = 0;
 }
 
-void fit_load_widen(const struct fit_load *load, const struct fit_array *array,
-                    const struct fit_settings *settings, struct fit_result *result) {
+void fit_load_widen(const struct fit_load *load, const struct fit_array *array, const struct fit_settings *settings,
+                    struct fit_result *result) {
   if (!is_located(result) || (load->known && load->ratio == 0.0f)) {
     return;
   }
   float by_pitch = SHIFT_PER_PITCH * array->pitch_mm;
   float by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
-  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f,
-                                          load->known ? load->ratio : FIT_LOAD_USUAL,
+  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, load->known ? load->ratio : FIT_LOAD_USUAL,
                                           by_pitch > by_sigma ? by_pitch : by_sigma);
   if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }
 }
 
-void fit_load_follow(struct fit_load *load, const struct fit_array *array,
-                     const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                     const struct fit_result *result) {
+void fit_load_follow(struct fit_load *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                     const struct fit_settings *settings, const struct fit_result *result) {
   struct fit_load_look *look = &load->look;
   switch (load->part) {
   case 0:
@@ -333,8 +315,8 @@ void fit_load_follow(struct fit_load *load, const struct fit_array *array,
     take_products(look);
     break;
   default: {
-    struct scaled ratio = scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))),
-                                     fit_grid_scaled(RATIO_PER_TRACE));
+    struct scaled ratio =
+        scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))), fit_grid_scaled(RATIO_PER_TRACE));
     load->ratio = fit_float(ratio.mantissa, ratio.exponent);
     load->known = true;
   }

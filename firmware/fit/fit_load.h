@@ -20,8 +20,7 @@
 /* With fewer sensors the residual shows nothing. With more than 24 there is no look, unless the
  * build is for a larger rectangle. */
 #define FIT_LOAD_SENSORS 8
-#define FIT_LOAD_SENSORS_MAX                                                                       \
-  (FIT_GRID_COLUMNS * FIT_GRID_ROWS > 24 ? FT_MAX_SENSORS : 24)
+#define FIT_LOAD_SENSORS_MAX (FIT_GRID_COLUMNS * FIT_GRID_ROWS > 24 ? FT_MAX_SENSORS : 24)
 
 /* Q / F that is usual in a gripper. */
 #define FIT_LOAD_USUAL 0.2f
@@ -61,13 +60,12 @@ void fit_load_begin(struct fit_load *load);
 
 /* Adds to location_sd_mm what the load does, as far as it is known, and sets UNCERTAIN if that
  * exceeds the limit. Leaves a result alone that is no fit, stopped at a limit, or is FLAT. */
-void fit_load_widen(const struct fit_load *load, const struct fit_array *array,
-                    const struct fit_settings *settings, struct fit_result *result);
+void fit_load_widen(const struct fit_load *load, const struct fit_array *array, const struct fit_settings *settings,
+                    struct fit_result *result);
 
 /* The next part of a look. A look begins with these readings, which are those of the result; its
  * later parts do not see them. A result that fit_load_widen leaves alone begins none. */
-void fit_load_follow(struct fit_load *load, const struct fit_array *array,
-                     const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                     const struct fit_result *result);
+void fit_load_follow(struct fit_load *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                     const struct fit_settings *settings, const struct fit_result *result);
 
 #endif

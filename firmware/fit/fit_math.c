@@ -44,8 +44,7 @@ float fit_exp2_negative(float z) {
 
 int32_t fit_log2_q24(uint32_t value) {
   int32_t whole = 31 - __builtin_clz(value);
-  int32_t f_q28 =
-      (int32_t)((whole > 28 ? value >> (whole - 28) : value << (28 - whole)) & 0x0FFFFFFF);
+  int32_t f_q28 = (int32_t)((whole > 28 ? value >> (whole - 28) : value << (28 - whole)) & 0x0FFFFFFF);
   /* Least-squares polynomial of log2(1 + f) on Chebyshev nodes of [0, 1], coefficients Q28. */
   int32_t f_q30 = f_q28 << 2;
   int32_t sum = -22242749;

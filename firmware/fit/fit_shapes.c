@@ -20,9 +20,8 @@
 
 static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 
-static NOINLINE bool weigh(const struct fit_array *array, const struct fit_settings *settings,
-                           uint32_t used, const struct readings *readings,
-                           struct fit_shapes_pad *pad) {
+static NOINLINE bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
+                           const struct readings *readings, struct fit_shapes_pad *pad) {
   struct fit_shapes_frame *frame = &pad->room.frame;
   int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, 1 << 18);
   frame->base_q22 = fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
@@ -31,10 +30,8 @@ static NOINLINE bool weigh(const struct fit_array *array, const struct fit_setti
     uint8_t sensor = array->grid.sensor[k];
     pad->room.weight_q12[k] = 0;
     if (used >> sensor & 1) {
-      int32_t gain =
-          (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * fixed_size(readings->q14[k]) >> 8);
-      pad->room.weight_q12[k] =
-          port_divide(frame->base_q22 << 8, fixed_longer_leg(frame->base_q22, gain) >> 4);
+      int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * fixed_size(readings->q14[k]) >> 8);
+      pad->room.weight_q12[k] = port_divide(frame->base_q22 << 8, fixed_longer_leg(frame->base_q22, gain) >> 4);
       sensors++;
     }
   }
@@ -74,12 +71,12 @@ static NOINLINE void set_known(const struct fit_array *array, const struct fit_s
 
 /* The models move and grow as the Gaussian does. Of what it is not the model, its place is unsure:
  * what that explains is no movement. */
-static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fit,
-                   struct fit_shapes_state *state, int32_t sum_q20) {
+static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state,
+                   int32_t sum_q20) {
   int32_t x = place_q20(pad, fit->x_mm) - pad->origin_x_q20;
   int32_t y = place_q20(pad, fit->y_mm) - pad->origin_y_q20;
-  if (state->frames > 0 && (sum_q20 < 1 << 18 || state->sum_q20 < 1 << 18 ||
-                            sum_q20 >> 2 >= state->sum_q20 || state->sum_q20 >> 2 >= sum_q20)) {
+  if (state->frames > 0 && (sum_q20 < 1 << 18 || state->sum_q20 < 1 << 18 || sum_q20 >> 2 >= state->sum_q20 ||
+                            state->sum_q20 >> 2 >= sum_q20)) {
     state->frames = 0;
   }
   if (state->frames > 0) {
@@ -129,15 +126,13 @@ static void advance(struct fit_shapes_pad *pad, int model, struct fit_shapes_sta
   }
 }
 
-static enum fit_shapes_progress forget(struct fit_shapes_state *state,
-                                       struct fit_shapes_result *result) {
+static enum fit_shapes_progress forget(struct fit_shapes_state *state, struct fit_shapes_result *result) {
   state->part = state->frames = 0;
   *result = (struct fit_shapes_result){0};
   return FIT_SHAPES_ANSWERED;
 }
 
-static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad,
-                                       struct fit_shapes_state *state,
+static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad, struct fit_shapes_state *state,
                                        struct fit_shapes_result *result) {
   int best = fit_shapes_best(pad, state->chi_square_q8, state->at);
   *result = (struct fit_shapes_result){0};
@@ -154,9 +149,8 @@ static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad,
 }
 
 /* What all parts of a frame need. */
-static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                 const struct fit_settings *settings, const struct fit_result *fit,
-                 struct fit_shapes_pad *pad) {
+static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                 const struct fit_result *fit, struct fit_shapes_pad *pad) {
   struct readings readings;
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &readings) ||
@@ -168,10 +162,8 @@ static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10,
 }
 
 enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad,
-                                         const int32_t *pressure_Pa_q10,
-                                         const struct fit_settings *settings,
-                                         const struct fit_result *fit,
-                                         struct fit_shapes_state *state,
+                                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                                         const struct fit_result *fit, struct fit_shapes_state *state,
                                          struct fit_shapes_result *result) {
   const bool first = state->part == 0;
   if (first && !take(array, pressure_Pa_q10, settings, fit, pad)) {
@@ -201,9 +193,8 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
   return state->frames == FIRST_ANSWER ? answer(pad, state, result) : FIT_SHAPES_STEPPED;
 }
 
-bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
-                const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                const struct fit_result *fit, struct fit_shapes_state *state,
+bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad, const int32_t *pressure_Pa_q10,
+                const struct fit_settings *settings, const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result) {
   enum fit_shapes_progress progress;
   do {

@@ -110,8 +110,8 @@ struct fit_shapes_pad {
   int32_t spread_q20, per_spread_sd_q4, spread_least_q20, spread_most_q20;
   float pitch_mm, per_pitch;
   int32_t pitch_q22_mm, per_pitch_q28, origin_x_q20, origin_y_q20; /* the origin node's place */
-  float force_unit_N; /* normal force of amplitude 1 at 1 Pa */
-  float widest_mm2;   /* variance of the widest normal term */
+  float force_unit_N;                                              /* normal force of amplitude 1 at 1 Pa */
+  float widest_mm2;                                                /* variance of the widest normal term */
   struct {
     struct fit_shapes_frame frame;
     int32_t row[FIT_SHAPES_NODES][FIT_SHAPES_UNKNOWNS + 1];
@@ -132,9 +132,8 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
 /* Whether the result is of this frame. Where it is not, the one before stands: every other frame
  * only steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
  * settings: its dip is the pad's, and cut_noises 0. */
-bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
-                const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                const struct fit_result *fit, struct fit_shapes_state *state,
+bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad, const int32_t *pressure_Pa_q10,
+                const struct fit_settings *settings, const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result);
 
 /* The same in parts: call it with the same pad, readings, fit and settings until the frame is done.
@@ -145,10 +144,8 @@ enum fit_shapes_progress {
   FIT_SHAPES_ANSWERED, /* the frame is done, and the result is of it */
 };
 enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad,
-                                         const int32_t *pressure_Pa_q10,
-                                         const struct fit_settings *settings,
-                                         const struct fit_result *fit,
-                                         struct fit_shapes_state *state,
+                                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                                         const struct fit_result *fit, struct fit_shapes_state *state,
                                          struct fit_shapes_result *result);
 
 #endif

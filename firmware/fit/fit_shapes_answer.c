@@ -14,12 +14,11 @@
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the
  * readings. */
-static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first,
-                                          int32_t a_q20, int second, int32_t b_q20) {
+static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20,
+                                          int second, int32_t b_q20) {
   const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   int32_t w_q10[UNKNOWNS], sum_q13 = 0;
-  int32_t q =
-      equations->q[first] > equations->q[second] ? equations->q[first] : equations->q[second];
+  int32_t q = equations->q[first] > equations->q[second] ? equations->q[first] : equations->q[second];
   int32_t a_q10 = shifted(a_q20, equations->q[first] - q - 10);
   int32_t b_q10 = shifted(b_q20, equations->q[second] - q - 10);
   for (int j = 0; j < equations->count; j++) {
@@ -55,22 +54,19 @@ static float sd_of(struct scaled scale, struct scaled form, struct scaled varian
   return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
 
-static NOINLINE void put_two(const struct fit_shapes_pad *pad,
-                             const struct fit_shapes_equations *equations, const int32_t *at,
-                             const struct scales *scales, struct fit_shapes_result *result) {
+static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations,
+                             const int32_t *at, const struct scales *scales, struct fit_shapes_result *result) {
   for (int c = 0; c < 2; c++) {
     int32_t sign = (c == 0) == (at[BALANCE] >= 0) ? 1 : -1;
     int32_t share_q20 = (ONE_Q20 + sign * at[BALANCE]) / 2;
     result->x_mm[c] = mm(pad, pad->origin_x_q20 + at[PLACE_X] + sign * at[SPAN_X]);
     result->y_mm[c] = mm(pad, pad->origin_y_q20 + at[PLACE_Y] + sign * at[SPAN_Y]);
-    result->force_N[c] = product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20),
-                                                             fit_scaled_from(share_q20, -20)));
-    struct scaled place =
-        scaled_add(variance_of(equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
-                   variance_of(equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
+    result->force_N[c] =
+        product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20), fit_scaled_from(share_q20, -20)));
+    struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
+                                     variance_of(equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
     result->location_sd_mm[c] = sd_of(scales->pitch, place, scales->variance);
-    struct scaled force =
-        variance_of(equations, AMPLITUDE, share_q20, BALANCE, sign * (at[AMPLITUDE] >> 1));
+    struct scaled force = variance_of(equations, AMPLITUDE, share_q20, BALANCE, sign * (at[AMPLITUDE] >> 1));
     result->force_sd_N[c] = sd_of(scales->unit, force, scales->variance);
   }
 }
@@ -88,8 +84,7 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations, cons
   struct scaled reach = fit_scaled_sqrt(square);
   int32_t ux_q20 = fit_scaled_to_fixed(scaled_div(x, reach), 20);
   int32_t uy_q20 = fit_scaled_to_fixed(scaled_div(y, reach), 20);
-  struct scaled sure =
-      scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20), scales->variance);
+  struct scaled sure = scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20), scales->variance);
   sure.mantissa *= LINE_SURE;
   if (scaled_sub(square, fit_scaled_short(sure)).mantissa <= 0) {
     return;
@@ -100,21 +95,18 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations, cons
   result->along_x = fit_float(sign * ux_q20, -20);
   result->along_y = fit_float(sign * uy_q20, -20);
   result->angle_sd_rad =
-      sd_of(fit_grid_reciprocal(reach), variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20),
-            scales->variance);
+      sd_of(fit_grid_reciprocal(reach), variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
 }
 
-static NOINLINE void put_one(const struct fit_shapes_pad *pad,
-                             const struct fit_shapes_equations *equations, const int32_t *at,
-                             const struct scales *scales, struct fit_shapes_result *result) {
+static NOINLINE void put_one(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations,
+                             const int32_t *at, const struct scales *scales, struct fit_shapes_result *result) {
   result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
   result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
   result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
   struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, PLACE_Y, 0),
                                    variance_of(equations, PLACE_Y, ONE_Q20, PLACE_X, 0));
   result->location_sd_mm[0] = sd_of(scales->pitch, place, scales->variance);
-  result->force_sd_N[0] =
-      sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
+  result->force_sd_N[0] = sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
 /* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by a quarter. */
@@ -140,13 +132,11 @@ static bool can_be_two(const struct fit_shapes_at *pair) {
   const int32_t *at = pair->value, square_q20 = span_square_q20(pair);
   uint32_t reach_x = fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]);
   uint32_t reach_y = fixed_size(at[PLACE_Y]) + fixed_size(at[SPAN_Y]);
-  return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 &&
-         square_q20 > SQUARE * at[SPREAD] && reach_x < COLUMNS / 2 * ONE_Q20 + BESIDE_Q20 &&
-         reach_y < ROWS / 2 * ONE_Q20 + BESIDE_Q20;
+  return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 && square_q20 > SQUARE * at[SPREAD] &&
+         reach_x < COLUMNS / 2 * ONE_Q20 + BESIDE_Q20 && reach_y < ROWS / 2 * ONE_Q20 + BESIDE_Q20;
 }
 
-int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8,
-                    const struct fit_shapes_at *at) {
+int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at) {
   int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
   bool is_longest = span_square_q20(&at[LONG]) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10;
   /* A point's spread is 0, and the least is far from that. */
@@ -193,8 +183,7 @@ static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32
   const float usual = (float)(FIT_SHAPES_ERRORS << 8), found = (float)chi_square_q8[best];
   const float times = found > usual ? found / usual : 1.0f;
   for (int c = 0; c < 2; c++) {
-    result->location_sd_mm[c] =
-        fit_quadrature(times, result->location_sd_mm[c], times, sqrtf(square_mm2[c] / total));
+    result->location_sd_mm[c] = fit_quadrature(times, result->location_sd_mm[c], times, sqrtf(square_mm2[c] / total));
   }
 }
 

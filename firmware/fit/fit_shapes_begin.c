@@ -19,8 +19,7 @@ static void set_pair(float x, float y, float dx, float dy, float share, struct f
   at->value[BALANCE] = fit_fixed(share, 20);
 }
 
-static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad,
-                                          struct fit_shapes_at *at) {
+static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, struct fit_shapes_at *at) {
   const struct fit_shapes_frame *readings = &pad->room.frame;
   int first = 0, second = -1;
   int32_t most = 0;
@@ -32,8 +31,7 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad,
   int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1];
   struct squares squares;
   struct bell narrow, wide;
-  fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096,
-                         &squares);
+  fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096, &squares);
   fit_shapes_set_bell(&squares, terms.k_q24[0], &narrow);
   fit_shapes_set_bell(&squares, terms.k_q24[1], &wide);
   for (int k = 0; k < NODES; k++) {
@@ -95,8 +93,7 @@ void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, 
   float y = fit->y_mm * per - fit_float(pad->origin_y_q20, -20);
   struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
   amplitude.exponent += pad->room.frame.shift - 18;
-  at.value[AMPLITUDE] =
-      fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
+  at.value[AMPLITUDE] = fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
   at.value[SPREAD] = fit_fixed(spread, 20);
   at.value[PLACE_X] = pitches_q20(x);
   at.value[PLACE_Y] = pitches_q20(y);

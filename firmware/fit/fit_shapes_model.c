@@ -23,9 +23,9 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   const float per = 1.0f / array->pitch_mm, per_square = per * per;
   const float widest = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm * per;
   const float narrowest = profile->normal[0].sd_mm * per;
-  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS ||
-      !pad_profile_is_valid(profile) || narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN ||
-      widest > 1.5f || profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
+  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS || !pad_profile_is_valid(profile) ||
+      narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN || widest > 1.5f ||
+      profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
     return FT_ERR_ARGUMENT;
   }
   const float V = widest * widest;
@@ -58,8 +58,7 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   return FT_OK;
 }
 
-void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls,
-                          struct terms *terms) {
+void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls, struct terms *terms) {
   int32_t heights = 0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
     int32_t v_q26 = pad->variance_q26[j] + t_q20 * 64;
@@ -81,8 +80,7 @@ void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool 
 }
 
 static int set_blobs(int model, const int32_t *at, struct blob *blob) {
-  static const int32_t weight_q14[4] = {5342, 5342, 2850, 2850},
-                       lever_q14[4] = {5570, -5570, 14109, -14109};
+  static const int32_t weight_q14[4] = {5342, 5342, 2850, 2850}, lever_q14[4] = {5570, -5570, 14109, -14109};
   int count = model == ROUND ? 1 : model == LONG ? 4 : 2;
   for (int b = 0; b < count; b++) {
     if (model == TWO) {
@@ -124,8 +122,7 @@ void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct be
 }
 
 /* The same within 0.6 %, for what is little. */
-static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24,
-                                    struct bell *bell) {
+static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
   for (int i = 0; i < COLUMNS; i++) {
     bell->x_q15[i] = exp2_rough((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
   }
@@ -135,8 +132,7 @@ static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24
 }
 
 /* Begins the rows: the readings, and the broad term about the middle, of a pair about both. */
-static NOINLINE void set_far(struct fit_shapes_pad *pad, int model, const struct blob *blob,
-                             const int32_t *at) {
+static NOINLINE void set_far(struct fit_shapes_pad *pad, int model, const struct blob *blob, const int32_t *at) {
   struct squares squares;
   struct bell bell, other;
   const int32_t k_q24 = pad->far_k_q24;
@@ -171,8 +167,8 @@ static NOINLINE void set_far(struct fit_shapes_pad *pad, int model, const struct
 }
 
 /* Adds a blob to the rows, whose elements are Q15 (RESIDUAL Q28). */
-static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *terms, int model,
-                              const struct blob *blob, int32_t amplitude_q13) {
+static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *terms, int model, const struct blob *blob,
+                              int32_t amplitude_q13) {
   struct squares squares;
   struct bell narrow, wide, dip;
   fit_shapes_set_squares(blob->x_q12, blob->y_q12, &squares);
@@ -220,8 +216,7 @@ static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *te
   }
 }
 
-static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *terms,
-                              const int32_t *at) {
+static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *terms, const int32_t *at) {
   struct squares squares;
   struct bell bell[PAD_TANGENTIAL_TERMS];
   int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
@@ -250,8 +245,7 @@ void fit_shapes_round_places(struct fit_shapes_at *at) {
   }
 }
 
-void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count,
-                         const struct fit_shapes_at *where,
+void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations) {
   const int32_t *at = where->value;
   const bool pulls = count > BALANCE && model == LONG;

@@ -39,8 +39,7 @@ struct priors {
 
 /* What a spread makes of the profile: exponents, heights, and these over v and v^2. */
 struct terms {
-  int32_t k_q24[PAD_NORMAL_TERMS], h_q14[PAD_NORMAL_TERMS], q_q12[PAD_NORMAL_TERMS],
-      s_q8[PAD_NORMAL_TERMS];
+  int32_t k_q24[PAD_NORMAL_TERMS], h_q14[PAD_NORMAL_TERMS], q_q12[PAD_NORMAL_TERMS], s_q8[PAD_NORMAL_TERMS];
   int32_t pull_k_q24[PAD_TANGENTIAL_TERMS], pull_q12[PAD_TANGENTIAL_TERMS];
   int32_t dip_k_q24, dip_q14;
 };
@@ -56,15 +55,14 @@ struct squares {
 };
 
 /* fit_shapes_model.c */
-void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls,
-                          struct terms *terms);
+void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls, struct terms *terms);
 void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *squares);
 void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell);
 /* Where a step begins is rounded, which moves the step and not where it ends. */
 void fit_shapes_round_places(struct fit_shapes_at *at);
 /* The weighted rows of a model with so many unknowns, columns Q27 and residual Q28. */
-void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count,
-                         const struct fit_shapes_at *where, struct fit_shapes_equations *equations);
+void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
+                         struct fit_shapes_equations *equations);
 
 /* Whether a spread is at its least, but for what fit_shapes_round_places makes of it. */
 static inline bool fit_shapes_is_narrowest(const struct fit_shapes_pad *pad, int32_t spread_q20) {
@@ -81,16 +79,13 @@ void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, 
  * of the matrix that answers. */
 void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, struct priors *priors,
                                struct fit_shapes_equations *equations);
-int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad,
-                              const struct fit_shapes_equations *equations);
-void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors,
-                     struct fit_shapes_at *at);
+int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations);
+void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors, struct fit_shapes_at *at);
 void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors,
                           const struct fit_shapes_at *at);
 
 /* fit_shapes_answer.c. at: where each model is. */
-int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8,
-                    const struct fit_shapes_at *at);
+int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at);
 void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result);
 

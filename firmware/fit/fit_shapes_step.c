@@ -52,8 +52,7 @@ static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size,
 }
 
 /* The sums of the products of a column with two others. */
-static NOINLINE void sum_products(const int32_t *a, const int32_t *b, const int32_t *c,
-                                  int32_t sums[2]) {
+static NOINLINE void sum_products(const int32_t *a, const int32_t *b, const int32_t *c, int32_t sums[2]) {
   int32_t first = 0, second = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t own = a[k];
@@ -130,8 +129,7 @@ static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *prior
 static NOINLINE void eliminate(struct fit_shapes_equations *equations, int32_t *right) {
   for (int j = 0; j < equations->count; j++) {
     int32_t over[UNKNOWNS];
-    struct fixed_pivot pivot =
-        fixed_eliminate(equations->matrix[0], UNKNOWNS, equations->count, j, right, over);
+    struct fixed_pivot pivot = fixed_eliminate(equations->matrix[0], UNKNOWNS, equations->count, j, right, over);
     equations->half[j] = (int8_t)pivot.half;
     equations->inverse_q14[j] = pivot.inverse_q14;
     right[j] = pivot.over;
@@ -142,8 +140,7 @@ static NOINLINE void eliminate(struct fit_shapes_equations *equations, int32_t *
 }
 
 /* x of L^T x = right, Q20 in the columns' units. */
-static NOINLINE void substitute(const struct fit_shapes_equations *equations, const int32_t *right,
-                                int32_t *x_q20) {
+static NOINLINE void substitute(const struct fit_shapes_equations *equations, const int32_t *right, int32_t *x_q20) {
   const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   for (int j = equations->count - 1; j >= 0; j--) {
     int32_t sum = right[j] * 64;
@@ -184,8 +181,7 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
       move[u] = fixed_mul_16(move[u], share_q14) * 4;
     }
     move[u] = fixed_clamp(move[u], -(1 << 22), 1 << 22);
-    at->value[u] = u == SPREAD ? fixed_clamp(at->value[u] + move[u], pad->spread_least_q20,
-                                             pad->spread_most_q20)
+    at->value[u] = u == SPREAD ? fixed_clamp(at->value[u] + move[u], pad->spread_least_q20, pad->spread_most_q20)
                                : fixed_clamp(at->value[u] + move[u], -limit, limit);
   }
   if (at->value[AMPLITUDE] < AMPLITUDE_LEAST) {
@@ -193,8 +189,7 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
   }
 }
 
-int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad,
-                              const struct fit_shapes_equations *equations) {
+int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations) {
   struct scaled base = fit_scaled_from(pad->room.frame.base_q22, -22);
   struct scaled squares = fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
@@ -202,11 +197,9 @@ int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad,
 
 /* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved.
  */
-static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations,
-                        int32_t spread) {
+static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
   int32_t right = equations->right[SPREAD];
-  if (!((fit_shapes_is_narrowest(pad, spread) && right < 0) ||
-        (spread > pad->spread_most_q20 - 256 && right > 0))) {
+  if (!((fit_shapes_is_narrowest(pad, spread) && right < 0) || (spread > pad->spread_most_q20 - 256 && right > 0))) {
     return;
   }
   for (int u = 0; u < SPREAD; u++) {
@@ -219,9 +212,8 @@ static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equa
 }
 
 /* Factors of the damped matrix; right: of the step that it asks for. */
-static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t spread,
-                               const struct fit_shapes_pad *pad, int damping_shift,
-                               int32_t *right) {
+static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t spread, const struct fit_shapes_pad *pad,
+                               int damping_shift, int32_t *right) {
   hold_spread(pad, equations, spread);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
@@ -230,8 +222,7 @@ static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t s
   eliminate(equations, right);
 }
 
-void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors,
-                     struct fit_shapes_at *at) {
+void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors, struct fit_shapes_at *at) {
   struct fit_shapes_equations *equations = &pad->room.equations[model];
   int32_t right[UNKNOWNS], x_q20[UNKNOWNS] = {0};
   form(pad, priors, equations);

@@ -101,12 +101,10 @@ static bool is_carried(const struct fit_pad *pad, int from, int end, float t, bo
   return sums[0] <= SUM_MAX_0 && sums[1] <= SUM_MAX_1 && sums[2] <= SUM_MAX_2;
 }
 
-enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
-                            const struct pad_profile *profile) {
+enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, const struct pad_profile *profile) {
   float widest_mm = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
-  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS ||
-      !pad_profile_is_valid(profile) || 2.0f * widest_mm > UNIT_MAX_mm ||
-      array->pitch_mm > PITCH_MAX * 2.0f * widest_mm) {
+  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS || !pad_profile_is_valid(profile) ||
+      2.0f * widest_mm > UNIT_MAX_mm || array->pitch_mm > PITCH_MAX * 2.0f * widest_mm) {
     return FT_ERR_ARGUMENT;
   }
   int32_t pitch_q12 = (int32_t)(array->pitch_mm / (2.0f * widest_mm) * 4096.0f + 0.5f);
@@ -114,10 +112,8 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
   float per_unit = 1.0f / unit_mm;
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {
     bool normal = j < PAD_NORMAL_TERMS;
-    float sd_mm =
-        normal ? profile->normal[j].sd_mm : profile->tangential[j - PAD_NORMAL_TERMS].sd_mm;
-    float strength = normal ? profile->normal[j].share
-                            : profile->tangential[j - PAD_NORMAL_TERMS].moment_mm * per_unit;
+    float sd_mm = normal ? profile->normal[j].sd_mm : profile->tangential[j - PAD_NORMAL_TERMS].sd_mm;
+    float strength = normal ? profile->normal[j].share : profile->tangential[j - PAD_NORMAL_TERMS].moment_mm * per_unit;
     float sd = sd_mm * per_unit;
     if (sd * sd > VARIANCE_MAX || strength > VARIANCE_MAX) {
       return FT_ERR_ARGUMENT;
@@ -144,8 +140,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
   }
   float force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
   pad->force_unit = (struct scaled){fit_fixed(force_unit_N, FORCE_UNIT_Q), -FORCE_UNIT_Q};
-  bool near_ends =
-      profile->overhang_mm > 0.0f && profile->overhang_mm < NEAR_ENDS * profile->thickness_mm;
+  bool near_ends = profile->overhang_mm > 0.0f && profile->overhang_mm < NEAR_ENDS * profile->thickness_mm;
   pad->chi_square_max = near_ends                     ? CHI_SQUARE_MAX_NEAR_ENDS
                         : profile->overhang_mm > 0.0f ? CHI_SQUARE_MAX_WITH_ENDS
                                                       : CHI_SQUARE_MAX;
@@ -158,9 +153,8 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
 }
 
 /* What a reading's errors are, and the weights that follow. False: too few sensors. */
-NOINLINE static bool weigh(const struct fit_array *array, const struct fit_settings *settings,
-                           uint32_t used, struct problem *problem,
-                           struct fit_tangential_room *room) {
+NOINLINE static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
+                           struct problem *problem, struct fit_tangential_room *room) {
   const struct readings *readings = &problem->readings;
   int32_t noise = shifted(settings->noise_Pa_q10, readings->shift - 6);
   noise = fixed_clamp(noise, 1, ONE_Q26 >> 5);
@@ -188,16 +182,16 @@ NOINLINE static bool weigh(const struct fit_array *array, const struct fit_setti
 }
 
 /* What the Gaussian says of the unknowns. */
-NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_result *fit,
-                                  int32_t shift, struct fit_tangential_unknowns *at) {
+NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_result *fit, int32_t shift,
+                                  struct fit_tangential_unknowns *at) {
   at->x_q26 = product(fit_fixed(fit->x_mm, 24) - pad->origin_x_q24_mm, pad->per_unit_q30, 28);
   at->y_q26 = product(fit_fixed(fit->y_mm, 24) - pad->origin_y_q24_mm, pad->per_unit_q30, 28);
   at->x_q26 = fixed_clamp(at->x_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
   at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
   int32_t sigma_q26 = product(fit_fixed(fit->sigma_mm, 24), pad->per_unit_q30, 28);
   sigma_q26 = fixed_clamp(sigma_q26, 0, 2 * ONE_Q26);
-  at->t_q26 = fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26,
-                          spread_least(pad), SPREAD_MOST_Q26);
+  at->t_q26 =
+      fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26, spread_least(pad), SPREAD_MOST_Q26);
   at->e1_q26 = at->e2_q26 = at->pull_x_q24 = at->pull_y_q24 = 0;
   struct scaled amplitude = scaled_mul(fit_grid_scaled(fit->force_N), pad->per_force);
   amplitude.exponent += shift - 18;
@@ -224,14 +218,12 @@ static int32_t in_proportion(int32_t value, int32_t share_q13, int32_t most) {
 /* Where the estimate begins: at the Gaussian's, or where the last frame's ended, moved as the
  * Gaussian has moved, unless its noise may have done that, and in proportion to the readings. */
 NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state,
-                           const struct fit_tangential_unknowns *fit, int32_t noise_q26,
-                           int32_t sum_q20) {
+                           const struct fit_tangential_unknowns *fit, int32_t noise_q26, int32_t sum_q20) {
   struct fit_tangential_unknowns *at = &state->at;
   int32_t before = state->sum_q20;
   int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
   uint32_t moved_q26 = fixed_size(dx_q26) + fixed_size(dy_q26);
-  bool other = sum_q20 < SUM_LEAST_Q20 || before < SUM_LEAST_Q20 || sum_q20 >> 2 >= before ||
-               before >> 2 >= sum_q20;
+  bool other = sum_q20 < SUM_LEAST_Q20 || before < SUM_LEAST_Q20 || sum_q20 >> 2 >= before || before >> 2 >= sum_q20;
   if (state->steps == 0 || other) {
     *at = *fit;
   } else {
@@ -264,8 +256,7 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
  * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
-static struct scaled variance_of(const struct fit_tangential_room *room,
-                                 const struct outcome *outcome, int u, int pull,
+static struct scaled variance_of(const struct fit_tangential_room *room, const struct outcome *outcome, int u, int pull,
                                  int32_t *with_pull_q8) {
   const struct solution *solution = &outcome->solution;
   int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
@@ -287,10 +278,9 @@ static struct scaled variance_of(const struct fit_tangential_room *room,
 
 /* How far the place moves for a change of Q / F along the same axis, if the other unknowns follow:
  * from its row of the inverse of L, 2^half of it. length: with the amplitude. */
-static int32_t moved_q20(const struct outcome *outcome, struct scaled length, int axis,
-                         int32_t with_pull_q8) {
-  int32_t q = outcome->column_q[PLACE_X + axis] - outcome->column_q[PULL_X + axis] -
-              outcome->solution.half[PULL_X + axis] - 8;
+static int32_t moved_q20(const struct outcome *outcome, struct scaled length, int axis, int32_t with_pull_q8) {
+  int32_t q =
+      outcome->column_q[PLACE_X + axis] - outcome->column_q[PULL_X + axis] - outcome->solution.half[PULL_X + axis] - 8;
   return shifted(with_pull_q8 * length.mantissa, q + length.exponent + 20);
 }
 
@@ -299,15 +289,15 @@ static bool exceeds(struct scaled a, struct scaled b) {
 }
 
 /* square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
-static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome,
-                         struct scaled square, struct scaled round, struct scaled variance) {
+static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square,
+                         struct scaled round, struct scaled variance) {
   const struct scaled least = {(int32_t)(ELONGATED_LEAST * ELONGATED_LEAST * 8388608.0f), -23};
   if (!exceeds(square, scaled_mul(least, scaled_mul(round, round)))) {
     return false;
   }
   const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 2048.0f), -12};
-  struct scaled twice = scaled_add(variance_of(room, outcome, STRETCH, 0, NULL),
-                                   variance_of(room, outcome, SLANT, 0, NULL));
+  struct scaled twice =
+      scaled_add(variance_of(room, outcome, STRETCH, 0, NULL), variance_of(room, outcome, SLANT, 0, NULL));
   return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
@@ -328,8 +318,7 @@ static struct scaled misfit_factor(const struct problem *problem, int32_t misfit
   return fit_scaled_from(misfit_q16, -16);
 }
 
-NOINLINE static void conclude(const struct problem *problem,
-                              const struct fit_tangential_unknowns *at,
+NOINLINE static void conclude(const struct problem *problem, const struct fit_tangential_unknowns *at,
                               const struct outcome *outcome, struct fit_tangential *result) {
   const struct fit_pad *pad = problem->pad;
   const struct fit_tangential_room *room = &pad->room;
@@ -342,22 +331,20 @@ NOINLINE static void conclude(const struct problem *problem,
   struct scaled e1 = fit_scaled_from(at->e1_q26, -26), e2 = fit_scaled_from(at->e2_q26, -26);
   struct scaled square = scaled_add(scaled_mul(e1, e1), scaled_mul(e2, e2));
   struct scaled amplitude = fit_scaled_from(at->amplitude_q24, -24);
-  struct scaled round =
-      scaled_mul(amplitude, fit_scaled_from(ONE_Q26 / 4 + at->t_q26, -26)); /* A v */
+  struct scaled round = scaled_mul(amplitude, fit_scaled_from(ONE_Q26 / 4 + at->t_q26, -26)); /* A v */
   struct scaled longest = scaled_mul((struct scaled){pad->long_most_q15, -15}, round);
   longest = fit_scaled_short(longest);
   if (exceeds(square, scaled_mul(longest, longest))) {
     return;
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
-  struct scaled pull_variance =
-      scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL));
+  struct scaled pull_variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL));
   pull_variance = fit_scaled_short(pull_variance);
   variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE));
   variance = fit_scaled_short(variance);
   int32_t x_q8, y_q8;
-  struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL),
-                                   variance_of(room, outcome, PULL_Y, 0, NULL));
+  struct scaled pulls =
+      scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));
   pulls.exponent -= 1;
   struct scaled place = scaled_add(variance_of(room, outcome, PLACE_X, PULL_X, &x_q8),
                                    variance_of(room, outcome, PLACE_Y, PULL_Y, &y_q8));
@@ -379,8 +366,7 @@ NOINLINE static void conclude(const struct problem *problem,
   result->q_sd_N = composed(scaled_mul(unit, pull_sd));
   result->location_sd_mm = composed(scaled_mul(length, root_of_product(place, variance)));
   struct scaled noise = fit_scaled_from(problem->noise_q22, -22);
-  result->location_noise_mm =
-      composed(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
+  result->location_noise_mm = composed(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
   struct scaled height = variance_of(room, outcome, AMPLITUDE, 0, NULL);
   result->force_sd_N = composed(scaled_mul(unit, root_of_product(height, variance)));
   struct scaled moved = scaled_mul(length, amplitude);
@@ -390,8 +376,7 @@ NOINLINE static void conclude(const struct problem *problem,
 }
 
 /* What a calibration knows of the pad. */
-static void set_known(const struct fit_array *array, const struct fit_settings *settings,
-                      struct problem *problem) {
+static void set_known(const struct fit_array *array, const struct fit_settings *settings, struct problem *problem) {
   problem->own = settings->own;
   problem->sensor = array->grid.sensor;
   problem->dip_share_q16 = 0;
@@ -408,10 +393,9 @@ static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
   return base_q26 / 2 >= sd_q26 ? 2 * ONE_Q26 : fixed_div_q26(base_q26, sd_q26) | 1;
 }
 
-void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
-                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                         const struct fit_result *fit, struct fit_tangential_state *state,
-                         struct fit_tangential *result) {
+void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
+                         const struct fit_settings *settings, const struct fit_result *fit,
+                         struct fit_tangential_state *state, struct fit_tangential *result) {
   *result = (struct fit_tangential){0};
   struct problem problem;
   problem.pad = pad;
@@ -428,8 +412,7 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   struct outcome outcome;
   set_from_fit(pad, fit, problem.readings.shift, &said);
   begin(pad, state, &said,
-        product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30,
-                28),
+        product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30, 28),
         sum_of(&problem.readings));
   int32_t long_sd_q26 = fixed_mul_q28(said.amplitude_q24 * 4, pad->long_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);

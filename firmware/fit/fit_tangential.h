@@ -60,20 +60,19 @@ struct fit_pad {
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
-  int32_t spread_q26, spread_sd_q26; /* prior of the contact's own variance */
-  int32_t long_sd_q26;               /* and of its elongations */
-  struct scaled force_unit;          /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
-  struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
+  int32_t spread_q26, spread_sd_q26;     /* prior of the contact's own variance */
+  int32_t long_sd_q26;                   /* and of its elongations */
+  struct scaled force_unit;              /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
+  struct scaled per_force;               /* amplitude of the Gaussian's 1 N at 1 Pa */
   int32_t chi_square_max, long_most_q15; /* no report beyond these */
-  struct scaled thin; /* by which variances grow on a pad thinner than the pitch */
+  struct scaled thin;                    /* by which variances grow on a pad thinner than the pitch */
   struct fit_tangential_room room;
 };
 
 /* FT_ERR_ARGUMENT: the array is no full rectangle of the grid that this build knows, or the profile
  * is not valid (pad_profile.h), or it is no layer's: its terms are narrower, stronger or wider than
  * those of layers of PAD_THICKNESS_MIN_mm to PAD_THICKNESS_MAX_mm on this pitch. */
-enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
-                            const struct pad_profile *profile);
+enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, const struct pad_profile *profile);
 
 struct fit_tangential_unknowns {
   int32_t amplitude_q24; /* of the unit of readings */
@@ -100,9 +99,9 @@ struct fit_tangential {
   float force_N, force_sd_N;               /* normal force */
   float qx_N, qy_N;                        /* of the object on the rubber, along x and y */
   float q_sd_N;                            /* standard deviation of either */
-  int32_t moved_q20_mm[2]; /* how far along x the place would lie elsewhere if qx / force were larger
-                              by 1, and along y of qy; what moves across is a tenth of that */
-  bool elongated; /* the contact is not round, whatever the Gaussian makes of its load */
+  int32_t moved_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
+                                              by 1, and along y of qy; what moves across is a tenth of that */
+  bool elongated;                          /* the contact is not round, whatever the Gaussian makes of its load */
 };
 
 /* A contact at rest is at its optimum after so many frames. */
@@ -115,9 +114,8 @@ struct fit_tangential {
  * the pad ends near), and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
-void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
-                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                         const struct fit_result *fit, struct fit_tangential_state *state,
-                         struct fit_tangential *result);
+void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
+                         const struct fit_settings *settings, const struct fit_result *fit,
+                         struct fit_tangential_state *state, struct fit_tangential *result);
 
 #endif

@@ -20,8 +20,8 @@ struct offset {
   int32_t along_x_q17, along_y_q17; /* in x e1 d and e2 d, in y e2 d and -e1 d */
 };
 
-FIXED_INLINE void set_offset(int32_t d_q12, int32_t pull_q13, int32_t e1_q17, int32_t by_x_q17,
-                             int32_t by_y_q17, struct offset *off) {
+FIXED_INLINE void set_offset(int32_t d_q12, int32_t pull_q13, int32_t e1_q17, int32_t by_x_q17, int32_t by_y_q17,
+                             struct offset *off) {
   off->d_q12 = d_q12;
   off->half_square_q24 = (d_q12 * d_q12) >> 1;
   off->pulled_q25 = d_q12 * pull_q13;
@@ -46,23 +46,21 @@ struct parabola {
 
 #define Z_LEAST_Q22 16 /* rounding takes no exponent below zero */
 
-NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32_t nodes,
-                                      const struct parabola *axis, int32_t *value_q30) {
+NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32_t nodes, const struct parabola *axis,
+                                      int32_t *value_q30) {
   uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q26, axis->square_q26) + Z_LEAST_Q22;
   int32_t slope = fixed_mul_q26(bend_q26, axis->by_pitch_q26) * 2;
   for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
-    value_q30[k] =
-        exp2_negative(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope));
+    value_q30[k] = exp2_negative(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope));
   }
 }
 
 #define LEAST_VARIANCE_Q26 (ONE_Q26 / 16)
 
-NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
-                              const struct parabola *axes, struct term *term) {
+NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26, const struct parabola *axes,
+                              struct term *term) {
   int32_t v = pad->variance_q26[j] + t_q26;
-  int32_t inverse_q22 =
-      fixed_div_q26(1 << 22, v < LEAST_VARIANCE_Q26 ? LEAST_VARIANCE_Q26 : v); /* 1 / v */
+  int32_t inverse_q22 = fixed_div_q26(1 << 22, v < LEAST_VARIANCE_Q26 ? LEAST_VARIANCE_Q26 : v); /* 1 / v */
   int32_t height_q24 = fixed_mul_q26(inverse_q22, pad->strength_q26[j]); /* V0 / v of it, V0 1/4 */
   if (j >= PAD_NORMAL_TERMS) {
     height_q24 = fixed_mul_q26(height_q24, inverse_q22) * 16; /* moment V0 / v^2 */
@@ -83,9 +81,8 @@ NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
 #define LONGER_MAX_Q26 ((4 << 26) - 1)
 
 /* The residuals of five nodes but for P s2, and the terms there with the weight, for set_sums. */
-NOINLINE static void set_terms(const struct problem *problem, const struct term *terms, int i,
-                               const struct offset *x, const struct offset *y,
-                               int32_t amplitude_q13, struct fit_tangential_room *room) {
+NOINLINE static void set_terms(const struct problem *problem, const struct term *terms, int i, const struct offset *x,
+                               const struct offset *y, int32_t amplitude_q13, struct fit_tangential_room *room) {
   for (int k = 0, n = i * ROWS; k < ROWS; k++, n++, y++) {
     struct fit_tangential_terms *found = &room->node[n].terms;
     int32_t weight_q12 = room->weight_q12[n];
@@ -101,8 +98,8 @@ NOINLINE static void set_terms(const struct problem *problem, const struct term 
       f0_q28 += w_q28;
       found->tangential_q28[j] = scaled_by(w_q28, weight_q12, 12);
     }
-    int32_t model_q24 = (scaled_by(s0_q28, amplitude_q13, 16) >> 1) +
-                        whole_product(x->pulled_q25 + y->pulled_q25, f0_q28 * 2, 30);
+    int32_t model_q24 =
+        (scaled_by(s0_q28, amplitude_q13, 16) >> 1) + whole_product(x->pulled_q25 + y->pulled_q25, f0_q28 * 2, 30);
     room->residual[n] = scaled_by((problem->readings.q28[n] >> 4) - model_q24, weight_q12, 12);
   }
 }
@@ -144,22 +141,20 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
 }
 
 /* The dip's Gaussian along an axis within 0.3 %, as set_exponentials has the terms'. */
-NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes,
-                                  const struct parabola *axis, int32_t *value_q15) {
+NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes, const struct parabola *axis,
+                                  int32_t *value_q15) {
   uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q22, axis->square_q26) + Z_LEAST_Q22;
   int32_t slope = fixed_mul_q26(bend_q22, axis->by_pitch_q26) * 2;
   for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
-    value_q15[k] =
-        exp2_rough(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope)) >> 15;
+    value_q15[k] = exp2_rough(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope)) >> 15;
   }
 }
 
 /* Takes the dip from the model: a share of the height in the contact's middle, in a Gaussian about
  * it. The dip is in the column of the amplitude; it is so wide that those of place and spread do
  * without. */
-NOINLINE static void take_dip(const struct problem *problem, const struct term *terms,
-                              const struct parabola *axes, int32_t amplitude_q13,
-                              struct fit_tangential_room *room) {
+NOINLINE static void take_dip(const struct problem *problem, const struct term *terms, const struct parabola *axes,
+                              int32_t amplitude_q13, struct fit_tangential_room *room) {
   int32_t x_q15[COLUMNS], y_q15[ROWS];
   int32_t bend_q22 = problem->dip_bend_q22;
   int32_t by_square = fixed_mul_q26(bend_q22, problem->pad->pitch_square_q26);
@@ -189,13 +184,11 @@ NOINLINE static void take_dip(const struct problem *problem, const struct term *
  *   dm/dx = dx (A s1 + P s3 + b f1) - (e1 dx + e2 dy) s2 - Bx f0
  *   dm/dt = r2 / 2 (A s2 + P s4 + KAPPA b f2) - (A s1 + 3 P s3 + 2 KAPPA b f1)
  * (e1 and e2 with the amplitude in them). */
-NOINLINE static void set_moving(const struct offset *x, const struct offset *y,
-                                const struct origin *at, union fit_tangential_node *node,
-                                int32_t *residual) {
+NOINLINE static void set_moving(const struct offset *x, const struct offset *y, const struct origin *at,
+                                union fit_tangential_node *node, int32_t *residual) {
   const union fit_tangential_node *end = node + ROWS;
   do {
-    int32_t longer_q26 =
-        x->longer_q26 - y->longer_q26 + scaled_by(x->d_q12 * y->d_q12, at->e2_q17, 15);
+    int32_t longer_q26 = x->longer_q26 - y->longer_q26 + scaled_by(x->d_q12 * y->d_q12, at->e2_q17, 15);
     int32_t longer_q28 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26) * 4;
     int32_t s2_q22 = node->sums.s2_q22;
     *residual++ -= product(longer_q28, s2_q22, 26);
@@ -207,16 +200,13 @@ NOINLINE static void set_moving(const struct offset *x, const struct offset *y,
     int32_t ps3_q22 = (node->sums.s3_q8 * p_q17) >> 3;
     int32_t radial_q13 = rounded(as1_q22 + ps3_q22 + ((f1_q12 * b_q14) >> 4), 9);
     int32_t flat_q22 = as1_q22 + 3 * ps3_q22 + ((f1_q12 * more_b_q14) >> 3);
-    int32_t bend_q20 = scaled_by(s2_q22, at->amplitude_q13, 15) +
-                       whole_product(node->sums.s4_q14, longer_q28, 22) +
+    int32_t bend_q20 = scaled_by(s2_q22, at->amplitude_q13, 15) + whole_product(node->sums.s4_q14, longer_q28, 22) +
                        product(node->sums.f2_q22, more_b_q14 * (1 << 11), 27);
     int32_t wider_q22 = whole_product(x->half_square_q24 + y->half_square_q24, bend_q20, 22);
     node->column[SPREAD] = rounded(wider_q22 - flat_q22, 8);
     int32_t s2_q8 = rounded(s2_q22, 14), f0_q14 = node->sums.f0_q14;
-    int32_t along_x_q25 =
-        s2_q8 * (x->along_x_q17 + y->along_x_q17) + ((f0_q14 * at->pull_x_q13) >> 2);
-    int32_t along_y_q25 =
-        s2_q8 * (x->along_y_q17 + y->along_y_q17) + ((f0_q14 * at->pull_y_q13) >> 2);
+    int32_t along_x_q25 = s2_q8 * (x->along_x_q17 + y->along_x_q17) + ((f0_q14 * at->pull_x_q13) >> 2);
+    int32_t along_y_q25 = s2_q8 * (x->along_y_q17 + y->along_y_q17) + ((f0_q14 * at->pull_y_q13) >> 2);
     node->column[PLACE_X] = rounded(radial_q13 * x->d_q12 - along_x_q25, 11);
     node->column[PLACE_Y] = rounded(radial_q13 * y->d_q12 - along_y_q25, 11);
     y++;
@@ -226,8 +216,8 @@ NOINLINE static void set_moving(const struct offset *x, const struct offset *y,
 /* Takes from the residuals what is the sensors' own. A sensor that is off by o and feels all wider
  * by b reads what the model has at d + o - b d, so that the columns of the place tell how much more
  * it is. */
-NOINLINE static void take_own(const struct problem *problem, const struct offset *x,
-                              const struct offset *y, struct fit_tangential_room *room) {
+NOINLINE static void take_own(const struct problem *problem, const struct offset *x, const struct offset *y,
+                              struct fit_tangential_room *room) {
   const int32_t pitch_q12 = problem->pad->pitch_q26 >> (26 - PLACE_Q);
   const uint8_t *sensor = problem->sensor;
   const int32_t *column = room->node[0].column;
@@ -246,13 +236,11 @@ NOINLINE static void take_own(const struct problem *problem, const struct offset
 }
 
 /* The columns of the unknowns that the model is linear in; that of the amplitude is s0. */
-NOINLINE static void set_still(const struct offset *x, const struct offset *y,
-                               union fit_tangential_node *node) {
+NOINLINE static void set_still(const struct offset *x, const struct offset *y, union fit_tangential_node *node) {
   const union fit_tangential_node *end = node + ROWS;
   do {
     int32_t s2_q22 = node->sums.s2_q22, f0_q14 = node->sums.f0_q14;
-    node->column[STRETCH] =
-        rounded(product(x->half_square_q24 - y->half_square_q24, s2_q22, 27), 5);
+    node->column[STRETCH] = rounded(product(x->half_square_q24 - y->half_square_q24, s2_q22, 27), 5);
     node->column[SLANT] = rounded(product(x->d_q12 * y->d_q12, s2_q22, 27), 5);
     node->column[PULL_X] = rounded(f0_q14 * x->d_q12, 10);
     node->column[PULL_Y] = rounded(f0_q14 * y->d_q12, 10);
@@ -260,28 +248,25 @@ NOINLINE static void set_still(const struct offset *x, const struct offset *y,
   } while (++node != end);
 }
 
-void fit_tangential_linearise(const struct problem *problem,
-                              const struct fit_tangential_unknowns *at,
+void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at,
                               struct fit_tangential_room *room) {
   const struct fit_pad *pad = problem->pad;
   struct offset off_x[COLUMNS], off_y[ROWS];
   struct term terms[FIT_TANGENTIAL_TERMS];
-  const struct parabola axes[2] = {
-      {fixed_mul_q26(at->x_q26, at->x_q26), fixed_mul_q26(at->x_q26, pad->pitch_q26)},
-      {fixed_mul_q26(at->y_q26, at->y_q26), fixed_mul_q26(at->y_q26, pad->pitch_q26)}};
-  const struct origin origin = {
-      at->x_q26 >> (26 - PLACE_Q),          at->y_q26 >> (26 - PLACE_Q),
-      at->amplitude_q24 >> (24 - HEIGHT_Q), at->pull_x_q24 >> (24 - HEIGHT_Q),
-      at->pull_y_q24 >> (24 - HEIGHT_Q),    at->e1_q26 >> (26 - LONG_Q),
-      at->e2_q26 >> (26 - LONG_Q)};
+  const struct parabola axes[2] = {{fixed_mul_q26(at->x_q26, at->x_q26), fixed_mul_q26(at->x_q26, pad->pitch_q26)},
+                                   {fixed_mul_q26(at->y_q26, at->y_q26), fixed_mul_q26(at->y_q26, pad->pitch_q26)}};
+  const struct origin origin = {at->x_q26 >> (26 - PLACE_Q),          at->y_q26 >> (26 - PLACE_Q),
+                                at->amplitude_q24 >> (24 - HEIGHT_Q), at->pull_x_q24 >> (24 - HEIGHT_Q),
+                                at->pull_y_q24 >> (24 - HEIGHT_Q),    at->e1_q26 >> (26 - LONG_Q),
+                                at->e2_q26 >> (26 - LONG_Q)};
   int32_t pitch_q12 = pad->pitch_q26 >> (26 - PLACE_Q);
   for (int i = 0; i < COLUMNS; i++) {
-    set_offset((i - COLUMNS / 2) * pitch_q12 - origin.x_q12, origin.pull_x_q13, origin.e1_q17,
-               origin.e1_q17, origin.e2_q17, &off_x[i]);
+    set_offset((i - COLUMNS / 2) * pitch_q12 - origin.x_q12, origin.pull_x_q13, origin.e1_q17, origin.e1_q17,
+               origin.e2_q17, &off_x[i]);
   }
   for (int k = 0; k < ROWS; k++) {
-    set_offset((k - ROWS / 2) * pitch_q12 - origin.y_q12, origin.pull_y_q13, origin.e1_q17,
-               origin.e2_q17, -origin.e1_q17, &off_y[k]);
+    set_offset((k - ROWS / 2) * pitch_q12 - origin.y_q12, origin.pull_y_q13, origin.e1_q17, origin.e2_q17,
+               -origin.e1_q17, &off_y[k]);
   }
   int32_t wider_q26 = fixed_mul_16(at->t_q26, KAPPA_Q14) * 4;
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {

@@ -18,7 +18,7 @@
 
 enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKNOWNS };
 
-#define SPREAD_LEAST_Q15 9830 /* 0.3 of the narrowest normal term's variance: as much below 0 */
+#define SPREAD_LEAST_Q15 9830         /* 0.3 of the narrowest normal term's variance: as much below 0 */
 #define SPREAD_MOST_Q26 (ONE_Q26 / 2) /* 2 V0 */
 #define LONG_MAX_Q26 (ONE_Q26 / 4 - 1)
 #define AMPLITUDE_MAX_Q24 ((4 << 24) - (1 << 11))
@@ -82,8 +82,7 @@ FIXED_INLINE int32_t reach(const struct fit_pad *pad, int32_t nodes) {
 FIXED_INLINE int32_t product(int32_t a, int32_t b, int shift) {
   int32_t a_high = a >> 16, a_low = (uint16_t)a;
   int32_t b_high = b >> 16, b_low = (uint16_t)b;
-  return a_high * b_high * (1 << (32 - shift)) +
-         ((a_high * b_low + a_low * b_high) >> (shift - 16));
+  return a_high * b_high * (1 << (32 - shift)) + ((a_high * b_low + a_low * b_high) >> (shift - 16));
 }
 
 /* The same with the fourth product: error below 2 units. */
@@ -105,8 +104,7 @@ FIXED_INLINE int32_t rounded(int32_t value, int shift) {
 /* fit_tangential_model.c: residuals and columns of the model there, with the weights. column_q: Qs
  * in which it leaves the columns. */
 extern const uint8_t fit_tangential_column_q[UNKNOWNS];
-void fit_tangential_linearise(const struct problem *problem,
-                              const struct fit_tangential_unknowns *at,
+void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at,
                               struct fit_tangential_room *room);
 
 /* fit_tangential_step.c: one Gauss-Newton step from there. */

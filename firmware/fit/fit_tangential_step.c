@@ -9,13 +9,11 @@ struct priors {
   int32_t residual[UNKNOWNS]; /* Q24, then as the residuals */
 };
 
-static void set_priors(const struct problem *problem, const struct fit_tangential_unknowns *at,
-                       struct priors *priors) {
+static void set_priors(const struct problem *problem, const struct fit_tangential_unknowns *at, struct priors *priors) {
   memset(priors, 0, sizeof *priors);
   priors->row_q26[SPREAD] = problem->spread_prior_q26;
   priors->row_q26[STRETCH] = priors->row_q26[SLANT] = problem->long_prior_q26;
-  priors->residual[SPREAD] =
-      fixed_mul_q28(problem->pad->spread_q26 - at->t_q26, problem->spread_prior_q26);
+  priors->residual[SPREAD] = fixed_mul_q28(problem->pad->spread_q26 - at->t_q26, problem->spread_prior_q26);
   priors->residual[STRETCH] = fixed_mul_q28(-at->e1_q26, problem->long_prior_q26);
   priors->residual[SLANT] = fixed_mul_q28(-at->e2_q26, problem->long_prior_q26);
 }
@@ -53,16 +51,14 @@ struct equations {
 NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
   const int32_t *end = column + NODES * UNKNOWNS;
   do {
-    largest |=
-        fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) | fixed_size(column[2 * UNKNOWNS]);
+    largest |= fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) | fixed_size(column[2 * UNKNOWNS]);
     column += 3 * UNKNOWNS;
   } while (column != end);
   return largest;
 }
 
 /* Divides a column by 2^shift; gives its square sum, and adds its products with the residuals. */
-NOINLINE static int32_t shift_column(int32_t *column, const int32_t *residual, int32_t shift,
-                                     int32_t *right) {
+NOINLINE static int32_t shift_column(int32_t *column, const int32_t *residual, int32_t shift, int32_t *right) {
   const int32_t *end = residual + NODES;
   int32_t own = 0, other = *right, half = (1 << shift) >> 1;
   do {
@@ -102,10 +98,10 @@ NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, i
 
 /* Every pair of the first seven unknowns is a, a + 1, a + 2 or a + 3 modulo 7 of one a. */
 _Static_assert(UNKNOWNS == 8, "every pair is in one of these");
-#define SUM_PRODUCTS(a)                                                                            \
-  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                    \
-    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7,      \
-                       ((a) + 2) % 7, ((a) + 3) % 7);                                              \
+#define SUM_PRODUCTS(a)                                                                                                \
+  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                                        \
+    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7, ((a) + 2) % 7,           \
+                       ((a) + 3) % 7);                                                                                 \
   }
 SUM_PRODUCTS(0)
 SUM_PRODUCTS(1)
@@ -117,8 +113,7 @@ SUM_PRODUCTS(6)
 
 static void form(struct fit_tangential_room *room, const int32_t *scale) {
   static void (*const sum[UNKNOWNS - 1])(const int32_t *, int32_t *) = {
-      sum_products_0, sum_products_1, sum_products_2, sum_products_3,
-      sum_products_4, sum_products_5, sum_products_6};
+      sum_products_0, sum_products_1, sum_products_2, sum_products_3, sum_products_4, sum_products_5, sum_products_6};
   for (int a = 0; a < UNKNOWNS - 1; a++) {
     int32_t sums[4];
     sum[a](room->node[0].column, sums);
@@ -156,8 +151,8 @@ FIXED_INLINE void reduce(int32_t matrix[UNKNOWNS][UNKNOWNS], int j) {
   } while (row != matrix[j - 1]);
 }
 
-NOINLINE static void take_pivot(int32_t matrix[UNKNOWNS][UNKNOWNS], int32_t j, int32_t right_q26,
-                                int32_t *y_q26, struct solution *solution) {
+NOINLINE static void take_pivot(int32_t matrix[UNKNOWNS][UNKNOWNS], int32_t j, int32_t right_q26, int32_t *y_q26,
+                                struct solution *solution) {
   int32_t *own = matrix[j];
   uint32_t known = 0;
   for (int32_t k = 0; k < j; k++) {
@@ -194,8 +189,7 @@ NOINLINE static void take_pivot(int32_t matrix[UNKNOWNS][UNKNOWNS], int32_t j, i
   y_q26[j] = shifted(y, half);
 }
 
-NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q26,
-                           struct solution *solution) {
+NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q26, struct solution *solution) {
   int32_t y_q26[UNKNOWNS]; /* 2^half of it */
   solution->explained_q30 = 0;
   take_pivot(matrix, 0, right_q26[0], y_q26, solution);
@@ -226,9 +220,8 @@ static int32_t in_limits(int32_t value, int32_t limit) {
 }
 
 /* Returns how long the step is, Q14 of the longest that is taken. */
-NOINLINE static int32_t take_step(const struct problem *problem, const struct outcome *outcome,
-                                  int32_t residual_q, struct fit_tangential_unknowns *at,
-                                  bool *at_bound) {
+NOINLINE static int32_t take_step(const struct problem *problem, const struct outcome *outcome, int32_t residual_q,
+                                  struct fit_tangential_unknowns *at, bool *at_bound) {
   const struct fit_pad *pad = problem->pad;
   int32_t move[UNKNOWNS];
   for (int u = 0; u < UNKNOWNS; u++) {
@@ -248,11 +241,9 @@ NOINLINE static int32_t take_step(const struct problem *problem, const struct ou
     }
   }
   *at_bound = false;
-  at->x_q26 =
-      clamp_told(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
+  at->x_q26 = clamp_told(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
   at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -reach(pad, ROWS), reach(pad, ROWS), at_bound);
-  at->amplitude_q24 =
-      clamp_told(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
+  at->amplitude_q24 = clamp_told(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
   at->pull_x_q24 = clamp_told(at->pull_x_q24 + move[PULL_X], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
   at->pull_y_q24 = clamp_told(at->pull_y_q24 + move[PULL_Y], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
   at->t_q26 = fixed_clamp(at->t_q26 + move[SPREAD], spread_least(pad), SPREAD_MOST_Q26);

@@ -15,13 +15,11 @@
 /* For the rectangle of the build: fit_gaussian_grid takes one of these alone. Their files have names
  * that begin with fit_grid, which is how the build finds the options they want. `fits` is true if
  * it has settled with residuals that look like an outlier, for fit_gaussian_grid to leave that out. */
-#define FIT_GRID_KERNELS(ROW)                                                                      \
-  ROW(grid, usable == all && !fit_steps_want_dip(array, settings),                                 \
-      fit_grid(array, pressure_Pa_q10, settings, result))                                          \
+#define FIT_GRID_KERNELS(ROW)                                                                                          \
+  ROW(grid, usable == all && !fit_steps_want_dip(array, settings), fit_grid(array, pressure_Pa_q10, settings, result)) \
   ROW(masked, true, fit_grid_masked(array, pressure_Pa_q10, usable, settings, result))
 
 /* For any other layout; each leaves an outlier out by itself. */
-#define FIT_OTHER_KERNELS(ROW)                                                                     \
-  ROW(general, true, fit_general(array, pressure_Pa_q10, usable, settings, result))
+#define FIT_OTHER_KERNELS(ROW) ROW(general, true, fit_general(array, pressure_Pa_q10, usable, settings, result))
 
 #endif

@@ -15,17 +15,17 @@ struct frame {
   uint64_t t_begin_us;     /* first bus activity */
   uint64_t t_converted_us; /* conversion over, reading begins */
   uint64_t t_read_us;      /* last sensor read */
-  bool held; /* pressures, renewed, restored, valid and saturated are those of the frame before:
-                the sensors converted their temperature meanwhile */
-  uint8_t sensor_count;   /* 1..FT_MAX_SENSORS */
-  int32_t noise_Pa_q10;   /* rms noise of a reading at this conversion's OSR, 1/1024 Pa */
-  int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until first measured */
-  uint32_t renewed;       /* bitmap: another sensor than in the frame before, with another zero */
-  uint32_t restored;      /* bitmap: reset since the frame before, or warmer, or stepped alone */
-  uint32_t valid;         /* bitmap: pressure is a measurement */
-  uint32_t doubtful;      /* bitmap: valid, but there is reason to doubt the reading */
-  uint32_t unsettled;     /* bitmap: doubtful until the next temperature settles it */
-  uint32_t saturated;     /* bitmap: beyond the range in which the sensor reads true */
+  bool held;               /* pressures, renewed, restored, valid and saturated are those of the frame before:
+                              the sensors converted their temperature meanwhile */
+  uint8_t sensor_count;    /* 1..FT_MAX_SENSORS */
+  int32_t noise_Pa_q10;    /* rms noise of a reading at this conversion's OSR, 1/1024 Pa */
+  int16_t temperature_cC;  /* mean of the sensors, 0.01 degC; 0 until first measured */
+  uint32_t renewed;        /* bitmap: another sensor than in the frame before, with another zero */
+  uint32_t restored;       /* bitmap: reset since the frame before, or warmer, or stepped alone */
+  uint32_t valid;          /* bitmap: pressure is a measurement */
+  uint32_t doubtful;       /* bitmap: valid, but there is reason to doubt the reading */
+  uint32_t unsettled;      /* bitmap: doubtful until the next temperature settles it */
+  uint32_t saturated;      /* bitmap: beyond the range in which the sensor reads true */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor]; 0 where not valid */
 };
 

@@ -2,11 +2,10 @@
 
 #include <stddef.h>
 
-#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                             \
-  {                                                                                                \
-    .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits),       \
-    .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us),                                 \
-    .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                  \
+#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                                                 \
+  {                                                                                                                    \
+    .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits),                           \
+    .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us), .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)       \
   }
 static const struct ms58xx_osr osr_table[] = {MS58XX_OSR_TABLE(ROW)};
 
@@ -24,8 +23,7 @@ uint8_t ms58xx_crc4_bytes(const uint8_t bytes[16]) {
   for (int i = 0; i < 16; i++) {
     remainder ^= bytes[i];
     for (int bit = 0; bit < 8; bit++) {
-      remainder = (uint16_t)((remainder & 0x8000u) ? (uint16_t)(remainder << 1) ^ 0x3000u
-                                                   : (uint16_t)(remainder << 1));
+      remainder = (uint16_t)((remainder & 0x8000u) ? (uint16_t)(remainder << 1) ^ 0x3000u : (uint16_t)(remainder << 1));
     }
   }
   return (uint8_t)(remainder >> 12);
@@ -95,8 +93,8 @@ int32_t ms58xx_first_order_cC(const struct ms58xx_prom *prom, uint32_t d2) {
 #define SUBTRACT_SENS(term) sensitivity -= (term)
 #define TERM(from, times, square, shift) SUBTRACT_##from(((times)*SQUARE_##square) >> (shift));
 
-void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2,
-                                   enum ms58xx_branch previous, struct ms58xx_thermal *thermal) {
+void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2, enum ms58xx_branch previous,
+                                   struct ms58xx_thermal *thermal) {
   const uint16_t *c = prom->word;
   int32_t dT = difference_from(prom, d2);
   int32_t temperature_cC = first_order_cC(dT, c[6]);

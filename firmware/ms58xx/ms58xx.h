@@ -81,8 +81,8 @@ int32_t ms58xx_first_order_cC(const struct ms58xx_prom *prom, uint32_t d2);
 
 /* d2: 24-bit code of a temperature conversion. previous: branch of the last call for this sensor,
  * or MS58XX_BRANCH_UNKNOWN. About 700 Cortex-M0+ cycles. */
-void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2,
-                                   enum ms58xx_branch previous, struct ms58xx_thermal *thermal);
+void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2, enum ms58xx_branch previous,
+                                   struct ms58xx_thermal *thermal);
 
 /* d1: 24-bit code of a pressure conversion. Absolute pressure in 1/1024 Pa, saturated to int32;
  * shifted right by 10 it is the pressure in Pa. About 130 Cortex-M0+ cycles. */

@@ -48,10 +48,9 @@
 #define MS58XX_COLD(TERM) TERM(T, 12, DT, 35) TERM(OFF, 30, X, 8)
 #define MS58XX_VERY_COLD(TERM) TERM(T, 14, DT, 35) TERM(OFF, 35, X, 3) TERM(SENS, 63, X, 5)
 #define MS58XX_NOISE_MAX_Pa 11
-#define MS58XX_OSR_TABLE(ROW)                                                                      \
-  ROW(256, 0x0, 560, 11.0f, 0.012f), ROW(512, 0x2, 1100, 6.2f, 0.009f),                            \
-      ROW(1024, 0x4, 2170, 3.9f, 0.006f), ROW(2048, 0x6, 4320, 2.8f, 0.004f),                      \
-      ROW(4096, 0x8, 8610, 2.1f, 0.003f), ROW(8192, 0xA, 17200, 1.6f, 0.002f)
+#define MS58XX_OSR_TABLE(ROW)                                                                                          \
+  ROW(256, 0x0, 560, 11.0f, 0.012f), ROW(512, 0x2, 1100, 6.2f, 0.009f), ROW(1024, 0x4, 2170, 3.9f, 0.006f),            \
+      ROW(2048, 0x6, 4320, 2.8f, 0.004f), ROW(4096, 0x8, 8610, 2.1f, 0.003f), ROW(8192, 0xA, 17200, 1.6f, 0.002f)
 
 #elif MS58XX_SENSOR == MS58XX_MS5837_30BA
 /* MS5837-30BA data sheet of 10/2015, pages 7 and 9, and rev. C2 of 12/2019, pages 9 and 11: PROM,
@@ -74,10 +73,9 @@
 #define MS58XX_COLD(TERM) TERM(OFF, 3, X, 1) TERM(SENS, 5, X, 3) TERM(T, 3, DT, 33)
 #define MS58XX_VERY_COLD(TERM) TERM(OFF, 7, Y, 0) TERM(SENS, 4, Y, 0) MS58XX_COLD(TERM)
 #define MS58XX_NOISE_MAX_Pa 157
-#define MS58XX_OSR_TABLE(ROW)                                                                      \
-  ROW(256, 0x0, 600, 157.0f, 0.012f), ROW(512, 0x2, 1170, 84.0f, 0.009f),                          \
-      ROW(1024, 0x4, 2280, 54.0f, 0.006f), ROW(2048, 0x6, 4540, 38.0f, 0.004f),                    \
-      ROW(4096, 0x8, 9040, 28.0f, 0.003f), ROW(8192, 0xA, 18080, 20.0f, 0.002f)
+#define MS58XX_OSR_TABLE(ROW)                                                                                          \
+  ROW(256, 0x0, 600, 157.0f, 0.012f), ROW(512, 0x2, 1170, 84.0f, 0.009f), ROW(1024, 0x4, 2280, 54.0f, 0.006f),         \
+      ROW(2048, 0x6, 4540, 38.0f, 0.004f), ROW(4096, 0x8, 9040, 28.0f, 0.003f), ROW(8192, 0xA, 18080, 20.0f, 0.002f)
 
 #else
 #error "MS58XX_SENSOR must be one of the sensors above; FINGERTIP_SENSOR sets it"

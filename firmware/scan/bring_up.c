@@ -95,11 +95,8 @@ struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us) 
   }
   const uint32_t admitted = bring_up->good | bring_up->differs;
   bring_up->rechecks =
-      bring_up->differs == 0
-          ? 0
-          : (uint8_t)(bring_up->rechecks + (bring_up->rechecks <= BRING_UP_RECHECKS));
-  if (admitted == all_sensors(bring_up) && !bring_up->of_suspects &&
-      !bring_up_wants_recheck(bring_up)) {
+      bring_up->differs == 0 ? 0 : (uint8_t)(bring_up->rechecks + (bring_up->rechecks <= BRING_UP_RECHECKS));
+  if (admitted == all_sensors(bring_up) && !bring_up->of_suspects && !bring_up_wants_recheck(bring_up)) {
     bring_up->next_us = now_us + REST * (now_us - bring_up->began_us);
     bring_up->interval_us = INTERVAL_MIN_us;
   } else if (bring_up->interval_us < INTERVAL_MAX_us) {

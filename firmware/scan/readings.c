@@ -3,7 +3,7 @@
 #define MAX_Pa_q10 (MS58XX_MAX_PRESSURE_Pa * 1024)
 
 /* The noise of all sensors together is no step (readings_take_pressures). */
-_Static_assert(FT_MAX_SENSORS * READINGS_STILL_NOISES * MS58XX_NOISE_MAX_Pa < MS58XX_STEP_Pa,
+_Static_assert(FT_MAX_SENSORS *READINGS_STILL_NOISES *MS58XX_NOISE_MAX_Pa < MS58XX_STEP_Pa,
                "MS58XX_STEP_Pa is too small for the noise of this sensor");
 
 static uint32_t all_sensors(uint8_t sensor_count) {
@@ -30,8 +30,7 @@ static int32_t difference(int32_t a, int32_t b) {
 }
 
 /* The sensor whose reading has stepped while all others of these stood still, as a bitmap. */
-static uint32_t find_alone(const struct frame *frame, uint32_t sensors,
-                           const int32_t last_Pa_q10[]) {
+static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[]) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
   uint32_t second = 0;
@@ -70,8 +69,8 @@ static void judge_alone(struct readings *readings, uint32_t alone, const struct 
 }
 
 /* Of a sensor without a reading that counts the last one is kept, to hold the next against. */
-static void keep(struct readings *readings, uint32_t usable, uint32_t left_out,
-                 const int32_t last_Pa_q10[], int32_t kept_Pa_q10[]) {
+static void keep(struct readings *readings, uint32_t usable, uint32_t left_out, const int32_t last_Pa_q10[],
+                 int32_t kept_Pa_q10[]) {
   uint32_t bit = 1;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, bit <<= 1) {
     if (!(usable & ~left_out & bit)) {
@@ -83,9 +82,8 @@ static void keep(struct readings *readings, uint32_t usable, uint32_t left_out,
 }
 
 /* For frames that are not like most. Returns the bitmap of readings that do not count. */
-static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *readings,
-                                                            struct frame *frame, uint32_t usable,
-                                                            const int32_t last_Pa_q10[],
+static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *readings, struct frame *frame,
+                                                            uint32_t usable, const int32_t last_Pa_q10[],
                                                             int32_t kept_Pa_q10[]) {
   const bool all = usable == all_sensors(frame->sensor_count);
   const uint32_t seen = usable & (readings->has_last | readings->awaited);
@@ -120,8 +118,8 @@ struct glance {
 };
 
 /* Keeps the readings on the way. */
-static struct glance compensate(const struct readings *readings, const uint32_t code[],
-                                uint32_t usable, struct frame *frame, int32_t kept_Pa_q10[]) {
+static struct glance compensate(const struct readings *readings, const uint32_t code[], uint32_t usable,
+                                struct frame *frame, int32_t kept_Pa_q10[]) {
   struct glance glance = {0, 0};
   const struct ms58xx_thermal *thermal = readings->thermal;
   int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
@@ -136,8 +134,7 @@ static struct glance compensate(const struct readings *readings, const uint32_t 
   return glance;
 }
 
-bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
-                             struct frame *frame) {
+bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame) {
   const uint32_t usable = good & readings->has_thermal & ~readings->suspects;
   const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
   readings->newest ^= 1;
@@ -149,8 +146,8 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], u
   const uint32_t noises = READINGS_STILL_NOISES * (uint32_t)frame->noise_Pa_q10;
   uint32_t left_out = 0;
   frame->saturated = 0;
-  if (usable != all_sensors(frame->sensor_count) || usable != readings->counted ||
-      (int32_t)glance.signs < 0 || step >= READINGS_STEP_Pa_q10 - frame->sensor_count * noises) {
+  if (usable != all_sensors(frame->sensor_count) || usable != readings->counted || (int32_t)glance.signs < 0 ||
+      step >= READINGS_STEP_Pa_q10 - frame->sensor_count * noises) {
     left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
   }
   readings->last_sum = glance.sum;

@@ -65,20 +65,20 @@ struct readings {
   uint8_t newest;
   int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
   uint8_t doubts_in_a_row;
-  uint32_t has_thermal; /* bitmap */
-  uint32_t renewed;     /* bitmap: another sensor since the last frame */
-  uint32_t restored;    /* bitmap: since the last frame, as in frame.h */
-  uint32_t doubted;     /* bitmap: the last temperature was not used */
-  uint32_t strange;     /* bitmap: a temperature that is not near the others' is in use */
-  uint32_t unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */
-  uint32_t was_near;    /* bitmap: an unproven one did, at the last temperature */
-  uint32_t doubtful;    /* bitmap: used, and to be flagged */
-  uint32_t has_last;    /* bitmap: last_Pa_q10 holds a reading */
-  uint32_t counted;     /* bitmap: and was in the last frame */
-  uint32_t awaited;     /* bitmap: last_Pa_q10 is of before a reset */
-  uint32_t last_sum;    /* of the pressures of the last frame, modulo 2^32 */
-  uint32_t was_low;     /* bitmap: the last pressure was below zero */
-  uint32_t alone;       /* bitmap of one sensor: its last pressure stepped alone, ... */
+  uint32_t has_thermal;    /* bitmap */
+  uint32_t renewed;        /* bitmap: another sensor since the last frame */
+  uint32_t restored;       /* bitmap: since the last frame, as in frame.h */
+  uint32_t doubted;        /* bitmap: the last temperature was not used */
+  uint32_t strange;        /* bitmap: a temperature that is not near the others' is in use */
+  uint32_t unproven;       /* bitmap: the PROM's CRC differs and the sensor has not read like others */
+  uint32_t was_near;       /* bitmap: an unproven one did, at the last temperature */
+  uint32_t doubtful;       /* bitmap: used, and to be flagged */
+  uint32_t has_last;       /* bitmap: last_Pa_q10 holds a reading */
+  uint32_t counted;        /* bitmap: and was in the last frame */
+  uint32_t awaited;        /* bitmap: last_Pa_q10 is of before a reset */
+  uint32_t last_sum;       /* of the pressures of the last frame, modulo 2^32 */
+  uint32_t was_low;        /* bitmap: the last pressure was below zero */
+  uint32_t alone;          /* bitmap of one sensor: its last pressure stepped alone, ... */
   int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
   uint32_t suspects;       /* bitmap: want a reset */
   uint32_t reset_once;     /* bitmap: had one for that reason */
@@ -116,7 +116,6 @@ void readings_doubt(struct readings *readings, uint32_t apart);
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost:
  * some 140 Cortex-M0+ cycles a sensor. */
-bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
-                             struct frame *frame);
+bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame);
 
 #endif

@@ -65,10 +65,8 @@ static uint32_t count_bits(uint32_t bitmap) {
   return bits;
 }
 
-enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
-                         const struct scan_settings *settings) {
-  if (settings->sensor_count < 1 || settings->sensor_count > FT_MAX_SENSORS ||
-      !ms58xx_find_osr(settings->osr)) {
+enum ft_status scan_init(struct scan *scan, const struct array_bus *bus, const struct scan_settings *settings) {
+  if (settings->sensor_count < 1 || settings->sensor_count > FT_MAX_SENSORS || !ms58xx_find_osr(settings->osr)) {
     return FT_ERR_ARGUMENT;
   }
   memset(scan, 0, sizeof *scan);
@@ -173,8 +171,7 @@ static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) 
   scan->was_zero = zero;
   /* What was not read is still there to be read, and the sensor may miss the next command. */
   scan->void_next = single ? 0 : zero | (missed & ~acknowledged);
-  scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 ||
-                          (get(&scan->suspects) & admitted) != 0 ||
+  scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 || (get(&scan->suspects) & admitted) != 0 ||
                           bring_up_wants_recheck(&scan->bring_up);
   count(&scan->counters.zero_readings, count_bits(unusable));
   set(&scan->present, acknowledged);
@@ -183,8 +180,7 @@ static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) 
 }
 
 /* Judges the codes in scan->result. Returns the bitmap of those that are measurements. */
-static uint32_t take_codes(struct scan *scan, const struct scan_conversion *conversion,
-                           uint32_t codes[]) {
+static uint32_t take_codes(struct scan *scan, const struct scan_conversion *conversion, uint32_t codes[]) {
   uint32_t zero = 0;
   uint32_t torn = 0;
   uint32_t ends_in_ones = 0;
@@ -251,8 +247,7 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
     scan->bring_up.changed = 0;
     scan->returned = 0;
   }
-  hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state,
-            SCAN_SLOT_FULL);
+  hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state, SCAN_SLOT_FULL);
 }
 
 static bool temperature_waits(const struct scan *scan) {
@@ -274,8 +269,7 @@ static void heed_wish(struct scan *scan, uint64_t now_us) {
  * because it is not due or the pause is too short. */
 static uint64_t temperature_in_pause_us(const struct scan *scan, uint64_t now_us) {
   uint32_t slot_us = scan->overhead_us + get_osr(scan)->conversion_us;
-  if (scan->next_temperature_us > scan->next_frame_us ||
-      scan->next_frame_us - now_us < slot_us + slot_us / 16) {
+  if (scan->next_temperature_us > scan->next_frame_us || scan->next_frame_us - now_us < slot_us + slot_us / 16) {
     return UINT64_MAX;
   }
   return scan->next_frame_us - slot_us - slot_us / 8;
@@ -317,8 +311,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
       if (temperature_us <= now_us) {
         convert(scan, true, false);
       } else {
-        scan->wait_until_us =
-            earlier(earlier(scan->next_frame_us, temperature_us), now_us + RATE_POLL_us);
+        scan->wait_until_us = earlier(earlier(scan->next_frame_us, temperature_us), now_us + RATE_POLL_us);
       }
       return;
     }
@@ -335,18 +328,16 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
   case SCAN_RESET:
     return bus->start_command(bus->context, MS58XX_CMD_RESET, now_us);
   case SCAN_READ_PROM:
-    return bus->start_read(bus->context, (uint8_t)(MS58XX_CMD_READ_PROM + 2 * scan->bring_up.word),
-                           2, now_us);
+    return bus->start_read(bus->context, (uint8_t)(MS58XX_CMD_READ_PROM + 2 * scan->bring_up.word), 2, now_us);
   case SCAN_CONVERT:
     conversion->osr = get_osr(scan);
     conversion->t_begin_us = now_us;
     if (conversion->is_temperature) {
       scan->next_temperature_us = now_us + get(&scan->temperature_interval_us);
     }
-    return bus->start_command(bus->context,
-                              conversion->is_temperature ? conversion->osr->convert_temperature
-                                                         : conversion->osr->convert_pressure,
-                              now_us);
+    return bus->start_command(
+        bus->context,
+        conversion->is_temperature ? conversion->osr->convert_temperature : conversion->osr->convert_pressure, now_us);
   case SCAN_READ_ADC:
     conversion->t_converted_us = now_us;
     return bus->start_read(bus->context, MS58XX_CMD_READ_ADC, 3, now_us);
@@ -525,8 +516,7 @@ static void adapt_interval(struct scan *scan, uint32_t news) {
   uint32_t interval_us = get(&scan->temperature_interval_us);
   if (news != 0) {
     set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
-    set(&scan->temperature_within_us,
-        news & READINGS_ASK_AGAIN ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
+    set(&scan->temperature_within_us, news & READINGS_ASK_AGAIN ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
   } else if (interval_us < TEMPERATURE_INTERVAL_MAX_us) {
     set(&scan->temperature_interval_us, 2 * interval_us);
   }
@@ -545,8 +535,7 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   adapt_interval(scan, readings_take_temperature(&scan->readings, scan->sensor_count, &taken));
 }
 
-static void fill_head(struct scan *scan, const struct scan_conversion *conversion,
-                      struct frame *frame) {
+static void fill_head(struct scan *scan, const struct scan_conversion *conversion, struct frame *frame) {
   frame->held = conversion->is_temperature;
   frame->number = conversion->number;
   frame->t_us = conversion->t_us;
@@ -580,8 +569,7 @@ bool scan_take(struct scan *scan, struct frame *frame) {
   const struct scan_conversion *temperature = &scan->temperature_slot.conversion;
   const bool waits = temperature_waits(scan);
   bool claimed = claim(&scan->slot_state);
-  const bool frame_is_older =
-      claimed && (int32_t)(scan->slot.conversion.number - temperature->number) < 0;
+  const bool frame_is_older = claimed && (int32_t)(scan->slot.conversion.number - temperature->number) < 0;
   if (waits && !frame_is_older) {
     if (claimed) {
       hand_over(&scan->slot_state, SCAN_SLOT_FULL);

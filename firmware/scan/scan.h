@@ -62,7 +62,7 @@ struct scan_counters {
   _Atomic uint32_t bus_nacks;         /* and readings that broke off */
   _Atomic uint32_t bus_timeouts;
   _Atomic uint32_t bus_recoveries;
-  _Atomic uint32_t zero_readings; /* readings of 0, and those void after one or after a NACK */
+  _Atomic uint32_t zero_readings;        /* readings of 0, and those void after one or after a NACK */
   _Atomic uint32_t implausible_readings; /* left out by scan_take: see readings.h */
 };
 
@@ -120,10 +120,9 @@ struct scan {
   /* Event context only. */
   enum scan_state state;
   bool operation_running;
-  bool bus_stuck; /* the last recovery did not free the bus */
-  struct scan_conversion
-      conversions[2];                 /* under way, and the one before, whose codes are in result */
-  struct scan_conversion *conversion; /* under way */
+  bool bus_stuck;                        /* the last recovery did not free the bus */
+  struct scan_conversion conversions[2]; /* under way, and the one before, whose codes are in result */
+  struct scan_conversion *conversion;    /* under way */
   bool last_was_temperature;
   uint32_t overhead_us; /* of a conversion: command and reading */
   uint64_t wait_until_us;
@@ -158,8 +157,7 @@ struct scan {
 };
 
 /* FT_ERR_ARGUMENT: a setting outside its range. The bus must outlive the scan. */
-enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
-                         const struct scan_settings *settings);
+enum ft_status scan_init(struct scan *scan, const struct array_bus *bus, const struct scan_settings *settings);
 
 /* Event context. Does whatever is due at now_us and returns the time of the next call at the
  * latest; an earlier one, when the bus has made progress, is welcome. */

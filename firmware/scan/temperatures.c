@@ -27,8 +27,8 @@ struct company {
   bool votes;
 };
 
-static struct company keep_company(const struct readings *readings, uint8_t sensor_count,
-                                   uint32_t good, const int16_t now_cC[]) {
+static struct company keep_company(const struct readings *readings, uint8_t sensor_count, uint32_t good,
+                                   const int16_t now_cC[]) {
   struct company company = {.votes = false};
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
@@ -56,22 +56,19 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
 }
 
 /* Whether to use a temperature that something speaks against. */
-static bool settle(struct readings *readings, uint8_t k, int16_t now_cC,
-                   const struct company *company) {
+static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const struct company *company) {
   uint32_t bit = UINT32_C(1) << k;
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
-  bool near = possible && (!company->votes ||
-                           within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
-  bool agrees = (readings->doubted & bit) &&
-                within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
+  bool near = possible && (!company->votes || within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
+  bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
   bool use;
   bool insists; /* says it again, and it cannot be */
   if (!(readings->has_thermal & bit)) {
     use = near || (agrees && possible && (readings->pardoned & bit));
     insists = agrees && !use;
   } else {
-    bool steps = !within(now_cC - readings->thermal[k].first_order_cC - company->step_cC,
-                         READINGS_TEMPERATURE_STEP_MAX_cC);
+    bool steps =
+        !within(now_cC - readings->thermal[k].first_order_cC - company->step_cC, READINGS_TEMPERATURE_STEP_MAX_cC);
     use = !steps || (agrees && near);
     insists = agrees && !near;
     readings->restored |= use && steps ? bit : 0;
@@ -135,8 +132,7 @@ static uint32_t compare(struct readings *readings, uint8_t sensor_count) {
   for (uint8_t k = 0; k < sensor_count; k++) {
     values[k] = readings->thermal[k].first_order_cC;
   }
-  const uint32_t apart =
-      apart_find(values, readings->has_thermal, sensor_count, READINGS_TEMPERATURE_APART_cC);
+  const uint32_t apart = apart_find(values, readings->has_thermal, sensor_count, READINGS_TEMPERATURE_APART_cC);
   const uint32_t like = readings->has_thermal & ~apart;
   readings->alike |= like & readings->was_alike;
   readings->was_alike = like;
@@ -158,14 +154,13 @@ static void average(struct readings *readings, uint8_t sensor_count, uint32_t ad
 }
 
 /* Whether any temperature needs more than a look at its own last one. */
-static bool is_unusual(const struct readings *readings, uint8_t sensor_count, uint32_t good,
-                       const int16_t now_cC[]) {
+static bool is_unusual(const struct readings *readings, uint8_t sensor_count, uint32_t good, const int16_t now_cC[]) {
   if (good & (~readings->has_thermal | readings->doubted | readings->strange)) {
     return true;
   }
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if ((good & (UINT32_C(1) << k)) && !within(now_cC[k] - readings->thermal[k].first_order_cC,
-                                               READINGS_TEMPERATURE_STEP_MAX_cC)) {
+    if ((good & (UINT32_C(1) << k)) &&
+        !within(now_cC[k] - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC)) {
       return true;
     }
   }
@@ -206,14 +201,14 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     if (!had || !within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC)) {
       news |= READINGS_MOVED;
     }
-    ms58xx_compensate_temperature(&taken->prom[k], taken->code[k],
-                                  had ? thermal->branch : MS58XX_BRANCH_UNKNOWN, thermal);
+    ms58xx_compensate_temperature(&taken->prom[k], taken->code[k], had ? thermal->branch : MS58XX_BRANCH_UNKNOWN,
+                                  thermal);
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
   readings->alike &= taken->admitted & ~taken->prom_changed;
-  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
-                       compare(readings, sensor_count);
+  readings->doubtful =
+      taken->prom_bad | readings->doubted | readings->strange | readings->apart | compare(readings, sensor_count);
   average(readings, sensor_count, taken->admitted);
   if (!(news & READINGS_ASK_AGAIN)) {
     readings->doubts_in_a_row = 0;

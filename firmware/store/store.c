@@ -36,9 +36,8 @@ enum {
   /* A flash whose erased slots do not hold what is written so often in a row fails. */
   MAX_ATTEMPTS = 3,
 };
-#define RECORD_BYTES(sensors)                                                                      \
-  (PAYLOAD_AT + CALIBRATION_AT + 14 + (8 + PLACE_BYTES) * (sensors) + SETTINGS_BYTES +             \
-   PROFILE_BYTES + SHAPE_BYTES)
+#define RECORD_BYTES(sensors)                                                                                          \
+  (PAYLOAD_AT + CALIBRATION_AT + 14 + (8 + PLACE_BYTES) * (sensors) + SETTINGS_BYTES + PROFILE_BYTES + SHAPE_BYTES)
 _Static_assert(RECORD_BYTES(STORE_SENSORS_OF_SHORT_SLOT) <= STORE_SHORT_SLOT_BYTES - 8 &&
                    RECORD_BYTES(FT_MAX_SENSORS) <= STORE_RECORD_BYTES &&
                    (int)STORE_RECORD_BYTES <= STORE_LONG_SLOT_BYTES - 8,
@@ -205,8 +204,8 @@ static void make_record(struct store *store, const struct parts *parts) {
   unsigned places_at = shape_at + SHAPE_BYTES;
   unsigned length = places_at + PLACE_BYTES * store->sensor_count;
   memset(payload, 0, length);
-  payload[0] = (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) |
-                         (parts->settings ? HAS_SETTINGS : 0) | (parts->profile ? HAS_PROFILE : 0));
+  payload[0] = (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) | (parts->settings ? HAS_SETTINGS : 0) |
+                         (parts->profile ? HAS_PROFILE : 0));
   payload[1] = store->sensor_count;
   if (parts->calibration) {
     put_calibration(payload + CALIBRATION_AT, parts->calibration, store->sensor_count);
@@ -253,7 +252,7 @@ static bool take_record(struct store *store) {
   const unsigned profile_at = settings_at + SETTINGS_BYTES;
   const unsigned shape_at = profile_at + PROFILE_BYTES;
   const unsigned places_at = shape_at + SHAPE_BYTES;
-  const unsigned expected = version == VERSION ? places_at + PLACE_BYTES * store->sensor_count
+  const unsigned expected = version == VERSION                   ? places_at + PLACE_BYTES * store->sensor_count
                             : version == VERSION_WITHOUT_PLACES  ? places_at
                             : version == VERSION_WITHOUT_SHAPE   ? shape_at
                             : version == VERSION_WITHOUT_PROFILE ? profile_at
@@ -294,8 +293,7 @@ static bool take_record(struct store *store) {
 /* Reads the record of a slot into the buffer, as it is at this moment. False: it is damaged. */
 static bool load_record(struct store *store, unsigned sector, unsigned slot) {
   const uint32_t address = slot_address(store, sector, slot);
-  const unsigned room =
-      sealed_at(store) < STORE_RECORD_BYTES ? sealed_at(store) : (unsigned)STORE_RECORD_BYTES;
+  const unsigned room = sealed_at(store) < STORE_RECORD_BYTES ? sealed_at(store) : (unsigned)STORE_RECORD_BYTES;
   uint8_t *record = store->record;
   store->record_length = PAYLOAD_AT;
   for (unsigned at = MAGIC_AT; at < store->record_length;) {
@@ -382,8 +380,7 @@ static struct sector read_sector(struct store *store, unsigned number) {
 void store_init(struct store *store, uint8_t sensor_count) {
   memset(store, 0, sizeof *store);
   store->sensor_count = sensor_count;
-  store->slot_bytes =
-      sensor_count <= STORE_SENSORS_OF_SHORT_SLOT ? STORE_SHORT_SLOT_BYTES : STORE_LONG_SLOT_BYTES;
+  store->slot_bytes = sensor_count <= STORE_SENSORS_OF_SHORT_SLOT ? STORE_SHORT_SLOT_BYTES : STORE_LONG_SLOT_BYTES;
   const struct sector sectors[PORT_FLASH_SECTORS] = {read_sector(store, 0), read_sector(store, 1)};
   store->sector = is_older(sectors[0].generation, sectors[1].generation);
   const struct sector *current = &sectors[store->sector];
@@ -395,8 +392,7 @@ void store_init(struct store *store, uint8_t sensor_count) {
   if (current->generation == 0) {
     /* The first record of all was cut short, and perhaps what was to settle that. */
     store->damaged = current->lost || other->lost;
-    store->must_settle =
-        !store->damaged && current->used > 0 && current->used < slots_of(store) && other->used == 0;
+    store->must_settle = !store->damaged && current->used > 0 && current->used < slots_of(store) && other->used == 0;
     return;
   }
   if (current->lost) {
@@ -448,8 +444,7 @@ static void begin_write(struct store *store, uint64_t now_us) {
     begin_slot(store, now_us);
   } else if (store->sure_slot < STORE_SLOTS) {
     /* The seal of what remains may have been cut short itself: made good before the other goes. */
-    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES +
-                           (store->sure_slot + 1u) * store->sure_slot_bytes - 8,
+    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES + (store->sure_slot + 1u) * store->sure_slot_bytes - 8,
                        mark, sizeof mark);
     begin_step(store, STORE_SECURE, now_us);
     store->to_sector = !store->sector;
@@ -546,8 +541,7 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
   case STORE_WRITE:
     store->at = store->step == STORE_BEGIN ? MAGIC_AT : (uint16_t)(store->at + write_length(store));
     if (store->at < store->record_length) {
-      port_flash_program(to_address(store) + store->at, store->record + store->at,
-                         write_length(store));
+      port_flash_program(to_address(store) + store->at, store->record + store->at, write_length(store));
       begin_step(store, STORE_WRITE, now_us);
     } else {
       store->at = BEGUN_AT; /* which the buffer holds zeros for, like the mark */

@@ -54,8 +54,8 @@ static void add_news(void) {
 }
 
 static __attribute__((noinline, cold)) size_t take_after_cut(void) {
-  const uint32_t length = ring_take(&transmit_ring, port.packet + CUT_MARK_BYTES,
-                                    USB_MAX_PACKET_BYTES - CUT_MARK_BYTES);
+  const uint32_t length =
+      ring_take(&transmit_ring, port.packet + CUT_MARK_BYTES, USB_MAX_PACKET_BYTES - CUT_MARK_BYTES);
   if (length == 0)
     return 0;
   memset(port.packet, 0, CUT_MARK_BYTES);
@@ -66,12 +66,11 @@ static __attribute__((noinline, cold)) size_t take_after_cut(void) {
 /* The host gets what there is at once: it reads in transfers of several packets, which a packet
  * below the maximum ends, so when the ring runs dry after a full one an empty one follows. */
 static void transmit(void) {
-  if (!atomic_load_explicit(&is_open, memory_order_relaxed) ||
-      port.packet_state == PACKET_OFFERED || device_endpoint_is_halted(CDC_ENDPOINT_IN))
+  if (!atomic_load_explicit(&is_open, memory_order_relaxed) || port.packet_state == PACKET_OFFERED ||
+      device_endpoint_is_halted(CDC_ENDPOINT_IN))
     return;
   if (port.packet_state == PACKET_NONE) {
-    size_t length = port.was_cut ? take_after_cut()
-                                 : ring_take(&transmit_ring, port.packet, USB_MAX_PACKET_BYTES);
+    size_t length = port.was_cut ? take_after_cut() : ring_take(&transmit_ring, port.packet, USB_MAX_PACKET_BYTES);
     if (length == 0 && !port.transfer_is_open)
       return;
     port.packet_bytes = length;
@@ -235,8 +234,7 @@ enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
 }
 
 size_t cdc_read(uint8_t *bytes, size_t capacity) {
-  uint32_t length = ring_take(&receive_ring, bytes,
-                              capacity < RECEIVE_BYTES ? (uint32_t)capacity : RECEIVE_BYTES);
+  uint32_t length = ring_take(&receive_ring, bytes, capacity < RECEIVE_BYTES ? (uint32_t)capacity : RECEIVE_BYTES);
   if (length)
     usb_controller_request_service();
   return length;

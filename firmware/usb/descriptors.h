@@ -25,7 +25,6 @@ enum {
 
 /* Writes the descriptor and returns its length; 0: the device has no such descriptor.
  * type_and_index is wValue of GET_DESCRIPTOR. */
-size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_index,
-                        uint8_t to[DESCRIPTOR_MAX_BYTES]);
+size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_index, uint8_t to[DESCRIPTOR_MAX_BYTES]);
 
 #endif

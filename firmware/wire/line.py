@@ -6,6 +6,7 @@
 
 Needs nothing but Python 3.11.
 """
+
 import argparse
 import pathlib
 import re
@@ -19,7 +20,16 @@ import line_values
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SAYS = "written by firmware/wire/line.py from line.toml; change it there"
 BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "n": 1}
-C_TYPES = {"u8": "uint8_t", "u16": "uint16_t", "i16": "int16_t", "u32": "uint32_t", "i32": "int32_t", "u64": "uint64_t", "f32": "float", "n": "uint8_t"}
+C_TYPES = {
+    "u8": "uint8_t",
+    "u16": "uint16_t",
+    "i16": "int16_t",
+    "u32": "uint32_t",
+    "i32": "int32_t",
+    "u64": "uint64_t",
+    "f32": "float",
+    "n": "uint8_t",
+}
 STRUCT_CODES = {"u8": "B", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "n": "n", "text": "16s"}
 SETS = {"flags": "Flag", "streams": "Streams", "capabilities": "Capability", "stored": "Stored"}
 
@@ -83,8 +93,12 @@ class Line:
     def __init__(self, path):
         with open(path, "rb") as file:
             said = tomllib.load(file)
-        self.version, self.sensors_max, self.text_bytes, self.loader_magic = (said[key] for key in ("version", "sensors_max", "text_bytes", "loader_magic"))
-        self.flags, self.streams, self.capabilities, self.stored, self.results = (said[key] for key in ("flags", "streams", "capabilities", "stored", "results"))
+        self.version, self.sensors_max, self.text_bytes, self.loader_magic = (
+            said[key] for key in ("version", "sensors_max", "text_bytes", "loader_magic")
+        )
+        self.flags, self.streams, self.capabilities, self.stored, self.results = (
+            said[key] for key in ("flags", "streams", "capabilities", "stored", "results")
+        )
         self.ranges = said["ranges"]
         wanted = said["struct"].keys()
         self.structs = {name: Body(name, table, wanted) for name, table in said["struct"].items()}
@@ -106,9 +120,16 @@ class Line:
 
     def longest_body(self):
         """Bytes, with all that a body can hold."""
+
         def size(fields):
-            return sum(size(self.structs[field.kind].fields) if field.is_struct else self.text_bytes if field.kind == "text"
-                       else BYTES[field.kind] * field.times * (field.per_sensor * self.sensors_max or 1) for field in fields)
+            return sum(
+                size(self.structs[field.kind].fields)
+                if field.is_struct
+                else self.text_bytes
+                if field.kind == "text"
+                else BYTES[field.kind] * field.times * (field.per_sensor * self.sensors_max or 1)
+                for field in fields
+            )
 
         return max(size(body.fields) for body in (*self.packets.values(), *self.commands.values()))
 
@@ -139,12 +160,16 @@ class Line:
 
 # ---- C
 
+
 def c_comment(text, indent="  ", width=100):
     if not text:
         return []
     lines = textwrap.wrap(text, width - len(indent) - 6)
-    return [f"{indent}/* {lines[0]}" + (" */" if len(lines) == 1 else ""), *(f"{indent} * {line}" for line in lines[1:-1]),
-            *([f"{indent} * {lines[-1]} */"] if len(lines) > 1 else [])]
+    return [
+        f"{indent}/* {lines[0]}" + (" */" if len(lines) == 1 else ""),
+        *(f"{indent} * {line}" for line in lines[1:-1]),
+        *([f"{indent} * {lines[-1]} */"] if len(lines) > 1 else []),
+    ]
 
 
 def c_described(code, text, indent="  "):
@@ -162,10 +187,19 @@ def c_bits(title, prefix, entries):
 
 
 def contact_flags_h(line):
-    lines = [f"/* {SAYS}.", " *", " * What a contact result says about itself. The bits travel unchanged in the contact packet.", " *",
-             " * A quantity may be used only under its VALID flag; where the flag is off its field is zero.",
-             " * The warnings leave the numbers in place and say why they deserve less trust.", " */",
-             "#ifndef COMMON_CONTACT_FLAGS_H", "#define COMMON_CONTACT_FLAGS_H", "", "enum contact_flag {"]
+    lines = [
+        f"/* {SAYS}.",
+        " *",
+        " * What a contact result says about itself. The bits travel unchanged in the contact packet.",
+        " *",
+        " * A quantity may be used only under its VALID flag; where the flag is off its field is zero.",
+        " * The warnings leave the numbers in place and say why they deserve less trust.",
+        " */",
+        "#ifndef COMMON_CONTACT_FLAGS_H",
+        "#define COMMON_CONTACT_FLAGS_H",
+        "",
+        "enum contact_flag {",
+    ]
     for flag in line.flags:
         lines += c_described(f"CONTACT_FLAG_{flag['name']} = 1 << {flag['bit']},", "warning: " * bool(flag.get("warning")) + flag["text"])
     return [*lines, "};", "", "#endif"]
@@ -195,7 +229,11 @@ def c_struct(name, body, line):
             groups.setdefault(field.group, []).append(field)
             continue
         if field.when != when and field.when:
-            lines.append(f"  /* {field.when[1]} */" if field.when[0] == "flags" else f"  /* with WIRE_{one(field.when[0])}_{field.when[1]}, else 0 */")
+            lines.append(
+                f"  /* {field.when[1]} */"
+                if field.when[0] == "flags"
+                else f"  /* with WIRE_{one(field.when[0])}_{field.when[1]}, else 0 */"
+            )
         elif field.when != when:
             lines.append("  /* always */")
         when = field.when
@@ -203,8 +241,12 @@ def c_struct(name, body, line):
         lines += c_described(first, field.text) + ["  " + other for other in others]
     before = []
     for group, fields in groups.items():
-        before += [*c_comment("Where the time of one frame went, us. The stages follow one another without a gap. Values above 65535 saturate.", ""),
-                   f"struct wire_{group} {{"]
+        before += [
+            *c_comment(
+                "Where the time of one frame went, us. The stages follow one another without a gap. Values above 65535 saturate.", ""
+            ),
+            f"struct wire_{group} {{",
+        ]
         for field in fields:
             before += c_described(c_member(field)[0], field.text)
         before += ["};", ""]
@@ -216,17 +258,40 @@ def one(key):
 
 
 def bodies_h(line):
-    lines = [f"/* {SAYS}.", " *", " * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.", " */",
-             "#ifndef WIRE_BODIES_H", "#define WIRE_BODIES_H", "",
-             '#include "common/calibration.h"', '#include "common/crash.h"', '#include "common/limits.h"', '#include "common/pad_profile.h"', "",
-             "#include <stdint.h>", "", f"#define WIRE_VERSION {line.version}", "", f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes}, WIRE_MAX_BODY_BYTES = {line.longest_body()} }};", "",
-             "enum wire_type {", "  /* device to host */"]
+    lines = [
+        f"/* {SAYS}.",
+        " *",
+        " * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.",
+        " */",
+        "#ifndef WIRE_BODIES_H",
+        "#define WIRE_BODIES_H",
+        "",
+        '#include "common/calibration.h"',
+        '#include "common/crash.h"',
+        '#include "common/limits.h"',
+        '#include "common/pad_profile.h"',
+        "",
+        "#include <stdint.h>",
+        "",
+        f"#define WIRE_VERSION {line.version}",
+        "",
+        f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes}, WIRE_MAX_BODY_BYTES = {line.longest_body()} }};",
+        "",
+        "enum wire_type {",
+        "  /* device to host */",
+    ]
     lines += [f"  WIRE_{body.name.upper()} = 0x{body.type:02X}," for body in line.packets.values()]
-    lines += ["  /* host to device */"] + [f"  WIRE_CMD_{body.name.upper()} = 0x{body.type:02X}," for body in line.commands.values()] + ["};", ""]
-    for title, prefix, entries in (("Bits of the stream mask.", "STREAM", line.streams),
-                                   ("What a build can do: cmake/options.cmake.", "CAPABILITY", line.capabilities),
-                                   ("The result code of an acknowledgement.", "RESULT", line.results),
-                                   ("Bits of the word that says what the fingertip keeps without power.", "STORED", line.stored)):
+    lines += (
+        ["  /* host to device */"]
+        + [f"  WIRE_CMD_{body.name.upper()} = 0x{body.type:02X}," for body in line.commands.values()]
+        + ["};", ""]
+    )
+    for title, prefix, entries in (
+        ("Bits of the stream mask.", "STREAM", line.streams),
+        ("What a build can do: cmake/options.cmake.", "CAPABILITY", line.capabilities),
+        ("The result code of an acknowledgement.", "RESULT", line.results),
+        ("Bits of the word that says what the fingertip keeps without power.", "STORED", line.stored),
+    ):
         lines += c_bits(title, prefix, entries)
         if prefix == "STREAM":
             lines.append(f"  WIRE_STREAM_ALL = {' | '.join('WIRE_STREAM_' + each['name'] for each in entries)},")
@@ -236,10 +301,13 @@ def bodies_h(line):
         unit = f"_{each['unit']}" if each["unit"] else ""
         lines += c_comment(each["text"], "")
         if "choices" in each:
-            lines += [f"#define WIRE_{name}_MIN {each['choices'][0]}u /* and its doubles */", f"#define WIRE_{name}_MAX {each['choices'][-1]}u"]
+            lines += [
+                f"#define WIRE_{name}_MIN {each['choices'][0]}u /* and its doubles */",
+                f"#define WIRE_{name}_MAX {each['choices'][-1]}u",
+            ]
             continue
         lines += [f"#define WIRE_{name}_{end.upper()}{unit} {c_number(each[end])}" for end in ("min", "max", "default") if end in each]
-    lines += [f"#define WIRE_LOADER_MAGIC 0x{line.loader_magic:08X}u /* \"Boot\" */", ""]
+    lines += [f'#define WIRE_LOADER_MAGIC 0x{line.loader_magic:08X}u /* "Boot" */', ""]
     for body in line.packets.values():
         if not body.c_struct:
             lines += [*c_struct(f"wire_{body.name}", body, line), ""]
@@ -255,7 +323,11 @@ def bodies_h(line):
     lines += ["", "/* The commands that every fingertip knows, and those of its capabilities, for its set. */"]
     for capability in dict.fromkeys(body.capability for body in line.commands.values()):
         macro = "WIRE_COMMANDS" + (f"_OF_{capability}" if capability else "")
-        entries = [f"&cmd_{body.name}_layout" for body in sorted(line.commands.values(), key=lambda body: body.type) if body.capability == capability]
+        entries = [
+            f"&cmd_{body.name}_layout"
+            for body in sorted(line.commands.values(), key=lambda body: body.type)
+            if body.capability == capability
+        ]
         lines += [f"#define {macro} \\", *(f"  {entry}, \\" for entry in entries[:-1]), f"  {entries[-1]}"]
     return [*lines, "", "#endif"]
 
@@ -286,8 +358,14 @@ def runs_of(body, line, when=None, prefix=""):
 
 
 def layouts_inc(line):
-    lines = [f"/* {SAYS}.", " *", " * The layouts of all bodies, for packet.c alone. */", "",
-             f'_Static_assert(FT_MAX_SENSORS == {line.sensors_max}, "sensors_max of line.toml, of which WIRE_MAX_BODY_BYTES is made");', ""]
+    lines = [
+        f"/* {SAYS}.",
+        " *",
+        " * The layouts of all bodies, for packet.c alone. */",
+        "",
+        f'_Static_assert(FT_MAX_SENSORS == {line.sensors_max}, "sensors_max of line.toml, of which WIRE_MAX_BODY_BYTES is made");',
+        "",
+    ]
     for prefix, bodies in (("wire_", line.packets), ("cmd_", line.commands)):
         for body in bodies.values():
             where = body.name if prefix == "wire_" else "cmd_" + body.name
@@ -302,22 +380,54 @@ def layouts_inc(line):
                     lines.append(f"    RUN(WHEN, {line.bit(when)}, {where}.{when[0]}),")
                 lines.append(f"    RUN({kind}, {count}, {where}.{member}),")
             lines += ["};", f"LAYOUT({name}, {number});"]
-    return [*lines, "", "#define ALL_PACKETS \\",
-            *(f"  &wire_{body.name}_layout, \\" for body in list(line.packets.values())[:-1]), f"  &wire_{list(line.packets)[-1]}_layout",
-            "#define ALL_COMMANDS \\", "  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL, \\", "  WIRE_COMMANDS_OF_SYNC"]
+    return [
+        *lines,
+        "",
+        "#define ALL_PACKETS \\",
+        *(f"  &wire_{body.name}_layout, \\" for body in list(line.packets.values())[:-1]),
+        f"  &wire_{list(line.packets)[-1]}_layout",
+        "#define ALL_COMMANDS \\",
+        "  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL, \\",
+        "  WIRE_COMMANDS_OF_SYNC",
+    ]
 
 
 # ---- C++
 
+
 def line_fields_hpp(line):
     contact, raw, info, health, ack, sync = (line.packets[name] for name in ("contact", "raw", "info", "health", "ack", "sync"))
-    lines = [f"/* {SAYS}.", " *", " * Walks over the fields of packets in the order of columns and comments of recordings, and the words",
-             " * for what packets number; no interface of the library. */", "#pragma once", "", '#include "libfingertip/wire.hpp"', "",
-             "#include <cstddef>", "#include <cstdint>", "#include <string>", "", "namespace fingertip::recording {", "",
-             "/* A value of the packet that the file shows in another unit: shown = raw / scale. */",
-             "template <typename Integer> struct Scaled {", "  Integer &raw;", "  double scale;", "  int digits;", "};", "",
-             "/* A float that holds under a flag. */", "struct Quantity {", "  float &value;", "  bool valid;", "};", "",
-             f"inline constexpr std::size_t RAW_COLUMNS = {len(raw.fields) - 2}; /* without those of the sensors */", ""]
+    lines = [
+        f"/* {SAYS}.",
+        " *",
+        " * Walks over the fields of packets in the order of columns and comments of recordings, and the words",
+        " * for what packets number; no interface of the library. */",
+        "#pragma once",
+        "",
+        '#include "libfingertip/wire.hpp"',
+        "",
+        "#include <cstddef>",
+        "#include <cstdint>",
+        "#include <string>",
+        "",
+        "namespace fingertip::recording {",
+        "",
+        "/* A value of the packet that the file shows in another unit: shown = raw / scale. */",
+        "template <typename Integer> struct Scaled {",
+        "  Integer &raw;",
+        "  double scale;",
+        "  int digits;",
+        "};",
+        "",
+        "/* A float that holds under a flag. */",
+        "struct Quantity {",
+        "  float &value;",
+        "  bool valid;",
+        "};",
+        "",
+        f"inline constexpr std::size_t RAW_COLUMNS = {len(raw.fields) - 2}; /* without those of the sensors */",
+        "",
+    ]
 
     def visit_contact(field):
         if field.kind == "f32":
@@ -325,21 +435,36 @@ def line_fields_hpp(line):
         return f'  visit("{field.name}", contact.{field.member});'
 
     later = line.later()
-    lines += ["/* Sets of columns that came later, one after the other; a recording has so many of them. */", f"inline constexpr int LATER_SETS = {len(later)};", "",
-              "/* Flags of columns that one with so many of these sets has not. */", "inline constexpr std::uint32_t flags_beyond(int sets) {",
-              "  std::uint32_t flags = 0;"]
+    lines += [
+        "/* Sets of columns that came later, one after the other; a recording has so many of them. */",
+        f"inline constexpr int LATER_SETS = {len(later)};",
+        "",
+        "/* Flags of columns that one with so many of these sets has not. */",
+        "inline constexpr std::uint32_t flags_beyond(int sets) {",
+        "  std::uint32_t flags = 0;",
+    ]
     for number, fields in enumerate(later.values()):
         flags = " | ".join(f"CONTACT_FLAG_{name}" for name in dict.fromkeys(field.when[1] for field in fields))
         lines.append(f"  flags |= sets > {number} ? 0u : static_cast<std::uint32_t>({flags});")
-    lines += ["  return flags;", "}", "", "template <typename Visitor>",
-              "void visit_contact(Visitor &visit, wire_packet &packet, int sets = LATER_SETS) {", "  wire_contact &contact = packet.body.contact;"]
+    lines += [
+        "  return flags;",
+        "}",
+        "",
+        "template <typename Visitor>",
+        "void visit_contact(Visitor &visit, wire_packet &packet, int sets = LATER_SETS) {",
+        "  wire_contact &contact = packet.body.contact;",
+    ]
     for name in contact.columns:
         lines.append('  visit("sequence", packet.sequence);' if name == "sequence" else visit_contact(contact.field(name)))
     for number, fields in enumerate(later.values()):
         lines += [f"  if (sets == {number}) {{", "    return;", "  }", *map(visit_contact, fields)]
     lines += ["}", ""]
-    lines += ["template <typename Visitor>", "void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {",
-              "  wire_raw &raw = packet.body.raw;", '  visit("raw_sequence", packet.sequence);']
+    lines += [
+        "template <typename Visitor>",
+        "void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {",
+        "  wire_raw &raw = packet.body.raw;",
+        '  visit("raw_sequence", packet.sequence);',
+    ]
     for field in raw.fields:
         if field.kind == "u32" and field.name != "frame":
             lines.append(f'  visit("{field.key}", raw.{field.name});')
@@ -347,13 +472,20 @@ def line_fields_hpp(line):
             lines.append('  visit("temperature_degC", Scaled<std::int16_t>{raw.temperature_cC, 100.0, 2});')
         elif field.pair:
             for column, name in zip(("s", "tare"), field.pair, strict=True):
-                lines += ["  for (int k = 0; k < sensor_count; k++) {",
-                          f'    visit("{column}" + std::to_string(k) + "_Pa", Scaled<std::int32_t>{{raw.{name}[k], 1024.0, 4}});', "  }"]
+                lines += [
+                    "  for (int k = 0; k < sensor_count; k++) {",
+                    f'    visit("{column}" + std::to_string(k) + "_Pa", Scaled<std::int32_t>{{raw.{name}[k], 1024.0, 4}});',
+                    "  }",
+                ]
     lines += ["}", ""]
 
     def visitor(name, body, fields, kind):
-        return [f"template <typename Visitor> void visit_{name}(Visitor &visit, {kind} &{name}) {{",
-                *(f'  visit("{field.key}", {name}.{field.member});' for field in fields), "}", ""]
+        return [
+            f"template <typename Visitor> void visit_{name}(Visitor &visit, {kind} &{name}) {{",
+            *(f'  visit("{field.key}", {name}.{field.member});' for field in fields),
+            "}",
+            "",
+        ]
 
     lines += visitor("health", health, map(health.field, health.keys), "wire_health") + visitor("ack", ack, ack.fields, "wire_ack")
     lines += visitor("sync", sync, sync.fields, "wire_sync")
@@ -361,28 +493,70 @@ def line_fields_hpp(line):
     calibration, pad = line.structs["calibration"], line.structs["pad_profile"]
     lines += ["/* What there is only of a calibrated fingertip: numbers, and lists with one for each sensor. */"]
     lines += visitor("calibration", calibration, [field for field in calibration.fields if not field.each], "struct calibration")
-    lines += ["template <typename Visitor> void visit_sensor_lists(Visitor &visit) {",
-              *(f'  visit("{key}", &sensor_calibration::{name});' for field in calibration.fields if field.each for key, name in zip(field.keys, field.each, strict=True)), "}", "",
-              "/* What there is only where a pad's profile is stored: numbers, and lists with one for each term. */"]
+    lines += [
+        "template <typename Visitor> void visit_sensor_lists(Visitor &visit) {",
+        *(
+            f'  visit("{key}", &sensor_calibration::{name});'
+            for field in calibration.fields
+            if field.each
+            for key, name in zip(field.keys, field.each, strict=True)
+        ),
+        "}",
+        "",
+        "/* What there is only where a pad's profile is stored: numbers, and lists with one for each term. */",
+    ]
     lines += visitor("pad", pad, [field for field in pad.fields if field.key.startswith("pad_")], "pad_profile")
-    lines += ["struct PadList {", "  const char *name;", "  std::size_t terms;", "  float &(*value)(pad_profile &pad, std::size_t term);", "};",
-              "inline constexpr PadList pad_lists[] = {"]
+    lines += [
+        "struct PadList {",
+        "  const char *name;",
+        "  std::size_t terms;",
+        "  float &(*value)(pad_profile &pad, std::size_t term);",
+        "};",
+        "inline constexpr PadList pad_lists[] = {",
+    ]
     for each in pad.lists:
-        lines.append(f'    {{"{each["key"]}", {each["count"]}, [](pad_profile &pad, std::size_t j) -> float & {{ return pad.{each["member"]}; }}}},')
-    lines += ["};", "", "} // namespace fingertip::recording", "", "namespace fingertip::words {", "",
-              "struct Word {", "  std::uint32_t value; /* a bit, or a number */", "  const char *word;", "};"]
-    for name, prefix, entries, word in (("streams", "WIRE_STREAM_", line.streams, "word"), ("capabilities", "WIRE_CAPABILITY_", line.capabilities, "word"),
-                                        ("stored", "WIRE_STORED_", line.stored, "word"), ("results", "WIRE_RESULT_", line.results, "word")):
+        lines.append(
+            f'    {{"{each["key"]}", {each["count"]}, [](pad_profile &pad, std::size_t j) -> float & {{ return pad.{each["member"]}; }}}},'
+        )
+    lines += [
+        "};",
+        "",
+        "} // namespace fingertip::recording",
+        "",
+        "namespace fingertip::words {",
+        "",
+        "struct Word {",
+        "  std::uint32_t value; /* a bit, or a number */",
+        "  const char *word;",
+        "};",
+    ]
+    for name, prefix, entries, word in (
+        ("streams", "WIRE_STREAM_", line.streams, "word"),
+        ("capabilities", "WIRE_CAPABILITY_", line.capabilities, "word"),
+        ("stored", "WIRE_STORED_", line.stored, "word"),
+        ("results", "WIRE_RESULT_", line.results, "word"),
+    ):
         lines += [f"inline constexpr Word {name}[] = {{", *(f'    {{{prefix}{each["name"]}, "{each[word]}"}},' for each in entries), "};"]
-    lines += ["inline constexpr Word commands[] = {", *(f'    {{WIRE_CMD_{body.name.upper()}, "{body.word}"}},' for body in line.commands.values()), "};",
-              "", "struct Flag {", "  std::uint32_t bit;", "  const char *name;", "  bool warning;", "};", "/* Those of state, then the warnings. */",
-              "inline constexpr Flag flags[] = {"]
+    lines += [
+        "inline constexpr Word commands[] = {",
+        *(f'    {{WIRE_CMD_{body.name.upper()}, "{body.word}"}},' for body in line.commands.values()),
+        "};",
+        "",
+        "struct Flag {",
+        "  std::uint32_t bit;",
+        "  const char *name;",
+        "  bool warning;",
+        "};",
+        "/* Those of state, then the warnings. */",
+        "inline constexpr Flag flags[] = {",
+    ]
     for flag in sorted(line.flags, key=lambda flag: bool(flag.get("warning"))):
         lines.append(f'    {{CONTACT_FLAG_{flag["name"]}, "{flag["name"]}", {"true" if flag.get("warning") else "false"}}},')
     return [*lines, "};", "", "} // namespace fingertip::words"]
 
 
 # ---- Python
+
 
 def py_wire(field, line):
     if field.is_struct:
@@ -393,7 +567,11 @@ def py_wire(field, line):
     base = {"f32": "float", "text": "str"}.get(field.kind, "int")
     if field.times > 1 or field.per_sensor:
         base = f"tuple[{base}, ...]"
-    said = f'"{code}"' + (f", {field.times}" if field.times > 1 else "") + (f", {field.per_sensor}, each_sensor=True" if field.per_sensor else "")
+    said = (
+        f'"{code}"'
+        + (f", {field.times}" if field.times > 1 else "")
+        + (f", {field.per_sensor}, each_sensor=True" if field.per_sensor else "")
+    )
     if field.when:
         absent = "math.nan" if field.kind == "f32" else "0" if field.when[0] == "flags" else None
         base += "" if absent else " | None"
@@ -420,19 +598,48 @@ def py_class(body, line):
     for field in body.fields:
         names = field.keys or (field.pair if field.kind == "f32" else None) or ()
         for i, name in enumerate(names):
-            lines += ["", "    @property", f"    def {name}(self) -> tuple[{'float' if field.kind == 'f32' else 'int'}, ...]:", '        """Of each sensor."""',
-                      f"        return self.{field.python}[{i}::{field.per_sensor}]"]
+            lines += [
+                "",
+                "    @property",
+                f"    def {name}(self) -> tuple[{'float' if field.kind == 'f32' else 'int'}, ...]:",
+                '        """Of each sensor."""',
+                f"        return self.{field.python}[{i}::{field.per_sensor}]",
+            ]
     return [*lines, "", ""]
 
 
 def line_py(line):
-    lines = [f'"""{SAYS}.', "", "The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a",
-             "body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.", '"""',
-             "import enum", "import math", "from typing import TYPE_CHECKING, Annotated, Any, NamedTuple", "", "if TYPE_CHECKING:", "    import numpy as np",
-             "    import numpy.typing as npt", "", f"VERSION = {line.version}", f"SENSORS_MAX = {line.sensors_max}",
-             f"MAX_FRAME_BYTES = {line.longest_frame()}  # longer is damage", f"LOADER_MAGIC = 0x{line.loader_magic:08X}", "", "",
-             "class Wire(NamedTuple):", '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, and under which bit of which field."""', "",
-             "    code: str", "    times: int = 1", "    each_sensor: bool = False", "    when: tuple[str, int] | None = None", "    absent: Any = None", "", ""]
+    lines = [
+        f'"""{SAYS}.',
+        "",
+        "The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a",
+        "body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.",
+        '"""',
+        "import enum",
+        "import math",
+        "from typing import TYPE_CHECKING, Annotated, Any, NamedTuple",
+        "",
+        "if TYPE_CHECKING:",
+        "    import numpy as np",
+        "    import numpy.typing as npt",
+        "",
+        f"VERSION = {line.version}",
+        f"SENSORS_MAX = {line.sensors_max}",
+        f"MAX_FRAME_BYTES = {line.longest_frame()}  # longer is damage",
+        f"LOADER_MAGIC = 0x{line.loader_magic:08X}",
+        "",
+        "",
+        "class Wire(NamedTuple):",
+        '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, and under which bit of which field."""',
+        "",
+        "    code: str",
+        "    times: int = 1",
+        "    each_sensor: bool = False",
+        "    when: tuple[str, int] | None = None",
+        "    absent: Any = None",
+        "",
+        "",
+    ]
 
     def bits(name, doc, entries, before=(), after=()):
         text = [f"class {name}(enum.IntFlag):", f'    """{doc}"""', "", *before]
@@ -441,32 +648,87 @@ def line_py(line):
             text.append(f"    {each['name']} = 1 << {each['bit']}  #: {warning}{each['text']}")
         return [*text, *after, "", ""]
 
-    lines += bits("Flag", "What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here.", line.flags)
-    lines += [f"WARNINGS = Flag(0x{line.warnings():X})", '"""The numbers are there, but deserve less trust: look at these before you use them."""', "", ""]
-    lines += bits("Streams", "What a fingertip sends unasked.", line.streams, ["    NONE = 0"], [f"    ALL = {' | '.join(each['name'] for each in line.streams)}"])
-    lines += bits("Capability", "What a firmware can do.", line.capabilities) + bits("Stored", "What a fingertip keeps without power.", line.stored)
-    lines += ["class Result(enum.IntEnum):", '    """What an acknowledgement says."""', "",
-              *(f"    {each['name']} = {each['number']}  #: {each['text']}" for each in line.results), "", ""]
+    lines += bits(
+        "Flag", "What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here.", line.flags
+    )
+    lines += [
+        f"WARNINGS = Flag(0x{line.warnings():X})",
+        '"""The numbers are there, but deserve less trust: look at these before you use them."""',
+        "",
+        "",
+    ]
+    lines += bits(
+        "Streams",
+        "What a fingertip sends unasked.",
+        line.streams,
+        ["    NONE = 0"],
+        [f"    ALL = {' | '.join(each['name'] for each in line.streams)}"],
+    )
+    lines += bits("Capability", "What a firmware can do.", line.capabilities) + bits(
+        "Stored", "What a fingertip keeps without power.", line.stored
+    )
+    lines += [
+        "class Result(enum.IntEnum):",
+        '    """What an acknowledgement says."""',
+        "",
+        *(f"    {each['name']} = {each['number']}  #: {each['text']}" for each in line.results),
+        "",
+        "",
+    ]
     for body in (*line.structs.values(), *line.packets.values(), *line.commands.values()):
         lines += py_class(body, line)
     bodies = [*line.packets.values(), *line.commands.values()]
-    lines += [f"Body = {bodies[0].python} | " + " | ".join(body.python for body in bodies[1:]), f"CONTACT, RAW = 0x{line.packets['contact'].type:02x}, 0x{line.packets['raw'].type:02x}",
-              "TYPES: dict[int, type[Body]] = {", *(f"    0x{body.type:02X}: {body.python}," for body in bodies), "}",
-              "NESTED: dict[str, Any] = {" + ", ".join(f'"{body.python}": {body.python}' for body in line.structs.values()) + "}", "", ""]
+    lines += [
+        f"Body = {bodies[0].python} | " + " | ".join(body.python for body in bodies[1:]),
+        f"CONTACT, RAW = 0x{line.packets['contact'].type:02x}, 0x{line.packets['raw'].type:02x}",
+        "TYPES: dict[int, type[Body]] = {",
+        *(f"    0x{body.type:02X}: {body.python}," for body in bodies),
+        "}",
+        "NESTED: dict[str, Any] = {" + ", ".join(f'"{body.python}": {body.python}' for body in line.structs.values()) + "}",
+        "",
+        "",
+    ]
     lines += line_settings.python_settings(line)
     contact, raw = line.packets["contact"], line.packets["raw"]
-    lines += ["# Columns of recordings, and what their comments have of an info packet.", py_tuple("STAGES", line.stages()[:-1]), py_tuple("CONTACT_COLUMNS", contact.columns),
-              *(py_tuple(f"{name}_COLUMNS", [field.name for field in fields], "NaN in recordings of before there were any") for name, fields in line.later().items()),
-              "LATER_COLUMNS = (" + ", ".join(f"*{name}_COLUMNS" for name in line.later()) + ")",
-              py_tuple("RAW_COLUMNS", ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"]),
-              py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]),
-              "# Of a calibration, one value for each sensor, and struct's code of it.",
-              "SENSOR_LISTS = {" + ", ".join(f'"{key}": "{STRUCT_CODES[field.kind]}"' for field in line.structs["calibration"].fields if field.each for key in field.keys) + "}", "", ""]
-    lines += ["class ContactQuantities:", '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""', "", "    __slots__ = ()", "    contact: Contact"]
+    lines += [
+        "# Columns of recordings, and what their comments have of an info packet.",
+        py_tuple("STAGES", line.stages()[:-1]),
+        py_tuple("CONTACT_COLUMNS", contact.columns),
+        *(
+            py_tuple(f"{name}_COLUMNS", [field.name for field in fields], "NaN in recordings of before there were any")
+            for name, fields in line.later().items()
+        ),
+        "LATER_COLUMNS = (" + ", ".join(f"*{name}_COLUMNS" for name in line.later()) + ")",
+        py_tuple(
+            "RAW_COLUMNS",
+            ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"],
+        ),
+        py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]),
+        "# Of a calibration, one value for each sensor, and struct's code of it.",
+        "SENSOR_LISTS = {"
+        + ", ".join(
+            f'"{key}": "{STRUCT_CODES[field.kind]}"' for field in line.structs["calibration"].fields if field.each for key in field.keys
+        )
+        + "}",
+        "",
+        "",
+    ]
+    lines += [
+        "class ContactQuantities:",
+        '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""',
+        "",
+        "    __slots__ = ()",
+        "    contact: Contact",
+    ]
     for field in contact.fields:
         if field.when:
-            lines += ["", "    @property", f"    def {field.name}(self) -> {'float' if field.kind == 'f32' else 'int'}:",
-                      *py_doc(field.text[0].upper() + field.text[1:] + ".", "        "), f"        return self.contact.{field.name}"]
+            lines += [
+                "",
+                "    @property",
+                f"    def {field.name}(self) -> {'float' if field.kind == 'f32' else 'int'}:",
+                *py_doc(field.text[0].upper() + field.text[1:] + ".", "        "),
+                f"        return self.contact.{field.name}",
+            ]
     return [*lines, "", "", *py_arrays(line)]
 
 
@@ -499,43 +761,90 @@ def contact_msg(line):
     def of(field):
         return said(f"{ROS_TYPES[field.kind]} {field.key.lower()}", field.text)
 
-    lines = [f"# {SAYS}.", "#", "# A frame of a fingertip: its contact packet, its raw packet, or both, unchanged. NaN is what there is not: a quantity whose flag is off.",
-             "# Use a number only if its flag is on, and no warning: flags & (FIT_VALID | WARNINGS) == FIT_VALID.", "",
-             said("std_msgs/Header header", "as log time: begin of the recording, and what the clocks tell since then"),
-             said("uint64 line", "of the recording, from 1, 0 outside of one; counts those of fingertip_msgs/Line and of other fingertips too"),
-             said("uint32 device", "number of the fingertip in a recording of several"),
-             said("float64 time_us", "on the recorder's clock, since the recording's host_zero_us; NaN in a recording of one"),
-             said("uint64 t_us", "on the fingertip's clock: the middle of the sensors' conversion"),
-             said("uint32 frame", "number, from the fingertip's start"), "",
-             said("bool has_contact", "without: all below, until raw_sequence, is 0 and NaN"), said("uint16 sequence", "of the packet"), "uint32 flags"]
+    lines = [
+        f"# {SAYS}.",
+        "#",
+        "# A frame of a fingertip: its contact packet, its raw packet, or both, unchanged. NaN is what there is not: a quantity whose flag is off.",
+        "# Use a number only if its flag is on, and no warning: flags & (FIT_VALID | WARNINGS) == FIT_VALID.",
+        "",
+        said("std_msgs/Header header", "as log time: begin of the recording, and what the clocks tell since then"),
+        said("uint64 line", "of the recording, from 1, 0 outside of one; counts those of fingertip_msgs/Line and of other fingertips too"),
+        said("uint32 device", "number of the fingertip in a recording of several"),
+        said("float64 time_us", "on the recorder's clock, since the recording's host_zero_us; NaN in a recording of one"),
+        said("uint64 t_us", "on the fingertip's clock: the middle of the sensors' conversion"),
+        said("uint32 frame", "number, from the fingertip's start"),
+        "",
+        said("bool has_contact", "without: all below, until raw_sequence, is 0 and NaN"),
+        said("uint16 sequence", "of the packet"),
+        "uint32 flags",
+    ]
     for flag in line.flags:
         lines.append(said(f"uint32 {flag['name']}={1 << flag['bit']}", "warning: " * bool(flag.get("warning")) + flag["text"]))
     lines.append(said(f"uint32 WARNINGS={line.warnings()}", "all of them"))
-    lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [of(field) for fields in line.later().values() for field in fields]
+    lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [
+        of(field) for fields in line.later().values() for field in fields
+    ]
     lines += ["", said("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
     lines += [of(field) for field in raw.fields if field.kind == "u32" and field.name != "frame"]
-    return [*lines, said("float64 temperature_degc", "mean of the sensors; 0 until measured"),
-            said("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"), said("float64[] tare_pa", "the zero of each sensor")]
+    return [
+        *lines,
+        said("float64 temperature_degc", "mean of the sensors; 0 until measured"),
+        said("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"),
+        said("float64[] tare_pa", "the zero of each sensor"),
+    ]
 
 
 # ---- the page
 
+
 def line_facts_ts(line):
-    lines = [f"/** {SAYS}. */", "", f"export const WIRE_VERSION = {line.version};",
-             f"export const LOADER_MAGIC = 0x{line.loader_magic:08x};", "", "export const PacketType = {"]
+    lines = [
+        f"/** {SAYS}. */",
+        "",
+        f"export const WIRE_VERSION = {line.version};",
+        f"export const LOADER_MAGIC = 0x{line.loader_magic:08x};",
+        "",
+        "export const PacketType = {",
+    ]
     lines += [f"  {body.name.upper()}: 0x{body.type:02x}," for body in line.packets.values()]
     lines += [f"  CMD_{body.name.upper()}: 0x{body.type:02x}," for body in line.commands.values()] + ["} as const;", ""]
-    for doc, name, entries in (("Bits of the stream mask.", "Stream", line.streams), ("What a firmware can do.", "Capability", line.capabilities),
-                               ("What a fingertip keeps without power.", "Stored", line.stored), ("What a frame says about itself.", "Flag", line.flags)):
-        lines += [f"/** {doc} */", f"export const {name} = {{", *(f"  {each['name']}: 1 << {each['bit']}," for each in entries), "} as const;"]
-    lines += ["/** What an acknowledgement says. */", "export const Result = {", *(f"  {each['name']}: {each['number']}," for each in line.results), "} as const;", ""]
-    lines += ["/** Those of state, then the warnings. warning: the numbers deserve less trust. */",
-              "export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = ["]
+    for doc, name, entries in (
+        ("Bits of the stream mask.", "Stream", line.streams),
+        ("What a firmware can do.", "Capability", line.capabilities),
+        ("What a fingertip keeps without power.", "Stored", line.stored),
+        ("What a frame says about itself.", "Flag", line.flags),
+    ):
+        lines += [
+            f"/** {doc} */",
+            f"export const {name} = {{",
+            *(f"  {each['name']}: 1 << {each['bit']}," for each in entries),
+            "} as const;",
+        ]
+    lines += [
+        "/** What an acknowledgement says. */",
+        "export const Result = {",
+        *(f"  {each['name']}: {each['number']}," for each in line.results),
+        "} as const;",
+        "",
+    ]
+    lines += [
+        "/** Those of state, then the warnings. warning: the numbers deserve less trust. */",
+        "export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = [",
+    ]
     for flag in sorted(line.flags, key=lambda flag: bool(flag.get("warning"))):
-        lines.append(f"  {{ bit: Flag.{flag['name']}, name: '{flag['name']}', warning: {'true' if flag.get('warning') else 'false'}, meaning: {ts_text(flag.get('plain', flag['text']))} }},")
-    lines += ["];", "", "/** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */", "export const CONTACT_FLAG = {",
-              *(f"  {field.name}: Flag.{field.when[1]}," for field in line.quantities()), "} as const;",
-              "export type ContactField = keyof typeof CONTACT_FLAG;", "export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];"]
+        lines.append(
+            f"  {{ bit: Flag.{flag['name']}, name: '{flag['name']}', warning: {'true' if flag.get('warning') else 'false'}, meaning: {ts_text(flag.get('plain', flag['text']))} }},"
+        )
+    lines += [
+        "];",
+        "",
+        "/** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */",
+        "export const CONTACT_FLAG = {",
+        *(f"  {field.name}: Flag.{field.when[1]}," for field in line.quantities()),
+        "} as const;",
+        "export type ContactField = keyof typeof CONTACT_FLAG;",
+        "export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];",
+    ]
     return [*lines, "", *line_values.page_packets(line), *line_settings.page_settings(line, ts_text)]
 
 
@@ -550,6 +859,7 @@ WHEN_TEXTS = {"flags": "", "capabilities": "capability ", "stored": "stored "}
 
 def protocol_parts(line):
     """name -> lines, for between its marks."""
+
     def table(fields, always=True):
         conditions = any(field.when for field in fields)
         rows = ["| type | field | what |" + (" there if |" if conditions else ""), "|---|---|---|" + ("---|" if conditions else "")]
@@ -560,9 +870,12 @@ def protocol_parts(line):
 
     parts = {name: table(body.fields) for name, body in (*line.packets.items(), *line.structs.items())}
     parts["flags"] = ["| bit | name | meaning |", "|---|---|---|"] + [
-        f"| {flag['bit']} | {flag['name']} | {flag['text']}{'; ' + flag['more'] if 'more' in flag else ''} |" for flag in line.flags]
+        f"| {flag['bit']} | {flag['name']} | {flag['text']}{'; ' + flag['more'] if 'more' in flag else ''} |" for flag in line.flags
+    ]
     for name in ("streams", "capabilities", "stored"):
-        parts[name] = ["| bit | name | meaning |", "|---|---|---|"] + [f"| {each['bit']} | {each['word']} | {each['text']} |" for each in getattr(line, name)]
+        parts[name] = ["| bit | name | meaning |", "|---|---|---|"] + [
+            f"| {each['bit']} | {each['word']} | {each['text']} |" for each in getattr(line, name)
+        ]
     parts["results"] = ["| number | meaning |", "|---|---|"] + [f"| {each['number']} | {each['text']} |" for each in line.results]
 
     def range_text(field):
@@ -571,11 +884,18 @@ def protocol_parts(line):
         each = line.ranges[field.range]
         if "words" in each:
             return f" ({', '.join(f'{number} {word}' for number, word in zip(each['choices'], each['words'], strict=True))})"
-        return f" ({', '.join(map(str, each['choices']))})" if "choices" in each else f" ({each['min']:.12g} to {each['max']:.12g} {each['unit']})"
+        return (
+            f" ({', '.join(map(str, each['choices']))})"
+            if "choices" in each
+            else f" ({each['min']:.12g} to {each['max']:.12g} {each['unit']})"
+        )
 
     parts["commands"] = ["| type | command | body | known with | what it does |", "|---|---|---|---|---|"]
     for body in sorted(line.commands.values(), key=lambda body: body.type):
-        fields = ", ".join(f"{field.type_text} {field.names_text}{range_text(field)}{': ' + field.text if field.text and not field.range else ''}" for field in body.fields)
+        fields = ", ".join(
+            f"{field.type_text} {field.names_text}{range_text(field)}{': ' + field.text if field.text and not field.range else ''}"
+            for field in body.fields
+        )
         known = next((each["word"] for each in line.capabilities if each["name"] == body.capability), "always")
         parts["commands"].append(f"| 0x{body.type:02X} | {body.word} | {fields or '-'} | {known} | {body.text} |")
     return parts

@@ -7,7 +7,15 @@ class Value:
     """A field as programs in other languages have it: its name, and where the C struct holds it."""
 
     def __init__(self, name, kind, member, count=1, per_sensor=False, stride=0, text=""):
-        self.name, self.kind, self.member, self.count, self.per_sensor, self.stride, self.text = name, kind, member, count, per_sensor, stride, text
+        self.name, self.kind, self.member, self.count, self.per_sensor, self.stride, self.text = (
+            name,
+            kind,
+            member,
+            count,
+            per_sensor,
+            stride,
+            text,
+        )
 
 
 def values_of(body, line, where, part=""):
@@ -19,10 +27,21 @@ def values_of(body, line, where, part=""):
         elif field.pair:
             values += [Value(name, field.kind, f"{where}.{name}", per_sensor=True, text=field.text) for name in field.pair]
         elif field.each:
-            values += [Value(name, field.kind, f"{member}[0].{name}", per_sensor=True, stride="sizeof(sensor_calibration)", text=field.text) for name in field.each]
+            values += [
+                Value(name, field.kind, f"{member}[0].{name}", per_sensor=True, stride="sizeof(sensor_calibration)", text=field.text)
+                for name in field.each
+            ]
         else:
             # Two names would be there twice: those of the header. A part's own are those that recordings have.
-            name = field.key if field.key != field.name else field.python if field.name in ("sequence", "t_us") else f"pad_{field.name}" if part == "pad_profile" else field.name
+            name = (
+                field.key
+                if field.key != field.name
+                else field.python
+                if field.name in ("sequence", "t_us")
+                else f"pad_{field.name}"
+                if part == "pad_profile"
+                else field.name
+            )
             name = field.name if field.kind == "n" or body.name == "raw" else name
             count = line.text_bytes if field.kind == "text" else field.times
             values.append(Value(name, "u8" if field.kind == "n" else field.kind, member, count, text=field.text))
@@ -31,24 +50,58 @@ def values_of(body, line, where, part=""):
 
 def all_values(line):
     """(body, its values) of each packet and command; the header is not among them."""
-    return [*((body, values_of(body, line, f"body.{body.name}")) for body in line.packets.values()),
-            *((body, values_of(body, line, f"body.cmd_{body.name}")) for body in line.commands.values())]
+    return [
+        *((body, values_of(body, line, f"body.{body.name}")) for body in line.packets.values()),
+        *((body, values_of(body, line, f"body.cmd_{body.name}")) for body in line.commands.values()),
+    ]
 
 
 def line_values_hpp(line, says):
-    lines = [f"/* {says}.", " *", " * Where wire_packet holds each field, for fingertip.cpp alone. */", "#pragma once", "", '#include "libfingertip/wire.hpp"', "",
-             "#include <cstddef>", "#include <cstdint>", "", "namespace fingertip::values {", "", "enum class Kind : std::uint8_t { u8, u16, i16, u32, i32, u64, f32, text };", "",
-             "/* count numbers, stride bytes apart; a text is one. */", "struct Field {", "  const char *name;", "  Kind kind;", "  std::uint16_t offset, count, stride;", "};", ""]
+    lines = [
+        f"/* {says}.",
+        " *",
+        " * Where wire_packet holds each field, for fingertip.cpp alone. */",
+        "#pragma once",
+        "",
+        '#include "libfingertip/wire.hpp"',
+        "",
+        "#include <cstddef>",
+        "#include <cstdint>",
+        "",
+        "namespace fingertip::values {",
+        "",
+        "enum class Kind : std::uint8_t { u8, u16, i16, u32, i32, u64, f32, text };",
+        "",
+        "/* count numbers, stride bytes apart; a text is one. */",
+        "struct Field {",
+        "  const char *name;",
+        "  Kind kind;",
+        "  std::uint16_t offset, count, stride;",
+        "};",
+        "",
+    ]
     for body, values in all_values(line):
         where = body.name if body in line.packets.values() else f"cmd_{body.name}"
         lines.append(f"inline constexpr Field {where}_fields[] = {{")
-        lines += ['    {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},', '    {"t_us", Kind::u64, offsetof(wire_packet, t_us), 1, 8},']
+        lines += [
+            '    {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},',
+            '    {"t_us", Kind::u64, offsetof(wire_packet, t_us), 1, 8},',
+        ]
         for value in values:
             count = "FT_MAX_SENSORS" if value.per_sensor else value.count
             stride = value.stride or BYTES[value.kind]
             lines.append(f'    {{"{value.name}", Kind::{value.kind}, offsetof(wire_packet, {value.member}), {count}, {stride}}},')
         lines += ["};"]
-    lines += ["", "struct Packet {", "  std::uint8_t type;", "  const Field *fields;", "  std::size_t count;", "};", "", "inline constexpr Packet packets[] = {"]
+    lines += [
+        "",
+        "struct Packet {",
+        "  std::uint8_t type;",
+        "  const Field *fields;",
+        "  std::size_t count;",
+        "};",
+        "",
+        "inline constexpr Packet packets[] = {",
+    ]
     for body, _ in all_values(line):
         where = body.name if body in line.packets.values() else f"cmd_{body.name}"
         lines.append(f"    {{0x{body.type:02X}, {where}_fields, sizeof {where}_fields / sizeof *{where}_fields}},")
@@ -57,20 +110,42 @@ def line_values_hpp(line, says):
 
 # ---- the page
 
+
 def page_packets(line):
     """What a packet is in the page: src/core.ts fills it in by these names."""
+
     def type_of(value, array):
         return "string" if value.kind == "text" else array if value.per_sensor or value.count > 1 else "number"
 
-    lines = ["interface Header {", "  sequence: number;", "  /** Device time since start; in commands the host's own clock. */", "  t_us: number;", "}"]
+    lines = [
+        "interface Header {",
+        "  sequence: number;",
+        "  /** Device time since start; in commands the host's own clock. */",
+        "  t_us: number;",
+        "}",
+    ]
     commands = []
     for body, values in all_values(line):
         if body in line.commands.values():
-            commands.append(" ".join([f"  | {{ type: 0x{body.type:02x};", *(f"{value.name}: {type_of(value, 'ArrayLike<number>')};" for value in values), "}"]))
+            commands.append(
+                " ".join(
+                    [
+                        f"  | {{ type: 0x{body.type:02x};",
+                        *(f"{value.name}: {type_of(value, 'ArrayLike<number>')};" for value in values),
+                        "}",
+                    ]
+                )
+            )
             continue
         lines += [f"/** {body.text} */", f"export interface {body.name.capitalize()} extends Header {{", f"  type: 0x{body.type:02x};"]
         for value in values:
             lines += [f"  /** {value.text} */"] * bool(value.text) + [f"  {value.name}: {type_of(value, 'Float64Array')};"]
         lines.append("}")
-    return [*lines, f"export type DevicePacket = {' | '.join(body.name.capitalize() for body in line.packets.values())};",
-            "/** What a command carries. */", "export type Command =", *commands[:-1], commands[-1] + ";"]
+    return [
+        *lines,
+        f"export type DevicePacket = {' | '.join(body.name.capitalize() for body in line.packets.values())};",
+        "/** What a command carries. */",
+        "export type Command =",
+        *commands[:-1],
+        commands[-1] + ";",
+    ]

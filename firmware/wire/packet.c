@@ -34,29 +34,24 @@ struct wire_layout {
   const struct run *runs;
 };
 
-#define RUN(kind, count, field)                                                                    \
+#define RUN(kind, count, field)                                                                                        \
   { kind, count, offsetof(struct wire_packet, body.field) }
-#define LAYOUT(name, type)                                                                         \
-  const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0],      \
-                                            name##_runs}
+#define LAYOUT(name, type)                                                                                             \
+  const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0], name##_runs}
 static const struct run no_runs[1]; /* NULL has no end to go to */
 #define EMPTY_LAYOUT(name, type) const struct wire_layout name##_layout = {type, 0, no_runs}
 _Static_assert(offsetof(struct sensor_calibration, gain_sd) == 4 &&
-                   offsetof(struct sensor_calibration, off_y_um) ==
-                       offsetof(struct sensor_calibration, off_x_um) + 2 &&
-                   offsetof(struct sensor_calibration, wider_q15) ==
-                       offsetof(struct sensor_calibration, off_x_um) + 4,
+                   offsetof(struct sensor_calibration, off_y_um) == offsetof(struct sensor_calibration, off_x_um) + 2 &&
+                   offsetof(struct sensor_calibration, wider_q15) == offsetof(struct sensor_calibration, off_x_um) + 4,
                "SENSORS_F32, SENSORS_U16");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
-                       offsetof(struct wire_packet, body.raw.pressure_Pa_q10) +
-                           4 * FT_MAX_SENSORS &&
+                       offsetof(struct wire_packet, body.raw.pressure_Pa_q10) + 4 * FT_MAX_SENSORS &&
                    offsetof(struct wire_packet, body.info.y_mm) ==
                        offsetof(struct wire_packet, body.info.x_mm) + 4 * FT_MAX_SENSORS,
                "PAIRS");
 
 _Static_assert(offsetof(struct crash_record, r0) % 4 == 0 &&
-                   offsetof(struct crash_record, event_ages_1024us) ==
-                       offsetof(struct crash_record, r0) + 9 * 4,
+                   offsetof(struct crash_record, event_ages_1024us) == offsetof(struct crash_record, r0) + 9 * 4,
                "U32 of crash");
 
 #include "wire/layouts.inc"
@@ -265,8 +260,7 @@ static inline struct repeat repeat_of(const struct run *run, uint8_t sensor_coun
 }
 
 /* False: a value is refused. */
-static bool put_body(const struct wire_layout *layout, const uint8_t *packet,
-                     struct writer *writer) {
+static bool put_body(const struct wire_layout *layout, const uint8_t *packet, struct writer *writer) {
   uint8_t sensor_count = 0;
   const struct run *end = layout->runs + layout->run_count;
   for (const struct run *run = layout->runs; run < end; run++) {
@@ -298,8 +292,7 @@ static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_
                                         [F32_PAIRS] = 8};
 
 /* False: a value is refused, or the body has another length. */
-static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length,
-                     uint8_t *packet) {
+static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length, uint8_t *packet) {
   uint8_t sensor_count = 0;
   const struct run *end = layout->runs + layout->run_count;
   for (const struct run *run = layout->runs; run < end; run++) {
@@ -429,8 +422,7 @@ void wire_receiver_init(struct wire_receiver *receiver, const struct wire_layout
   receiver->overlong = 0;
 }
 
-enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte,
-                            struct wire_packet *packet) {
+enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte, struct wire_packet *packet) {
   if (byte != 0) {
     if (receiver->length < sizeof receiver->frame) {
       receiver->frame[receiver->length++] = byte;

@@ -74,7 +74,6 @@ void wire_receiver_init(struct wire_receiver *receiver, const struct wire_layout
  * Else a damaged frame ended here and was discarded, for the reason given by wire_decode, or
  * FT_ERR_SPACE for an overlong one. Empty frames (two delimiters in a row) are legal fill.
  */
-enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte,
-                            struct wire_packet *packet);
+enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte, struct wire_packet *packet);
 
 #endif

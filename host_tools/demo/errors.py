@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 """Says what fingertip-evaluate found, a column for each pad.
 
-    errors.py NAME=SUMMARY.json...
+errors.py NAME=SUMMARY.json...
 """
+
 import argparse
 import json
 import pathlib
@@ -33,8 +34,10 @@ def main(argv):
             raise InputError(f"{text} is no NAME=SUMMARY.json")
         with open(path, encoding="utf-8") as file:
             summaries[name] = json.load(file)
-    table = [("what the fingertip felt, against the truth", list(summaries)),
-             *((label, [value(summary) for summary in summaries.values()]) for label, value in ROWS)]
+    table = [
+        ("what the fingertip felt, against the truth", list(summaries)),
+        *((label, [value(summary) for summary in summaries.values()]) for label, value in ROWS),
+    ]
     width = max(len(label) for label, _ in table)
     columns = [max(len(cells[i]) for _, cells in table) for i in range(len(summaries))]
     for label, cells in table:

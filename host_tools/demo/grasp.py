@@ -5,6 +5,7 @@
 
 RECORDING.csv: of fingertip grasp; TRUTH.csv: of fingertip simulate --lift.
 """
+
 import argparse
 import io
 import pathlib
@@ -79,14 +80,31 @@ def draw(grip, t_s, truth, truth_s, slips, happened):
             panel.axvspan(begin, end, color=SLIPPING, alpha=0.15, lw=0, zorder=0)
             if reaction:
                 panel.axvline(reaction, color=SLIPPING, lw=1, ls=":", zorder=1)
-    force.plot(truth_s, np.where(truth["least_N"] > 0, truth["least_N"], np.nan), color=SLIPPING, lw=1, ls="--", label="need: the least that holds it")
+    force.plot(
+        truth_s,
+        np.where(truth["least_N"] > 0, truth["least_N"], np.nan),
+        color=SLIPPING,
+        lw=1,
+        ls="--",
+        label="need: the least that holds it",
+    )
     force.plot(t_s, grip["force_N"], color=MEASURED, lw=1.1, label="felt", zorder=2)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.3, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
     width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
     for at_s, what in happened:
         force.axvline(at_s, color=FAINT, lw=0.8, zorder=0)
-        force.annotate(what, (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 1), textcoords="offset points", size=8, color=FAINT, ha="center", va="bottom")
+        force.annotate(
+            what,
+            (at_s, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 1),
+            textcoords="offset points",
+            size=8,
+            color=FAINT,
+            ha="center",
+            va="bottom",
+        )
     slid.set_ylim(bottom=min(0, truth["slid_mm"].min()) - 0.05, top=max(1.0, 1.1 * truth["slid_mm"].max()))
     force.legend(loc="upper left", fontsize=8, frameon=False)
     width.legend(loc="upper right", fontsize=8, frameon=False)

@@ -1,4 +1,5 @@
 """Screens of a terminal as a PNG that moves, and what a cell looks like."""
+
 import io
 import pathlib
 

@@ -16,6 +16,7 @@ That of a lift in host_tools/README.md is of the firmware on the host:
     simulation/player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
     /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.svg
 """
+
 import argparse
 import copy
 import fcntl
@@ -108,9 +109,11 @@ def shapes(column, row, cell):
 
 def svg(screen):
     columns, rows = screen.columns, screen.lines
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {columns * WIDTH + 16} {rows * HEIGHT + 16}">',
-           f'<rect width="100%" height="100%" rx="8" fill="{BACKGROUND}"/>',
-           '<g transform="translate(8 8)" shape-rendering="crispEdges" font-family="DejaVu Sans Mono, Menlo, Consolas, monospace" font-size="13">']
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {columns * WIDTH + 16} {rows * HEIGHT + 16}">',
+        f'<rect width="100%" height="100%" rx="8" fill="{BACKGROUND}"/>',
+        '<g transform="translate(8 8)" shape-rendering="crispEdges" font-family="DejaVu Sans Mono, Menlo, Consolas, monospace" font-size="13">',
+    ]
     marks, texts = [], []
     for row in range(rows):
         cells = [screen.buffer[row][column] for column in range(columns)]
@@ -120,8 +123,10 @@ def svg(screen):
             while end < columns and cells[end].bg == cells[start].bg:
                 end += 1
             if cells[start].bg != "default":
-                out.append(f'<rect x="{start * WIDTH}" y="{row * HEIGHT}" width="{(end - start) * WIDTH}" height="{HEIGHT}" '
-                           f'fill="{moving.colour(cells[start].bg, BACKGROUND)}"/>')
+                out.append(
+                    f'<rect x="{start * WIDTH}" y="{row * HEIGHT}" width="{(end - start) * WIDTH}" height="{HEIGHT}" '
+                    f'fill="{moving.colour(cells[start].bg, BACKGROUND)}"/>'
+                )
             start = end
         column = 0
         while column < columns:
@@ -132,13 +137,19 @@ def svg(screen):
                 column += 1
                 continue
             end = column  # a word of one style
-            while end < columns and cells[end].data != " " and shapes(end, row, cells[end]) is None \
-                    and (cells[end].fg, cells[end].bold) == (cell.fg, cell.bold):
+            while (
+                end < columns
+                and cells[end].data != " "
+                and shapes(end, row, cells[end]) is None
+                and (cells[end].fg, cells[end].bold) == (cell.fg, cell.bold)
+            ):
                 end += 1
             word = "".join(each.data for each in cells[column:end])
             weight = ' font-weight="bold"' if cell.bold else ""
-            texts.append(f'<text x="{column * WIDTH}" y="{row * HEIGHT + 12}" textLength="{(end - column) * WIDTH}" '
-                         f'fill="{moving.colour(cell.fg, FOREGROUND)}"{weight}>{html.escape(word)}</text>')
+            texts.append(
+                f'<text x="{column * WIDTH}" y="{row * HEIGHT + 12}" textLength="{(end - column) * WIDTH}" '
+                f'fill="{moving.colour(cell.fg, FOREGROUND)}"{weight}>{html.escape(word)}</text>'
+            )
             column = end
     return "\n".join([*out, *marks, '<g shape-rendering="auto">', *texts, "</g></g>", "</svg>"]) + "\n"
 
@@ -167,7 +178,9 @@ def main(argv):
     columns, rows = int(size[1]), int(size[2])
     if moves:
         times_s = [options.at + i * options.every for i in range(1 + int((options.until - options.at) / options.every))]
-        write_bytes(options.output, moving.png(replayed(replay, columns, rows, times_s, options.every, options.every * STEPS_PER_s), options.every))
+        write_bytes(
+            options.output, moving.png(replayed(replay, columns, rows, times_s, options.every, options.every * STEPS_PER_s), options.every)
+        )
     else:
         write_text(options.output, svg(screen_at(replay, columns, rows, options.at)))
     return 0

@@ -22,8 +22,7 @@ constexpr std::size_t MOST_NEWS = 80000;
 
 } // namespace
 
-GraspLoop::GraspLoop(const std::array<Way, FINGERS> &ways, Options options)
-    : options_(std::move(options)) {
+GraspLoop::GraspLoop(const std::array<Way, FINGERS> &ways, Options options) : options_(std::move(options)) {
   DeviceLoop::Options wanted;
   wanted.streams = options_.streams;
   wanted.follow_clock = true;
@@ -64,8 +63,7 @@ std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<b
   return {std::move(*ready[0]), std::move(*ready[1])};
 }
 
-void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen,
-                      const GripSettings &settings) {
+void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const GripSettings &settings) {
   status_ = gripper->poll();
   core_.emplace(settings, gripper->traits());
   core_->take(*status_);
@@ -211,8 +209,8 @@ void GraspLoop::tell_fault(std::uint32_t trouble) {
     told.text = fault_text_;
   }
   if ((trouble & GRIP_GRIPPER_INACTIVE) != 0) {
-    told.text += (told.text.empty() ? "" : "; ") +
-                 std::string("it is not active any more: it lost its power, or was reset");
+    told.text +=
+        (told.text.empty() ? "" : "; ") + std::string("it is not active any more: it lost its power, or was reset");
   }
   put(std::move(told));
 }

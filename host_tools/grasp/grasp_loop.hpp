@@ -121,7 +121,7 @@ private:
   std::optional<GripperStatus> status_;
   std::string gripper_trouble_;
   std::string fault_text_; // of the newest answer with a fault
-  GripReport report_{}; // of the last step
+  GripReport report_{};    // of the last step
   bool is_activating_ = false;
   unsigned interrupts_ = 0;
   std::atomic<bool> end_{false}, abandoned_{false};

@@ -58,9 +58,7 @@ struct Writer {
   }
   void state(const char *, std::uint8_t value) { put(state_name(value)); }
   void trouble(const char *, std::uint32_t value) { put(trouble_names(value)); }
-  void number(const char *, const double *value, int digits) {
-    put(value ? fixed(*value, digits) : "");
-  }
+  void number(const char *, const double *value, int digits) { put(value ? fixed(*value, digits) : ""); }
   void flag(const char *, const bool *value) { put(value ? (*value ? "1" : "0") : ""); }
   void object(const char *, const std::optional<bool> *value) {
     put(!value ? "" : !*value ? "-1" : **value ? "1" : "0");
@@ -179,9 +177,8 @@ GripRow grip_row(std::string_view value) {
   static const std::size_t status_us = status_column(columns);
   const auto cells = split(value, ',');
   if (cells.size() != columns.size()) {
-    throw Error(ErrorCode::damaged_line, std::to_string(cells.size()) +
-                                             " columns of the gripper instead of " +
-                                             std::to_string(columns.size()));
+    throw Error(ErrorCode::damaged_line,
+                std::to_string(cells.size()) + " columns of the gripper instead of " + std::to_string(columns.size()));
   }
   GripRow row;
   const auto time_us = to_double(cells[0]);
@@ -223,8 +220,7 @@ std::optional<GripRow> GripRowReader::next() {
     if (value.substr(0, 8) == "time_us,") {
       if (value != "time_us," + grip_columns()) {
         throw Error(ErrorCode::other_format,
-                    path_ + ":" + std::to_string(line.number) +
-                        ": other columns of the gripper than this version's");
+                    path_ + ":" + std::to_string(line.number) + ": other columns of the gripper than this version's");
       }
       continue;
     }
@@ -235,8 +231,7 @@ std::optional<GripRow> GripRowReader::next() {
       return grip_row(value);
     } catch (const Error &error) {
       if (!salvage_) {
-        throw Error(ErrorCode::damaged_line,
-                    path_ + ":" + std::to_string(line.number) + ": " + error.what());
+        throw Error(ErrorCode::damaged_line, path_ + ":" + std::to_string(line.number) + ": " + error.what());
       }
     }
   }

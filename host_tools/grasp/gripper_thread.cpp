@@ -19,9 +19,8 @@ constexpr std::int64_t REOPEN_us = 200000;
 constexpr std::size_t MOST_NEWS = 2000;
 
 bool is_same(const GripCommand &a, const GripCommand &b) {
-  return a.motion == b.motion &&
-         (a.motion != GRIP_MOVE ||
-          (a.width_mm == b.width_mm && a.speed_mm_s == b.speed_mm_s && a.force_N == b.force_N));
+  return a.motion == b.motion && (a.motion != GRIP_MOVE ||
+                                  (a.width_mm == b.width_mm && a.speed_mm_s == b.speed_mm_s && a.force_N == b.force_N));
 }
 
 std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
@@ -86,9 +85,7 @@ GripperStatus GripperThread::exchange() {
   if (is_new && command.motion == GRIP_ACTIVATE) {
     gripper_->activate();
   }
-  const GripperStatus status = is_new && command.motion == GRIP_MOVE
-                                   ? gripper_->move(command)
-                                   : gripper_->poll();
+  const GripperStatus status = is_new && command.motion == GRIP_MOVE ? gripper_->move(command) : gripper_->poll();
   std::lock_guard lock(mutex_);
   sent_ = number;
   return status;

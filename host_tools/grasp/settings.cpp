@@ -33,36 +33,27 @@ const std::vector<GraspSetting> &grasp_settings() {
        "The true force stays below, errors of the fingertips included"},
       {"travel-cap", "mm", 0.5, 100, 1, [](S &s) -> double & { return s.travel_cap_mm; },
        "Never close further since the touch"},
-      {"start", "N", 0.2, 100, 1, [](S &s) -> double & { return s.start_N; },
-       "Force before anything pulls"},
+      {"start", "N", 0.2, 100, 1, [](S &s) -> double & { return s.start_N; }, "Force before anything pulls"},
       {"floor", "N", 0.2, 100, 1, [](S &s) -> double & { return s.floor_N; },
        "Least force once the load is known; more where frames come late"},
-      {"blind", "N", 0.2, 100, 1, [](S &s) -> double & { return s.blind_N; },
-       "Force where no load can be estimated"},
-      {"friction", "", 0.1, 1.5, 1, [](S &s) -> double & { return s.friction; },
-       "Friction coefficient to begin with"},
+      {"blind", "N", 0.2, 100, 1, [](S &s) -> double & { return s.blind_N; }, "Force where no load can be estimated"},
+      {"friction", "", 0.1, 1.5, 1, [](S &s) -> double & { return s.friction; }, "Friction coefficient to begin with"},
       {"margin", "", 1, 5, 1, [](S &s) -> double & { return s.margin; },
        "Force divided by load / friction; more where frames come late"},
-      {"slid", "", 1, 3, 1, [](S &s) -> double & { return s.slid; },
-       "Factor on that once the object has slid"},
+      {"slid", "", 1, 3, 1, [](S &s) -> double & { return s.slid; }, "Factor on that once the object has slid"},
       {"decay", "%/s", 0, 2000, 0.01, [](S &s) -> double & { return s.decay_1_s; },
        "How fast an excess of force decays"},
-      {"rest", "s", 0, 60, 1, [](S &s) -> double & { return s.rest_s; },
-       "No decay for so long after a slide"},
-      {"touch", "N", 0.02, 2, 1, [](S &s) -> double & { return s.touch_N; },
-       "Force at which a touch begins"},
+      {"rest", "s", 0, 60, 1, [](S &s) -> double & { return s.rest_s; }, "No decay for so long after a slide"},
+      {"touch", "N", 0.02, 2, 1, [](S &s) -> double & { return s.touch_N; }, "Force at which a touch begins"},
       {"approach", "mm/s", 0.5, 8, 1, [](S &s) -> double & { return s.approach_mm_s; },
        "Speed until the touch; slower where frames come late"},
-      {"release", "mm/s", 0.5, 100, 1, [](S &s) -> double & { return s.release_mm_s; },
-       "Speed of opening"},
-      {"open-width", "mm", 0, 500, 1, [](S &s) -> double & { return s.release_width_mm; },
-       "How far to open"},
+      {"release", "mm/s", 0.5, 100, 1, [](S &s) -> double & { return s.release_mm_s; }, "Speed of opening"},
+      {"open-width", "mm", 0, 500, 1, [](S &s) -> double & { return s.release_width_mm; }, "How far to open"},
       {"stale", "ms", 5, 1000, 1e-3, [](S &s) -> double & { return s.stale_s; },
        "Ignore a fingertip without a new frame for so long"},
       {"late", "ms", 5, 500, 1e-3, [](S &s) -> double & { return s.late_s; },
        "Say so if frames are older than that when they come"},
-      {"silent", "ms", 20, 5000, 1e-3, [](S &s) -> double & { return s.silent_s; },
-       "Timeout of the gripper"},
+      {"silent", "ms", 20, 5000, 1e-3, [](S &s) -> double & { return s.silent_s; }, "Timeout of the gripper"},
       {"differ", "%", 5, 100, 0.01, [](S &s) -> double & { return s.differ; },
        "Warn if the fingertips' forces differ by more at rest"},
       {"kp", "um/N", 0, 10000, 1e-3, [](S &s) -> double & { return s.gains.kp_mm_N; },
@@ -71,8 +62,7 @@ const std::vector<GraspSetting> &grasp_settings() {
        "Its gain of the integral"},
       {"kd", "um s/N", 0, 10000, 1e-3, [](S &s) -> double & { return s.gains.kd_mm_s_N; },
        "Its gain of the derivative"},
-      {"control", "ms", 0.5, 1000, 1e-3, [](S &s) -> double & { return s.control_s; },
-       "Time between two of its steps"},
+      {"control", "ms", 0.5, 1000, 1e-3, [](S &s) -> double & { return s.control_s; }, "Time between two of its steps"},
   };
   return all;
 }
@@ -82,8 +72,7 @@ double value_of(const GraspSetting &setting, GripSettings settings) {
 }
 
 const std::vector<GraspPreset> &grasp_presets() {
-  static const std::vector<GraspPreset> all = {
-      {"egg", 25.0}, {"strawberry", 5.0}, {"cup", 3.0}, {"crisp", 1.5}};
+  static const std::vector<GraspPreset> all = {{"egg", 25.0}, {"strawberry", 5.0}, {"cup", 3.0}, {"crisp", 1.5}};
   return all;
 }
 
@@ -106,8 +95,7 @@ std::map<std::string, double> preset_values(const std::string &preset) {
   impossible("no preset " + printable(preset) + "; there are " + names);
 }
 
-GripSettings settings_for(const GripperTraits &traits,
-                          const std::map<std::string, double> &wanted) {
+GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted) {
   GripSettings settings = default_settings(traits);
   settings.mode = wanted.count(FIXED) != 0 ? GRIP_MODE_FIXED : GRIP_MODE_HOLD;
   for (const GraspSetting &setting : grasp_settings()) {
@@ -117,14 +105,12 @@ GripSettings settings_for(const GripperTraits &traits,
     }
     if (!(value->second >= setting.low && value->second <= setting.high)) {
       impossible("--" + std::string(setting.name) + " is not possible; give " +
-                 shortest(static_cast<float>(setting.low)) + " to " +
-                 shortest(static_cast<float>(setting.high)) + (*setting.unit ? " " : "") +
-                 setting.unit);
+                 shortest(static_cast<float>(setting.low)) + " to " + shortest(static_cast<float>(setting.high)) +
+                 (*setting.unit ? " " : "") + setting.unit);
     }
     setting.field(settings) = value->second * setting.scale;
   }
-  const auto follow = [&](const char *name, double &field, double low, double high,
-                          const std::string &limit) {
+  const auto follow = [&](const char *name, double &field, double low, double high, const std::string &limit) {
     if (field < low || field > high) {
       if (wanted.count(name) != 0) {
         impossible("--" + std::string(name) + " is not possible; " + limit);
@@ -138,16 +124,14 @@ GripSettings settings_for(const GripperTraits &traits,
   follow(FIXED, settings.set_N, 0.0, cap_N, "it is above --cap");
   follow("start", settings.start_N, 0.0, cap_N, "it is above --cap");
   follow("floor", settings.floor_N, 0.0, cap_N, "it is above --cap");
-  follow("blind", settings.blind_N, settings.start_N, cap_N,
-         "it must lie between --start and --cap");
+  follow("blind", settings.blind_N, settings.start_N, cap_N, "it must lie between --start and --cap");
   const double least_mm =
-      traits.step_mm *
-      std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
+      traits.step_mm * std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
   const double step_N = GripBound::first_N(least_mm);
   if (step_N > cap_N) {
-    impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) +
-               " mm, may press with " + fixed(step_N, 1) + " N, and the cap is " +
-               fixed(cap_N, 1) + " N; take a gripper of finer steps, or a higher --cap");
+    impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) + " mm, may press with " +
+               fixed(step_N, 1) + " N, and the cap is " + fixed(cap_N, 1) +
+               " N; take a gripper of finer steps, or a higher --cap");
   }
   return settings;
 }

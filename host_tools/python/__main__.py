@@ -4,6 +4,7 @@
 
 what pip installs as fingertip-plot, fingertip-scenario and so on; --help after a command has its options.
 """
+
 import importlib
 import sys
 

@@ -121,8 +121,7 @@ public:
     return text + (more.empty() ? "" : ")");
   }
 
-  std::string make_help(const CLI::App *app, std::string name,
-                        CLI::AppFormatMode mode) const override {
+  std::string make_help(const CLI::App *app, std::string name, CLI::AppFormatMode mode) const override {
     std::string help = CLI::Formatter::make_help(app, name, mode);
     std::string all;
     for (std::string_view line : split(help, '\n')) {
@@ -161,9 +160,8 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
       for (const CLI::Option *option : command->get_options()) {
         const Values values = values_of(*option);
         if (!values.allowed.empty() && text.rfind(option->get_name() + ": ", 0) == 0) {
-          return option->get_name() + " takes " + values.allowed +
-                 (values.unit.empty() ? "" : " " + values.unit) + ", not \"" +
-                 refused_value(text.substr(option->get_name().size() + 2)) + "\"";
+          return option->get_name() + " takes " + values.allowed + (values.unit.empty() ? "" : " " + values.unit) +
+                 ", not \"" + refused_value(text.substr(option->get_name().size() + 2)) + "\"";
         }
       }
     }
@@ -189,8 +187,7 @@ void speak_plainly(CLI::App &app) {
     for (const CLI::App *chosen : failed->get_subcommands()) {
       command += " " + chosen->get_name();
     }
-    return printable("fingertip: " + problem_of(failed, error) + "; see " + command + " --help") +
-           "\n";
+    return printable("fingertip: " + problem_of(failed, error) + "; see " + command + " --help") + "\n";
   });
 }
 

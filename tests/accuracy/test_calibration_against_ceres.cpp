@@ -19,17 +19,16 @@ constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 7, // log gain, dx, dy, o, d, r, b
 // placement's (x, y, e, w, q1, q2).
 struct ReadingCost {
   double x_mm, y_mm, reading_Pa, sd_Pa, tau, earlier_Pa;
-  template <typename T>
-  bool operator()(const T *sensor, const T *profile, const T *placement, T *residual) const {
+  template <typename T> bool operator()(const T *sensor, const T *profile, const T *placement, T *residual) const {
     const T u = x_mm + sensor[1] - placement[0], v = y_mm + sensor[2] - placement[1];
     const T q1 = profile[3] + placement[4], q2 = profile[4] + placement[5];
     const T square = u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v;
     const T width = exp(profile[1] + sensor[6] + placement[3]);
     const T wide = exp(-square / (2.0 * width * width));
     const T narrow = exp(-square / (2.0 * NARROW * NARROW * width * width));
-    const T value = exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
-                    ((1.0 - profile[2]) * wide + profile[2] * narrow -
-                     profile[5] * exp(-square / (2.0 * exp(2.0 * profile[6]))));
+    const T value =
+        exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
+        ((1.0 - profile[2]) * wide + profile[2] * narrow - profile[5] * exp(-square / (2.0 * exp(2.0 * profile[6]))));
     const T left = sensor[5] * earlier_Pa;
     const T hidden = left <= T(0.0)    ? left
                      : value <= T(0.0) ? T(0.0)
@@ -52,9 +51,8 @@ template <int SIZE> struct Prior {
 template <int SIZE>
 void add_prior(ceres::Problem &problem, double *block, int at, double mean, double sd,
                ceres::LossFunction *loss = nullptr) {
-  problem.AddResidualBlock(
-      new ceres::AutoDiffCostFunction<Prior<SIZE>, 1, SIZE>(new Prior<SIZE>{at, mean, sd}), loss,
-      block);
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior<SIZE>, 1, SIZE>(new Prior<SIZE>{at, mean, sd}), loss,
+                           block);
 }
 
 struct Found {
@@ -63,8 +61,7 @@ struct Found {
 };
 
 // With the spreads that the solver has learnt.
-Found by_ceres(const Array &array, std::vector<Placement> placements, const Solution &solution,
-               Random &start) {
+Found by_ceres(const Array &array, std::vector<Placement> placements, const Solution &solution, Random &start) {
   remember(placements);
   const Assumptions assumed;
   double peak_Pa = 0.0, near_Pa = 0.0;
@@ -83,8 +80,8 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
     sensor[0] = 0.05 * start.normal();
   }
   const double dip_mm = DIP_PITCHES * array.pitch_mm;
-  std::array<double, PROFILE_UNKNOWNS> profile{
-      std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0, std::log(dip_mm)};
+  std::array<double, PROFILE_UNKNOWNS> profile{std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0,
+                                               std::log(dip_mm)};
   std::vector<std::array<double, 6>> own(placements.size());
   ceres::Problem problem;
   const double first_s = placements.front().t_s, last_s = placements.back().t_s;
@@ -99,14 +96,12 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
     for (std::size_t k = 0; k < SENSORS; k++) {
       const double reading = placements[i].reading_Pa[k];
       const double model = assumed.model_share * peak_Pa, share = assumed.reading_share * reading;
-      const double sd =
-          std::sqrt(placements[i].noise_Pa * placements[i].noise_Pa +
-                    solution.excess * solution.excess * (model * model + share * share));
+      const double sd = std::sqrt(placements[i].noise_Pa * placements[i].noise_Pa +
+                                  solution.excess * solution.excess * (model * model + share * share));
       const double tau = 2.0 * (placements[i].t_s - first_s) / (last_s - first_s) - 1.0;
       problem.AddResidualBlock(
           new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, PROFILE_UNKNOWNS, 6>(
-              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau,
-                              placements[i].earlier_Pa[k]}),
+              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, placements[i].earlier_Pa[k]}),
           huber, sensors[k].data(), profile.data(), own[i].data());
     }
     add_prior<6>(problem, own[i].data(), 2, 0.0, solution.spread.force, huber);
@@ -116,9 +111,8 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
   }
   for (auto &sensor : sensors) {
     const double zero_Pa = assumed.offset_share * peak_Pa;
-    const double sds[] = {
-        assumed.gain, solution.spread.position_mm, solution.spread.position_mm, zero_Pa,
-        zero_Pa,      solution.spread.memory,      solution.spread.own_width};
+    const double sds[] = {assumed.gain, solution.spread.position_mm, solution.spread.position_mm, zero_Pa,
+                          zero_Pa,      solution.spread.memory,      solution.spread.own_width};
     for (int at = 0; at < SENSOR_UNKNOWNS; at++) {
       add_prior<SENSOR_UNKNOWNS>(problem, sensor.data(), at, 0.0, sds[at]);
     }

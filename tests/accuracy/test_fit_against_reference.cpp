@@ -31,9 +31,7 @@ Press random_press(std::mt19937_64 &random, const reference::Array &array, bool 
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
-  const auto log_uniform = [&](double low, double high) {
-    return std::exp(uniform(std::log(low), std::log(high)));
-  };
+  const auto log_uniform = [&](double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); };
   double x = uniform(-9, 9);
   double y = uniform(-18, 18);
   if (outside) {
@@ -58,8 +56,7 @@ Press random_press(std::mt19937_64 &random, const reference::Array &array, bool 
 
 double quantile(std::vector<double> &values, double share) {
   const auto index = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(index),
-                   values.end());
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(index), values.end());
   return values[index];
 }
 
@@ -75,8 +72,7 @@ int main(int argc, char **argv) {
     array.y_mm.push_back(static_cast<double>(geometry.y_mm[k]));
   }
   fit_array chip_array;
-  if (fit_array_init(&chip_array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK) {
+  if (fit_array_init(&chip_array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
     std::puts("the geometry is refused");
     return 1;
   }
@@ -97,11 +93,9 @@ int main(int argc, char **argv) {
     settings.noise_Pa_q10 = static_cast<std::int32_t>(press.noise_Pa * 1024);
     fit_result chip;
     fit_gaussian(&chip_array, press.pressure_Pa_q10.data(), all, &settings, &chip);
-    const reference::Parameters start{
-        static_cast<double>(chip.p0_Pa), static_cast<double>(chip.x_mm),
-        static_cast<double>(chip.y_mm), static_cast<double>(chip.sigma_mm)};
-    const reference::Fit best =
-        reference::fit(array, press.pressure_Pa, all, press.noise_Pa, {start});
+    const reference::Parameters start{static_cast<double>(chip.p0_Pa), static_cast<double>(chip.x_mm),
+                                      static_cast<double>(chip.y_mm), static_cast<double>(chip.sigma_mm)};
+    const reference::Fit best = reference::fit(array, press.pressure_Pa, all, press.noise_Pa, {start});
     if (!reference::observable(best) || best.at_bound) {
       gated_out++;
       continue;
@@ -118,17 +112,14 @@ int main(int argc, char **argv) {
   const double p50 = quantile(distance_um, 0.5), p99 = quantile(distance_um, 0.99);
   const double p999 = quantile(distance_um, 0.999), worst = quantile(distance_um, 1.0);
   std::printf("%d observable presses (%d not), %d iterations\n", wanted, gated_out, iterations);
-  std::printf("distance to the reference, um: p50 %.3f  p99 %.3f  p99.9 %.3f  worst %.1f\n", p50,
-              p99, p999, worst);
-  std::printf("force against the reference, ppm: p50 %.2f  p99.9 %.1f\n",
-              quantile(force_error_ppm, 0.5), quantile(force_error_ppm, 0.999));
-  std::printf("above 100 um: %d, of these not flagged UNCERTAIN: %d; flagged in all: %d\n",
-              above_100um, above_100um_unflagged, flagged);
+  std::printf("distance to the reference, um: p50 %.3f  p99 %.3f  p99.9 %.3f  worst %.1f\n", p50, p99, p999, worst);
+  std::printf("force against the reference, ppm: p50 %.2f  p99.9 %.1f\n", quantile(force_error_ppm, 0.5),
+              quantile(force_error_ppm, 0.999));
+  std::printf("above 100 um: %d, of these not flagged UNCERTAIN: %d; flagged in all: %d\n", above_100um,
+              above_100um_unflagged, flagged);
 
   // float32 leaves about 0.15 um at p99.9 on these sets; the limits leave a factor of three.
-  const bool good =
-      p50 < 0.05 && p999 < 0.5 && above_100um * 10000 <= wanted * 3 && above_100um_unflagged == 0;
-  std::puts(good ? "as close as float32 allows"
-                 : "FAILED: farther from the optimum than float32 explains");
+  const bool good = p50 < 0.05 && p999 < 0.5 && above_100um * 10000 <= wanted * 3 && above_100um_unflagged == 0;
+  std::puts(good ? "as close as float32 allows" : "FAILED: farther from the optimum than float32 explains");
   return good ? 0 : 1;
 }

@@ -28,11 +28,9 @@ double error_um(const KernelResult &result, const Case &c) {
   return 1e3 * std::hypot(result.x_mm - c.best.theta.x_mm, result.y_mm - c.best.theta.y_mm);
 }
 
-KernelResult fit_with(const Kernel &kernel, const Case &c, int iterations,
-                      Guess guess = Guess::log_linear) {
+KernelResult fit_with(const Kernel &kernel, const Case &c, int iterations, Guess guess = Guess::log_linear) {
   static const fit_array array = firmware_fit_array();
-  return kernel.fit(array, c.pressure_Pa_q10.data(), c.usable,
-                    {iterations, c.press.noise_Pa, 0, 0.0, 0.0, guess});
+  return kernel.fit(array, c.pressure_Pa_q10.data(), c.usable, {iterations, c.press.noise_Pa, 0, 0.0, 0.0, guess});
 }
 
 TEST(Kernels, EveryOneReachesTheOptimumOfAnEasyPress) {

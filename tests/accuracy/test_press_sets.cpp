@@ -45,8 +45,7 @@ TEST(Layer, TableIsInterpolatedPrecisely) {
     double sum = 0.0;
     for (int i = 1; i < steps; i++) {
       const double u = i * step;
-      sum += (i % 2 == 1 ? 4.0 : 2.0) * u * fingertip::twin::base_transfer(u, 0.49) *
-             j0(u * r_mm / thickness_mm);
+      sum += (i % 2 == 1 ? 4.0 : 2.0) * u * fingertip::twin::base_transfer(u, 0.49) * j0(u * r_mm / thickness_mm);
     }
     const double direct_Pa = sum * step / 3.0 * 1e6 / (2.0 * M_PI * thickness_mm * thickness_mm);
     EXPECT_NEAR(layer.point_load_Pa(r_mm), direct_Pa, 1e-7 * layer.point_load_Pa(0.0));
@@ -96,8 +95,7 @@ TEST(ContactPressure, ConservesForceAndPushes) {
 
 TEST(ContactPressure, PeakPerNewton) {
   // Under the contact's centre, 5 N: the ranges a full contact solution gives for the indenters.
-  for (const auto &[thickness_mm, low_kPa, high_kPa] :
-       {std::array{6.0, 11.4, 18.0}, std::array{12.0, 4.3, 5.0}}) {
+  for (const auto &[thickness_mm, low_kPa, high_kPa] : {std::array{6.0, 11.4, 18.0}, std::array{12.0, 4.3, 5.0}}) {
     const Layer layer(thickness_mm);
     for (Indenter indenter : ALL_INDENTERS) {
       double kPa = 0.0;
@@ -119,8 +117,7 @@ TEST(Press, RepeatsAndPassesTheGate) {
       EXPECT_TRUE(press.pressure_Pa != make_press(set, array, SEED, i + 1).pressure_Pa);
       EXPECT_TRUE(press.pressure_Pa != make_press(set, array, SEED + 1, i).pressure_Pa);
       EXPECT_TRUE(press.noise_Pa >= 2.0 && press.noise_Pa <= 20.0);
-      EXPECT_TRUE(*std::max_element(press.pressure_Pa.begin(), press.pressure_Pa.end()) >=
-                  20.0 * press.noise_Pa);
+      EXPECT_TRUE(*std::max_element(press.pressure_Pa.begin(), press.pressure_Pa.end()) >= 20.0 * press.noise_Pa);
       const bool inside = std::abs(press.x_mm) <= 9.0 && std::abs(press.y_mm) <= 18.0;
       EXPECT_EQ(set != PressSet::B, inside);
       EXPECT_TRUE(std::abs(press.x_mm) <= 15.0 && std::abs(press.y_mm) <= 24.0);

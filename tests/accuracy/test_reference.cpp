@@ -16,10 +16,9 @@ constexpr std::uint64_t SEED = 11;
 const std::string cache_dir = FINGERTIP_TEST_CACHE_DIR;
 
 bool same(const Fit &a, const Fit &b) {
-  return a.theta.p0_Pa == b.theta.p0_Pa && a.theta.x_mm == b.theta.x_mm &&
-         a.theta.y_mm == b.theta.y_mm && a.theta.sigma_mm == b.theta.sigma_mm && a.cost == b.cost &&
-         a.force_N == b.force_N && a.location_sd_mm == b.location_sd_mm &&
-         a.condition_number == b.condition_number && a.at_bound == b.at_bound;
+  return a.theta.p0_Pa == b.theta.p0_Pa && a.theta.x_mm == b.theta.x_mm && a.theta.y_mm == b.theta.y_mm &&
+         a.theta.sigma_mm == b.theta.sigma_mm && a.cost == b.cost && a.force_N == b.force_N &&
+         a.location_sd_mm == b.location_sd_mm && a.condition_number == b.condition_number && a.at_bound == b.at_bound;
 }
 
 bool same(const std::vector<Case> &a, const std::vector<Case> &b) {
@@ -54,8 +53,7 @@ TEST_F(Cache, RationedStartsMissNoMinimum) {
         }
         const Fit full = fit(array, pressure_Pa, c.usable, c.press.noise_Pa, {}, Starts::all);
         EXPECT_TRUE(c.best.cost <= full.cost * (1.0 + 1e-9));
-        EXPECT_TRUE(std::hypot(c.best.theta.x_mm - full.theta.x_mm,
-                               c.best.theta.y_mm - full.theta.y_mm) < 1e-6);
+        EXPECT_TRUE(std::hypot(c.best.theta.x_mm - full.theta.x_mm, c.best.theta.y_mm - full.theta.y_mm) < 1e-6);
         observable_presses++;
       }
     }
@@ -73,8 +71,8 @@ TEST_F(Cache, NoNeighbourOfTheRecordIsBetter) {
         const double dx = array.x_mm[k] - c.best.theta.x_mm - dx_mm;
         const double dy = array.y_mm[k] - c.best.theta.y_mm - dy_mm;
         const double s = c.best.theta.sigma_mm;
-        const double r = c.best.theta.p0_Pa * std::exp(-0.5 * (dx * dx + dy * dy) / (s * s)) -
-                         c.pressure_Pa_q10[k] / 1024.0;
+        const double r =
+            c.best.theta.p0_Pa * std::exp(-0.5 * (dx * dx + dy * dy) / (s * s)) - c.pressure_Pa_q10[k] / 1024.0;
         sum += 0.5 * r * r;
       }
       return sum;
@@ -82,12 +80,7 @@ TEST_F(Cache, NoNeighbourOfTheRecordIsBetter) {
     if (c.observable) {
       EXPECT_NEAR(c.best.cost, cost(0.0, 0.0), 1e-9 * c.best.cost);
       for (int i = 0; i < 4; i++) {
-        EXPECT_TRUE(cost(i == 0   ? 1e-3
-                         : i == 1 ? -1e-3
-                                  : 0.0,
-                         i == 2   ? 1e-3
-                         : i == 3 ? -1e-3
-                                  : 0.0) > cost(0.0, 0.0));
+        EXPECT_TRUE(cost(i == 0 ? 1e-3 : i == 1 ? -1e-3 : 0.0, i == 2 ? 1e-3 : i == 3 ? -1e-3 : 0.0) > cost(0.0, 0.0));
       }
     }
   }

@@ -2,6 +2,7 @@
 
 usage: test_reference_program.py REFERENCE
 """
+
 import csv
 import io
 import math
@@ -94,16 +95,28 @@ class Reference(unittest.TestCase):
     def test_what_is_wrong_is_one_line(self):
         good = [pressure_Pa(k) for k in range(15)]
         for options, text, words in (
-                (("fit", "none.csv"), "", "none.csv: cannot read it"), (("fit",), "", "no header"),
-                (("fit",), table(good[:14]), "has no column s14_Pa"), (("fit",), table(good, device=0), "several fingertips"),
-                (("fit",), table([AIR_Pa] * 15), "absolute pressures"), (("fit",), table(good).replace("\n7", "\n7,7"), "standard input:2: has 17 cells"),
-                (("fit",), table(good, noise_Pa="loud"), "'loud' is not a number"), (("fit",), table(good, before="# gains: 1 1\n"), "2 gains for 15"),
-                (("fit",), table(good, before=f"# gains:{' 0' * 15}\n"), "'0' is no gain")):
+            (("fit", "none.csv"), "", "none.csv: cannot read it"),
+            (("fit",), "", "no header"),
+            (("fit",), table(good[:14]), "has no column s14_Pa"),
+            (("fit",), table(good, device=0), "several fingertips"),
+            (("fit",), table([AIR_Pa] * 15), "absolute pressures"),
+            (("fit",), table(good).replace("\n7", "\n7,7"), "standard input:2: has 17 cells"),
+            (("fit",), table(good, noise_Pa="loud"), "'loud' is not a number"),
+            (("fit",), table(good, before="# gains: 1 1\n"), "2 gains for 15"),
+            (("fit",), table(good, before=f"# gains:{' 0' * 15}\n"), "'0' is no gain"),
+        ):
             done = run(*options, text=text)
             self.assertEqual(done.returncode, 1, words)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
             self.assertIn(words, done.stderr)
-        for options in (("fit", "--noise", "0"), ("presses", "--set", "E"), ("presses", "--count", "0"), ("presses", "--count", "-1"), ("presses", "--seed", "-1"), ()):
+        for options in (
+            ("fit", "--noise", "0"),
+            ("presses", "--set", "E"),
+            ("presses", "--count", "0"),
+            ("presses", "--count", "-1"),
+            ("presses", "--seed", "-1"),
+            (),
+        ):
             done = run(*options)
             self.assertEqual(done.returncode, 2, options)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)

@@ -37,14 +37,13 @@ Readings model_Pa(const fit_array &array, const pad_profile &profile, const twin
     const double r2 = dx * dx + dy * dy;
     for (const auto &term : profile.normal) {
       const double v = std::pow(static_cast<double>(term.sd_mm), 2) + 4.0;
-      readings[k] += 1e6 * touch.force_N * static_cast<double>(term.share) *
-                     std::exp(-r2 / (2.0 * v)) / (2.0 * M_PI * v);
+      readings[k] +=
+          1e6 * touch.force_N * static_cast<double>(term.share) * std::exp(-r2 / (2.0 * v)) / (2.0 * M_PI * v);
     }
     for (const auto &term : profile.tangential) {
       const double v = std::pow(static_cast<double>(term.sd_mm), 2) + 1.3 * 4.0;
-      readings[k] += 1e6 * (touch.pull_x_N * dx + touch.pull_y_N * dy) *
-                     static_cast<double>(term.moment_mm) * std::exp(-r2 / (2.0 * v)) /
-                     (2.0 * M_PI * v * v);
+      readings[k] += 1e6 * (touch.pull_x_N * dx + touch.pull_y_N * dy) * static_cast<double>(term.moment_mm) *
+                     std::exp(-r2 / (2.0 * v)) / (2.0 * M_PI * v * v);
     }
   }
   return readings;

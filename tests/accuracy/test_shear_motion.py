@@ -2,6 +2,7 @@
 
 usage: test_shear_motion.py SHEAR_MOTION [unittest arguments]
 """
+
 import json
 import subprocess
 import sys
@@ -18,7 +19,7 @@ class ShearMotion(unittest.TestCase):
         cls.options = ("--usual", "--pads", "60", "--seed", "5")
         cls.text = run(*cls.options).stdout
         cls.found = json.loads(cls.text)
-        cls.case, = cls.found["motion_cases"]
+        (cls.case,) = cls.found["motion_cases"]
 
     def test_no_lift_is_a_slide(self):
         for duration in ("100ms", "300ms", "1s"):

@@ -2,6 +2,7 @@
 
 usage: test_shear_static.py SHEAR_STATIC SHEAR.PY [unittest arguments]
 """
+
 import json
 import pathlib
 import subprocess
@@ -11,15 +12,40 @@ import unittest
 
 # (key, least, most): what a full run finds, with room for a fortieth of its pads.
 LIMITS = (
-    ("ratio_error_p50", 0.005, 0.014), ("ratio_error_p95", 0.02, 0.05), ("vector_error_p50", 0.01, 0.023), ("vector_error_p95", 0.03, 0.065),
-    ("direction_p90_deg", 3, 7.5), ("location_loaded_median_mm", 0.05, 0.1), ("location_loaded_without_mm", 0.95, 1.1), ("location_price_mm", -0.09, -0.02),
-    ("equal_ratio_error_p50", 0.005, 0.011), ("equal_vector_error_p50", 0.01, 0.018), ("equal_location_loaded_mm", 0.04, 0.075), ("valid_percent", 91, 100),
-    ("q_cover_1sd", 65, 98), ("q_cover_2sd", 96, 100), ("location_cover_1sd", 60, 92), ("location_cover_2sd", 92, 100), ("force_p50_percent", 0.1, 0.6),
-    ("force_without_p50_percent", 1, 2.2), ("screw_ratio", 0.005, 0.02), ("screw_change_p95", 0.001, 0.012), ("increment_error_p50_13mm", 0.03, 0.06),
-    ("increment_error_p50_9mm", 0.015, 0.045), ("zero_error_p50_9mm", 0.1, 0.18), ("zero_error_p50_own_tables", 0.01, 0.036),
-    ("increment_error_p50_own_tables_9mm", 0.01, 0.03), ("elongated_false_unflagged_percent", 0, 2), ("elongated_false_percent", 0, 2), ("raw_beyond_2sd_percent", 0, 10),
-    ("learned_ratio_error_p50", 0.005, 0.02), ("learned_ratio_error_p95", 0.02, 0.06), ("learned_valid_percent", 88, 100), ("told_wrong_said_percent", 90, 100),
-    ("told_right_said_percent", 0, 5))
+    ("ratio_error_p50", 0.005, 0.014),
+    ("ratio_error_p95", 0.02, 0.05),
+    ("vector_error_p50", 0.01, 0.023),
+    ("vector_error_p95", 0.03, 0.065),
+    ("direction_p90_deg", 3, 7.5),
+    ("location_loaded_median_mm", 0.05, 0.1),
+    ("location_loaded_without_mm", 0.95, 1.1),
+    ("location_price_mm", -0.09, -0.02),
+    ("equal_ratio_error_p50", 0.005, 0.011),
+    ("equal_vector_error_p50", 0.01, 0.018),
+    ("equal_location_loaded_mm", 0.04, 0.075),
+    ("valid_percent", 91, 100),
+    ("q_cover_1sd", 65, 98),
+    ("q_cover_2sd", 96, 100),
+    ("location_cover_1sd", 60, 92),
+    ("location_cover_2sd", 92, 100),
+    ("force_p50_percent", 0.1, 0.6),
+    ("force_without_p50_percent", 1, 2.2),
+    ("screw_ratio", 0.005, 0.02),
+    ("screw_change_p95", 0.001, 0.012),
+    ("increment_error_p50_13mm", 0.03, 0.06),
+    ("increment_error_p50_9mm", 0.015, 0.045),
+    ("zero_error_p50_9mm", 0.1, 0.18),
+    ("zero_error_p50_own_tables", 0.01, 0.036),
+    ("increment_error_p50_own_tables_9mm", 0.01, 0.03),
+    ("elongated_false_unflagged_percent", 0, 2),
+    ("elongated_false_percent", 0, 2),
+    ("raw_beyond_2sd_percent", 0, 10),
+    ("learned_ratio_error_p50", 0.005, 0.02),
+    ("learned_ratio_error_p95", 0.02, 0.06),
+    ("learned_valid_percent", 88, 100),
+    ("told_wrong_said_percent", 90, 100),
+    ("told_right_said_percent", 0, 5),
+)
 PADS = ("--pads", "40", "--few")  # the objects on each other thickness take seconds to solve
 
 
@@ -70,14 +96,22 @@ class ShearStatic(unittest.TestCase):
         named = self.rows("by_object", "case")
         self.assertLess(named["sphere15, Q/F 0.3"]["vector_error_p50"], 0.5 * named["cylinder12, Q/F 0.3"]["vector_error_p50"])
         self.assertIn("cube15, Q/F 0", named)
-        zero = {row["overhang_mm"]: row["zero_error_p50"] for row in self.found["by_overhang"] if (row["told"], row["place"]) == ("thickness", "anywhere")}
+        zero = {
+            row["overhang_mm"]: row["zero_error_p50"]
+            for row in self.found["by_overhang"]
+            if (row["told"], row["place"]) == ("thickness", "anywhere")
+        }
         self.assertEqual([zero[mm] for mm in sorted(zero, reverse=True)], sorted(zero.values()))
         told = self.rows("by_thickness", "case")
         self.assertLess(told["12 mm, told 12 mm, Q/F 0"]["vector_error_p50"], 0.6 * told["12 mm, told 13.2 mm, Q/F 0"]["vector_error_p50"])
         rubber = self.rows("by_rubber", "case")
         at = "{}, 10 s after the load"
-        self.assertLess(rubber[at.format("none")]["vector_error_p50"], 0.5 * rubber[at.format("relaxation, calibrated")]["vector_error_p50"])
-        self.assertLess(rubber[at.format("relaxation, calibrated")]["vector_error_p50"], rubber[at.format("relaxation")]["vector_error_p50"])
+        self.assertLess(
+            rubber[at.format("none")]["vector_error_p50"], 0.5 * rubber[at.format("relaxation, calibrated")]["vector_error_p50"]
+        )
+        self.assertLess(
+            rubber[at.format("relaxation, calibrated")]["vector_error_p50"], rubber[at.format("relaxation")]["vector_error_p50"]
+        )
 
     def test_the_same_seed_gives_the_same_and_another_another(self):
         texts = [run("--pads", "4", "--few", "--seed", seed).stdout for seed in ("3", "3", "4")]
@@ -96,11 +130,20 @@ class ShearStatic(unittest.TestCase):
             program.parent.mkdir(parents=True)
             program.write_text(f"#!{sys.executable}\nprint({self.text!r})\n")
             program.chmod(0o755)
-            done = subprocess.run([sys.executable, REPORT, "--build", folder, "--boards", folder, "-o", f"{folder}/out"], capture_output=True, text=True)
+            done = subprocess.run(
+                [sys.executable, REPORT, "--build", folder, "--boards", folder, "-o", f"{folder}/out"], capture_output=True, text=True
+            )
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             out = pathlib.Path(folder) / "out"
             text = (out / "shear.md").read_text()
-            for title in ("By pad and load", "Where the misses lie", "What is physics and what is ours", "Pads that end", "Creep and relaxation", "Screws"):
+            for title in (
+                "By pad and load",
+                "Where the misses lie",
+                "What is physics and what is ours",
+                "Pads that end",
+                "Creep and relaxation",
+                "Screws",
+            ):
                 self.assertIn(f"## {title}\n", text)
             self.assertGreater(len((out / "shear.png").read_bytes()), 50000)
 

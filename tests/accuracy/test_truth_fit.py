@@ -2,6 +2,7 @@
 
 usage: test_truth_fit.py TRUTH_FIT [unittest arguments]
 """
+
 import json
 import subprocess
 import sys
@@ -9,9 +10,20 @@ import unittest
 
 # (key, least, most): what a full run is held to, with room for a tenth of its pads.
 GOALS = (
-    ("cover_1sd_min", 54, 100), ("cover_1sd_max", 0, 77), ("cover_2sd_min", 92, 100), ("cal_warned_percent", 0, 6), ("cal_bad_unflagged_percent", 0, 0.2),
-    ("raw_warned_percent", 0, 36), ("raw_bad_unflagged_percent", 0, 2), ("raw_20_bad_unflagged_percent", 0, 4),
-    ("loaded_silent_percent", 0, 1), ("raw_loaded_silent_percent", 0, 4), ("unloaded_warned_percent", 0, 6), ("elongated_bad_unflagged_percent", 0, 3), ("round_elongated_percent", 0, 1))
+    ("cover_1sd_min", 54, 100),
+    ("cover_1sd_max", 0, 77),
+    ("cover_2sd_min", 92, 100),
+    ("cal_warned_percent", 0, 6),
+    ("cal_bad_unflagged_percent", 0, 0.2),
+    ("raw_warned_percent", 0, 36),
+    ("raw_bad_unflagged_percent", 0, 2),
+    ("raw_20_bad_unflagged_percent", 0, 4),
+    ("loaded_silent_percent", 0, 1),
+    ("raw_loaded_silent_percent", 0, 4),
+    ("unloaded_warned_percent", 0, 6),
+    ("elongated_bad_unflagged_percent", 0, 3),
+    ("round_elongated_percent", 0, 1),
+)
 
 
 def run(*options):

@@ -2,6 +2,7 @@
 
 usage: test_truth_gate.py TRUTH_GATE [unittest arguments]
 """
+
 import json
 import math
 import os
@@ -13,11 +14,17 @@ import tempfile
 import unittest
 
 GOALS = {"slow_force_error_percent": 2, "false_contacts": 0, "zero_recovery_s": 5, "phantom_force_longest_s": 1}
-REAL = ("real_phantom_percent_worst", "real_phantom_longest_s", "real_held_missed", "real_held_doubted_percent_worst",
-        "real_median_mm_worst_test", "real_median_mm_worst_other")
+REAL = (
+    "real_phantom_percent_worst",
+    "real_phantom_longest_s",
+    "real_held_missed",
+    "real_held_doubted_percent_worst",
+    "real_median_mm_worst_test",
+    "real_median_mm_worst_other",
+)
 ROWS_PER_S = 17
 DEEPEST = 2000  # steps; 1 mm is 1000 along the strip
-PRESSES = 14    # one at each millimetre
+PRESSES = 14  # one at each millimetre
 PLACES_mm = (-6.5, -0.5, 5.5, 11.5)
 AMBIENT_Pa = 101000
 

@@ -25,8 +25,7 @@ protected:
   }
 
   /* How much less the pair leaves than the line, and the pair. */
-  std::pair<double, Unknowns<PAIR>> looked_at(const Column &readings, const Column &weights,
-                                              const Unknowns<PAIR> &near,
+  std::pair<double, Unknowns<PAIR>> looked_at(const Column &readings, const Column &weights, const Unknowns<PAIR> &near,
                                               const Unknowns<LINE> &line) {
     Unknowns<PAIR> wider = near;
     wider.segment<2>(0) += 0.3 * (near.segment<2>(0) - near.segment<2>(3));
@@ -42,8 +41,7 @@ protected:
   }
 
   /* Share of the touches of this pair in which the most likely answer is right. */
-  double reached(const Unknowns<PAIR> &pair, const ReadingErrors &errors,
-                 const Unknowns<LINE> &line) {
+  double reached(const Unknowns<PAIR> &pair, const ReadingErrors &errors, const Unknowns<LINE> &line) {
     const Column readings = rubber_.readings_Pa(pair), weights = per_sd(readings, errors);
     const Column of_line = rubber_.readings_Pa(line);
     std::vector<double> less;
@@ -77,8 +75,7 @@ TEST_F(TwoBound, TheMostLikelyAnswerIsNearIt) {
     const PairBound bound = bound_of(rubber_, pair, errors, RIGHT, random_);
     const double limit = std::min(bound.placed, bound.told);
     const double share = reached(pair, errors, bound.line);
-    std::printf("%g mm: placed %.2f, told %.2f, reached %.2f\n", apart, bound.placed, bound.told,
-                share);
+    std::printf("%g mm: placed %.2f, told %.2f, reached %.2f\n", apart, bound.placed, bound.told, share);
     EXPECT_LE(share, limit + 0.12); /* three standard deviations of the draws */
     all += share;
     possible += limit;

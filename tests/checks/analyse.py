@@ -21,6 +21,7 @@ The mandatory rules, and what holds each:
     22.2, 22.4 to 22.6  free() and streams: no allocation, no FILE: here; boards/native allocates: gcc -fanalyzer
 What gcc holds are errors of every build (cmake/warnings.cmake).
 """
+
 import argparse
 import concurrent.futures
 import json
@@ -42,7 +43,24 @@ ON_CHIP = ["--target=thumbv6m-none-eabi", "-isystem", "/usr/lib/arm-none-eabi/in
 SLOW = "-clang-analyzer-*"
 # gcc and clang define what C leaves to them: a right shift of a negative number keeps its sign.
 CPPCHECK_OFF = ("shiftTooManyBitsSigned", "shiftNegativeLHS", "missingIncludeSystem", "unusedStructMember")
-MANDATORY = ("9.1", "12.5", "13.6", "17.3", "17.4", "17.6", "19.1", "21.13", "21.17", "21.18", "21.19", "21.20", "22.2", "22.4", "22.5", "22.6")
+MANDATORY = (
+    "9.1",
+    "12.5",
+    "13.6",
+    "17.3",
+    "17.4",
+    "17.6",
+    "19.1",
+    "21.13",
+    "21.17",
+    "21.18",
+    "21.19",
+    "21.20",
+    "22.2",
+    "22.4",
+    "22.5",
+    "22.6",
+)
 HEADERS = {"math", "stdatomic", "stdbool", "stddef", "stdint", "string"}
 NATIVE_HEADERS = HEADERS | {"setjmp", "stdio", "stdlib"}
 FORBIDDEN = (
@@ -73,7 +91,12 @@ def units(build):
         for entry in json.loads(path.read_text(encoding="utf-8")):
             source, words = pathlib.Path(entry["file"]), shlex.split(entry["command"])
             is_test = words[words.index("-o") + 1].startswith("tests/") if "-o" in words else True
-            if source.suffix == ".c" and not is_test and source.is_relative_to(ROOT) and source.relative_to(ROOT).parts[0] in ("firmware", "boards"):
+            if (
+                source.suffix == ".c"
+                and not is_test
+                and source.is_relative_to(ROOT)
+                and source.relative_to(ROOT).parts[0] in ("firmware", "boards")
+            ):
                 found.setdefault(source, (source, {**entry, "words": words}, name != "host"))
     return list(found.values())
 
@@ -83,8 +106,23 @@ def database(found, folder):
     entries = []
     for source, entry, on_chip in found:
         kept = [word for word in entry["words"] if word.startswith(("-I", "-D", "-std="))]
-        entries.append({"directory": entry["directory"], "file": str(source),
-                        "arguments": ["clang", "-O1", "-Wall", "-Wextra", "-Wno-unknown-attributes", *(ON_CHIP if on_chip else []), *kept, "-c", str(source)]})
+        entries.append(
+            {
+                "directory": entry["directory"],
+                "file": str(source),
+                "arguments": [
+                    "clang",
+                    "-O1",
+                    "-Wall",
+                    "-Wextra",
+                    "-Wno-unknown-attributes",
+                    *(ON_CHIP if on_chip else []),
+                    *kept,
+                    "-c",
+                    str(source),
+                ],
+            }
+        )
     (folder / "compile_commands.json").write_text(json.dumps(entries), encoding="utf-8")
 
 
@@ -113,9 +151,19 @@ def analyse_paths(source, entry):
 def cppcheck(folder, addon=False):
     kept = folder / "misra"  # else the addon leaves files beside the sources
     kept.mkdir(exist_ok=True)
-    call = ["cppcheck", f"--project={folder}/compile_commands.json", "--enable=warning,performance,portability", "--inconclusive", "--inline-suppr",
-            "--std=c11", "--quiet", "--template={file}:{line}: {severity}: {message} [{id}]", f"-j{os.cpu_count() or 1}",
-            *(f"--suppress={name}" for name in CPPCHECK_OFF), *(["--addon=misra", f"--cppcheck-build-dir={kept}"] if addon else [])]
+    call = [
+        "cppcheck",
+        f"--project={folder}/compile_commands.json",
+        "--enable=warning,performance,portability",
+        "--inconclusive",
+        "--inline-suppr",
+        "--std=c11",
+        "--quiet",
+        "--template={file}:{line}: {severity}: {message} [{id}]",
+        f"-j{os.cpu_count() or 1}",
+        *(f"--suppress={name}" for name in CPPCHECK_OFF),
+        *(["--addon=misra", f"--cppcheck-build-dir={kept}"] if addon else []),
+    ]
     lines = [line for line in run(call).stderr.splitlines() if re.search(r" \[[\w.-]+\]$", line)]
     if not addon:
         return lines
@@ -127,7 +175,7 @@ def mandatory(path, text):
     """What our own eyes hold of the mandatory rules."""
     lines, is_native = strip_comments(text), path.parts[:2] == ("boards", "native")
     for number, line in enumerate(lines, 1):
-        header = re.match(r'\s*#\s*include\s*<(\w+)\.h>', line)
+        header = re.match(r"\s*#\s*include\s*<(\w+)\.h>", line)
         if header and header.group(1) not in (NATIVE_HEADERS if is_native else HEADERS):
             yield f"{path}:{number}: MISRA C:2012 21: <{header.group(1)}.h> is none of the headers in use; see analyse.py"
         for rule, what, pattern in FORBIDDEN:
@@ -150,7 +198,10 @@ def findings(build, files, everything):
         wanted = {pathlib.Path(file).resolve() for file in files}
         found = [unit for unit in found if unit[0] in wanted]
     told = list(mandatory_in(ROOT))
-    with tempfile.TemporaryDirectory(prefix="fingertip-analyse-") as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with (
+        tempfile.TemporaryDirectory(prefix="fingertip-analyse-") as folder,
+        concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool,
+    ):
         folder = pathlib.Path(folder)
         database(found, folder)
         jobs = [pool.submit(tidy, source, folder, everything) for source, _, _ in found]

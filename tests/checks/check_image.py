@@ -6,6 +6,7 @@ usage: check_image.py IMAGE.elf [--bin IMAGE.bin] [--flash-limit BYTES] [--json 
 
 Prints the sizes; --json writes them. Exit 1 and one line for the first thing that is wrong.
 """
+
 import argparse
 import binascii
 import json
@@ -18,8 +19,15 @@ FLASH = (0x10000000, 2 * 1024 * 1024)
 RAM = (0x20000000, 256 * 1024)
 SCRATCH_Y = (0x20041000, 4 * 1024)
 REGIONS = {
-    ".boot2": FLASH, ".boot": FLASH, ".vectors": RAM, ".text": RAM, ".rodata": RAM, ".data": RAM,
-    ".bss": RAM, ".noinit": RAM, ".stack": SCRATCH_Y,
+    ".boot2": FLASH,
+    ".boot": FLASH,
+    ".vectors": RAM,
+    ".text": RAM,
+    ".rodata": RAM,
+    ".data": RAM,
+    ".bss": RAM,
+    ".noinit": RAM,
+    ".stack": SCRATCH_Y,
 }
 BOOT_EXCEPTIONS = 16
 VECTORS = 48
@@ -29,14 +37,18 @@ FORBIDDEN = {
     "double arithmetic; write float constants with an f and call the f functions": re.compile(
         r"__aeabi_(c?d|[a-z0-9]+2d)[a-z0-9]*|__[a-z]+df[a-z0-9]*|__df[a-z0-9]*|__(ieee754|kernel)_[a-z0-9]+(?<!f)"
         r"|(sqrt|cbrt|hypot|exp|exp2|expm1|log|log2|log10|log1p|pow|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh"
-        r"|tanh|floor|ceil|round|trunc|rint|lround|lrint|fmod|fma|fabs|ldexp|frexp|scalbn|copysign|erf)"),
+        r"|tanh|floor|ceil|round|trunc|rint|lround|lrint|fmod|fma|fabs|ldexp|frexp|scalbn|copysign|erf)"
+    ),
     "memory allocation; give the memory to the caller": re.compile(
-        r"_?(malloc|calloc|realloc|free|memalign|aligned_alloc|posix_memalign)(_r)?|_?sbrk(_r)?|alloca"),
+        r"_?(malloc|calloc|realloc|free|memalign|aligned_alloc|posix_memalign)(_r)?|_?sbrk(_r)?|alloca"
+    ),
     "stdio; the firmware has no console": re.compile(
         r"_?[vfsdna]*i?(printf|scanf)(_r|_i|_float|_common)?|f?put[sc](har)?(_r)?|f?get[sc](har)?|f(open|close|read|write"
-        r"|flush|seek)(_r)?|_(write|read|close|lseek|fstat|isatty|open)(_r)?|__s(init|flush.*|init_.*)|perror"),
+        r"|flush|seek)(_r)?|_(write|read|close|lseek|fstat|isatty|open)(_r)?|__s(init|flush.*|init_.*)|perror"
+    ),
     "a way out of the firmware; use port_panic()": re.compile(
-        r"_?exit|abort|atexit|raise|_?kill|__assert(_func)?|(long|set)jmp|__register_exitproc"),
+        r"_?exit|abort|atexit|raise|_?kill|__assert(_func)?|(long|set)jmp|__register_exitproc"
+    ),
 }
 
 

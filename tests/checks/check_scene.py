@@ -6,6 +6,7 @@ usage: check_scene.py IMAGE.elf --build FOLDER --capabilities NAME...
 A capability owns the symbols that its sources define, as the objects in the build folder have them, and those of its packets
 and commands. Exit 1 and one line for the first thing that is wrong.
 """
+
 import argparse
 import pathlib
 import re
@@ -17,9 +18,16 @@ from elf import Elf, fail
 OWNED = {
     "FIT": (["ft_fit.dir/fit/*.obj"], r"wire_contact_\w+|contact_weigh|app_use_calibration|cmd_(calibrate|prior|location_limit)_\w+"),
     "SLIP": (["ft_contact.dir/contact/slip.c.obj"], r"contact_update|cmd_slip_\w+"),
-    "TANGENTIAL": (["ft_fit.dir/fit/fit_tangential*.obj", "ft_fit.dir/fit/fit_shapes*.obj", "ft_contact.dir/contact/tangential.c.obj",
-                    "ft_contact.dir/contact/shapes.c.obj", "ft_app.dir/app/working.c.obj"],
-                   r"store_put_profile|app_use_pad|cmd_(pad|erase_pad)_\w+"),
+    "TANGENTIAL": (
+        [
+            "ft_fit.dir/fit/fit_tangential*.obj",
+            "ft_fit.dir/fit/fit_shapes*.obj",
+            "ft_contact.dir/contact/tangential.c.obj",
+            "ft_contact.dir/contact/shapes.c.obj",
+            "ft_app.dir/app/working.c.obj",
+        ],
+        r"store_put_profile|app_use_pad|cmd_(pad|erase_pad)_\w+",
+    ),
     "RAW_STREAM": ([], r"wire_raw_\w+"),
     "SYNC": (["ft_app.dir/app/sync.c.obj"], r"sync|sync_pin|numbers|times_us|port_sync_\w+|packets_send_sync|(wire|cmd)_sync_\w+"),
 }

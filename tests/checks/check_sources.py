@@ -5,6 +5,7 @@ usage: check_sources.py [ROOT]
 
 Prints one line for each violation and exits with 1 if there is any.
 """
+
 import ast
 import pathlib
 import re
@@ -48,17 +49,28 @@ def rules_for(path):
             (rf'#include\s+"({BOARDS}|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
         ]
     if top == "host_tools" and path.parts[1] not in MEASURING and path.name != "clock.cpp":
-        rules.append((r"\b(steady|system|high_resolution)_clock::now\s*\(|this_thread::sleep|\bu?sleep\s*\(|\bpoll\([^)]*, -?[1-9]\d*\)",
-                      "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them"))
+        rules.append(
+            (
+                r"\b(steady|system|high_resolution)_clock::now\s*\(|this_thread::sleep|\bu?sleep\s*\(|\bpoll\([^)]*, -?[1-9]\d*\)",
+                "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them",
+            )
+        )
     if top == "host_tools" and path.parts[1] in PRODUCT:
         rules.append((r'#include\s+"(simulation|report)/', "the product does not reach into the simulation, nor into what measures it"))
     return [(re.compile(pattern), message) for pattern, message in rules]
 
 
 # What a test waits with, by the system's clock. A file whose subject is real time says so in a comment, "real time: ", and why.
-WAITS = (("sleep", re.compile(r"\b(?:usleep|nanosleep|setTimeout|waitForTimeout)\s*\(|\b(?:time|asyncio)\.sleep\s*\(|this_thread::sleep"
-                              r"|(?<!def )(?<![\w.])sleep\s*\(|(?<![\w.'-])u?sleep [0-9.]")),
-         ("retry", re.compile(r"once_in_three|\b(?:flaky|retries|retry_until|rerun_failures|ctest --repeat)\b")))
+WAITS = (
+    (
+        "sleep",
+        re.compile(
+            r"\b(?:usleep|nanosleep|setTimeout|waitForTimeout)\s*\(|\b(?:time|asyncio)\.sleep\s*\(|this_thread::sleep"
+            r"|(?<!def )(?<![\w.])sleep\s*\(|(?<![\w.'-])u?sleep [0-9.]"
+        ),
+    ),
+    ("retry", re.compile(r"once_in_three|\b(?:flaky|retries|retry_until|rerun_failures|ctest --repeat)\b")),
+)
 TESTS = SOURCE | {".py", ".mjs", ".js", ".ts", ".sh"}
 REAL_TIME = re.compile(r"^\s*(?:#|//|\*)?\s*real time: ")
 
@@ -72,20 +84,28 @@ def waits(root):
         lines = path.read_text(encoding="utf-8").split("\n")
         if any(REAL_TIME.search(line) for line in lines):
             continue
-        found += [(path.relative_to(root), number, what) for number, line in enumerate(lines, 1) for what, pattern in WAITS
-                  if pattern.search(re.sub(r"\s*(?:#|//).*", "", line))]
+        found += [
+            (path.relative_to(root), number, what)
+            for number, line in enumerate(lines, 1)
+            for what, pattern in WAITS
+            if pattern.search(re.sub(r"\s*(?:#|//).*", "", line))
+        ]
     return found
 
 
-WAIT_MESSAGES = {"sleep": "a test that sleeps: let it live on simulated time (tests/README.md), or say in a comment why its subject is real time",
-                 "retry": "a test that tries again until it passes"}
+WAIT_MESSAGES = {
+    "sleep": "a test that sleeps: let it live on simulated time (tests/README.md), or say in a comment why its subject is real time",
+    "retry": "a test that tries again until it passes",
+}
 
 
 def circles(root):
     """Modules of the Python package that import each other, by whatever way, also within functions."""
     needs = {}
     for path in sorted((root / "host_tools/python/fingertip").glob("*.py")):
-        imports = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom) and node.level == 1]
+        imports = [
+            node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom) and node.level == 1
+        ]
         needs[path.stem] = {name for node in imports for name in ([node.module] if node.module else [each.name for each in node.names])}
 
     def reached(module):

@@ -1,4 +1,5 @@
 """What the image checks need of a 32-bit little-endian ELF file: sections, segments, symbols."""
+
 import struct
 import sys
 

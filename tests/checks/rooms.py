@@ -6,13 +6,19 @@ usage: rooms.py [ROOT] [--check]
 Writes the picture between its marks. With --check it writes nothing, and fails if the picture is out of date or a folder needs itself.
 A folder needs another if its list names a library of the other, or one of its sources. The picture leaves out a need that follows from another need.
 """
+
 import argparse
 import pathlib
 import re
 import sys
 
 MARKS = "<!-- rooms: python3 tests/checks/rooms.py -->\n", "<!-- /rooms -->\n"
-WHOLE = ("host_tools/report", "boards", "host_tools/library/libfingertip", "host_tools/install")  # drawn as one, with the folders below them
+WHOLE = (
+    "host_tools/report",
+    "boards",
+    "host_tools/library/libfingertip",
+    "host_tools/install",
+)  # drawn as one, with the folders below them
 LIBRARY = re.compile(r"\badd_library\(\s*(\w+)")
 TARGET = re.compile(r"\badd_(?:library|executable)\(")
 VARIABLE = re.compile(r"\bset\((\w+) (\$\{CMAKE_SOURCE_DIR\}/[\w/]+)\)")
@@ -39,7 +45,9 @@ def needs(lists):
             for variable, value in VARIABLE.findall(text):
                 text = text.replace(f"${{{variable}}}", value)
             named = {homes[word] for word in re.findall(r"\w+", text) if word in homes}
-            found.setdefault(folder_of(path), set()).update(named, (folder_of(pathlib.PurePosixPath(source)) for source in SOURCE.findall(text)))
+            found.setdefault(folder_of(path), set()).update(
+                named, (folder_of(pathlib.PurePosixPath(source)) for source in SOURCE.findall(text))
+            )
     return {folder: others - {folder} for folder, others in found.items()}
 
 
@@ -73,7 +81,9 @@ def main():
     options = parser.parse_args()
     root = pathlib.Path(options.root).resolve()
     paths = [path for top in ("firmware", "boards", "host_tools") for path in sorted((root / top).rglob("CMakeLists.txt"))]
-    found = needs({path.relative_to(root): path.read_text(encoding="utf-8") for path in paths if not {"node_modules", "example"} & set(path.parts)})
+    found = needs(
+        {path.relative_to(root): path.read_text(encoding="utf-8") for path in paths if not {"node_modules", "example"} & set(path.parts)}
+    )
     circles = sorted(folder for folder in found if folder in reached(found, folder))
     if circles:
         sys.exit("rooms.py: these folders need themselves, by way of others: " + ", ".join(circles))

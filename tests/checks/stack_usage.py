@@ -17,6 +17,7 @@ priority an exception frame and its deepest handler. A fault can come on top, bu
 
 The exception frame has 32 bytes, and 4 more when the stack must be aligned (ARMv6-M B1.5.7).
 """
+
 import argparse
 import bisect
 import json
@@ -59,8 +60,9 @@ def read_functions(elf):
 
 def disassemble(path, functions):
     try:
-        lines = subprocess.run(["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", path],
-                               check=True, capture_output=True, text=True).stdout.splitlines()
+        lines = subprocess.run(
+            ["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", path], check=True, capture_output=True, text=True
+        ).stdout.splitlines()
     except (OSError, subprocess.CalledProcessError) as error:
         fail(f"arm-none-eabi-objdump {path}: {error}")
     starts = sorted(functions)
@@ -238,8 +240,11 @@ def main():
     print(f"worst     {total:5}  of {reserved} reserved, exception frames of {frames_bytes} included")
     if args.json:
         result = {
-            "worst_bytes": total, "main_bytes": main_bytes, "interrupt_bytes": handler_bytes,
-            "exception_frame_bytes": frames_bytes, "reserved_bytes": reserved,
+            "worst_bytes": total,
+            "main_bytes": main_bytes,
+            "interrupt_bytes": handler_bytes,
+            "exception_frame_bytes": frames_bytes,
+            "reserved_bytes": reserved,
             "main_chain": [f.name for f in main_chain],
             "interrupt_chains": [[f.name for f in deepest[priority][1]] for priority in sorted(deepest)],
         }

@@ -1,4 +1,5 @@
 """analyse.py finds what it is for, with each of its tools."""
+
 import pathlib
 import shutil
 import sys
@@ -50,8 +51,15 @@ class Analyse(unittest.TestCase):
         self.assert_found(analyse.analyse_paths(source, entry), "-Wanalyzer-double-free")
 
     def test_mandatory_rules(self):
-        for text, rule in (("void f(int a[static 3]);", "17.6"), ("#include <ctype.h>", "21: <ctype.h>"), ("n = strlen(s);", "21.17"),
-                           ("char *s = getenv(n);", "21.19"), ("t = localtime(&n);", "21.20"), ("free(p);", "22.2"), ("FILE *f;", "22.5")):
+        for text, rule in (
+            ("void f(int a[static 3]);", "17.6"),
+            ("#include <ctype.h>", "21: <ctype.h>"),
+            ("n = strlen(s);", "21.17"),
+            ("char *s = getenv(n);", "21.19"),
+            ("t = localtime(&n);", "21.20"),
+            ("free(p);", "22.2"),
+            ("FILE *f;", "22.5"),
+        ):
             for path in ("firmware/a/a.c", "boards/rp2040/a.c"):
                 told = list(analyse.mandatory(pathlib.Path(path), f"\n{text}\n"))
                 self.assertEqual(len(told), 1, text)

@@ -1,4 +1,5 @@
 """The source rules catch what they are for."""
+
 import pathlib
 import subprocess
 import sys
@@ -42,8 +43,11 @@ class CheckSources(unittest.TestCase):
             self.assert_caught("host_tools/tool/cli/a.cpp", line + "\n", "libfingertip/clock.hpp")
 
     def test_who_measures_may_look_at_the_clock_and_all_may_ask_at_once(self):
-        for path, line in (("host_tools/report/a.cpp", "steady_clock::now();"), ("host_tools/library/libfingertip/clock.cpp", "steady_clock::now();"),
-                           ("host_tools/tool/cli/a.cpp", "poll(&asked, 1, 0);")):
+        for path, line in (
+            ("host_tools/report/a.cpp", "steady_clock::now();"),
+            ("host_tools/library/libfingertip/clock.cpp", "steady_clock::now();"),
+            ("host_tools/tool/cli/a.cpp", "poll(&asked, 1, 0);"),
+        ):
             self.assertEqual(self.check(path, line + "\n")[0], 0, path)
 
     def test_comments_and_strings_are_free(self):
@@ -61,8 +65,13 @@ class Circles(unittest.TestCase):
         with tempfile.TemporaryDirectory() as root:
             package = pathlib.Path(root, "host_tools/python/fingertip")
             package.mkdir(parents=True)
-            for name, text in (("a", "from .b import x\n"), ("b", "def f():\n    from .c import y\n"), ("c", "from . import a, d\n"), ("d", "import e\n"),
-                               ("e", "from .a import z\n")):
+            for name, text in (
+                ("a", "from .b import x\n"),
+                ("b", "def f():\n    from .c import y\n"),
+                ("c", "from . import a, d\n"),
+                ("d", "import e\n"),
+                ("e", "from .a import z\n"),
+            ):
                 (package / f"{name}.py").write_text(text)
             self.assertEqual(circles(pathlib.Path(root)), ["a", "b", "c"])
 
@@ -81,9 +90,15 @@ class Waits(unittest.TestCase):
             return [(str(where), number, what) for where, number, what in waits(pathlib.Path(root))]
 
     def test_each_way_to_wait_is_found(self):
-        for name, line in (("a.py", "    time.sleep(1)"), ("a.py", "    await asyncio.sleep(1)"), ("a.py", '    self.sh("sleep 4")'),
-                           ("a.cpp", "  std::this_thread::sleep_for(milliseconds(1));"), ("a.c", "  usleep(100);"),
-                           ("a.mjs", "await new Promise((r) => setTimeout(r, 25));"), ("a.sh", "while :; do sleep 0.1; done")):
+        for name, line in (
+            ("a.py", "    time.sleep(1)"),
+            ("a.py", "    await asyncio.sleep(1)"),
+            ("a.py", '    self.sh("sleep 4")'),
+            ("a.cpp", "  std::this_thread::sleep_for(milliseconds(1));"),
+            ("a.c", "  usleep(100);"),
+            ("a.mjs", "await new Promise((r) => setTimeout(r, 25));"),
+            ("a.sh", "while :; do sleep 0.1; done"),
+        ):
             self.assertEqual(self.found(name, f"one\n{line}\n"), [(f"tests/{name}", 2, "sleep")], line)
         self.assertEqual(self.found("a.py", "def once_in_three():\n"), [("tests/a.py", 1, "retry")])
 

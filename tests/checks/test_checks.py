@@ -3,6 +3,7 @@
 
 usage: test_checks.py IMAGE.elf BUILD
 """
+
 import pathlib
 import re
 import subprocess
@@ -87,10 +88,19 @@ class Checks(unittest.TestCase):
 
     def test_forbidden_symbols(self):
         for name, reason in [
-            ("__aeabi_dadd", "double"), ("__aeabi_f2d", "double"), ("__muldf3", "double"), ("sqrt", "double"),
-            ("malloc", "allocation"), ("_sbrk", "allocation"), ("_free_r", "allocation"),
-            ("printf", "stdio"), ("sniprintf", "stdio"), ("puts", "stdio"), ("_write_r", "stdio"),
-            ("exit", "way out"), ("longjmp", "way out"),
+            ("__aeabi_dadd", "double"),
+            ("__aeabi_f2d", "double"),
+            ("__muldf3", "double"),
+            ("sqrt", "double"),
+            ("malloc", "allocation"),
+            ("_sbrk", "allocation"),
+            ("_free_r", "allocation"),
+            ("printf", "stdio"),
+            ("sniprintf", "stdio"),
+            ("puts", "stdio"),
+            ("_write_r", "stdio"),
+            ("exit", "way out"),
+            ("longjmp", "way out"),
         ]:
             self.data = bytearray(self.elf.data)
             self.rename("usb_controller_request_service", name)

@@ -2,6 +2,7 @@
 
 usage: test_drawings.py HEADERS [unittest arguments]; HEADERS: folder where the build has written <board>/board.h
 """
+
 import contextlib
 import copy
 import io
@@ -50,7 +51,10 @@ class Wiring(unittest.TestCase):
     def test_the_firmware_has_the_pins_that_are_drawn(self):
         for bus, (name, _) in BY_BUS.items():
             board = wired(bus)
-            told = {key.lower(): int(value, 0) for key, value in re.findall(r"BOARD_(\w+) = (\w+),", (HEADERS / name / "board.h").read_text(encoding="utf-8"))}
+            told = {
+                key.lower(): int(value, 0)
+                for key, value in re.findall(r"BOARD_(\w+) = (\w+),", (HEADERS / name / "board.h").read_text(encoding="utf-8"))
+            }
             self.assertEqual({key: value if isinstance(value, int) else int(value, 0) for key, value in board.wiring.items()}, told)
             pins = [gpio for gpio, _ in pins_drawn(board)]
             for key, gpio in told.items():
@@ -73,8 +77,11 @@ class Wiring(unittest.TestCase):
         self.assertEqual([count for count, part, _ in wiring.parts(board) if part in ("sensor", "multiplexer", "capacitor")], [8, 2, 10])
 
     def test_what_it_refuses(self):
-        for words, wires in (("GPIO 5 has two wires", {"pin_sda": 5}), ("a Pico has no pin for GPIO 23", {"pin_sync": 23}),
-                             ("a TCA9548A has 8 channels", {"sensors_of_strip": 9})):
+        for words, wires in (
+            ("GPIO 5 has two wires", {"pin_sda": 5}),
+            ("a Pico has no pin for GPIO 23", {"pin_sync": 23}),
+            ("a TCA9548A has 8 channels", {"sensors_of_strip": 9}),
+        ):
             with self.assertRaisesRegex(wiring.Unwired, words):
                 wired("multiplexed", **wires)
         name, descriptor = copy.deepcopy(BY_BUS["parallel"])
@@ -103,7 +110,9 @@ class Pad(unittest.TestCase):
         m = mould.measures(geometry.places())
         for x, y in m.screws:
             radius = mould.SCREW_mm / 2
-            self.assertTrue(abs(x) - radius > m.flange[0] / 2 + mould.FRAME_PLAY_mm or abs(y) - radius > m.flange[1] / 2 + mould.FRAME_PLAY_mm)
+            self.assertTrue(
+                abs(x) - radius > m.flange[0] / 2 + mould.FRAME_PLAY_mm or abs(y) - radius > m.flange[1] / 2 + mould.FRAME_PLAY_mm
+            )
             self.assertLess(abs(x) + radius, m.outside[0] / 2)
             self.assertLess(abs(y) + radius, m.outside[1] / 2)
 

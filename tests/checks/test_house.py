@@ -1,4 +1,5 @@
 """The counts of the house see what they are for."""
+
 import pathlib
 import tempfile
 import unittest

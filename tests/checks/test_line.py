@@ -1,4 +1,5 @@
 """The generator of what the languages know of the line: a field is added by its one line, and what differs is told."""
+
 import io
 import pathlib
 import re
@@ -62,8 +63,11 @@ class Generator(unittest.TestCase):
         self.assertEqual(self.run_it("--check"), (0, ""))
 
     def test_a_change_by_hand_is_told_and_undone(self):
-        for name, before, after in ((PAGE, "| 8 | LOW_SIGNAL |", "| 9 | LOW_SIGNAL |"), ("firmware/common/contact_flags.h", "1 << 8", "1 << 9"),
-                                    ("host_tools/web/src/line/line_facts.ts", "  bus_nacks: number;", "  bus_timeouts: number;")):
+        for name, before, after in (
+            (PAGE, "| 8 | LOW_SIGNAL |", "| 9 | LOW_SIGNAL |"),
+            ("firmware/common/contact_flags.h", "1 << 8", "1 << 9"),
+            ("host_tools/web/src/line/line_facts.ts", "  bus_nacks: number;", "  bus_timeouts: number;"),
+        ):
             self.change(name, before, after)
             status, said = self.run_it("--check")
             self.assertEqual((status, said.split(":")[0]), (1, name))
@@ -75,15 +79,28 @@ class Generator(unittest.TestCase):
         status, said = self.run_it()
         self.assertEqual(status, 0)
         changed = {each.split(":")[0] for each in said.splitlines()}
-        self.assertEqual(changed, {"firmware/wire/bodies.h", "firmware/wire/layouts.inc", "host_tools/library/libfingertip/line_fields.hpp", "host_tools/library/libfingertip/line_values.hpp",
-                                   "host_tools/python/fingertip/line.py", "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg",
-                                   "host_tools/web/src/line/line_facts.ts", PAGE})
+        self.assertEqual(
+            changed,
+            {
+                "firmware/wire/bodies.h",
+                "firmware/wire/layouts.inc",
+                "host_tools/library/libfingertip/line_fields.hpp",
+                "host_tools/library/libfingertip/line_values.hpp",
+                "host_tools/python/fingertip/line.py",
+                "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg",
+                "host_tools/web/src/line/line_facts.ts",
+                PAGE,
+            },
+        )
         texts = {name: (self.root / name).read_text(encoding="utf-8") for name in changed}
         self.assertIn("float torque_N_mm; /* about the normal of the pad */", texts["firmware/wire/bodies.h"])
         runs = re.findall(r"RUN\((.*)\)", texts["firmware/wire/layouts.inc"].split("wire_raw_runs")[0])
         at = runs.index("F32, 1, contact.torque_N_mm")
         self.assertEqual(runs[at - 1], "WHEN, 20, contact.flags")
-        self.assertIn("float32 torque_n_mm         # about the normal of the pad\n", texts["host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg"])
+        self.assertIn(
+            "float32 torque_n_mm         # about the normal of the pad\n",
+            texts["host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg"],
+        )
         self.assertIn("  torque_N_mm: Flag.TANGENTIAL_VALID,", texts["host_tools/web/src/line/line_facts.ts"])
         self.assertIn("| f32 | torque_N_mm | about the normal of the pad | TANGENTIAL_VALID |", texts[PAGE])
 
@@ -93,7 +110,11 @@ class Generator(unittest.TestCase):
         self.change(toml, FIRST_COMMAND, NEW_COMMAND + FIRST_COMMAND)
         self.change(toml, "SLIP_WINDOW = {", 'HOLD = { unit = "ms", min = 7, max = 70, text = "hold" }\nSLIP_WINDOW = {')
         self.change(toml, '"osr", "temperature_interval_ms"', '"osr", "hold_ms", "temperature_interval_ms"')
-        self.change(toml, '  { name = "osr", type = "u16", text', '  { name = "hold_ms", type = "u16", text = "hold" },\n  { name = "osr", type = "u16", text')
+        self.change(
+            toml,
+            '  { name = "osr", type = "u16", text',
+            '  { name = "hold_ms", type = "u16", text = "hold" },\n  { name = "osr", type = "u16", text',
+        )
         self.assertEqual(self.run_it()[0], 0)
         texts = {name: (self.root / name).read_text(encoding="utf-8") for name in line.FILES}
         tool = texts["host_tools/library/libfingertip/line_settings.hpp"]
@@ -103,15 +124,22 @@ class Generator(unittest.TestCase):
         said = {}
         exec(texts["host_tools/python/fingertip/line.py"], said)
         setting = said["SETTINGS"][0]
-        self.assertEqual((setting.argument, setting.command, setting.least, setting.most, setting.whole), ("hold_ms", said["SetHold"], 7, 70, True))
+        self.assertEqual(
+            (setting.argument, setting.command, setting.least, setting.most, setting.whole), ("hold_ms", said["SetHold"], 7, 70, True)
+        )
         self.assertIn("hold_ms: int | None", texts["host_tools/python/fingertip/line.py"])
         self.assertIn("hold_ms", said["INFO_KEYS"])
         self.assertIn("        hold_ms: 7 to 70.\n", said["Settable"].set.__doc__)
-        self.assertIn("field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]", texts["host_tools/web/src/line/line_facts.ts"])
+        self.assertIn(
+            "field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]",
+            texts["host_tools/web/src/line/line_facts.ts"],
+        )
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):
         described = line.Line(ROOT / "firmware/wire/line.toml")
-        self.assertEqual(described.longest_frame(), 12 + (136 + 22 * 32 + 177) + 4 + 4 + 2)  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
+        self.assertEqual(
+            described.longest_frame(), 12 + (136 + 22 * 32 + 177) + 4 + 4 + 2
+        )  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
         self.assertIn(f"longer than {described.longest_frame()} bytes is damage", (ROOT / PAGE).read_text(encoding="utf-8"))
 
     def test_what_is_there_twice_is_refused(self):

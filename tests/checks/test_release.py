@@ -1,4 +1,5 @@
 """What a release is made by: version.py and release.py."""
+
 import gzip
 import os
 import pathlib
@@ -100,6 +101,7 @@ class Release(Folder):
             done = subprocess.run([sys.executable, tree / "cmake/release.py", *words], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1)
             return done.stderr
+
         git("init", "-q")
         git("add", ".")
         git("commit", "-q", "-m", "first")

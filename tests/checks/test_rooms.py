@@ -1,4 +1,5 @@
 """The picture of the house shows what the CMake lists say."""
+
 import pathlib
 import subprocess
 import sys
@@ -20,9 +21,16 @@ def lists(**texts):
 class Rooms(unittest.TestCase):
     def test_libraries_and_sources_of_others_are_needs_and_comments_are_not(self):
         high = "add_library(high STATIC b.cpp)\ntarget_link_libraries(high PRIVATE low ft_common)\n"
-        self.assertEqual(rooms.needs(lists(firmware=FIRMWARE, low=LIBRARY, high=high, tool=TOOL)), {
-            "firmware/common": set(), "firmware/fit": {"firmware/common"}, "host_tools/low": {"firmware/fit"},
-            "host_tools/high": {"host_tools/low", "firmware/common"}, "host_tools/tool": {"host_tools/low"}})
+        self.assertEqual(
+            rooms.needs(lists(firmware=FIRMWARE, low=LIBRARY, high=high, tool=TOOL)),
+            {
+                "firmware/common": set(),
+                "firmware/fit": {"firmware/common"},
+                "host_tools/low": {"firmware/fit"},
+                "host_tools/high": {"host_tools/low", "firmware/common"},
+                "host_tools/tool": {"host_tools/low"},
+            },
+        )
 
     def test_a_need_that_follows_from_another_is_left_out(self):
         needs = {"host_tools/b": {"host_tools/a", "firmware/c"}, "host_tools/a": {"firmware/c"}, "firmware/c": set()}

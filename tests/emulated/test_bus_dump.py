@@ -3,6 +3,7 @@ measured and held against UM10204.
 
 usage: test_bus_dump.py --board NAME --image F.bin --node NODE --sigrok SIGROK-CLI
 """
+
 import argparse
 import csv
 import json
@@ -21,8 +22,7 @@ TOOLS = argparse.Namespace()
 
 FROM_S, TO_S = 0.400, 0.420
 # The shortest that UM10204 table 10 allows in fast mode, ns.
-FAST_MODE_ns = {"tHD_STA": 600, "tLOW": 1300, "tHIGH": 600, "tSU_STA": 600, "tSU_DAT": 100, "tSU_STO": 600, "tBUF": 1300,
-                "period": 2500}
+FAST_MODE_ns = {"tHD_STA": 600, "tLOW": 1300, "tHIGH": 600, "tSU_STA": 600, "tSU_DAT": 100, "tSU_STO": 600, "tBUF": 1300, "period": 2500}
 # The longest, but for as much as SCL stays low beyond its shortest time.
 TVD_DAT_ns = 900
 # The longest rise time that fast mode allows; as good as any for lines whose bus model knows no levels between low and high.
@@ -33,11 +33,32 @@ def run(folder, rise_ns):
     """Report, dump and log of a short run."""
     folder = pathlib.Path(folder)
     scenario = folder / "scenario.csv"
-    subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(scenario), "--seconds", "1"],
-                   check=True)
-    call = [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", TOOLS.board, "--image", TOOLS.image, "--scenario",
-            str(scenario), "--fast-enumeration", "--seconds", str(TO_S + 0.01), "--vcd", str(folder / "bus.vcd"), "--vcd-from",
-            str(FROM_S), "--vcd-to", str(TO_S), "--bus-log", str(folder / "bus.csv"), "--report", str(folder / "run.json")]
+    subprocess.run(
+        [sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(scenario), "--seconds", "1"], check=True
+    )
+    call = [
+        TOOLS.node,
+        str(ROOT / "host_tools/simulation/emulator/main.mjs"),
+        "--board",
+        TOOLS.board,
+        "--image",
+        TOOLS.image,
+        "--scenario",
+        str(scenario),
+        "--fast-enumeration",
+        "--seconds",
+        str(TO_S + 0.01),
+        "--vcd",
+        str(folder / "bus.vcd"),
+        "--vcd-from",
+        str(FROM_S),
+        "--vcd-to",
+        str(TO_S),
+        "--bus-log",
+        str(folder / "bus.csv"),
+        "--report",
+        str(folder / "run.json"),
+    ]
     if rise_ns is not None:
         call += ["--rise-ns", str(rise_ns)]
     done = subprocess.run(call, capture_output=True, text=True)
@@ -71,8 +92,14 @@ def decode(path, pairs):
             transactions[-2]["whole"] = True
         elif what == "Stop":
             transactions[-1]["whole"] = True
-    return [[(t["address"], t["rw"], t["bytes"], all(t["acks"][:-1] if t["rw"] == "r" and t["bytes"] else t["acks"]))
-             for t in lines[name] if t["whole"]] for name in lines]
+    return [
+        [
+            (t["address"], t["rw"], t["bytes"], all(t["acks"][:-1] if t["rw"] == "r" and t["bytes"] else t["acks"]))
+            for t in lines[name]
+            if t["whole"]
+        ]
+        for name in lines
+    ]
 
 
 def measure(sda, scl, rise_ns):
@@ -145,15 +172,18 @@ class BusDump(unittest.TestCase):
         decoded = decode(self.dump, self.pairs)
         self.assertEqual(len(decoded), 15 if TOOLS.board == "pico_parallel" else 1)
         for (sda, _), transactions in zip(self.pairs, decoded):
-            logged = [(int(row["address"], 16), row["rw"], row["bytes"], row["ack"] == "1") for row in self.log
-                      if row["muxes"] == sda or TOOLS.board == "pico_mux"
-                      if float(row["start_ns"]) > FROM_S * 1e9 and float(row["end_ns"]) < TO_S * 1e9]
+            logged = [
+                (int(row["address"], 16), row["rw"], row["bytes"], row["ack"] == "1")
+                for row in self.log
+                if row["muxes"] == sda or TOOLS.board == "pico_mux"
+                if float(row["start_ns"]) > FROM_S * 1e9 and float(row["end_ns"]) < TO_S * 1e9
+            ]
             self.assertGreater(len(logged), 20)
             # A transfer across the edge of the dump may be whole in one and not in the other.
-            at = next(i for i in (0, 1) if transactions[i:i + 10] == logged[:10])
+            at = next(i for i in (0, 1) if transactions[i : i + 10] == logged[:10])
             self.assertLessEqual(abs(len(transactions) - at - len(logged)), 1, sda)
             count = min(len(transactions) - at, len(logged))
-            self.assertEqual(transactions[at:at + count], logged[:count], sda)
+            self.assertEqual(transactions[at : at + count], logged[:count], sda)
 
     def test_times_are_within_the_specification(self):
         for sda, scl in self.pairs:

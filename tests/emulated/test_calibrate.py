@@ -5,6 +5,7 @@ The image keeps 50 frames/s in its flash first, so that three minutes of placeme
 
 usage: test_calibrate.py --build BUILD --image FILE.bin --node NODE
 """
+
 import argparse
 import pathlib
 import re
@@ -33,13 +34,40 @@ class Calibrate(unittest.TestCase):
         cls.addClassCleanup(temporary.cleanup)
         cls.folder = pathlib.Path(temporary.name)
         cls.scenario = cls.folder / "placements.csv"
-        subprocess.run([OPTIONS.build / "host_tools/simulation/twin/twin", "scenario", "placements", "-o", cls.scenario, "--gain", "10", "--seed", "41", "--pad", "7",
-                        "--cache", OPTIONS.build / "contact_tables"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [
+                OPTIONS.build / "host_tools/simulation/twin/twin",
+                "scenario",
+                "placements",
+                "-o",
+                cls.scenario,
+                "--gain",
+                "10",
+                "--seed",
+                "41",
+                "--pad",
+                "7",
+                "--cache",
+                OPTIONS.build / "contact_tables",
+            ],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
 
     def start(self, *options):
         """The image, powered on when its port is opened."""
-        return self.world.emulator(self.port, "--board", "pico_parallel", "--image", OPTIONS.image, "--scenario", self.scenario,
-                                   "--flash", self.folder / "flash.bin", *options)
+        return self.world.emulator(
+            self.port,
+            "--board",
+            "pico_parallel",
+            "--image",
+            OPTIONS.image,
+            "--scenario",
+            self.scenario,
+            "--flash",
+            self.folder / "flash.bin",
+            *options,
+        )
 
     def end(self, process):
         """What the flash holds is written when the run ends."""

@@ -113,7 +113,7 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
     // bl port_panic
     const offset = panic - (caller + 4);
     const [s, imm10, imm11] = [(offset >>> 24) & 1, (offset >>> 12) & 0x3ff, (offset >>> 1) & 0x7ff];
-    const [j1, j2] = [23, 22].map((bit) => (((offset >>> bit) & 1) ^ s ^ 1));
+    const [j1, j2] = [23, 22].map((bit) => ((offset >>> bit) & 1) ^ s ^ 1);
     const code = Buffer.alloc(4);
     code.writeUInt16LE(0xf000 | (s << 10) | imm10, 0);
     code.writeUInt16LE(0xd000 | (j1 << 13) | (j2 << 11) | imm11, 2);
@@ -153,7 +153,12 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
 
   /** While no host hears it, or none comes, nothing is stuck. */
   test(`${name}: a bus that sleeps, a cable that is out, a host that is silent or does not read are no reason`, () => {
-    const bench = new Bench(name, { faults: [{ type: 'usb_unplug', from_s: 2.5, to_s: 5 }, { type: 'host_stall', from_s: 5.5, to_s: 7 }] });
+    const bench = new Bench(name, {
+      faults: [
+        { type: 'usb_unplug', from_s: 2.5, to_s: 5 },
+        { type: 'host_stall', from_s: 5.5, to_s: 7 },
+      ],
+    });
     bench.stream();
     bench.machine.host.suspend();
     bench.run(1500);
@@ -202,7 +207,10 @@ for (const name of ['pico_mux', 'pico_parallel']) {
     bench.end();
   });
 
-  for (const [what, where, code] of [['a scan that never wants to be called again', 'scan_step', RETURN_FAR], ['a bus operation that never ends', 'poll', RETURN_PENDING]]) {
+  for (const [what, where, code] of [
+    ['a scan that never wants to be called again', 'scan_step', RETURN_FAR],
+    ['a bus operation that never ends', 'poll', RETURN_PENDING],
+  ]) {
     test(`${name}: ${what}, while its events go on`, () => {
       const bench = new Bench(name);
       bench.stream();
@@ -231,7 +239,9 @@ for (const name of ['pico_mux', 'pico_parallel']) {
 }
 
 test('the slowest rate, and sensors that are all dead, are no reason', () => {
-  const bench = new Bench('pico_mux', { faults: Array.from({ length: 15 }, (_, sensor) => ({ type: 'sensor_dead', sensor, from_s: 1, to_s: 3 })) });
+  const bench = new Bench('pico_mux', {
+    faults: Array.from({ length: 15 }, (_, sensor) => ({ type: 'sensor_dead', sensor, from_s: 1, to_s: 3 })),
+  });
   bench.stream();
   bench.machine.client.write(bench.encoded('rate', '0.1'));
   bench.run(5000);

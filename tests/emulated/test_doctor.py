@@ -2,6 +2,7 @@
 
 usage: test_doctor.py --boards FOLDER --support FOLDER --node NODE
 """
+
 import argparse
 import fcntl
 import json
@@ -43,7 +44,8 @@ class Doctor(unittest.TestCase):
             for shared in ("dev", "proc", "sys"):
                 (cls.folder / name / shared).symlink_to(f"/{shared}")
         (cls.folder / "with_rule/etc/udev/rules.d/60-fingertip.rules").write_text(
-            subprocess.run([TOOLS.support / "simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout)
+            subprocess.run([TOOLS.support / "simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout
+        )
 
     def setUp(self):
         self.plugged_in = 0
@@ -54,8 +56,22 @@ class Doctor(unittest.TestCase):
         self.plugged_in += 1
         port, plan = self.folder / f"port-{self.plugged_in}", self.folder / "faults.json"
         plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
-        self.world.emulator(port, "--board", board, "--image", pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin",
-                            "--scenario", scenario or self.at_rest, "--sensor", sensor, "--faults", plan, "--seconds", "3600", "--fast-enumeration")
+        self.world.emulator(
+            port,
+            "--board",
+            board,
+            "--image",
+            pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin",
+            "--scenario",
+            scenario or self.at_rest,
+            "--sensor",
+            sensor,
+            "--faults",
+            plan,
+            "--seconds",
+            "3600",
+            "--fast-enumeration",
+        )
         return port
 
     def examine(self, port, *arguments, system="with_rule", seconds=1):
@@ -109,8 +125,11 @@ class Doctor(unittest.TestCase):
         board = "pico_parallel"
         port = self.plug_in(board, [{"type": "sram_upset", "address": self.function(board, "scan_take"), "bytes": "fee7", "from_s": 0.5}])
         text = self.only(self.examine(port, "--elf", self.elf(board)), "crash", "bad")["text"]
-        self.assertRegex(text, r"^the watchdog struck: the main loop stood still; the processor was at scan_take\+0x0 \(0x2000[0-9a-f]{4}\), called "
-                               r"from app_run\+0x[0-9a-f]+ \(.*\), in the main loop, taking readings, [01]\.[0-9]. s after its start; before that: ")
+        self.assertRegex(
+            text,
+            r"^the watchdog struck: the main loop stood still; the processor was at scan_take\+0x0 \(0x2000[0-9a-f]{4}\), called "
+            r"from app_run\+0x[0-9a-f]+ \(.*\), in the main loop, taking readings, [01]\.[0-9]. s after its start; before that: ",
+        )
         self.assertEqual(self.result["crash"]["place"], "scan_take+0x0")
         # and without names that are of another image
         text = self.only(self.examine(port, "--elf", self.elf("pico_mux")), "crash", "bad")["text"]
@@ -177,8 +196,9 @@ class Doctor(unittest.TestCase):
         self.assertAlmostEqual(self.result["measured"]["sensors"][4]["drift_Pa_per_s"], 3, delta=1)
 
     def test_something_touches(self):
-        press = write_scenario(self.folder / "press.csv", [0, *[0] * SENSORS], [1, *[0] * SENSORS],
-                               [1.1, *[0] * 6, 3000, 9000, 3000, *[0] * 6])
+        press = write_scenario(
+            self.folder / "press.csv", [0, *[0] * SENSORS], [1, *[0] * SENSORS], [1.1, *[0] * 6, 3000, 9000, 3000, *[0] * 6]
+        )
         findings = self.examine(self.plug_in("pico_mux", scenario=press), seconds=3)
         self.assertIn("something touches the pad", self.only(findings, "zero", "warn")["text"])
         self.assertEqual(len(findings), 1, findings)

@@ -52,7 +52,9 @@ function press(x_mm, y_mm, p0_Pa, sigma_mm, noise_Pa) {
   });
 }
 
-const presses = Array.from({ length: 200 }, () => press(between(-15, 15), between(-24, 24), 10 ** between(2, 6), 10 ** between(0.2, 1.4), 10 ** between(-1, 2)));
+const presses = Array.from({ length: 200 }, () =>
+  press(between(-15, 15), between(-24, 24), 10 ** between(2, 6), 10 ** between(0.2, 1.4), 10 ** between(-1, 2)),
+);
 const garbage = [
   ...Array.from({ length: 60 }, () => Array.from({ length: SENSORS }, anyInt32)),
   ...Array.from({ length: 40 }, () => Array.from({ length: SENSORS }, () => anyInt32() >> Math.floor(between(0, 31)))),
@@ -91,12 +93,18 @@ for (const [what, kernel, limit, usable] of [
 }
 
 /** Readings that rise along the pull. */
-const pulled = (readings, qx, qy) => readings.map((value, k) => Math.round(value * (1 + qx * (Math.floor(k / 5) - 1) + qy * ((k % 5) - 2))));
+const pulled = (readings, qx, qy) =>
+  readings.map((value, k) => Math.round(value * (1 + qx * (Math.floor(k / 5) - 1) + qy * ((k % 5) - 2))));
 
 test(`the tangential estimate takes at most ${TANGENTIAL_CYCLES_MAX} cycles, nor much less where it ends with a result`, (t) => {
-  const run = (readings, usable) => bench.run({ kernel: 'tangential', iterations: ITERATIONS, noise_Pa_q10: 4096, usable, own: true, readings });
-  const list = Array.from({ length: 100 }, () => pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)));
-  const answers = list.map((readings, i) => run(readings, i % 4 ? ALL : maskFor(readings, i))).filter((answer) => answer.x_mm !== 0 || answer.y_mm !== 0);
+  const run = (readings, usable) =>
+    bench.run({ kernel: 'tangential', iterations: ITERATIONS, noise_Pa_q10: 4096, usable, own: true, readings });
+  const list = Array.from({ length: 100 }, () =>
+    pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)),
+  );
+  const answers = list
+    .map((readings, i) => run(readings, i % 4 ? ALL : maskFor(readings, i)))
+    .filter((answer) => answer.x_mm !== 0 || answer.y_mm !== 0);
   assert.ok(answers.length > 60, `${answers.length} results`);
   const cycles = answers.map((answer) => answer.cycles);
   const [min, max] = [Math.min(...cycles), Math.max(...cycles)];
@@ -109,13 +117,19 @@ test(`the tangential estimate takes at most ${TANGENTIAL_CYCLES_MAX} cycles, nor
 });
 
 test(`no part of the look for a load takes more than ${LOAD_PART_CYCLES_MAX} cycles, nor all more than ${LOAD_CYCLES_MAX}`, (t) => {
-  const inside = Array.from({ length: 60 }, () => pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)));
+  const inside = Array.from({ length: 60 }, () =>
+    pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)),
+  );
   let sum = 0;
   for (let part = 0; part < LOAD_PARTS; part++) {
     let dearest = 0;
     for (const [name, list] of Object.entries({ inside, presses, garbage })) {
-      const cycles = list.map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `load_${part}`, true)).sort((a, b) => a - b);
-      t.diagnostic(`part ${part}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`);
+      const cycles = list
+        .map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `load_${part}`, true))
+        .sort((a, b) => a - b);
+      t.diagnostic(
+        `part ${part}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`,
+      );
       dearest = Math.max(dearest, cycles[cycles.length - 1]);
     }
     assert.ok(dearest <= LOAD_PART_CYCLES_MAX, `part ${part}: ${dearest}`);
@@ -136,13 +150,18 @@ test(`what a touch tells of the gains takes at most ${GAINS_CYCLES_MAX} cycles`,
 
 test(`no part of what presses takes more than ${SHAPES_PART_CYCLES_MAX} cycles`, (t) => {
   const one = () => press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2);
-  const pairs = Array.from({ length: 30 }, () => { const other = one(); return one().map((value, k) => value + other[k]); });
+  const pairs = Array.from({ length: 30 }, () => {
+    const other = one();
+    return one().map((value, k) => value + other[k]);
+  });
   const ones = Array.from({ length: 20 }, one);
   const parts = Array.from({ length: SHAPES_PARTS }, (_, part) => `shapes_${part}`);
   for (const kernel of ['shapes_first_0', 'shapes_first_1', ...parts]) {
     for (const [name, list] of Object.entries({ ones, pairs, presses: presses.slice(0, 60), garbage: garbage.slice(0, 100) })) {
       const inputs = list.map((readings, i) => [readings, i % 4 ? ALL : maskFor(readings, i)]).filter((input) => anyPositive(...input));
-      const cycles = inputs.map(([readings, usable]) => bench.run({ kernel, iterations: ITERATIONS, noise_Pa_q10: 4096, usable, own: true, readings }).cycles).sort((a, b) => a - b);
+      const cycles = inputs
+        .map(([readings, usable]) => bench.run({ kernel, iterations: ITERATIONS, noise_Pa_q10: 4096, usable, own: true, readings }).cycles)
+        .sort((a, b) => a - b);
       const max = cycles[cycles.length - 1];
       t.diagnostic(`${kernel}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${max} cycles (min, median, max)`);
       assert.ok(max <= SHAPES_PART_CYCLES_MAX, `${kernel}, ${name}: ${max}`);
@@ -154,7 +173,10 @@ test(`no part of what presses takes more than ${SHAPES_PART_CYCLES_MAX} cycles`,
 test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUTLIER_CYCLES_MAX} with the fit without it`, (t) => {
   const wrong = presses.map((readings, i) => readings.map((value, k) => value + (k === i % SENSORS ? 10000 * 1024 : 0)));
   const cycles = wrong.map((readings) => cyclesOf(readings, ITERATIONS, ALL, 'fit'));
-  for (const [what, least, most] of [['in vain', COLD_CYCLES_MAX, MASKED_CYCLES_MAX], ['found', MASKED_CYCLES_MAX, Infinity]]) {
+  for (const [what, least, most] of [
+    ['in vain', COLD_CYCLES_MAX, MASKED_CYCLES_MAX],
+    ['found', MASKED_CYCLES_MAX, Infinity],
+  ]) {
     const group = cycles.filter((value) => value > least && value <= most);
     assert.ok(group.length > 10, `${what}: ${group.length}`);
     const max = Math.max(...group);
@@ -179,7 +201,13 @@ test('each further iteration costs the same', () => {
 test('the cycles are spent on fits', () => {
   for (let i = 0; i < 20; i++) {
     const [x_mm, y_mm] = [between(-8, 8), between(-17, 17)];
-    const answer = bench.run({ kernel: 'fit', iterations: ITERATIONS, noise_Pa_q10: 1024, usable: i % 2 ? ALL : ALL & ~(1 << i % SENSORS), readings: press(x_mm, y_mm, 5e4, 6, 1) });
+    const answer = bench.run({
+      kernel: 'fit',
+      iterations: ITERATIONS,
+      noise_Pa_q10: 1024,
+      usable: i % 2 ? ALL : ALL & ~(1 << (i % SENSORS)),
+      readings: press(x_mm, y_mm, 5e4, 6, 1),
+    });
     assert.ok(Math.hypot(answer.x_mm - x_mm, answer.y_mm - y_mm) < 0.01, `${x_mm} ${y_mm}: ${answer.x_mm} ${answer.y_mm}`);
   }
 });

@@ -3,6 +3,7 @@ lock step refuses.
 
 usage: test_grasp.py --image F.bin --world FINGERTIP_CELL_EMULATED --tables FOLDER --node NODE
 """
+
 import argparse
 import pathlib
 import subprocess
@@ -76,8 +77,21 @@ class Grasp(unittest.TestCase):
 
 class LockStep(unittest.TestCase):
     def refused(self, words, *program, options=()):
-        done = subprocess.run([OPTIONS.node, ROOT / "host_tools/simulation/emulator/lockstep.mjs", "--image", OPTIONS.image, "--board", emulated_grasp.BOARD, *options, "--", *program],
-                              capture_output=True, text=True)
+        done = subprocess.run(
+            [
+                OPTIONS.node,
+                ROOT / "host_tools/simulation/emulator/lockstep.mjs",
+                "--image",
+                OPTIONS.image,
+                "--board",
+                emulated_grasp.BOARD,
+                *options,
+                "--",
+                *program,
+            ],
+            capture_output=True,
+            text=True,
+        )
         self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
         self.assertIn(words, done.stderr)
 
@@ -89,11 +103,22 @@ class LockStep(unittest.TestCase):
         self.refused("begins an answer with 7", *python, "import sys; sys.stdout.buffer.write(bytes([7, 0, 0, 0]))")
         self.refused("a pressure of NaN", *python, f"import sys; sys.stdout.buffer.write(bytes(4) + b'\\xff' * {BYTES_OF_ANSWER})")
         self.refused("its result is no JSON", *python, "import sys; sys.stdout.buffer.write(bytes([1, 0, 0, 0]) + b'no')")
-        self.refused("is not over after 0.001 s", *python, f"import sys; sys.stdout.buffer.write(bytes(9 * {BYTES_OF_ANSWER}))", options=("--seconds", "0.001"))
+        self.refused(
+            "is not over after 0.001 s",
+            *python,
+            f"import sys; sys.stdout.buffer.write(bytes(9 * {BYTES_OF_ANSWER}))",
+            options=("--seconds", "0.001"),
+        )
 
     def test_wrong_usage(self):
-        for words, options in (("--boards", ("--boards", "0")), ("--clock-ppm", ("--clock-ppm", "fast")), ("3 numbers for 2 boards", ("--clock-ppm", "1,2,3")),
-                               ("--slice-us", ("--slice-us", "1")), ("--seconds", ("--seconds", "0")), ("see --help", ("--pace", "1"))):
+        for words, options in (
+            ("--boards", ("--boards", "0")),
+            ("--clock-ppm", ("--clock-ppm", "fast")),
+            ("3 numbers for 2 boards", ("--clock-ppm", "1,2,3")),
+            ("--slice-us", ("--slice-us", "1")),
+            ("--seconds", ("--seconds", "0")),
+            ("see --help", ("--pace", "1")),
+        ):
             self.refused(words, "true", options=options)
         self.refused("no program is named")
 

@@ -16,7 +16,12 @@ for (const board of BOARDS) {
     assert.equal(storms.ehciDetaches(board, 2), 0);
   });
 
-  for (const [revision, held_ms] of [[1, 920], [2, 920], [1, 3000], [2, 3000]]) {
+  for (const [revision, held_ms] of [
+    [1, 920],
+    [2, 920],
+    [1, 3000],
+    [2, 3000],
+  ]) {
     test(`${board}: a reset of the bus that lasts ${held_ms} ms, on revision B${revision}`, () => {
       assert.equal(storms.se0Bites(board, revision, held_ms), 0);
     });
@@ -31,7 +36,12 @@ for (const board of BOARDS) {
     assert.equal(storms.tornAfterResume(board, 40), 0);
   });
 
-  for (const [rosc_MHz, after_ms, how] of [[6.5, 10, 'fault'], [12, 10, 'fault'], [12, 100, 'fault'], [12, 50, 'unfed']]) {
+  for (const [rosc_MHz, after_ms, how] of [
+    [6.5, 10, 'fault'],
+    [12, 10, 'fault'],
+    [12, 100, 'fault'],
+    [12, 50, 'unfed'],
+  ]) {
     test(`${board}: the chip resets itself (${how}) ${after_ms} ms into a slow erase, with a ring oscillator of ${rosc_MHz} MHz`, () => {
       assert.ok(storms.eraseResetRecovered(board, rosc_MHz * 1e6, after_ms, how));
     });

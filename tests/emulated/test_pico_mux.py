@@ -2,6 +2,7 @@
 
 usage: test_pico_mux.py --image F.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
+
 import argparse
 import csv
 import json
@@ -39,9 +40,22 @@ class Run:
         self.base = pathlib.Path(folder) / name
         script = [(0.45, "dtr 1"), (0.46, encoded("stream", "contact,raw,health")), *commands]
         self.path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
-        call = [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", "pico_mux", "--image", TOOLS.image,
-                "--scenario", str(scenario), "--host-script", str(self.path("script")), "--capture", str(self.path("ftr")),
-                "--report", str(self.path("run.json"))]
+        call = [
+            TOOLS.node,
+            str(ROOT / "host_tools/simulation/emulator/main.mjs"),
+            "--board",
+            "pico_mux",
+            "--image",
+            TOOLS.image,
+            "--scenario",
+            str(scenario),
+            "--host-script",
+            str(self.path("script")),
+            "--capture",
+            str(self.path("ftr")),
+            "--report",
+            str(self.path("run.json")),
+        ]
         if seconds:
             call += ["--seconds", str(seconds)]
         if faults is not None:
@@ -59,16 +73,18 @@ class Run:
         if self.process.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{output}")
         self.report = json.loads(self.path("run.json").read_text())
-        subprocess.run([TOOLS.fingertip, "replay", str(self.path("ftr")), "--to-csv", str(self.path("csv"))],
-                       check=True, capture_output=True)
+        subprocess.run(
+            [TOOLS.fingertip, "replay", str(self.path("ftr")), "--to-csv", str(self.path("csv"))], check=True, capture_output=True
+        )
         self.recording = files.read_recording(self.path("csv"))
         return self
 
 
 def make_scenario(folder, name, seconds):
     path = pathlib.Path(folder) / f"{name}.csv"
-    subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", name, "-o", str(path), "--seconds",
-                    str(seconds)], check=True)
+    subprocess.run(
+        [sys.executable, str(ROOT / "host_tools/python"), "scenario", name, "-o", str(path), "--seconds", str(seconds)], check=True
+    )
     return path
 
 
@@ -93,8 +109,20 @@ class PicoMux(unittest.TestCase):
 
     def test_ideal_presses_are_located_and_weighed(self):
         out = self.first.path("summary.json")
-        subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "evaluate", str(self.first.path("csv")),
-                        str(self.scenario), "--run", str(self.first.path("run.json")), "-o", str(out)], check=True)
+        subprocess.run(
+            [
+                sys.executable,
+                str(ROOT / "host_tools/python"),
+                "evaluate",
+                str(self.first.path("csv")),
+                str(self.scenario),
+                "--run",
+                str(self.first.path("run.json")),
+                "-o",
+                str(out),
+            ],
+            check=True,
+        )
         summary = json.loads(out.read_text())
         self.assertLessEqual(summary["localisation_median_mm"], 0.05)
         self.assertLessEqual(summary["force_mape_percent"], 1.0)
@@ -114,8 +142,7 @@ class PicoMux(unittest.TestCase):
             transfers = list(csv.DictReader(file))
         start_us = [float(row["start_ns"]) / 1e3 - zero_us for row in transfers]
         end_us = [float(row["end_ns"]) / 1e3 - zero_us for row in transfers]
-        conversions = [i for i, row in enumerate(transfers)
-                       if row["address"] == "0x76" and row["rw"] == "w" and row["bytes"] == "44"]
+        conversions = [i for i, row in enumerate(transfers) if row["address"] == "0x76" and row["rw"] == "w" and row["bytes"] == "44"]
         recording = self.first.recording
         held = recording.flag(FLAG_HELD)
         checked = 0
@@ -133,8 +160,11 @@ class PicoMux(unittest.TestCase):
             self.assertLess(abs(t_us - end_us[command] - 1.05 * 2170 / 2), 20)
             convert_us, read_us = stages[0], stages[1]
             begin_us = start_us[command - 3]  # three selections lead up to the broadcast
-            reads = [i for i in range(command, min(command + 60, len(transfers)))
-                     if transfers[i]["rw"] == "r" and start_us[i] < begin_us + convert_us + read_us + 100]
+            reads = [
+                i
+                for i in range(command, min(command + 60, len(transfers)))
+                if transfers[i]["rw"] == "r" and start_us[i] < begin_us + convert_us + read_us + 100
+            ]
             self.assertEqual(len(reads), 15)
             self.assertLess(abs(end_us[reads[-1]] - begin_us - convert_us - read_us), 40)
             checked += 1
@@ -156,7 +186,9 @@ class PicoMux(unittest.TestCase):
         measured = ~recording.flag(FLAG_HELD)
         dead = (t_s > 1.05) & (t_s < 1.45) & measured
         self.assertTrue((valid[dead] & 1 << 7 == 0).all())
-        self.assertLessEqual((valid[dead] != 0x7FFF & ~(1 << 7)).sum(), 2)  # a code in 65536 ends in sixteen ones, and costs the next reading too
+        self.assertLessEqual(
+            (valid[dead] != 0x7FFF & ~(1 << 7)).sum(), 2
+        )  # a code in 65536 ends in sixteen ones, and costs the next reading too
         self.assertTrue((valid[(t_s > 3.0) & measured] == 0x7FFF).all())
         flags = recording["flags"].astype("uint32")
         in_contact = dead & (flags & FLAG_CONTACT != 0)

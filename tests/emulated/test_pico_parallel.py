@@ -2,6 +2,7 @@
 
 usage: test_pico_parallel.py --image F.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
+
 import argparse
 import json
 import pathlib
@@ -42,9 +43,29 @@ class Run:
         path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
         path("faults.json").write_text(json.dumps(list(faults)))
         done = subprocess.run(
-            [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", "pico_parallel", "--image", TOOLS.image, "--scenario",
-             str(truth.path), "--host-script", str(path("script")), "--capture", str(path("ftr")), "--report", str(path("run.json")),
-             "--seconds", str(seconds), "--faults", str(path("faults.json"))], capture_output=True, text=True)
+            [
+                TOOLS.node,
+                str(ROOT / "host_tools/simulation/emulator/main.mjs"),
+                "--board",
+                "pico_parallel",
+                "--image",
+                TOOLS.image,
+                "--scenario",
+                str(truth.path),
+                "--host-script",
+                str(path("script")),
+                "--capture",
+                str(path("ftr")),
+                "--report",
+                str(path("run.json")),
+                "--seconds",
+                str(seconds),
+                "--faults",
+                str(path("faults.json")),
+            ],
+            capture_output=True,
+            text=True,
+        )
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         self.report = json.loads(path("run.json").read_text())
@@ -66,8 +87,9 @@ class PicoParallel(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         path = pathlib.Path(cls.folder.name) / "ideal.csv"
-        subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(path), "--seconds", "12"],
-                       check=True)
+        subprocess.run(
+            [sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(path), "--seconds", "12"], check=True
+        )
         cls.truth = Truth(path)
 
     def assert_nothing_is_wrong_and_unflagged(self, run):
@@ -103,8 +125,11 @@ class PicoParallel(unittest.TestCase):
     def test_what_befalls_one_line_costs_its_sensor_only(self):
         first = {"line_stuck_low": 0, "sensor_missing": 5, "clock_glitch": 14}
         second = {"line_stuck_high": 3, "sensor_dead": 8, "sda_stuck_low": 11}
-        plan = [{"type": kind, "sensor": sensor, "from_s": from_s, "to_s": from_s + 0.1}
-                for from_s, kinds in ((0.8, first), (0.9, second)) for kind, sensor in kinds.items()]
+        plan = [
+            {"type": kind, "sensor": sensor, "from_s": from_s, "to_s": from_s + 0.1}
+            for from_s, kinds in ((0.8, first), (0.9, second))
+            for kind, sensor in kinds.items()
+        ]
         run = Run(self.folder.name, "lines", self.truth, 2.6, 256, plan, [(0.95, encoded("health")), (2.5, encoded("health"))])
         self.assertTrue((run.valid[run.between(0.7, 0.795)] == ALL).all())
         for from_s, silent, touched in ((0.8, (0, 5), (0, 5, 14)), (0.9, (3, 8), (0, 5, 14, 3, 8, 11))):
@@ -158,7 +183,9 @@ class PicoParallel(unittest.TestCase):
     def test_temperatures_that_are_wrong_are_not_used(self):
         plan = [{"type": "sensor_d2_corrupt", "sensor": sensor, "from_s": 1.0, "to_s": 5.0} for sensor in (3, 8, 12)]
         run = Run(self.folder.name, "temperatures", self.truth, 7.0, 256, plan)
-        self.assertGreater(run.doubtful[run.between(1.6, 5.0)].mean(), 0.02)  # one is some 0.1 s of 3.4 s; nine bits of 24 make more than 1 degC, of a sensor alone at times in none
+        self.assertGreater(
+            run.doubtful[run.between(1.6, 5.0)].mean(), 0.02
+        )  # one is some 0.1 s of 3.4 s; nine bits of 24 make more than 1 degC, of a sensor alone at times in none
         self.assertFalse(run.doubtful[run.between(0.5, 1.0) | run.between(6.0, 7.0)].any())
         self.assertGreater((run.valid[run.between(1.0, 7.0)] == ALL).mean(), 0.98)
         good = ~run.doubtful

@@ -3,6 +3,7 @@ board's own, of scene grasp, tells the tangential load in every frame. It keeps 
 
 usage: test_scenes.py --scenes FOLDER --image FILE.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
+
 import argparse
 import pathlib
 import subprocess
@@ -34,17 +35,41 @@ class Run:
     def __init__(self, folder, scene, stream, extra=()):
         base = pathlib.Path(folder) / scene
         path = lambda suffix: str(base.with_suffix("." + suffix))
-        subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "wander", "-o", path("scenario"), "--seconds", "3"],
-                       check=True)
-        script = [(0.45, "dtr 1"), (0.46, encoded("--sequence", "1", "info")), (0.47, encoded("--sequence", "2", "stream", "contact,raw,health")),
-                  (0.48, encoded("--sequence", "3", "slip", "1", "100")), (0.49, encoded("--sequence", "4", "stream", f"{stream},health")),
-                  (1.7, encoded("--sequence", "5", "health")), *extra]
+        subprocess.run(
+            [sys.executable, str(ROOT / "host_tools/python"), "scenario", "wander", "-o", path("scenario"), "--seconds", "3"], check=True
+        )
+        script = [
+            (0.45, "dtr 1"),
+            (0.46, encoded("--sequence", "1", "info")),
+            (0.47, encoded("--sequence", "2", "stream", "contact,raw,health")),
+            (0.48, encoded("--sequence", "3", "slip", "1", "100")),
+            (0.49, encoded("--sequence", "4", "stream", f"{stream},health")),
+            (1.7, encoded("--sequence", "5", "health")),
+            *extra,
+        ]
         script.sort()
         pathlib.Path(path("script")).write_text("".join(f"{t_s} {what}\n" for t_s, what in script))
         image = TOOLS.image if scene == "grasp" else pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
         done = subprocess.run(
-            [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", BOARD, "--image", image, "--scenario", path("scenario"),
-             "--host-script", path("script"), "--capture", path("ftr"), "--seconds", "1.8"], capture_output=True, text=True)
+            [
+                TOOLS.node,
+                str(ROOT / "host_tools/simulation/emulator/main.mjs"),
+                "--board",
+                BOARD,
+                "--image",
+                image,
+                "--scenario",
+                path("scenario"),
+                "--host-script",
+                path("script"),
+                "--capture",
+                path("ftr"),
+                "--seconds",
+                "1.8",
+            ],
+            capture_output=True,
+            text=True,
+        )
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         subprocess.run([TOOLS.fingertip, "replay", path("ftr"), "--to-csv", path("csv")], check=True, capture_output=True)

@@ -43,7 +43,9 @@ function kill(bench, kill) {
 test('killed at any instant of a frame it costs no frame, and is started again', () => {
   const { kills, reboots, lost, bench } = killedAt(folder, tools, KILLS);
   assert.deepEqual([reboots, lost], [0, 0]);
-  kills.forEach(({ late, both, estimates_again }, i) => assert.ok(late >= 1 && late <= 2 && both === 0 && estimates_again, `kill ${i}: ${JSON.stringify(kills[i])}`));
+  kills.forEach(({ late, both, estimates_again }, i) =>
+    assert.ok(late >= 1 && late <= 2 && both === 0 && estimates_again, `kill ${i}: ${JSON.stringify(kills[i])}`),
+  );
   bench.received = [];
   const { events } = bench.crash();
   assert.deepEqual(events, [], 'no crash');
@@ -63,7 +65,10 @@ test('a stack of core 1 that grows into its guard parks it', () => {
   kill(bench, ({ core }) => (core.registers[13] = 0x2003fff0));
 });
 
-for (const [when, isSo] of [['sleeps', (second) => !second.isAwake], ['works', (second) => second.isAwake]]) {
+for (const [when, isSo] of [
+  ['sleeps', (second) => !second.isAwake],
+  ['works', (second) => second.isAwake],
+]) {
   test(`a USB suspend while core 1 ${when}: both cores sleep, and go on after the resume`, () => {
     const bench = newBench();
     const { host, chip, client } = bench.machine;
@@ -93,6 +98,9 @@ test('a reset by the watchdog ends core 1, and it is started again; the record t
   bench.patch('app_run', 'fee7');
   bench.untilReset();
   const { events } = bench.crash();
-  assert.ok(events.some(([code]) => code === EVENT_WORKER), `${events}`);
+  assert.ok(
+    events.some(([code]) => code === EVENT_WORKER),
+    `${events}`,
+  );
   assert.equal(bench.second.state, 'runs');
 });

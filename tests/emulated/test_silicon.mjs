@@ -52,7 +52,10 @@ test('an abort of the I2C controller, whose FIFO stays flushed until it is told,
 });
 
 for (const name of BOARDS) {
-  for (const [type, limit_ms] of [['usb_deaf', 1000], ['usb_dead', 1500]]) {
+  for (const [type, limit_ms] of [
+    ['usb_deaf', 1000],
+    ['usb_dead', 1500],
+  ]) {
     test(`${name}: a USB controller hung as by erratum E15 (${type}) is reset and comes back`, (t) => {
       const from_s = 0.2;
       const bench = new Bench(name, { faults: [{ type, from_s }] });
@@ -184,7 +187,10 @@ for (const name of BOARDS) {
 }
 
 for (const [name, revision, faults] of [
-  ['pico_mux', 1, [{ type: 'usb_busy_hub', from_s: 0 }]], ['pico_mux', 0, []], ['pico_parallel', 1, []], ['pico_parallel', 2, [{ type: 'usb_busy_hub', from_s: 0 }]],
+  ['pico_mux', 1, [{ type: 'usb_busy_hub', from_s: 0 }]],
+  ['pico_mux', 0, []],
+  ['pico_parallel', 1, []],
+  ['pico_parallel', 2, [{ type: 'usb_busy_hub', from_s: 0 }]],
 ]) {
   test(`${name}: a chip of revision B${revision} enumerates${faults.length ? ' behind a busy hub' : ''}`, (t) => {
     const bench = new Bench(name, { revision, faults, fastEnumeration: false });

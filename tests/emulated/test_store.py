@@ -2,6 +2,7 @@
 
 usage: test_store.py --build BUILD --boards BOARDS --node NODE
 """
+
 import argparse
 import json
 import pathlib
@@ -44,12 +45,34 @@ class Store(unittest.TestCase):
         """One run of the image with its flash; its last info packet, and its acknowledgements of keep."""
         script, capture, table = (self.folder / name for name in ("host.txt", "capture.ftr", "capture.csv"))
         faulty = self.folder / "faults.json"
-        lines = ["0.45 dtr 1", *(f"{t} {run(f'{OPTIONS.build}/tests/support/command_frame', *words.split()).strip()}" for t, words in commands)]
+        lines = [
+            "0.45 dtr 1",
+            *(f"{t} {run(f'{OPTIONS.build}/tests/support/command_frame', *words.split()).strip()}" for t, words in commands),
+        ]
         script.write_text("\n".join(lines) + "\n")
         faulty.write_text(json.dumps(list(faults)))
-        run(OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",
-            "--scenario", self.scenario, "--host-script", script, "--capture", capture, "--faults", faulty, "--seconds", seconds,
-            "--flash", self.flash, "--fast-enumeration", *options)
+        run(
+            OPTIONS.node,
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            "pico_mux",
+            "--image",
+            f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",
+            "--scenario",
+            self.scenario,
+            "--host-script",
+            script,
+            "--capture",
+            capture,
+            "--faults",
+            faulty,
+            "--seconds",
+            seconds,
+            "--flash",
+            self.flash,
+            "--fast-enumeration",
+            *options,
+        )
         run(self.tool, "replay", capture, "--to-csv", table, "--overwrite")
         recording = files.read_recording(table)
         results = [int(f["result"]) for kind, f in recording.packets if kind == "ack" and int(f["command"]) == KEEP]
@@ -70,12 +93,22 @@ class Store(unittest.TestCase):
         for slow in ((), ("--slow-flash",)):
             with self.subTest(slow=slow):
                 self.setUp()
-                info, results = self.life((0.5, "osr 512"), (0.51, "prior 3.1:0.4"), (0.52, "limit 0.8"), (0.53, "keep"), (1.2, "info"),
-                                          (1.21, "stream contact"), seconds=1.3, options=slow)
+                info, results = self.life(
+                    (0.5, "osr 512"),
+                    (0.51, "prior 3.1:0.4"),
+                    (0.52, "limit 0.8"),
+                    (0.53, "keep"),
+                    (1.2, "info"),
+                    (1.21, "stream contact"),
+                    seconds=1.3,
+                    options=slow,
+                )
                 self.assertEqual((results, info["stored"]), ([0], str(SETTINGS)))
                 info, _ = self.life(*self.LOOK)
-                self.assertEqual((info["osr"], info["prior_sigma_mm"], info["prior_width_mm"], info["location_limit_mm"], info["stored"]),
-                                 ("512", "3.1", "0.4", "0.8", str(SETTINGS)))
+                self.assertEqual(
+                    (info["osr"], info["prior_sigma_mm"], info["prior_width_mm"], info["location_limit_mm"], info["stored"]),
+                    ("512", "3.1", "0.4", "0.8", str(SETTINGS)),
+                )
                 info, results = self.life((0.5, "forget"), *self.LOOK)
                 self.assertEqual((results, info["osr"], info["stored"]), ([0], "512", "0"))
                 self.assertEqual(self.life(*self.LOOK)[0]["osr"], "1024")
@@ -88,8 +121,13 @@ class Store(unittest.TestCase):
         for cut_ms in (0.5, 3, 20, 46, 48, 60, 90, 150):
             self.flash.write_bytes(kept)
             at_s = 0.5315 + cut_ms / 1e3
-            self.life((0.5, "osr 256"), (0.53, "keep"), (1.2, "stream contact"), seconds=1.3,
-                      faults=[{"type": "power_cut", "from_s": at_s, "to_s": at_s + 0.01}])
+            self.life(
+                (0.5, "osr 256"),
+                (0.53, "keep"),
+                (1.2, "stream contact"),
+                seconds=1.3,
+                faults=[{"type": "power_cut", "from_s": at_s, "to_s": at_s + 0.01}],
+            )
             info, _ = self.life(*self.LOOK)
             self.assertIn(info["osr"], ("256", "512"), cut_ms)
             self.assertEqual(info["stored"], str(SETTINGS))
@@ -98,8 +136,20 @@ class Store(unittest.TestCase):
 
     def test_the_power_is_cut_at_each_step(self):
         """The report's measurement, in short."""
-        found = json.loads(run("/usr/bin/python3", ROOT / "host_tools/report/truth/flash/truth_flash.py", "--build", OPTIONS.build,
-                               "--boards", OPTIONS.boards, "--updates", 80, "--commands", 3))
+        found = json.loads(
+            run(
+                "/usr/bin/python3",
+                ROOT / "host_tools/report/truth/flash/truth_flash.py",
+                "--build",
+                OPTIONS.build,
+                "--boards",
+                OPTIONS.boards,
+                "--updates",
+                80,
+                "--commands",
+                3,
+            )
+        )
         self.assertEqual((found["flash_lost"], found["flash_frames_skipped"]), (0, 0))
         power = found["flash"]["power"]
         self.assertEqual(power["updates"], 80)

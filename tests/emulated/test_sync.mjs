@@ -19,7 +19,10 @@ const EDGE_ns = 400;
 const KEPT = 48;
 const PER_ms = 2;
 /** A fault that ends in a recovery of the bus, which on pico_parallel resets DMA. */
-const RESETS_BUS = { pico_mux: { type: 'sda_stuck_low', sensor: 3, from_s: 0.35 }, pico_parallel: { type: 'scl_stuck_low', from_s: 0.35, to_s: 0.36 } };
+const RESETS_BUS = {
+  pico_mux: { type: 'sda_stuck_low', sensor: 3, from_s: 0.35 },
+  pico_parallel: { type: 'scl_stuck_low', from_s: 0.35, to_s: 0.36 },
+};
 /** The wire is quiet so long. */
 const QUIET_ms = 300;
 const measured = {};
@@ -38,7 +41,10 @@ after(() => {
 class Bench extends ImageBench {
   constructor(name, { next = null, ...options } = {}) {
     const changes = [];
-    super(images, { fingertip, command_frame }, name, { ...options, sync: { next, onLevel: (high, t_ns) => changes.push({ high, t_ns }) } });
+    super(images, { fingertip, command_frame }, name, {
+      ...options,
+      sync: { next, onLevel: (high, t_ns) => changes.push({ high, t_ns }) },
+    });
     this.changes = changes;
   }
 
@@ -58,10 +64,17 @@ class Bench extends ImageBench {
   }
 
   edges() {
-    return this.recording().filter((line) => line.startsWith('# packet: sync')).map((line) => {
-      const fields = Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')));
-      return { t_us: Number(fields.t_us), number: Number(fields.number), high: fields.level === '1' };
-    });
+    return this.recording()
+      .filter((line) => line.startsWith('# packet: sync'))
+      .map((line) => {
+        const fields = Object.fromEntries(
+          line
+            .split(' ')
+            .slice(3)
+            .map((pair) => pair.split('=')),
+        );
+        return { t_us: Number(fields.t_us), number: Number(fields.number), high: fields.level === '1' };
+      });
   }
 
   frames() {
@@ -96,7 +109,10 @@ for (const name of BOARDS) {
     bench.run(QUIET_ms + 1000 - bench.now_ms);
     const edges = bench.edges();
     assert.ok(edges.length > 200 && bench.changes.length - edges.length <= 4, `${edges.length} of ${bench.changes.length}`);
-    assert.deepEqual(edges.map(({ number }) => number), edges.map((_, i) => i + 1));
+    assert.deepEqual(
+      edges.map(({ number }) => number),
+      edges.map((_, i) => i + 1),
+    );
     const worst_us = bench.judge(edges);
     t.diagnostic(`${edges.length} edges, the worst off by ${worst_us.toFixed(3)} us`);
     note('sync_error_us_max', worst_us);
@@ -120,7 +136,9 @@ for (const name of BOARDS) {
     const late = edges.filter(({ number }) => number > edges_of_storm);
     const worst_us = bench.judge(edges);
     const share = (during.length - before) / storm_ms / (before / (from_ms - bench.streams_ms));
-    t.diagnostic(`${edges.length} edges of ${bench.changes.length} sent, the worst off by ${worst_us.toFixed(3)} us; ${(100 * share).toFixed(1)} % of the frames`);
+    t.diagnostic(
+      `${edges.length} edges of ${bench.changes.length} sent, the worst off by ${worst_us.toFixed(3)} us; ${(100 * share).toFixed(1)} % of the frames`,
+    );
     note('sync_storm_frames_lost_max', 1 - share);
     assert.ok(share > 0.93, `${share} of the frames`);
     assert.ok(edges.length <= PER_ms * (storm_ms + quiet_ms) && edges.length > storm_ms, `${edges.length} edges`);
@@ -135,7 +153,10 @@ for (const name of BOARDS) {
     bench.begin('in');
     bench.run(QUIET_ms + 100 - bench.now_ms);
     const edges = bench.edges();
-    assert.deepEqual(edges.map(({ number }) => number), Array.from({ length: KEPT }, (_, i) => i + 1));
+    assert.deepEqual(
+      edges.map(({ number }) => number),
+      Array.from({ length: KEPT }, (_, i) => i + 1),
+    );
     assert.ok(bench.judge(edges) <= LIMIT_us);
     assert.equal(bench.changes.length, KEPT + 40);
     bench.end();
@@ -176,7 +197,9 @@ for (const name of BOARDS) {
     bench.run(400);
     assert.deepEqual(bench.edges(), []);
     const frames = bench.frames();
-    const pulses = bench.changes.flatMap(({ high, t_ns }, i, all) => (high && all[i + 1] ? [[bench.device_us(t_ns), bench.device_us(all[i + 1].t_ns)]] : []));
+    const pulses = bench.changes.flatMap(({ high, t_ns }, i, all) =>
+      high && all[i + 1] ? [[bench.device_us(t_ns), bench.device_us(all[i + 1].t_ns)]] : [],
+    );
     let off_us = 0;
     let matched = 0;
     for (const [from_us, to_us] of pulses.slice(0, -3)) {

@@ -5,6 +5,7 @@ usage: test_sync_wire.py --image F.bin --support FOLDER --node NODE --report FIL
 A strobe drives both sync pins. Each emulator says when, on the tool's clock, it was powered on, and so when every frame truly was: the
 error between rows of both is that of the alignment by edges, which begins some seconds after the recording, and before that the one over USB.
 """
+
 import argparse
 import json
 import pathlib
@@ -32,7 +33,9 @@ class OneWire(unittest.TestCase):
         write_scenario(folder / "scenario.csv", (0, 1), (0, 0))
         cls.file = folder / "both.csv"
         with World(TOOLS.support, TOOLS.node, folder) as world:
-            cls.emulators = [Emulator(world, TOOLS.image, folder, serial, folder / "scenario.csv", "--sync-strobe", STROBE_ms) for serial in CLOCKS_ppm]
+            cls.emulators = [
+                Emulator(world, TOOLS.image, folder, serial, folder / "scenario.csv", "--sync-strobe", STROBE_ms) for serial in CLOCKS_ppm
+            ]
             cls.said = [world.tool("set", "--port", each.port, f"rate={RATE_Hz}", "sync=in") for each in cls.emulators]
             record_all(world, cls.emulators, folder / "both.mcap", RECORDED_s)
             world.tool("convert", folder / "both.mcap", cls.file)
@@ -75,7 +78,9 @@ class OneWire(unittest.TestCase):
         by_edges_us = worst_us(self.emulators, self.recordings, from_s=BY_USB_s)
         bound_us = float(self.recordings[0].end["edges_alignment_us"])
         print(f"over USB {by_usb_us:.1f} us, by edges {by_edges_us:.2f} us, stated bound {bound_us:.1f} us")
-        MEASURED.update(sync_alignment_us=round(by_edges_us, 2), sync_alignment_bound_us=bound_us, sync_alignment_usb_us=round(by_usb_us, 1))
+        MEASURED.update(
+            sync_alignment_us=round(by_edges_us, 2), sync_alignment_bound_us=bound_us, sync_alignment_usb_us=round(by_usb_us, 1)
+        )
         self.assertLessEqual(by_edges_us, LIMIT_us)
         self.assertLessEqual(by_edges_us, bound_us)
         self.assertLessEqual(bound_us, 4)

@@ -2,6 +2,7 @@
 
 usage: test_traces.py --boards BUILD_OF_IMAGES
 """
+
 import pathlib
 import re
 import subprocess

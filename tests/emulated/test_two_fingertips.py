@@ -5,6 +5,7 @@ usage: test_two_fingertips.py --image F.bin --support FOLDER --node NODE --repor
 Each emulator says when, on the tool's clock, it was powered on, and so when every frame truly was. The sensors of both feel
 triangles of pressure: their tops, found in the recording, show the same without any device's clock.
 """
+
 import argparse
 import json
 import pathlib
@@ -91,9 +92,12 @@ class TwoFingertips(unittest.TestCase):
         print(f"worst {apart_us:.1f} us, stated bound {bound_us:.1f} us")
         self.assertLess(apart_us, LIMIT_us)
         self.assertLessEqual(apart_us, bound_us)
-        report(alignment_us=round(apart_us, 1), alignment_bound_us=bound_us, alignment_seconds=RECORDED_s,
-               alignment_of="two emulated fingertips, clocks 50 ppm apart, on one simulated time with the "
-                            "host tool that recorded them")
+        report(
+            alignment_us=round(apart_us, 1),
+            alignment_bound_us=bound_us,
+            alignment_seconds=RECORDED_s,
+            alignment_of="two emulated fingertips, clocks 50 ppm apart, on one simulated time with the host tool that recorded them",
+        )
 
     def test_what_both_felt_tells_the_same(self):
         errors = []

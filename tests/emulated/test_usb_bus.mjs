@@ -20,7 +20,10 @@ const LINE_CODING_115200 = '00c20100000008';
 const received = [];
 const arrivals_ns = [];
 const machine = new Machine({
-  image: readFileSync(image), Board: findBoard('pico_mux'), scenario: steady(), fastEnumeration: true,
+  image: readFileSync(image),
+  Board: findBoard('pico_mux'),
+  scenario: steady(),
+  fastEnumeration: true,
   onData: (bytes) => received.push(Buffer.from(bytes)),
   onUsbPacket: (p) => arrivals_ns.push(p.t_ns),
 });
@@ -73,7 +76,10 @@ for (let i = 0; i < 60; i++) {
 suspend();
 const asleep_ns = machine.time.nanos;
 run(0.5);
-assert.ok(arrivals_ns.every((t_ns) => t_ns < asleep_ns + 1e6), 'a packet on a suspended bus');
+assert.ok(
+  arrivals_ns.every((t_ns) => t_ns < asleep_ns + 1e6),
+  'a packet on a suspended bus',
+);
 host.resume();
 const before = count();
 run(0.1);

@@ -2,6 +2,7 @@
 
 usage: test_world.py --image F.bin --support FOLDER --node NODE
 """
+
 import argparse
 import contextlib
 import json
@@ -30,8 +31,18 @@ class Emulated(unittest.TestCase):
         (self.folder / "rest.csv").write_text(f"# fingertip-scenario 1\n{','.join(names)}\n{','.join('0' for _ in names)}\n")
 
     def emulator(self, world, *options, **how):
-        return world.emulator(self.folder / "port", "--board", "pico_mux", "--image", OPTIONS.image, "--scenario", self.folder / "rest.csv",
-                              "--fast-enumeration", *options, **how)
+        return world.emulator(
+            self.folder / "port",
+            "--board",
+            "pico_mux",
+            "--image",
+            OPTIONS.image,
+            "--scenario",
+            self.folder / "rest.csv",
+            "--fast-enumeration",
+            *options,
+            **how,
+        )
 
     def recorded(self, disturb=lambda pid: None):
         """What two programs, one after the other, find at the port, when, and what became of the emulator."""
@@ -53,6 +64,7 @@ class Emulated(unittest.TestCase):
 
         def hold_up(pid):
             """Stops the process over and over: a machine that is busy. In real time, which is what must not matter."""
+
             def act():
                 while not over.wait(BUSY_EVERY_s):
                     try:
@@ -77,7 +89,9 @@ class Emulated(unittest.TestCase):
 
     def test_who_does_not_read_stops_the_board_and_loses_nothing(self):
         with World(OPTIONS.support, OPTIONS.node, self.folder) as world:
-            emulator = self.emulator(world, "--seconds", "3600", "--capture", self.folder / "captured", "--usb-log", self.folder / "usb.csv")
+            emulator = self.emulator(
+                world, "--seconds", "3600", "--capture", self.folder / "captured", "--usb-log", self.folder / "usb.csv"
+            )
             came = b""
             with socket.socket(socket.AF_UNIX) as port:
                 port.connect(str(self.folder / "port"))

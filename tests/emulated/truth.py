@@ -1,4 +1,5 @@
 """What a recording of an emulated run says, held against what its scenario made the sensors feel."""
+
 import pathlib
 import sys
 
@@ -39,4 +40,6 @@ class Truth:
         told = (flags & files.FIT_VALID != 0) & (flags & (WARNINGS | HELD) == 0)
         pressed = (self.scenario.at("force_N", t_s - MOMENT_s) > 0.3) & (self.scenario.at("force_N", t_s + MOMENT_s) > 0.3)
         rows = told & pressed
-        return np.hypot(recording["x_mm"][rows] - self.scenario.at("x_mm", t_s[rows]), recording["y_mm"][rows] - self.scenario.at("y_mm", t_s[rows]))
+        return np.hypot(
+            recording["x_mm"][rows] - self.scenario.at("x_mm", t_s[rows]), recording["y_mm"][rows] - self.scenario.at("y_mm", t_s[rows])
+        )

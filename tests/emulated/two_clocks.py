@@ -2,6 +2,7 @@
 
 Each emulator says when, on the tool's clock, it was powered on, and so when every frame truly was.
 """
+
 import json
 import os
 import pathlib
@@ -20,7 +21,9 @@ SENSORS = 15
 def write_scenario(path, times_s, pressures_Pa):
     """All sensors alike."""
     names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(SENSORS))]
-    rows = [f"{t_s:g},{','.join('0' * len(files.TRUTH_COLUMNS))},{','.join([str(p_Pa)] * SENSORS)}" for t_s, p_Pa in zip(times_s, pressures_Pa)]
+    rows = [
+        f"{t_s:g},{','.join('0' * len(files.TRUTH_COLUMNS))},{','.join([str(p_Pa)] * SENSORS)}" for t_s, p_Pa in zip(times_s, pressures_Pa)
+    ]
     path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
 
 
@@ -29,8 +32,26 @@ class Emulator:
         self.port = folder / f"tty-{serial}"
         self.report_path = folder / f"{serial}.json"
         self.process = world.emulator(
-            self.port, "--image", image, "--board", "pico_mux", "--scenario", scenario, "--seconds", "3600", "--seed", int(serial[-2:]),
-            "--serial", serial, "--clock-ppm", CLOCKS_ppm[serial], "--fast-enumeration", *more, "--report", self.report_path)
+            self.port,
+            "--image",
+            image,
+            "--board",
+            "pico_mux",
+            "--scenario",
+            scenario,
+            "--seconds",
+            "3600",
+            "--seed",
+            int(serial[-2:]),
+            "--serial",
+            serial,
+            "--clock-ppm",
+            CLOCKS_ppm[serial],
+            "--fast-enumeration",
+            *more,
+            "--report",
+            self.report_path,
+        )
 
     def stop(self):
         self.process.terminate()

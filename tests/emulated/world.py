@@ -1,9 +1,10 @@
 """Emulated fingertips and the host's tool on one simulated time: however slow the machine is, two runs are the same.
 
-    with World(OPTIONS.support, OPTIONS.node, folder) as world:
-        emulator = world.emulator(port, "--board", "pico_mux", "--image", IMAGE, "--scenario", SCENARIO)
-        print(world.tool("info", "--port", port))
+with World(OPTIONS.support, OPTIONS.node, folder) as world:
+    emulator = world.emulator(port, "--board", "pico_mux", "--image", IMAGE, "--scenario", SCENARIO)
+    print(world.tool("info", "--port", port))
 """
+
 import pathlib
 import sys
 
@@ -21,7 +22,14 @@ class World(SimulatedTime):
 
     def emulator(self, port, *options, wait_open=True):
         """One whose power comes when the port is first opened; a process, whose first line is the world's time then, us."""
-        call = (self._support / "emulated_fingertip", port, *["--wait-open"] * wait_open, self._node, ROOT / "host_tools/simulation/emulator/main.mjs", *options)
+        call = (
+            self._support / "emulated_fingertip",
+            port,
+            *["--wait-open"] * wait_open,
+            self._node,
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            *options,
+        )
         process = self.start([str(part) for part in call])
         if process.poll() is not None:
             raise AssertionError(f"the emulator did not start: {process.communicate()[1]}")

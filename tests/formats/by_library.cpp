@@ -1,4 +1,5 @@
-// What libfingertip makes of each input of the corpus: usage by_library JOBS.json > answers.json. corpus.py says what a job is.
+// What libfingertip makes of each input of the corpus: usage by_library JOBS.json > answers.json. corpus.py says what a
+// job is.
 #include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
@@ -18,9 +19,7 @@ namespace {
 
 struct Numbers {
   json &to;
-  template <typename Value> void operator()(const std::string &name, const Value &value) {
-    to[name] = value;
-  }
+  template <typename Value> void operator()(const std::string &name, const Value &value) { to[name] = value; }
   void operator()(const std::string &name, std::uint64_t value) { to[name] = std::to_string(value); }
 };
 
@@ -73,8 +72,8 @@ json recording_json(const std::string &path, bool salvage, const std::string &de
       rows.push_back(item->time_us ? json{{"time_us", fixed(*item->time_us, 1)}, {"row", told}} : told);
     }
   }
-  return {{"rows", rows}, {"packets", packets}, {"events", events}, {"info", info},
-          {"has_end", reader.has_end()}, {"skipped", reader.skipped_lines()}};
+  return {{"rows", rows}, {"packets", packets},          {"events", events},
+          {"info", info}, {"has_end", reader.has_end()}, {"skipped", reader.skipped_lines()}};
 }
 
 json stream_json(const std::string &path) {
@@ -82,15 +81,14 @@ json stream_json(const std::string &path) {
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   json packets = json::array();
   Decoder decoder;
-  decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size(),
-               [&](const wire_packet &packet) {
-                 json told = packet_json(packet);
-                 told["frame"] = hex(frame_bytes(packet));
-                 if (packet.type == WIRE_INFO) {
-                   told["keys"] = info_metadata(packet.body.info);
-                 }
-                 packets.push_back(told);
-               });
+  decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size(), [&](const wire_packet &packet) {
+    json told = packet_json(packet);
+    told["frame"] = hex(frame_bytes(packet));
+    if (packet.type == WIRE_INFO) {
+      told["keys"] = info_metadata(packet.body.info);
+    }
+    packets.push_back(told);
+  });
   return {{"packets", packets}, {"counts", decoder.statistics().text()}, {"other_version", decoder.other_version()}};
 }
 
@@ -143,7 +141,9 @@ json refusal_of_all(const std::string &path) {
 json answer_to(const json &job) {
   const std::string kind = job["kind"], input = job["input"], device = job["device"];
   json answer = answered([&] {
-    return kind == "recording" ? recording_json(input, job["salvage"], device) : kind == "stream" ? stream_json(input) : setting_json(input);
+    return kind == "recording" ? recording_json(input, job["salvage"], device)
+           : kind == "stream"  ? stream_json(input)
+                               : setting_json(input);
   });
   if (kind == "recording" && !device.empty() && !job["salvage"]) {
     if (json refusal = refusal_of_all(input); !refusal.is_null()) {

@@ -14,7 +14,14 @@ await build({
   logLevel: 'error',
   resolve: { alias: [{ find: 'fzstd', replacement: join(page, 'node_modules/fzstd') }] },
   ssr: { noExternal: true },
-  build: { ssr: join(here, 'by_page.ts'), target: 'node18', outDir: folder, emptyOutDir: true, minify: false, rollupOptions: { output: { entryFileNames: 'by_page.mjs' } } },
+  build: {
+    ssr: join(here, 'by_page.ts'),
+    target: 'node18',
+    outDir: folder,
+    emptyOutDir: true,
+    minify: false,
+    rollupOptions: { output: { entryFileNames: 'by_page.mjs' } },
+  },
 });
 process.env.FINGERTIP_CORE = core;
 process.argv = [process.argv[0], join(folder, 'by_page.mjs'), jobs];

@@ -143,7 +143,16 @@ function stream(job: Job): Answer | null {
 
 function setting(job: Job): Answer {
   const [key, value] = job.input.split('=') as [string, string];
-  const info = { slip_threshold_mm: 1, slip_window_ms: 100, rate_mHz: 1, osr: 1, prior_sigma_mm: 1.5, prior_width_mm: 1.5, location_limit_mm: 1.5, sync: 9 };
+  const info = {
+    slip_threshold_mm: 1,
+    slip_window_ms: 100,
+    rate_mHz: 1,
+    osr: 1,
+    prior_sigma_mm: 1.5,
+    prior_width_mm: 1.5,
+    location_limit_mm: 1.5,
+    sync: 9,
+  };
   try {
     const [command] = commandsFor(info as unknown as Info, { [key]: value });
     return hex(core.encode({ sequence: 0, t_us: 0, ...(command as Command) }));

@@ -1,4 +1,5 @@
 """What the Python package makes of each input of the corpus, as by_library says it: usage by_python.py JOBS.json > answers.json."""
+
 import json
 import math
 import pathlib
@@ -16,9 +17,13 @@ from fingertip.settings import setting_commands  # noqa: E402
 
 FLAG_OF = {name: int(field.when[1]) for name, field in wire.layout_of(wire.Contact) if field.when and field.code == "f"}
 CONTACT = (*CONTACT_COLUMNS, *LATER_COLUMNS)
-KINDS = (("holds several", "several"), ("no fingertip", "no such"), ("format .* is unknown", "other format"),
-         (r":1: no recording|no recording of a fingertip|no MCAP file", "no recording"),
-         (r":\d+: |damaged|torn|no header line|missing", "damaged"))
+KINDS = (
+    ("holds several", "several"),
+    ("no fingertip", "no such"),
+    ("format .* is unknown", "other format"),
+    (r":1: no recording|no recording of a fingertip|no MCAP file", "no recording"),
+    (r":\d+: |damaged|torn|no header line|missing", "damaged"),
+)
 
 
 def quantity(name, value, flags):
@@ -46,20 +51,25 @@ def raw_text(t_us, frame, value, pressures_Pa, tares_Pa):
 
 def info_of(metadata):
     """The keys of a recording's head that are of an info packet, as the library writes them."""
+
     def plain(key, text):
         if key in ("serial", "board", "scene", "git", "firmware"):
             return text[:16] if key != "firmware" else ".".join(str(int(part)) for part in text.split("."))
         return " ".join(str(int(word)) if re.fullmatch("-?[0-9]+", word) else shortest(float(word)) for word in text.split())
 
     stored = int(metadata.get("stored", "0"))
-    known = {key for key in KNOWN_KEYS if not ((key.startswith(("calibration_", "force_scale")) or key in SENSOR_LISTS) and not stored & 1)
-             and not (key.startswith("pad_") and not stored & 16)}
+    known = {
+        key
+        for key in KNOWN_KEYS
+        if not ((key.startswith(("calibration_", "force_scale")) or key in SENSOR_LISTS) and not stored & 1)
+        and not (key.startswith("pad_") and not stored & 16)
+    }
     nothing = {"serial": "", "board": "", "scene": "", "git": "", "firmware": "0.0.0"}
     found = []
     for key in filter(known.__contains__, KNOWN_KEYS):
         text = plain(key, metadata.get(key, nothing.get(key, "0")))
         if key in ("x_mm", "y_mm", *SENSOR_LISTS):
-            text = " ".join([*(text.split() if key in metadata else ()), *["0"] * SENSORS_MAX][:int(metadata["sensors"])])
+            text = " ".join([*(text.split() if key in metadata else ()), *["0"] * SENSORS_MAX][: int(metadata["sensors"])])
         found.append([key, text])
     return found
 
@@ -82,6 +92,7 @@ def recording(path, salvage, device):
     found = read_recording(path, salvage=salvage, serial=device or None)
     rows = []
     for i in range(len(found["t_us"])):
+
         def value(name):
             return float(found[name][i])
 
@@ -94,19 +105,29 @@ def recording(path, salvage, device):
     fields = {"health": wire.Health._fields, "ack": wire.Acknowledgement._fields, "sync": wire.SyncEdge._fields, "info": ()}
     packets = [{kind: numbers({name: int(values[name]) for name in ("sequence", "t_us", *fields[kind])})} for kind, values in found.packets]
     has_info = any("info" in packet for packet in packets)
-    return {"rows": rows, "packets": packets, "events": [event.encode("utf-8", "surrogateescape").decode("utf-8", "replace") for event in found.events],
-            "info": info_of(found.metadata) if has_info else None, "has_end": bool(found.end), "skipped": found.skipped_lines}
+    return {
+        "rows": rows,
+        "packets": packets,
+        "events": [event.encode("utf-8", "surrogateescape").decode("utf-8", "replace") for event in found.events],
+        "info": info_of(found.metadata) if has_info else None,
+        "has_end": bool(found.end),
+        "skipped": found.skipped_lines,
+    }
 
 
 def packet_answer(packet):
     body, told = packet.body, {"sequence": packet.sequence, "t_us": packet.t_us}
     answer = {"other": told}
     if isinstance(body, wire.Contact):
-        answer = contact_text(packet.t_us, body.frame, lambda name: getattr(body, name, packet.sequence) if name != "sequence" else packet.sequence)
+        answer = contact_text(
+            packet.t_us, body.frame, lambda name: getattr(body, name, packet.sequence) if name != "sequence" else packet.sequence
+        )
     elif isinstance(body, wire.Raw):
         named = {"raw_sequence": packet.sequence, "raw_flags": body.flags, "temperature_degC": body.temperature_cC / 100}
         readings = [value / 1024 for value in body.readings]
-        answer = raw_text(packet.t_us, body.frame, lambda name: named[name] if name in named else getattr(body, name), readings[0::2], readings[1::2])
+        answer = raw_text(
+            packet.t_us, body.frame, lambda name: named[name] if name in named else getattr(body, name), readings[0::2], readings[1::2]
+        )
     elif isinstance(body, wire.Health):
         answer = {"health": {**told, **{name: value or 0 for name, value in body._asdict().items()}}}
     elif isinstance(body, wire.Acknowledgement):
@@ -134,15 +155,21 @@ def setting(text):
             if value != "none" and keys["prior_sigma_mm"] == 0:
                 raise BadValueError("none is said by its word")
         else:
-            name, kind = {"rate": ("rate_Hz", float), "osr": ("osr", int), "limit": ("location_limit_mm", float),
-                          "slip_threshold": ("slip_threshold_mm", float), "slip_window": ("slip_window_ms", int), "sync": ("sync", str)}[key]
+            name, kind = {
+                "rate": ("rate_Hz", float),
+                "osr": ("osr", int),
+                "limit": ("location_limit_mm", float),
+                "slip_threshold": ("slip_threshold_mm", float),
+                "slip_window": ("slip_window_ms", int),
+                "sync": ("sync", str),
+            }[key]
             keys = {name: 0.0 if value == "max" and key == "rate" else kind(value)}
             if keys == {"rate_Hz": 0.0} and value != "max":
                 raise BadValueError("max is said by its word")
     except ValueError:
         raise BadValueError(f"{value} is no number") from None
     now = some_info()._replace(slip_threshold_mm=1.0, slip_window_ms=100)
-    command, = setting_commands({**{each.argument: None for each in SETTINGS}, **keys}, now)
+    (command,) = setting_commands({**{each.argument: None for each in SETTINGS}, **keys}, now)
     return wire.encode(wire.Packet(0, 0, command)).hex()
 
 

@@ -3,6 +3,7 @@ same damaged in ways that have a name, and by chance. All follow from here, from
 
 A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}.
 """
+
 import pathlib
 import random
 import re
@@ -94,7 +95,7 @@ def with_cells(lines, **changes):
     """The full row, with other cells."""
     names, at = lines[header_at(lines)].split(","), full_row_at(lines)
     cells = dict(zip(names, lines[at].split(",")))
-    return [*lines[:at], ",".join({**cells, **changes}.values()), *lines[at + 1:]]
+    return [*lines[:at], ",".join({**cells, **changes}.values()), *lines[at + 1 :]]
 
 
 def without_columns(lines, names):
@@ -104,39 +105,110 @@ def without_columns(lines, names):
 
 
 CELLS = {
-    "nan": {"x_mm": "nan"}, "infinite": {"force_N": "inf"}, "empty_under_its_flag": {"x_mm": ""}, "too_large": {"force_N": "1e39"},
-    "vanishes": {"force_N": "1e-50"}, "zero_of_400_digits": {"force_N": "1e-400"}, "plus": {"x_mm": "+1"}, "blank": {"x_mm": " 1"}, "blank_behind": {"x_mm": "1 "},
-    "underscore": {"x_mm": "1_0"}, "hexadecimal": {"x_mm": "0x1p3"}, "no_digits": {"x_mm": "."}, "half_an_exponent": {"x_mm": "1e"},
-    "leading_point": {"x_mm": "-.5e-1"}, "trailing_point": {"x_mm": "1."}, "capital_exponent": {"x_mm": "1E-2"}, "smallest": {"x_mm": "1e-45"},
-    "largest": {"x_mm": "3.4028235e38"}, "beyond_largest": {"x_mm": "3.4028236e38"}, "word": {"x_mm": "one"}, "minus_zero": {"x_mm": "-0"},
-    "negative_flags": {"flags": "-1"}, "large_flags": {"flags": "4294967296"}, "broken_flags": {"flags": "2.0"}, "exponent_flags": {"flags": "1e3"},
-    "minus_zero_sequence": {"sequence": "-0"}, "large_sequence": {"sequence": "65536"}, "largest_sequence": {"sequence": "65535"}, "zeros_before": {"sequence": "007"},
-    "empty_sequence": {"sequence": ""}, "empty_stage": {"fit_us": ""}, "large_stage": {"fit_us": "65536"}, "negative_time": {"t_us": "-5"},
-    "minus_zero_time": {"t_us": "-0"}, "no_time": {"t_us": ""}, "large_time": {"t_us": "18446744073709551616"}, "late_time": {"t_us": "9007199254740992"},
-    "no_frame": {"frame": ""}, "large_frame": {"frame": "4294967296"}, "thousand_digits": {"frame": "9" * 5000}, "arabic": {"t_us": "\u0665"},
-    "pressure_beyond": {"s0_Pa": "3000000.0"}, "pressure_at_the_end": {"s0_Pa": "2097151.9990"}, "pressure_rounds_beyond": {"s0_Pa": "2097151.9996"},
-    "pressure_least": {"s0_Pa": "-2097152.0"}, "pressure_below": {"s0_Pa": "-2097152.001"}, "pressure_empty": {"s3_Pa": ""}, "pressure_exponent": {"tare2_Pa": "1e5"},
-    "pressure_huge": {"s0_Pa": "1e13"}, "pressure_half": {"s0_Pa": "0.00048828125"}, "pressure_nan": {"s1_Pa": "nan"},
-    "temperature_beyond": {"temperature_degC": "327.68"}, "temperature_most": {"temperature_degC": "327.674"}, "temperature_least": {"temperature_degC": "-327.68"},
-    "temperature_empty": {"temperature_degC": ""}, "zero_without_flag": {"flags": "0", "x_mm": "0"}, "value_without_flag": {"flags": "0", "x_mm": "3.5"},
-    "return_in_it": {"x_mm": "1\r"}, "zero_byte": {"x_mm": "1\0"},
+    "nan": {"x_mm": "nan"},
+    "infinite": {"force_N": "inf"},
+    "empty_under_its_flag": {"x_mm": ""},
+    "too_large": {"force_N": "1e39"},
+    "vanishes": {"force_N": "1e-50"},
+    "zero_of_400_digits": {"force_N": "1e-400"},
+    "plus": {"x_mm": "+1"},
+    "blank": {"x_mm": " 1"},
+    "blank_behind": {"x_mm": "1 "},
+    "underscore": {"x_mm": "1_0"},
+    "hexadecimal": {"x_mm": "0x1p3"},
+    "no_digits": {"x_mm": "."},
+    "half_an_exponent": {"x_mm": "1e"},
+    "leading_point": {"x_mm": "-.5e-1"},
+    "trailing_point": {"x_mm": "1."},
+    "capital_exponent": {"x_mm": "1E-2"},
+    "smallest": {"x_mm": "1e-45"},
+    "largest": {"x_mm": "3.4028235e38"},
+    "beyond_largest": {"x_mm": "3.4028236e38"},
+    "word": {"x_mm": "one"},
+    "minus_zero": {"x_mm": "-0"},
+    "negative_flags": {"flags": "-1"},
+    "large_flags": {"flags": "4294967296"},
+    "broken_flags": {"flags": "2.0"},
+    "exponent_flags": {"flags": "1e3"},
+    "minus_zero_sequence": {"sequence": "-0"},
+    "large_sequence": {"sequence": "65536"},
+    "largest_sequence": {"sequence": "65535"},
+    "zeros_before": {"sequence": "007"},
+    "empty_sequence": {"sequence": ""},
+    "empty_stage": {"fit_us": ""},
+    "large_stage": {"fit_us": "65536"},
+    "negative_time": {"t_us": "-5"},
+    "minus_zero_time": {"t_us": "-0"},
+    "no_time": {"t_us": ""},
+    "large_time": {"t_us": "18446744073709551616"},
+    "late_time": {"t_us": "9007199254740992"},
+    "no_frame": {"frame": ""},
+    "large_frame": {"frame": "4294967296"},
+    "thousand_digits": {"frame": "9" * 5000},
+    "arabic": {"t_us": "\u0665"},
+    "pressure_beyond": {"s0_Pa": "3000000.0"},
+    "pressure_at_the_end": {"s0_Pa": "2097151.9990"},
+    "pressure_rounds_beyond": {"s0_Pa": "2097151.9996"},
+    "pressure_least": {"s0_Pa": "-2097152.0"},
+    "pressure_below": {"s0_Pa": "-2097152.001"},
+    "pressure_empty": {"s3_Pa": ""},
+    "pressure_exponent": {"tare2_Pa": "1e5"},
+    "pressure_huge": {"s0_Pa": "1e13"},
+    "pressure_half": {"s0_Pa": "0.00048828125"},
+    "pressure_nan": {"s1_Pa": "nan"},
+    "temperature_beyond": {"temperature_degC": "327.68"},
+    "temperature_most": {"temperature_degC": "327.674"},
+    "temperature_least": {"temperature_degC": "-327.68"},
+    "temperature_empty": {"temperature_degC": ""},
+    "zero_without_flag": {"flags": "0", "x_mm": "0"},
+    "value_without_flag": {"flags": "0", "x_mm": "3.5"},
+    "return_in_it": {"x_mm": "1\r"},
+    "zero_byte": {"x_mm": "1\0"},
 }
 COMMENTS = {
-    "unknown_key": "# weather: fine", "no_key": "# just a comment", "no_blank": "#note:x", "colon_at_the_end": "# note:", "empty_value": "# note: ",
-    "not_utf8": "# note: \udcff\udcfe", "unknown_packet": "# packet: weather sequence=1 t_us=1", "packet_without_fields": "# packet: health",
-    "packet_field_missing": "# packet: ack sequence=1 t_us=2 command=1 result=0 command_sequence=3", "packet_more_fields":
-    "# packet: ack sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4 colour=5", "packet_twice_a_field":
-    "# packet: ack sequence=1 sequence=9 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4", "packet_large":
-    "# packet: ack sequence=1 t_us=2 command=256 result=0 command_sequence=3 host_time_us=4", "packet_negative":
-    "# packet: ack sequence=1 t_us=2 command=-1 result=0 command_sequence=3 host_time_us=4", "packet_word":
-    "# packet: ack sequence=1 t_us=2 command=one result=0 command_sequence=3 host_time_us=4", "packet_no_pair": "# packet: ack sequence",
+    "unknown_key": "# weather: fine",
+    "no_key": "# just a comment",
+    "no_blank": "#note:x",
+    "colon_at_the_end": "# note:",
+    "empty_value": "# note: ",
+    "not_utf8": "# note: \udcff\udcfe",
+    "unknown_packet": "# packet: weather sequence=1 t_us=1",
+    "packet_without_fields": "# packet: health",
+    "packet_field_missing": "# packet: ack sequence=1 t_us=2 command=1 result=0 command_sequence=3",
+    "packet_more_fields": "# packet: ack sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4 colour=5",
+    "packet_twice_a_field": "# packet: ack sequence=1 sequence=9 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4",
+    "packet_large": "# packet: ack sequence=1 t_us=2 command=256 result=0 command_sequence=3 host_time_us=4",
+    "packet_negative": "# packet: ack sequence=1 t_us=2 command=-1 result=0 command_sequence=3 host_time_us=4",
+    "packet_word": "# packet: ack sequence=1 t_us=2 command=one result=0 command_sequence=3 host_time_us=4",
+    "packet_no_pair": "# packet: ack sequence",
     "packet_two_blanks": "# packet: ack  sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4",
-    "event": "# event: back", "event_not_utf8": "# event: \udcff", "sensors_word": "# sensors: many", "rate_word": "# rate_mHz: abc", "rate_beyond": "# rate_mHz: 4294967296",
-    "osr_negative": "# osr: -5", "many_x": "# x_mm: " + " ".join(["1"] * 33), "x_word": "# x_mm: 1 b", "x_two_blanks": "# x_mm: 1  2", "x_none": "# x_mm: ",
-    "gain_nan": "# gains: nan", "off_beyond": "# off_x_um: 1 -32769", "off_part": "# wider_q15: 1.5",
-    "off_least": "# off_y_um: -32768 32767", "pad_word": "# pad_thickness_mm: thick", "pad_list": "# pad_shares: 1 2 3", "pad_touch": "# pad_from_touch: 256", "date": "# calibration_date_s: x",
-    "firmware_two": "# firmware: 1.2", "firmware_large": "# firmware: 1.2.256", "serial_umlaut": "# serial: \u00e4", "serial_long": "# serial: 0123456789abcdefg",
-    "end_word": "# end: reason", "end_blank": "# end: frames=1 ", "end_number": "# end: reason=x frames=many", "slash": "# 0/note: x", "prior_beyond": "# prior_sigma_mm: 1e39",
+    "event": "# event: back",
+    "event_not_utf8": "# event: \udcff",
+    "sensors_word": "# sensors: many",
+    "rate_word": "# rate_mHz: abc",
+    "rate_beyond": "# rate_mHz: 4294967296",
+    "osr_negative": "# osr: -5",
+    "many_x": "# x_mm: " + " ".join(["1"] * 33),
+    "x_word": "# x_mm: 1 b",
+    "x_two_blanks": "# x_mm: 1  2",
+    "x_none": "# x_mm: ",
+    "gain_nan": "# gains: nan",
+    "off_beyond": "# off_x_um: 1 -32769",
+    "off_part": "# wider_q15: 1.5",
+    "off_least": "# off_y_um: -32768 32767",
+    "pad_word": "# pad_thickness_mm: thick",
+    "pad_list": "# pad_shares: 1 2 3",
+    "pad_touch": "# pad_from_touch: 256",
+    "date": "# calibration_date_s: x",
+    "firmware_two": "# firmware: 1.2",
+    "firmware_large": "# firmware: 1.2.256",
+    "serial_umlaut": "# serial: \u00e4",
+    "serial_long": "# serial: 0123456789abcdefg",
+    "end_word": "# end: reason",
+    "end_blank": "# end: frames=1 ",
+    "end_number": "# end: reason=x frames=many",
+    "slash": "# 0/note: x",
+    "prior_beyond": "# prior_sigma_mm: 1e39",
 }
 
 
@@ -152,22 +224,25 @@ def csv_cases(corpus, name, text, devices):
     add("crcrlf", text.replace(b"\n", b"\r\r\n"))
     add("no_end_line", lines[:-1])
     add("no_line_end", text[:-1])
-    add("torn_row", text_of(lines[:row + 1])[:-20])
+    add("torn_row", text_of(lines[: row + 1])[:-20])
     add("torn_blank", text + b"  ")
     add("blank_lines", [*lines[:row], "", " \t", *lines[row:]])
     add("blank_line_first", ["", *lines])
     add("byte_order_mark", b"\xef\xbb\xbf" + text)
-    add("rows_twice", [*lines[:row + 1], *lines[row:]])
-    add("rows_backwards", [*lines[:header + 1], *reversed(lines[header + 1:-1]), lines[-1]])
-    add("head_only", lines[:header + 1])
+    add("rows_twice", [*lines[: row + 1], *lines[row:]])
+    add("rows_backwards", [*lines[: header + 1], *reversed(lines[header + 1 : -1]), lines[-1]])
+    add("head_only", lines[: header + 1])
     add("no_header", lines[:header])
     add("first_line", lines[:1])
     add("first_line_torn", text_of(lines[:1])[:-1])
     add("empty", b"")
-    add("header_twice", [*lines[:header + 1], *lines[header:]])
+    add("header_twice", [*lines[: header + 1], *lines[header:]])
     add("two_ends", [*lines, lines[-1]])
     for format_ in ("0", "3", "01", "1.0", "1 2", "", "\u0661"):
-        add(f"format_{format_.replace(' ', '_').encode('ascii', 'replace').decode()}", [lines[0].rsplit(" ", 1)[0] + " " + format_, *lines[1:]])
+        add(
+            f"format_{format_.replace(' ', '_').encode('ascii', 'replace').decode()}",
+            [lines[0].rsplit(" ", 1)[0] + " " + format_, *lines[1:]],
+        )
     add("scenario", ["# fingertip-scenario 1", *lines[1:]])
     add("other_text", ["hello", *lines[1:]])
     add("first_line_blanks", [lines[0] + "  ", *lines[1:]])
@@ -176,10 +251,13 @@ def csv_cases(corpus, name, text, devices):
     add("column_missing", without_columns(lines, ["q_sd_N"]))
     add("earlier", without_columns(lines, LATER_COLUMNS))
     add("before_shapes", without_columns(lines, SHAPE_COLUMNS))
-    add("earlier_flags", without_columns([without_flags(lines[header], line) if line[:1].isdigit() else line for line in lines], LATER_COLUMNS))
+    add(
+        "earlier_flags",
+        without_columns([without_flags(lines[header], line) if line[:1].isdigit() else line for line in lines], LATER_COLUMNS),
+    )
     add("sensors_14", without_columns(lines, ["s14_Pa", "tare14_Pa", "s0_Pa", "tare0_Pa"]))
-    add("row_longer", [*lines[:row], lines[row] + ",", *lines[row + 1:]])
-    add("row_shorter", [*lines[:row], lines[row].rsplit(",", 1)[0], *lines[row + 1:]])
+    add("row_longer", [*lines[:row], lines[row] + ",", *lines[row + 1 :]])
+    add("row_shorter", [*lines[:row], lines[row].rsplit(",", 1)[0], *lines[row + 1 :]])
     names = lines[header].split(",")
     first, last = names.index("sequence"), names.index("raw_sequence")
     add("no_contact", with_cells(lines, **dict.fromkeys(names[first:last], "")))
@@ -194,7 +272,10 @@ def csv_cases(corpus, name, text, devices):
         add(f"head_{what}", [*lines[:header], own, *lines[header:]])
     prng = random.Random(name)
     for chance in range(CHANCES):
-        add(f"chance_{chance}", damaged(text, prng, (b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", b"\xb5", b": ", b"/", b"9", b"=")))
+        add(
+            f"chance_{chance}",
+            damaged(text, prng, (b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", b"\xb5", b": ", b"/", b"9", b"=")),
+        )
 
 
 def without_flags(header, row):
@@ -210,10 +291,10 @@ def damaged(content, prng, words):
     for _ in range(prng.randrange(1, 4)):
         at = prng.randrange(24, len(data))
         if prng.randrange(3):
-            data[at:at + prng.randrange(3)] = prng.choice(words)
+            data[at : at + prng.randrange(3)] = prng.choice(words)
         else:
             data[at] ^= 1 << prng.randrange(8)
-    return bytes(data[:prng.randrange(len(data) // 2, len(data) + 1)] if not prng.randrange(4) else data)
+    return bytes(data[: prng.randrange(len(data) // 2, len(data) + 1)] if not prng.randrange(4) else data)
 
 
 def joint_cases(corpus, text):
@@ -227,16 +308,36 @@ def joint_cases(corpus, text):
     add("no_devices", [line for line in lines if not line.startswith("# devices")])
     add("devices_late", [*lines[:1], *lines[2:], lines[1]])
     add("header_of_one", [line.removeprefix("device,time_us,") if at == header else line for at, line in enumerate(lines)])
-    for what, change in {"device_00": ("0,", "00,"), "device_5": ("0,", "5,"), "no_time": ("0,1000.5,", "0,,"), "time_word": ("0,1000.5,", "0,noon,"),
-                         "time_infinite": ("0,1000.5,", "0,inf,"), "time_back": ("1,2000.5,", "1,-2000.5,"), "two_cells": ("0,1000.5,41177,", "0,1000.5#"),
-                         "other_broken": ("1,2000.5,2990954", "1,2000.5,x"), "one_cell": ("0,1000.5,41177", "0")}.items():
+    for what, change in {
+        "device_00": ("0,", "00,"),
+        "device_5": ("0,", "5,"),
+        "no_time": ("0,1000.5,", "0,,"),
+        "time_word": ("0,1000.5,", "0,noon,"),
+        "time_infinite": ("0,1000.5,", "0,inf,"),
+        "time_back": ("1,2000.5,", "1,-2000.5,"),
+        "two_cells": ("0,1000.5,41177,", "0,1000.5#"),
+        "other_broken": ("1,2000.5,2990954", "1,2000.5,x"),
+        "one_cell": ("0,1000.5,41177", "0"),
+    }.items():
         add(what, [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
-    for what, comment in {"own_end": "# 0/end: frames", "others_end": "# 1/end: frames", "end": "# end: frames", "number": "# 9/event: x", "zeros": "# 00/event: x", "of_all": "# event: x",
-                          "key_with_slash": "# 0/a/b: c", "slash_in_value": "# note: 0/event: c", "grip": "# grip: x", "packet_of_all": "# packet: info sequence=1 t_us=1"}.items():
-        add(f"comment_{what}", [*lines[:header + 1], comment, *lines[header + 1:]])
+    for what, comment in {
+        "own_end": "# 0/end: frames",
+        "others_end": "# 1/end: frames",
+        "end": "# end: frames",
+        "number": "# 9/event: x",
+        "zeros": "# 00/event: x",
+        "of_all": "# event: x",
+        "key_with_slash": "# 0/a/b: c",
+        "slash_in_value": "# note: 0/event: c",
+        "grip": "# grip: x",
+        "packet_of_all": "# packet: info sequence=1 t_us=1",
+    }.items():
+        add(f"comment_{what}", [*lines[: header + 1], comment, *lines[header + 1 :]])
 
 
-def bag_of(path, lines, change=lambda number, name, row: [(name, row)], compression=mcap.writer.CompressionType.ZSTD, chunk=2000, **options):
+def bag_of(
+    path, lines, change=lambda number, name, row: [(name, row)], compression=mcap.writer.CompressionType.ZSTD, chunk=2000, **options
+):
     """A bag with the lines and contacts of another, each as change has it: (schema's name, message or bytes)s."""
     with open(path, "wb") as file:
         writer = mcap.writer.Writer(file, chunk_size=chunk, compression=compression, **options)
@@ -255,19 +356,27 @@ def bag_of(path, lines, change=lambda number, name, row: [(name, row)], compress
 def messages_of(path):
     """[(schema's name, message)] of lines and contacts."""
     with open(path, "rb") as file:
-        found = [(schema.name.replace("/msg/", "/"), message.data) for schema, _, message in make_reader(file).iter_messages(log_time_order=False)]
+        found = [
+            (schema.name.replace("/msg/", "/"), message.data)
+            for schema, _, message in make_reader(file).iter_messages(log_time_order=False)
+        ]
     return [(name, decode(name, data)) for name, data in found if name in (LINE_TYPE, CONTACT_TYPE)]
 
 
 def message_cases(corpus, name, bag, devices):
     messages = messages_of(bag)
-    where = [at for at, (kind, row) in enumerate(messages) if kind == CONTACT_TYPE and row["has_contact"] and row["has_raw"] and row["flags"] & 2 and row["device"] == 0]
+    where = [
+        at
+        for at, (kind, row) in enumerate(messages)
+        if kind == CONTACT_TYPE and row["has_contact"] and row["has_raw"] and row["flags"] & 2 and row["device"] == 0
+    ]
     at = where[0] if where else next(at for at, (kind, row) in enumerate(messages) if kind == CONTACT_TYPE)
     scratch = corpus.folder / "scratch.mcap"
 
     def add(what, change=None, **options):
         def at_its_place(number, kind, row):
             return change(kind, dict(row)) if change and number == at else [(kind, row)]
+
         corpus.recording(f"{name}_{what}", bag_of(scratch, messages, at_its_place, **options), "mcap", devices)
 
     def changed(**changes):
@@ -283,26 +392,65 @@ def message_cases(corpus, name, bag, devices):
     add("no_crc", enable_crcs=False)
     add("no_index", index_types=mcap.writer.IndexType.NONE, use_statistics=False, use_summary_offsets=False)
     for what, changes in {
-            "nan_under_its_flag": {"x_mm": nan}, "all_nan": {"x_mm": nan, "y_mm": nan, "force_n": nan}, "infinite": {"x_mm": inf}, "nan_without_flag": {"flags": 0, "x_mm": nan},
-            "value_without_flag": {"flags": 0, "x_mm": 3.5}, "time_infinite": {"time_us": inf}, "time_minus_infinite": {"time_us": -inf}, "time": {"time_us": 5.5},
-            "no_time": {"time_us": nan}, "time_huge": {"time_us": 1e300}, "device_7": {"device": 7}, "sensors_14": {"pressure_pa": pressures[:-1], "tare_pa": pressures[:-1]},
-            "sensors_16": {"pressure_pa": [*pressures, 0.0], "tare_pa": [*pressures, 0.0]}, "sensors_33": {"pressure_pa": 33 * [0.0], "tare_pa": 33 * [0.0]},
-            "no_sensors": {"pressure_pa": [], "tare_pa": []}, "fewer_pressures": {"pressure_pa": pressures[:-1]}, "fewer_zeros": {"tare_pa": pressures[:-1]},
-            "pressure_beyond": {"pressure_pa": [3e6, *pressures[1:]]}, "pressure_least": {"pressure_pa": [-2097152.0, *pressures[1:]]}, "pressure_nan": {"pressure_pa": [nan, *pressures[1:]]},
-            "pressure_half": {"pressure_pa": [0.00048828125, *pressures[1:]]}, "zero_beyond": {"tare_pa": [-3e6, *pressures[1:]]}, "temperature_beyond": {"temperature_degc": 400.0},
-            "temperature_nan": {"temperature_degc": nan}, "no_contact": {"has_contact": False}, "no_raw": {"has_raw": False}, "no_packet": {"has_contact": False, "has_raw": False},
-            "number_again": {"line": row["line"] - 1}, "number_far": {"line": row["line"] + 5}, "number_back": {"line": 1}, "number_0": {"line": 0},
-            "late_time": {"t_us": 2**53}}.items():
+        "nan_under_its_flag": {"x_mm": nan},
+        "all_nan": {"x_mm": nan, "y_mm": nan, "force_n": nan},
+        "infinite": {"x_mm": inf},
+        "nan_without_flag": {"flags": 0, "x_mm": nan},
+        "value_without_flag": {"flags": 0, "x_mm": 3.5},
+        "time_infinite": {"time_us": inf},
+        "time_minus_infinite": {"time_us": -inf},
+        "time": {"time_us": 5.5},
+        "no_time": {"time_us": nan},
+        "time_huge": {"time_us": 1e300},
+        "device_7": {"device": 7},
+        "sensors_14": {"pressure_pa": pressures[:-1], "tare_pa": pressures[:-1]},
+        "sensors_16": {"pressure_pa": [*pressures, 0.0], "tare_pa": [*pressures, 0.0]},
+        "sensors_33": {"pressure_pa": 33 * [0.0], "tare_pa": 33 * [0.0]},
+        "no_sensors": {"pressure_pa": [], "tare_pa": []},
+        "fewer_pressures": {"pressure_pa": pressures[:-1]},
+        "fewer_zeros": {"tare_pa": pressures[:-1]},
+        "pressure_beyond": {"pressure_pa": [3e6, *pressures[1:]]},
+        "pressure_least": {"pressure_pa": [-2097152.0, *pressures[1:]]},
+        "pressure_nan": {"pressure_pa": [nan, *pressures[1:]]},
+        "pressure_half": {"pressure_pa": [0.00048828125, *pressures[1:]]},
+        "zero_beyond": {"tare_pa": [-3e6, *pressures[1:]]},
+        "temperature_beyond": {"temperature_degc": 400.0},
+        "temperature_nan": {"temperature_degc": nan},
+        "no_contact": {"has_contact": False},
+        "no_raw": {"has_raw": False},
+        "no_packet": {"has_contact": False, "has_raw": False},
+        "number_again": {"line": row["line"] - 1},
+        "number_far": {"line": row["line"] + 5},
+        "number_back": {"line": 1},
+        "number_0": {"line": 0},
+        "late_time": {"t_us": 2**53},
+    }.items():
         add(f"message_{what}", changed(**changes))
     good = encode(CONTACT_TYPE, row)
-    for what, data in {"torn": good[:-5], "torn_early": good[:20], "empty": b"", "head_only": good[:4], "big_endian": b"\0\0" + good[2:], "longer": good + bytes(8),
-                       "parameters": b"\0\3" + good[2:], "true_is_2": bytes(good).replace(b"\1", b"\2", 0)}.items():
+    for what, data in {
+        "torn": good[:-5],
+        "torn_early": good[:20],
+        "empty": b"",
+        "head_only": good[:4],
+        "big_endian": b"\0\0" + good[2:],
+        "longer": good + bytes(8),
+        "parameters": b"\0\3" + good[2:],
+        "true_is_2": bytes(good).replace(b"\1", b"\2", 0),
+    }.items():
         add(f"message_{what}", lambda kind, row, data=data: [(kind, data)])
     add("message_missing", lambda kind, row: [])
     add("message_twice", lambda kind, row: [(kind, row), (kind, row)])
     add("message_of_others", lambda kind, row: [("std_msgs/Header", b"\0\1\0\0nonsense"), (kind, row)])
     line = {"header": row["header"], "line": row["line"], "torn": False}
-    for what, text in {"comment": "# note: x", "row": "1,2,3", "two_lines": "# note: a\nb", "empty": "", "blank": " ", "umlaut": "# note: \u00e4", "return": "# note: x\r"}.items():
+    for what, text in {
+        "comment": "# note: x",
+        "row": "1,2,3",
+        "two_lines": "# note: a\nb",
+        "empty": "",
+        "blank": " ",
+        "umlaut": "# note: \u00e4",
+        "return": "# note: x\r",
+    }.items():
         add(f"line_{what}", lambda kind, row, text=text: [(LINE_TYPE, {**line, "text": text})])
     add("line_torn", lambda kind, row: [(LINE_TYPE, {**line, "text": "# note: x", "torn": True})])
     add("line_torn_empty", lambda kind, row: [(LINE_TYPE, {**line, "text": "", "torn": True})])
@@ -311,10 +459,18 @@ def message_cases(corpus, name, bag, devices):
     add("line_without_end", lambda kind, row: [(LINE_TYPE, plain[:-2])])
     length_at = plain.index(b"# note") - 4
     for length in (0, 1, 5, 2**31):
-        add(f"line_length_{length}", lambda kind, row, length=length: [(LINE_TYPE, plain[:length_at] + struct.pack("<I", length) + plain[length_at + 4:])])
+        add(
+            f"line_length_{length}",
+            lambda kind, row, length=length: [(LINE_TYPE, plain[:length_at] + struct.pack("<I", length) + plain[length_at + 4 :])],
+        )
     first = next(number for number, (kind, _) in enumerate(messages) if kind == CONTACT_TYPE)
-    for what, kept in {"head_missing": messages[first - 1:], "head_only": messages[:first], "nothing": [], "header_missing": messages[:first - 1] + messages[first:],
-                       "first_missing": messages[1:]}.items():
+    for what, kept in {
+        "head_missing": messages[first - 1 :],
+        "head_only": messages[:first],
+        "nothing": [],
+        "header_missing": messages[: first - 1] + messages[first:],
+        "first_missing": messages[1:],
+    }.items():
         corpus.recording(f"{name}_{what}", bag_of(scratch, kept), "mcap", devices)
 
 
@@ -330,18 +486,32 @@ def bag_cases(corpus, name, content, devices, chances):
     for chunk in (chunks[0], chunks[-1]):
         start, end = chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length
         number = chunks.index(chunk)
-        for what, at in {"begin": start, "opcode": start + 1, "length": start + 5, "middle": (start + end) // 2, "one_short": end - 1, "end": end}.items():
+        for what, at in {
+            "begin": start,
+            "opcode": start + 1,
+            "length": start + 5,
+            "middle": (start + end) // 2,
+            "one_short": end - 1,
+            "end": end,
+        }.items():
             add(f"cut_{number}_{what}", content[:at])
         add(f"without_chunk_{number}", content[:start] + content[end:])
         add(f"chunk_twice_{number}", content[:end] + content[start:])
-        for what, at, data in (("crc", start + 33, b"\1\2\3\4"), ("size", start + 25, struct.pack("<Q", 5)), ("huge", start + 25, struct.pack("<Q", 1 << 62)),
-                               ("no_crc", start + 33, bytes(4)), ("name", start + 41, b"lz4x"), ("unknown", start, b"\x7f"), ("longer", start + 1, struct.pack("<Q", 1 << 40))):
-            add(f"chunk_{number}_{what}", content[:at] + data + content[at + len(data):])
-        add(f"chunk_{number}_size_and_no_crc", content[:start + 25] + struct.pack("<QI", 5, 0) + content[start + 37:])
+        for what, at, data in (
+            ("crc", start + 33, b"\1\2\3\4"),
+            ("size", start + 25, struct.pack("<Q", 5)),
+            ("huge", start + 25, struct.pack("<Q", 1 << 62)),
+            ("no_crc", start + 33, bytes(4)),
+            ("name", start + 41, b"lz4x"),
+            ("unknown", start, b"\x7f"),
+            ("longer", start + 1, struct.pack("<Q", 1 << 40)),
+        ):
+            add(f"chunk_{number}_{what}", content[:at] + data + content[at + len(data) :])
+        add(f"chunk_{number}_size_and_no_crc", content[: start + 25] + struct.pack("<QI", 5, 0) + content[start + 37 :])
     add("magic_only", content[:8])
     add("half_a_magic", content[:5])
     add("bytes_behind", content + b"hello")
-    add("no_footer", content[:chunks[-1].chunk_start_offset + chunks[-1].chunk_length + chunks[-1].message_index_length])
+    add("no_footer", content[: chunks[-1].chunk_start_offset + chunks[-1].chunk_length + chunks[-1].message_index_length])
     prng = random.Random(name)
     for chance in range(chances):
         at = prng.randrange(8, chunks[-1].chunk_start_offset + chunks[-1].chunk_length)
@@ -355,11 +525,18 @@ def inner_cases(corpus, messages, devices):
     path = corpus.folder / "scratch.mcap"
     content = bag_of(path, messages, compression=mcap.writer.CompressionType.NONE, enable_crcs=False, chunk=10**9)
     at = content.index(b"\x05", 60)  # the first message's record
-    while content[at + 3:at + 9] != bytes(6):
+    while content[at + 3 : at + 9] != bytes(6):
         at = content.index(b"\x05", at + 1)
-    for what, place, data in (("torn", at + 1, struct.pack("<Q", 1 << 30)), ("shorter", at + 1, struct.pack("<Q", 3)), ("empty", at + 1, struct.pack("<Q", 0)),
-                              ("channel", at + 9, b"\x63"), ("opcode", at, b"\x7f"), ("chunk", at, b"\x06"), ("end", at, b"\x0f")):
-        corpus.recording(f"inner_{what}", content[:place] + data + content[place + len(data):], "mcap", devices)
+    for what, place, data in (
+        ("torn", at + 1, struct.pack("<Q", 1 << 30)),
+        ("shorter", at + 1, struct.pack("<Q", 3)),
+        ("empty", at + 1, struct.pack("<Q", 0)),
+        ("channel", at + 9, b"\x63"),
+        ("opcode", at, b"\x7f"),
+        ("chunk", at, b"\x06"),
+        ("end", at, b"\x0f"),
+    ):
+        corpus.recording(f"inner_{what}", content[:place] + data + content[place + len(data) :], "mcap", devices)
 
 
 def frame_of(packet):
@@ -393,7 +570,7 @@ def stream_cases(corpus):
         add(f"{name}_no_delimiter", b"\0" + frame[:-1])
         add(f"{name}_crc", b"\0" + wire.cobs_encode(packet[:-1] + bytes([packet[-1] ^ 1])) + b"\0")
         add(f"{name}_version", b"\0" + frame_of(bytes([body[VERSION_AT] - 1]) + body[1:]))
-        add(f"{name}_type", b"\0" + frame_of(body[:TYPE_AT] + b"\x70" + body[TYPE_AT + 1:]))
+        add(f"{name}_type", b"\0" + frame_of(body[:TYPE_AT] + b"\x70" + body[TYPE_AT + 1 :]))
         add(f"{name}_longer", b"\0" + frame_of(body + b"\0"))
         add(f"{name}_shorter", b"\0" + frame_of(body[:-1]))
         prng = random.Random(name)
@@ -407,7 +584,7 @@ def stream_cases(corpus):
     contact = found["contact_grasp"][0][:-4]
     for at in range(12, len(contact) - 3, 2):
         for what, value in (("nan", b"\0\0\xc0\x7f"), ("inf", b"\0\0\x80\xff")):
-            add(f"contact_{what}_at_{at}", b"\0" + frame_of(contact[:at] + value + contact[at + 4:]))
+            add(f"contact_{what}_at_{at}", b"\0" + frame_of(contact[:at] + value + contact[at + 4 :]))
     raw = found["raw"][0][:-4]
     for sensors in (0, 1, 14, 16, 32, 33, 255):
         add(f"raw_sensors_{sensors}", b"\0" + frame_of(raw[:34] + bytes([sensors]) + raw[35:]))
@@ -416,7 +593,7 @@ def stream_cases(corpus):
             add(f"raw_fits_{sensors}", b"\0" + frame_of(fitting))
     info = found["info_grasp"][0][:-4]
     for what, text in (("umlaut", b"\xe4"), ("zero_within", b"a\0b"), ("escape", b"\x1b")):
-        add(f"info_text_{what}", b"\0" + frame_of(info[:20] + text + info[20 + len(text):]))
+        add(f"info_text_{what}", b"\0" + frame_of(info[:20] + text + info[20 + len(text) :]))
     add("all", b"\0" + b"".join(frame for _, frame in found.values()))
     frames = [frame for name, (_, frame) in found.items() if not name.startswith("command_")]
     packets = [packet[:-4] for packet, _ in found.values()]
@@ -434,18 +611,76 @@ def stream_cases(corpus):
         data = bytearray(b"\0" + b"".join(prng.sample(frames, 6)))
         for _ in range(prng.randrange(1, 6)):
             at = prng.randrange(len(data))
-            data[at:at + prng.randrange(4)] = prng.choice((b"", b"\0", b"\xff", b"\0\0", bytes([prng.randrange(256)])))
+            data[at : at + prng.randrange(4)] = prng.choice((b"", b"\0", b"\xff", b"\0\0", bytes([prng.randrange(256)])))
         add(f"chance_{chance}", bytes(data))
     add("noise", bytes(prng.randrange(256) for _ in range(4000)))
 
 
-SETTINGS = ("osr=256", "osr=300", "osr=8192", "osr=16384", "osr=128", "osr=0", "osr=-256", "osr=256.0", "osr=many", "osr=", "osr=0256",
-            "rate=max", "rate=0.1", "rate=0.09", "rate=2000", "rate=2000.1", "rate=0", "rate=-1", "rate=nan", "rate=inf", "rate=fast", "rate=12.3456", "rate=1e2",
-            "slip_threshold=0.01", "slip_threshold=0.009", "slip_threshold=50", "slip_threshold=50.1", "slip_threshold=nan", "slip_threshold=x",
-            "slip_window=5", "slip_window=4", "slip_window=1000", "slip_window=1001", "slip_window=7.5", "slip_window=x",
-            "prior=none", "prior=0", "prior=0.5", "prior=0.4", "prior=100", "prior=101", "prior=3:0.5", "prior=3:0", "prior=3:100", "prior=3:101", "prior=3:x", "prior=x", "prior=nan",
-            "sync=off", "sync=in", "sync=frame", "sync=second", "sync=out", "sync=In", "sync=1", "sync=0", "sync=",
-            "limit=0.01", "limit=0.001", "limit=100", "limit=101", "limit=nan", "limit=x")
+SETTINGS = (
+    "osr=256",
+    "osr=300",
+    "osr=8192",
+    "osr=16384",
+    "osr=128",
+    "osr=0",
+    "osr=-256",
+    "osr=256.0",
+    "osr=many",
+    "osr=",
+    "osr=0256",
+    "rate=max",
+    "rate=0.1",
+    "rate=0.09",
+    "rate=2000",
+    "rate=2000.1",
+    "rate=0",
+    "rate=-1",
+    "rate=nan",
+    "rate=inf",
+    "rate=fast",
+    "rate=12.3456",
+    "rate=1e2",
+    "slip_threshold=0.01",
+    "slip_threshold=0.009",
+    "slip_threshold=50",
+    "slip_threshold=50.1",
+    "slip_threshold=nan",
+    "slip_threshold=x",
+    "slip_window=5",
+    "slip_window=4",
+    "slip_window=1000",
+    "slip_window=1001",
+    "slip_window=7.5",
+    "slip_window=x",
+    "prior=none",
+    "prior=0",
+    "prior=0.5",
+    "prior=0.4",
+    "prior=100",
+    "prior=101",
+    "prior=3:0.5",
+    "prior=3:0",
+    "prior=3:100",
+    "prior=3:101",
+    "prior=3:x",
+    "prior=x",
+    "prior=nan",
+    "sync=off",
+    "sync=in",
+    "sync=frame",
+    "sync=second",
+    "sync=out",
+    "sync=In",
+    "sync=1",
+    "sync=0",
+    "sync=",
+    "limit=0.01",
+    "limit=0.001",
+    "limit=100",
+    "limit=101",
+    "limit=nan",
+    "limit=x",
+)
 
 
 def fuzz_seed(path):

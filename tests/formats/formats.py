@@ -1,6 +1,7 @@
 """One corpus of recordings, lines and settings, good and damaged, through the library, the Python package and the page: the same answer, or the
 same refusal. usage: formats.py FINGERTIP BY_LIBRARY [--page FOLDER] [--json FILE] [--keep FOLDER]
 """
+
 import argparse
 import collections
 import json
@@ -44,12 +45,22 @@ def of_library(answer, who):
 def is_of_decompressors(name, library, answer):
     """A flipped bit that the library's zstd decodes to the very same and other decoders refuse: Debian has 1.5.4, PyPI's package 1.5.7, the page fzstd."""
     whole = library.get(re.sub(r"_chance_\d+ ", "_whole ", name))
-    return "_chance_" in name and library[name] == whole and re.search("decompression error|cannot be unpacked", answer.get("text", "")) is not None
+    return (
+        "_chance_" in name
+        and library[name] == whole
+        and re.search("decompression error|cannot be unpacked", answer.get("text", "")) is not None
+    )
 
 
 def agree(one, other):
     """The page tells of no events."""
-    return one == other or isinstance(one, dict) and isinstance(other, dict) and {**one, **other} == one and one.keys() - other.keys() <= {"events"}
+    return (
+        one == other
+        or isinstance(one, dict)
+        and isinstance(other, dict)
+        and {**one, **other} == one
+        and one.keys() - other.keys() <= {"events"}
+    )
 
 
 def main():
@@ -76,13 +87,23 @@ def main():
     disagreements = []
     for name in found["library"]:
         told = {who: judged(answer[name]) for who, answer in found.items() if name in answer}
-        others = [who for who, answer in told.items() if who != "library" and not agree(judged(of_library(found["library"][name], who)), answer)
-                  and not is_of_decompressors(name, found["library"], found[who][name])]
+        others = [
+            who
+            for who, answer in told.items()
+            if who != "library"
+            and not agree(judged(of_library(found["library"][name], who)), answer)
+            and not is_of_decompressors(name, found["library"], found[who][name])
+        ]
         if others:
             disagreements.append({"input": name, "of": others, **{who: found[who][name] for who in told}})
     refusals = collections.Counter(answer.get("refused", "taken") for answer in found["library"].values() if isinstance(answer, dict))
-    said = {"inputs": len(jobs), "refused": dict(refusals), "through": {who: len(each) for who, each in found.items()},
-            "format_disagreements": len(disagreements), "disagreements": disagreements}
+    said = {
+        "inputs": len(jobs),
+        "refused": dict(refusals),
+        "through": {who: len(each) for who, each in found.items()},
+        "format_disagreements": len(disagreements),
+        "disagreements": disagreements,
+    }
     if options.json:
         path = pathlib.Path(options.json)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -91,7 +112,9 @@ def main():
         print(f"{each['input']}: " + ", ".join(f"{who}: {json.dumps(each[who])[:300]}" for who in found if who in each), file=sys.stderr)
     ours = sum(each["of"] != ["page"] for each in disagreements)
     goal, may = house.LIMITS["format_disagreements"]
-    print(f"{len(jobs)} inputs, {dict(refusals)}; {len(disagreements)} disagreements (goal {goal}, may be {may} until then), {ours} of them between library and Python")
+    print(
+        f"{len(jobs)} inputs, {dict(refusals)}; {len(disagreements)} disagreements (goal {goal}, may be {may} until then), {ours} of them between library and Python"
+    )
     return 1 if ours or len(disagreements) > may else 0
 
 

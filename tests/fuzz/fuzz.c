@@ -82,8 +82,7 @@ static struct text read_text(const char *path) {
 }
 
 /* In place of `taken` bytes of an input, `length` others, as far as it may grow. */
-static void replace(struct text *text, size_t at, size_t taken, const uint8_t *bytes,
-                    size_t length) {
+static void replace(struct text *text, size_t at, size_t taken, const uint8_t *bytes, size_t length) {
   size_t room = walk_max - (text->length - taken);
   length = length < room ? length : room;
   struct text other = {malloc(text->length - taken + length + 1), text->length - taken + length};

@@ -23,12 +23,12 @@ void fuzz_one(const uint8_t *bytes, size_t length);
 }
 #endif
 
-#define FUZZ_CHECK(condition)                                                                      \
-  do {                                                                                             \
-    if (!(condition)) {                                                                            \
-      fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);               \
-      abort();                                                                                     \
-    }                                                                                              \
+#define FUZZ_CHECK(condition)                                                                                          \
+  do {                                                                                                                 \
+    if (!(condition)) {                                                                                                \
+      fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                                   \
+      abort();                                                                                                         \
+    }                                                                                                                  \
   } while (0)
 
 /* Takes an input apart from its front; behind its end there are zeros. */

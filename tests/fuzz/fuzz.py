@@ -8,6 +8,7 @@
 What stops a target is kept in build/fuzz/findings, named and told with the command that does it again; the others go on. What new
 ways of a target were found in hours is kept in build/fuzz/corpus. Exit status 1 if there is any finding.
 """
+
 import argparse
 import concurrent.futures
 import configparser
@@ -57,7 +58,7 @@ def part_of_packet(packet):
 
 
 def part_of_frame(frame):
-    return b"".join(bytes([0xC0 | len(frame[i:i + 63])]) + frame[i:i + 63] for i in range(0, len(frame), 63))
+    return b"".join(bytes([0xC0 | len(frame[i : i + 63])]) + frame[i : i + 63] for i in range(0, len(frame), 63))
 
 
 def vector_seeds(target):
@@ -77,7 +78,7 @@ def bulk_seed(target, seeds, length):
     if target in ("recording", "scenario"):
         lines = max(seeds, key=len).splitlines(keepends=True)
         rows = [line for line in lines if line[:1].isdigit() and b"fingertip" not in line]
-        head = b"".join(lines[:lines.index(rows[0])])
+        head = b"".join(lines[: lines.index(rows[0])])
         if target == "recording":
             return head + b"".join(rows) * (length // len(rows[0]) // len(rows))
         cells = rows[0].split(b",", 1)[1]
@@ -87,7 +88,7 @@ def bulk_seed(target, seeds, length):
 
 class Target:
     def __init__(self, program):
-        self.program, self.name = program, program.name[len("fuzz_"):]
+        self.program, self.name = program, program.name[len("fuzz_") :]
         options = configparser.ConfigParser()
         options.read(f"{program}.options")
         self.options = dict(options["libfuzzer"])
@@ -98,7 +99,14 @@ class Target:
         return seeds or [random.Random(seed).randbytes(64 << seed) for seed in range(4)]
 
     def libfuzzer(self, max_len, seconds, seed, bulk, folder, new, given):
-        call = [self.program, f"-max_total_time={seconds}", f"-seed={seed}", f"-max_len={max_len}", f"-timeout={HANGS_s}", f"-artifact_prefix={folder}/"]
+        call = [
+            self.program,
+            f"-max_total_time={seconds}",
+            f"-seed={seed}",
+            f"-max_len={max_len}",
+            f"-timeout={HANGS_s}",
+            f"-artifact_prefix={folder}/",
+        ]
         if "dict" in self.options:
             call.append(f"-dict={self.options['dict']}")
         if bulk:
@@ -120,16 +128,31 @@ class Target:
             for i, data in enumerate(seeds):
                 (given / f"{i:03d}").write_bytes(data)
             running = folder / "running"
-            call = ([self.program, "walk", runs, max_len, seed, running, *sorted(given.iterdir())] if runs is not None else
-                    self.libfuzzer(max_len, seconds, seed, bulk, folder, new, given))
+            call = (
+                [self.program, "walk", runs, max_len, seed, running, *sorted(given.iterdir())]
+                if runs is not None
+                else self.libfuzzer(max_len, seconds, seed, bulk, folder, new, given)
+            )
             begun_s = time.monotonic()
-            done = subprocess.run([str(part) for part in call], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                                  env={**os.environ, "FINGERTIP_FUZZ_COUNT": str(count), "UBSAN_OPTIONS": "print_stacktrace=1"})
+            done = subprocess.run(
+                [str(part) for part in call],
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                env={**os.environ, "FINGERTIP_FUZZ_COUNT": str(count), "UBSAN_OPTIONS": "print_stacktrace=1"},
+            )
             said = done.stderr.decode("utf-8", "replace")
             done_runs, size, length = struct.unpack("<QQQ", count.read_bytes()) if count.exists() else (0, 0, 0)
             covered = re.findall(r"cov: (\d+)", said)
-            result = {"target": self.name, "seconds": round(time.monotonic() - begun_s, 1), "runs": done_runs, "bytes": size,
-                      "edges": int(covered[-1]) if covered else 0, "seed": seed, "crashes": 0, "sanitizer_findings": 0}
+            result = {
+                "target": self.name,
+                "seconds": round(time.monotonic() - begun_s, 1),
+                "runs": done_runs,
+                "bytes": size,
+                "edges": int(covered[-1]) if covered else 0,
+                "seed": seed,
+                "crashes": 0,
+                "sanitizer_findings": 0,
+            }
             if done.returncode not in (0, INTERRUPTED):
                 kind = "sanitizer_findings" if any(word in said for word in SANITIZERS) else "crashes"
                 result[kind] = 1
@@ -141,8 +164,10 @@ class Target:
     def tell_finding(self, findings, folder, said):
         findings.mkdir(parents=True, exist_ok=True)
         lines = said.splitlines()
-        first = next((i for i, line in enumerate(lines) if any(word in line for word in (*SANITIZERS, "does not hold:", "ERROR: "))), len(lines) - 40)
-        print("\n".join(lines[max(0, first):first + 60]), file=sys.stderr)
+        first = next(
+            (i for i, line in enumerate(lines) if any(word in line for word in (*SANITIZERS, "does not hold:", "ERROR: "))), len(lines) - 40
+        )
+        print("\n".join(lines[max(0, first) : first + 60]), file=sys.stderr)
         inputs = [path for path in folder.iterdir() if path.is_file() and re.match(r"(crash|leak|oom|timeout)-", path.name)]
         for path in inputs:
             data = path.read_bytes()
@@ -155,7 +180,7 @@ class Target:
 
 def targets_in(build, names):
     folder = build / "tests/fuzz"
-    found = {path.stem[len("fuzz_"):]: Target(path.with_suffix("")) for path in sorted(folder.glob("fuzz_*.options"))}
+    found = {path.stem[len("fuzz_") :]: Target(path.with_suffix("")) for path in sorted(folder.glob("fuzz_*.options"))}
     missing = [target.program for target in found.values() if not target.program.is_file()]
     if not found or missing:
         raise Stop(f"{missing[0] if missing else folder}: is not there; build it: cmake --preset fuzz && cmake --build --preset fuzz")
@@ -173,8 +198,11 @@ def round_of(targets, jobs, one):
                 result = future.result()
                 found = result["crashes"] + result["sanitizer_findings"]
                 edges = f" {result['edges']:6d} edges" if result["edges"] else ""
-                print(f"{result['target']:10s} {result['runs']:10d} runs {result['bytes']:12d} bytes{edges} {result['seconds']:7.1f} s  "
-                      f"seed {result['seed']}{'  FOUND' if found else ''}", flush=True)
+                print(
+                    f"{result['target']:10s} {result['runs']:10d} runs {result['bytes']:12d} bytes{edges} {result['seconds']:7.1f} s  "
+                    f"seed {result['seed']}{'  FOUND' if found else ''}",
+                    flush=True,
+                )
                 yield result
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -189,7 +217,9 @@ def summary(targets, results):
         for name in ("seconds", "runs", "bytes", "crashes", "sanitizer_findings"):
             row[name] = sum(result[name] for result in own)
         rows.append(row)
-    totals = {f"fuzz_{name}" if name == "bytes" else name: sum(row[name] for row in rows) for name in ("bytes", "crashes", "sanitizer_findings")}
+    totals = {
+        f"fuzz_{name}" if name == "bytes" else name: sum(row[name] for row in rows) for name in ("bytes", "crashes", "sanitizer_findings")
+    }
     return {**totals, "fuzz_targets": rows}
 
 
@@ -220,8 +250,13 @@ def main(argv):
             while (left_s := end_s - time.monotonic()) > (0 if not results else 10):
                 own_s = max(1, round(min(left_s, ROUND_s) * min(options.jobs, len(targets)) / len(targets)))
                 bulk = options.seconds is not None
-                results += round_of(targets, options.jobs, lambda target: target.run(
-                    findings, seed, seconds=own_s, grown=None if bulk else build / "corpus" / target.name, bulk=bulk))
+                results += round_of(
+                    targets,
+                    options.jobs,
+                    lambda target: target.run(
+                        findings, seed, seconds=own_s, grown=None if bulk else build / "corpus" / target.name, bulk=bulk
+                    ),
+                )
                 seed += 1
                 if bulk:
                     break

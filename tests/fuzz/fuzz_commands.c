@@ -56,17 +56,15 @@ static void power_up(void) {
 
 static void check_info(const struct wire_info *info) {
   FUZZ_CHECK(info->sensor_count == geometry.sensor_count);
-  FUZZ_CHECK(info->rate_mHz == 0 ||
-             (info->rate_mHz >= WIRE_RATE_MIN_mHz && info->rate_mHz <= WIRE_RATE_MAX_mHz));
+  FUZZ_CHECK(info->rate_mHz == 0 || (info->rate_mHz >= WIRE_RATE_MIN_mHz && info->rate_mHz <= WIRE_RATE_MAX_mHz));
   FUZZ_CHECK(info->osr >= 256 && info->osr <= 8192 && (info->osr & (info->osr - 1)) == 0);
   FUZZ_CHECK(info->slip_threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm &&
              info->slip_threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm);
-  FUZZ_CHECK(info->slip_window_ms >= WIRE_SLIP_WINDOW_MIN_ms &&
-             info->slip_window_ms <= WIRE_SLIP_WINDOW_MAX_ms);
+  FUZZ_CHECK(info->slip_window_ms >= WIRE_SLIP_WINDOW_MIN_ms && info->slip_window_ms <= WIRE_SLIP_WINDOW_MAX_ms);
   FUZZ_CHECK(info->location_limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm &&
              info->location_limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm);
-  FUZZ_CHECK(info->prior_width_mm == 0.0f || (info->prior_sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm &&
-                                              info->prior_sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm));
+  FUZZ_CHECK(info->prior_width_mm == 0.0f ||
+             (info->prior_sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && info->prior_sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm));
   FUZZ_CHECK((info->streams & ~WIRE_STREAM_ALL) == 0);
   FUZZ_CHECK(info->sync <= PORT_SYNC_SECOND);
   if (info->stored & WIRE_STORED_CALIBRATION) {
@@ -172,12 +170,12 @@ static void send_raw(struct fuzz_input *input) {
 }
 
 static void send_command(struct fuzz_input *input) {
-  static const uint8_t body_bytes[] = {
-      1, 1, 4, 2, 6, 0, 0, 4, 15 + 8 * 15, 0, 1, 8, 4, 4 * PAD_PROFILE_FLOATS + 1, 0, 3};
+  static const uint8_t body_bytes[] = {1, 1, 4, 2, 6, 0, 0, 4, 15 + 8 * 15, 0, 1, 8, 4, 4 * PAD_PROFILE_FLOATS + 1,
+                                       0, 3};
   const uint8_t type = fuzz_u8(input);
   const bool is_sync = (type & 0x0F) == (WIRE_CMD_SYNC & 0x0F) && type & 0x40;
-  uint8_t packet[WIRE_HEADER_BYTES + 256] = {
-      WIRE_VERSION, is_sync ? (uint8_t)WIRE_CMD_SYNC : (uint8_t)(0x80 | (type & 0x0F))};
+  uint8_t packet[WIRE_HEADER_BYTES + 256] = {WIRE_VERSION,
+                                             is_sync ? (uint8_t)WIRE_CMD_SYNC : (uint8_t)(0x80 | (type & 0x0F))};
   size_t length = type & 0x10 ? fuzz_u8(input) : body_bytes[type & 0x0F];
   if (type & 0x20) { /* some other version or type */
     packet[0] = fuzz_u8(input);

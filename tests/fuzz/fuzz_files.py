@@ -5,6 +5,7 @@
 
 libFuzzer cannot see into Python: these are the seeds of `corpus`, damaged at random, without coverage.
 """
+
 import argparse
 import pathlib
 import random
@@ -19,8 +20,28 @@ from grasp import read_truth  # noqa: E402
 
 TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"
 RUN = '{"device_time_zero_s": 0.25, "warnings": [], "cycles": 5}\n'
-WORDS = (b"18446744073709551616", b"-1", b"1e400", b"nan", b"inf", b"", b"\n", b"\r\n", b",", b"#", b": ", b"\x00", b"\xff\xfe", b"0x10", b"1_000",
-         b"# end: ", b"# packet: info", b"# grip: ", b"# devices: ", b"\xe2\x80\xa8")
+WORDS = (
+    b"18446744073709551616",
+    b"-1",
+    b"1e400",
+    b"nan",
+    b"inf",
+    b"",
+    b"\n",
+    b"\r\n",
+    b",",
+    b"#",
+    b": ",
+    b"\x00",
+    b"\xff\xfe",
+    b"0x10",
+    b"1_000",
+    b"# end: ",
+    b"# packet: info",
+    b"# grip: ",
+    b"# devices: ",
+    b"\xe2\x80\xa8",
+)
 
 
 def check_recording(path, prng):
@@ -58,7 +79,7 @@ def damaged(data, prng):
         if kind == 0:
             data = data[:at] + prng.choice(WORDS) + data[end:]
         elif kind == 1:
-            data = data[:at] + bytes([prng.randrange(256)]) + data[at + 1:]
+            data = data[:at] + bytes([prng.randrange(256)]) + data[at + 1 :]
         elif kind == 2:
             data = data[:at]
         elif kind == 3 and lines:
@@ -81,8 +102,12 @@ def main(argv):
     options = parser.parse_args(argv)
     recordings = [path.read_bytes()[1:] for path in sorted((HERE / "corpus/recording").iterdir())]
     scenarios = [path.read_bytes() for path in sorted((HERE / "corpus/scenario").iterdir())]
-    jobs = ([(check_recording, data) for data in recordings] + [(check_grip, data) for data in recordings] +
-            [(check_scenario, data) for data in scenarios] + [(check_truth, TRUTH.encode()), (check_run, RUN.encode())])
+    jobs = (
+        [(check_recording, data) for data in recordings]
+        + [(check_grip, data) for data in recordings]
+        + [(check_scenario, data) for data in scenarios]
+        + [(check_truth, TRUTH.encode()), (check_run, RUN.encode())]
+    )
     prng = random.Random(options.seed)
     read = 0
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:

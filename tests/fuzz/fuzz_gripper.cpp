@@ -74,8 +74,7 @@ private:
       }
       const Bytes answer = answer_to(Bytes(question, question + length));
       over_ = fuzz_left(&answers_) == 0;
-      FUZZ_CHECK(write(master_, answer.data(), answer.size()) ==
-                 static_cast<ssize_t>(answer.size()));
+      FUZZ_CHECK(write(master_, answer.data(), answer.size()) == static_cast<ssize_t>(answer.size()));
     }
   }
 
@@ -89,8 +88,7 @@ private:
 
   Bytes answer_to(const Bytes &question) {
     const std::uint8_t how = fuzz_u8(&answers_);
-    Bytes answer = how < 0xC0 ? (modbus_ ? modbus_answer(question) : feetech_answer(question))
-                              : some(how & 0x3F);
+    Bytes answer = how < 0xC0 ? (modbus_ ? modbus_answer(question) : feetech_answer(question)) : some(how & 0x3F);
     if (how >= 0xA0 && how < 0xC0 && !answer.empty()) { // damaged
       answer[fuzz_u8(&answers_) % answer.size()] ^= fuzz_u8(&answers_);
     } else if (how >= 0xE0) {
@@ -154,8 +152,7 @@ void talk(const std::string &port, bool modbus, fuzz_input questions, const Line
       if (what < 0x40) {
         check(gripper->poll(), gripper->traits());
       } else if (what < 0xF8) {
-        check(gripper->move({fuzz_u8(&questions) * 1.0, fuzz_u8(&questions) * 1.0, what * 1.0}),
-              gripper->traits());
+        check(gripper->move({fuzz_u8(&questions) * 1.0, fuzz_u8(&questions) * 1.0, what * 1.0}), gripper->traits());
       } else {
         gripper->activate();
       }
@@ -163,8 +160,7 @@ void talk(const std::string &port, bool modbus, fuzz_input questions, const Line
       gripper->line();
     }
   } catch (const Error &error) {
-    FUZZ_CHECK(error.code() == ErrorCode::gripper_silent ||
-               error.code() == ErrorCode::gripper_garbled ||
+    FUZZ_CHECK(error.code() == ErrorCode::gripper_silent || error.code() == ErrorCode::gripper_garbled ||
                error.code() == ErrorCode::gripper_refused || error.code() == ErrorCode::gone);
   }
 }

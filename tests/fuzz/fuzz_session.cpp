@@ -12,12 +12,9 @@ namespace {
 // Nothing waits: each reading takes what the input has next, and at its end the port is gone.
 class Said : public Transport {
 public:
-  explicit Said(fuzz_input &input) : input_(input) {
-    wire_receiver_init(&commands_, wire_commands);
-  }
+  explicit Said(fuzz_input &input) : input_(input) { wire_receiver_init(&commands_, wire_commands); }
 
-  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-              std::chrono::milliseconds) override {
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, std::chrono::milliseconds) override {
     *length = 0;
     if (fuzz_left(&input_) == 0) {
       return Result::gone;
@@ -56,8 +53,7 @@ private:
     packet.type = WIRE_ACK;
     packet.t_us = how & 1 ? fuzz_u64(&input_) : 5;
     packet.body.ack.command = asked_.type;
-    packet.body.ack.sequence =
-        static_cast<std::uint16_t>(asked_.sequence - (how & 2 ? fuzz_u8(&input_) : 0));
+    packet.body.ack.sequence = static_cast<std::uint16_t>(asked_.sequence - (how & 2 ? fuzz_u8(&input_) : 0));
     packet.body.ack.result = how & 4 ? fuzz_u8(&input_) : 0;
     packet.body.ack.host_time_us = how & 8 ? fuzz_u64(&input_) : asked_.t_us;
     line = frame_bytes(packet);
@@ -88,8 +84,7 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
       case 0: {
         const wire_packet packet = session.info(patient);
         FUZZ_CHECK(packet.type == WIRE_INFO);
-        FUZZ_CHECK(packet.body.info.sensor_count >= 1 &&
-                   packet.body.info.sensor_count <= FT_MAX_SENSORS);
+        FUZZ_CHECK(packet.body.info.sensor_count >= 1 && packet.body.info.sensor_count <= FT_MAX_SENSORS);
         break;
       }
       case 1:

@@ -21,9 +21,7 @@ struct Program {
 
 class Scene {
 public:
-  explicit Scene(fuzz_input input) : input_(input) {
-    wire_receiver_init(&commands_, wire_commands);
-  }
+  explicit Scene(fuzz_input input) : input_(input) { wire_receiver_init(&commands_, wire_commands); }
 
   void run() {
     while (fuzz_left(&input_) > 0) {

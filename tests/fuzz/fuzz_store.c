@@ -12,8 +12,7 @@ static uint64_t now_us;
 
 static bool is_same(const struct store_content *a, const struct store_content *b) {
   return a->has_calibration == b->has_calibration && a->has_settings == b->has_settings &&
-         a->has_profile == b->has_profile &&
-         memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
+         a->has_profile == b->has_profile && memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
          memcmp(&a->settings, &b->settings, sizeof a->settings) == 0 &&
          memcmp(&a->profile, &b->profile, PROFILE_BYTES) == 0;
 }
@@ -23,13 +22,10 @@ static void check_content(void) {
   static const struct store_content none;
   struct store_content content = store.content;
   FUZZ_CHECK(!content.has_calibration || calibration_is_valid(&content.calibration, sensors));
-  FUZZ_CHECK(content.has_calibration ||
-             memcmp(&content.calibration, &none.calibration, sizeof none.calibration) == 0);
-  FUZZ_CHECK(content.has_settings ||
-             memcmp(&content.settings, &none.settings, sizeof none.settings) == 0);
+  FUZZ_CHECK(content.has_calibration || memcmp(&content.calibration, &none.calibration, sizeof none.calibration) == 0);
+  FUZZ_CHECK(content.has_settings || memcmp(&content.settings, &none.settings, sizeof none.settings) == 0);
   FUZZ_CHECK(content.has_profile || memcmp(&content.profile, &none.profile, PROFILE_BYTES) == 0);
-  FUZZ_CHECK(store.next_slot <= STORE_SLOTS && store.sure_slot <= STORE_SLOTS &&
-             store.sector < PORT_FLASH_SECTORS);
+  FUZZ_CHECK(store.next_slot <= STORE_SLOTS && store.sure_slot <= STORE_SLOTS && store.sector < PORT_FLASH_SECTORS);
 }
 
 /* Until nothing is under way, or power is lost. */
@@ -53,8 +49,7 @@ static void start(void) {
 static enum ft_status begin_change(struct fuzz_input *input, struct store_content *after) {
   *after = store.content;
   const uint8_t kind = fuzz_u8(input);
-  struct calibration calibration = {
-      .date_s = fuzz_u8(input), .placements = 20, .force_scale = 1.0f};
+  struct calibration calibration = {.date_s = fuzz_u8(input), .placements = 20, .force_scale = 1.0f};
   for (int k = 0; k < sensors; k++) {
     struct sensor_calibration *sensor = &calibration.sensors[k];
     sensor->gain = 0.5f + (float)fuzz_u8(input) / 255.0f;
@@ -62,8 +57,7 @@ static enum ft_status begin_change(struct fuzz_input *input, struct store_conten
     sensor->off_x_um = sensor->wider_q15 = fuzz_u8(input);
     sensor->off_y_um = (int16_t)-sensor->off_x_um;
   }
-  struct store_settings settings = {
-      .rate_mHz = fuzz_u32(input), .osr = fuzz_u16(input), .slip_threshold_mm = 1.0f};
+  struct store_settings settings = {.rate_mHz = fuzz_u32(input), .osr = fuzz_u16(input), .slip_threshold_mm = 1.0f};
   struct pad_profile profile = {.thickness_mm = (float)fuzz_u8(input)};
   memset((uint8_t *)&profile + PROFILE_BYTES, 0, sizeof profile - PROFILE_BYTES);
   const bool erases = (kind & 0x80) != 0;

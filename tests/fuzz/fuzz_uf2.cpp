@@ -56,8 +56,7 @@ Bytes file_of(const Bytes &flash) {
 }
 
 bool is_word(const std::string &text) {
-  return !text.empty() &&
-         std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
 }
 
 } // namespace

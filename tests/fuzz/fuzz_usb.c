@@ -9,13 +9,7 @@
 
 #include <unity.h>
 
-enum {
-  BULK_IN = 0x82,
-  BULK_OUT = 0x02,
-  CONTROL_IN = 0x80,
-  TRANSMIT_BYTES = 4096,
-  RECEIVE_BYTES = 256
-};
+enum { BULK_IN = 0x82, BULK_OUT = 0x02, CONTROL_IN = 0x80, TRANSMIT_BYTES = 4096, RECEIVE_BYTES = 256 };
 
 /* What has been written and not yet been delivered, either way. */
 struct queue {
@@ -144,8 +138,7 @@ static void check_is_alive(void) {
   while (device_reads(RECEIVE_BYTES) > 0) {
   }
   FUZZ_CHECK(device_writes(100) == FT_OK);
-  FUZZ_CHECK(host_reads(BULK_IN) == 64 && host_reads(BULK_IN) == 36 + MARK_BYTES &&
-             host_reads(BULK_IN) == HOST_NAK);
+  FUZZ_CHECK(host_reads(BULK_IN) == 64 && host_reads(BULK_IN) == 36 + MARK_BYTES && host_reads(BULK_IN) == HOST_NAK);
   for (int i = 0; i < 5; i++) {
     FUZZ_CHECK(host_writes(BULK_OUT, 64) == (i < 4 ? 0 : HOST_NAK));
   }
@@ -177,8 +170,7 @@ static struct setup some_setup(struct fuzz_input *input) {
   uint8_t which = fuzz_u8(input);
   struct setup setup = known[which % KNOWN];
   if (which >= 200) {
-    setup = (struct setup){fuzz_u8(input), fuzz_u8(input), fuzz_u16(input), fuzz_u16(input),
-                           fuzz_u16(input)};
+    setup = (struct setup){fuzz_u8(input), fuzz_u8(input), fuzz_u16(input), fuzz_u16(input), fuzz_u16(input)};
   } else if (which >= 120) {
     setup.length = fuzz_u8(input);
   }
@@ -202,15 +194,13 @@ static void transfer(struct fuzz_input *input, bool whole) {
     begin_transfer(&setup);
     result = whole ? host_reads(CONTROL_IN) : 0;
   } else if (setup.type & 0x80) {
-    result =
-        host_control_in(setup.type, setup.request, setup.value, setup.index, setup.length, data);
+    result = host_control_in(setup.type, setup.request, setup.value, setup.index, setup.length, data);
   } else {
     size_t given = setup.length;
     const uint8_t *bytes = fuzz_bytes(input, &given);
     memset(data, 0, setup.length);
     memcpy(data, bytes, given);
-    result =
-        host_control_out(setup.type, setup.request, setup.value, setup.index, data, setup.length);
+    result = host_control_out(setup.type, setup.request, setup.value, setup.index, data, setup.length);
   }
   FUZZ_CHECK(result <= setup.length);
   if (whole && result == 0 && setup.type == 0x00 && setup.request == 5) {
@@ -219,8 +209,7 @@ static void transfer(struct fuzz_input *input, bool whole) {
 }
 
 static uint8_t some_endpoint(struct fuzz_input *input) {
-  static const uint8_t endpoints[] = {BULK_IN, BULK_OUT,   BULK_IN, BULK_OUT,
-                                      0x00,    CONTROL_IN, 0x81,    0x01};
+  static const uint8_t endpoints[] = {BULK_IN, BULK_OUT, BULK_IN, BULK_OUT, 0x00, CONTROL_IN, 0x81, 0x01};
   return endpoints[fuzz_u8(input) % sizeof endpoints];
 }
 

@@ -30,8 +30,7 @@ void check_setting(const std::string &text) {
 }
 
 void check_text(const std::string &text) {
-  for (const char *name :
-       {"rate=", "osr=", "slip_threshold=", "slip_window=", "prior=", "limit=", "sync="}) {
+  for (const char *name : {"rate=", "osr=", "slip_threshold=", "slip_window=", "prior=", "limit=", "sync="}) {
     check_setting(name + text);
   }
   if (const auto number = to_float(text)) {
@@ -74,8 +73,8 @@ void check_settings(fuzz_input &input) {
     const GripSettings settings = settings_for(traits, wanted);
     for (const GraspSetting &setting : all) {
       const auto asked = wanted.find(setting.name);
-      FUZZ_CHECK(asked == wanted.end() || std::abs(value_of(setting, settings) - asked->second) <=
-                                              1e-9 * (1.0 + std::abs(asked->second)));
+      FUZZ_CHECK(asked == wanted.end() ||
+                 std::abs(value_of(setting, settings) - asked->second) <= 1e-9 * (1.0 + std::abs(asked->second)));
     }
     settings_metadata(settings);
   } catch (const Error &error) {

@@ -12,15 +12,13 @@ namespace fuzz {
 inline fingertip::Bytes encoded(const wire_packet &packet) {
   fingertip::Bytes frame(WIRE_MAX_FRAME_BYTES);
   std::size_t length = 0;
-  FUZZ_CHECK(wire_encode(wire_find_layout(wire_all_layouts, packet.type), &packet, frame.data(),
-                         &length) == FT_OK);
+  FUZZ_CHECK(wire_encode(wire_find_layout(wire_all_layouts, packet.type), &packet, frame.data(), &length) == FT_OK);
   FUZZ_CHECK(length <= WIRE_MAX_FRAME_BYTES);
   frame.resize(length);
   return frame;
 }
 
-inline void append_packet(fingertip::Bytes &line, fuzz_input &input, std::uint8_t type,
-                          std::size_t body_length) {
+inline void append_packet(fingertip::Bytes &line, fuzz_input &input, std::uint8_t type, std::size_t body_length) {
   fingertip::Bytes packet = {WIRE_VERSION, type};
   for (int i = 2; i < WIRE_HEADER_BYTES; i++) {
     packet.push_back(fuzz_u8(&input));

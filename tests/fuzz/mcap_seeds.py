@@ -5,6 +5,7 @@
 A seed is a byte of options (fuzz_mcap.cpp) and a file: one and two not packed, packed_one as the tool writes it, no_chunks. Each must fit into
 the longest input of the target (CMakeLists.txt).
 """
+
 import pathlib
 import subprocess
 import sys
@@ -18,7 +19,12 @@ import mcap.writer  # noqa: E402
 
 UNPACKED = {"compression": mcap.writer.CompressionType.NONE, "repeat_schemas": False}
 # name: byte of options, recording, how another writer writes it; None: as the tool did
-SEEDS = {"one": (0x01, "one", UNPACKED), "two": (0x03, "two", UNPACKED), "packed_one": (0x00, "one", None), "no_chunks": (0x22, "two", {"use_chunking": False, "repeat_schemas": False})}
+SEEDS = {
+    "one": (0x01, "one", UNPACKED),
+    "two": (0x03, "two", UNPACKED),
+    "packed_one": (0x00, "one", None),
+    "no_chunks": (0x22, "two", {"use_chunking": False, "repeat_schemas": False}),
+}
 
 
 def main(argv):

@@ -1,4 +1,5 @@
 """fuzz.py with stand-ins for the targets: what it feeds, keeps and says."""
+
 import json
 import pathlib
 import subprocess
@@ -8,7 +9,12 @@ import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path[:0] = [str(HERE), str(ROOT / "host_tools/report/reliability"), str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [
+    str(HERE),
+    str(ROOT / "host_tools/report/reliability"),
+    str(ROOT / "host_tools/report/shared"),
+    str(ROOT / "host_tools/python"),
+]
 import fuzz  # noqa: E402
 import fuzzing  # noqa: E402
 
@@ -46,8 +52,12 @@ class FuzzTest(unittest.TestCase):
         program.with_name(program.name + ".options").write_text(f"[libfuzzer]\n{options}\n")
 
     def fuzz(self, *options):
-        return subprocess.run([sys.executable, HERE / "fuzz.py", "--build", self.build, "--json", self.build / "found.json", *options],
-                              capture_output=True, text=True, timeout=60)
+        return subprocess.run(
+            [sys.executable, HERE / "fuzz.py", "--build", self.build, "--json", self.build / "found.json", *options],
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
 
     def found(self):
         return json.loads((self.build / "found.json").read_text())
@@ -67,8 +77,11 @@ class FuzzTest(unittest.TestCase):
         self.assertFalse((self.build / "findings").exists())
 
     def test_a_finding_is_kept_told_and_fails(self):
-        for kind, words in (("crashes", "SUMMARY: libFuzzer: deadly signal"), ("sanitizer_findings", "a.c:1: runtime error: overflow"),
-                            ("sanitizer_findings", "ERROR: AddressSanitizer: heap-use-after-free")):
+        for kind, words in (
+            ("crashes", "SUMMARY: libFuzzer: deadly signal"),
+            ("sanitizer_findings", "a.c:1: runtime error: overflow"),
+            ("sanitizer_findings", "ERROR: AddressSanitizer: heap-use-after-free"),
+        ):
             for how in (("--seconds", "2"), ("--runs", "7")):
                 with self.subTest(words, how=how):
                     self.finding(kind, words, how)
@@ -79,8 +92,10 @@ class FuzzTest(unittest.TestCase):
         done = self.fuzz(*how)
         self.assertEqual(done.returncode, 1)
         found = self.found()
-        self.assertEqual({name: found[name] for name in ("crashes", "sanitizer_findings")}, {"crashes": 0, "sanitizer_findings": 0, kind: 1})
-        kept, = (self.build / "findings").iterdir()
+        self.assertEqual(
+            {name: found[name] for name in ("crashes", "sanitizer_findings")}, {"crashes": 0, "sanitizer_findings": 0, kind: 1}
+        )
+        (kept,) = (self.build / "findings").iterdir()
         self.assertEqual(kept.read_bytes(), b"wrong")
         self.assertIn(words, done.stderr)
         self.assertIn(f"to do it again: {self.build / 'tests/fuzz/fuzz_usb'} {kept}", done.stderr)
@@ -103,8 +118,10 @@ class FuzzTest(unittest.TestCase):
 
     def test_what_is_missing_is_one_line(self):
         done = self.fuzz("--runs", "1")
-        self.assertEqual((done.returncode, done.stderr), (1, f"fuzz.py: {self.build}/tests/fuzz: is not there; build it: cmake --preset fuzz && "
-                                                             "cmake --build --preset fuzz\n"))
+        self.assertEqual(
+            (done.returncode, done.stderr),
+            (1, f"fuzz.py: {self.build}/tests/fuzz: is not there; build it: cmake --preset fuzz && cmake --build --preset fuzz\n"),
+        )
         self.target("usb")
         done = self.fuzz("--runs", "1", "toaster")
         self.assertEqual((done.returncode, done.stderr), (1, "fuzz.py: no target toaster; there are: usb\n"))
@@ -114,8 +131,11 @@ class FuzzTest(unittest.TestCase):
         long = fuzz.bulk_seed("recording", [recording], 100000)
         self.assertTrue(long.startswith(recording.split(b"# packet")[0]))
         self.assertGreater(len(long), 50000)
-        times = [line.split(b",")[0] for line in fuzz.bulk_seed("scenario", [(HERE / "corpus/scenario/two").read_bytes()], 5000).splitlines()
-                 if line[:1].isdigit()]
+        times = [
+            line.split(b",")[0]
+            for line in fuzz.bulk_seed("scenario", [(HERE / "corpus/scenario/two").read_bytes()], 5000).splitlines()
+            if line[:1].isdigit()
+        ]
         self.assertEqual(sorted(times, key=float), times)
         self.assertEqual(fuzz.bulk_seed("uf2", [b"ab", b"c"], 8), b"abcabcab")
 

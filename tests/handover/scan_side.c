@@ -69,8 +69,7 @@ static uint32_t answer(void) {
   return (uint32_t)prom.word[(sensors.command - MS58XX_CMD_READ_PROM) / 2 % MS58XX_PROM_WORDS] << 8;
 }
 
-static enum ft_status poll(void *context, uint64_t t_us, struct array_bus_result *result,
-                           uint64_t *wake_us) {
+static enum ft_status poll(void *context, uint64_t t_us, struct array_bus_result *result, uint64_t *wake_us) {
   (void)context;
   (void)t_us;
   (void)wake_us;

@@ -30,8 +30,7 @@ static void tell(const char *what, unsigned most, unsigned long runs, unsigned l
 }
 
 static void test_what_main_writes_is_whole(void) {
-  static const struct explore_interrupt interrupts[] = {{usb_take_packet, 1, 3},
-                                                        {usb_reopen, 1, 2}};
+  static const struct explore_interrupt interrupts[] = {{usb_take_packet, 1, 3}, {usb_reopen, 1, 2}};
   unsigned long points;
   usb_open_port();
   unsigned long runs = explore(write_some, interrupts, 2, 3, &points);

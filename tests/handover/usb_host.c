@@ -49,8 +49,7 @@ void usb_judge_session(void) {
   const size_t begin = is_marked ? sizeof mark : 0;
   TEST_ASSERT_EQUAL_MESSAGE(0, host.got[begin] % WRITE_BYTES, "a session begins within a write");
   for (size_t i = begin + 1; i < host.got_bytes; i++) {
-    TEST_ASSERT_EQUAL_MESSAGE(host.got[begin] + i - begin, host.got[i],
-                              "bytes torn, lost or twice");
+    TEST_ASSERT_EQUAL_MESSAGE(host.got[begin] + i - begin, host.got[i], "bytes torn, lost or twice");
   }
 }
 

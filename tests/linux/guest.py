@@ -8,6 +8,7 @@
 Software emulation throughout: no KVM, no privileges. Kernel and modules come out of Debian's package, which is
 downloaded and never installed.
 """
+
 import base64
 import gzip
 import lzma
@@ -42,7 +43,7 @@ def call(*command, **options):
 def unpack_vmlinux(image):
     """The kernel inside a bzImage: Documentation/x86/boot.rst, setup_sects, payload_offset, payload_length."""
     at = (image[0x1F1] + 1) * 512 + int.from_bytes(image[0x248:0x24C], "little")
-    payload = image[at:at + int.from_bytes(image[0x24C:0x250], "little")]
+    payload = image[at : at + int.from_bytes(image[0x24C:0x250], "little")]
     if not payload.startswith(b"\xfd7zXZ"):
         raise Unavailable("the kernel package's image is not compressed with xz, as Debian's is")
     return lzma.LZMADecompressor().decompress(payload)
@@ -169,17 +170,50 @@ class Guest:
         listener.listen()
         self.errors = open(self.folder / "qemu.err", "w+")
         self.process = subprocess.Popen(
-            [QEMU, "-M", "pc", "-accel", "tcg", "-m", "256", "-display", "none", "-monitor", "none", "-no-reboot",
-             "-nic", "none", "-kernel", kernel / "vmlinux", "-initrd", initramfs,
-             # From no_timer_check on: a machine that is given no time for a second or two is not ill.
-             "-append", "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check "
-                        "tsc=nowatchdog nowatchdog rcupdate.rcu_cpu_stall_suppress=1",
-             "-serial", f"file:{self.folder / 'console.log'}", "-serial", f"unix:{port},server=off",
-             "-device", "qemu-xhci",
-             *(option for number, path in enumerate(usbredir)
-               for option in ("-chardev", f"socket,id=usb{number},path={path},reconnect=1",
-                              "-device", f"usb-redir,chardev=usb{number}"))],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.errors)
+            [
+                QEMU,
+                "-M",
+                "pc",
+                "-accel",
+                "tcg",
+                "-m",
+                "256",
+                "-display",
+                "none",
+                "-monitor",
+                "none",
+                "-no-reboot",
+                "-nic",
+                "none",
+                "-kernel",
+                kernel / "vmlinux",
+                "-initrd",
+                initramfs,
+                # From no_timer_check on: a machine that is given no time for a second or two is not ill.
+                "-append",
+                "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check "
+                "tsc=nowatchdog nowatchdog rcupdate.rcu_cpu_stall_suppress=1",
+                "-serial",
+                f"file:{self.folder / 'console.log'}",
+                "-serial",
+                f"unix:{port},server=off",
+                "-device",
+                "qemu-xhci",
+                *(
+                    option
+                    for number, path in enumerate(usbredir)
+                    for option in (
+                        "-chardev",
+                        f"socket,id=usb{number},path={path},reconnect=1",
+                        "-device",
+                        f"usb-redir,chardev=usb{number}",
+                    )
+                ),
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=self.errors,
+        )
         self.requests = 0
         self.received = b""
         try:
@@ -227,7 +261,7 @@ class Guest:
             raise RuntimeError(f"answer {number} to request {self.requests}")
         while len(self.received) < int(length):
             self._receive(limit_s)
-        output, self.received = self.received[:int(length)], self.received[int(length):]
+        output, self.received = self.received[: int(length)], self.received[int(length) :]
         return int(status), output
 
     def run(self, script, limit_s=LIMIT_s):

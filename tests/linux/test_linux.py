@@ -11,6 +11,7 @@ run it.
 real time: a kernel in a virtual machine. Its busybox has nothing that waits for a file to change, so the machine's shell looks
 for one every tenth of a second. Limits are for what hangs; the one time that is judged is judged beside the machine's own delays.
 """
+
 import argparse
 import csv
 import json
@@ -36,8 +37,20 @@ import guest as virtual  # noqa: E402
 
 TOOLS = argparse.Namespace()
 REPORT = {}
-REPORTED = ("packets_serial", "packets_libusb", "packets_compared", "different", "packets_pico_parallel", "lost",
-            "stalled_shown_s", "kernel_warnings", "controller_warnings", "machine_warnings", "detach_cycles", "linux_test_s")
+REPORTED = (
+    "packets_serial",
+    "packets_libusb",
+    "packets_compared",
+    "different",
+    "packets_pico_parallel",
+    "lost",
+    "stalled_shown_s",
+    "kernel_warnings",
+    "controller_warnings",
+    "machine_warnings",
+    "detach_cycles",
+    "linux_test_s",
+)
 SERIAL = "E660583883265A2C"
 OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
@@ -66,7 +79,8 @@ KERNEL_WARNING = 4
 # apart.
 CONTROLLER_WARNING = re.compile(
     r"xhci_hcd [\w:.]+: (ERROR Transfer event TRB DMA ptr not part of current TD|Looking for event-dma |"
-    r"WARN Event TRB for slot \d+ ep \d+ with no TDs queued|URB req \d+ and actual \d+ transfer length mismatch)")
+    r"WARN Event TRB for slot \d+ ep \d+ with no TDs queued|URB req \d+ and actual \d+ transfer length mismatch)"
+)
 # What the kernel says of its own clock and processor when the computer gave the virtual machine no time.
 MACHINE_WARNING = re.compile(r"(clocksource: |hrtimer: interrupt took |rcu: |sched: RT throttling )")
 CONTACT, RAW = 0x01, 0x02
@@ -89,7 +103,7 @@ def cobs_decode(coded):
     at = 0
     while at < len(coded):
         code = coded[at]
-        plain += coded[at + 1:at + code]
+        plain += coded[at + 1 : at + code]
         at += code
         if code < 0xFF and at < len(coded):
             plain.append(0)
@@ -138,10 +152,34 @@ class Emulator:
     def __init__(self, folder, name, image, board, scenario, socket, serial=SERIAL):
         self.base = folder / name
         self.process = subprocess.Popen(
-            [TOOLS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--image", image, "--board", board,
-             "--scenario", scenario, "--seconds", "3600", "--serial", serial, "--usbredir", socket, "--fast-enumeration",
-             "--progress", "--usb-log", self.path("usb"), "--capture", self.path("ftr"), "--report", self.path("json")],
-            stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            [
+                TOOLS.node,
+                ROOT / "host_tools/simulation/emulator/main.mjs",
+                "--image",
+                image,
+                "--board",
+                board,
+                "--scenario",
+                scenario,
+                "--seconds",
+                "3600",
+                "--serial",
+                serial,
+                "--usbredir",
+                socket,
+                "--fast-enumeration",
+                "--progress",
+                "--usb-log",
+                self.path("usb"),
+                "--capture",
+                self.path("ftr"),
+                "--report",
+                self.path("json"),
+            ],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.lines, self.more = [], threading.Condition()
         self.listener = threading.Thread(target=self._listen)
         self.listener.start()
@@ -166,6 +204,7 @@ class Emulator:
 
     def pass_time(self, seconds):
         """Of the device's time, to the second, of which it tells each on the wall."""
+
         def now_s():
             told = [PROGRESS.match(line) for line in self.lines]
             return max((float(each[1]) for each in told if each), default=0.0)
@@ -208,18 +247,24 @@ def until(condition, limit_s=PATIENCE_s):
 
 def write_press(path):
     """The same press from PRESSED_s on."""
-    press = [20000 * math.exp(-((x_mm - 2) ** 2 + (y_mm - 3) ** 2) / (2 * 5.7 ** 2))
-             for x_mm, y_mm in zip(files.SENSOR_X_mm, files.SENSOR_Y_mm)]
+    press = [
+        20000 * math.exp(-((x_mm - 2) ** 2 + (y_mm - 3) ** 2) / (2 * 5.7**2)) for x_mm, y_mm in zip(files.SENSOR_X_mm, files.SENSOR_Y_mm)
+    ]
     names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(len(press)))]
     truth = ",".join("0" * len(files.TRUTH_COLUMNS))
-    rows = [f"{t_s},{truth},{','.join(f'{scale * p_Pa:.3f}' for p_Pa in press)}" for t_s, scale in ((0, 0), (PRESSED_s - 0.2, 0), (PRESSED_s, 1))]
+    rows = [
+        f"{t_s},{truth},{','.join(f'{scale * p_Pa:.3f}' for p_Pa in press)}"
+        for t_s, scale in ((0, 0), (PRESSED_s - 0.2, 0), (PRESSED_s, 1))
+    ]
     path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
 
 
 def packaged_tool(folder):
     """fingertip as the Debian package holds it."""
     packed, unpacked = folder / "packages", folder / "unpacked"
-    subprocess.run([TOOLS.cpack, "--config", pathlib.Path(TOOLS.build) / "CPackConfig.cmake", "-B", packed], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [TOOLS.cpack, "--config", pathlib.Path(TOOLS.build) / "CPackConfig.cmake", "-B", packed], check=True, stdout=subprocess.DEVNULL
+    )
     [package] = packed.glob("fingertip_*.deb")
     subprocess.run(["dpkg-deb", "--extract", package, unpacked], check=True)
     return unpacked / "usr/bin/fingertip"
@@ -246,7 +291,7 @@ class Linux(unittest.TestCase):
     def setUp(self):
         """What the kernel complained of until now, and before which test."""
         log = self.kernel_log()
-        self.complaints += [(self._testMethodName, text) for level, text in log[self.heard:] if level <= KERNEL_WARNING]
+        self.complaints += [(self._testMethodName, text) for level, text in log[self.heard :] if level <= KERNEL_WARNING]
         type(self).heard = len(log)
 
     @classmethod
@@ -279,8 +324,10 @@ class Linux(unittest.TestCase):
 
     def stream(self, transport, seconds=STREAM_s, wanted=PACKETS):
         """Records so many packets; check_bytes then sees that the tool got every byte that the device sent meanwhile."""
-        self.tool(f"record /tmp/{transport}.csv --overwrite --raw-bytes /tmp/{transport}.ftr --transport {transport} "
-                  f"--seconds {seconds}", STREAM_LIMIT_s)
+        self.tool(
+            f"record /tmp/{transport}.csv --overwrite --raw-bytes /tmp/{transport}.ftr --transport {transport} --seconds {seconds}",
+            STREAM_LIMIT_s,
+        )
         end = self.sh(f"tail -n 1 /tmp/{transport}.csv")
         self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
         received = self.guest.read_file(f"/tmp/{transport}.ftr")
@@ -309,8 +356,13 @@ class Linux(unittest.TestCase):
     def test_01_enumeration(self):
         self.wait_for_port()
         texts = [text for _, text in self.kernel_log()]
-        for wanted in ("new full-speed USB device", "Product: Fingertip tactile sensor", "Manufacturer: Fingertip",
-                       f"SerialNumber: {SERIAL}", "ttyACM0: USB ACM device"):
+        for wanted in (
+            "new full-speed USB device",
+            "Product: Fingertip tactile sensor",
+            "Manufacturer: Fingertip",
+            f"SerialNumber: {SERIAL}",
+            "ttyACM0: USB ACM device",
+        ):
             self.assertTrue(any(wanted in text for text in texts), f"{wanted}: not in\n" + "\n".join(texts))
 
     def test_02_ten_thousand_packets_over_the_serial_port(self):
@@ -318,12 +370,27 @@ class Linux(unittest.TestCase):
 
     def test_03_descriptors(self):
         text = self.sh(f"lsusb -v -d {VENDOR_PRODUCT} 2>&1")
-        for wanted in (r"bcdUSB +2\.00", r"bMaxPacketSize0 +64", r"iManufacturer +1 Fingertip", r"bNumConfigurations +1",
-                       r"iProduct +2 Fingertip tactile sensor", rf"iSerial +3 {SERIAL}", r"bNumInterfaces +2",
-                       r"bFunctionClass +2", r"bInterfaceClass +2", r"bInterfaceSubClass +2", r"bInterfaceClass +10",
-                       r"CDC Header:", r"CDC Call Management:", r"CDC ACM:\s+bmCapabilities +0x06",
-                       r"bMasterInterface +0\s+bSlaveInterface +1", r"EP 1 IN\s+bmAttributes +3", r"EP 2 OUT\s+bmAttributes +2",
-                       r"EP 2 IN\s+bmAttributes +2", r"Device Status: +0x0000"):
+        for wanted in (
+            r"bcdUSB +2\.00",
+            r"bMaxPacketSize0 +64",
+            r"iManufacturer +1 Fingertip",
+            r"bNumConfigurations +1",
+            r"iProduct +2 Fingertip tactile sensor",
+            rf"iSerial +3 {SERIAL}",
+            r"bNumInterfaces +2",
+            r"bFunctionClass +2",
+            r"bInterfaceClass +2",
+            r"bInterfaceSubClass +2",
+            r"bInterfaceClass +10",
+            r"CDC Header:",
+            r"CDC Call Management:",
+            r"CDC ACM:\s+bmCapabilities +0x06",
+            r"bMasterInterface +0\s+bSlaveInterface +1",
+            r"EP 1 IN\s+bmAttributes +3",
+            r"EP 2 OUT\s+bmAttributes +2",
+            r"EP 2 IN\s+bmAttributes +2",
+            r"Device Status: +0x0000",
+        ):
             self.assertRegex(text, wanted)
         for complaint in ("Warning", "INVALID", "UNRECOGNIZED", "Bad", "cannot read"):
             self.assertNotIn(complaint, text)
@@ -357,8 +424,9 @@ class Linux(unittest.TestCase):
         requests = self.device.requests()
         setups = [setup for setup, _ in requests]
         self.assertIn("8006000600000a00", setups, "DEVICE_QUALIFIER was not asked for")
-        self.assertEqual([data for setup, data in requests if setup.startswith("80060006")][0], [],
-                         "a full-speed device has no DEVICE_QUALIFIER")
+        self.assertEqual(
+            [data for setup, data in requests if setup.startswith("80060006")][0], [], "a full-speed device has no DEVICE_QUALIFIER"
+        )
         for string in (0, 1, 2, 3):
             asked = [data for setup, data in requests if re.match(f"8006{string:02}03(0000|0904)", setup)]
             self.assertTrue(asked and all(asked), f"string {string}")
@@ -377,8 +445,11 @@ class Linux(unittest.TestCase):
 
     def test_11_equal_sequences_and_none_lost(self):
         received = {transport: packets_of(stream)[0] for transport, stream in self.streams.items()}
-        REPORT.update(packets_serial=len(received["serial"]), packets_libusb=len(received["usb"]),
-                      lost=sum(gaps(packets) for packets in received.values()))
+        REPORT.update(
+            packets_serial=len(received["serial"]),
+            packets_libusb=len(received["usb"]),
+            lost=sum(gaps(packets) for packets in received.values()),
+        )
         for packets in received.values():
             frames = [(kind, int.from_bytes(body[:4], "little")) for kind, _, body in packets if kind in (CONTACT, RAW)]
             first = frames[0][1]
@@ -391,7 +462,7 @@ class Linux(unittest.TestCase):
             of_frame = {}
             for kind, _, body in packets_of(stream)[0]:
                 if kind == CONTACT:
-                    body = body[:STAGE_TIMES.start] + body[STAGE_TIMES.stop:]
+                    body = body[: STAGE_TIMES.start] + body[STAGE_TIMES.stop :]
                 frame = int.from_bytes(body[:4], "little")
                 if kind in (CONTACT, RAW) and frame >= STEADY_FROM_FRAME:
                     of_frame[kind, frame] = body
@@ -404,22 +475,30 @@ class Linux(unittest.TestCase):
         # All that both can have seen: on a busy machine one recording begins later than the other.
         frames = [[frame for _, frame in each] for each in bodies]
         least, most = max(map(min, frames)), min(map(max, frames))
-        self.assertEqual(shared, {key for each in bodies for key in each if least < key[1] < most} | {key for key in shared if key[1] in (least, most)})
+        self.assertEqual(
+            shared, {key for each in bodies for key in each if least < key[1] < most} | {key for key in shared if key[1] in (least, most)}
+        )
         self.assertGreaterEqual(len(shared), SHARED_PACKETS)
         self.assertGreater(len({body[4:] for body in bodies[0].values()}), 0.95 * len(shared), "readings that never change")
 
     def stall(self, transport):
         """Seconds in the machine from a silent device to the monitor's word, at least and at most, and the longest that the machine
         kept another program waiting meanwhile; the device is silent while it is stopped."""
+
         def uptime_s():
             return float(self.sh("cut -d' ' -f1 /proc/uptime"))
-        self.sh(f"(fingertip monitor --colour plain --transport {transport} | while read -r line; do "
-                "echo \"$(cut -d' ' -f1 /proc/uptime) $line\"; done) > /tmp/monitor.log 2>&1 & "
-                f"{until('pidof fingertip > /tmp/monitor.pid')}")
+
+        self.sh(
+            f"(fingertip monitor --colour plain --transport {transport} | while read -r line; do "
+            "echo \"$(cut -d' ' -f1 /proc/uptime) $line\"; done) > /tmp/monitor.log 2>&1 & "
+            f"{until('pidof fingertip > /tmp/monitor.pid')}"
+        )
         self.wait_for("grep -q 'CONTACT FIT_VALID' /tmp/monitor.log")
         # Another program, which wants to run every BEAT_s.
-        self.sh(f"(while [ ! -e /tmp/over ]; do read -r now rest < /proc/uptime; echo $now; usleep {BEAT_s * 1e6:.0f}; done) "
-                "> /tmp/beats 2>&1 & true")
+        self.sh(
+            f"(while [ ! -e /tmp/over ]; do read -r now rest < /proc/uptime; echo $now; usleep {BEAT_s * 1e6:.0f}; done) "
+            "> /tmp/beats 2>&1 & true"
+        )
         sounding_s = uptime_s()
         self.device.process.send_signal(signal.SIGSTOP)
         try:
@@ -447,8 +526,10 @@ class Linux(unittest.TestCase):
         REPORT["stalled_shown_s"] = round(max(shown_s), 2)
 
     def start_recording(self, name, transport):
-        self.sh(f"fingertip record /tmp/{name}.csv --raw-bytes /tmp/{name}.ftr --transport {transport} "
-                f"> /tmp/{name}.log 2>&1 & echo $! > /tmp/{name}.pid")
+        self.sh(
+            f"fingertip record /tmp/{name}.csv --raw-bytes /tmp/{name}.ftr --transport {transport} "
+            f"> /tmp/{name}.log 2>&1 & echo $! > /tmp/{name}.pid"
+        )
         self.wait_for_growth(name)
 
     def wait_for_growth(self, name):
@@ -502,8 +583,10 @@ class Linux(unittest.TestCase):
     def test_15_echo_of_a_terminal_not_yet_raw(self):
         before = self.pairs(self.tool("info"))
         command = self.encoded("stream", "contact,raw")
-        self.sh("mkfifo /tmp/echoed; (exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 sane echo; "
-                f"printf '{command}' >&3; read -r enough < /tmp/echoed) > /dev/null 2>&1 &")
+        self.sh(
+            "mkfifo /tmp/echoed; (exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 sane echo; "
+            f"printf '{command}' >&3; read -r enough < /tmp/echoed) > /dev/null 2>&1 &"
+        )
         self.device.pass_time(ECHOED_s)
         self.sh("echo enough > /tmp/echoed; wait; rm /tmp/echoed")
         after = self.pairs(self.tool("info"))
@@ -513,9 +596,11 @@ class Linux(unittest.TestCase):
     def test_16_host_that_opens_and_does_not_read(self):
         before = self.pairs(self.tool("info"))
         command = self.encoded("stream", "contact,raw")
-        self.sh("mkfifo /tmp/late.go; (exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 raw -echo; "
-                f"printf '{command}' >&3; read -r go < /tmp/late.go; exec cat <&3) "
-                "> /tmp/late.ftr 2>&1 & echo $! > /tmp/late.pid")
+        self.sh(
+            "mkfifo /tmp/late.go; (exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 raw -echo; "
+            f"printf '{command}' >&3; read -r go < /tmp/late.go; exec cat <&3) "
+            "> /tmp/late.ftr 2>&1 & echo $! > /tmp/late.pid"
+        )
         self.device.pass_time(UNREAD_s)
         self.sh("echo go > /tmp/late.go")
         self.wait_for(f"[ $(stat -c %s /tmp/late.ftr) -gt {READ_AFTERWARDS_bytes} ]", STREAM_LIMIT_s)
@@ -558,11 +643,14 @@ class Linux(unittest.TestCase):
         listed = [line.split("\t") for line in self.tool("list").splitlines()]
         self.assertEqual({serial: board for serial, board, *_ in listed}, boards)
         self.assertEqual({re.search("ttyACM[01]", reached)[0] for *_, reached in listed}, {"ttyACM0", "ttyACM1"})
-        self.assertEqual(self.guest.run("fingertip info"), (1, f"fingertip: several fingertips found: {SERIAL}, {OTHER_SERIAL}; "
-                                                               "choose one with --device SERIAL\n"))
-        self.assertEqual(self.guest.run("fingertip info --device 1234"),
-                         (1, f"fingertip: no fingertip 1234 here, there are: {SERIAL} {OTHER_SERIAL}; "
-                             "plug it in, then see `fingertip list`\n"))
+        self.assertEqual(
+            self.guest.run("fingertip info"),
+            (1, f"fingertip: several fingertips found: {SERIAL}, {OTHER_SERIAL}; choose one with --device SERIAL\n"),
+        )
+        self.assertEqual(
+            self.guest.run("fingertip info --device 1234"),
+            (1, f"fingertip: no fingertip 1234 here, there are: {SERIAL} {OTHER_SERIAL}; plug it in, then see `fingertip list`\n"),
+        )
         for serial, board in boards.items():
             for transport in ("serial", "usb"):
                 told = self.pairs(self.tool(f"info --device {serial} --transport {transport}"))
@@ -585,7 +673,9 @@ class Linux(unittest.TestCase):
             self.check_bytes(transport)
 
     def test_20_no_complaint(self):
-        controller, machine = ([each for each in self.complaints if pattern.match(each[1])] for pattern in (CONTROLLER_WARNING, MACHINE_WARNING))
+        controller, machine = (
+            [each for each in self.complaints if pattern.match(each[1])] for pattern in (CONTROLLER_WARNING, MACHINE_WARNING)
+        )
         complaints = [each for each in self.complaints if each not in controller + machine]
         REPORT.update(kernel_warnings=len(complaints), controller_warnings=len(controller), machine_warnings=len(machine))
         for before, text in controller + machine:

@@ -1,4 +1,5 @@
 """The test programs of a build tree, built again with something changed: their objects, archives and link lines are the build's."""
+
 import concurrent.futures
 import dataclasses
 import hashlib
@@ -32,10 +33,10 @@ def run(command, **how):
 
 @dataclasses.dataclass
 class Object:
-    output: str         # below the build tree
+    output: str  # below the build tree
     source: pathlib.Path
-    command: list       # without -o, -c, warnings and debugging
-    depends: set        # files of this project, resolved, the source among them
+    command: list  # without -o, -c, warnings and debugging
+    depends: set  # files of this project, resolved, the source among them
     digest: str
 
     @property
@@ -45,13 +46,13 @@ class Object:
 
 @dataclasses.dataclass
 class Program:
-    name: str           # below the build tree
+    name: str  # below the build tree
     link: list
-    objects: list       # all that may be in it: its own and its archives'
+    objects: list  # all that may be in it: its own and its archives'
     digest: str = ""
     time_s: float = 0
-    lines: dict = dataclasses.field(default_factory=dict)   # {path below the root: lines that it runs}
-    known: dict = dataclasses.field(default_factory=dict)   # {path: lines that have code}
+    lines: dict = dataclasses.field(default_factory=dict)  # {path below the root: lines that it runs}
+    known: dict = dataclasses.field(default_factory=dict)  # {path: lines that have code}
 
 
 class Built:
@@ -74,7 +75,7 @@ class Built:
             if not source.is_relative_to(root) and "unity" not in source.name:
                 continue
             at = words.index("-o")
-            kept = [w for w in words[:at] + words[at + 2:] if not w.startswith("-W") and w not in ("-g", "-c", entry["file"])]
+            kept = [w for w in words[:at] + words[at + 2 :] if not w.startswith("-W") and w not in ("-g", "-c", entry["file"])]
             files = {path for path in depends[output] if path.is_relative_to(root) and not path.is_relative_to(root / "build")}
             self.objects[output] = Object(output, source, kept + ["-w"], files, digest(kept, *(self.content(f) for f in sorted(files))))
         self.programs = [program for program in map(self.program, self.names()) if any(self.is_ours(o.source) for o in program.objects)]
@@ -185,13 +186,21 @@ def limits(cpu_s):
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
         resource.setrlimit(resource.RLIMIT_AS, (2**32, 2**32))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
     return set_limits
 
 
 def fails(program, cpu_s, **how):
     """How it fails, as soon as it does; "" if it passes. Unity goes on after a failure: that is not waited for."""
-    test = subprocess.Popen(["stdbuf", "-oL", str(program)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace",
-                            preexec_fn=limits(cpu_s), **how)
+    test = subprocess.Popen(
+        ["stdbuf", "-oL", str(program)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        errors="replace",
+        preexec_fn=limits(cpu_s),
+        **how,
+    )
     try:
         for line in test.stdout:
             found = re.search(r":(\w+):FAIL", line)

@@ -1,9 +1,9 @@
 """Mutants that change nothing that anybody could see: equivalent.txt, one after another, as
 
-    firmware/scan/scan.c take_codes
-    - the line
-    + the line of the mutant
-    = why that makes no difference
+firmware/scan/scan.c take_codes
+- the line
++ the line of the mutant
+= why that makes no difference
 """
 
 

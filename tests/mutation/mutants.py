@@ -1,4 +1,5 @@
 """The mutants of a C source: each one small change that its tests should notice, found on clang's syntax tree."""
+
 import bisect
 import dataclasses
 import json
@@ -7,10 +8,35 @@ import re
 import subprocess
 
 OPERATORS = {
-    "<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "==": ("!=",), "!=": ("==",),
-    "+": ("-",), "-": ("+",), "*": ("/",), "/": ("*",), "%": ("/",), "&": ("|",), "|": ("&",), "^": ("|",),
-    "<<": (">>",), ">>": ("<<",), "&&": ("||",), "||": ("&&",), "+=": ("-=",), "-=": ("+=",), "*=": ("/=",),
-    "/=": ("*=",), "&=": ("|=",), "|=": ("&=",), "^=": ("|=",), "<<=": (">>=",), ">>=": ("<<=",), "++": ("--",), "--": ("++",),
+    "<": ("<=", ">="),
+    "<=": ("<", ">"),
+    ">": (">=", "<="),
+    ">=": (">", "<"),
+    "==": ("!=",),
+    "!=": ("==",),
+    "+": ("-",),
+    "-": ("+",),
+    "*": ("/",),
+    "/": ("*",),
+    "%": ("/",),
+    "&": ("|",),
+    "|": ("&",),
+    "^": ("|",),
+    "<<": (">>",),
+    ">>": ("<<",),
+    "&&": ("||",),
+    "||": ("&&",),
+    "+=": ("-=",),
+    "-=": ("+=",),
+    "*=": ("/=",),
+    "/=": ("*=",),
+    "&=": ("|=",),
+    "|=": ("&=",),
+    "^=": ("|=",),
+    "<<=": (">>=",),
+    ">>=": ("<<=",),
+    "++": ("--",),
+    "--": ("++",),
 }
 DROPPED = {"!", "-", "~"}
 DELETED = {"CallExpr", "CompoundAssignOperator", "UnaryOperator", "BreakStmt", "ContinueStmt"}
@@ -22,15 +48,15 @@ SMALL = 16
 
 @dataclasses.dataclass(frozen=True)
 class Mutant:
-    path: str         # below the root
-    function: str     # or "" outside of all
+    path: str  # below the root
+    function: str  # or "" outside of all
     line: int
-    begin: int        # offsets in the file
+    begin: int  # offsets in the file
     end: int
-    text: str         # in their place
-    before: str       # the line, without its indentation
+    text: str  # in their place
+    before: str  # the line, without its indentation
     after: str
-    in_macro: bool    # spelled in a definition, so that no line tells who runs it
+    in_macro: bool  # spelled in a definition, so that no line tells who runs it
 
     @property
     def key(self):
@@ -93,7 +119,7 @@ class Finder:
         outer = [self.span({"expansionLoc": place["expansionLoc"]} if "expansionLoc" in place else place) for place in (begin, end)]
         if None in outer or outer[0][0] > outer[1][0]:
             return None
-        if "expansionLoc" in end and self.text[outer[1][1]:outer[1][1] + 1] == "(":
+        if "expansionLoc" in end and self.text[outer[1][1] : outer[1][1] + 1] == "(":
             return None  # a macro with arguments: where they end is not told
         return outer[0][0], outer[1][1]
 
@@ -101,9 +127,18 @@ class Finder:
         index = bisect.bisect_right(self.starts, begin) - 1
         line, column = self.lines[index], begin - self.starts[index]
         last = bisect.bisect_right(self.starts, end) - 1
-        rest = self.text[end:self.starts[last] + len(self.lines[last])]
-        mutant = Mutant(self.path, self.function, index + 1, begin, end, text, line.strip(), (line[:column] + text + rest).strip(),
-                        self.is_in_macro(index))
+        rest = self.text[end : self.starts[last] + len(self.lines[last])]
+        mutant = Mutant(
+            self.path,
+            self.function,
+            index + 1,
+            begin,
+            end,
+            text,
+            line.strip(),
+            (line[:column] + text + rest).strip(),
+            self.is_in_macro(index),
+        )
         self.found.setdefault((begin, end, text), mutant)
 
     def is_in_macro(self, index):
@@ -151,7 +186,7 @@ class Finder:
     def unary(self, node):
         opcode = node["opcode"]
         place = self.span(node["range"]["end" if node.get("isPostfix") else "begin"])
-        if place is None or self.text[place[0]:place[1]] != opcode:
+        if place is None or self.text[place[0] : place[1]] != opcode:
             return
         if opcode in DROPPED:
             self.add(*place, "")
@@ -195,7 +230,7 @@ class Finder:
         if node["kind"] not in DELETED and not (node["kind"] == "BinaryOperator" and node["opcode"] == "="):
             return
         place = self.extent(node)
-        if place and re.match(r"\s*;", self.text[place[1]:]):
+        if place and re.match(r"\s*;", self.text[place[1] :]):
             self.add(*place, "(void)0")
 
 

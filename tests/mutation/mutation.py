@@ -10,6 +10,7 @@ build/mutation until the programs change. Changes that make no other code are le
 nothing that anybody could see, each with its reason; one that is not true any more is an error. Exit status 1 if more than
 --most percent of the others survive.
 """
+
 import argparse
 import collections
 import concurrent.futures
@@ -52,7 +53,10 @@ class Mutation:
         builds.cover(self.built, folder, jobs)
         self.tree = builds.Tree(self.built, folder / "objects", [], jobs)
         for program in self.built.programs:  # by its code, so that a comment makes it no other
-            program.digest = digest(program.link, *((self.tree.folder / o.output).read_bytes() for o in program.objects if not o.output.endswith("build_info.c.o")))
+            program.digest = digest(
+                program.link,
+                *((self.tree.folder / o.output).read_bytes() for o in program.objects if not o.output.endswith("build_info.c.o")),
+            )
         self.names, self.lock = {}, threading.Lock()
         self.kept = {}
         self.kept_file = folder / "kept.json"
@@ -92,7 +96,7 @@ class Mutation:
         return sorted(programs, key=lambda program: program.time_s)
 
     def judge(self, mutant):
-        """"not compiled", "same code", "survived", or who killed it."""
+        """ "not compiled", "same code", "survived", or who killed it."""
         programs = self.programs_for(mutant)
         with self.lock:
             kept = self.kept.setdefault(self.names[mutant], {})
@@ -108,7 +112,7 @@ class Mutation:
             work = pathlib.Path(work)
             file = work / "source" / mutant.path.split("/", 1)[1]
             file.parent.mkdir(parents=True)
-            file.write_text(text[:mutant.begin] + mutant.text + text[mutant.end:])
+            file.write_text(text[: mutant.begin] + mutant.text + text[mutant.end :])
             changed = self.compile(mutant, file, programs, [])
             if changed is None:
                 return self.note(kept, programs, "not compiled")
@@ -148,7 +152,7 @@ class Mutation:
         return how and f"{program.name.rsplit('/', 1)[-1]}: {how}"
 
     def note(self, kept, programs, how):
-        """"": survived this one."""
+        """ "": survived this one."""
         with self.lock:
             kept.update({program.digest: how for program in programs})
         return how
@@ -214,8 +218,8 @@ def sample(mutation, found, count, seed, tell):
         chosen = {}
         for name in modules:
             wanted = share[name] - len(judged[name])
-            chosen.update({mutant: name for mutant in waiting[name][:max(0, wanted)]})
-            waiting[name] = waiting[name][max(0, wanted):]
+            chosen.update({mutant: name for mutant in waiting[name][: max(0, wanted)]})
+            waiting[name] = waiting[name][max(0, wanted) :]
         if not chosen:
             return {mutant: how for own in judged.values() for mutant, how in own.items()}
         for mutant, how in mutation.judge_all(chosen):
@@ -232,12 +236,27 @@ def summary(judged, known):
         survived = [mutant for mutant, how in own.items() if how == "survived"]
         unexplained = [mutant for mutant in survived if mutant.key not in known]
         survivors += unexplained
-        rows.append({"module": name, "mutants": len(own) - len(survived) + len(unexplained), "survived": len(unexplained),
-                     "set_apart": len(survived) - len(unexplained)})
+        rows.append(
+            {
+                "module": name,
+                "mutants": len(own) - len(survived) + len(unexplained),
+                "survived": len(unexplained),
+                "set_apart": len(survived) - len(unexplained),
+            }
+        )
     wrong = [mutant for mutant, how in judged.items() if how != "survived" and mutant.key in known]
     total = sum(row["mutants"] for row in rows)
-    return {"mutants": total, "mutants_survived": len(survivors), "mutants_set_apart": sum(row["set_apart"] for row in rows),
-            "mutants_survived_percent": round(100 * len(survivors) / max(1, total), 2), "mutation_modules": rows}, survivors, wrong
+    return (
+        {
+            "mutants": total,
+            "mutants_survived": len(survivors),
+            "mutants_set_apart": sum(row["set_apart"] for row in rows),
+            "mutants_survived_percent": round(100 * len(survivors) / max(1, total), 2),
+            "mutation_modules": rows,
+        },
+        survivors,
+        wrong,
+    )
 
 
 def main(argv):
@@ -280,8 +299,10 @@ def main(argv):
         raise Stop("\n".join(["equivalent.txt calls the same what a test tells apart:", *(mutant.key for mutant in wrong)]))
     for row in result["mutation_modules"]:
         print(f"{row['module']:14s} {row['mutants']:5d} mutants {row['survived']:4d} survived {row['set_apart']:4d} set apart")
-    print(f"{result['mutants']} mutants, {result['mutants_survived']} survived ({result['mutants_survived_percent']} %), "
-          f"{result['mutants_set_apart']} set apart as equivalent, {time.monotonic() - begun_s:.0f} s")
+    print(
+        f"{result['mutants']} mutants, {result['mutants_survived']} survived ({result['mutants_survived_percent']} %), "
+        f"{result['mutants_set_apart']} set apart as equivalent, {time.monotonic() - begun_s:.0f} s"
+    )
     if options.json:
         unexplained = [{"file": m.path, "line": m.line, "before": m.before, "after": m.after} for m in survivors]
         result.update(mutation_seed=options.seed, mutants_possible=sum(map(len, found.values())), mutation_survivors=unexplained)

@@ -1,4 +1,5 @@
 """The mutants of a source, what equivalent.txt may say, and how the mutants are chosen."""
+
 import pathlib
 import sys
 import tempfile
@@ -41,16 +42,25 @@ class Mutants(unittest.TestCase):
         changes = {(mutant.before, mutant.after) for mutant in self.find()}
         loop = "for (int i = 0; i < n; i++) {"
         test = "if (n > LIMIT && !twice) {"
-        for change in (("#define LIMIT 100", "#define LIMIT 200"), (loop, "for (int i = 0; i <= n; i++) {"), (loop, "for (int i = 1; i < n; i++) {"),
-                       (loop, "for (int i = 0; i < n; i--) {"), (test, "if (n >= LIMIT && !twice) {"), (test, "if (n > LIMIT || !twice) {"),
-                       (test, "if (n > LIMIT && twice) {"), (test, "if ((0 && (n > LIMIT && !twice))) {"), ("sum += 2 * i;", "sum -= 2 * i;"),
-                       ("sum += 2 * i;", "sum += 2 / i;"), ("sum += 2 * i;", "(void)0;")):
+        for change in (
+            ("#define LIMIT 100", "#define LIMIT 200"),
+            (loop, "for (int i = 0; i <= n; i++) {"),
+            (loop, "for (int i = 1; i < n; i++) {"),
+            (loop, "for (int i = 0; i < n; i--) {"),
+            (test, "if (n >= LIMIT && !twice) {"),
+            (test, "if (n > LIMIT || !twice) {"),
+            (test, "if (n > LIMIT && twice) {"),
+            (test, "if ((0 && (n > LIMIT && !twice))) {"),
+            ("sum += 2 * i;", "sum -= 2 * i;"),
+            ("sum += 2 * i;", "sum += 2 / i;"),
+            ("sum += 2 * i;", "(void)0;"),
+        ):
             self.assertIn(change, changes)
 
     def test_each_changes_the_text_where_it_says(self):
         text = SOURCE
         for mutant in self.find():
-            changed = (text[:mutant.begin] + mutant.text + text[mutant.end:]).split("\n")
+            changed = (text[: mutant.begin] + mutant.text + text[mutant.end :]).split("\n")
             self.assertEqual(changed[mutant.line - 1].strip(), mutant.after)
             self.assertEqual(mutant.in_macro, mutant.line == 2)
             self.assertEqual(mutant.function, "count")

@@ -33,7 +33,13 @@ class Bench {
     this.asleep = 0;
     const stimulus = { at_ns: (sensor, t_ns) => this.#felt(sensor, t_ns) };
     const machine = new Machine({
-      image: readFileSync(image), Board: this.Board, scenario: stimulus, seed, uptime_us, fastEnumeration: true, allowWatchdog: true,
+      image: readFileSync(image),
+      Board: this.Board,
+      scenario: stimulus,
+      seed,
+      uptime_us,
+      fastEnumeration: true,
+      allowWatchdog: true,
       onData: (bytes) => {
         this.#look();
         this.events.push(['bytes', this.#now_us(), Buffer.from(bytes).toString('hex')]);
@@ -110,7 +116,11 @@ class Bench {
       faults.add(off);
       this.mayRestart_ns = late.to_ns + 1e9;
     } else if (this.ofTheHost[type]) {
-      for (const [active, t_s] of [[true, from_s], [false, fault.to_s]]) this.machine.scope.createAlarm(() => this.ofTheHost[type](active)).scheduleAt(t_s * 1e9);
+      for (const [active, t_s] of [
+        [true, from_s],
+        [false, fault.to_s],
+      ])
+        this.machine.scope.createAlarm(() => this.ofTheHost[type](active)).scheduleAt(t_s * 1e9);
     } else {
       faults.add(parseFaults(JSON.stringify([fault]), 'soak', this.Board)[0]);
     }
@@ -130,7 +140,11 @@ class Bench {
     if (write) machine.client.write(Buffer.from(write, 'hex'));
     machine.run(to_us * 1000);
     this.#look();
-    const answer = { events: this.events, unasked: this.unasked, ended: machine.endReason ? `${machine.endReason} ${this.warnings.join('; ')}` : '' };
+    const answer = {
+      events: this.events,
+      unasked: this.unasked,
+      ended: machine.endReason ? `${machine.endReason} ${this.warnings.join('; ')}` : '',
+    };
     this.events = [];
     return answer;
   }
@@ -140,10 +154,18 @@ async function main(argv) {
   let values, positionals;
   try {
     ({ values, positionals } = parseArgs({
-      args: argv, strict: true, allowPositionals: true,
+      args: argv,
+      strict: true,
+      allowPositionals: true,
       options: {
-        image: { type: 'string' }, board: { type: 'string' }, soak: { type: 'string' }, seed: { type: 'string', default: '1' },
-        seconds: { type: 'string', default: '60' }, show: { type: 'string' }, steady: { type: 'boolean' }, help: { type: 'boolean' },
+        image: { type: 'string' },
+        board: { type: 'string' },
+        soak: { type: 'string' },
+        seed: { type: 'string', default: '1' },
+        seconds: { type: 'string', default: '60' },
+        show: { type: 'string' },
+        steady: { type: 'boolean' },
+        help: { type: 'boolean' },
       },
     }));
   } catch (error) {
@@ -152,15 +174,23 @@ async function main(argv) {
   if (values.help) return void process.stdout.write(`${USAGE}\n`);
   for (const name of ['image', 'board', 'soak']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
   const seed = Number(values.seed);
-  if (!Number.isInteger(seed) || seed < 1 || seed > 1e9) throw new InputError(`--seed "${values.seed}" is not a whole number from 1 to 1000000000`);
+  if (!Number.isInteger(seed) || seed < 1 || seed > 1e9)
+    throw new InputError(`--seed "${values.seed}" is not a whole number from 1 to 1000000000`);
   const more = [...(values.show === undefined ? [] : ['--show', values.show, ...positionals]), ...(values.steady ? ['--steady'] : [])];
-  const child = spawn(values.soak, ['--emulated', values.board, '--seed', `${seed}`, '--seconds', values.seconds, ...more], { stdio: ['pipe', 'pipe', 'inherit'] });
+  const child = spawn(values.soak, ['--emulated', values.board, '--seed', `${seed}`, '--seconds', values.seconds, ...more], {
+    stdio: ['pipe', 'pipe', 'inherit'],
+  });
   const ended = new Promise((resolve, reject) => {
     child.on('error', (error) => reject(new InputError(`${values.soak}: cannot be run (${error.code})`)));
     child.on('close', (code, signal) => resolve(signal ? 1 : code));
   });
   child.stdin.on('error', () => {}); // what it did not read shows in how it ended
-  const bench = new Bench({ image: values.image, board: values.board, seed, uptime_us: values.steady ? 2 ** 32 - 5e5 * Number(values.seconds) : undefined });
+  const bench = new Bench({
+    image: values.image,
+    board: values.board,
+    seed,
+    uptime_us: values.steady ? 2 ** 32 - 5e5 * Number(values.seconds) : undefined,
+  });
   for await (const line of createInterface({ input: child.stdout })) {
     const said = JSON.parse(line);
     if (said.to_us === undefined) {

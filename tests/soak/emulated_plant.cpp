@@ -48,8 +48,7 @@ int digit(char c) {
 
 } // namespace
 
-EmulatedPlant::EmulatedPlant(const World &world, const std::string &board, std::istream &from,
-                             std::ostream &to)
+EmulatedPlant::EmulatedPlant(const World &world, const std::string &board, std::istream &from, std::ostream &to)
     : world_(world), from_(from), to_(to), faults_(std::begin(OF_ALL), std::end(OF_ALL)) {
   if (board == "pico_mux") {
     faults_.insert(faults_.end(), std::begin(OF_MUXES), std::end(OF_MUXES));
@@ -69,8 +68,7 @@ void EmulatedPlant::write(const std::vector<std::uint8_t> &bytes) {
 void EmulatedPlant::run_to(std::uint64_t t_us, Judge &judge) {
   nlohmann::json faults = nlohmann::json::array();
   for (const Fault &fault : scheduled_) {
-    nlohmann::json one = {{"type", fault.kind},
-                          {"from_s", 1e-6 * static_cast<double>(fault.from_us)}};
+    nlohmann::json one = {{"type", fault.kind}, {"from_s", 1e-6 * static_cast<double>(fault.from_us)}};
     if (fault.to_us > fault.from_us) {
       one["to_s"] = 1e-6 * static_cast<double>(fault.to_us);
     }
@@ -86,8 +84,7 @@ void EmulatedPlant::run_to(std::uint64_t t_us, Judge &judge) {
     const Row row = world_.at(told_us_);
     rows.push_back({{"t_us", told_us_}, {"Pa", row.pressure_Pa}, {"degC", row.temperature_degC}});
   }
-  to_ << nlohmann::json{{"to_us", t_us}, {"rows", rows}, {"faults", faults}, {"write", to_send_}}
-      << std::endl;
+  to_ << nlohmann::json{{"to_us", t_us}, {"rows", rows}, {"faults", faults}, {"write", to_send_}} << std::endl;
   to_send_.clear();
 
   std::string line;

@@ -110,9 +110,7 @@ void Judge::close(std::uint64_t t_us) {
   if (open_ && session_missing_ == 0) {
     for (const auto &[sequence, question] : asked_) {
       if (t_us > question.t_us + ANSWER_LIMIT_us && last_frame_heard_us_ > question.t_us) {
-        find("loss", t_us,
-             text("command 0x%02x of %llu us was not answered", question.type,
-                  number(question.t_us)));
+        find("loss", t_us, text("command 0x%02x of %llu us was not answered", question.type, number(question.t_us)));
       }
     }
   }
@@ -142,8 +140,7 @@ void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t 
 }
 
 void Judge::count_sequence(std::uint64_t t_us, const wire_packet &packet) {
-  const std::uint16_t gap =
-      sequence_ ? static_cast<std::uint16_t>(packet.sequence - *sequence_ - 1) : 0;
+  const std::uint16_t gap = sequence_ ? static_cast<std::uint16_t>(packet.sequence - *sequence_ - 1) : 0;
   figures_.wraps += sequence_ && packet.sequence < *sequence_ && gap < 0x8000;
   sequence_ = packet.sequence;
   session_missing_ += gap;
@@ -161,15 +158,12 @@ void Judge::count_sequence(std::uint64_t t_us, const wire_packet &packet) {
 
 void Judge::check_clock(std::uint64_t t_us, const wire_packet &packet) {
   if (bench_us(packet.t_us) > t_us) {
-    find("time", t_us,
-         text("packet 0x%02x is of %llu us, which is still to come", packet.type,
-              number(packet.t_us)));
+    find("time", t_us, text("packet 0x%02x is of %llu us, which is still to come", packet.type, number(packet.t_us)));
   }
   if (is_frame(packet)) {
     const std::uint64_t other_us = packet.type == WIRE_CONTACT ? raw_us_ : last_frame_us_;
     if (packet.t_us < other_us) {
-      find("time", t_us,
-           text("frame of %llu us after one of %llu us", number(packet.t_us), number(other_us)));
+      find("time", t_us, text("frame of %llu us after one of %llu us", number(packet.t_us), number(other_us)));
     }
     return;
   }
@@ -224,8 +218,8 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     const std::int32_t step = static_cast<std::int32_t>(contact.frame - *contact_frame_);
     if (step <= 0 || packet.t_us <= last_frame_us_) {
       find("time", t_us,
-           text("frame %u of %llu us after frame %u of %llu us", contact.frame, number(packet.t_us),
-                *contact_frame_, number(last_frame_us_)));
+           text("frame %u of %llu us after frame %u of %llu us", contact.frame, number(packet.t_us), *contact_frame_,
+                number(last_frame_us_)));
     } else if (contact_follows_) {
       figures_.skipped += static_cast<std::uint64_t>(step - 1);
       if (counted_) {
@@ -241,11 +235,9 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     counted_->contacts++;
   }
   const wire_stages &s = contact.stages;
-  const unsigned sum =
-      s.convert_us + s.read_us + s.queue_us + s.condition_us + s.fit_us + s.contact_us;
+  const unsigned sum = s.convert_us + s.read_us + s.queue_us + s.condition_us + s.fit_us + s.contact_us;
   if (s.total_us != 0xFFFF && sum != s.total_us) {
-    find("answer", t_us,
-         text("stages of frame %u add up to %u us, not %u", contact.frame, sum, s.total_us));
+    find("answer", t_us, text("stages of frame %u add up to %u us, not %u", contact.frame, sum, s.total_us));
   }
   const std::uint32_t flags = contact.flags;
   figures_.loads += (flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
@@ -260,13 +252,12 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     std::fprintf(stderr,
                  "%.4f s contact %u of %.4f s, %05x: %.2f %.2f mm %.3f N, sd %.2f mm; truth %.2f "
                  "%.2f mm %.3f N, %.0f Pa\n",
-                 seconds(t_us), contact.frame, seconds(felt_us), flags,
-                 static_cast<double>(contact.x_mm), static_cast<double>(contact.y_mm),
-                 static_cast<double>(contact.force_N), static_cast<double>(contact.location_sd_mm),
-                 truth.x_mm, truth.y_mm, truth.force_N(), truth.peak_Pa);
+                 seconds(t_us), contact.frame, seconds(felt_us), flags, static_cast<double>(contact.x_mm),
+                 static_cast<double>(contact.y_mm), static_cast<double>(contact.force_N),
+                 static_cast<double>(contact.location_sd_mm), truth.x_mm, truth.y_mm, truth.force_N(), truth.peak_Pa);
   }
-  const bool good = (flags & CONTACT_FLAG_TARED) &&
-                    !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
+  const bool good =
+      (flags & CONTACT_FLAG_TARED) && !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
   if (good && good_in_a_row_++ == 0) {
     good_since_us_ = t_us;
   }
@@ -277,24 +268,23 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
   }
   if (flags & CONTACT_FLAG_FIT_VALID) {
     figures_.unwarned++;
-    const double error_mm = std::hypot(static_cast<double>(contact.x_mm) - truth.x_mm,
-                                       static_cast<double>(contact.y_mm) - truth.y_mm);
+    const double error_mm =
+        std::hypot(static_cast<double>(contact.x_mm) - truth.x_mm, static_cast<double>(contact.y_mm) - truth.y_mm);
     const double force_N = truth.force_N();
     const double error_N = std::fabs(static_cast<double>(contact.force_N) - force_N);
     const double share = std::max(0.0, error_N - FORCE_BOUND_N) / std::max(force_N, 1e-9);
-    const bool touched = truth.peak_Pa > 0 || felt_us < RELEASED_FOR_us ||
-                         world_.at(felt_us - RELEASED_FOR_us).peak_Pa > 0;
+    const bool touched =
+        truth.peak_Pa > 0 || felt_us < RELEASED_FOR_us || world_.at(felt_us - RELEASED_FOR_us).peak_Pa > 0;
     if (!touched) {
-      wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame,
-                       static_cast<double>(contact.force_N)));
+      wrong(t_us,
+            text("frame %u says %.2f N where nothing touches", contact.frame, static_cast<double>(contact.force_N)));
     } else if (truth.peak_Pa >= FELT_Pa) {
       const double allowed_mm = allowed_sds_ * static_cast<double>(contact.location_sd_mm);
       if (error_mm > std::max(LOCATION_BOUND_mm, allowed_mm) || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
                          "mm, sensors %04x, sd %.2f mm",
-                         contact.frame, flags, error_mm, static_cast<double>(contact.force_N),
-                         force_N, truth.x_mm, truth.y_mm, contact.sensors_used,
-                         static_cast<double>(contact.location_sd_mm)));
+                         contact.frame, flags, error_mm, static_cast<double>(contact.force_N), force_N, truth.x_mm,
+                         truth.y_mm, contact.sensors_used, static_cast<double>(contact.location_sd_mm)));
       } else {
         figures_.worst_mm = std::max(figures_.worst_mm, error_mm);
         figures_.worst_force = std::max(figures_.worst_force, share);
@@ -303,9 +293,8 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
   } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
     figures_.at_rest++;
     if (felt_us >= FELT_FOR_us && is_firm(felt_us - FELT_FOR_us) && is_firm(felt_us)) {
-      wrong(t_us,
-            text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa",
-                 contact.frame, flags, truth.peak_Pa));
+      wrong(t_us, text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa", contact.frame,
+                       flags, truth.peak_Pa));
     }
   }
 }
@@ -319,11 +308,10 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
   raw_us_ = packet.t_us;
   const std::uint64_t felt_us = bench_us(packet.t_us);
   if (shows(t_us)) {
-    std::fprintf(stderr, "%.4f s raw %u of %.4f s, valid %04x doubtful %04x, Pa off / zero off:",
-                 seconds(t_us), raw.frame, seconds(felt_us), raw.valid, raw.doubtful);
+    std::fprintf(stderr, "%.4f s raw %u of %.4f s, valid %04x doubtful %04x, Pa off / zero off:", seconds(t_us),
+                 raw.frame, seconds(felt_us), raw.valid, raw.doubtful);
     for (unsigned k = 0; k < SENSORS; k++) {
-      std::fprintf(stderr, " %.0f/%.0f",
-                   raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us),
+      std::fprintf(stderr, " %.0f/%.0f", raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us),
                    raw.baseline_Pa_q10[k] / 1024.0 - world_.ambient_Pa(k));
     }
     std::fputc('\n', stderr);
@@ -335,13 +323,11 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
       continue;
     }
     figures_.readings++;
-    const double off_Pa =
-        std::fabs(raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us));
+    const double off_Pa = std::fabs(raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us));
     if (off_Pa > READING_BOUND_Pa && t_us < readings_excused_until_us_) {
       figures_.excused++;
     } else if (off_Pa > READING_BOUND_Pa) {
-      wrong(t_us, text("frame %u: sensor %u is off by %.0f Pa, flags %05x", raw.frame, k, off_Pa,
-                       raw.flags));
+      wrong(t_us, text("frame %u: sensor %u is off by %.0f Pa, flags %05x", raw.frame, k, off_Pa, raw.flags));
     } else {
       figures_.worst_Pa = std::max(figures_.worst_Pa, off_Pa);
     }
@@ -375,8 +361,7 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
         health.zero_readings - before.zero_readings,
         health.implausible_readings - before.implausible_readings,
     };
-    if (std::any_of(std::begin(rises), std::end(rises),
-                    [](std::uint32_t rise) { return rise >= 0x80000000u; })) {
+    if (std::any_of(std::begin(rises), std::end(rises), [](std::uint32_t rise) { return rise >= 0x80000000u; })) {
       find("loss", t_us, "a counter of the health packet went back");
     }
   }
@@ -390,20 +375,19 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
     const std::uint32_t dropped = health.packets_dropped - before.health.packets_dropped;
     if (before.received != sent || before.missing != dropped) {
       find("loss", t_us,
-           text("%llu packets came and %llu are missing, where %u were sent and %u dropped",
-                number(before.received), number(before.missing), sent, dropped));
+           text("%llu packets came and %llu are missing, where %u were sent and %u dropped", number(before.received),
+                number(before.missing), sent, dropped));
     }
     if (before.missing == 0 && before.follows) {
       // One frame may wait for the processor at either health packet.
       const std::uint32_t skipped = health.frames_skipped - before.health.frames_skipped;
       const std::uint32_t frames = health.frames - before.health.frames - skipped;
-      now.contacts_over =
-          before.contacts_over + static_cast<std::int64_t>(before.contacts) - frames;
+      now.contacts_over = before.contacts_over + static_cast<std::int64_t>(before.contacts) - frames;
       now.skipped_over = before.skipped_over + static_cast<std::int64_t>(before.skipped) - skipped;
       if (std::abs(now.contacts_over) > 1 || std::abs(now.skipped_over) > 1) {
         find("loss", t_us,
-             text("%llu frames came and %llu were skipped, where %u were taken and %u skipped",
-                  number(before.contacts), number(before.skipped), frames, skipped));
+             text("%llu frames came and %llu were skipped, where %u were taken and %u skipped", number(before.contacts),
+                  number(before.skipped), frames, skipped));
         now.contacts_over = now.skipped_over = 0;
       }
     }
@@ -417,8 +401,7 @@ void Judge::judge_ack(std::uint64_t t_us, const wire_packet &packet) {
   if (question == asked_.end() || question->second.type != ack.command ||
       question->second.host_time_us != ack.host_time_us) {
     find("answer", t_us,
-         text("an answer to command 0x%02x with number %u, which was not sent", ack.command,
-              ack.sequence));
+         text("an answer to command 0x%02x with number %u, which was not sent", ack.command, ack.sequence));
     return;
   }
   asked_.erase(question);

@@ -56,7 +56,7 @@ struct Figures {
   std::uint64_t answered = 0; // commands
   std::uint64_t excused = 0;  // wrong frames and readings after what nothing can tell
   std::uint64_t time = 0, loss = 0, damaged = 0, answer = 0, wrong = 0; // findings
-  double worst_mm = 0, worst_force = 0, worst_Pa = 0; // of the unwarned; force: share beyond the N
+  double worst_mm = 0, worst_force = 0, worst_Pa = 0;                   // of the unwarned; force: share beyond the N
 };
 
 class Judge {
@@ -133,7 +133,7 @@ private:
   std::vector<Finding> findings_;
 
   // Of a life
-  double zero_us_ = 0, began_us_ = 0; // began_us_: what the clock showed at first
+  double zero_us_ = 0, began_us_ = 0;                    // began_us_: what the clock showed at first
   std::uint64_t last_answer_us_ = 0, last_frame_us_ = 0; // device time
   std::optional<std::uint32_t> contact_frame_, raw_frame_;
   std::uint64_t raw_us_ = 0;

@@ -30,8 +30,7 @@ nlohmann::json told(const Storm &storm, const Judge &judge, std::uint64_t seed) 
   }
   nlohmann::json findings = nlohmann::json::array();
   for (const Finding &finding : judge.findings()) {
-    findings.push_back(finding.kind + " at " +
-                       std::to_string(1e-6 * static_cast<double>(finding.t_us)) +
+    findings.push_back(finding.kind + " at " + std::to_string(1e-6 * static_cast<double>(finding.t_us)) +
                        " s: " + finding.text);
   }
   return {{"seed", seed},
@@ -112,10 +111,9 @@ int run(int argc, char **argv) {
                "Nothing goes wrong: the highest rate and a 12 mm pad's profile, over a wrap of the "
                "clock's 32 bits in the middle. Natively the second processor is a thread");
   bool packets = false;
-  app.add_flag(
-      "--packets", packets,
-      "No episode: of each line of hexadecimal bytes on standard input one JSON object, what "
-      "its packets say last of what is kept and of the sensors");
+  app.add_flag("--packets", packets,
+               "No episode: of each line of hexadecimal bytes on standard input one JSON object, what "
+               "its packets say last of what is kept and of the sensors");
   CLI11_PARSE(app, argc, argv);
   if (packets) {
     return tell_packets();
@@ -124,8 +122,7 @@ int run(int argc, char **argv) {
   World world(seed);
   Judge judge(world);
   if (show.size() == 2) {
-    judge.show(static_cast<std::uint64_t>(1e6 * show[0]),
-               static_cast<std::uint64_t>(1e6 * show[1]));
+    judge.show(static_cast<std::uint64_t>(1e6 * show[0]), static_cast<std::uint64_t>(1e6 * show[1]));
   }
   std::unique_ptr<Plant> plant;
   std::optional<WorkerThread> worker;

@@ -52,8 +52,7 @@ double temperature_degC(void *, unsigned, std::uint64_t t_us) {
 
 } // namespace
 
-NativePlant::NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us,
-                         bool has_line_each)
+NativePlant::NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us, bool has_line_each)
     : world_(world), random_{seed * 2 + 0xB0A2D} {
   native_flash_reset(seed);
   soak_firmware_power_sensors(seed);
@@ -85,10 +84,9 @@ void NativePlant::start(std::uint64_t t_us, std::uint64_t clock_us, Judge *judge
 
 void NativePlant::schedule(const Fault &fault) {
   const auto add = [&](const Change &change) {
-    changes_.insert(
-        std::upper_bound(changes_.begin(), changes_.end(), change,
-                         [](const Change &a, const Change &b) { return a.t_us < b.t_us; }),
-        change);
+    changes_.insert(std::upper_bound(changes_.begin(), changes_.end(), change,
+                                     [](const Change &a, const Change &b) { return a.t_us < b.t_us; }),
+                    change);
   };
   add({fault.from_us, fault, true});
   if (fault.to_us > fault.from_us) {
@@ -121,8 +119,7 @@ void NativePlant::act(const Change &change, Judge &judge) {
   const std::string &kind = change.fault.kind;
   const auto sensor = static_cast<unsigned>(std::max(change.fault.target, 0));
   struct sim_array *array = soak_firmware_array();
-  const auto strike = [&](enum sim_fault_kind what, std::uint32_t count = 1,
-                          std::uint32_t mask = 0) {
+  const auto strike = [&](enum sim_fault_kind what, std::uint32_t count = 1, std::uint32_t mask = 0) {
     array->fault = {what, array->transfers + 1 + random_below(&random_, 2 * SENSORS), count, mask,
                     static_cast<std::uint8_t>(sensor)};
   };

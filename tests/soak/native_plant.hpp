@@ -16,8 +16,7 @@ class NativePlant : public Plant {
 public:
   // The chip's clock shows clock_us at the first start, and 0 at later ones. has_line_each: a data
   // line for each sensor, as pico_parallel has, instead of multiplexers.
-  NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us = 0,
-              bool has_line_each = false);
+  NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us = 0, bool has_line_each = false);
   ~NativePlant() override;
   NativePlant(const NativePlant &) = delete;
   NativePlant &operator=(const NativePlant &) = delete;

@@ -26,7 +26,9 @@ power to streams, with the emulator's fast enumeration), and "what" went wrong, 
 Exit: 0 done, whatever was found; 2 wrong usage.`;
 
 const [OLD, NEW] = [512, 2048];
-const SETTINGS = 2, WRITING = 4, DAMAGED = 8;
+const SETTINGS = 2,
+  WRITING = 4,
+  DAMAGED = 8;
 const ALL_SENSORS = 0x7fff;
 const OFF_MS = 3;
 /** Before the first step of a write and behind its last. */
@@ -46,15 +48,23 @@ class Cutter {
     this.encoded = (...command) => Buffer.from(execFileSync(options['command-frame'], command, { encoding: 'utf8' }).trim(), 'hex');
     this.ask = Buffer.concat([this.encoded('stream', 'raw'), this.encoded('info')]);
     this.again = Buffer.concat([this.encoded('info'), this.encoded('health')]);
-    this.update = Object.fromEntries([OLD, NEW].map((osr) => [osr, Buffer.concat([this.encoded('osr', `${osr}`), this.encoded('rate', '20'), this.encoded('keep')])]));
+    this.update = Object.fromEntries(
+      [OLD, NEW].map((osr) => [osr, Buffer.concat([this.encoded('osr', `${osr}`), this.encoded('rate', '20'), this.encoded('keep')])]),
+    );
   }
 
   /** A life of the board with this flash; `kept`: { bytes, unstable, resolvesAtPowerUp }. */
   machine(kept, seed, faults = []) {
     const felt = { pressure_Pa: 101325, temperature_degC: 25 };
     const machine = new Machine({
-      image: this.image, Board: this.Board, scenario: { at_ns: () => felt }, seed, fastEnumeration: true, allowWatchdog: true,
-      flash: kept?.bytes ?? null, faults: parseFaults(JSON.stringify(faults), 'cuts', this.Board),
+      image: this.image,
+      Board: this.Board,
+      scenario: { at_ns: () => felt },
+      seed,
+      fastEnumeration: true,
+      allowWatchdog: true,
+      flash: kept?.bytes ?? null,
+      faults: parseFaults(JSON.stringify(faults), 'cuts', this.Board),
       onData: (bytes) => machine.heard.push(Buffer.from(bytes)),
     });
     machine.heard = [];
@@ -110,7 +120,9 @@ class Cutter {
     for (let at_ns = steps_ns[0] - MARGIN_NS; at_ns <= steps_ns.at(-1) + MARGIN_NS; ) {
       moments.push(at_ns);
       const changes = steps_ns.some((begin_ns, i) => i % 2 === 0 && at_ns >= begin_ns - MARGIN_NS && at_ns <= steps_ns[i + 1] + MARGIN_NS);
-      const next_ns = Math.min(...steps_ns.filter((begin_ns, i) => i % 2 === 0 && begin_ns - MARGIN_NS > at_ns).map((begin_ns) => begin_ns - MARGIN_NS));
+      const next_ns = Math.min(
+        ...steps_ns.filter((begin_ns, i) => i % 2 === 0 && begin_ns - MARGIN_NS > at_ns).map((begin_ns) => begin_ns - MARGIN_NS),
+      );
       at_ns += changes ? step_ns : Math.max(step_ns, Math.min(PAUSE_NS, next_ns - at_ns));
     }
     return moments;
@@ -129,7 +141,8 @@ class Cutter {
       this.store(machine, NEW);
       const kind = machine.memory.erases > erases ? 'erase' : 'write';
       kept[kind] ??= before;
-      if (n === 9) { // an odd number of records, or the erases would always come before the old ones
+      if (n === 9) {
+        // an odd number of records, or the erases would always come before the old ones
         machine.client.write(this.encoded('forget'));
         this.run(machine, SETTLED_MS);
       }
@@ -193,8 +206,15 @@ class Cutter {
     for (const at_ns of moments) {
       cuts.push({ at_ns, ...this.cut(kept, 1 + cuts.length, at_ns, { type: kind === 'reset' ? 'chip_reset' : 'power_cut', writes }) });
     }
-    const lines = execFileSync(this.options.soak, ['--packets'], { input: `${cuts.flatMap((c) => c.lives).join('\n')}\n`, encoding: 'utf8', maxBuffer: 1 << 28 });
-    const told = lines.trim().split('\n').map((line) => JSON.parse(line));
+    const lines = execFileSync(this.options.soak, ['--packets'], {
+      input: `${cuts.flatMap((c) => c.lives).join('\n')}\n`,
+      encoding: 'utf8',
+      maxBuffer: 1 << 28,
+    });
+    const told = lines
+      .trim()
+      .split('\n')
+      .map((line) => JSON.parse(line));
     const problem = (cut, name, what) => {
       found[name] += 1;
       if (found.what.length < 10) found.what.push(`${kind} cut at ${(cut.at_ns / 1e6).toFixed(3)} ms: ${what}`);
@@ -209,7 +229,12 @@ class Cutter {
       found.slowest_ms = Math.max(found.slowest_ms, cut.start_ms);
       if (cut.warnings.length || [now, later].some((life) => life.present !== ALL_SENSORS || life.prom_bad !== 0 || life.complete < 1)) {
         problem(cut, 'not_started', `${JSON.stringify([now, later])} ${cut.warnings.join('; ')}`);
-      } else if (![OLD, NEW].includes(now.osr) || later.osr !== now.osr || now.stored !== SETTINGS || (later.stored & ~WRITING) !== SETTINGS) {
+      } else if (
+        ![OLD, NEW].includes(now.osr) ||
+        later.osr !== now.osr ||
+        now.stored !== SETTINGS ||
+        (later.stored & ~WRITING) !== SETTINGS
+      ) {
         problem(cut, 'wrong_values', `holds ${JSON.stringify([now, later])}${now.stored & DAMAGED ? ', damaged' : ''}`);
       } else if (now.osr === NEW) found.brought += 1;
     }
@@ -221,17 +246,24 @@ function main(argv) {
   let values;
   try {
     ({ values } = parseArgs({
-      args: argv, strict: true,
+      args: argv,
+      strict: true,
       options: {
-        image: { type: 'string' }, board: { type: 'string' }, soak: { type: 'string' }, 'command-frame': { type: 'string' },
-        'step-us': { type: 'string', default: '100' }, kinds: { type: 'string', default: KINDS.join(',') }, help: { type: 'boolean' },
+        image: { type: 'string' },
+        board: { type: 'string' },
+        soak: { type: 'string' },
+        'command-frame': { type: 'string' },
+        'step-us': { type: 'string', default: '100' },
+        kinds: { type: 'string', default: KINDS.join(',') },
+        help: { type: 'boolean' },
       },
     }));
   } catch (error) {
     throw new InputError(`${error.message.split('\n')[0]}; see --help`);
   }
   if (values.help) return void process.stdout.write(`${USAGE}\n`);
-  for (const name of ['image', 'board', 'soak', 'command-frame']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
+  for (const name of ['image', 'board', 'soak', 'command-frame'])
+    if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
   const step_us = Number(values['step-us']);
   if (!(step_us >= 1 && step_us <= 1e6)) throw new InputError(`--step-us "${values['step-us']}" is not a number from 1 to 1000000`);
   const kinds = values.kinds.split(',');
@@ -241,7 +273,9 @@ function main(argv) {
   const kept = cutter.prepare();
   if (kinds.includes('mend')) kept.mend = cutter.torn(kept.write);
   kept.start = kept.reset = kept.write;
-  process.stdout.write(`${JSON.stringify(Object.fromEntries(kinds.map((kind) => [kind, cutter.sweep(kind, kept[kind], step_us * 1000)])))}\n`);
+  process.stdout.write(
+    `${JSON.stringify(Object.fromEntries(kinds.map((kind) => [kind, cutter.sweep(kind, kept[kind], step_us * 1000)])))}\n`,
+  );
 }
 
 try {

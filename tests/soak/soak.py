@@ -10,6 +10,7 @@ Kinds: native (boards/native in one process), pico_mux, pico_parallel (emulated)
 at the highest rate with a pad's profile, over a wrap of the clock's 32 bits; natively with the second processor as a thread. What is found is kept in build/soak/findings, named and
 told with the command that does it again; every episode is a line of build/soak/results.jsonl. Exit status 1 if there is any finding.
 """
+
 import argparse
 import concurrent.futures
 import hashlib
@@ -30,7 +31,22 @@ KINDS = (*EMULATED, "native")
 STEADY = {"steady_native": "native", "steady_pico_parallel": "pico_parallel"}
 EPISODE_s = {"native": 600, "pico_mux": 60, "pico_parallel": 60, "steady_native": 3600, "steady_pico_parallel": 600}
 COUNTS = ("hangs", "wrong_unflagged", "uncounted_losses", "disorder")
-SUMS = ("seconds", "bouts", "frames", "unwarned", "at_rest", "readings", "missing", "skipped", "answered", "excused", "loads", "late", "sequence_wraps", *COUNTS)
+SUMS = (
+    "seconds",
+    "bouts",
+    "frames",
+    "unwarned",
+    "at_rest",
+    "readings",
+    "missing",
+    "skipped",
+    "answered",
+    "excused",
+    "loads",
+    "late",
+    "sequence_wraps",
+    *COUNTS,
+)
 WORST = ("worst_mm", "worst_force", "worst_Pa")
 COMMIT = re.compile(rb"fingertip-git=[0-9a-z]+\+?\0")  # write_build_info.cmake
 # No machine is too slow for an episode in this; one that takes longer hangs.
@@ -45,8 +61,9 @@ class Soak:
     def __init__(self, build, boards, out, kinds):
         self.out = out
         self.program = build / "tests/soak/fingertip_soak"
-        self.images = {board: boards / board / f"fingertip-{board}.bin" for board in EMULATED
-                       if board in [STEADY.get(kind, kind) for kind in kinds]}
+        self.images = {
+            board: boards / board / f"fingertip-{board}.bin" for board in EMULATED if board in [STEADY.get(kind, kind) for kind in kinds]
+        }
         for path in (self.program, *self.images.values()):
             if not path.is_file():
                 raise Stop(f"{path}: is not there; build it: cmake --preset host && cmake --build --preset host")
@@ -57,8 +74,19 @@ class Soak:
         parts = [self.program.read_bytes()]
         if parts[0].startswith(b"\x7fELF"):
             with tempfile.NamedTemporaryFile() as stripped:
-                subprocess.run(["objcopy", "-O", "binary", "--only-section=.text", "--only-section=.rodata", "--only-section=.data", self.program,
-                                stripped.name], check=True)
+                subprocess.run(
+                    [
+                        "objcopy",
+                        "-O",
+                        "binary",
+                        "--only-section=.text",
+                        "--only-section=.rodata",
+                        "--only-section=.data",
+                        self.program,
+                        stripped.name,
+                    ],
+                    check=True,
+                )
                 parts = [pathlib.Path(stripped.name).read_bytes()]
         if STEADY.get(kind, kind) in self.images:
             parts.append(self.images[STEADY.get(kind, kind)].read_bytes())
@@ -132,7 +160,9 @@ def summary(results):
     for result in results:
         bench = "native" if STEADY.get(result["kind"], result["kind"]) == "native" else "emulated"
         for fault, one in result["recovery"].items():
-            row = recovery.setdefault(fault, {"fault": fault, "native_bouts": 0, "native_worst_s": None, "emulated_bouts": 0, "emulated_worst_s": None})
+            row = recovery.setdefault(
+                fault, {"fault": fault, "native_bouts": 0, "native_worst_s": None, "emulated_bouts": 0, "emulated_worst_s": None}
+            )
             row[f"{bench}_bouts"] += one["bouts"]
             row[f"{bench}_worst_s"] = round(max(row[f"{bench}_worst_s"] or 0, one["worst_s"]), 3)
     found["recovery"] = [recovery[name] for name in sorted(recovery)]
@@ -144,8 +174,11 @@ def summary(results):
 
 def tell(result):
     counts = ", ".join(f"{result[name]} {name}" for name in COUNTS if result[name])
-    print(f"{result['kind']:20s} seed {result['seed']:<10d} {result['seconds']:7.1f} s in {result['wall_s']:7.1f} s  {result['bouts']:4d} bouts "
-          f"{result['frames']:7d} frames{'  FOUND ' + counts if result['findings'] else ''}", flush=True)
+    print(
+        f"{result['kind']:20s} seed {result['seed']:<10d} {result['seconds']:7.1f} s in {result['wall_s']:7.1f} s  {result['bouts']:4d} bouts "
+        f"{result['frames']:7d} frames{'  FOUND ' + counts if result['findings'] else ''}",
+        flush=True,
+    )
 
 
 def run(soak, jobs, wanted, until):
@@ -218,8 +251,10 @@ def main(argv):
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     count = len(found["findings"])
-    print(f"{found['soak_hours_emulated']:.2f} h emulated and {found['soak_hours_native']:.2f} h native, "
-          f"{count} finding{'' if count == 1 else 's'}{f', kept in {soak.out}/findings' if count else ''}")
+    print(
+        f"{found['soak_hours_emulated']:.2f} h emulated and {found['soak_hours_native']:.2f} h native, "
+        f"{count} finding{'' if count == 1 else 's'}{f', kept in {soak.out}/findings' if count else ''}"
+    )
     return 1 if count else 0
 
 

@@ -89,17 +89,13 @@ void Storm::write_some_command() {
   case 0:
     return write(fingertip::command_osr(256u << random_below(r, 6)));
   case 1:
-    return write(
-        fingertip::command_rate_mHz(random_below(r, 2) ? 0 : 20000 + random_below(r, 1980000)));
+    return write(fingertip::command_rate_mHz(random_below(r, 2) ? 0 : 20000 + random_below(r, 1980000)));
   case 2:
-    return write(fingertip::command_slip(static_cast<float>(random_between(r, 0.05, 5)),
-                                         5 + random_below(r, 900)));
+    return write(fingertip::command_slip(static_cast<float>(random_between(r, 0.05, 5)), 5 + random_below(r, 900)));
   case 3:
-    return write(random_below(r, 2) ? fingertip::command_prior(0, 0)
-                                    : fingertip::command_prior(6.5f, 3));
+    return write(random_below(r, 2) ? fingertip::command_prior(0, 0) : fingertip::command_prior(6.5f, 3));
   case 4:
-    return write(
-        fingertip::command_location_limit(static_cast<float>(random_between(r, 0.3, 0.6))));
+    return write(fingertip::command_location_limit(static_cast<float>(random_between(r, 0.3, 0.6))));
   case 5:
     return write(fingertip::command_health());
   case 6:
@@ -120,10 +116,8 @@ void Storm::write_some_command() {
     packet.body.cmd_rate.rate_mHz = 1 + random_below(r, WIRE_RATE_MIN_mHz - 1);
     return write(packet);
   default:
-    if (!loses_power_ && world_.resting_since_us() != UINT64_MAX &&
-        now_us_ > world_.resting_since_us() + 1000000) {
-      world_.keep_off(world_.told_us() + STEP_us,
-                      std::max(world_.told_us(), ends_us_) + STARTS_WITHIN_us);
+    if (!loses_power_ && world_.resting_since_us() != UINT64_MAX && now_us_ > world_.resting_since_us() + 1000000) {
+      world_.keep_off(world_.told_us() + STEP_us, std::max(world_.told_us(), ends_us_) + STARTS_WITHIN_us);
       write(fingertip::command_tare());
     }
   }
@@ -154,20 +148,16 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   Fault fault;
   fault.kind = target.kind;
   fault.target =
-      target.targets
-          ? static_cast<int>(random_below(&random_, static_cast<std::uint32_t>(target.targets)))
-          : -1;
+      target.targets ? static_cast<int>(random_below(&random_, static_cast<std::uint32_t>(target.targets))) : -1;
   fault.from_us = from_us;
   fault.to_us = from_us;
   if (target.most_us > 0) {
     fault.to_us +=
-        target.least_us +
-        random_below(&random_, static_cast<std::uint32_t>(target.most_us - target.least_us) + 1);
+        target.least_us + random_below(&random_, static_cast<std::uint32_t>(target.most_us - target.least_us) + 1);
   }
   ends_us_ = std::max(ends_us_, fault.to_us);
   char told[120];
-  std::snprintf(told, sizeof told, "%s%s%s %.3f to %.3f s", scene_.empty() ? "" : ", ",
-                fault.kind.c_str(),
+  std::snprintf(told, sizeof told, "%s%s%s %.3f to %.3f s", scene_.empty() ? "" : ", ", fault.kind.c_str(),
                 fault.target < 0 ? "" : (" " + std::to_string(fault.target)).c_str(),
                 1e-6 * static_cast<double>(fault.from_us), 1e-6 * static_cast<double>(fault.to_us));
   scene_ += told;
@@ -195,15 +185,13 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
 void Storm::begin_bout() {
   struct random *r = &random_;
   const std::vector<Target> &own = plant_.faults();
-  const std::uint32_t kinds =
-      static_cast<std::uint32_t>(own.size() + std::size(ON_THE_LINE)) + 1; // and STORE_CUT
+  const std::uint32_t kinds = static_cast<std::uint32_t>(own.size() + std::size(ON_THE_LINE)) + 1; // and STORE_CUT
   bouts_++;
   in_bout_ = true;
   loses_power_ = false;
   ends_us_ = now_us_;
   scene_.clear();
-  const std::uint64_t from_us =
-      std::max(now_us_, world_.told_us()) + LEAD_us + random_below(r, 20000);
+  const std::uint64_t from_us = std::max(now_us_, world_.told_us()) + LEAD_us + random_below(r, 20000);
   begins_us_ = from_us;
   const bool several = random_below(r, 3) == 0;
   const unsigned count = several ? 2 + random_below(r, 4) : 1;
@@ -312,8 +300,7 @@ void Storm::run_to(std::uint64_t end_us) {
         Recovery &recovery = recovery_[kind_];
         const std::uint64_t since_us = std::max(judge_.good_since_us(), ends_us_);
         recovery.bouts++;
-        recovery.worst_s =
-            std::max(recovery.worst_s, 1e-6 * static_cast<double>(since_us - ends_us_));
+        recovery.worst_s = std::max(recovery.worst_s, 1e-6 * static_cast<double>(since_us - ends_us_));
         recovers_ = false;
         next_us_ = now_us_ + random_below(&random_, 1500000);
       } else if (now_us_ > ends_us_ + RECOVERY_LIMIT_us) {

@@ -72,8 +72,7 @@ public:
       world_.extend_to(t_us);
       const Row row = world_.at(t_us);
       strongest_Pa = std::max(strongest_Pa, row.peak_Pa);
-      if (row.peak_Pa > 1500 && row.peak_Pa < share * strongest_Pa &&
-          row.p0_Pa == world_.at(t_us - 200000).p0_Pa) {
+      if (row.peak_Pa > 1500 && row.peak_Pa < share * strongest_Pa && row.p0_Pa == world_.at(t_us - 200000).p0_Pa) {
         return t_us;
       }
     }
@@ -88,8 +87,7 @@ private:
     contact.frame = frame_;
     contact.flags = CONTACT_FLAG_TARED;
     if (truth.peak_Pa > 200) {
-      contact.flags |=
-          CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
       contact.x_mm = static_cast<float>(truth.x_mm);
       contact.y_mm = static_cast<float>(truth.y_mm);
       contact.force_N = static_cast<float>(truth.force_N());

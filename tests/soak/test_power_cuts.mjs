@@ -14,7 +14,27 @@ import { fileURLToPath } from 'node:url';
 const [image, soak, command_frame] = process.argv.slice(2);
 const PROGRAM = fileURLToPath(new URL('power_cuts.mjs', import.meta.url));
 const cuts = (program, kinds, step_us) =>
-  JSON.parse(execFileSync('node', [PROGRAM, '--image', image, '--board', 'pico_mux', '--soak', program, '--command-frame', command_frame, '--kinds', kinds, '--step-us', `${step_us}`], { encoding: 'utf8' }));
+  JSON.parse(
+    execFileSync(
+      'node',
+      [
+        PROGRAM,
+        '--image',
+        image,
+        '--board',
+        'pico_mux',
+        '--soak',
+        program,
+        '--command-frame',
+        command_frame,
+        '--kinds',
+        kinds,
+        '--step-us',
+        `${step_us}`,
+      ],
+      { encoding: 'utf8' },
+    ),
+  );
 
 test('whatever is cut it starts again and holds the old or the new', (t) => {
   const found = cuts(soak, 'write,erase,mend,reset', 9700);

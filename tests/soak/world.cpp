@@ -76,13 +76,11 @@ void World::add_row(std::uint64_t t_us) {
   row.x_mm = touch_.x_mm + touch_.reach_mm * std::cos(angle);
   row.y_mm = touch_.y_mm + touch_.reach_mm * std::sin(angle);
   row.sigma_mm = touch_.sigma_mm;
-  row.temperature_degC =
-      TEMPERATURE_degC + TEMPERATURE_SWING_degC * std::sin(2 * PI * t_s / TEMPERATURE_PERIOD_s);
+  row.temperature_degC = TEMPERATURE_degC + TEMPERATURE_SWING_degC * std::sin(2 * PI * t_s / TEMPERATURE_PERIOD_s);
   for (unsigned k = 0; k < SENSORS; k++) {
     const double dx = static_cast<double>(geometry.x_mm[k]) - row.x_mm;
     const double dy = static_cast<double>(geometry.y_mm[k]) - row.y_mm;
-    const double above =
-        row.p0_Pa * std::exp(-(dx * dx + dy * dy) / (2 * row.sigma_mm * row.sigma_mm));
+    const double above = row.p0_Pa * std::exp(-(dx * dx + dy * dy) / (2 * row.sigma_mm * row.sigma_mm));
     row.pressure_Pa[k] = ambient_Pa_[k] + above;
     row.peak_Pa = std::max(row.peak_Pa, above);
   }

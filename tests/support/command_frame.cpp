@@ -40,8 +40,7 @@ wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
   constexpr std::uint8_t SENSORS = 15;
   const auto sigma_mm = to_double(sigma), dip_percent = to_double(dip);
   if (!sigma_mm || !dip_percent) {
-    throw Error("\"" + sigma + "\" and \"" + dip +
-                "\" must be numbers; give a contact's width, mm, and its dip, %");
+    throw Error("\"" + sigma + "\" and \"" + dip + "\" must be numbers; give a contact's width, mm, and its dip, %");
   }
   calibration made{};
   made.date_s = 1785931200;
@@ -51,8 +50,7 @@ wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
   made.sigma_um = static_cast<std::uint16_t>(std::lround(1e3 * *sigma_mm));
   made.sigma_sd_um = static_cast<std::uint16_t>(std::lround(10.0 * *sigma_mm));
   made.dip_share_q16 = static_cast<std::uint16_t>(std::lround(655.36 * *dip_percent));
-  made.dip_sd_um =
-      static_cast<std::uint16_t>(made.dip_share_q16 ? std::lround(2500.0 * *sigma_mm) : 0);
+  made.dip_sd_um = static_cast<std::uint16_t>(made.dip_share_q16 ? std::lround(2500.0 * *sigma_mm) : 0);
   made.ambient_kPa = 101;
   std::fill(made.sensors, made.sensors + SENSORS, sensor_calibration{1.0F, 0.01F, 0, 0, 0});
   return command_calibrate(made, SENSORS);
@@ -75,9 +73,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
   };
   auto word = [&](std::size_t i) { return words[i]; };
   const std::map<std::string, Form> forms = {
-      {"stream",
-       {1, "stream none|contact,raw,health",
-        [&] { return command_stream(streams_from_text(word(1))); }}},
+      {"stream", {1, "stream none|contact,raw,health", [&] { return command_stream(streams_from_text(word(1))); }}},
       {"tare", {0, "tare", [] { return command_tare(); }}},
       {"tare-force", {0, "tare-force", [] { return command_tare(true); }}},
       {"rate", {1, "rate HZ|max", [&] { return command_of({"rate=" + word(1)}); }}},
@@ -96,13 +92,11 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"sync", {1, "sync MODE|off", [&] { return command_of({"sync=" + word(1)}); }}},
       {"keep", {0, "keep", [] { return command_keep(true); }}},
       {"forget", {0, "forget", [] { return command_keep(false); }}},
-      {"calibrate",
-       {2, "calibrate SIGMA_MM DIP_PERCENT", [&] { return calibration_of(word(1), word(2)); }}},
+      {"calibrate", {2, "calibrate SIGMA_MM DIP_PERCENT", [&] { return calibration_of(word(1), word(2)); }}},
       {"erase", {0, "erase", command_erase_calibration}},
       {"pad", {2, "pad THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), false); }}},
       {"pad-from-touch",
-       {2, "pad-from-touch THICKNESS_MM OVERHANG_MM",
-        [&] { return pad_of(word(1), word(2), true); }}},
+       {2, "pad-from-touch THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), true); }}},
       {"erase-pad", {0, "erase-pad", command_erase_pad}},
   };
   const auto form = forms.find(words.empty() ? "" : words[0]);

@@ -209,13 +209,9 @@ public:
   }
 
 private:
-  bool is_over() const {
-    return emulator_.has_ended() && sent_.empty() && now() >= emulator_.now();
-  }
+  bool is_over() const { return emulator_.has_ended() && sent_.empty() && now() >= emulator_.now(); }
 
-  microseconds now() const {
-    return std::chrono::duration_cast<microseconds>(host_now() - zero_);
-  }
+  microseconds now() const { return std::chrono::duration_cast<microseconds>(host_now() - zero_); }
 
   // What the client does.
   void hear() {

@@ -40,8 +40,7 @@ struct Object {
 class CellGripper {
 public:
   CellGripper(std::string link, const std::string &model, bool active, Object &object)
-      : link_(std::move(link)), model_(model), object_(object),
-        motion_(GripperServer::mechanics(model)) {
+      : link_(std::move(link)), model_(model), object_(object), motion_(GripperServer::mechanics(model)) {
     motion_.blocked_at = [&object](double width_mm, double force_N) {
       return force_N > 0 && object.stiffness_N_mm * (object.width_mm - width_mm) / 2 >= force_N;
     };
@@ -88,15 +87,11 @@ public:
   }
   void line(const std::string &fault) {
     LineTrouble trouble;
-    trouble.fault = fault == "silent"    ? LineFault::silent
-                    : fault == "garbage" ? LineFault::garbage
-                                         : LineFault::none;
+    trouble.fault = fault == "silent" ? LineFault::silent : fault == "garbage" ? LineFault::garbage : LineFault::none;
     server_->trouble(trouble);
   }
   void power(bool on) { server_->power(on); }
-  void fail(int fault) {
-    server_->fail(static_cast<std::uint8_t>(fault));
-  }
+  void fail(int fault) { server_->fail(static_cast<std::uint8_t>(fault)); }
 
 private:
   static constexpr std::int64_t STEP_us = 500;

@@ -75,8 +75,7 @@ public:
     if (!firmware.empty()) {
       auto parts = fingertip::split(firmware, '.');
       for (std::size_t i = 0; i < 3; i++) {
-        info.firmware_version[i] =
-            static_cast<std::uint8_t>(fingertip::to_u64(parts.at(i)).value_or(0));
+        info.firmware_version[i] = static_cast<std::uint8_t>(fingertip::to_u64(parts.at(i)).value_or(0));
       }
     }
     if (number("calibrated", 0)) {
@@ -134,8 +133,7 @@ public:
           std::string text = options_["vanish"];
           wait_for_reader();
           power_off();
-          fingertip::wait_until(fingertip::host_now() +
-                                milliseconds(std::atol(text.c_str() + text.find(',') + 1)));
+          fingertip::wait_until(fingertip::host_now() + milliseconds(std::atol(text.c_str() + text.find(',') + 1)));
           power_on();
         }
         if (frame_ == number("frames", -1)) {
@@ -163,10 +161,8 @@ private:
       } else if (item->packet.type == WIRE_INFO) {
         wire_info &info = info_.body.info;
         info.sensor_count = item->packet.body.info.sensor_count;
-        std::copy(std::begin(item->packet.body.info.x_mm), std::end(item->packet.body.info.x_mm),
-                  info.x_mm);
-        std::copy(std::begin(item->packet.body.info.y_mm), std::end(item->packet.body.info.y_mm),
-                  info.y_mm);
+        std::copy(std::begin(item->packet.body.info.x_mm), std::end(item->packet.body.info.x_mm), info.x_mm);
+        std::copy(std::begin(item->packet.body.info.y_mm), std::end(item->packet.body.info.y_mm), info.y_mm);
       }
     }
   }
@@ -196,8 +192,7 @@ private:
     if (!options_["zero_log"].empty()) {
       double ago_us = static_cast<double>(number("started", 0)) * 1e6 / clock_rate();
       std::FILE *log = std::fopen(options_["zero_log"].c_str(), "w");
-      double now_us =
-          std::chrono::duration<double, std::micro>(started_.time_since_epoch()).count();
+      double now_us = std::chrono::duration<double, std::micro>(started_.time_since_epoch()).count();
       std::fprintf(log, "%.3f\n", now_us - ago_us);
       std::fclose(log);
     }
@@ -224,8 +219,7 @@ private:
 
   std::uint64_t device_us(Time at) const {
     double us = std::chrono::duration<double, std::micro>(at - started_).count();
-    return static_cast<std::uint64_t>(us * clock_rate() +
-                                      static_cast<double>(number("started", 0)) * 1e6);
+    return static_cast<std::uint64_t>(us * clock_rate() + static_cast<double>(number("started", 0)) * 1e6);
   }
 
   void send(wire_packet packet, bool flip = false) {
@@ -271,8 +265,7 @@ private:
     contact.body.contact.x_mm = 8 * std::cos(angle);
     contact.body.contact.y_mm = 16 * std::sin(angle);
     contact.body.contact.force_N = 5;
-    contact.body.contact.flags =
-        static_cast<std::uint32_t>(number("flags", contact.body.contact.flags));
+    contact.body.contact.flags = static_cast<std::uint32_t>(number("flags", contact.body.contact.flags));
     if (drop && frame_ % drop == 0) {
       sequence_ = static_cast<std::uint16_t>(sequence_ + 2);
       return;
@@ -338,8 +331,8 @@ private:
   }
 
   bool obey(const wire_packet &command) {
-    bool known = command.type == WIRE_CMD_STREAM || command.type == WIRE_CMD_INFO ||
-                 command.type == WIRE_CMD_HEALTH || command.type == WIRE_CMD_CRASH;
+    bool known = command.type == WIRE_CMD_STREAM || command.type == WIRE_CMD_INFO || command.type == WIRE_CMD_HEALTH ||
+                 command.type == WIRE_CMD_CRASH;
     std::uint8_t result = number("refuse", 0) && !known ? WIRE_RESULT_NOT_NOW : WIRE_RESULT_DONE;
     send(test::make_ack(0, now_us(), command.type, result, command.sequence, command.t_us));
     if (result != WIRE_RESULT_DONE) {

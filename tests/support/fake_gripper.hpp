@@ -18,8 +18,7 @@ namespace test {
 // What outlives a gripper that is closed and opened again.
 class FakeGripperState {
 public:
-  std::atomic<bool> silent{false}, active{true}, unplugged{false},
-      was_left_alone{false};
+  std::atomic<bool> silent{false}, active{true}, unplugged{false}, was_left_alone{false};
   std::atomic<int> fault{0}, activations{0}, opened{0}, exchanges{0}, delay_ms{0};
 
   double width_mm() {
@@ -65,8 +64,7 @@ public:
     state_->opened++;
   }
   const fingertip::GripperTraits &traits() const override {
-    static const fingertip::GripperTraits own = {"fake", 50.0, 0.05, 0.0,  1.0,
-                                                 100.0,  0.0,  0.0,  0.01, 0.002};
+    static const fingertip::GripperTraits own = {"fake", 50.0, 0.05, 0.0, 1.0, 100.0, 0.0, 0.0, 0.01, 0.002};
     return own;
   }
   std::string line() const override { return "no line"; }
@@ -91,9 +89,7 @@ public:
     state_->move(move);
     return poll();
   }
-  std::string fault_text(std::uint8_t fault) const override {
-    return "text of " + std::to_string(fault);
-  }
+  std::string fault_text(std::uint8_t fault) const override { return "text of " + std::to_string(fault); }
 
 private:
   void check() const {

@@ -67,8 +67,7 @@ namespace {
 libusb_context *current = nullptr;
 
 bool is_waiting(const libusb_transfer *transfer) {
-  return current && std::find(current->waiting.begin(), current->waiting.end(), transfer) !=
-                        current->waiting.end();
+  return current && std::find(current->waiting.begin(), current->waiting.end(), transfer) != current->waiting.end();
 }
 
 void complete(libusb_transfer *transfer, libusb_transfer_status status) {
@@ -110,8 +109,7 @@ void LIBUSB_CALL libusb_free_device_list(libusb_device **list, int) {
   delete[] list;
 }
 
-int LIBUSB_CALL libusb_get_device_descriptor(libusb_device *device,
-                                             libusb_device_descriptor *descriptor) {
+int LIBUSB_CALL libusb_get_device_descriptor(libusb_device *device, libusb_device_descriptor *descriptor) {
   std::memset(descriptor, 0, sizeof *descriptor);
   descriptor->idVendor = device->fake->vendor;
   descriptor->idProduct = device->fake->product;
@@ -126,8 +124,7 @@ std::uint8_t LIBUSB_CALL libusb_get_device_address(libusb_device *device) {
   return device->fake->address;
 }
 
-int LIBUSB_CALL libusb_get_active_config_descriptor(libusb_device *device,
-                                                    libusb_config_descriptor **configuration) {
+int LIBUSB_CALL libusb_get_active_config_descriptor(libusb_device *device, libusb_config_descriptor **configuration) {
   static libusb_endpoint_descriptor notify, data[2];
   static libusb_interface_descriptor settings[2];
   static libusb_interface interfaces[2];
@@ -221,9 +218,8 @@ int LIBUSB_CALL libusb_release_interface(libusb_device_handle *handle, int inter
   return 0;
 }
 
-int LIBUSB_CALL libusb_control_transfer(libusb_device_handle *handle, std::uint8_t type,
-                                        std::uint8_t request, std::uint16_t value,
-                                        std::uint16_t index, unsigned char *data,
+int LIBUSB_CALL libusb_control_transfer(libusb_device_handle *handle, std::uint8_t type, std::uint8_t request,
+                                        std::uint16_t value, std::uint16_t index, unsigned char *data,
                                         std::uint16_t length, unsigned) {
   Device &device = *handle->fake;
   if (!device.is_plugged_in) {
@@ -240,8 +236,8 @@ int LIBUSB_CALL libusb_control_transfer(libusb_device_handle *handle, std::uint8
   return length;
 }
 
-int LIBUSB_CALL libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint,
-                                     unsigned char *data, int length, int *transferred, unsigned) {
+int LIBUSB_CALL libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint, unsigned char *data,
+                                     int length, int *transferred, unsigned) {
   Device &device = *handle->fake;
   *transferred = 0;
   if (!device.is_plugged_in) {
@@ -281,8 +277,7 @@ int LIBUSB_CALL libusb_submit_transfer(libusb_transfer *transfer) {
   misuse_if(is_waiting(transfer), "submitted twice");
   misuse_if(transfer->endpoint != 0x82 || !handle->fake->claimed[1], "transfer to the wrong place");
   handle->context->waiting.push_back(transfer);
-  handle->fake->most_waiting =
-      std::max(handle->fake->most_waiting, static_cast<int>(handle->context->waiting.size()));
+  handle->fake->most_waiting = std::max(handle->fake->most_waiting, static_cast<int>(handle->context->waiting.size()));
   return 0;
 }
 

@@ -137,8 +137,8 @@ std::string asked(const std::string &port, const std::string &question, std::siz
 
 struct PlainSlave::Mapped {
   modbus_t *modbus = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
-  modbus_mapping_t *mapping = modbus_mapping_new_start_address(
-      0, 0, 0, 0, robotiq::COMMAND_REGISTER, 1003, robotiq::STATUS_REGISTER, 3);
+  modbus_mapping_t *mapping =
+      modbus_mapping_new_start_address(0, 0, 0, 0, robotiq::COMMAND_REGISTER, 1003, robotiq::STATUS_REGISTER, 3);
   int ends[2]; /* libmodbus at the first, the port's bytes at the second */
   Mapped() {
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends) != 0) {
@@ -162,8 +162,7 @@ struct PlainSlave::Mapped {
   }
 };
 
-PlainSlave::PlainSlave()
-    : port_(""), mapped_(std::make_unique<Mapped>()), serves_([this] { serve(); }) {}
+PlainSlave::PlainSlave() : port_(""), mapped_(std::make_unique<Mapped>()), serves_([this] { serve(); }) {}
 
 PlainSlave::~PlainSlave() {
   serves_.end();

@@ -25,8 +25,8 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   contact.frame = frame;
   contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                   CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID |
-                  CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
-                  CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
+                  CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SHAPE_VALID |
+                  CONTACT_FLAG_EDGE;
   contact.sensors_used = 0x7FFF;
   contact.x_mm = 0.1f + static_cast<float>(frame % 10);
   contact.y_mm = -3.3333333f;
@@ -79,8 +79,7 @@ inline calibration make_calibration() {
   made.force_scale = 1.0625f;
   made.force_scale_sd = 0.021f;
   for (int k = 0; k < 15; k++) {
-    made.sensors[k] = {0.86f + 0.02f * static_cast<float>(k),
-                       0.008f + 0.0001f * static_cast<float>(k),
+    made.sensors[k] = {0.86f + 0.02f * static_cast<float>(k), 0.008f + 0.0001f * static_cast<float>(k),
                        static_cast<std::int16_t>(100 * k - 700), static_cast<std::int16_t>(-20 * k),
                        static_cast<std::int16_t>(1000 - 300 * k)};
   }
@@ -120,8 +119,7 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
 
 inline wire_packet make_health(std::uint16_t sequence, std::uint64_t t_us) {
   wire_packet packet = make_packet(WIRE_HEALTH, sequence, t_us);
-  packet.body.health = {7,  1,  2,  3,  4,      5,  6,           7,  8,  9,
-                        10, 11, 12, 14, 0x7FFF, 15, 0xFFFFFFFFu, 17, 18, 13};
+  packet.body.health = {7, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 0x7FFF, 15, 0xFFFFFFFFu, 17, 18, 13};
   return packet;
 }
 
@@ -146,9 +144,8 @@ inline wire_packet make_crash(std::uint16_t sequence, std::uint64_t t_us) {
   return packet;
 }
 
-inline wire_packet make_ack(std::uint16_t sequence, std::uint64_t t_us, std::uint8_t command,
-                            std::uint8_t result, std::uint16_t command_sequence,
-                            std::uint64_t host_time_us) {
+inline wire_packet make_ack(std::uint16_t sequence, std::uint64_t t_us, std::uint8_t command, std::uint8_t result,
+                            std::uint16_t command_sequence, std::uint64_t host_time_us) {
   wire_packet packet = make_packet(WIRE_ACK, sequence, t_us);
   packet.body.ack = {command, result, command_sequence, host_time_us};
   return packet;

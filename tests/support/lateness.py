@@ -6,6 +6,7 @@
 
 A thread asks to be woken every few milliseconds. What it oversleeps, anything else may have been held up too.
 """
+
 # real time: the machine's own lateness is what this measures
 import threading
 import time

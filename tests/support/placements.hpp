@@ -74,8 +74,8 @@ struct KnownPad {
 };
 
 /* Anywhere on the array, one weight, one every four seconds. */
-inline std::vector<fingertip::calibrating::Placement>
-good_session(const KnownPad &pad, std::size_t count, std::uint64_t seed) {
+inline std::vector<fingertip::calibrating::Placement> good_session(const KnownPad &pad, std::size_t count,
+                                                                   std::uint64_t seed) {
   fingertip::Random random(seed, 2, 0);
   std::vector<fingertip::calibrating::Placement> placements;
   for (std::size_t i = 0; i < count; i++) {

@@ -2,6 +2,7 @@
 
 Patience is a guard against hanging, not a limit: a busy machine takes as long as it takes.
 """
+
 # real time: programs on pseudo-terminals of this kernel
 import os
 import subprocess

@@ -1,4 +1,5 @@
 """A report (host_tools/report/NAME/NAME.py) with scripts in the place of the programs that it runs."""
+
 import json
 import pathlib
 import subprocess
@@ -26,8 +27,21 @@ class ReportOfPrograms(unittest.TestCase):
         path.chmod(0o755)
 
     def run_tool(self, *options):
-        return subprocess.run([sys.executable, str(ROOT / f"host_tools/report/{self.NAME}/{self.NAME}.py"), "--build", str(self.folder),
-                               "--boards", str(self.folder), "-o", str(self.out), *options], capture_output=True, text=True)
+        return subprocess.run(
+            [
+                sys.executable,
+                str(ROOT / f"host_tools/report/{self.NAME}/{self.NAME}.py"),
+                "--build",
+                str(self.folder),
+                "--boards",
+                str(self.folder),
+                "-o",
+                str(self.out),
+                *options,
+            ],
+            capture_output=True,
+            text=True,
+        )
 
     def found(self):
         return json.loads((self.out / f"{self.NAME}.json").read_text())

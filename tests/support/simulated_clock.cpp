@@ -1,8 +1,9 @@
 // libfingertip's clock, simulated: programs that are linked with this one instead live on the time
 // of a time keeper (time_keeper.cpp), whose socket the environment names. One thread of all those
 // programs runs at a time; time passes only while all of them wait.
-#include "libfingertip/clock.hpp"
 #include "support/simulated_clock.hpp"
+
+#include "libfingertip/clock.hpp"
 #include "support/time_keeper.hpp"
 
 #include <atomic>
@@ -163,8 +164,7 @@ HostTime test::others_wait_until() {
 
 std::chrono::system_clock::time_point wall_now() {
   return std::chrono::system_clock::time_point(std::chrono::seconds(WALL_ZERO_s)) +
-         std::chrono::duration_cast<std::chrono::system_clock::duration>(
-             host_now().time_since_epoch());
+         std::chrono::duration_cast<std::chrono::system_clock::duration>(host_now().time_since_epoch());
 }
 
 int wait_for(pollfd *descriptors, std::size_t count, HostTime until) {

@@ -3,6 +3,7 @@ programs do, each with a connection of its own to the keeper.
 
     host_time.use(SimulatedHostTime(world))
 """
+
 import contextlib
 import os
 import select

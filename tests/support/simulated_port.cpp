@@ -28,14 +28,12 @@ Error failure(const std::string &what) {
 std::string own_name() {
   static std::atomic<unsigned> number{0};
   const char *folder = std::getenv("TMPDIR");
-  return std::string(folder ? folder : "/tmp") + "/port-" + std::to_string(getpid()) + "-" +
-         std::to_string(number++);
+  return std::string(folder ? folder : "/tmp") + "/port-" + std::to_string(getpid()) + "-" + std::to_string(number++);
 }
 
 } // namespace
 
-ServedPort::ServedPort(const std::string &link)
-    : path_(link.empty() ? own_name() : link), link_(link), name_(path_) {
+ServedPort::ServedPort(const std::string &link) : path_(link.empty() ? own_name() : link), link_(link), name_(path_) {
   unlink(path_.c_str());
   make_raw();
 }
@@ -59,8 +57,7 @@ void ServedPort::make_raw() {
   std::memcpy(address.sun_path, path_.data(), path_.size());
   unlink(path_.c_str());
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (listener_ < 0 ||
-      bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
+  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
       listen(listener_, 8) != 0) {
     throw failure(path_);
   }
@@ -109,8 +106,7 @@ std::size_t ServedPort::write(const std::uint8_t *bytes, std::size_t length) {
     return length;
   }
   const ssize_t count = send(fd_, bytes, length, MSG_DONTWAIT | MSG_NOSIGNAL);
-  return count < 0 && errno != EAGAIN ? length
-                                      : static_cast<std::size_t>(std::max<ssize_t>(count, 0));
+  return count < 0 && errno != EAGAIN ? length : static_cast<std::size_t>(std::max<ssize_t>(count, 0));
 }
 
 std::size_t ServedPort::unread() const {

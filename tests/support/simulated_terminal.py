@@ -1,4 +1,5 @@
 """A program in a simulated world on a terminal: its screen, and keys for it."""
+
 import contextlib
 import fcntl
 import os
@@ -40,8 +41,15 @@ class Terminal:
         self._came, self._more = b"", threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        self.process = world.start(arguments, env=env, stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
-                                   preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
+        self.process = world.start(
+            arguments,
+            env=env,
+            stdin=self._slave,
+            stdout=self._slave,
+            stderr=self._slave,
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        )
 
     def __enter__(self):
         return self
@@ -65,7 +73,7 @@ class Terminal:
         os.write(self._slave, MARK)
         with self._more:
             assert self._more.wait_for(lambda: self._came.endswith(MARK), ARRIVAL_s), "what was written does not arrive"
-            came, self._came = self._came[:-len(MARK)], b""
+            came, self._came = self._came[: -len(MARK)], b""
         self.output += came
         for part in re.split(rb"(?<=\x1b\[\?2026l)", came):
             self._stream.feed(part)
@@ -99,6 +107,7 @@ class Terminal:
 
     def until(self, pattern, limit_s=PATIENCE_s):
         """Until the picture shows this."""
+
         def is_shown():
             has_ended = self.process.poll() is not None
             shown = re.search(pattern, self.look() or self.output.decode(errors="replace"), re.S)
@@ -109,10 +118,13 @@ class Terminal:
         try:
             return self._world.until(is_shown, limit_s)
         except TimedOut as error:
-            raise AssertionError(f"{error}: {pattern!r} is not shown; status {self.process.poll()}\n{self.shown}\n{self.output[-500:]}") from None
+            raise AssertionError(
+                f"{error}: {pattern!r} is not shown; status {self.process.poll()}\n{self.shown}\n{self.output[-500:]}"
+            ) from None
 
     def wait(self, limit_s=PATIENCE_s):
         """Its status. A terminal that is not read stops it."""
+
         def has_ended():
             self.look()
             return self.process.poll() is not None

@@ -9,6 +9,7 @@
 The programs are linked with simulated_clock.cpp; time_keeper.cpp says whose turn it is. Whatever this test does between two
 waits takes no time. A program that ends a test's patience has waited simulated seconds for nothing, however busy the machine is.
 """
+
 import array
 import contextlib
 import fcntl
@@ -152,8 +153,9 @@ class Process:
     """A program in this world, as subprocess.Popen has it; what it writes is text, unless text=False. Waits are of the world's
     time."""
 
-    def __init__(self, world, arguments, env=None, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                 text=True, **options):
+    def __init__(
+        self, world, arguments, env=None, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    ):
         self._world = world
         environment = {**(os.environ if env is None else env), **world.environment}
         self._popen = subprocess.Popen(arguments, env=environment, stdin=stdin, stdout=stdout, stderr=stderr, bufsize=0, **options)
@@ -213,8 +215,8 @@ class Process:
             is_open = self._read(name)
             at = self._came[name].find(b"\n")
             if at >= 0 or not is_open:
-                line = self._came[name][:at + 1] if at >= 0 else self._came[name]
-                del self._came[name][:len(line)]
+                line = self._came[name][: at + 1] if at >= 0 else self._came[name]
+                del self._came[name][: len(line)]
                 return self._said(line)
             if self._world.now_s >= end_s:
                 raise TimedOut(f"no line within {limit_s} s of the world's time; so far: {self._came}")

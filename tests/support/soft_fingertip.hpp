@@ -27,8 +27,7 @@ struct Feel {
 class SoftFingertip {
 public:
   // link: made to its port. feel: asked for each frame, in its thread.
-  SoftFingertip(std::string link, const std::string &serial, int rate_Hz,
-                std::function<Feel()> feel)
+  SoftFingertip(std::string link, const std::string &serial, int rate_Hz, std::function<Feel()> feel)
       : link_(std::move(link)), rate_Hz_(rate_Hz), feel_(std::move(feel)) {
     wire_info &info = info_.body.info;
     std::memset(info.serial, 0, sizeof info.serial);
@@ -71,9 +70,7 @@ public:
   }
 
 private:
-  std::uint64_t now_us() const {
-    return static_cast<std::uint64_t>(fingertip::steady_now_us() - started_us_);
-  }
+  std::uint64_t now_us() const { return static_cast<std::uint64_t>(fingertip::steady_now_us() - started_us_); }
 
   void run() {
     wire_receiver receiver;
@@ -82,8 +79,7 @@ private:
     while (!ended_) {
       const std::uint64_t look_us = now_us() + LOOK_us;
       const std::uint64_t until_us = streams_ == 0 ? look_us : std::min(look_us, next_us);
-      port_->wait(fingertip::HostTime(
-          std::chrono::microseconds(started_us_ + static_cast<std::int64_t>(until_us))));
+      port_->wait(fingertip::HostTime(std::chrono::microseconds(started_us_ + static_cast<std::int64_t>(until_us))));
       std::uint8_t bytes[256];
       const std::size_t count = port_->read(bytes, sizeof bytes);
       for (std::size_t i = 0; i < count; i++) {
@@ -124,8 +120,8 @@ private:
     const float noise = frozen ? 0 : 1e-3f * static_cast<float>(frame_ % 17);
     contact.flags = CONTACT_FLAG_TARED | feel.flags;
     if (touches) {
-      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
-                       CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TANGENTIAL_VALID;
+      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                       CONTACT_FLAG_TANGENTIAL_VALID;
       contact.force_N = feel.force_N + noise;
       contact.x_mm = noise;
       contact.y_mm = 2;

@@ -1,4 +1,5 @@
 """A machine that stops is seen, and allowed for. Real time is the subject."""
+
 # real time: a process that is stopped and goes on
 import os
 import subprocess

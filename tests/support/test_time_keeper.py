@@ -1,4 +1,5 @@
 """The keeper of simulated time: usage test_time_keeper.py SIMULATED_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import os
 import signal
 import sys

@@ -3,10 +3,10 @@
 //   time_keeper SOCKET              prints "ready" once it listens there
 //   time_keeper --run TEST [...]    starts a test that is such a process, ends with its status
 //
-// and ends with its first connection, the test's. Of all the threads that are connected (simulated_clock.cpp, simulated_time.py) one runs at a time. When it
-// waits, the next is one that has something to go on with, longest not run first; where none has,
-// time jumps to the first moment that somebody waits for. So what happens, and when, is the same
-// however fast the machine is, and silence takes no time.
+// and ends with its first connection, the test's. Of all the threads that are connected (simulated_clock.cpp,
+// simulated_time.py) one runs at a time. When it waits, the next is one that has something to go on with, longest not
+// run first; where none has, time jumps to the first moment that somebody waits for. So what happens, and when, is the
+// same however fast the machine is, and silence takes no time.
 //
 // A thread that runs for two minutes of real time, and a world in which everybody waits for ever,
 // end it with a word on standard error.
@@ -38,8 +38,8 @@ using fingertip::test::Turn;
 namespace {
 
 constexpr std::int64_t BEGIN_us = 1'000'000'000;
-constexpr int PATIENCE_ms = 120'000; // of real time, with a thread that runs
-constexpr int SIGNAL_ms = 5'000;     // of real time, until a signal has arrived
+constexpr int PATIENCE_ms = 120'000;   // of real time, with a thread that runs
+constexpr int SIGNAL_ms = 5'000;       // of real time, until a signal has arrived
 constexpr long MOST_TURNS = 5'000'000; // without time passing
 
 [[noreturn]] void fail(const char *what) {
@@ -69,9 +69,9 @@ private:
 // A process; of those that go on without a word nothing is known but that they have not ended.
 struct Process {
   pid_t pid;
-  Descriptor handle;    // pidfd
-  long born;            // which of all that began
-  bool is_awaited;      // its hello, or its end
+  Descriptor handle; // pidfd
+  long born;         // which of all that began
+  bool is_awaited;   // its hello, or its end
   bool is_dying = false;
   bool expects_signal = false;
   std::int64_t held_us = 0; // no turn before
@@ -130,11 +130,9 @@ public:
 
 private:
   bool is_somebody_running() const {
-    return std::any_of(clients_.begin(), clients_.end(),
-                       [](const Client &each) { return each.runs; }) ||
-           std::any_of(processes_.begin(), processes_.end(), [](const Process &each) {
-             return each.is_awaited || each.is_dying || each.expects_signal;
-           });
+    return std::any_of(clients_.begin(), clients_.end(), [](const Client &each) { return each.runs; }) ||
+           std::any_of(processes_.begin(), processes_.end(),
+                       [](const Process &each) { return each.is_awaited || each.is_dying || each.expects_signal; });
   }
 
   Process *process(pid_t pid) {
@@ -177,8 +175,7 @@ private:
       pids.push_back(each.pid);
     }
     const bool is_signal_expected =
-        std::any_of(processes_.begin(), processes_.end(),
-                    [](const Process &each) { return each.expects_signal; });
+        std::any_of(processes_.begin(), processes_.end(), [](const Process &each) { return each.expects_signal; });
     const int patience_ms = is_signal_expected ? std::min(timeout_ms, SIGNAL_ms) : timeout_ms;
     if (poll(ears.data(), ears.size(), patience_ms) == 0 && timeout_ms != 0) {
       if (is_signal_expected) { // it was ignored
@@ -215,8 +212,7 @@ private:
     }
     for (const Process &each : processes_) {
       if (each.is_awaited || each.is_dying) {
-        std::fprintf(stderr, "time_keeper: process %d %s\n", each.pid,
-                     each.is_dying ? "ends" : "begins");
+        std::fprintf(stderr, "time_keeper: process %d %s\n", each.pid, each.is_dying ? "ends" : "begins");
       }
     }
   }
@@ -225,8 +221,7 @@ private:
     Descriptor line(accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
     ucred peer = {};
     socklen_t size = sizeof peer;
-    if (line.get() < 0 ||
-        getsockopt(line.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+    if (line.get() < 0 || getsockopt(line.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
       return;
     }
     expect(peer.pid);
@@ -336,8 +331,7 @@ private:
         continue;
       }
       const std::int64_t each_us = may ? now_us_ : each.until_us;
-      if (may && (best == nullptr ||
-                  std::pair(each.ran, each.born) < std::pair(best->ran, best->born))) {
+      if (may && (best == nullptr || std::pair(each.ran, each.born) < std::pair(best->ran, best->born))) {
         others_us = first_us; // of those before; those behind follow
         best = &each;
       } else {

@@ -6,6 +6,7 @@ namespace where another one lies there.
 
 real time: a browser. Waits are for what it says or shows; PATIENCE_s only ends what hangs.
 """
+
 import base64
 import contextlib
 import json
@@ -21,10 +22,25 @@ PATIENCE_s = 1200
 BINARIES = ("/usr/lib/chromium/chromium",)
 POLICY_FOLDER = "/etc/chromium"
 # nothing of the browser's own on the network; WebGL in software, as where there is no graphics processor
-FLAGS = ("--headless", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run", "--no-default-browser-check", "--disable-extensions",
-         "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-default-apps", "--disable-breakpad",
-         "--disable-dev-shm-usage", "--mute-audio", "--hide-scrollbars", "--force-color-profile=srgb", "--force-device-scale-factor=1",
-         "--enable-unsafe-swiftshader")
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--remote-debugging-pipe",
+    "--no-first-run",
+    "--no-default-browser-check",
+    "--disable-extensions",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-default-apps",
+    "--disable-breakpad",
+    "--disable-dev-shm-usage",
+    "--mute-audio",
+    "--hide-scrollbars",
+    "--force-color-profile=srgb",
+    "--force-device-scale-factor=1",
+    "--enable-unsafe-swiftshader",
+)
 FAINT = """(() => {
   const paint = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
   const parts = colour => {
@@ -109,9 +125,26 @@ class Browser:
         environment |= {"FROM_TEST": str(from_test), "TO_TEST": str(to_test)}
         self._log = open(self.folder / "browser.log", "wb")
         self._process = subprocess.Popen(
-            [*unshare(), "bash", "-c", START, "bash", self.folder / "policies", POLICY_FOLDER, binary, *FLAGS, *flags,
-             f"--user-data-dir={self.folder / 'profile'}", "about:blank"],
-            env=environment, pass_fds=(from_test, to_test), stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log)
+            [
+                *unshare(),
+                "bash",
+                "-c",
+                START,
+                "bash",
+                self.folder / "policies",
+                POLICY_FOLDER,
+                binary,
+                *FLAGS,
+                *flags,
+                f"--user-data-dir={self.folder / 'profile'}",
+                "about:blank",
+            ],
+            env=environment,
+            pass_fds=(from_test, to_test),
+            stdin=subprocess.DEVNULL,
+            stdout=self._log,
+            stderr=self._log,
+        )
         os.close(from_test)
         os.close(to_test)
         self._received = b""
@@ -174,7 +207,7 @@ class Browser:
         message = {"id": self._number, "method": method, "params": parameters} | ({"sessionId": session} if session else {})
         data = json.dumps(message).encode() + b"\0"
         while data:
-            data = data[os.write(self._to_browser, data):]
+            data = data[os.write(self._to_browser, data) :]
         return self._number
 
     def call(self, method, session=None, **parameters):
@@ -246,7 +279,9 @@ class Page:
 
     def media(self, **features):
         """prefers_color_scheme="dark" and the like."""
-        self.call("Emulation.setEmulatedMedia", features=[{"name": name.replace("_", "-"), "value": value} for name, value in features.items()])
+        self.call(
+            "Emulation.setEmulatedMedia", features=[{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
+        )
 
     def go(self, url):
         answer = self.call("Page.navigate", url=url)
@@ -264,8 +299,10 @@ class Page:
 
     def until(self, expression):
         """Its value once that is true: the page looks before each picture of it."""
-        look = (f"new Promise((resolve, reject) => {{ const look = () => {{ try {{ const value = ({expression}); if (value) resolve(value); "
-                "else requestAnimationFrame(look); } catch (error) { reject(error); } }; look(); })")
+        look = (
+            f"new Promise((resolve, reject) => {{ const look = () => {{ try {{ const value = ({expression}); if (value) resolve(value); "
+            "else requestAnimationFrame(look); } catch (error) { reject(error); } }; look(); })"
+        )
         try:
             return self.run(look)
         except TimeoutError:
@@ -280,8 +317,11 @@ class Page:
 
     def accessible(self):
         """(role, name, backend node) of all that is not left out of the accessibility tree."""
-        return [(node["role"]["value"], node.get("name", {}).get("value", "").strip(), node.get("backendDOMNodeId"))
-                for node in self.call("Accessibility.getFullAXTree")["nodes"] if not node["ignored"]]
+        return [
+            (node["role"]["value"], node.get("name", {}).get("value", "").strip(), node.get("backendDOMNodeId"))
+            for node in self.call("Accessibility.getFullAXTree")["nodes"]
+            if not node["ignored"]
+        ]
 
     def has(self, role, name):
         return self._find(role, name) is not None
@@ -323,16 +363,36 @@ class Page:
         x, y = self._at
         held = kind == "mousePressed" or (kind == "mouseMoved" and self._held)
         self._held = kind != "mouseReleased" and held
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left" if kind != "mouseMoved" or held else "none",
-                  buttons=int(held), clickCount=1)
+        self.call(
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            button="left" if kind != "mouseMoved" or held else "none",
+            buttons=int(held),
+            clickCount=1,
+        )
 
     def key(self, key, code=None):
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key, **({"text": key} if kind == "keyDown" and len(key) == 1 else {}))
+            self.call(
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key=key,
+                code=code or key,
+                **({"text": key} if kind == "keyDown" and len(key) == 1 else {}),
+            )
 
     def enter(self):
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", windowsVirtualKeyCode=13, **({"text": "\r"} if kind == "keyDown" else {}))
+            self.call(
+                "Input.dispatchKeyEvent",
+                type=kind,
+                key="Enter",
+                code="Enter",
+                windowsVirtualKeyCode=13,
+                **({"text": "\r"} if kind == "keyDown" else {}),
+            )
 
     def type(self, role, name, text):
         """Into a field, instead of what it holds."""
@@ -356,7 +416,11 @@ class Page:
         origin = self.run("location.origin")
         asked = [each["request"]["url"] for each in self.of("Network.requestWillBeSent")]
         asked += [each["url"] for each in self.of("Network.webSocketCreated")]
-        broken = [json.dumps(each["issue"]["details"]) for each in self.of("Audits.issueAdded") if each["issue"]["code"] == "ContentSecurityPolicyIssue"]
+        broken = [
+            json.dumps(each["issue"]["details"])
+            for each in self.of("Audits.issueAdded")
+            if each["issue"]["code"] == "ContentSecurityPolicyIssue"
+        ]
         return [url for url in asked if not url.startswith((origin + "/", "data:", "blob:", "about:"))] + broken
 
     def of(self, *methods):

@@ -1,4 +1,5 @@
 """Steps on the page that its tests and its report share."""
+
 import pathlib
 import re
 import subprocess
@@ -24,7 +25,17 @@ def connected(page, count):
 
 def run_all(build, image):
     """Every test of the page: {"web_steps": [{"step", "outcome"}], "web_steps_driven": how many, "web_steps_failed": how many}."""
-    done = subprocess.run([sys.executable, str(TESTS), "--build", str(build), "--image", str(image), "--node", "node"], capture_output=True, text=True)
-    steps = [{"step": f"{group}: {name.replace('_', ' ')}", "outcome": outcome} for name, group, outcome in re.findall(
-        r"(?ms)^test_(\w+) \(__main__\.(\w+)\.\w+\)(?:(?!^test_).)*? \.\.\. (ok|FAIL|ERROR|skipped)", done.stderr)]
-    return {"web_steps": steps, "web_steps_driven": len(steps), "web_steps_failed": sum(each["outcome"] != "ok" for each in steps) if steps else None}
+    done = subprocess.run(
+        [sys.executable, str(TESTS), "--build", str(build), "--image", str(image), "--node", "node"], capture_output=True, text=True
+    )
+    steps = [
+        {"step": f"{group}: {name.replace('_', ' ')}", "outcome": outcome}
+        for name, group, outcome in re.findall(
+            r"(?ms)^test_(\w+) \(__main__\.(\w+)\.\w+\)(?:(?!^test_).)*? \.\.\. (ok|FAIL|ERROR|skipped)", done.stderr
+        )
+    ]
+    return {
+        "web_steps": steps,
+        "web_steps_driven": len(steps),
+        "web_steps_failed": sum(each["outcome"] != "ok" for each in steps) if steps else None,
+    }

@@ -1,4 +1,5 @@
 """Fingertips for a browser under test: emulated release images, and programs that say what a fingertip says, on its ports."""
+
 # real time: a browser and emulated boards on ports that it opens
 import contextlib
 import os
@@ -48,29 +49,71 @@ class Bench(contextlib.ExitStack):
     def emulated(self, browser, serial, scenario, *options, image=None):
         """The release image of pico_parallel, powered on when its port is first opened."""
         port = browser.ports / f"{USB_ID}:{serial}"
-        return self._until_there(self._start(
-            self._tools.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_parallel", "--image", image or self._tools.image,
-            "--scenario", scenario, "--serial", serial, "--pty", port, "--wait-open", "--fast-enumeration", *options,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL), port)
+        return self._until_there(
+            self._start(
+                self._tools.node,
+                ROOT / "host_tools/simulation/emulator/main.mjs",
+                "--board",
+                "pico_parallel",
+                "--image",
+                image or self._tools.image,
+                "--scenario",
+                scenario,
+                "--serial",
+                serial,
+                "--pty",
+                port,
+                "--wait-open",
+                "--fast-enumeration",
+                *options,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            ),
+            port,
+        )
 
     def fake(self, browser, serial, *options, usb_id=USB_ID):
         """tests/support/fake_device.cpp, with its options."""
         port = browser.ports / f"{usb_id}:{serial}"
-        return self._until_there(self._start(
-            self._tools.build / "tests/support/fake_device", port, f"serial={serial}", f"life={PATIENCE_s}", *options, stdout=subprocess.DEVNULL), port)
+        return self._until_there(
+            self._start(
+                self._tools.build / "tests/support/fake_device",
+                port,
+                f"serial={serial}",
+                f"life={PATIENCE_s}",
+                *options,
+                stdout=subprocess.DEVNULL,
+            ),
+            port,
+        )
 
     def simulated(self, runtime, *options):
         """`fingertip simulate`, which a page served with the same runtime folder finds."""
-        process = self._start(self._tools.build / "host_tools/tool/cli/fingertip", "simulate", *options, stdout=subprocess.PIPE, text=True,
-                              env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)})
+        process = self._start(
+            self._tools.build / "host_tools/tool/cli/fingertip",
+            "simulate",
+            *options,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)},
+        )
         if not process.stdout.readline().startswith("ready: "):
             raise AssertionError("nothing is simulated")
         return process
 
     def served(self, runtime):
         """The page, by `fingertip web`: its address without the last slash. runtime: folder where it finds what is simulated."""
-        process = self._start(self._tools.build / "host_tools/tool/cli/fingertip", "web", "--port", "0", "--no-browser", stdout=subprocess.PIPE,
-                              stderr=subprocess.DEVNULL, text=True, env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)})
+        process = self._start(
+            self._tools.build / "host_tools/tool/cli/fingertip",
+            "web",
+            "--port",
+            "0",
+            "--no-browser",
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)},
+        )
         url = process.stdout.readline().strip()
         if not re.fullmatch(r"http://127\.0\.0\.1:\d+/", url):
             raise AssertionError("the page is not served")

@@ -1,11 +1,14 @@
 """How different two pictures look: in CIE L*a*b*, after the blur of an eye that does not look for single pixels."""
+
 import io
 
 import matplotlib.image
 import numpy as np
 
 BLUR_px = 3  # of half the size
-TO_XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])  # sRGB, IEC 61966-2-1
+TO_XYZ = np.array(
+    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+)  # sRGB, IEC 61966-2-1
 WHITE = TO_XYZ.sum(axis=1)
 
 
@@ -34,7 +37,7 @@ def lab(picture):
 def blurred(picture):
     """Means of squares of BLUR_px; the margin that fills none is left out."""
     sums = np.pad(picture.cumsum(0).cumsum(1), ((1, 0), (1, 0), (0, 0)))
-    return (sums[BLUR_px:, BLUR_px:] - sums[:-BLUR_px, BLUR_px:] - sums[BLUR_px:, :-BLUR_px] + sums[:-BLUR_px, :-BLUR_px]) / BLUR_px ** 2
+    return (sums[BLUR_px:, BLUR_px:] - sums[:-BLUR_px, BLUR_px:] - sums[BLUR_px:, :-BLUR_px] + sums[:-BLUR_px, :-BLUR_px]) / BLUR_px**2
 
 
 def difference(one, other):

@@ -46,7 +46,8 @@ static const char *folder(void) {
 }
 
 static bool is_port(const char *name) {
-  return name[0] != '.' && strlen(name) > 2 * (ID_DIGITS + 1) && name[ID_DIGITS] == ':' && name[2 * ID_DIGITS + 1] == ':';
+  return name[0] != '.' && strlen(name) > 2 * (ID_DIGITS + 1) && name[ID_DIGITS] == ':' &&
+         name[2 * ID_DIGITS + 1] == ':';
 }
 
 static struct udev_device *device_of(const char *name, const char *action) {
@@ -62,7 +63,9 @@ static struct udev_device *device_of(const char *name, const char *action) {
   return device;
 }
 
-API struct udev *udev_new(void) { return calloc(1, sizeof(struct udev)); }
+API struct udev *udev_new(void) {
+  return calloc(1, sizeof(struct udev));
+}
 
 API struct udev *udev_unref(struct udev *udev) {
   free(udev);
@@ -96,7 +99,9 @@ API int udev_enumerate_scan_devices(struct udev_enumerate *enumerate) {
   return 0;
 }
 
-API struct udev_list_entry *udev_enumerate_get_list_entry(struct udev_enumerate *enumerate) { return enumerate->first; }
+API struct udev_list_entry *udev_enumerate_get_list_entry(struct udev_enumerate *enumerate) {
+  return enumerate->first;
+}
 
 API struct udev_enumerate *udev_enumerate_unref(struct udev_enumerate *enumerate) {
   while (enumerate->first) {
@@ -108,9 +113,13 @@ API struct udev_enumerate *udev_enumerate_unref(struct udev_enumerate *enumerate
   return NULL;
 }
 
-API struct udev_list_entry *udev_list_entry_get_next(struct udev_list_entry *entry) { return entry->next; }
+API struct udev_list_entry *udev_list_entry_get_next(struct udev_list_entry *entry) {
+  return entry->next;
+}
 
-API const char *udev_list_entry_get_name(struct udev_list_entry *entry) { return entry->syspath; }
+API const char *udev_list_entry_get_name(struct udev_list_entry *entry) {
+  return entry->syspath;
+}
 
 API struct udev_device *udev_device_new_from_syspath(struct udev *udev, const char *syspath) {
   (void)udev;
@@ -122,11 +131,21 @@ API struct udev_device *udev_device_unref(struct udev_device *device) {
   return NULL;
 }
 
-API const char *udev_device_get_action(struct udev_device *device) { return device->action; }
-API const char *udev_device_get_devnode(struct udev_device *device) { return device->devname; }
-API const char *udev_device_get_subsystem(struct udev_device *device) { return device ? "tty" : NULL; }
-API const char *udev_device_get_syspath(struct udev_device *device) { return device->syspath; }
-API const char *udev_device_get_sysname(struct udev_device *device) { return device->syspath + sizeof SYSPATH - 1; }
+API const char *udev_device_get_action(struct udev_device *device) {
+  return device->action;
+}
+API const char *udev_device_get_devnode(struct udev_device *device) {
+  return device->devname;
+}
+API const char *udev_device_get_subsystem(struct udev_device *device) {
+  return device ? "tty" : NULL;
+}
+API const char *udev_device_get_syspath(struct udev_device *device) {
+  return device->syspath;
+}
+API const char *udev_device_get_sysname(struct udev_device *device) {
+  return device->syspath + sizeof SYSPATH - 1;
+}
 
 API const char *udev_device_get_property_value(struct udev_device *device, const char *key) {
   return strcmp(key, "DEVNAME") == 0           ? device->devname
@@ -139,22 +158,34 @@ API const char *udev_device_get_property_value(struct udev_device *device, const
 }
 
 /* What else a browser may ask: there is nothing. */
-API const char *udev_device_get_devtype(struct udev_device *device) { return (void)device, NULL; }
-API const char *udev_device_get_driver(struct udev_device *device) { return (void)device, NULL; }
-API struct udev_device *udev_device_get_parent(struct udev_device *device) { return (void)device, NULL; }
-API struct udev_list_entry *udev_device_get_properties_list_entry(struct udev_device *device) { return (void)device, NULL; }
+API const char *udev_device_get_devtype(struct udev_device *device) {
+  return (void)device, NULL;
+}
+API const char *udev_device_get_driver(struct udev_device *device) {
+  return (void)device, NULL;
+}
+API struct udev_device *udev_device_get_parent(struct udev_device *device) {
+  return (void)device, NULL;
+}
+API struct udev_list_entry *udev_device_get_properties_list_entry(struct udev_device *device) {
+  return (void)device, NULL;
+}
 
-API struct udev_device *udev_device_get_parent_with_subsystem_devtype(struct udev_device *device, const char *subsystem, const char *devtype) {
+API struct udev_device *udev_device_get_parent_with_subsystem_devtype(struct udev_device *device, const char *subsystem,
+                                                                      const char *devtype) {
   return (void)device, (void)subsystem, (void)devtype, NULL;
 }
 
-API const char *udev_device_get_sysattr_value(struct udev_device *device, const char *name) { return (void)device, (void)name, NULL; }
+API const char *udev_device_get_sysattr_value(struct udev_device *device, const char *name) {
+  return (void)device, (void)name, NULL;
+}
 
 API struct udev_device *udev_device_new_from_devnum(struct udev *udev, char type, unsigned long number) {
   return (void)udev, (void)type, (void)number, NULL;
 }
 
-API struct udev_device *udev_device_new_from_subsystem_sysname(struct udev *udev, const char *subsystem, const char *name) {
+API struct udev_device *udev_device_new_from_subsystem_sysname(struct udev *udev, const char *subsystem,
+                                                               const char *name) {
   return (void)udev, (void)subsystem, (void)name, NULL;
 }
 
@@ -166,7 +197,8 @@ API struct udev_monitor *udev_monitor_new_from_netlink(struct udev *udev, const 
   return monitor;
 }
 
-API int udev_monitor_filter_add_match_subsystem_devtype(struct udev_monitor *monitor, const char *subsystem, const char *devtype) {
+API int udev_monitor_filter_add_match_subsystem_devtype(struct udev_monitor *monitor, const char *subsystem,
+                                                        const char *devtype) {
   return (void)monitor, (void)subsystem, (void)devtype, 0;
 }
 
@@ -175,7 +207,9 @@ API int udev_monitor_enable_receiving(struct udev_monitor *monitor) {
   return 0;
 }
 
-API int udev_monitor_get_fd(struct udev_monitor *monitor) { return monitor->fd; }
+API int udev_monitor_get_fd(struct udev_monitor *monitor) {
+  return monitor->fd;
+}
 
 /* One event at a time, so that those behind it keep the descriptor readable: the least room that one fits in. */
 API struct udev_device *udev_monitor_receive_device(struct udev_monitor *monitor) {

@@ -6,6 +6,7 @@ With --pictures Looks writes the reference pictures again, and that of the manua
 
 real time: a browser, whose fingertips are on pseudo-terminals.
 """
+
 import argparse
 import json
 import pathlib
@@ -75,7 +76,9 @@ class PageTest(unittest.TestCase):
 
     def open(self, before="", patience=PATIENT, **options):
         """patience: the page's, model/patience.ts."""
-        page = self.browser.page(self.url + "/", before=f"globalThis.fingertipPatience = {json.dumps(patience)}; {NO_SAVE_DIALOG}{before}", **options)
+        page = self.browser.page(
+            self.url + "/", before=f"globalThis.fingertipPatience = {json.dumps(patience)}; {NO_SAVE_DIALOG}{before}", **options
+        )
         self.addCleanup(page.close)
         self.addCleanup(self.nothing_else_happened, page)
         driven.ready_s(page)
@@ -84,16 +87,29 @@ class PageTest(unittest.TestCase):
     def nothing_else_happened(self, page):
         """Whatever was done: no request to elsewhere, nothing that its policy refused, no error that was not caught."""
         self.assertEqual(page.foreign(), [])
-        self.assertEqual([each["exceptionDetails"].get("exception", {}).get("description") for each in page.of("Runtime.exceptionThrown")], [])
+        self.assertEqual(
+            [each["exceptionDetails"].get("exception", {}).get("description") for each in page.of("Runtime.exceptionThrown")], []
+        )
 
     def alert(self, page, pattern):
         """What the page says and leaves standing."""
-        return page.until(f"[...document.querySelectorAll('[role=alert]')].map(each => each.textContent).find(text => {pattern}.test(text))")
+        return page.until(
+            f"[...document.querySelectorAll('[role=alert]')].map(each => each.textContent).find(text => {pattern}.test(text))"
+        )
 
     def scenario(self, kind, *options):
         path = self.folder / f"{kind}.csv"
         if not path.exists():
-            run(OPTIONS.build / "host_tools/simulation/twin/twin", "scenario", kind, "-o", path, "--cache", OPTIONS.build / "contact_tables", *options)
+            run(
+                OPTIONS.build / "host_tools/simulation/twin/twin",
+                "scenario",
+                kind,
+                "-o",
+                path,
+                "--cache",
+                OPTIONS.build / "contact_tables",
+                *options,
+            )
         return path
 
 
@@ -183,7 +199,6 @@ class Use(PageTest):
         self.assertEqual(sorted(page.run("fingertip.fingertips.map(each => each.info.serial)")), sorted(SERIALS))
         self.assertEqual(page.run("fingertip.fingertips.map(each => each.lost)"), [0, 0])
 
-
     def test_flash(self):
         image = OPTIONS.build.parent / "pico_mux/fingertip-pico_mux.uf2"
         device = self.bench.fake(self.browser, SERIALS[0], "rate=100", "board=pico_mux", "loader=1")
@@ -192,7 +207,10 @@ class Use(PageTest):
         page.click("button", "Flash")
         torn = self.folder / "torn.uf2"
         torn.write_bytes(image.read_bytes()[:-100])
-        for wrong, pattern in ((torn, "/torn.uf2/"), (OPTIONS.image.with_suffix(".uf2"), "/is for board pico_parallel, but this fingertip is a pico_mux/")):
+        for wrong, pattern in (
+            (torn, "/torn.uf2/"),
+            (OPTIONS.image.with_suffix(".uf2"), "/is for board pico_parallel, but this fingertip is a pico_mux/"),
+        ):
             page.give("dialog input[type=file]", wrong)
             self.alert(page, pattern)
         page.give("dialog input[type=file]", image)
@@ -215,8 +233,15 @@ class Calibrate(PageTest):
         first = next(i for i, line in enumerate(once) if line.startswith("t_s,")) + 1
         rows = [line.split(",", 1) for line in once[first:]]
         often = self.folder / "placements_often.csv"
-        often.write_text("".join(once[:first] + [f"{float(t_s) + again * (float(rows[-1][0]) + 0.1):.6f},{rest}" for again in range(REPEATED) for t_s, rest in rows]))
-        return self.bench.emulated(self.browser, SERIALS[0], often, "--pace", "fast", "--seconds", 3600, "--flash", self.folder / "flash.bin", *options)
+        often.write_text(
+            "".join(
+                once[:first]
+                + [f"{float(t_s) + again * (float(rows[-1][0]) + 0.1):.6f},{rest}" for again in range(REPEATED) for t_s, rest in rows]
+            )
+        )
+        return self.bench.emulated(
+            self.browser, SERIALS[0], often, "--pace", "fast", "--seconds", 3600, "--flash", self.folder / "flash.bin", *options
+        )
 
     def test_a_weight_finds_the_gains(self):
         process = self.start()
@@ -237,12 +262,25 @@ class Calibrate(PageTest):
         page.type("textbox", "Weight, g", f"{1000 * FORCE_N / 9.80665:.6g}")
         page.click("button", "Begin")
         page.find("button", "Store")
-        after_mm = page.run("Number(document.querySelector('dialog table').textContent.match(/location off by[ 0-9.]*? mm *([0-9.]+) mm/)?.[1] ?? NaN)")
+        after_mm = page.run(
+            "Number(document.querySelector('dialog table').textContent.match(/location off by[ 0-9.]*? mm *([0-9.]+) mm/)?.[1] ?? NaN)"
+        )
         page.click("button", "Store")
         page.until("document.querySelector('dialog [role=status]').textContent.startsWith('Stored')")
         self.assertLess(after_mm, 0.15)
         found = np.array(page.run("Array.from(fingertip.fingertips[0].info.gain)"))
-        true = 1 + np.array([float(each) for each in re.search("(?m)^# gain_errors_percent: (.*)$", self.scenario("placements", *self.PLACEMENTS).read_text())[1].split()]) / 100
+        true = (
+            1
+            + np.array(
+                [
+                    float(each)
+                    for each in re.search("(?m)^# gain_errors_percent: (.*)$", self.scenario("placements", *self.PLACEMENTS).read_text())[
+                        1
+                    ].split()
+                ]
+            )
+            / 100
+        )
         self.assertEqual(len(found), len(true))
         self.assertLess(np.std(found / true), 0.015)
         self.assertGreater(np.std(true), 0.1)
@@ -251,8 +289,17 @@ class Calibrate(PageTest):
     def test_the_doctor_examines(self):
         rest = self.folder / "rest.csv"
         row = ",".join("0" for _ in files.TRUTH_COLUMNS) + ",0" * 15
-        rest.write_text("\n".join(["# fingertip-scenario 1", ",".join(["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]),
-                                   f"0,{row}", f"3600,{row}"]) + "\n")
+        rest.write_text(
+            "\n".join(
+                [
+                    "# fingertip-scenario 1",
+                    ",".join(["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]),
+                    f"0,{row}",
+                    f"3600,{row}",
+                ]
+            )
+            + "\n"
+        )
         process = self.bench.emulated(self.browser, SERIALS[0], rest, "--pace", "fast")
         page = self.open()
         driven.connected(page, 1)
@@ -285,8 +332,11 @@ class BadInput(PageTest):
 
     def test_files_that_are_none(self):
         page = self.open()
-        for name, content, pattern in (("letter.txt", b"Dear reader,\n", "/letter.txt.*recording/"), ("empty.csv", b"", "/empty.csv/"),
-                                       ("noise.mcap", bytes(range(256)) * 8, "/noise.mcap/")):
+        for name, content, pattern in (
+            ("letter.txt", b"Dear reader,\n", "/letter.txt.*recording/"),
+            ("empty.csv", b"", "/empty.csv/"),
+            ("noise.mcap", bytes(range(256)) * 8, "/noise.mcap/"),
+        ):
             (self.folder / name).write_bytes(content)
             page.give("input[type=file]", self.folder / name)
             self.alert(page, pattern)
@@ -319,7 +369,9 @@ class BadInput(PageTest):
         page.give("input[type=file]", two)
         page.until("fingertip.fingertips.length === 2 && fingertip.fingertips.every(each => each.state === 'closed')")
         page.shown()
-        names = page.until("(names => names.every(name => /fingertip/.test(name)) && names)([...document.querySelectorAll('.pad-card .name')].map(each => each.textContent))")
+        names = page.until(
+            "(names => names.every(name => /fingertip/.test(name)) && names)([...document.querySelectorAll('.pad-card .name')].map(each => each.textContent))"
+        )
         self.assertEqual(names, ["two.csv: fingertip E110", "two.csv: fingertip E111"])
         self.assertEqual(page.run("document.querySelector('.moment').textContent"), "newest")
         self.assertEqual([page.has("button", name) for name in ("Look back", "Go live")], [True, False])
@@ -372,7 +424,10 @@ class Looks(PageTest):
         page = self.open(before=TEN_TIMES, width=1120, height=760)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")
-        page.call("DOM.focus", nodeId=page.call("DOM.querySelector", nodeId=page.call("DOM.getDocument")["root"]["nodeId"], selector="main")["nodeId"])
+        page.call(
+            "DOM.focus",
+            nodeId=page.call("DOM.querySelector", nodeId=page.call("DOM.getDocument")["root"]["nodeId"], selector="main")["nodeId"],
+        )
         page.key(" ", "Space")
         for _ in range(steps):
             page.key("ArrowLeft")
@@ -393,9 +448,15 @@ class Looks(PageTest):
     def apart(self, page, found):
         """From the picture in light colours: of all that is shown, or of the traces alone, which are thin lines in a part of it."""
         reference = pictures.read(str(REFERENCES / "light.png"))
-        left, top, right, bottom = (int(edge / 2) for edge in page.run(
-            "(({left, top, right, bottom}) => [left, top, right, bottom])(document.querySelector('.traces').getBoundingClientRect())"))
-        return max(pictures.difference(found, reference), pictures.difference(found[top:bottom, left:right], reference[top:bottom, left:right]))
+        left, top, right, bottom = (
+            int(edge / 2)
+            for edge in page.run(
+                "(({left, top, right, bottom}) => [left, top, right, bottom])(document.querySelector('.traces').getBoundingClientRect())"
+            )
+        )
+        return max(
+            pictures.difference(found, reference), pictures.difference(found[top:bottom, left:right], reference[top:bottom, left:right])
+        )
 
     def test_it_looks_as_it_did(self):
         page = self.paused()
@@ -405,16 +466,20 @@ class Looks(PageTest):
             if OPTIONS.pictures:
                 pictures.write(reference, found)
                 continue
-            self.assertLess(self.apart(page, found) if name == "light" else pictures.difference(found, pictures.read(str(reference))), self.LIMIT, name)
+            self.assertLess(
+                self.apart(page, found) if name == "light" else pictures.difference(found, pictures.read(str(reference))), self.LIMIT, name
+            )
         if OPTIONS.pictures:
             return
         # and what is missing is noticed
-        for what, hide in (("the pad", "document.querySelector('.pad-picture').style.opacity = 0"), ("the traces", "document.querySelector('.traces').style.opacity = 0"),
-                           ("the colours", "document.documentElement.style.filter = 'grayscale(1)'")):
+        for what, hide in (
+            ("the pad", "document.querySelector('.pad-picture').style.opacity = 0"),
+            ("the traces", "document.querySelector('.traces').style.opacity = 0"),
+            ("the colours", "document.documentElement.style.filter = 'grayscale(1)'"),
+        ):
             page.run(hide)
             self.assertGreater(self.apart(page, pictures.half(self.shown(page, "light"))), self.LIMIT, what)
             page.run("document.querySelectorAll('[style*=opacity]').forEach(each => each.style.opacity = '')")
-
 
     def test_the_manuals_picture(self):
         """What the boards' default scene shows of a fingertip that knows its pad: a pull beside force and place."""
@@ -432,7 +497,9 @@ class Looks(PageTest):
         page = self.paused()
         for width in (700, 1120):
             page.size(width, 760)
-            page.until("document.querySelector('.traces').clientWidth === document.querySelector('canvas.flags').getBoundingClientRect().width")
+            page.until(
+                "document.querySelector('.traces').clientWidth === document.querySelector('canvas.flags').getBoundingClientRect().width"
+            )
 
 
 class Simulations(PageTest):
@@ -444,7 +511,11 @@ class Simulations(PageTest):
     def numbers(self, page):
         """{title: text} of the numbers, once they are written."""
         page.shown()
-        return dict(page.run("[...document.querySelectorAll('.number:not([hidden])')].map(each => [each.querySelector('dt').textContent, each.querySelector('dd').textContent])"))
+        return dict(
+            page.run(
+                "[...document.querySelectorAll('.number:not([hidden])')].map(each => [each.querySelector('dt').textContent, each.querySelector('dd').textContent])"
+            )
+        )
 
     def test_the_pointer_presses_the_pad(self):
         page = self.open()
@@ -454,7 +525,9 @@ class Simulations(PageTest):
         self.assertFalse(page.has("combobox", "Object"))  # the ball is the only one
         page.click("button", "From above")
         page.shown()
-        x, y, width, height = page.run("(({x, y, width, height}) => [x, y, width, height])(document.querySelector('.pad').getBoundingClientRect())")
+        x, y, width, height = page.run(
+            "(({x, y, width, height}) => [x, y, width, height])(document.querySelector('.pad').getBoundingClientRect())"
+        )
         page.press_at(x + width / 2, y + height / 2)
         page.until(f"{self.FIRST}.contact.force_N > 2")
         page.until(f"{self.FIRST}.line.truth.force_N > 2")
@@ -462,7 +535,9 @@ class Simulations(PageTest):
         true = page.run(f"(({{x_mm, y_mm}}) => [x_mm, y_mm])({self.FIRST}.line.truth)")
         self.assertLess(np.hypot(*true), 2)  # the middle of the picture is that of the pad
         self.assertLess(np.hypot(*np.subtract(felt, true)), 2.5)  # never calibrated
-        page.until("[...document.querySelectorAll('.truth')].filter(each => /^true /.test(each.textContent)).length === 3")  # force, place, pull
+        page.until(
+            "[...document.querySelectorAll('.truth')].filter(each => /^true /.test(each.textContent)).length === 3"
+        )  # force, place, pull
         self.assertRegex(self.numbers(page)["Force"], r"^\d+\.\d\d.* N .*true \d+\.\d\d$")
         page.drag_to(x + width / 2, y + height / 2 - height / 8)
         page.until(f"{self.FIRST}.line.truth.y_mm > {true[1] + 2} && {self.FIRST}.contact.y_mm > {felt[1] + 1}")
@@ -493,7 +568,22 @@ class Simulations(PageTest):
 class Everyone(PageTest):
     """Who does not see it, who sees little, who holds it in one hand."""
 
-    NAMED = {"button", "link", "textbox", "checkbox", "radio", "combobox", "listbox", "slider", "spinbutton", "tab", "menuitem", "searchbox", "switch", "dialog"}
+    NAMED = {
+        "button",
+        "link",
+        "textbox",
+        "checkbox",
+        "radio",
+        "combobox",
+        "listbox",
+        "slider",
+        "spinbutton",
+        "tab",
+        "menuitem",
+        "searchbox",
+        "switch",
+        "dialog",
+    }
 
     def everything(self):
         """A page with a simulated fingertip on it."""
@@ -592,7 +682,10 @@ class Everyone(PageTest):
         page = self.everything()
         page.until("fingertip.fingertips[0].health")
         page.until("[...document.querySelectorAll('.facts dt')].some(each => each.textContent === 'running for')")
-        self.assertEqual(page.run("[...document.querySelectorAll('.facts dt')].map(each => each.textContent).filter(each => /busy|stack/.test(each))"), [])
+        self.assertEqual(
+            page.run("[...document.querySelectorAll('.facts dt')].map(each => each.textContent).filter(each => /busy|stack/.test(each))"),
+            [],
+        )
 
     def test_the_focus_stays_where_something_was_pressed(self):
         """Though its control is hidden, disabled or gone."""

@@ -7,8 +7,7 @@
 
 #include <stdint.h>
 
-static inline __attribute__((always_inline)) int32_t port_divide(int32_t numerator,
-                                                                 int32_t denominator) {
+static inline __attribute__((always_inline)) int32_t port_divide(int32_t numerator, int32_t denominator) {
   const uint32_t sio = 0xd0000060;
   int32_t quotient;
   __asm("str %1, [%3, #8]\n\t"                     /* DIV_SDIVIDEND */

@@ -16,15 +16,14 @@ namespace {
 // noise changes them with every frame.
 constexpr double FROZEN_s = 0.05;
 constexpr int FROZEN_FRAMES = 5;
-constexpr double OLD_s = 0.5; // an older frame says nothing of now
+constexpr double OLD_s = 0.5;        // an older frame says nothing of now
 constexpr double DELAY_SHARE = 0.05; // that a frame has in the mean delay
 constexpr int ZERO_FRAMES = 3;
 // A force with a larger standard deviation, as a share of it, is no measurement.
 constexpr double FORCE_SD_MOST = 1.0;
 // What a load is not to be believed with.
-constexpr std::uint32_t FORCE_ONLY = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT |
-                                     CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED |
-                                     CONTACT_FLAG_ZERO_DOUBTFUL;
+constexpr std::uint32_t FORCE_ONLY = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND |
+                                     CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
 // A contact with a larger sigma is a plate's. Its Gaussian reaches far beyond the pad, which takes
 // of its force what lies on so much of it: a block of 36 by 54 mm does.
@@ -42,13 +41,12 @@ bool tells_force(const GripTouch &touch) {
     return true; // none
   }
   return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 &&
-         ((touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 ||
-          touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
+         ((touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 || touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
 }
 
 bool is_same(const GripTouch &a, const GripTouch &b) {
-  return a.force_N == b.force_N && a.force_sd_N == b.force_sd_N && a.x_mm == b.x_mm &&
-         a.y_mm == b.y_mm && a.qx_N == b.qx_N && a.qy_N == b.qy_N;
+  return a.force_N == b.force_N && a.force_sd_N == b.force_sd_N && a.x_mm == b.x_mm && a.y_mm == b.y_mm &&
+         a.qx_N == b.qx_N && a.qy_N == b.qy_N;
 }
 
 } // namespace
@@ -57,8 +55,7 @@ void GripFinger::take(const GripTouch &touch) {
   if (is_heard_ && touch.t_s <= touch_.t_s) {
     return;
   }
-  const bool says_something =
-      (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
+  const bool says_something = (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
   if (!is_heard_ || !says_something || !is_same(touch_, touch)) {
     changed_s_ = touch.t_s;
     unchanged_ = 0;
@@ -111,10 +108,8 @@ GripFelt GripFinger::look(double now_s, const GripSettings &settings) {
     told_s_ = force_t_s_ == touch_.t_s ? now_s : told_s_;
     is_new_ = false;
   }
-  const bool stale =
-      !is_heard_ || now_s > heard_s_ + settings.stale_s || now_s > touch_.t_s + OLD_s;
-  const bool frozen =
-      !stale && unchanged_ >= FROZEN_FRAMES && touch_.t_s - changed_s_ >= FROZEN_s;
+  const bool stale = !is_heard_ || now_s > heard_s_ + settings.stale_s || now_s > touch_.t_s + OLD_s;
+  const bool frozen = !stale && unchanged_ >= FROZEN_FRAMES && touch_.t_s - changed_s_ >= FROZEN_s;
   const bool untold = !stale && now_s > told_s_ + settings.stale_s;
   felt.trouble = (stale ? GRIP_FINGER_0_STALE : 0u) | (frozen ? GRIP_FINGER_0_FROZEN : 0u) |
                  (untold ? GRIP_FINGER_0_UNTOLD : 0u) |
@@ -142,8 +137,7 @@ GripFelt GripFinger::look(double now_s, const GripSettings &settings) {
   return felt;
 }
 
-GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s,
-                const GripSettings &settings) {
+GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings) {
   GripFelts all;
   all.low_N = all.t_s = std::numeric_limits<double>::infinity();
   double loads_N = 0.0, most_N = 0.0, normal_N = 0.0;

@@ -18,7 +18,7 @@ struct GripTouch {
   double force_N = 0.0, force_sd_N = 0.0;
   double x_mm = 0.0, y_mm = 0.0, sigma_mm = 0.0;
   double qx_N = 0.0, qy_N = 0.0, q_sd_N = 0.0; // tangential load of the object on the rubber
-  double speed_mm_s = 0.0; // of the contact on the rubber
+  double speed_mm_s = 0.0;                     // of the contact on the rubber
 };
 
 // Troubles; bits. Each is on while it lasts, those of GRIP_FAULT stay.
@@ -31,14 +31,14 @@ enum GripTrouble : std::uint32_t {
   GRIP_FINGER_1_FORCE_ONLY = 1u << 5,
   GRIP_FINGER_0_OVER = 1u << 6, // SATURATED or FORCE_LOWER_BOUND: never tightens further
   GRIP_FINGER_1_OVER = 1u << 7,
-  GRIP_FINGERS_DIFFER = 1u << 8, // forces by more than settings.differ while the gripper rests
-  GRIP_AT_CAP = 1u << 9,         // more force than cap_N is wanted
-  GRIP_AT_TRAVEL_CAP = 1u << 10, // closing further than travel_cap_mm since the touch is wanted
+  GRIP_FINGERS_DIFFER = 1u << 8,    // forces by more than settings.differ while the gripper rests
+  GRIP_AT_CAP = 1u << 9,            // more force than cap_N is wanted
+  GRIP_AT_TRAVEL_CAP = 1u << 10,    // closing further than travel_cap_mm since the touch is wanted
   GRIP_GRIPPER_SILENT = 1u << 11,   // no status for settings.silent_s
   GRIP_GRIPPER_FAULT = 1u << 12,    // its own code in the report
   GRIP_GRIPPER_INACTIVE = 1u << 13, // it was activated and is no longer
-  GRIP_NO_LOAD = 1u << 14, // mode hold: no fingertip reports a load; the grip does not loosen
-  GRIP_FINGER_0_UNTOLD = 1u << 15, // frames, but none with a measured force
+  GRIP_NO_LOAD = 1u << 14,          // mode hold: no fingertip reports a load; the grip does not loosen
+  GRIP_FINGER_0_UNTOLD = 1u << 15,  // frames, but none with a measured force
   GRIP_FINGER_1_UNTOLD = 1u << 16,
   GRIP_FINGER_0_LATE = 1u << 17, // frames older than settings.late_s when they come
   GRIP_FINGER_1_LATE = 1u << 18,
@@ -84,10 +84,10 @@ private:
 // Of both, as far as they are believed.
 struct GripFelts {
   std::uint32_t trouble = 0;
-  int fingers = 0, touches = 0; // so many tell a force; feel a contact
+  int fingers = 0, touches = 0;                               // so many tell a force; feel a contact
   double low_N = 0.0, high_N = 0.0, mean_N = 0.0, sd_N = 0.0; // 0 without any
-  double grip_N = 0.0; // what the object is held with
-  double t_s = 0.0;    // of the older of them
+  double grip_N = 0.0;                                        // what the object is held with
+  double t_s = 0.0;                                           // of the older of them
   double delay_s = 0.0;
   bool fresh = false, over = false, tells_load = false, slides = false;
   double load_N = 0.0;     // tangential load of one fingertip, since its zero
@@ -97,7 +97,6 @@ struct GripFelts {
   bool is_alone() const { return low_N < 0.5 * high_N; } // one presses, the other hardly
 };
 
-GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s,
-                const GripSettings &settings);
+GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings);
 
 } // namespace fingertip

@@ -14,8 +14,8 @@ constexpr double CLOSES = 0.625, OPENS = 1.0;
 
 } // namespace
 
-std::uint32_t GripFixed::step(const GripFelts &felt, const GripSettings &settings,
-                               const GripperTraits &traits, double now_s, GripReach &reach) {
+std::uint32_t GripFixed::step(const GripFelts &felt, const GripSettings &settings, const GripperTraits &traits,
+                              double now_s, GripReach &reach) {
   std::uint32_t trouble = 0;
   if (felt.fingers == 0 || (runs_ && now_s - stepped_s_ < settings.control_s)) {
     return trouble;
@@ -30,13 +30,11 @@ std::uint32_t GripFixed::step(const GripFelts &felt, const GripSettings &setting
     slope_N_s = (error_N - error_N_) / passed_s;
     integral_N_s += mends ? error_N * passed_s : 0.0;
   }
-  const double change_mm =
-      gains.kp_mm_N * error_N + gains.ki_mm_Ns * integral_N_s + gains.kd_mm_s_N * slope_N_s;
+  const double change_mm = gains.kp_mm_N * error_N + gains.ki_mm_Ns * integral_N_s + gains.kd_mm_s_N * slope_N_s;
   const double off_mm = reach.touch_width_mm() - change_mm - reach.target_mm();
   const double steps = std::round(off_mm / traits.step_mm);
   double next_mm = reach.target_mm() + (mends ? steps * traits.step_mm : 0.0);
-  const bool no_room =
-      felt.is_alone() && next_mm < reach.last_below_cap_mm(felt, settings) - 1e-9;
+  const bool no_room = felt.is_alone() && next_mm < reach.last_below_cap_mm(felt, settings) - 1e-9;
   if (steps < 0.0 && (no_room || felt.high_N >= settings.cap_N)) {
     trouble |= GRIP_AT_CAP;
     next_mm = reach.target_mm();

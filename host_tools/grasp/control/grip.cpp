@@ -63,15 +63,15 @@ void Grip::enter(GripState state) {
 }
 
 bool Grip::is_grasping() const {
-  return state_ == GRIP_SQUEEZE || state_ == GRIP_READY || state_ == GRIP_HOLDING ||
-         state_ == GRIP_SLIPPING || (state_ == GRIP_STILL && still_grasps_);
+  return state_ == GRIP_SQUEEZE || state_ == GRIP_READY || state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING ||
+         (state_ == GRIP_STILL && still_grasps_);
 }
 
 bool Grip::request(GripRequest request) {
   switch (request) {
   case GRIP_REQUEST_GRASP:
-    if (state_ != GRIP_IDLE && state_ != GRIP_OPEN && state_ != GRIP_DROPPED &&
-        state_ != GRIP_MISSED && state_ != GRIP_STILL) {
+    if (state_ != GRIP_IDLE && state_ != GRIP_OPEN && state_ != GRIP_DROPPED && state_ != GRIP_MISSED &&
+        state_ != GRIP_STILL) {
       return false;
     }
     hold_.begin();
@@ -107,8 +107,7 @@ std::uint32_t Grip::gripper_trouble() {
     return 0;
   }
   const bool was_active = state_ > GRIP_ACTIVATING;
-  return (status_.fault != 0 ? GRIP_GRIPPER_FAULT : 0u) |
-         (was_active && !status_.active ? GRIP_GRIPPER_INACTIVE : 0u);
+  return (status_.fault != 0 ? GRIP_GRIPPER_FAULT : 0u) | (was_active && !status_.active ? GRIP_GRIPPER_INACTIVE : 0u);
 }
 
 double Grip::dead_s() const {
@@ -116,9 +115,7 @@ double Grip::dead_s() const {
 }
 
 double Grip::start_force() const {
-  return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N
-         : is_blind_                       ? settings_.blind_N
-                                           : settings_.start_N;
+  return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.blind_N : settings_.start_N;
 }
 
 // A step of the width at this speed since the last.
@@ -178,8 +175,7 @@ void Grip::approach() {
 std::uint32_t Grip::aim(const GripAim &aim) {
   GripAim below = aim;
   wanted_N_ = below.wanted_N = std::min(aim.wanted_N, settings_.cap_N);
-  return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) |
-         reach_.aim(below, felt_, settings_, now_s_);
+  return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) | reach_.aim(below, felt_, settings_, now_s_);
 }
 
 std::uint32_t Grip::squeeze() {
@@ -193,9 +189,8 @@ std::uint32_t Grip::squeeze() {
   }
   const double from_N = is_blind_ ? settings_.start_N : settings_.touch_N;
   const double risen_N = from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
-  const std::uint32_t trouble =
-      fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
-            : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
+  const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
+                                      : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
   // Or as near to it as a move brings it.
   const bool nearest = !fixed && felt_.fingers > 0 && reach_.has_come(now_s_, felt_.t_s);
@@ -203,10 +198,9 @@ std::uint32_t Grip::squeeze() {
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, felt_.t_s);
   // A step nearer than its least moves bring it: to a set force, or where it is far too weak.
   const bool may_round = nearest && (capped || there);
-  if (may_round &&
-      (settings_.sets_force() ? reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)
-                              : felt_.low_N < SQUEEZED * aimed_N &&
-                                    reach_.goes_round_closer(felt_, settings_, now_s_))) {
+  if (may_round && (settings_.sets_force()
+                        ? reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)
+                        : felt_.low_N < SQUEEZED * aimed_N && reach_.goes_round_closer(felt_, settings_, now_s_))) {
     enter(GRIP_APPROACH);
     return trouble;
   }
@@ -227,9 +221,8 @@ std::uint32_t Grip::squeeze() {
 
 std::uint32_t Grip::make_ready() {
   const bool fixed = settings_.mode == GRIP_MODE_FIXED;
-  const std::uint32_t trouble =
-      fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
-            : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
+  const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
+                                      : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
   if (now_s_ - since_s_ >= READY_s && fingers_[0].has_zero() && fingers_[1].has_zero()) {
     for (GripFinger &finger : fingers_) {
       finger.end_zero();
@@ -244,8 +237,7 @@ std::uint32_t Grip::hold() {
   if (settings_.mode == GRIP_MODE_FIXED) {
     return fixed_.step(felt_, settings_, traits_, now_s_, reach_);
   }
-  const double wanted_N =
-      hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
+  const double wanted_N = hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
   std::uint32_t trouble = felt_.tells_load ? 0u : GRIP_NO_LOAD;
   // The rubber has relaxed, and a step brings it nearer to a force that is only held. Without a
@@ -257,8 +249,7 @@ std::uint32_t Grip::hold() {
   if (reach_.goes_round()) {
     reach_.comes_round(now_s_, felt_.t_s);
   } else if (!only_held || !reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)) {
-    trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual,
-                    hold_.is_set()});
+    trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set()});
   }
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : GRIP_HOLDING);
@@ -345,8 +336,7 @@ void Grip::tell(GripCommand &command) const {
   }
   command.motion = GRIP_MOVE;
   command.speed_mm_s = std::clamp(speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
-  command.force_N =
-      std::clamp(GripReach::LIMIT * settings_.cap_N, traits_.force_min_N, traits_.force_max_N);
+  command.force_N = std::clamp(GripReach::LIMIT * settings_.cap_N, traits_.force_min_N, traits_.force_max_N);
 }
 
 GripReport Grip::report() const {

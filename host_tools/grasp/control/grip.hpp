@@ -61,17 +61,17 @@ enum GripState : std::uint8_t {
 enum GripRequest { GRIP_REQUEST_GRASP, GRIP_REQUEST_HOLD, GRIP_REQUEST_RELEASE };
 
 struct GripReport {
-  std::uint8_t state = GRIP_IDLE; // GripState
-  std::uint32_t trouble = 0;      // GripTrouble
-  std::uint8_t gripper_fault = 0; // its own code; that of FAULT stays, until there is another
-  double wanted_N = 0.0;          // the grip force that it aims at
-  double force_N = 0.0;           // as reported: of both fingertips
+  std::uint8_t state = GRIP_IDLE;            // GripState
+  std::uint32_t trouble = 0;                 // GripTrouble
+  std::uint8_t gripper_fault = 0;            // its own code; that of FAULT stays, until there is another
+  double wanted_N = 0.0;                     // the grip force that it aims at
+  double force_N = 0.0;                      // as reported: of both fingertips
   std::array<double, GRIP_FINGERS> felt_N{}; // and of each
-  double load_N = 0.0;            // tangential load of one fingertip since READY; 0: unknown
-  double margin = 0.0;            // force x friction / load; 0: no load
+  double load_N = 0.0;                       // tangential load of one fingertip since READY; 0: unknown
+  double margin = 0.0;                       // force x friction / load; 0: no load
   double friction = 0.0;
   double width_mm = 0.0;
-  double delay_s = 0.0; // from a fingertip's measurement to here
+  double delay_s = 0.0;     // from a fingertip's measurement to here
   std::uint32_t slides = 0; // so many since GRASP
 };
 

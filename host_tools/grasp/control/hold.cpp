@@ -59,8 +59,7 @@ void GripLoad::rests(double load_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
   const bool rises = load_N >= peak_N_ && !swings;
   swings_s_ = load_N < peak_N_ - 2.0 * LOAD_NOISE_N ? SWINGS_s : swings_s_ - passed_s;
-  rate_N_s_ =
-      rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
+  rate_N_s_ = rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
   slow_N_ += std::min(passed_s / RATE_s, 1.0) * (load_N - slow_N_);
   if (rises) {
     load_N_ = peak_N_ = load_N;
@@ -104,8 +103,7 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
   fastest_mm_s_ -= std::min(passed_s / LATELY_s, 1.0) * fastest_mm_s_;
   fastest_mm_s_ = std::max(fastest_mm_s_, felt.speed_mm_s);
   const bool creeps = felt.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
-  const bool holds =
-      moved_mm_ < FAR_mm && felt.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * felt.grip_N;
+  const bool holds = moved_mm_ < FAR_mm && felt.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * felt.grip_N;
   const bool was_sliding = sliding_;
   sliding_ = felt.slides && (was_sliding || !felt.tells_load || !(holds || creeps));
   goes_on_ = sliding_ && (!felt.tells_load || (!holds && felt.speed_mm_s >= fastest_mm_s_));
@@ -143,8 +141,8 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
   was_loaded_ = was_loaded_ || now_s - steady_s_ > LOADED_s;
 }
 
-double GripHold::wants(const GripFelts &felt, double coming_N, const GripSettings &settings,
-                       double now_s, double dead_s) {
+double GripHold::wants(const GripFelts &felt, double coming_N, const GripSettings &settings, double now_s,
+                       double dead_s) {
   const double passed_s = begun_ ? now_s - now_s_ : 0.0;
   if (!begun_) {
     begun_ = true;

@@ -41,8 +41,7 @@ public:
   void begin();
   // The force that is wanted now. coming_N: what the moves under way make. dead_s: from a motion of
   // the object until the gripper moves.
-  double wants(const GripFelts &felt, double coming_N, const GripSettings &settings, double now_s,
-               double dead_s);
+  double wants(const GripFelts &felt, double coming_N, const GripSettings &settings, double now_s, double dead_s);
   double friction(const GripSettings &settings) const { return friction_.value(settings.friction); }
   bool is_set() const { return is_set_; } // nothing pulls at a set force
   double load_N() const { return load_.now_N(); }
@@ -64,14 +63,13 @@ private:
   double slid_s_ = 0.0; // the last frame of a slide
   double fastest_mm_s_ = 0.0;
   double going_N_ = 0.0, going_load_N_ = 0.0; // grip and load of a slide, as its friction was seen
-  double still_s_ = 0.0;  // the last frame that told no slide
-  double steady_s_ = 0.0; // since when the load is steady
-  double was_N_ = 0.0;    // the load, as far as it is remembered
-  double ratio_ = 0.0;    // smoothed, of what rests
-  double lately_ = 0.0;   // the largest within LATELY_s
-  double moved_mm_ = 0.0; // of what is reported as one slide
-  bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false,
-       is_set_ = false;
+  double still_s_ = 0.0;                      // the last frame that told no slide
+  double steady_s_ = 0.0;                     // since when the load is steady
+  double was_N_ = 0.0;                        // the load, as far as it is remembered
+  double ratio_ = 0.0;                        // smoothed, of what rests
+  double lately_ = 0.0;                       // the largest within LATELY_s
+  double moved_mm_ = 0.0;                     // of what is reported as one slide
+  bool begun_ = false, sliding_ = false, goes_on_ = false, has_told_ = false, was_loaded_ = false, is_set_ = false;
   std::uint32_t slides_ = 0;
 };
 

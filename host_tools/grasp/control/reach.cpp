@@ -24,11 +24,11 @@ constexpr double SPACED_s = 0.003;     // widths of the ring
 constexpr double WIDTH_LAGS_s = 0.008; // newer forces tell nothing while the gripper moves
 constexpr double SHOWS_s = 0.02;       // after a move, in the force, whatever the clocks differ by
 constexpr double POLL_SHARE = 0.05;    // that an answer has in the mean
-constexpr double MISSES = 0.35; // of what the least move makes: less may be missing
-constexpr double NEAR = 0.03;             // of the wanted force: near enough
-constexpr double WEAK = 0.8;              // and too weak, where the cap leaves no room
-constexpr double SHORT_mm = 0.5;          // a short move
-constexpr double OPENS_mm = 0.3;           // at once
+constexpr double MISSES = 0.35;        // of what the least move makes: less may be missing
+constexpr double NEAR = 0.03;          // of the wanted force: near enough
+constexpr double WEAK = 0.8;           // and too weak, where the cap leaves no room
+constexpr double SHORT_mm = 0.5;       // a short move
+constexpr double OPENS_mm = 0.3;       // at once
 // A set force may be off by so many steps: by more than half of one, or it goes to and fro. Going
 // round it keeps so much of it, and does so no more often in a grasp.
 constexpr double OFF = 0.65, KEEPS = 0.25;
@@ -71,8 +71,7 @@ double GripRubber::force_at(double to_mm, double force_N, double from_mm) const 
 }
 
 double GripRubber::width_for(double wanted_N, double force_N, double from_mm) const {
-  const double share = (wanted_N - force_N) / std::max(force_N, LEAST_N) /
-                       (wanted_N > force_N ? closing_ : opening_);
+  const double share = (wanted_N - force_N) / std::max(force_N, LEAST_N) / (wanted_N > force_N ? closing_ : opening_);
   const double grown = std::pow(std::max(1.0 + share, 0.0), 1.0 / EXPONENT);
   return from_mm - (grown - 1.0) * indentation_mm(from_mm, both_mm_);
 }
@@ -194,8 +193,7 @@ void GripReach::first_touch(double t_s) {
 
 // Where it is going to be. Where it stands, it makes no move that is shorter than its deadband.
 double GripReach::coming_mm(double now_s) const {
-  const bool stays = stands(now_s) &&
-                     std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
+  const bool stays = stands(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
   return stays ? status_.width_mm : target_mm_;
 }
 
@@ -222,7 +220,7 @@ double GripReach::last_below_cap_mm(const GripFelts &felt, const GripSettings &s
 }
 
 double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSettings &settings,
-                      std::uint32_t &trouble) const {
+                          std::uint32_t &trouble) const {
   const double least_mm = touch_width_mm() - settings.travel_cap_mm;
   if (width_mm < least_mm) {
     width_mm = least_mm;
@@ -236,8 +234,7 @@ double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSett
   return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
 }
 
-double GripReach::steps_off(double wanted_N, double force_N, double from_mm,
-                            double coming_mm) const {
+double GripReach::steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const {
   return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
 }
 
@@ -245,8 +242,7 @@ bool GripReach::may_go_round(const GripFelts &felt) const {
   return least_mm() > traits_.step_mm && !felt.is_alone() && !felt.over;
 }
 
-double GripReach::room_mm(const GripFelts &felt, const GripSettings &settings,
-                          double coming_mm) const {
+double GripReach::room_mm(const GripFelts &felt, const GripSettings &settings, double coming_mm) const {
   return coming_mm - bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
 }
 
@@ -258,19 +254,16 @@ void GripReach::go_round(double to_mm, double now_s) {
   aimed_s_ = now_s;
 }
 
-bool GripReach::goes_round_closer(const GripFelts &felt, const GripSettings &settings,
-                                  double now_s) {
+bool GripReach::goes_round_closer(const GripFelts &felt, const GripSettings &settings, double now_s) {
   const double coming = coming_mm(now_s);
-  const bool goes = !limits_itself(settings) && may_go_round(felt) &&
-                    room_mm(felt, settings, coming) > traits_.step_mm;
+  const bool goes = !limits_itself(settings) && may_go_round(felt) && room_mm(felt, settings, coming) > traits_.step_mm;
   if (goes) {
     go_round(coming - traits_.step_mm, now_s);
   }
   return goes;
 }
 
-bool GripReach::goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings,
-                              double now_s) {
+bool GripReach::goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings, double now_s) {
   if (!may_go_round(felt) || rounds_ >= ROUNDS || !rests(now_s, felt.t_s)) {
     return false;
   }
@@ -279,8 +272,7 @@ bool GripReach::goes_round_to(double set_N, const GripFelts &felt, const GripSet
   const double to_mm = coming - std::copysign(traits_.step_mm, off);
   const double widest_mm = std::max(coming, to_mm) + least_mm();
   const bool has_room = off < 0.0 || room_mm(felt, settings, coming) > traits_.step_mm;
-  if (std::abs(off) < OFF || !has_room ||
-      rubber_.force_at(widest_mm, felt.low_N, width_mm) < KEEPS * set_N) {
+  if (std::abs(off) < OFF || !has_room || rubber_.force_at(widest_mm, felt.low_N, width_mm) < KEEPS * set_N) {
     return false;
   }
   rounds_++;
@@ -312,8 +304,7 @@ double GripReach::nearest_steps(double off, double least_mm, bool may_round) con
   return worth && !(may_round && rounds_ < ROUNDS) ? std::copysign(least, off) : 0.0;
 }
 
-std::uint32_t GripReach::aim(const GripAim &aim, const GripFelts &felt,
-                             const GripSettings &settings, double now_s) {
+std::uint32_t GripReach::aim(const GripAim &aim, const GripFelts &felt, const GripSettings &settings, double now_s) {
   const double wanted_N = aim.wanted_N;
   const Haste haste = aim.haste;
   const bool nearest = aim.nearest;
@@ -334,8 +325,7 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripFelts &felt,
   // A gripper that limits itself does not wait until a move has ended: the bound is not all that
   // keeps it below the cap.
   if (limits_itself(settings) ? come : rested) {
-    felt.low_N > settings.touch_N && !felt.is_alone() ? bound_.learn(felt.grip_N, width_mm)
-                                                      : bound_.forget_pair();
+    felt.low_N > settings.touch_N && !felt.is_alone() ? bound_.learn(felt.grip_N, width_mm) : bound_.forget_pair();
   }
   // Nor does a gripper that cannot keep the cap itself add a move to one that does not show yet.
   if (!(limits_itself(settings) ? haste != Haste::patient || come : rested)) {
@@ -356,23 +346,20 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripFelts &felt,
   const double misses_N = exact ? near_N : std::max(near_N, (waits ? 1.0 : MISSES) * closes_N);
   const auto off = [&](double force_N) { return steps_off(force_N, low_N, width_mm, coming); };
   const bool may_round = felt.tells_load || haste == Haste::patient;
-  const double near_steps =
-      std::abs(now_N - wanted_N) > near_N ? nearest_steps(off(wanted_N), least, may_round) : 0.0;
+  const double near_steps = std::abs(now_N - wanted_N) > near_N ? nearest_steps(off(wanted_N), least, may_round) : 0.0;
   const bool closes = nearest ? near_steps > 0.0 : now_N < wanted_N - misses_N;
   double to_mm = coming;
   if (closes) {
     double way_mm = step_mm * (nearest ? near_steps : std::ceil(off(wanted_N - misses_N) - 1e-6));
-    way_mm = haste == Haste::patient ? std::min(way_mm, step_mm * std::floor(SHORT_mm / step_mm))
-                                     : way_mm;
+    way_mm = haste == Haste::patient ? std::min(way_mm, step_mm * std::floor(SHORT_mm / step_mm)) : way_mm;
     way_mm = std::max(way_mm, least);
     const double room_mm = this->room_mm(felt, settings, coming);
     if (way_mm > room_mm) {
       // What is held too weakly gets a short move all the same, if the gripper's own limit keeps it
       // below the cap.
       const bool too_weak = !felt.is_alone() && (exact || now_N < WEAK * wanted_N);
-      const double short_mm = too_weak && limits_itself(settings)
-                                  ? std::max(least, step_mm * std::floor(SHORT_mm / step_mm))
-                                  : 0.0;
+      const double short_mm =
+          too_weak && limits_itself(settings) ? std::max(least, step_mm * std::floor(SHORT_mm / step_mm)) : 0.0;
       way_mm = std::min(way_mm, std::max(step_mm * std::floor(room_mm / step_mm), short_mm));
       trouble |= GRIP_AT_CAP;
     }

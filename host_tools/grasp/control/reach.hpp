@@ -110,20 +110,17 @@ public:
   // the cap.
   double last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const;
   // A width that no cap forbids.
-  double allowed(double width_mm, const GripFelts &felt, const GripSettings &settings,
-                 std::uint32_t &trouble) const;
+  double allowed(double width_mm, const GripFelts &felt, const GripSettings &settings, std::uint32_t &trouble) const;
 
   // Sends it to where the force is what is wanted. Troubles: which cap keeps it from that.
-  std::uint32_t aim(const GripAim &aim, const GripFelts &felt, const GripSettings &settings,
-                    double now_s);
+  std::uint32_t aim(const GripAim &aim, const GripFelts &felt, const GripSettings &settings, double now_s);
 
   // Going round: a gripper whose least move is several steps gets one step further by two moves,
   // back and on again. Only while nothing pulls. True: it does.
   // Closer, where only the fingertips keep the cap, and it has room for the step.
   bool goes_round_closer(const GripFelts &felt, const GripSettings &settings, double now_s);
   // Either way, where that is nearer to this force. On the way it keeps some of it.
-  bool goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings,
-                     double now_s);
+  bool goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings, double now_s);
   bool goes_round() const { return goes_round_; }
   void leave_round() { goes_round_ = false; }
   // Goes on with it; true once it stands there.

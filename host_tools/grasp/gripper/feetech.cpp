@@ -44,11 +44,9 @@ void put_word(Bytes *bytes, int value) {
 
 } // namespace
 
-Jaw::Jaw(int closed_count, int open_count, double jaw_mm)
-    : closed_(closed_count), open_(open_count), jaw_mm_(jaw_mm) {}
+Jaw::Jaw(int closed_count, int open_count, double jaw_mm) : closed_(closed_count), open_(open_count), jaw_mm_(jaw_mm) {}
 
-Jaw::Jaw(const GripperWay &complete)
-    : Jaw(*complete.closed_count, *complete.open_count, complete.jaw_mm) {}
+Jaw::Jaw(const GripperWay &complete) : Jaw(*complete.closed_count, *complete.open_count, complete.jaw_mm) {}
 
 double Jaw::step_mm() const {
   return jaw_mm_ * COUNT_rad;
@@ -56,8 +54,7 @@ double Jaw::step_mm() const {
 
 double Jaw::width_mm(double count) const {
   const double turned = open_ > closed_ ? count - closed_ : closed_ - count;
-  return 2 * jaw_mm_ *
-         std::sin(std::clamp(turned * COUNT_rad, -std::numbers::pi, std::numbers::pi) / 2);
+  return 2 * jaw_mm_ * std::sin(std::clamp(turned * COUNT_rad, -std::numbers::pi, std::numbers::pi) / 2);
 }
 
 double Jaw::count(double width_mm) const {
@@ -98,9 +95,8 @@ FeetechGripper::FeetechGripper(const GripperWay &given)
   servo_model_ = word(table, 0);
   const int mode = table[OPERATING_MODE - MODEL];
   if (mode != 0) {
-    throw Error(ErrorCode::gripper_refused, way_.port + ": the servo is in mode " +
-                                                std::to_string(mode) +
-                                                ", a gripper needs 0 (position)");
+    throw Error(ErrorCode::gripper_refused,
+                way_.port + ": the servo is in mode " + std::to_string(mode) + ", a gripper needs 0 (position)");
   }
   poll();
 }
@@ -129,8 +125,7 @@ Bytes FeetechGripper::hear(const Packet &question, std::size_t answer_length, Ho
   std::size_t noise = 0;
   bool other_slave = false, other_answer = false, echo_gone = false;
   for (;;) {
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
     std::uint8_t bytes[256];
     std::size_t length = 0;
     if (left.count() <= 0) {
@@ -162,8 +157,7 @@ Bytes FeetechGripper::hear(const Packet &question, std::size_t answer_length, Ho
   }
   if (other_slave || other_answer) {
     throw Error(ErrorCode::gripper_garbled,
-                way_.port + (other_slave ? ": another slave answers"
-                                         : ": an answer is not one to the question"));
+                way_.port + (other_slave ? ": another slave answers" : ": an answer is not one to the question"));
   }
   if (noise + came.size() > 0) {
     throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is damaged (checksum)");
@@ -184,8 +178,7 @@ void FeetechGripper::make_sure() {
     return;
   }
   const auto question = [this] {
-    return ours(
-        {.code = READ, .parameters = {MODEL, static_cast<std::uint8_t>(sure_length_)}});
+    return ours({.code = READ, .parameters = {MODEL, static_cast<std::uint8_t>(sure_length_)}});
   };
   if (sure_length_ == 0 || host_now() >= sure_until_) {
     sure_length_ = sure_length_ == 2 ? 3 : 2;
@@ -228,8 +221,8 @@ GripperStatus FeetechGripper::poll() {
   active_ = table[at(TORQUE_ENABLE)] != 0;
   status.active = active_;
   const double off = std::abs(count - magnitude(GOAL_POSITION));
-  status.moving = active_ && (table[at(MOVING)] != 0 ||
-                              (off > OFF_GOAL && status.host_us - commanded_us_ < STARTING_us));
+  status.moving =
+      active_ && (table[at(MOVING)] != 0 || (off > OFF_GOAL && status.host_us - commanded_us_ < STARTING_us));
   if (active_ && !status.moving) {
     status.object = off > OFF_GOAL;
   }
@@ -268,30 +261,24 @@ GripperStatus FeetechGripper::move(const GripperMove &move) {
     }
   }
   const double width_mm = std::clamp(move.width_mm, 0.0, traits_.stroke_mm);
-  const double speed_mm_s =
-      std::clamp(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
+  const double speed_mm_s = std::clamp(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
   const double force_N = std::clamp(move.force_N, traits_.force_min_N, traits_.force_max_N);
-  command(jaw_.count(width_mm),
-          std::max(1, static_cast<int>(std::lround(speed_mm_s / jaw_.slope_mm(width_mm)))),
+  command(jaw_.count(width_mm), std::max(1, static_cast<int>(std::lround(speed_mm_s / jaw_.slope_mm(width_mm)))),
           static_cast<int>(std::lround(force_N / traits_.force_max_N * 1000)));
   return poll();
 }
 
 std::string FeetechGripper::line() const {
-  return "Feetech bus at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) +
-         ", servo model " + std::to_string(servo_model_) + limited_by(way_.port, 2);
+  return "Feetech bus at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) + ", servo model " +
+         std::to_string(servo_model_) + limited_by(way_.port, 2);
 }
 
 std::string FeetechGripper::fault_text(std::uint8_t fault) const {
   static const struct {
     Trouble bit;
     const char *text;
-  } TEXTS[] = {{VOLTAGE, "voltage out of its range"},
-               {SENSOR, "position sensor fails"},
-               {TEMPERATURE, "too hot"},
-               {CURRENT, "too much current"},
-               {ANGLE, "angle out of its range"},
-               {OVERLOAD, "overloaded"}};
+  } TEXTS[] = {{VOLTAGE, "voltage out of its range"}, {SENSOR, "position sensor fails"}, {TEMPERATURE, "too hot"},
+               {CURRENT, "too much current"},         {ANGLE, "angle out of its range"}, {OVERLOAD, "overloaded"}};
   std::string text;
   for (const auto &entry : TEXTS) {
     if (fault & entry.bit) {

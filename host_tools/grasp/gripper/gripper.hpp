@@ -32,10 +32,10 @@ namespace fingertip {
 enum class GripperDriver { robotiq, feetech };
 
 struct GripperTraits {
-  std::string model;        // "2f85"
-  double stroke_mm = 0.0;   // width between the pads when open
-  double step_mm = 0.0;     // of the commanded width; of a servo's jaw the largest
-  double deadband_mm = 0.0; // moves shorter than this are not made
+  std::string model;                                 // "2f85"
+  double stroke_mm = 0.0;                            // width between the pads when open
+  double step_mm = 0.0;                              // of the commanded width; of a servo's jaw the largest
+  double deadband_mm = 0.0;                          // moves shorter than this are not made
   double speed_min_mm_s = 0.0, speed_max_mm_s = 0.0; // of the width
   double force_min_N = 0.0, force_max_N = 0.0;       // of its own limit of force; 0: it has none
   double latency_s = 0.0;                            // from a command to motion

@@ -13,9 +13,8 @@ struct Model {
 };
 
 template <typename Driver> Model driven_by(GripperTraits traits) {
-  return {std::move(traits), [](const GripperWay &way) -> std::unique_ptr<Gripper> {
-            return std::make_unique<Driver>(way);
-          }};
+  return {std::move(traits),
+          [](const GripperWay &way) -> std::unique_ptr<Gripper> { return std::make_unique<Driver>(way); }};
 }
 
 /* Strokes, speeds and forces: Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Instruction
@@ -26,37 +25,36 @@ template <typename Driver> Model driven_by(GripperTraits traits) {
 const std::vector<Model> &models() {
   static const std::vector<Model> all = {
       driven_by<RobotiqGripper>({.model = "2f85",
-       .stroke_mm = 85.0,
-       .step_mm = 85.0 / 227,
-       .deadband_mm = 0.4,
-       .speed_min_mm_s = 20.0,
-       .speed_max_mm_s = 150.0,
-       .force_min_N = 20.0,
-       .force_max_N = 235.0,
-       .latency_s = 0.025,
-       .poll_s = 0.005}),
+                                 .stroke_mm = 85.0,
+                                 .step_mm = 85.0 / 227,
+                                 .deadband_mm = 0.4,
+                                 .speed_min_mm_s = 20.0,
+                                 .speed_max_mm_s = 150.0,
+                                 .force_min_N = 20.0,
+                                 .force_max_N = 235.0,
+                                 .latency_s = 0.025,
+                                 .poll_s = 0.005}),
       driven_by<RobotiqGripper>({.model = "2f140",
-       .stroke_mm = 140.0,
-       .step_mm = 140.0 / 227,
-       .deadband_mm = 0.65,
-       .speed_min_mm_s = 30.0,
-       .speed_max_mm_s = 250.0,
-       .force_min_N = 10.0,
-       .force_max_N = 125.0,
-       .latency_s = 0.025,
-       .poll_s = 0.005}),
+                                 .stroke_mm = 140.0,
+                                 .step_mm = 140.0 / 227,
+                                 .deadband_mm = 0.65,
+                                 .speed_min_mm_s = 30.0,
+                                 .speed_max_mm_s = 250.0,
+                                 .force_min_N = 10.0,
+                                 .force_max_N = 125.0,
+                                 .latency_s = 0.025,
+                                 .poll_s = 0.005}),
       driven_by<RobotiqGripper>({.model = "hande",
-       .stroke_mm = 50.0,
-       .step_mm = 50.0 / 227,
-       .deadband_mm = 0.23,
-       .speed_min_mm_s = 20.0,
-       .speed_max_mm_s = 150.0,
-       .force_min_N = 20.0,
-       .force_max_N = 185.0,
-       .latency_s = 0.025,
-       .poll_s = 0.005}),
-      driven_by<FeetechGripper>(
-          feetech_traits("sts3215", Jaw(feetech_way({})), GripperWay().jaw_mm)),
+                                 .stroke_mm = 50.0,
+                                 .step_mm = 50.0 / 227,
+                                 .deadband_mm = 0.23,
+                                 .speed_min_mm_s = 20.0,
+                                 .speed_max_mm_s = 150.0,
+                                 .force_min_N = 20.0,
+                                 .force_max_N = 185.0,
+                                 .latency_s = 0.025,
+                                 .poll_s = 0.005}),
+      driven_by<FeetechGripper>(feetech_traits("sts3215", Jaw(feetech_way({})), GripperWay().jaw_mm)),
   };
   return all;
 }
@@ -67,8 +65,7 @@ const Model &model_of(const std::string &name) {
       return model;
     }
   }
-  throw Error(ErrorCode::bad_value,
-              "no gripper model " + printable(name) + "; there are " + gripper_model_names());
+  throw Error(ErrorCode::bad_value, "no gripper model " + printable(name) + "; there are " + gripper_model_names());
 }
 
 } // namespace

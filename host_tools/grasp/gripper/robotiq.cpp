@@ -24,11 +24,8 @@ constexpr std::uint8_t WRITE = 16, WRITE_AND_READ = 23; // functions
 constexpr int RESET_READS = 10;
 constexpr int BOTH_TRIES = 2;
 
-constexpr GripperUsual USUAL = {.slave = SLAVE,
-                                .most_slave = 247,
-                                .closed_count = CLOSED_COUNT,
-                                .open_count = OPEN_COUNT,
-                                .most_count = 255};
+constexpr GripperUsual USUAL = {
+    .slave = SLAVE, .most_slave = 247, .closed_count = CLOSED_COUNT, .open_count = OPEN_COUNT, .most_count = 255};
 
 Error gripper_error(const GripperWay &way, int error) {
   const std::string &port = way.port;
@@ -42,8 +39,7 @@ Error gripper_error(const GripperWay &way, int error) {
   case EMBBADDATA:
   case EMBMDATA:
   case EMBBADEXC:
-    return Error(ErrorCode::gripper_garbled,
-                 port + ": an answer is not one to the question, or none of a gripper");
+    return Error(ErrorCode::gripper_garbled, port + ": an answer is not one to the question, or none of a gripper");
   case EIO:
   case EBADF:
   case ENXIO:
@@ -164,8 +160,7 @@ HostTime RobotiqGripper::ask(const Bytes &request) {
   return HostTime(std::chrono::microseconds(began_us_)) + timeout();
 }
 
-RobotiqGripper::Bytes RobotiqGripper::hear(const Bytes &request, std::size_t length,
-                                           HostTime until) {
+RobotiqGripper::Bytes RobotiqGripper::hear(const Bytes &request, std::size_t length, HostTime until) {
   pollfd coming = {line_.descriptor(), POLLIN, 0};
   while (wait_for(&coming, 1, until) == 0) {
     if (host_now() >= until) {
@@ -250,8 +245,7 @@ GripperStatus RobotiqGripper::told(const Registers &registers) {
     status.object = gobj != AT_REQUEST;
   }
   const int count = registers[2] >> 8;
-  status.width_mm =
-      std::clamp((*way_.closed_count - count) * traits_.step_mm, 0.0, traits_.stroke_mm);
+  status.width_mm = std::clamp((*way_.closed_count - count) * traits_.step_mm, 0.0, traits_.stroke_mm);
   status.current_A = (registers[2] & 0xFF) * AMPERE_PER_COUNT;
   status.fault = static_cast<std::uint8_t>(registers[1] >> 8 & 0xF);
   // Whose answer it is proves that it is over.
@@ -297,16 +291,14 @@ GripperStatus RobotiqGripper::poll() {
 GripperStatus RobotiqGripper::move(const GripperMove &move) {
   check_move(move);
   // At an end all that there is: its count differs from one gripper to the next.
-  const int count =
-      move.width_mm <= 0 ? 255
-      : move.width_mm >= traits_.stroke_mm
-          ? 0
-          : static_cast<int>(std::lround(*way_.closed_count - move.width_mm / traits_.step_mm));
+  const int count = move.width_mm <= 0 ? 255
+                    : move.width_mm >= traits_.stroke_mm
+                        ? 0
+                        : static_cast<int>(std::lround(*way_.closed_count - move.width_mm / traits_.step_mm));
   const Registers command = {
       rACT | rGTO, static_cast<std::uint16_t>(count),
-      static_cast<std::uint16_t>(
-          share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
-          share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
+      static_cast<std::uint16_t>(share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
+                                 share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
   make_sure();
   if (!goes_) {
     const GripperStatus now = read_status();
@@ -324,8 +316,7 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
       put_range(&request, STATUS_REGISTER, REGISTERS);
       put_range(&request, COMMAND_REGISTER + 1, REGISTERS - 1);
       put_values(&request, REGISTERS - 1, command.data() + 1);
-      const Registers registers =
-          registers_of(exchange(request, answer_length(REGISTERS)), REGISTERS);
+      const Registers registers = registers_of(exchange(request, answer_length(REGISTERS)), REGISTERS);
       both_worked_ = true;
       return told(registers);
     } catch (const Error &error) {
@@ -343,9 +334,8 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
 }
 
 std::string RobotiqGripper::line() const {
-  std::string text = "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " +
-                     std::to_string(way_.slave) + ", function " +
-                     (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_));
+  std::string text = "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) +
+                     ", function " + (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_));
   return text + limited_by(line_.path(), both_at_once_ ? 1 : 2);
 }
 

@@ -47,7 +47,7 @@ SerialLine::SerialLine(const std::string &path, unsigned baud) : path_(path), tr
   if (is_simulated) {
     speed_of(baud); // which a socket does not have
   } else if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 ||
-      tcsetattr(fd, TCSANOW, &settings) != 0) {
+             tcsetattr(fd, TCSANOW, &settings) != 0) {
     throw Error(ErrorCode::cannot_open, path + ": cannot go at " + std::to_string(baud) + " baud");
   }
   drop_input();
@@ -69,8 +69,8 @@ void SerialLine::drop_input() {
 std::optional<int> latency_timer_ms(const std::string &port, const std::string &root) {
   std::error_code none;
   const fs::path device = fs::canonical(port, none);
-  const std::optional<std::int64_t> milliseconds = to_i64(
-      line_of(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
+  const std::optional<std::int64_t> milliseconds =
+      to_i64(line_of(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
   if (none || !milliseconds) {
     return {};
   }
@@ -100,16 +100,14 @@ std::vector<GripperPort> find_gripper_ports(const std::string &root) {
     // Up from the tty to the USB device, which has the names.
     for (fs::path usb = interface; usb.has_relative_path(); usb = usb.parent_path()) {
       if (fs::exists(usb / "idVendor", none)) {
-        port.adapter =
-            std::string(trim(line_of(usb / "manufacturer") + " " + line_of(usb / "product")));
+        port.adapter = std::string(trim(line_of(usb / "manufacturer") + " " + line_of(usb / "product")));
         break;
       }
     }
     port.latency_timer_ms = latency_timer_ms(device, root);
     ports.push_back(port);
   }
-  std::sort(ports.begin(), ports.end(),
-            [](const GripperPort &a, const GripperPort &b) { return a.path < b.path; });
+  std::sort(ports.begin(), ports.end(), [](const GripperPort &a, const GripperPort &b) { return a.path < b.path; });
   return ports;
 }
 

@@ -10,8 +10,7 @@ namespace fingertip {
 
 class CdrWriter {
 public:
-  template <typename Number, typename = std::enable_if_t<std::is_arithmetic_v<Number>>>
-  void put(Number value) {
+  template <typename Number, typename = std::enable_if_t<std::is_arithmetic_v<Number>>> void put(Number value) {
     align(sizeof value);
     put_number(bytes_, value);
   }

@@ -28,8 +28,7 @@ struct Thread::State {
   std::thread thread;
 };
 
-Thread::Thread(std::function<void()> run)
-    : state_(std::make_unique<State>(State{std::thread(std::move(run))})) {}
+Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>(State{std::thread(std::move(run))})) {}
 
 void Thread::join() {
   state_->thread.join();

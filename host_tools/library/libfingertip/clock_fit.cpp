@@ -54,12 +54,10 @@ std::optional<ClockEstimate> ClockFit::fit() const {
   const ClockExchange &last = exchanges_.back();
   /* Limits at the time of the last exchange of a line of this slope, relative to its sending. */
   auto limit = [&](double slope, bool upper) {
-    double tightest =
-        upper ? std::numeric_limits<double>::infinity() : -std::numeric_limits<double>::infinity();
+    double tightest = upper ? std::numeric_limits<double>::infinity() : -std::numeric_limits<double>::infinity();
     for (const ClockExchange &exchange : exchanges_) {
       auto ago_us = static_cast<double>(last.device_us - exchange.device_us);
-      auto host_us =
-          static_cast<double>((upper ? exchange.received_us : exchange.sent_us) - last.sent_us);
+      auto host_us = static_cast<double>((upper ? exchange.received_us : exchange.sent_us) - last.sent_us);
       double here = host_us + ago_us * (1 + slope);
       tightest = upper ? std::min(tightest, here) : std::max(tightest, here);
     }
@@ -73,13 +71,11 @@ std::optional<ClockEstimate> ClockFit::fit() const {
   }
   double slowest = edge(widest, -SLOPE_LIMIT, gap);
   double fastest = edge(widest, SLOPE_LIMIT, gap);
-  double slope = highest(slowest, fastest, [&](double candidate) {
-    return gap(candidate) - DRIFT_COST_us * std::abs(candidate);
-  });
+  double slope =
+      highest(slowest, fastest, [&](double candidate) { return gap(candidate) - DRIFT_COST_us * std::abs(candidate); });
   double middle = (limit(slope, true) + limit(slope, false)) / 2;
   double latest = limit(highest(slowest, fastest, [&](double s) { return limit(s, true); }), true);
-  double earliest =
-      limit(highest(slowest, fastest, [&](double s) { return -limit(s, false); }), false);
+  double earliest = limit(highest(slowest, fastest, [&](double s) { return -limit(s, false); }), false);
   ClockEstimate estimate;
   estimate.device_us = last.device_us;
   estimate.host_us = static_cast<double>(last.sent_us) + middle;
@@ -102,8 +98,8 @@ void ClockFit::add(const ClockExchange &exchange) {
   if (!estimate_) {
     jumps_++;
     while (!estimate_) {
-      exchanges_.erase(exchanges_.begin(), exchanges_.begin() + static_cast<std::ptrdiff_t>(
-                                                                    (exchanges_.size() + 1) / 2));
+      exchanges_.erase(exchanges_.begin(),
+                       exchanges_.begin() + static_cast<std::ptrdiff_t>((exchanges_.size() + 1) / 2));
       if (exchanges_.empty()) {
         exchanges_.push_back(exchange);
       }

@@ -61,15 +61,13 @@ bool is_possible(const SettingValue &value, double number) {
 void check(const Setting &setting, const SettingValues &values, const std::string &shown) {
   for (std::size_t i = 0; i < setting.count; i++) {
     if (!is_possible(setting.values[i], values[i])) {
-      throw Error(ErrorCode::bad_value,
-                  spoken(setting) + " " + shown + " is out of range; give " + setting.give);
+      throw Error(ErrorCode::bad_value, spoken(setting) + " " + shown + " is out of range; give " + setting.give);
     }
   }
 }
 
 void put(wire_packet &command, const Setting &setting, const SettingValues &values) {
-  const bool zeros =
-      std::all_of(values.begin(), values.end(), [](double each) { return each == 0; });
+  const bool zeros = std::all_of(values.begin(), values.end(), [](double each) { return each == 0; });
   std::string shown;
   for (std::size_t i = 0; i < setting.count; i++) {
     setting.values[i].put(command, values[i]);
@@ -132,9 +130,7 @@ SettingValues values_from_text(const Setting &setting, const std::string &text) 
       throw Error(ErrorCode::bad_value,
                   spoken(setting) + " \"" + text + "\" is " +
                       (value.words ? "unknown"
-                                   : std::string("no ") +
-                                         (value.whole && value.per == 1 ? "whole " : "") +
-                                         "number") +
+                                   : std::string("no ") + (value.whole && value.per == 1 ? "whole " : "") + "number") +
                       "; give " + setting.give);
     }
     values[i] = *number;
@@ -202,8 +198,7 @@ wire_packet command_loader() {
 }
 
 wire_packet command_calibrate(const calibration &calibration, std::uint8_t sensor_count) {
-  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
-      !calibration_is_valid(&calibration, sensor_count)) {
+  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS || !calibration_is_valid(&calibration, sensor_count)) {
     throw Error(ErrorCode::bad_value, "the calibration holds a value out of range");
   }
   wire_packet packet = packet_of(WIRE_CMD_CALIBRATE);
@@ -256,12 +251,10 @@ WantedSetting setting_from_text(const std::string &text) {
     }
     throw Error("setting \"" + text + "\" is unknown; give " + known);
   }
-  return {setting,
-          values_from_text(*setting, equals == std::string::npos ? "" : text.substr(equals + 1))};
+  return {setting, values_from_text(*setting, equals == std::string::npos ? "" : text.substr(equals + 1))};
 }
 
-std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted,
-                                          const wire_info &now) {
+std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted, const wire_info &now) {
   std::vector<wire_packet> commands;
   for (const Setting &setting : all_settings) {
     bool is_wanted = false; /* it, or what travels with it */

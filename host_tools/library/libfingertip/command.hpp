@@ -45,8 +45,7 @@ struct WantedSetting {
 WantedSetting setting_from_text(const std::string &text);
 /* The commands for these settings. A value that travels with a wanted one, and is not wanted, stays
  * as it is now. */
-std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted,
-                                          const wire_info &now);
+std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted, const wire_info &now);
 /* "rate=20.000 osr=1024 ...": the settings that this firmware has. */
 std::string settings_text(const wire_info &info);
 /* "rate=HZ|max (0.1 to 2000), ..." */

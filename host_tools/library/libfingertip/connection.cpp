@@ -17,8 +17,8 @@ namespace {
 constexpr Session::Policy QUICK = {std::chrono::milliseconds(400), 3};
 
 const Found *with_serial(const std::vector<Found> &found, const std::string &serial) {
-  auto at = std::find_if(found.begin(), found.end(),
-                         [&](const Found &each) { return is_same_serial(each.serial, serial); });
+  auto at =
+      std::find_if(found.begin(), found.end(), [&](const Found &each) { return is_same_serial(each.serial, serial); });
   return at == found.end() ? nullptr : &*at;
 }
 
@@ -32,12 +32,10 @@ bool never() {
 
 [[noreturn]] void no_way(const Found &found, Reach reach) {
   if (reach == Reach::socket) {
-    throw Error(ErrorCode::not_shared,
-                (found.serial.empty() ? found.port : found.serial) + ": no program shares it");
+    throw Error(ErrorCode::not_shared, (found.serial.empty() ? found.port : found.serial) + ": no program shares it");
   }
-  throw Error(ErrorCode::no_driver, found.serial +
-                                        ": has no serial port: its driver cdc_acm is not "
-                                        "loaded, or another program uses it by libusb");
+  throw Error(ErrorCode::no_driver, found.serial + ": has no serial port: its driver cdc_acm is not "
+                                                   "loaded, or another program uses it by libusb");
 }
 
 /* Its serial number; where it does not tell, its port. */
@@ -55,8 +53,7 @@ std::string name_of(const Found &found, Reach reach, const std::string &root) {
   return found.port;
 }
 
-Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root,
-             const char *none) {
+Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root, const char *none) {
   if (found.empty()) {
     throw Error(ErrorCode::no_fingertip, none);
   }
@@ -111,13 +108,11 @@ Way with_wanted_serial(const Choice &choice, const std::string &root) {
 }
 
 /* Takes out the one that is shared from there; nothing: none. */
-std::string take_socket(std::vector<Shared> &shared, const std::string &serial,
-                        const std::string &port) {
+std::string take_socket(std::vector<Shared> &shared, const std::string &serial, const std::string &port) {
   std::error_code none;
   std::string real_port = port.empty() ? "" : std::filesystem::canonical(port, none).string();
   auto at = std::find_if(shared.begin(), shared.end(), [&](const Shared &each) {
-    return (!serial.empty() && is_same_serial(each.serial, serial)) ||
-           (!real_port.empty() && each.port == real_port);
+    return (!serial.empty() && is_same_serial(each.serial, serial)) || (!real_port.empty() && each.port == real_port);
   });
   if (at == shared.end()) {
     return "";
@@ -195,8 +190,7 @@ Way choose_way(const Choice &wanted, const std::string &root) {
     return only_one(finds.in_environment, choice.reach, root, "");
   }
   return only_one(finds.here, choice.reach, root,
-                  choice.reach == Reach::usb ? "no fingertip found by libusb"
-                                             : "no fingertip found");
+                  choice.reach == Reach::usb ? "no fingertip found by libusb" : "no fingertip found");
 }
 
 std::vector<Way> all_ways(Reach reach, const std::string &root) {
@@ -228,8 +222,7 @@ std::unique_ptr<Transport> open_way(const Way &way, const std::string &root) {
     return again ? again->port : std::string();
   };
   if (!way.port.empty()) {
-    return std::make_unique<SerialTransport>(
-        way.port, way.found_by_usb ? find_again : std::function<std::string()>());
+    return std::make_unique<SerialTransport>(way.port, way.found_by_usb ? find_again : std::function<std::string()>());
   }
   /* libusb would take the port away from the program that has it open. */
   std::string port = find_again();

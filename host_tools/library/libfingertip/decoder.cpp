@@ -5,9 +5,7 @@
 namespace fingertip {
 
 std::string LineStatistics::text() const {
-  auto pair = [](const char *key, std::uint64_t value) {
-    return std::string(key) + "=" + std::to_string(value);
-  };
+  auto pair = [](const char *key, std::uint64_t value) { return std::string(key) + "=" + std::to_string(value); };
   return pair("packets", packets) + " " + pair("dropped_packets", dropped_packets) + " " +
          pair("out_of_order", out_of_order) + " " + pair("crc_errors", crc_errors) + " " +
          pair("format_errors", format_errors) + " " + pair("version_errors", version_errors) + " " +
@@ -15,14 +13,13 @@ std::string LineStatistics::text() const {
 }
 
 bool LineStatistics::set(std::string_view key, std::uint64_t value) {
-  const std::pair<std::string_view, std::uint64_t &> fields[] = {
-      {"packets", packets},
-      {"dropped_packets", dropped_packets},
-      {"out_of_order", out_of_order},
-      {"crc_errors", crc_errors},
-      {"format_errors", format_errors},
-      {"version_errors", version_errors},
-      {"unknown_types", unknown_types}};
+  const std::pair<std::string_view, std::uint64_t &> fields[] = {{"packets", packets},
+                                                                 {"dropped_packets", dropped_packets},
+                                                                 {"out_of_order", out_of_order},
+                                                                 {"crc_errors", crc_errors},
+                                                                 {"format_errors", format_errors},
+                                                                 {"version_errors", version_errors},
+                                                                 {"unknown_types", unknown_types}};
   for (const auto &[name, field] : fields) {
     if (name == key) {
       field = value;

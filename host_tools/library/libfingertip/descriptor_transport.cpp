@@ -24,8 +24,7 @@ void DescriptorTransport::close() {
   }
 }
 
-Transport::Result DescriptorTransport::read(std::uint8_t *bytes, std::size_t capacity,
-                                            std::size_t *length,
+Transport::Result DescriptorTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
                                             std::chrono::milliseconds timeout) {
   *length = 0;
   if (fd_ < 0) {

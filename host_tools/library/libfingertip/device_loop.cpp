@@ -39,8 +39,7 @@ std::vector<DeviceNews> DeviceFeed::take(milliseconds timeout) {
     filled_.wait(limit);
     lock.lock();
   }
-  std::vector<DeviceNews> taken(std::make_move_iterator(news_.begin()),
-                                std::make_move_iterator(news_.end()));
+  std::vector<DeviceNews> taken(std::make_move_iterator(news_.begin()), std::make_move_iterator(news_.end()));
   news_.clear();
   drained_.set();
   return taken;
@@ -65,8 +64,7 @@ void DeviceFeed::wake() {
 
 DeviceLoop::DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed)
     : number_(number), options_(options), feed_(feed), transport_(open_way(way)),
-      session_(*transport_, [this] { return stop_ && !ending_; }),
-      name_(transport_->description()) {
+      session_(*transport_, [this] { return stop_ && !ending_; }), name_(transport_->description()) {
   if (options.follow_clock) {
     session_.on_exchange([this](const ClockExchange &exchange) {
       fit_.add(exchange);
@@ -112,8 +110,7 @@ LineStatistics DeviceLoop::statistics() const {
 }
 
 double DeviceLoop::read_until_us() const {
-  return nothing_expected_ ? std::numeric_limits<double>::infinity()
-                           : static_cast<double>(read_until_us_);
+  return nothing_expected_ ? std::numeric_limits<double>::infinity() : static_cast<double>(read_until_us_);
 }
 
 void DeviceLoop::rethrow() const {
@@ -160,9 +157,9 @@ void DeviceLoop::greet(bool again) {
   fit_ = ClockFit();
   wire_packet info = session_.info();
   if (again && std::memcmp(info.body.info.serial, info_->serial, WIRE_TEXT_BYTES) != 0) {
-    throw Error(ErrorCode::other_fingertip,
-                name() + ": another fingertip came back there; it had " +
-                    text_field(info_->serial) + ", now " + text_field(info.body.info.serial));
+    throw Error(ErrorCode::other_fingertip, name() + ": another fingertip came back there; it had " +
+                                                text_field(info_->serial) + ", now " +
+                                                text_field(info.body.info.serial));
   }
   fit_ = ClockFit(); /* the first answers may have waited for the device to start */
   for (int i = 0; options_.follow_clock && i < FIRST_EXCHANGES; i++) {
@@ -249,13 +246,11 @@ void DeviceLoop::take(const wire_packet &packet) {
   std::int64_t now_us = steady_now_us();
   DeviceNews news{Kind::packet, number_};
   news.packet = packet;
-  news.host_us =
-      fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
+  news.host_us = fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
   if (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW) {
     last_frame_ = host_now();
   }
-  auto until_us =
-      std::clamp(static_cast<std::int64_t>(news.host_us), now_us - LONGEST_BACKLOG_us, now_us);
+  auto until_us = std::clamp(static_cast<std::int64_t>(news.host_us), now_us - LONGEST_BACKLOG_us, now_us);
   put(std::move(news));
   read_until_us_ = until_us;
 }

@@ -21,8 +21,7 @@ constexpr double KNOT_us = 1e6;
 constexpr std::size_t KNOTS = 64;
 
 double place_of(const ClockEstimate &clock, double t_us) {
-  return clock.host_us +
-         (t_us - static_cast<double>(clock.device_us)) / (1 + clock.drift_ppm * 1e-6);
+  return clock.host_us + (t_us - static_cast<double>(clock.device_us)) / (1 + clock.drift_ppm * 1e-6);
 }
 
 } // namespace
@@ -39,11 +38,9 @@ void EdgeAlignment::edge(std::size_t device, std::uint64_t t_us, bool rises) {
   if (!member.clock) {
     return;
   }
-  const Edge edge{t_us, place_of(*member.clock, static_cast<double>(t_us)),
-                  member.clock->uncertainty_us, rises};
+  const Edge edge{t_us, place_of(*member.clock, static_cast<double>(t_us)), member.clock->uncertainty_us, rises};
   member.edges.push_back(edge);
-  while (member.edges.size() > EDGES ||
-         edge.host_us - member.edges.front().host_us > EDGE_LIFE_us) {
+  while (member.edges.size() > EDGES || edge.host_us - member.edges.front().host_us > EDGE_LIFE_us) {
     member.edges.pop_front();
   }
   for (std::size_t other = 0; other < members_.size(); other++) {
@@ -54,8 +51,7 @@ void EdgeAlignment::edge(std::size_t device, std::uint64_t t_us, bool rises) {
     bool is_alone = true;
     for (const Edge &each : members_[other].edges) {
       const double apart_us = std::abs(each.host_us - edge.host_us);
-      if (each.rises == rises &&
-          apart_us <= each.uncertainty_us + edge.uncertainty_us + STAMPS_us) {
+      if (each.rises == rises && apart_us <= each.uncertainty_us + edge.uncertainty_us + STAMPS_us) {
         is_alone = !same;
         same = &each;
       }
@@ -104,13 +100,11 @@ void EdgeAlignment::extend(std::uint64_t until_us) {
 }
 
 double EdgeAlignment::to_host(double reference_us) const {
-  auto after = std::upper_bound(
-      knots_.begin(), knots_.end(), reference_us,
-      [](double value, const Knot &knot) { return value < knot.reference_us; });
+  auto after = std::upper_bound(knots_.begin(), knots_.end(), reference_us,
+                                [](double value, const Knot &knot) { return value < knot.reference_us; });
   after = std::clamp(after, std::next(knots_.begin()), std::prev(knots_.end()));
   const Knot &a = *std::prev(after), &b = *after;
-  return a.host_us +
-         (reference_us - a.reference_us) * (b.host_us - a.host_us) / (b.reference_us - a.reference_us);
+  return a.host_us + (reference_us - a.reference_us) * (b.host_us - a.host_us) / (b.reference_us - a.reference_us);
 }
 
 void EdgeAlignment::restart(std::size_t device) {
@@ -128,17 +122,14 @@ void EdgeAlignment::restart(std::size_t device) {
   }
 }
 
-std::optional<EdgeAlignment::Place> EdgeAlignment::place(std::size_t device,
-                                                         std::uint64_t t_us) const {
+std::optional<EdgeAlignment::Place> EdgeAlignment::place(std::size_t device, std::uint64_t t_us) const {
   auto is_tied = [&](const Member &member) {
-    return member.ties >= TIES &&
-           static_cast<double>(member.last_tie_us - member.first_tie_us) >= SPAN_us;
+    return member.ties >= TIES && static_cast<double>(member.last_tie_us - member.first_tie_us) >= SPAN_us;
   };
   const auto at_us = static_cast<double>(t_us);
   if (reference_ == device) {
-    return std::any_of(members_.begin(), members_.end(), is_tied)
-               ? std::optional(Place{to_host(at_us), 0})
-               : std::nullopt;
+    return std::any_of(members_.begin(), members_.end(), is_tied) ? std::optional(Place{to_host(at_us), 0})
+                                                                  : std::nullopt;
   }
   const Member &member = members_[device];
   if (!is_tied(member) || !member.clock) {

@@ -43,8 +43,7 @@ static_assert(all_fit());
 thread_local std::string last_error;
 
 const Packet *find(std::uint8_t type) {
-  auto at = std::find_if(std::begin(packets), std::end(packets),
-                         [&](const Packet &each) { return each.type == type; });
+  auto at = std::find_if(std::begin(packets), std::end(packets), [&](const Packet &each) { return each.type == type; });
   return at == std::end(packets) ? nullptr : at;
 }
 
@@ -73,8 +72,7 @@ double number_at(Kind kind, const std::uint8_t *from) {
   }
 }
 
-template <typename Integer>
-void store_integer(const Field &field, double value, std::uint8_t *to) {
+template <typename Integer> void store_integer(const Field &field, double value, std::uint8_t *to) {
   /* The next number above the largest, which a double has exactly. */
   const double above = std::ldexp(1.0, std::numeric_limits<Integer>::digits);
   if (!(value >= static_cast<double>(std::numeric_limits<Integer>::min()) && value < above) ||
@@ -124,11 +122,10 @@ std::size_t count_of(std::uint8_t type) {
 wire_packet packet_of(std::uint8_t type, const double *values, std::size_t count) {
   const Packet *known = find(type);
   if (!known || count != count_of(type)) {
-    throw Error(ErrorCode::wrong_choice,
-                known ? "a packet of type " + std::to_string(type) + " has " +
-                            std::to_string(count_of(type)) + " numbers, not " +
-                            std::to_string(count)
-                      : "there is no packet of type " + std::to_string(type));
+    throw Error(ErrorCode::wrong_choice, known ? "a packet of type " + std::to_string(type) + " has " +
+                                                     std::to_string(count_of(type)) + " numbers, not " +
+                                                     std::to_string(count)
+                                               : "there is no packet of type " + std::to_string(type));
   }
   wire_packet packet;
   std::memset(&packet, 0, sizeof packet);
@@ -136,10 +133,8 @@ wire_packet packet_of(std::uint8_t type, const double *values, std::size_t count
   auto *bytes = reinterpret_cast<std::uint8_t *>(&packet);
   for (std::size_t i = 0; i < known->count; i++) {
     const Field &field = known->fields[i];
-    if (std::strcmp(field.name, "sensor_count") == 0 &&
-        !(*values >= 1 && *values <= FT_MAX_SENSORS)) {
-      throw Error(ErrorCode::bad_value, "sensor_count is not 1 to " +
-                                            std::to_string(FT_MAX_SENSORS));
+    if (std::strcmp(field.name, "sensor_count") == 0 && !(*values >= 1 && *values <= FT_MAX_SENSORS)) {
+      throw Error(ErrorCode::bad_value, "sensor_count is not 1 to " + std::to_string(FT_MAX_SENSORS));
     }
     for (std::size_t k = 0; k < field.count; k++) {
       store(field, *values++, bytes + field.offset + k * field.stride);
@@ -162,9 +157,8 @@ void put(const wire_packet &packet, double *values) {
 namespace {
 
 constexpr std::uint64_t LineStatistics::*counted[FINGERTIP_COUNTS] = {
-    &LineStatistics::bytes,          &LineStatistics::packets,
-    &LineStatistics::dropped_packets, &LineStatistics::out_of_order,
-    &LineStatistics::crc_errors,     &LineStatistics::format_errors,
+    &LineStatistics::bytes,          &LineStatistics::packets,      &LineStatistics::dropped_packets,
+    &LineStatistics::out_of_order,   &LineStatistics::crc_errors,   &LineStatistics::format_errors,
     &LineStatistics::version_errors, &LineStatistics::unknown_types};
 
 } // namespace
@@ -259,8 +253,8 @@ size_t fingertip_value_count(uint8_t type) {
   return count_of(type);
 }
 
-enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count,
-                                       uint8_t *frame, size_t size, size_t *length) {
+enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size,
+                                       size_t *length) {
   return guarded([&] {
     if (!values || !frame || !length) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
@@ -280,8 +274,7 @@ enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_
   });
 }
 
-enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size,
-                                               size_t *length) {
+enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size, size_t *length) {
   return guarded([&] {
     const auto bytes = info_frame_of_version(version);
     if (!frame || !length || bytes.size() > size) {
@@ -301,8 +294,8 @@ void fingertip_decoder_free(struct fingertip_decoder *decoder) {
   delete decoder;
 }
 
-size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes,
-                              size_t length, double *values, size_t size, size_t *filled) {
+size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values,
+                              size_t size, size_t *filled) {
   if (filled) {
     *filled = 0;
   }
@@ -314,8 +307,7 @@ size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *
   while (taken < length && size - used > FINGERTIP_VALUES_MOST) {
     const void *zero = std::memchr(bytes + taken, 0, length - taken);
     const std::size_t end =
-        zero ? static_cast<std::size_t>(static_cast<const std::uint8_t *>(zero) - bytes) + 1
-             : length;
+        zero ? static_cast<std::size_t>(static_cast<const std::uint8_t *>(zero) - bytes) + 1 : length;
     decoder->decoder.feed(bytes + taken, end - taken, [&](const wire_packet &packet) {
       values[used++] = packet.type;
       put(packet, values + used);
@@ -331,8 +323,7 @@ void fingertip_decoder_restart(struct fingertip_decoder *decoder) {
   decoder->decoder.restart();
 }
 
-void fingertip_decoder_counts(const struct fingertip_decoder *decoder,
-                              double counts[FINGERTIP_COUNTS]) {
+void fingertip_decoder_counts(const struct fingertip_decoder *decoder, double counts[FINGERTIP_COUNTS]) {
   put(decoder->decoder.statistics(), counts);
 }
 
@@ -348,22 +339,19 @@ void fingertip_clock_free(struct fingertip_clock *clock) {
   delete clock;
 }
 
-void fingertip_clock_add(struct fingertip_clock *clock, double sent_us, double received_us,
-                         double device_us) {
+void fingertip_clock_add(struct fingertip_clock *clock, double sent_us, double received_us, double device_us) {
   if (std::isfinite(sent_us) && std::isfinite(received_us) && device_us >= 0) {
-    clock->fit.add({std::llround(sent_us), std::llround(received_us),
-                    static_cast<std::uint64_t>(device_us)});
+    clock->fit.add({std::llround(sent_us), std::llround(received_us), static_cast<std::uint64_t>(device_us)});
   }
 }
 
-enum fingertip_status fingertip_clock_estimate(const struct fingertip_clock *clock,
-                                               double estimate[4]) {
+enum fingertip_status fingertip_clock_estimate(const struct fingertip_clock *clock, double estimate[4]) {
   const auto &found = clock->fit.estimate();
   if (!found) {
     return FINGERTIP_END;
   }
-  const double numbers[4] = {static_cast<double>(found->device_us), found->host_us,
-                             found->drift_ppm, found->uncertainty_us};
+  const double numbers[4] = {static_cast<double>(found->device_us), found->host_us, found->drift_ppm,
+                             found->uncertainty_us};
   std::copy(std::begin(numbers), std::end(numbers), estimate);
   return FINGERTIP_OK;
 }
@@ -411,22 +399,20 @@ size_t fingertip_stored_text(uint32_t stored, char *text, size_t size) {
 }
 
 size_t fingertip_columns(uint8_t sensor_count, char *text, size_t size) {
-  return put_text(recording::header_text(std::min<std::uint8_t>(sensor_count, FT_MAX_SENSORS)),
-                  text, size);
+  return put_text(recording::header_text(std::min<std::uint8_t>(sensor_count, FT_MAX_SENSORS)), text, size);
 }
 
 size_t fingertip_number_text(float value, char *text, size_t size) {
   return put_text(shortest(value), text, size);
 }
 
-enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length,
-                                         char *board, char *version, char *git_hash, size_t size) {
+enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board,
+                                         char *version, char *git_hash, size_t size) {
   return guarded([&] {
     if (!bytes && length > 0) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
     }
-    const FirmwareImage image =
-        firmware_of(name ? name : "", std::vector<std::uint8_t>(bytes, bytes + length));
+    const FirmwareImage image = firmware_of(name ? name : "", std::vector<std::uint8_t>(bytes, bytes + length));
     put_text(image.board, board, size);
     put_text(image.version, version, size);
     put_text(image.git_hash, git_hash, size);

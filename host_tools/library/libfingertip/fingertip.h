@@ -36,8 +36,8 @@ extern "C" {
 
 enum fingertip_status {
   FINGERTIP_OK = 0,
-  FINGERTIP_END = 1,  /* there is no more */
-  FINGERTIP_WAIT = 2, /* feed more bytes first */
+  FINGERTIP_END = 1,                  /* there is no more */
+  FINGERTIP_WAIT = 2,                 /* feed more bytes first */
   FINGERTIP_ERR_ARGUMENT = -1,        /* NULL, an unknown type, a buffer too small */
   FINGERTIP_ERR_VALUE = -2,           /* a number that no packet may hold, or that a file cannot */
   FINGERTIP_ERR_NOT_A_RECORDING = -3, /* nor bytes of a line */
@@ -53,10 +53,10 @@ enum fingertip_status {
 const char *fingertip_error(void);
 
 enum {
-  FINGERTIP_PROTOCOL = 9,       /* version of the line's protocol */
-  FINGERTIP_SENSORS_MOST = 32,  /* of one fingertip */
-  FINGERTIP_FRAME_MOST = 1039,  /* bytes of a packet on the line, its final zero included */
-  FINGERTIP_VALUES_MOST = 416,  /* at least as many as the longest packet has numbers */
+  FINGERTIP_PROTOCOL = 9,      /* version of the line's protocol */
+  FINGERTIP_SENSORS_MOST = 32, /* of one fingertip */
+  FINGERTIP_FRAME_MOST = 1039, /* bytes of a packet on the line, its final zero included */
+  FINGERTIP_VALUES_MOST = 416, /* at least as many as the longest packet has numbers */
   FINGERTIP_TEXT_LENGTH = 16
 };
 
@@ -66,8 +66,8 @@ enum {
 
 struct fingertip_field {
   const char *name;
-  uint32_t at;     /* place of its first number in the packet's */
-  uint32_t count;  /* of its numbers: 1, or as many as its array has */
+  uint32_t at;    /* place of its first number in the packet's */
+  uint32_t count; /* of its numbers: 1, or as many as its array has */
   uint32_t is_text;
 };
 
@@ -78,20 +78,19 @@ size_t fingertip_value_count(uint8_t type);
 
 /* The frame of a packet or a command as it goes onto the line, final zero included. count: of values,
  * fingertip_value_count. FINGERTIP_ERR_VALUE names the field. */
-enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count,
-                                       uint8_t *frame, size_t size, size_t *length);
+enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size,
+                                       size_t *length);
 /* The command info in another version of the protocol: a fingertip that speaks that version
  * answers. */
-enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size,
-                                               size_t *length);
+enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size, size_t *length);
 
 /* ---- Bytes of a line to packets */
 
 enum fingertip_count {
   FINGERTIP_COUNT_BYTES,
-  FINGERTIP_COUNT_PACKETS,       /* undamaged and of a known type */
-  FINGERTIP_COUNT_DROPPED,       /* missing from the sequence */
-  FINGERTIP_COUNT_OUT_OF_ORDER,  /* repeated, or older than one before */
+  FINGERTIP_COUNT_PACKETS,      /* undamaged and of a known type */
+  FINGERTIP_COUNT_DROPPED,      /* missing from the sequence */
+  FINGERTIP_COUNT_OUT_OF_ORDER, /* repeated, or older than one before */
   FINGERTIP_COUNT_CRC_ERRORS,
   FINGERTIP_COUNT_FORMAT_ERRORS, /* right or no CRC, but no frame of this protocol */
   FINGERTIP_COUNT_VERSION_ERRORS,
@@ -109,12 +108,11 @@ void fingertip_decoder_free(struct fingertip_decoder *decoder);
  * fewer than length where values is full: use what is there, and call again with the rest. size: 1
  * + FINGERTIP_VALUES_MOST at least, else none is taken. A receiver that joins gets only the end of
  * the first frame, which counts as nothing. */
-size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes,
-                              size_t length, double *values, size_t size, size_t *filled);
+size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values,
+                              size_t size, size_t *filled);
 /* The line was interrupted: join again, and expect no particular sequence number. */
 void fingertip_decoder_restart(struct fingertip_decoder *decoder);
-void fingertip_decoder_counts(const struct fingertip_decoder *decoder,
-                              double counts[FINGERTIP_COUNTS]);
+void fingertip_decoder_counts(const struct fingertip_decoder *decoder, double counts[FINGERTIP_COUNTS]);
 /* Of the last packet that counted as a version error; 0: there was none. */
 uint8_t fingertip_decoder_other_version(const struct fingertip_decoder *decoder);
 
@@ -126,8 +124,7 @@ struct fingertip_reader *fingertip_reader_new(const char *name, uint64_t size, i
 void fingertip_reader_free(struct fingertip_reader *reader);
 
 /* The next bytes of the file, from its beginning on. They are copied. */
-enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, const uint8_t *bytes,
-                                            size_t length);
+enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, const uint8_t *bytes, size_t length);
 
 struct fingertip_item {
   double time_us;  /* of a row: on the recorder's clock in a recording of several, else on the
@@ -137,9 +134,8 @@ struct fingertip_item {
 };
 
 /* The next packet or event, with its numbers. FINGERTIP_WAIT: feed more. FINGERTIP_END: that was all. */
-enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader,
-                                            struct fingertip_item *item, double *values,
-                                            size_t size, size_t *count);
+enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item,
+                                            double *values, size_t size, size_t *count);
 const char *fingertip_reader_event(const struct fingertip_reader *reader);
 
 /* 1: a capture of the line, no recording. */
@@ -149,8 +145,7 @@ int fingertip_reader_is_capture(const struct fingertip_reader *reader);
 int fingertip_reader_has_end(const struct fingertip_reader *reader);
 /* Lines that were skipped, and in a capture the line's counters by its packets. */
 uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader);
-void fingertip_reader_counts(const struct fingertip_reader *reader,
-                             double counts[FINGERTIP_COUNTS]);
+void fingertip_reader_counts(const struct fingertip_reader *reader, double counts[FINGERTIP_COUNTS]);
 /* Of a capture, as fingertip_decoder_other_version. */
 uint8_t fingertip_reader_other_version(const struct fingertip_reader *reader);
 
@@ -163,31 +158,27 @@ struct fingertip_writer;
 /* infos: of each of the fingertips an info packet's numbers, fingertip_value_count(0x03), one behind
  * the other; all have equally many sensors. comments: lines "key: value" of the recorder's own for the
  * head, such as "started_utc: 2026-08-05T12:00:00.125Z", each ended by "\n". NULL on failure. */
-struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, const double *info,
-                                              const char *comments);
+struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, const double *info, const char *comments);
 /* A recording of several on one clock, host_zero_us of which its times are counted from. */
-struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format,
-                                                    const double *infos, size_t devices,
+struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format, const double *infos, size_t devices,
                                                     int64_t host_zero_us, const char *comments);
 void fingertip_writer_free(struct fingertip_writer *writer);
 
 /* A packet of a device, 0 in a recording of one. host_us: its time on the recorder's clock, for a
  * recording of several alone. A contact packet waits for the raw packet of its frame where the
  * fingertip sends both. */
-enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device,
-                                              uint8_t type, const double *values, size_t count,
-                                              double host_us);
+enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type,
+                                              const double *values, size_t count, double host_us);
 /* "gone ..." and "back ..." with the time: the port vanished, and was there again. */
-enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device,
-                                             const char *text);
+enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device, const char *text);
 /* Of a recording of several: what fingertip_clock says of a device now; and that rows of before
  * host_us will not come any more, so that lines until then may be written. */
-enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device,
-                                             const double estimate[4], unsigned jumps);
+enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4],
+                                             unsigned jumps);
 enum fingertip_status fingertip_writer_settle(struct fingertip_writer *writer, double host_us);
 /* Last of all. counts: FINGERTIP_COUNTS of each device, one behind the other; reason: one word. */
-enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer,
-                                              const char *reason, const double *counts);
+enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason,
+                                              const double *counts);
 /* Rows until now. */
 uint64_t fingertip_writer_frames(const struct fingertip_writer *writer);
 
@@ -202,12 +193,10 @@ struct fingertip_clock *fingertip_clock_new(void);
 void fingertip_clock_free(struct fingertip_clock *clock);
 /* A command that was sent and answered at these times of the host's clock; device_us: t_us of its
  * acknowledgement. In order of device time. */
-void fingertip_clock_add(struct fingertip_clock *clock, double sent_us, double received_us,
-                         double device_us);
+void fingertip_clock_add(struct fingertip_clock *clock, double sent_us, double received_us, double device_us);
 /* device_us of the last exchange; host_us at that time; drift_ppm, positive where the fingertip's
  * clock is fast; uncertainty_us, no error at that time is larger. FINGERTIP_END: no exchange yet. */
-enum fingertip_status fingertip_clock_estimate(const struct fingertip_clock *clock,
-                                               double estimate[4]);
+enum fingertip_status fingertip_clock_estimate(const struct fingertip_clock *clock, double estimate[4]);
 unsigned fingertip_clock_jumps(const struct fingertip_clock *clock);
 /* The fingertip was gone: its clock may be another. */
 void fingertip_clock_restart(struct fingertip_clock *clock);
@@ -232,8 +221,8 @@ size_t fingertip_number_text(float value, char *text, size_t size);
 
 /* What a UF2 file is the firmware of: board, version and commit, each a text of up to size - 1
  * characters. Fails unless it is whole, undamaged, and for the RP2040. name: of the file, for errors. */
-enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length,
-                                         char *board, char *version, char *git_hash, size_t size);
+enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board,
+                                         char *version, char *git_hash, size_t size);
 
 #ifdef __cplusplus
 }

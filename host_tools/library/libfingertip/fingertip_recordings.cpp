@@ -97,8 +97,8 @@ public:
     line.torn = end == std::string_view::npos;
     if (line.torn && !window_.is_whole()) {
       if (bytes.size() > LONGEST) {
-        throw Error(ErrorCode::other_format, name_ + ":" + std::to_string(number_ + 1) +
-                                                 ": a line of more than a megabyte");
+        throw Error(ErrorCode::other_format,
+                    name_ + ":" + std::to_string(number_ + 1) + ": a line of more than a megabyte");
       }
       throw NotYet();
     }
@@ -169,8 +169,7 @@ bool sends_both(const wire_info &info) {
 } // namespace
 
 struct fingertip_reader {
-  fingertip_reader(const char *file, std::uint64_t size, bool skip)
-      : name(file), salvage(skip), window(size) {}
+  fingertip_reader(const char *file, std::uint64_t size, bool skip) : name(file), salvage(skip), window(size) {}
 
   /* Nothing at the end. */
   std::optional<RecordingReader::Item> next();
@@ -201,12 +200,10 @@ void fingertip_reader::look() {
   if (start.rfind("# fingertip-", 0) == 0) {
     recording.emplace(name, salvage, std::make_unique<FedLines>(window, name));
   } else if (start.rfind(std::string_view(mcap::MAGIC, sizeof mcap::MAGIC), 0) == 0) {
-    recording.emplace(name, salvage, std::make_unique<McapLineSource>(
-                                         name, std::make_unique<FedBytes>(window)));
+    recording.emplace(name, salvage, std::make_unique<McapLineSource>(name, std::make_unique<FedBytes>(window)));
   } else if (start.find('\0') == std::string_view::npos) {
     throw Error(ErrorCode::not_a_recording,
-                name + (start.empty() ? ": is empty"
-                                      : ": neither a recording nor bytes of a fingertip's line"));
+                name + (start.empty() ? ": is empty" : ": neither a recording nor bytes of a fingertip's line"));
   }
   known = true;
 }
@@ -259,8 +256,7 @@ void fingertip_reader_free(struct fingertip_reader *reader) {
   delete reader;
 }
 
-enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, const uint8_t *bytes,
-                                            size_t length) {
+enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, const uint8_t *bytes, size_t length) {
   return guarded([&] {
     if (!reader || (!bytes && length > 0)) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
@@ -270,9 +266,8 @@ enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, con
   });
 }
 
-enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader,
-                                            struct fingertip_item *item, double *values,
-                                            size_t size, size_t *count) {
+enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item,
+                                            double *values, size_t size, size_t *count) {
   return guarded([&] {
     if (!reader || !item || !values || !count) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
@@ -297,8 +292,7 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader,
     reader->waiting.reset();
     reader->event = next->event;
     const bool is_row = !is_event && (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW);
-    item->time_us = is_row ? next->time_us.value_or(static_cast<double>(packet.t_us))
-                           : static_cast<double>(NAN);
+    item->time_us = is_row ? next->time_us.value_or(static_cast<double>(packet.t_us)) : static_cast<double>(NAN);
     item->device = next->device;
     item->type = is_event ? 0 : packet.type;
     if (!is_event) {
@@ -325,10 +319,8 @@ uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader) {
   return reader->recording ? reader->recording->skipped_lines() : 0;
 }
 
-void fingertip_reader_counts(const struct fingertip_reader *reader,
-                             double counts[FINGERTIP_COUNTS]) {
-  put(reader->recording ? reader->recording->end_statistics().value_or(LineStatistics())
-                        : reader->decoder.statistics(),
+void fingertip_reader_counts(const struct fingertip_reader *reader, double counts[FINGERTIP_COUNTS]) {
+  put(reader->recording ? reader->recording->end_statistics().value_or(LineStatistics()) : reader->decoder.statistics(),
       counts);
 }
 
@@ -349,8 +341,7 @@ template <typename Make> fingertip_writer *made(enum fingertip_format format, Ma
 }
 
 /* Of a writer's call about a device. */
-template <typename Body>
-fingertip_status written(fingertip_writer *writer, std::size_t device, Body body) {
+template <typename Body> fingertip_status written(fingertip_writer *writer, std::size_t device, Body body) {
   return guarded([&] {
     if (!writer || device >= writer->devices) {
       return failed(FINGERTIP_ERR_ARGUMENT, "the recording has no such fingertip");
@@ -362,23 +353,19 @@ fingertip_status written(fingertip_writer *writer, std::size_t device, Body body
 
 } // namespace
 
-struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, const double *info,
-                                              const char *comments) {
+struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, const double *info, const char *comments) {
   return made(format, [&](fingertip_writer &writer, std::unique_ptr<LineSink> lines) {
     const wire_info own = infos_of(info, 1)[0];
-    writer.one.emplace(std::move(lines), &own, own.sensor_count, metadata_of(comments),
-                       sends_both(own));
+    writer.one.emplace(std::move(lines), &own, own.sensor_count, metadata_of(comments), sends_both(own));
   });
 }
 
-struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format,
-                                                    const double *infos, size_t devices,
+struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format, const double *infos, size_t devices,
                                                     int64_t host_zero_us, const char *comments) {
   return made(format, [&](fingertip_writer &writer, std::unique_ptr<LineSink> lines) {
     const auto all = infos_of(infos, devices);
     writer.devices = devices;
-    writer.several.emplace(std::move(lines), all, metadata_of(comments), host_zero_us,
-                           sends_both(all[0]));
+    writer.several.emplace(std::move(lines), all, metadata_of(comments), host_zero_us, sends_both(all[0]));
   });
 }
 
@@ -386,9 +373,8 @@ void fingertip_writer_free(struct fingertip_writer *writer) {
   delete writer;
 }
 
-enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device,
-                                              uint8_t type, const double *values, size_t count,
-                                              double host_us) {
+enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type,
+                                              const double *values, size_t count, double host_us) {
   return written(writer, device, [&] {
     const wire_packet packet = packet_of(type, values, values ? count : 0);
     if (writer->one) {
@@ -399,8 +385,7 @@ enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, s
   });
 }
 
-enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device,
-                                             const char *text) {
+enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device, const char *text) {
   return written(writer, device, [&] {
     const std::string line = printable(text ? text : "");
     if (writer->one) {
@@ -411,12 +396,11 @@ enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, si
   });
 }
 
-enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device,
-                                             const double estimate[4], unsigned jumps) {
+enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4],
+                                             unsigned jumps) {
   return written(writer, device, [&] {
     if (writer->several && estimate) {
-      const ClockEstimate now = {static_cast<std::uint64_t>(estimate[0]), estimate[1], estimate[2],
-                                 estimate[3]};
+      const ClockEstimate now = {static_cast<std::uint64_t>(estimate[0]), estimate[1], estimate[2], estimate[3]};
       writer->several->clock(device, now, jumps);
     }
   });
@@ -430,8 +414,8 @@ enum fingertip_status fingertip_writer_settle(struct fingertip_writer *writer, d
   });
 }
 
-enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer,
-                                              const char *reason, const double *counts) {
+enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason,
+                                              const double *counts) {
   return written(writer, 0, [&] {
     std::vector<LineStatistics> all(writer->devices);
     for (std::size_t i = 0; counts && i < all.size(); i++) {

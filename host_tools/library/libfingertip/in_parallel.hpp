@@ -13,10 +13,8 @@
 
 namespace fingertip::twin {
 
-template <typename Work>
-void in_parallel(std::size_t count, const Work &work, std::size_t threads = 2) {
-  const std::size_t chunk =
-      std::clamp<std::size_t>(count / (32 * std::max<std::size_t>(threads, 1)), 1, 64);
+template <typename Work> void in_parallel(std::size_t count, const Work &work, std::size_t threads = 2) {
+  const std::size_t chunk = std::clamp<std::size_t>(count / (32 * std::max<std::size_t>(threads, 1)), 1, 64);
   std::atomic<std::size_t> next{0};
   std::mutex failing;
   std::exception_ptr failure;

@@ -20,24 +20,20 @@ constexpr double ROUNDING_us = 0.1;
 
 } // namespace
 
-JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace,
-                                           const std::vector<wire_info> &infos,
-                                           const Metadata &extra, std::int64_t host_zero_us,
-                                           bool raw_expected, OutputFile::Appears appears)
-    : JointRecordingWriter(make_lines(path, replace, appears), infos, extra, host_zero_us,
-                           raw_expected) {}
+JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace, const std::vector<wire_info> &infos,
+                                           const Metadata &extra, std::int64_t host_zero_us, bool raw_expected,
+                                           OutputFile::Appears appears)
+    : JointRecordingWriter(make_lines(path, replace, appears), infos, extra, host_zero_us, raw_expected) {}
 
-JointRecordingWriter::JointRecordingWriter(std::unique_ptr<LineSink> file,
-                                           const std::vector<wire_info> &infos,
-                                           const Metadata &extra, std::int64_t host_zero_us,
-                                           bool raw_expected)
+JointRecordingWriter::JointRecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos,
+                                           const Metadata &extra, std::int64_t host_zero_us, bool raw_expected)
     : file_(std::move(file)), host_zero_us_(host_zero_us), edges_(infos.size()) {
   std::string serials;
   for (std::size_t i = 0; i < infos.size(); i++) {
     if (infos[i].sensor_count != infos[0].sensor_count) {
-      throw Error(ErrorCode::other_sensor_count,
-                  "fingertips with " + std::to_string(infos[0].sensor_count) + " and " +
-                      std::to_string(infos[i].sensor_count) + " sensors do not fit into one file");
+      throw Error(ErrorCode::other_sensor_count, "fingertips with " + std::to_string(infos[0].sensor_count) + " and " +
+                                                     std::to_string(infos[i].sensor_count) +
+                                                     " sensors do not fit into one file");
     }
     serials += " " + text_field(infos[i].serial);
     auto number = std::to_string(i);
@@ -54,8 +50,7 @@ JointRecordingWriter::JointRecordingWriter(std::unique_ptr<LineSink> file,
         [this, number, i](std::uint64_t t_us, const std::string &cells) {
           const Device &device = devices_[i];
           double host_us =
-              device.packet_host_us +
-              static_cast<double>(static_cast<std::int64_t>(t_us - device.packet_t_us));
+              device.packet_host_us + static_cast<double>(static_cast<std::int64_t>(t_us - device.packet_t_us));
           line(i, host_us, number + "," + time_text(host_us) + "," + cells);
           last_us_ = std::max(last_us_, host_us);
         }));
@@ -107,8 +102,7 @@ void JointRecordingWriter::packet(std::size_t device, const wire_packet &packet,
       bounds.push_back(each.edges_uncertainty_us);
     }
     std::sort(bounds.rbegin(), bounds.rend());
-    edges_alignment_us_ =
-        std::max(edges_alignment_us_, bounds[0] + (bounds.size() > 1 ? bounds[1] : 0));
+    edges_alignment_us_ = std::max(edges_alignment_us_, bounds[0] + (bounds.size() > 1 ? bounds[1] : 0));
   }
   state.lines.packet(packet);
 }
@@ -118,8 +112,7 @@ void JointRecordingWriter::event(std::size_t device, const std::string &text) {
   line(device, devices_[device].last_line_us, "# " + std::to_string(device) + "/event: " + text);
 }
 
-void JointRecordingWriter::clock(std::size_t device, const ClockEstimate &estimate,
-                                 unsigned jumps) {
+void JointRecordingWriter::clock(std::size_t device, const ClockEstimate &estimate, unsigned jumps) {
   constexpr double interval_us = 1e6;
   Device &state = devices_[device];
   state.clock = estimate;
@@ -135,13 +128,12 @@ void JointRecordingWriter::clock(std::size_t device, const ClockEstimate &estima
     state.clock_written_us = estimate.host_us;
     line(device, estimate.host_us,
          "# " + std::to_string(device) + "/clock: t_us=" + std::to_string(estimate.device_us) +
-             " time_us=" + time_text(estimate.host_us) + " drift_ppm=" +
-             fixed(estimate.drift_ppm, 3) + " uncertainty_us=" + fixed(estimate.uncertainty_us, 1));
+             " time_us=" + time_text(estimate.host_us) + " drift_ppm=" + fixed(estimate.drift_ppm, 3) +
+             " uncertainty_us=" + fixed(estimate.uncertainty_us, 1));
   }
 }
 
-void JointRecordingWriter::comment(const std::string &key, double host_us,
-                                   const std::string &value) {
+void JointRecordingWriter::comment(const std::string &key, double host_us, const std::string &value) {
   waiting_.emplace(host_us, "# " + key + ": " + printable(value));
 }
 
@@ -160,8 +152,7 @@ std::uint64_t JointRecordingWriter::frames() const {
   return sum;
 }
 
-void JointRecordingWriter::finish(const std::vector<LineStatistics> &statistics,
-                                  const std::string &reason) {
+void JointRecordingWriter::finish(const std::vector<LineStatistics> &statistics, const std::string &reason) {
   for (Device &device : devices_) {
     device.lines.write_pending();
   }
@@ -169,20 +160,17 @@ void JointRecordingWriter::finish(const std::vector<LineStatistics> &statistics,
   LineStatistics sum;
   for (std::size_t i = 0; i < devices_.size(); i++) {
     const Device &device = devices_[i];
-    std::string clock = device.clock
-                            ? " drift_ppm=" + fixed(device.clock->drift_ppm, 3) +
-                                  " uncertainty_us=" + fixed(device.clock->uncertainty_us, 1)
-                            : "";
+    std::string clock = device.clock ? " drift_ppm=" + fixed(device.clock->drift_ppm, 3) +
+                                           " uncertainty_us=" + fixed(device.clock->uncertainty_us, 1)
+                                     : "";
     line("# " + std::to_string(i) + "/end: frames=" + std::to_string(device.lines.frames()) +
-         " jumps=" + std::to_string(device.jumps) + clock + device.lines.edges_text() + " " +
-         statistics[i].text());
+         " jumps=" + std::to_string(device.jumps) + clock + device.lines.edges_text() + " " + statistics[i].text());
     sum += statistics[i];
   }
   double seconds = frames() > 0 ? (last_us_ - static_cast<double>(host_zero_us_)) / 1e6 : 0;
-  line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" +
-       fixed(seconds, 6) + " alignment_us=" + fixed(alignment_us_, 1) +
-       (edges_alignment_us_ > 0 ? " edges_alignment_us=" + fixed(edges_alignment_us_, 1) : "") +
-       " " + sum.text());
+  line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" + fixed(seconds, 6) +
+       " alignment_us=" + fixed(alignment_us_, 1) +
+       (edges_alignment_us_ > 0 ? " edges_alignment_us=" + fixed(edges_alignment_us_, 1) : "") + " " + sum.text());
   file_->finish();
 }
 

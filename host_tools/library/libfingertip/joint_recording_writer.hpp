@@ -24,8 +24,8 @@ public:
                        OutputFile::Appears appears);
 
   /* To other lines than those of a file. */
-  JointRecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos,
-                       const Metadata &extra, std::int64_t host_zero_us, bool raw_expected);
+  JointRecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos, const Metadata &extra,
+                       std::int64_t host_zero_us, bool raw_expected);
 
   /* host_us: its time on the recorder's clock, unless edges at the sync pins tell it better. */
   void packet(std::size_t device, const wire_packet &packet, double host_us);
@@ -50,10 +50,10 @@ private:
   struct Device {
     explicit Device(PacketLines packet_lines) : lines(std::move(packet_lines)) {}
     PacketLines lines;
-    std::uint64_t packet_t_us = 0; /* of the packet under way, */
-    double packet_host_us = 0;     /* on both clocks */
-    double last_line_us = 0;       /* where its last line stands among those that wait */
-    std::uint64_t newest_us = 0;   /* of its times */
+    std::uint64_t packet_t_us = 0;   /* of the packet under way, */
+    double packet_host_us = 0;       /* on both clocks */
+    double last_line_us = 0;         /* where its last line stands among those that wait */
+    std::uint64_t newest_us = 0;     /* of its times */
     double edges_uncertainty_us = 0; /* of its last packet, if edges have placed it; else 0 */
     std::optional<ClockEstimate> clock;
     unsigned jumps = 0;

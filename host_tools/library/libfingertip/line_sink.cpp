@@ -39,8 +39,7 @@ bool is_mcap_name(const std::string &path) {
   return end == ".mcap";
 }
 
-std::unique_ptr<LineSink> make_lines(const std::string &path, bool replace,
-                                     OutputFile::Appears appears) {
+std::unique_ptr<LineSink> make_lines(const std::string &path, bool replace, OutputFile::Appears appears) {
   return make_lines(std::make_unique<OutputFile>(path, replace, appears), is_mcap_name(path));
 }
 

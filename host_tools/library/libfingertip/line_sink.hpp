@@ -28,7 +28,6 @@ std::unique_ptr<LineSink> make_lines(std::unique_ptr<ByteSink> bytes, bool as_mc
 bool is_mcap_name(const std::string &path);
 
 /* Throws Error as OutputFile does. */
-std::unique_ptr<LineSink> make_lines(const std::string &path, bool replace,
-                                     OutputFile::Appears appears);
+std::unique_ptr<LineSink> make_lines(const std::string &path, bool replace, OutputFile::Appears appears);
 
 } // namespace fingertip

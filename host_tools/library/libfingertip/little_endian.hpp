@@ -28,8 +28,7 @@ template <typename Number> void put_number(std::string &bytes, Number value) {
 template <typename Number> Number number_at(std::string_view bytes, std::size_t at) {
   typename BitsOf<sizeof(Number)>::Type bits = 0;
   for (std::size_t i = 0; i < sizeof bits; i++) {
-    bits = static_cast<decltype(bits)>(
-        bits | std::uint64_t{static_cast<unsigned char>(bytes[at + i])} << (8 * i));
+    bits = static_cast<decltype(bits)>(bits | std::uint64_t{static_cast<unsigned char>(bytes[at + i])} << (8 * i));
   }
   Number value;
   std::memcpy(&value, &bits, sizeof value);

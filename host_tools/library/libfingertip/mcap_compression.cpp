@@ -19,8 +19,7 @@ const char *const COMPRESSION = "zstd";
 
 std::string compressed(const std::string &bytes) {
   std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-  std::size_t length =
-      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), LEVEL);
+  std::size_t length = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), LEVEL);
   if (ZSTD_isError(length)) {
     throw std::runtime_error(std::string("zstd: ") + ZSTD_getErrorName(length));
   }

@@ -89,8 +89,7 @@ bool Reader::read_record() {
   if (length > RECORD_MOST_bytes) {
     next_ = next;
     record_ = next;
-    throw Damage("byte " + std::to_string(at) + ": a record of " + std::to_string(length) +
-                 " bytes");
+    throw Damage("byte " + std::to_string(at) + ": a record of " + std::to_string(length) + " bytes");
   }
   std::string content(length, '\0');
   const bool whole = bytes_->read(at + sizeof head, content.data(), content.size()) == length;

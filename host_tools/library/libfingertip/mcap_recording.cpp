@@ -63,8 +63,8 @@ bool is_list(const std::string &key) {
   bool of_sensors = false;
   auto visit = [&](const char *name, auto) { of_sensors = of_sensors || key == name; };
   visit_sensor_lists(visit);
-  return of_sensors || std::any_of(std::begin(pad_lists), std::end(pad_lists),
-                                   [&](const auto &each) { return key == each.name; });
+  return of_sensors ||
+         std::any_of(std::begin(pad_lists), std::end(pad_lists), [&](const auto &each) { return key == each.name; });
 }
 
 bool begins_with(const std::string &text, const char *begin) {
@@ -72,8 +72,8 @@ bool begins_with(const std::string &text, const char *begin) {
 }
 
 bool is_of_calibration(const std::string &key) {
-  return begins_with(key, "calibration_") || begins_with(key, "force_scale") ||
-         begins_with(key, "pad_") || is_list(key);
+  return begins_with(key, "calibration_") || begins_with(key, "force_scale") || begins_with(key, "pad_") ||
+         is_list(key);
 }
 
 /* "# key: value" taken apart; nothing of other lines. */
@@ -87,8 +87,7 @@ std::optional<std::pair<std::string, std::string>> key_and_value(const std::stri
 }
 
 void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
-  auto found =
-      std::find_if(pairs.begin(), pairs.end(), [&](const auto &pair) { return pair.first == key; });
+  auto found = std::find_if(pairs.begin(), pairs.end(), [&](const auto &pair) { return pair.first == key; });
   if (found == pairs.end()) {
     pairs.emplace_back(key, value);
   } else {
@@ -122,8 +121,7 @@ std::string joint_cells(std::uint32_t device, double time_us) {
 
 } // namespace
 
-McapLineSink::LogClock::LogClock(const std::string &started_utc,
-                                 const std::string &started_device_us)
+McapLineSink::LogClock::LogClock(const std::string &started_utc, const std::string &started_device_us)
     : begin_ns_(utc_ns(started_utc).value_or(0)), now_ns_(begin_ns_) {
   if (auto device_us = to_u64(started_device_us)) {
     anchor_ = {begin_ns_, *device_us};
@@ -132,8 +130,7 @@ McapLineSink::LogClock::LogClock(const std::string &started_utc,
 
 void McapLineSink::LogClock::event(std::string_view text) {
   std::size_t blank = text.rfind(' ');
-  event_ns_ = utc_ns(std::string(text.substr(blank == std::string_view::npos ? 0 : blank + 1)))
-                  .value_or(event_ns_);
+  event_ns_ = utc_ns(std::string(text.substr(blank == std::string_view::npos ? 0 : blank + 1))).value_or(event_ns_);
 }
 
 void McapLineSink::LogClock::row(std::uint64_t t_us, std::optional<double> time_us) {
@@ -147,15 +144,13 @@ void McapLineSink::LogClock::row(std::uint64_t t_us, std::optional<double> time_
     anchor_ = {std::max(event_ns_, now_ns_), t_us};
   }
   last_us_ = t_us;
-  now_ns_ = shifted_ns(anchor_->utc_ns, t_us >= anchor_->device_us
-                                            ? static_cast<double>(t_us - anchor_->device_us)
-                                            : -static_cast<double>(anchor_->device_us - t_us));
+  now_ns_ = shifted_ns(anchor_->utc_ns, t_us >= anchor_->device_us ? static_cast<double>(t_us - anchor_->device_us)
+                                                                   : -static_cast<double>(anchor_->device_us - t_us));
 }
 
 McapLineSink::McapLineSink(std::unique_ptr<ByteSink> file)
     : file_(std::move(file)),
-      writer_([this](const std::string &bytes) { file_->append(bytes.data(), bytes.size()); },
-              "ros2", "fingertip") {}
+      writer_([this](const std::string &bytes) { file_->append(bytes.data(), bytes.size()); }, "ros2", "fingertip") {}
 
 void McapLineSink::line(const std::string &text) {
   take(text, false);
@@ -205,8 +200,7 @@ void McapLineSink::device_key(Device &device, const std::string &key, const std:
       places.push_back(to_float(word).value_or(NAN));
     }
   } else if (key == "sensors") {
-    device.sensors =
-        static_cast<unsigned>(std::min<std::uint64_t>(to_u64(value).value_or(0), FT_MAX_SENSORS));
+    device.sensors = static_cast<unsigned>(std::min<std::uint64_t>(to_u64(value).value_or(0), FT_MAX_SENSORS));
   } else if (is_of_calibration(key)) {
     set(device.calibration, key, value);
   }
@@ -224,8 +218,7 @@ void McapLineSink::begin() {
     }
   }
   auto value = [&](const char *key) {
-    auto found =
-        std::find_if(keys.begin(), keys.end(), [&](const auto &pair) { return pair.first == key; });
+    auto found = std::find_if(keys.begin(), keys.end(), [&](const auto &pair) { return pair.first == key; });
     return found == keys.end() ? std::string() : found->second;
   };
   joint_ = head[0].first == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
@@ -255,14 +248,13 @@ void McapLineSink::begin() {
   writer_.metadata("fingertip_recording", keys);
   for (const Device &device : devices_) {
     if (!device.calibration.empty()) {
-      writer_.attachment(clock_.now_ns(), "calibration_" + device.serial + ".json",
-                         "application/json", json(device.serial, device.calibration));
+      writer_.attachment(clock_.now_ns(), "calibration_" + device.serial + ".json", "application/json",
+                         json(device.serial, device.calibration));
     }
   }
   std::map<std::string, std::uint16_t> schemas;
-  for (const char *name :
-       {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped",
-        "sensor_msgs/PointCloud2", "diagnostic_msgs/DiagnosticArray"}) {
+  for (const char *name : {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped",
+                           "sensor_msgs/PointCloud2", "diagnostic_msgs/DiagnosticArray"}) {
     schemas[name] = writer_.schema(full_name(name), "ros2msg", ros::schema_of(name));
   }
   auto channel = [&](const std::string &topic, const char *name) {
@@ -296,11 +288,9 @@ void McapLineSink::put(const std::string &text, bool torn) {
 void McapLineSink::put_line(const std::string &text, bool torn) {
   number_++;
   if (!is_text(text)) {
-    throw Error(path() + ": line " + std::to_string(number_) +
-                " is no UTF-8 text, which an MCAP file cannot hold");
+    throw Error(path() + ": line " + std::to_string(number_) + " is no UTF-8 text, which an MCAP file cannot hold");
   }
-  writer_.message(lines_, clock_.now_ns(),
-                  ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
+  writer_.message(lines_, clock_.now_ns(), ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
 }
 
 void McapLineSink::diagnose(const std::string &message) {
@@ -356,8 +346,7 @@ bool McapLineSink::put_row(const std::string &text) {
     return false;
   }
   std::string as_written = joint_ ? joint_cells(row.device, *row.time_us) : "";
-  as_written += row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr,
-                         sensor_count_, sets_);
+  as_written += row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr, sensor_count_, sets_);
   if (as_written != text) {
     return false;
   }
@@ -409,8 +398,7 @@ bool McapLineSource::next(Line &line) {
         }
         if (!has_header_ && !line.text.empty() && line.text[0] != '#') {
           bool joint_header = line.text.rfind(JOINT_COLUMNS, 0) == 0;
-          auto columns =
-              columns_of(line.text.substr(joint_header ? std::string(JOINT_COLUMNS).size() : 0));
+          auto columns = columns_of(line.text.substr(joint_header ? std::string(JOINT_COLUMNS).size() : 0));
           sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
           sets_ = columns ? columns->sets : LATER_SETS;
           has_header_ = true;
@@ -445,8 +433,7 @@ bool McapLineSource::next(Line &line) {
 
 std::string McapLineSource::text_of(const ros::Row &row) const {
   return (joint_ ? joint_cells(row.device, *row.time_us) : "") +
-         row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr,
-                  sensor_count_, sets_);
+         row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr, sensor_count_, sets_);
 }
 
 LineSource::Place McapLineSource::place() {

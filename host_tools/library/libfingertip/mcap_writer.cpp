@@ -62,8 +62,7 @@ void Writer::Span::put(std::string &bytes) const {
   put_number(bytes, last_ns);
 }
 
-Writer::Writer(Append append, const std::string &profile, const std::string &library)
-    : append_(std::move(append)) {
+Writer::Writer(Append append, const std::string &profile, const std::string &library) : append_(std::move(append)) {
   std::string content;
   put_text(content, profile);
   put_text(content, library);
@@ -78,8 +77,7 @@ std::uint64_t Writer::append(const std::string &bytes) {
   return at;
 }
 
-std::uint16_t Writer::schema(const std::string &name, const std::string &encoding,
-                             const std::string &data) {
+std::uint16_t Writer::schema(const std::string &name, const std::string &encoding, const std::string &data) {
   auto id = static_cast<std::uint16_t>(schemas_.size() + 1);
   std::string content;
   put_number(content, id);
@@ -91,8 +89,8 @@ std::uint16_t Writer::schema(const std::string &name, const std::string &encodin
   return id;
 }
 
-std::uint16_t Writer::channel(const std::string &topic, std::uint16_t schema,
-                              const std::string &encoding, const Pairs &metadata) {
+std::uint16_t Writer::channel(const std::string &topic, std::uint16_t schema, const std::string &encoding,
+                              const Pairs &metadata) {
   auto id = static_cast<std::uint16_t>(channels_.size() + 1);
   std::string content;
   put_number(content, id);
@@ -116,8 +114,8 @@ void Writer::metadata(const std::string &name, const Pairs &pairs) {
   metadata_.push_back(record(METADATA_INDEX, index));
 }
 
-void Writer::attachment(std::uint64_t time_ns, const std::string &name,
-                        const std::string &media_type, const std::string &data) {
+void Writer::attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type,
+                        const std::string &data) {
   std::string content;
   put_number(content, time_ns);
   put_number(content, time_ns);
@@ -138,8 +136,7 @@ void Writer::attachment(std::uint64_t time_ns, const std::string &name,
 }
 
 void Writer::message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data) {
-  std::uint64_t passed_ns =
-      time_ns > chunk_begin_ns_ ? time_ns - chunk_begin_ns_ : chunk_begin_ns_ - time_ns;
+  std::uint64_t passed_ns = time_ns > chunk_begin_ns_ ? time_ns - chunk_begin_ns_ : chunk_begin_ns_ - time_ns;
   if (!records_.empty() && (records_.size() >= CHUNK_bytes || passed_ns >= CHUNK_ns)) {
     end_chunk();
   }

@@ -22,8 +22,7 @@ public:
   Writer(Append append, const std::string &profile, const std::string &library);
 
   /* Their ids. */
-  std::uint16_t schema(const std::string &name, const std::string &encoding,
-                       const std::string &data);
+  std::uint16_t schema(const std::string &name, const std::string &encoding, const std::string &data);
   std::uint16_t channel(const std::string &topic, std::uint16_t schema, const std::string &encoding,
                         const Pairs &metadata);
 
@@ -44,8 +43,7 @@ private:
     void take(const Span &other);
     void put(std::string &bytes) const;
   };
-  using Index =
-      std::vector<std::pair<std::uint64_t, std::uint64_t>>; /* time, offset in the chunk */
+  using Index = std::vector<std::pair<std::uint64_t, std::uint64_t>>; /* time, offset in the chunk */
 
   std::uint64_t append(const std::string &bytes);
 

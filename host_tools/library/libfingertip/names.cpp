@@ -45,8 +45,7 @@ std::string flags_text(std::uint32_t flags) {
 
 namespace {
 
-template <std::size_t count>
-const char *word_of(const words::Word (&all)[count], std::uint32_t value) {
+template <std::size_t count> const char *word_of(const words::Word (&all)[count], std::uint32_t value) {
   for (const words::Word &each : all) {
     if (each.value == value) {
       return each.word;
@@ -105,8 +104,7 @@ std::uint8_t streams_from_text(const std::string &text) {
     }
     if (!known) {
       throw Error(ErrorCode::bad_value,
-                  "stream \"" + std::string(part) +
-                      "\" is unknown; give none, or some of contact,raw,health");
+                  "stream \"" + std::string(part) + "\" is unknown; give none, or some of contact,raw,health");
     }
   }
   return streams;

@@ -46,8 +46,7 @@ void check_output(const std::string &path, bool replace) {
   if (exists && !replace) {
     fail(path, EEXIST);
   }
-  if (exists ? access(path.c_str(), W_OK) != 0
-             : access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) {
+  if (exists ? access(path.c_str(), W_OK) != 0 : access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) {
     fail(path, errno);
   }
 }
@@ -129,8 +128,7 @@ void OutputFile::finish() {
     fail(path_, errno);
   }
   /* Some file systems cannot refuse to replace: EINVAL. */
-  if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(),
-                replace_ ? 0 : RENAME_NOREPLACE) != 0 &&
+  if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), replace_ ? 0 : RENAME_NOREPLACE) != 0 &&
       (errno != EINVAL || rename(temporary_.c_str(), target_.c_str()) != 0)) {
     fail(path_, errno);
   }

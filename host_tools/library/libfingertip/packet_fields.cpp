@@ -35,8 +35,7 @@ Metadata info_metadata(const wire_info &info) {
       {"serial", text_field(info.serial)},
       {"board", text_field(info.board)},
       {"scene", text_field(info.scene)},
-      {"firmware", std::to_string(version[0]) + "." + std::to_string(version[1]) + "." +
-                       std::to_string(version[2])},
+      {"firmware", std::to_string(version[0]) + "." + std::to_string(version[1]) + "." + std::to_string(version[2])},
       {"git", text_field(info.git_hash)},
   };
   wire_info copy = info;
@@ -71,9 +70,7 @@ Metadata info_metadata(const wire_info &info) {
 
 std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_health &health) {
   std::vector<std::pair<std::string, std::uint32_t>> fields;
-  auto visit = [&](const std::string &name, std::uint32_t value) {
-    fields.emplace_back(name, value);
-  };
+  auto visit = [&](const std::string &name, std::uint32_t value) { fields.emplace_back(name, value); };
   wire_health copy = health;
   visit_health(visit, copy);
   return fields;

@@ -20,8 +20,7 @@ PacketFile::PacketFile(const std::string &path, bool salvage, const std::string 
     bytes_.close();
     reader_ = std::make_unique<RecordingReader>(path, salvage, device);
   } else if (!start.empty() && start.find('\0') == std::string::npos) {
-    throw Error(ErrorCode::not_a_recording,
-                path + ": neither a recording nor bytes of a fingertip's line");
+    throw Error(ErrorCode::not_a_recording, path + ": neither a recording nor bytes of a fingertip's line");
   }
 }
 

@@ -9,10 +9,9 @@
 namespace fingertip {
 
 ProgressBar::ProgressBar(const std::string &what, Lines lines)
-    : what_(printable(what)), terminal_(isatty(STDERR_FILENO) != 0),
-      step_percent_(terminal_                ? 1
-                    : lines == Lines::tenths ? 10
-                                             : 0) {}
+    : what_(printable(what)), terminal_(isatty(STDERR_FILENO) != 0), step_percent_(terminal_                ? 1
+                                                                                   : lines == Lines::tenths ? 10
+                                                                                                            : 0) {}
 
 ProgressBar::~ProgressBar() {
   if (terminal_ && shown_percent_ >= 0) {
@@ -24,8 +23,7 @@ void ProgressBar::show(double share) {
   if (step_percent_ == 0) {
     return;
   }
-  const int percent =
-      static_cast<int>(100.0 * std::clamp(share, 0.0, 1.0)) / step_percent_ * step_percent_;
+  const int percent = static_cast<int>(100.0 * std::clamp(share, 0.0, 1.0)) / step_percent_ * step_percent_;
   if (percent == shown_percent_) {
     return;
   }

@@ -22,13 +22,9 @@ public:
     return z ^ z >> 31;
   }
 
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-  }
+  double uniform(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53; }
 
-  double log_uniform(double low, double high) {
-    return std::exp(uniform(std::log(low), std::log(high)));
-  }
+  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
 
   /* Mean 0, standard deviation 1. */
   double normal() {

@@ -33,9 +33,7 @@ inline constexpr const char *PACKET_SYNC = "sync";
 inline constexpr double Q10 = 1024.0;
 struct Namer {
   std::string text;
-  template <typename Value> void operator()(const std::string &name, const Value &) {
-    text += "," + name;
-  }
+  template <typename Value> void operator()(const std::string &name, const Value &) { text += "," + name; }
 };
 
 template <typename Value> std::string cell_text(const Value &value) {
@@ -53,9 +51,7 @@ template <typename Value> std::string cell_text(const Value &value) {
 
 struct RowWriter {
   std::string text;
-  template <typename Value> void operator()(const std::string &, const Value &value) {
-    text += "," + cell_text(value);
-  }
+  template <typename Value> void operator()(const std::string &, const Value &value) { text += "," + cell_text(value); }
 };
 
 struct PairWriter {
@@ -85,8 +81,7 @@ template <typename Integer> Integer checked(std::int64_t value, const std::strin
   return static_cast<Integer>(value);
 }
 
-template <typename Value>
-void parse_cell(const std::string &name, std::string_view cell, Value &&value) {
+template <typename Value> void parse_cell(const std::string &name, std::string_view cell, Value &&value) {
   using Plain = std::decay_t<Value>;
   std::string wrong = name + " is \"" + std::string(cell) + "\"";
   if constexpr (std::is_same_v<Plain, Quantity>) {
@@ -118,8 +113,7 @@ void parse_cell(const std::string &name, std::string_view cell, Value &&value) {
     if (!number || std::fabs(*number) > 1e12) {
       throw Damage{wrong};
     }
-    value.raw =
-        checked<std::decay_t<decltype(value.raw)>>(std::llround(*number * value.scale), name);
+    value.raw = checked<std::decay_t<decltype(value.raw)>>(std::llround(*number * value.scale), name);
   }
 }
 
@@ -165,8 +159,8 @@ struct RowPackets {
 };
 
 /* From t_us on. */
-inline std::string row_text(const wire_packet *contact, const wire_packet *raw,
-                            std::uint8_t sensor_count, int sets = LATER_SETS) {
+inline std::string row_text(const wire_packet *contact, const wire_packet *raw, std::uint8_t sensor_count,
+                            int sets = LATER_SETS) {
   const wire_packet &any = contact ? *contact : *raw;
   std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
   RowWriter writer;
@@ -244,8 +238,7 @@ inline std::optional<Columns> columns_of(const std::string &header) {
   for (int sets = LATER_SETS; sets >= 0; sets--) {
     std::size_t fixed_columns = 2 + contact_columns(sets) + RAW_COLUMNS;
     std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
-    if (sensors <= FT_MAX_SENSORS &&
-        header == header_text(static_cast<std::uint8_t>(sensors), sets)) {
+    if (sensors <= FT_MAX_SENSORS && header == header_text(static_cast<std::uint8_t>(sensors), sets)) {
       return Columns{static_cast<std::uint8_t>(sensors), sets};
     }
   }

@@ -9,10 +9,10 @@ namespace fingertip {
 
 using namespace recording;
 
-PacketLines::PacketLines(std::string path, std::uint8_t sensor_count, bool raw_expected,
-                         CommentHandler comment, RowHandler row)
-    : path_(std::move(path)), sensor_count_(sensor_count), raw_expected_(raw_expected),
-      comment_(std::move(comment)), row_(std::move(row)) {}
+PacketLines::PacketLines(std::string path, std::uint8_t sensor_count, bool raw_expected, CommentHandler comment,
+                         RowHandler row)
+    : path_(std::move(path)), sensor_count_(sensor_count), raw_expected_(raw_expected), comment_(std::move(comment)),
+      row_(std::move(row)) {}
 
 void PacketLines::info(const wire_info &info) {
   Metadata all = info_metadata(info);
@@ -29,9 +29,9 @@ double PacketLines::seconds() const {
 }
 
 std::string PacketLines::edges_text() const {
-  return edges_.edges() == 0 ? ""
-                             : " edges=" + std::to_string(edges_.edges()) +
-                                   " edges_missing=" + std::to_string(edges_.missing());
+  return edges_.edges() == 0
+             ? ""
+             : " edges=" + std::to_string(edges_.edges()) + " edges_missing=" + std::to_string(edges_.missing());
 }
 
 void PacketLines::row(const wire_packet *contact, const wire_packet *raw) {
@@ -72,8 +72,7 @@ void PacketLines::packet(const wire_packet &packet) {
     if (packet.body.raw.sensor_count != sensor_count_) {
       throw Error(ErrorCode::other_sensor_count, path_ + ": the fingertip now has " +
                                                      std::to_string(packet.body.raw.sensor_count) +
-                                                     " sensors instead of " +
-                                                     std::to_string(sensor_count_));
+                                                     " sensors instead of " + std::to_string(sensor_count_));
     }
     if (pending_contact_ && pending_contact_->body.contact.frame == packet.body.raw.frame &&
         pending_contact_->t_us == packet.t_us) {

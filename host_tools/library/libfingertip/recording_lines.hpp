@@ -18,8 +18,7 @@ public:
   /* Without the columns of the fingertip's number and the recorder's clock. */
   using RowHandler = std::function<void(std::uint64_t t_us, const std::string &cells)>;
 
-  PacketLines(std::string path, std::uint8_t sensor_count, bool raw_expected,
-              CommentHandler comment, RowHandler row);
+  PacketLines(std::string path, std::uint8_t sensor_count, bool raw_expected, CommentHandler comment, RowHandler row);
 
   /* Throws Error if a raw packet has another number of sensors. */
   void packet(const wire_packet &packet);

@@ -22,9 +22,8 @@ std::string format_of(const std::string &path, const std::string &line) {
   if (words.substr(0, begin.size()) == begin) {
     std::string format(words.substr(begin.size()));
     if (format != FORMAT_OF_ONE && format != FORMAT_OF_SEVERAL) {
-      throw Error(ErrorCode::other_format, path + ":1: recording format \"" + format +
-                                               "\" is unknown, " + FORMAT_OF_ONE + " and " +
-                                               FORMAT_OF_SEVERAL + " are known");
+      throw Error(ErrorCode::other_format, path + ":1: recording format \"" + format + "\" is unknown, " +
+                                               FORMAT_OF_ONE + " and " + FORMAT_OF_SEVERAL + " are known");
     }
     return format;
   }
@@ -32,8 +31,7 @@ std::string format_of(const std::string &path, const std::string &line) {
   std::string kind(words.substr(0, ours.size()) == ours ? words.substr(ours.size()) : "");
   throw Error(ErrorCode::not_a_recording,
               path + (kind.empty()
-                          ? ":1: no recording; its first line is not \"" + std::string(begin) +
-                                FORMAT_OF_ONE + "\""
+                          ? ":1: no recording; its first line is not \"" + std::string(begin) + FORMAT_OF_ONE + "\""
                           : ": a " + kind.substr(0, kind.find(' ')) + ", not a recording"));
 }
 
@@ -269,8 +267,7 @@ void RecordingReader::read_end(std::string_view text) {
   end_statistics_ = statistics;
 }
 
-void RecordingReader::read_info_field(wire_info &info, const std::string &key,
-                                      const std::string &value) {
+void RecordingReader::read_info_field(wire_info &info, const std::string &key, const std::string &value) {
   auto copy_text = [&](char *field) {
     if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
       throw Damage{key + " is no printable ASCII"};
@@ -358,12 +355,10 @@ void RecordingReader::choose_device(const std::string &serials) {
   if (wanted_.empty()) {
     throw Error(ErrorCode::several_in_file, path_ + ": holds several fingertips: " + names);
   }
-  throw Error(ErrorCode::no_such_in_file,
-              path_ + ": no fingertip " + wanted_ + " in it, there are: " + names);
+  throw Error(ErrorCode::no_such_in_file, path_ + ": no fingertip " + wanted_ + " in it, there are: " + names);
 }
 
-void RecordingReader::read_row(std::string_view text, std::uint32_t device,
-                               std::optional<double> time_us) {
+void RecordingReader::read_row(std::string_view text, std::uint32_t device, std::optional<double> time_us) {
   RowPackets row = parse_row(text, sensor_count_, sets_);
   for (const auto &packet : {row.contact, row.raw}) {
     if (packet) {
@@ -394,14 +389,12 @@ std::vector<std::string> fingertips_in(const std::string &path) {
     LineSource::Line line;
     /* It is the second line; a capture of the line has no lines. */
     for (int i = 0; i < 2 && lines->next(line); i++) {
-      bool ours =
-          i == 0 ? line.text.rfind("# fingertip-recording", 0) == 0 : line.text.rfind(key, 0) == 0;
+      bool ours = i == 0 ? line.text.rfind("# fingertip-recording", 0) == 0 : line.text.rfind(key, 0) == 0;
       if (!ours) {
         break;
       }
       for (std::string_view serial :
-           split(trim(std::string_view(line.text).substr(i == 1 ? key.size() : line.text.size())),
-                 ' ')) {
+           split(trim(std::string_view(line.text).substr(i == 1 ? key.size() : line.text.size())), ' ')) {
         if (!serial.empty()) {
           serials.emplace_back(serial);
         }

@@ -68,8 +68,7 @@ private:
   bool read_next();
   void read_line(const std::string &text);
   void read_comment(const std::string &text);
-  void read_row(std::string_view text, std::uint32_t device,
-                std::optional<double> time_us = {});
+  void read_row(std::string_view text, std::uint32_t device, std::optional<double> time_us = {});
   void choose_device(const std::string &serials);
   void read_end(std::string_view text);
   void read_info_field(wire_info &info, const std::string &key, const std::string &value);
@@ -85,9 +84,9 @@ private:
   std::optional<LineStatistics> end_statistics_;
   Metadata recorder_metadata_;
   std::uint8_t sensor_count_ = 0;
-  int sets_ = 0; /* of columns that came later, as the header says */
-  bool joint_ = false;         /* of several fingertips */
-  bool all_ = false;           /* of them are read */
+  int sets_ = 0;       /* of columns that came later, as the header says */
+  bool joint_ = false; /* of several fingertips */
+  bool all_ = false;   /* of them are read */
   bool begun_ = false;
   std::string wanted_;                        /* serial number */
   std::optional<std::uint32_t> number_;       /* of the wanted one in a joint recording */

@@ -9,20 +9,16 @@ namespace fingertip {
 using namespace recording;
 
 RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
-                                 std::uint8_t sensor_count, const Metadata &extra,
-                                 bool raw_expected, OutputFile::Appears appears)
-    : RecordingWriter(make_lines(path, replace, appears), info, sensor_count, extra, raw_expected) {
-}
+                                 std::uint8_t sensor_count, const Metadata &extra, bool raw_expected,
+                                 OutputFile::Appears appears)
+    : RecordingWriter(make_lines(path, replace, appears), info, sensor_count, extra, raw_expected) {}
 
-RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info,
-                                 std::uint8_t sensor_count, const Metadata &extra,
-                                 bool raw_expected)
+RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count,
+                                 const Metadata &extra, bool raw_expected)
     : file_(std::move(file)),
       lines_(
           file_->path(), sensor_count, raw_expected,
-          [this](const std::string &key, const std::string &value) {
-            line("# " + key + ": " + value);
-          },
+          [this](const std::string &key, const std::string &value) { line("# " + key + ": " + value); },
           [this](std::uint64_t, const std::string &cells) { line(cells); }) {
   line(std::string(FIRST_WORDS) + FORMAT_OF_ONE);
   for (const auto &[key, value] : extra) {

@@ -15,9 +15,8 @@ class RecordingWriter {
 public:
   /* sensor_count: columns for raw packets, 0 to FT_MAX_SENSORS; extra: the recorder's own metadata.
    * raw_expected: a contact packet waits for the raw packet of its frame, to share its row. */
-  RecordingWriter(const std::string &path, bool replace, const wire_info *info,
-                  std::uint8_t sensor_count, const Metadata &extra, bool raw_expected,
-                  OutputFile::Appears appears);
+  RecordingWriter(const std::string &path, bool replace, const wire_info *info, std::uint8_t sensor_count,
+                  const Metadata &extra, bool raw_expected, OutputFile::Appears appears);
 
   /* To other lines than those of a file. */
   RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count,

@@ -46,8 +46,7 @@ bool is_trusted(std::uint32_t flags) {
 
 /* Tared, and without a warning nothing presses. */
 bool is_untouched(std::uint32_t flags) {
-  return (flags & (CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED | warning_flags())) ==
-         CONTACT_FLAG_TARED;
+  return (flags & (CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED | warning_flags())) == CONTACT_FLAG_TARED;
 }
 
 struct Vector {
@@ -61,8 +60,7 @@ void put(CdrWriter &writer, const Vector &vector) {
 }
 
 std::string status(const Header &header, const std::string &name, const std::string &trouble,
-                   const std::string &otherwise, const std::string &serial,
-                   const Metadata &values) {
+                   const std::string &otherwise, const std::string &serial, const Metadata &values) {
   enum : std::uint8_t { OK, WARN };
   CdrWriter writer = begun(header);
   writer.count(1);
@@ -146,8 +144,7 @@ std::string schema_of(const std::string &name) {
     text += (i > 0 ? std::string(80, '=') + "\nMSG: " + each + "\n" : "") + definition;
     for (std::string_view line : split(definition, '\n')) {
       std::string type(line.substr(0, line.find_first_of(" [")));
-      if (definitions().count(type) &&
-          std::find(needed.begin(), needed.end(), type) == needed.end()) {
+      if (definitions().count(type) && std::find(needed.begin(), needed.end(), type) == needed.end()) {
         needed.push_back(type);
       }
     }
@@ -166,8 +163,7 @@ std::string name_in_ros(const std::string &serial) {
 std::string wrench(const Header &header, const wire_contact &contact) {
   Vector force = {0, 0, 0}, torque = {0, 0, 0};
   if (!is_untouched(contact.flags)) {
-    constexpr std::uint32_t tangential =
-        CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
+    constexpr std::uint32_t tangential = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
     bool trusted = is_trusted(contact.flags);
     bool sure = trusted && (contact.flags & tangential) == CONTACT_FLAG_TANGENTIAL_VALID;
     double x_m = metres(contact.x_mm), y_m = metres(contact.y_mm);
@@ -213,8 +209,7 @@ std::string pressures(const Header &header, const wire_raw &raw, const std::vect
   for (std::uint32_t k = 0; k < width; k++) {
     bool valid = raw.valid >> k & 1;
     double pressure_Pa = raw.pressure_Pa_q10[k] / Q10 - raw.baseline_Pa_q10[k] / Q10;
-    for (double value :
-         {metres(x_mm[k]), metres(y_mm[k]), 0.0, valid ? pressure_Pa : NOT_A_NUMBER}) {
+    for (double value : {metres(x_mm[k]), metres(y_mm[k]), 0.0, valid ? pressure_Pa : NOT_A_NUMBER}) {
       writer.put(static_cast<float>(value)); /* aligned: the bytes begin at a multiple of four */
     }
   }
@@ -222,8 +217,7 @@ std::string pressures(const Header &header, const wire_raw &raw, const std::vect
   return writer.bytes();
 }
 
-std::string health(const Header &header, const std::string &serial, unsigned sensors,
-                   const Metadata &fields) {
+std::string health(const Header &header, const std::string &serial, unsigned sensors, const Metadata &fields) {
   std::uint64_t present = 0, bad = 0;
   for (const auto &[key, value] : fields) {
     if (key == "sensors_present" || key == "sensors_prom_bad") {
@@ -244,8 +238,7 @@ std::string health(const Header &header, const std::string &serial, unsigned sen
 
 std::string warnings(const Header &header, const std::string &serial, std::uint32_t flags) {
   std::uint32_t warned = flags & warning_flags();
-  return status(header, "fingertip " + serial + " contact", warned ? flags_text(warned) : "",
-                "no warning", serial, {});
+  return status(header, "fingertip " + serial + " contact", warned ? flags_text(warned) : "", "no warning", serial, {});
 }
 
 std::string encode(const Header &header, const Line &line) {
@@ -279,8 +272,7 @@ std::string encode(const Header &header, const Row &row) {
   visit_contact(put_contact, contact);
   writer.put(put_raw.is_there);
   visit_raw(put_raw, raw, WITHOUT_SENSORS);
-  for (const std::int32_t *readings :
-       {raw.body.raw.pressure_Pa_q10, raw.body.raw.baseline_Pa_q10}) {
+  for (const std::int32_t *readings : {raw.body.raw.pressure_Pa_q10, raw.body.raw.baseline_Pa_q10}) {
     writer.count(raw.body.raw.sensor_count);
     for (unsigned k = 0; k < raw.body.raw.sensor_count; k++) {
       writer.put(readings[k] / Q10);

@@ -39,8 +39,7 @@ std::string pressures(const Header &header, const wire_raw &raw, const std::vect
                       const std::vector<float> &y_mm);
 
 /* diagnostic_msgs/DiagnosticArray of one status: a health packet's, and a contact's warnings. */
-std::string health(const Header &header, const std::string &serial, unsigned sensors,
-                   const Metadata &fields);
+std::string health(const Header &header, const std::string &serial, unsigned sensors, const Metadata &fields);
 std::string warnings(const Header &header, const std::string &serial, std::uint32_t flags);
 
 /* fingertip_msgs/Line. */

@@ -28,8 +28,7 @@ Error failure(const std::string &what) {
 ServedPort::ServedPort(const std::string &link) : link_(link) {
   char name[64];
   fd_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (fd_ < 0 || grantpt(fd_) != 0 || unlockpt(fd_) != 0 ||
-      ptsname_r(fd_, name, sizeof name) != 0) {
+  if (fd_ < 0 || grantpt(fd_) != 0 || unlockpt(fd_) != 0 || ptsname_r(fd_, name, sizeof name) != 0) {
     throw failure("no pseudo-terminal to be had");
   }
   name_ = name;

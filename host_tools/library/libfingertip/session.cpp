@@ -28,8 +28,7 @@ ErrorCode refusal_code(std::uint8_t result) {
 
 } // namespace
 
-Session::Session(Transport &transport, std::function<bool()> stop)
-    : transport_(transport), stop_(std::move(stop)) {}
+Session::Session(Transport &transport, std::function<bool()> stop) : transport_(transport), stop_(std::move(stop)) {}
 
 Transport::Result Session::poll(std::chrono::milliseconds timeout) {
   std::uint8_t bytes[4096];
@@ -52,8 +51,7 @@ void Session::take(const wire_packet &packet) {
     if (sent_us > 0 && sent_us <= now_us) {
       /* Without a sign until it is known: any time of a device is possible. */
       auto middle_us = static_cast<std::uint64_t>((sent_us + now_us) / 2);
-      ClockRelation relation = {static_cast<std::int64_t>(packet.t_us - middle_us),
-                                (now_us - sent_us + 1) / 2};
+      ClockRelation relation = {static_cast<std::int64_t>(packet.t_us - middle_us), (now_us - sent_us + 1) / 2};
       if (!clock_ || relation.uncertainty_us < clock_->uncertainty_us) {
         clock_ = relation;
       }
@@ -105,8 +103,7 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
   repeat_refused_ = false;
   std::uint64_t version_errors = statistics().version_errors;
   const auto refused = [&](std::uint8_t result) {
-    return Error(refusal_code(result),
-                 "the fingertip refused \"" + name + "\": " + result_text(result));
+    return Error(refusal_code(result), "the fingertip refused \"" + name + "\": " + result_text(result));
   };
   for (int attempt = 0; attempt < policy.attempts; attempt++) {
     send(command);
@@ -118,8 +115,7 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
       if (stop_()) {
         throw Interrupted();
       }
-      auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - now) +
-                  std::chrono::milliseconds(1);
+      auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - now) + std::chrono::milliseconds(1);
       if (poll(std::min(left, POLL_INTERVAL)) == Transport::Result::gone) {
         throw Gone(transport_.description() + ": vanished before it answered \"" + name + "\"");
       }
@@ -133,10 +129,9 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
       }
     }
     if (statistics().version_errors > version_errors) {
-      throw Error(ErrorCode::other_version, transport_.description() +
-                                                ": speaks protocol version " +
-                                                std::to_string(decoder_.other_version()) +
-                                                ", not " + std::to_string(WIRE_VERSION));
+      throw Error(ErrorCode::other_version, transport_.description() + ": speaks protocol version " +
+                                                std::to_string(decoder_.other_version()) + ", not " +
+                                                std::to_string(WIRE_VERSION));
     }
   }
   if (repeat_refused_) {

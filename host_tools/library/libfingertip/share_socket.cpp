@@ -51,15 +51,13 @@ std::string own_folder_in_tmp() {
 
 bool is_of_this_user(const std::string &folder) {
   struct stat status;
-  return lstat(folder.c_str(), &status) == 0 && S_ISDIR(status.st_mode) &&
-         status.st_uid == geteuid();
+  return lstat(folder.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == geteuid();
 }
 
 /* What is in no name of a file becomes '_'. */
 std::string as_name(std::string serial) {
   std::replace_if(
-      serial.begin(), serial.end(),
-      [](unsigned char c) { return !std::isalnum(c) && c != '-' && c != '_'; }, '_');
+      serial.begin(), serial.end(), [](unsigned char c) { return !std::isalnum(c) && c != '-' && c != '_'; }, '_');
   return serial;
 }
 
@@ -118,8 +116,7 @@ std::vector<Shared> find_shared() {
       }
     }
   }
-  std::sort(all.begin(), all.end(),
-            [](const Shared &a, const Shared &b) { return a.serial < b.serial; });
+  std::sort(all.begin(), all.end(), [](const Shared &a, const Shared &b) { return a.serial < b.serial; });
   return all;
 }
 
@@ -139,8 +136,7 @@ SocketTransport::SocketTransport(const std::string &path) : DescriptorTransport(
     return;
   }
   if (error == EACCES || error == EPERM) {
-    throw Error(ErrorCode::share_denied,
-                path + ": permission denied: it is its owner's and group's");
+    throw Error(ErrorCode::share_denied, path + ": permission denied: it is its owner's and group's");
   }
   if (error == ENOENT || error == ECONNREFUSED) {
     throw Error(ErrorCode::not_shared, path + ": no program shares a fingertip there");

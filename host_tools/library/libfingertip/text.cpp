@@ -12,11 +12,7 @@ std::size_t printable_length(std::string_view text) {
   if (first < 0x80) {
     return first >= 0x20 && first != 0x7F;
   }
-  std::size_t length = first < 0xC0   ? 0
-                       : first < 0xE0 ? 2
-                       : first < 0xF0 ? 3
-                       : first < 0xF8 ? 4
-                                      : 0;
+  std::size_t length = first < 0xC0 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF8 ? 4 : 0;
   if (length == 0 || length > text.size()) {
     return 0;
   }

@@ -57,8 +57,7 @@ FirmwareImage firmware_of(const std::string &name, std::vector<std::uint8_t> fil
   image.file = std::move(file);
   std::size_t count = image.file.size() / BLOCK_BYTES;
   auto damaged = [&](std::size_t block, const std::string &what) {
-    return Error(ErrorCode::damaged_firmware,
-                 name + ": damaged (block " + std::to_string(block) + ": " + what + ")");
+    return Error(ErrorCode::damaged_firmware, name + ": damaged (block " + std::to_string(block) + ": " + what + ")");
   };
   if (image.file.size() < BLOCK_BYTES || bytes_get_u32(image.file.data()) != MAGIC_FIRST) {
     throw Error(ErrorCode::not_firmware, name + ": no UF2 file");
@@ -81,8 +80,7 @@ FirmwareImage firmware_of(const std::string &name, std::vector<std::uint8_t> fil
     if (word(5) != i || word(6) != count) {
       throw damaged(i, "numbered " + std::to_string(word(5)) + " of " + std::to_string(word(6)));
     }
-    if (word(4) != PAGE_BYTES || word(3) != FLASH_BASE + i * PAGE_BYTES ||
-        (i + 1) * PAGE_BYTES > FLASH_BYTES) {
+    if (word(4) != PAGE_BYTES || word(3) != FLASH_BASE + i * PAGE_BYTES || (i + 1) * PAGE_BYTES > FLASH_BYTES) {
       throw damaged(i, "not the next page of the flash");
     }
     flash.insert(flash.end(), block + HEAD_BYTES, block + HEAD_BYTES + PAGE_BYTES);

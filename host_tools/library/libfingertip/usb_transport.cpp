@@ -131,8 +131,7 @@ public:
       return true;
     }
     std::vector<pollfd> descriptors = poll_descriptors();
-    const bool is_whole = wait_for(descriptors.data(), descriptors.size(), until) > 0 ||
-                          host_now() >= until;
+    const bool is_whole = wait_for(descriptors.data(), descriptors.size(), until) > 0 || host_now() >= until;
     handle_events();
     return is_whole;
   }
@@ -148,8 +147,8 @@ public:
 
   bool write(const std::uint8_t *bytes, std::size_t length) {
     int sent = 0;
-    int result = libusb_bulk_transfer(handle_, layout_.out, const_cast<std::uint8_t *>(bytes),
-                                      static_cast<int>(length), &sent, WRITE_TIMEOUT_ms);
+    int result = libusb_bulk_transfer(handle_, layout_.out, const_cast<std::uint8_t *>(bytes), static_cast<int>(length),
+                                      &sent, WRITE_TIMEOUT_ms);
     gone_ = gone_ || result == LIBUSB_ERROR_NO_DEVICE;
     if (result == LIBUSB_ERROR_PIPE) {
       libusb_clear_halt(handle_, layout_.out);
@@ -192,8 +191,8 @@ private:
     ssize_t count = libusb_get_device_list(context_, &list);
     for (ssize_t i = 0; i < count && !handle_; i++) {
       libusb_device_descriptor descriptor;
-      if (libusb_get_device_descriptor(list[i], &descriptor) != 0 ||
-          descriptor.idVendor != FINGERTIP_USB_VID || descriptor.idProduct != FINGERTIP_USB_PID) {
+      if (libusb_get_device_descriptor(list[i], &descriptor) != 0 || descriptor.idVendor != FINGERTIP_USB_VID ||
+          descriptor.idProduct != FINGERTIP_USB_PID) {
         continue;
       }
       libusb_device_handle *handle = nullptr;
@@ -203,10 +202,8 @@ private:
         continue;
       }
       unsigned char text[128] = {};
-      int length = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text,
-                                                      sizeof text - 1);
-      std::string here(reinterpret_cast<char *>(text),
-                       length > 0 ? static_cast<size_t>(length) : 0);
+      int length = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text, sizeof text - 1);
+      std::string here(reinterpret_cast<char *>(text), length > 0 ? static_cast<size_t>(length) : 0);
       if (!serial.empty() && !is_same_serial(here, serial)) {
         libusb_close(handle);
         continue;
@@ -227,8 +224,7 @@ private:
   /* False: it vanished meanwhile. */
   bool claim() {
     if (!layout_.is_complete()) {
-      throw Error(ErrorCode::not_a_fingertip,
-                  description_ + ": its interfaces are not those of a fingertip");
+      throw Error(ErrorCode::not_a_fingertip, description_ + ": its interfaces are not those of a fingertip");
     }
     for (int interface : {layout_.control_interface, layout_.data_interface}) {
       int result = 0;
@@ -248,8 +244,8 @@ private:
       case LIBUSB_ERROR_BUSY:
         throw Error(ErrorCode::port_in_use, description_ + ": in use by another program");
       default:
-        throw Error(ErrorCode::usb_failed, description_ + ": cannot claim its interfaces (" +
-                                               libusb_error_name(result) + ")");
+        throw Error(ErrorCode::usb_failed,
+                    description_ + ": cannot claim its interfaces (" + libusb_error_name(result) + ")");
       }
     }
     return true;
@@ -258,8 +254,7 @@ private:
   void start() {
     slots_.resize(TRANSFERS);
     for (Slot &slot : slots_) {
-      slot = {this, libusb_alloc_transfer(0), std::vector<std::uint8_t>(layout_.in_packet_bytes),
-              false};
+      slot = {this, libusb_alloc_transfer(0), std::vector<std::uint8_t>(layout_.in_packet_bytes), false};
       if (!slot.transfer) {
         throw Error(ErrorCode::usb_failed, description_ + ": no memory for its transfers");
       }
@@ -292,8 +287,7 @@ private:
     Link &link = *slot.link;
     slot.waiting = false;
     link.waiting_--;
-    link.received_.insert(link.received_.end(), transfer->buffer,
-                          transfer->buffer + transfer->actual_length);
+    link.received_.insert(link.received_.end(), transfer->buffer, transfer->buffer + transfer->actual_length);
     switch (transfer->status) {
     case LIBUSB_TRANSFER_COMPLETED:
       link.halts_ = 0;
@@ -326,8 +320,8 @@ private:
 
   bool set_lines(std::uint16_t lines) {
     return libusb_control_transfer(handle_, TO_INTERFACE, SET_CONTROL_LINE_STATE, lines,
-                                   static_cast<std::uint16_t>(layout_.control_interface), nullptr,
-                                   0, CONTROL_TIMEOUT_ms) == 0;
+                                   static_cast<std::uint16_t>(layout_.control_interface), nullptr, 0,
+                                   CONTROL_TIMEOUT_ms) == 0;
   }
 
   bool set_baud(std::uint32_t baud) {
@@ -338,8 +332,8 @@ private:
     }
     coding[6] = 8;
     return libusb_control_transfer(handle_, TO_INTERFACE, SET_LINE_CODING, 0,
-                                   static_cast<std::uint16_t>(layout_.control_interface),
-                                   coding.data(), static_cast<std::uint16_t>(coding.size()),
+                                   static_cast<std::uint16_t>(layout_.control_interface), coding.data(),
+                                   static_cast<std::uint16_t>(coding.size()),
                                    CONTROL_TIMEOUT_ms) == static_cast<int>(coding.size());
   }
 

@@ -57,8 +57,7 @@ Vector lagrange(const Vector &nodes, double s, bool derivative) {
 // Functions on a line cut into elements.
 class Line {
 public:
-  Line(std::vector<double> edges, int degree)
-      : edges_(std::move(edges)), degree_(degree), nodes_(degree + 1) {
+  Line(std::vector<double> edges, int degree) : edges_(std::move(edges)), degree_(degree), nodes_(degree + 1) {
     for (int k = 0; k <= degree; k++) { // Chebyshev's: the functions, not the nodes, matter
       nodes_[k] = -std::cos(M_PI * k / degree);
     }
@@ -73,10 +72,8 @@ public:
         const Index row = e * points + q;
         points_[row] = begin + half * (1.0 + rule.points[q]);
         weights_[row] = half * rule.weights[q];
-        values_.block(row, e * degree, 1, degree + 1) =
-            lagrange(nodes_, rule.points[q], false).transpose();
-        slopes_.block(row, e * degree, 1, degree + 1) =
-            lagrange(nodes_, rule.points[q], true).transpose() / half;
+        values_.block(row, e * degree, 1, degree + 1) = lagrange(nodes_, rule.points[q], false).transpose();
+        slopes_.block(row, e * degree, 1, degree + 1) = lagrange(nodes_, rule.points[q], true).transpose() / half;
       }
     }
   }
@@ -115,8 +112,7 @@ struct Modes {
     const auto gram = [&](const Matrix &of) -> Matrix {
       return (of.transpose() * line.weights().asDiagonal() * of).bottomRightCorner(size, size);
     };
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> solver(gram(line.slopes()),
-                                                                  gram(line.values()));
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix> solver(gram(line.slopes()), gram(line.values()));
     modes = Matrix::Zero(line.size(), size);
     modes.bottomRows(size) = solver.eigenvectors();
     stiffness = solver.eigenvalues();
@@ -125,8 +121,7 @@ struct Modes {
 
 // Integrals of slopes of the one times values of the other.
 Matrix slopes_by_values(const Line &line, const Modes &a, const Modes &b) {
-  return (line.slopes() * a.modes).transpose() * line.weights().asDiagonal() *
-         (line.values() * b.modes);
+  return (line.slopes() * a.modes).transpose() * line.weights().asDiagonal() * (line.values() * b.modes);
 }
 
 struct Shape {
@@ -167,20 +162,19 @@ using Field = std::array<Vector, 3>;
 class Quarter {
 public:
   Quarter(const Line &x, const Line &y, const Line &z, bool odd_x, bool odd_y, double lame)
-      : lame_(lame), x_{Modes(x, !odd_x), Modes(x, odd_x)}, y_{Modes(y, !odd_y), Modes(y, odd_y)},
-        z_(z, true), gx_(slopes_by_values(x, x_[0], x_[1])),
-        hx_(slopes_by_values(x, x_[1], x_[0]).transpose()), gy_(slopes_by_values(y, y_[0], y_[1])),
-        hy_(slopes_by_values(y, y_[1], y_[0]).transpose()), gz_(slopes_by_values(z, z_, z_)) {
+      : lame_(lame), x_{Modes(x, !odd_x), Modes(x, odd_x)}, y_{Modes(y, !odd_y), Modes(y, odd_y)}, z_(z, true),
+        gx_(slopes_by_values(x, x_[0], x_[1])), hx_(slopes_by_values(x, x_[1], x_[0]).transpose()),
+        gy_(slopes_by_values(y, y_[0], y_[1])), hy_(slopes_by_values(y, y_[1], y_[0]).transpose()),
+        gz_(slopes_by_values(z, z_, z_)) {
     for (std::size_t c = 0; c < 3; c++) {
       const Shape s = shape(c);
       diagonal_[c].resize(s.x * s.y * s.z);
       for (Index k = 0; k < s.z; k++) {
         for (Index j = 0; j < s.y; j++) {
           for (Index i = 0; i < s.x; i++) {
-            diagonal_[c][i + s.x * (j + s.y * k)] =
-                (c == 0 ? lame_ + 2.0 : 1.0) * x_of(c).stiffness[i] +
-                (c == 1 ? lame_ + 2.0 : 1.0) * y_of(c).stiffness[j] +
-                (c == 2 ? lame_ + 2.0 : 1.0) * z_.stiffness[k];
+            diagonal_[c][i + s.x * (j + s.y * k)] = (c == 0 ? lame_ + 2.0 : 1.0) * x_of(c).stiffness[i] +
+                                                    (c == 1 ? lame_ + 2.0 : 1.0) * y_of(c).stiffness[j] +
+                                                    (c == 2 ? lame_ + 2.0 : 1.0) * z_.stiffness[k];
           }
         }
       }
@@ -190,9 +184,7 @@ public:
   const Modes &x_of(std::size_t c) const { return x_[c == 0 ? 0 : 1]; }
   const Modes &y_of(std::size_t c) const { return y_[c == 1 ? 0 : 1]; }
   const Modes &z_of() const { return z_; }
-  Shape shape(std::size_t c) const {
-    return {x_of(c).stiffness.size(), y_of(c).stiffness.size(), z_.stiffness.size()};
-  }
+  Shape shape(std::size_t c) const { return {x_of(c).stiffness.size(), y_of(c).stiffness.size(), z_.stiffness.size()}; }
 
   // By conjugate gradients, the diagonal taken as the whole.
   Field solve(const Field &load) const {
@@ -248,8 +240,8 @@ private:
   }
 
   // Along the axis of the component, by the matrix of that axis.
-  static void along(std::size_t c, const Matrix &by_x, const Matrix &by_y, const Matrix &by_z,
-                    const Vector &in, const Shape &from, Vector &out, bool add) {
+  static void along(std::size_t c, const Matrix &by_x, const Matrix &by_y, const Matrix &by_z, const Vector &in,
+                    const Shape &from, Vector &out, bool add) {
     if (c == 0) {
       along_x(by_x, from, in, out, add);
     } else if (c == 1) {
@@ -268,13 +260,11 @@ private:
 };
 
 // From the middle (or the base) to an end, where elements are small; at the beginning too if said.
-std::vector<double> edges_of(double length, double element, double edge, double growth,
-                             bool both_ends) {
+std::vector<double> edges_of(double length, double element, double edge, double growth, bool both_ends) {
   std::vector<double> sizes;
   double small = 0.0;
   const double room = both_ends ? 0.5 * length : length;
-  for (double size = std::min(edge, room); size < element && small + size < 0.5 * room;
-       size *= growth) {
+  for (double size = std::min(edge, room); size < element && small + size < 0.5 * room; size *= growth) {
     sizes.push_back(size);
     small += size;
   }
@@ -319,8 +309,7 @@ public:
         edge_mm_(grid.edge_thicknesses * block.layer.thickness_mm),
         x_(edges_of(block.half_x_mm, element_mm_, edge_mm_, grid.growth, false), grid.degree),
         y_(edges_of(block.half_y_mm, element_mm_, edge_mm_, grid.growth, false), grid.degree),
-        z_(edges_of(block.layer.thickness_mm, element_mm_, edge_mm_, grid.growth, true),
-           grid.degree),
+        z_(edges_of(block.layer.thickness_mm, element_mm_, edge_mm_, grid.growth, true), grid.degree),
         lift_(block.layer, {z_.points().begin(), z_.points().end()}, reach_mm) {
     const double lame = 2.0 * block.layer.poisson / (1.0 - 2.0 * block.layer.poisson);
     for (int c = 0; c < 4; c++) {
@@ -329,18 +318,15 @@ public:
   }
 
   // Adds what is even or odd in x and y of the answer of one place.
-  void add(const Place &place, bool odd_x, bool odd_y, int nodes_x, int nodes_y,
-           std::array<Matrix, 3> &answer) const {
+  void add(const Place &place, bool odd_x, bool odd_y, int nodes_x, int nodes_y, std::array<Matrix, 3> &answer) const {
     const Quarter &quarter = quarters_[odd_x ? (odd_y ? 3 : 2) : (odd_y ? 1 : 0)];
     const Field moved = quarter.solve(load(quarter, place, odd_x, odd_y));
     const Vector top = quarter.z_of().modes.transpose() * z_.values_at(z_.end());
     for (std::size_t c = 0; c < 3; c++) {
       const Shape s = quarter.shape(c);
       const Vector flat = Eigen::Map<const Matrix>(moved[c].data(), s.x * s.y, s.z) * top;
-      const Matrix of_x =
-          mirrored(at_nodes(x_, nodes_x), odd_x != (c == 0)) * quarter.x_of(c).modes;
-      const Matrix of_y =
-          mirrored(at_nodes(y_, nodes_y), odd_y != (c == 1)) * quarter.y_of(c).modes;
+      const Matrix of_x = mirrored(at_nodes(x_, nodes_x), odd_x != (c == 0)) * quarter.x_of(c).modes;
+      const Matrix of_y = mirrored(at_nodes(y_, nodes_y), odd_y != (c == 1)) * quarter.y_of(c).modes;
       answer[c] += of_x * Eigen::Map<const Matrix>(flat.data(), s.x, s.y) * of_y.transpose();
     }
   }
@@ -378,12 +364,11 @@ private:
       for (std::size_t c = 0; c < 3; c++) {
         const Shape s = quarter.shape(c);
         const Modes &modes = of_x ? quarter.y_of(c) : quarter.x_of(c);
-        const Matrix projected = (along.values() * modes.modes).transpose() *
-                                 along.weights().asDiagonal() * traction[c] *
-                                 z_.weights().asDiagonal() * (z_.values() * quarter.z_of().modes);
+        const Matrix projected = (along.values() * modes.modes).transpose() * along.weights().asDiagonal() *
+                                 traction[c] * z_.weights().asDiagonal() * (z_.values() * quarter.z_of().modes);
         const Line &across = of_x ? x_ : y_;
-        const Vector end = (of_x ? quarter.x_of(c) : quarter.y_of(c)).modes.transpose() *
-                           across.values_at(across.end());
+        const Vector end =
+            (of_x ? quarter.x_of(c) : quarter.y_of(c)).modes.transpose() * across.values_at(across.end());
         for (Index k = 0; k < s.z; k++) {
           Eigen::Map<Matrix> layer(made[c].data() + k * s.x * s.y, s.x, s.y);
           if (of_x) {
@@ -409,13 +394,12 @@ int block_nodes(double half_mm, double step_mm) {
   return static_cast<int>(std::ceil(2.0 * half_mm / step_mm)) + 1;
 }
 
-std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places,
-                                     double step_mm, const BlockGrid &grid,
-                                     const std::function<void(double)> &on_progress) {
+std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm,
+                                     const BlockGrid &grid, const std::function<void(double)> &on_progress) {
   double reach_mm = 0.0;
   for (const Place &place : places) {
-    reach_mm = std::max(reach_mm, std::hypot(block.half_x_mm + std::abs(place.x_mm),
-                                             block.half_y_mm + std::abs(place.y_mm)));
+    reach_mm =
+        std::max(reach_mm, std::hypot(block.half_x_mm + std::abs(place.x_mm), block.half_y_mm + std::abs(place.y_mm)));
   }
   const BlockSolver solver(block, grid, reach_mm);
   const int nodes_x = block_nodes(block.half_x_mm, step_mm);

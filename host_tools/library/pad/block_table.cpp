@@ -21,11 +21,9 @@ constexpr double SPREAD = 0.5;
 std::string key_of(const Block &block, const std::vector<Place> &places) {
   const BlockGrid grid;
   char text[256];
-  std::snprintf(text, sizeof text,
-                "block-table %d: %.9g %.9g %.9g %.9g grid %d %.9g %.9g %.9g %.9g step %.9g at",
-                VERSION, block.layer.thickness_mm, block.layer.poisson, block.half_x_mm,
-                block.half_y_mm, grid.degree, grid.element_mm, grid.element_thicknesses,
-                grid.edge_thicknesses, grid.growth, STEP_mm);
+  std::snprintf(text, sizeof text, "block-table %d: %.9g %.9g %.9g %.9g grid %d %.9g %.9g %.9g %.9g step %.9g at",
+                VERSION, block.layer.thickness_mm, block.layer.poisson, block.half_x_mm, block.half_y_mm, grid.degree,
+                grid.element_mm, grid.element_thicknesses, grid.edge_thicknesses, grid.growth, STEP_mm);
   std::string key = text;
   for (const Place &place : places) {
     std::snprintf(text, sizeof text, " %.9g,%.9g", place.x_mm, place.y_mm);
@@ -45,8 +43,8 @@ Between between(double place, double half, int nodes) {
   const int first = std::clamp(static_cast<int>(at) - 1, 0, nodes - 4);
   const double t = at - first - 1;
   return {first,
-          {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-           -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0}};
+          {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0, -(t + 1.0) * t * (t - 2.0) / 2.0,
+           (t + 1.0) * t * (t - 1.0) / 6.0}};
 }
 
 } // namespace
@@ -54,12 +52,10 @@ Between between(double place, double half, int nodes) {
 BlockTable::BlockTable(const Block &block, const std::vector<Place> &sensors) : block_(block) {
   for (const Place &sensor : sensors) {
     const Place mirror{std::abs(sensor.x_mm), std::abs(sensor.y_mm)};
-    const auto same = [&](const Place &place) {
-      return place.x_mm == mirror.x_mm && place.y_mm == mirror.y_mm;
-    };
+    const auto same = [&](const Place &place) { return place.x_mm == mirror.x_mm && place.y_mm == mirror.y_mm; };
     const auto found = std::find_if(places_.begin(), places_.end(), same);
-    sensors_.push_back({static_cast<std::size_t>(found - places_.begin()),
-                        sensor.x_mm < 0.0 ? -1.0 : 1.0, sensor.y_mm < 0.0 ? -1.0 : 1.0});
+    sensors_.push_back({static_cast<std::size_t>(found - places_.begin()), sensor.x_mm < 0.0 ? -1.0 : 1.0,
+                        sensor.y_mm < 0.0 ? -1.0 : 1.0});
     if (found == places_.end()) {
       places_.push_back(mirror);
     }
@@ -94,13 +90,11 @@ BlockTable BlockTable::load_or_build(const Block &block, const std::vector<Place
 double BlockTable::added_Pa(std::size_t sensor, const Load &load, double x_mm, double y_mm) const {
   const Sensor &at = sensors_[sensor];
   const std::array<double, 3> by{load.force_N, at.sign_x * load.x_N, at.sign_y * load.y_N};
-  const float *values =
-      values_.data() + 3 * at.place * std::size_t(nodes_x_) * std::size_t(nodes_y_);
+  const float *values = values_.data() + 3 * at.place * std::size_t(nodes_x_) * std::size_t(nodes_y_);
   // As far from the middle as the force is in the mean square.
   const double away_mm = std::sqrt(SPREAD) * load.radius_mm;
   double sum = 0.0;
-  for (const auto &[dx, dy] :
-       {std::pair{away_mm, 0.0}, {-away_mm, 0.0}, {0.0, away_mm}, {0.0, -away_mm}}) {
+  for (const auto &[dx, dy] : {std::pair{away_mm, 0.0}, {-away_mm, 0.0}, {0.0, away_mm}, {0.0, -away_mm}}) {
     const Between x = between(at.sign_x * (x_mm + dx), block_.half_x_mm, nodes_x_);
     const Between y = between(at.sign_y * (y_mm + dy), block_.half_y_mm, nodes_y_);
     for (int i = 0; i < 4; i++) {

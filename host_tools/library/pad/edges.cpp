@@ -43,8 +43,7 @@ double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, 
   }
   for (const auto &term : profile.tangential) {
     const double v = of(term.sd_mm) * of(term.sd_mm) + 1.3 * of(profile.spread_mm2);
-    sum += (qx * dx_mm + qy * dy_mm) * of(term.moment_mm) / (2 * M_PI * v * v) *
-           std::exp(-r2 / (2 * v));
+    sum += (qx * dx_mm + qy * dy_mm) * of(term.moment_mm) / (2 * M_PI * v * v) * std::exp(-r2 / (2 * v));
   }
   return 1e6 * sum;
 }
@@ -56,24 +55,20 @@ struct Prepared {
 
 Prepared prepare(const pad_profile &profile, const wire_info &info) {
   Prepared made{};
-  if (fit_array_init(&made.array, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) !=
-          FT_OK ||
+  if (fit_array_init(&made.array, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
       fit_pad_init(&made.pad, &made.array, &profile) != FT_OK) {
-    throw Error(ErrorCode::bad_value,
-                "the fingertip's sensors are no rectangle that tangential load is estimated on");
+    throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential load is estimated on");
   }
   return made;
 }
 
 class Estimate {
 public:
-  Estimate(const Prepared &prepared, const pad_profile &profile, const wire_info &info,
-           const twin::BlockTable &block)
+  Estimate(const Prepared &prepared, const pad_profile &profile, const wire_info &info, const twin::BlockTable &block)
       : profile_(profile), info_(info), block_(block), prepared_(prepared) {
     settings_.iterations = 4;
     settings_.noise_Pa_q10 = 1024;
-    std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS,
-                static_cast<std::uint16_t>(65536.0 * GAIN_SD));
+    std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS, static_cast<std::uint16_t>(65536.0 * GAIN_SD));
   }
 
   // False: there is no estimate.
@@ -81,22 +76,19 @@ public:
     std::array<std::int32_t, FT_MAX_SENSORS> readings{};
     const double radius_mm = std::sqrt(5.0 * of(profile_.spread_mm2)); // under Hertz's pressure
     for (std::size_t k = 0; k < info_.sensor_count; k++) {
-      const double layer =
-          FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm,
-                             of(info_.y_mm[k]) - contact.y_mm);
-      const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N,
-                                        radius_mm};
+      const double layer = FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm,
+                                              of(info_.y_mm[k]) - contact.y_mm);
+      const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N, radius_mm};
       const double added = block_.added_Pa(k, load, contact.x_mm, contact.y_mm);
       readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * (layer + added)));
     }
     fit_result fit;
     struct fit_tangential found;
     fit_tangential_state state{};
-    fit_gaussian_grid(&prepared_.array, readings.data(),
-                      UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count), &settings_, &fit);
+    fit_gaussian_grid(&prepared_.array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count),
+                      &settings_, &fit);
     for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
-      fit_tangential_load(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit,
-                          &state, &found);
+      fit_tangential_load(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit, &state, &found);
     }
     if (!found.valid) {
       return false;
@@ -151,19 +143,15 @@ struct AxisTerms {
   Terms ratio, gain, place, pull;
 };
 
-AxisTerms terms_along(const Axis &axis, const std::vector<Contact> &free,
-                      const std::vector<Contact> &pulled) {
+AxisTerms terms_along(const Axis &axis, const std::vector<Contact> &free, const std::vector<Contact> &pulled) {
   const auto lever = [&](const Contact &c) { return c.*axis.told_place / of(PAD_EDGE_UNIT_mm); };
   const auto off = [&](const Contact &c) { return c.*axis.told_place - c.*axis.place; };
   AxisTerms terms;
   terms.ratio = fitted(free, lever, [&](const Contact &c) { return c.*axis.told_load; });
   terms.place = fitted(free, lever, off);
-  const auto load = [&](const Contact &c) {
-    return c.*axis.told_load - lever(c) * even(terms.ratio, c);
-  };
+  const auto load = [&](const Contact &c) { return c.*axis.told_load - lever(c) * even(terms.ratio, c); };
   terms.gain = fitted(
-      pulled, [](const Contact &) { return RATIO; },
-      [&](const Contact &c) { return load(c) - RATIO; });
+      pulled, [](const Contact &) { return RATIO; }, [&](const Contact &c) { return load(c) - RATIO; });
   terms.pull = fitted(
       pulled, [&](const Contact &c) { return load(c) / (1.0 + even(terms.gain, c)); },
       [&](const Contact &c) { return off(c) - lever(c) * even(terms.place, c); });
@@ -182,8 +170,7 @@ double outermost(const float *places, int count) {
 
 } // namespace
 
-pad_edges edges_of(const pad_profile &profile, const wire_info &info,
-                   const std::filesystem::path &cache_directory,
+pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std::filesystem::path &cache_directory,
                    const std::function<void(double)> &on_progress) {
   const double overhang_mm = of(profile.overhang_mm);
   if (!(overhang_mm >= EDGE_OVERHANG_MIN_mm && overhang_mm <= EDGE_OVERHANG_MAX_mm)) {
@@ -198,10 +185,8 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info,
   for (int k = 0; k < count; k++) {
     sensors.push_back({of(info.x_mm[k]), of(info.y_mm[k])});
   }
-  const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm,
-                           half_y + overhang_mm};
-  const twin::BlockTable block =
-      twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
+  const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm, half_y + overhang_mm};
+  const twin::BlockTable block = twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
   Estimate estimate(prepared, profile, info, block);
   std::vector<Contact> contacts[3]; // without load, pulled along x, along y
   std::size_t places = 0;
@@ -209,8 +194,7 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info,
     for (double y_mm = -half_y; y_mm <= half_y + 1e-9; y_mm += STEP_mm) {
       places++;
       for (int load = 0; load < 3; load++) {
-        Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0,
-                        0.0,  0.0};
+        Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
         if (estimate.of_contact(contact)) {
           contacts[load].push_back(contact);
         }
@@ -219,16 +203,14 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info,
   }
   for (const auto &some : contacts) {
     if (static_cast<double>(some.size()) < LEAST_SHARE * static_cast<double>(places)) {
-      throw Error(ErrorCode::bad_value,
-                  "the rubber ends " + shortest(profile.overhang_mm) +
-                      " mm beyond the outer sensors, too near to estimate a tangential load");
+      throw Error(ErrorCode::bad_value, "the rubber ends " + shortest(profile.overhang_mm) +
+                                            " mm beyond the outer sensors, too near to estimate a tangential load");
     }
   }
   const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);
   const AxisTerms y = terms_along(ALONG_Y, contacts[0], contacts[2]);
   const Terms force = fitted(
-      contacts[0], [](const Contact &) { return 1.0; },
-      [](const Contact &c) { return c.told_force - 1.0; });
+      contacts[0], [](const Contact &) { return 1.0; }, [](const Contact &c) { return c.told_force - 1.0; });
   pad_edges edges{};
   put(x.ratio, edges.ratio_x);
   put(y.ratio, edges.ratio_y);

@@ -25,8 +25,7 @@ constexpr double EDGE_OVERHANG_MIN_mm = 3.0, EDGE_OVERHANG_MAX_mm = 20.0;
 // gets the share done, 0..1. Throws Error where the overhang is out of range, the sensors are no
 // array that the estimate takes, or the edges leave it on less than half of the array; and as
 // twin::BlockTable does.
-pad_edges edges_of(const pad_profile &profile, const wire_info &info,
-                   const std::filesystem::path &cache_directory,
+pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std::filesystem::path &cache_directory,
                    const std::function<void(double)> &on_progress = {});
 
 } // namespace fingertip::pad

@@ -16,10 +16,8 @@ constexpr double H_END = 32.0;
 constexpr double PANEL_rad = 6.0;
 
 // Gauss and Legendre, eight points in -1..1.
-constexpr double POINT[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
-                             0.9602898564975363};
-constexpr double WEIGHT[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
-                              0.1012285362903763};
+constexpr double POINT[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
+constexpr double WEIGHT[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
 
 // Displacement (i u along the wave, w upward) of one wave and its derivatives by k z.
 struct Wave {
@@ -92,8 +90,7 @@ PointLift::PointLift(const Layer &layer, std::vector<double> heights_mm, double 
       j2(r, n) = kr > 0.0 ? 2.0 * j1(r, n) / kr - j0(r, n) : 0.0;
     }
   }
-  const Eigen::MatrixXd volumes = j0 * volume, planes = j0 * along, stretches = -j2 * along,
-                        shears = j1 * shear;
+  const Eigen::MatrixXd volumes = j0 * volume, planes = j0 * along, stretches = -j2 * along, shears = j1 * shear;
   rest_.reserve(distances_ * heights_mm_.size());
   for (Eigen::Index z = 0; z < heights; z++) {
     for (Eigen::Index r = 0; r < j0.rows(); r++) {
@@ -110,17 +107,14 @@ PointLift::Parts PointLift::half_space(double r, double z) const {
   const double f_rz = 3.0 * r * (4.0 * z * z - r * r) / R2 * by;
   const double f_rr_less = 15.0 * z * r * r / R2 * by; // f_rr - f_r / r
   const double f_zz = 3.0 * z * (2.0 * z * z - 3.0 * r * r) / R2 * by;
-  return {f_z * (1.0 - 1.0 / b), z / b * f_zz, -z / b * f_rr_less,
-          f_r * (1.0 - 1.0 / b) - 2.0 * z / b * f_rz};
+  return {f_z * (1.0 - 1.0 / b), z / b * f_zz, -z / b * f_rr_less, f_r * (1.0 - 1.0 / b) - 2.0 * z / b * f_rz};
 }
 
 PointLift::Stress PointLift::stress(double r_mm, std::size_t height) const {
   const double at = r_mm / STEP_mm;
-  const std::size_t first =
-      std::min(static_cast<std::size_t>(std::max(at - 1.0, 0.0)), distances_ - 4);
+  const std::size_t first = std::min(static_cast<std::size_t>(std::max(at - 1.0, 0.0)), distances_ - 4);
   const double t = at - static_cast<double>(first) - 1.0;
-  const double weight[4] = {-t * (t - 1.0) * (t - 2.0) / 6.0,
-                            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+  const double weight[4] = {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
                             -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0};
   Parts sum = half_space(r_mm, heights_mm_[height]);
   for (std::size_t n = 0; n < 4; n++) {
@@ -131,8 +125,7 @@ PointLift::Stress PointLift::stress(double r_mm, std::size_t height) const {
     sum.shear += weight[n] * part.shear;
   }
   const double lame = 2.0 * poisson_ / (1.0 - 2.0 * poisson_);
-  return {lame * sum.volume + sum.plane + sum.stretch, lame * sum.volume + sum.plane - sum.stretch,
-          sum.shear};
+  return {lame * sum.volume + sum.plane + sum.stretch, lame * sum.volume + sum.plane - sum.stretch, sum.shear};
 }
 
 } // namespace fingertip::twin

@@ -135,8 +135,7 @@ Sum tangential_sum(const pad_profile &profile) {
   Sum sum(2 * PAD_TANGENTIAL_TERMS);
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     sum[j] = static_cast<double>(profile.tangential[j].moment_mm / profile.thickness_mm);
-    sum[PAD_TANGENTIAL_TERMS + j] =
-        static_cast<double>(profile.tangential[j].sd_mm / profile.thickness_mm);
+    sum[PAD_TANGENTIAL_TERMS + j] = static_cast<double>(profile.tangential[j].sd_mm / profile.thickness_mm);
   }
   return sum;
 }
@@ -179,12 +178,11 @@ double force_ratio(const pad_profile &profile, const wire_info &info) {
     for (std::size_t k = 0; k < info.sensor_count; k++) {
       const double dx = static_cast<double>(info.x_mm[k]) - at_x_mm;
       const double dy = static_cast<double>(info.y_mm[k]) - at_y_mm;
-      pressures_Pa_q10[k] = static_cast<std::int32_t>(
-          std::lround(1024 * FORCE_N * pressure_Pa(profile, dx * dx + dy * dy)));
+      pressures_Pa_q10[k] =
+          static_cast<std::int32_t>(std::lround(1024 * FORCE_N * pressure_Pa(profile, dx * dx + dy * dy)));
     }
     fit_result fit;
-    fit_gaussian(&array, pressures_Pa_q10.data(),
-                 UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &settings, &fit);
+    fit_gaussian(&array, pressures_Pa_q10.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &settings, &fit);
     if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
       throw Error(ErrorCode::bad_value, "the fingertip has too few sensors to fit a contact");
     }
@@ -194,16 +192,14 @@ double force_ratio(const pad_profile &profile, const wire_info &info) {
 }
 
 double relative(const Waves &waves, const Sum &sum) {
-  return std::sqrt(residual(waves, sum).squaredNorm() /
-                   waves.weight.cwiseProduct(waves.target).squaredNorm());
+  return std::sqrt(residual(waves, sum).squaredNorm() / waves.weight.cwiseProduct(waves.target).squaredNorm());
 }
 
 void check(const char *what, double value, double least, double greatest) {
   if (!(value >= least && value <= greatest)) {
-    throw Error(ErrorCode::bad_value,
-                std::string(what) + " " + shortest(static_cast<float>(value)) +
-                    " is out of range; give " + shortest(static_cast<float>(least)) + " to " +
-                    shortest(static_cast<float>(greatest)) + " mm");
+    throw Error(ErrorCode::bad_value, std::string(what) + " " + shortest(static_cast<float>(value)) +
+                                          " is out of range; give " + shortest(static_cast<float>(least)) + " to " +
+                                          shortest(static_cast<float>(greatest)) + " mm");
   }
 }
 
@@ -218,8 +214,7 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
   profile.overhang_mm = static_cast<float>(shape.overhang_mm);
   const Sum normal = fitted(normal_waves(), start(PAD_NORMAL_TERMS));
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    profile.normal[j] = {static_cast<float>(normal[j]),
-                         static_cast<float>(h_mm * normal[PAD_NORMAL_TERMS + j])};
+    profile.normal[j] = {static_cast<float>(normal[j]), static_cast<float>(h_mm * normal[PAD_NORMAL_TERMS + j])};
   }
   const Sum tangential = fitted(tangential_waves(), start(PAD_TANGENTIAL_TERMS));
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
@@ -258,8 +253,7 @@ bool edges_spoil_the_zero(const Shape &shape) {
 }
 
 Misfit misfit(const pad_profile &profile) {
-  return {relative(normal_waves(), normal_sum(profile)),
-          relative(tangential_waves(), tangential_sum(profile))};
+  return {relative(normal_waves(), normal_sum(profile)), relative(tangential_waves(), tangential_sum(profile))};
 }
 
 } // namespace fingertip::pad

@@ -24,12 +24,10 @@ std::uint64_t fnv1a(const void *data, std::size_t length) {
 } // namespace
 
 // A file holds the key, the values, and a hash of both.
-TableFile::TableFile(const std::filesystem::path &directory, const std::string &name,
-                     std::string key)
+TableFile::TableFile(const std::filesystem::path &directory, const std::string &name, std::string key)
     : key_(std::move(key)) {
   char hash[24];
-  std::snprintf(hash, sizeof hash, "-%016llx",
-                static_cast<unsigned long long>(fnv1a(key_.data(), key_.size())));
+  std::snprintf(hash, sizeof hash, "-%016llx", static_cast<unsigned long long>(fnv1a(key_.data(), key_.size())));
   path_ = directory / (name + hash + ".table");
 }
 
@@ -43,8 +41,7 @@ bool TableFile::read(std::vector<float> &values) const {
   std::uint64_t hash = 0;
   std::memcpy(&hash, file.data() + key_.size() + value_bytes, sizeof hash);
   std::memcpy(values.data(), file.data() + key_.size(), value_bytes);
-  return std::equal(key_.begin(), key_.end(), file.begin()) &&
-         hash == fnv1a(file.data(), key_.size() + value_bytes);
+  return std::equal(key_.begin(), key_.end(), file.begin()) && hash == fnv1a(file.data(), key_.size() + value_bytes);
 }
 
 void TableFile::write(const std::vector<float> &values) const {
@@ -61,8 +58,7 @@ void TableFile::write(const std::vector<float> &values) const {
   out.close();
   if (!out) {
     std::filesystem::remove(temporary);
-    throw std::runtime_error("cannot write " + temporary.string() +
-                             "; make room or give another --cache");
+    throw std::runtime_error("cannot write " + temporary.string() + "; make room or give another --cache");
   }
   std::filesystem::rename(temporary, path_);
 }
@@ -70,8 +66,7 @@ void TableFile::write(const std::vector<float> &values) const {
 std::filesystem::path default_cache_directory() {
   const char *cache = std::getenv("XDG_CACHE_HOME"), *home = std::getenv("HOME");
   const std::filesystem::path base =
-      cache && *cache ? std::filesystem::path(cache)
-                      : std::filesystem::path(home && *home ? home : ".") / ".cache";
+      cache && *cache ? std::filesystem::path(cache) : std::filesystem::path(home && *home ? home : ".") / ".cache";
   return base / "fingertip" / "contact-tables";
 }
 

@@ -60,9 +60,8 @@ double thickness_mm_of(double sigma_mm, double spread_mm2) {
 
 Thickness thickness_of(double sigma_mm, double sigma_sd_mm) {
   const double mm = thickness_mm_of(sigma_mm, SPREAD_mm2);
-  const double by_spread =
-      0.5 * (thickness_mm_of(sigma_mm, SPREAD_mm2 - SPREAD_SD_mm2) -
-             thickness_mm_of(sigma_mm, SPREAD_mm2 + SPREAD_SD_mm2));
+  const double by_spread = 0.5 * (thickness_mm_of(sigma_mm, SPREAD_mm2 - SPREAD_SD_mm2) -
+                                  thickness_mm_of(sigma_mm, SPREAD_mm2 + SPREAD_SD_mm2));
   const double sd_mm = std::hypot(sigma_sd_mm, SESSION_SD * sigma_mm);
   const double by_width = thickness_mm_of(sigma_mm + sd_mm, SPREAD_mm2) - mm;
   return {mm, std::hypot(by_spread, by_width)};
@@ -87,11 +86,9 @@ bool profile_suits(const Thickness &thickness) {
   return thickness.mm >= THINNEST_mm && thickness.mm <= static_cast<double>(PAD_THICKNESS_MAX_mm);
 }
 
-std::optional<Thickness> thickness_for_profile(const wire_info &info,
-                                               const calibration &calibration) {
+std::optional<Thickness> thickness_for_profile(const wire_info &info, const calibration &calibration) {
   const auto found = thickness_of(calibration);
-  const bool wants =
-      (info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && !(info.stored & WIRE_STORED_PAD);
+  const bool wants = (info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && !(info.stored & WIRE_STORED_PAD);
   return wants && found && profile_suits(*found) ? found : std::nullopt;
 }
 
@@ -103,9 +100,8 @@ std::string disagreement(const Thickness &found, double set_mm) {
   if (found.agrees_with(set_mm)) {
     return {};
   }
-  return "the profile is of " + fixed(set_mm, 1) +
-         " mm of rubber, but the calibration's width is that of " + text_of(found) +
-         ": with a wrong thickness the tangential load and the place are off, or there are none";
+  return "the profile is of " + fixed(set_mm, 1) + " mm of rubber, but the calibration's width is that of " +
+         text_of(found) + ": with a wrong thickness the tangential load and the place are off, or there are none";
 }
 
 } // namespace fingertip::pad

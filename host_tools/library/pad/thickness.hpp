@@ -18,7 +18,7 @@ namespace fingertip::pad {
 
 struct Thickness {
   double mm, sd_mm;
-  double shown_mm() const; // as text_of shows it, so that a profile is of what was said
+  double shown_mm() const;               // as text_of shows it, so that a profile is of what was said
   bool agrees_with(double set_mm) const; // within two standard deviations
 };
 
@@ -36,8 +36,7 @@ bool profile_suits(const Thickness &thickness);
 
 // The thickness whose profile a fingertip gets with its calibration. None: it has a profile, it
 // estimates no tangential load, or the rubber does not suit.
-std::optional<Thickness> thickness_for_profile(const wire_info &info,
-                                               const calibration &calibration);
+std::optional<Thickness> thickness_for_profile(const wire_info &info, const calibration &calibration);
 
 // "12.1 mm, sd 0.5"
 std::string text_of(const Thickness &thickness);

@@ -70,9 +70,8 @@ void Hub::take_command(Client client, Envelope command, const Bytes &frame, Time
     entry.asked = static_cast<std::uint8_t>(entry.wanted | wanted_by_others(client, now));
     *command.body() = entry.asked;
   }
-  loader_wished_ =
-      loader_wished_ || (!heard_ && entry.type == WIRE_CMD_LOADER && command.body_length() == 4 &&
-                         bytes_get_u32(command.body()) == WIRE_LOADER_MAGIC);
+  loader_wished_ = loader_wished_ || (!heard_ && entry.type == WIRE_CMD_LOADER && command.body_length() == 4 &&
+                                      bytes_get_u32(command.body()) == WIRE_LOADER_MAGIC);
   send(std::move(command), entry);
 }
 
@@ -120,9 +119,8 @@ bool Hub::is_asked(Client client, std::uint8_t type, Time now) const {
 }
 
 bool Hub::takes_commands(Time now) const {
-  auto unanswered = std::count_if(commands_.begin(), commands_.end(), [&](const Command &command) {
-    return now - command.sent < PATIENCE;
-  });
+  auto unanswered = std::count_if(commands_.begin(), commands_.end(),
+                                  [&](const Command &command) { return now - command.sent < PATIENCE; });
   return static_cast<std::size_t>(unanswered) < MOST_UNANSWERED;
 }
 
@@ -133,10 +131,9 @@ void Hub::tick(Time now) {
   if (!info_ && !is_asked(OURSELVES, WIRE_CMD_INFO, now)) {
     ask(WIRE_CMD_INFO, now);
   }
-  bool any_on_its_way =
-      std::any_of(commands_.begin(), commands_.end(), [&](const Command &command) {
-        return command.type == WIRE_CMD_STREAM && now - command.sent < PATIENCE;
-      });
+  bool any_on_its_way = std::any_of(commands_.begin(), commands_.end(), [&](const Command &command) {
+    return command.type == WIRE_CMD_STREAM && now - command.sent < PATIENCE;
+  });
   std::uint8_t wanted = wanted_by_others(OURSELVES, now);
   if (!any_on_its_way && streams_ != wanted) {
     ask(WIRE_CMD_STREAM, now, wanted);
@@ -144,8 +141,7 @@ void Hub::tick(Time now) {
 }
 
 void Hub::from_line(const std::uint8_t *bytes, std::size_t length) {
-  line_.feed(bytes, length,
-             [this](const Bytes &frame, bool joining) { take_frame(frame, joining); });
+  line_.feed(bytes, length, [this](const Bytes &frame, bool joining) { take_frame(frame, joining); });
 }
 
 void Hub::take_frame(const Bytes &frame, bool joining) {
@@ -303,8 +299,7 @@ void Hub::took(Client client, std::size_t length) {
     state.queue.clear();
     state.taken = 0;
   } else if (state.taken > queue_bytes_ / 2) {
-    state.queue.erase(state.queue.begin(),
-                      state.queue.begin() + static_cast<std::ptrdiff_t>(state.taken));
+    state.queue.erase(state.queue.begin(), state.queue.begin() + static_cast<std::ptrdiff_t>(state.taken));
     state.taken = 0;
   }
 }

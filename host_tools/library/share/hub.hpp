@@ -61,9 +61,7 @@ public:
   /* Packets that it did not take in time. */
   std::uint64_t lost(Client client) const { return clients_.at(client).lost; }
   /* It lost so many that it has to begin again. */
-  bool is_lost_for_good(Client client) const {
-    return clients_.at(client).lost_in_a_row > MOST_LOST_IN_A_ROW;
-  }
+  bool is_lost_for_good(Client client) const { return clients_.at(client).lost_in_a_row > MOST_LOST_IN_A_ROW; }
 
   /* As last reported by the fingertip. */
   const std::optional<wire_info> &info() const { return info_; }

@@ -40,8 +40,7 @@ constexpr std::size_t MOST_CLIENTS = 60;
 constexpr std::size_t CLIENT_BYTES = 256;
 
 Error cannot_share(const std::string &path) {
-  return Error(ErrorCode::cannot_share,
-               path + ": cannot share there (" + std::strerror(errno) + ")");
+  return Error(ErrorCode::cannot_share, path + ": cannot share there (" + std::strerror(errno) + ")");
 }
 
 /* "pid 4242, fingertip" */
@@ -97,10 +96,8 @@ std::optional<std::size_t> send_now(int fd, const std::uint8_t *bytes, std::size
 class Listener {
 public:
   /* A socket that a killed program left is replaced. Throws Error: another program serves there. */
-  Listener(const std::string &folder, const std::string &serial, const std::string &port,
-           std::optional<gid_t> group)
-      : path_(folder + "/" + share_socket_name(serial)),
-        port_path_(folder + "/" + share_port_name(serial)) {
+  Listener(const std::string &folder, const std::string &serial, const std::string &port, std::optional<gid_t> group)
+      : path_(folder + "/" + share_socket_name(serial)), port_path_(folder + "/" + share_port_name(serial)) {
     if (SocketTransport::is_served(path_)) {
       throw Error(ErrorCode::shared_already, path_ + ": another program shares this fingertip");
     }
@@ -153,9 +150,7 @@ private:
 /* One fingertip, there or waited for. */
 class Server::Station {
 public:
-  Station(Server &server, const Way &way) : server_(server), way_(way), transport_(open_way(way)) {
-    begin();
-  }
+  Station(Server &server, const Way &way) : server_(server), way_(way), transport_(open_way(way)) { begin(); }
   ~Station() {
     auto end = frame_bytes(command_stream(0));
     transport_->write(end.data(), end.size());
@@ -251,8 +246,7 @@ private:
     if (listener_ || serial_.empty()) {
       return;
     }
-    listener_.emplace(server_.folder_, serial_, way_.port.empty() ? "" : transport_->description(),
-                      server_.group_);
+    listener_.emplace(server_.folder_, serial_, way_.port.empty() ? "" : transport_->description(), server_.group_);
     tell(serial_ + ": shared as " + listener_->path());
   }
 
@@ -294,16 +288,15 @@ private:
         hub_->leave(each.client);
       }
     }
-    connections_.erase(std::remove_if(connections_.begin(), connections_.end(),
-                                      [](const Connection &each) { return each.over; }),
-                       connections_.end());
+    connections_.erase(
+        std::remove_if(connections_.begin(), connections_.end(), [](const Connection &each) { return each.over; }),
+        connections_.end());
   }
 
   void tell_losses(Connection &connection, bool finally) {
     std::uint64_t lost = hub_->lost(connection.client);
     if (lost > 0 && finally) {
-      tell(name() + ": " + connection.peer + " lost " + std::to_string(lost) +
-           " packets that it did not read in time");
+      tell(name() + ": " + connection.peer + " lost " + std::to_string(lost) + " packets that it did not read in time");
     } else if (lost > 0 && !connection.told_losses) {
       connection.told_losses = true;
       tell(name() + ": " + connection.peer + " does not read in time and loses packets");
@@ -345,8 +338,7 @@ private:
       tell_losses(each, true);
       std::size_t length = 0;
       const std::uint8_t *bytes = hub_->waiting(each.client, &length);
-      leaving_.push_back(
-          {std::move(each.fd), Bytes(bytes, bytes + length), host_now() + LAST_PACKETS});
+      leaving_.push_back({std::move(each.fd), Bytes(bytes, bytes + length), host_now() + LAST_PACKETS});
     }
     connections_.clear();
     listener_.reset();
@@ -360,10 +352,9 @@ private:
       auto taken = static_cast<std::ptrdiff_t>(sent.value_or(each.rest.size()));
       each.rest.erase(each.rest.begin(), each.rest.begin() + taken);
     }
-    leaving_.erase(
-        std::remove_if(leaving_.begin(), leaving_.end(),
-                       [&](const Leaving &each) { return each.rest.empty() || now > each.until; }),
-        leaving_.end());
+    leaving_.erase(std::remove_if(leaving_.begin(), leaving_.end(),
+                                  [&](const Leaving &each) { return each.rest.empty() || now > each.until; }),
+                   leaving_.end());
   }
 
   /* Whatever keeps it from being opened may pass. */
@@ -429,8 +420,7 @@ Server::~Server() = default;
 bool Server::has(const Way &way) const {
   return std::any_of(stations_.begin(), stations_.end(), [&](const auto &station) {
     const Way &other = station->way();
-    return way.found_by_usb && other.found_by_usb ? is_same_serial(way.serial, other.serial)
-                                                  : way.port == other.port;
+    return way.found_by_usb && other.found_by_usb ? is_same_serial(way.serial, other.serial) : way.port == other.port;
   });
 }
 
@@ -450,8 +440,7 @@ void Server::step(milliseconds longest_wait) {
     more = station->add_descriptors(waiting) || more;
     any_gone = any_gone || waiting.size() == before;
   }
-  milliseconds wait =
-      more ? milliseconds(0) : std::min(longest_wait, any_gone ? REOPEN_INTERVAL : TICK);
+  milliseconds wait = more ? milliseconds(0) : std::min(longest_wait, any_gone ? REOPEN_INTERVAL : TICK);
   wait_for(waiting.data(), waiting.size(), host_now() + wait);
   for (const auto &station : stations_) {
     station->step(waiting);

@@ -1,4 +1,5 @@
 """A fingertip for asyncio."""
+
 import asyncio
 import contextlib
 import functools

@@ -4,6 +4,7 @@ waited for. Nothing is encrypted and everybody in reach may tare and set, unless
 
 In Python, because the package reconnects, finds and shares fingertips already, and Debian has no Zenoh for C++.
 """
+
 import argparse
 import collections
 import concurrent.futures
@@ -64,10 +65,20 @@ class _Published:
         self._token = None
         self._root = f"{ROOT}/{tip.serial}"
         drop = {"congestion_control": self._zenoh.CongestionControl.DROP, "express": True}
-        self._publishers = {name: session.declare_publisher(f"{self._root}/{name}", **drop) for name in (*NAMES.values(), "other", "status")}
+        self._publishers = {
+            name: session.declare_publisher(f"{self._root}/{name}", **drop) for name in (*NAMES.values(), "other", "status")
+        }
         self._pool = concurrent.futures.ThreadPoolExecutor(3, thread_name_prefix="answer")
-        self._queryables = [session.declare_queryable(f"{self._root}/{name}", self._when_asked(answer)) for name, answer in (
-            ("tare", self._tare), ("set", self._set), ("info", self._info), ("status", self._tell_status), ("again", self._again))]
+        self._queryables = [
+            session.declare_queryable(f"{self._root}/{name}", self._when_asked(answer))
+            for name, answer in (
+                ("tare", self._tare),
+                ("set", self._set),
+                ("info", self._info),
+                ("status", self._tell_status),
+                ("again", self._again),
+            )
+        ]
         self._begin_line()
         self._thread = host_time.thread(self._publish, name="publish", daemon=True)
         self._thread.start()
@@ -94,13 +105,17 @@ class _Published:
             ahead = 0
         self._expected = packet.sequence + 1 & 0xFFFF
         self._number += ahead + 1
-        self._early.append((NAMES.get(type(packet.body), "other"), packet.t_us, bytes(frame), self._line, self._number, host_time.wall_ns()))
+        self._early.append(
+            (NAMES.get(type(packet.body), "other"), packet.t_us, bytes(frame), self._line, self._number, host_time.wall_ns())
+        )
         clock = self.tip.clock
         if clock.host_us != clock.host_us:
             return  # until the clocks were compared
         offset_ns, shared = _offset_ns(), int(self.tip.description.endswith(".sock"))
         for name, t_us, data, line, number, taken_ns in self._early:
-            stamp = Stamp(line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared).packed()
+            stamp = Stamp(
+                line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared
+            ).packed()
             self._kept[line, number] = (name, data, stamp)
             self._queue.append((name, data, stamp, line, number, host_time.now_s()))
             self._note(1, line, number)
@@ -139,11 +154,19 @@ class _Published:
     def _status(self, column):
         """column: 1, packets that were read; 2, those that were published."""
         clock, line = self._clock_of_host(), self.tip.statistics
-        return json.dumps({
-            "host": platform.node(), "boot": _boot(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": host_time.wall_ns(),
-            "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
-            "lines": [(each[0], each[column]) for each in list(self._lines)], "unpublished": self.skipped,
-            "line": {name: getattr(line, name) for name in line.COUNTS}})
+        return json.dumps(
+            {
+                "host": platform.node(),
+                "boot": _boot(),
+                "port": self.tip.description,
+                "there": not self.tip.is_returning,
+                "now_ns": host_time.wall_ns(),
+                "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
+                "lines": [(each[0], each[column]) for each in list(self._lines)],
+                "unpublished": self.skipped,
+                "line": {name: getattr(line, name) for name in line.COUNTS},
+            }
+        )
 
     # Answers
 
@@ -151,6 +174,7 @@ class _Published:
         def asked(query):
             with contextlib.suppress(RuntimeError):  # the bridge ends
                 self._pool.submit(self._answer, query, answer)
+
         return asked
 
     def _answer(self, query, answer):
@@ -240,7 +264,13 @@ class Bridge:
 
     def _open(self, way, found):
         try:
-            tip = Fingertip(found.port or None, serial=None if found.port else found.serial, reconnect=True, latency_ms=self._latency_ms, buffer_frames=1)
+            tip = Fingertip(
+                found.port or None,
+                serial=None if found.port else found.serial,
+                reconnect=True,
+                latency_ms=self._latency_ms,
+                buffer_frames=1,
+            )
         except FingertipError as error:
             if self._complaints.get(way) != str(error):
                 self._complaints[way] = str(error)
@@ -259,10 +289,20 @@ class Bridge:
 
 def main(argv):
     parser = argparse.ArgumentParser(prog="fingertip-bridge", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--port", action="append", default=[], metavar="PORT", help="this serial port; several times for several; without, all")
-    parser.add_argument("--keep", type=int, default=100_000, metavar="N", help="packets of each fingertip that are kept for recorders that missed them, "
-                        "some 0.4 kB each; default 100000: 38 s at the highest rate")
-    parser.add_argument("--latency-ms", type=float, default=1.0, metavar="MS", help="how long bytes may wait to be read together; default 1")
+    parser.add_argument(
+        "--port", action="append", default=[], metavar="PORT", help="this serial port; several times for several; without, all"
+    )
+    parser.add_argument(
+        "--keep",
+        type=int,
+        default=100_000,
+        metavar="N",
+        help="packets of each fingertip that are kept for recorders that missed them, "
+        "some 0.4 kB each; default 100000: 38 s at the highest rate",
+    )
+    parser.add_argument(
+        "--latency-ms", type=float, default=1.0, metavar="MS", help="how long bytes may wait to be read together; default 1"
+    )
     parser.add_argument("--router", action="store_true", help="be a router too, for others to --connect to; with --listen")
     add_session_options(parser)
     options = parser.parse_args(argv)

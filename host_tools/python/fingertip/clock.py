@@ -7,6 +7,7 @@ If no line passes, the clock has jumped, and the older half of the exchanges goe
 
 The host's clock is time.perf_counter(), in microseconds: on Linux CLOCK_MONOTONIC, which joint recordings are in, too.
 """
+
 import collections
 import math
 from collections.abc import Callable, Sequence
@@ -122,8 +123,12 @@ class ClockFit:
     def _fit(self) -> ClockEstimate | None:
         last = self._exchanges[-1]
         upper_lines = _lowest_lines([(each.received_us - last.sent_us, last.device_us - each.device_us) for each in self._exchanges])
-        lower_lines = [(-host, -ago) for host, ago in _lowest_lines(
-            [(last.sent_us - each.sent_us, each.device_us - last.device_us) for each in reversed(self._exchanges)])]
+        lower_lines = [
+            (-host, -ago)
+            for host, ago in _lowest_lines(
+                [(last.sent_us - each.sent_us, each.device_us - last.device_us) for each in reversed(self._exchanges)]
+            )
+        ]
 
         # Limits at the time of the last exchange of a line of this slope, relative to its sending.
         def upper(slope: float) -> float:

@@ -1,10 +1,19 @@
 """What a program and a fingertip say to each other on one line, from its opening to its end."""
+
 import threading
 
 from . import host_time, wire
 from .clock import NO_CLOCK, ClockExchange, ClockFit, host_now_us
 from .errors import (
-    FingertipError, GoneError, NoAnswerError, NotNowError, OtherVersionError, RefusedError, RefusedValueError, UnknownCommandError)
+    FingertipError,
+    GoneError,
+    NoAnswerError,
+    NotNowError,
+    OtherVersionError,
+    RefusedError,
+    RefusedValueError,
+    UnknownCommandError,
+)
 from .line import Result
 from .transport import Transport
 from .wire import Acknowledgement, Body, Info, LineStatistics, Packet
@@ -124,7 +133,9 @@ class Conversation:
                     if self._await_answer(answer_type):
                         break
                     if self.statistics.version_errors > versions:
-                        raise OtherVersionError(f"{self.description}: speaks protocol version {self.decoder.other_version}, not {wire.VERSION}")
+                        raise OtherVersionError(
+                            f"{self.description}: speaks protocol version {self.decoder.other_version}, not {wire.VERSION}"
+                        )
                 else:
                     raise NoAnswerError(f"{self.description}: no answer to {name}")
             finally:

@@ -2,6 +2,7 @@
 
 Needs the package cyclonedds.
 """
+
 import contextlib
 import os
 from typing import Any
@@ -19,17 +20,22 @@ try:
     import cyclonedds.qos
     import cyclonedds.topic
 except ImportError:
-    raise InputError('ROS 2 topics need the package cyclonedds; pip install cyclonedds') from None
+    raise InputError("ROS 2 topics need the package cyclonedds; pip install cyclonedds") from None
 
 HISTORY = 1000  # messages that are kept for who has not acknowledged them: 0.8 s at the highest rate
 BLOCKING_ns = 5_000_000
 CLOSING_s = 1.0
-LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast></General>"
-            "<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>")
+LOOPBACK = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast></General>"
+    "<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
+)
 # Who is late is waited for no longer than that. A reliable writer is heard by best-effort readers too, the other way round not.
 QOS = cyclonedds.qos.Qos(
-    cyclonedds.qos.Policy.Reliability.Reliable(BLOCKING_ns), cyclonedds.qos.Policy.History.KeepLast(HISTORY),
-    cyclonedds.qos.Policy.Durability.Volatile, cyclonedds.qos.Policy.DataRepresentation(use_cdrv0_representation=True))
+    cyclonedds.qos.Policy.Reliability.Reliable(BLOCKING_ns),
+    cyclonedds.qos.Policy.History.KeepLast(HISTORY),
+    cyclonedds.qos.Policy.Durability.Volatile,
+    cyclonedds.qos.Policy.DataRepresentation(use_cdrv0_representation=True),
+)
 
 _SEQUENCE: Any = idl.sequence
 
@@ -70,7 +76,7 @@ class Participant:
         self._participant = self._domain = None  # which cyclonedds deletes with its last reference
 
     def topic(self, name: str, kind: str) -> "Topic":
-        """"/fingertip/..." of messages "geometry_msgs/WrenchStamped"."""
+        """ "/fingertip/..." of messages "geometry_msgs/WrenchStamped"."""
         self._topics.append(Topic(self._participant, name, _type_of(kind, self._types)))
         return self._topics[-1]
 

@@ -1,4 +1,5 @@
 """One fingertip: its frames, its settings, its state."""
+
 import collections
 import contextlib
 import os
@@ -49,9 +50,18 @@ class Fingertip(Settable):
     OtherFingertipError, OtherVersionError, NoAnswerError, BadValueError. All methods may be called from any thread; one takes the frames.
     """
 
-    def __init__(self, port: "str | os.PathLike[str] | None" = None, *, serial: str | None = None, share: bool | None = None,
-                 streams: Streams | None = None, reconnect: bool = False, buffer_frames: int = 16384, latency_ms: float = 8.0,
-                 timeout_s: float = 3.0) -> None:
+    def __init__(
+        self,
+        port: "str | os.PathLike[str] | None" = None,
+        *,
+        serial: str | None = None,
+        share: bool | None = None,
+        streams: Streams | None = None,
+        reconnect: bool = False,
+        buffer_frames: int = 16384,
+        latency_ms: float = 8.0,
+        timeout_s: float = 3.0,
+    ) -> None:
         _in_range("buffer_frames", buffer_frames, (1, FRAMES_MAX), "frames")
         _in_range("latency_ms", latency_ms, (0, 1000), "ms")
         _in_range("timeout_s", timeout_s, (0.01, 3600), "s")
@@ -368,8 +378,14 @@ class Fingertip(Settable):
         """
         if self._recorder:
             raise BadValueError("it is being recorded already")
-        writer = RecordingWriter(path, self._info, replace=replace, raw_expected=bool(self._streams & Streams.RAW),
-                                 extra={"port": self.description}, count=lambda: self.detach(writer) - first)
+        writer = RecordingWriter(
+            path,
+            self._info,
+            replace=replace,
+            raw_expected=bool(self._streams & Streams.RAW),
+            extra={"port": self.description},
+            count=lambda: self.detach(writer) - first,
+        )
         first = self.attach(writer)
         return writer
 

@@ -1,5 +1,6 @@
 """Finds fingertips: on USB, in the environment variable FINGERTIP_PORT, and those that `fingertip serve` shares. Nothing is opened
 but sockets, to see whether somebody serves them."""
+
 import contextlib
 import errno
 import os
@@ -69,7 +70,10 @@ def find_shared() -> list[Found]:
 def find_usb() -> list[Found]:
     """Serial ports with our USB ids, sorted by serial number."""
     from serial.tools import list_ports
-    return sorted(Found(port.serial_number or "", port.device) for port in list_ports.comports() if (port.vid, port.pid) == (USB_VID, USB_PID))
+
+    return sorted(
+        Found(port.serial_number or "", port.device) for port in list_ports.comports() if (port.vid, port.pid) == (USB_VID, USB_PID)
+    )
 
 
 def find_in_environment() -> list[Found]:

@@ -28,6 +28,7 @@ without contact belong to neither.
     dropped_packets, crc_errors, format_errors       as the recorder counted; null if it was killed
     emulator_warnings          of the run report
 """
+
 import argparse
 import json
 import sys
@@ -35,8 +36,24 @@ import sys
 import numpy as np
 
 from .files import (
-    CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError, check_output, printable, read_recording, read_run,
-    read_scenario, recorded_devices, restart_rows, run_tool, write_text)
+    CONTACT,
+    FIT_VALID,
+    SLIP,
+    SLIP_VALID,
+    STAGES,
+    TANGENTIAL_FROM_TOUCH,
+    TANGENTIAL_VALID,
+    InputError,
+    check_output,
+    printable,
+    read_recording,
+    read_run,
+    read_scenario,
+    recorded_devices,
+    restart_rows,
+    run_tool,
+    write_text,
+)
 
 FORCE_MIN_N = 0.2
 SLIP_MIN_s = 0.05
@@ -113,8 +130,9 @@ class Comparison:
             "slip_false": int(outside.sum()),
             "total_us_median": float(np.median(total)),
             "stages_sum_wrong": int((unsaturated & (stages.sum(axis=1) != total)).sum()),
-            **{key: int(recording.end[key]) if key in recording.end else None
-               for key in ("dropped_packets", "crc_errors", "format_errors")},
+            **{
+                key: int(recording.end[key]) if key in recording.end else None for key in ("dropped_packets", "crc_errors", "format_errors")
+            },
             "emulator_warnings": len(run.get("warnings", [])),
         }
 
@@ -131,8 +149,13 @@ class Comparison:
         turned = np.arctan2(*found[::-1, aimed]) - np.arctan2(*truth[::-1, aimed])
         turned_deg = np.degrees(np.abs(np.angle(np.exp(1j * turned))))
         from_touch = recording.flag(TANGENTIAL_FROM_TOUCH)[rows] & pulled
-        values = (int(pulled.sum()), float(np.median(error)), float(np.percentile(error, 95)),
-                  float(np.percentile(turned_deg, 90)) if aimed.any() else None, int(from_touch.sum()))
+        values = (
+            int(pulled.sum()),
+            float(np.median(error)),
+            float(np.percentile(error, 95)),
+            float(np.percentile(turned_deg, 90)) if aimed.any() else None,
+            int(from_touch.sum()),
+        )
         return {f"tangential_{key}": value for key, value in zip(keys, values)}
 
 
@@ -159,8 +182,10 @@ def check_time(recording):
     restarts = restart_rows(t_us, frame)
     contact = np.flatnonzero(recording.has_contact)
     repeated = contact[1:][np.diff(t_us[contact]) == 0]
-    for rows, what in ((restarts, "the fingertip restarted here; record again, or cut the file before this line"),
-                       (repeated, "a second frame of the same time; remove the line")):
+    for rows, what in (
+        (restarts, "the fingertip restarted here; record again, or cut the file before this line"),
+        (repeated, "a second frame of the same time; remove the line"),
+    ):
         if len(rows):
             raise InputError(f"{recording.path}:{recording.line_numbers[rows[0]]}: {what}")
 

@@ -25,6 +25,7 @@ Run report (JSON): what the emulator measured; used are device_time_zero_s and w
 
 Every error is an InputError whose text is one line that names file and line and says what to do.
 """
+
 import array
 import json
 import math
@@ -59,9 +60,21 @@ TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "sli
 OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in any order
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS)
 
-CONTACT, FIT_VALID, SLIP_VALID, SLIP, TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING, WARNINGS = map(int, (
-    Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP, Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_FROM_TOUCH, Flag.VELOCITY_VALID, Flag.MOVING,
-    Flag.SLIDING, line.WARNINGS))
+CONTACT, FIT_VALID, SLIP_VALID, SLIP, TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING, WARNINGS = map(
+    int,
+    (
+        Flag.CONTACT,
+        Flag.FIT_VALID,
+        Flag.SLIP_VALID,
+        Flag.SLIP,
+        Flag.TANGENTIAL_VALID,
+        Flag.TANGENTIAL_FROM_TOUCH,
+        Flag.VELOCITY_VALID,
+        Flag.MOVING,
+        Flag.SLIDING,
+        line.WARNINGS,
+    ),
+)
 
 
 def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
@@ -151,7 +164,7 @@ class Scenario:
         self.has_pull = "Qx_N" in header and "Qy_N" in header
         for name in ("Qx_N", "Qy_N"):
             self.truth[name] = table[:, header.index(name)] if name in header else np.zeros(len(table))
-        self.sensors_Pa = table[:, 1 + len(TRUTH_COLUMNS):1 + len(TRUTH_COLUMNS) + sensors]
+        self.sensors_Pa = table[:, 1 + len(TRUTH_COLUMNS) : 1 + len(TRUTH_COLUMNS) + sensors]
 
     def at(self, name: str, t_s: Any) -> Any:
         """The truth at these times, linear between rows."""
@@ -192,10 +205,12 @@ def read_scenario(path: Path) -> Scenario:
             header = cells
             sensors = sum(name.startswith("s") and name[1:].removesuffix("_Pa").isdigit() for name in cells)
             expected = ["t_s", *TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(sensors))]
-            more = cells[len(expected):]
-            if cells[:len(expected)] != expected or not sensors or not set(more) <= set(OPTIONAL_COLUMNS) or len(set(more)) < len(more):
-                raise InputError(f"{path}:{number}: wrong header; it must be {','.join(['t_s', *TRUTH_COLUMNS])},s0_Pa,... "
-                                 f"and after the sensors, once each, any of {', '.join(OPTIONAL_COLUMNS)}")
+            more = cells[len(expected) :]
+            if cells[: len(expected)] != expected or not sensors or not set(more) <= set(OPTIONAL_COLUMNS) or len(set(more)) < len(more):
+                raise InputError(
+                    f"{path}:{number}: wrong header; it must be {','.join(['t_s', *TRUTH_COLUMNS])},s0_Pa,... "
+                    f"and after the sensors, once each, any of {', '.join(OPTIONAL_COLUMNS)}"
+                )
             continue
         if len(cells) != len(header):
             raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; write the scenario again")
@@ -227,8 +242,20 @@ class Recording:
     measurements), events, end; packets, those that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file;
     time_us[n] on the recorder's clock, None in a recording of one."""
 
-    def __init__(self, path: Path, metadata: dict[str, str], names: list[str], table: Array, line_numbers: Any, sensors: int, events: list[str],
-                 packets: list[tuple[str, dict[str, str]]], end: dict[str, str], skipped_lines: int, time_us: Array | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        metadata: dict[str, str],
+        names: list[str],
+        table: Array,
+        line_numbers: Any,
+        sensors: int,
+        events: list[str],
+        packets: list[tuple[str, dict[str, str]]],
+        end: dict[str, str],
+        skipped_lines: int,
+        time_us: Array | None = None,
+    ) -> None:
         self.path = path
         self.time_us = time_us
         self.line_numbers = np.array(line_numbers)
@@ -237,8 +264,8 @@ class Recording:
         self.columns = {name: table[:, i] for i, name in enumerate(names[:first])}
         missing = set(LATER_COLUMNS).difference(self.columns)
         self.columns |= {name: np.full(len(table), math.nan) for name in missing}
-        self.sensors_Pa = table[:, first:first + sensors]
-        self.tare_Pa = table[:, first + sensors:first + 2 * sensors]
+        self.sensors_Pa = table[:, first : first + sensors]
+        self.tare_Pa = table[:, first + sensors : first + 2 * sensors]
         self.events = events
         self.packets = packets
         self.end = end
@@ -416,7 +443,9 @@ class _Reading:
         except ValueError:
             raise ValueError("wrong header; record again with this version of fingertip") from None
         names = self.rows.names
-        self.wanted = tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
+        self.wanted = (
+            tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
+        )
         self.sensors = self.rows.sensors if self.columns is None else 0
 
     def take_rows(self, damaged: Callable[[int, ValueError], None]) -> None:
@@ -426,7 +455,9 @@ class _Reading:
             self.waits.clear()
             self.take(numbers, texts, damaged, times_us)
 
-    def take(self, numbers: Sequence[int], texts: Sequence[str], damaged: Callable[[int, ValueError], None], times_us: Sequence[float] = ()) -> None:
+    def take(
+        self, numbers: Sequence[int], texts: Sequence[str], damaged: Callable[[int, ValueError], None], times_us: Sequence[float] = ()
+    ) -> None:
         """Rows and their lines' numbers."""
         assert self.rows is not None
         at = 0
@@ -436,8 +467,8 @@ class _Reading:
                 at += 1
                 continue
             self.table.frombytes((found if self.columns is None else found[:, self.wanted]).tobytes())
-            self.line_numbers.extend(numbers[at:at + len(found)])
-            self.times_us.extend(times_us[at:at + len(found)])
+            self.line_numbers.extend(numbers[at : at + len(found)])
+            self.times_us.extend(times_us[at : at + len(found)])
             at += len(found)
 
     def _comment(self, text: str) -> None:
@@ -475,8 +506,13 @@ class _Reading:
         self.packets.append((kind, fields))
 
 
-def read_recording(path: Path, salvage: bool = False, serial: str | None = None, columns: Collection[str] | None = None,
-                   progress: Callable[[float], None] | None = None) -> Recording:
+def read_recording(
+    path: Path,
+    salvage: bool = False,
+    serial: str | None = None,
+    columns: Collection[str] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
     """serial: of one of several fingertips. columns: only these (t_us and frame among them), for recordings
     that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
     lines = _RecordingLines(path, progress)
@@ -531,12 +567,37 @@ def read_recording(path: Path, salvage: bool = False, serial: str | None = None,
         raise InputError(f"{path}: no header line; record again")
     names = [reading.rows.names[i] for i in reading.wanted]
     table = np.frombuffer(reading.table) if reading.table else np.empty(0)
-    return Recording(path, reading.metadata, names, table.reshape(-1, len(names)), reading.line_numbers, reading.sensors,
-                     reading.events, reading.packets, reading.end, skipped, np.array(reading.times_us) if reading.is_joint else None)
+    return Recording(
+        path,
+        reading.metadata,
+        names,
+        table.reshape(-1, len(names)),
+        reading.line_numbers,
+        reading.sensors,
+        reading.events,
+        reading.packets,
+        reading.end,
+        skipped,
+        np.array(reading.times_us) if reading.is_joint else None,
+    )
 
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names
-GRIP_STATES = ("idle", "activating", "approach", "squeeze", "ready", "holding", "slipping", "still", "release", "open", "dropped", "missed", "fault")
+GRIP_STATES = (
+    "idle",
+    "activating",
+    "approach",
+    "squeeze",
+    "ready",
+    "holding",
+    "slipping",
+    "still",
+    "release",
+    "open",
+    "dropped",
+    "missed",
+    "fault",
+)
 GRIP_ROW, GRIP_EVENT = "# grip: ", "# grip_event: "
 
 
@@ -549,7 +610,9 @@ def restart_rows(t: npt.NDArray[Any], frame: npt.NDArray[Any]) -> npt.NDArray[np
 
 def _grip_values(path: Path, number: int, columns: list[str], cells: list[str]) -> list[Any]:
     if len(cells) != len(columns):
-        raise InputError(f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line")
+        raise InputError(
+            f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line"
+        )
     if cells[columns.index("state")] not in GRIP_STATES:
         raise InputError(f'{path}:{number}: state is "{cells[columns.index("state")]}"; use --salvage to skip the line')
     return [cell if name in GRIP_WORDS else _number(path, number, name, cell, name != "time_us") for name, cell in zip(columns, cells)]
@@ -570,7 +633,7 @@ def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
     for number, line, torn in _undamaged(path, salvage):
         if not line.startswith(GRIP_ROW):
             continue
-        cells = line[len(GRIP_ROW):].split(",")
+        cells = line[len(GRIP_ROW) :].split(",")
         if columns is None:
             if cells[0] != "time_us" or "state" not in cells:
                 raise InputError(f"{path}:{number}: a row of the gripper before its header; record again")
@@ -593,7 +656,7 @@ def read_grip_events(path: Path) -> list[tuple[float, str]]:
     events = []
     for number, line, torn in _undamaged(path, False):
         if line.startswith(GRIP_EVENT) and not torn:
-            time_us, _, text = line[len(GRIP_EVENT):].partition(",")
+            time_us, _, text = line[len(GRIP_EVENT) :].partition(",")
             events.append((_number(path, number, "time_us", time_us, False), text))
     return events
 

@@ -1,4 +1,5 @@
 """Frames, one by one and as arrays."""
+
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -48,8 +49,17 @@ class Frame(ContactQuantities):
 
     __slots__ = ("serial", "run", "frame", "t_us", "has_contact", "has_raw", "contact", "raw", "sequence", "raw_sequence", "clock")
 
-    def __init__(self, serial: str, run: int, t_us: int, contact: Contact | None, raw: Raw | None, sequence: int, raw_sequence: int,
-                 clock: ClockEstimate) -> None:
+    def __init__(
+        self,
+        serial: str,
+        run: int,
+        t_us: int,
+        contact: Contact | None,
+        raw: Raw | None,
+        sequence: int,
+        raw_sequence: int,
+        clock: ClockEstimate,
+    ) -> None:
         self.serial = serial
         self.run = run
         self.t_us = t_us
@@ -184,5 +194,5 @@ def frame_of(columns: dict[str, Any]) -> "pandas.DataFrame":
     try:
         import pandas
     except ImportError:
-        raise ImportError('pandas is not installed: pip install pandas') from None
+        raise ImportError("pandas is not installed: pip install pandas") from None
     return pandas.DataFrame(columns)

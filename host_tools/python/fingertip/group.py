@@ -1,4 +1,5 @@
 """Several fingertips on one clock."""
+
 import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -50,7 +51,9 @@ class Fingertips:
     (Fingertip.clock_jumps). Raises what Fingertip raises, and BadValueError if one is named twice.
     """
 
-    def __init__(self, ports: "Sequence[str | os.PathLike[str]] | None" = None, *, serials: Sequence[str] | None = None, **options: Any) -> None:
+    def __init__(
+        self, ports: "Sequence[str | os.PathLike[str]] | None" = None, *, serials: Sequence[str] | None = None, **options: Any
+    ) -> None:
         if ports is not None and serials is not None:
             raise BadValueError("give ports or serials")
         self._news = host_time.event()
@@ -99,8 +102,13 @@ class Fingertips:
         def count() -> list[LineStatistics]:
             return [tip.detach(side) - before for tip, side, before in zip(fingertips, sides, first)]
 
-        writer = JointRecordingWriter(path, [tip.info for tip in fingertips], replace=replace, count=count,
-                                      raw_expected=all(tip.info.capabilities & Capability.RAW_STREAM for tip in fingertips))
+        writer = JointRecordingWriter(
+            path,
+            [tip.info for tip in fingertips],
+            replace=replace,
+            count=count,
+            raw_expected=all(tip.info.capabilities & Capability.RAW_STREAM for tip in fingertips),
+        )
         try:
             for number, tip in enumerate(fingertips):
                 sides.append(_Side(writer, number, tip))

@@ -3,6 +3,7 @@
 use() puts another in its place, before anything is opened: tests run the package on simulated time. time.perf_counter(), and on Linux
 CLOCK_MONOTONIC, in which joint recordings are, too.
 """
+
 import select
 import threading
 import time

@@ -1,4 +1,5 @@
 """Text files, line by line, and numbers as text in them."""
+
 import math
 import os
 

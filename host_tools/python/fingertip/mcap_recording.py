@@ -2,6 +2,7 @@
 
 Needs the package mcap.
 """
+
 import calendar
 import collections
 import io
@@ -20,8 +21,13 @@ from .lines import LineFile, shortest
 from .ros_messages import decode, encode, schema_of
 
 CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (
-    "fingertip_msgs/Contact", "fingertip_msgs/Line", "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", "sensor_msgs/PointCloud2",
-    "diagnostic_msgs/DiagnosticArray")
+    "fingertip_msgs/Contact",
+    "fingertip_msgs/Line",
+    "geometry_msgs/WrenchStamped",
+    "geometry_msgs/PointStamped",
+    "sensor_msgs/PointCloud2",
+    "diagnostic_msgs/DiagnosticArray",
+)
 TYPES = (CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE)
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can say
 MAGIC = b"\x89MCAP0\r\n"
@@ -47,7 +53,7 @@ def _mcap() -> types.ModuleType:
         import mcap.writer
         import zstandard  # noqa: F401
     except ImportError:
-        raise InputError('MCAP files need the package mcap; pip install mcap') from None
+        raise InputError("MCAP files need the package mcap; pip install mcap") from None
     return mcap
 
 
@@ -69,9 +75,14 @@ def wrench(flags: int, x_mm: float, y_mm: float, force_N: float, qx_N: float, qy
     sure = trusted and flags & _TANGENTIAL == Flag.TANGENTIAL_VALID
     x_m, y_m, z_N = x_mm / 1000, y_mm / 1000, -force_N if trusted else math.nan
     x_N, y_N = (qx_N, qy_N) if sure else (math.nan, math.nan)
-    return {"force": {"x": x_N, "y": y_N, "z": z_N},
-            "torque": {"x": y_m * z_N if trusted else math.nan, "y": -x_m * z_N if trusted else math.nan,
-                       "z": x_m * y_N - y_m * x_N if sure else math.nan}}
+    return {
+        "force": {"x": x_N, "y": y_N, "z": z_N},
+        "torque": {
+            "x": y_m * z_N if trusted else math.nan,
+            "y": -x_m * z_N if trusted else math.nan,
+            "z": x_m * y_N - y_m * x_N if sure else math.nan,
+        },
+    }
 
 
 def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
@@ -83,11 +94,21 @@ def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
 def pressure_cloud(x_mm: list[float], y_mm: list[float], valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> dict[str, Any]:
     """sensor_msgs/PointCloud2 of a raw packet, without its header."""
     count = len(pressures_Pa)
-    data = b"".join(struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
-                    for k in range(count))
+    data = b"".join(
+        struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
+        for k in range(count)
+    )
     fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
-    return {"height": 1, "width": count, "fields": fields, "is_bigendian": False, "point_step": 16, "row_step": 16 * count, "data": data,
-            "is_dense": False}
+    return {
+        "height": 1,
+        "width": count,
+        "fields": fields,
+        "is_bigendian": False,
+        "point_step": 16,
+        "row_step": 16 * count,
+        "data": data,
+        "is_dense": False,
+    }
 
 
 class _Cloud:
@@ -112,15 +133,28 @@ def health_status(serial: str, sensors: int, fields: dict[str, str]) -> dict[str
     present, bad = (int(fields.get(name, "0")) for name in ("sensors_present", "sensors_prom_bad"))
     missing = " ".join(str(k) for k in range(sensors) if not present >> k & 1)
     doubtful = " ".join(str(k) for k in range(sensors) if bad >> k & 1)
-    said = [text for text in (f"sensors missing: {missing}" * bool(missing), f"damaged PROM of sensors: {doubtful}" * bool(doubtful)) if text]
-    return {"level": 1 if said else 0, "name": f"fingertip {serial}", "message": "; ".join(said) or "all sensors are there", "hardware_id": serial,
-            "values": [{"key": key, "value": value} for key, value in fields.items()]}
+    said = [
+        text for text in (f"sensors missing: {missing}" * bool(missing), f"damaged PROM of sensors: {doubtful}" * bool(doubtful)) if text
+    ]
+    return {
+        "level": 1 if said else 0,
+        "name": f"fingertip {serial}",
+        "message": "; ".join(said) or "all sensors are there",
+        "hardware_id": serial,
+        "values": [{"key": key, "value": value} for key, value in fields.items()],
+    }
 
 
 def warning_status(serial: str, warnings: int) -> dict[str, Any]:
     """diagnostic_msgs/DiagnosticStatus of a contact packet's warnings."""
     names = " ".join(flag.name or "" for flag in Flag if flag & WARNINGS & warnings)
-    return {"level": 1 if names else 0, "name": f"fingertip {serial} contact", "message": names or "no warning", "hardware_id": serial, "values": []}
+    return {
+        "level": 1 if names else 0,
+        "name": f"fingertip {serial} contact",
+        "message": names or "no warning",
+        "hardware_id": serial,
+        "values": [],
+    }
 
 
 def _utc_ns(text: str) -> int | None:
@@ -199,13 +233,25 @@ class _Device:
 
     def calibration(self) -> str:
         """What there is of gains, force scale and pad, as JSON; nothing without."""
-        found = [f'"{key}": ' + (f'[{", ".join(value.split())}]' if key in _LISTS else value) for key, value in self.keys.items()
-                 if key.startswith(("calibration_", "force_scale", "pad_")) or key in SENSOR_LISTS]
+        found = [
+            f'"{key}": ' + (f"[{', '.join(value.split())}]" if key in _LISTS else value)
+            for key, value in self.keys.items()
+            if key.startswith(("calibration_", "force_scale", "pad_")) or key in SENSOR_LISTS
+        ]
         return "{" + ", ".join([f'"serial": "{self.serial}"', *found]) + "}" if found else ""
 
 
-_LISTS = {*SENSOR_LISTS, "pad_shares", "pad_sds_mm", "pad_moments_mm", "pad_moment_sds_mm",
-          *(f"pad_edge_{name}" for name in ("ratio_x", "ratio_y", "gain_x", "gain_y", "place_x_mm", "place_y_mm", "pull_x_mm", "pull_y_mm", "force"))}
+_LISTS = {
+    *SENSOR_LISTS,
+    "pad_shares",
+    "pad_sds_mm",
+    "pad_moments_mm",
+    "pad_moment_sds_mm",
+    *(
+        f"pad_edge_{name}"
+        for name in ("ratio_x", "ratio_y", "gain_x", "gain_y", "place_x_mm", "place_y_mm", "pull_x_mm", "pull_y_mm", "force")
+    ),
+}
 
 
 class McapLines:
@@ -268,14 +314,25 @@ class McapLines:
         for device in self._devices:
             calibration = device.calibration()
             if calibration:
-                self._writer.add_attachment(now_ns, now_ns, f"calibration_{device.serial}.json", "application/json", calibration.encode("utf-8"))
+                self._writer.add_attachment(
+                    now_ns, now_ns, f"calibration_{device.serial}.json", "application/json", calibration.encode("utf-8")
+                )
         for name in TYPES:
             self._schemas[name] = self._writer.register_schema(name.replace("/", "/msg/"), "ros2msg", schema_of(name).encode("utf-8"))
-        self._channels = {name: self._channel(topic, name) for name, topic in ((LINE_TYPE, "/fingertip/lines"), (DIAGNOSTICS_TYPE, "/diagnostics"))}
+        self._channels = {
+            name: self._channel(topic, name) for name, topic in ((LINE_TYPE, "/fingertip/lines"), (DIAGNOSTICS_TYPE, "/diagnostics"))
+        }
         for device in self._devices:
             root = f"/fingertip/{name_in_ros(device.serial)}/"
-            device.channels = {name: self._channel(root + topic, name) for name, topic in (
-                (CONTACT_TYPE, "contact"), (WRENCH_TYPE, "wrench"), (PLACE_TYPE, "place"), (PRESSURES_TYPE, "pressures"))}
+            device.channels = {
+                name: self._channel(root + topic, name)
+                for name, topic in (
+                    (CONTACT_TYPE, "contact"),
+                    (WRENCH_TYPE, "wrench"),
+                    (PLACE_TYPE, "place"),
+                    (PRESSURES_TYPE, "pressures"),
+                )
+            }
         for text in head:
             self._put_line(text)
         self._writer.flush()
@@ -361,20 +418,25 @@ def contact_of(cells: list[str]) -> dict[str, Any]:
     for name, cell in zip(RAW_COLUMNS, cells[_FIRST_RAW:]):
         row[name.lower()] = (float(cell) if cell else math.nan) if name == "temperature_degC" else int(cell or "0")
     pressures = [round(float(cell) * Q10) / Q10 for cell in cells[_FIRST_SENSOR:]] if row["has_raw"] else []
-    row["pressure_pa"], row["tare_pa"] = pressures[:len(pressures) // 2], pressures[len(pressures) // 2:]
+    row["pressure_pa"], row["tare_pa"] = pressures[: len(pressures) // 2], pressures[len(pressures) // 2 :]
     return row
 
 
 def _cells_of(row: dict[str, Any], names: list[str]) -> str:
     """The columns of these names, out of a fingertip_msgs/Contact."""
-    sensors = {f"s{k}_Pa": value for k, value in enumerate(row["pressure_pa"])} | {f"tare{k}_Pa": value for k, value in enumerate(row["tare_pa"])}
+    sensors = {f"s{k}_Pa": value for k, value in enumerate(row["pressure_pa"])} | {
+        f"tare{k}_Pa": value for k, value in enumerate(row["tare_pa"])
+    }
     cells = []
     for name in names:
         own = row.get(name.lower())
         if name in sensors:
             cells.append(f"{sensors[name]:.4f}")
-        elif own is None or (name in RAW_COLUMNS and not row["has_raw"]) or (
-                (name in CONTACT_COLUMNS or name in LATER_COLUMNS) and not row["has_contact"]):
+        elif (
+            own is None
+            or (name in RAW_COLUMNS and not row["has_raw"])
+            or ((name in CONTACT_COLUMNS or name in LATER_COLUMNS) and not row["has_contact"])
+        ):
             cells.append("")
         elif name == "temperature_degC":
             cells.append(f"{own:.2f}")
@@ -504,8 +566,12 @@ class McapLineReader:
         if length != size:
             raise ValueError("its length is wrong")
         try:
-            return [message for _, opcode, content in self._records(stream, size) if opcode != self._mcap.opcode.Opcode.CHUNK
-                    for message in self._judge(opcode, content)]
+            return [
+                message
+                for _, opcode, content in self._records(stream, size)
+                if opcode != self._mcap.opcode.Opcode.CHUNK
+                for message in self._judge(opcode, content)
+            ]
         except EOFError:
             raise ValueError("a record in it is torn") from None
 
@@ -514,7 +580,9 @@ class McapLineReader:
             row = decode(name, data)
             return self._of_row(row) if name == CONTACT_TYPE else self._of_line(row)
         except ValueError as error:
-            return Damaged(f"{self.path}: a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it")
+            return Damaged(
+                f"{self.path}: a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it"
+            )
 
     def _of_line(self, row: dict[str, Any]) -> Line:
         text: str = row["text"]

@@ -20,6 +20,7 @@ has its own.
 
 Needs the package eclipse-zenoh.
 """
+
 import argparse
 import json
 import re
@@ -106,15 +107,22 @@ def zenoh_module() -> types.ModuleType:
     try:
         import zenoh
     except ImportError:
-        raise InputError('this needs the package eclipse-zenoh; pip install eclipse-zenoh mcap') from None
+        raise InputError("this needs the package eclipse-zenoh; pip install eclipse-zenoh mcap") from None
     return zenoh
 
 
 def add_session_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--connect", action="append", default=[], metavar="ENDPOINT", help="a router, as tcp/192.168.1.2:7447; it is waited for. "
-                        "Without, others are found by multicast")
+    parser.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="a router, as tcp/192.168.1.2:7447; it is waited for. Without, others are found by multicast",
+    )
     parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT", help="where others reach this, as tcp/0.0.0.0:7447")
-    parser.add_argument("--config", metavar="FILE.json5", help="Zenoh's own configuration, with TLS and access control; the options above add to it")
+    parser.add_argument(
+        "--config", metavar="FILE.json5", help="Zenoh's own configuration, with TLS and access control; the options above add to it"
+    )
 
 
 def open_session(options: argparse.Namespace, router: bool = False) -> Any:
@@ -148,7 +156,9 @@ def parts_of(key: str) -> tuple[str, str]:
 
 def settings_of(parameters: dict[str, str]) -> dict[str, Any]:
     """The arguments of Fingertip.set. Raises BadValueError."""
-    kinds: dict[str, Any] = {setting.argument: str if setting.words else int if setting.whole and setting.per == 1 else float for setting in SETTINGS}
+    kinds: dict[str, Any] = {
+        setting.argument: str if setting.words else int if setting.whole and setting.per == 1 else float for setting in SETTINGS
+    }
     kinds["keep"] = lambda text: bool(int(text))
     settings: dict[str, Any] = {}
     for name, text in parameters.items():

@@ -4,6 +4,7 @@ With --beside it draws what another fingertip of the recording felt of the same 
 
     fingertip-plot RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
+
 import argparse
 import io
 import sys
@@ -11,7 +12,7 @@ import sys
 try:
     import matplotlib
 except ImportError:
-    sys.exit('fingertip-plot: matplotlib is not installed: pip install matplotlib')
+    sys.exit("fingertip-plot: matplotlib is not installed: pip install matplotlib")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -20,13 +21,35 @@ from matplotlib.patches import FancyBboxPatch
 
 from .evaluate import Comparison, add_recording_options, check_time, load_recording
 from .files import (
-    FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError, check_output, read_grip, read_run, read_scenario, recorded_devices,
-    restart_rows, run_tool, write_bytes)
+    FIT_VALID,
+    MOVING,
+    SLIDING,
+    SLIP,
+    STAGES,
+    TANGENTIAL_FROM_TOUCH,
+    TANGENTIAL_VALID,
+    WARNINGS,
+    InputError,
+    check_output,
+    read_grip,
+    read_run,
+    read_scenario,
+    recorded_devices,
+    restart_rows,
+    run_tool,
+    write_bytes,
+)
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
 ALONG_Y = "#0d9488"
 TIME_COLOURS = "winter"  # from blue to green: far from DOUBTFUL and SLIPPING
-ABOVE = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.2, "fontsize": 8, "frameon": False}  # a legend that covers no curve
+ABOVE = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1, 1),
+    "borderaxespad": 0.2,
+    "fontsize": 8,
+    "frameon": False,
+}  # a legend that covers no curve
 RIM_mm = 6.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
@@ -86,8 +109,14 @@ def draw_pad(axes, recording, t_s, x, y, good, doubtful, truth):
         axes.set_ylim(corner[1] - 1, corner[1] + size[1] + 1)
     if truth is not None:
         on = truth.truth["contact"] > 0.5
-        axes.plot(np.where(on, truth.truth["x_mm"], np.nan), np.where(on, truth.truth["y_mm"], np.nan),
-                  color=TRUTH, lw=5, solid_capstyle="round", zorder=2)
+        axes.plot(
+            np.where(on, truth.truth["x_mm"], np.nan),
+            np.where(on, truth.truth["y_mm"], np.nan),
+            color=TRUTH,
+            lw=5,
+            solid_capstyle="round",
+            zorder=2,
+        )
     axes.scatter(x[doubtful], y[doubtful], s=9, fc="none", ec=DOUBTFUL, lw=0.5, zorder=3)
     points = axes.scatter(x[good], y[good], c=t_s[good], s=9, cmap=TIME_COLOURS, lw=0, zorder=3)
     bar = plt.colorbar(points, ax=axes, orientation="horizontal", pad=0.07, fraction=0.03, aspect=40)
@@ -111,8 +140,14 @@ def draw_marks(panel, marks):
     step = 0.06 * (high - low)
     for i, (t_s, on, colour, label) in enumerate(marks):
         for j, (start, end) in enumerate(runs(t_s, on)):
-            panel.plot([start, max(end, start + 1e-3)], [low - (i + 1) * step] * 2, color=colour, lw=4, solid_capstyle="butt",
-                       label=label if j == 0 else None)
+            panel.plot(
+                [start, max(end, start + 1e-3)],
+                [low - (i + 1) * step] * 2,
+                color=colour,
+                lw=4,
+                solid_capstyle="butt",
+                label=label if j == 0 else None,
+            )
     panel.set_ylim(low - (len(marks) + 0.7) * step, high)
 
 
@@ -139,8 +174,16 @@ def draw_pull(axes, recording, rows, t_s, restarts_s, force, good, doubtful, tru
     for panel, curves in ((loads, (qx, qy)), (ratios, (ratio,))):
         low, high = panel.get_ylim()
         for i, values in enumerate(curves):
-            panel.scatter(t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5,
-                          label="doubtful" if doubtful.any() and i == 0 else None, zorder=2)
+            panel.scatter(
+                t_s[doubtful],
+                values[doubtful],
+                s=7,
+                fc="none",
+                ec=DOUBTFUL,
+                lw=0.5,
+                label="doubtful" if doubtful.any() and i == 0 else None,
+                zorder=2,
+            )
         if good.any() or truth is not None:
             panel.set_ylim(low, high)
         for at_s in restarts_s:
@@ -179,11 +222,21 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth, b
             for start, end in truth.intervals("slip"):
                 panel.axvspan(start, end, color=SLIPPING, alpha=0.10, lw=0, zorder=0)
         if beside:
-            panel.plot(beside.t_s, gaps_as_nan(beside.t_s, beside.values[name], beside.good), color=ALONG_Y, lw=1.1, ls="--", label=beside.serial, zorder=1.5)
+            panel.plot(
+                beside.t_s,
+                gaps_as_nan(beside.t_s, beside.values[name], beside.good),
+                color=ALONG_Y,
+                lw=1.1,
+                ls="--",
+                label=beside.serial,
+                zorder=1.5,
+            )
         panel.plot(t_s, gaps_as_nan(t_s, values, good), color=MEASURED, lw=1.1, label="measured", zorder=2)
         # What carries a warning is shown, but no axis is made for it.
         low, high = panel.get_ylim()
-        panel.scatter(t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, label="doubtful" if doubtful.any() else None, zorder=2)
+        panel.scatter(
+            t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, label="doubtful" if doubtful.any() else None, zorder=2
+        )
         if good.any() or truth is not None:
             panel.set_ylim(low, high)
         panel.set_xlim(t_s[0], t_s[-1])
@@ -275,9 +328,11 @@ def draw_grasp(path, grip, fingertips):
     force.legend(loc="upper left", ncol=3, fontsize=8, frameon=False)
     width.legend(loc="upper right", ncol=2, fontsize=8, frameon=False)
     slides = int(grip["slides"].max())
-    told = (f"{slides} slide{'' if slides == 1 else 's'}, held by at most {np.nanmax(grip['force_N']):.1f} N, at last {grip['state'][-1]}")
+    told = f"{slides} slide{'' if slides == 1 else 's'}, held by at most {np.nanmax(grip['force_N']):.1f} N, at last {grip['state'][-1]}"
     figure.text(0.055, 0.955, "Fingertip, a grasp", size=17, weight="bold")
-    identity = "  ·  ".join(text for text in (*(f.metadata.get("serial", "") for f in fingertips), fingertips[0].metadata.get("grasp_gripper", "")) if text)
+    identity = "  ·  ".join(
+        text for text in (*(f.metadata.get("serial", "") for f in fingertips), fingertips[0].metadata.get("grasp_gripper", "")) if text
+    )
     figure.text(0.055, 0.925, f"{identity}  ·  {told}", size=9, color=FAINT)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=110, format="png")
@@ -286,16 +341,29 @@ def draw_grasp(path, grip, fingertips):
 
 
 def set_style():
-    plt.rcParams.update({
-        "font.size": 9, "axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT,
-        "text.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
+    plt.rcParams.update(
+        {
+            "font.size": 9,
+            "axes.edgecolor": TRUTH,
+            "axes.labelcolor": INK,
+            "xtick.color": FAINT,
+            "ytick.color": FAINT,
+            "text.color": INK,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.titlecolor": FAINT,
+        }
+    )
 
 
 def compared_in_words(summary):
     """How far location and force were off."""
     force = summary["force_mape_percent"]
-    return (f"location: median {summary['localisation_median_mm']:.3f} mm, 95 % {summary['localisation_p95_mm']:.3f} mm  ·  force: "
-            + (f"median {force:.2f} %, " if force is not None else "") + f"RMSE {summary['force_rmse_N']:.3f} N")
+    return (
+        f"location: median {summary['localisation_median_mm']:.3f} mm, 95 % {summary['localisation_p95_mm']:.3f} mm  ·  force: "
+        + (f"median {force:.2f} %, " if force is not None else "")
+        + f"RMSE {summary['force_rmse_N']:.3f} N"
+    )
 
 
 def header(recording, comparison, t_s, simulated, beside):
@@ -307,7 +375,8 @@ def header(recording, comparison, t_s, simulated, beside):
             f"{s['frames']} frames at {s['frames_per_s']:.1f}/s  ·  {compared_in_words(s)}  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
             f"{s['slip_false']} false frames  ·  "
             + (f"Q/F: median {s['tangential_ratio_error_p50']:.3f}  ·  " if s["tangential_frames"] else "")
-            + f"dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}")
+            + f"dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}"
+        )
         if beside:
             lines.append(f"{beside.serial}, dashed  ·  {compared_in_words(beside.comparison.summary)}")
     else:
@@ -334,8 +403,10 @@ def main(argv):
     if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
         grip = read_grip(options.recording, options.salvage)
         if grip:
-            fingertips = [load_recording(argparse.Namespace(**{**vars(options), "device": serial}), columns=GRASP_COLUMNS)
-                          for serial in recorded_devices(options.recording)]
+            fingertips = [
+                load_recording(argparse.Namespace(**{**vars(options), "device": serial}), columns=GRASP_COLUMNS)
+                for serial in recorded_devices(options.recording)
+            ]
             print(f"{options.output}: {draw_grasp(options.output, grip, fingertips)}")
             return 0
     run = read_run(options.run)
@@ -360,8 +431,17 @@ def main(argv):
     height = 9.2 + 3.6 * pulled
     from_top = lambda of_usual: 1 - (1 - of_usual) * 9.2 / height
     figure = plt.figure(figsize=(14, height))
-    grid = figure.add_gridspec(over_time + bool(comparison), 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27,
-                               left=0.055, right=0.985, top=from_top(0.85 if beside else 0.87), bottom=0.06 * 9.2 / height)
+    grid = figure.add_gridspec(
+        over_time + bool(comparison),
+        3,
+        width_ratios=[1.25, 1, 1],
+        hspace=0.38,
+        wspace=0.27,
+        left=0.055,
+        right=0.985,
+        top=from_top(0.85 if beside else 0.87),
+        bottom=0.06 * 9.2 / height,
+    )
     draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, good, doubtful, truth)
     first = figure.add_subplot(grid[0, 1:])
     panels = [first, *(figure.add_subplot(grid[i, 1:], sharex=first) for i in range(1, over_time))]

@@ -1,4 +1,5 @@
 """What may stand in a line of a recording. What libfingertip refuses is refused here too (recording_reader.cpp; the test formats)."""
+
 import io
 import math
 import operator
@@ -10,24 +11,49 @@ import numpy.typing as npt
 
 from .frames import Q10
 from .line import (
-    CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile,
-    SyncEdge, Wire)
+    CONTACT_COLUMNS,
+    LATER_COLUMNS,
+    RAW_COLUMNS,
+    SENSOR_LISTS,
+    SENSORS_MAX,
+    SHAPE_COLUMNS,
+    TANGENTIAL_COLUMNS,
+    Acknowledgement,
+    Calibration,
+    Contact,
+    Health,
+    Info,
+    PadProfile,
+    SyncEdge,
+    Wire,
+)
 from .wire import layout_of
 
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
-_LEAST = {"h": -2**15}  # of the others 0
+_LEAST = {"h": -(2**15)}  # of the others 0
 _WHOLE = re.compile("-?[0-9]+")
 _NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _BINARY32 = 2.0**-150, 2.0**128 - 2.0**103  # not above the first it becomes 0, from the second on infinite
 _BINARY64 = 0.0, math.inf
-_PAD_LISTS = {"pad_shares": 2, "pad_sds_mm": 2, "pad_moments_mm": 3, "pad_moment_sds_mm": 3,
-              **{f"pad_{name}": 3 for name in PadProfile._fields if name.startswith("edge_")}}
+_PAD_LISTS = {
+    "pad_shares": 2,
+    "pad_sds_mm": 2,
+    "pad_moments_mm": 3,
+    "pad_moment_sds_mm": 3,
+    **{f"pad_{name}": 3 for name in PadProfile._fields if name.startswith("edge_")},
+}
 _LISTS = {**dict.fromkeys(("x_mm", "y_mm", *SENSOR_LISTS), SENSORS_MAX), **_PAD_LISTS}
-_SCALARS = {prefix + name: wire.code for body, prefix in ((Info, ""), (Calibration, ""), (PadProfile, "pad_")) for name, wire in layout_of(body)
-            if wire.code in "BnHIf" and wire.times == 1}
+_SCALARS = {
+    prefix + name: wire.code
+    for body, prefix in ((Info, ""), (Calibration, ""), (PadProfile, "pad_"))
+    for name, wire in layout_of(body)
+    if wire.code in "BnHIf" and wire.times == 1
+}
 _SCALARS |= {f"calibration_{name}": _SCALARS.pop(name) for name in ("date_s", "placements")}
-_PACKETS = {kind: {"sequence": "H", "t_us": "Q", **{name: wire.code for name, wire in layout_of(body)}}
-            for kind, body in (("health", Health), ("ack", Acknowledgement), ("sync", SyncEdge))}
+_PACKETS = {
+    kind: {"sequence": "H", "t_us": "Q", **{name: wire.code for name, wire in layout_of(body)}}
+    for kind, body in (("health", Health), ("ack", Acknowledgement), ("sync", SyncEdge))
+}
 _PACKETS["info"] = {"sequence": "H", "t_us": "Q"}
 
 
@@ -52,7 +78,7 @@ def _scaled(name: str, cell: str, scale: float, bits: int) -> float:
     value = number(name, cell)
     if abs(value) > 1e12:
         raise ValueError(f'{name} is "{cell}"')
-    if not -2**(bits - 1) <= math.copysign(math.floor(abs(value) * scale + 0.5), value) < 2**(bits - 1):
+    if not -(2 ** (bits - 1)) <= math.copysign(math.floor(abs(value) * scale + 0.5), value) < 2 ** (bits - 1):
         raise ValueError(f"{name} is out of range")
     return value
 
@@ -116,12 +142,19 @@ class Rows:
         self._first_raw = 2 + len(CONTACT_COLUMNS) + len(there)
         first_sensor = self._first_raw + len(RAW_COLUMNS)
         self.sensors = max(0, (header.count(",") + 1 - first_sensor) // 2)
-        self.names = ["t_us", "frame", *CONTACT_COLUMNS, *there, *RAW_COLUMNS,
-                      *(f"s{k}_Pa" for k in range(self.sensors)), *(f"tare{k}_Pa" for k in range(self.sensors))]
+        self.names = [
+            "t_us",
+            "frame",
+            *CONTACT_COLUMNS,
+            *there,
+            *RAW_COLUMNS,
+            *(f"s{k}_Pa" for k in range(self.sensors)),
+            *(f"tare{k}_Pa" for k in range(self.sensors)),
+        ]
         if header != ",".join(self.names) or self.sensors > SENSORS_MAX:
             raise ValueError("wrong header")
         wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}
-        contact = [wires[name] for name in self.names[2:self._first_raw]]
+        contact = [wires[name] for name in self.names[2 : self._first_raw]]
         self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", "I", "I", "I", "h", *"i" * 2 * self.sensors]
         self._flags = {at: int(wire.when[1]) for at, wire in enumerate(contact, 2) if wire.code == "f" and wire.when}
         most = {"f": 3.4e38, "h": 327.67, "i": 2097151.999}  # what is beyond is judged by values

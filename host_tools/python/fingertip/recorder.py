@@ -4,6 +4,7 @@ file too. It ends by Ctrl-C or --seconds.
 
 Exit status: 0 nothing was lost, 3 something was, and is counted, 1 an error.
 """
+
 import argparse
 import itertools
 import json
@@ -236,8 +237,14 @@ class Recording:
         self.behind = self._said_behind = False  # too much for this computer
         self.unrecorded = set()  # came later
         self.unheard = []  # did not say at the end what they had sent
-        self._writer = JointRecordingWriter(path, infos, replace=replace, extra=extra, count=self._counts,
-                                            raw_expected=all(info.capabilities & Capability.RAW_STREAM for info in infos))
+        self._writer = JointRecordingWriter(
+            path,
+            infos,
+            replace=replace,
+            extra=extra,
+            count=self._counts,
+            raw_expected=all(info.capabilities & Capability.RAW_STREAM for info in infos),
+        )
         self._subscriber = session.declare_subscriber(f"{ROOT}/*/*", self._hear)
         self._threads = [host_time.thread(self._ask_on, args=(source,), daemon=True) for source in self.sources.values()]
         for thread in self._threads:
@@ -329,7 +336,9 @@ class Recording:
                 touched.add(source)
         if self.behind and not self._said_behind:
             self._said_behind = True
-            self._say("more comes than this computer writes: what does not fit is asked for again, and lost once no bridge keeps it; record fewer, or slower")
+            self._say(
+                "more comes than this computer writes: what does not fit is asked for again, and lost once no bridge keeps it; record fewer, or slower"
+            )
         now_s = host_time.now_s()
         for source in self.sources.values():
             if source in touched or source.account.lines:
@@ -386,14 +395,27 @@ class Recording:
     @staticmethod
     def _summary(source):
         account = source.account
-        return (f"network: sent={account.sent} recorded={account.recorded} lost={account.lost} "
-                f"unread_frames={account.unread_frames} came_again={source.recovered} restarts={account.restarts} "
-                f"unheard={int(source.must_answer)}")
+        return (
+            f"network: sent={account.sent} recorded={account.recorded} lost={account.lost} "
+            f"unread_frames={account.unread_frames} came_again={source.recovered} restarts={account.restarts} "
+            f"unheard={int(source.must_answer)}"
+        )
 
     def figures(self):
-        return {source.serial: {"sent": source.account.sent, "recorded": source.account.recorded, "lost": source.account.lost,
-                                "lost_between_lines": source.account.lost_between_lines, "unread_frames": source.account.unread_frames, "recovered": source.recovered, "asked": source.asked,
-                                "restarts": source.account.restarts, "unheard": source.serial in self.unheard} for source in self.sources.values()}
+        return {
+            source.serial: {
+                "sent": source.account.sent,
+                "recorded": source.account.recorded,
+                "lost": source.account.lost,
+                "lost_between_lines": source.account.lost_between_lines,
+                "unread_frames": source.account.unread_frames,
+                "recovered": source.recovered,
+                "asked": source.asked,
+                "restarts": source.account.restarts,
+                "unheard": source.serial in self.unheard,
+            }
+            for source in self.sources.values()
+        }
 
 
 def ask(session, key, timeout_s=ASK_TIMEOUT_s):
@@ -457,8 +479,15 @@ def _clock_of(session, serial):
             status = json.loads(answer[0])
             best = min(best, ((answer[2] - answer[1]) / 2000, (status["now_ns"] - (answer[1] + answer[2]) / 2) / 1000))
             clock = status["clock"]
-            found = _HostClock(str(status["host"]), str(status["boot"]), bool(clock["disciplined"]), float(clock["bound_us"] or 0), str(clock["text"]),
-                           best[1], best[0])
+            found = _HostClock(
+                str(status["host"]),
+                str(status["boot"]),
+                bool(clock["disciplined"]),
+                float(clock["bound_us"] or 0),
+                str(clock["text"]),
+                best[1],
+                best[0],
+            )
         except (ValueError, KeyError, TypeError):
             raise InputError(f"{serial}: its bridge says its clock in a way that is not known here; it is of another version") from None
     return found
@@ -477,30 +506,47 @@ def judge_clocks(session, serials, bound_us, may_be_undisciplined):
         if a.boot == b.boot:
             continue
         if a.disciplined and b.disciplined and a.bound_us + b.bound_us > bound_us:
-            raise InputError(f"the clocks of {one} and {other} may be {a.bound_us + b.bound_us:.0f} us apart by chrony's estimate, more than "
-                             f"--clock-bound-us {bound_us:g}")
+            raise InputError(
+                f"the clocks of {one} and {other} may be {a.bound_us + b.bound_us:.0f} us apart by chrony's estimate, more than "
+                f"--clock-bound-us {bound_us:g}"
+            )
         surely_us = abs(a.ahead_us - b.ahead_us) - a.within_us - b.within_us
         if surely_us > bound_us:
-            raise InputError(f"the clocks of {one} and {other} are at least {surely_us:.0f} us apart, more than --clock-bound-us {bound_us:g}")
+            raise InputError(
+                f"the clocks of {one} and {other} are at least {surely_us:.0f} us apart, more than --clock-bound-us {bound_us:g}"
+            )
     return {serial: clock.note() for serial, clock in clocks.items()}
 
 
 def main(argv):
     parser = argparse.ArgumentParser(prog="fingertip-recorder", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", metavar="FILE.mcap|FILE.csv")
-    parser.add_argument("--serial", action="append", default=[], metavar="SERIAL", help="this fingertip; several times for several; without, all")
+    parser.add_argument(
+        "--serial", action="append", default=[], metavar="SERIAL", help="this fingertip; several times for several; without, all"
+    )
     parser.add_argument("--expect", type=int, default=1, metavar="N", help="wait until so many are there")
     parser.add_argument("--wait", type=float, default=10.0, metavar="S", help="for fingertips, at most; default 10")
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S")
     parser.add_argument("--patience", type=float, default=30.0, metavar="S", help="at the end, for hosts that are cut off; default 30")
-    parser.add_argument("--clock-bound-us", type=float, default=5000.0, metavar="US", help="no recording if two hosts' clocks are, or by chrony's own "
-                        "estimate may be, further apart; default 5000")
+    parser.add_argument(
+        "--clock-bound-us",
+        type=float,
+        default=5000.0,
+        metavar="US",
+        help="no recording if two hosts' clocks are, or by chrony's own estimate may be, further apart; default 5000",
+    )
     parser.add_argument("--undisciplined", action="store_true", help="take hosts whose clock nothing keeps, too")
     parser.add_argument("--replace", action="store_true", help="over a file that exists")
     parser.add_argument("--json", action="store_true", help="the counts as JSON on stdout")
     add_session_options(parser)
     options = parser.parse_args(argv)
-    for name, low, high in (("expect", 1, 1000), ("wait", 0, 86400), ("seconds", 0, math.inf), ("patience", 0, 86400), ("clock_bound_us", 0, 1e9)):
+    for name, low, high in (
+        ("expect", 1, 1000),
+        ("wait", 0, 86400),
+        ("seconds", 0, math.inf),
+        ("patience", 0, 86400),
+        ("clock_bound_us", 0, 1e9),
+    ):
         if not low <= getattr(options, name) <= high:
             raise InputError(f"--{name.replace('_', '-')} {getattr(options, name):g} is out of range; give {low} to {high:g}")
     check_output(options.file)

@@ -1,4 +1,5 @@
 """Writes recordings as `fingertip record` does (host_tools/library/libfingertip/RECORDING.md has the format); read_recording reads them."""
+
 import contextlib
 import datetime
 import heapq
@@ -38,27 +39,57 @@ def _list(values: Iterable[float]) -> str:
 
 
 def _calibration_metadata(calibration: Calibration) -> dict[str, str]:
-    return {"calibration_date_s": str(calibration.date_s), "calibration_placements": str(calibration.placements),
-            "force_scale": _number(calibration.force_scale), "force_scale_sd": _number(calibration.force_scale_sd),
-            **{f"calibration_{name}": str(getattr(calibration, name))
-               for name in ("sigma_um", "sigma_sd_um", "dip_share_q16", "dip_sd_um", "ambient_kPa")},
-            **{name: _list(getattr(calibration, name)) for name in SENSOR_LISTS}}
+    return {
+        "calibration_date_s": str(calibration.date_s),
+        "calibration_placements": str(calibration.placements),
+        "force_scale": _number(calibration.force_scale),
+        "force_scale_sd": _number(calibration.force_scale_sd),
+        **{
+            f"calibration_{name}": str(getattr(calibration, name))
+            for name in ("sigma_um", "sigma_sd_um", "dip_share_q16", "dip_sd_um", "ambient_kPa")
+        },
+        **{name: _list(getattr(calibration, name)) for name in SENSOR_LISTS},
+    }
 
 
 def _pad_metadata(pad: PadProfile) -> dict[str, str]:
-    scalars = ("thickness_mm", "overhang_mm", "spread_mm2", "spread_sd_mm2", "force_ratio", "tangential_scale", "tangential_scale_sd", "from_touch")
-    pairs = {"pad_shares": pad.normal[0::2], "pad_sds_mm": pad.normal[1::2], "pad_moments_mm": pad.tangential[0::2],
-             "pad_moment_sds_mm": pad.tangential[1::2]}
+    scalars = (
+        "thickness_mm",
+        "overhang_mm",
+        "spread_mm2",
+        "spread_sd_mm2",
+        "force_ratio",
+        "tangential_scale",
+        "tangential_scale_sd",
+        "from_touch",
+    )
+    pairs = {
+        "pad_shares": pad.normal[0::2],
+        "pad_sds_mm": pad.normal[1::2],
+        "pad_moments_mm": pad.tangential[0::2],
+        "pad_moment_sds_mm": pad.tangential[1::2],
+    }
     edges = {f"pad_{name}": getattr(pad, name) for name in pad._fields if name.startswith("edge_")}
-    return {**{f"pad_{name}": _number(getattr(pad, name)) for name in scalars},
-            **{name: _list(values) for name, values in (pairs | edges).items()}}
+    return {
+        **{f"pad_{name}": _number(getattr(pad, name)) for name in scalars},
+        **{name: _list(values) for name, values in (pairs | edges).items()},
+    }
 
 
 def info_metadata(info: Info) -> dict[str, str]:
     """An info packet as the comments of a recording."""
-    return {"serial": info.serial, "board": info.board, "scene": info.scene, "firmware": ".".join(map(str, info.firmware)), "git": info.git,
-            **{name: _number(getattr(info, name)) for name in INFO_KEYS}, "x_mm": _list(info.x_mm), "y_mm": _list(info.y_mm),
-            **(_calibration_metadata(info.calibration) if info.calibration else {}), **(_pad_metadata(info.pad) if info.pad else {})}
+    return {
+        "serial": info.serial,
+        "board": info.board,
+        "scene": info.scene,
+        "firmware": ".".join(map(str, info.firmware)),
+        "git": info.git,
+        **{name: _number(getattr(info, name)) for name in INFO_KEYS},
+        "x_mm": _list(info.x_mm),
+        "y_mm": _list(info.y_mm),
+        **(_calibration_metadata(info.calibration) if info.calibration else {}),
+        **(_pad_metadata(info.pad) if info.pad else {}),
+    }
 
 
 def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | McapLines:
@@ -69,8 +100,17 @@ def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | Mca
 
 
 def _header(sensors: int) -> str:
-    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS, *(f"s{k}_Pa" for k in range(sensors)),
-                     *(f"tare{k}_Pa" for k in range(sensors))])
+    return ",".join(
+        [
+            "t_us",
+            "frame",
+            *CONTACT_COLUMNS,
+            *LATER_COLUMNS,
+            *RAW_COLUMNS,
+            *(f"s{k}_Pa" for k in range(sensors)),
+            *(f"tare{k}_Pa" for k in range(sensors)),
+        ]
+    )
 
 
 def _own_keys(extra: Mapping[str, str] | None) -> dict[str, str]:
@@ -82,7 +122,9 @@ def _own_keys(extra: Mapping[str, str] | None) -> dict[str, str]:
 class _PacketLines:
     """The packets of one fingertip as comments and rows."""
 
-    def __init__(self, path: str, sensors: int, raw_expected: bool, comment: Callable[[str, str], None], row: Callable[[int, str], None]) -> None:
+    def __init__(
+        self, path: str, sensors: int, raw_expected: bool, comment: Callable[[str, str], None], row: Callable[[int, str], None]
+    ) -> None:
         self.frames = 0
         self._path = path
         self._sensors = sensors
@@ -175,7 +217,14 @@ class _PacketLines:
         if raw and isinstance(raw.body, Raw):
             read = raw.body
             frame = read.frame
-            cells += [str(raw.sequence), str(read.flags), str(read.valid), str(read.saturated), str(read.doubtful), f"{read.temperature_cC / 100:.2f}"]
+            cells += [
+                str(raw.sequence),
+                str(read.flags),
+                str(read.valid),
+                str(read.saturated),
+                str(read.doubtful),
+                f"{read.temperature_cC / 100:.2f}",
+            ]
             cells += [f"{value / Q10:.4f}" for value in (*read.readings[0::2], *read.readings[1::2])]
         else:
             cells += self._no_raw
@@ -250,8 +299,16 @@ class RecordingWriter(_Writer):
     line counted, asked for when it ends. Raises InputError.
     """
 
-    def __init__(self, path: "str | os.PathLike[str]", info: Info, *, replace: bool = False, raw_expected: bool = True,
-                 extra: Mapping[str, str] | None = None, count: Callable[[], LineStatistics] = LineStatistics) -> None:
+    def __init__(
+        self,
+        path: "str | os.PathLike[str]",
+        info: Info,
+        *,
+        replace: bool = False,
+        raw_expected: bool = True,
+        extra: Mapping[str, str] | None = None,
+        count: Callable[[], LineStatistics] = LineStatistics,
+    ) -> None:
         super().__init__(path, replace)
         self._count = count
         self._lines = _PacketLines(self.path, info.sensors, raw_expected, self._comment, lambda _, cells: self._file.line(cells))
@@ -292,7 +349,9 @@ class RecordingWriter(_Writer):
     def _end(self, reason: str) -> None:
         self._lines.write_pending()
         lines = self._lines
-        self._file.line(f"# end: reason={reason} frames={lines.frames} seconds={lines.seconds:.6f}{lines.edges_text()} {self._count().text()}")
+        self._file.line(
+            f"# end: reason={reason} frames={lines.frames} seconds={lines.seconds:.6f}{lines.edges_text()} {self._count().text()}"
+        )
 
 
 class _Member:
@@ -314,8 +373,16 @@ class JointRecordingWriter(_Writer):
     Rows of different fingertips are in order of time unless one is more than a quarter of a second late. Raises InputError.
     """
 
-    def __init__(self, path: "str | os.PathLike[str]", infos: Sequence[Info], *, replace: bool = False, raw_expected: bool = True,
-                 extra: Mapping[str, str] | None = None, count: Callable[[], Sequence[LineStatistics]] | None = None) -> None:
+    def __init__(
+        self,
+        path: "str | os.PathLike[str]",
+        infos: Sequence[Info],
+        *,
+        replace: bool = False,
+        raw_expected: bool = True,
+        extra: Mapping[str, str] | None = None,
+        count: Callable[[], Sequence[LineStatistics]] | None = None,
+    ) -> None:
         if len({info.sensors for info in infos}) != 1:
             raise InputError(f"{os.fspath(path)}: fingertips with different numbers of sensors do not fit into one file")
         super().__init__(path, replace)
@@ -394,8 +461,12 @@ class JointRecordingWriter(_Writer):
         self._alignment_us = max(self._alignment_us, sum(bounds[:2]))
         if clock.host_us - member.clock_written_us >= CLOCK_LINES_us:
             member.clock_written_us = clock.host_us
-            self._wait(member, clock.host_us, f"# {member.number}/clock: t_us={clock.device_us} time_us={self._time(clock.host_us)} "
-                                              f"drift_ppm={clock.drift_ppm:.3f} uncertainty_us={clock.uncertainty_us:.1f}")
+            self._wait(
+                member,
+                clock.host_us,
+                f"# {member.number}/clock: t_us={clock.device_us} time_us={self._time(clock.host_us)} "
+                f"drift_ppm={clock.drift_ppm:.3f} uncertainty_us={clock.uncertainty_us:.1f}",
+            )
 
     def event(self, number: int, text: str) -> None:
         with self._lock:
@@ -413,7 +484,11 @@ class JointRecordingWriter(_Writer):
         for member, statistics in zip(self._members, counts):
             total += statistics
             clock = f" drift_ppm={member.clock.drift_ppm:.3f} uncertainty_us={member.clock.uncertainty_us:.1f}" if member.clock else ""
-            self._file.line(f"# {member.number}/end: frames={member.lines.frames} jumps={member.jumps}{clock}{member.lines.edges_text()} {statistics.text()}")
+            self._file.line(
+                f"# {member.number}/end: frames={member.lines.frames} jumps={member.jumps}{clock}{member.lines.edges_text()} {statistics.text()}"
+            )
         frames = sum(member.lines.frames for member in self._members)
         seconds = (self._last_us - self._host_zero_us) / 1e6 if frames else 0
-        self._file.line(f"# end: reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}")
+        self._file.line(
+            f"# end: reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}"
+        )

@@ -14,6 +14,7 @@ of each topic: readers of sensor data hear it too, and one that stalls for longe
 ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY=1 and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST act as in ROS 2, CYCLONEDDS_URI as in cyclonedds. Judged by
 Fast DDS and rosbags; not run against ROS 2.
 """
+
 import argparse
 import math
 import os
@@ -31,8 +32,19 @@ from .files import run_tool
 from .frames import Q10, Frame
 from .group import Fingertips
 from .mcap_recording import (
-    CONTACT_TYPE, DIAGNOSTICS_TYPE, PLACE_TYPE, PRESSURES_TYPE, WRENCH_TYPE, health_status, name_in_ros, place, pressure_cloud, stamp, warning_status,
-    wrench)
+    CONTACT_TYPE,
+    DIAGNOSTICS_TYPE,
+    PLACE_TYPE,
+    PRESSURES_TYPE,
+    WRENCH_TYPE,
+    health_status,
+    name_in_ros,
+    place,
+    pressure_cloud,
+    stamp,
+    warning_status,
+    wrench,
+)
 from .line import WARNINGS
 from .ros_messages import encode
 from .wire import Contact, Health
@@ -57,11 +69,25 @@ def domain_of_environment() -> int:
 def contact_of_frame(frame: Frame) -> dict[str, Any]:
     """fingertip_msgs/Contact, without its header: of no recording, hence of no line."""
     raw = frame.raw
-    return {**dict(zip(_CONTACT_FIELDS, frame.contact)), "line": 0, "device": 0, "time_us": math.nan, "t_us": frame.t_us, "frame": frame.frame,
-            "has_contact": frame.has_contact, "sequence": frame.sequence if frame.has_contact else 0, "has_raw": frame.has_raw,
-            "raw_sequence": frame.raw_sequence if frame.has_raw else 0, "raw_flags": raw.flags, "valid": raw.valid, "saturated": raw.saturated,
-            "doubtful": raw.doubtful, "temperature_degc": raw.temperature_cC / 100 if frame.has_raw else math.nan,
-            "pressure_pa": [value / Q10 for value in raw.readings[0::2]], "tare_pa": [value / Q10 for value in raw.readings[1::2]]}
+    return {
+        **dict(zip(_CONTACT_FIELDS, frame.contact)),
+        "line": 0,
+        "device": 0,
+        "time_us": math.nan,
+        "t_us": frame.t_us,
+        "frame": frame.frame,
+        "has_contact": frame.has_contact,
+        "sequence": frame.sequence if frame.has_contact else 0,
+        "has_raw": frame.has_raw,
+        "raw_sequence": frame.raw_sequence if frame.has_raw else 0,
+        "raw_flags": raw.flags,
+        "valid": raw.valid,
+        "saturated": raw.saturated,
+        "doubtful": raw.doubtful,
+        "temperature_degc": raw.temperature_cC / 100 if frame.has_raw else math.nan,
+        "pressure_pa": [value / Q10 for value in raw.readings[0::2]],
+        "tare_pa": [value / Q10 for value in raw.readings[1::2]],
+    }
 
 
 def _system_minus_host_ns() -> int:
@@ -86,7 +112,9 @@ class _Device:
         self.fingertip = fingertip
         name = name_in_ros(fingertip.serial)
         self.frame_id = "fingertip_" + name
-        self.topics: "dict[str, Topic]" = {kind: participant.topic(f"/fingertip/{name}/{topic}", kind) for topic, kind in FRAME_TOPICS.items()}
+        self.topics: "dict[str, Topic]" = {
+            kind: participant.topic(f"/fingertip/{name}/{topic}", kind) for topic, kind in FRAME_TOPICS.items()
+        }
         self.frames = 0
         self.warnings: int | None = None
         self.health: Health | None = None
@@ -103,7 +131,10 @@ class Publisher:
 
     def __init__(self, domain: int | None = None) -> None:
         from . import dds  # says what to install
-        loopback_only = os.environ.get("ROS_LOCALHOST_ONLY", "") == "1" or os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+
+        loopback_only = (
+            os.environ.get("ROS_LOCALHOST_ONLY", "") == "1" or os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+        )
         self.domain = domain_of_environment() if domain is None else domain
         if not 0 <= self.domain <= DOMAIN_MAX:
             raise BadValueError(f"domain {self.domain} is out of range; give 0 to {DOMAIN_MAX}")
@@ -133,7 +164,11 @@ class Publisher:
         device.send(CONTACT_TYPE, time_ns, contact_of_frame(frame))
         contact, raw = frame.contact, frame.raw
         if frame.has_contact:
-            device.send(WRENCH_TYPE, time_ns, {"wrench": wrench(contact.flags, contact.x_mm, contact.y_mm, contact.force_N, contact.qx_N, contact.qy_N)})
+            device.send(
+                WRENCH_TYPE,
+                time_ns,
+                {"wrench": wrench(contact.flags, contact.x_mm, contact.y_mm, contact.force_N, contact.qx_N, contact.qy_N)},
+            )
             device.send(PLACE_TYPE, time_ns, {"point": place(contact.flags, contact.x_mm, contact.y_mm)})
             if device.warnings != contact.flags & WARNINGS:
                 device.warnings = contact.flags & WARNINGS
@@ -150,8 +185,16 @@ class Publisher:
             if tip.is_returning != device.is_gone:
                 device.is_gone = tip.is_returning
                 said = "gone; it is waited for" if device.is_gone else "there again"
-                self._diagnose({"level": 2 if device.is_gone else 0, "name": f"fingertip {serial} line", "message": said, "hardware_id": serial,
-                                "values": []}, host_time.wall_ns())
+                self._diagnose(
+                    {
+                        "level": 2 if device.is_gone else 0,
+                        "name": f"fingertip {serial} line",
+                        "message": said,
+                        "hardware_id": serial,
+                        "values": [],
+                    },
+                    host_time.wall_ns(),
+                )
             health = tip.health
             if health is not None and health is not device.health:
                 device.health = health
@@ -160,7 +203,9 @@ class Publisher:
 
     def _diagnose(self, status: dict[str, Any], time_ns: int) -> None:
         with self._lock:
-            self._diagnostics.send(encode(DIAGNOSTICS_TYPE, {"header": {"stamp": stamp(time_ns), "frame_id": ""}, "status": [status]}), time_ns)
+            self._diagnostics.send(
+                encode(DIAGNOSTICS_TYPE, {"header": {"stamp": stamp(time_ns), "frame_id": ""}, "status": [status]}), time_ns
+            )
 
     @property
     def frames(self) -> dict[str, int]:
@@ -230,7 +275,10 @@ def main(argv: list[str]) -> int:
         with Publisher(options.domain) as publisher:
             fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
             end_s = host_time.now_s() + options.seconds
-            print(f"domain {publisher.domain}: " + " ".join(f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial), flush=True)
+            print(
+                f"domain {publisher.domain}: " + " ".join(f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial),
+                flush=True,
+            )
             publish(publisher, fingertips, lambda: stop.is_set() or host_time.now_s() >= end_s)
             for serial, tip in fingertips.by_serial.items():
                 print(f"{serial}: {publisher.frames[serial]} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")

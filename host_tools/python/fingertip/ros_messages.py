@@ -1,4 +1,5 @@
 """ROS 2 messages without ROS: their definitions (the folder msg beside this module, with what the numbers mean), and CDR bytes."""
+
 import functools
 import importlib.resources
 import re
@@ -6,8 +7,21 @@ import struct
 from typing import Any
 
 _CDR_LITTLE_ENDIAN = b"\0\1\0\0"
-_PRIMITIVES = {"bool": "?", "byte": "B", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
-               "int64": "q", "uint64": "Q", "float32": "f", "float64": "d"}
+_PRIMITIVES = {
+    "bool": "?",
+    "byte": "B",
+    "char": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
 _FIELD = re.compile(r"^([A-Za-z0-9_/]+)(\[\])?\s+([a-z0-9_]+)\s*(?:#.*)?$")
 
 
@@ -104,7 +118,7 @@ class _Reader:
         return self.message(kind)
 
     def sequence(self, kind: str) -> Any:
-        count, = self.take("I")
+        (count,) = self.take("I")
         if kind in _PRIMITIVES:
             return self.take(_PRIMITIVES[kind], count) if count else ()
         return tuple(self.value(kind) for _ in range(min(count, len(self.data))))

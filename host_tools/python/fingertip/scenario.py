@@ -11,6 +11,7 @@ The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the fo
 F = 2 pi p0 sigma^2. slip is 1 while the contact moves faster than 10 mm/s. The same name, length and seed
 give the same bytes. The file format is described in files.py.
 """
+
 import argparse
 
 import numpy as np
@@ -82,8 +83,15 @@ class Motion:
         distance2 = (SENSOR_X_mm[None, :] - x[:, None]) ** 2 + (SENSOR_Y_mm[None, :] - y[:, None]) ** 2
         sensors = p0[:, None] * np.exp(-0.5 * distance2 / sigma_mm**2)
         return {
-            "t_s": self.t_s, "contact": contact, "x_mm": x, "y_mm": y, "force_N": force, "p0_Pa": p0,
-            "sigma_mm": np.where(contact, sigma_mm, 0), "slip": slip, "sensors_Pa": sensors,
+            "t_s": self.t_s,
+            "contact": contact,
+            "x_mm": x,
+            "y_mm": y,
+            "force_N": force,
+            "p0_Pa": p0,
+            "sigma_mm": np.where(contact, sigma_mm, 0),
+            "slip": slip,
+            "sensors_Pa": sensors,
         }
 
 
@@ -142,8 +150,7 @@ def wander(seconds, random):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(
-        prog="fingertip-scenario", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="fingertip-scenario", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name", choices=sorted(DESCRIPTIONS), metavar="NAME", help=", ".join(sorted(DESCRIPTIONS)))
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
     parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
@@ -158,8 +165,12 @@ def main(argv):
     make = {"ideal": ideal, "demo": demo, "slip20": slip20, "wander": wander}[options.name]
     motion = make(seconds, np.random.default_rng(options.seed))
     metadata = {
-        "name": options.name, "description": DESCRIPTIONS[options.name], "seed": options.seed,
-        "ambient_Pa": 101325, "temperature_degC": 25, "sensors": len(SENSOR_X_mm),
+        "name": options.name,
+        "description": DESCRIPTIONS[options.name],
+        "seed": options.seed,
+        "ambient_Pa": 101325,
+        "temperature_degC": 25,
+        "sensors": len(SENSOR_X_mm),
     }
     write_scenario(options.output, metadata, motion.columns())
     return 0

@@ -1,4 +1,5 @@
 """What Fingertip.set is given, as commands; line.py lists the settings with their ranges."""
+
 import itertools
 import math
 from collections.abc import Mapping
@@ -54,7 +55,8 @@ def setting_commands(given: Given, now: Info) -> list[Body]:
         for setting, value in zip(settings, values, strict=True):
             if not (zeros and setting.zero):
                 _check(setting, value)
-        fields: dict[str, Any] = {setting.field: round(value * setting.per) if setting.whole else value
-                                  for setting, value in zip(settings, values, strict=True)}
+        fields: dict[str, Any] = {
+            setting.field: round(value * setting.per) if setting.whole else value for setting, value in zip(settings, values, strict=True)
+        }
         commands.append(command(**fields))
     return commands

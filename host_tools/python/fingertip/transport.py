@@ -1,4 +1,5 @@
 """Ways to a fingertip: a serial port, or the socket of `fingertip serve`."""
+
 import contextlib
 import errno
 import os
@@ -62,6 +63,7 @@ class SerialTransport:
 
     def __init__(self, path: str) -> None:
         import serial
+
         self.description = path
         try:
             self._port = serial.Serial(path, BAUD, timeout=0.05, write_timeout=WRITE_TIMEOUT_s, exclusive=sys.platform != "win32" or None)

@@ -1,4 +1,5 @@
 """The wire protocol's packets as bytes and back (firmware/wire/PROTOCOL.md), in pure Python; line.py has the packets."""
+
 import functools
 import math
 import operator
@@ -9,14 +10,90 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from .errors import CrcError, FormatError, PacketError, PacketVersionError, UnknownTypeError
-from .line import (CONTACT, LOADER_MAGIC, MAX_FRAME_BYTES, NESTED, RAW, SENSORS_MAX, TYPES, VERSION, Acknowledgement, AskCrash, AskHealth, AskInfo,
-                   Body, Calibration, Contact, Crash, EraseCalibration, ErasePad, Health, Info, Keep, Loader, PadProfile, Raw, SetLocationLimit,
-                   SetOsr, SetPrior, SetRate, SetSlip, SetStreams, SetSync, StoreCalibration, StorePad, SyncEdge, Tare, Wire)
+from .line import (
+    CONTACT,
+    LOADER_MAGIC,
+    MAX_FRAME_BYTES,
+    NESTED,
+    RAW,
+    SENSORS_MAX,
+    TYPES,
+    VERSION,
+    Acknowledgement,
+    AskCrash,
+    AskHealth,
+    AskInfo,
+    Body,
+    Calibration,
+    Contact,
+    Crash,
+    EraseCalibration,
+    ErasePad,
+    Health,
+    Info,
+    Keep,
+    Loader,
+    PadProfile,
+    Raw,
+    SetLocationLimit,
+    SetOsr,
+    SetPrior,
+    SetRate,
+    SetSlip,
+    SetStreams,
+    SetSync,
+    StoreCalibration,
+    StorePad,
+    SyncEdge,
+    Tare,
+    Wire,
+)
 
-__all__ = ["CONTACT", "LOADER_MAGIC", "MAX_FRAME_BYTES", "RAW", "SENSORS_MAX", "TYPES", "VERSION", "Acknowledgement", "AskCrash", "AskHealth",
-           "AskInfo", "Body", "Calibration", "Contact", "Crash", "Decoder", "EraseCalibration", "ErasePad", "Health", "Info", "Keep", "LineStatistics",
-           "Loader", "Packet", "PadProfile", "Raw", "SetLocationLimit", "SetOsr", "SetPrior", "SetRate", "SetSlip", "SetStreams", "SetSync",
-           "StoreCalibration", "StorePad", "SyncEdge", "Tare", "cobs_decode", "cobs_encode", "decode", "decode_stream_packet", "encode", "layout_of"]
+__all__ = [
+    "CONTACT",
+    "LOADER_MAGIC",
+    "MAX_FRAME_BYTES",
+    "RAW",
+    "SENSORS_MAX",
+    "TYPES",
+    "VERSION",
+    "Acknowledgement",
+    "AskCrash",
+    "AskHealth",
+    "AskInfo",
+    "Body",
+    "Calibration",
+    "Contact",
+    "Crash",
+    "Decoder",
+    "EraseCalibration",
+    "ErasePad",
+    "Health",
+    "Info",
+    "Keep",
+    "LineStatistics",
+    "Loader",
+    "Packet",
+    "PadProfile",
+    "Raw",
+    "SetLocationLimit",
+    "SetOsr",
+    "SetPrior",
+    "SetRate",
+    "SetSlip",
+    "SetStreams",
+    "SetSync",
+    "StoreCalibration",
+    "StorePad",
+    "SyncEdge",
+    "Tare",
+    "cobs_decode",
+    "cobs_encode",
+    "decode",
+    "decode_stream_packet",
+    "encode",
+    "layout_of",
+]
 
 _HEADER = struct.Struct("<BBHQ")
 _CRC = _FLAGS = struct.Struct("<I")
@@ -47,8 +124,7 @@ def layout_of(body: Any) -> Layout:
 
 def _layout_of(body: Any) -> Layout:
     hints = typing.get_type_hints(body, include_extras=True)
-    return tuple((name, next(each for each in typing.get_args(hints[name])[1:] if isinstance(each, Wire)))
-                 for name in body._fields)
+    return tuple((name, next(each for each in typing.get_args(hints[name])[1:] if isinstance(each, Wire))) for name in body._fields)
 
 
 def _text(field: bytes) -> str:
@@ -127,8 +203,8 @@ def cobs_encode(packet: bytes) -> bytes:
     for number, run in enumerate(runs):
         while len(run) >= _LONGEST_RUN - 1:
             coded.append(_LONGEST_RUN)
-            coded += run[:_LONGEST_RUN - 1]
-            run = run[_LONGEST_RUN - 1:]
+            coded += run[: _LONGEST_RUN - 1]
+            run = run[_LONGEST_RUN - 1 :]
             if not run and number == len(runs) - 1:
                 return bytes(coded)  # a full run at the end needs no other
         coded.append(len(run) + 1)
@@ -146,7 +222,7 @@ def cobs_decode(frame: bytes) -> bytes:
         code = frame[at]
         if at + code > end:
             raise FormatError("a frame that ends within a run")
-        packet += frame[at + 1:at + code]
+        packet += frame[at + 1 : at + code]
         at += code
         if code != _LONGEST_RUN and at < end:
             packet.append(0)
@@ -334,7 +410,7 @@ class Decoder:
         statistics = self.statistics
         statistics.bytes += len(data)
         frames = (self._rest + data).split(b"\0")
-        self._rest = frames.pop()[:MAX_FRAME_BYTES + 1]  # cut, it is still too long
+        self._rest = frames.pop()[: MAX_FRAME_BYTES + 1]  # cut, it is still too long
         packets: list[Packet] = []
         for frame in frames:
             if frame:

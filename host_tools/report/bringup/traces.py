@@ -8,6 +8,7 @@
 The release images run in the emulator, whose dump of the lines this is: nothing here was measured on a board. A level is high
 from 0.7 VDD on.
 """
+
 import argparse
 import csv
 import pathlib
@@ -37,9 +38,27 @@ class Trace:
         image, base = image_of(boards, board), pathlib.Path(folder) / board
         if not image.is_file():
             raise InputError(f"{image}: is not there; {TO_BUILD}")
-        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", image, "--scenario", scenario(folder, "rest", 1, board),
-            "--fast-enumeration", "--seconds", SECONDS + 0.001, "--vcd", f"{base}.vcd", "--vcd-to", SECONDS, "--bus-log", f"{base}.csv",
-            "--report", f"{base}.json")
+        run(
+            "node",
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            board,
+            "--image",
+            image,
+            "--scenario",
+            scenario(folder, "rest", 1, board),
+            "--fast-enumeration",
+            "--seconds",
+            SECONDS + 0.001,
+            "--vcd",
+            f"{base}.vcd",
+            "--vcd-to",
+            SECONDS,
+            "--bus-log",
+            f"{base}.csv",
+            "--report",
+            f"{base}.json",
+        )
         self.board = board
         last = DESCRIPTORS[board]["wiring"]["sensor_count"] - 1
         data = [f"SDA{k}" for k in (0, last // 2, last)] if DESCRIPTORS[board]["bus"] == "parallel" else ["SDA"]
@@ -130,8 +149,10 @@ def draw_byte(axes, trace):
     rises = [t for t, v in scl if v == 1][:9]
     draw_lines(axes, trace, trace.transactions[0][0] - 2e3, falls[9] + 1e3, 1e3, "us")
     found = {
-        "low": min(r - f for f, r in zip(falls, rises)), "high": min(f - r for f, r in zip(falls[1:], rises)),
-        "period": min(b - a for a, b in zip(falls, falls[1:]))}
+        "low": min(r - f for f, r in zip(falls, rises)),
+        "high": min(f - r for f, r in zip(falls[1:], rises)),
+        "period": min(b - a for a, b in zip(falls, falls[1:])),
+    }
     told = ", ".join(f"{name} {found[name] / 1e3:.2f} us (at least {least / 1e3:.1f})" for name, least in BYTE_TIMES)
     axes.set_title(f"Its first byte. SCL, with the rise: {told}", pad=8)
     return found

@@ -4,6 +4,7 @@
 
 What a bag must say is worked out here from the cells of its CSV file alone.
 """
+
 import collections
 import csv
 import dataclasses
@@ -69,23 +70,68 @@ def some_packets(seed, frames):
         return float(np.float32(prng.choice((0.0, -1e-9, 3.25, 1e6, prng.gauss(0, 10)))))
 
     xy_mm = tuple(float(value) for k in range(15) for value in (9 * (k // 5 - 1), 9 * (k % 5 - 2)))
-    calibration = wire.Calibration(1700000000, 20, 1.5, 0.01, 5552, 60, 3277, 13954, 101, tuple(1 + k / 100 for k in range(30)),
-                                   tuple(50 * k - 1000 for k in range(45)))
-    info = wire.Info((1, 2, 3), 15, 31, "abc", "board", "grasp", f"{seed:04d}ABCD", 400000, 399000, 256, 500, 3, 7, 100, 0.75, 9.0, xy_mm, 3.1, 0.5,
-                     0.6, 1, 1, calibration, None)
+    calibration = wire.Calibration(
+        1700000000,
+        20,
+        1.5,
+        0.01,
+        5552,
+        60,
+        3277,
+        13954,
+        101,
+        tuple(1 + k / 100 for k in range(30)),
+        tuple(50 * k - 1000 for k in range(45)),
+    )
+    info = wire.Info(
+        (1, 2, 3),
+        15,
+        31,
+        "abc",
+        "board",
+        "grasp",
+        f"{seed:04d}ABCD",
+        400000,
+        399000,
+        256,
+        500,
+        3,
+        7,
+        100,
+        0.75,
+        9.0,
+        xy_mm,
+        3.1,
+        0.5,
+        0.6,
+        1,
+        1,
+        calibration,
+        None,
+    )
     yield wire.Packet(0, 1000, info)
     t_us = 2**33
     for frame in range(frames):
         t_us = 500 if frame == frames // 2 else t_us + prng.randrange(100, 40000)  # it restarts
-        flags = prng.choice((TARED, 0, CONTACT | TARED, prng.getrandbits(25), prng.getrandbits(25) & ~WARNINGS | TRUSTED,
-                             TRUSTED | CONTACT | TARED | TANGENTIAL))
+        flags = prng.choice(
+            (
+                TARED,
+                0,
+                CONTACT | TARED,
+                prng.getrandbits(25),
+                prng.getrandbits(25) & ~WARNINGS | TRUSTED,
+                TRUSTED | CONTACT | TARED | TANGENTIAL,
+            )
+        )
         values = {}
         for name, field in wire.layout_of(wire.Contact):
             there = not field.when or flags & field.when[1]
             values[name] = (number() if field.code == "f" else prng.getrandbits(8 * struct.calcsize(field.code))) if there else field.absent
         contact = wire.Contact(**{**values, "frame": frame, "flags": flags})
-        readings = tuple(prng.randrange(-2**31, 2**31) for _ in range(30))
-        raw = wire.Raw(frame, flags, prng.getrandbits(15), prng.getrandbits(15), prng.getrandbits(15), prng.randrange(-4000, 8500), 15, readings)
+        readings = tuple(prng.randrange(-(2**31), 2**31) for _ in range(30))
+        raw = wire.Raw(
+            frame, flags, prng.getrandbits(15), prng.getrandbits(15), prng.getrandbits(15), prng.randrange(-4000, 8500), 15, readings
+        )
         which = prng.randrange(10)
         if which != 0:
             yield wire.Packet(2 * frame & 0xFFFF, t_us, contact)
@@ -141,7 +187,10 @@ def by_mcap_stream(path):
 
 def by_rosbags(path):
     with AnyReader([pathlib.Path(path)]) as reader:
-        return [(connection.topic, time_ns, plain(reader.deserialize(data, connection.msgtype))) for connection, time_ns, data in reader.messages()]
+        return [
+            (connection.topic, time_ns, plain(reader.deserialize(data, connection.msgtype)))
+            for connection, time_ns, data in reader.messages()
+        ]
 
 
 def in_order(messages):
@@ -171,9 +220,14 @@ def expected_contacts(csv_path):
         for name, text in cell.items():
             if name.endswith("_Pa") and name[0] in "st" and name[-4].isdigit():
                 continue
-            whole = name in ("t_us", "frame", "flags", "sensors_used", "sequence") or (name.endswith("_us")) or name in (
-                "raw_sequence", "raw_flags", "valid", "saturated", "doubtful")
-            message[name.lower()] = (int(text or 0) if whole else plain(float(text or "nan")) if name == "temperature_degC" else binary32(text))
+            whole = (
+                name in ("t_us", "frame", "flags", "sensors_used", "sequence")
+                or (name.endswith("_us"))
+                or name in ("raw_sequence", "raw_flags", "valid", "saturated", "doubtful")
+            )
+            message[name.lower()] = (
+                int(text or 0) if whole else plain(float(text or "nan")) if name == "temperature_degC" else binary32(text)
+            )
         for name, kind in (("pressure_pa", "s"), ("tare_pa", "tare")):
             message[name] = [round(float(cell[f"{kind}{k}_Pa"]) * 1024) / 1024 for k in range(sensors)] if has_raw else []
         rows[number] = message
@@ -231,10 +285,18 @@ def differences(csv_path, bag):
     told = collections.Counter()
     for contact in expected.values():
         if contact["has_raw"]:
-            told[json.dumps(["NaN" if not contact["valid"] >> k & 1 else binary32(a - b)
-                             for k, (a, b) in enumerate(zip(contact["pressure_pa"], contact["tare_pa"]))])] += 1
-    found = collections.Counter(json.dumps([plain(float(values[3])) for values in np.frombuffer(bytes(message["data"]), "<f4").reshape(-1, 4)])
-                                for _, message in by_topic["pressures"])
+            told[
+                json.dumps(
+                    [
+                        "NaN" if not contact["valid"] >> k & 1 else binary32(a - b)
+                        for k, (a, b) in enumerate(zip(contact["pressure_pa"], contact["tare_pa"]))
+                    ]
+                )
+            ] += 1
+    found = collections.Counter(
+        json.dumps([plain(float(values[3])) for values in np.frombuffer(bytes(message["data"]), "<f4").reshape(-1, 4)])
+        for _, message in by_topic["pressures"]
+    )
     differ += sum(((told - found) + (found - told)).values())
     health = sum(line.startswith("# packet: health") for line in lines)
     differ += health != sum(bool(message["status"][0]["values"]) for _, message in by_topic["diagnostics"])
@@ -247,9 +309,13 @@ def contents(bag):
     with open(bag, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
         header, statistics = reader.get_header(), reader.get_summary().statistics
-        return (header, dataclasses.replace(statistics, chunk_count=0),
-                [(schema, channel, message) for schema, channel, message in reader.iter_messages(log_time_order=False)],
-                list(reader.iter_attachments()), [(each.name, list(each.metadata.items())) for each in reader.iter_metadata()])
+        return (
+            header,
+            dataclasses.replace(statistics, chunk_count=0),
+            [(schema, channel, message) for schema, channel, message in reader.iter_messages(log_time_order=False)],
+            list(reader.iter_attachments()),
+            [(each.name, list(each.metadata.items())) for each in reader.iter_metadata()],
+        )
 
 
 def of_python(csv_path, bag):
@@ -303,6 +369,7 @@ def chunk_counts(record):
     from mcap.records import Chunk
     from mcap.stream_reader import breakup_chunk
     import io
+
     stream = ReadDataStream(io.BytesIO(record[9:]))
     found = [entry for entry in breakup_chunk(Chunk.read(stream)) if isinstance(entry, Message)]
     return len(found), sum(entry.channel_id in LINE_CHANNELS for entry in found)
@@ -341,8 +408,11 @@ def main(tool, fake_device, seconds, count):
             figures["mcap_round_trips_differ"] += end.read_bytes() != start.read_bytes()
             middle.unlink()
         frames = sum(not line.startswith("#") for line in told.read_text(encoding="utf-8").splitlines()) - 1
-        figures |= {"mcap_bytes_per_frame": round(bag.stat().st_size / frames), "mcap_csv_bytes_per_frame": round(told.stat().st_size / frames),
-                    "mcap_truncations": count}
+        figures |= {
+            "mcap_bytes_per_frame": round(bag.stat().st_size / frames),
+            "mcap_csv_bytes_per_frame": round(told.stat().st_size / frames),
+            "mcap_truncations": count,
+        }
         figures["mcap_chunks_lost"], figures["mcap_truncations_unread"] = truncations(tool, bag, told, folder, count, 11)
     return figures
 

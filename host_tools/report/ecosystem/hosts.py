@@ -7,6 +7,7 @@
 
 The truth of cuts is a second terminal of each fingertip (fake_device's mirror), which gets the same bytes a moment before the first.
 """
+
 import contextlib
 import json
 import os
@@ -171,7 +172,18 @@ def cuts(fake_device, seconds):
         mirrors = {serial: folder / f"mirror{serial}" for serial in ports}
         for serial, port in ports.items():
             unplugged = [f"vanish={RATE_Hz * seconds // 2},1500"] if serial == UNPLUGGED else []
-            start([fake_device, port, f"serial={serial}", f"mirror={mirrors[serial]}", f"rate={RATE_Hz}", f"frames={RATE_Hz * seconds}", "life=600", *unplugged])
+            start(
+                [
+                    fake_device,
+                    port,
+                    f"serial={serial}",
+                    f"mirror={mirrors[serial]}",
+                    f"rate={RATE_Hz}",
+                    f"frames={RATE_Hz * seconds}",
+                    "life=600",
+                    *unplugged,
+                ]
+            )
         wait_for(lambda: all(path.is_symlink() for path in (*ports.values(), *mirrors.values())), "the fingertips")
         truth = Mirrors(mirrors)
 
@@ -184,8 +196,13 @@ def cuts(fake_device, seconds):
 
         the_router, bridges = router(), [bridge(host) for host in range(HOSTS)]
         recording = folder / "all.mcap"
-        recorder = start(command("recorder", recording, "--connect", endpoint, "--expect", HOSTS * TIPS, "--wait", 60, "--undisciplined", "--json"),
-                         network.name, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        recorder = start(
+            command("recorder", recording, "--connect", endpoint, "--expect", HOSTS * TIPS, "--wait", 60, "--undisciplined", "--json"),
+            network.name,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         wait_for(lambda: recording.exists() or recorder.poll() is not None, "the recorder")
         begun_s, busy_before_s = time.monotonic(), busy_s(recorder)
         time.sleep(3)
@@ -220,20 +237,34 @@ def cuts(fake_device, seconds):
             first = of_device.index(of_file[0])
             before += first
             sent += len(of_device) - first
-            strangers += len(set(of_file) - set(of_device)) + len(of_file) - len(set(of_file)) + abs(len(of_file) - told[serial]["recorded"])
+            strangers += (
+                len(set(of_file) - set(of_device)) + len(of_file) - len(set(of_file)) + abs(len(of_file) - told[serial]["recorded"])
+            )
             uncounted += abs(len(of_device) - first - len(of_file) - told[serial]["lost"])
             by_host[int(serial[2])] += told[serial]["lost"]
-        return {"zenoh_hosts": HOSTS, "zenoh_fingertips": HOSTS * TIPS, "zenoh_sent": sent, "zenoh_recorded": sum(map(len, in_file.values())),
-                "zenoh_before_the_recording": before, "zenoh_lost_counted": sum(by_host), "zenoh_lost_uncounted": uncounted,
-                "zenoh_not_sent_but_recorded": strangers, "zenoh_lost_by_network": sum(by_host) - by_host[2], "zenoh_lost_by_killed_bridge": by_host[2],
-                "zenoh_losses_in_file": events, "zenoh_recorder_core_percent": core_percent, "zenoh_rate_Hz": RATE_Hz,
-                "zenoh_asked_again": sum(each["recovered"] for each in told.values()),
-                "zenoh_device_restarts": sum(each["restarts"] for each in told.values()),
-                "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in told.items())}
+        return {
+            "zenoh_hosts": HOSTS,
+            "zenoh_fingertips": HOSTS * TIPS,
+            "zenoh_sent": sent,
+            "zenoh_recorded": sum(map(len, in_file.values())),
+            "zenoh_before_the_recording": before,
+            "zenoh_lost_counted": sum(by_host),
+            "zenoh_lost_uncounted": uncounted,
+            "zenoh_not_sent_but_recorded": strangers,
+            "zenoh_lost_by_network": sum(by_host) - by_host[2],
+            "zenoh_lost_by_killed_bridge": by_host[2],
+            "zenoh_losses_in_file": events,
+            "zenoh_recorder_core_percent": core_percent,
+            "zenoh_rate_Hz": RATE_Hz,
+            "zenoh_asked_again": sum(each["recovered"] for each in told.values()),
+            "zenoh_device_restarts": sum(each["restarts"] for each in told.values()),
+            "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in told.items()),
+        }
 
 
 def latency(fake_device, seconds):
     import zenoh
+
     endpoint = f"tcp/127.0.0.1:{PORT + os.getpid() % 1000}"
     with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
         port = pathlib.Path(name) / "port"
@@ -242,7 +273,9 @@ def latency(fake_device, seconds):
         bridge = None
         try:
             wait_for(port.is_symlink, "the fingertip")
-            bridge = subprocess.Popen(command("bridge", "--listen", endpoint, "--router", "--port", port), env=environment, stderr=subprocess.DEVNULL)
+            bridge = subprocess.Popen(
+                command("bridge", "--listen", endpoint, "--router", "--port", port), env=environment, stderr=subprocess.DEVNULL
+            )
             config = zenoh.Config()
             config.insert_json5("mode", '"client"')
             config.insert_json5("connect/endpoints", json.dumps([endpoint]))
@@ -263,7 +296,12 @@ def latency(fake_device, seconds):
                 begun_s, busy_before_s, frames, number = time.perf_counter(), busy_s(bridge), taken["raw"], last[0]
                 late_ns.clear()
                 time.sleep(seconds)
-                wall_s, cpu_s, frames, number = time.perf_counter() - begun_s, busy_s(bridge) - busy_before_s, taken["raw"] - frames, last[0] - number
+                wall_s, cpu_s, frames, number = (
+                    time.perf_counter() - begun_s,
+                    busy_s(bridge) - busy_before_s,
+                    taken["raw"] - frames,
+                    last[0] - number,
+                )
                 found = sorted(late_ns)
                 subscriber.undeclare()
         finally:
@@ -271,13 +309,19 @@ def latency(fake_device, seconds):
                 if process:
                     process.kill()
                     process.wait()
-    return {"zenoh_latency_median_ms": round(found[len(found) // 2] / 1e6, 3), "zenoh_latency_99_ms": round(found[len(found) * 99 // 100] / 1e6, 3),
-            "zenoh_fps": round(frames / wall_s, 1), "zenoh_bridge_core_percent": round(100 * cpu_s / wall_s, 1),
-            "zenoh_live_percent": round(100 * len(found) / max(number, 1), 2), "zenoh_seconds": seconds}
+    return {
+        "zenoh_latency_median_ms": round(found[len(found) // 2] / 1e6, 3),
+        "zenoh_latency_99_ms": round(found[len(found) * 99 // 100] / 1e6, 3),
+        "zenoh_fps": round(frames / wall_s, 1),
+        "zenoh_bridge_core_percent": round(100 * cpu_s / wall_s, 1),
+        "zenoh_live_percent": round(100 * len(found) / max(number, 1), 2),
+        "zenoh_seconds": seconds,
+    }
 
 
 def router(endpoint):
     import zenoh
+
     config = zenoh.Config()
     config.insert_json5("mode", '"router"')
     config.insert_json5("listen/endpoints", json.dumps([endpoint]))

@@ -1,4 +1,5 @@
 """What the Python package costs a program, what it loses, and whether it speaks as the firmware does."""
+
 import json
 import os
 import pathlib
@@ -24,7 +25,7 @@ def vectors_that_differ():
     for path in paths:
         words = [word for line in path.read_text(encoding="utf-8").splitlines() for word in line.split("#")[0].split()]
         middle = words.index("frame")
-        packet, frame = (bytes.fromhex("".join(part)) for part in (words[1:middle], words[middle + 1:]))
+        packet, frame = (bytes.fromhex("".join(part)) for part in (words[1:middle], words[middle + 1 :]))
         try:
             same = wire.cobs_decode(frame[:-1]) == packet and wire.encode(wire.decode(frame[:-1])) == frame
         except PacketError:
@@ -51,8 +52,14 @@ def reading(build):
         device = subprocess.Popen([fake, port, f"rate={RATE_Hz}", f"life={SECONDS + 2 * PATIENCE_s}"])
         try:
             wait_for(port)
-            done = subprocess.run([sys.executable, ROOT / "host_tools/report/ecosystem/reader.py", port, str(SECONDS)], capture_output=True,
-                                  text=True, timeout=SECONDS + PATIENCE_s, env={**os.environ, "XDG_RUNTIME_DIR": folder}, check=False)
+            done = subprocess.run(
+                [sys.executable, ROOT / "host_tools/report/ecosystem/reader.py", port, str(SECONDS)],
+                capture_output=True,
+                text=True,
+                timeout=SECONDS + PATIENCE_s,
+                env={**os.environ, "XDG_RUNTIME_DIR": folder},
+                check=False,
+            )
         finally:
             device.kill()
             device.wait()
@@ -66,15 +73,27 @@ def measure(build, steps):
     steps.say(f"{count} vectors, {len(differ)} differ")
     found = reading(build)
     steps.say(f"{found['frames']} frames by Python")
-    return {"python_seconds": SECONDS, "python_frames": found["frames"], "python_fps": round(found["fps"], 1),
-            "python_core_percent": round(found["core_percent"], 2), "python_us_per_packet": round(found["us_per_packet"], 1),
-            "python_lost": found["lost"], "python_clock_us": round(found["uncertainty_us"], 1), "python_vectors": count,
-            "python_vectors_differ": len(differ), "python_vectors_that_differ": differ}
+    return {
+        "python_seconds": SECONDS,
+        "python_frames": found["frames"],
+        "python_fps": round(found["fps"], 1),
+        "python_core_percent": round(found["core_percent"], 2),
+        "python_us_per_packet": round(found["us_per_packet"], 1),
+        "python_lost": found["lost"],
+        "python_clock_us": round(found["uncertainty_us"], 1),
+        "python_vectors": count,
+        "python_vectors_differ": len(differ),
+        "python_vectors_that_differ": differ,
+    }
 
 
 def text(found):
-    return ["## Python", "",
-            f"A program takes and judges every frame of a simulated fingertip, which says contact and raw packets of fifteen sensors on a pseudo-terminal at "
-            f"{RATE_Hz} frames a second, for {found['python_seconds']} s ([reader.py](reader.py)): processor time of all its threads over wall-clock time on this "
-            "computer, and everything that was lost on the way. Beside it the vectors of tests/vectors/wire, decoded and encoded by the package; the "
-            "firmware's codec passes them in its unit test.", ""]
+    return [
+        "## Python",
+        "",
+        f"A program takes and judges every frame of a simulated fingertip, which says contact and raw packets of fifteen sensors on a pseudo-terminal at "
+        f"{RATE_Hz} frames a second, for {found['python_seconds']} s ([reader.py](reader.py)): processor time of all its threads over wall-clock time on this "
+        "computer, and everything that was lost on the way. Beside it the vectors of tests/vectors/wire, decoded and encoded by the package; the "
+        "firmware's codec passes them in its unit test.",
+        "",
+    ]

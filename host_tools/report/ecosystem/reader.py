@@ -6,6 +6,7 @@
 core_percent: processor time of all threads over wall-clock time, while every frame is taken and judged. lost: frames that their numbers
 show to be missing, packets that the line lost or damaged, and frames that this program did not take in time.
 """
+
 import json
 import pathlib
 import sys
@@ -32,9 +33,16 @@ def read(port, seconds):
         wall_s, cpu_s = time.perf_counter() - begun_s, time.process_time() - busy_s
         line = fingertip.statistics
         damaged = line.crc_errors + line.format_errors + line.out_of_order
-        return {"wall_s": wall_s, "frames": taken, "fps": taken / wall_s, "core_percent": 100 * cpu_s / wall_s,
-                "us_per_packet": 1e6 * cpu_s / (2 * taken), "lost": missing + line.dropped_packets + damaged + fingertip.overrun_frames,
-                "uncertainty_us": fingertip.clock.uncertainty_us, "mean_N": sum_N / taken}
+        return {
+            "wall_s": wall_s,
+            "frames": taken,
+            "fps": taken / wall_s,
+            "core_percent": 100 * cpu_s / wall_s,
+            "us_per_packet": 1e6 * cpu_s / (2 * taken),
+            "lost": missing + line.dropped_packets + damaged + fingertip.overrun_frames,
+            "uncertainty_us": fingertip.clock.uncertainty_us,
+            "mean_N": sum_N / taken,
+        }
 
 
 if __name__ == "__main__":

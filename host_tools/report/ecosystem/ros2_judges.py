@@ -1,4 +1,5 @@
 """Who judges the topics of ROS 2: Fast DDS, which ROS 2 has as its default, and rosbags. Needs rosbags (tests/requirements.txt)."""
+
 import contextlib
 import os
 import struct
@@ -80,10 +81,10 @@ class Ears:
         """Those that are there in whole."""
         data, at, found = self.file_of(topic).read_bytes(), 0, []
         while at + 4 <= len(data):
-            length, = struct.unpack_from("<I", data, at)
+            (length,) = struct.unpack_from("<I", data, at)
             at += 4 + length
             if at <= len(data):
-                found.append(data[at - length:at])
+                found.append(data[at - length : at])
         return found
 
 

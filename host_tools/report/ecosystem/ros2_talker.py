@@ -6,6 +6,7 @@
 sent, heard: messages on all topics. refused: not taken by DDS. differ: messages of which rosbags writes other bytes than came. core_percent:
 processor time of reading, encoding and sending over wall-clock time. Needs cyclonedds and rosbags (tests/requirements.txt).
 """
+
 import json
 import os
 import pathlib
@@ -44,8 +45,17 @@ def talk(port, folder, listener, seconds):
         ears.process.kill()
     rosbags = Rosbags()
     differ = {topic: sum(not rosbags.writes_the_same(KINDS[topic], data) for data in messages) for topic, messages in heard.items()}
-    return {"frames": count, "fps": count / wall_s, "core_percent": 100 * cpu_s / wall_s, "lost": lost, "refused": publisher.refused,
-            "sent": sum(publisher.sent.values()), "heard": sum(map(len, heard.values())), "differ": sum(differ.values()), "topics": len(KINDS)}
+    return {
+        "frames": count,
+        "fps": count / wall_s,
+        "core_percent": 100 * cpu_s / wall_s,
+        "lost": lost,
+        "refused": publisher.refused,
+        "sent": sum(publisher.sent.values()),
+        "heard": sum(map(len, heard.values())),
+        "differ": sum(differ.values()),
+        "topics": len(KINDS),
+    }
 
 
 def main(fake, listener, seconds, rate_Hz):

@@ -84,8 +84,8 @@ Gaussian log_linear(const Samples &samples, double noise_Pa, const Gaussian &pea
   const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
   const double curvature = limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
   const double half_inverse = 0.5 / curvature;
-  return {1.0, peak.x + limited(c[1] * half_inverse, -1.0, 1.0),
-          peak.y + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
+  return {1.0, peak.x + limited(c[1] * half_inverse, -1.0, 1.0), peak.y + limited(c[2] * half_inverse, -1.0, 1.0),
+          std::sqrt(half_inverse)};
 }
 
 double best_amplitude(const Samples &samples, const Gaussian &theta) {
@@ -100,15 +100,14 @@ double best_amplitude(const Samples &samples, const Gaussian &theta) {
 }
 
 // What the firmware's fit of these readings starts from.
-Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                        std::uint32_t usable, const Samples &samples) {
+Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                        const Samples &samples) {
   fit_settings none{};
   none.noise_Pa_q10 = 1;
   fit_result result;
   fit_gaussian(&array, pressure_Pa_q10, usable, &none, &result);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
-  Gaussian theta{1.0, static_cast<double>(result.x_mm) / pitch_mm,
-                 static_cast<double>(result.y_mm) / pitch_mm,
+  Gaussian theta{1.0, static_cast<double>(result.x_mm) / pitch_mm, static_cast<double>(result.y_mm) / pitch_mm,
                  std::max(static_cast<double>(result.sigma_mm) / pitch_mm, SIGMA_MIN)};
   theta.p0 = best_amplitude(samples, theta);
   return theta;
@@ -116,8 +115,7 @@ Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_
 
 } // namespace
 
-Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                  std::uint32_t usable) {
+Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable) {
   Samples samples;
   std::int32_t largest = 0;
   for (unsigned k = 0; k < array.sensor_count; k++) {
@@ -143,8 +141,8 @@ Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
 
 Gaussian first_guess(const Samples &samples, double noise_Pa, Guess guess) {
   const auto first = samples.p.begin();
-  const auto peak = static_cast<std::size_t>(
-      std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
+  const auto peak =
+      static_cast<std::size_t>(std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
   Gaussian theta{1.0, samples.x[peak], samples.y[peak], PLAIN_GUESS_SIGMA};
   if (guess == Guess::log_linear) {
     theta = log_linear(samples, noise_Pa, theta);
@@ -163,22 +161,20 @@ Gaussian first_guess(const Samples &samples, double noise_Pa, Guess guess) {
   return theta;
 }
 
-KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                           std::uint32_t usable, const KernelSettings &settings) {
+KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                           const KernelSettings &settings) {
   KernelResult result{};
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   if (samples.count < 4) {
     result.flags = samples.count == 0 ? CONTACT_FLAG_LOW_SIGNAL : 0;
     return result;
   }
-  Gaussian theta = settings.guess == Guess::firmware
-                       ? firmware_guess(array, pressure_Pa_q10, usable, samples)
-                       : first_guess(samples, settings.noise_Pa, settings.guess);
+  Gaussian theta = settings.guess == Guess::firmware ? firmware_guess(array, pressure_Pa_q10, usable, samples)
+                                                     : first_guess(samples, settings.noise_Pa, settings.guess);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
-  const double prior_weight =
-      static_cast<double>(FIT_PRIOR_WEIGHT) * pitch_mm / settings.prior_width_mm;
+  const double prior_weight = static_cast<double>(FIT_PRIOR_WEIGHT) * pitch_mm / settings.prior_width_mm;
   for (int i = 0; i < settings.iterations; i++) {
     theta.p0 = best_amplitude(samples, theta);
     Normal normal;
@@ -194,8 +190,8 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
                  prior_weight * (settings.prior_sigma_mm / pitch_mm - theta.sigma));
     }
     const Vector4 b = Factors(normal.matrix).solve(normal.rhs);
-    const double excess = gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT,
-                                           std::abs(b[3]) / WIDEN_LIMIT});
+    const double excess =
+        gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT, std::abs(b[3]) / WIDEN_LIMIT});
     const double share = excess > 1.0 ? 1.0 / excess : 1.0;
     theta.p0 = limited(theta.p0 + share * b[0], P0_MIN, P0_MAX);
     theta.x = limited(theta.x + share * gain * b[1], x_min - OVERSHOOT, x_max + OVERSHOOT);

@@ -21,14 +21,13 @@ struct Gaussian {
   double p0, x, y, sigma;
 };
 
-Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                  std::uint32_t usable);
+Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable);
 
 // Any guess but the firmware's, with the best amplitude for its shape. Needs four samples, one of
 // them positive.
 Gaussian first_guess(const Samples &samples, double noise_Pa, Guess guess = Guess::log_linear);
 
-KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                           std::uint32_t usable, const KernelSettings &settings);
+KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                           const KernelSettings &settings);
 
 } // namespace fingertip::fitting

@@ -12,6 +12,7 @@ host, paired), and fit_stiff, and merges what they find:
 
 Errors are distances of the location from the reference optimum over the observable presses of the sets A to D.
 """
+
 import csv
 import json
 import math
@@ -58,13 +59,43 @@ def measure(options, out):
     if not image.exists():
         raise InputError(f"{image} is not there; {TO_BUILD}")
     common = ("--limit", options.limit, "--seed", options.seed, "--out", out, "--cache", out / "cache")
-    logged("fit_error", "error against the reference (the first run solves the reference, about eight minutes on two cores)", tools / "fit_report", *common)
+    logged(
+        "fit_error",
+        "error against the reference (the first run solves the reference, about eight minutes on two cores)",
+        tools / "fit_report",
+        *common,
+    )
     jobs = out / "fit_jobs.json"
     logged("fit_jobs", "presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
-    logged("fit_cycles", "cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", image, "--jobs", jobs,
-              "--out", out / "fit_cycles.csv", "--budget", options.budget)
-    logged("fit_bench", "time on this host", tools / "fit_bench", "--limit", max(1200, options.limit // 10), "--passes", options.passes,
-              "--seed", options.seed, "--out", out, "--cache", out / "cache")
+    logged(
+        "fit_cycles",
+        "cycles on the emulated chip",
+        "node",
+        HERE / "on_chip/bench.mjs",
+        "--image",
+        image,
+        "--jobs",
+        jobs,
+        "--out",
+        out / "fit_cycles.csv",
+        "--budget",
+        options.budget,
+    )
+    logged(
+        "fit_bench",
+        "time on this host",
+        tools / "fit_bench",
+        "--limit",
+        max(1200, options.limit // 10),
+        "--passes",
+        options.passes,
+        "--seed",
+        options.seed,
+        "--out",
+        out,
+        "--cache",
+        out / "cache",
+    )
     logged("stiff", "what is hard, extreme, or no press", tools / "fit_stiff", "--out", out, "--limit", max(200, options.limit // 15))
     steps.say("table and picture")
 
@@ -116,11 +147,22 @@ class Results:
 
 # Of fit.json: what to stay below or above, as the fit is meant to be.
 GOALS = (
-    ("observable_presses", ">=", 100000), ("p99_9_um", "<=", 0.5), ("above_100um", "<=", 1), ("masked_p99_9_um", "<=", 1),
-    ("masked_p99_um_d", "<=", 10), ("masked_peak_p99_um", "<=", 1), ("masked_peak_above_100um_d", "<=", "masked_peak_above_100um_d_double"),
-    ("bad_unflagged_percent_worst", "<=", 1.3), ("good_flagged_percent_c", "<=", 20), ("good_flagged_percent_d", "<=", 50),
-    ("cold_cycles", "<=", 31000), ("masked_cycles", "<=", 62000), ("speed_vs_ceres", ">=", 20), ("speed_vs_tinysolver", ">=", 2),
-    ("speed_vs_cminpack", ">=", 6))
+    ("observable_presses", ">=", 100000),
+    ("p99_9_um", "<=", 0.5),
+    ("above_100um", "<=", 1),
+    ("masked_p99_9_um", "<=", 1),
+    ("masked_p99_um_d", "<=", 10),
+    ("masked_peak_p99_um", "<=", 1),
+    ("masked_peak_above_100um_d", "<=", "masked_peak_above_100um_d_double"),
+    ("bad_unflagged_percent_worst", "<=", 1.3),
+    ("good_flagged_percent_c", "<=", 20),
+    ("good_flagged_percent_d", "<=", 50),
+    ("cold_cycles", "<=", 31000),
+    ("masked_cycles", "<=", 62000),
+    ("speed_vs_ceres", ">=", 20),
+    ("speed_vs_tinysolver", ">=", 2),
+    ("speed_vs_cminpack", ">=", 6),
+)
 
 
 def figures(results):
@@ -172,11 +214,15 @@ def table(results):
     for kernel, variant in results.variants():
         cycles = results.cycles.get((kernel, variant), {})
         median = cycles.get("cycles_median")
-        row = {"kernel": kernel, "variant": variant, **{f"cycles_{k}": cycles.get(f"cycles_{k}", "") for k in ("min", "median", "max")},
-               "ms": "" if median is None else int(median) / CLOCK_Hz * 1e3,
-               "host_us": results.host[kernel]["us"] if variant == USUAL and kernel in results.host else "",
-               "presses": results.error(kernel, variant, ALL_SETS, "presses"),
-               "above_100um": results.error(kernel, variant, ALL_SETS, "above_100um")}
+        row = {
+            "kernel": kernel,
+            "variant": variant,
+            **{f"cycles_{k}": cycles.get(f"cycles_{k}", "") for k in ("min", "median", "max")},
+            "ms": "" if median is None else int(median) / CLOCK_Hz * 1e3,
+            "host_us": results.host[kernel]["us"] if variant == USUAL and kernel in results.host else "",
+            "presses": results.error(kernel, variant, ALL_SETS, "presses"),
+            "above_100um": results.error(kernel, variant, ALL_SETS, "above_100um"),
+        }
         for key in ("p50_um", "p99_um", "p999_um", "worst_um"):
             row[key] = results.error(kernel, variant, ALL_SETS, key)
             for set_ in SETS:
@@ -186,17 +232,27 @@ def table(results):
         rows.append(row)
     for kernel, host in results.host.items():
         if (kernel, USUAL) not in results.variants():
-            rows.append({"kernel": kernel, "variant": "host library", "host_us": host["us"], "presses": results.bench["presses"],
-                         "above_100um": host["above_100um"], "p50_um": host["p50_um"],
-                         "p999_um": math.inf if host["p999_um"] is None else host["p999_um"]})
+            rows.append(
+                {
+                    "kernel": kernel,
+                    "variant": "host library",
+                    "host_us": host["us"],
+                    "presses": results.bench["presses"],
+                    "above_100um": host["above_100um"],
+                    "p50_um": host["p50_um"],
+                    "p999_um": math.inf if host["p999_um"] is None else host["p999_um"],
+                }
+            )
     return rows
 
 
 def write_table_csv(path, rows):
     names = list(rows[0])
     lines = [",".join(names)]
-    lines += [",".join("" if row.get(n) is None else f"{row[n]:.6g}" if isinstance(row.get(n), float) else str(row.get(n, "")) for n in names)
-              for row in rows]
+    lines += [
+        ",".join("" if row.get(n) is None else f"{row[n]:.6g}" if isinstance(row.get(n), float) else str(row.get(n, "")) for n in names)
+        for row in rows
+    ]
     write_text(path, "\n".join(lines) + "\n")
 
 
@@ -211,22 +267,57 @@ def number(value, digits=2):
 
 
 def write_table_md(path, rows, found):
-    lines = ["# Error of the fit against run time", "",
-             "Written by `sh cmake/bootstrap.sh report`. Cycles: emulated Cortex-M0+, median; ms at 125 MHz. um: distance of the location from",
-             f"the reference optimum over the observable presses of sets A to D, seed {found['seed']}. host us: {found['processor']}.", "",
-             f"How far from the optimum, p99.9 in the worst set: {number(found['p99_9_um'])} um with seven iterations (`{USUAL}`), "
-             f"{number(found['shipped_p99_9_um'])} um with the firmware's four (`{BUILT}`), where {found['shipped_above_100um']} presses are "
-             f"more than 100 um away. At most {max(found['shipped_bad_unflagged_percent_per_set'].values()):.2g} % of a set's presses are then "
-             "more than 1 mm from the truth without a warning.", "",
-             "The presses have no dip and the fit is not told of one: these figures say how near the arithmetic comes to the optimum of its own model. What a",
-             "dip and the fit that knows it do to the distance from the truth is in the parts `truth`, `validation` and, on real rubber, `real`.", "",
-             *goal_table_md(found)]
-    cells = [[row["kernel"], row["variant"], row.get("cycles_median", ""), number(row.get("ms"), 3), number(row["host_us"], 3),
-              *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),
-              f"{row['above_100um']} of {row['presses']}",
-              ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row)] for row in rows]
-    lines += ["", *table_md(("kernel", "variant", "cycles", "ms", "host us", "p50", "p99", "p99.9", "A p99.9", "B", "C", "D", "above 100 um",
-                             "C, D: p99 mm to the truth"), cells)]
+    lines = [
+        "# Error of the fit against run time",
+        "",
+        "Written by `sh cmake/bootstrap.sh report`. Cycles: emulated Cortex-M0+, median; ms at 125 MHz. um: distance of the location from",
+        f"the reference optimum over the observable presses of sets A to D, seed {found['seed']}. host us: {found['processor']}.",
+        "",
+        f"How far from the optimum, p99.9 in the worst set: {number(found['p99_9_um'])} um with seven iterations (`{USUAL}`), "
+        f"{number(found['shipped_p99_9_um'])} um with the firmware's four (`{BUILT}`), where {found['shipped_above_100um']} presses are "
+        f"more than 100 um away. At most {max(found['shipped_bad_unflagged_percent_per_set'].values()):.2g} % of a set's presses are then "
+        "more than 1 mm from the truth without a warning.",
+        "",
+        "The presses have no dip and the fit is not told of one: these figures say how near the arithmetic comes to the optimum of its own model. What a",
+        "dip and the fit that knows it do to the distance from the truth is in the parts `truth`, `validation` and, on real rubber, `real`.",
+        "",
+        *goal_table_md(found),
+    ]
+    cells = [
+        [
+            row["kernel"],
+            row["variant"],
+            row.get("cycles_median", ""),
+            number(row.get("ms"), 3),
+            number(row["host_us"], 3),
+            *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),
+            f"{row['above_100um']} of {row['presses']}",
+            ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row),
+        ]
+        for row in rows
+    ]
+    lines += [
+        "",
+        *table_md(
+            (
+                "kernel",
+                "variant",
+                "cycles",
+                "ms",
+                "host us",
+                "p50",
+                "p99",
+                "p99.9",
+                "A p99.9",
+                "B",
+                "C",
+                "D",
+                "above 100 um",
+                "C, D: p99 mm to the truth",
+            ),
+            cells,
+        ),
+    ]
     write_text(path, "\n".join(lines) + "\n")
 
 
@@ -240,17 +331,42 @@ def pareto(points):
 
 
 def plot(path, results, found):
-    colours = {"fit": BLUE, "general": "#0e9aa7", "naive_float": "#e08a1e", "naive_double": "#b5651d", "lm_float": "#a05cc5",
-               "lm_double": "#6f3d94", "double": FAINT, "separable": GOAL}
-    labels = {"fit": "firmware, fixed point", "general": "firmware, float32, any layout", "naive_float": "Gauss-Newton, expf",
-              "naive_double": "Gauss-Newton, exp", "lm_float": "Levenberg-Marquardt, float", "lm_double": "Levenberg-Marquardt, double"}
+    colours = {
+        "fit": BLUE,
+        "general": "#0e9aa7",
+        "naive_float": "#e08a1e",
+        "naive_double": "#b5651d",
+        "lm_float": "#a05cc5",
+        "lm_double": "#6f3d94",
+        "double": FAINT,
+        "separable": GOAL,
+    }
+    labels = {
+        "fit": "firmware, fixed point",
+        "general": "firmware, float32, any layout",
+        "naive_float": "Gauss-Newton, expf",
+        "naive_double": "Gauss-Newton, exp",
+        "lm_float": "Levenberg-Marquardt, float",
+        "lm_double": "Levenberg-Marquardt, double",
+    }
     # on the host: name, whether it stands left or right of the bar or else above the point, lifted by so many points
-    host_labels = {"fit": ("firmware, fixed point", "left", 0), "general": ("firmware, float32", "left", 0), "masked": ("firmware, a sensor masked", "right", 0),
-                   "double": ("the same steps in double", "right", 0), "separable": ("fixed point's iteration in double", "right", 0),
-                   "naive_float": ("Gauss-Newton, expf", "left", -5), "naive_double": ("Gauss-Newton, exp", "left", 5),
-                   "lm_float": ("Levenberg-Marquardt, float", "left", -4), "lm_double": ("Levenberg-Marquardt, double", "right", -4),
-                   "tiny_solver": ("TinySolver", "right", 4), "tiny_tight": ("TinySolver, tight", "left", -9), "gsl": ("GSL", "left", 0),
-                   "ceres_reused": ("Ceres", "above, left", 9), "ceres_tight": ("Ceres, tight", "above, right", 9), "cminpack": ("cminpack", "right", 0)}
+    host_labels = {
+        "fit": ("firmware, fixed point", "left", 0),
+        "general": ("firmware, float32", "left", 0),
+        "masked": ("firmware, a sensor masked", "right", 0),
+        "double": ("the same steps in double", "right", 0),
+        "separable": ("fixed point's iteration in double", "right", 0),
+        "naive_float": ("Gauss-Newton, expf", "left", -5),
+        "naive_double": ("Gauss-Newton, exp", "left", 5),
+        "lm_float": ("Levenberg-Marquardt, float", "left", -4),
+        "lm_double": ("Levenberg-Marquardt, double", "right", -4),
+        "tiny_solver": ("TinySolver", "right", 4),
+        "tiny_tight": ("TinySolver, tight", "left", -9),
+        "gsl": ("GSL", "left", 0),
+        "ceres_reused": ("Ceres", "above, left", 9),
+        "ceres_tight": ("Ceres, tight", "above, right", 9),
+        "cminpack": ("cminpack", "right", 0),
+    }
     low_um, high_um = 1e-3, 1e5
 
     def shown(um):
@@ -277,15 +393,39 @@ def plot(path, results, found):
         for n in range(4, 15):
             cycles, error = results.cycles.get((kernel, f"n_largest={n}")), results.error(kernel, f"n_largest={n}", ALL_SETS, "p999_um")
             if cycles is not None and error is not None:
-                chip.plot(int(cycles["cycles_median"]), shown(error), "x", color=colours[kernel], ms=5, zorder=3,
-                          label="n largest, 4 to 14" if n == 4 else None)
+                chip.plot(
+                    int(cycles["cycles_median"]),
+                    shown(error),
+                    "x",
+                    color=colours[kernel],
+                    ms=5,
+                    zorder=3,
+                    label="n largest, 4 to 14" if n == 4 else None,
+                )
     for variant, marker, label in (("mask=random", "s", "one random sensor masked"), ("mask=peak", "D", "peak sensor masked")):
         if ("fit", variant) in results.cycles:
-            chip.plot(int(results.cycles["fit", variant]["cycles_median"]), shown(results.error("fit", variant, ALL_SETS, "p999_um")),
-                      marker, mfc="white", mec=colours["fit"], ms=6, label=label, zorder=4)
+            chip.plot(
+                int(results.cycles["fit", variant]["cycles_median"]),
+                shown(results.error("fit", variant, ALL_SETS, "p999_um")),
+                marker,
+                mfc="white",
+                mec=colours["fit"],
+                ms=6,
+                label=label,
+                zorder=4,
+            )
     front = pareto(every)
-    chip.step([p[0] for p in front], [p[1] for p in front], where="post", color="#b4bac6", lw=5, alpha=0.6, solid_capstyle="round",
-              label="Pareto front", zorder=1)
+    chip.step(
+        [p[0] for p in front],
+        [p[1] for p in front],
+        where="post",
+        color="#b4bac6",
+        lw=5,
+        alpha=0.6,
+        solid_capstyle="round",
+        label="Pareto front",
+        zorder=1,
+    )
     chip.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
     chip.set_ylabel("p99.9 distance to the least-squares optimum, um")
     chip.set_title("on the chip", loc="left", size=10, color=FAINT)
@@ -299,12 +439,28 @@ def plot(path, results, found):
             continue  # as fit, and as ceres_reused
         error = math.inf if row["p999_um"] is None else row["p999_um"]
         colour = colours.get(kernel, INK)
-        host.errorbar(row["us"], shown(error), xerr=[[row["us"] - row["us_p10"]], [row["us_p90"] - row["us"]]], fmt="o", ms=5,
-                      color=colour, elinewidth=0.8, zorder=3)
+        host.errorbar(
+            row["us"],
+            shown(error),
+            xerr=[[row["us"] - row["us_p10"]], [row["us_p90"] - row["us"]]],
+            fmt="o",
+            ms=5,
+            color=colour,
+            elinewidth=0.8,
+            zorder=3,
+        )
         name, side, up = host_labels[kernel]
         at_us, outwards = {"right": (row["us_p90"], 4), "left": (row["us_p10"], -4)}.get(side, (row["us"], 0))
-        host.annotate(name, (at_us, shown(error)), (outwards, up), textcoords="offset points", size=7.5, va="center",
-                      ha="left" if side.endswith("right") else "right", color=colour)
+        host.annotate(
+            name,
+            (at_us, shown(error)),
+            (outwards, up),
+            textcoords="offset points",
+            size=7.5,
+            va="center",
+            ha="left" if side.endswith("right") else "right",
+            color=colour,
+        )
     host.set_xlabel("us of one fit on the host, median and 10..90 %, paired")
     host.set_title("on this host, each from one start", loc="left", size=10, color=FAINT)
     for axes in (chip, host):
@@ -313,8 +469,13 @@ def plot(path, results, found):
         axes.set_ylim(low_um * 0.7, high_um * 1.5)
         axes.grid()
     figure.text(0.06, 0.945, "The fit: error against run time", size=15, weight="bold")
-    figure.text(0.06, 0.905, f"{found['observable_presses']} observable presses of sets A to D (simulated), seed {found['seed']}; errors outside the "
-                f"axis are drawn on its edge; host: {found['processor']}", size=8.5)
+    figure.text(
+        0.06,
+        0.905,
+        f"{found['observable_presses']} observable presses of sets A to D (simulated), seed {found['seed']}; errors outside the "
+        f"axis are drawn on its edge; host: {found['processor']}",
+        size=8.5,
+    )
     save(figure, path)
 
 

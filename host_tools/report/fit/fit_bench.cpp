@@ -75,8 +75,7 @@ std::vector<Case> mixed_cases(std::uint64_t limit, std::uint64_t seed, const std
   std::vector<std::vector<Case>> sets;
   for (reference::PressSet set : reference::ALL_PRESS_SETS) {
     const bool gaussian = set == reference::PressSet::A || set == reference::PressSet::B;
-    sets.push_back(
-        reference::load_cases(set, reference::Mask::none, seed, limit / (gaussian ? 3 : 6), cache));
+    sets.push_back(reference::load_cases(set, reference::Mask::none, seed, limit / (gaussian ? 3 : 6), cache));
   }
   for (std::size_t i = 0; i < limit; i++) {
     // A B C A B D: each set keeps its share in every block.
@@ -107,16 +106,13 @@ std::vector<Measured> measure(const std::vector<Kernel> &kernels, const std::vec
         const double before_us = processor_time_us();
         for (std::size_t n = 0; n < BLOCK; n++) {
           const Case &c = cases[start + n];
-          results[n] = kernels[k].fit(array, c.pressure_Pa_q10.data(), c.usable,
-                                      {iterations, c.press.noise_Pa});
+          results[n] = kernels[k].fit(array, c.pressure_Pa_q10.data(), c.usable, {iterations, c.press.noise_Pa});
         }
         all[k].block_us.push_back((processor_time_us() - before_us) / BLOCK);
         for (std::size_t n = 0; n < BLOCK; n++) {
           const auto &best = cases[start + n].best.theta;
-          const double um =
-              1e3 * std::hypot(results[n].x_mm - best.x_mm, results[n].y_mm - best.y_mm);
-          all[k].error_um[start + n] =
-              std::isfinite(um) ? um : std::numeric_limits<double>::infinity();
+          const double um = 1e3 * std::hypot(results[n].x_mm - best.x_mm, results[n].y_mm - best.y_mm);
+          all[k].error_um[start + n] = std::isfinite(um) ? um : std::numeric_limits<double>::infinity();
         }
       }
     }
@@ -154,9 +150,8 @@ int bench(int argc, char **argv) {
     throw std::runtime_error("too few presses: raise --limit to 1000 at least, --passes to 1");
   }
   std::vector<Kernel> kernels = fitting::all_kernels();
-  std::stable_partition(kernels.begin(), kernels.end(), [](const Kernel &kernel) {
-    return std::strcmp(kernel.name, HOST_KERNEL) == 0;
-  });
+  std::stable_partition(kernels.begin(), kernels.end(),
+                        [](const Kernel &kernel) { return std::strcmp(kernel.name, HOST_KERNEL) == 0; });
   for (const Kernel &kernel : fitting::library_kernels()) {
     kernels.push_back(kernel);
   }
@@ -164,24 +159,20 @@ int bench(int argc, char **argv) {
 
   auto rows = nlohmann::ordered_json::array();
   std::printf("%zu observable presses, %s\n", cases.size(), processor().c_str());
-  std::printf("%-13s %8s %17s %8s %17s %10s %10s %7s\n", "kernel", "us", "10 %..90 %", "ratio",
-              "10 %..90 %", "p50_um", "p99.9_um", ">100um");
+  std::printf("%-13s %8s %17s %8s %17s %10s %10s %7s\n", "kernel", "us", "10 %..90 %", "ratio", "10 %..90 %", "p50_um",
+              "p99.9_um", ">100um");
   for (const Measured &m : all) {
     std::vector<double> ratio;
     for (std::size_t i = 0; i < m.block_us.size(); i++) {
       ratio.push_back(m.block_us[i] / all.front().block_us[i]);
     }
-    const double values[] = {quantile(m.block_us, 0.5), quantile(m.block_us, 0.1),
-                             quantile(m.block_us, 0.9), quantile(ratio, 0.5),
-                             quantile(ratio, 0.1),      quantile(ratio, 0.9),
+    const double values[] = {quantile(m.block_us, 0.5), quantile(m.block_us, 0.1),  quantile(m.block_us, 0.9),
+                             quantile(ratio, 0.5),      quantile(ratio, 0.1),       quantile(ratio, 0.9),
                              quantile(m.error_um, 0.5), quantile(m.error_um, 0.999)};
-    const auto above =
-        std::count_if(m.error_um.begin(), m.error_um.end(), [](double um) { return um > 100.0; });
-    std::printf("%-13s %8.3f %8.3f..%7.3f %8.3f %8.3f..%7.3f %10.4g %10.4g %7td\n", m.name,
-                values[0], values[1], values[2], values[3], values[4], values[5], values[6],
-                values[7], above);
-    const char *names[] = {"us",        "us_p10",    "us_p90", "ratio",
-                           "ratio_p10", "ratio_p90", "p50_um", "p999_um"};
+    const auto above = std::count_if(m.error_um.begin(), m.error_um.end(), [](double um) { return um > 100.0; });
+    std::printf("%-13s %8.3f %8.3f..%7.3f %8.3f %8.3f..%7.3f %10.4g %10.4g %7td\n", m.name, values[0], values[1],
+                values[2], values[3], values[4], values[5], values[6], values[7], above);
+    const char *names[] = {"us", "us_p10", "us_p90", "ratio", "ratio_p10", "ratio_p90", "p50_um", "p999_um"};
     nlohmann::ordered_json row{{"kernel", m.name}};
     for (std::size_t i = 0; i < std::size(names); i++) {
       row[names[i]] = values[i];

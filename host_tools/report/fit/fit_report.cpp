@@ -56,8 +56,8 @@ that a kernel does not have are left out:
 
 constexpr int USUAL_ITERATIONS = 7;
 constexpr double BAD_mm = 1.0;
-constexpr std::uint32_t WARNINGS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT |
-                                   CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
+constexpr std::uint32_t WARNINGS =
+    CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
 
 struct Variant {
   std::string name;
@@ -116,8 +116,8 @@ std::vector<Variant> all_variants() {
     }
   }
   for (Mask mask : {Mask::random, Mask::peak}) { // as built
-    Variant &variant = add(std::string("mask=") + reference::name_of(mask) +
-                           " iterations=" + std::to_string(DEFAULT_FIT_ITERATIONS));
+    Variant &variant =
+        add(std::string("mask=") + reference::name_of(mask) + " iterations=" + std::to_string(DEFAULT_FIT_ITERATIONS));
     variant.mask = mask;
     variant.iterations = DEFAULT_FIT_ITERATIONS;
     variant.needs = fitting::ANY_SUBSET;
@@ -188,8 +188,7 @@ double quantile(const std::vector<double> &sorted, double share) {
 // What a row is made from; sets may be added together.
 class Tally {
 public:
-  void add(const std::vector<Case> &cases, const std::vector<Outcome> &outcomes, PressSet set,
-           bool observable) {
+  void add(const std::vector<Case> &cases, const std::vector<Outcome> &outcomes, PressSet set, bool observable) {
     const bool gaussian = set == PressSet::A || set == PressSet::B;
     for (std::size_t i = 0; i < cases.size(); i++) {
       if (cases[i].observable != observable) {
@@ -239,17 +238,16 @@ private:
   std::vector<double> um_, truth_mm_;
 };
 
-std::vector<Outcome> run(const fitting::Kernel &kernel, const fit_array &array,
-                         const Variant &variant, const std::vector<Case> &cases) {
+std::vector<Outcome> run(const fitting::Kernel &kernel, const fit_array &array, const Variant &variant,
+                         const std::vector<Case> &cases) {
   std::vector<Outcome> outcomes(cases.size());
   fingertip::twin::in_parallel(cases.size(), [&](std::size_t i) {
     const Case &c = cases[i];
     const auto readings = reference::quantise(c.press.pressure_Pa, variant.lsb_Pa);
     const auto result = kernel.fit(array, readings.data(), c.usable,
-                                   {variant.iterations, c.press.noise_Pa, variant.n_largest,
-                                    variant.prior_sigma_mm, variant.prior_width_mm, variant.guess});
-    const double um =
-        1e3 * std::hypot(result.x_mm - c.best.theta.x_mm, result.y_mm - c.best.theta.y_mm);
+                                   {variant.iterations, c.press.noise_Pa, variant.n_largest, variant.prior_sigma_mm,
+                                    variant.prior_width_mm, variant.guess});
+    const double um = 1e3 * std::hypot(result.x_mm - c.best.theta.x_mm, result.y_mm - c.best.theta.y_mm);
     const bool fitted = (result.flags & CONTACT_FLAG_FIT_VALID) && std::isfinite(um);
     outcomes[i] = {fitted ? um : std::numeric_limits<double>::infinity(),
                    std::hypot(result.x_mm - c.press.x_mm, result.y_mm - c.press.y_mm), result.flags,
@@ -259,18 +257,17 @@ std::vector<Outcome> run(const fitting::Kernel &kernel, const fit_array &array,
 }
 
 void print_header() {
-  std::printf("%-12s %-18s set  obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel",
-              "variant", "presses", "p50_um", "p99_um", "p99.9_um", "worst_um", ">10um", ">100um",
-              "tru50_mm", "tru99_mm", "bad!flag", "good&fl");
+  std::printf("%-12s %-18s set  obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel", "variant", "presses",
+              "p50_um", "p99_um", "p99.9_um", "worst_um", ">10um", ">100um", "tru50_mm", "tru99_mm", "bad!flag",
+              "good&fl");
 }
 
 void print(const Row &row) {
   std::printf("%-12s %-18s %-4s %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
               "%7.3f%%\n",
-              row.kernel.c_str(), row.variant.c_str(), row.set.c_str(),
-              row.observable ? "yes" : " no", row.presses, row.p50_um, row.p99_um, row.p999_um,
-              row.worst_um, row.above_10um, row.above_100um, row.truth_p50_mm, row.truth_p99_mm,
-              100.0 * row.bad_unflagged, 100.0 * row.good_flagged);
+              row.kernel.c_str(), row.variant.c_str(), row.set.c_str(), row.observable ? "yes" : " no", row.presses,
+              row.p50_um, row.p99_um, row.p999_um, row.worst_um, row.above_10um, row.above_100um, row.truth_p50_mm,
+              row.truth_p99_mm, 100.0 * row.bad_unflagged, 100.0 * row.good_flagged);
   std::fflush(stdout);
 }
 
@@ -295,9 +292,8 @@ void write_rows(const std::vector<Row> &rows, const Options &options) {
                     {"bad_unflagged", r.bad_unflagged},
                     {"good_flagged", r.good_flagged}});
   }
-  fitting::write_json(
-      options.out + "/fit_error.json",
-      {{"seed", options.seed}, {"presses", options.limit}, {"rows", std::move(list)}});
+  fitting::write_json(options.out + "/fit_error.json",
+                      {{"seed", options.seed}, {"presses", options.limit}, {"rows", std::move(list)}});
 }
 
 // {"variants": [{"kernel": .., "variant": .., settings}], "presses": {mask: [press]}}
@@ -322,8 +318,7 @@ void write_jobs(const Options &options) {
   for (Mask mask : reference::ALL_MASKS) {
     auto &of_mask = presses[reference::name_of(mask)];
     for (PressSet set : reference::ALL_PRESS_SETS) {
-      const std::size_t count =
-          std::max<std::size_t>(1, presses_of(set, Mask::none, options.limit) / SHARE);
+      const std::size_t count = std::max<std::size_t>(1, presses_of(set, Mask::none, options.limit) / SHARE);
       for (const Case &c : reference::load_cases(set, mask, options.seed, count, options.cache)) {
         of_mask.push_back({{"set", std::string(1, reference::name_of(set))},
                            {"observable", c.observable},
@@ -335,8 +330,7 @@ void write_jobs(const Options &options) {
       }
     }
   }
-  fitting::write_json(options.jobs,
-                      {{"variants", std::move(variants)}, {"presses", std::move(presses)}});
+  fitting::write_json(options.jobs, {{"variants", std::move(variants)}, {"presses", std::move(presses)}});
 }
 
 int report(const Options &options) {
@@ -350,8 +344,7 @@ int report(const Options &options) {
   const auto cases_of = [&](PressSet set, Mask mask) -> const std::vector<Case> & {
     auto &cases = loaded[{set, mask}];
     if (cases.empty()) {
-      cases = reference::load_cases(set, mask, options.seed, presses_of(set, mask, options.limit),
-                                    options.cache);
+      cases = reference::load_cases(set, mask, options.seed, presses_of(set, mask, options.limit), options.cache);
     }
     return cases;
   };

@@ -40,14 +40,13 @@ namespace fitting = fingertip::fitting;
 namespace reference = fingertip::reference;
 using reference::Random;
 
-constexpr char HELP[] =
-    "usage: fit_stiff [--limit N] [--seed S] [--case TEXT] [--out DIR] [--check]\n"
-    "  --limit N    presses of each case, 8000 by default\n"
-    "  --seed S     of the presses\n"
-    "  --case TEXT  only cases whose name holds it\n"
-    "  --out DIR    where stiff.json goes, build/.../report by default\n"
-    "  --check      exit status 1 if a result is not finite, or if more than 1.3 % of a case are\n"
-    "               bad and carry no warning (6 % where a prior is wrong)\n";
+constexpr char HELP[] = "usage: fit_stiff [--limit N] [--seed S] [--case TEXT] [--out DIR] [--check]\n"
+                        "  --limit N    presses of each case, 8000 by default\n"
+                        "  --seed S     of the presses\n"
+                        "  --case TEXT  only cases whose name holds it\n"
+                        "  --out DIR    where stiff.json goes, build/.../report by default\n"
+                        "  --check      exit status 1 if a result is not finite, or if more than 1.3 % of a case are\n"
+                        "               bad and carry no warning (6 % where a prior is wrong)\n";
 
 constexpr double ATMOSPHERE_Pa = 101325.0;
 constexpr double NOISE_Pa = 5.0;
@@ -58,8 +57,7 @@ constexpr double BAD_UNFLAGGED_MAX = 0.013;
 constexpr double BAD_UNFLAGGED_MAX_WRONG_PRIOR = 0.06;
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint32_t WARNINGS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT |
-                                   CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL |
-                                   CONTACT_FLAG_FORCE_LOWER_BOUND;
+                                   CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FORCE_LOWER_BOUND;
 
 struct Flag {
   const char *name;
@@ -112,8 +110,7 @@ struct Row {
   double bad_unflagged = 0, good_flagged = 0, bad_unflagged_max = BAD_UNFLAGGED_MAX;
 };
 
-std::vector<double> gaussian(const reference::Array &array, double x_mm, double y_mm,
-                             double sigma_mm, double p0_Pa) {
+std::vector<double> gaussian(const reference::Array &array, double x_mm, double y_mm, double sigma_mm, double p0_Pa) {
   std::vector<double> pressure_Pa;
   for (std::size_t k = 0; k < array.x_mm.size(); k++) {
     const double dx = array.x_mm[k] - x_mm, dy = array.y_mm[k] - y_mm;
@@ -146,8 +143,8 @@ double draw_from(Random &random, Range range) {
 }
 
 // A Gaussian at (x, y), without noise.
-Press gaussian_at(const reference::Array &array, Random &random, double x_mm, double y_mm,
-                  Range sigma_mm, Range p0_Pa) {
+Press gaussian_at(const reference::Array &array, Random &random, double x_mm, double y_mm, Range sigma_mm,
+                  Range p0_Pa) {
   Press press;
   press.x_mm = x_mm;
   press.y_mm = y_mm;
@@ -400,14 +397,12 @@ std::vector<Case> all_cases() {
       {"layer 12 mm", from_set(reference::PressSet::C, 0)},
       {"layer 6 mm", from_set(reference::PressSet::D, 0)},
       {"layer 6 mm, prior 3.2", from_set(reference::PressSet::D, 3.2)},
-      {"layer 6 mm, prior 3.8", from_set(reference::PressSet::D, 3.8), false,
-       BAD_UNFLAGGED_MAX_WRONG_PRIOR},
+      {"layer 6 mm, prior 3.8", from_set(reference::PressSet::D, 3.8), false, BAD_UNFLAGGED_MAX_WRONG_PRIOR},
   };
 }
 
 std::int32_t saturated_q10(double pressure_Pa) {
-  return static_cast<std::int32_t>(
-      std::clamp(std::round(1024.0 * pressure_Pa), -2147483648.0, 2147483647.0));
+  return static_cast<std::int32_t>(std::clamp(std::round(1024.0 * pressure_Pa), -2147483648.0, 2147483647.0));
 }
 
 struct Chain {
@@ -473,20 +468,19 @@ struct Chain {
     input.saturated = taken.saturated;
     input.fit = readings.contact ? &fit : nullptr;
     slip_history history{};
-    const contact_settings slip{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, 1.0f,
-                                0.0f};
+    const contact_settings slip{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, 1.0f, 0.0f};
     contact_result said;
     contact_update(&history, &slip, &input, &said);
 
     Result result{NOT_A_NUMBER, said.flags, press.located, true};
-    for (float value : {fit.x_mm, fit.y_mm, fit.p0_Pa, fit.sigma_mm, fit.force_N,
-                        fit.residual_rms_Pa, fit.location_sd_mm, fit.location_noise_mm,
-                        fit.force_sd_N, fit.sigma_x_mm, fit.sigma_y_mm, fit.width_correlation}) {
+    for (float value :
+         {fit.x_mm, fit.y_mm, fit.p0_Pa, fit.sigma_mm, fit.force_N, fit.residual_rms_Pa, fit.location_sd_mm,
+          fit.location_noise_mm, fit.force_sd_N, fit.sigma_x_mm, fit.sigma_y_mm, fit.width_correlation}) {
       result.finite = result.finite && std::isfinite(value);
     }
     if ((said.flags & CONTACT_FLAG_FIT_VALID) && press.located) {
-      result.error_mm = std::hypot(static_cast<double>(fit.x_mm) - press.x_mm,
-                                   static_cast<double>(fit.y_mm) - press.y_mm);
+      result.error_mm =
+          std::hypot(static_cast<double>(fit.x_mm) - press.x_mm, static_cast<double>(fit.y_mm) - press.y_mm);
     }
     return result;
   }
@@ -505,9 +499,8 @@ reference::Array doubled(const reference::Array &array) {
 }
 
 double quantile(const std::vector<double> &sorted, double share) {
-  return sorted.empty()
-             ? NOT_A_NUMBER
-             : sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+  return sorted.empty() ? NOT_A_NUMBER
+                        : sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
 Row summarise(const std::string &name, const std::vector<Result> &results) {
@@ -561,10 +554,9 @@ void write_json(const std::string &path, const std::vector<Row> &rows, std::uint
   auto cases = nlohmann::ordered_json::array();
   for (const Row &r : rows) {
     worst = std::max(worst, r.bad_unflagged_max > BAD_UNFLAGGED_MAX ? 0.0 : r.bad_unflagged);
-    nlohmann::ordered_json row{{"case", r.name},        {"presses", r.presses},
-                               {"fits", r.fits},        {"not_finite", r.not_finite},
-                               {"p50_mm", r.p50_mm},    {"p95_mm", r.p95_mm},
-                               {"worst_mm", r.worst_mm}};
+    nlohmann::ordered_json row{
+        {"case", r.name},     {"presses", r.presses}, {"fits", r.fits},        {"not_finite", r.not_finite},
+        {"p50_mm", r.p50_mm}, {"p95_mm", r.p95_mm},   {"worst_mm", r.worst_mm}};
     for (std::size_t i = 0; i < FLAG_COUNT; i++) {
       row[FLAGS[i].name] = r.share[i];
     }
@@ -572,8 +564,7 @@ void write_json(const std::string &path, const std::vector<Row> &rows, std::uint
     row["good_flagged"] = r.good_flagged;
     cases.push_back(std::move(row));
   }
-  fingertip::fitting::write_json(
-      path, {{"seed", seed}, {"bad_unflagged_worst", worst}, {"cases", std::move(cases)}});
+  fingertip::fitting::write_json(path, {{"seed", seed}, {"bad_unflagged_worst", worst}, {"cases", std::move(cases)}});
 }
 
 struct Options {
@@ -621,8 +612,8 @@ int run(const Options &options) {
       failed = 1;
     }
     if (row.bad_unflagged > row.bad_unflagged_max) {
-      std::printf("%s: %.2f %% are bad and carry no warning, at most %.1f %% may\n",
-                  row.name.c_str(), 100.0 * row.bad_unflagged, 100.0 * row.bad_unflagged_max);
+      std::printf("%s: %.2f %% are bad and carry no warning, at most %.1f %% may\n", row.name.c_str(),
+                  100.0 * row.bad_unflagged, 100.0 * row.bad_unflagged_max);
       failed = 1;
     }
   }

@@ -4,10 +4,10 @@
 #include "report/fit/separable.hpp"
 
 extern "C" {
-#include "fit/kernels.h"
 #include "alternatives/alternatives.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
+#include "fit/kernels.h"
 }
 #include "common/contact_flags.h"
 
@@ -18,8 +18,8 @@ extern "C" {
 namespace fingertip::fitting {
 namespace {
 
-std::uint32_t largest_readings(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                               std::uint32_t usable, int n) {
+std::uint32_t largest_readings(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                               int n) {
   std::vector<int> sensors;
   for (int k = 0; k < array.sensor_count; k++) {
     if (usable >> k & 1u) {
@@ -68,8 +68,8 @@ KernelResult fit(const fit_array &array, const std::int32_t *pressure_Pa_q10, st
 }
 
 // Of a row of fit/kernels.h.
-#define SUITS(suits)                                                                               \
-  []([[maybe_unused]] const fit_array *array, [[maybe_unused]] const fit_settings *settings,       \
+#define SUITS(suits)                                                                                                   \
+  []([[maybe_unused]] const fit_array *array, [[maybe_unused]] const fit_settings *settings,                           \
      [[maybe_unused]] std::uint32_t usable, [[maybe_unused]] std::uint32_t all) { return suits; }
 template <class SUITS> unsigned takes_a_subset(SUITS suits) {
   const fit_array array{};
@@ -78,31 +78,29 @@ template <class SUITS> unsigned takes_a_subset(SUITS suits) {
 }
 
 // One for each row.
-#define OF_THE_FIRMWARE(name, suits, fits)                                                         \
-  KernelResult name(const fit_array &of, const std::int32_t *pressure_Pa_q10,                       \
-                    [[maybe_unused]] std::uint32_t usable, const KernelSettings &chosen) {          \
-    const fit_array *array = &of;                                                                   \
-    const fit_settings chip = chip_settings(chosen), *settings = &chip;                             \
-    fit_result found, *result = &found;                                                             \
-    fits;                                                                                           \
-    return widened(found);                                                                          \
+#define OF_THE_FIRMWARE(name, suits, fits)                                                                             \
+  KernelResult name(const fit_array &of, const std::int32_t *pressure_Pa_q10, [[maybe_unused]] std::uint32_t usable,   \
+                    const KernelSettings &chosen) {                                                                    \
+    const fit_array *array = &of;                                                                                      \
+    const fit_settings chip = chip_settings(chosen), *settings = &chip;                                                \
+    fit_result found, *result = &found;                                                                                \
+    fits;                                                                                                              \
+    return widened(found);                                                                                             \
   }
 FIT_GRID_KERNELS(OF_THE_FIRMWARE)
 FIT_OTHER_KERNELS(OF_THE_FIRMWARE)
 
-KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                       std::uint32_t usable, const KernelSettings &settings) {
-  return double_kernel(array, pressure_Pa_q10,
-                       largest_readings(array, pressure_Pa_q10, usable, settings.n_largest),
+KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                       const KernelSettings &settings) {
+  return double_kernel(array, pressure_Pa_q10, largest_readings(array, pressure_Pa_q10, usable, settings.n_largest),
                        settings);
 }
 
 // Neither judges itself, so the only flag is whether it came to anything.
 template <auto SOLVE>
-KernelResult alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                         std::uint32_t usable, const KernelSettings &settings) {
-  const alternative_settings chosen{settings.iterations,
-                                    static_cast<alternative_guess>(settings.guess)};
+KernelResult alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                         const KernelSettings &settings) {
+  const alternative_settings chosen{settings.iterations, static_cast<alternative_guess>(settings.guess)};
   const auto found = SOLVE(&array, pressure_Pa_q10, usable, &chosen);
   KernelResult result{};
   result.x_mm = static_cast<double>(found.x_mm);
@@ -129,8 +127,7 @@ const std::vector<Kernel> &all_kernels() {
 #define GRID_ROW(name, suits, fits) {#name, takes_a_subset(SUITS(suits)) | PRIOR, name},
       FIT_GRID_KERNELS(GRID_ROW)
 #define OTHER_ROW(name, suits, fits) {#name, ANY_SUBSET | N_LARGEST | PRIOR, name},
-      FIT_OTHER_KERNELS(OTHER_ROW)
-      {"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
+          FIT_OTHER_KERNELS(OTHER_ROW){"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
       {"separable", 0, separable},
       {"naive_float", ANY_SUBSET | GUESSES, alternative<alternative_naive_float>},
       {"naive_double", ANY_SUBSET | GUESSES, alternative<alternative_naive_double>},
@@ -142,8 +139,7 @@ const std::vector<Kernel> &all_kernels() {
 
 fit_array firmware_fit_array() {
   fit_array array;
-  if (fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK) {
+  if (fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
     throw std::runtime_error("fit_array_init refuses the geometry of firmware/config/geometry.c");
   }
   return array;

@@ -47,8 +47,8 @@ enum Capability : unsigned {
 struct Kernel {
   const char *name;
   unsigned capabilities;
-  KernelResult (*fit)(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                      std::uint32_t usable, const KernelSettings &settings);
+  KernelResult (*fit)(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                      const KernelSettings &settings);
 };
 
 // fit      fit_gaussian, as the firmware calls it: it picks the kernel and masks outliers

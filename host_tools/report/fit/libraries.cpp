@@ -19,8 +19,7 @@ constexpr int SENSORS = 15;
 constexpr int MAX_ITERATIONS = 50;
 
 // residual[k] = model - reading; row k of the Jacobian goes to jacobian[k * row + j * column].
-void evaluate(const Samples &samples, const double *theta, double *residual, double *jacobian,
-              int row, int column) {
+void evaluate(const Samples &samples, const double *theta, double *residual, double *jacobian, int row, int column) {
   const double inverse_variance = 1.0 / (theta[3] * theta[3]);
   for (int k = 0; k < SENSORS; k++) {
     const auto s = static_cast<std::size_t>(k);
@@ -69,8 +68,7 @@ KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, s
 class CeresResiduals final : public ceres::SizedCostFunction<SENSORS, 4> {
 public:
   explicit CeresResiduals(const Samples *samples) : samples_(samples) {}
-  bool Evaluate(double const *const *parameters, double *residuals,
-                double **jacobians) const override {
+  bool Evaluate(double const *const *parameters, double *residuals, double **jacobians) const override {
     evaluate(*samples_, parameters[0], residuals, jacobians ? jacobians[0] : nullptr, 4, 1);
     return true;
   }
@@ -162,8 +160,8 @@ void tiny_tight(const Samples &samples, double theta[4]) {
   solve_tiny(&solver, samples, theta);
 }
 
-int cminpack_function(void *context, int, int, const double *theta, double *residuals,
-                      double *jacobian, int stride, int what) {
+int cminpack_function(void *context, int, int, const double *theta, double *residuals, double *jacobian, int stride,
+                      int what) {
   const auto &samples = *static_cast<const Samples *>(context);
   if (what == 1) {
     evaluate(samples, theta, residuals, nullptr, 0, 0);
@@ -178,8 +176,8 @@ void cminpack(const Samples &samples, double theta[4]) {
   int pivots[4];
   Samples context = samples;
   const double tolerance = std::sqrt(std::numeric_limits<double>::epsilon());
-  lmder1(cminpack_function, &context, SENSORS, 4, theta, residuals, jacobian, SENSORS, tolerance,
-         pivots, work, 5 * 4 + SENSORS);
+  lmder1(cminpack_function, &context, SENSORS, 4, theta, residuals, jacobian, SENSORS, tolerance, pivots, work,
+         5 * 4 + SENSORS);
 }
 
 int gsl_residuals(const gsl_vector *theta, void *context, gsl_vector *residuals) {
@@ -197,8 +195,7 @@ void gsl(const Samples &samples, double theta[4]) {
   struct Free {
     void operator()(gsl_multifit_nlinear_workspace *w) const { gsl_multifit_nlinear_free(w); }
   };
-  static const gsl_multifit_nlinear_parameters parameters =
-      gsl_multifit_nlinear_default_parameters();
+  static const gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters();
   static const std::unique_ptr<gsl_multifit_nlinear_workspace, Free> workspace(
       gsl_multifit_nlinear_alloc(gsl_multifit_nlinear_trust, &parameters, SENSORS, 4));
   Samples context = samples;
@@ -211,8 +208,7 @@ void gsl(const Samples &samples, double theta[4]) {
   const gsl_vector_const_view start = gsl_vector_const_view_array(theta, 4);
   gsl_multifit_nlinear_init(&start.vector, &system, workspace.get());
   int info = 0;
-  gsl_multifit_nlinear_driver(MAX_ITERATIONS, 1e-8, 1e-8, 0.0, nullptr, nullptr, &info,
-                              workspace.get());
+  gsl_multifit_nlinear_driver(MAX_ITERATIONS, 1e-8, 1e-8, 0.0, nullptr, nullptr, &info, workspace.get());
   const gsl_vector *x = gsl_multifit_nlinear_position(workspace.get());
   for (std::size_t i = 0; i < 4; i++) {
     theta[i] = gsl_vector_get(x, i);

@@ -62,8 +62,7 @@ inline float rough_log(float x) {
   float mantissa;
   std::memcpy(&mantissa, &bits, sizeof mantissa);
   const float f = mantissa - 1.0F;
-  const float series =
-      1.0000072F + f * (-0.49927367F + f * (0.33219161F + f * (-0.2753717F + f * 0.22646900F)));
+  const float series = 1.0000072F + f * (-0.49927367F + f * (0.33219161F + f * (-0.2753717F + f * 0.22646900F)));
   return static_cast<float>(exponent) * 0.6931472F + f * series;
 }
 
@@ -169,9 +168,9 @@ State guess(const Readings &p, int peak_column, int peak_row) {
   }
   const Parabola<COLUMNS> x(along_x, FIRST_COLUMN);
   const Parabola<ROWS> y(along_y, FIRST_ROW);
-  const double height = std::clamp((GUESS_WEIGHT * GUESS_HEIGHT - x.curvature - y.curvature) /
-                                       (x.axis.n2 + y.axis.n2 + GUESS_WEIGHT),
-                                   GUESS_HEIGHT_MIN, GUESS_HEIGHT_MAX);
+  const double height =
+      std::clamp((GUESS_WEIGHT * GUESS_HEIGHT - x.curvature - y.curvature) / (x.axis.n2 + y.axis.n2 + GUESS_WEIGHT),
+                 GUESS_HEIGHT_MIN, GUESS_HEIGHT_MAX);
   const double half = 0.5 / height;
   return {within(x.axis.kappa * 0.5 + x.linear * half, FIRST_COLUMN, COLUMNS, 1.0),
           within(y.axis.kappa * 0.5 + y.linear * half, FIRST_ROW, ROWS, 1.0), height, 1.0};
@@ -211,15 +210,15 @@ bool step(const Readings &p, bool last, State *state) {
   const double ratio = gain * b3 / (x.n2 * y.n0 + x.n0 * y.n2); // of the change of sigma to sigma
   const double dx = c1 - ratio * (x.kappa - 2.0 * state->x);
   const double dy = c2 - ratio * (y.kappa - 2.0 * state->y);
-  const double excess = std::max(std::max(std::abs(dx), std::abs(dy)) * (1.0 / MOVE_LIMIT),
-                                 std::abs(ratio) * (1.0 / WIDEN_LIMIT));
+  const double excess =
+      std::max(std::max(std::abs(dx), std::abs(dy)) * (1.0 / MOVE_LIMIT), std::abs(ratio) * (1.0 / WIDEN_LIMIT));
   const double share = excess > 1.0 ? 1.0 / excess : 1.0;
   last = last || excess < SETTLED;
   if (last) {
     const double at_x = state->x - x.mean, at_y = state->y - y.mean;
-    const double change = c1 * at_x + c2 * at_y +
-                          ratio * (at_x * (state->x + x.mean - x.kappa) - x.variance +
-                                   at_y * (state->y + y.mean - y.kappa) - y.variance);
+    const double change =
+        c1 * at_x + c2 * at_y +
+        ratio * (at_x * (state->x + x.mean - x.kappa) - x.variance + at_y * (state->y + y.mean - y.kappa) - y.variance);
     const double rise = state->height * (state->x * state->x + state->y * state->y);
     state->p0 = peak * std::exp(rise) * (1.0 + 2.0 * state->height * share * change);
   }
@@ -232,8 +231,8 @@ bool step(const Readings &p, bool last, State *state) {
 
 } // namespace
 
-KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                       std::uint32_t usable, const KernelSettings &settings) {
+KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                       const KernelSettings &settings) {
   KernelResult result{};
   const fit_grid_shape &grid = array.grid;
   if (grid.columns != COLUMNS || grid.rows != ROWS) {

@@ -13,7 +13,7 @@
 namespace fingertip::fitting {
 
 // No flag but FIT_VALID, and none without a positive reading or a rectangle of the build's size.
-KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                       std::uint32_t usable, const KernelSettings &settings);
+KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                       const KernelSettings &settings);
 
 } // namespace fingertip::fitting

@@ -26,8 +26,7 @@ constexpr Thing THINGS[] = {{"paper cup", "sphere18", 0.05, 0.6, 5.0, 5.0, 4.0},
                             {"ball", "sphere24", 0.25, 0.5, UNLIMITED, UNLIMITED, 10.0}};
 
 enum Fingers { NONE = 0, LEFT = 1, BOTH = 3 };
-constexpr std::uint32_t LEFT_STALE = GRIP_FINGER_0_STALE,
-                        STALE = GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE;
+constexpr std::uint32_t LEFT_STALE = GRIP_FINGER_0_STALE, STALE = GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE;
 constexpr std::uint32_t FROZEN = GRIP_FINGER_0_FROZEN | GRIP_FINGER_1_FROZEN;
 constexpr std::uint32_t FORCE_ONLY = GRIP_FINGER_0_FORCE_ONLY | GRIP_FINGER_1_FORCE_ONLY;
 constexpr std::uint32_t OVER = GRIP_FINGER_0_OVER | GRIP_FINGER_1_OVER;
@@ -68,14 +67,13 @@ struct When {
   std::uint8_t state;
   double after_s, watched_s;
 };
-constexpr When STATES[] = {
-    {"activate", GRIP_ACTIVATING, 0.3, 7.0}, {"approach", GRIP_APPROACH, 0.05, 3.0},
-    {"squeeze", GRIP_SQUEEZE, 0.02, 2.5},    {"ready", GRIP_READY, 0.02, 2.5},
-    {"holding", GRIP_HOLDING, 0.8, 2.0},     {"slipping", GRIP_SLIPPING, 0.0, 2.0},
-    {"still", GRIP_STILL, 0.05, 2.0},        {"release", GRIP_RELEASE, 0.02, 2.0}};
+constexpr When STATES[] = {{"activate", GRIP_ACTIVATING, 0.3, 7.0}, {"approach", GRIP_APPROACH, 0.05, 3.0},
+                           {"squeeze", GRIP_SQUEEZE, 0.02, 2.5},    {"ready", GRIP_READY, 0.02, 2.5},
+                           {"holding", GRIP_HOLDING, 0.8, 2.0},     {"slipping", GRIP_SLIPPING, 0.0, 2.0},
+                           {"still", GRIP_STILL, 0.05, 2.0},        {"release", GRIP_RELEASE, 0.02, 2.0}};
 
-Trial trial_of(const Thing &thing, const std::string &gripper, const When &when,
-               const Happening &happening, std::uint64_t n) {
+Trial trial_of(const Thing &thing, const std::string &gripper, const When &when, const Happening &happening,
+               std::uint64_t n) {
   Trial trial;
   trial.gripper = gripper_mechanics(gripper);
   Scene &scene = trial.scene;
@@ -194,10 +192,8 @@ FaultOutcome FaultRunner::run(const FaultTrial &one) const {
   done.opened = failed.opened_mm > one.opens_mm;
   done.beyond_cap = done.outcome.peak_N > one.cap_N;
   const auto ends = std::find(one.ends_in.begin(), one.ends_in.end(), failed.state);
-  done.unsaid = (!one.ends_in.empty() && ends == one.ends_in.end()) ||
-                failed.gripper_fault != one.gripper_fault ||
-                (failed.trouble & one.all_of) != one.all_of ||
-                (one.any_of != 0 && (failed.trouble & one.any_of) == 0);
+  done.unsaid = (!one.ends_in.empty() && ends == one.ends_in.end()) || failed.gripper_fault != one.gripper_fault ||
+                (failed.trouble & one.all_of) != one.all_of || (one.any_of != 0 && (failed.trouble & one.any_of) == 0);
   return done;
 }
 

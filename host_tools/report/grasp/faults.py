@@ -1,4 +1,5 @@
 """Every fault in every state of a grasp: what fingertip_grasp_faults found, for grasp.json and grasp.md."""
+
 import json
 import pathlib
 
@@ -33,10 +34,21 @@ def table_of(rows):
     groups = {}
     for row in rows:
         groups.setdefault((row["fault"], row["state"], row["untold"]), []).append(row)
-    return [{"fault": fault, "state": state, "untold": untold, "grasps": len(group), "said": joined(group, "said"), "ends": joined(group, "ends"),
-             "opened_mm": max(row["opened_mm"] for row in group), "peak_N": max(row["peak_N"] for row in group),
-             "of_cap": max(row["peak_N"] / row["cap_N"] for row in group), "crushed": sum(row["crushed"] for row in group)}
-            for (fault, state, untold), group in groups.items()]
+    return [
+        {
+            "fault": fault,
+            "state": state,
+            "untold": untold,
+            "grasps": len(group),
+            "said": joined(group, "said"),
+            "ends": joined(group, "ends"),
+            "opened_mm": max(row["opened_mm"] for row in group),
+            "peak_N": max(row["peak_N"] for row in group),
+            "of_cap": max(row["peak_N"] / row["cap_N"] for row in group),
+            "crushed": sum(row["crushed"] for row in group),
+        }
+        for (fault, state, untold), group in groups.items()
+    ]
 
 
 def measure(build, cache):
@@ -45,13 +57,28 @@ def measure(build, cache):
     if never:
         raise InputError(f"{never[0]['fault']} never began in {never[0]['state']}: the grasp came not so far")
     told = [row for row in rows if not row["untold"]]
-    return {"faults": table_of(rows), "faults_grasps": len(rows), "faults_opened": sum(row["opened"] for row in told),
-            "faults_beyond_cap": sum(row["beyond_cap"] for row in told), "faults_unsaid": sum(row["unsaid"] for row in told),
-            "cups_crushed": sum(row["crushed"] for row in told)}
+    return {
+        "faults": table_of(rows),
+        "faults_grasps": len(rows),
+        "faults_opened": sum(row["opened"] for row in told),
+        "faults_beyond_cap": sum(row["beyond_cap"] for row in told),
+        "faults_unsaid": sum(row["unsaid"] for row in told),
+        "cups_crushed": sum(row["crushed"] for row in told),
+    }
 
 
 def text(found):
-    cells = [[row["fault"] + (" (not counted)" if row["untold"] else ""), row["state"], " ".join(row["said"]).replace("_", " ") or "nothing",
-              " ".join(row["ends"]), f"{row['opened_mm']:.2f}", f"{row['peak_N']:.1f}", f"{row['of_cap']:.2f}", str(row["crushed"])]
-             for row in found["faults"]]
+    cells = [
+        [
+            row["fault"] + (" (not counted)" if row["untold"] else ""),
+            row["state"],
+            " ".join(row["said"]).replace("_", " ") or "nothing",
+            " ".join(row["ends"]),
+            f"{row['opened_mm']:.2f}",
+            f"{row['peak_N']:.1f}",
+            f"{row['of_cap']:.2f}",
+            str(row["crushed"]),
+        ]
+        for row in found["faults"]
+    ]
     return [*ABOUT.split("\n"), "", *UNTOLD.split("\n"), "", *table_md(list(COLUMNS), cells), ""]

@@ -18,13 +18,11 @@ inline nlohmann::ordered_json quantile(std::vector<double> values, double share)
   }
   std::sort(values.begin(), values.end());
   const double value = values[static_cast<std::size_t>(share * (double(values.size()) - 1.0))];
-  return std::isfinite(value) ? nlohmann::ordered_json(rounded(value))
-                              : nlohmann::ordered_json(nullptr);
+  return std::isfinite(value) ? nlohmann::ordered_json(rounded(value)) : nlohmann::ordered_json(nullptr);
 }
 
 inline nlohmann::ordered_json percent(double part, double whole) {
-  return whole > 0.0 ? nlohmann::ordered_json(rounded(100.0 * part / whole))
-                     : nlohmann::ordered_json(nullptr);
+  return whole > 0.0 ? nlohmann::ordered_json(rounded(100.0 * part / whole)) : nlohmann::ordered_json(nullptr);
 }
 
 } // namespace fingertip::grasp

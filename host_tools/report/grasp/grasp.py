@@ -11,6 +11,7 @@ The controller is the tool's own and the fingertips' code the firmware's; rubber
 whose headers say what is assumed). The controller's constants were chosen with other seeds (--seed refuses them) and
 other pads. What is judged are grasps of all kinds in a world that disagrees with the controller (kinds.py). In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
 """
+
 import json
 import pathlib
 import sys
@@ -31,8 +32,12 @@ SEED = 27001  # seen by no choice of a constant
 CHOSE = (5001, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101, 18001, 18101)  # and all below 1000
 # In the twin's cell: a set force of 8 to 15 N is there within so long, and held so well.
 LIMITS = {"settle_s": 1.2, "hold_rms_percent": 5}
-GOALS = kinds.GOALS + tuple((f"{name}_{called}", "<=", limit) for name, limit in LIMITS.items() for called in kinds.CALLED.values()) + (
-    ("limit_cycles", "<=", 0), ("emulated_reaction_ms", "<=", 60)) + faults.GOALS
+GOALS = (
+    kinds.GOALS
+    + tuple((f"{name}_{called}", "<=", limit) for name, limit in LIMITS.items() for called in kinds.CALLED.values())
+    + (("limit_cycles", "<=", 0), ("emulated_reaction_ms", "<=", 60))
+    + faults.GOALS
+)
 # set: what it is, its options; all are of each gripper
 SETS = {
     "hold": ("round objects at 410 frames a second", ()),
@@ -87,8 +92,13 @@ def quantiles(values):
 def caught(each):
     """Number of a grasp and when its slip began: of all slips by disturbances of 1 mm or more that were answered within 0.1 s, the one of the
     median way."""
-    slips = sorted((slip["way_mm"], grasp["n"], slip["begin_s"]) for grasp in each if not grasp["dropped"] for slip in grasp["slips"]
-                   if slip["way_mm"] >= 1 and slip["begin_s"] > grasp["lift_s"] and slip["reaction_ms"] is not None and slip["reaction_ms"] < 100)
+    slips = sorted(
+        (slip["way_mm"], grasp["n"], slip["begin_s"])
+        for grasp in each
+        if not grasp["dropped"]
+        for slip in grasp["slips"]
+        if slip["way_mm"] >= 1 and slip["begin_s"] > grasp["lift_s"] and slip["reaction_ms"] is not None and slip["reaction_ms"] < 100
+    )
     _, number, begin_s = slips[len(slips) // 2] if slips else (0, None, None)
     return number, begin_s
 
@@ -96,8 +106,16 @@ def caught(each):
 def row_of(name, gripper, options):
     about, more = SETS[name]
     found = trials(options, gripper, (*more, "--count", count_of(name, options), *(("--each",) if name == "hold" else ())))
-    row = {"set": name, "gripper": gripper, "about": about, **{key: value for key, value in found.items() if not isinstance(value, (dict, list))
-                                                               and key not in ("mode", "objects", "seed", "effect", "prepared_s", "ran_s")}}
+    row = {
+        "set": name,
+        "gripper": gripper,
+        "about": about,
+        **{
+            key: value
+            for key, value in found.items()
+            if not isinstance(value, (dict, list)) and key not in ("mode", "objects", "seed", "effect", "prepared_s", "ran_s")
+        },
+    }
     row["set"] = name
     return row, found
 
@@ -120,16 +138,23 @@ def measure(options):
                     found |= {f"settle_s_{called}": firm.get("settle_p50_s"), f"hold_rms_percent_{called}": firm.get("rms_p50_percent")}
                 else:
                     found[f"hold_rms_possible_percent_{called}"] = firm.get("rms_p50_percent")
-                found.setdefault("by_set", []).extend({"gripper": gripper, "about": BY_SET[name], "set_force": key, **value}
-                                                      for key, value in all_of_it["by_set"].items())
+                found.setdefault("by_set", []).extend(
+                    {"gripper": gripper, "about": BY_SET[name], "set_force": key, **value} for key, value in all_of_it["by_set"].items()
+                )
             if name == "hold":
                 each = all_of_it["each"]
                 for group in ("by_object", "by_friction", "by_mass", "by_disturbance"):
-                    found.setdefault(group, []).extend({"gripper": gripper, group[3:]: key, **value} for key, value in all_of_it[group].items())
-                found.setdefault("distributions", []).append({
-                    "gripper": gripper, "margin": quantiles([one["margin"] for one in each if not one["dropped"]]),
-                    "slid_mm": quantiles([one["slid_mm"] for one in each if not one["dropped"]]),
-                    "reaction_ms": quantiles([slip["reaction_ms"] for one in each for slip in one["slips"]])})
+                    found.setdefault(group, []).extend(
+                        {"gripper": gripper, group[3:]: key, **value} for key, value in all_of_it[group].items()
+                    )
+                found.setdefault("distributions", []).append(
+                    {
+                        "gripper": gripper,
+                        "margin": quantiles([one["margin"] for one in each if not one["dropped"]]),
+                        "slid_mm": quantiles([one["slid_mm"] for one in each if not one["dropped"]]),
+                        "reaction_ms": quantiles([slip["reaction_ms"] for one in each for slip in one["slips"]]),
+                    }
+                )
                 number, begin_s = caught(each)
                 if "caught" not in found and number is not None:
                     found["caught"] = {"gripper": gripper, "begin_s": begin_s, **trials(options, gripper, ("--trace", number))}

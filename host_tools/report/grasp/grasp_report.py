@@ -1,4 +1,5 @@
 """What grasp.py measured as text and as a picture."""
+
 import bisect
 
 import emulated_grasp
@@ -11,14 +12,41 @@ from kinds import GRIPPERS
 from tables import table_md, text_of
 
 # key: what its column is called
-COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction": "friction", "mass": "mass", "disturbance": "disturbance", "grasps": "grasps",
-           "drops_percent": "dropped, %", "margin_p50": "grip over least grip: p50", "margin_p5": "p5", "margin_p95": "p95",
-           "force_told_p50": "force told over true", "force_taken_p50": "taken for over true", "slips": "slips", "unanswered": "never answered", "reaction_p50_ms": "slip to 5 % more grip, ms: p50", "reaction_p95_ms": "p95 ",
-           "reaction_after_lift_p50_ms": "after the lift: p50", "slid_p95_mm": "slid, mm: p95", "disturbance_slip_p95_mm": "by disturbances: p95",
-           "peak_p95_N": "largest grip, N: p95"}
-STILL = {"gripper": "gripper", "about": "what", "set_force": "set force", "grasps": "grasps", "settle_p50_s": "settles within, s: p50", "settle_p95_s": "p95",
-         "never_settled_percent": "never, %", "rms_p50_percent": "rms error, %: p50",
-         "rms_of_steps_p50_percent": "of it by rounding to the gripper's steps", "limit_cycles": "limit cycles"}
+COLUMNS = {
+    "gripper": "gripper",
+    "about": "what",
+    "object": "object",
+    "friction": "friction",
+    "mass": "mass",
+    "disturbance": "disturbance",
+    "grasps": "grasps",
+    "drops_percent": "dropped, %",
+    "margin_p50": "grip over least grip: p50",
+    "margin_p5": "p5",
+    "margin_p95": "p95",
+    "force_told_p50": "force told over true",
+    "force_taken_p50": "taken for over true",
+    "slips": "slips",
+    "unanswered": "never answered",
+    "reaction_p50_ms": "slip to 5 % more grip, ms: p50",
+    "reaction_p95_ms": "p95 ",
+    "reaction_after_lift_p50_ms": "after the lift: p50",
+    "slid_p95_mm": "slid, mm: p95",
+    "disturbance_slip_p95_mm": "by disturbances: p95",
+    "peak_p95_N": "largest grip, N: p95",
+}
+STILL = {
+    "gripper": "gripper",
+    "about": "what",
+    "set_force": "set force",
+    "grasps": "grasps",
+    "settle_p50_s": "settles within, s: p50",
+    "settle_p95_s": "p95",
+    "never_settled_percent": "never, %",
+    "rms_p50_percent": "rms error, %: p50",
+    "rms_of_steps_p50_percent": "of it by rounding to the gripper's steps",
+    "limit_cycles": "limit cycles",
+}
 ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller is the tool's own,
 the fingertips' code the firmware's. Nothing was checked on hardware.
 
@@ -45,8 +73,27 @@ def rows_md(rows, columns):
 def write(found, path):
     moving = [row for row in found["rows"] if "drops_percent" in row]
     still = [row for row in found["rows"] if "settle_p50_s" in row]
-    lines = ["# Grasps", "", *ABOUT.split("\n"), "", "![Drops, grip, reaction, a slip that is caught](grasp.png)", "", *goal_table_md(found), "",
-             "## By kind", "", *kinds.text(found), "## In the twin's cell, by gripper, mode and rate", "", *rows_md(moving, COLUMNS), "", "## Set forces", "", *rows_md(still, STILL), ""]
+    lines = [
+        "# Grasps",
+        "",
+        *ABOUT.split("\n"),
+        "",
+        "![Drops, grip, reaction, a slip that is caught](grasp.png)",
+        "",
+        *goal_table_md(found),
+        "",
+        "## By kind",
+        "",
+        *kinds.text(found),
+        "## In the twin's cell, by gripper, mode and rate",
+        "",
+        *rows_md(moving, COLUMNS),
+        "",
+        "## Set forces",
+        "",
+        *rows_md(still, STILL),
+        "",
+    ]
     if "by_set" in found:
         lines += [*firm_of(found), "", "Of those held for 12 s, by the set force:", "", *rows_md(found["by_set"], STILL), ""]
     for name, title in PARTS.items():
@@ -60,8 +107,15 @@ def write(found, path):
 
 def firm_of(found):
     """What is asked of set forces of 8 N and more, what is possible, and what ours does."""
-    rows = [[gripper, found["goals"][f"hold_rms_percent_{called}"]["goal"], text_of(found.get(f"hold_rms_possible_percent_{called}"), 3),
-             text_of(found[f"hold_rms_percent_{called}"], 3)] for gripper, (called, _) in GRIPPERS.items()]
+    rows = [
+        [
+            gripper,
+            found["goals"][f"hold_rms_percent_{called}"]["goal"],
+            text_of(found.get(f"hold_rms_possible_percent_{called}"), 3),
+            text_of(found[f"hold_rms_percent_{called}"], 3),
+        ]
+        for gripper, (called, _) in GRIPPERS.items()
+    ]
     return [*FIRM.split("\n"), "", *table_md(("gripper", "rms error asked, %", "possible: the oracle's", "ours"), rows)]
 
 
@@ -76,7 +130,9 @@ def draw_distribution(axes, found, key, title, label, most):
     for one in found["distributions"]:
         values = one[key]
         shares = [100 * i / (len(values) - 1) for i in range(len(values))] if len(values) > 1 else []
-        axes.plot([most * 2 if value is None else value for value in values], shares, color=GRIPPERS[one["gripper"]][1], label=one["gripper"])
+        axes.plot(
+            [most * 2 if value is None else value for value in values], shares, color=GRIPPERS[one["gripper"]][1], label=one["gripper"]
+        )
     axes.set_xlim(0, most)
     axes.set_ylim(0, 100)
     axes.legend(fontsize=8, loc="lower right")
@@ -111,25 +167,46 @@ def draw_film(axes, series, at):
         axes.fill_betweenx([-18, 18], inner, outer, color="#c9ced8", lw=0)
         axes.plot([outer, outer], [-18, 18], color=INK, lw=2)
         force_N, load_N = series["force_N"][i], series["load_N"][i]
-        axes.annotate("", (inner + side * 1, -series["way_mm"][i]), (inner + side * (1 + 0.8 * force_N), -series["way_mm"][i]),
-                      arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0})
-        axes.annotate("", (side * (base_mm - 1), -series["way_mm"][i] + 2 + 3 * load_N), (side * (base_mm - 1), -series["way_mm"][i] + 2),
-                      arrowprops={"arrowstyle": "-|>", "color": ORANGE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0})
-    axes.add_patch(plt.Rectangle((-base_mm - 1, -half_mm - series["way_mm"][i]), 2 * base_mm + 2, 2 * half_mm, angle=0, color="#f3ddb8", ec=INK, lw=0.8, zorder=2))
+        axes.annotate(
+            "",
+            (inner + side * 1, -series["way_mm"][i]),
+            (inner + side * (1 + 0.8 * force_N), -series["way_mm"][i]),
+            arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0},
+        )
+        axes.annotate(
+            "",
+            (side * (base_mm - 1), -series["way_mm"][i] + 2 + 3 * load_N),
+            (side * (base_mm - 1), -series["way_mm"][i] + 2),
+            arrowprops={"arrowstyle": "-|>", "color": ORANGE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0},
+        )
+    axes.add_patch(
+        plt.Rectangle(
+            (-base_mm - 1, -half_mm - series["way_mm"][i]), 2 * base_mm + 2, 2 * half_mm, angle=0, color="#f3ddb8", ec=INK, lw=0.8, zorder=2
+        )
+    )
     axes.axhline(0, color=FAINT, lw=0.6, ls=":", zorder=3)
     axes.plot([-base_mm, base_mm], [-series["way_mm"][i]] * 2, color=INK, lw=0.8, zorder=3)
     axes.set_xlim(-base_mm - 16, base_mm + 16)
     axes.set_ylim(-26, 22)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_title(f"{1e3 * (series['lift_s'][i] - series['begin_s']):+.0f} ms\ngrip {series['force_N'][i]:.1f} N, slid {series['slid_mm'][i] - series['slid_from_mm']:.1f} mm"
-                   f"{', slides' if series['slips'][i] else ''}", size=8, color=INK)
+    axes.set_title(
+        f"{1e3 * (series['lift_s'][i] - series['begin_s']):+.0f} ms\ngrip {series['force_N'][i]:.1f} N, slid {series['slid_mm'][i] - series['slid_from_mm']:.1f} mm"
+        f"{', slides' if series['slips'][i] else ''}",
+        size=8,
+        color=INK,
+    )
 
 
 def draw_caught(axes, series, shots):
     begin = series["begin_s"]
     t_ms = [1e3 * (at - begin) for at in series["lift_s"]]
-    for key, colour, label in (("force_N", BLUE, "grip"), ("felt_N", FAINT, "as felt"), ("least_N", GOAL, "least that holds"), ("load_N", ORANGE, "load of a fingertip")):
+    for key, colour, label in (
+        ("force_N", BLUE, "grip"),
+        ("felt_N", FAINT, "as felt"),
+        ("least_N", GOAL, "least that holds"),
+        ("load_N", ORANGE, "load of a fingertip"),
+    ):
         axes.plot(t_ms, series[key], color=colour, lw=1, label=label)
     axes.plot(t_ms, [value - series["slid_from_mm"] for value in series["slid_mm"]], color=INK, lw=1.4, label="slid, mm")
     for shot in shots:
@@ -160,7 +237,14 @@ def draw(found, path):
         for axes, shot in zip(film.subplots(1, len(shots)), shots):
             draw_film(axes, series, caught["begin_s"] + offset_s + shot)
         draw_caught(course.subplots(), series, shots)
-        film.suptitle(f"A slip that is caught: {caught['face']}, {caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, "
-                      f"{' and '.join(caught['disturbances'])} (blue: grip; orange: load)", x=0.01, ha="left", size=10)
-    figure.suptitle("Grasps: simulated cell, the tool's own controller, the firmware's own fingertips", x=0.01, ha="left", size=12, weight="bold")
+        film.suptitle(
+            f"A slip that is caught: {caught['face']}, {caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, "
+            f"{' and '.join(caught['disturbances'])} (blue: grip; orange: load)",
+            x=0.01,
+            ha="left",
+            size=10,
+        )
+    figure.suptitle(
+        "Grasps: simulated cell, the tool's own controller, the firmware's own fingertips", x=0.01, ha="left", size=12, weight="bold"
+    )
     save(figure, path)

@@ -50,8 +50,7 @@ GripSettings settings_with(const KindOptions &options, const KindTrial &trial) {
   if (options.controller == "fixed" || options.controller == "paper") {
     values["fixed"] = options.controller == "fixed" ? FIXED_N : PAPER_N;
     values.erase("cap");
-  } else if (options.controller != "ours" && options.controller != "textbook" &&
-             options.controller != "oracle") {
+  } else if (options.controller != "ours" && options.controller != "textbook" && options.controller != "oracle") {
     throw std::runtime_error("there is no controller \"" + options.controller +
                              "\"; choose one of: ours textbook fixed paper oracle");
   }
@@ -65,9 +64,7 @@ GripSettings settings_with(const KindOptions &options, const KindTrial &trial) {
 class Timed : public Controller {
 public:
   explicit Timed(Controller &inner) : inner_(inner) {}
-  void take_touch(std::size_t finger, const GripTouch &touch) override {
-    inner_.take_touch(finger, touch);
-  }
+  void take_touch(std::size_t finger, const GripTouch &touch) override { inner_.take_touch(finger, touch); }
   void take_status(const GripperStatus &status) override { inner_.take_status(status); }
   GripReport step(double now_s, GripCommand &command) override {
     using Clock = std::chrono::steady_clock;
@@ -85,7 +82,7 @@ private:
 };
 
 KindDone run_one(const KindOptions &options, std::uint64_t n,
-             const std::function<void(const KindMoment &)> &trace = {}) {
+                 const std::function<void(const KindMoment &)> &trace = {}) {
   const KindTrial trial = trial_of(options, n);
   const GripperTraits &traits = trial.gripper.traits;
   const GripSettings settings = settings_with(options, trial);
@@ -105,8 +102,7 @@ KindDone run_one(const KindOptions &options, std::uint64_t n,
   }
   Timed timed(*controller);
   const KindOutcome outcome = run_kind(trial, timed, seen);
-  return {trial.grasp, outcome, settings.start_N, settings.cap_N,
-          timed.mean_us()};
+  return {trial.grasp, outcome, settings.start_N, settings.cap_N, timed.mean_us()};
 }
 
 ordered_json line_of(std::uint64_t n, const KindDone &one) {
@@ -134,21 +130,19 @@ ordered_json line_of(std::uint64_t n, const KindDone &one) {
                     {"reversals_s", rounded(o.reversals_s)}};
   line["events"] = ordered_json::array();
   for (const Event &event : one.grasp.events) {
-    line["events"].push_back(
-        {{"kind", name_of(event.kind)},
-         {"begin_s", rounded(event.begin_s)},
-         {"amount", rounded(event.amount)},
-         {"seconds", rounded(event.seconds)}});
+    line["events"].push_back({{"kind", name_of(event.kind)},
+                              {"begin_s", rounded(event.begin_s)},
+                              {"amount", rounded(event.amount)},
+                              {"seconds", rounded(event.seconds)}});
   }
   line["catches"] = ordered_json::array();
   for (const Catch &one_catch : o.catches) {
-    line["catches"].push_back(
-        {{"begin_s", rounded(one_catch.begin_s)},
-         {"way_mm", rounded(one_catch.way_mm)},
-         {"peak_N", rounded(one_catch.peak_N)},
-         {"least_N", rounded(one_catch.least_N)},
-         {"reaction_ms", one_catch.reaction_s ? ordered_json(rounded(1e3 * *one_catch.reaction_s))
-                                              : ordered_json(nullptr)}});
+    line["catches"].push_back({{"begin_s", rounded(one_catch.begin_s)},
+                               {"way_mm", rounded(one_catch.way_mm)},
+                               {"peak_N", rounded(one_catch.peak_N)},
+                               {"least_N", rounded(one_catch.least_N)},
+                               {"reaction_ms", one_catch.reaction_s ? ordered_json(rounded(1e3 * *one_catch.reaction_s))
+                                                                    : ordered_json(nullptr)}});
   }
   return line;
 }
@@ -208,8 +202,7 @@ ordered_json summary_of_kinds(const std::vector<KindDone> &done) {
 ordered_json kind_row(const KindOptions &options) {
   std::vector<KindDone> done(options.count);
   twin::in_parallel(
-      options.count, [&](std::size_t i) { done[i] = run_one(options, options.first + i); },
-      options.jobs);
+      options.count, [&](std::size_t i) { done[i] = run_one(options, options.first + i); }, options.jobs);
   ordered_json row{{"kind", options.kind},
                    {"gripper", options.gripper},
                    {"controller", options.controller},

@@ -13,8 +13,8 @@ struct KindOptions {
   std::string gripper = gripper_models().front().model;
   // ours, textbook, fixed (15 N), paper: eq. (5) and (6) at 6 N, oracle
   std::string controller = "ours";
-  std::string settings;            // of ours: name=value, split by commas
-  double later_s = 0.0;            // all frames come later by so much
+  std::string settings; // of ours: name=value, split by commas
+  double later_s = 0.0; // all frames come later by so much
   std::uint64_t seed = 1, first = 0, count = 100, jobs = 2;
   bool each = false;
 };

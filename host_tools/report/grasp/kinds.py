@@ -1,4 +1,5 @@
 """Grasps of all kinds (host_tools/simulation/cell/kinds.hpp): what fingertip_grasp_kinds found, for grasp.json and grasp.md."""
+
 import json
 import pathlib
 
@@ -10,14 +11,35 @@ from tables import table_md, text_of
 # model: what the figures call it, its colour
 GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}
 CALLED = {model: called for model, (called, _) in GRIPPERS.items()}
-BY_GRIPPER = {"drops_percent": (1, 1.5, 0.5), "peak_over_need_p50": (2.2, 2.0, 1.8), "margin_median": (2.2, None, 1.7), "reaction_ms": (41, None, None)}
-GOALS = tuple((f"{name}_{called}", "<=", limit) for name, limits in BY_GRIPPER.items() for called, limit in zip(CALLED.values(), limits)
-              if limit is not None) + (
-    ("slick_drops_percent_worst", "<=", 3), ("peak_over_need_p95_worst", "<=", 3.5), ("hunting_percent_worst", "<=", 2), ("crushed_percent", "<=", 0),
-    ("dropped_fragile_percent", "<=", 1), ("over_cap", "<=", 0), ("first_grip_over_2x_percent", "<=", 0.5), ("late_40ms_drops_percent", "<=", 3),
-    ("step_us", "<=", 20))
-CONTROLLERS = {"ours": "ours", "textbook": "a textbook's: 1.3 load / friction, 30 % more in a slide", "fixed": "15 N", "paper": "eq. (5) and (6) at 6 N",
-               "oracle": "oracle"}
+BY_GRIPPER = {
+    "drops_percent": (1, 1.5, 0.5),
+    "peak_over_need_p50": (2.2, 2.0, 1.8),
+    "margin_median": (2.2, None, 1.7),
+    "reaction_ms": (41, None, None),
+}
+GOALS = tuple(
+    (f"{name}_{called}", "<=", limit)
+    for name, limits in BY_GRIPPER.items()
+    for called, limit in zip(CALLED.values(), limits)
+    if limit is not None
+) + (
+    ("slick_drops_percent_worst", "<=", 3),
+    ("peak_over_need_p95_worst", "<=", 3.5),
+    ("hunting_percent_worst", "<=", 2),
+    ("crushed_percent", "<=", 0),
+    ("dropped_fragile_percent", "<=", 1),
+    ("over_cap", "<=", 0),
+    ("first_grip_over_2x_percent", "<=", 0.5),
+    ("late_40ms_drops_percent", "<=", 3),
+    ("step_us", "<=", 20),
+)
+CONTROLLERS = {
+    "ours": "ours",
+    "textbook": "a textbook's: 1.3 load / friction, 30 % more in a slide",
+    "fixed": "15 N",
+    "paper": "eq. (5) and (6) at 6 N",
+    "oracle": "oracle",
+}
 # row: its options, whether it is judged; the others' controllers are beside it
 ROWS = {
     "usual and rough": (("--kind", "usual,rough"), True),
@@ -40,10 +62,25 @@ or more. Hunting: the commanded width turns by 0.05 mm or more, half a time a se
 force of either pad. First grip over 2x: the mean force before the lift over twice the start force. An egg breaks at 25 N, a strawberry at 5 N, a cup at
 3 N; each is held with its preset. What the tool refuses before it moves (a crisp of 1.5 N in a 2F-85) is in no row. The oracle knows the true load, friction and stiffness, and has the same frames, gripper and least move: a bar that it
 meets is one that the gripper allows."""
-COLUMNS = {"row": "kinds", "gripper": "gripper", "controller": "controller", "grasps": "grasps", "drops_percent": "dropped, %", "margin_p50": "margin: p50",
-           "margin_p95": "p95", "catches": "catches", "peak_over_need_p50": "peak over need: p50", "peak_over_need_p95": "p95 ", "slid_p50_mm": "slid, mm: p50",
-           "slid_p95_mm": "p95  ", "reaction_p50_ms": "reaction, ms: p50", "hunting_percent": "hunting, %", "crushed_percent": "crushed, %", "over_cap": "over the cap",
-           "first_grip_over_2x_percent": "first grip over 2x, %"}
+COLUMNS = {
+    "row": "kinds",
+    "gripper": "gripper",
+    "controller": "controller",
+    "grasps": "grasps",
+    "drops_percent": "dropped, %",
+    "margin_p50": "margin: p50",
+    "margin_p95": "p95",
+    "catches": "catches",
+    "peak_over_need_p50": "peak over need: p50",
+    "peak_over_need_p95": "p95 ",
+    "slid_p50_mm": "slid, mm: p50",
+    "slid_p95_mm": "p95  ",
+    "reaction_p50_ms": "reaction, ms: p50",
+    "hunting_percent": "hunting, %",
+    "crushed_percent": "crushed, %",
+    "over_cap": "over the cap",
+    "first_grip_over_2x_percent": "first grip over 2x, %",
+}
 
 
 def row_of(program, name, gripper, controller, count, seed):
@@ -66,16 +103,24 @@ def figures(rows):
     for row in rows:
         if row["controller"] == "ours" and row["row"] == "usual and rough":
             called = CALLED[row["gripper"]]
-            for name, key in (("drops_percent", "drops_percent"), ("peak_over_need_p50", "peak_over_need_p50"), ("margin_median", "margin_p50"),
-                              ("reaction_ms", "reaction_p50_ms")):
+            for name, key in (
+                ("drops_percent", "drops_percent"),
+                ("peak_over_need_p50", "peak_over_need_p50"),
+                ("margin_median", "margin_p50"),
+                ("reaction_ms", "reaction_p50_ms"),
+            ):
                 found[f"{name}_{called}"] = row[key]
     return found | {
-        "slick_drops_percent_worst": worst(rows, "drops_percent", "slick"), "peak_over_need_p95_worst": worst(rows, "peak_over_need_p95", "usual and rough"),
-        "hunting_percent_worst": worst(rows, "hunting_percent", "usual and rough"), "crushed_percent": worst(rows, "crushed_percent", "fragile"),
+        "slick_drops_percent_worst": worst(rows, "drops_percent", "slick"),
+        "peak_over_need_p95_worst": worst(rows, "peak_over_need_p95", "usual and rough"),
+        "hunting_percent_worst": worst(rows, "hunting_percent", "usual and rough"),
+        "crushed_percent": worst(rows, "crushed_percent", "fragile"),
         "dropped_fragile_percent": worst(rows, "drops_percent", "fragile"),
         "over_cap": sum(row["over_cap"] for row in rows if row["controller"] == "ours"),
         "first_grip_over_2x_percent": worst(rows, "first_grip_over_2x_percent", "usual and rough"),
-        "late_40ms_drops_percent": worst(rows, "drops_percent", "usual and rough, 40 ms later"), "step_us": worst(rows, "step_us")}
+        "late_40ms_drops_percent": worst(rows, "drops_percent", "usual and rough, 40 ms later"),
+        "step_us": worst(rows, "step_us"),
+    }
 
 
 def measure(options, steps):

@@ -17,23 +17,22 @@ namespace {
 using namespace fingertip;
 using namespace fingertip::grasp;
 
-constexpr char HELP[] =
-    "usage: fingertip_grasp_kinds [options]\n"
-    "  --kind NAME        gentle, usual (usual), rough, slick, fragile; several, split by commas,\n"
-    "                     by turns\n"
-    "  --gripper NAME     a model that `fingertip gripper list` names (usual: the first), or\n"
-    "                     ideal\n"
-    "  --controller NAME  ours (usual), textbook, fixed (15 N), paper: eq. (5) and (6) at 6 N,\n"
-    "                     oracle: told the true load, friction and stiffness\n"
-    "  --set NAME=VALUE   of our settings, split by commas\n"
-    "  --later MS         all frames come later by so much, 0\n"
-    "  --seed S           another set of grasps; 1 to 999 are there to choose constants by, the\n"
-    "                     report judges by others; 1\n"
-    "  --count N          grasps, 100\n"
-    "  --first N          number of the first, 0\n"
-    "  --jobs N           threads, 2\n"
-    "  --each             adds each grasp\n"
-    "  --trace            instead: all that is known of the first, every 2 ms\n";
+constexpr char HELP[] = "usage: fingertip_grasp_kinds [options]\n"
+                        "  --kind NAME        gentle, usual (usual), rough, slick, fragile; several, split by commas,\n"
+                        "                     by turns\n"
+                        "  --gripper NAME     a model that `fingertip gripper list` names (usual: the first), or\n"
+                        "                     ideal\n"
+                        "  --controller NAME  ours (usual), textbook, fixed (15 N), paper: eq. (5) and (6) at 6 N,\n"
+                        "                     oracle: told the true load, friction and stiffness\n"
+                        "  --set NAME=VALUE   of our settings, split by commas\n"
+                        "  --later MS         all frames come later by so much, 0\n"
+                        "  --seed S           another set of grasps; 1 to 999 are there to choose constants by, the\n"
+                        "                     report judges by others; 1\n"
+                        "  --count N          grasps, 100\n"
+                        "  --first N          number of the first, 0\n"
+                        "  --jobs N           threads, 2\n"
+                        "  --each             adds each grasp\n"
+                        "  --trace            instead: all that is known of the first, every 2 ms\n";
 
 } // namespace
 

@@ -19,25 +19,24 @@ using namespace fingertip;
 using namespace fingertip::grasp;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] =
-    "usage: fingertip_grasp_trials [options]\n"
-    "  --gripper NAME    a model that `fingertip gripper list` names (usual: the first), or ideal\n"
-    "  --mode NAME       hold (usual), fixed; on the table, no lift: still, still-fixed,\n"
-    "                    still-oracle: knows the true force, stiffness and relaxation\n"
-    "  --objects NAME    round (usual: balls and cylinders), balls, cylinders, faces, flats; or\n"
-    "                    faces of the twin, split by commas\n"
-    "  --rate HZ         frames of a fingertip a second, 410; above 600 at OSR 256, else 1024\n"
-    "  --effect SHARE    of a pull's field that acts on the readings, 1\n"
-    "  --still S         length of a still grasp, 12\n"
-    "  --set NAME=VALUE  of the controller's settings, split by commas: margin=1.4\n"
-    "  --seed S          another set of scenes, pads and noise; 1 to 999 are there to choose\n"
-    "                    constants by, the report judges by others; 1\n"
-    "  --count N         grasps, 100\n"
-    "  --first N         number of the first, 0\n"
-    "  --jobs N          threads, 2\n"
-    "  --each            adds a line for each grasp\n"
-    "  --trace N         instead: all that is known of that grasp, every 2 ms\n"
-    "  --cache DIR       folder of the contact tables\n";
+constexpr char HELP[] = "usage: fingertip_grasp_trials [options]\n"
+                        "  --gripper NAME    a model that `fingertip gripper list` names (usual: the first), or ideal\n"
+                        "  --mode NAME       hold (usual), fixed; on the table, no lift: still, still-fixed,\n"
+                        "                    still-oracle: knows the true force, stiffness and relaxation\n"
+                        "  --objects NAME    round (usual: balls and cylinders), balls, cylinders, faces, flats; or\n"
+                        "                    faces of the twin, split by commas\n"
+                        "  --rate HZ         frames of a fingertip a second, 410; above 600 at OSR 256, else 1024\n"
+                        "  --effect SHARE    of a pull's field that acts on the readings, 1\n"
+                        "  --still S         length of a still grasp, 12\n"
+                        "  --set NAME=VALUE  of the controller's settings, split by commas: margin=1.4\n"
+                        "  --seed S          another set of scenes, pads and noise; 1 to 999 are there to choose\n"
+                        "                    constants by, the report judges by others; 1\n"
+                        "  --count N         grasps, 100\n"
+                        "  --first N         number of the first, 0\n"
+                        "  --jobs N          threads, 2\n"
+                        "  --each            adds a line for each grasp\n"
+                        "  --trace N         instead: all that is known of that grasp, every 2 ms\n"
+                        "  --cache DIR       folder of the contact tables\n";
 
 struct Options {
   SetOptions set;
@@ -60,8 +59,7 @@ int measure(const Options &options) {
   const Set set(options.set);
   ordered_json out;
   if (!options.trace.empty()) {
-    std::cout << trace_of(set, static_cast<std::uint64_t>(number_of("--trace", options.trace)))
-              << '\n';
+    std::cout << trace_of(set, static_cast<std::uint64_t>(number_of("--trace", options.trace))) << '\n';
     return std::cout.flush() ? 0 : 1;
   }
   const auto ready = Clock::now();

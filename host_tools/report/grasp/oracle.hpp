@@ -15,8 +15,7 @@ namespace fingertip::grasp {
 class Oracle : public cell::Controller {
 public:
   // grasp must outlive it.
-  Oracle(const cell::KindOfGrasp &grasp, const GripperMechanics &gripper,
-         const GripSettings &settings);
+  Oracle(const cell::KindOfGrasp &grasp, const GripperMechanics &gripper, const GripSettings &settings);
   void see(const cell::KindMoment &moment);
   void take_touch(std::size_t, const GripTouch &touch) override { told_s_ = touch.t_s; }
   void take_status(const GripperStatus &status) override { status_ = status; }

@@ -19,8 +19,7 @@ constexpr int LOOKS_STEPS = 12;                   // and from there
 } // namespace
 
 StillOracle::StillOracle(const cell::Trial &trial, const cell::Face &face)
-    : trial_(trial), gripper_(trial.gripper),
-      untouched_(face, trial.scene.object, trial.scene.grasp),
+    : trial_(trial), gripper_(trial.gripper), untouched_(face, trial.scene.object, trial.scene.grasp),
       strength_(twin::relaxation_strengths(trial.scene.grasp.relaxation)),
       touched_s_(std::numeric_limits<double>::infinity()) {}
 
@@ -75,12 +74,10 @@ double StillOracle::passing_cost_s(double drive_mm) const {
 
 void StillOracle::choose(double rest_s, double far_mm) {
   const double step_mm = gripper_.traits.step_mm, stands_mm = target_mm_;
-  const double least_mm =
-      step_mm * std::max(1.0, std::ceil(gripper_.traits.deadband_mm / step_mm - 1e-9));
+  const double least_mm = step_mm * std::max(1.0, std::ceil(gripper_.traits.deadband_mm / step_mm - 1e-9));
   double least_s = cost_s(stands_mm, rest_s);
   for (double way_mm = -far_mm; way_mm <= far_mm; way_mm += step_mm) {
-    const double to_mm = step_mm * std::round((stands_mm + way_mm) / step_mm),
-                 moved_mm = to_mm - stands_mm;
+    const double to_mm = step_mm * std::round((stands_mm + way_mm) / step_mm), moved_mm = to_mm - stands_mm;
     const bool round = std::abs(moved_mm) < least_mm - 1e-9;
     const double over_mm = stands_mm + std::copysign(least_mm, -moved_mm);
     const double cost = cost_s(to_mm, rest_s) + (round ? passing_cost_s(over_mm) : 0.0);
@@ -106,8 +103,7 @@ GripReport StillOracle::step(double now_s, GripCommand &command) {
   const double end_s = std::min(touched_s_, now_s) + trial_.still_s;
   if (first) {
     // The object's width in whole steps; from there on as from any other position.
-    target_mm_ = then_mm_ =
-        traits.step_mm * std::round(trial_.scene.object.width_mm / traits.step_mm);
+    target_mm_ = then_mm_ = traits.step_mm * std::round(trial_.scene.object.width_mm / traits.step_mm);
     choose(trial_.still_s, FIRST_mm);
     target_mm_ = then_mm_;
     sent_s_ = now_s;

@@ -16,8 +16,8 @@ namespace {
 
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
   std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
-  std::vector<double> margin, told, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N,
-      holding_s, settle_s, rms, rms_of_steps;
+  std::vector<double> margin, told, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s, settle_s,
+      rms, rms_of_steps;
   for (const Done *one : all) {
     const Outcome &o = one->outcome;
     drops += o.dropped ? 1 : 0;
@@ -123,18 +123,15 @@ ordered_json summary_of(const std::vector<Done> &done, bool still) {
     all.push_back(&one);
   }
   ordered_json out = summary(all, still);
-  out["by_object"] =
-      by(done, still, [](const Done &one) { return std::vector<std::string>{one.scene.face}; });
+  out["by_object"] = by(done, still, [](const Done &one) { return std::vector<std::string>{one.scene.face}; });
   if (still) {
-    out["by_set"] = by(
-        done, still, [](const Done &one) { return std::vector<std::string>{set_band(one.set_N)}; });
+    out["by_set"] = by(done, still, [](const Done &one) { return std::vector<std::string>{set_band(one.set_N)}; });
   } else {
     out["by_friction"] = by(done, still, [](const Done &one) {
       return std::vector<std::string>{friction_band(one.scene.object.friction)};
     });
-    out["by_mass"] = by(done, still, [](const Done &one) {
-      return std::vector<std::string>{mass_band(one.scene.object.mass_kg)};
-    });
+    out["by_mass"] =
+        by(done, still, [](const Done &one) { return std::vector<std::string>{mass_band(one.scene.object.mass_kg)}; });
     out["by_disturbance"] = by(done, still, [](const Done &one) {
       std::vector<std::string> names;
       for (const Disturbance &disturbance : one.scene.disturbances) {
@@ -176,8 +173,7 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
     line["slips"].push_back(
         {{"begin_s", rounded(slip.begin_s)},
          {"way_mm", rounded(slip.way_mm)},
-         {"reaction_ms", slip.reaction_s ? ordered_json(rounded(1e3 * *slip.reaction_s))
-                                         : ordered_json(nullptr)}});
+         {"reaction_ms", slip.reaction_s ? ordered_json(rounded(1e3 * *slip.reaction_s)) : ordered_json(nullptr)}});
   }
   line["settle_s"] = o.settle_s ? ordered_json(rounded(*o.settle_s)) : ordered_json(nullptr);
   line["rms_percent"] = rounded(100.0 * o.rms);

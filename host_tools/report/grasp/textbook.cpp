@@ -35,8 +35,7 @@ void Textbook::hold(double now_s, double low_N, double force_N, double load_N, b
       wanted_N_ = SLID * low_N;
     }
     slides_ = slides;
-    wanted_N_ = std::clamp(std::max(MARGIN * load_N / friction_, slides ? wanted_N_ : FIRST_N),
-                           FIRST_N, MOST_N);
+    wanted_N_ = std::clamp(std::max(MARGIN * load_N / friction_, slides ? wanted_N_ : FIRST_N), FIRST_N, MOST_N);
   }
   if (now_s - moved_s_ >= MOVES_s) {
     const double step_mm = traits_.step_mm;
@@ -58,8 +57,7 @@ GripReport Textbook::step(double now_s, GripCommand &command) {
     target_mm_ = begun_ ? target_mm_ : status_.width_mm;
     begun_ = true;
     report_.state = std::max<std::uint8_t>(report_.state, GRIP_APPROACH);
-    report_.state == GRIP_APPROACH ? approach(now_s, low_N)
-                                   : hold(now_s, low_N, force_N, load_N, slides);
+    report_.state == GRIP_APPROACH ? approach(now_s, low_N) : hold(now_s, low_N, force_N, load_N, slides);
     command.motion = GRIP_MOVE;
     command.width_mm = target_mm_;
     command.speed_mm_s = traits_.speed_max_mm_s;

@@ -33,11 +33,9 @@ std::map<std::string, double> settings_of(const std::string &changes) {
     }
     const std::size_t equals = one.find('=');
     const std::string name(one.substr(0, equals));
-    const auto value =
-        equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
+    const auto value = equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
     const auto &all = grasp_settings();
-    if (std::none_of(all.begin(), all.end(),
-                     [&](const GraspSetting &each) { return name == each.name; })) {
+    if (std::none_of(all.begin(), all.end(), [&](const GraspSetting &each) { return name == each.name; })) {
       throw std::runtime_error("the controller has no setting \"" + name + "\"");
     }
     if (!value) {
@@ -98,8 +96,7 @@ std::vector<std::string> names_of(const std::string &objects) {
 } // namespace
 
 Set::Set(const SetOptions &options)
-    : options_(options), faces_(names_of(options.objects)),
-      gripper_(gripper_mechanics(options.gripper)) {
+    : options_(options), faces_(names_of(options.objects)), gripper_(gripper_mechanics(options.gripper)) {
   if (options.mode != "hold" && options.mode != "fixed" && !is_still()) {
     throw std::runtime_error("there is no mode \"" + options.mode +
                              "\"; choose one of: hold fixed still still-fixed still-oracle");
@@ -162,8 +159,7 @@ Outcome Set::run(std::uint64_t n, const std::function<void(const Moment &)> &tra
   return run_trial(one, face, controller, trace);
 }
 
-std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count,
-                          std::uint64_t jobs) {
+std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count, std::uint64_t jobs) {
   std::vector<Done> done(count);
   const auto one = [&](std::size_t i) {
     const Trial trial = set.trial(first + i);

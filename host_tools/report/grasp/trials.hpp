@@ -39,8 +39,7 @@ public:
   cell::Trial trial(std::uint64_t n) const;
   GripSettings settings(std::uint64_t n) const;
   // For several threads at once.
-  cell::Outcome run(std::uint64_t n,
-                    const std::function<void(const cell::Moment &)> &trace = {}) const;
+  cell::Outcome run(std::uint64_t n, const std::function<void(const cell::Moment &)> &trace = {}) const;
 
 private:
   SetOptions options_;
@@ -58,7 +57,6 @@ struct Done {
 };
 
 // Those from `first` on, on so many threads.
-std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count,
-                          std::uint64_t jobs);
+std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count, std::uint64_t jobs);
 
 } // namespace fingertip::grasp

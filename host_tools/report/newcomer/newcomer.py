@@ -8,6 +8,7 @@
     newcomer.json    the figures by which that is judged, with their goals
     newcomer.md      the same to read
 """
+
 import pathlib
 import sys
 

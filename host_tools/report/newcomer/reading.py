@@ -1,4 +1,5 @@
 """How long Python takes to read a recording, beside what numpy takes for the same numbers alone."""
+
 import io
 import pathlib
 import subprocess
@@ -46,14 +47,26 @@ def measure(build, steps):
         head, rows = rows_of(path)
         path.write_text("".join(head + TIMES * rows), encoding="utf-8")
         alone = numbers_alone(TIMES * rows)
-        read_s, loadtxt_s = zip(*((busy_s(lambda: files.read_recording(path)), busy_s(lambda: np.loadtxt(io.BytesIO(alone), delimiter=",", comments=None)))
-                                  for _ in range(REPEATS)))
+        read_s, loadtxt_s = zip(
+            *(
+                (busy_s(lambda: files.read_recording(path)), busy_s(lambda: np.loadtxt(io.BytesIO(alone), delimiter=",", comments=None)))
+                for _ in range(REPEATS)
+            )
+        )
     count = TIMES * len(rows)
     steps.say(f"{count} rows by Python")
-    return {"reader_rows": count, "reader_us_per_row": round(1e6 * min(read_s) / count, 1), "reader_times_loadtxt": round(min(read_s) / min(loadtxt_s), 2)}
+    return {
+        "reader_rows": count,
+        "reader_us_per_row": round(1e6 * min(read_s) / count, 1),
+        "reader_times_loadtxt": round(min(read_s) / min(loadtxt_s), 2),
+    }
 
 
 def text(found):
-    return ["## Reading", "",
-            f"A recording of {found['reader_rows']} rows, of fifteen sensors, is read by `fingertip.read_recording`, which judges every cell, and its numbers "
-            f"alone by `numpy.loadtxt`: processor time, in turn, the best of {REPEATS}. `reader_times_loadtxt` is the ratio.", ""]
+    return [
+        "## Reading",
+        "",
+        f"A recording of {found['reader_rows']} rows, of fifteen sensors, is read by `fingertip.read_recording`, which judges every cell, and its numbers "
+        f"alone by `numpy.loadtxt`: processor time, in turn, the best of {REPEATS}. `reader_times_loadtxt` is the ratio.",
+        "",
+    ]

@@ -1,4 +1,5 @@
 """How soon `fingertip simulate` is ready, how many frames a program gets of it, and whether the README's example runs on it."""
+
 import contextlib
 import json
 import os
@@ -20,8 +21,14 @@ SECONDS = 10
 STARTS = 5  # of which the best counts: this computer may have other things to do
 LINES = 20  # of the example
 PATIENCE_s = 60
-GOALS = (("readme_words", "<=", 600), ("help_ms", "<=", 30), ("simulate_ready_s", "<=", 2), ("simulate_fps", ">=", 1300), ("simulate_lost", "<=", 0),
-         ("python_example_runs", ">=", 1))
+GOALS = (
+    ("readme_words", "<=", 600),
+    ("help_ms", "<=", 30),
+    ("simulate_ready_s", "<=", 2),
+    ("simulate_fps", ">=", 1300),
+    ("simulate_lost", "<=", 0),
+    ("python_example_runs", ">=", 1),
+)
 
 
 def example(readme):
@@ -33,8 +40,12 @@ def example(readme):
 
 
 def environment_of(folder):
-    return {**{name: value for name, value in os.environ.items() if name != "FINGERTIP_PORT"}, "XDG_RUNTIME_DIR": str(folder), "MPLBACKEND": "Agg",
-            "PYTHONPATH": str(ROOT / "host_tools/python")}
+    return {
+        **{name: value for name, value in os.environ.items() if name != "FINGERTIP_PORT"},
+        "XDG_RUNTIME_DIR": str(folder),
+        "MPLBACKEND": "Agg",
+        "PYTHONPATH": str(ROOT / "host_tools/python"),
+    }
 
 
 @contextlib.contextmanager
@@ -54,7 +65,9 @@ def simulated(tool, environment, *options):
 def run_example(environment):
     """The lines that it printed, and what it wrote to standard error. It runs for ever, and is interrupted after so many lines."""
     program = example((ROOT / "README.md").read_text(encoding="utf-8"))
-    process = subprocess.Popen(["/usr/bin/python3", "-u", "-c", program], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        ["/usr/bin/python3", "-u", "-c", program], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     guard = threading.Timer(PATIENCE_s, process.kill)
     guard.start()
     lines = [line for line, _ in zip(iter(process.stdout.readline, ""), range(LINES))]
@@ -78,6 +91,7 @@ def help_ms(tool):
         begun_s = time.monotonic()
         subprocess.run([tool, "--help"], stdout=subprocess.DEVNULL, check=True)
         return time.monotonic() - begun_s
+
     return 1000 * min(once() for _ in range(STARTS))
 
 
@@ -95,19 +109,37 @@ def measure(build, steps):
         with simulated(tool, environment):
             lines, err = run_example(environment)
             subprocess.run([tool, "set", "osr=256", "rate=max"], env=environment, stdout=subprocess.DEVNULL, check=True)
-            read = subprocess.run([sys.executable, ROOT / "host_tools/report/ecosystem/reader.py", "sim:", str(SECONDS)], capture_output=True, text=True,
-                                  timeout=SECONDS + PATIENCE_s, env=environment, check=False)
+            read = subprocess.run(
+                [sys.executable, ROOT / "host_tools/report/ecosystem/reader.py", "sim:", str(SECONDS)],
+                capture_output=True,
+                text=True,
+                timeout=SECONDS + PATIENCE_s,
+                env=environment,
+                check=False,
+            )
         if read.returncode != 0:
             raise InputError(f"the Python reader failed: {read.stderr.strip()[-500:]}")
         found = json.loads(read.stdout)
-        steps.say(f"{found['frames']} frames in {SECONDS} s; the README's example " + ("runs" if runs(lines) else f"does not run: {err or lines}"))
-    return {"readme_words": len((ROOT / "README.md").read_text(encoding="utf-8").split()), "help_ms": round(help_ms(tool), 1),
-            "simulate_ready_s": round(min(ready_s), 3), "simulate_seconds": SECONDS, "simulate_fps": round(found["fps"], 1),
-            "simulate_lost": found["lost"], "python_example_runs": int(runs(lines))}
+        steps.say(
+            f"{found['frames']} frames in {SECONDS} s; the README's example " + ("runs" if runs(lines) else f"does not run: {err or lines}")
+        )
+    return {
+        "readme_words": len((ROOT / "README.md").read_text(encoding="utf-8").split()),
+        "help_ms": round(help_ms(tool), 1),
+        "simulate_ready_s": round(min(ready_s), 3),
+        "simulate_seconds": SECONDS,
+        "simulate_fps": round(found["fps"], 1),
+        "simulate_lost": found["lost"],
+        "python_example_runs": int(runs(lines)),
+    }
 
 
 def text(found):
-    return ["## Without a board", "",
-            f"`fingertip simulate` starts {STARTS} times, and the fastest counts. Then the Python example of README.md runs as it is printed, until it has printed "
-            f"{LINES} lines: each has to be a place on the pad and a force that a weight of 300 g may have. After `fingertip set osr=256 rate=max` a Python "
-            f"program takes every frame for {found['simulate_seconds']} s. `readme_words` counts what stands between blanks in README.md.", ""]
+    return [
+        "## Without a board",
+        "",
+        f"`fingertip simulate` starts {STARTS} times, and the fastest counts. Then the Python example of README.md runs as it is printed, until it has printed "
+        f"{LINES} lines: each has to be a place on the pad and a force that a weight of 300 g may have. After `fingertip set osr=256 rate=max` a Python "
+        f"program takes every frame for {found['simulate_seconds']} s. `readme_words` counts what stands between blanks in README.md.",
+        "",
+    ]

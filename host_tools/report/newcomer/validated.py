@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 """What `fingertip validate` says of simulated pads, held against what is true of them.
 
-    validated.py --build build/host            writes host_tools/tool/validation/twin_says.inc: what healthy pads of the twin score
-    validated.py --build build/host --check    says whether that file is what would be written
+validated.py --build build/host            writes host_tools/tool/validation/twin_says.inc: what healthy pads of the twin score
+validated.py --build build/host --check    says whether that file is what would be written
 """
+
 import argparse
 import concurrent.futures
 import json
@@ -32,16 +33,24 @@ PLAIN, LIKE_REAL = ("--known-pad", "--plain", *PULL), ("--known-pad", *PULL)
 WORKERS = 2
 # Of a standard deviation that is honest: these shares of the errors are within one and within two of it, percent.
 WITHIN_1, WITHIN_2 = (60, 80), (90, 100)
-GOALS = (("validate_location_error_percent_off", "<=", 10), ("validate_gain_sd_honest", ">=", 1), ("validate_finds", ">=", len(FAULTS)),
-         ("validate_false_findings", "<=", 0))
+GOALS = (
+    ("validate_location_error_percent_off", "<=", 10),
+    ("validate_gain_sd_honest", ">=", 1),
+    ("validate_finds", ">=", len(FAULTS)),
+    ("validate_false_findings", "<=", 0),
+)
 
 
 def session(build, cache, folder, fault, seed, calibrated, options=()):
     """(what the card says, what is true) of one pad."""
     name = "".join((f"{fault}-{seed}-{calibrated}", *options))
     recording, figures, truth = (pathlib.Path(folder) / f"{name}{kind}" for kind in (".csv", ".card.json", ".truth.json"))
-    for command in ([build / PAD, "-o", recording, "--truth", truth, "--fault", fault, "--seed", str(seed), "--cache", cache] + ["--calibrated"] * calibrated + list(options),
-                    [build / TOOL, "validate", "--from", recording, "--figures", figures]):
+    for command in (
+        [build / PAD, "-o", recording, "--truth", truth, "--fault", fault, "--seed", str(seed), "--cache", cache]
+        + ["--calibrated"] * calibrated
+        + list(options),
+        [build / TOOL, "validate", "--from", recording, "--figures", figures],
+    ):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise InputError(f"{pathlib.Path(command[0]).name} failed on {name}: {done.stderr.strip()}")
@@ -68,8 +77,11 @@ def sessions(build, jobs):
 
 def location_off(card, truth):
     """The card's error of the location over the true one, less 1."""
-    true_mm = statistics.median(math.hypot(said["x_mm"] - press["x_mm"], said["y_mm"] - press["y_mm"])
-                                for said, press in zip(card["presses"], truth["presses"]) if said["frames"])
+    true_mm = statistics.median(
+        math.hypot(said["x_mm"] - press["x_mm"], said["y_mm"] - press["y_mm"])
+        for said, press in zip(card["presses"], truth["presses"])
+        if said["frames"]
+    )
     return card["figures"]["location_error_mm"] / true_mm - 1
 
 
@@ -92,11 +104,14 @@ def pulls(build, steps):
     moved = [one["figures"]["pull_moves_mm"] - truth["pulls"][0]["way_mm"] for _, (one, truth) in plain]
     found = [sum(pull["frames"] > 0 for pull in one["pulls"]) for _, (one, _) in real]
     seen = [len(one["pulls"]) for _, (one, _) in plain + real]
-    return {"validate_pull_pads": len(plain), "validate_pulls_seen_percent": round(100 * sum(seen) / sum(len(truth["pulls"]) for _, (_, truth) in plain + real)),
-            "validate_pull_off_percent": round(100 * statistics.median(map(abs, off)), 1),
-            "validate_pull_location_off_mm": round(statistics.median(map(abs, moved)), 3),
-            "validate_pull_way_mm": round(statistics.median(truth["pulls"][0]["way_mm"] for _, (_, truth) in plain), 3),
-            "validate_pull_like_real_estimated_percent": round(100 * sum(found) / sum(len(truth["pulls"]) for _, (_, truth) in real))}
+    return {
+        "validate_pull_pads": len(plain),
+        "validate_pulls_seen_percent": round(100 * sum(seen) / sum(len(truth["pulls"]) for _, (_, truth) in plain + real)),
+        "validate_pull_off_percent": round(100 * statistics.median(map(abs, off)), 1),
+        "validate_pull_location_off_mm": round(statistics.median(map(abs, moved)), 3),
+        "validate_pull_way_mm": round(statistics.median(truth["pulls"][0]["way_mm"] for _, (_, truth) in plain), 3),
+        "validate_pull_like_real_estimated_percent": round(100 * sum(found) / sum(len(truth["pulls"]) for _, (_, truth) in real)),
+    }
 
 
 def measure(build, steps):
@@ -104,38 +119,55 @@ def measure(build, steps):
     steps.say(f"{len(healthy)} healthy pads validated")
     faulty = sessions(build, [(fault, seed, calibrated) for fault in FAULTS for calibrated in (False, True) for seed in FAULTY_SEEDS])
     steps.say(f"{len(faulty)} faulty pads validated")
-    off = {kind: [100 * abs(location_off(card, truth)) for job, (card, truth) in healthy if job[2] in kind] for kind in ((False, True), (False,), (True,))}
+    off = {
+        kind: [100 * abs(location_off(card, truth)) for job, (card, truth) in healthy if job[2] in kind]
+        for kind in ((False, True), (False,), (True,))
+    }
     errors = [error for _, (card, truth) in healthy for error in gain_errors(card, truth)]
     within = [100 * sum(error <= sds for error in errors) / len(errors) for sds in (1, 2)]
     missed = {fault: sum(not is_found(fault, card, truth) for job, (card, truth) in faulty if job[0] == fault) for fault in FAULTS}
     # A finding is false if it is not of the fault, or of sensors that have none.
-    false = [sum(finding["finding"] != job[0] or not set(finding["sensors"]) <= set(truth["faulty"]) for finding in card["findings"])
-             for job, (card, truth) in healthy + faulty]
-    return {"validate_healthy_pads": len(healthy), "validate_faulty_pads": len(faulty),
-            "validate_location_error_percent_off": round(statistics.median(off[False, True]), 1),
-            "validate_location_error_uncalibrated_percent_off": round(statistics.median(off[False,]), 1),
-            "validate_location_error_calibrated_percent_off": round(statistics.median(off[True,]), 1),
-            "validate_location_error_worst_percent_off": round(max(off[False, True]), 1),
-            "validate_gain_within_1_sd_percent": round(within[0], 1), "validate_gain_within_2_sd_percent": round(within[1], 1),
-            "validate_gain_sd_honest": int(WITHIN_1[0] <= within[0] <= WITHIN_1[1] and WITHIN_2[0] <= within[1] <= WITHIN_2[1]),
-            "validate_finds": sum(count == 0 for count in missed.values()), "validate_missed": sum(missed.values()),
-            "validate_false_findings": sum(false), **pulls(build, steps)}
+    false = [
+        sum(finding["finding"] != job[0] or not set(finding["sensors"]) <= set(truth["faulty"]) for finding in card["findings"])
+        for job, (card, truth) in healthy + faulty
+    ]
+    return {
+        "validate_healthy_pads": len(healthy),
+        "validate_faulty_pads": len(faulty),
+        "validate_location_error_percent_off": round(statistics.median(off[False, True]), 1),
+        "validate_location_error_uncalibrated_percent_off": round(statistics.median(off[False,]), 1),
+        "validate_location_error_calibrated_percent_off": round(statistics.median(off[True,]), 1),
+        "validate_location_error_worst_percent_off": round(max(off[False, True]), 1),
+        "validate_gain_within_1_sd_percent": round(within[0], 1),
+        "validate_gain_within_2_sd_percent": round(within[1], 1),
+        "validate_gain_sd_honest": int(WITHIN_1[0] <= within[0] <= WITHIN_1[1] and WITHIN_2[0] <= within[1] <= WITHIN_2[1]),
+        "validate_finds": sum(count == 0 for count in missed.values()),
+        "validate_missed": sum(missed.values()),
+        "validate_false_findings": sum(false),
+        **pulls(build, steps),
+    }
 
 
 def text(found):
-    return ["## A report card", "",
-            f"`fingertip validate` makes the card of {found['validate_healthy_pads']} healthy and {found['validate_faulty_pads']} faulty simulated pads, half of "
-            f"them calibrated before. Sensors' gains, places, widths, relaxation, after-effects, drift and dip are as recordings of real pads have them. The hand "
-            f"misses the marks by 0.3 mm each way, and the print lies shifted and turned. The bounds of the findings were chosen on other seeds.", "",
-            "`validate_location_error_percent_off`: how far the card's error of the location is from the true one, median over the healthy pads. "
-            f"`validate_gain_sd_honest`: {WITHIN_1[0]} to {WITHIN_1[1]} % of the gains' errors are within one standard deviation, and {WITHIN_2[0]} % or more "
-            "within two. `validate_finds`: of the seven faults, those that the card finds on every pad that has them, with the right sensors. "
-            "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.", "",
-            f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ only in their gains, and of as many with all the errors of real pads. Each is "
-            "calibrated and knows its profile. On the first, `validate_pull_off_percent` says how far the pull that the card finds differs from the thread's. "
-            "`validate_pull_location_off_mm` says how far the movement of the location differs from that of the ball, which is `validate_pull_way_mm`. Both are "
-            "medians. On the second, the firmware does not estimate every pull, but `validate_pull_like_real_estimated_percent` of them. The pulley has no "
-            "friction here.", ""]
+    return [
+        "## A report card",
+        "",
+        f"`fingertip validate` makes the card of {found['validate_healthy_pads']} healthy and {found['validate_faulty_pads']} faulty simulated pads, half of "
+        f"them calibrated before. Sensors' gains, places, widths, relaxation, after-effects, drift and dip are as recordings of real pads have them. The hand "
+        f"misses the marks by 0.3 mm each way, and the print lies shifted and turned. The bounds of the findings were chosen on other seeds.",
+        "",
+        "`validate_location_error_percent_off`: how far the card's error of the location is from the true one, median over the healthy pads. "
+        f"`validate_gain_sd_honest`: {WITHIN_1[0]} to {WITHIN_1[1]} % of the gains' errors are within one standard deviation, and {WITHIN_2[0]} % or more "
+        "within two. `validate_finds`: of the seven faults, those that the card finds on every pad that has them, with the right sensors. "
+        "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.",
+        "",
+        f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ only in their gains, and of as many with all the errors of real pads. Each is "
+        "calibrated and knows its profile. On the first, `validate_pull_off_percent` says how far the pull that the card finds differs from the thread's. "
+        "`validate_pull_location_off_mm` says how far the movement of the location differs from that of the ball, which is `validate_pull_way_mm`. Both are "
+        "medians. On the second, the firmware does not estimate every pull, but `validate_pull_like_real_estimated_percent` of them. The pulley has no "
+        "friction here.",
+        "",
+    ]
 
 
 def table(build):

@@ -11,7 +11,8 @@ export function readFunctions(path) {
   } catch (error) {
     throw new InputError(`${path}: cannot read (${inWords(error)}); build the image first`);
   }
-  if (file.length < 52 || file.readUInt32BE(0) !== 0x7f454c46 || file[4] !== 1 || file[5] !== 1) throw new InputError(`${path}: not a 32-bit little-endian ELF file`);
+  if (file.length < 52 || file.readUInt32BE(0) !== 0x7f454c46 || file[4] !== 1 || file[5] !== 1)
+    throw new InputError(`${path}: not a 32-bit little-endian ELF file`);
   const [heads, size, count] = [file.readUInt32LE(32), file.readUInt16LE(46), file.readUInt16LE(48)];
   const section = (i) => Array.from({ length: 10 }, (_, word) => file.readUInt32LE(heads + i * size + 4 * word));
   const byStart = new Map();

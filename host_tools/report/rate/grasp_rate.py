@@ -1,4 +1,5 @@
 """The release images, of scene grasp, with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two, on calibrated rubber with a dip, where the fit costs most, and with a sensor that reads double."""
+
 import math
 import pathlib
 
@@ -12,9 +13,15 @@ from reporting import run
 PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
 CALIBRATED = ("5.5", "5.8")  # width of a contact, mm, and its dip, %: as a calibration finds them on the twin's rubber with a dip
 GOALS = (
-    ("grasp_parallel_fps_osr256", ">=", 1305), ("grasp_frames_skipped", "<=", 0), ("grasp_latency_p99_us", "<=", 1000),
-    ("grasp_two_latency_p99_us", "<=", 1500), ("grasp_calibrated_latency_p99_us", "<=", 1000),
-    ("grasp_broken_fps_osr256", ">=", 1305), ("grasp_broken_latency_p99_us", "<=", 1000), ("grasp_sleep_percent", ">=", 20))
+    ("grasp_parallel_fps_osr256", ">=", 1305),
+    ("grasp_frames_skipped", "<=", 0),
+    ("grasp_latency_p99_us", "<=", 1000),
+    ("grasp_two_latency_p99_us", "<=", 1500),
+    ("grasp_calibrated_latency_p99_us", "<=", 1000),
+    ("grasp_broken_fps_osr256", ">=", 1305),
+    ("grasp_broken_latency_p99_us", "<=", 1000),
+    ("grasp_sleep_percent", ">=", 20),
+)
 TWO_FROM_s = 0.65
 ONE_SLIP_s = 6  # a scenario with one contact at least
 BROKEN = "s3_Pa"
@@ -24,11 +31,23 @@ PITCH_mm, SIGMA_mm, PEAK_Pa = 9.0, 5.7, 25000.0
 def two_contacts(path, seconds):
     """A scenario of two presses 18 mm apart."""
     sensors = [(PITCH_mm * (k // 5 - 1), PITCH_mm * (k % 5 - 2)) for k in range(15)]
-    pressures = [round(sum(PEAK_Pa * math.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / (2 * SIGMA_mm ** 2)) for at_x, at_y in ((2, 10), (-1, -8)))) for x, y in sensors]
+    pressures = [
+        round(sum(PEAK_Pa * math.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / (2 * SIGMA_mm**2)) for at_x, at_y in ((2, 10), (-1, -8))))
+        for x, y in sensors
+    ]
     names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
     rows = [(0.0, [0] * 15), (TWO_FROM_s, [0] * 15), (TWO_FROM_s + 0.01, pressures), (seconds, pressures)]
-    path.write_text("\n".join(["# fingertip-scenario 1", "# name: two", ",".join(names),
-                                *(",".join(map(str, [f"{t_s:g}", *[0] * 7, *values])) for t_s, values in rows)]) + "\n")
+    path.write_text(
+        "\n".join(
+            [
+                "# fingertip-scenario 1",
+                "# name: two",
+                ",".join(names),
+                *(",".join(map(str, [f"{t_s:g}", *[0] * 7, *values])) for t_s, values in rows),
+            ]
+        )
+        + "\n"
+    )
     return path
 
 
@@ -58,8 +77,23 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
     tools = Tools(build, boards)
 
     dipped = wander.with_name("grasp-dip.csv")
-    run(pathlib.Path(build) / "host_tools/simulation/twin/twin", "scenario", "slip", "--force", "5", "--quiet", "0.3", "--effects", "dip=5",
-        "--seconds", f"{max(FROM_s + seconds + 1, ONE_SLIP_s):g}", "-o", dipped, "--cache", pathlib.Path(folder) / "contact_tables")
+    run(
+        pathlib.Path(build) / "host_tools/simulation/twin/twin",
+        "scenario",
+        "slip",
+        "--force",
+        "5",
+        "--quiet",
+        "0.3",
+        "--effects",
+        "dip=5",
+        "--seconds",
+        f"{max(FROM_s + seconds + 1, ONE_SLIP_s):g}",
+        "-o",
+        dipped,
+        "--cache",
+        pathlib.Path(folder) / "contact_tables",
+    )
 
     def one(board, path, *commands):
         return Measurement(tools, folder, board, 256, path, seconds, commands=[*commands, tools.encoded("pad", *PAD)])
@@ -68,7 +102,10 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
     cases.append(("calibrated", PARALLEL, dipped, (tools.encoded("calibrate", *CALIBRATED),)))
     broken = with_broken_sensor(wander.with_name("grasp-broken.csv"), wander)
     cases.append(("broken", PARALLEL, broken, (tools.encoded("calibrate", *CALIBRATED),)))
-    return {name: (f"scene grasp on {board}, {path.stem}", lambda b=board, p=path, c=commands: one(b, p, *c)) for name, board, path, commands in cases}
+    return {
+        name: (f"scene grasp on {board}, {path.stem}", lambda b=board, p=path, c=commands: one(b, p, *c))
+        for name, board, path, commands in cases
+    }
 
 
 def figures(runs):
@@ -82,9 +119,13 @@ def figures(runs):
         "grasp_calibrated_latency_p99_us": calibrated_us["p99"],
         "grasp_broken_fps_osr256": runs["broken"].fitted_per_s,
         "grasp_broken_latency_p99_us": distribution(runs["broken"].offered_us)["p99"],
-        "grasp_frames_skipped": max(one.frames_skipped for one in runs.values()), "grasp_dropped": max(one.dropped for one in runs.values()),
-        "grasp_latency_p99_us": latency_us["p99"], "grasp_latency_max_us": latency_us["max"], "grasp_two_latency_p99_us": of_two_us["p99"],
-        "grasp_sleep_percent": parallel.sleep_percent, "grasp_load_percent": share_of(recording, TANGENTIAL_VALID, parallel.seconds),
+        "grasp_frames_skipped": max(one.frames_skipped for one in runs.values()),
+        "grasp_dropped": max(one.dropped for one in runs.values()),
+        "grasp_latency_p99_us": latency_us["p99"],
+        "grasp_latency_max_us": latency_us["max"],
+        "grasp_two_latency_p99_us": of_two_us["p99"],
+        "grasp_sleep_percent": parallel.sleep_percent,
+        "grasp_load_percent": share_of(recording, TANGENTIAL_VALID, parallel.seconds),
         "grasp_shape_percent": share_of(recording, Flag.SHAPE_VALID, parallel.seconds),
         "grasp_shape_age_ms": float(np.nanmean(recording["shape_age_ms"])),
     }

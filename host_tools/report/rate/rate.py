@@ -13,6 +13,7 @@ they repeat the fit before while the sensors measure their temperature. Latencie
 conversion that the datasheet allows. A packet is offered when the firmware gives its first part to the USB controller, and
 delivered with its last byte on the wire. Runs are the same bit for bit each time.
 """
+
 import json
 import pathlib
 import sys
@@ -32,10 +33,21 @@ from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
 GOALS = (
-    ("parallel_fps_osr256", ">=", 1250), ("parallel_fps_osr1024", ">=", 410), ("mux_fps_osr256", ">=", 260),
-    ("mux_fps_osr1024", ">=", 185), ("latency_parallel_us", "<=", 700), ("idle_sleep_percent", ">=", 80),
-    ("contact_sleep_percent", ">=", 40), ("flash_bytes", "<=", 64 * 1024), ("ram_bytes", "<=", 32 * 1024), ("stack_bytes", "<=", 2048),
-    ("raw_flash_bytes", "<=", "half_flash_bytes"), ("dropped", "<=", 0), ("unfitted", "<=", 0), *grasp_rate.GOALS)
+    ("parallel_fps_osr256", ">=", 1250),
+    ("parallel_fps_osr1024", ">=", 410),
+    ("mux_fps_osr256", ">=", 260),
+    ("mux_fps_osr1024", ">=", 185),
+    ("latency_parallel_us", "<=", 700),
+    ("idle_sleep_percent", ">=", 80),
+    ("contact_sleep_percent", ">=", 40),
+    ("flash_bytes", "<=", 64 * 1024),
+    ("ram_bytes", "<=", 32 * 1024),
+    ("stack_bytes", "<=", 2048),
+    ("raw_flash_bytes", "<=", "half_flash_bytes"),
+    ("dropped", "<=", 0),
+    ("unfitted", "<=", 0),
+    *grasp_rate.GOALS,
+)
 QUICK_OSRS = (256, 1024)
 SHORT_s = 4
 
@@ -48,22 +60,37 @@ def measure(tools, options, steps):
         wander, rest = (scenario(folder, name, FROM_s + options.seconds + 1) for name in ("wander", "rest"))
 
         def job(board, osr, path, seconds):
-            return (f"{board} at OSR {osr}, {seconds:g} s {'in contact' if path is wander else 'at rest'}",
-                    lambda: Measurement(tools, folder, board, osr, path, seconds))
+            return (
+                f"{board} at OSR {osr}, {seconds:g} s {'in contact' if path is wander else 'at rest'}",
+                lambda: Measurement(tools, folder, board, osr, path, seconds),
+            )
 
-        jobs = {(board, osr): job(board, osr, wander, options.seconds if board == PARALLEL and osr in QUICK_OSRS else short_s)
-                for board in BOARDS for osr in osrs}
+        jobs = {
+            (board, osr): job(board, osr, wander, options.seconds if board == PARALLEL and osr in QUICK_OSRS else short_s)
+            for board in BOARDS
+            for osr in osrs
+        }
         jobs["rest"] = job(PARALLEL, 256, rest, short_s)
         runs = steps.run_all(jobs)
     return runs, runs.pop("rest")
 
 
 def by_osr(runs):
-    return [{
-        "board": board, "osr": osr, "frames_per_s": found.frames_per_s, "fitted_per_s": found.fitted_per_s, "held_per_s": found.held_per_s,
-        "sleep_percent": found.sleep_percent, **found.stages_us, "latency_us": distribution(found.offered_us),
-        "delivery_us": distribution(found.delivered_us), "dropped": found.dropped,
-    } for (board, osr), found in runs.items()]
+    return [
+        {
+            "board": board,
+            "osr": osr,
+            "frames_per_s": found.frames_per_s,
+            "fitted_per_s": found.fitted_per_s,
+            "held_per_s": found.held_per_s,
+            "sleep_percent": found.sleep_percent,
+            **found.stages_us,
+            "latency_us": distribution(found.offered_us),
+            "delivery_us": distribution(found.delivered_us),
+            "dropped": found.dropped,
+        }
+        for (board, osr), found in runs.items()
+    ]
 
 
 def by_sensors(tools, runs):
@@ -103,13 +130,20 @@ def figures(runs, resting, rows):
         **{f"latency_parallel_{name}_us": value for name, value in latency_us.items()},
         **{f"delivery_parallel_{name}_us": value for name, value in delivery_us.items()},
         "clock_jitter_us": parallel.clock_jitter_us,
-        "idle_sleep_percent": resting.sleep_percent, "contact_sleep_percent": parallel.sleep_percent,
+        "idle_sleep_percent": resting.sleep_percent,
+        "contact_sleep_percent": parallel.sleep_percent,
         "contact_frames_per_s": parallel.frames_per_s,
         **{name: worst(name) for name in ("flash_bytes", "ram_bytes", "code_in_sram_bytes", "stack_bytes")},
-        "raw_flash_bytes": worst("flash_bytes", "raw"), "half_flash_bytes": min(row["flash_bytes"] for row in rows if row["scene"] == "slip") // 2,
-        "dropped": parallel.dropped, "sequence_gaps": parallel.sequence_gaps, "packets_dropped": parallel.packets_dropped,
-        "frames_skipped": parallel.frames_skipped, "frames_missing": parallel.frames_missing, "unfitted": parallel.unfitted,
-        "seconds": parallel.seconds, "fit_iterations": parallel.iterations,
+        "raw_flash_bytes": worst("flash_bytes", "raw"),
+        "half_flash_bytes": min(row["flash_bytes"] for row in rows if row["scene"] == "slip") // 2,
+        "dropped": parallel.dropped,
+        "sequence_gaps": parallel.sequence_gaps,
+        "packets_dropped": parallel.packets_dropped,
+        "frames_skipped": parallel.frames_skipped,
+        "frames_missing": parallel.frames_missing,
+        "unfitted": parallel.unfitted,
+        "seconds": parallel.seconds,
+        "fit_iterations": parallel.iterations,
     }
 
 
@@ -126,7 +160,9 @@ def main(argv):
     rows = scenes.measure(tools.command_frame, tools.boards / "scenes", steps, **few)
     runs, resting = measure(tools, options, steps)
     with tempfile.TemporaryDirectory() as folder:
-        grasp = steps.run_all(grasp_rate.jobs(options.build, options.boards, folder, min(options.seconds, SHORT_s), few.get("boards", BOARDS)))
+        grasp = steps.run_all(
+            grasp_rate.jobs(options.build, options.boards, folder, min(options.seconds, SHORT_s), few.get("boards", BOARDS))
+        )
         of_grasp = grasp_rate.figures(grasp)
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}

@@ -7,6 +7,7 @@
 
 Builds the images of all scenes in folders below --scenes and runs them in the emulator.
 """
+
 import argparse
 import json
 import pathlib
@@ -33,8 +34,19 @@ GUARD_FUNCTIONS, GUARD_OBJECTS = ("port_alive", "port_at", "port_event", "port_w
 def build(scene, board, folder):
     """Folder of the images of a scene on a board."""
     place = pathlib.Path(folder).absolute() / scene / board
-    run("cmake", "-G", "Ninja", "-S", ROOT, "-B", place, f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/toolchain-arm-none-eabi.cmake",
-        "-DCMAKE_BUILD_TYPE=Release", f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}")
+    run(
+        "cmake",
+        "-G",
+        "Ninja",
+        "-S",
+        ROOT,
+        "-B",
+        place,
+        f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/toolchain-arm-none-eabi.cmake",
+        "-DCMAKE_BUILD_TYPE=Release",
+        f"-DFINGERTIP_BOARD={board}",
+        f"-DFINGERTIP_SCENE={scene}",
+    )
     run("cmake", "--build", place, "--target", f"fingertip-{board}", "-j", "1")
     return place
 
@@ -62,7 +74,9 @@ def sizes(place, board):
     return {
         "flash_bytes": image["flash_bytes"],
         "ram_bytes": image["constants_in_sram_bytes"] + image["variables_bytes"] + image["stack_reserved_bytes"],
-        "code_in_sram_bytes": image["code_in_sram_bytes"], "stack_bytes": stack["worst_bytes"], **guard_sizes(place),
+        "code_in_sram_bytes": image["code_in_sram_bytes"],
+        "stack_bytes": stack["worst_bytes"],
+        **guard_sizes(place),
     }
 
 
@@ -81,6 +95,7 @@ def guard_sizes(place):
 
 def cycles(command_frame, place, scene, board, osrs, folder):
     """Cycles of a frame by stage without and in contact, at the first OSR, and frames a second at each."""
+
     def encoded(*command):
         return run(command_frame, *command).strip()
 
@@ -93,27 +108,47 @@ def cycles(command_frame, place, scene, board, osrs, folder):
         t_s = begin_s + WINDOW_s
     files = [pathlib.Path(folder) / f"{scene}-{board}.{suffix}" for suffix in ("script", "json")]
     files[0].write_text("".join(f"{at_s:.3f} {what}\n" for at_s, what in sorted(script)))
-    run("node", ROOT / "host_tools/report/rate/stage_cycles.mjs", "--image", place / f"fingertip-{board}", "--board", board, "--scenario",
-        scenario(folder, "wander", t_s + 1, f"{scene}-{board}"), "--host-script", files[0], "--json", files[1],
-        *(word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")))
+    run(
+        "node",
+        ROOT / "host_tools/report/rate/stage_cycles.mjs",
+        "--image",
+        place / f"fingertip-{board}",
+        "--board",
+        board,
+        "--scenario",
+        scenario(folder, "wander", t_s + 1, f"{scene}-{board}"),
+        "--host-script",
+        files[0],
+        "--json",
+        files[1],
+        *(word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")),
+    )
     found = json.loads(files[1].read_text())
     contact = found[str(osrs[0])]
     guards = sum(cycles for name, cycles in contact["functions"].items() if set(name.split("=")) & set(GUARD_FUNCTIONS))
     return {
-        "guard_cycles": guards, "guard_percent": 100 * guards * contact["frames_per_s"] / CLOCK_Hz,
-        "cycles_of_frame_at_rest": found["rest"]["total_cycles_per_frame"], "cycles_of_frame": contact["total_cycles_per_frame"],
-        "cycles_by_stage": contact["cycles_per_frame"], "frames_per_s": {str(osr): found[str(osr)]["frames_per_s"] for osr in osrs},
+        "guard_cycles": guards,
+        "guard_percent": 100 * guards * contact["frames_per_s"] / CLOCK_Hz,
+        "cycles_of_frame_at_rest": found["rest"]["total_cycles_per_frame"],
+        "cycles_of_frame": contact["total_cycles_per_frame"],
+        "cycles_by_stage": contact["cycles_per_frame"],
+        "frames_per_s": {str(osr): found[str(osr)]["frames_per_s"] for osr in osrs},
     }
 
 
 def measure(command_frame, scenes_folder, steps, scenes=SCENES, boards=BOARDS, osrs=tuple(CONVERSION_us)):
     """Rows of the table."""
+
     def one(scene, board, folder):
         place = build(scene, board, scenes_folder)
         return {"scene": scene, "board": board, **sizes(place, board), **cycles(command_frame, place, scene, board, osrs, folder)}
 
     with tempfile.TemporaryDirectory() as folder:
-        jobs = {(scene, board): (f"scene {scene} on {board}", lambda s=scene, b=board: one(s, b, folder)) for board in boards for scene in scenes}
+        jobs = {
+            (scene, board): (f"scene {scene} on {board}", lambda s=scene, b=board: one(s, b, folder))
+            for board in boards
+            for scene in scenes
+        }
         return list(steps.run_all(jobs).values())
 
 
@@ -122,21 +157,61 @@ def text(rows):
     osrs = list(rows[0]["frames_per_s"])
     lines = [
         "RAM is constants, variables and the whole stack; code runs from SRAM and is counted apart. Stack: the worst case by the call",
-        f"graph. Cycles of a frame are counted at OSR {osrs[0]}, in contact and at rest; frames are those that hold new pressures.", ""]
-    names = ["board", "scene", "flash", "RAM", "code in SRAM", "stack", "cycles in contact", "at rest", *(f"frames/s, OSR {osr}" for osr in osrs)]
-    lines += table_md(names, [
-        [row["board"], row["scene"], *(row[f"{name}_bytes"] for name in ("flash", "ram", "code_in_sram", "stack")),
-         row["cycles_of_frame"], row["cycles_of_frame_at_rest"], *(f"{rate:.0f}" for rate in row["frames_per_s"].values())] for row in rows])
+        f"graph. Cycles of a frame are counted at OSR {osrs[0]}, in contact and at rest; frames are those that hold new pressures.",
+        "",
+    ]
+    names = [
+        "board",
+        "scene",
+        "flash",
+        "RAM",
+        "code in SRAM",
+        "stack",
+        "cycles in contact",
+        "at rest",
+        *(f"frames/s, OSR {osr}" for osr in osrs),
+    ]
+    lines += table_md(
+        names,
+        [
+            [
+                row["board"],
+                row["scene"],
+                *(row[f"{name}_bytes"] for name in ("flash", "ram", "code_in_sram", "stack")),
+                row["cycles_of_frame"],
+                row["cycles_of_frame_at_rest"],
+                *(f"{rate:.0f}" for rate in row["frames_per_s"].values()),
+            ]
+            for row in rows
+        ],
+    )
     stages = list(rows[0]["cycles_by_stage"])
     lines += ["", "Cycles of a frame in contact by stage; what an interrupt takes is its own stage, wherever it strikes.", ""]
-    lines += table_md(["board", "scene", *stages],
-                      [[row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages)] for row in rows])
-    lines += ["", "What the guards cost: the watchdog that wants signs of life of scan, USB and main loop, and the record of a crash. Cycles of a frame in",
-              "contact, in the functions that run all the time; bytes of the two files, without the calls. Frames at most: what the rate would lose if",
-              "the processor were what limits it. The guarded pages cost nothing but a bank of 4 KiB that is empty anyway.", ""]
-    lines += table_md(["board", "scene", "cycles", "% of the processor", "frames/s at most", "flash", "RAM"], [
-        [row["board"], row["scene"], row["guard_cycles"], f"{row['guard_percent']:.3f}", f"{row['guard_percent'] / 100 * row['frames_per_s'][osrs[0]]:.1f}",
-         row["guard_flash_bytes"], row["guard_ram_bytes"]] for row in rows])
+    lines += table_md(
+        ["board", "scene", *stages], [[row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages)] for row in rows]
+    )
+    lines += [
+        "",
+        "What the guards cost: the watchdog that wants signs of life of scan, USB and main loop, and the record of a crash. Cycles of a frame in",
+        "contact, in the functions that run all the time; bytes of the two files, without the calls. Frames at most: what the rate would lose if",
+        "the processor were what limits it. The guarded pages cost nothing but a bank of 4 KiB that is empty anyway.",
+        "",
+    ]
+    lines += table_md(
+        ["board", "scene", "cycles", "% of the processor", "frames/s at most", "flash", "RAM"],
+        [
+            [
+                row["board"],
+                row["scene"],
+                row["guard_cycles"],
+                f"{row['guard_percent']:.3f}",
+                f"{row['guard_percent'] / 100 * row['frames_per_s'][osrs[0]]:.1f}",
+                row["guard_flash_bytes"],
+                row["guard_ram_bytes"],
+            ]
+            for row in rows
+        ],
+    )
     return lines
 
 

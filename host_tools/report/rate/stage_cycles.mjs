@@ -22,8 +22,17 @@ Exit: 0 done; 1 the image failed or warned; 2 wrong usage or input.`;
 
 /** Function that begins a stage in the main loop, and the stage. */
 const STAGES = {
-  scan_take: 'take', condition_frame: 'condition', condition_follow: 'condition', fit_gaussian_follow: 'fit', fit_gaussian_grid_follow: 'fit', contact_update: 'contact', contact_judge: 'contact', wire_encode: 'encode',
-  cdc_write: 'queue', cdc_read: 'commands', wire_receive: 'commands',
+  scan_take: 'take',
+  condition_frame: 'condition',
+  condition_follow: 'condition',
+  fit_gaussian_follow: 'fit',
+  fit_gaussian_grid_follow: 'fit',
+  contact_update: 'contact',
+  contact_judge: 'contact',
+  wire_encode: 'encode',
+  cdc_write: 'queue',
+  cdc_read: 'commands',
+  wire_receive: 'commands',
 };
 /** Interrupt number and its stage. */
 const INTERRUPTS = { 0: 'bus', 5: 'usb', 7: 'bus', 11: 'bus', 23: 'bus', 26: 'usb' };
@@ -133,23 +142,37 @@ function parseOptions(argv) {
   let values;
   try {
     const text = { type: 'string' };
-    ({ values } = parseArgs({ args: argv, strict: true, options: {
-      image: text, board: text, scenario: text, 'host-script': text, window: { type: 'string', multiple: true, default: [] }, json: text,
-      functions: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false } } }));
+    ({ values } = parseArgs({
+      args: argv,
+      strict: true,
+      options: {
+        image: text,
+        board: text,
+        scenario: text,
+        'host-script': text,
+        window: { type: 'string', multiple: true, default: [] },
+        json: text,
+        functions: { type: 'boolean', default: false },
+        help: { type: 'boolean', short: 'h', default: false },
+      },
+    }));
   } catch (error) {
     throw new InputError(`${error.message.split('\n')[0]}; see --help`);
   }
   if (values.help) return values;
-  for (const name of ['image', 'board', 'scenario', 'host-script']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
+  for (const name of ['image', 'board', 'scenario', 'host-script'])
+    if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
   values.windows = values.window.map((text) => {
     const [name, from, to] = text.split(':');
     const window = { name, from_s: Number(from), to_s: Number(to) };
-    if (!name || !(window.from_s >= 0) || !(window.to_s > window.from_s)) throw new InputError(`--window "${text}" is not NAME:FROM_S:TO_S`);
+    if (!name || !(window.from_s >= 0) || !(window.to_s > window.from_s))
+      throw new InputError(`--window "${text}" is not NAME:FROM_S:TO_S`);
     return window;
   });
   if (!values.windows.length) throw new InputError('--window is missing; see --help');
   values.windows.reduce((before, next) => {
-    if (next.from_s < before.to_s) throw new InputError(`--window ${next.name} begins before ${before.name} ends; give them in order of time`);
+    if (next.from_s < before.to_s)
+      throw new InputError(`--window ${next.name} begins before ${before.name} ends; give them in order of time`);
     return next;
   });
   return values;
@@ -171,11 +194,15 @@ function main(argv) {
   }
   const meter = new StageMeter(readFunctions(`${options.image}.elf`));
   const machine = new Machine({
-    image: readImage(`${options.image}.bin`), Board: findBoard(options.board), scenario: readScenario(options.scenario), fastEnumeration: true,
+    image: readImage(`${options.image}.bin`),
+    Board: findBoard(options.board),
+    scenario: readScenario(options.scenario),
+    fastEnumeration: true,
   });
   scheduleHostScript(readHostScript(options['host-script']), machine.scope, machine.client);
   const run = (to_s) => {
-    if (!machine.run(to_s * 1e9)) throw new Error(`the image stopped at ${machine.time.nanos / 1e9} s: ${machine.result.warnings.join('; ') || machine.endReason}`);
+    if (!machine.run(to_s * 1e9))
+      throw new Error(`the image stopped at ${machine.time.nanos / 1e9} s: ${machine.result.warnings.join('; ') || machine.endReason}`);
   };
   run(options.windows[0].from_s);
   meter.attach(machine.chip);
@@ -190,12 +217,21 @@ function main(argv) {
     const cycles_per_frame = Object.fromEntries(meter.stages.map((stage, i) => [stage, Math.round(meter.cycles[i] / meter.frames)]));
     const functions = meter.functionsOfFrame();
     result[name] = {
-      frames: meter.frames, frames_per_s: meter.frames / (to_s - from_s), cycles_per_frame, total_cycles_per_frame: Math.round(busy / meter.frames),
-      busy_percent: (100 * busy) / ((to_s - from_s) * clock_Hz), functions: Object.fromEntries(functions.map((f) => [f.name, Math.round(f.cycles)])),
+      frames: meter.frames,
+      frames_per_s: meter.frames / (to_s - from_s),
+      cycles_per_frame,
+      total_cycles_per_frame: Math.round(busy / meter.frames),
+      busy_percent: (100 * busy) / ((to_s - from_s) * clock_Hz),
+      functions: Object.fromEntries(functions.map((f) => [f.name, Math.round(f.cycles)])),
     };
-    const stages = Object.entries(cycles_per_frame).map(([stage, cycles]) => `${stage} ${cycles}`).join(', ');
-    process.stdout.write(`${name}: ${result[name].frames_per_s.toFixed(1)} frames/s, ${result[name].total_cycles_per_frame} cycles a frame, busy ${result[name].busy_percent.toFixed(1)} %: ${stages}\n`);
-    if (options.functions) for (const f of functions.slice(0, 45)) process.stdout.write(`  ${f.cycles.toFixed(0).padStart(8)}  ${f.name}\n`);
+    const stages = Object.entries(cycles_per_frame)
+      .map(([stage, cycles]) => `${stage} ${cycles}`)
+      .join(', ');
+    process.stdout.write(
+      `${name}: ${result[name].frames_per_s.toFixed(1)} frames/s, ${result[name].total_cycles_per_frame} cycles a frame, busy ${result[name].busy_percent.toFixed(1)} %: ${stages}\n`,
+    );
+    if (options.functions)
+      for (const f of functions.slice(0, 45)) process.stdout.write(`  ${f.cycles.toFixed(0).padStart(8)}  ${f.name}\n`);
   }
   if (options.json) {
     try {

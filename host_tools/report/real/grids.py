@@ -3,6 +3,7 @@
 The sensors stand in two columns of four; the board's drawing gives the pitch. The gantry's frame is laid on that layout by one rotation and one
 shift. Every second row of presses aligns the layout and gives placements for calibrations; the figures are of the other rows.
 """
+
 import csv
 import json
 import subprocess
@@ -12,12 +13,12 @@ from fingertip.files import InputError
 from fingertip.line import WARNINGS, Flag
 
 PA_PER_PSI = 6894.757
-NOISE_PA = 10.0        # of a mean of ten samples, whose steps are 20 Pa
-RESPONSE_MM = 6.0      # a sensor's response is fitted to presses so near it
-OUTSIDE_MM = 3.0       # presses so far beyond the outer sensors are judged apart
-RAW_GAIN_SD = 0.105    # of a pad that was never calibrated: DEFAULT_GAIN_SD
-PRIOR_WIDTH_MM = 0.5   # of the prior on sigma that a user types: PRIOR_WIDTH in line.toml
-DIP_PITCHES = 2.3      # standard deviation of the dip: DIP_PITCHES of calibration/solver.hpp
+NOISE_PA = 10.0  # of a mean of ten samples, whose steps are 20 Pa
+RESPONSE_MM = 6.0  # a sensor's response is fitted to presses so near it
+OUTSIDE_MM = 3.0  # presses so far beyond the outer sensors are judged apart
+RAW_GAIN_SD = 0.105  # of a pad that was never calibrated: DEFAULT_GAIN_SD
+PRIOR_WIDTH_MM = 0.5  # of the prior on sigma that a user types: PRIOR_WIDTH in line.toml
+DIP_PITCHES = 2.3  # standard deviation of the dip: DIP_PITCHES of calibration/solver.hpp
 DIP_FROM_WIDTHS = 3.0
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
 PLACEMENT_PEAK_PA = 1500.0  # a calibration refuses lighter ones
@@ -55,8 +56,11 @@ class Grid:
             top = where[reading.argmax()]
             near = np.hypot(*(where - top).T) < RESPONSE_MM
             fitted.append(fit_gaussian(where[near], reading[near], top, 0.4 * RESPONSE_MM))
-        self.peak_Pa, places, self.width_mm = np.array([one[0] for one in fitted]), np.array([one[1:3] for one in fitted]), np.array(
-            [one[3] for one in fitted])
+        self.peak_Pa, places, self.width_mm = (
+            np.array([one[0] for one in fitted]),
+            np.array([one[1:3] for one in fitted]),
+            np.array([one[3] for one in fitted]),
+        )
         middle = places.mean(axis=0)
         left, _, right = np.linalg.svd((places - middle).T @ self.layout)
         turn = left @ np.diag([1.0, np.linalg.det(left @ right)]) @ right
@@ -76,13 +80,15 @@ def fit_gaussian(xy, reading_Pa, start, width_mm):
     for _ in range(60):
         apart = xy - at[1:3]
         square = (apart**2).sum(axis=1)
-        shape = np.exp(-square / (2 * at[3]**2))
-        by = np.column_stack([shape, at[0] * shape * apart[:, 0] / at[3]**2, at[0] * shape * apart[:, 1] / at[3]**2, at[0] * shape * square / at[3]**3])
+        shape = np.exp(-square / (2 * at[3] ** 2))
+        by = np.column_stack(
+            [shape, at[0] * shape * apart[:, 0] / at[3] ** 2, at[0] * shape * apart[:, 1] / at[3] ** 2, at[0] * shape * square / at[3] ** 3]
+        )
         left = reading_Pa - at[0] * shape
         normal = by.T @ by
         trial = at + np.linalg.solve(normal + damping * np.diag(np.diag(normal)), by.T @ left)
-        model = trial[0] * np.exp(-((xy - trial[1:3])**2).sum(axis=1) / (2 * trial[3]**2))
-        lower = ((reading_Pa - model)**2).sum() < (left**2).sum()
+        model = trial[0] * np.exp(-((xy - trial[1:3]) ** 2).sum(axis=1) / (2 * trial[3] ** 2))
+        lower = ((reading_Pa - model) ** 2).sum() < (left**2).sum()
         at, damping = (trial, damping / 10) if lower else (at, damping * 10)
         if damping > 1e9 or damping < 1e-12:
             break
@@ -102,15 +108,31 @@ def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0),
     """prior: sigma, its standard deviation, mm; dip: its share, its sd, mm; NaN in readings: that sensor is missing. settings: others of real_fit."""
     sensors = readings.shape[1]
     return {
-        "kind": "fit", "presses": [[None if np.isnan(one) else one for one in press] for press in readings.tolist()], "noise_Pa": NOISE_PA,
-        "gain": [1.0] * sensors if gain is None else gain, "gain_sd": [RAW_GAIN_SD] * sensors if gain_sd is None else gain_sd,
-        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1], "dip_share": dip[0], "dip_sd_mm": dip[1], "own": list(own), **settings}
+        "kind": "fit",
+        "presses": [[None if np.isnan(one) else one for one in press] for press in readings.tolist()],
+        "noise_Pa": NOISE_PA,
+        "gain": [1.0] * sensors if gain is None else gain,
+        "gain_sd": [RAW_GAIN_SD] * sensors if gain_sd is None else gain_sd,
+        "prior_sigma_mm": prior[0],
+        "prior_width_mm": prior[1],
+        "dip_share": dip[0],
+        "dip_sd_mm": dip[1],
+        "own": list(own),
+        **settings,
+    }
 
 
 def stored_job(readings, stored, **settings):
     """With what a calibration leaves in the fingertip."""
-    return fit_job(readings, stored["gain"], stored["gain_sd"], (stored["prior_sigma_mm"], stored["prior_width_mm"]),
-                   (stored["dip_share"], stored["dip_sd_mm"]), stored["own"], **settings)
+    return fit_job(
+        readings,
+        stored["gain"],
+        stored["gain_sd"],
+        (stored["prior_sigma_mm"], stored["prior_width_mm"]),
+        (stored["dip_share"], stored["dip_sd_mm"]),
+        stored["own"],
+        **settings,
+    )
 
 
 def calibration_job(readings, every_s=EVERY_S):
@@ -119,10 +141,10 @@ def calibration_job(readings, every_s=EVERY_S):
 
 def dip_share(grid):
     """Depth of the dip, as a share of the contact's peak: least squares over the rows that align, where the Gaussian has ended."""
-    square = ((grid.xy[:, None, :] - grid.layout)**2).sum(axis=2) / grid.width_mm**2
+    square = ((grid.xy[:, None, :] - grid.layout) ** 2).sum(axis=2) / grid.width_mm**2
     far = (square > DIP_FROM_WIDTHS**2) & ~grid.judged[:, None]
     below = (np.exp(-square / 2) - grid.reading_Pa / grid.peak_Pa)[far]
-    dip = np.exp(-square[far] / (2 * (DIP_PITCHES * grid.pitch_mm / grid.width_mm.mean())**2))
+    dip = np.exp(-square[far] / (2 * (DIP_PITCHES * grid.pitch_mm / grid.width_mm.mean()) ** 2))
     return float((below * dip).sum() / (dip**2).sum())
 
 
@@ -149,12 +171,18 @@ class Felt:
     def figures(self, inside, outside):
         error, warned = self.error_mm[inside], self.warned[inside]
         return {
-            "presses": int(inside.sum()), "inside_p50_mm": quantile(error, 0.5), "inside_p95_mm": quantile(error, 0.95),
-            "over_1mm_percent": percent(error > 1.0), "over_2mm_percent": percent(error > 2.0),
-            "cover_1sd_percent": percent(error <= self.sd_mm[inside]), "cover_2sd_percent": percent(error <= 2 * self.sd_mm[inside]),
-            "warned_percent": percent(warned), "silent_percent": percent((error > 1.0) & ~warned),
+            "presses": int(inside.sum()),
+            "inside_p50_mm": quantile(error, 0.5),
+            "inside_p95_mm": quantile(error, 0.95),
+            "over_1mm_percent": percent(error > 1.0),
+            "over_2mm_percent": percent(error > 2.0),
+            "cover_1sd_percent": percent(error <= self.sd_mm[inside]),
+            "cover_2sd_percent": percent(error <= 2 * self.sd_mm[inside]),
+            "warned_percent": percent(warned),
+            "silent_percent": percent((error > 1.0) & ~warned),
             "force_scatter_percent": 100 * float(np.nanstd(np.log(np.maximum(self.force_N[inside], 1e-9)))),
-            "outside_p50_mm": quantile(self.error_mm[outside], 0.5)}
+            "outside_p50_mm": quantile(self.error_mm[outside], 0.5),
+        }
 
 
 def quantile(values, share):

@@ -3,6 +3,7 @@
 On presses of real arrays, and of simulated pads with their dip, gains and widths. Distances are from where the press was, not from an optimum. Run
 times are of this host, all ways in turns, over that of the published fit with four iterations.
 """
+
 import json
 import subprocess
 from types import SimpleNamespace
@@ -20,10 +21,15 @@ WAYS = (("published", "as published"), ("shipped", "as shipped, not calibrated")
 
 def jobs_of(readings, stored):
     """{(way, iterations): job}"""
-    return {(way, iterations): job(iterations) for way, job in (
-        ("published", lambda n: grids.fit_job(readings, iterations=n, cut_noises=0)),
-        ("shipped", lambda n: grids.fit_job(readings, iterations=n)),
-        ("calibrated", lambda n: grids.stored_job(readings, stored, iterations=n))) for iterations in ITERATIONS}
+    return {
+        (way, iterations): job(iterations)
+        for way, job in (
+            ("published", lambda n: grids.fit_job(readings, iterations=n, cut_noises=0)),
+            ("shipped", lambda n: grids.fit_job(readings, iterations=n)),
+            ("calibrated", lambda n: grids.stored_job(readings, stored, iterations=n)),
+        )
+        for iterations in ITERATIONS
+    }
 
 
 def rows(presses, measured):
@@ -36,9 +42,16 @@ def rows(presses, measured):
         for key, answer in zip(jobs, answers):
             error_mm.setdefault(key, []).append(grids.Felt(answer, xy_mm).error_mm)
             run_time.setdefault(key, []).append(us[key] / us["published", PUBLISHED_ITERATIONS])
-    return [{"presses": presses, "way": way, "iterations": iterations, "run_time": float(np.median(run_time[way, iterations])),
-             **{f"p{percent}_mm": grids.quantile(np.concatenate(errors), percent / 100) for percent in (50, 95)}}
-            for (way, iterations), errors in error_mm.items()]
+    return [
+        {
+            "presses": presses,
+            "way": way,
+            "iterations": iterations,
+            "run_time": float(np.median(run_time[way, iterations])),
+            **{f"p{percent}_mm": grids.quantile(np.concatenate(errors), percent / 100) for percent in (50, 95)},
+        }
+        for (way, iterations), errors in error_mm.items()
+    ]
 
 
 def twin_rows(programs, pads):
@@ -50,6 +63,13 @@ def twin_rows(programs, pads):
     made = json.loads(done.stdout)
     array = SimpleNamespace(layout=np.column_stack([made["x_mm"], made["y_mm"]]), pitch_mm=made["pitch_mm"])
     program = programs / "twin_fit"
-    calibrations = (grids.ask(program, array, [grids.calibration_job(np.array(pad["placements"]), pad["every_s"])])[0] for pad in made["pads"])
-    return rows("twin", [(program, array, np.array(pad["presses"]), np.array(pad["xy_mm"]), calibration["stored"])
-                         for pad, calibration in zip(made["pads"], calibrations)])
+    calibrations = (
+        grids.ask(program, array, [grids.calibration_job(np.array(pad["placements"]), pad["every_s"])])[0] for pad in made["pads"]
+    )
+    return rows(
+        "twin",
+        [
+            (program, array, np.array(pad["presses"]), np.array(pad["xy_mm"]), calibration["stored"])
+            for pad, calibration in zip(made["pads"], calibrations)
+        ],
+    )

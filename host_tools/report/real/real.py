@@ -14,6 +14,7 @@ checksum, and what is missing is named and left out.
 Recordings that chose a constant ("chooses") judge nothing. Presses lie in rows: every second row aligns the layout and gives the placements of
 calibrations, the others are judged.
 """
+
 import hashlib
 import json
 import pathlib
@@ -34,11 +35,25 @@ from goals import judge  # noqa: E402
 from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
 
 GOALS = (
-    ("raw_inside_p50_mm", "<=", 0.35), ("raw_over_2mm_percent", "<=", 3), ("cal_inside_p50_mm", "<=", 0.20), ("cal_inside_p95_mm", "<=", 0.60),
-    ("cal_over_1mm_percent", "<=", 1.5), ("cal_silent_percent", "<=", 0.1), ("cal_warned_percent", "<=", 15), ("cal_cover_1sd_percent", ">=", 55),
-    ("cal_cover_1sd_most_percent", "<=", 85), ("cal_outside_p50_mm", "<=", 0.65), ("cal_force_scatter_percent", "<=", 7),
-    ("sessions_accepted_percent", ">=", 90), ("worse_after_accept", "<=", 0), ("one_missing_over_1mm_percent", "<=", 15),
-    ("phantom_percent_1308", "<=", 2.5), ("phantom_percent_57", "<=", 5), ("doubted_percent", "<=", 20), ("holds_missed", "<=", 0))
+    ("raw_inside_p50_mm", "<=", 0.35),
+    ("raw_over_2mm_percent", "<=", 3),
+    ("cal_inside_p50_mm", "<=", 0.20),
+    ("cal_inside_p95_mm", "<=", 0.60),
+    ("cal_over_1mm_percent", "<=", 1.5),
+    ("cal_silent_percent", "<=", 0.1),
+    ("cal_warned_percent", "<=", 15),
+    ("cal_cover_1sd_percent", ">=", 55),
+    ("cal_cover_1sd_most_percent", "<=", 85),
+    ("cal_outside_p50_mm", "<=", 0.65),
+    ("cal_force_scatter_percent", "<=", 7),
+    ("sessions_accepted_percent", ">=", 90),
+    ("worse_after_accept", "<=", 0),
+    ("one_missing_over_1mm_percent", "<=", 15),
+    ("phantom_percent_1308", "<=", 2.5),
+    ("phantom_percent_57", "<=", 5),
+    ("doubted_percent", "<=", 20),
+    ("holds_missed", "<=", 0),
+)
 SEED = 20230101
 
 
@@ -50,7 +65,9 @@ def found_below(folder, sources):
         if path.name in wanted and hashlib.sha256(path.read_bytes()).hexdigest() == wanted[path.name]:
             here.setdefault(path.name, path)
     if not here:
-        raise InputError(f"{folder}: none of the recordings of sources.json is there; host_tools/report/real/README.md says where they come from")
+        raise InputError(
+            f"{folder}: none of the recordings of sources.json is there; host_tools/report/real/README.md says where they come from"
+        )
     return here
 
 
@@ -68,14 +85,31 @@ def judge_grid(program, one, path):
     inside, outside = grid.inside[grid.judged], grid.outside[grid.judged]
     typed = (float(np.median(grid.width_mm)), grids.PRIOR_WIDTH_MM)
     sessions = grid.sessions(SEED)
-    shipped, raw, *calibrations = grids.ask(program, grid, [
-        grids.fit_job(readings), grids.fit_job(readings, prior=typed), *(grids.calibration_job(grid.reading_Pa[these]) for these in sessions)])
+    shipped, raw, *calibrations = grids.ask(
+        program,
+        grid,
+        [
+            grids.fit_job(readings),
+            grids.fit_job(readings, prior=typed),
+            *(grids.calibration_job(grid.reading_Pa[these]) for these in sessions),
+        ],
+    )
     accepted = [one for one in calibrations if one["state"] == "good"]
     solved = [one for one in calibrations if one["solved"]]
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
-    fits = grids.ask(program, grid, [
-        job for one in solved for job in (
-            grids.stored_job(readings, one["stored"]), grids.stored_job(torn, one["stored"]), grids.stored_job(readings, {**one["stored"], "own": []}))])
+    fits = grids.ask(
+        program,
+        grid,
+        [
+            job
+            for one in solved
+            for job in (
+                grids.stored_job(readings, one["stored"]),
+                grids.stored_job(torn, one["stored"]),
+                grids.stored_job(readings, {**one["stored"], "own": []}),
+            )
+        ],
+    )
     felt = [grids.Felt(answer, xy) for answer in fits[0::3]]
     missing = [grids.Felt(answer, torn_xy) for answer in fits[1::3]]
     by_gains = [grids.Felt(answer, xy) for answer in fits[2::3]]
@@ -83,20 +117,38 @@ def judge_grid(program, one, path):
     all_inside, all_outside = np.tile(inside, len(felt)), np.tile(outside, len(felt))
     before = float(np.median(raw_felt.error_mm[inside]))
     found = {
-        "recording": one["key"], "part": one["part"], "width_mm": typed[0], "dip_percent": 100 * grids.dip_share(grid), "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
+        "recording": one["key"],
+        "part": one["part"],
+        "width_mm": typed[0],
+        "dip_percent": 100 * grids.dip_share(grid),
+        "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
         "places_off_mm": float(np.median(grid.places_off_mm)),
         "centroid_p50_mm": grids.quantile(np.hypot(*(grids.centroid(readings, grid.layout) - xy)[inside].T), 0.5),
-        "shipped": shipped_felt.figures(inside, outside), "raw": raw_felt.figures(inside, outside),
-        "sessions": len(calibrations), "accepted": len(accepted), "reasons": sorted({one["reason"] for one in calibrations} - {"none"}),
+        "shipped": shipped_felt.figures(inside, outside),
+        "raw": raw_felt.figures(inside, outside),
+        "sessions": len(calibrations),
+        "accepted": len(accepted),
+        "reasons": sorted({one["reason"] for one in calibrations} - {"none"}),
         "width_found_mm": grids.quantile([one["width_mm"] for one in solved], 0.5),
-        "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(felt, solved) if one["state"] == "good")}
+        "worse_after_accept": sum(
+            float(np.median(each.error_mm[inside])) > before for each, one in zip(felt, solved) if one["state"] == "good"
+        ),
+    }
     if felt:
         found["calibrated"] = grids.Felt.joined(felt).figures(all_inside, all_outside)
-        found["calibrated"]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt]))
+        found["calibrated"]["force_scatter_percent"] = float(
+            np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt])
+        )
         found["by_gains_inside_p50_mm"] = grids.quantile(np.concatenate([each.error_mm[inside] for each in by_gains]), 0.5)
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
-    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None,
-             "to_pace": [(program, grid, readings[inside], xy[inside], one["stored"]) for one in accepted]}
+    shown = {
+        "grid": grid,
+        "inside": inside,
+        "shipped": shipped_felt,
+        "raw": raw_felt,
+        "calibrated": felt[0] if felt else None,
+        "to_pace": [(program, grid, readings[inside], xy[inside], one["stored"]) for one in accepted],
+    }
     return found, shown
 
 
@@ -118,12 +170,22 @@ def judge_grids(program, source, here):
             found.append(row)
     rows = [row for row in found if row["part"] == "judges"]
     figures = {f"raw_{name}": mean_of(rows, "raw", name) for name in ("inside_p50_mm", "over_2mm_percent")}
-    for name in ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "silent_percent", "warned_percent", "cover_1sd_percent", "outside_p50_mm",
-                 "force_scatter_percent"):
+    for name in (
+        "inside_p50_mm",
+        "inside_p95_mm",
+        "over_1mm_percent",
+        "silent_percent",
+        "warned_percent",
+        "cover_1sd_percent",
+        "outside_p50_mm",
+        "force_scatter_percent",
+    ):
         figures[f"cal_{name}"] = mean_of(rows, "calibrated", name)
     figures["cal_by_gains_inside_p50_mm"] = mean_of(rows, "by_gains_inside_p50_mm")  # without the sensors' own places and widths
     figures["cal_cover_1sd_most_percent"] = figures["cal_cover_1sd_percent"]
-    figures["sessions_accepted_percent"] = 100 * sum(row["accepted"] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
+    figures["sessions_accepted_percent"] = (
+        100 * sum(row["accepted"] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
+    )
     figures["worse_after_accept"] = sum(row["worse_after_accept"] for row in rows) if rows else None
     figures["one_missing_over_1mm_percent"] = mean_of(rows, "one_missing_over_1mm_percent")
     return {**figures, "grids": found}, shown
@@ -147,15 +209,20 @@ def judge_strips(program, source, here):
     by_rate = {rate["frames_per_s"]: [strip["rates"][k] for strip in rows] for k, rate in enumerate(rows[0]["rates"])} if rows else {}
     fast, slow = by_rate.get(1308.0, []), by_rate.get(57.0, [])
     return {
-        "phantom_percent_1308": mean_of(fast, "phantom_percent"), "phantom_percent_57": mean_of(slow, "phantom_percent"),
+        "phantom_percent_1308": mean_of(fast, "phantom_percent"),
+        "phantom_percent_57": mean_of(slow, "phantom_percent"),
         "doubted_percent": mean_of(fast, "doubted_percent"),
-        "holds_missed": sum(rate["holds_missed"] for rates in by_rate.values() for rate in rates) if rows else None, "strips": strips}
+        "holds_missed": sum(rate["holds_missed"] for rates in by_rate.values() for rate in rates) if rows else None,
+        "strips": strips,
+    }
 
 
 def main(argv):
     parser = option_parser(__doc__)
     parser.add_argument("folder", metavar="FOLDER", help="with the recordings, in any folders below it")
-    parser.add_argument("--sources", default=pathlib.Path(__file__).with_name("sources.json"), metavar="FILE.json", help="which recordings there are")
+    parser.add_argument(
+        "--sources", default=pathlib.Path(__file__).with_name("sources.json"), metavar="FILE.json", help="which recordings there are"
+    )
     parser.add_argument("--pads", type=int, default=30, help="simulated ones for the run times (default: %(default)s)")
     options = parser.parse_args(argv)
     out, programs = output_folder(options), pathlib.Path(options.build) / "host_tools/report/real"

@@ -5,7 +5,8 @@
 //
 //   job {"kind": "fit", "presses": [[reading_Pa of each sensor, null: missing]], "noise_Pa",
 //        "gain": [sensor], "gain_sd": [sensor], "prior_sigma_mm", "prior_width_mm", "dip_share",
-//        "dip_sd_mm", "own": [[off_x_mm, off_y_mm, wider] of each sensor, or none], "iterations" and "cut_noises", by default as the firmware is built}
+//        "dip_sd_mm", "own": [[off_x_mm, off_y_mm, wider] of each sensor, or none], "iterations" and "cut_noises", by
+//        default as the firmware is built}
 //     -> {"x_mm", "y_mm", "sigma_mm", "force_N", "location_sd_mm", "flags": [press each]}, 0 without a fit
 //   job {"kind": "pace", "fits": [jobs of the kind fit], "passes": n}
 //     -> {"us": [job]}, of one press, in the quickest of n passes in which the jobs take turns
@@ -53,7 +54,7 @@ std::uint8_t or_built(const json &job, const char *setting, int built) {
 struct Prepared {
   fit_array array;
   fit_settings settings;
-  std::vector<fit_own> own; /* that of the settings */
+  std::vector<fit_own> own;                                              /* that of the settings */
   std::vector<std::array<std::int32_t, FT_MAX_SENSORS>> pressure_Pa_q10; /* [press] */
   std::vector<std::uint32_t> usable;                                     /* [press] */
 };
@@ -90,8 +91,7 @@ Prepared prepare(const Array &layout, const json &job) {
     auto &pressure = made.pressure_Pa_q10.emplace_back();
     for (std::size_t k = 0; k < layout.sensors(); k++) {
       if (!press.at(k).is_null()) {
-        pressure[k] =
-            static_cast<std::int32_t>(std::lround(1024.0 * press[k].get<double>() / gain.at(k)));
+        pressure[k] = static_cast<std::int32_t>(std::lround(1024.0 * press[k].get<double>() / gain.at(k)));
       }
     }
     made.usable.push_back(usable_of(press));
@@ -101,8 +101,8 @@ Prepared prepare(const Array &layout, const json &job) {
 
 fit_result fit_press(const Prepared &prepared, std::size_t press) {
   fit_result result;
-  fit_gaussian(&prepared.array, prepared.pressure_Pa_q10[press].data(), prepared.usable[press],
-               &prepared.settings, &result);
+  fit_gaussian(&prepared.array, prepared.pressure_Pa_q10[press].data(), prepared.usable[press], &prepared.settings,
+               &result);
   return result;
 }
 
@@ -114,8 +114,7 @@ json fit(const Array &layout, const json &job) {
     fit_result result = fit_press(prepared, press);
     fit_load load{};
     for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) { // of a press that is held
-      fit_load_follow(&load, &prepared.array, prepared.pressure_Pa_q10[press].data(),
-                      &prepared.settings, &result);
+      fit_load_follow(&load, &prepared.array, prepared.pressure_Pa_q10[press].data(), &prepared.settings, &result);
     }
     fit_load_widen(&load, &prepared.array, &prepared.settings, &result);
     x_mm.push_back(result.x_mm);
@@ -125,9 +124,9 @@ json fit(const Array &layout, const json &job) {
     location_sd_mm.push_back(result.location_sd_mm);
     flags.push_back(result.flags);
   }
-  return {{"x_mm", x_mm},       {"y_mm", y_mm},
-          {"sigma_mm", sigma_mm}, {"force_N", force_N},
-          {"location_sd_mm", location_sd_mm}, {"flags", flags}};
+  return {
+      {"x_mm", x_mm},  {"y_mm", y_mm}, {"sigma_mm", sigma_mm}, {"force_N", force_N}, {"location_sd_mm", location_sd_mm},
+      {"flags", flags}};
 }
 
 json pace(const Array &layout, const json &job) {
@@ -198,9 +197,7 @@ int main() {
     json results = json::array();
     for (const json &job : asked.at("jobs")) {
       const auto kind = job.at("kind").get<std::string>();
-      results.push_back(kind == "fit"    ? fit(layout, job)
-                        : kind == "pace" ? pace(layout, job)
-                                         : calibrate(layout, job));
+      results.push_back(kind == "fit" ? fit(layout, job) : kind == "pace" ? pace(layout, job) : calibrate(layout, job));
     }
     std::cout << json{{"results", results}} << '\n';
     return 0;

@@ -1,4 +1,5 @@
 """Tables and picture of real.py."""
+
 import numpy as np
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
 from fingertip.files import write_text
@@ -7,8 +8,18 @@ from pace import PUBLISHED_ITERATIONS
 from pace import WAYS as PACE_WAYS
 from tables import table_md, text_of
 
-COLUMNS = ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "over_2mm_percent", "cover_1sd_percent", "cover_2sd_percent", "warned_percent",
-           "silent_percent", "force_scatter_percent", "outside_p50_mm")
+COLUMNS = (
+    "inside_p50_mm",
+    "inside_p95_mm",
+    "over_1mm_percent",
+    "over_2mm_percent",
+    "cover_1sd_percent",
+    "cover_2sd_percent",
+    "warned_percent",
+    "silent_percent",
+    "force_scatter_percent",
+    "outside_p50_mm",
+)
 WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"))
 PROFILE_TO = 6.0  # widths
 
@@ -21,30 +32,114 @@ def grid_rows(found):
 
 
 def write(found, path):
-    lines = ["# Real rubber", "", "Written by `sh cmake/bootstrap.sh report real FOLDER`. The code is the firmware's own, compiled for the host; the readings are of",
-             "others. No pad of this project was measured.", "", *goal_table_md(found), "", "## Where the recordings come from", ""]
-    lines += table_md(("repository", "commit", "terms", "what"), [[source[key] for key in ("repository", "commit", "terms", "what")] for source in found["sources"].values()])
+    lines = [
+        "# Real rubber",
+        "",
+        "Written by `sh cmake/bootstrap.sh report real FOLDER`. The code is the firmware's own, compiled for the host; the readings are of",
+        "others. No pad of this project was measured.",
+        "",
+        *goal_table_md(found),
+        "",
+        "## Where the recordings come from",
+        "",
+    ]
+    lines += table_md(
+        ("repository", "commit", "terms", "what"),
+        [[source[key] for key in ("repository", "commit", "terms", "what")] for source in found["sources"].values()],
+    )
     if found["missing"]:
         lines += ["", f"Not there, and so not judged: {', '.join(found['missing'])}."]
     if found["grids"]:
-        lines += ["", "## Presses on arrays", "", "Inside the outer sensors, of rows that neither align nor calibrate. \"width typed\": a prior of the pad's own width, 0.5 mm.",
-                  "\"calibrated\": with the gains, width and dip of each session of twenty placements, whether the tool accepts it or not.",
-                  "silent: beyond 1 mm and no warning.", ""]
+        lines += [
+            "",
+            "## Presses on arrays",
+            "",
+            'Inside the outer sensors, of rows that neither align nor calibrate. "width typed": a prior of the pad\'s own width, 0.5 mm.',
+            '"calibrated": with the gains, width and dip of each session of twenty placements, whether the tool accepts it or not.',
+            "silent: beyond 1 mm and no warning.",
+            "",
+        ]
         lines += table_md(("recording", "part", "way", *COLUMNS), grid_rows(found))
-        lines += ["", *table_md(("recording", "width mm", "width found mm", "dip %", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
-            [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "dip_percent", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),
-             row["sessions"], row["accepted"], ", ".join(row["reasons"])] for row in found["grids"]])]
-    lines += ["", "## Error against run time", "", "Distance from where the press was. As published: a Gaussian of free width, readings below zero as they are. Run time: of this",
-              f"host, over that of the published fit with {PUBLISHED_ITERATIONS} iterations.", ""]
-    lines += table_md(("presses", "way", "iterations", "run time", "p50 mm", "p95 mm"), [
-        [row["presses"], dict(PACE_WAYS)[row["way"]], row["iterations"], *(text_of(row[key], 3) for key in ("run_time", "p50_mm", "p95_mm"))]
-        for row in found["pace"]])
+        lines += [
+            "",
+            *table_md(
+                (
+                    "recording",
+                    "width mm",
+                    "width found mm",
+                    "dip %",
+                    "gains cv %",
+                    "places off mm",
+                    "centroid p50 mm",
+                    "sessions",
+                    "accepted",
+                    "refused for",
+                ),
+                [
+                    [
+                        row["recording"],
+                        *(
+                            text_of(row[key], 3)
+                            for key in ("width_mm", "width_found_mm", "dip_percent", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")
+                        ),
+                        row["sessions"],
+                        row["accepted"],
+                        ", ".join(row["reasons"]),
+                    ]
+                    for row in found["grids"]
+                ],
+            ),
+        ]
+    lines += [
+        "",
+        "## Error against run time",
+        "",
+        "Distance from where the press was. As published: a Gaussian of free width, readings below zero as they are. Run time: of this",
+        f"host, over that of the published fit with {PUBLISHED_ITERATIONS} iterations.",
+        "",
+    ]
+    lines += table_md(
+        ("presses", "way", "iterations", "run time", "p50 mm", "p95 mm"),
+        [
+            [
+                row["presses"],
+                dict(PACE_WAYS)[row["way"]],
+                row["iterations"],
+                *(text_of(row[key], 3) for key in ("run_time", "p50_mm", "p95_mm")),
+            ]
+            for row in found["pace"]
+        ],
+    )
     if found["strips"]:
         rates = [f"{rate['frames_per_s']:g}/s" for rate in found["strips"][0]["rates"]]
-        lines += ["", "## The zero on strips", "", "Share of the time in which nothing touches: contact without a doubt, and doubted zero, at each rate. Longest: of such contacts.", ""]
-        lines += table_md(("recording", "part", "holds", *(f"{what} {rate}" for rate in rates for what in ("contact %", "doubted %", "longest s", "missed"))), [
-            [strip["name"], strip["part"], strip["holds"], *(text_of(rate[key], 3) for rate in strip["rates"] for key in (
-                "phantom_percent", "doubted_percent", "longest_s", "holds_missed"))] for strip in found["strips"]])
+        lines += [
+            "",
+            "## The zero on strips",
+            "",
+            "Share of the time in which nothing touches: contact without a doubt, and doubted zero, at each rate. Longest: of such contacts.",
+            "",
+        ]
+        lines += table_md(
+            (
+                "recording",
+                "part",
+                "holds",
+                *(f"{what} {rate}" for rate in rates for what in ("contact %", "doubted %", "longest s", "missed")),
+            ),
+            [
+                [
+                    strip["name"],
+                    strip["part"],
+                    strip["holds"],
+                    *(
+                        text_of(rate[key], 3)
+                        for rate in strip["rates"]
+                        for key in ("phantom_percent", "doubted_percent", "longest_s", "holds_missed")
+                    ),
+                ]
+                for strip in found["strips"]
+            ],
+        )
     write_text(path, "\n".join(lines) + "\n")
 
 
@@ -59,9 +154,14 @@ def draw_profile(axes, shown):
         share = grid.reading_Pa / grid.peak_Pa
         mean = [share[which == k].mean() if (which == k).any() else np.nan for k in range(len(middle))]
         axes.plot(middle, 100 * np.array(mean), lw=1.1, label=key)
-    axes.plot(middle, 100 * np.exp(-middle**2 / 2), color=INK, lw=1, ls=":", label="Gaussian")
+    axes.plot(middle, 100 * np.exp(-(middle**2) / 2), color=INK, lw=1, ls=":", label="Gaussian")
     axes.axhline(0, color=FAINT, lw=0.6)
-    axes.set(title="Response: the dip three to five widths away", xlabel="distance / width", ylabel="% of the peak, symmetric log", yscale="symlog")
+    axes.set(
+        title="Response: the dip three to five widths away",
+        xlabel="distance / width",
+        ylabel="% of the peak, symmetric log",
+        yscale="symlog",
+    )
     axes.set_yscale("symlog", linthresh=5)
     axes.legend(fontsize=7)
 
@@ -78,13 +178,16 @@ def draw_map(axes, each, way, title):
 
 def draw_coverage(axes, shown, part):
     for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE)):
-        ratios = [each[way].error_mm[each["inside"]] / np.maximum(each[way].sd_mm[each["inside"]], 1e-6) for key, each in shown.items()
-                  if each[way] is not None and key in part]
+        ratios = [
+            each[way].error_mm[each["inside"]] / np.maximum(each[way].sd_mm[each["inside"]], 1e-6)
+            for key, each in shown.items()
+            if each[way] is not None and key in part
+        ]
         if ratios:
             ratio = np.sort(np.concatenate(ratios))
             axes.plot(ratio, 100 * np.arange(1, len(ratio) + 1) / len(ratio), color=colour, label=name)
     sd = np.linspace(0, 3, 100)
-    axes.plot(sd, 100 * (1 - np.exp(-sd**2)), color=GOAL, ls=":", label="what the sd promises")
+    axes.plot(sd, 100 * (1 - np.exp(-(sd**2))), color=GOAL, ls=":", label="what the sd promises")
     axes.set(title="Coverage, inside", xlabel="error / location_sd_mm", ylabel="% of presses", xlim=(0, 3), ylim=(0, 100))
     axes.legend(fontsize=7)
 
@@ -112,10 +215,26 @@ def draw_pace(rows, path):
             these = [row for row in rows if row["presses"] == presses and row["way"] == way]
             x = [row["run_time"] for row in these]
             for key, style in (("p50_mm", "-o"), ("p95_mm", ":o")):
-                axes.plot(x, [row[key] for row in these], style, color=colour, ms=3.5, lw=1.3, label=f"{name}, {'half' if key == 'p50_mm' else '95 %'} below")
+                axes.plot(
+                    x,
+                    [row[key] for row in these],
+                    style,
+                    color=colour,
+                    ms=3.5,
+                    lw=1.3,
+                    label=f"{name}, {'half' if key == 'p50_mm' else '95 %'} below",
+                )
             for row in these:
                 if row["iterations"] in (1, PUBLISHED_ITERATIONS, 10):
-                    axes.annotate(str(row["iterations"]), (row["run_time"], row["p50_mm"]), (0, 5), textcoords="offset points", size=7, ha="center", color=colour)
+                    axes.annotate(
+                        str(row["iterations"]),
+                        (row["run_time"], row["p50_mm"]),
+                        (0, 5),
+                        textcoords="offset points",
+                        size=7,
+                        ha="center",
+                        color=colour,
+                    )
         axes.set(title=title, yscale="log", xlabel=f"run time over that of the published fit with {PUBLISHED_ITERATIONS} iterations")
         axes.grid()
     both[0].set_ylabel("distance from where the press was, mm")

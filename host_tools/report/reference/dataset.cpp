@@ -63,17 +63,15 @@ Record solve(const Array &array, const Case &c) {
   }
   // The truth is a good start where it is a Gaussian, and an honest one where it is not.
   const double peak_Pa = *std::max_element(pressure_Pa.begin(), pressure_Pa.end());
-  const double sigma_mm =
-      std::clamp(std::sqrt(1e6 * c.press.force_N / (2.0 * M_PI * peak_Pa)), 2.0, 40.0);
+  const double sigma_mm = std::clamp(std::sqrt(1e6 * c.press.force_N / (2.0 * M_PI * peak_Pa)), 2.0, 40.0);
   if (largest_usable(c) <= 0) {
     const double infinity = std::numeric_limits<double>::infinity();
     return {key_of(c), 0, 0, 0, 0, 0, 0, infinity, infinity, 0};
   }
-  const Fit best = fit(array, pressure_Pa, c.usable, c.press.noise_Pa,
-                       {{peak_Pa, c.press.x_mm, c.press.y_mm, sigma_mm}});
-  return {
-      key_of(c), best.theta.p0_Pa, best.theta.x_mm,     best.theta.y_mm,       best.theta.sigma_mm,
-      best.cost, best.force_N,     best.location_sd_mm, best.condition_number, best.at_bound};
+  const Fit best =
+      fit(array, pressure_Pa, c.usable, c.press.noise_Pa, {{peak_Pa, c.press.x_mm, c.press.y_mm, sigma_mm}});
+  return {key_of(c), best.theta.p0_Pa, best.theta.x_mm,     best.theta.y_mm,       best.theta.sigma_mm,
+          best.cost, best.force_N,     best.location_sd_mm, best.condition_number, best.at_bound};
 }
 
 std::vector<Record> read_records(const std::string &path) {
@@ -85,8 +83,7 @@ std::vector<Record> read_records(const std::string &path) {
   }
   records.resize(size / sizeof(Record));
   std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char *>(records.data()),
-            static_cast<std::streamsize>(records.size() * sizeof(Record)));
+  file.read(reinterpret_cast<char *>(records.data()), static_cast<std::streamsize>(records.size() * sizeof(Record)));
   if (!file) {
     records.clear();
   }
@@ -96,22 +93,19 @@ std::vector<Record> read_records(const std::string &path) {
 // Written beside and moved into place: a killed run leaves the old file.
 void write_records(const std::string &path, const std::vector<Record> &records) {
   std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  const std::string fresh =
-      path + "." + std::to_string(std::chrono::steady_clock::now().time_since_epoch().count());
+  const std::string fresh = path + "." + std::to_string(std::chrono::steady_clock::now().time_since_epoch().count());
   std::ofstream file(fresh, std::ios::binary);
   file.write(reinterpret_cast<const char *>(records.data()),
              static_cast<std::streamsize>(records.size() * sizeof(Record)));
   file.close();
   if (!file) {
     std::filesystem::remove(fresh);
-    throw std::runtime_error("cannot write " + fresh +
-                             ": is the folder writable and the disk free?");
+    throw std::runtime_error("cannot write " + fresh + ": is the folder writable and the disk free?");
   }
   std::filesystem::rename(fresh, path);
 }
 
-std::uint32_t usable_of(const Press &press, const std::vector<std::int32_t> &q10, Mask mask,
-                        Random random) {
+std::uint32_t usable_of(const Press &press, const std::vector<std::int32_t> &q10, Mask mask, Random random) {
   const auto count = press.pressure_Pa.size();
   const std::uint32_t all = (std::uint32_t{1} << count) - 1;
   if (mask == Mask::none) {
@@ -154,12 +148,12 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
     Case &c = cases[i];
     c.press = make_press(set, array, seed, i);
     c.pressure_Pa_q10 = quantise(c.press.pressure_Pa);
-    c.usable = usable_of(c.press, c.pressure_Pa_q10, mask,
-                         Random(seed, MASK_STREAM + static_cast<std::uint64_t>(set), i));
+    c.usable =
+        usable_of(c.press, c.pressure_Pa_q10, mask, Random(seed, MASK_STREAM + static_cast<std::uint64_t>(set), i));
   });
 
-  const std::string path = cache_dir + "/reference_" + std::to_string(seed) + "_" + name_of(set) +
-                           "_" + name_of(mask) + ".bin";
+  const std::string path =
+      cache_dir + "/reference_" + std::to_string(seed) + "_" + name_of(set) + "_" + name_of(mask) + ".bin";
   std::vector<Record> records = read_records(path);
   records.resize(std::max(records.size(), count));
   std::vector<std::size_t> missing;
@@ -174,8 +168,8 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
       records[missing[m]] = solve(array, cases[missing[m]]);
       const std::size_t now = ++done;
       if (now % 2000 == 0 || now == missing.size()) {
-        std::fprintf(stderr, "\rreference of set %c, mask %s: %zu of %zu ", name_of(set),
-                     name_of(mask), now, missing.size());
+        std::fprintf(stderr, "\rreference of set %c, mask %s: %zu of %zu ", name_of(set), name_of(mask), now,
+                     missing.size());
       }
     });
     std::fputc('\n', stderr);
@@ -190,8 +184,8 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
               r.location_sd_mm,
               r.condition_number,
               r.at_bound != 0};
-    c.observable = observable(c.best) && !c.best.at_bound &&
-                   largest_usable(c) >= GATE_SIGMAS * 1024.0 * c.press.noise_Pa;
+    c.observable =
+        observable(c.best) && !c.best.at_bound && largest_usable(c) >= GATE_SIGMAS * 1024.0 * c.press.noise_Pa;
   }
   return cases;
 }

@@ -21,8 +21,7 @@ enum class Mask {
   random2, // two sensors, drawn from the seed
   random3,
 };
-constexpr std::array<Mask, 5> ALL_MASKS{Mask::none, Mask::random, Mask::peak, Mask::random2,
-                                        Mask::random3};
+constexpr std::array<Mask, 5> ALL_MASKS{Mask::none, Mask::random, Mask::peak, Mask::random2, Mask::random3};
 const char *name_of(Mask mask);
 
 struct Case {

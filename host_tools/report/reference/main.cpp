@@ -39,8 +39,7 @@ int presses(const Options &options) {
   std::putchar('\n');
   for (std::size_t i = 0; i < options.count; i++) {
     const Press press = make_press(set, array, options.seed, i);
-    std::printf("%zu,%.9g,%.9g,%.9g,%.9g", i, press.x_mm, press.y_mm, press.force_N,
-                press.noise_Pa);
+    std::printf("%zu,%.9g,%.9g,%.9g,%.9g", i, press.x_mm, press.y_mm, press.force_N, press.noise_Pa);
     for (std::int32_t q10 : quantise(press.pressure_Pa)) {
       std::printf(",%.10g", q10 / 1024.0);
     }
@@ -64,9 +63,8 @@ public:
       sensor_.push_back(column("s" + std::to_string(k) + "_Pa"));
       tare_.push_back(column("tare" + std::to_string(k) + "_Pa"));
       if (!sensor_[k]) {
-        throw std::runtime_error(path_ + ": has no column s" + std::to_string(k) +
-                                 "_Pa; give readings of all " + std::to_string(sensors) +
-                                 " sensors, a recording with the raw stream, or a scenario");
+        throw std::runtime_error(path_ + ": has no column s" + std::to_string(k) + "_Pa; give readings of all " +
+                                 std::to_string(sensors) + " sensors, a recording with the raw stream, or a scenario");
       }
     }
   }
@@ -77,8 +75,7 @@ public:
     }
     cells_ = split(line_);
     if (cells_.size() != names_.size()) {
-      fail("has " + std::to_string(cells_.size()) + " cells, its header " +
-           std::to_string(names_.size()));
+      fail("has " + std::to_string(cells_.size()) + " cells, its header " + std::to_string(names_.size()));
     }
     return true;
   }
@@ -143,8 +140,7 @@ private:
   void read_gains(const std::string &text) {
     const auto gains = fingertip::split(text, ' ');
     if (gains.size() != gain_.size()) {
-      fail(std::to_string(gains.size()) + " gains for " + std::to_string(gain_.size()) +
-           " sensors");
+      fail(std::to_string(gains.size()) + " gains for " + std::to_string(gain_.size()) + " sensors");
     }
     for (std::size_t k = 0; k < gains.size(); k++) {
       const std::optional<double> gain = to_double(gains[k]);
@@ -175,8 +171,7 @@ int fit_rows(const Options &options) {
     }
   }
   const Array array = firmware_array();
-  Readings rows(standard ? std::cin : file, standard ? "standard input" : options.input,
-                array.x_mm.size());
+  Readings rows(standard ? std::cin : file, standard ? "standard input" : options.input, array.x_mm.size());
   const auto noise = rows.column("noise_Pa"), x = rows.column("x_mm"), y = rows.column("y_mm");
   std::printf("%s,best_x_mm,best_y_mm,best_p0_Pa,best_sigma_mm,best_force_N,location_sd_mm,"
               "condition_number,observable,at_bound,distance_mm\n",
@@ -195,22 +190,20 @@ int fit_rows(const Options &options) {
     }
     const bool no_zero = usable != 0 && least_Pa > ABSOLUTE_Pa;
     if (no_zero && !rows.column("tare0_Pa")) {
-      throw std::runtime_error(
-          "the readings are absolute pressures; subtract each sensor's zero, or give its column "
-          "tare0_Pa, ...");
+      throw std::runtime_error("the readings are absolute pressures; subtract each sensor's zero, or give its column "
+                               "tare0_Pa, ...");
     }
     const std::string &row = rows.first_cell();
-    if (__builtin_popcount(usable) < static_cast<int>(SENSORS_MIN) || largest_Pa <= 0.0 ||
-        no_zero) {
+    if (__builtin_popcount(usable) < static_cast<int>(SENSORS_MIN) || largest_Pa <= 0.0 || no_zero) {
       std::printf("%s,,,,,,,,,,\n", row.c_str());
       continue;
     }
     const double noise_Pa = rows.number(noise).value_or(options.noise_Pa);
     const Fit best = fit(array, pressure_Pa, usable, noise_Pa);
     const bool located = observable(best) && !best.at_bound && largest_Pa >= GATE_SIGMAS * noise_Pa;
-    std::printf("%s,%.7g,%.7g,%.7g,%.7g,%.7g,%.4g,%.4g,%d,%d,", row.c_str(), best.theta.x_mm,
-                best.theta.y_mm, best.theta.p0_Pa, best.theta.sigma_mm, best.force_N,
-                best.location_sd_mm, best.condition_number, located, best.at_bound);
+    std::printf("%s,%.7g,%.7g,%.7g,%.7g,%.7g,%.4g,%.4g,%d,%d,", row.c_str(), best.theta.x_mm, best.theta.y_mm,
+                best.theta.p0_Pa, best.theta.sigma_mm, best.force_N, best.location_sd_mm, best.condition_number,
+                located, best.at_bound);
     const auto there_x = rows.number(x), there_y = rows.number(y);
     if (located && there_x && there_y) {
       std::printf("%.5g", std::hypot(best.theta.x_mm - *there_x, best.theta.y_mm - *there_y));
@@ -223,8 +216,7 @@ int fit_rows(const Options &options) {
 int run(int argc, char **argv) {
   Options options;
   std::function<int()> action;
-  CLI::App app("The optimum that the fingertip's fit is measured against, in double precision.",
-               "reference");
+  CLI::App app("The optimum that the fingertip's fit is measured against, in double precision.", "reference");
   app.set_version_flag("--version", "reference " FINGERTIP_VERSION);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App *, const CLI::Error &error) {
@@ -238,17 +230,14 @@ int run(int argc, char **argv) {
   draw->add_option("--count", options.count, "How many")
       ->check(CLI::Range(std::size_t{1}, PRESSES_MAX))
       ->capture_default_str();
-  draw->add_option("--seed", options.seed, "Of the presses")
-      ->check(whole_number())
-      ->capture_default_str();
+  draw->add_option("--seed", options.seed, "Of the presses")->check(whole_number())->capture_default_str();
   draw->callback([&] { action = [&] { return presses(options); }; });
 
-  CLI::App *solve = app.add_subcommand(
-      "fit", "Print the optimum of each row of readings: a recording with the raw stream, a\n"
-             "scenario, or what presses prints. A row keeps its first cell; distance_mm is from\n"
-             "its x_mm, y_mm; a sensor with an empty cell is left out.");
-  solve->add_option("file", options.input, "The readings; - is standard input, the default")
-      ->type_name("FILE.csv");
+  CLI::App *solve =
+      app.add_subcommand("fit", "Print the optimum of each row of readings: a recording with the raw stream, a\n"
+                                "scenario, or what presses prints. A row keeps its first cell; distance_mm is from\n"
+                                "its x_mm, y_mm; a sensor with an empty cell is left out.");
+  solve->add_option("file", options.input, "The readings; - is standard input, the default")->type_name("FILE.csv");
   solve->add_option("--noise", options.noise_Pa, "Of a sensor, Pa rms, without a column noise_Pa")
       ->check(CLI::Range(0.01, 10000.0))
       ->capture_default_str();

@@ -12,11 +12,10 @@
 
 namespace fingertip::reference {
 
-void parse_options(int argc, char **argv, const std::vector<Option> &options,
-                   const std::string &usage) {
+void parse_options(int argc, char **argv, const std::vector<Option> &options, const std::string &usage) {
   CLI::App app;
-  auto formatter = std::make_shared<CLI::FormatterLambda>(
-      [&](const CLI::App *, std::string, CLI::AppFormatMode) { return usage; });
+  auto formatter =
+      std::make_shared<CLI::FormatterLambda>([&](const CLI::App *, std::string, CLI::AppFormatMode) { return usage; });
   app.formatter(formatter);
   app.set_help_flag("--help");
   for (const Option &option : options) {

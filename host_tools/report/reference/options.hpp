@@ -18,8 +18,7 @@ struct Option {
 };
 
 // Throws std::runtime_error with a message for the user. On --help, prints the usage and ends.
-void parse_options(int argc, char **argv, const std::vector<Option> &options,
-                   const std::string &usage);
+void parse_options(int argc, char **argv, const std::vector<Option> &options, const std::string &usage);
 
 // A main that prints what it found as one JSON object on the standard output, or in one line on
 // stderr what went wrong. Exit status.

@@ -95,14 +95,12 @@ double Layer::point_load_Pa(double r_mm) const {
   const double t = position - static_cast<double>(i);
   const double before = table[i == 0 ? 1 : i - 1];
   const double *at = &table[i];
-  const double value =
-      -t * (t - 1.0) * (t - 2.0) / 6.0 * before + (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * at[0] -
-      (t + 1.0) * t * (t - 2.0) / 2.0 * at[1] + (t + 1.0) * t * (t - 1.0) / 6.0 * at[2];
+  const double value = -t * (t - 1.0) * (t - 2.0) / 6.0 * before + (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * at[0] -
+                       (t + 1.0) * t * (t - 2.0) / 2.0 * at[1] + (t + 1.0) * t * (t - 1.0) / 6.0 * at[2];
   return 1e6 / (thickness_mm_ * thickness_mm_) * value;
 }
 
-std::vector<PointLoad> contact_pressure(Indenter indenter, double force_N,
-                                        double layer_thickness_mm) {
+std::vector<PointLoad> contact_pressure(Indenter indenter, double force_N, double layer_thickness_mm) {
   // With t = sqrt(1 - (r/a)^2) the force within the contour r is dt for the punch, whose pressure
   // goes as 1/t, and 3 t^2 dt for Hertz, whose pressure goes as t. The base sees even powers of r.
   const bool sphere = indenter == Indenter::sphere_6mm || indenter == Indenter::sphere_15mm;
@@ -163,8 +161,7 @@ Press make_press(PressSet set, const Array &array, std::uint64_t seed, std::size
       for (std::size_t k = 0; k < array.x_mm.size(); k++) {
         const double dx = array.x_mm[k] - press.x_mm;
         const double dy = array.y_mm[k] - press.y_mm;
-        press.pressure_Pa.push_back(p0_Pa *
-                                    std::exp(-0.5 * (dx * dx + dy * dy) / (sigma_mm * sigma_mm)));
+        press.pressure_Pa.push_back(p0_Pa * std::exp(-0.5 * (dx * dx + dy * dy) / (sigma_mm * sigma_mm)));
       }
     } else {
       const Layer layer(set == PressSet::C ? 12.0 : 6.0);
@@ -184,8 +181,7 @@ Press make_press(PressSet set, const Array &array, std::uint64_t seed, std::size
     for (double &p : press.pressure_Pa) {
       p += press.noise_Pa * random.normal();
     }
-    if (*std::max_element(press.pressure_Pa.begin(), press.pressure_Pa.end()) >=
-        GATE_SIGMAS * press.noise_Pa) {
+    if (*std::max_element(press.pressure_Pa.begin(), press.pressure_Pa.end()) >= GATE_SIGMAS * press.noise_Pa) {
       return press;
     }
   }

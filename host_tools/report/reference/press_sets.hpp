@@ -34,8 +34,7 @@ using fingertip::Random;
 constexpr double GATE_SIGMAS = 20.0;
 
 enum class PressSet { A, B, C, D };
-constexpr std::array<PressSet, 4> ALL_PRESS_SETS{PressSet::A, PressSet::B, PressSet::C,
-                                                 PressSet::D};
+constexpr std::array<PressSet, 4> ALL_PRESS_SETS{PressSet::A, PressSet::B, PressSet::C, PressSet::D};
 char name_of(PressSet set);
 
 struct Press {
@@ -49,8 +48,7 @@ struct Press {
 Press make_press(PressSet set, const Array &array, std::uint64_t seed, std::size_t index);
 
 // As the firmware receives it, 1/1024 Pa, after rounding to multiples of lsb_Pa.
-std::vector<std::int32_t> quantise(const std::vector<double> &pressure_Pa,
-                                   double lsb_Pa = 1.0 / 1024.0);
+std::vector<std::int32_t> quantise(const std::vector<double> &pressure_Pa, double lsb_Pa = 1.0 / 1024.0);
 
 // Pressure on the base of a bonded elastic layer of Poisson's ratio 0.49 (pad/layer.hpp).
 class Layer {
@@ -66,14 +64,13 @@ private:
 };
 
 enum class Indenter { sphere_6mm, sphere_15mm, cylinder_6mm, cube_6mm };
-constexpr std::array<Indenter, 4> ALL_INDENTERS{Indenter::sphere_6mm, Indenter::sphere_15mm,
-                                                Indenter::cylinder_6mm, Indenter::cube_6mm};
+constexpr std::array<Indenter, 4> ALL_INDENTERS{Indenter::sphere_6mm, Indenter::sphere_15mm, Indenter::cylinder_6mm,
+                                                Indenter::cube_6mm};
 
 // The contact pressure as point loads: quadrature nodes relative to the contact's centre.
 struct PointLoad {
   double x_mm, y_mm, share; // shares are positive and add up to 1
 };
-std::vector<PointLoad> contact_pressure(Indenter indenter, double force_N,
-                                        double layer_thickness_mm);
+std::vector<PointLoad> contact_pressure(Indenter indenter, double force_N, double layer_thickness_mm);
 
 } // namespace fingertip::reference

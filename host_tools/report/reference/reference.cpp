@@ -30,8 +30,7 @@ struct Box {
 
   bool touches(const Vector4 &theta) const {
     const Vector4 margin = 1e-9 * (high - low);
-    return ((theta - low).array() < margin.array()).any() ||
-           ((high - theta).array() < margin.array()).any();
+    return ((theta - low).array() < margin.array()).any() || ((high - theta).array() < margin.array()).any();
   }
 };
 
@@ -42,8 +41,7 @@ public:
     mutable_parameter_block_sizes()->push_back(4);
   }
 
-  bool Evaluate(double const *const *parameters, double *residuals,
-                double **jacobians) const override {
+  bool Evaluate(double const *const *parameters, double *residuals, double **jacobians) const override {
     const double *theta = parameters[0];
     const double inverse_variance = 1.0 / (theta[3] * theta[3]);
     for (std::size_t k = 0; k < samples_.size(); k++) {
@@ -114,11 +112,9 @@ double cost_at(const std::vector<Sample> &samples, const Vector4 &theta) {
 }
 
 // Takes parameters that rest on the box and are pushed outwards out of the system.
-void hold_at_box(const Box &box, const Vector4 &theta, const Vector4 &gradient, Matrix4 *matrix,
-                 Vector4 *right) {
+void hold_at_box(const Box &box, const Vector4 &theta, const Vector4 &gradient, Matrix4 *matrix, Vector4 *right) {
   for (int i = 0; i < 4; i++) {
-    if ((theta[i] <= box.low[i] && gradient[i] > 0.0) ||
-        (theta[i] >= box.high[i] && gradient[i] < 0.0)) {
+    if ((theta[i] <= box.low[i] && gradient[i] > 0.0) || (theta[i] >= box.high[i] && gradient[i] < 0.0)) {
       matrix->row(i).setZero();
       matrix->col(i).setZero();
       (*matrix)(i, i) = 1.0;
@@ -230,8 +226,7 @@ Shape shape_at(const std::vector<Sample> &samples, const Vector4 &theta) {
   const Matrix4 covariance = scale.asDiagonal() * scaled.inverse().eval() * scale.asDiagonal();
   const double radial = std::sqrt(covariance(1, 1) + covariance(2, 2));
   return {std::isfinite(radial) ? radial : infinity,
-          eigen.eigenvalues()(0) > 0.0 ? eigen.eigenvalues()(3) / eigen.eigenvalues()(0)
-                                       : infinity};
+          eigen.eigenvalues()(0) > 0.0 ? eigen.eigenvalues()(3) / eigen.eigenvalues()(0) : infinity};
 }
 
 Box box_of(const Array &array) {
@@ -247,29 +242,27 @@ bool observable(const Fit &fit) {
   return fit.location_sd_mm < 0.5 && fit.condition_number < 1e12;
 }
 
-Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_t usable,
-        double noise_Pa, const std::vector<Parameters> &starts, Starts effort) {
+Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_t usable, double noise_Pa,
+        const std::vector<Parameters> &starts, Starts effort) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < array.x_mm.size(); k++) {
     if (usable >> k & 1u) {
       order.push_back(k);
     }
   }
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return pressure_Pa[a] > pressure_Pa[b]; });
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return pressure_Pa[a] > pressure_Pa[b]; });
   const double largest = pressure_Pa[order.front()];
   std::vector<Sample> samples;
   for (std::size_t k : order) {
-    samples.push_back(
-        {array.x_mm[k] / array.pitch_mm, array.y_mm[k] / array.pitch_mm, pressure_Pa[k] / largest});
+    samples.push_back({array.x_mm[k] / array.pitch_mm, array.y_mm[k] / array.pitch_mm, pressure_Pa[k] / largest});
   }
 
   const Box box = box_of(array);
   const Vector4 middle(1.0, samples[0].x, samples[0].y, 0.65);
   std::vector<Vector4> guesses{middle};
   for (const Parameters &start : starts) {
-    guesses.emplace_back(start.p0_Pa / largest, start.x_mm / array.pitch_mm,
-                         start.y_mm / array.pitch_mm, start.sigma_mm / array.pitch_mm);
+    guesses.emplace_back(start.p0_Pa / largest, start.x_mm / array.pitch_mm, start.y_mm / array.pitch_mm,
+                         start.sigma_mm / array.pitch_mm);
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(4, samples.size()); i++) {
     for (double sigma : {0.35, 0.65, 1.5}) {
@@ -293,9 +286,8 @@ Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_
   for (const Vector4 &guess : guesses) {
     const Vector4 end = levenberg_marquardt(samples, box, into_box(box, guess));
     offer(end);
-    if (std::none_of(ends.begin(), ends.end(), [&](const Vector4 &other) {
-          return (other - end).cwiseAbs().maxCoeff() < SAME_END;
-        })) {
+    if (std::none_of(ends.begin(), ends.end(),
+                     [&](const Vector4 &other) { return (other - end).cwiseAbs().maxCoeff() < SAME_END; })) {
       ends.push_back(end);
     }
   }
@@ -320,11 +312,9 @@ Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_
   shape = shape_at(samples, best);
 
   Fit result{};
-  result.theta = {best[0] * largest, best[1] * array.pitch_mm, best[2] * array.pitch_mm,
-                  best[3] * array.pitch_mm};
+  result.theta = {best[0] * largest, best[1] * array.pitch_mm, best[2] * array.pitch_mm, best[3] * array.pitch_mm};
   result.cost = cost_at(samples, best) * largest * largest;
-  result.force_N =
-      2.0 * M_PI * result.theta.p0_Pa * result.theta.sigma_mm * result.theta.sigma_mm * 1e-6;
+  result.force_N = 2.0 * M_PI * result.theta.p0_Pa * result.theta.sigma_mm * result.theta.sigma_mm * 1e-6;
   result.location_sd_mm = noise_Pa / largest * array.pitch_mm * shape.radial;
   result.condition_number = shape.condition_number;
   result.at_bound = box.touches(best);

@@ -54,8 +54,7 @@ enum class Starts {
 // pressure_Pa[sensor]; usable: bitmap of the sensors to use, at least four, one of them positive.
 // starts: first guesses beside the built-in ones (every sensor among the four strongest, at three
 // widths).
-Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_t usable,
-        double noise_Pa, const std::vector<Parameters> &starts = {},
-        Starts effort = Starts::rationed);
+Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_t usable, double noise_Pa,
+        const std::vector<Parameters> &starts = {}, Starts effort = Starts::rationed);
 
 } // namespace fingertip::reference

@@ -41,8 +41,7 @@ struct Reading {
     for (const auto &term : profile.tangential) {
       const double sd = static_cast<double>(term.sd_mm);
       const Real v = sd * sd + KAPPA * u[T];
-      sum += static_cast<double>(term.moment_mm) / (v * v) * exp(-r2 / (2.0 * v)) *
-             (u[QX] * dx + u[QY] * dy);
+      sum += static_cast<double>(term.moment_mm) / (v * v) * exp(-r2 / (2.0 * v)) * (u[QX] * dx + u[QY] * dy);
     }
     residual[0] = weight * (1e6 / (2.0 * M_PI) * sum - sample.pressure_Pa);
     return true;
@@ -61,9 +60,8 @@ struct Prior {
 
 } // namespace
 
-TangentialFit fit_tangential_load(const pad_profile &profile,
-                                  const std::vector<TangentialSample> &samples, double noise_Pa,
-                                  const TangentialStart &start) {
+TangentialFit fit_tangential_load(const pad_profile &profile, const std::vector<TangentialSample> &samples,
+                                  double noise_Pa, const TangentialStart &start) {
   double largest_Pa = 0.0;
   for (const TangentialSample &sample : samples) {
     largest_Pa = std::max(largest_Pa, sample.pressure_Pa);
@@ -78,16 +76,15 @@ TangentialFit fit_tangential_load(const pad_profile &profile,
   ceres::Problem problem;
   for (const TangentialSample &sample : samples) {
     const double sd_Pa = together(base_Pa, sample.gain_sd * std::abs(sample.pressure_Pa));
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reading, 1, UNKNOWNS>(
-                                 new Reading{profile, sample, 1.0 / sd_Pa}),
-                             nullptr, u.data());
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<Reading, 1, UNKNOWNS>(new Reading{profile, sample, 1.0 / sd_Pa}), nullptr,
+        u.data());
   }
   const double long_sd = ELONGATION_SD_mm2 * force_N;
-  for (const Prior &prior : {Prior{T, static_cast<double>(profile.spread_mm2),
-                                   static_cast<double>(profile.spread_sd_mm2)},
-                             Prior{E1, 0.0, long_sd}, Prior{E2, 0.0, long_sd}}) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior, 1, UNKNOWNS>(new Prior(prior)),
-                             nullptr, u.data());
+  for (const Prior &prior :
+       {Prior{T, static_cast<double>(profile.spread_mm2), static_cast<double>(profile.spread_sd_mm2)},
+        Prior{E1, 0.0, long_sd}, Prior{E2, 0.0, long_sd}}) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior, 1, UNKNOWNS>(new Prior(prior)), nullptr, u.data());
   }
   problem.SetParameterLowerBound(u.data(), T, low);
   problem.SetParameterUpperBound(u.data(), T, high);
@@ -103,12 +100,10 @@ TangentialFit fit_tangential_load(const pad_profile &profile,
   best.cost = HUGE_VAL;
   std::array<double, UNKNOWNS> best_u{};
   const double own = start.sigma_mm * start.sigma_mm - GAUSSIAN_VARIANCE * wide;
-  for (const double spread :
-       {std::clamp(own, low, high), static_cast<double>(profile.spread_mm2)}) {
+  for (const double spread : {std::clamp(own, low, high), static_cast<double>(profile.spread_mm2)}) {
     for (const double qx : {-0.4, 0.0, 0.4}) {
       for (const double qy : {-0.4, 0.0, 0.4}) {
-        u = {force_N, start.x_mm - 3.0 * qx, start.y_mm - 3.0 * qy, spread, 0.0,
-             0.0,     qx * force_N,          qy * force_N};
+        u = {force_N, start.x_mm - 3.0 * qx, start.y_mm - 3.0 * qy, spread, 0.0, 0.0, qx * force_N, qy * force_N};
         ceres::Solver::Summary summary;
         ceres::Solve(options, &problem, &summary);
         if (summary.IsSolutionUsable() && summary.final_cost < best.cost) {
@@ -123,10 +118,8 @@ TangentialFit fit_tangential_load(const pad_profile &profile,
   problem.Evaluate(ceres::Problem::EvaluateOptions(), nullptr, nullptr, nullptr, &rows);
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows.num_rows, UNKNOWNS);
   for (int row = 0; row < rows.num_rows; row++) {
-    for (int k = rows.rows[static_cast<std::size_t>(row)];
-         k < rows.rows[static_cast<std::size_t>(row) + 1]; k++) {
-      jacobian(row, rows.cols[static_cast<std::size_t>(k)]) =
-          rows.values[static_cast<std::size_t>(k)];
+    for (int k = rows.rows[static_cast<std::size_t>(row)]; k < rows.rows[static_cast<std::size_t>(row) + 1]; k++) {
+      jacobian(row, rows.cols[static_cast<std::size_t>(k)]) = rows.values[static_cast<std::size_t>(k)];
     }
   }
   const Eigen::MatrixXd covariance =

@@ -1,4 +1,5 @@
 """Analysis of the firmware without running it, and mutation of it: tests/checks/analyse.py and tests/mutation."""
+
 import json
 import pathlib
 import subprocess
@@ -32,16 +33,23 @@ def measure(build, steps):
 
 
 def text(found):
-    lines = ["## Analysis", "",
-             f"clang-tidy with clang's analyser of paths, cppcheck, gcc's -fanalyzer and the mandatory rules of MISRA C:2012 over the "
-             f"{found['analyzed_files']} C files of firmware/ and boards/ (tests/checks/analyse.py says which tool holds which rule).", "",
-             "## Mutation", "",
-             f"Of the {found['mutants_possible']} small changes that can be made to the firmware and the two buses, a sample spread evenly "
-             f"over the modules (seed {found['mutation_seed']}): an operator, a number, a condition, a statement. Killed: a unit test fails, "
-             "or does under the sanitizer of undefined behaviour. Set apart: changes that cannot be seen, each with its reason in "
-             "tests/mutation/equivalent.txt; changes that make the same code are not counted. The tests were bettered with survivors of "
-             "this sample in view, so of other samples more survive (`mutation.py --seed`).", "",
-             *table_of_dicts_md(found["mutation_modules"]), ""]
+    lines = [
+        "## Analysis",
+        "",
+        f"clang-tidy with clang's analyser of paths, cppcheck, gcc's -fanalyzer and the mandatory rules of MISRA C:2012 over the "
+        f"{found['analyzed_files']} C files of firmware/ and boards/ (tests/checks/analyse.py says which tool holds which rule).",
+        "",
+        "## Mutation",
+        "",
+        f"Of the {found['mutants_possible']} small changes that can be made to the firmware and the two buses, a sample spread evenly "
+        f"over the modules (seed {found['mutation_seed']}): an operator, a number, a condition, a statement. Killed: a unit test fails, "
+        "or does under the sanitizer of undefined behaviour. Set apart: changes that cannot be seen, each with its reason in "
+        "tests/mutation/equivalent.txt; changes that make the same code are not counted. The tests were bettered with survivors of "
+        "this sample in view, so of other samples more survive (`mutation.py --seed`).",
+        "",
+        *table_of_dicts_md(found["mutation_modules"]),
+        "",
+    ]
     if found["mutation_survivors"]:
         lines += ["Survivors:", ""]
         for survivor in found["mutation_survivors"]:

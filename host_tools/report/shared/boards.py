@@ -1,4 +1,5 @@
 """The boards, by their descriptors (boards/README.md). As a program: says their names, the fastest first."""
+
 import json
 import pathlib
 

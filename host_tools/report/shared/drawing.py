@@ -1,4 +1,5 @@
 """How every picture of a report looks, and how it gets into its file."""
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -7,10 +8,22 @@ from fingertip.files import InputError  # noqa: E402
 
 INK, FAINT, GRID, GOAL, BLUE, ORANGE = "#22252e", "#8a8f9c", "#e6e8ee", "#2a9d4a", "#1f6fd6", "#d98a1f"
 
-plt.rcParams.update({
-    "font.size": 9, "axes.edgecolor": "#b4bac6", "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT, "text.color": INK,
-    "axes.spines.top": False, "axes.spines.right": False, "axes.axisbelow": True, "grid.color": GRID, "grid.linewidth": 0.6,
-    "legend.frameon": False})
+plt.rcParams.update(
+    {
+        "font.size": 9,
+        "axes.edgecolor": "#b4bac6",
+        "axes.labelcolor": INK,
+        "xtick.color": FAINT,
+        "ytick.color": FAINT,
+        "text.color": INK,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.axisbelow": True,
+        "grid.color": GRID,
+        "grid.linewidth": 0.6,
+        "legend.frameon": False,
+    }
+)
 
 
 def save(figure, path):

@@ -1,4 +1,5 @@
 """Measurements of the release images in the emulator: rates, latencies, sleep. The same bit for bit each time."""
+
 import csv
 import json
 import pathlib
@@ -27,6 +28,7 @@ MARGIN = 1.05
 
 class Tools:
     """The boards' own images. scene: theirs (cmake/options.cmake)."""
+
     scene = "grasp"
 
     def __init__(self, build, boards):
@@ -45,7 +47,7 @@ class Tools:
 
 
 def scenario(folder, name, seconds, stem=None):
-    """"wander" touches from 0.65 s on; "rest" never."""
+    """ "wander" touches from 0.65 s on; "rest" never."""
     path = pathlib.Path(folder) / f"{stem or name}.csv"
     if name != "rest":
         run(sys.executable, ROOT / "host_tools/python", "scenario", name, "-o", path, "--seconds", f"{seconds:g}")
@@ -61,7 +63,7 @@ def unstuffed(frame):
     packet, at = bytearray(), 0
     while at < len(frame):
         code = frame[at]
-        packet += frame[at + 1:at + code]
+        packet += frame[at + 1 : at + code]
         at += code
         if code != 0xFF and at < len(frame):
             packet.append(0)
@@ -89,8 +91,12 @@ def contact_times_us(usb_log, zero_us):
 
 
 def distribution(values):
-    return {"median": float(np.median(values)), "p99": float(np.percentile(values, 99)),
-            "p99_9": float(np.percentile(values, 99.9)), "max": float(values.max())}
+    return {
+        "median": float(np.median(values)),
+        "p99": float(np.percentile(values, 99)),
+        "p99_9": float(np.percentile(values, 99.9)),
+        "max": float(values.max()),
+    }
 
 
 class Measurement:
@@ -104,13 +110,34 @@ class Measurement:
         """commands: encoded, sent as soon as it streams and the one before is stored."""
         base = pathlib.Path(folder) / f"{board}-{osr}-{path.stem}"
         script = base.with_suffix(".script")
-        script.write_text(f"0.45 dtr 1\n0.452 {tools.encoded('info')}\n0.455 {tools.encoded('osr', osr)}\n"
-                          f"0.46 {tools.encoded('stream', 'contact,health')}\n" + "".join(f"{0.465 + 0.09 * n:.3f} {command}\n" for n, command in enumerate(commands)))
+        script.write_text(
+            f"0.45 dtr 1\n0.452 {tools.encoded('info')}\n0.455 {tools.encoded('osr', osr)}\n"
+            f"0.46 {tools.encoded('stream', 'contact,health')}\n"
+            + "".join(f"{0.465 + 0.09 * n:.3f} {command}\n" for n, command in enumerate(commands))
+        )
 
         def emulate(name, until_s):
             to = f"{base}.{name}"
-            run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", tools.image(board), "--scenario", path,
-                "--seconds", until_s, "--host-script", script, "--capture", f"{to}.ftr", "--report", f"{to}.json", "--usb-log", f"{to}.usb")
+            run(
+                "node",
+                ROOT / "host_tools/simulation/emulator/main.mjs",
+                "--board",
+                board,
+                "--image",
+                tools.image(board),
+                "--scenario",
+                path,
+                "--seconds",
+                until_s,
+                "--host-script",
+                script,
+                "--capture",
+                f"{to}.ftr",
+                "--report",
+                f"{to}.json",
+                "--usb-log",
+                f"{to}.usb",
+            )
             return to, json.loads(pathlib.Path(f"{to}.json").read_text())
 
         _, before = emulate("before", FROM_s)
@@ -145,7 +172,10 @@ class Measurement:
         steps_us = np.diff(t_us)
         # A frame whose time goes to the temperature may take longer, so its step is another.
         self.clock_jitter_us = float(np.ptp(steps_us[~held[1:] & ~held[:-1]]))
-        self.stages_us = {name: float(recording[name][rows][~held].mean()) for name in ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")}
+        self.stages_us = {
+            name: float(recording[name][rows][~held].mean())
+            for name in ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
+        }
 
     def _losses(self, recording):
         """From the first frame on: what did not come, as the host and as the device counts it."""

@@ -3,6 +3,7 @@
 A goal is (name, sign, limit): sign ">=" or "<="; limit a number or the name of another figure. A figure that was not
 measured is None.
 """
+
 from tables import table_md, text_of
 
 VERDICTS = {True: "met", False: "MISSED", None: "not measured"}

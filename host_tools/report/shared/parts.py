@@ -14,6 +14,7 @@ part.json has
     page             title, about, origin of the figures; origins: [pattern, origin], the first that matches goes before origin;
                      text: its file if that is not NAME.md; pictures, tables: [file, what it shows]; by: the command, if none runs it
 """
+
 import dataclasses
 import json
 import pathlib
@@ -86,8 +87,19 @@ def steps(what, folder=None):
         needed = chosen[0][0].run.folder
         if bool(needed) != bool(folder):
             raise InputError(f"{what} needs the folder {needed}" if needed else f"{what} takes no folder")
-    return [(part.run.says, ["/usr/bin/python3", f"host_tools/report/{part.name}/{part.run.program}", *part.run.arguments, *more,
-                             *([folder] if folder else [])]) for part, more in chosen]
+    return [
+        (
+            part.run.says,
+            [
+                "/usr/bin/python3",
+                f"host_tools/report/{part.name}/{part.run.program}",
+                *part.run.arguments,
+                *more,
+                *([folder] if folder else []),
+            ],
+        )
+        for part, more in chosen
+    ]
 
 
 def main(argv):

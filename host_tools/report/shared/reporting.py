@@ -1,4 +1,5 @@
 """What every report does besides measuring: its options, its steps, its files, and how it ends."""
+
 import argparse
 import concurrent.futures
 import json
@@ -58,6 +59,7 @@ class Steps:
 
     def run_all(self, jobs, workers=2):
         """jobs: key -> (what, function). key -> result."""
+
         def one(what, function):
             result = function()
             self.say(what)

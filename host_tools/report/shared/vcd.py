@@ -1,4 +1,5 @@
 """A value change dump of lines, as the emulator writes it."""
+
 import re
 
 

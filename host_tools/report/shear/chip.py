@@ -1,5 +1,6 @@
 """What the tangential load costs on the chip: the images of scene grasp in the emulator, a pad of 12 mm in their profile, and the cycles of
 the estimate alone."""
+
 import pathlib
 import sys
 import tempfile
@@ -29,11 +30,15 @@ def measure(build, boards, say):
             told = read_recording(f"{measured.name}.csv")
             flags = told["flags"][told.has_contact & (told["t_us"] > told["t_us"][-1] - 1e6 * SECONDS)].astype(np.int64)
             found |= {
-                f"chip_fps_osr{osr}": measured.fitted_per_s, f"chip_frames_per_s_osr{osr}": measured.frames_per_s,
-                f"chip_frames_skipped_osr{osr}": measured.frames_skipped, f"chip_latency_us_osr{osr}": float(measured.offered_us.max()),
+                f"chip_fps_osr{osr}": measured.fitted_per_s,
+                f"chip_frames_per_s_osr{osr}": measured.frames_per_s,
+                f"chip_frames_skipped_osr{osr}": measured.frames_skipped,
+                f"chip_latency_us_osr{osr}": float(measured.offered_us.max()),
                 f"chip_latency_median_us_osr{osr}": float(np.median(measured.offered_us)),
                 f"chip_fit_us_osr{osr}": measured.stages_us["fit_us"],
-                f"chip_told_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()), f"chip_sleep_percent_osr{osr}": measured.sleep_percent}
+                f"chip_told_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()),
+                f"chip_sleep_percent_osr{osr}": measured.sleep_percent,
+            }
             say(f"grasp on {BOARD}, OSR {osr}: {measured.fitted_per_s:.0f} frames/s")
     cycles = run("node", pathlib.Path(__file__).with_name("cycles.mjs"), fit_cycles_of(boards)).split()
     return {**found, "fit_cycles_median": int(cycles[0]), "shear_cycles_median": int(cycles[1]), "shear_cycles": int(cycles[2])}

@@ -12,11 +12,19 @@ const between = (low, high) => random.range(low, high);
 
 /** Round, with a field as of a pull, which need not be a layer's: the cost does not depend on it. */
 function press() {
-  const [x_mm, y_mm, sigma_mm, p0_Pa, tilt] = [between(-9, 9), between(-18, 18), between(5.5, 7), 10 ** between(3, 4.7), between(-0.4, 0.4)];
+  const [x_mm, y_mm, sigma_mm, p0_Pa, tilt] = [
+    between(-9, 9),
+    between(-18, 18),
+    between(5.5, 7),
+    10 ** between(3, 4.7),
+    between(-0.4, 0.4),
+  ];
   return Array.from({ length: SENSORS }, (_, k) => {
     const dx = PITCH_mm * (Math.floor(k / 5) - 1) - x_mm;
     const dy = PITCH_mm * ((k % 5) - 2) - y_mm;
-    return Math.round(1024 * (p0_Pa * Math.exp(-(dx * dx + dy * dy) / (2 * sigma_mm * sigma_mm)) * (1 + (tilt * dx) / 12) + 4 * between(-1, 1)));
+    return Math.round(
+      1024 * (p0_Pa * Math.exp(-(dx * dx + dy * dy) / (2 * sigma_mm * sigma_mm)) * (1 + (tilt * dx) / 12) + 4 * between(-1, 1)),
+    );
   });
 }
 

@@ -7,6 +7,7 @@
 Medians over touches anywhere on the array, 1 to 10 N, of seven objects, on 12 mm of simulated rubber without end whose sensors' gains differ by
 10 %. Calibrated: with twenty placements of a known weight. Pulled: along the rubber by 0.3 of the force. Rubber does not relax here.
 """
+
 import argparse
 import json
 import pathlib
@@ -51,20 +52,39 @@ def table(header, lines):
 
 def long_table(rows):
     cases = [(pad, load) for pad in (RAW, CALIBRATED) for load in (STRAIGHT, PULLED)]
-    lines = [[name, *(write(rows[case][key]) for case in cases)] for name, key, write in (
-        ("location off by, scene `slip`", "location_without_p50_mm", mm), ("location, scene `grasp`", "location_p50_mm", mm),
-        ("force off by, scene `slip`", "force_without_p50_percent", percent), ("force, scene `grasp`", "force_p50_percent", percent),
-        ("pull off by, of the force, scene `grasp`", "vector_error_p50", share))]
+    lines = [
+        [name, *(write(rows[case][key]) for case in cases)]
+        for name, key, write in (
+            ("location off by, scene `slip`", "location_without_p50_mm", mm),
+            ("location, scene `grasp`", "location_p50_mm", mm),
+            ("force off by, scene `slip`", "force_without_p50_percent", percent),
+            ("force, scene `grasp`", "force_p50_percent", percent),
+            ("pull off by, of the force, scene `grasp`", "vector_error_p50", share),
+        )
+    ]
     return table(["median, simulated 12 mm", "never calibrated", "and pulled by 0.3 of the force", "calibrated", "and pulled"], lines)
 
 
 def short_table(rows):
     straight, pulled = rows[CALIBRATED, STRAIGHT], rows[CALIBRATED, PULLED]
-    return table(["off by, simulated", "`slip`, never calibrated", "`slip`, calibrated", "`slip`, and pulled", "`grasp`, and pulled"], [
-        ["location", mm(rows[RAW, STRAIGHT]["location_without_p50_mm"]), *(mm(row["location_without_p50_mm"]) for row in (straight, pulled)), mm(pulled["location_p50_mm"])],
-        ["force", percent(rows[RAW, STRAIGHT]["force_without_p50_percent"]), *(percent(row["force_without_p50_percent"]) for row in (straight, pulled)),
-         percent(pulled["force_p50_percent"])],
-        ["pull", "", "", "", f"{share(pulled['vector_error_p50'])} of force"]])
+    return table(
+        ["off by, simulated", "`slip`, never calibrated", "`slip`, calibrated", "`slip`, and pulled", "`grasp`, and pulled"],
+        [
+            [
+                "location",
+                mm(rows[RAW, STRAIGHT]["location_without_p50_mm"]),
+                *(mm(row["location_without_p50_mm"]) for row in (straight, pulled)),
+                mm(pulled["location_p50_mm"]),
+            ],
+            [
+                "force",
+                percent(rows[RAW, STRAIGHT]["force_without_p50_percent"]),
+                *(percent(row["force_without_p50_percent"]) for row in (straight, pulled)),
+                percent(pulled["force_p50_percent"]),
+            ],
+            ["pull", "", "", "", f"{share(pulled['vector_error_p50'])} of force"],
+        ],
+    )
 
 
 def filled(path, text):
@@ -92,7 +112,9 @@ def main(argv):
         elif page != path.read_text(encoding="utf-8"):
             wrong.append(str(path.relative_to(ROOT)))
     if wrong:
-        raise InputError(f"{' and '.join(wrong)}: the figures to expect are not those that host_tools/report/shear/expected.py finds; run it")
+        raise InputError(
+            f"{' and '.join(wrong)}: the figures to expect are not those that host_tools/report/shear/expected.py finds; run it"
+        )
     return 0
 
 

@@ -12,6 +12,7 @@ processors, and one that writes to the disk all the time. The files are written 
 test that cannot be run has failed; skipped is only what says so itself. Seconds are of quiet runs: ctest's times added up for the tests,
 minutes and seconds on the wall for a run, on as many jobs as there are processors. Mutants are those of the last report of reliability in the output folder.
 """
+
 import collections
 import contextlib
 import json
@@ -33,9 +34,18 @@ from goals import goal_table_md, judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 from tables import table_md  # noqa: E402
 
-GOALS = (("whole_runs", ">=", 6), ("whole_failures", "<=", 0), ("quick_runs", ">=", 20), ("quick_failures", "<=", 0), ("quick_seconds", "<=", 60),
-         ("whole_test_seconds", "<=", 1400), ("whole_minutes", "<=", 12), ("sleeps", "<=", 0), ("retries", "<=", 0),
-         ("mutants_survive_percent", "<=", 4))
+GOALS = (
+    ("whole_runs", ">=", 6),
+    ("whole_failures", "<=", 0),
+    ("quick_runs", ">=", 20),
+    ("quick_failures", "<=", 0),
+    ("quick_seconds", "<=", 60),
+    ("whole_test_seconds", "<=", 1400),
+    ("whole_minutes", "<=", 12),
+    ("sleeps", "<=", 0),
+    ("retries", "<=", 0),
+    ("mutants_survive_percent", "<=", 4),
+)
 LONGEST = 15  # tests that are listed
 # Both end with the report, however that ends: its process is the first argument.
 BURN = """
@@ -91,8 +101,10 @@ def status_of(case):
 
 def read_junit(path):
     """name -> Test, of each that ctest wrote down."""
-    tests = {case.get("name"): Test(float(case.get("time", 0)), status_of(case), case.findtext("system-out") or "")
-             for case in xml.etree.ElementTree.parse(path).iter("testcase")}
+    tests = {
+        case.get("name"): Test(float(case.get("time", 0)), status_of(case), case.findtext("system-out") or "")
+        for case in xml.etree.ElementTree.parse(path).iter("testcase")
+    }
     if not tests:
         raise InputError(f"{path}: no test was run")
     return tests
@@ -113,8 +125,24 @@ def run_suite(build, only, machine):
     with tempfile.TemporaryDirectory(prefix="suite-", dir=build) as folder, machine(folder):  # on the disk that the tests are on
         result = os.path.join(folder, "result.xml")
         begun_s = time.monotonic()
-        done = subprocess.run(["ctest", "--test-dir", build, "-j", str(os.cpu_count() + 1), "--output-junit", result, "--test-output-truncation", "head",
-                               *(["-L", f"^{only}$"] if only else [])], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        done = subprocess.run(
+            [
+                "ctest",
+                "--test-dir",
+                build,
+                "-j",
+                str(os.cpu_count() + 1),
+                "--output-junit",
+                result,
+                "--test-output-truncation",
+                "head",
+                *(["-L", f"^{only}$"] if only else []),
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         seconds = time.monotonic() - begun_s
         if not os.path.exists(result):
             return seconds, {"ctest": Test(seconds, "fail", f"ended with status {done.returncode}\n{done.stderr}")}
@@ -123,8 +151,12 @@ def run_suite(build, only, machine):
 
 def plan(whole, quick):
     """(label or None, is it quiet) of each run: quiet ones first, so that the machine must be left alone for the first part only."""
-    return [(only, is_quiet) for is_quiet in (True, False) for only, count in (("quick", quick), (None, whole))
-            for _ in range((count + 1) // 2 if is_quiet else count // 2)]
+    return [
+        (only, is_quiet)
+        for is_quiet in (True, False)
+        for only, count in (("quick", quick), (None, whole))
+        for _ in range((count + 1) // 2 if is_quiet else count // 2)
+    ]
 
 
 def run_all(build, planned, steps, kept):
@@ -139,8 +171,10 @@ def run_all(build, planned, steps, kept):
         for name in failed:
             kept.mkdir(exist_ok=True)
             write_text(kept / f"{only or 'whole'}-{len(runs[only])}-{machine}-{name}.txt", tests[name].output)
-        steps.say(f"run {i + 1} of {len(planned)}, {only or 'whole'}, {machine}: {seconds / 60:.1f} min, {len(tests)} tests"
-                  + (f", failed: {', '.join(failed)}" if failed else ""))
+        steps.say(
+            f"run {i + 1} of {len(planned)}, {only or 'whole'}, {machine}: {seconds / 60:.1f} min, {len(tests)} tests"
+            + (f", failed: {', '.join(failed)}" if failed else "")
+        )
         yield runs[None], runs["quick"]
 
 
@@ -172,13 +206,19 @@ def summary(whole, quick, named):
     for name, seconds in times.items():
         by_label[named.get(name, "none")] = by_label.get(named.get(name, "none"), 0) + seconds
     return {
-        "whole_runs": len(whole), "whole_failures": failures(whole), "whole_failed": named_with("fail", whole), "whole_tests": len(times),
+        "whole_runs": len(whole),
+        "whole_failures": failures(whole),
+        "whole_failed": named_with("fail", whole),
+        "whole_tests": len(times),
         "whole_test_seconds": max((sum(test.seconds for test in tests.values()) for _, tests in quiet), default=None),
         "whole_minutes": max((seconds / 60 for seconds, _ in quiet), default=None),
         "whole_minutes_busy": max((seconds / 60 for is_quiet, seconds, _ in whole if not is_quiet), default=None),
-        "quick_runs": len(quick), "quick_failures": failures(quick), "quick_failed": named_with("fail", quick),
+        "quick_runs": len(quick),
+        "quick_failures": failures(quick),
+        "quick_failed": named_with("fail", quick),
         "quick_seconds": max((seconds for is_quiet, seconds, _ in quick if is_quiet), default=None),
-        "skipped": named_with("skipped", whole), "skipped_in_part": skipped_in_part(whole),
+        "skipped": named_with("skipped", whole),
+        "skipped_in_part": skipped_in_part(whole),
         "seconds_by_label": dict(sorted(by_label.items())),
         "longest": dict(sorted(times.items(), key=lambda item: -item[1])[:LONGEST]),
     }
@@ -195,9 +235,22 @@ def text(found):
     parts = [[label, f"{seconds:.0f}"] for label, seconds in found["seconds_by_label"].items()]
     failed = sorted({*found["whole_failed"], *found["quick_failed"]})
     in_part = ", ".join(f"{name} ({parts})" for name, parts in found["skipped_in_part"].items())
-    return "\n".join(["# The test suite", "", "Written by `sh cmake/bootstrap.sh report suite`.", "", *goal_table_md(found), "",
-                      f"Failed: {', '.join(failed) or 'none'}. Skipped: {', '.join(found['skipped']) or 'none'}. Skipped in part: {in_part or 'none'}.", "",
-                      *table_md(("label", "seconds"), parts), "", *table_md(("longest tests", "seconds"), tests), ""])
+    return "\n".join(
+        [
+            "# The test suite",
+            "",
+            "Written by `sh cmake/bootstrap.sh report suite`.",
+            "",
+            *goal_table_md(found),
+            "",
+            f"Failed: {', '.join(failed) or 'none'}. Skipped: {', '.join(found['skipped']) or 'none'}. Skipped in part: {in_part or 'none'}.",
+            "",
+            *table_md(("label", "seconds"), parts),
+            "",
+            *table_md(("longest tests", "seconds"), tests),
+            "",
+        ]
+    )
 
 
 def main(argv):
@@ -214,8 +267,11 @@ def main(argv):
     shutil.rmtree(kept, ignore_errors=True)  # of the last report
     steps = Steps()
     found = waits(ROOT)
-    counted = {"sleeps": sum(what == "sleep" for _, _, what in found), "retries": sum(what == "retry" for _, _, what in found),
-               "mutants_survive_percent": surviving_mutants(out)}
+    counted = {
+        "sleeps": sum(what == "sleep" for _, _, what in found),
+        "retries": sum(what == "retry" for _, _, what in found),
+        "mutants_survive_percent": surviving_mutants(out),
+    }
     for whole, quick in run_all(options.build, plan(options.whole, options.quick), steps, kept):
         figures = judge(summary(whole, quick, named) | counted, GOALS)
         write_json(out / "suite.json", figures)

@@ -29,9 +29,8 @@ constexpr std::int64_t TICK_us = 100000;
 constexpr std::int64_t LAST_ANSWERS_us = 3000000, SILENCE_us = 10000000;
 
 wire_packet nth_command(std::int64_t n) {
-  const wire_packet all[] = {command_health(),   command_slip(0.5F, 100),
-                             command_tare(true), command_rate_mHz(1308000),
-                             command_info(),     command_location_limit(0.5F)};
+  const wire_packet all[] = {command_health(),          command_slip(0.5F, 100), command_tare(true),
+                             command_rate_mHz(1308000), command_info(),          command_location_limit(0.5F)};
   return all[static_cast<std::size_t>(n) % std::size(all)];
 }
 
@@ -75,8 +74,7 @@ int main(int argc, char **argv) {
   try {
     std::string name = argv[1];
     bool listens = name[0] == '/';
-    auto transport =
-        open_way(listens ? Way{"", name, false} : choose_way({"", name, Reach::socket}));
+    auto transport = open_way(listens ? Way{"", name, false} : choose_way({"", name, Reach::socket}));
     Session session(*transport);
     Got got;
     got.last_frame = static_cast<std::uint32_t>(*to_u64(argv[2]));
@@ -113,12 +111,10 @@ int main(int argc, char **argv) {
     const LineStatistics &line = session.statistics();
     std::printf("{\"first\": %u, \"contacts\": %llu, \"raws\": %llu, \"sent\": %llu, \"answered\": "
                 "%llu, \"dropped\": %llu, \"damaged\": %llu, \"gone\": %s}\n",
-                got.first, static_cast<unsigned long long>(got.contacts),
-                static_cast<unsigned long long>(got.raws), static_cast<unsigned long long>(sent),
-                static_cast<unsigned long long>(got.acks),
+                got.first, static_cast<unsigned long long>(got.contacts), static_cast<unsigned long long>(got.raws),
+                static_cast<unsigned long long>(sent), static_cast<unsigned long long>(got.acks),
                 static_cast<unsigned long long>(line.dropped_packets + line.out_of_order),
-                static_cast<unsigned long long>(line.crc_errors + line.format_errors),
-                gone ? "true" : "false");
+                static_cast<unsigned long long>(line.crc_errors + line.format_errors), gone ? "true" : "false");
     return 0;
   } catch (const Error &error) {
     std::fprintf(stderr, "serve_client: %s\n", error.what());

@@ -12,6 +12,7 @@ times a second, all at the same moments. One client is stopped for the middle th
 terminal too, at the same moment, and is read there directly: added is the time from the arrival of a frame there to its arrival at
 a client.
 """
+
 import contextlib
 import json
 import os
@@ -31,8 +32,13 @@ from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 
-GOALS = (("serve_clients", ">=", 8), ("serve_fps", ">=", 1308), ("serve_lost", "<=", 0), ("serve_unanswered", "<=", 0),
-         ("serve_added_median_us", "<=", 300))
+GOALS = (
+    ("serve_clients", ">=", 8),
+    ("serve_fps", ">=", 1308),
+    ("serve_lost", "<=", 0),
+    ("serve_unanswered", "<=", 0),
+    ("serve_added_median_us", "<=", 300),
+)
 SERIALS = ("AAAA", "BBBB")
 CLIENTS_EACH = 4
 RATE_Hz = 1310  # 763 us a frame; 764 would be 1308.9, and the last one may come late
@@ -81,8 +87,9 @@ def cpu_s(pid):
 
 
 def measure(build, seconds, steps):
-    fingertip, client, fake = (build / name for name in (
-        "host_tools/tool/cli/fingertip", "host_tools/report/tools/serve_client", "tests/support/fake_device"))
+    fingertip, client, fake = (
+        build / name for name in ("host_tools/tool/cli/fingertip", "host_tools/report/tools/serve_client", "tests/support/fake_device")
+    )
     for tool in (fingertip, client, fake):
         if not tool.exists():
             raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
@@ -104,8 +111,12 @@ def measure(build, seconds, steps):
         wait_for(lambda: log.read_text(encoding="utf-8").count("shared as") == len(SERIALS), "fingertip serve")
         names = [(serial, number) for serial in SERIALS for number in range(CLIENTS_EACH)]
         begun_s, busy_s = time.monotonic(), cpu_s(server.pid)
-        clients = {name: processes.start(client, name[0], last_frame, folder / f"{name[0]}{name[1]}", env=environment, stdout=subprocess.PIPE,
-                                         text=True) for name in names}
+        clients = {
+            name: processes.start(
+                client, name[0], last_frame, folder / f"{name[0]}{name[1]}", env=environment, stdout=subprocess.PIPE, text=True
+            )
+            for name in names
+        }
         stopped = names[-1]
         time.sleep(seconds / 3)
         clients[stopped].send_signal(signal.SIGSTOP)
@@ -116,22 +127,27 @@ def measure(build, seconds, steps):
         answer_of(direct, "direct reader")
         at_once = np.loadtxt(direct_file, ndmin=2)
         reading = [name for name in names if name != stopped]
-        added_us = np.concatenate([added(at_once, np.loadtxt(folder / f"{serial}{number}", ndmin=2))
-                                   for serial, number in reading if serial == SERIALS[0]])
+        added_us = np.concatenate(
+            [added(at_once, np.loadtxt(folder / f"{serial}{number}", ndmin=2)) for serial, number in reading if serial == SERIALS[0]]
+        )
         said = log.read_text(encoding="utf-8")
     steps.say(f"{len(names)} clients on {len(SERIALS)} fingertips, {seconds:g} s")
     packets = {name: 2 * (last_frame - got[name]["first"] + 1) for name in reading}
     lost_by_stopped = re.search(rf"{stopped[0]}: pid {clients[stopped].pid}, .* lost (\d+) packets", said)
     return {
-        "serve_clients": len(names), "serve_fingertips": len(SERIALS), "serve_seconds": seconds,
+        "serve_clients": len(names),
+        "serve_fingertips": len(SERIALS),
+        "serve_seconds": seconds,
         "serve_fps": (len(at_once) - 1) / (at_once[-1, 1] - at_once[0, 1]) * 1e6,
         "serve_packets": sum(packets.values()),
         "serve_lost": sum(packets[name] - got[name]["contacts"] - got[name]["raws"] for name in reading),
         "serve_gaps": sum(got[name]["dropped"] + got[name]["damaged"] for name in reading),
         "serve_commands": sum(got[name]["sent"] for name in reading),
         "serve_unanswered": sum(got[name]["sent"] - got[name]["answered"] for name in reading),
-        "serve_added_median_us": float(np.median(added_us)), "serve_added_p99_us": float(np.percentile(added_us, 99)),
-        "serve_added_max_us": float(added_us.max()), "serve_cpu_percent": cpu_percent,
+        "serve_added_median_us": float(np.median(added_us)),
+        "serve_added_p99_us": float(np.percentile(added_us, 99)),
+        "serve_added_max_us": float(added_us.max()),
+        "serve_cpu_percent": cpu_percent,
         "serve_lost_by_stopped": int(lost_by_stopped[1]) if lost_by_stopped else 0,
     }
 
@@ -143,11 +159,23 @@ def added(direct, through):
 
 
 def text(found):
-    return "\n".join(["# The tools", "", "## Many programs on one fingertip", "", __doc__.split("\n\n")[-1].strip(), "", *goal_table_md(found), "",
-                      f"The server took {found['serve_cpu_percent']:.0f} % of a core for {found['serve_packets']} packets in {found['serve_seconds']:g} s. "
-                      f"One frame in a hundred came {found['serve_added_p99_us']:.0f} us or more later than directly, "
-                      "which depends on what else the computer does. "
-                      f"The stopped client lost {found['serve_lost_by_stopped']} packets of its own.", ""])
+    return "\n".join(
+        [
+            "# The tools",
+            "",
+            "## Many programs on one fingertip",
+            "",
+            __doc__.split("\n\n")[-1].strip(),
+            "",
+            *goal_table_md(found),
+            "",
+            f"The server took {found['serve_cpu_percent']:.0f} % of a core for {found['serve_packets']} packets in {found['serve_seconds']:g} s. "
+            f"One frame in a hundred came {found['serve_added_p99_us']:.0f} us or more later than directly, "
+            "which depends on what else the computer does. "
+            f"The stopped client lost {found['serve_lost_by_stopped']} packets of its own.",
+            "",
+        ]
+    )
 
 
 def main(argv):

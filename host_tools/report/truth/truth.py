@@ -12,6 +12,7 @@ real strips are used where they are at hand (--recordings, or the environment's 
 elsewhere. Constants were chosen with other seeds and other pads than those that judge here. Cycles are those of the fit report in
 the same folder.
 """
+
 import os
 import pathlib
 import sys
@@ -31,25 +32,54 @@ PARTS = {
     "flash": "what is kept, when power goes",
 }
 GOALS = (
-    ("cal_median_mm", "<=", 0.15), ("cal_rough_median_mm", "<=", 0.21), ("cal_20_median_mm", "<=", 0.15),
-    ("cal_dip_median_mm", "<=", 0.13), ("worse_after_accept", "<=", 0), ("accepted_good_percent", ">=", 95),
-    ("refused_percent_worst", ">=", 90), ("cal_force_mape_percent", "<=", 2), ("calibrated_warned_percent_worst", "<=", 5),
-    ("cover_1sd_min", ">=", 55), ("cover_1sd_max", "<=", 75), ("cover_2sd_min", ">=", 93), ("cal_warned_percent", "<=", 5),
-    ("cal_bad_unflagged_percent", "<=", 0.1), ("raw_warned_percent", "<=", 32), ("raw_bad_unflagged_percent", "<=", 1.3),
+    ("cal_median_mm", "<=", 0.15),
+    ("cal_rough_median_mm", "<=", 0.21),
+    ("cal_20_median_mm", "<=", 0.15),
+    ("cal_dip_median_mm", "<=", 0.13),
+    ("worse_after_accept", "<=", 0),
+    ("accepted_good_percent", ">=", 95),
+    ("refused_percent_worst", ">=", 90),
+    ("cal_force_mape_percent", "<=", 2),
+    ("calibrated_warned_percent_worst", "<=", 5),
+    ("cover_1sd_min", ">=", 55),
+    ("cover_1sd_max", "<=", 75),
+    ("cover_2sd_min", ">=", 93),
+    ("cal_warned_percent", "<=", 5),
+    ("cal_bad_unflagged_percent", "<=", 0.1),
+    ("raw_warned_percent", "<=", 32),
+    ("raw_bad_unflagged_percent", "<=", 1.3),
     ("raw_20_bad_unflagged_percent", "<=", 2),
-    ("loaded_silent_percent", "<=", 1), ("unloaded_warned_percent", "<=", 5), ("elongated_bad_unflagged_percent", "<=", 3),
+    ("loaded_silent_percent", "<=", 1),
+    ("unloaded_warned_percent", "<=", 5),
+    ("elongated_bad_unflagged_percent", "<=", 3),
     ("round_elongated_percent", "<=", 1),
-    ("slow_force_error_percent", "<=", 2), ("false_contacts", "<=", 0), ("zero_recovery_s", "<=", 5), ("real_phantom_percent_worst", "<=", 5),
-    ("real_phantom_longest_s", "<=", 5), ("real_held_missed", "<=", 0), ("phantom_force_longest_s", "<=", 10), ("real_median_mm_worst_test", "<=", 0.15),
-    ("real_median_mm_worst_other", "<=", 0.30), ("flash_lost", "<=", 0), ("flash_frames_skipped", "<=", 0), ("cold_cycles", "<=", 31000),
-    ("masked_cycles", "<=", 62000))
+    ("slow_force_error_percent", "<=", 2),
+    ("false_contacts", "<=", 0),
+    ("zero_recovery_s", "<=", 5),
+    ("real_phantom_percent_worst", "<=", 5),
+    ("real_phantom_longest_s", "<=", 5),
+    ("real_held_missed", "<=", 0),
+    ("phantom_force_longest_s", "<=", 10),
+    ("real_median_mm_worst_test", "<=", 0.15),
+    ("real_median_mm_worst_other", "<=", 0.30),
+    ("flash_lost", "<=", 0),
+    ("flash_frames_skipped", "<=", 0),
+    ("cold_cycles", "<=", 31000),
+    ("masked_cycles", "<=", 62000),
+)
 OF_FIT_REPORT = ("cold_cycles", "masked_cycles")  # of another report in the same folder
 
 
 def command_of(part, options):
     if part == "flash":
-        command = [sys.executable, str(ROOT / "host_tools/report/truth/flash/truth_flash.py"), "--build", str(options.build),
-                   "--boards", str(options.boards)]
+        command = [
+            sys.executable,
+            str(ROOT / "host_tools/report/truth/flash/truth_flash.py"),
+            "--build",
+            str(options.build),
+            "--boards",
+            str(options.boards),
+        ]
     else:
         program = pathlib.Path(options.build) / "host_tools/report/truth" / part / f"truth_{part}"
         if not program.is_file():
@@ -75,8 +105,16 @@ def main(argv):
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's truth.json")
     options = parser.parse_args(argv)
     parts = chosen_parts(options, PARTS, PARTS)
-    return report_of_programs(options, "truth", PARTS, parts, GOALS, lambda part: figures_printed(f"truth_{part}", command_of(part, options)),
-                              lambda _, out: figures_kept(out / "fit.json", OF_FIT_REPORT), truth_report)
+    return report_of_programs(
+        options,
+        "truth",
+        PARTS,
+        parts,
+        GOALS,
+        lambda part: figures_printed(f"truth_{part}", command_of(part, options)),
+        lambda _, out: figures_kept(out / "fit.json", OF_FIT_REPORT),
+        truth_report,
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """What truth.py measured as text and as a picture."""
+
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, tidy
 from fingertip.files import write_text
 from goals import goal_table_md
@@ -16,8 +17,17 @@ def tables_of(found):
 
 
 def write(found, path):
-    lines = ["# From the optimum to the truth", "", "Written by `sh cmake/bootstrap.sh report`. Simulated pads and presses, the firmware's own code;",
-             "`real_...`: recordings of real strips, where they are at hand.", "", "![Coverage, calibration, warnings](truth.png)", "", *goal_table_md(found), ""]
+    lines = [
+        "# From the optimum to the truth",
+        "",
+        "Written by `sh cmake/bootstrap.sh report`. Simulated pads and presses, the firmware's own code;",
+        "`real_...`: recordings of real strips, where they are at hand.",
+        "",
+        "![Coverage, calibration, warnings](truth.png)",
+        "",
+        *goal_table_md(found),
+        "",
+    ]
     for name, rows in tables_of(found):
         lines += [f"## {name.replace('_', ' ')}", "", *table_of_dicts_md(rows), ""]
     write_text(path, "\n".join(lines))
@@ -64,8 +74,14 @@ def draw_iterations(axes, rows):
     for layer, colour in ((12, BLUE), (6, ORANGE)):
         for gain, style in ((0, "o-"), (10, "s--")):
             line = [row for row in rows if row["layer_mm"] == layer and round(row["gain_percent"]) == gain]
-            axes.plot([row["iterations"] for row in line], [row["error_p50_mm"] for row in line], style, color=colour, ms=4,
-                      label=f"{layer} mm, gains {gain} %")
+            axes.plot(
+                [row["iterations"] for row in line],
+                [row["error_p50_mm"] for row in line],
+                style,
+                color=colour,
+                ms=4,
+                label=f"{layer} mm, gains {gain} %",
+            )
     axes.set_ylim(bottom=0)
     axes.set_xlabel("iterations of the fit", size=9)
     axes.legend(fontsize=7.5, loc="lower right", ncols=2)
@@ -84,7 +100,7 @@ def draw(found, path):
     figure, places = plt.subplots(2, 2, figsize=(12, 8), layout="constrained")
     for axes, panel in zip(places.flat, panels):
         panel(axes)
-    for axes in places.flat[len(panels):]:
+    for axes in places.flat[len(panels) :]:
         axes.set_axis_off()
     figure.suptitle("From the optimum to the truth: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
     save(figure, path)

@@ -33,7 +33,11 @@ for (let i = 0; i < PRESSES; i++) {
 }
 const { tangential, ...parts } = most;
 const cycles_part_max = Math.max(...Object.values(parts));
-process.stdout.write(JSON.stringify({
-  cycles_load_max: tangential, cycles_part_max, cycles_all_parts_max: parts.shapes_0 + parts.shapes_1 + parts.shapes_2,
-  cycles_core1_max: tangential + cycles_part_max,
-}) + '\n');
+process.stdout.write(
+  JSON.stringify({
+    cycles_load_max: tangential,
+    cycles_part_max,
+    cycles_all_parts_max: parts.shapes_0 + parts.shapes_1 + parts.shapes_2,
+    cycles_core1_max: tangential + cycles_part_max,
+  }) + '\n',
+);

@@ -11,6 +11,7 @@ Pads and touches are the twin's, with a dip and calibrated; the code that answer
 recording has two contacts and their truth, so nothing here was seen on a real pad. Constants were chosen with the seeds 20000 and 30000,
 how a packet's place is doubted with 50000 and 60000.
 """
+
 import pathlib
 import sys
 
@@ -28,15 +29,25 @@ PARTS = {
     "cycles": "cycles of a frame on the emulated chip",
 }
 GOALS = (
-    ("two_right_percent_8mm", ">=", 90), ("two_right_percent_12mm", ">=", 97), ("two_right_percent_10mm_3to1", ">=", 80),
-    ("one_called_two_percent", "<=", 0.2), ("edge_angle_p50_deg_20mm", "<=", 1.5), ("edge_angle_p50_deg_10mm", "<=", 3),
-    ("silent_over_1mm_percent", "<=", 0.5), ("cycles_core1_max", "<=", 85000))
+    ("two_right_percent_8mm", ">=", 90),
+    ("two_right_percent_12mm", ">=", 97),
+    ("two_right_percent_10mm_3to1", ">=", 80),
+    ("one_called_two_percent", "<=", 0.2),
+    ("edge_angle_p50_deg_20mm", "<=", 1.5),
+    ("edge_angle_p50_deg_10mm", "<=", 3),
+    ("silent_over_1mm_percent", "<=", 0.5),
+    ("cycles_core1_max", "<=", 85000),
+)
 
 
 def command_of(part, options):
-    program = pathlib.Path(options.build) / "host_tools/report/two/touches/two_touches" if part == "touches" else fit_cycles_of(options.boards)
+    program = (
+        pathlib.Path(options.build) / "host_tools/report/two/touches/two_touches" if part == "touches" else fit_cycles_of(options.boards)
+    )
     if not program.is_file():
-        raise InputError(f"{program} is not there; build it: {'cmake --build --preset host' if part == 'touches' else 'sh cmake/bootstrap.sh'}")
+        raise InputError(
+            f"{program} is not there; build it: {'cmake --build --preset host' if part == 'touches' else 'sh cmake/bootstrap.sh'}"
+        )
     if part == "cycles":
         return ["node", pathlib.Path(__file__).with_name("cycles.mjs"), program]
     command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
@@ -55,8 +66,16 @@ def main(argv):
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's two.json")
     options = parser.parse_args(argv)
     parts = chosen_parts(options, PARTS, PARTS)
-    return report_of_programs(options, "two", PARTS, parts, GOALS, lambda part: figures_printed(f"two_{part}", command_of(part, options)),
-                              lambda found, out: {}, two_report)
+    return report_of_programs(
+        options,
+        "two",
+        PARTS,
+        parts,
+        GOALS,
+        lambda part: figures_printed(f"two_{part}", command_of(part, options)),
+        lambda found, out: {},
+        two_report,
+    )
 
 
 if __name__ == "__main__":

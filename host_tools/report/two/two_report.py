@@ -1,4 +1,5 @@
 """What two.py measured as text and as a picture."""
+
 from drawing import BLUE, FAINT, INK, ORANGE, plt, save, tidy
 from fingertip.files import write_text
 from goals import goal_table_md
@@ -12,30 +13,51 @@ PAIRS = {"8 mm, 1:1": "8mm", "12 mm, 1:1": "12mm", "10 mm, 3:1": "10mm_3to1"}
 
 def possible_rows(found):
     """(pair, asked, possible with the rubber known, with models of rising errors, found), percent."""
-    kinds = ("two_possible_rubber_known_percent", "two_possible_model_quartered_percent", "two_possible_model_halved_percent", "two_possible_percent",
-             "two_right_percent")
-    return [(pair, found["goals"][f"two_right_percent_{end}"]["goal"], *(text_of(found[f"{kind}_{end}"], 3) for kind in kinds))
-            for pair, end in PAIRS.items()]
+    kinds = (
+        "two_possible_rubber_known_percent",
+        "two_possible_model_quartered_percent",
+        "two_possible_model_halved_percent",
+        "two_possible_percent",
+        "two_right_percent",
+    )
+    return [
+        (pair, found["goals"][f"two_right_percent_{end}"]["goal"], *(text_of(found[f"{kind}_{end}"], 3) for kind in kinds))
+        for pair, end in PAIRS.items()
+    ]
 
 
 def write(found, path):
     lines = [
-        "# What presses", "", "Written by `sh cmake/bootstrap.sh report two`. Simulated pads of 12 mm with a dip, calibrated; the firmware's own code,",
-        "as scene grasp runs it. No public recording has two contacts and their truth.", "", "![Pairs by distance, what touches are called](two.png)", "",
-        *goal_table_md(found), ""]
+        "# What presses",
+        "",
+        "Written by `sh cmake/bootstrap.sh report two`. Simulated pads of 12 mm with a dip, calibrated; the firmware's own code,",
+        "as scene grasp runs it. No public recording has two contacts and their truth.",
+        "",
+        "![Pairs by distance, what touches are called](two.png)",
+        "",
+        *goal_table_md(found),
+        "",
+    ]
     if "touches" in found:
         lines += [
-            *table_md(("pairs", "asked", "possible, rubber known", "model off by 0.0005", "by 0.001", "by 0.002", "right"), possible_rows(found)), "",
+            *table_md(
+                ("pairs", "asked", "possible, rubber known", "model off by 0.0005", "by 0.001", "by 0.002", "right"), possible_rows(found)
+            ),
+            "",
             "`possible`: what no judge does better than on such pads, be it with the rubber's response known exactly, or with a model that is off by",
             "so much of the largest reading at each sensor: 0.002, as the firmware states of its own, half or a quarter of it. Noise and the gains'",
             "errors are in all. It is the smaller of two limits, touch by touch: the Cramer-Rao bound of places and forces, and the likelihood ratio",
-            "of the pair to the nearest long contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).", "",
+            "of the pair to the nearest long contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).",
+            "",
             "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
             "or long, from the middle of the forces. `silent`: what the packet shows is off by more than 1 mm, or is one for two, or",
             "two for one, with a standard deviation below 0.6 mm and no shape that says so. `warned`: the standard deviation is above that. `exact gains`:",
             "a pad whose gains are known without error. `along` and `across`: the pad's longer and shorter side, within 45 degrees. `first`: in the first answer;",
-            "all else when the touch has been held for a while. The worse of the two is judged. Edges of 24 mm and more and pairs of cubes are not.", "",
-            *table_of_dicts_md(found["touches"]), ""]
+            "all else when the touch has been held for a while. The worse of the two is judged. Edges of 24 mm and more and pairs of cubes are not.",
+            "",
+            *table_of_dicts_md(found["touches"]),
+            "",
+        ]
     write_text(path, "\n".join(lines))
 
 
@@ -44,7 +66,9 @@ def draw_pairs(axes, rows):
         line = [rows[f"two, {apart} mm, {ratio}"] for apart in DISTANCES_mm]
         axes.plot(DISTANCES_mm, [row["two_and_right"] for row in line], "o-", color=colour, label=f"{ratio}, two and right")
         axes.plot(DISTANCES_mm, [row["possible"] for row in line], "--", color=colour, lw=1, label=f"{ratio}, possible, model off by 0.002")
-        axes.plot(DISTANCES_mm, [row["possible_rubber_known"] for row in line], ":", color=colour, lw=1, label=f"{ratio}, possible, rubber known")
+        axes.plot(
+            DISTANCES_mm, [row["possible_rubber_known"] for row in line], ":", color=colour, lw=1, label=f"{ratio}, possible, rubber known"
+        )
     axes.set_ylim(0, 105)
     axes.set_xlabel("distance of the two, mm", size=9)
     axes.legend(fontsize=8)
@@ -87,5 +111,11 @@ def draw(found, path):
     else:
         for axes in places:
             axes.set_axis_off()
-    figure.suptitle("What presses: simulated pads, calibrated, with a dip; the firmware's own code; no real pad", x=0.01, ha="left", size=12, weight="bold")
+    figure.suptitle(
+        "What presses: simulated pads, calibrated, with a dip; the firmware's own code; no real pad",
+        x=0.01,
+        ha="left",
+        size=12,
+        weight="bold",
+    )
     save(figure, path)

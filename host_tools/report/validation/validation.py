@@ -14,6 +14,7 @@ pad costs, not how good a fingertip is.
 A sample is a frame in contact that was fitted. Localisation errors are of samples of at least 1 N. Contact tables are
 cached beside the results.
 """
+
 import pathlib
 import sys
 
@@ -52,20 +53,40 @@ SLIP_DIP = "dip"  # of equal sensors: the paper's slips are judged without a spr
 ALL = "all,branch=9"
 # What, effects, noise of the sensors.
 BUDGET = (
-    ("nothing but the model", "", 0), ("noise, OSR 1024", "", 1),
+    ("nothing but the model", "", 0),
+    ("noise, OSR 1024", "", 1),
     *((f"gain spread {gain} %", f"gain={gain}", 0) for gain in BUDGET_GAINS),
-    ("drift 170 Pa in 16 min", "drift", 0), ("relaxation 17.5 % in a hold", "relaxation", 0), ("hysteresis 3 %", "hysteresis", 0),
-    ("after-effect of 4 %", "aftereffect", 0), ("warming across a branch of the compensation", "branch=9", 0),
-    ("dip of 5 %", "dip", 0), ("widths 3.5 % apart", "widths", 0), ("places 0.1 mm off", "places", 0),
-    ("warming by 6 K", "temperature", 0), ("low by 1 % at 2 bar", "bias", 0), ("clip at 2.02 bar", "clip", 0),
-    ("clip at the ADC's 5 bar", "clip=5", 0), ("all of them, gain spread 10 %", ALL, 1))
+    ("drift 170 Pa in 16 min", "drift", 0),
+    ("relaxation 17.5 % in a hold", "relaxation", 0),
+    ("hysteresis 3 %", "hysteresis", 0),
+    ("after-effect of 4 %", "aftereffect", 0),
+    ("warming across a branch of the compensation", "branch=9", 0),
+    ("dip of 5 %", "dip", 0),
+    ("widths 3.5 % apart", "widths", 0),
+    ("places 0.1 mm off", "places", 0),
+    ("warming by 6 K", "temperature", 0),
+    ("low by 1 % at 2 bar", "bias", 0),
+    ("clip at 2.02 bar", "clip", 0),
+    ("clip at the ADC's 5 bar", "clip=5", 0),
+    ("all of them, gain spread 10 %", ALL, 1),
+)
 
 GOALS = (
-    ("samples", ">=", 40000), ("seconds", "<=", 300), ("h12_gain0_median_mm", "<=", 0.12), ("h12_gain10_median_mm", "<=", 0.40),
-    ("h12_dip_median_mm", "<=", 0.40), ("h12_dip_calibrated_median_mm", "<=", 0.13), ("dip_calibrated_bad_unflagged_percent", "<=", 0.1),
-    ("force_mape_scaled_gain0_percent", "<=", 0.5), ("force_mape_scaled_gain10_percent", "<=", 3.5),
-    ("force_mape_dip_calibrated_percent", "<=", 2), ("h6_prior_p99_mm", "<=", 1.5),
-    ("h6_bad_unflagged_percent", "<=", 0.5), ("saturated_median_mm", "<=", 0.1), ("emulated_frames_different", "<=", 0))
+    ("samples", ">=", 40000),
+    ("seconds", "<=", 300),
+    ("h12_gain0_median_mm", "<=", 0.12),
+    ("h12_gain10_median_mm", "<=", 0.40),
+    ("h12_dip_median_mm", "<=", 0.40),
+    ("h12_dip_calibrated_median_mm", "<=", 0.13),
+    ("dip_calibrated_bad_unflagged_percent", "<=", 0.1),
+    ("force_mape_scaled_gain0_percent", "<=", 0.5),
+    ("force_mape_scaled_gain10_percent", "<=", 3.5),
+    ("force_mape_dip_calibrated_percent", "<=", 2),
+    ("h6_prior_p99_mm", "<=", 1.5),
+    ("h6_bad_unflagged_percent", "<=", 0.5),
+    ("saturated_median_mm", "<=", 0.1),
+    ("emulated_frames_different", "<=", 0),
+)
 
 
 def calibrated_with(case):
@@ -91,7 +112,9 @@ def plan(shop):
             shop.add_on_pads("taps", "taps", indenter, 600, effects, margin_mm=0, **more)
             for margin_mm in STIFF_MARGINS_mm:
                 for prior in PRIORS[case in CALIBRATED]:
-                    shop.add_on_pads("stiff", "taps", indenter, 300, effects, layer_mm=STIFF_LAYER_mm, margin_mm=margin_mm, prior=prior, **more)
+                    shop.add_on_pads(
+                        "stiff", "taps", indenter, 300, effects, layer_mm=STIFF_LAYER_mm, margin_mm=margin_mm, prior=prior, **more
+                    )
             shop.add("high", "high", indenter, effects=",".join(filter(None, (effects, "clip"))), **more)
         for indenter in OBJECTS:
             shop.add("pokes", "pokes", indenter, effects=effects, **more)
@@ -136,20 +159,29 @@ class Samples:
         return (self.flags & LOCATION_WARNINGS) != 0
 
     def location(self):
-        return {"median_mm": float(np.median(self.error_mm)), "sd_mm": float(np.std(self.error_mm)),
-                "p95_mm": float(np.quantile(self.error_mm, 0.95)), "p99_mm": float(np.quantile(self.error_mm, 0.99)),
-                "max_mm": float(np.max(self.error_mm))}
+        return {
+            "median_mm": float(np.median(self.error_mm)),
+            "sd_mm": float(np.std(self.error_mm)),
+            "p95_mm": float(np.quantile(self.error_mm, 0.95)),
+            "p99_mm": float(np.quantile(self.error_mm, 0.99)),
+            "max_mm": float(np.max(self.error_mm)),
+        }
 
     def trust(self):
-        return {"warned_percent": float(100 * np.mean(self.warned)), "bad_percent": float(100 * np.mean(self.error_mm > 1)),
-                "bad_unflagged_percent": float(100 * np.mean((self.error_mm > 1) & ~self.warned))}
+        return {
+            "warned_percent": float(100 * np.mean(self.warned)),
+            "bad_percent": float(100 * np.mean(self.error_mm > 1)),
+            "bad_unflagged_percent": float(100 * np.mean((self.error_mm > 1) & ~self.warned)),
+        }
 
     def force(self, scale=1.0):
         """RMSE, MAPE (median of the absolute errors), correlation."""
         said_N = scale * self.said_N
-        return {"rmse_N": float(np.sqrt(np.mean((said_N - self.force_N) ** 2))),
-                "mape_percent": float(100 * np.median(np.abs(said_N - self.force_N) / self.force_N)),
-                "r": float(np.corrcoef(self.force_N, self.said_N)[0, 1])}
+        return {
+            "rmse_N": float(np.sqrt(np.mean((said_N - self.force_N) ** 2))),
+            "mape_percent": float(100 * np.median(np.abs(said_N - self.force_N) / self.force_N)),
+            "r": float(np.corrcoef(self.force_N, self.said_N)[0, 1]),
+        }
 
 
 def pads_of(shop, what, **wanted):
@@ -160,8 +192,12 @@ def scaled_force(pads):
     """Each pad has a factor of its own."""
     off = [pad.scale * pad.said_N - pad.force_N for pad in pads]
     relative = np.abs(np.concatenate([o / pad.force_N for o, pad in zip(off, pads)]))
-    return {"scale": float(np.median([pad.scale for pad in pads])), "rmse_N": float(np.sqrt(np.mean(np.concatenate(off) ** 2))),
-            "mape_percent": float(100 * np.median(relative)), "p95_percent": float(100 * np.quantile(relative, 0.95))}
+    return {
+        "scale": float(np.median([pad.scale for pad in pads])),
+        "rmse_N": float(np.sqrt(np.mean(np.concatenate(off) ** 2))),
+        "mape_percent": float(100 * np.median(relative)),
+        "p95_percent": float(100 * np.quantile(relative, 0.95)),
+    }
 
 
 def slip_steps(scenarios):
@@ -179,17 +215,23 @@ def slip_steps(scenarios):
             begin, end = float(moving[0]["t_begin_s"]), float(moving[-1]["t_end_s"])
             near = (played.time_s >= begin - SLIP_MARGIN_s) & (played.time_s <= end + SLIP_MARGIN_s) & played.touched
             found = played.time_s[said & (played.time_s >= begin) & (played.time_s <= end + 0.1)]
-            rows.append((float(moving[0]["speed_mm_s"]), near.sum(), (said == played.slips)[near].sum(), found[0] - begin if len(found) else np.nan))
+            rows.append(
+                (float(moving[0]["speed_mm_s"]), near.sum(), (said == played.slips)[near].sum(), found[0] - begin if len(found) else np.nan)
+            )
     return np.array(rows).reshape(-1, 4)
 
 
 def slip_success(acts):
     found_s = acts[np.isfinite(acts[:, 3]), 3]
     steps = int(acts[:, 1].sum())
-    return {"steps": steps, "success_percent": float(100 * acts[:, 2].sum() / steps) if steps else None,
-            "acts": len(acts), "acts_not_found": len(acts) - len(found_s),
-            "latency_median_ms": float(1e3 * np.median(found_s)) if len(found_s) else None,
-            "latency_p95_ms": float(1e3 * np.quantile(found_s, 0.95)) if len(found_s) else None}
+    return {
+        "steps": steps,
+        "success_percent": float(100 * acts[:, 2].sum() / steps) if steps else None,
+        "acts": len(acts),
+        "acts_not_found": len(acts) - len(found_s),
+        "latency_median_ms": float(1e3 * np.median(found_s)) if len(found_s) else None,
+        "latency_p95_ms": float(1e3 * np.quantile(found_s, 0.95)) if len(found_s) else None,
+    }
 
 
 def measure_location(shop):
@@ -204,8 +246,11 @@ def measure_location(shop):
         for phase in played.phases:
             inside = played.located & (played.time_s >= float(phase["t_begin_s"])) & (played.time_s < float(phase["t_end_s"]))
             near_mm.setdefault(phase["sensors_near"], []).append(played.error_mm[inside])
-    return {"location": rows, "taps_trust": [{"case": case, **Samples(shop.select("taps", case=case)).trust()} for case in CASES],
-            "grid_median_mm_by_sensors_near": {n: float(np.median(np.concatenate(parts))) for n, parts in sorted(near_mm.items())}}
+    return {
+        "location": rows,
+        "taps_trust": [{"case": case, **Samples(shop.select("taps", case=case)).trust()} for case in CASES],
+        "grid_median_mm_by_sensors_near": {n: float(np.median(np.concatenate(parts))) for n, parts in sorted(near_mm.items())},
+    }
 
 
 def measure_force(shop, scales):
@@ -227,8 +272,16 @@ def measure_stiff(shop):
             for prior in PRIORS[case in CALIBRATED]:
                 wanted = {"margin_mm": margin_mm, "case": case, "prior": prior}
                 samples = Samples(shop.select("stiff", **wanted))
-                rows.append({"margin_mm": margin_mm, "case": case, "prior": prior, **samples.location(), **samples.trust(),
-                             "force": scaled_force(pads_of(shop, "stiff", **wanted))})
+                rows.append(
+                    {
+                        "margin_mm": margin_mm,
+                        "case": case,
+                        "prior": prior,
+                        **samples.location(),
+                        **samples.trust(),
+                        "force": scaled_force(pads_of(shop, "stiff", **wanted)),
+                    }
+                )
     return {"stiff": rows, "prior_sigma_mm": shop.prior_sigma_mm, "prior_width_mm": PRIOR_WIDTH_mm}
 
 
@@ -236,40 +289,82 @@ def measure_slip(shop):
     rows = []
     for indenter in (*OBJECTS, *SOLIDS):
         if shop.select("slip", indenter=indenter):
-            rows.append({"indenter": indenter, **{case: slip_success(slip_steps(shop.select("slip", indenter=indenter, case=case)))
-                                                  for case in ("steady", "stick-slip", *SLIP_DIPS)}})
+            rows.append(
+                {
+                    "indenter": indenter,
+                    **{
+                        case: slip_success(slip_steps(shop.select("slip", indenter=indenter, case=case)))
+                        for case in ("steady", "stick-slip", *SLIP_DIPS)
+                    },
+                }
+            )
     steady, fast = slip_steps(shop.select("slip", case="steady")), slip_steps(shop.select("slip fast"))
     dips = {case: slip_steps(shop.select("slip", case=case)) for case in SLIP_DIPS}
-    speeds = [{"speed_mm_s": speed, "paper_rate": slip_success(steady[steady[:, 0] == speed]), "every_frame": slip_success(fast[fast[:, 0] == speed]),
-               **{case: slip_success(acts[acts[:, 0] == speed]) for case, acts in dips.items()}} for speed in sorted(set(steady[:, 0]))]
-    dead = [{"dead_travel_mm": scenario.case, **slip_success(slip_steps([shop.played[scenario]]))} for scenario in shop.scenarios if scenario.what == "dead travel"]
+    speeds = [
+        {
+            "speed_mm_s": speed,
+            "paper_rate": slip_success(steady[steady[:, 0] == speed]),
+            "every_frame": slip_success(fast[fast[:, 0] == speed]),
+            **{case: slip_success(acts[acts[:, 0] == speed]) for case, acts in dips.items()},
+        }
+        for speed in sorted(set(steady[:, 0]))
+    ]
+    dead = [
+        {"dead_travel_mm": scenario.case, **slip_success(slip_steps([shop.played[scenario]]))}
+        for scenario in shop.scenarios
+        if scenario.what == "dead travel"
+    ]
     every = slip_success(steady)
-    return {"slip_success_percent": every["success_percent"],
-            **{f"slip_success_{key_of(case)}_percent": slip_success(acts)["success_percent"] for case, acts in dips.items()},
-            "slip_steps": every["steps"], "slip_by_object": rows, "slip_by_speed": speeds,
-            "slip_by_dead_travel": dead}
+    return {
+        "slip_success_percent": every["success_percent"],
+        **{f"slip_success_{key_of(case)}_percent": slip_success(acts)["success_percent"] for case, acts in dips.items()},
+        "slip_steps": every["steps"],
+        "slip_by_object": rows,
+        "slip_by_speed": speeds,
+        "slip_by_dead_travel": dead,
+    }
 
 
 def measure_budget(shop):
     rows = []
     for what, effects, _ in BUDGET:
         if pads := pads_of(shop, "budget", case=what):
-            rows.append({"effect": what, "gain": gain_of(effects), "pads": len(pads), **Samples(shop.select("budget", case=what)).location(), "force": scaled_force(pads)})
+            rows.append(
+                {
+                    "effect": what,
+                    "gain": gain_of(effects),
+                    "pads": len(pads),
+                    **Samples(shop.select("budget", case=what)).location(),
+                    "force": scaled_force(pads),
+                }
+            )
     other = []
     for scenario in shop.scenarios:
         if scenario.what == "other":
             played = shop.played[scenario]
             samples = Samples([played])
-            other.append({"scenario": scenario.kind + (", dip" if scenario.effects else ""), **samples.trust(), **samples.location(),
-                          "slip_percent": float(100 * np.mean((played.flags[played.touched] & SLIP) != 0))})
+            other.append(
+                {
+                    "scenario": scenario.kind + (", dip" if scenario.effects else ""),
+                    **samples.trust(),
+                    **samples.location(),
+                    "slip_percent": float(100 * np.mean((played.flags[played.touched] & SLIP) != 0)),
+                }
+            )
     return {"budget": rows, "other": other}
 
 
 def measure(shop, seconds, emulated):
-    found = {"samples": int(sum(p.sample.sum() for p in shop.played.values())), "frames": int(sum(len(p.time_s) for p in shop.played.values())),
-             "seconds": seconds, "pads": shop.pads, "rate_Hz": PAPER_RATE_Hz,
-             "calibrated_pads": sum(commands is not None for commands in shop.sessions.values()), "sessions_refused": shop.refused,
-             "refused_pads": sum(commands is None for commands in shop.sessions.values())}
+    found = {
+        "samples": int(sum(p.sample.sum() for p in shop.played.values())),
+        "frames": int(sum(len(p.time_s) for p in shop.played.values())),
+        "seconds": seconds,
+        "pads": shop.pads,
+        "rate_Hz": PAPER_RATE_Hz,
+        "calibrated_pads": sum(commands is not None for commands in shop.sessions.values()),
+        "sessions_refused": shop.refused,
+        "refused_pads": sum(commands is None for commands in shop.sessions.values()),
+    }
     scales = {}
     for case in CASES:
         pads = pads_of(shop, "taps", case=case)
@@ -301,6 +396,7 @@ def measure(shop, seconds, emulated):
 
 def curves(shop):
     """What the pictures show, by picture; a part that was not played is not there."""
+
     def force_of(played, shown):
         return {"time_s": played.time_s[shown], "true_N": played.force_N[shown], "said_N": played.said["force_N"][shown]}
 
@@ -309,8 +405,11 @@ def curves(shop):
         if played := shop.first(what, indenter=indenter, case="dip calibrated"):
             force[name] = force_of(played, (played.time_s > 20) & (played.time_s < 40))
     for name in ("dip", "dip calibrated"):
-        every = [force_of(played, np.flatnonzero(played.sample)[::7])
-                 for kind in ("grid", "taps", "pokes", "high") for played in shop.select(kind, case=name)]
+        every = [
+            force_of(played, np.flatnonzero(played.sample)[::7])
+            for kind in ("grid", "taps", "pokes", "high")
+            for played in shop.select(kind, case=name)
+        ]
         force[name] = {column: np.concatenate([one[column] for one in every]) for column in every[0]}
     if played := shop.first("cycle"):
         begin = next(float(phase["t_begin_s"]) for phase in played.phases if phase["phase"] == "load")
@@ -324,8 +423,12 @@ def curves(shop):
         inside = (played.time_s >= float(first["t_begin_s"])) & (played.time_s <= float(first["t_end_s"]))
         moving = np.flatnonzero(played.slips & played.sample & inside)
         if len(moving):
-            slip = {"time_s": played.time_s[moving], "true_x_mm": played.x_mm[moving], "true_y_mm": played.y_mm[moving],
-                    **{name: values[moving] for name, values in played.said.items()}}
+            slip = {
+                "time_s": played.time_s[moving],
+                "true_x_mm": played.x_mm[moving],
+                "true_y_mm": played.y_mm[moving],
+                **{name: values[moving] for name, values in played.said.items()},
+            }
     return {"force": force, "signals": signals, "slip": slip}
 
 

@@ -1,4 +1,5 @@
 """What the page's WebAssembly weighs, and what the simulated fingertip costs at its highest rate, in node."""
+
 import gzip
 import json
 import pathlib
@@ -26,7 +27,12 @@ def measure(build, steps):
 
 
 def text(found):
-    return ["## What it costs", "", f"Compressed: the library, without which the page does not start, {found['core_wasm_kB']:.0f} kB; the simulated fingertip {found['simulated_wasm_kB']:.0f} kB and its objects {found['objects_bin_kB']:.0f} kB, "
-            f"the judges of calibration and doctor {found['judges_wasm_kB']:.0f} kB, each fetched when it is used. In node the simulated fingertip "
-            f"takes {found['simulated_cpu_percent']:.1f} % of a core at {found['simulated_frames_per_s']:.0f} frames a second while an object is dragged "
-            f"over its pad, {found['simulated_memory_MB']:.1f} MB, and starts in {found['simulated_start_ms']:.0f} ms.", ""]
+    return [
+        "## What it costs",
+        "",
+        f"Compressed: the library, without which the page does not start, {found['core_wasm_kB']:.0f} kB; the simulated fingertip {found['simulated_wasm_kB']:.0f} kB and its objects {found['objects_bin_kB']:.0f} kB, "
+        f"the judges of calibration and doctor {found['judges_wasm_kB']:.0f} kB, each fetched when it is used. In node the simulated fingertip "
+        f"takes {found['simulated_cpu_percent']:.1f} % of a core at {found['simulated_frames_per_s']:.0f} frames a second while an object is dragged "
+        f"over its pad, {found['simulated_memory_MB']:.1f} MB, and starts in {found['simulated_start_ms']:.0f} ms.",
+        "",
+    ]

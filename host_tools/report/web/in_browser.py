@@ -1,5 +1,6 @@
 """What the page costs and keeps up with, in a headless Chromium that renders in software, served by `fingertip web`, with a program that
 says what a fingertip of fifteen sensors says at its highest rate on a pseudo-terminal."""
+
 import gzip
 import os
 import pathlib
@@ -19,8 +20,16 @@ from fingertip.files import InputError  # noqa: E402
 from fingertips import Bench  # noqa: E402
 from tables import table_md  # noqa: E402
 
-GOALS = (("page_ready_s", "<=", 1), ("bundle_kB", "<=", 600), ("draws_per_s", ">=", 30), ("web_fps", ">=", 1308), ("web_lost", "<=", 0),
-         ("web_memory_kB_per_minute", "<=", 100), ("web_foreign_requests", "<=", 0), ("web_steps_failed", "<=", 0))
+GOALS = (
+    ("page_ready_s", "<=", 1),
+    ("bundle_kB", "<=", 600),
+    ("draws_per_s", ">=", 30),
+    ("web_fps", ">=", 1308),
+    ("web_lost", "<=", 0),
+    ("web_memory_kB_per_minute", "<=", 100),
+    ("web_foreign_requests", "<=", 0),
+    ("web_steps_failed", "<=", 0),
+)
 STEP_OUTCOMES = {"ok": "as it should", "FAIL": "WRONG", "ERROR": "WRONG", "skipped": "not run"}
 LOADS = 5
 RATE_Hz = 1310  # as in the tools' report
@@ -69,8 +78,13 @@ def watched(page, seconds):
     after = page.run(driven.COUNTS)
     took_s = (after["at_ms"] - before["at_ms"]) / 1000
     frames = after["frames"] - before["frames"]
-    return {"draws_per_s": (after["pictures"] - before["pictures"]) / took_s, "web_fps": frames / took_s, "web_frames": frames,
-            "web_lost": after["lost"], "web_cpu_percent": 100 * (cpu_s(page.browser.process_id) - busy_s) / took_s}
+    return {
+        "draws_per_s": (after["pictures"] - before["pictures"]) / took_s,
+        "web_fps": frames / took_s,
+        "web_frames": frames,
+        "web_lost": after["lost"],
+        "web_cpu_percent": 100 * (cpu_s(page.browser.process_id) - busy_s) / took_s,
+    }
 
 
 def slope_kB_per_minute(looked):
@@ -111,19 +125,36 @@ def measure(build, steps):
         raise InputError(f"no browser here: {why}") from None
     outcome = driven.run_all(build, image_of(build.parent, PARALLEL))
     steps.say(f"{outcome['web_steps_driven']} steps driven")
-    return {"page_ready_s": statistics.median(ready_s), "page_ready_worst_s": max(ready_s), "bundle_kB": bundle_kB, "bundle_simulated_kB": simulated_kB,
-            **found, "web_seconds": WATCHED_s, "web_memory_seconds": REMEMBERED_s, "web_memory_kB": looked[-1][1],
-            "web_memory_kB_per_minute": slope_kB_per_minute(looked), "web_foreign_requests": len(foreign), **outcome}
+    return {
+        "page_ready_s": statistics.median(ready_s),
+        "page_ready_worst_s": max(ready_s),
+        "bundle_kB": bundle_kB,
+        "bundle_simulated_kB": simulated_kB,
+        **found,
+        "web_seconds": WATCHED_s,
+        "web_memory_seconds": REMEMBERED_s,
+        "web_memory_kB": looked[-1][1],
+        "web_memory_kB_per_minute": slope_kB_per_minute(looked),
+        "web_foreign_requests": len(foreign),
+        **outcome,
+    }
 
 
 def text(found):
-    return ["## In a browser", "", f"Chromium, headless, without a graphics processor. A page was ready {found['page_ready_s']:.2f} s after its address was given "
-            f"({found['page_ready_worst_s']:.2f} s at worst, {LOADS} times, each in a new browser). It weighs {found['bundle_kB']:.0f} kB compressed, its simulated "
-            f"fingertip {found['bundle_simulated_kB']:.0f} kB more, fetched when it is asked for. While a program that says what a fingertip says sent "
-            f"{found['web_fps']:.0f} frames a second for {found['web_seconds']} s, it drew {found['draws_per_s']:.0f} pictures a second, lost "
-            f"{found['web_lost']} packets and took {found['web_cpu_percent']:.0f} % of a core, the browser's processes together. Then memory was looked at for "
-            f"{found['web_memory_seconds']} s after collections: {found['web_memory_kB'] / 1000:.0f} MB at the end, {found['web_memory_kB_per_minute']:.0f} kB a minute "
-            f"once it had settled. Requests to elsewhere: {found['web_foreign_requests']}.", "",
-            "Driven against emulated release images, and, where the device must misbehave or come and go, against a program that answers "
-            "as one (tests/web/test_page.py says which):", "",
-            *table_md(("step", "outcome"), [(each["step"], STEP_OUTCOMES[each["outcome"]]) for each in found["web_steps"]]), ""]
+    return [
+        "## In a browser",
+        "",
+        f"Chromium, headless, without a graphics processor. A page was ready {found['page_ready_s']:.2f} s after its address was given "
+        f"({found['page_ready_worst_s']:.2f} s at worst, {LOADS} times, each in a new browser). It weighs {found['bundle_kB']:.0f} kB compressed, its simulated "
+        f"fingertip {found['bundle_simulated_kB']:.0f} kB more, fetched when it is asked for. While a program that says what a fingertip says sent "
+        f"{found['web_fps']:.0f} frames a second for {found['web_seconds']} s, it drew {found['draws_per_s']:.0f} pictures a second, lost "
+        f"{found['web_lost']} packets and took {found['web_cpu_percent']:.0f} % of a core, the browser's processes together. Then memory was looked at for "
+        f"{found['web_memory_seconds']} s after collections: {found['web_memory_kB'] / 1000:.0f} MB at the end, {found['web_memory_kB_per_minute']:.0f} kB a minute "
+        f"once it had settled. Requests to elsewhere: {found['web_foreign_requests']}.",
+        "",
+        "Driven against emulated release images, and, where the device must misbehave or come and go, against a program that answers "
+        "as one (tests/web/test_page.py says which):",
+        "",
+        *table_md(("step", "outcome"), [(each["step"], STEP_OUTCOMES[each["outcome"]]) for each in found["web_steps"]]),
+        "",
+    ]

@@ -8,6 +8,7 @@
 
 Each part is a module beside this one (reporting.report_of_parts).
 """
+
 import pathlib
 import sys
 

@@ -12,12 +12,8 @@ namespace fingertip::cell {
 
 class Arrivals {
 public:
-  void touch(double at_s, std::size_t finger, const GripTouch &touch) {
-    known_.push_back({at_s, finger, touch, {}});
-  }
-  void status(double at_s, const GripperStatus &status) {
-    known_.push_back({at_s, GRIPPER, {}, status});
-  }
+  void touch(double at_s, std::size_t finger, const GripTouch &touch) { known_.push_back({at_s, finger, touch, {}}); }
+  void status(double at_s, const GripperStatus &status) { known_.push_back({at_s, GRIPPER, {}, status}); }
   // Infinity: nothing is on its way.
   double next_s() const {
     double next_s = std::numeric_limits<double>::infinity();
@@ -29,8 +25,7 @@ public:
   // Hands over what has come, in the order in which it was sent. After each, after(finger, touch)
   // or after(): the controller may step.
   template <class AFTER_TOUCH, class AFTER_STATUS>
-  void deliver(double now_s, Controller &controller, AFTER_TOUCH after_touch,
-               AFTER_STATUS after_status) {
+  void deliver(double now_s, Controller &controller, AFTER_TOUCH after_touch, AFTER_STATUS after_status) {
     for (auto known = known_.begin(); known != known_.end();) {
       if (known->at_s > now_s) {
         ++known;

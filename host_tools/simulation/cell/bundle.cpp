@@ -18,8 +18,7 @@ double mindlin(double share) {
 
 } // namespace
 
-Bundle::Bundle(double friction, double kinetic_share)
-    : static_(friction), kinetic_share_(kinetic_share) {
+Bundle::Bundle(double friction, double kinetic_share) : static_(friction), kinetic_share_(kinetic_share) {
   // Straight between as many points of the curve as there are elements; where its slope falls, one
   // begins to slide. The points are denser where the last ones slide.
   const auto at = [](std::size_t i) {
@@ -36,8 +35,7 @@ Bundle::Bundle(double friction, double kinetic_share)
   }
 }
 
-Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, double radius_mm,
-                    const Motion &motion) {
+Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, double radius_mm, const Motion &motion) {
   const double holds_N = friction() * force_N;
   const double lever_mm = LEVER * radius_mm;
   const double turn_mm_s = lever_mm * motion.turn_rad_s;
@@ -68,8 +66,8 @@ Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, doubl
     sum_y += y;
     sum_t += t;
     // What the motion puts in and the springs do not get.
-    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s + t * turn_mm_s - x_N_[i] * stretch_x -
-               y_N_[i] * stretch_y - t_N_[i] * stretch_t;
+    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s + t * turn_mm_s - x_N_[i] * stretch_x - y_N_[i] * stretch_y -
+               t_N_[i] * stretch_t;
     const double k = stiffness_share_[i] * stiffness_N_mm * seconds;
     x_N_[i] += k * stretch_x;
     y_N_[i] += k * stretch_y;
@@ -81,8 +79,7 @@ Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, doubl
   const double size_2 = sum_x * sum_x + sum_y * sum_y + sum_t * sum_t;
   slips_ = slides && size_2 >= TOGETHER * TOGETHER * holds_N * holds_N;
   slip_mm_s_ = slips_ ? slowest : 0.0;
-  rested_ += seconds * ((1.0 - rested_) / HeldObject::HEALS_s -
-                        rested_ * slip_mm_s_ / HeldObject::SETTLES_mm);
+  rested_ += seconds * ((1.0 - rested_) / HeldObject::HEALS_s - rested_ * slip_mm_s_ / HeldObject::SETTLES_mm);
   rested_ = std::max(rested_, 0.0);
   pull_x_N_ = sum_x;
   pull_y_N_ = sum_y;

@@ -23,17 +23,14 @@ Vector turned(const Vector &v, double rad) {
 } // namespace
 
 Cell::Cell(const Face &face, const Object &object, const Grasp &grasp)
-    : face_(face), object_(object),
-      grasp_(grasp), down_{std::cos(grasp.down_rad), std::sin(grasp.down_rad)},
+    : face_(face), object_(object), grasp_(grasp), down_{std::cos(grasp.down_rad), std::sin(grasp.down_rad)},
       bundles_{Bundle(object.friction * (1.0 + object.uneven_friction), object.kinetic_share),
                Bundle(object.friction * (1.0 - object.uneven_friction), object.kinetic_share)},
-      strength_(twin::relaxation_strengths(grasp.relaxation)), com_mm_(object.com_mm),
-      mass_kg_(object.mass_kg), stands_mm_(object.mass_kg * GRAVITY_m_s2 / (2.0 * TABLE_N_mm)) {
+      strength_(twin::relaxation_strengths(grasp.relaxation)), com_mm_(object.com_mm), mass_kg_(object.mass_kg),
+      stands_mm_(object.mass_kg * GRAVITY_m_s2 / (2.0 * TABLE_N_mm)) {
   // The squeeze over the force is the known direction.
   const double gives = 1.0 / grasp.fingers_N_mm + 1.0 / object.stiffness_N_mm;
-  const auto squeezed = [&](double force_N) {
-    return 2.0 * face_.indentation_mm(force_N) + gives * force_N;
-  };
+  const auto squeezed = [&](double force_N) { return 2.0 * face_.indentation_mm(force_N) + gives * force_N; };
   constexpr double FORCE_STEP_N = 0.002;
   double force_N = 0.0;
   force_by_squeeze_.push_back(0.0F);
@@ -42,8 +39,8 @@ Cell::Cell(const Face &face, const Object &object, const Grasp &grasp)
       force_N += FORCE_STEP_N;
     }
     const double below_mm = squeezed(force_N), above_mm = squeezed(force_N + FORCE_STEP_N);
-    force_by_squeeze_.push_back(static_cast<float>(
-        force_N + FORCE_STEP_N * (at_mm - below_mm) / std::max(above_mm - below_mm, 1e-12)));
+    force_by_squeeze_.push_back(
+        static_cast<float>(force_N + FORCE_STEP_N * (at_mm - below_mm) / std::max(above_mm - below_mm, 1e-12)));
   }
 }
 
@@ -57,8 +54,7 @@ double Cell::elastic_N(double squeezed_mm) const {
     return static_cast<double>(force_by_squeeze_.back());
   }
   const double t = at - static_cast<double>(i);
-  return (1.0 - t) * static_cast<double>(force_by_squeeze_[i]) +
-         t * static_cast<double>(force_by_squeeze_[i + 1]);
+  return (1.0 - t) * static_cast<double>(force_by_squeeze_[i]) + t * static_cast<double>(force_by_squeeze_[i + 1]);
 }
 
 double Cell::force_at_N(double width_mm) const {
@@ -96,15 +92,13 @@ Wrench Cell::table(const Drive &drive) {
   if (!drive.table) {
     return sum;
   }
-  const double damping =
-      2.0 * TABLE_DAMPING * std::sqrt(0.5 * mass_kg_ * TABLE_N_mm / PER_M); // N s/mm
+  const double damping = 2.0 * TABLE_DAMPING * std::sqrt(0.5 * mass_kg_ * TABLE_N_mm / PER_M); // N s/mm
   const Vector along{-down_.y, down_.x};
   for (const double side : {-0.5, 0.5}) {
     const Vector foot{FEET_BELOW_mm * down_.x + side * object_.base_mm * along.x,
                       FEET_BELOW_mm * down_.y + side * object_.base_mm * along.y};
     const Vector now = turned(foot, turn_rad_);
-    const Vector moved{com_mm_.x - object_.com_mm.x + now.x - foot.x,
-                       com_mm_.y - object_.com_mm.y + now.y - foot.y};
+    const Vector moved{com_mm_.x - object_.com_mm.x + now.x - foot.x, com_mm_.y - object_.com_mm.y + now.y - foot.y};
     const Vector speed{com_mm_s_.x - turning_ * now.y, com_mm_s_.y + turning_ * now.x};
     const double depth_mm = stands_mm_ + moved.dot(down_) - drive.lifted_mm;
     const double closing_mm_s = speed.dot(down_) - drive.lift_mm_s;
@@ -141,16 +135,14 @@ void Cell::step(double seconds, const Drive &drive) {
                        mass_kg_ * (GRAVITY_m_s2 * down_.y - drive.hand_m_s2.y) + drive.knock_N.y};
   const Vector to_com = arm();
   const double inertia_kg_mm2 = mass_kg_ * object_.gyration_mm * object_.gyration_mm;
-  const double torque_Nmm =
-      held.turn_Nmm + stands.turn_Nmm - (to_com.x * held.y_N - to_com.y * held.x_N);
+  const double torque_Nmm = held.turn_Nmm + stands.turn_Nmm - (to_com.x * held.y_N - to_com.y * held.x_N);
   const Vector before = com_mm_s_;
   com_mm_s_.x += PER_M * (outer_N.x + held.x_N + stands.x_N) / mass_kg_ * seconds;
   com_mm_s_.y += PER_M * (outer_N.y + held.y_N + stands.y_N) / mass_kg_ * seconds;
   turning_ += PER_M * torque_Nmm / inertia_kg_mm2 * seconds;
   const Vector mean{0.5 * (before.x + com_mm_s_.x), 0.5 * (before.y + com_mm_s_.y)};
   work_mJ_ += outer_N.dot(mean) * seconds;
-  table_lost_mJ_ -=
-      (stands.x_N * mean.x + stands.y_N * mean.y + stands.turn_Nmm * turning_) * seconds;
+  table_lost_mJ_ -= (stands.x_N * mean.x + stands.y_N * mean.y + stands.turn_Nmm * turning_) * seconds;
   com_mm_.x += com_mm_s_.x * seconds;
   com_mm_.y += com_mm_s_.y * seconds;
   turn_rad_ += turning_ * seconds;
@@ -164,8 +156,7 @@ void Cell::step(double seconds, const Drive &drive) {
 void Cell::run(double seconds, const Drive &drive) {
   constexpr double SLOW_mm_s = 20.0;
   for (double left_s = seconds; left_s > 0.0;) {
-    const bool fast = bundles_[0].slips() || bundles_[1].slips() ||
-                      std::abs(speed_.x) + std::abs(speed_.y) > SLOW_mm_s;
+    const bool fast = bundles_[0].slips() || bundles_[1].slips() || std::abs(speed_.x) + std::abs(speed_.y) > SLOW_mm_s;
     const double longest_s = fast ? SLIP_s : REST_s;
     // Equal parts, so that no step is a mere remainder.
     const double parts = std::ceil(left_s / longest_s - 1e-9);
@@ -188,17 +179,15 @@ twin::Touch Cell::touch(std::size_t finger) const {
   touch.pull_y_N = bundle.pull_y_N();
   touch.stuck_N = bundle.slips()
                       ? 0.0
-                      : twin::stuck_force_N(force_N_, std::hypot(touch.pull_x_N, touch.pull_y_N),
-                                            bundle.friction());
+                      : twin::stuck_force_N(force_N_, std::hypot(touch.pull_x_N, touch.pull_y_N), bundle.friction());
   return touch;
 }
 
 Cell::Energy Cell::energy() const {
   Energy energy;
   energy.work = work_mJ_;
-  energy.kinetic =
-      0.5 * mass_kg_ / PER_M *
-      (com_mm_s_.dot(com_mm_s_) + object_.gyration_mm * object_.gyration_mm * turning_ * turning_);
+  energy.kinetic = 0.5 * mass_kg_ / PER_M *
+                   (com_mm_s_.dot(com_mm_s_) + object_.gyration_mm * object_.gyration_mm * turning_ * turning_);
   energy.lost = table_lost_mJ_;
   for (const Bundle &bundle : bundles_) {
     energy.elastic += bundle.elastic_mJ(grasp_.shear_N_mm2 * face_.radius_mm(force_N_));

@@ -41,10 +41,10 @@ struct Vector {
 struct Object {
   double width_mm = 40.0, mass_kg = 0.3;
   double friction = 0.5, kinetic_share = 0.8;
-  double uneven_friction = 0.0; // fingertip 0 has 1 + this of it, the other 1 - this
-  Vector com_mm;                // centre of mass from the grasp's axis, as it stands
-  double gyration_mm = 25.0;    // radius of gyration about it
-  double base_mm = 40.0;        // between its feet
+  double uneven_friction = 0.0;                                    // fingertip 0 has 1 + this of it, the other 1 - this
+  Vector com_mm;                                                   // centre of mass from the grasp's axis, as it stands
+  double gyration_mm = 25.0;                                       // radius of gyration about it
+  double base_mm = 40.0;                                           // between its feet
   double stiffness_N_mm = std::numeric_limits<double>::infinity(); // when squeezed
   double crushes_N = std::numeric_limits<double>::infinity();      // and then it is broken
 };

@@ -45,24 +45,19 @@ int serve(const Options &options) {
 int main(int argc, char **argv) {
   CLI::App app("Serves a simulated gripper with its own protocol; prints its port. Ctrl-C ends it.",
                "fingertip_cell_gripper");
-  const std::vector<std::pair<std::string, LineFault>> faults = {
-      {"silent", LineFault::silent},
-      {"garbage", LineFault::garbage},
-      {"damaged", LineFault::damaged},
-      {"other_slave", LineFault::other_slave},
-      {"refused", LineFault::refused}};
+  const std::vector<std::pair<std::string, LineFault>> faults = {{"silent", LineFault::silent},
+                                                                 {"garbage", LineFault::garbage},
+                                                                 {"damaged", LineFault::damaged},
+                                                                 {"other_slave", LineFault::other_slave},
+                                                                 {"refused", LineFault::refused}};
   Options options;
   std::vector<std::string> models;
   for (const GripperTraits &traits : gripper_models()) {
     models.push_back(traits.model);
   }
-  app.add_option("--model", options.server.model, "Which one")
-      ->required()
-      ->check(CLI::IsMember(models));
-  app.add_option("--slave", options.server.slave, "Its address on the line; else the usual")
-      ->check(CLI::Range(1, 253));
-  app.add_option("--link", options.server.link, "A name for the port, as long as it is served")
-      ->type_name("PATH");
+  app.add_option("--model", options.server.model, "Which one")->required()->check(CLI::IsMember(models));
+  app.add_option("--slave", options.server.slave, "Its address on the line; else the usual")->check(CLI::Range(1, 253));
+  app.add_option("--link", options.server.link, "A name for the port, as long as it is served")->type_name("PATH");
   app.add_option("--object", options.object_mm, "An object of this width lies between its fingers")
       ->type_name("MM")
       ->check(CLI::PositiveNumber);
@@ -70,8 +65,7 @@ int main(int argc, char **argv) {
       ->type_name("NUMBER")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--functions", options.server.functions,
-                 "Modbus functions that it answers, else 3 4 16 23")
+  app.add_option("--functions", options.server.functions, "Modbus functions that it answers, else 3 4 16 23")
       ->type_name("N")
       ->check(CLI::IsMember(std::vector<int>{3, 4, 16, 23}));
   app.add_option("--line", options.trouble.fault, "What befalls each answer")

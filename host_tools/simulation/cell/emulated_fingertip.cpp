@@ -42,8 +42,8 @@ void EmulatedFingertip::obeyed(const wire_packet &packet, std::int64_t now_us) {
     return;
   }
   if (ack.result != WIRE_RESULT_DONE) {
-    throw std::runtime_error("a fingertip refuses the command " + command_name(ack.command) +
-                             " with result " + std::to_string(ack.result));
+    throw std::runtime_error("a fingertip refuses the command " + command_name(ack.command) + " with result " +
+                             std::to_string(ack.result));
   }
   clock_.add({static_cast<std::int64_t>(ack.host_time_us), now_us, packet.t_us});
   awaits_ = false;
@@ -53,8 +53,7 @@ void EmulatedFingertip::obeyed(const wire_packet &packet, std::int64_t now_us) {
 EmulatedFingertip::Frame EmulatedFingertip::frame_of(const wire_packet &packet, double arrived_us,
                                                      std::int64_t now_us) {
   tared_ = (packet.body.contact.flags & CONTACT_FLAG_TARED) != 0;
-  const double measured_us =
-      std::clamp(clock_.estimate()->host_at(packet.t_us), 0.0, static_cast<double>(now_us));
+  const double measured_us = std::clamp(clock_.estimate()->host_at(packet.t_us), 0.0, static_cast<double>(now_us));
   return {measured_us, arrived_us, touch_from_packet(packet, measured_us)};
 }
 

@@ -41,8 +41,7 @@ CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
     rubber.gain[k] = gain;
-    rubber.told.sensors[k].gain =
-        static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
+    rubber.told.sensors[k].gain = static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
     rubber.told.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
   }
   return rubber;
@@ -57,33 +56,28 @@ Rubber rubber_after(const CalibratedRubber &rubber) {
   return left;
 }
 
-EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face,
-                             const pad_profile &profile)
+EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
     : trial_(trial), face_(face), cell_(face, trial.scene.object, trial.scene.grasp),
-      gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm,
-               Random(trial.seed, LINE, 0)),
-      fingers_{EmulatedFingertip(profile, trial.rubber[0].told),
-               EmulatedFingertip(profile, trial.rubber[1].told)},
+      gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm, Random(trial.seed, LINE, 0)),
+      fingers_{EmulatedFingertip(profile, trial.rubber[0].told), EmulatedFingertip(profile, trial.rubber[1].told)},
       holds_s_(NEVER_s), lift_s_(NEVER_s), touched_s_(NEVER_s) {
   gripper_.press(cell_);
 }
 
-void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::size_t length,
-                         double arrived_s) {
-  fingers_[finger].take(bytes, length, 1e6 * arrived_s, std::llround(1e6 * t_s_),
-                        [&](const EmulatedFingertip::Frame &frame) {
-                          if (!controller_) {
-                            return;
-                          }
-                          const GripTouch &touch = frame.touch;
-                          controller_->take_touch(finger, touch);
-                          told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us,
-                                           finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0,
-                                           std::hypot(touch.qx_N, touch.qy_N)});
-                          frames_[finger]++;
-                          loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
-                          step_controller();
-                        });
+void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::size_t length, double arrived_s) {
+  fingers_[finger].take(
+      bytes, length, 1e6 * arrived_s, std::llround(1e6 * t_s_), [&](const EmulatedFingertip::Frame &frame) {
+        if (!controller_) {
+          return;
+        }
+        const GripTouch &touch = frame.touch;
+        controller_->take_touch(finger, touch);
+        told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us, finger,
+                         (touch.flags & CONTACT_FLAG_SLIDING) != 0, std::hypot(touch.qx_N, touch.qy_N)});
+        frames_[finger]++;
+        loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+        step_controller();
+      });
 }
 
 void EmulatedGrasp::step_controller() {

@@ -46,8 +46,7 @@ Scene scene_of(const Options &options) {
   scene.waits_s = 0.05;
   scene.lift_mm = 4.0;
   scene.lift_s = 0.5;
-  scene.disturbances = {
-      {Disturbance::Kind::slick, scene.lift_s + 0.1, 0.03, options.friction_falls, 0.0}};
+  scene.disturbances = {{Disturbance::Kind::slick, scene.lift_s + 0.1, 0.03, options.friction_falls, 0.0}};
   scene.ends_s = scene.lift_s + 0.4;
   return scene;
 }
@@ -171,8 +170,7 @@ int main(int argc, char **argv) {
                "a gripper and the controller. It is lifted, and its friction falls.",
                "fingertip_cell_emulated");
   Options options;
-  app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")
-      ->capture_default_str();
+  app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")->capture_default_str();
   app.add_option("--friction", options.friction, "Static, before it falls")
       ->check(CLI::Range(0.1, 1.5))
       ->capture_default_str();

@@ -26,8 +26,7 @@ using Weights = std::array<float, 4>;
 Weights cubic(double t) {
   return {static_cast<float>(-t * (t - 1.0) * (t - 2.0) / 6.0),
           static_cast<float>((t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0),
-          static_cast<float>(-(t + 1.0) * t * (t - 2.0) / 2.0),
-          static_cast<float>((t + 1.0) * t * (t - 1.0) / 6.0)};
+          static_cast<float>(-(t + 1.0) * t * (t - 2.0) / 2.0), static_cast<float>((t + 1.0) * t * (t - 1.0) / 6.0)};
 }
 
 struct Between {
@@ -36,11 +35,9 @@ struct Between {
 };
 
 Between between_forces(double force_N) {
-  static const double SCALE =
-      (FORCES - 1) / std::log(ForcePlanes::FORCE_MAX_N / ForcePlanes::FORCE_MIN_N);
-  const double at =
-      SCALE * std::log(std::clamp(force_N, ForcePlanes::FORCE_MIN_N, ForcePlanes::FORCE_MAX_N) /
-                       ForcePlanes::FORCE_MIN_N);
+  static const double SCALE = (FORCES - 1) / std::log(ForcePlanes::FORCE_MAX_N / ForcePlanes::FORCE_MIN_N);
+  const double at = SCALE * std::log(std::clamp(force_N, ForcePlanes::FORCE_MIN_N, ForcePlanes::FORCE_MAX_N) /
+                                     ForcePlanes::FORCE_MIN_N);
   const int first = std::clamp(static_cast<int>(at) - 1, 0, FORCES - 4);
   return {first, cubic(at - first - 1)};
 }
@@ -60,8 +57,7 @@ Face::Face(const std::string &name, double layer_mm, const std::filesystem::path
     const double root = static_cast<double>(i) / (ROOTS - 1);
     const double force_N = FORCE_MAX_N * root * root;
     indentation_mm_.push_back(static_cast<float>(table.indentation_mm(force_N)));
-    radius_mm_.push_back(
-        static_cast<float>(table.contact_radius_mm(std::max(force_N, ForcePlanes::FORCE_MIN_N))));
+    radius_mm_.push_back(static_cast<float>(table.contact_radius_mm(std::max(force_N, ForcePlanes::FORCE_MIN_N))));
   }
   values_.reserve(std::size_t(NODES) * NODES * FORCES * FIELDS);
   for (int i = 0; i < NODES; i++) {
@@ -70,13 +66,10 @@ Face::Face(const std::string &name, double layer_mm, const std::filesystem::path
       const double x_mm = STEP_mm * i, y_mm = STEP_mm * j;
       for (int f = 0; f < FORCES; f++) {
         const double force_N = ForcePlanes::force_at(f);
-        values_.push_back(
-            static_cast<float>(table.base_pressure_Pa(force_N, x_mm, y_mm) / force_N));
+        values_.push_back(static_cast<float>(table.base_pressure_Pa(force_N, x_mm, y_mm) / force_N));
         for (const bool along_x : {true, false}) {
-          const twin::TractionTable::Load load{force_N, 0.0, along_x ? force_N : 0.0,
-                                               along_x ? 0.0 : force_N};
-          values_.push_back(
-              static_cast<float>(traction.base_pressure_Pa(load, x_mm, y_mm) / force_N));
+          const twin::TractionTable::Load load{force_N, 0.0, along_x ? force_N : 0.0, along_x ? 0.0 : force_N};
+          values_.push_back(static_cast<float>(traction.base_pressure_Pa(load, x_mm, y_mm) / force_N));
         }
       }
     }
@@ -92,8 +85,7 @@ void Face::make_plate(const twin::Layer &layer) {
   const Plate plate(layer, half_x_mm, half_y_mm);
   for (std::size_t i = 0; i < ROOTS; i++) {
     const double root = static_cast<double>(i) / (ROOTS - 1);
-    indentation_mm_.push_back(
-        static_cast<float>(FORCE_MAX_N * root * root / plate.stiffness_N_mm()));
+    indentation_mm_.push_back(static_cast<float>(FORCE_MAX_N * root * root / plate.stiffness_N_mm()));
     radius_mm_.push_back(static_cast<float>(plate.radius_mm()));
   }
   for (std::size_t k = 0; k < SENSORS; k++) {
@@ -117,9 +109,8 @@ Pressures Face::base_Pa(const twin::Touch &touch, double tangential) const {
     return base_Pa;
   }
   for (std::size_t k = 0; k < plate_.size(); k++) {
-    base_Pa[k] =
-        touch.force_N * plate_[k][NORMAL] +
-        tangential * (touch.pull_x_N * plate_[k][ALONG_X] + touch.pull_y_N * plate_[k][ALONG_Y]);
+    base_Pa[k] = touch.force_N * plate_[k][NORMAL] +
+                 tangential * (touch.pull_x_N * plate_[k][ALONG_X] + touch.pull_y_N * plate_[k][ALONG_Y]);
   }
   if (!plate_.empty()) {
     return base_Pa;
@@ -145,8 +136,7 @@ Pressures Face::base_Pa(const twin::Touch &touch, double tangential) const {
     for (int a = 0; a < 4; a++) {
       for (int b = 0; b < 4; b++) {
         const float *node =
-            values_.data() +
-            std::size_t(std::abs(i + a - 1) * NODES + std::abs(j + b - 1)) * FORCES * FIELDS;
+            values_.data() + std::size_t(std::abs(i + a - 1) * NODES + std::abs(j + b - 1)) * FORCES * FIELDS;
         std::array<float, FIELDS> by_force{}, by_stuck{};
         for (std::size_t f = 0; f < 4; f++) {
           const float *at_force = node + (std::size_t(pressed.first) + f) * FIELDS;

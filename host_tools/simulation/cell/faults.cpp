@@ -20,8 +20,7 @@ void Faults::look(double t_s, std::uint8_t state) {
   }
 }
 
-std::optional<FeltFinger::Frame> Faults::frame(std::size_t finger, const FeltFinger::Frame &felt,
-                                               double t_s) {
+std::optional<FeltFinger::Frame> Faults::frame(std::size_t finger, const FeltFinger::Frame &felt, double t_s) {
   using Kind = Fault::Kind;
   FeltFinger::Frame frame = felt;
   if (!lasts(t_s) || !fault_.fingers[finger]) {

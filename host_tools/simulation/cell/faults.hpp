@@ -45,8 +45,7 @@ public:
   bool is(Fault::Kind kind, double t_s) const { return fault_.kind == kind && lasts(t_s); }
 
   // What comes of a frame; none: nothing.
-  std::optional<FeltFinger::Frame> frame(std::size_t finger, const FeltFinger::Frame &felt,
-                                         double t_s);
+  std::optional<FeltFinger::Frame> frame(std::size_t finger, const FeltFinger::Frame &felt, double t_s);
   struct Line {
     bool commands = true, answers = true; // come through
     double late_s = 0.0;                  // the answer, and what is asked next

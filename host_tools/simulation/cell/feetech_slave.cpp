@@ -51,14 +51,12 @@ void FeetechSlave::refresh() {
   put(PRESENT_POSITION, static_cast<int>(std::lround(jaw_.count(motion_.told_width_mm()))));
   const double effort = motion_.effort();
   const bool down = (effort < 0) == (jaw_.open_count() > jaw_.closed_count());
-  put(PRESENT_LOAD, static_cast<int>(std::lround(std::abs(effort) * 1000)) |
-                        (down && effort != 0 ? LOAD_SIGN : 0));
+  put(PRESENT_LOAD, static_cast<int>(std::lround(std::abs(effort) * 1000)) | (down && effort != 0 ? LOAD_SIGN : 0));
   memory_[PRESENT_VOLTAGE] = 74;
   memory_[PRESENT_TEMPERATURE] = 35;
   memory_[STATUS] = trouble_;
   memory_[MOVING] = motion_.moving() ? 1 : 0;
-  put(PRESENT_CURRENT,
-      static_cast<int>(std::lround(std::abs(effort) * STALL_A / AMPERE_PER_COUNT)));
+  put(PRESENT_CURRENT, static_cast<int>(std::lround(std::abs(effort) * STALL_A / AMPERE_PER_COUNT)));
 }
 
 void FeetechSlave::write(std::uint8_t address, const std::uint8_t *bytes, std::size_t count) {
@@ -84,10 +82,9 @@ void FeetechSlave::obey() {
   const int goal = std::clamp(word(GOAL_POSITION), word(LEAST_ANGLE), word(MOST_ANGLE));
   const double width_mm = jaw_.width_mm(goal);
   const int speed = word(GOAL_SPEED);
-  motion_.move(
-      {.width_mm = width_mm,
-       .speed_mm_s = speed == 0 ? traits.speed_max_mm_s : speed * jaw_.slope_mm(width_mm),
-       .force_N = std::min(word(TORQUE_LIMIT), word(MOST_TORQUE)) * traits.force_max_N / 1000});
+  motion_.move({.width_mm = width_mm,
+                .speed_mm_s = speed == 0 ? traits.speed_max_mm_s : speed * jaw_.slope_mm(width_mm),
+                .force_N = std::min(word(TORQUE_LIMIT), word(MOST_TORQUE)) * traits.force_max_N / 1000});
 }
 
 Packet FeetechSlave::telling(std::uint8_t address, std::uint8_t length) {
@@ -129,8 +126,7 @@ std::optional<Packet> FeetechSlave::answer(const Packet &question) {
     }
     break;
   case SYNC_WRITE: // address, length, then of each servo its id and so many bytes
-    for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size();
-         at += given[1] + 1u) {
+    for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size(); at += given[1] + 1u) {
       if (given[at] == id_) {
         write(given[0], given.data() + at + 1, given[1]);
       }

@@ -43,8 +43,7 @@ const Model &model_of(double layer_mm) {
   Model model;
   model.profile = pad::profile_over_own_sensors({layer_mm, 0.0, false});
   if (geometry.sensor_count != SENSORS ||
-      fit_array_init(&model.array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK ||
+      fit_array_init(&model.array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK ||
       fit_pad_init(&model.pad, &model.array, &model.profile) != FT_OK) {
     throw std::runtime_error("the firmware refuses the profile of this layer");
   }
@@ -82,14 +81,12 @@ FeltFinger::Firmware::Firmware(double layer_mm, const Rubber &rubber, double noi
     fit.gain_sd_q16[k] = static_cast<std::uint16_t>(std::lround(65536.0 * rubber.gain_sd[k]));
   }
   const pad_profile &profile = model_of(layer_mm).profile;
-  contact = {DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000U, 1.0F / profile.force_ratio,
-             FORCE_SCALE_SD};
+  contact = {DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000U, 1.0F / profile.force_ratio, FORCE_SCALE_SD};
   tangential_use(&tangential, &profile, &contact, true);
   tangential.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
-                                       const std::int32_t *readings) {
+GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed, const std::int32_t *readings) {
   fit_result fitted{};
   fit_tangential estimate{};
   if (pressed) {
@@ -131,8 +128,7 @@ GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
   return told;
 }
 
-FeltFinger::FeltFinger(const Face &face, const Rubber &rubber, const Sensing &sensing,
-                       Random random)
+FeltFinger::FeltFinger(const Face &face, const Rubber &rubber, const Sensing &sensing, Random random)
     : face_(&face), rubber_(rubber), sensing_(sensing), random_(random) {
   const ms58xx_osr *osr = ms58xx_find_osr(sensing.osr);
   if (!osr) {
@@ -161,8 +157,8 @@ FeltFinger::Frame FeltFinger::feel(const twin::Touch &touch) {
   frame.touch = firmware_->frame(t_us, largest_Pa > GATE_NOISES * noise_Pa_, readings.data());
   const double processing_s = std::min(PROCESSING_s, 1.0 / sensing_.rate_Hz);
   // No frame overtakes another.
-  frame.known_s = std::max(last_known_s_, next_s_ + 0.5 * conversion_s_ + processing_s +
-                                              JITTER_s * std::abs(random_.normal()));
+  frame.known_s =
+      std::max(last_known_s_, next_s_ + 0.5 * conversion_s_ + processing_s + JITTER_s * std::abs(random_.normal()));
   last_known_s_ = frame.known_s;
   next_s_ += 1.0 / sensing_.rate_Hz;
   return frame;

@@ -6,10 +6,9 @@
 // to temperatures.
 #pragma once
 
+#include "grasp/control/grip.hpp"
 #include "libfingertip/random.hpp"
 #include "simulation/cell/face.hpp"
-
-#include "grasp/control/grip.hpp"
 
 #include <cstdint>
 #include <memory>

@@ -39,8 +39,8 @@ constexpr std::chrono::milliseconds ROUND{1};
 class Fingertip {
 public:
   Fingertip(const FingerProcess &finger, SharedPressures &pressures)
-      : finger_(finger), pressures_(pressures),
-        pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})), port_(finger.link) {
+      : finger_(finger), pressures_(pressures), pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})),
+        port_(finger.link) {
     power_up();
   }
 
@@ -106,8 +106,8 @@ private:
     told.force_scale = 1.0F / pad_.force_ratio;
     told.force_scale_sd = FORCE_SCALE_SD;
     for (std::size_t k = 0; k < SENSORS; k++) {
-      told.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())),
-                         static_cast<float>(sd), 0, 0, 0};
+      told.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd), 0,
+                         0, 0};
     }
     order(command_calibrate(told, SENSORS));
   }
@@ -121,8 +121,7 @@ private:
       std::uint8_t came[NATIVE_CDC_TRANSMIT_BYTES];
       for (std::size_t count; (count = native_cdc_receive(came, sizeof came)) > 0;) {
         decoder.feed(came, count, [&](const wire_packet &packet) {
-          is_done =
-              is_done || (packet.type == WIRE_ACK && packet.body.ack.result == WIRE_RESULT_DONE);
+          is_done = is_done || (packet.type == WIRE_ACK && packet.body.ack.result == WIRE_RESULT_DONE);
         });
       }
     }
@@ -174,9 +173,8 @@ private:
     }
     std::uint8_t bytes[NATIVE_CDC_RECEIVE_BYTES];
     if (const std::size_t count = port_.read(bytes, sizeof bytes)) {
-      asks_.feed(bytes, count, [this](const wire_packet &packet) {
-        pressures_.rates_set += packet.type == WIRE_CMD_RATE;
-      });
+      asks_.feed(bytes, count,
+                 [this](const wire_packet &packet) { pressures_.rates_set += packet.type == WIRE_CMD_RATE; });
       asked_.push_back({steady_now_us(), {bytes, bytes + count}});
     }
   }
@@ -239,9 +237,7 @@ double SharedPressures::at(std::int64_t host_us, std::size_t sensor) const {
   // Only half of them, so that none is overwritten while it is read.
   const std::uint64_t oldest = count > KEPT / 2 ? count - KEPT / 2 : 0;
   std::uint64_t i = count - 1;
-  const auto time_us = [&](std::uint64_t number) {
-    return moment(number).host_us.load(std::memory_order_relaxed);
-  };
+  const auto time_us = [&](std::uint64_t number) { return moment(number).host_us.load(std::memory_order_relaxed); };
   const auto pressure_Pa = [&](std::uint64_t number) {
     return static_cast<double>(moment(number).pressure_Pa[sensor].load(std::memory_order_relaxed));
   };
@@ -251,8 +247,7 @@ double SharedPressures::at(std::int64_t host_us, std::size_t sensor) const {
   if (i + 1 == count || time_us(i) >= host_us) {
     return pressure_Pa(i);
   }
-  const double share =
-      static_cast<double>(host_us - time_us(i)) / static_cast<double>(time_us(i + 1) - time_us(i));
+  const double share = static_cast<double>(host_us - time_us(i)) / static_cast<double>(time_us(i + 1) - time_us(i));
   return (1.0 - share) * pressure_Pa(i) + share * pressure_Pa(i + 1);
 }
 

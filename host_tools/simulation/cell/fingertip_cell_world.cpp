@@ -28,8 +28,7 @@ constexpr Known KNOWN[] = {{Disturbs::pour, 0.0, 5.0, 1.0},
                            {Disturbs::slick, 0.0, 0.95, 0.5}};
 
 const Known &known(Disturbs kind) {
-  return *std::find_if(std::begin(KNOWN), std::end(KNOWN),
-                       [&](const Known &one) { return one.kind == kind; });
+  return *std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
 }
 
 Scene scene_of(const World::Options &options) {
@@ -39,8 +38,7 @@ Scene scene_of(const World::Options &options) {
   scene.lift_mm = options.lift_mm;
   scene.lift_s = options.lift_s;
   for (const Planned &one : options.planned) {
-    scene.disturbances.push_back(
-        {one.kind, scene.lift_s + one.after_s, known(one.kind).seconds, one.amount, 0.0});
+    scene.disturbances.push_back({one.kind, scene.lift_s + one.after_s, known(one.kind).seconds, one.amount, 0.0});
   }
   return scene;
 }
@@ -51,13 +49,12 @@ Planned planned(const std::string &text) {
   const std::size_t colon = text.find(':'), at = text.find('@');
   if (colon != std::string::npos) {
     const std::string name = text.substr(0, colon);
-    const auto amount = to_double(
-        std::string_view(text).substr(colon + 1, at == std::string::npos ? at : at - colon - 1));
-    const auto after_s =
-        at == std::string::npos ? 0.0 : to_double(std::string_view(text).substr(at + 1));
+    const auto amount =
+        to_double(std::string_view(text).substr(colon + 1, at == std::string::npos ? at : at - colon - 1));
+    const auto after_s = at == std::string::npos ? 0.0 : to_double(std::string_view(text).substr(at + 1));
     for (const Known &one : KNOWN) {
-      if (name == name_of(one.kind) && amount && *amount >= one.low && *amount <= one.high &&
-          after_s && *after_s >= 0.0 && *after_s <= 1e6) {
+      if (name == name_of(one.kind) && amount && *amount >= one.low && *amount <= one.high && after_s &&
+          *after_s >= 0.0 && *after_s <= 1e6) {
         return {one.kind, *amount, *after_s};
       }
     }
@@ -69,8 +66,7 @@ Planned planned(const std::string &text) {
 }
 
 bool is_disturbance(const std::string &name) {
-  return std::any_of(std::begin(KNOWN), std::end(KNOWN),
-                     [&](const Known &one) { return name == name_of(one.kind); });
+  return std::any_of(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return name == name_of(one.kind); });
 }
 
 void World::be_of_kind(Options &options, const KindOfGrasp &kind) {
@@ -141,8 +137,7 @@ double World::need_N(double since_s) const {
   const double down_rad = scene_.grasp.down_rad;
   const double x_N = now.mass_kg * (GRAVITY_m_s2 * std::cos(down_rad) - now.hand_m_s2.x);
   const double y_N = now.mass_kg * (GRAVITY_m_s2 * std::sin(down_rad) - now.hand_m_s2.y);
-  return std::hypot(x_N + now.knock_N.x, y_N + now.knock_N.y) /
-         (2.0 * scene_.object.friction * now.friction_share);
+  return std::hypot(x_N + now.knock_N.x, y_N + now.knock_N.y) / (2.0 * scene_.object.friction * now.friction_share);
 }
 
 void World::advance(double seconds) {
@@ -170,8 +165,7 @@ void World::look_at_force() {
   if (lift_s_ || !options_.lift_after_s) {
     return;
   }
-  if (!stands_ || force_N < STANDS_LEAST_N ||
-      std::abs(force_N - stands_->force_N) > STANDS * stands_->force_N) {
+  if (!stands_ || force_N < STANDS_LEAST_N || std::abs(force_N - stands_->force_N) > STANDS * stands_->force_N) {
     stands_ = {time_s_, force_N};
   } else if (time_s_ - stands_->since_s >= *options_.lift_after_s) {
     lift();
@@ -241,9 +235,9 @@ std::string World::cells() const {
   const double least_N = is_there_ && since_s >= scene_.lift_s ? need_N(since_s) : 0.0;
   const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
   std::string text = fixed(time_s_, 5);
-  for (const double value : {motion_.width_mm(), is_there_ ? cell_.force_N() : 0.0, peak_N_, load_N,
-                             least_N, cell_.slid_mm(), cell_.way_mm().dot(cell_.down()), friction,
-                             scene_.drive(since_s).lifted_mm}) {
+  for (const double value :
+       {motion_.width_mm(), is_there_ ? cell_.force_N() : 0.0, peak_N_, load_N, least_N, cell_.slid_mm(),
+        cell_.way_mm().dot(cell_.down()), friction, scene_.drive(since_s).lifted_mm}) {
     text += "," + fixed(value, 4);
   }
   for (const bool value : {is_there_ && cell_.slips(), is_there_, is_dropped_, is_crushed_}) {

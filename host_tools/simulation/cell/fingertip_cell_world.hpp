@@ -56,9 +56,7 @@ public:
 
   Pressures pressures_Pa(std::size_t finger) const;
   // Without a force where nothing is touched.
-  twin::Touch touch(std::size_t finger) const {
-    return is_there_ ? cell_.touch(finger) : twin::Touch{};
-  }
+  twin::Touch touch(std::size_t finger) const { return is_there_ ? cell_.touch(finger) : twin::Touch{}; }
 
   // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
   // With a kind, against all that acts; without, knocks are left out.

@@ -39,9 +39,8 @@ GripperMechanics gripper_mechanics(const std::string &model) {
 }
 
 GripperMotion::GripperMotion(const GripperMechanics &mechanics)
-    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm),
-      fingers_mm_(drive_mm_), target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s),
-      force_N_(mechanics.traits.force_max_N) {}
+    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm), fingers_mm_(drive_mm_),
+      target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
 
 bool GripperMotion::blocks(double width_mm, double force_N) const {
   return blocked_at && blocked_at(width_mm, force_N);
@@ -80,8 +79,8 @@ void GripperMotion::power_off() {
 }
 
 void GripperMotion::move(const GripperMove &move) {
-  const bool same = asked_ && asked_->width_mm == move.width_mm &&
-                    asked_->speed_mm_s == move.speed_mm_s && asked_->force_N == move.force_N;
+  const bool same = asked_ && asked_->width_mm == move.width_mm && asked_->speed_mm_s == move.speed_mm_s &&
+                    asked_->force_N == move.force_N;
   if (active() && !same) {
     asked_ = move;
     commands_.push_back({time_s_ + mechanics_.traits.latency_s, false, move});
@@ -197,9 +196,7 @@ double GripperMotion::effort() const {
   if (activating()) {
     return phase_ == Phase::closing ? -full : full;
   }
-  return moving_ ? (target_mm_ > drive_mm_ ? full : -full) * speed_mm_s_ /
-                       mechanics_.traits.speed_max_mm_s
-                 : 0.0;
+  return moving_ ? (target_mm_ > drive_mm_ ? full : -full) * speed_mm_s_ / mechanics_.traits.speed_max_mm_s : 0.0;
 }
 
 GripperStatus GripperMotion::status() const {

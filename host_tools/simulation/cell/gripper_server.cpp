@@ -58,8 +58,7 @@ public:
         modbus_(modbus_new_rtu("/dev/null", robotiq::BAUD, 'N', 8, 1)),
         mapping_(modbus_mapping_new_start_address(0, 0, 0, 0, robotiq::COMMAND_REGISTER, MAPPED,
                                                   robotiq::STATUS_REGISTER, robotiq::REGISTERS)) {
-    if (modbus_ == nullptr || mapping_ == nullptr ||
-        socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends_) != 0) {
+    if (modbus_ == nullptr || mapping_ == nullptr || socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends_) != 0) {
       throw std::bad_alloc();
     }
     modbus_set_slave(modbus_, options.slave == 0 ? robotiq::SLAVE : options.slave);
@@ -134,8 +133,7 @@ public:
   void fail(std::uint8_t fault) override { registers_.fail(fault); }
 
 private:
-  static constexpr int MAPPED =
-      robotiq::STATUS_REGISTER + robotiq::REGISTERS - robotiq::COMMAND_REGISTER;
+  static constexpr int MAPPED = robotiq::STATUS_REGISTER + robotiq::REGISTERS - robotiq::COMMAND_REGISTER;
 
   // False: a function or register that it does not know, which it does not answer.
   bool obey(const Bytes &query) {
@@ -156,8 +154,7 @@ private:
         return false;
       }
       for (int i = 0; i < word(at + 2); i++) {
-        registers_.write(word(at) + i, static_cast<std::uint16_t>(
-                                           word(values + 2 * static_cast<std::size_t>(i))));
+        registers_.write(word(at) + i, static_cast<std::uint16_t>(word(values + 2 * static_cast<std::size_t>(i))));
       }
     }
     registers_.update();
@@ -227,8 +224,7 @@ GripperMechanics GripperServer::mechanics(const std::string &model) {
 }
 
 GripperServer::GripperServer(GripperMotion &motion, const Options &options)
-    : motion_(motion), real_time_(options.real_time), port_(options.link),
-      stepped_at_(host_now()) {
+    : motion_(motion), real_time_(options.real_time), port_(options.link), stepped_at_(host_now()) {
   switch (gripper_traits(options.model).driver) {
   case GripperDriver::robotiq:
     slave_ = std::make_unique<ModbusSlave>(motion, options);
@@ -290,8 +286,7 @@ void GripperServer::take() {
       return std::chrono::duration_cast<HostTime::duration>(std::chrono::duration<double>(time_s));
     };
     const std::size_t crossing = frame.size() + bytes.size();
-    HostTime due =
-        came_at_ + seconds(static_cast<double>(crossing) * BITS_PER_BYTE / slave_->baud());
+    HostTime due = came_at_ + seconds(static_cast<double>(crossing) * BITS_PER_BYTE / slave_->baud());
     if (has_fault) {
       due += seconds(trouble_.late_s);
     }
@@ -326,8 +321,7 @@ void GripperServer::step(std::chrono::microseconds longest_wait) {
   const HostTime now = host_now();
   if (real_time_) {
     const double late_s = std::chrono::duration<double>(now - stepped_at_).count();
-    double passed_s =
-        std::min(late_s, std::chrono::duration<double>(longest_wait).count() + STALL_s);
+    double passed_s = std::min(late_s, std::chrono::duration<double>(longest_wait).count() + STALL_s);
     for (; passed_s > 0; passed_s -= LONGEST_STEP_s) {
       motion_.step(std::min(passed_s, LONGEST_STEP_s));
     }

@@ -45,7 +45,7 @@ class GripperServer {
 public:
   struct Options {
     std::string model = {};
-    int slave = 0; // 0: the model's usual
+    int slave = 0;         // 0: the model's usual
     std::string link = {}; // made to its port; "": none
     // Whether step moves the fingers on as real time passes; else the driver of the motion does.
     bool real_time = true;

@@ -26,8 +26,7 @@ void put(int client, const std::string &line) {
 } // namespace
 
 HandServer::HandServer(const Place &place, std::size_t fingertips, bool obeys)
-    : fingertips_(fingertips), obeys_(obeys), path_(place.port("truth")),
-      name_(place.port("hand")) {
+    : fingertips_(fingertips), obeys_(obeys), path_(place.port("truth")), name_(place.port("hand")) {
   sockaddr_un address = {};
   address.sun_family = AF_UNIX;
   if (path_.size() >= sizeof address.sun_path) {
@@ -39,10 +38,9 @@ HandServer::HandServer(const Place &place, std::size_t fingertips, bool obeys)
   unlink(name_.c_str());
   listening_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const mode_t mask = umask(0177);
-  const bool bound =
-      listening_ >= 0 &&
-      bind(listening_, reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0 &&
-      listen(listening_, MOST_CLIENTS) == 0;
+  const bool bound = listening_ >= 0 &&
+                     bind(listening_, reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0 &&
+                     listen(listening_, MOST_CLIENTS) == 0;
   umask(mask);
   if (!bound || (obeys_ && symlink("truth", name_.c_str()) != 0)) {
     throw Error(ErrorCode::cannot_write, path_ + ": " + std::strerror(errno));
@@ -71,9 +69,8 @@ void HandServer::step() {
 }
 
 void HandServer::come() {
-  for (int client;
-       clients_.size() < MOST_CLIENTS &&
-       (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+  for (int client; clients_.size() < MOST_CLIENTS &&
+                   (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
     clients_[client];
   }
 }
@@ -123,8 +120,7 @@ std::string HandServer::obey(int client, const std::string &line) {
   }
   if (is_press) {
     hands_[finger] = {HandAt{std::clamp(values[0], -FARTHEST_mm, FARTHEST_mm),
-                             std::clamp(values[1], -FARTHEST_mm, FARTHEST_mm),
-                             std::min(values[2], MOST_N)},
+                             std::clamp(values[1], -FARTHEST_mm, FARTHEST_mm), std::min(values[2], MOST_N)},
                       client};
   } else {
     hands_[finger] = {};

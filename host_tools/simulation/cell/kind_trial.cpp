@@ -23,8 +23,7 @@ enum Stream : std::uint64_t { TIP = 871, LINE };
 
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double RATE_Hz = 410.0, CONVERSION_s = 2.3e-3;
-constexpr double FORCE_NOISE = 0.004, FORCE_NOISE_N = 0.01, LOAD_NOISE_N = 0.015,
-                 PLACE_NOISE_mm = 0.012;
+constexpr double FORCE_NOISE = 0.004, FORCE_NOISE_N = 0.01, LOAD_NOISE_N = 0.015, PLACE_NOISE_mm = 0.012;
 constexpr double GATE_N = 0.05; // less is no contact
 constexpr double STEPS_s = 0.01, PATIENCE_s = 12.0, SAMPLED_s = 2e-3;
 constexpr double JOINED_s = 0.03, MORE_FORCE = 1.05, AFTER_s = 1.0;
@@ -47,16 +46,16 @@ public:
   bool is_lost(double share) { return random_.uniform(0.0, 1.0) < share; }
   // From next_s on its way.
   double known_s(double jitter_s, double later_s) {
-    known_s_ = std::max(known_s_, next_s_ + 0.5 * CONVERSION_s + PROCESSING_s + pad_.delay_s +
-                                      later_s + jitter_s * std::abs(random_.normal()));
+    known_s_ = std::max(known_s_, next_s_ + 0.5 * CONVERSION_s + PROCESSING_s + pad_.delay_s + later_s +
+                                      jitter_s * std::abs(random_.normal()));
     return known_s_;
   }
 
   GripTouch feel(double force_N, const Vector &load_N, const Vector &way_mm) {
     GripTouch told{};
     told.t_s = next_s_;
-    const double felt_N = pad_.gain * force_N * (1.0 + FORCE_NOISE * random_.normal()) +
-                          FORCE_NOISE_N * random_.normal();
+    const double felt_N =
+        pad_.gain * force_N * (1.0 + FORCE_NOISE * random_.normal()) + FORCE_NOISE_N * random_.normal();
     contact_input input{};
     input.t_us = in_us(next_s_);
     input.contact = felt_N > GATE_N;
@@ -71,20 +70,15 @@ public:
       const auto noise = [&](double sd) { return sd * random_.normal(); };
       found.valid = true;
       found.force_N = static_cast<float>(felt_N);
-      found.qx_N = static_cast<float>(
-          mirror_ * (pad_.gain * load_N.x + pad_.ratio.x * felt_N) + noise(LOAD_NOISE_N));
-      found.qy_N = static_cast<float>(pad_.gain * load_N.y + pad_.ratio.y * felt_N +
-                                      noise(LOAD_NOISE_N));
-      found.x_mm = static_cast<float>(
-          mirror_ * (way_mm.x + pad_.crosstalk * load_N.x * share) + noise(PLACE_NOISE_mm));
-      found.y_mm = static_cast<float>(way_mm.y + pad_.crosstalk * load_N.y * share +
-                                      noise(PLACE_NOISE_mm));
+      found.qx_N = static_cast<float>(mirror_ * (pad_.gain * load_N.x + pad_.ratio.x * felt_N) + noise(LOAD_NOISE_N));
+      found.qy_N = static_cast<float>(pad_.gain * load_N.y + pad_.ratio.y * felt_N + noise(LOAD_NOISE_N));
+      found.x_mm = static_cast<float>(mirror_ * (way_mm.x + pad_.crosstalk * load_N.x * share) + noise(PLACE_NOISE_mm));
+      found.y_mm = static_cast<float>(way_mm.y + pad_.crosstalk * load_N.y * share + noise(PLACE_NOISE_mm));
       found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);
       found.location_sd_mm = 0.1F;
       input.tangential = &found;
-      result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
-                     CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED |
-                     CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_TANGENTIAL_VALID;
+      result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                     CONTACT_FLAG_TARED | CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_TANGENTIAL_VALID;
     }
     motion_update(&history_, &settings_, &input, &result, &moved);
     told.flags = result.flags;
@@ -160,10 +154,8 @@ private:
 
 class KindRun {
 public:
-  KindRun(const KindTrial &trial, Controller &controller,
-          const std::function<void(const KindMoment &)> &trace)
-      : grasp_(trial.grasp), later_s_(trial.later_s), controller_(controller), trace_(trace),
-        pinch_(grasp_),
+  KindRun(const KindTrial &trial, Controller &controller, const std::function<void(const KindMoment &)> &trace)
+      : grasp_(trial.grasp), later_s_(trial.later_s), controller_(controller), trace_(trace), pinch_(grasp_),
         gripper_(slowed(trial), grasp_.width_mm + grasp_.opens_mm, Random(trial.seed, LINE, 0)),
         tips_{Tip(grasp_.pads[0], 1.0, Random(trial.seed, TIP, 0)),
               Tip(grasp_.pads[1], -1.0, Random(trial.seed, TIP, 1))} {
@@ -211,8 +203,7 @@ private:
         continue;
       }
       const GripTouch touch = tip.feel(pinch_.force_N(i), pinch_.load_N(i), pinch_.way_mm());
-      const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s &&
-                        since_lift_s() >= grasp_.gone_s;
+      const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone) {
         arrivals_.touch(tip.known_s(grasp_.jitter_s, later_s_), i, touch);
       }
@@ -270,10 +261,9 @@ private:
     }
     if (trace_) {
       const Vector one = pinch_.load_N(0), other = pinch_.load_N(1);
-      trace_({t_s_, since_s, gripper_.motion().width_mm(), sent_mm, pinch_.force_N(0),
-              pinch_.force_N(1), since_s >= 0.0 ? least_N_ : 0.0,
-              0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)), pinch_.slid_mm(),
-              pinch_.slips(), report_});
+      trace_({t_s_, since_s, gripper_.motion().width_mm(), sent_mm, pinch_.force_N(0), pinch_.force_N(1),
+              since_s >= 0.0 ? least_N_ : 0.0, 0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)),
+              pinch_.slid_mm(), pinch_.slips(), report_});
     }
   }
 

@@ -19,7 +19,7 @@ namespace fingertip::cell {
 
 // A slide of 0.3 mm or more that ended before the object was lost.
 struct Catch {
-  double begin_s;                   // since the lift began
+  double begin_s; // since the lift began
   double way_mm;
   std::optional<double> reaction_s; // until the grip was 5 % stronger
   double peak_N, least_N;           // from its beginning to 1 s after its end, the largest of each
@@ -28,10 +28,10 @@ struct Catch {
 struct KindOutcome {
   bool dropped = false, never_held = false, crushed = false, hunts = false;
   double slid_mm = 0.0, peak_N = 0.0;
-  double first_N = 0.0;    // the largest force before the lift
-  double margin = 0.0;     // median of force over least force, from the lift's end on
+  double first_N = 0.0;     // the largest force before the lift
+  double margin = 0.0;      // median of force over least force, from the lift's end on
   double reversals_s = 0.0; // of the commanded width, a second, while nothing happens any more
-  double held_s = 0.0;     // from the beginning to HOLDING
+  double held_s = 0.0;      // from the beginning to HOLDING
   std::vector<Catch> catches;
 };
 

@@ -24,16 +24,11 @@ struct Ranges {
 
 // In the order of Kind. side: the two sides' friction differs by this share.
 constexpr Ranges RANGES[] = {
-    {{0.05, 0.6}, {0.4, 1.0}, {0.9, 1.0}, {0.0, 0.05}, {0, 1}, {0.2, 0.6}, {0, 0},
-     2e-4, 0, 0, 0, 0, 0},
-    {{0.05, 1.0}, {0.3, 1.0}, {0.75, 1.0}, {0.0, 0.15}, {0, 2}, {0.2, 1.2}, {0, 0.015},
-     1e-3, 0.02, 0.03, 1, 2, 0.7},
-    {{0.05, 1.0}, {0.25, 0.9}, {0.714, 1.0}, {0.0, 0.3}, {0, 3}, {0.5, 2.0}, {0.01, 0.04},
-     3e-3, 0.05, 0.08, 2, 3, 1.0},
-    {{0.05, 1.0}, {0.35, 1.0}, {0.75, 1.0}, {0.0, 0.15}, {0, 2}, {0.2, 1.2}, {0, 0.015},
-     1e-3, 0.02, 0, 1, 1, 1.0},
-    {{0.0, 0.0}, {0.35, 0.9}, {0.75, 1.0}, {0.0, 0.15}, {0, 3}, {0.2, 0.8}, {0, 0.015},
-     1e-3, 0.02, 0, 0, 1, 0.4},
+    {{0.05, 0.6}, {0.4, 1.0}, {0.9, 1.0}, {0.0, 0.05}, {0, 1}, {0.2, 0.6}, {0, 0}, 2e-4, 0, 0, 0, 0, 0},
+    {{0.05, 1.0}, {0.3, 1.0}, {0.75, 1.0}, {0.0, 0.15}, {0, 2}, {0.2, 1.2}, {0, 0.015}, 1e-3, 0.02, 0.03, 1, 2, 0.7},
+    {{0.05, 1.0}, {0.25, 0.9}, {0.714, 1.0}, {0.0, 0.3}, {0, 3}, {0.5, 2.0}, {0.01, 0.04}, 3e-3, 0.05, 0.08, 2, 3, 1.0},
+    {{0.05, 1.0}, {0.35, 1.0}, {0.75, 1.0}, {0.0, 0.15}, {0, 2}, {0.2, 1.2}, {0, 0.015}, 1e-3, 0.02, 0, 1, 1, 1.0},
+    {{0.0, 0.0}, {0.35, 0.9}, {0.75, 1.0}, {0.0, 0.15}, {0, 3}, {0.2, 0.8}, {0, 0.015}, 1e-3, 0.02, 0, 0, 1, 0.4},
 };
 
 struct Fragile {
@@ -66,8 +61,8 @@ Event draw_event(Random &random, const Ranges &ranges, double begin_s, bool calm
   Event event{};
   event.begin_s = begin_s;
   event.angle_rad = random.uniform(-M_PI, M_PI);
-  event.kind = calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push)
-                    : static_cast<Event::Kind>(random.next() % 6);
+  event.kind =
+      calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push) : static_cast<Event::Kind>(random.next() % 6);
   const double strength = ranges.strength;
   switch (event.kind) {
   case Event::Kind::knock:
@@ -102,9 +97,7 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
   const Ranges &ranges = RANGES[static_cast<int>(kind)];
   KindOfGrasp grasp{};
   grasp.kind = kind;
-  grasp.mass_kg = ranges.mass_kg.low > 0.0
-                      ? random.log_uniform(ranges.mass_kg.low, ranges.mass_kg.high)
-                      : 0.0;
+  grasp.mass_kg = ranges.mass_kg.low > 0.0 ? random.log_uniform(ranges.mass_kg.low, ranges.mass_kg.high) : 0.0;
   grasp.crushes_N = std::numeric_limits<double>::infinity();
   if (kind == Kind::fragile) {
     const Fragile &fragile = FRAGILE[random.next() % std::size(FRAGILE)];
@@ -119,14 +112,13 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
   const double delay_s = draw(random, ranges.delay_s);
   for (int i = 0; i < 2; i++) {
     const double sign = i == 0 ? 1.0 : -1.0, angle_rad = random.uniform(-M_PI, M_PI);
-    grasp.pads[static_cast<std::size_t>(i)] = {
-        at_1_mm_N * (1.0 + sign * apart),
-        random.uniform(0.06, 0.3),
-        friction * (1.0 + sign * side),
-        1.0 + gain_sd * std::clamp(random.normal(), -2.5, 2.5),
-        {ratio * std::cos(angle_rad), ratio * std::sin(angle_rad)},
-        random.uniform(-0.3, 0.3),
-        delay_s + random.uniform(0.0, 0.002)};
+    grasp.pads[static_cast<std::size_t>(i)] = {at_1_mm_N * (1.0 + sign * apart),
+                                               random.uniform(0.06, 0.3),
+                                               friction * (1.0 + sign * side),
+                                               1.0 + gain_sd * std::clamp(random.normal(), -2.5, 2.5),
+                                               {ratio * std::cos(angle_rad), ratio * std::sin(angle_rad)},
+                                               random.uniform(-0.3, 0.3),
+                                               delay_s + random.uniform(0.0, 0.002)};
   }
   grasp.exponent = random.uniform(1.3, 1.9);
   grasp.shear_N_mm = random.log_uniform(2.0, 6.0);
@@ -148,8 +140,7 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
     grasp.events.push_back(draw_event(random, ranges, t_s, kind == Kind::fragile));
     Event &event = grasp.events.back();
     if (kind == Kind::slick) {
-      event = {Event::Kind::slick, t_s, random.uniform(0.005, 0.06), random.uniform(0.25, 0.55),
-               0.0, 0.0};
+      event = {Event::Kind::slick, t_s, random.uniform(0.005, 0.06), random.uniform(0.25, 0.55), 0.0, 0.0};
     }
     t_s += event.seconds;
   }
@@ -182,8 +173,7 @@ Kind kind_of(const std::string &name) {
       return kind;
     }
   }
-  throw std::runtime_error("there is no kind \"" + name +
-                           "\"; choose one of: gentle usual rough slick fragile");
+  throw std::runtime_error("there is no kind \"" + name + "\"; choose one of: gentle usual rough slick fragile");
 }
 
 KindOfGrasp::Acts KindOfGrasp::acts(double t_s) const {
@@ -200,18 +190,13 @@ KindOfGrasp::Acts KindOfGrasp::acts(double t_s) const {
     double hand_m_s2 = 0.0, push_N = 0.0;
     switch (event.kind) {
     case Event::Kind::knock:
-      push_N = lasts ? mass_kg * event.amount * 0.5 * M_PI / event.seconds * std::sin(M_PI * share)
-                     : 0.0;
+      push_N = lasts ? mass_kg * event.amount * 0.5 * M_PI / event.seconds * std::sin(M_PI * share) : 0.0;
       break;
     case Event::Kind::push:
-      push_N = lasts ? event.amount * mass_kg * GRAVITY_m_s2 *
-                           std::min(1.0, 8.0 * std::min(share, 1.0 - share))
-                     : 0.0;
+      push_N = lasts ? event.amount * mass_kg * GRAVITY_m_s2 * std::min(1.0, 8.0 * std::min(share, 1.0 - share)) : 0.0;
       break;
     case Event::Kind::vibrate:
-      hand_m_s2 =
-          lasts ? event.amount * std::sin(2.0 * M_PI * event.rate_Hz * share * event.seconds)
-                : 0.0;
+      hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * event.rate_Hz * share * event.seconds) : 0.0;
       break;
     case Event::Kind::pour:
       acts.mass_kg += event.amount * mass_kg * way_of(share);

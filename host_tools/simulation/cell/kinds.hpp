@@ -15,8 +15,7 @@
 namespace fingertip::cell {
 
 enum class Kind { gentle, usual, rough, slick, fragile };
-constexpr std::array<Kind, 5> KINDS = {Kind::gentle, Kind::usual, Kind::rough, Kind::slick,
-                                       Kind::fragile};
+constexpr std::array<Kind, 5> KINDS = {Kind::gentle, Kind::usual, Kind::rough, Kind::slick, Kind::fragile};
 const char *name_of(Kind kind);
 // Throws std::runtime_error: there is none.
 Kind kind_of(const std::string &name);
@@ -52,24 +51,24 @@ struct KindOfGrasp {
   Kind kind;
   std::string object; // of kind fragile
   std::array<KindOfPad, 2> pads;
-  double exponent;        // of force over indentation
-  double shear_N_mm;      // tangential stiffness of a pad at 4 N
-  double rubber_N_s_mm;   // damping of it, with the loss at the contact's edge
-  double kinetic_share;   // of static friction, at speed
-  double stribeck_mm_s;   // at which friction has fallen by 63 % of the way there
+  double exponent;                  // of force over indentation
+  double shear_N_mm;                // tangential stiffness of a pad at 4 N
+  double rubber_N_s_mm;             // damping of it, with the loss at the contact's edge
+  double kinetic_share;             // of static friction, at speed
+  double stribeck_mm_s;             // at which friction has fallen by 63 % of the way there
   double width_mm, mass_kg, off_mm; // off_mm: from the middle between the fingers
   double table_friction;
   double crushes_N;
   double opens_mm;
-  double waits_s;           // from HOLDING to the lift
-  double lift_mm, lift_s;   // minimum jerk
+  double waits_s;         // from HOLDING to the lift
+  double lift_mm, lift_s; // minimum jerk
   std::vector<Event> events;
-  double steady_s, ends_s;  // nothing happens any more from steady_s on
-  double jitter_s;          // of frames
-  double lost_share;        // of frames
-  int gone;                 // this fingertip goes silent, -1: none
-  double gone_s;            // since the lift began
-  double poll_factor;       // the gripper's line is slower than its traits say
+  double steady_s, ends_s; // nothing happens any more from steady_s on
+  double jitter_s;         // of frames
+  double lost_share;       // of frames
+  int gone;                // this fingertip goes silent, -1: none
+  double gone_s;           // since the lift began
+  double poll_factor;      // the gripper's line is slower than its traits say
 
   struct Acts {
     double lifted_mm = 0.0, lift_mm_s = 0.0;

@@ -71,8 +71,7 @@ private:
 };
 
 // A gripper on its own line, activated and as far open as it is to begin with.
-void stand_open(GripperServer &server, GripperMotion &motion, const std::string &model,
-                double width_mm) {
+void stand_open(GripperServer &server, GripperMotion &motion, const std::string &model, double width_mm) {
   constexpr double HURRY_s = 0.02; // in a round: too short to notice
   std::atomic<bool> is_done{false};
   std::string why;
@@ -111,8 +110,8 @@ class Lift {
 public:
   Lift(const LiftOptions &options, const Place &place)
       : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache),
-        fingers_(place, fingers_of(options, place)),
-        motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
+        fingers_(place, fingers_of(options, place)), motion_(GripperServer::mechanics(options.model)),
+        server_(motion_, server_options()) {
     fingers_.wait_until_ready();
     stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
@@ -138,8 +137,7 @@ public:
     const double all_s = 1e-6 * static_cast<double>(last_us_ - began_us);
     const double stood_s = 1e-6 * static_cast<double>(stood_us_);
     if (stood_s > 0.01 * all_s) {
-      std::fprintf(stderr, "the world stood still for %.2f of %.2f s: this machine is busy\n",
-                   stood_s, all_s);
+      std::fprintf(stderr, "the world stood still for %.2f of %.2f s: this machine is busy\n", stood_s, all_s);
     }
   }
 
@@ -155,8 +153,8 @@ private:
   std::string head() const {
     const Object &object = options_.world.object;
     std::ostringstream text;
-    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: "
-         << options_.model << "\n# face: " << options_.face
+    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model
+         << "\n# face: " << options_.face
          << "\n# kind: " << (options_.world.kind ? name_of(options_.world.kind->kind) : "none")
          << "\n# width_mm: " << object.width_mm << "\n# mass_kg: " << object.mass_kg
          << "\n# friction: " << object.friction << "\n# crushes_N: " << object.crushes_N
@@ -171,19 +169,16 @@ private:
       return now_us - seen_us > LATE_us && now_us - seen_us < patience_us;
     };
     const std::int64_t heard_us =
-        std::chrono::duration_cast<std::chrono::microseconds>(server_.heard_at().time_since_epoch())
-            .count();
+        std::chrono::duration_cast<std::chrono::microseconds>(server_.heard_at().time_since_epoch()).count();
     bool is_late_one = is_late(heard_us);
     for (std::size_t i = 0; i < FINGERS; i++) {
-      is_late_one = is_late_one || (fingers_.is_there(i) && !fingers_.is_frozen(i) &&
-                                    is_late(fingers_.reached_us(i)));
+      is_late_one = is_late_one || (fingers_.is_there(i) && !fingers_.is_frozen(i) && is_late(fingers_.reached_us(i)));
     }
     return is_late_one;
   }
 
   void round(std::int64_t now_us) {
-    const std::int64_t passed_us =
-        is_waited_for(now_us) ? 0 : std::min(now_us - last_us_, LONGEST_ROUND_us);
+    const std::int64_t passed_us = is_waited_for(now_us) ? 0 : std::min(now_us - last_us_, LONGEST_ROUND_us);
     stood_us_ += now_us - last_us_ - passed_us;
     last_us_ = now_us;
     world_->advance(1e-6 * static_cast<double>(passed_us));
@@ -275,8 +270,8 @@ private:
       return true;
     }
     if (verb == "line") {
-      const auto known = std::find_if(std::begin(FAULTS), std::end(FAULTS),
-                                      [&](const auto &one) { return what == one.first; });
+      const auto known =
+          std::find_if(std::begin(FAULTS), std::end(FAULTS), [&](const auto &one) { return what == one.first; });
       if (known == std::end(FAULTS)) {
         return false;
       }
@@ -306,12 +301,8 @@ private:
       "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
       "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
   static constexpr std::pair<const char *, LineFault> FAULTS[] = {
-      {"none", LineFault::none},
-      {"silent", LineFault::silent},
-      {"garbage", LineFault::garbage},
-      {"damaged", LineFault::damaged},
-      {"other_slave", LineFault::other_slave},
-      {"refused", LineFault::refused}};
+      {"none", LineFault::none},       {"silent", LineFault::silent},           {"garbage", LineFault::garbage},
+      {"damaged", LineFault::damaged}, {"other_slave", LineFault::other_slave}, {"refused", LineFault::refused}};
 
   const LiftOptions &options_;
   const Place &place_;
@@ -342,8 +333,7 @@ void check(const LiftOptions &options) {
   const double widest_mm = options.world.object.width_mm + options.opens_mm;
   if (widest_mm > traits.stroke_mm) {
     throw Error(ErrorCode::bad_value, options.model + " opens to " + fixed(traits.stroke_mm, 1) +
-                                          " mm; the object and --opens take " +
-                                          fixed(widest_mm, 1));
+                                          " mm; the object and --opens take " + fixed(widest_mm, 1));
   }
 }
 

@@ -26,9 +26,7 @@ Pinch::Pinch(const KindOfGrasp &grasp) : grasp_(grasp), along_mm_(grasp.off_mm) 
 void Pinch::press(std::size_t i, double seconds, double indentation_mm) {
   Pad &pad = pads_[i];
   const double elastic_N =
-      indentation_mm > 0.0
-          ? grasp_.pads[i].at_1_mm_N * std::pow(indentation_mm, grasp_.exponent)
-          : 0.0;
+      indentation_mm > 0.0 ? grasp_.pads[i].at_1_mm_N * std::pow(indentation_mm, grasp_.exponent) : 0.0;
   double loss_N = 0.0;
   for (std::size_t k = 0; k < pad.strength.size(); k++) {
     pad.follows_N[k] += seconds / twin::Pad::TIMES_s[k] * (elastic_N - pad.follows_N[k]);
@@ -41,13 +39,10 @@ void Pinch::press(std::size_t i, double seconds, double indentation_mm) {
 double Pinch::force_at_N(double width_mm) const {
   double force_N = 0.0;
   for (std::size_t i = 0; i < pads_.size(); i++) {
-    const double indentation_mm =
-        0.5 * (grasp_.width_mm - width_mm) + (i == 0 ? -along_mm_ : along_mm_);
+    const double indentation_mm = 0.5 * (grasp_.width_mm - width_mm) + (i == 0 ? -along_mm_ : along_mm_);
     if (indentation_mm > 0.0) {
-      const double elastic_N =
-          grasp_.pads[i].at_1_mm_N * std::pow(indentation_mm, grasp_.exponent);
-      force_N =
-          std::max(force_N, elastic_N - (pads_[i].elastic_N - pads_[i].force_N));
+      const double elastic_N = grasp_.pads[i].at_1_mm_N * std::pow(indentation_mm, grasp_.exponent);
+      force_N = std::max(force_N, elastic_N - (pads_[i].elastic_N - pads_[i].force_N));
     }
   }
   return force_N;
@@ -64,8 +59,7 @@ void Pinch::drag(std::size_t i, double seconds, double friction_share) {
   const double stiffness_N_mm = grasp_.shear_N_mm * std::cbrt(pad.force_N / 4.0);
   const double kinetic = grasp_.kinetic_share;
   const double falls = std::exp(-std::pow(pad.slid_mm_s / grasp_.stribeck_mm_s, 2));
-  const double most_N = pad.force_N * friction_share * grasp_.pads[i].friction *
-                        (kinetic + (1.0 - kinetic) * falls);
+  const double most_N = pad.force_N * friction_share * grasp_.pads[i].friction * (kinetic + (1.0 - kinetic) * falls);
   const Vector before = pad.bristle_mm;
   pad.bristle_mm.x += speed_mm_s_.x * seconds;
   pad.bristle_mm.y += speed_mm_s_.y * seconds;
@@ -75,8 +69,7 @@ void Pinch::drag(std::size_t i, double seconds, double friction_share) {
     pad.bristle_mm.x *= most_N / pull_N;
     pad.bristle_mm.y *= most_N / pull_N;
   }
-  const Vector gives{(pad.bristle_mm.x - before.x) / seconds,
-                     (pad.bristle_mm.y - before.y) / seconds};
+  const Vector gives{(pad.bristle_mm.x - before.x) / seconds, (pad.bristle_mm.y - before.y) / seconds};
   pad.slid_mm_s = pad.slips ? std::hypot(speed_mm_s_.x - gives.x, speed_mm_s_.y - gives.y) : 0.0;
   pad.load_N = {stiffness_N_mm * pad.bristle_mm.x + grasp_.rubber_N_s_mm * gives.x,
                 stiffness_N_mm * pad.bristle_mm.y + grasp_.rubber_N_s_mm * gives.y};
@@ -88,9 +81,7 @@ double Pinch::table_N(const KindOfGrasp::Acts &acts) const {
   const double depth_mm = stands_mm - at_mm_.y - acts.lifted_mm;
   const double damping = 2.0 * TABLE_DAMPING * std::sqrt(acts.mass_kg * TABLE_N_mm / PER_M);
   const double closing_mm_s = -(speed_mm_s_.y + acts.lift_mm_s);
-  return acts.table && depth_mm > 0.0
-             ? std::max(0.0, TABLE_N_mm * depth_mm + damping * closing_mm_s)
-             : 0.0;
+  return acts.table && depth_mm > 0.0 ? std::max(0.0, TABLE_N_mm * depth_mm + damping * closing_mm_s) : 0.0;
 }
 
 void Pinch::push_along(double seconds, double squeezed_mm, double mass_kg, double table_N) {
@@ -103,8 +94,7 @@ void Pinch::push_along(double seconds, double squeezed_mm, double mass_kg, doubl
   double stiffness_N_mm = 0.0;
   for (std::size_t i = 0; i < pads_.size(); i++) {
     const double indentation_mm = squeezed_mm + (i == 0 ? -along_mm_ : along_mm_);
-    stiffness_N_mm +=
-        indentation_mm > 0.0 ? grasp_.exponent * pads_[i].elastic_N / indentation_mm : 0.0;
+    stiffness_N_mm += indentation_mm > 0.0 ? grasp_.exponent * pads_[i].elastic_N / indentation_mm : 0.0;
   }
   const double damping_N_s_mm = std::sqrt(mass_kg * stiffness_N_mm / PER_M);
   const double against = along_mm_s_ != 0.0 ? along_mm_s_ : push_N;
@@ -125,10 +115,9 @@ void Pinch::step(double seconds, double width_mm, const KindOfGrasp::Acts &acts)
   push_along(seconds, squeezed_mm, acts.mass_kg, stands_N);
   drag(0, seconds, acts.friction_share);
   drag(1, seconds, acts.friction_share);
-  const Vector force_N{
-      acts.push_N.x - acts.mass_kg * acts.hand_m_s2.x - pads_[0].load_N.x - pads_[1].load_N.x,
-      acts.push_N.y - acts.mass_kg * (GRAVITY_m_s2 + acts.hand_m_s2.y) + stands_N -
-          pads_[0].load_N.y - pads_[1].load_N.y};
+  const Vector force_N{acts.push_N.x - acts.mass_kg * acts.hand_m_s2.x - pads_[0].load_N.x - pads_[1].load_N.x,
+                       acts.push_N.y - acts.mass_kg * (GRAVITY_m_s2 + acts.hand_m_s2.y) + stands_N - pads_[0].load_N.y -
+                           pads_[1].load_N.y};
   speed_mm_s_.x += PER_M * force_N.x / acts.mass_kg * seconds;
   speed_mm_s_.y += PER_M * force_N.y / acts.mass_kg * seconds;
   if (stands_N > 0.0 && force_N.y <= 0.0) { // the table's friction holds it in the plane too

@@ -48,9 +48,8 @@ Place::Place(const std::string &folder)
   }
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     close(lock_);
-    throw Error(ErrorCode::file_exists,
-                folder_ + ": another simulation has its ports there; end that one, or choose "
-                          "another folder (--ports)");
+    throw Error(ErrorCode::file_exists, folder_ + ": another simulation has its ports there; end that one, or choose "
+                                                  "another folder (--ports)");
   }
 }
 
@@ -78,8 +77,8 @@ Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers)
       }
     });
   }
-  void *memory = mmap(nullptr, count() * sizeof(SharedPressures), PROT_READ | PROT_WRITE,
-                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void *memory =
+      mmap(nullptr, count() * sizeof(SharedPressures), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) {
     throw std::bad_alloc();
   }

@@ -62,9 +62,7 @@ public:
   std::uint32_t rates_set(std::size_t finger) const { return shared_[finger].rates_set; }
   std::int64_t reached_us(std::size_t finger) const { return shared_[finger].reached_us; }
   // In the fingertip's own time.
-  std::int64_t device_us(std::size_t finger, std::int64_t host_us) const {
-    return host_us - shared_[finger].zero_us;
-  }
+  std::int64_t device_us(std::size_t finger, std::int64_t host_us) const { return host_us - shared_[finger].zero_us; }
   bool is_there(std::size_t finger) const { return processes_[finger] > 0; }
   bool is_frozen(std::size_t finger) const { return shared_[finger].frozen; }
   void freeze(std::size_t finger, bool frozen) { shared_[finger].frozen = frozen; }

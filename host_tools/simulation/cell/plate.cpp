@@ -17,8 +17,8 @@ Plate::Plate(const twin::Layer &layer, double half_x_mm, double half_y_mm)
   for (int m = 1; m <= TERMS; m += 2) {
     for (int n = 1; n <= TERMS; n += 2) {
       const double kx = 0.5 * M_PI * m / half_x_mm_, ky = 0.5 * M_PI * n / half_y_mm_;
-      mean_ += 256.0 / (M_PI * M_PI * M_PI * M_PI * m * m * n * n * thickness_mm_ * thickness_mm_ *
-                        (kx * kx + ky * ky));
+      mean_ +=
+          256.0 / (M_PI * M_PI * M_PI * M_PI * m * m * n * n * thickness_mm_ * thickness_mm_ * (kx * kx + ky * ky));
     }
   }
   const double area_mm2 = 4.0 * half_x_mm_ * half_y_mm_;
@@ -34,8 +34,7 @@ double Plate::squeezed(double x_mm, double y_mm) const {
   for (int m = 1; m <= TERMS; m += 2) {
     for (int n = 1; n <= TERMS; n += 2) {
       const double kx = 0.5 * M_PI * m / half_x_mm_, ky = 0.5 * M_PI * n / half_y_mm_;
-      const double strength =
-          64.0 / (M_PI * M_PI * m * n * thickness_mm_ * thickness_mm_ * (kx * kx + ky * ky));
+      const double strength = 64.0 / (M_PI * M_PI * m * n * thickness_mm_ * thickness_mm_ * (kx * kx + ky * ky));
       sum += strength * std::sin(kx * (x_mm + half_x_mm_)) * std::sin(ky * (y_mm + half_y_mm_));
     }
   }
@@ -50,8 +49,7 @@ double Plate::normal_Pa_N(double x_mm, double y_mm) const {
 double Plate::edge_Pa_N(double half_mm, double at_mm) const {
   const double rate = DECAY / thickness_mm_;
   // Integral of x sinh(rate x) from -half to half.
-  const double moment = 2.0 * (half_mm * std::cosh(rate * half_mm) / rate -
-                               std::sinh(rate * half_mm) / (rate * rate));
+  const double moment = 2.0 * (half_mm * std::cosh(rate * half_mm) / rate - std::sinh(rate * half_mm) / (rate * rate));
   return 0.5 * thickness_mm_ * std::sinh(rate * at_mm) / moment;
 }
 

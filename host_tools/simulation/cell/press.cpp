@@ -48,8 +48,8 @@ class Pressed {
 public:
   Pressed(const Face &face, const PressOptions &options, std::uint64_t seed)
       : face_(face), weight_N_(1e-3 * options.weight_g * GRAVITY_m_s2),
-        rubber_(twin::parse_effects("relaxation"), SENSORS, LAYER_mm, AIR_Pa, seed),
-        base_Pa_(SENSORS), felt_Pa_(SENSORS) {
+        rubber_(twin::parse_effects("relaxation"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS),
+        felt_Pa_(SENSORS) {
     Random random(seed, PLACES, 0);
     begin_x_ = random.uniform(0.0, 1.0);
     begin_y_ = random.uniform(0.0, 1.0);
@@ -63,8 +63,8 @@ public:
     touch_ = {};
     touch_.x_mm = HALF_WIDTH_mm * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
     touch_.y_mm = HALF_LENGTH_mm * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
-    touch_.force_N = weight_N_ * (smooth(since_s / SETS_DOWN_s) -
-                                  smooth((since_s - SETS_DOWN_s - STANDS_s) / SETS_DOWN_s));
+    touch_.force_N =
+        weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - STANDS_s) / SETS_DOWN_s));
     feel(time_s);
   }
   // Or where the hand is.
@@ -101,8 +101,7 @@ public:
 
 private:
   void feel(double time_s) {
-    const Pressures pressures =
-        touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
+    const Pressures pressures = touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
     std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
     rubber_.report(time_s, base_Pa_, felt_Pa_);
   }
@@ -131,8 +130,8 @@ std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &
 
 std::string head_of(const PressOptions &options, const std::vector<FingerProcess> &fingers) {
   std::ostringstream text;
-  text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: "
-       << options.weight_g << "\n# seed: " << options.seed;
+  text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g
+       << "\n# seed: " << options.seed;
   for (std::size_t i = 0; i < fingers.size(); i++) {
     text << "\n# gain_" << SIDES[i] << ":";
     for (double gain : fingers[i].gain) {

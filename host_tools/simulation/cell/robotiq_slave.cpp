@@ -26,9 +26,7 @@ void RobotiqSlave::write(int address, std::uint16_t value) {
 
 GripperMove RobotiqSlave::wanted() const {
   const GripperTraits &traits = motion_.mechanics().traits;
-  const auto scaled = [](int value, double least, double most) {
-    return least + (most - least) * value / 255.0;
-  };
+  const auto scaled = [](int value, double least, double most) { return least + (most - least) * value / 255.0; };
   if (says(rATR)) {
     return {.width_mm = says(rARD) ? traits.stroke_mm : 0.0,
             .speed_mm_s = traits.speed_min_mm_s,
@@ -83,20 +81,18 @@ std::uint8_t RobotiqSlave::fault() const {
 std::array<std::uint16_t, REGISTERS> RobotiqSlave::status() const {
   const GripperTraits &traits = motion_.mechanics().traits;
   const bool goes = says(rGTO) && motion_.active() && failed_ == NO_FAULT && !released_;
-  const int gsta = !says(rACT) || failed_ != NO_FAULT || released_ ? RESET
-                   : motion_.active()                              ? ACTIVATED
-                                                                   : ACTIVATING;
+  const int gsta = !says(rACT) || failed_ != NO_FAULT || released_ ? RESET : motion_.active() ? ACTIVATED : ACTIVATING;
   const int gobj = !goes || motion_.moving() ? IN_MOTION
                    : motion_.blocked() > 0   ? STOPPED_OPENING
                    : motion_.blocked() < 0   ? STOPPED_CLOSING
                                              : AT_REQUEST;
-  const long count = CLOSED_COUNT - std::lround(motion_.told_width_mm() / traits.stroke_mm *
-                                                (CLOSED_COUNT - OPEN_COUNT));
+  const long count =
+      CLOSED_COUNT - std::lround(motion_.told_width_mm() / traits.stroke_mm * (CLOSED_COUNT - OPEN_COUNT));
   const long current = std::lround(std::abs(motion_.effort()) * FULL_CURRENT_A / AMPERE_PER_COUNT);
-  return {static_cast<std::uint16_t>((says(rACT) ? gACT : 0) | (goes ? gGTO : 0) |
-                                     gsta << gSTA_SHIFT | gobj << gOBJ_SHIFT),
-          static_cast<std::uint16_t>(fault() << 8 | (command_[1] & 0xFF)),
-          static_cast<std::uint16_t>(count << 8 | current)};
+  return {
+      static_cast<std::uint16_t>((says(rACT) ? gACT : 0) | (goes ? gGTO : 0) | gsta << gSTA_SHIFT | gobj << gOBJ_SHIFT),
+      static_cast<std::uint16_t>(fault() << 8 | (command_[1] & 0xFF)),
+      static_cast<std::uint16_t>(count << 8 | current)};
 }
 
 void RobotiqSlave::told() {

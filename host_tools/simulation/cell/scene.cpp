@@ -97,8 +97,7 @@ Drive Scene::drive(double t_s) const {
       break;
     case Kind::knock:
       if (lasts) {
-        const double knock_N =
-            object.mass_kg * one.amount * 0.5 * M_PI / one.seconds * std::sin(M_PI * share);
+        const double knock_N = object.mass_kg * one.amount * 0.5 * M_PI / one.seconds * std::sin(M_PI * share);
         drive.knock_N.x += knock_N * way.x;
         drive.knock_N.y += knock_N * way.y;
       }
@@ -155,8 +154,7 @@ Scene draw_scene(const std::vector<std::string> &faces, std::uint64_t seed, std:
     scene.object.gyration_mm = random.uniform(15.0, 40.0);
     scene.object.base_mm = random.uniform(30.0, 70.0);
     scene.grasp.down_rad = random.uniform(-M_PI, M_PI);
-    scene.object.com_mm =
-        rotated({random.uniform(-5.0, 15.0), 2.5 * random.normal()}, scene.grasp.down_rad);
+    scene.object.com_mm = rotated({random.uniform(-5.0, 15.0), 2.5 * random.normal()}, scene.grasp.down_rad);
     scene.grasp.place_mm = {random.uniform(-4.5, 4.5), random.uniform(-10.0, 10.0)};
     scene.grasp.angle_rad = random.uniform(-M_PI, M_PI);
     scene.grasp.relaxation = random.uniform(0.09, 0.26);

@@ -49,9 +49,7 @@ void run(const Options &options, bool is_lift, bool is_validate) {
   if (!options.truth.empty()) {
     check_output(options.truth, options.overwrite);
   }
-  const auto cache = [&](const std::string &face) {
-    return options.cache.empty() ? tables_for(face) : options.cache;
-  };
+  const auto cache = [&](const std::string &face) { return options.cache.empty() ? tables_for(face) : options.cache; };
   const auto both = [&](auto &one) {
     one.truth = options.truth;
     one.overwrite = options.overwrite;
@@ -93,11 +91,10 @@ void run(const Options &options, bool is_lift, bool is_validate) {
 } // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app(
-      "Simulates fingertips in real time: their firmware on this machine, on simulated rubber. "
-      "Every program finds them as it finds real ones, and by the names sim:left and sim:right "
-      "(sim: for the first). Ctrl-C ends it.",
-      "fingertip simulate");
+  CLI::App app("Simulates fingertips in real time: their firmware on this machine, on simulated rubber. "
+               "Every program finds them as it finds real ones, and by the names sim:left and sim:right "
+               "(sim: for the first). Ctrl-C ends it.",
+               "fingertip simulate");
   speak_plainly(app);
   Options options;
   Object &object = options.lift.world.object;
@@ -108,26 +105,23 @@ int main(int argc, char **argv) {
   bool is_press = false, by_command = false;
   options.gain_spread = std::nan("");
   double lift_after_s = *options.lift.world.lift_after_s;
-  CLI::Option *press_flag = app.add_flag(
-      "--press", is_press,
-      "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is "
-      "what happens without an option");
-  CLI::Option *mouse_flag =
-      app.add_flag("--mouse", options.press.by_hand,
-                   "A hand presses the ball: yours, with the pointer on the pad in the page of "
-                   "`fingertip web`")
-          ->excludes(press_flag);
+  CLI::Option *press_flag =
+      app.add_flag("--press", is_press,
+                   "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is "
+                   "what happens without an option");
+  CLI::Option *mouse_flag = app.add_flag("--mouse", options.press.by_hand,
+                                         "A hand presses the ball: yours, with the pointer on the pad in the page of "
+                                         "`fingertip web`")
+                                ->excludes(press_flag);
   CLI::Option *lift_flag =
-      app.add_flag("--lift",
-                   "Two fingertips on a gripper with an object between: `fingertip grasp "
-                   "--gripper 2f85 --gripper-port sim:gripper` grasps it, then a hand lifts it. "
-                   "Obeys lines of standard input (help lists them)")
+      app.add_flag("--lift", "Two fingertips on a gripper with an object between: `fingertip grasp "
+                             "--gripper 2f85 --gripper-port sim:gripper` grasps it, then a hand lifts it. "
+                             "Obeys lines of standard input (help lists them)")
           ->excludes(press_flag)
           ->excludes(mouse_flag);
   CLI::Option *validate_flag =
-      app.add_flag("--validate",
-                   "A hand that goes through the steps of `fingertip validate`, when that "
-                   "begins: the weight at each mark of the template, a hold, a rest")
+      app.add_flag("--validate", "A hand that goes through the steps of `fingertip validate`, when that "
+                                 "begins: the weight at each mark of the template, a hold, a rest")
           ->excludes(press_flag, mouse_flag, lift_flag);
   app.add_option("--pull", options.pull_g,
                  "The hand of --validate pulls in the end, by so much on a thread, as that of "
@@ -135,12 +129,9 @@ int main(int argc, char **argv) {
       ->needs(validate_flag)
       ->check(CLI::Range(10.0, 1000.0))
       ->type_name("GRAMS");
-  const auto number = [&](const char *name, double &value, const char *unit, double low,
-                          double high, const char *help) {
-    return app.add_option(name, value, help)
-        ->type_name(unit)
-        ->check(CLI::Range(low, high))
-        ->capture_default_str();
+  const auto number = [&](const char *name, double &value, const char *unit, double low, double high,
+                          const char *help) {
+    return app.add_option(name, value, help)->type_name(unit)->check(CLI::Range(low, high))->capture_default_str();
   };
   app.add_option("--ports", options.ports,
                  "Folder for the ports left, right and gripper, which FINGERTIP_PORT may name; no "
@@ -151,13 +142,10 @@ int main(int argc, char **argv) {
                  "Standard deviation between sensors; default 0.1, with --lift 0.05")
       ->type_name("SHARE")
       ->check(CLI::Range(0.0, 0.2));
-  app.add_option("--seconds", options.seconds, "Ends after so long")
-      ->type_name("S")
-      ->check(CLI::Range(0.1, 1e6));
+  app.add_option("--seconds", options.seconds, "Ends after so long")->type_name("S")->check(CLI::Range(0.1, 1e6));
   app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.csv");
   app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
-  app.add_option("--cache", options.cache,
-                 "Of contact tables; default: those installed, else ~/.cache/fingertip")
+  app.add_option("--cache", options.cache, "Of contact tables; default: those installed, else ~/.cache/fingertip")
       ->type_name("FOLDER");
 
   app.add_option("--fingertips", options.press.fingertips, "How many")
@@ -174,42 +162,36 @@ int main(int argc, char **argv) {
       ->capture_default_str();
 
   std::vector<CLI::Option *> of_lift;
-  const auto lift_number = [&](const char *name, double &value, const char *unit, double low,
-                               double high, const char *help) {
+  const auto lift_number = [&](const char *name, double &value, const char *unit, double low, double high,
+                               const char *help) {
     of_lift.push_back(number(name, value, unit, low, high, help));
     return of_lift.back();
   };
   of_lift.push_back(app.add_option("--gripper", options.lift.model, "Which one")
                         ->check(CLI::IsMember(models))
                         ->capture_default_str());
-  of_lift.push_back(app.add_option("--face", options.lift.face,
-                                   "What of the object is touched: an indenter, or plate")
+  of_lift.push_back(app.add_option("--face", options.lift.face, "What of the object is touched: an indenter, or plate")
                         ->capture_default_str());
   std::vector<std::string> kinds;
   for (const Kind kind : KINDS) {
     kinds.push_back(name_of(kind));
   }
-  CLI::Option *kind =
-      app.add_option("--kind", options.kind,
-                     "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
-          ->check(CLI::IsMember(kinds));
+  CLI::Option *kind = app.add_option("--kind", options.kind,
+                                     "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
+                          ->check(CLI::IsMember(kinds));
   const std::size_t before_drawn = of_lift.size();
   lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object");
   lift_number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
   lift_number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
-  lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0,
-              "Of the friction, while it slides");
+  lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
   const std::size_t stiffness = of_lift.size();
-  of_lift.push_back(app.add_option("--stiffness", object.stiffness_N_mm,
-                                   "Its stiffness; default: it does not yield")
+  of_lift.push_back(app.add_option("--stiffness", object.stiffness_N_mm, "Its stiffness; default: it does not yield")
                         ->type_name("N/MM")
                         ->check(CLI::Range(0.1, 1e6)));
-  of_lift.push_back(
-      app.add_option("--crushes", object.crushes_N, "More force breaks it; default: none does")
-          ->type_name("N")
-          ->check(CLI::Range(0.1, 1e6)));
-  lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0,
-              "The gripper stands so much wider at first");
+  of_lift.push_back(app.add_option("--crushes", object.crushes_N, "More force breaks it; default: none does")
+                        ->type_name("N")
+                        ->check(CLI::Range(0.1, 1e6)));
+  lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0, "The gripper stands so much wider at first");
   lift_number("--height", options.lift.world.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
   lift_number("--lift-time", options.lift.world.lift_s, "S", 0.05, 60.0, "And how long that takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
@@ -218,16 +200,14 @@ int main(int argc, char **argv) {
     }
   }
   of_lift.push_back(kind);
-  CLI::Option *after = lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6,
-                                   "Lifted once the force has stood for so long");
-  of_lift.push_back(
-      app.add_flag("--by-command", by_command, "Lift only on the command")->excludes(after));
+  CLI::Option *after =
+      lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Lifted once the force has stood for so long");
+  of_lift.push_back(app.add_flag("--by-command", by_command, "Lift only on the command")->excludes(after));
   of_lift.push_back(app.add_option("--then", planned_texts,
                                    "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S or "
                                    "slick:SHARE, @SECONDS after the lift")
                         ->type_name("KIND:AMOUNT@S"));
-  lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2,
-              "That calibration left of the gains");
+  lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2, "That calibration left of the gains");
   lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
               "The world stands still at most so long while fingertips or the gripper's client "
               "are held up");

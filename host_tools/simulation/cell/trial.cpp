@@ -93,13 +93,10 @@ double median(std::vector<double> &values) {
 
 class Run {
 public:
-  Run(const Trial &trial, const Face &face, Controller &controller,
-      const std::function<void(const Moment &)> &trace)
-      : trial_(trial), controller_(controller), trace_(trace),
-        cell_(face, trial.scene.object, trial.scene.grasp),
+  Run(const Trial &trial, const Face &face, Controller &controller, const std::function<void(const Moment &)> &trace)
+      : trial_(trial), controller_(controller), trace_(trace), cell_(face, trial.scene.object, trial.scene.grasp),
         gripper_(trial.gripper,
-                 trial.activates ? trial.gripper.traits.stroke_mm
-                                 : trial.scene.object.width_mm + trial.scene.opens_mm,
+                 trial.activates ? trial.gripper.traits.stroke_mm : trial.scene.object.width_mm + trial.scene.opens_mm,
                  Random(trial.seed, LINE, 0)),
         fingers_{FeltFinger(face, trial.rubber[0], trial.sensing, Random(trial.seed, FINGER, 0)),
                  FeltFinger(face, trial.rubber[1], trial.sensing, Random(trial.seed, FINGER, 1))},
@@ -113,10 +110,9 @@ public:
 
   Outcome go() {
     while (!over_) {
-      const double next_s =
-          std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
-                    stepped_s_ + STEPS_s, faults_.has_begun(t_s_) ? NEVER_s : faults_.begins_s(),
-                    t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
+      const double next_s = std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
+                                      stepped_s_ + STEPS_s, faults_.has_begun(t_s_) ? NEVER_s : faults_.begins_s(),
+                                      t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
       advance(std::min(next_s, arrivals_.next_s()));
       fail();
       deliver();
@@ -157,17 +153,15 @@ private:
 
   double force_N() const { return is_between_ ? cell_.force_N() : 0.0; }
 
-  twin::Touch touch(std::size_t finger) const {
-    return is_between_ ? cell_.touch(finger) : twin::Touch{};
-  }
+  twin::Touch touch(std::size_t finger) const { return is_between_ ? cell_.touch(finger) : twin::Touch{}; }
 
   // What the trial adds to its scene.
   void disturb(Drive &drive, double t_s) {
     if (trial_.slick_after_s && since_lift_s(t_s) >= *trial_.slick_after_s) {
       if (slick_s_ == NEVER_s) {
         slick_s_ = t_s;
-        slick_share_ = std::min(1.0, SLICK_SHARE * trial_.scene.least_N(since_lift_s(t_s)) /
-                                         std::max(cell_.force_N(), LOST_N));
+        slick_share_ =
+            std::min(1.0, SLICK_SHARE * trial_.scene.least_N(since_lift_s(t_s)) / std::max(cell_.force_N(), LOST_N));
       }
       const double gone = std::min(1.0, (t_s - slick_s_) / SLICK_s);
       drive.friction_share *= 1.0 - gone * (1.0 - slick_share_);
@@ -232,14 +226,12 @@ private:
       }
     }
     const Vector way = cell_.way_mm();
-    outcome_.dropped = std::hypot(way.x, way.y) >= DROP_mm ||
-                       (lift_s_ < NEVER_s && !drive.table && force_N() < LOST_N);
+    outcome_.dropped = std::hypot(way.x, way.y) >= DROP_mm || (lift_s_ < NEVER_s && !drive.table && force_N() < LOST_N);
     if (trial_.fault) {
       if (outcome_.dropped && is_between_) {
         take_away();
       }
-      over_ = faults_.has_begun(t_s_) ? t_s_ >= faults_.begins_s() + trial_.fault->watched_s
-                                      : t_s_ >= BEGINS_s;
+      over_ = faults_.has_begun(t_s_) ? t_s_ >= faults_.begins_s() + trial_.fault->watched_s : t_s_ >= BEGINS_s;
       return;
     }
     const bool lifted = lift_s_ < NEVER_s && since_lift_s(t_s_) >= trial_.scene.ends_s;
@@ -308,8 +300,7 @@ private:
     const double felt_N = 0.5 * (felt_[0].force_N + felt_[1].force_N);
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
       const double smaller_N = std::min(felt_[0].force_N, felt_[1].force_N);
-      set_point_.look(t_s_, trial_.set_of_smaller ? smaller_N : felt_N,
-                      gripper_.sent().width_mm, touched_s_,
+      set_point_.look(t_s_, trial_.set_of_smaller ? smaller_N : felt_N, gripper_.sent().width_mm, touched_s_,
                       touched_mm_ - gripper_.motion().width_mm());
     }
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_) : -1.0;
@@ -329,8 +320,7 @@ private:
       moment.width_mm = gripper_.motion().width_mm();
       moment.force_N = cell_.force_N();
       moment.least_N = trial_.scene.least_N(since_s);
-      moment.load_N = 0.5 * (std::hypot(one.pull_x_N, one.pull_y_N) +
-                             std::hypot(other.pull_x_N, other.pull_y_N));
+      moment.load_N = 0.5 * (std::hypot(one.pull_x_N, one.pull_y_N) + std::hypot(other.pull_x_N, other.pull_y_N));
       moment.way_mm = way.dot(cell_.down());
       moment.slid_mm = cell_.slid_mm();
       moment.turned_rad = cell_.turned_rad();
@@ -382,14 +372,12 @@ private:
   double began_mm_ = 0.0, stepped_s_ = 0.0, answered_s_ = 0.0;
   double slick_s_ = NEVER_s, slick_share_ = 1.0;
   double t_s_ = 0.0, sample_s_ = 0.0;
-  double touched_mm_ = 0.0, touched_s_ = NEVER_s, held_s_ = NEVER_s, lift_at_s_ = NEVER_s,
-         lift_s_ = NEVER_s;
+  double touched_mm_ = 0.0, touched_s_ = NEVER_s, held_s_ = NEVER_s, lift_at_s_ = NEVER_s, lift_s_ = NEVER_s;
 };
 
 } // namespace
 
-CoreController::CoreController(const GripSettings &settings, const GripperTraits &traits)
-    : core_(settings, traits) {
+CoreController::CoreController(const GripSettings &settings, const GripperTraits &traits) : core_(settings, traits) {
   core_.request(GRIP_REQUEST_GRASP);
 }
 

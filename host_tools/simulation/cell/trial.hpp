@@ -24,13 +24,9 @@ namespace fingertip::cell {
 class CoreController : public Controller {
 public:
   CoreController(const GripSettings &settings, const GripperTraits &traits);
-  void take_touch(std::size_t finger, const GripTouch &touch) override {
-    core_.take(finger, touch);
-  }
+  void take_touch(std::size_t finger, const GripTouch &touch) override { core_.take(finger, touch); }
   void take_status(const GripperStatus &status) override { core_.take(status); }
-  GripReport step(double now_s, GripCommand &command) override {
-    return core_.step(now_s, command);
-  }
+  GripReport step(double now_s, GripCommand &command) override { return core_.step(now_s, command); }
   void ask(GripRequest request) override { core_.request(request); }
 
 private:
@@ -77,8 +73,7 @@ constexpr double DROP_mm = 22.0, SETTLED_s = 0.5;
 // Since a fault began.
 struct Failed {
   bool begun = false;
-  double opened_mm =
-      0.0; // the fingers wider than when it began, at most, with the object between them
+  double opened_mm = 0.0;    // the fingers wider than when it began, at most, with the object between them
   double peak_N = 0.0;       // the largest true force of a fingertip
   std::uint32_t trouble = 0; // all that was ever on
   std::uint8_t state = 0;    // at the end

@@ -42,20 +42,17 @@ twin::EffectValues usual_effects() {
 }
 
 const std::vector<std::string> &pad_fault_names() {
-  static const std::vector<std::string> names = {"none",         "dead_sensor",  "loose_sensor",
-                                                 "tilted_skin",  "thin_skin",    "drift",
-                                                 "wrong_weight", "swapped_wires"};
+  static const std::vector<std::string> names = {"none",      "dead_sensor", "loose_sensor", "tilted_skin",
+                                                 "thin_skin", "drift",       "wrong_weight", "swapped_wires"};
   return names;
 }
 
 ValidatedPad::ValidatedPad(const ValidatedOptions &options)
-    : options_(options),
-      layer_(twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm)),
+    : options_(options), layer_(twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm)),
       table_(twin::ContactTable::load_or_build(twin::indenter(PRESS_FACE), layer_, options.cache)),
       weight_N_(calibrating::GRAVITY_N_PER_g * options.weight_g),
-      rubber_(options.effects, SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0),
-      drift_Pa_s_(SENSORS, 0.0), absent_(SENSORS, false), before_Pa_(SENSORS, 0.0),
-      after_Pa_(SENSORS, 0.0) {
+      rubber_(options.effects, SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0), drift_Pa_s_(SENSORS, 0.0),
+      absent_(SENSORS, false), before_Pa_(SENSORS, 0.0), after_Pa_(SENSORS, 0.0) {
   for (std::size_t k = 0; k < SENSORS; k++) {
     x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + rubber_.seats()[k].dx_mm);
     y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + rubber_.seats()[k].dy_mm);
@@ -86,9 +83,7 @@ ValidatedPad::ValidatedPad(const ValidatedOptions &options)
 
 void ValidatedPad::choose_fault() {
   Random random(options_.seed, FAULT, 0);
-  const auto any = [&] {
-    return std::min(static_cast<std::size_t>(random.uniform(0.0, 1.0) * SENSORS), SENSORS - 1);
-  };
+  const auto any = [&] { return std::min(static_cast<std::size_t>(random.uniform(0.0, 1.0) * SENSORS), SENSORS - 1); };
   const double sign = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
   switch (options_.fault) {
   case PadFault::dead_sensor:
@@ -107,8 +102,8 @@ void ValidatedPad::choose_fault() {
       const std::size_t k = any();
       if (std::find(faulty_.begin(), faulty_.end(), k) == faulty_.end()) {
         faulty_.push_back(k);
-        drift_Pa_s_[k] = (random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) *
-                         random.uniform(DRIFT_MIN_Pa_min, DRIFT_MAX_Pa_min) / 60.0;
+        drift_Pa_s_[k] =
+            (random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * random.uniform(DRIFT_MIN_Pa_min, DRIFT_MAX_Pa_min) / 60.0;
       }
     }
     break;
@@ -141,9 +136,9 @@ std::vector<double> ValidatedPad::base_Pa(double x_mm, double y_mm) const {
   std::vector<double> base(SENSORS);
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double own = width * rubber_.seats()[k].width;
-    base[k] = table_.base_pressure_Pa(weight_N_, (x_mm_[k] - x_mm) / own, (y_mm_[k] - y_mm) / own,
-                                      rubber_.dip_share()) /
-              (width * width);
+    base[k] =
+        table_.base_pressure_Pa(weight_N_, (x_mm_[k] - x_mm) / own, (y_mm_[k] - y_mm) / own, rubber_.dip_share()) /
+        (width * width);
   }
   return base;
 }
@@ -164,13 +159,12 @@ std::vector<double> ValidatedPad::pulled_Pa(double x_mm, double y_mm, const True
   const double tilts_mm = options_.pulling.height_mm * pull.pull_N / weight_N_;
   std::vector<double> base = base_Pa(at_x_mm + tilts_mm * along_x, at_y_mm + tilts_mm * along_y);
   const double width = width_at(at_x_mm, at_y_mm);
-  const twin::TractionLoad load{weight_N_, twin::stuck_force_N(weight_N_, pull.pull_N, FRICTION),
-                                pull.pull_N * along_x, pull.pull_N * along_y};
+  const twin::TractionLoad load{weight_N_, twin::stuck_force_N(weight_N_, pull.pull_N, FRICTION), pull.pull_N * along_x,
+                                pull.pull_N * along_y};
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double own = width * rubber_.seats()[k].width;
     base[k] +=
-        traction_->base_pressure_Pa(load, (x_mm_[k] - at_x_mm) / own, (y_mm_[k] - at_y_mm) / own) /
-        (width * width);
+        traction_->base_pressure_Pa(load, (x_mm_[k] - at_x_mm) / own, (y_mm_[k] - at_y_mm) / own) / (width * width);
   }
   return base;
 }
@@ -195,8 +189,8 @@ void ValidatedPad::draw_plan() {
     touches_.push_back(std::move(made));
     t_s += MOVES_s + stands_s;
   };
-  for (const Step &step : validating::steps_of(validating::marks_of(array), options_.weight_g,
-                                               LAYER_mm, options_.pulling)) {
+  for (const Step &step :
+       validating::steps_of(validating::marks_of(array), options_.weight_g, LAYER_mm, options_.pulling)) {
     plan_.emplace_back(t_s, step);
     switch (step.kind) {
     case Step::Kind::empty:
@@ -212,13 +206,11 @@ void ValidatedPad::draw_plan() {
       break;
     }
     case Step::Kind::hold:
-      touch(options_.hand_sd_mm * hand.normal(), options_.hand_sd_mm * hand.normal(),
-            validating::HOLD_s + SPARE_s);
+      touch(options_.hand_sd_mm * hand.normal(), options_.hand_sd_mm * hand.normal(), validating::HOLD_s + SPARE_s);
       break; // the rest begins with the lift
     case Step::Kind::pull: {
       const double pull_N = calibrating::GRAVITY_N_PER_g * options_.pulling.weight_g;
-      true_pulls_.push_back(
-          {step.toward_deg + AIM_SD_deg * hand.normal(), pull_N, weight_N_, way_mm(pull_N)});
+      true_pulls_.push_back({step.toward_deg + AIM_SD_deg * hand.normal(), pull_N, weight_N_, way_mm(pull_N)});
       const double x_mm = options_.hand_sd_mm * hand.normal();
       const double y_mm = options_.hand_sd_mm * hand.normal();
       touch(x_mm, y_mm, PULLS_AFTER_s + PULLS_s + PULLED_s);
@@ -240,9 +232,7 @@ void ValidatedPad::draw_plan() {
 void ValidatedPad::step() {
   before_Pa_ = after_Pa_;
   const double t_s = STEP_s * double(++steps_);
-  const auto end_s = [&](const Touch &touch) {
-    return touch.begin_s + 2.0 * MOVES_s + touch.stands_s;
-  };
+  const auto end_s = [&](const Touch &touch) { return touch.begin_s + 2.0 * MOVES_s + touch.stands_s; };
   while (touch_ < touches_.size() && t_s > end_s(touches_[touch_])) {
     touch_++;
   }
@@ -250,14 +240,10 @@ void ValidatedPad::step() {
   if (touch_ < touches_.size() && t_s > touches_[touch_].begin_s) {
     const Touch &touch = touches_[touch_];
     const double since_s = t_s - touch.begin_s;
-    const double share =
-        smooth(since_s / MOVES_s) - smooth((since_s - MOVES_s - touch.stands_s) / MOVES_s);
-    const double pulled =
-        touch.pulled_Pa.empty() ? 0.0 : smooth((since_s - MOVES_s - PULLS_AFTER_s) / PULLS_s);
+    const double share = smooth(since_s / MOVES_s) - smooth((since_s - MOVES_s - touch.stands_s) / MOVES_s);
+    const double pulled = touch.pulled_Pa.empty() ? 0.0 : smooth((since_s - MOVES_s - PULLS_AFTER_s) / PULLS_s);
     for (std::size_t k = 0; k < SENSORS; k++) {
-      const double base_Pa =
-          touch.base_Pa[k] +
-          (pulled > 0.0 ? pulled * (touch.pulled_Pa[k] - touch.base_Pa[k]) : 0.0);
+      const double base_Pa = touch.base_Pa[k] + (pulled > 0.0 ? pulled * (touch.pulled_Pa[k] - touch.base_Pa[k]) : 0.0);
       base[k] = share * touch.share[k] * deaf_[k] * base_Pa;
     }
   }

@@ -53,9 +53,7 @@ public:
   struct Truth {
     double x_mm, y_mm, force_N;
   };
-  const std::vector<Truth> &presses() const {
-    return truth_;
-  } // as in the plan; the hold is not there
+  const std::vector<Truth> &presses() const { return truth_; } // as in the plan; the hold is not there
   // A pull that the rubber shears under: the ball moves by way_mm along it. The thread's moment
   // moves what presses, and not what pulls, by the thread's height times the pull over the weight.
   struct TruePull {

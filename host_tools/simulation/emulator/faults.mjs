@@ -76,7 +76,20 @@ const TARGET = {
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut', 'chip_reset', 'sram_upset'];
+const OF_THE_WORLD = [
+  'host_stall',
+  'usb_unplug',
+  'crystal_dead',
+  'crystal_weak',
+  'pll_late',
+  'usb_busy_hub',
+  'usb_deaf',
+  'usb_dead',
+  'usb_late_resume',
+  'power_cut',
+  'chip_reset',
+  'sram_upset',
+];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {
@@ -93,7 +106,8 @@ export function parseFaults(text, file, { sensors, muxes, lines }) {
   return list.map((fault, i) => {
     const at = `fault ${i + 1}`;
     const known = `known: ${Object.keys(TARGET).join(', ')}`;
-    if (!fault || typeof fault !== 'object' || Array.isArray(fault)) fail(`${at}: must be an object, e.g. {"type":"sensor_dead","sensor":3,"from_s":1}`);
+    if (!fault || typeof fault !== 'object' || Array.isArray(fault))
+      fail(`${at}: must be an object, e.g. {"type":"sensor_dead","sensor":3,"from_s":1}`);
     if (fault.type === undefined) fail(`${at}: "type" is missing; ${known}`);
     if (!Object.hasOwn(TARGET, fault.type)) fail(`${at}: unknown type "${fault.type}"; ${known}`);
     const target = TARGET[fault.type];
@@ -104,11 +118,17 @@ export function parseFaults(text, file, { sensors, muxes, lines }) {
     if (extra) fail(`${at}: key "${extra}" does not belong to ${fault.type}`);
     if (target) {
       const count = target === 'sensor' ? sensors : muxes;
-      if (!Number.isInteger(fault[target]) || fault[target] < 0 || fault[target] >= count) fail(`${at}: "${target}" must be 0..${count - 1}`);
+      if (!Number.isInteger(fault[target]) || fault[target] < 0 || fault[target] >= count)
+        fail(`${at}: "${target}" must be 0..${count - 1}`);
     }
-    if (fault.type === 'sram_upset' && !(typeof fault.bytes === 'string' && /^([0-9a-f]{2})+$/i.test(fault.bytes))) fail(`${at}: "bytes" must be pairs of hexadecimal digits`);
+    if (fault.type === 'sram_upset' && !(typeof fault.bytes === 'string' && /^([0-9a-f]{2})+$/i.test(fault.bytes)))
+      fail(`${at}: "bytes" must be pairs of hexadecimal digits`);
     const upset = fault.type === 'sram_upset' ? { address: fault.address, bytes: Buffer.from(fault.bytes, 'hex') } : null;
-    if (upset && !(Number.isInteger(upset.address) && upset.address >= RAM_BASE && upset.address + upset.bytes.length <= RAM_BASE + RAM_BYTES)) fail(`${at}: "address" must be one of SRAM, and so must be where the bytes end`);
+    if (
+      upset &&
+      !(Number.isInteger(upset.address) && upset.address >= RAM_BASE && upset.address + upset.bytes.length <= RAM_BASE + RAM_BYTES)
+    )
+      fail(`${at}: "address" must be one of SRAM, and so must be where the bytes end`);
     const { from_s, to_s = Infinity } = fault;
     if (typeof from_s !== 'number' || !(from_s >= 0)) fail(`${at}: "from_s" must be a time >= 0`);
     if (typeof to_s !== 'number' || !(to_s > from_s)) fail(`${at}: "to_s" must be later than "from_s"`);
@@ -143,8 +163,14 @@ export class Faults {
   add(fault) {
     const { scope, on } = this;
     const key = {
-      sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_collision: 'promCollision', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
-      sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy', sensor_fast: 'fast',
+      sensor_dead: 'dead',
+      sensor_prom_corrupt: 'promCorrupt',
+      sensor_prom_collision: 'promCollision',
+      sensor_prom_bit: 'promBit',
+      sensor_adc_zero: 'adcZero',
+      sensor_d2_corrupt: 'd2Corrupt',
+      sensor_noisy: 'noisy',
+      sensor_fast: 'fast',
     };
     /** How many have begun. */
     const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };

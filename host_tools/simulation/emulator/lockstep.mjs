@@ -30,8 +30,13 @@ writes from there on is a JSON object, which goes to the standard output with wh
 Exit: 0 clean; 1 a warning or failure of firmware or emulation; 2 wrong usage or input, or a program that failed.`;
 
 const OPTIONS = {
-  image: { type: 'string' }, board: { type: 'string' }, boards: { type: 'string', default: '2' }, 'clock-ppm': { type: 'string', default: '0' },
-  'slice-us': { type: 'string', default: '500' }, seconds: { type: 'string', default: '10' }, seed: { type: 'string', default: '1' },
+  image: { type: 'string' },
+  board: { type: 'string' },
+  boards: { type: 'string', default: '2' },
+  'clock-ppm': { type: 'string', default: '0' },
+  'slice-us': { type: 'string', default: '500' },
+  seconds: { type: 'string', default: '10' },
+  seed: { type: 'string', default: '1' },
   help: { type: 'boolean', short: 'h', default: false },
 };
 const PRESSURE_LIMIT_Pa = 1e7;
@@ -53,12 +58,20 @@ function parseOptions(argv) {
     if (text.trim() === '' || !check(value)) throw new InputError(`--${name} "${text}" is not ${what}`);
     return value;
   };
-  const whole = (name, low, high) => number(name, values[name], (v) => Number.isInteger(v) && v >= low && v <= high, `a whole number from ${low} to ${high}`);
+  const whole = (name, low, high) =>
+    number(name, values[name], (v) => Number.isInteger(v) && v >= low && v <= high, `a whole number from ${low} to ${high}`);
   const boards = whole('boards', 1, 8);
-  const listed = values['clock-ppm'].split(',').map((text) => number('clock-ppm', text, (v) => Math.abs(v) <= 1000, 'a list of numbers from -1000 to 1000'));
+  const listed = values['clock-ppm']
+    .split(',')
+    .map((text) => number('clock-ppm', text, (v) => Math.abs(v) <= 1000, 'a list of numbers from -1000 to 1000'));
   if (listed.length > boards) throw new InputError(`--clock-ppm has ${listed.length} numbers for ${boards} boards`);
   return {
-    image: values.image, board: values.board, boards, program: positionals, slice_ns: 1000 * whole('slice-us', 100, 10000), seed: whole('seed', 0, 2 ** 32 - 16),
+    image: values.image,
+    board: values.board,
+    boards,
+    program: positionals,
+    slice_ns: 1000 * whole('slice-us', 100, 10000),
+    seed: whole('seed', 0, 2 ** 32 - 16),
     end_ns: 1e9 * number('seconds', values.seconds, (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds'),
     clocks_ppm: Array.from({ length: boards }, (_, i) => listed[i] ?? 0),
   };
@@ -150,7 +163,12 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
   const machines = live.map((scenario, i) => {
     const serial = DEFAULT_SERIAL.slice(0, -2) + (i + 1).toString(16).padStart(2, '0');
     const machine = new Machine({
-      image, Board, scenario, seed: seed + i, serial, clock_ppm: clocks_ppm[i],
+      image,
+      Board,
+      scenario,
+      seed: seed + i,
+      serial,
+      clock_ppm: clocks_ppm[i],
       onData: (bytes) => chunks.push({ board: i, at_ns: machine.time.nanos, bytes: Uint8Array.from(bytes) }),
     });
     machine.client.setDtr(true);
@@ -171,15 +189,24 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
         if (bytes.length) machines[i].client.write(bytes);
       });
       const stopped = machines.findIndex((machine) => !machine.run((slice + 1) * slice_ns));
-      if (stopped >= 0) throw new InputError(`board ${stopped} ended after ${machines[stopped].result.emulated_s} s: ${machines[stopped].endReason}`);
+      if (stopped >= 0)
+        throw new InputError(`board ${stopped} ended after ${machines[stopped].result.emulated_s} s: ${machines[stopped].endReason}`);
     }
     result = await world.result();
   } finally {
     world.child.kill();
   }
   const ran = machines.map((machine) => machine.result);
-  const told = ran.map(({ emulated_s, busy_fraction, clock_ppm, warnings, image_sha256 }) => ({ emulated_s, busy_fraction, clock_ppm, warnings, image_sha256 }));
-  process.stdout.write(`${JSON.stringify({ ...result, slice_us: slice_ns / 1e3, boards: told, wall_s: (performance.now() - started_ms) / 1e3 }, null, 1)}\n`);
+  const told = ran.map(({ emulated_s, busy_fraction, clock_ppm, warnings, image_sha256 }) => ({
+    emulated_s,
+    busy_fraction,
+    clock_ppm,
+    warnings,
+    image_sha256,
+  }));
+  process.stdout.write(
+    `${JSON.stringify({ ...result, slice_us: slice_ns / 1e3, boards: told, wall_s: (performance.now() - started_ms) / 1e3 }, null, 1)}\n`,
+  );
   for (const [i, { warnings }] of ran.entries()) for (const line of warnings) process.stderr.write(`board ${i}: ${line}\n`);
   return ran.every(({ warnings }) => warnings.length === 0) ? 0 : 1;
 }

@@ -30,8 +30,29 @@ export class Machine {
    *   default
    */
   constructor({
-    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, companion = false, allowWatchdog = false, revision, uptime_us, rosc_hz,
-    flash = null, flashSpeed, sync = {}, sensor, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
+    image,
+    Board,
+    scenario,
+    seed = 1,
+    faults = [],
+    serial = DEFAULT_SERIAL,
+    clock_ppm = 0,
+    fastEnumeration = false,
+    companion = false,
+    allowWatchdog = false,
+    revision,
+    uptime_us,
+    rosc_hz,
+    flash = null,
+    flashSpeed,
+    sync = {},
+    sensor,
+    rise_ns,
+    onLevels,
+    onBusTransfer = () => {},
+    onUsbPacket = () => {},
+    onData = () => {},
+    makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
     this.Board = Board;
@@ -55,10 +76,18 @@ export class Machine {
 
     this.memory = new FlashMemory({ time: this.time, serial: this.serial, seed, speed: flashSpeed });
     if (flash) this.memory.bytes.set(flash);
-    this.makeBoard = () => new Board({
-      scope: this.boardScope, report: this.report, seed, sensor, rise_ns, onLevels, onTransfer: onBusTransfer,
-      stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
-    });
+    this.makeBoard = () =>
+      new Board({
+        scope: this.boardScope,
+        report: this.report,
+        seed,
+        sensor,
+        rise_ns,
+        onLevels,
+        onTransfer: onBusTransfer,
+        stimulus: (index, t_ns) => scenario.at_ns(index, t_ns),
+        faults: () => this.faults,
+      });
     this.trouble = new Trouble();
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
@@ -99,11 +128,22 @@ export class Machine {
 
   #checkClock() {
     const { clkSys, wild, usbCtrl } = this.chip;
-    if (!wild && !usbCtrl.isSuspended && clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
+    if (!wild && !usbCtrl.isSuspended && clkSys !== this.Board.clkSys_Hz)
+      this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, revision: this.revision, uptime_us: this.uptime_us, rosc_hz: this.rosc_hz, memory: this.memory, trouble: this.trouble, kept });
+    this.chip = new Chip(this.time, this.report, {
+      serial: this.serial,
+      seed: this.seed,
+      clock_ppm: this.clock_ppm,
+      revision: this.revision,
+      uptime_us: this.uptime_us,
+      rosc_hz: this.rosc_hz,
+      memory: this.memory,
+      trouble: this.trouble,
+      kept,
+    });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.sync.attachChip(this.chip);
@@ -221,7 +261,8 @@ export class Machine {
       reboots: this.reboots,
       flash: { erases: this.memory.erases, programs: this.memory.programs, power_cuts: this.powerCuts },
       usb: {
-        ...host.statistics, configured: host.configured,
+        ...host.statistics,
+        configured: host.configured,
         ...(host.device ? { strings: host.device.strings, vendor: host.device.vendor, product: host.device.product } : {}),
       },
       i2c: { ...board.statistics, ...(board.times_ns ? { times_ns: board.times_ns } : {}) },

@@ -75,14 +75,39 @@ Exit: 0 clean; 1 a warning or failure of firmware or emulation, or an output tha
 each printed as a line; 2 wrong usage or input.`;
 
 const OPTIONS = {
-  image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, sensor: { type: 'string', default: 'ms5840' }, seconds: { type: 'string' },
-  seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
-  revision: { type: 'string', default: '2' }, flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
-  'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
-  pty: { type: 'string' }, stepped: { type: 'boolean' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, 'wait-reader': { type: 'boolean', default: false }, pace: { type: 'string' },
-  'host-script': { type: 'string' }, capture: { type: 'string' }, 'sync-strobe': { type: 'string' }, 'sync-log': { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
-  vcd: { type: 'string' }, 'vcd-from': { type: 'string', default: '0' }, 'vcd-to': { type: 'string' }, 'rise-ns': { type: 'string' },
-  report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
+  image: { type: 'string' },
+  board: { type: 'string' },
+  scenario: { type: 'string' },
+  sensor: { type: 'string', default: 'ms5840' },
+  seconds: { type: 'string' },
+  seed: { type: 'string', default: '1' },
+  'clock-ppm': { type: 'string', default: '0' },
+  serial: { type: 'string', default: DEFAULT_SERIAL },
+  faults: { type: 'string' },
+  revision: { type: 'string', default: '2' },
+  flash: { type: 'string' },
+  'slow-flash': { type: 'boolean', default: false },
+  'fast-enumeration': { type: 'boolean', default: false },
+  'allow-watchdog': { type: 'boolean', default: false },
+  pty: { type: 'string' },
+  stepped: { type: 'boolean' },
+  usbredir: { type: 'string' },
+  'wait-open': { type: 'boolean', default: false },
+  'wait-reader': { type: 'boolean', default: false },
+  pace: { type: 'string' },
+  'host-script': { type: 'string' },
+  capture: { type: 'string' },
+  'sync-strobe': { type: 'string' },
+  'sync-log': { type: 'string' },
+  'bus-log': { type: 'string' },
+  'usb-log': { type: 'string' },
+  vcd: { type: 'string' },
+  'vcd-from': { type: 'string', default: '0' },
+  'vcd-to': { type: 'string' },
+  'rise-ns': { type: 'string' },
+  report: { type: 'string' },
+  progress: { type: 'boolean', default: false },
+  help: { type: 'boolean', short: 'h', default: false },
 };
 
 /** Emulated time run between looks at the wall clock and the pseudo-terminal. */
@@ -100,7 +125,8 @@ function joinNegativeNumbers(argv) {
   const joined = [];
   for (const argument of argv) {
     const name = joined.at(-1) ?? '';
-    if (/^-[.0-9]/.test(argument) && name.startsWith('--') && OPTIONS[name.slice(2)]?.type === 'string') joined[joined.length - 1] = `${name}=${argument}`;
+    if (/^-[.0-9]/.test(argument) && name.startsWith('--') && OPTIONS[name.slice(2)]?.type === 'string')
+      joined[joined.length - 1] = `${name}=${argument}`;
     else joined.push(argument);
   }
   return joined;
@@ -125,10 +151,12 @@ function parseOptions(argv) {
   values.revision = number('revision', (v) => [0, 1, 2].includes(v), '0, 1 or 2');
   if (values.seconds !== undefined) values.seconds = number('seconds', (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds');
   for (const name of ['vcd-from', 'vcd-to']) {
-    values[name] = values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
+    values[name] =
+      values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
   }
   if (values['vcd-to'] < values['vcd-from']) throw new InputError('--vcd-to is before --vcd-from');
-  if (values['sync-strobe'] !== undefined) values['sync-strobe'] = number('sync-strobe', (v) => v >= 2 && v <= 60000, 'a period from 2 to 60000 ms');
+  if (values['sync-strobe'] !== undefined)
+    values['sync-strobe'] = number('sync-strobe', (v) => v >= 2 && v <= 60000, 'a period from 2 to 60000 ms');
   if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
@@ -151,7 +179,8 @@ function readFlash(path) {
     if (error.code === 'ENOENT') return null;
     throw new InputError(`${path}: cannot read the flash (${inWords(error)}); check the path`);
   }
-  if (flash.length !== FLASH_BYTES) throw new InputError(`${path}: ${flash.length} bytes; the flash has ${FLASH_BYTES}; give the file of an earlier run, or a new name`);
+  if (flash.length !== FLASH_BYTES)
+    throw new InputError(`${path}: ${flash.length} bytes; the flash has ${FLASH_BYTES}; give the file of an earlier run, or a new name`);
   return flash;
 }
 
@@ -183,7 +212,8 @@ function runStepped(machine, port, end_ns) {
     }
     const until_ns = Math.min(step.until_ns, end_ns);
     let goesOn = true;
-    while (goesOn && machine.time.nanos < until_ns && !port.hasSent) goesOn = machine.run(Math.min(until_ns, machine.time.nanos + step.margin_ns));
+    while (goesOn && machine.time.nanos < until_ns && !port.hasSent)
+      goesOn = machine.run(Math.min(until_ns, machine.time.nanos + step.margin_ns));
     const hasEnded = !goesOn || machine.time.nanos >= end_ns;
     port.answer(machine.time.nanos, hasEnded);
     if (hasEnded) return;
@@ -195,7 +225,8 @@ async function run(options) {
   findSensor(options.sensor);
   const image = readImage(options.image);
   const scenario = readScenario(options.scenario);
-  if (scenario.sensors !== Board.sensors) throw new InputError(`${options.scenario}: ${scenario.sensors} sensors, but board ${options.board} has ${Board.sensors}`);
+  if (scenario.sensors !== Board.sensors)
+    throw new InputError(`${options.scenario}: ${scenario.sensors} sensors, but board ${options.board} has ${Board.sensors}`);
   const flash = options.flash ? readFlash(options.flash) : null;
   const faults = options.faults ? readFaults(options.faults, Board) : [];
   const script = options['host-script'] ? readHostScript(options['host-script']) : [];
@@ -227,10 +258,15 @@ async function run(options) {
     const reportFile = output(options.report);
     const capture = output(options.capture);
     const busLog = output(options['bus-log'], 'start_ns,end_ns,muxes,address,rw,bytes,ack');
-    const vcd = options.vcd && new VcdDump({
-      file: output(options.vcd), probes: Board.probes, comment: `board ${options.board}; a level is high from 0.7 VDD on`,
-      from_ns: options['vcd-from'] * 1e9, to_ns: options['vcd-to'] * 1e9,
-    });
+    const vcd =
+      options.vcd &&
+      new VcdDump({
+        file: output(options.vcd),
+        probes: Board.probes,
+        comment: `board ${options.board}; a level is high from 0.7 VDD on`,
+        from_ns: options['vcd-from'] * 1e9,
+        to_ns: options['vcd-to'] * 1e9,
+      });
     const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes,offered_ns');
 
     const syncLog = output(options['sync-log'], 't_ns,level');
@@ -238,18 +274,42 @@ async function run(options) {
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
-      image, Board, scenario, sensor: options.sensor, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'], revision: options.revision,
-      fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
+      image,
+      Board,
+      scenario,
+      sensor: options.sensor,
+      faults,
+      flash,
+      flashSpeed: options['slow-flash'] ? 'slowest' : 'typical',
+      seed: options.seed,
+      serial: options.serial,
+      clock_ppm: options['clock-ppm'],
+      revision: options.revision,
+      fastEnumeration: options['fast-enumeration'],
+      allowWatchdog: options['allow-watchdog'],
       sync: {
-        next: options['sync-strobe'] ? (t_ns) => strobe({ period_ns: options['sync-strobe'] * 1e6, high_ns: STROBE_HIGH_NS, zero_ns: stepped?.zero_ns })(t_ns) : null,
+        next: options['sync-strobe']
+          ? (t_ns) => strobe({ period_ns: options['sync-strobe'] * 1e6, high_ns: STROBE_HIGH_NS, zero_ns: stepped?.zero_ns })(t_ns)
+          : null,
         onLevel: (high, t_ns) => syncLog.write(Buffer.from(`${t_ns.toFixed(1)},${high ? 1 : 0}\n`)),
       },
-      rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
+      rise_ns: options['rise-ns'],
+      onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']
-        ? (t) => busLog.write(Buffer.from(`${t.start_ns.toFixed(0)},${t.end_ns.toFixed(0)},${t.muxes},0x${t.address.toString(16)},${t.read ? 'r' : 'w'},${hex(t.bytes)},${t.acknowledged ? 1 : 0}\n`))
+        ? (t) =>
+            busLog.write(
+              Buffer.from(
+                `${t.start_ns.toFixed(0)},${t.end_ns.toFixed(0)},${t.muxes},0x${t.address.toString(16)},${t.read ? 'r' : 'w'},${hex(t.bytes)},${t.acknowledged ? 1 : 0}\n`,
+              ),
+            )
         : undefined,
       onUsbPacket: (p) => {
-        if (options['usb-log']) usbLog.write(Buffer.from(`${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)},${p.offered_ns?.toFixed(0) ?? ''}\n`));
+        if (options['usb-log'])
+          usbLog.write(
+            Buffer.from(
+              `${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)},${p.offered_ns?.toFixed(0) ?? ''}\n`,
+            ),
+          );
         if (p.isIn && machine.host.isBulkIn(p.endpoint)) capture.write(p.data);
       },
       onData: (bytes) => {
@@ -274,59 +334,70 @@ async function run(options) {
     let paced_ns = 0;
     let shown_ms = started_ms;
     const wall_lag_s = [];
-    const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
+    const slice_ns = usbredir
+      ? USBREDIR_SLICE_NS
+      : options.pace === 'wall'
+        ? WALL_SLICE_NS
+        : pty || options.pace === 'real'
+          ? SLICE_NS
+          : SLICE_BATCH_NS;
     if (stepped) runStepped(machine, stepped, end_ns);
-    else for (;;) {
-      const reader = usbredir ?? (options['wait-reader'] ? pty : null);
-      while (reader?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
-      let target = Math.min(end_ns, machine.time.nanos + slice_ns);
-      if (options.pace === 'wall') {
-        target = Math.min(end_ns, Math.max(target, Math.min(wall_ns(), machine.time.nanos + WALL_CATCH_UP_NS)));
-        while (wall_ns() < target) {
-          nap((target - wall_ns()) / 1e6);
-          await breathe();
+    else
+      for (;;) {
+        const reader = usbredir ?? (options['wait-reader'] ? pty : null);
+        while (reader?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
+        let target = Math.min(end_ns, machine.time.nanos + slice_ns);
+        if (options.pace === 'wall') {
+          target = Math.min(end_ns, Math.max(target, Math.min(wall_ns(), machine.time.nanos + WALL_CATCH_UP_NS)));
+          while (wall_ns() < target) {
+            nap((target - wall_ns()) / 1e6);
+            await breathe();
+          }
         }
-      }
-      if (!machine.run(target) || target >= end_ns) break;
-      if (options.pace === 'wall') {
-        const now_s = wall_ns() / 1e9;
-        const lag_s = Math.max(0, now_s - machine.time.nanos / 1e9);
-        while (wall_lag_s.length <= now_s) wall_lag_s.push(lag_s);
-        wall_lag_s.push(Math.max(wall_lag_s.pop(), lag_s));
-      }
-      const now_ms = performance.now();
-      if (interrupted) {
-        machine.endReason = 'interrupted';
-        break;
-      }
-      if (pty?.failure) {
-        machine.report.warn('pty', pty.failure);
-        machine.endReason = 'pseudo-terminal lost';
-        break;
-      }
-      if (options.progress && now_ms - shown_ms >= 1000) {
-        shown_ms = now_ms;
-        const emulated_s = machine.time.nanos / 1e9;
-        const line = `${emulated_s.toFixed(2)} / ${seconds} s, ${(emulated_s / ((now_ms - started_ms) / 1000)).toFixed(2)} x real time`;
-        process.stderr.write(process.stderr.isTTY ? `\r${line}   ` : `${line}\n`);
-      }
-      if (options.pace === 'real') {
-        // A lag is dropped, not caught up: a client that waited must not see a burst.
-        const ahead_ms = (machine.time.nanos - paced_ns) / 1e6 - (now_ms - paced_ms);
-        if (ahead_ms < -50) {
-          paced_ms = now_ms;
-          paced_ns = machine.time.nanos;
+        if (!machine.run(target) || target >= end_ns) break;
+        if (options.pace === 'wall') {
+          const now_s = wall_ns() / 1e9;
+          const lag_s = Math.max(0, now_s - machine.time.nanos / 1e9);
+          while (wall_lag_s.length <= now_s) wall_lag_s.push(lag_s);
+          wall_lag_s.push(Math.max(wall_lag_s.pop(), lag_s));
         }
-        if (ahead_ms > 1) await sleep(ahead_ms);
-        else await breathe();
-      } else await breathe();
-    }
+        const now_ms = performance.now();
+        if (interrupted) {
+          machine.endReason = 'interrupted';
+          break;
+        }
+        if (pty?.failure) {
+          machine.report.warn('pty', pty.failure);
+          machine.endReason = 'pseudo-terminal lost';
+          break;
+        }
+        if (options.progress && now_ms - shown_ms >= 1000) {
+          shown_ms = now_ms;
+          const emulated_s = machine.time.nanos / 1e9;
+          const line = `${emulated_s.toFixed(2)} / ${seconds} s, ${(emulated_s / ((now_ms - started_ms) / 1000)).toFixed(2)} x real time`;
+          process.stderr.write(process.stderr.isTTY ? `\r${line}   ` : `${line}\n`);
+        }
+        if (options.pace === 'real') {
+          // A lag is dropped, not caught up: a client that waited must not see a burst.
+          const ahead_ms = (machine.time.nanos - paced_ns) / 1e6 - (now_ms - paced_ms);
+          if (ahead_ms < -50) {
+            paced_ms = now_ms;
+            paced_ns = machine.time.nanos;
+          }
+          if (ahead_ms > 1) await sleep(ahead_ms);
+          else await breathe();
+        } else await breathe();
+      }
     if (options.progress && process.stderr.isTTY) process.stderr.write('\n');
     if (pty) await pty.drain();
     vcd?.close(machine.time.nanos);
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
-    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3, wall_lag_s } : {}) }, null, 2)}\n`));
+    reportFile.write(
+      Buffer.from(
+        `${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3, wall_lag_s } : {}) }, null, 2)}\n`,
+      ),
+    );
     if (machine.memory.isBusy) machine.memory.cutPower(); // the end of the run is the end of its power
     if (options.flash) output(options.flash).write(machine.memory.bytes);
     for (const line of result.warnings) process.stderr.write(`${line}\n`);

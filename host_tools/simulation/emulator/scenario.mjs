@@ -84,16 +84,20 @@ export function parseScenario(text, file) {
     if (!header) {
       header = cells;
       sensors = Number(metadata.sensors ?? 15);
-      if (!Number.isInteger(sensors) || sensors < 1 || sensors > 32) fail(number, `metadata "sensors" is "${metadata.sensors}"; give a whole number from 1 to 32`);
+      if (!Number.isInteger(sensors) || sensors < 1 || sensors > 32)
+        fail(number, `metadata "sensors" is "${metadata.sensors}"; give a whole number from 1 to 32`);
       for (const key of ['ambient_Pa', 'temperature_degC']) {
-        if (metadata[key] !== undefined && !Number.isFinite(Number(metadata[key] || NaN))) fail(number, `metadata "${key}" is "${metadata[key]}"; give a number`);
+        if (metadata[key] !== undefined && !Number.isFinite(Number(metadata[key] || NaN)))
+          fail(number, `metadata "${key}" is "${metadata[key]}"; give a number`);
       }
-      if (Math.abs(metadata.ambient_Pa ?? 0) > PRESSURE_LIMIT_Pa) fail(number, `metadata "ambient_Pa" is "${metadata.ambient_Pa}"; give at most 1e7 Pa`);
+      if (Math.abs(metadata.ambient_Pa ?? 0) > PRESSURE_LIMIT_Pa)
+        fail(number, `metadata "ambient_Pa" is "${metadata.ambient_Pa}"; give at most 1e7 Pa`);
       const expected = ['t_s', ...TRUTH, ...Array.from({ length: sensors }, (_, k) => `s${k}_Pa`)];
       const wrong = expected.findIndex((name, i) => cells[i] !== name);
       if (wrong >= 0) fail(number, `column ${wrong + 1} is "${cells[wrong] ?? ''}"; expected "${expected[wrong]}"`);
       cells.slice(expected.length).forEach((name, i, more) => {
-        if (!OPTIONAL.includes(name) || more.indexOf(name) !== i) fail(number, `column ${expected.length + i + 1} is "${name}"; after the sensors there may be, once each: ${OPTIONAL.join(', ')}`);
+        if (!OPTIONAL.includes(name) || more.indexOf(name) !== i)
+          fail(number, `column ${expected.length + i + 1} is "${name}"; after the sensors there may be, once each: ${OPTIONAL.join(', ')}`);
       });
       temperatureAt = cells.indexOf('temperature_degC');
       return;

@@ -74,16 +74,14 @@ private:
 };
 
 // The file's bytes go to the decoder. Throws Error where it cannot be read.
-void feed_file(const std::string &path, Decoder &decoder,
-               const std::function<void(const wire_packet &)> &on_packet) {
+void feed_file(const std::string &path, Decoder &decoder, const std::function<void(const wire_packet &)> &on_packet) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     throw Error(path + ": cannot read (" + std::strerror(errno) + ")");
   }
   char bytes[4096];
   while (file.read(bytes, sizeof bytes) || file.gcount() > 0) {
-    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes),
-                 static_cast<std::size_t>(file.gcount()), on_packet);
+    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes), static_cast<std::size_t>(file.gcount()), on_packet);
   }
 }
 
@@ -148,8 +146,7 @@ int play(const PlayOptions &options) {
   std::optional<pad_profile> pad;
   if (options.pad_mm) {
     pad = pad::profile_over_own_sensors({*options.pad_mm, options.overhang_mm, options.from_touch});
-    if (options.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm &&
-        options.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm) {
+    if (options.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm && options.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm) {
       pad->edges = pad::edges_of(*pad, pad::own_sensors(), twin::default_cache_directory());
     }
   }
@@ -211,8 +208,8 @@ int play(const PlayOptions &options) {
     if (!writer && packet.type == WIRE_INFO) {
       const wire_info &info = packet.body.info;
       if (scenario.sensors() != info.sensor_count) {
-        throw Error(options.scenario + ": has " + std::to_string(scenario.sensors()) +
-                    " sensors; this firmware has " + std::to_string(info.sensor_count));
+        throw Error(options.scenario + ": has " + std::to_string(scenario.sensors()) + " sensors; this firmware has " +
+                    std::to_string(info.sensor_count));
       }
       writer.emplace(options.recording, options.replace, &info, info.sensor_count,
                      Metadata{{"recorded_by", "fingertip_player"},
@@ -252,8 +249,7 @@ int play(const PlayOptions &options) {
     }
   }
   if (!writer) {
-    throw Error(options.scenario +
-                ": ends before the fingertip answers; make it longer than 0.1 s");
+    throw Error(options.scenario + ": ends before the fingertip answers; make it longer than 0.1 s");
   }
   writer->finish(decoder.statistics(), "seconds");
   if (raw_bytes) {
@@ -289,8 +285,7 @@ public:
         if (packet.body.ack.command == WIRE_CMD_TARE) {
           repeat_tare();
           tared_ = true;
-        } else if (packet.body.ack.command == WIRE_CMD_SLIP ||
-                   packet.body.ack.command == WIRE_CMD_OSR) {
+        } else if (packet.body.ack.command == WIRE_CMD_SLIP || packet.body.ack.command == WIRE_CMD_OSR) {
           throw Error("settings change within the capture; make one without \"set\"");
         }
       }
@@ -336,12 +331,10 @@ private:
       std::snprintf(text, sizeof text,
                     "frame %u: flags %08x %08x, x %.9g %.9g mm, y %.9g %.9g mm, force %.9g %.9g N, "
                     "slip %.9g %.9g mm",
-                    static_cast<unsigned>(a.frame), static_cast<unsigned>(a.flags),
-                    static_cast<unsigned>(b.flags), static_cast<double>(a.x_mm),
-                    static_cast<double>(b.x_mm), static_cast<double>(a.y_mm),
-                    static_cast<double>(b.y_mm), static_cast<double>(a.force_N),
-                    static_cast<double>(b.force_N), static_cast<double>(a.slip_mm),
-                    static_cast<double>(b.slip_mm));
+                    static_cast<unsigned>(a.frame), static_cast<unsigned>(a.flags), static_cast<unsigned>(b.flags),
+                    static_cast<double>(a.x_mm), static_cast<double>(b.x_mm), static_cast<double>(a.y_mm),
+                    static_cast<double>(b.y_mm), static_cast<double>(a.force_N), static_cast<double>(b.force_N),
+                    static_cast<double>(a.slip_mm), static_cast<double>(b.slip_mm));
       result_.first_difference = text;
     }
   }
@@ -371,12 +364,11 @@ int repeat_capture(const RepeatOptions &options) {
                                                       "before anything touches the pad"));
   }
   std::printf("{\"frames\": %llu, \"in_contact\": %llu, \"held\": %llu, \"equal\": %llu}\n",
-              static_cast<unsigned long long>(r.frames),
-              static_cast<unsigned long long>(r.in_contact),
+              static_cast<unsigned long long>(r.frames), static_cast<unsigned long long>(r.in_contact),
               static_cast<unsigned long long>(r.held), static_cast<unsigned long long>(r.equal));
   if (r.equal != r.frames) {
-    throw Error(options.capture + ": " + std::to_string(r.frames - r.equal) +
-                " contact packets differ, the first " + r.first_difference);
+    throw Error(options.capture + ": " + std::to_string(r.frames - r.equal) + " contact packets differ, the first " +
+                r.first_difference);
   }
   return 0;
 }
@@ -386,8 +378,8 @@ int run(int argc, char **argv) {
   app.require_subcommand(1);
   app.get_formatter()->column_width(28);
   PlayOptions play_options;
-  CLI::App *player = app.add_subcommand(
-      "play", "Play a scenario to simulated sensors and record what the firmware says");
+  CLI::App *player =
+      app.add_subcommand("play", "Play a scenario to simulated sensors and record what the firmware says");
   player->add_option("scenario", play_options.scenario, "CSV file, from twin or fingertip-scenario")
       ->required()
       ->type_name("FILE.csv");
@@ -395,12 +387,9 @@ int run(int argc, char **argv) {
       ->required()
       ->type_name("FILE.csv");
   player->add_flag("--overwrite", play_options.replace, "Replace a recording that exists");
-  player->add_option("--osr", play_options.osr, "Oversampling, 256 to 8192; default 1024")
-      ->type_name("N");
-  player->add_option("--rate", play_options.rate, "Frames a second, or max (default)")
-      ->type_name("HZ");
-  player->add_option("--slip-threshold", play_options.slip_threshold, "Slip distance")
-      ->type_name("MM");
+  player->add_option("--osr", play_options.osr, "Oversampling, 256 to 8192; default 1024")->type_name("N");
+  player->add_option("--rate", play_options.rate, "Frames a second, or max (default)")->type_name("HZ");
+  player->add_option("--slip-threshold", play_options.slip_threshold, "Slip distance")->type_name("MM");
   player->add_option("--slip-window", play_options.slip_window, "Its window")->type_name("MS");
   player->add_option("--prior-sigma", play_options.prior_sigma_mm, "Prior on sigma")
       ->check(CLI::Range(0.1, 100.0))
@@ -408,17 +397,12 @@ int run(int argc, char **argv) {
   player->add_option("--prior-width", play_options.prior_width_mm, "Its standard deviation")
       ->check(CLI::Range(0.001, 100.0))
       ->type_name("MM");
-  CLI::Option *pad = player
-                         ->add_option("--pad", play_options.pad_mm,
-                                      "Thickness of the pad: the firmware tells tangential load")
-                         ->type_name("MM");
-  player->add_option("--overhang", play_options.overhang_mm, "Of the pad")
-      ->type_name("MM")
-      ->needs(pad);
+  CLI::Option *pad =
+      player->add_option("--pad", play_options.pad_mm, "Thickness of the pad: the firmware tells tangential load")
+          ->type_name("MM");
+  player->add_option("--overhang", play_options.overhang_mm, "Of the pad")->type_name("MM")->needs(pad);
   player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
-  player
-      ->add_option("--first", play_options.first,
-                   "Commands that it is sent first, of fingertip_player calibrate")
+  player->add_option("--first", play_options.first, "Commands that it is sent first, of fingertip_player calibrate")
       ->type_name("FILE");
   player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
       ->check(CLI::Range(0.0, 1000.0))
@@ -430,48 +414,39 @@ int run(int argc, char **argv) {
       ->type_name("PERCENT");
   player->add_option("--serial", play_options.serial, "Serial number of the fingertip")
       ->check([](const std::string &text) {
-        const bool is_one =
-            text.size() == 16 && text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
+        const bool is_one = text.size() == 16 && text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
         return is_one ? std::string() : "give 16 hexadecimal digits, as 000000000000B0BB";
       })
       ->type_name("HEX16")
       ->capture_default_str();
-  player->add_option("--seed", play_options.seed, "Of noise and calibration; default 1")
-      ->type_name("N");
+  player->add_option("--seed", play_options.seed, "Of noise and calibration; default 1")->type_name("N");
   player->add_option("--seconds", play_options.seconds, "Default: to the scenario's end")
       ->check(CLI::Range(0.1, SECONDS_MAX))
       ->type_name("S");
   player->add_flag("--raw", play_options.raw, "Record the pressures too");
-  player
-      ->add_option("--raw-bytes", play_options.raw_bytes,
-                   "Keep the bytes of the line too, as of fingertip record")
+  player->add_option("--raw-bytes", play_options.raw_bytes, "Keep the bytes of the line too, as of fingertip record")
       ->type_name("FILE.ftr");
-  player->add_option("--commands", play_options.commands, "And those that it was sent, before 0 s")
-      ->type_name("FILE");
+  player->add_option("--commands", play_options.commands, "And those that it was sent, before 0 s")->type_name("FILE");
   player->add_flag("--quiet", play_options.quiet, "No progress");
 
   CalibrateOptions calibrate_options;
-  CLI::App *calibrater = app.add_subcommand(
-      "calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
-                   "commands that bring what it found: play --first");
-  calibrater
-      ->add_option("placements", calibrate_options.placements, "Recording of them, with --raw")
+  CLI::App *calibrater =
+      app.add_subcommand("calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
+                                      "commands that bring what it found: play --first");
+  calibrater->add_option("placements", calibrate_options.placements, "Recording of them, with --raw")
       ->required()
       ->type_name("FILE.csv");
   calibrater->add_option("--force", calibrate_options.force_N, "That weight, N")
       ->required()
       ->check(CLI::Range(0.1, 100.0))
       ->type_name("N");
-  calibrater->add_option("-o,--output", calibrate_options.commands, "The commands")
-      ->required()
-      ->type_name("FILE");
+  calibrater->add_option("-o,--output", calibrate_options.commands, "The commands")->required()->type_name("FILE");
   calibrater->add_flag("--overwrite", calibrate_options.replace, "Replace a file that exists");
 
   RepeatOptions repeat_options;
-  CLI::App *repeater = app.add_subcommand(
-      "repeat",
-      "Compute the contact packets of a capture once more from its pressures, and compare "
-      "them byte by byte, stage times apart");
+  CLI::App *repeater =
+      app.add_subcommand("repeat", "Compute the contact packets of a capture once more from its pressures, and compare "
+                                   "them byte by byte, stage times apart");
   repeater
       ->add_option("capture", repeat_options.capture,
                    "Bytes of the line (fingertip record --raw-bytes, or the emulator's --capture) "
@@ -483,9 +458,7 @@ int run(int argc, char **argv) {
   } catch (const CLI::ParseError &error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  return *player       ? play(play_options)
-         : *calibrater ? calibrate(calibrate_options)
-                       : repeat_capture(repeat_options);
+  return *player ? play(play_options) : *calibrater ? calibrate(calibrate_options) : repeat_capture(repeat_options);
 }
 
 } // namespace

@@ -25,9 +25,7 @@ constexpr const char *OPTIONAL[] = {"Qx_N", "Qy_N", "temperature_degC"};
 
 std::string trimmed(const std::string &text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
-  return first == std::string::npos
-             ? std::string()
-             : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+  return first == std::string::npos ? std::string() : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
 /* Not finite where it is no number. */
@@ -98,8 +96,7 @@ Scenario::Scenario(const std::string &path) {
       }
       sensors_ = static_cast<unsigned>(sensors);
       ambient_Pa_ = given("ambient_Pa", ambient_Pa_, PRESSURE_LIMIT_Pa, "at most 1e7 Pa");
-      temperature_degC =
-          given("temperature_degC", temperature_degC, TEMPERATURE_LIMIT_degC, "at most 1000 degC");
+      temperature_degC = given("temperature_degC", temperature_degC, TEMPERATURE_LIMIT_degC, "at most 1000 degC");
       name_ = metadata["name"];
       std::vector<std::string> expected{"t_s"};
       expected.insert(expected.end(), std::begin(TRUTH), std::end(TRUTH));
@@ -108,8 +105,8 @@ Scenario::Scenario(const std::string &path) {
       }
       for (std::size_t i = 0; i < expected.size(); i++) {
         if (i >= header.size() || header[i] != expected[i]) {
-          fail("column " + std::to_string(i + 1) + " is \"" + (i < header.size() ? header[i] : "") +
-               "\"; expected \"" + expected[i] + "\"");
+          fail("column " + std::to_string(i + 1) + " is \"" + (i < header.size() ? header[i] : "") + "\"; expected \"" +
+               expected[i] + "\"");
         }
       }
       const auto more = header.begin() + static_cast<std::ptrdiff_t>(expected.size());
@@ -132,15 +129,14 @@ Scenario::Scenario(const std::string &path) {
       const double value = number(at, comma);
       if (!std::isfinite(value)) {
         const std::size_t column = values.size();
-        fail("column \"" + (column < header.size() ? header[column] : "") + "\" is \"" +
-             std::string(at, comma) + "\"; give a finite number");
+        fail("column \"" + (column < header.size() ? header[column] : "") + "\" is \"" + std::string(at, comma) +
+             "\"; give a finite number");
       }
       values.push_back(value);
       at = comma + 1;
     }
     if (values.size() != header.size()) {
-      fail(std::to_string(values.size()) + " columns; the header has " +
-           std::to_string(header.size()));
+      fail(std::to_string(values.size()) + " columns; the header has " + std::to_string(header.size()));
     }
     if (values[0] < 0.0) {
       fail("t_s is negative; time starts at 0");

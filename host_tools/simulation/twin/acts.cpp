@@ -5,9 +5,8 @@
 namespace fingertip::twin {
 
 Stage::Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table)
-    : options(scenario_options), table(contact_table), forces(options.forces),
-      tangential(options.tangential), friction("--friction", options.friction),
-      mass_kg("--mass", options.mass_kg.empty() ? "0" : options.mass_kg) {}
+    : options(scenario_options), table(contact_table), forces(options.forces), tangential(options.tangential),
+      friction("--friction", options.friction), mass_kg("--mass", options.mass_kg.empty() ? "0" : options.mass_kg) {}
 
 bool Stage::play(Act act) {
   const double length_s = act.phases.back().end_s;

@@ -14,8 +14,7 @@ namespace fingertip::twin {
 constexpr double GRID_STEP_mm = 4.5;
 constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
 constexpr double SPEED_UP_s = 0.01;
-constexpr double SLIDE_SPEED_MAX_mm_s =
-    200.0; // of the hand; faster, an object is thrown off the pad
+constexpr double SLIDE_SPEED_MAX_mm_s = 200.0; // of the hand; faster, an object is thrown off the pad
 constexpr double DEGREE = M_PI / 180.0;
 
 constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
@@ -55,8 +54,7 @@ public:
   double half_x_mm() const { return GRID_HALF_X_mm + *options.margin_mm; }
   double half_y_mm() const { return GRID_HALF_Y_mm + *options.margin_mm; }
   // Of what is pushed or pulled in the nth act.
-  template <std::size_t N>
-  double speed_mm_s(std::size_t n, const std::array<double, N> &usual_mm_s) const {
+  template <std::size_t N> double speed_mm_s(std::size_t n, const std::array<double, N> &usual_mm_s) const {
     const std::vector<double> &given_mm_s = options.speeds_mm_s;
     return given_mm_s.empty() ? usual_mm_s[n % N] : given_mm_s[n % given_mm_s.size()];
   }

@@ -122,8 +122,7 @@ Act drag(const Stage &stage, std::size_t n) {
   load_N.line(LOADS_s, chosen.friction * force_N);
   phase(act, "pull", load_N.end_s());
   track.pusher_mm.hold(load_N.end_s());
-  track.pusher_mm.travel(WAY_mm, act.speed_mm_s,
-                         std::min(SPEED_UP_s, 0.5 * WAY_mm / act.speed_mm_s));
+  track.pusher_mm.travel(WAY_mm, act.speed_mm_s, std::min(SPEED_UP_s, 0.5 * WAY_mm / act.speed_mm_s));
   load_N.hold(track.pusher_mm.end_s() - load_N.end_s());
   phase(act, "slip", load_N.end_s(), true);
   load_N.ease(LOADS_s, 0.0);
@@ -163,7 +162,7 @@ struct Course {
 
 const std::string STICKS = "sticks", PARTLY_SLIPS = "partial_slip", SLIPS = "slip";
 constexpr double LOWERS_s = 0.3, RESTS_s = 0.3;
-constexpr double BRAKES = 2.0; // times the weight: braked by the weight again
+constexpr double BRAKES = 2.0;                         // times the weight: braked by the weight again
 constexpr double CARRIED_MIN = 0.4, CARRIED_MAX = 0.9; // of what static friction holds
 
 // As stiff as lets the usual grip's object slip after the usual dead travel.
@@ -172,8 +171,8 @@ public:
   explicit Rubber(const Stage &stage) : stage_(stage) {}
   double stiffness_N_mm(double force_N) const {
     constexpr double USUAL_N = 6.0, USUAL_FRICTION = 0.5;
-    return 1.5 * USUAL_FRICTION * USUAL_N / stage_.options.dead_travel_mm *
-           stage_.table.contact_radius_mm(force_N) / stage_.table.contact_radius_mm(USUAL_N);
+    return 1.5 * USUAL_FRICTION * USUAL_N / stage_.options.dead_travel_mm * stage_.table.contact_radius_mm(force_N) /
+           stage_.table.contact_radius_mm(USUAL_N);
   }
   double dead_travel_mm(double force_N, double friction) const {
     return 1.5 * friction * force_N / stiffness_N_mm(force_N);
@@ -210,14 +209,12 @@ Course run(const Script &script, const Stage &stage) {
     for (int i = 0; i < steps; i++) {
       const double t_s = MS_s * ms + HeldObject::STEP_s * i;
       const double hand_mm_s =
-          (script.hand_mm.at(t_s + HeldObject::STEP_s) - script.hand_mm.at(t_s)) /
-          HeldObject::STEP_s;
+          (script.hand_mm.at(t_s + HeldObject::STEP_s) - script.hand_mm.at(t_s)) / HeldObject::STEP_s;
       const double string_N =
           t_s < script.hand_begin_s
               ? 0.0
-              : std::max(0.0,
-                         STRING_N_mm * (script.hand_mm.at(t_s) + straight_mm - object.way_mm()) +
-                             damping_N_s_mm * (hand_mm_s - object.speed_mm_s()));
+              : std::max(0.0, STRING_N_mm * (script.hand_mm.at(t_s) + straight_mm - object.way_mm()) +
+                                  damping_N_s_mm * (hand_mm_s - object.speed_mm_s()));
       object.step(HeldObject::STEP_s, grip_N.at(t_s), stiffness_N_mm,
                   lowered.at(t_s - over_s) * (script.weight_N.at(t_s) + string_N));
     }
@@ -243,9 +240,7 @@ Course run(const Script &script, const Stage &stage) {
         slip_mm = object.way_mm();
       }
     }
-    if (!noticed &&
-        (t_s - slip_s >= script.notice_s ||
-         std::abs(object.way_mm() - slip_mm) >= script.notice_mm) &&
+    if (!noticed && (t_s - slip_s >= script.notice_s || std::abs(object.way_mm() - slip_mm) >= script.notice_mm) &&
         t_s >= slip_s) {
       noticed = true;
       grip_N = Profile(force_N);
@@ -267,8 +262,7 @@ void slide_phases(Act &act, const std::vector<std::string> &phases, double begin
     }
     const bool slips = phases[begin] == SLIPS;
     const double end_s = begin_s + 1e-3 * static_cast<double>(end);
-    if (begin > 0 &&
-        ((end - begin < MOMENT_ms && !slips) || act.phases.back().name == phases[begin])) {
+    if (begin > 0 && ((end - begin < MOMENT_ms && !slips) || act.phases.back().name == phases[begin])) {
       act.phases.back().end_s = milliseconds(end_s);
     } else {
       phase(act, phases[begin], end_s, slips);
@@ -342,8 +336,7 @@ Act slide(const Stage &stage, std::size_t n) {
   }
   default:
     script.name = "carry";
-    force_N = std::max(FORCE_MIN_N,
-                       weight_N / (random.uniform(CARRIED_MIN, CARRIED_MAX) * script.friction));
+    force_N = std::max(FORCE_MIN_N, weight_N / (random.uniform(CARRIED_MIN, CARRIED_MAX) * script.friction));
     script.weight_N.ease(random.log_uniform(0.1, 1.0), weight_N);
     script.over_s = script.weight_N.end_s() + 1.0;
     script.grip_N = Profile(force_N);
@@ -372,9 +365,7 @@ Act slide(const Stage &stage, std::size_t n) {
   act.speed_mm_s = course.fastest_mm_s;
   Track track;
   double angle_rad = random.uniform(-M_PI, M_PI);
-  for (int i = 0;
-       i < 50 && course.farthest_mm * std::abs(std::cos(angle_rad)) > 2.0 * stage.half_x_mm();
-       i++) {
+  for (int i = 0; i < 50 && course.farthest_mm * std::abs(std::cos(angle_rad)) > 2.0 * stage.half_x_mm(); i++) {
     angle_rad = random.uniform(-M_PI, M_PI);
   }
   aim(track, angle_rad);
@@ -444,9 +435,8 @@ Act screw(const Stage &stage, std::size_t n) {
     std::vector<double> angles_rad;
     for (int i = 1; i <= steps; i++) {
       const double change = (to - from) * i / steps;
-      angles_rad.push_back(angle_rad + side * turns *
-                                           wind_up_rad(change / turns, chosen.friction * force_N,
-                                                       shear_MPa, radius_mm));
+      angles_rad.push_back(angle_rad +
+                           side * turns * wind_up_rad(change / turns, chosen.friction * force_N, shear_MPa, radius_mm));
     }
     track.angle_rad.trace(angles_rad, 1e-5);
     phase(act, name, track.angle_rad.end_s());

@@ -22,8 +22,7 @@ BestGaussian::BestGaussian(const ContactTable &table, double layer_mm) {
     double squares = 0.0;
     for (int i = 0; i < SIDE; i++) {
       for (int j = 0; j < SIDE; j++) {
-        const double p =
-            table.base_pressure_Pa(force_N, (i - STEPS) * step_mm, (j - STEPS) * step_mm) / force_N;
+        const double p = table.base_pressure_Pa(force_N, (i - STEPS) * step_mm, (j - STEPS) * step_mm) / force_N;
         pressure[static_cast<std::size_t>(i * SIDE + j)] = p;
         squares += p * p;
       }

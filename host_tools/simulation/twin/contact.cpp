@@ -22,8 +22,7 @@ constexpr double SETTLED = 1e-7;
 } // namespace
 
 Grid grid_for(const Indenter &indenter, const Layer &layer) {
-  const double half_mm =
-      std::max(TABLE_REACH_mm, indenter.reach_mm()) + ROOM_THICKNESSES * layer.thickness_mm;
+  const double half_mm = std::max(TABLE_REACH_mm, indenter.reach_mm()) + ROOM_THICKNESSES * layer.thickness_mm;
   const double step_mm = indenter.reach_mm() < SMALL_REACH_mm ? FINE_STEP_mm : STEP_mm;
   int nodes = 32;
   while (nodes * step_mm < 2.0 * half_mm) {
@@ -43,20 +42,17 @@ struct ContactSolver::Work {
   double yield_mm_Pa; // of one node under its own pressure
 
   Work(const Indenter &indenter, const Layer &layer, const Grid &g)
-      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)), transform(g.nodes),
-        height_mm(nodes2), compliance(transform.waves()), transfer(transform.waves()),
-        pressure_Pa(nodes2, 0.0) {
+      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)), transform(g.nodes), height_mm(nodes2),
+        compliance(transform.waves()), transfer(transform.waves()), pressure_Pa(nodes2, 0.0) {
     for (int i = 0; i < g.nodes; i++) {
       for (int j = 0; j < g.nodes; j++) {
-        height_mm[at(i, j)] =
-            indenter.profile_mm((i - g.nodes / 2) * g.step_mm, (j - g.nodes / 2) * g.step_mm);
+        height_mm[at(i, j)] = indenter.profile_mm((i - g.nodes / 2) * g.step_mm, (j - g.nodes / 2) * g.step_mm);
       }
     }
     const double unit = 2.0 * M_PI / (g.nodes * g.step_mm); // per mm
     const double nu = layer.poisson, norm = 1.0 / static_cast<double>(nodes2);
     const double of_layer = 2.0 * (1.0 - nu * nu) / layer.youngs_modulus_Pa;
-    const double of_body =
-        indenter.youngs_modulus_Pa > 0.0 ? 2.0 * (1.0 - nu * nu) / indenter.youngs_modulus_Pa : 0.0;
+    const double of_body = indenter.youngs_modulus_Pa > 0.0 ? 2.0 * (1.0 - nu * nu) / indenter.youngs_modulus_Pa : 0.0;
     for (int i = 0; i < g.nodes; i++) {
       for (int j = 0; j <= g.nodes / 2; j++) {
         const double k = unit * std::hypot(transform.i_of(i), j), h = layer.thickness_mm;
@@ -73,9 +69,7 @@ struct ContactSolver::Work {
     pressure_Pa.front() = 0.0;
   }
 
-  std::size_t at(int i, int j) const {
-    return std::size_t(i) * std::size_t(grid.nodes) + std::size_t(j);
-  }
+  std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(grid.nodes) + std::size_t(j); }
 };
 
 ContactSolver::ContactSolver(const Indenter &indenter, const Layer &layer, const Grid &grid)

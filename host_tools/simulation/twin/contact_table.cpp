@@ -20,25 +20,22 @@ std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &gri
   std::snprintf(text, sizeof text,
                 "contact-table %d: %d %.9g %.9g %.9g %.9g %.9g on %.9g %.9g %.9g grid %d %.9g "
                 "forces %d %.9g %.9g step %.9g %d",
-                VERSION, static_cast<int>(indenter.shape), indenter.size_x_mm, indenter.size_y_mm,
-                indenter.size_z_mm, indenter.edge_mm, indenter.youngs_modulus_Pa,
-                layer.thickness_mm, layer.youngs_modulus_Pa, layer.poisson, grid.nodes,
-                grid.step_mm, FORCES, ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N, STEP_mm,
-                NODES);
+                VERSION, static_cast<int>(indenter.shape), indenter.size_x_mm, indenter.size_y_mm, indenter.size_z_mm,
+                indenter.edge_mm, indenter.youngs_modulus_Pa, layer.thickness_mm, layer.youngs_modulus_Pa,
+                layer.poisson, grid.nodes, grid.step_mm, FORCES, ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N,
+                STEP_mm, NODES);
   return text;
 }
 
 } // namespace
 
-double ContactTable::base_pressure_Pa(double force_N, double dx_mm, double dy_mm,
-                                      double dip_share) const {
+double ContactTable::base_pressure_Pa(double force_N, double dx_mm, double dy_mm, double dip_share) const {
   double pressure_Pa = base_pressure_Pa(force_N, dx_mm, dy_mm);
   if (dip_share > 0.0 && force_N > 0.0) {
     const double middle_Pa = base_pressure_Pa(force_N, 0.0, 0.0);
     const double square_mm2 = 1e6 * force_N / (2.0 * M_PI * middle_Pa);
     pressure_Pa -= dip_share * middle_Pa *
-                   std::exp(-(dx_mm * dx_mm + dy_mm * dy_mm) /
-                            (2.0 * DIP_WIDTHS * DIP_WIDTHS * square_mm2));
+                   std::exp(-(dx_mm * dx_mm + dy_mm * dy_mm) / (2.0 * DIP_WIDTHS * DIP_WIDTHS * square_mm2));
   }
   return pressure_Pa;
 }
@@ -66,16 +63,14 @@ ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &
       const Contact contact = solver.solve(ForcePlanes::force_at(f));
       for (int i = 0; i < NODES; i++) {
         for (int j = 0; j < NODES; j++) {
-          const std::size_t from =
-              std::size_t(grid.nodes / 2 + i * stride) * std::size_t(grid.nodes) +
-              std::size_t(grid.nodes / 2 + j * stride);
+          const std::size_t from = std::size_t(grid.nodes / 2 + i * stride) * std::size_t(grid.nodes) +
+                                   std::size_t(grid.nodes / 2 + j * stride);
           values[std::size_t(f) * PLANE + std::size_t(i * NODES + j)] =
               static_cast<float>(contact.base_Pa[from] / contact.force_N);
         }
       }
       values[VALUES + std::size_t(f)] = static_cast<float>(contact.indentation_mm);
-      values[VALUES + FORCES + std::size_t(f)] =
-          static_cast<float>(std::sqrt(contact.contact_area_mm2 / M_PI));
+      values[VALUES + FORCES + std::size_t(f)] = static_cast<float>(std::sqrt(contact.contact_area_mm2 / M_PI));
       if (on_progress) {
         on_progress((f + 1.0) / FORCES);
       }
@@ -84,8 +79,7 @@ ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &
   }
   ContactTable table;
   const auto begin = values.begin();
-  table.pressure_ = {
-      {begin, begin + VALUES}, ForcePlanes::Symmetry::even, ForcePlanes::Symmetry::even};
+  table.pressure_ = {{begin, begin + VALUES}, ForcePlanes::Symmetry::even, ForcePlanes::Symmetry::even};
   table.indentation_mm_.assign(begin + VALUES, begin + VALUES + FORCES);
   table.radius_mm_.assign(begin + VALUES + FORCES, values.end());
   return table;

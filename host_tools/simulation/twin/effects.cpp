@@ -50,8 +50,7 @@ const Effect &effect(const std::string &name) {
     }
     names += (names.empty() ? "" : ", ") + one.name;
   }
-  throw Error("there is no effect \"" + printable(name) + "\"; give some of: " + names +
-              "; or all or none");
+  throw Error("there is no effect \"" + printable(name) + "\"; give some of: " + names + "; or all or none");
 }
 
 // What the series has followed of a ramp of RAMP_s to 1, after a hold of `hold_s`.
@@ -83,8 +82,8 @@ Pad::Branch branch_of(const std::array<double, PROM.size()> &c, double ambient_P
   const double offset_step = (35.0 * 0x1p-3 - 30.0 * 0x1p-8) * SQUARE;
   const double slope = 63.0 * 0x1p-5 * SQUARE / sensitivity;
   // The temperature itself loses 14 / 2^35 of dT^2 below and 12 / 2^35 above: the middle.
-  return {0.01 * (1000.0 - 13.0 * dT * dT * 0x1p-35),
-          slope * (ambient_Pa + offset * 0x1p-15) - offset_step * 0x1p-15, slope};
+  return {0.01 * (1000.0 - 13.0 * dT * dT * 0x1p-35), slope * (ambient_Pa + offset * 0x1p-15) - offset_step * 0x1p-15,
+          slope};
 }
 
 } // namespace
@@ -119,8 +118,7 @@ const std::vector<Effect> &effects() {
        "three undershoots by 0.25 to 2.25 times, back with a time constant of 0.5 to 10 s",
        std::string(STRIP) + ": 0.4 to 8 % above or 1 to 9 % below, back in 0.5 to 10 s; how many "
                             "undershoot is assumed"},
-      {"creep", "%", 2.5, 0.0, 10.0,
-       "each sensor rises in a hold by this share, and falls as slowly after: 3 s",
+      {"creep", "%", 2.5, 0.0, 10.0, "each sensor rises in a hold by this share, and falls as slowly after: 3 s",
        "presses beside a load cell: Shaevitzaiden/slip_detection, two of seven read: per newton a "
        "sensor rises by 0.9 to 1.7 % in a hold, and stands 1.2 to 2.1 % of the peak above its zero "
        "0.5 s after it, 0.8 to 1.3 % at 1.5 s"},
@@ -172,10 +170,8 @@ EffectValues parse_effects(const std::string &text) {
   return values;
 }
 
-Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa,
-         std::uint64_t seed)
-    : ambient_Pa_(ambient_Pa), clip_Pa_(std::numeric_limits<double>::infinity()),
-      seats_(sensors), rubber_(sensors) {
+Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa, std::uint64_t seed)
+    : ambient_Pa_(ambient_Pa), clip_Pa_(std::numeric_limits<double>::infinity()), seats_(sensors), rubber_(sensors) {
   for (const auto &[name, value] : effects) {
     if (name == "dip") {
       dip_share_ = 0.01 * value;
@@ -205,15 +201,13 @@ Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, doub
       for (std::size_t k = 0; k < sensors; k++) {
         Random random(seed, DRIFT, k);
         const double sign = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
-        drifts_Pa_s_.push_back(sign * value * (1.0 + random.uniform(-DRIFT_SPREAD, DRIFT_SPREAD)) /
-                               DRIFT_SPAN_s);
+        drifts_Pa_s_.push_back(sign * value * (1.0 + random.uniform(-DRIFT_SPREAD, DRIFT_SPREAD)) / DRIFT_SPAN_s);
       }
     } else if (name == "relaxation") {
       relaxes_ = true;
       for (std::size_t k = 0; k < sensors; k++) {
         Random random(seed, RELAXATION, k);
-        const double share =
-            0.01 * value * (1.0 + random.uniform(-RELAXATION_SPREAD, RELAXATION_SPREAD));
+        const double share = 0.01 * value * (1.0 + random.uniform(-RELAXATION_SPREAD, RELAXATION_SPREAD));
         relaxations_.push_back(share);
         const auto strengths = relaxation_strengths(share);
         for (std::size_t i = 0; i < PRONY.size(); i++) {
@@ -226,10 +220,9 @@ Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, doub
       for (std::size_t k = 0; k < sensors; k++) {
         Random random(seed, AFTEREFFECT, k);
         const bool dips = random.uniform(0.0, 1.0) < DIPS_SHARE;
-        const double times = dips ? -random.uniform(DIPS_LEAST, DIPS_MOST)
-                                  : random.uniform(STANDS_OFF_LEAST, STANDS_OFF_MOST);
-        aftereffects_.push_back(
-            {0.01 * value * times, random.log_uniform(BACK_LEAST_s, BACK_MOST_s)});
+        const double times =
+            dips ? -random.uniform(DIPS_LEAST, DIPS_MOST) : random.uniform(STANDS_OFF_LEAST, STANDS_OFF_MOST);
+        aftereffects_.push_back({0.01 * value * times, random.log_uniform(BACK_LEAST_s, BACK_MOST_s)});
       }
     } else if (name == "branch") {
       start_degC_ = value;
@@ -295,8 +288,7 @@ double Pad::left_behind(Rubber &r, const Aftereffect &effect, double base_Pa) co
   const double rate = step_s_ > 0.0 ? (felt_Pa - r.felt_Pa) / step_s_ : 0.0;
   const double lag = rate * effect.time_s;
   // Exact as above, and where the pressure overtakes what is remembered.
-  r.remembered_Pa =
-      std::max(felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
+  r.remembered_Pa = std::max(felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
   r.felt_Pa = felt_Pa;
   return effect.share * (r.remembered_Pa - felt_Pa);
 }
@@ -354,8 +346,7 @@ void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<dou
         pressure_Pa += branch.step_Pa + branch.slope * pressure_Pa;
       }
     }
-    const double excess =
-        (ambient_Pa_ + pressure_Pa - SPECIFIED_Pa) / (RANGE_END_Pa - SPECIFIED_Pa);
+    const double excess = (ambient_Pa_ + pressure_Pa - SPECIFIED_Pa) / (RANGE_END_Pa - SPECIFIED_Pa);
     if (excess > 0.0) {
       pressure_Pa -= bias_ * RANGE_END_Pa * excess * excess;
     }

@@ -77,8 +77,7 @@ public:
   static constexpr std::array<double, 2> TIMES_s{1.0, 10.0};
   static constexpr double WARMING_K_s = 0.1; // of `branch`
 
-  Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa,
-      std::uint64_t seed);
+  Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa, std::uint64_t seed);
 
   // The pressure that each sensor reports above ambient at this time, given the pressure on the
   // base. Times must increase; between them the pressure on the base is linear. The first time is

@@ -9,8 +9,8 @@ namespace {
 
 // Weights of the cubic through four equally spaced nodes, at `t` between the second and the third.
 std::array<double, 4> cubic(double t) {
-  return {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-          -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0};
+  return {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0, -(t + 1.0) * t * (t - 2.0) / 2.0,
+          (t + 1.0) * t * (t - 1.0) / 6.0};
 }
 
 // Four neighbouring forces and their weights.
@@ -21,8 +21,8 @@ struct Between {
 
 Between between(double force_N) {
   constexpr double LOWEST_N = ForcePlanes::FORCE_MIN_N, HIGHEST_N = ForcePlanes::FORCE_MAX_N;
-  const double at = std::log(std::clamp(force_N, LOWEST_N, HIGHEST_N) / LOWEST_N) *
-                    (ForcePlanes::FORCES - 1) / std::log(HIGHEST_N / LOWEST_N);
+  const double at = std::log(std::clamp(force_N, LOWEST_N, HIGHEST_N) / LOWEST_N) * (ForcePlanes::FORCES - 1) /
+                    std::log(HIGHEST_N / LOWEST_N);
   const int first = std::clamp(static_cast<int>(at) - 1, 0, ForcePlanes::FORCES - 4);
   return {first, cubic(at - first - 1)};
 }

@@ -25,8 +25,7 @@ public:
   enum class Symmetry { even, odd };
   ForcePlanes() = default;
   // values: [force][x][y] for x, y from 0 on, per newton; as many along x as along y, so far apart.
-  ForcePlanes(std::vector<float> values, Symmetry in_x, Symmetry in_y, double step_mm = STEP_mm,
-              int nodes = NODES)
+  ForcePlanes(std::vector<float> values, Symmetry in_x, Symmetry in_y, double step_mm = STEP_mm, int nodes = NODES)
       : values_(std::move(values)), in_x_(in_x), in_y_(in_y), step_mm_(step_mm), nodes_(nodes) {}
 
   // By dx, dy from the middle of the contact; for the whole of the force.

@@ -21,9 +21,7 @@ HeldObject::HeldObject(double mass_kg, double friction, double kinetic_share)
   // Straight between as many points of the curve as there are elements; where its slope falls, one
   // begins to slide.
   const auto slope = [](int i) {
-    return i == ELEMENTS
-               ? 0.0
-               : ELEMENTS * (mindlin(double(i + 1) / ELEMENTS) - mindlin(double(i) / ELEMENTS));
+    return i == ELEMENTS ? 0.0 : ELEMENTS * (mindlin(double(i + 1) / ELEMENTS) - mindlin(double(i) / ELEMENTS));
   };
   for (int i = 0; i < ELEMENTS; i++) {
     const double bend = slope(i) - slope(i + 1);
@@ -43,8 +41,7 @@ void HeldObject::step(double seconds, double force_N, double stiffness_N_mm, dou
   tangential_N_ = 0.0;
   for (std::size_t i = 0; i < ELEMENTS; i++) {
     const Element &element = elements_[i];
-    const double trial_N =
-        element.spring_N + element.stiffness_share * stiffness_N_mm * LOSS_s * speed_mm_s_;
+    const double trial_N = element.spring_N + element.stiffness_share * stiffness_N_mm * LOSS_s * speed_mm_s_;
     sliding[i] = std::abs(trial_N) > element.friction_share * holds_N;
     forces_N[i] = sliding[i] ? std::copysign(element.friction_share * holds_N, trial_N) : trial_N;
     tangential_N_ += forces_N[i];
@@ -60,8 +57,7 @@ void HeldObject::step(double seconds, double force_N, double stiffness_N_mm, dou
     Element &element = elements_[i];
     const double stiffness = element.stiffness_share * stiffness_N_mm;
     // A slider takes what its spring, which the damper slows, does not.
-    const double stretch_mm_s =
-        sliding[i] ? (forces_N[i] - element.spring_N) / (stiffness * LOSS_s) : speed_mm_s_;
+    const double stretch_mm_s = sliding[i] ? (forces_N[i] - element.spring_N) / (stiffness * LOSS_s) : speed_mm_s_;
     const double slip_mm_s = speed_mm_s_ - stretch_mm_s;
     damped_mJ_ += (forces_N[i] - element.spring_N) * stretch_mm_s * seconds;
     rubbed_mJ_ += forces_N[i] * slip_mm_s * seconds;
@@ -72,8 +68,7 @@ void HeldObject::step(double seconds, double force_N, double stiffness_N_mm, dou
   }
   stiffness_N_mm_ = stiffness_N_mm;
   slips_ = forward || back;
-  rested_ +=
-      seconds * ((1.0 - rested_) / HEALS_s - (slips_ ? rested_ * slowest_mm_s / SETTLES_mm : 0.0));
+  rested_ += seconds * ((1.0 - rested_) / HEALS_s - (slips_ ? rested_ * slowest_mm_s / SETTLES_mm : 0.0));
   rested_ = std::max(rested_, 0.0);
 }
 
@@ -82,8 +77,7 @@ HeldObject::Energy HeldObject::energy() const {
   energy.work = work_mJ_;
   energy.kinetic = 0.5 * mass_kg_ * speed_mm_s_ * speed_mm_s_ / mN_PER_N;
   for (const Element &element : elements_) {
-    energy.elastic +=
-        0.5 * element.spring_N * element.spring_N / (element.stiffness_share * stiffness_N_mm_);
+    energy.elastic += 0.5 * element.spring_N * element.spring_N / (element.stiffness_share * stiffness_N_mm_);
   }
   energy.damped = damped_mJ_;
   energy.rubbed = rubbed_mJ_;

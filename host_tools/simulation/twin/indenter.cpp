@@ -36,21 +36,18 @@ std::vector<Indenter> make() {
       sphere("sphere15", 15, "large spherical indenter, 15 mm"),
       flat(Shape::flat_cylinder, "cylinder6", 6, EDGE_mm, "cylindrical indenter, flat end of 6 mm"),
       flat(Shape::flat_square, "cube6", 6, EDGE_mm, "cubical indenter, flat side of 6 mm"),
-      {"ball_bearing", "ball bearing held by its outer ring: steel roller, 22 mm by 7 mm",
-       Shape::roller, 22, 7, 0, EDGE_mm, 0},
-      flat(Shape::flat_cylinder, "bottle_cap", 28, 1.5,
-           "bottle cap held by its top: flat disc, 28 mm"),
-      {"lime", "lime: ellipsoid 45 by 55 mm, as stiff as its rind, 1 MPa", Shape::ellipsoid, 45, 55,
-       45, 0, 1e6},
+      {"ball_bearing", "ball bearing held by its outer ring: steel roller, 22 mm by 7 mm", Shape::roller, 22, 7, 0,
+       EDGE_mm, 0},
+      flat(Shape::flat_cylinder, "bottle_cap", 28, 1.5, "bottle cap held by its top: flat disc, 28 mm"),
+      {"lime", "lime: ellipsoid 45 by 55 mm, as stiff as its rind, 1 MPa", Shape::ellipsoid, 45, 55, 45, 0, 1e6},
       sphere("ping_pong", 40, "ping-pong ball: rigid sphere, 40 mm"),
-      sphere("rubber_duck", 30, "rubber duck held by its body: sphere 30 mm of soft vinyl, 0.5 MPa",
-             0.5e6),
+      sphere("rubber_duck", 30, "rubber duck held by its body: sphere 30 mm of soft vinyl, 0.5 MPa", 0.5e6),
   };
   for (int size : {12, 18, 24}) {
     const std::string mm = std::to_string(size);
     all.push_back(sphere("sphere" + mm, size, "sphere of " + mm + " mm"));
-    all.push_back({"cylinder" + mm, "cylinder of " + mm + " mm on its side, as long as it is thick",
-                   Shape::roller, double(size), double(size), 0, EDGE_mm, 0});
+    all.push_back({"cylinder" + mm, "cylinder of " + mm + " mm on its side, as long as it is thick", Shape::roller,
+                   double(size), double(size), 0, EDGE_mm, 0});
     all.push_back(flat(Shape::flat_square, "cube" + mm, size, EDGE_mm, "cube of " + mm + " mm"));
   }
   return all;
@@ -60,8 +57,7 @@ std::vector<Indenter> make() {
 
 bool Indenter::operator==(const Indenter &other) const {
   return shape == other.shape && size_x_mm == other.size_x_mm && size_y_mm == other.size_y_mm &&
-         size_z_mm == other.size_z_mm && edge_mm == other.edge_mm &&
-         youngs_modulus_Pa == other.youngs_modulus_Pa;
+         size_z_mm == other.size_z_mm && edge_mm == other.edge_mm && youngs_modulus_Pa == other.youngs_modulus_Pa;
 }
 
 double Indenter::profile_mm(double x_mm, double y_mm) const {
@@ -78,8 +74,7 @@ double Indenter::profile_mm(double x_mm, double y_mm) const {
   case Shape::flat_square:
     return rounding(std::max(x, y) - (a - edge_mm), edge_mm);
   case Shape::roller:
-    return (x < a ? a - std::sqrt(a * a - x * x) : NOTHING_mm) +
-           rounding(y - (b - edge_mm), edge_mm);
+    return (x < a ? a - std::sqrt(a * a - x * x) : NOTHING_mm) + rounding(y - (b - edge_mm), edge_mm);
   }
   return NOTHING_mm;
 }

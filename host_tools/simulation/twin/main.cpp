@@ -65,8 +65,8 @@ void show(ProgressBar &bar, double share) {
 
 Layer layer_of(double thickness_mm) {
   if (!(thickness_mm >= LAYER_MIN_mm && thickness_mm <= LAYER_MAX_mm)) {
-    throw Error("--layer " + number(thickness_mm) + " is out of range; give " +
-                number(LAYER_MIN_mm) + " to " + number(LAYER_MAX_mm) + " mm");
+    throw Error("--layer " + number(thickness_mm) + " is out of range; give " + number(LAYER_MIN_mm) + " to " +
+                number(LAYER_MAX_mm) + " mm");
   }
   return silicone(thickness_mm);
 }
@@ -98,8 +98,8 @@ int list() {
               "MM", number(LAYER_MIN_mm).c_str(), number(LAYER_MAX_mm).c_str());
   std::printf("\nEffects (--effects NAME[=VALUE],...; none and all), usual value:\n");
   for (const Effect &effect : effects()) {
-    std::printf("  %-14s%s; %s %s. %s\n", effect.name.c_str(), effect.description.c_str(),
-                number(effect.usual).c_str(), effect.unit.c_str(), effect.source.c_str());
+    std::printf("  %-14s%s; %s %s. %s\n", effect.name.c_str(), effect.description.c_str(), number(effect.usual).c_str(),
+                effect.unit.c_str(), effect.source.c_str());
   }
   return 0;
 }
@@ -147,8 +147,7 @@ int tables(const Options &options) {
 
 ContactTable table_of(const std::string &name, const Layer &layer, const Options &options) {
   ProgressBar bar("contact table of " + name + ", once", ProgressBar::Lines::none);
-  return ContactTable::load_or_build(indenter(name), layer, cache_of(options),
-                                     [&](double share) { show(bar, share); });
+  return ContactTable::load_or_build(indenter(name), layer, cache_of(options), [&](double share) { show(bar, share); });
 }
 
 int width(const Options &options) {
@@ -161,8 +160,7 @@ int width(const Options &options) {
   const BestGaussian::Fit fit = gaussian.at(options.width_force_N);
   const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
   std::printf("sigma_mm=%s force_share=%s peak_kPa=%s\n", fixed(fit.sigma_mm, 3).c_str(),
-              fixed(force_N / options.width_force_N, 3).c_str(),
-              fixed(1e-3 * fit.p0_Pa, 2).c_str());
+              fixed(force_N / options.width_force_N, 3).c_str(), fixed(1e-3 * fit.p0_Pa, 2).c_str());
   return 0;
 }
 
@@ -188,20 +186,18 @@ int scenario(Options &options) {
   std::optional<BlockTable> block;
   if (chosen.overhang_mm) {
     ProgressBar bar("table of the pad's edges, once", ProgressBar::Lines::none);
-    block = BlockTable::load_or_build(block_around(layer, *chosen.overhang_mm), sensor_places(),
-                                      cache_of(options), [&](double share) { show(bar, share); });
+    block = BlockTable::load_or_build(block_around(layer, *chosen.overhang_mm), sensor_places(), cache_of(options),
+                                      [&](double share) { show(bar, share); });
   }
   Written written;
   {
     ProgressBar bar(made.name, ProgressBar::Lines::none);
-    written = write_scenario(made, layer, table, second, block ? &*block : nullptr, options.output,
-                             options.overwrite, [&](double share) { show(bar, share); });
+    written = write_scenario(made, layer, table, second, block ? &*block : nullptr, options.output, options.overwrite,
+                             [&](double share) { show(bar, share); });
   }
-  std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n",
-              printable(options.output).c_str(), made.name.c_str(), made.acts.size(),
-              number(*made.options.seconds).c_str(), written.rows,
-              fixed(1e-6 * static_cast<double>(written.bytes), 1).c_str(),
-              fixed(1e-3 * written.peak_Pa, 1).c_str());
+  std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n", printable(options.output).c_str(),
+              made.name.c_str(), made.acts.size(), number(*made.options.seconds).c_str(), written.rows,
+              fixed(1e-6 * static_cast<double>(written.bytes), 1).c_str(), fixed(1e-3 * written.peak_Pa, 1).c_str());
   return 0;
 }
 
@@ -209,8 +205,7 @@ int scenario(Options &options) {
 std::uint64_t seed_from_text(const std::string &option, const std::string &text) {
   const auto seed = to_u64(text);
   if (!seed) {
-    throw CLI::ValidationError(option + " \"" + text +
-                               "\" is not possible; give a whole number from 0");
+    throw CLI::ValidationError(option + " \"" + text + "\" is not possible; give a whole number from 0");
   }
   return *seed;
 }
@@ -218,8 +213,7 @@ std::uint64_t seed_from_text(const std::string &option, const std::string &text)
 int run(int argc, char **argv) {
   Options options;
   std::function<int()> action;
-  CLI::App app("Writes what the sensors of a simulated pad feel, for emulator and native pipeline.",
-               "twin");
+  CLI::App app("Writes what the sensors of a simulated pad feel, for emulator and native pipeline.", "twin");
   app.set_version_flag("--version", "twin " FINGERTIP_VERSION);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
@@ -236,9 +230,7 @@ int run(int argc, char **argv) {
         ->type_name("DIR");
   };
 
-  app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] {
-    action = list;
-  });
+  app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] { action = list; });
 
   CLI::App *build = app.add_subcommand("tables", "Compute the contact tables that are not cached");
   build->add_option("--indenter", options.indenters, "Only of these; default: all")
@@ -257,8 +249,7 @@ int run(int argc, char **argv) {
         ->add_option("--indenter", options.scenario.indenter,
                      "What presses; default sphere6, for placements and drags sphere15")
         ->type_name("NAME");
-    command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")
-        ->type_name("MM");
+    command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")->type_name("MM");
   };
 
   CLI::App *fit = app.add_subcommand("width", "Width of the Gaussian that fits the pressure under "
@@ -275,25 +266,19 @@ int run(int argc, char **argv) {
   with_cache(fit);
   fit->callback([&] { action = [&] { return width(options); }; });
 
-  CLI::App *write =
-      app.add_subcommand("scenario", "Write a scenario, and its events beside it: FILE.truth.csv");
+  CLI::App *write = app.add_subcommand("scenario", "Write a scenario, and its events beside it: FILE.truth.csv");
   ScenarioOptions &s = options.scenario;
   write->add_option("kind", s.kind, "What happens: see twin list")->required()->type_name("KIND");
-  write->add_option("-o,--output", options.output, "The scenario to write")
-      ->required()
-      ->type_name("FILE.csv");
+  write->add_option("-o,--output", options.output, "The scenario to write")->required()->type_name("FILE.csv");
   with_contact(write);
-  write
-      ->add_option("--overhang", s.overhang_mm,
-                   "The pad ends so far beyond its outer sensors; default: never")
+  write->add_option("--overhang", s.overhang_mm, "The pad ends so far beyond its outer sensors; default: never")
       ->type_name("MM");
   write
       ->add_option("--second", s.second_indenter,
                    "What presses too, in scenarios of two contacts; "
                    "default: the same")
       ->type_name("NAME");
-  write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")
-      ->type_name("PERCENT");
+  write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")->type_name("PERCENT");
   write
       ->add_option("--effects", options.effects,
                    "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
@@ -325,10 +310,8 @@ int run(int argc, char **argv) {
                    "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides "
                    "0.3..0.8")
       ->type_name("MU");
-  write->add_option("--kinetic", s.kinetic_share, "Kinetic friction per static, in slides; 0.8")
-      ->type_name("SHARE");
-  write->add_option("--mass", s.mass_kg, "Of the object, in slides; default 0.1..0.5")
-      ->type_name("KG");
+  write->add_option("--kinetic", s.kinetic_share, "Kinetic friction per static, in slides; 0.8")->type_name("SHARE");
+  write->add_option("--mass", s.mass_kg, "Of the object, in slides; default 0.1..0.5")->type_name("KG");
   write->add_option("--speed", s.speeds_mm_s, "In turn, of slip, rolloff, drag, the hand in slides")
       ->delimiter(',')
       ->type_name("MM_PER_S,...");
@@ -336,17 +319,12 @@ int run(int argc, char **argv) {
       ->add_option("--dead-travel", s.dead_travel_mm,
                    "Way of the pusher, or of the pulled object, before it slips; default 1")
       ->type_name("MM");
-  write
-      ->add_option("--creep", s.creep_share,
-                   "Share of the dead travel by which the contact moves along; default 0.5")
+  write->add_option("--creep", s.creep_share, "Share of the dead travel by which the contact moves along; default 0.5")
       ->type_name("SHARE");
+  write->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")->type_name("MM");
   write
-      ->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")
-      ->type_name("MM");
-  write
-      ->add_option(
-          "--margin", s.margin_mm,
-          "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5")
+      ->add_option("--margin", s.margin_mm,
+                   "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5")
       ->type_name("MM");
   write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");

@@ -31,11 +31,9 @@ public:
   }
   void number(double value, int digits) {
     char buffer[64];
-    char *end =
-        std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, digits).ptr;
+    char *end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, digits).ptr;
     // No "-0.00".
-    const bool zero =
-        std::all_of(buffer, end, [](char c) { return c == '-' || c == '0' || c == '.'; });
+    const bool zero = std::all_of(buffer, end, [](char c) { return c == '-' || c == '0' || c == '.'; });
     const std::string_view text(buffer, static_cast<std::size_t>(end - buffer));
     bytes_ += zero && text[0] == '-' ? text.substr(1) : text;
   }
@@ -62,8 +60,7 @@ struct Row {
 // Leaves out rows that the line through their neighbours tells.
 class RowWriter {
 public:
-  RowWriter(OutputFile &file, bool pulls, bool temperature)
-      : file_(file), pulls_(pulls), temperature_(temperature) {}
+  RowWriter(OutputFile &file, bool pulls, bool temperature) : file_(file), pulls_(pulls), temperature_(temperature) {}
 
   void add(const Row &row) {
     if (!anchor_) {
@@ -171,8 +168,8 @@ private:
     }
     channels_.clear();
     for (const auto &[value, tolerance] : values_of(row)) {
-      channels_.push_back({value, tolerance, -std::numeric_limits<double>::infinity(),
-                           std::numeric_limits<double>::infinity()});
+      channels_.push_back(
+          {value, tolerance, -std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
     }
     anchor_ = true;
     anchor_s_ = row.t_s;
@@ -217,17 +214,15 @@ std::string file_name(const std::string &path) {
 }
 
 const ScenarioKind &kind_of(const Scenario &scenario) {
-  return *std::find_if(
-      scenario_kinds().begin(), scenario_kinds().end(),
-      [&](const ScenarioKind &kind) { return kind.name == scenario.options.kind; });
+  return *std::find_if(scenario_kinds().begin(), scenario_kinds().end(),
+                       [&](const ScenarioKind &kind) { return kind.name == scenario.options.kind; });
 }
 
 bool moves_under_load(const std::string &kind) {
   return kind == "lift" || kind == "drag" || kind == "slide" || kind == "screw";
 }
 
-void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pad &pad,
-              const std::string &path) {
+void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pad &pad, const std::string &path) {
   const ScenarioOptions &options = scenario.options;
   metadata(text, "name", scenario.name);
   metadata(text, "description", kind_of(scenario).description + "; simulated by twin");
@@ -239,8 +234,7 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
   metadata(text, "sensors", std::to_string(geometry.sensor_count));
   metadata(text, "indenter", options.indenter + ", " + indenter(options.indenter).description);
   if (options.kind == "two") {
-    const std::string &second =
-        options.second_indenter.empty() ? options.indenter : options.second_indenter;
+    const std::string &second = options.second_indenter.empty() ? options.indenter : options.second_indenter;
     metadata(text, "second_indenter", second + ", " + indenter(second).description);
   }
   metadata(text, "layer_mm", number(layer.thickness_mm));
@@ -271,8 +265,7 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
   for (const Effect &effect : effects()) {
     const auto chosen = options.effects.find(effect.name);
     if (chosen != options.effects.end()) {
-      metadata(text, "effect_" + effect.name,
-               number(chosen->second) + " " + effect.unit + "; " + effect.source);
+      metadata(text, "effect_" + effect.name, number(chosen->second) + " " + effect.unit + "; " + effect.source);
     }
   }
   if (options.effects.count("places") + options.effects.count("widths") > 0) {
@@ -312,9 +305,8 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
     metadata(text, "branch_steps_Pa", list(steps_Pa, 1.0, 2));
   }
   metadata(text, "gaussian",
-           scenario.options.kind == "two"
-               ? "none: p0_Pa and sigma_mm are 0"
-               : "p0_Pa and sigma_mm: closest to the pressure on the base");
+           scenario.options.kind == "two" ? "none: p0_Pa and sigma_mm are 0"
+                                          : "p0_Pa and sigma_mm: closest to the pressure on the base");
   metadata(text, "truth", file_name(truth_path(path)));
 }
 
@@ -354,9 +346,7 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
       }
       text << "," << std::to_string(act.sensors_near);
       text.cell(act.speed_mm_s, 1);
-      text.cell(pushed || moves_under_load(scenario.options.kind) ? scenario.options.dead_travel_mm
-                                                                  : 0.0,
-                3);
+      text.cell(pushed || moves_under_load(scenario.options.kind) ? scenario.options.dead_travel_mm : 0.0, 3);
       text.cell(pushed ? scenario.options.stick_slip_mm : 0.0, 3);
       if (scenario.pulls) {
         for (double t_s : {begin_s, end_s}) {
@@ -377,12 +367,11 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
 void check_inside(const Block &block, const Touch &contact, const Track &track, double radius_mm) {
   const bool rolls = std::isfinite(track.edge_x_mm);
   const double room_mm = rolls ? 0.0 : radius_mm;
-  if (contact.force_N > 0.0 && (std::abs(contact.x_mm) + room_mm > block.half_x_mm ||
-                                std::abs(contact.y_mm) + room_mm > block.half_y_mm)) {
-    throw Error("a contact of " + fixed(radius_mm, 1) + " mm radius at " + fixed(contact.x_mm, 1) +
-                ", " + fixed(contact.y_mm, 1) + " mm leaves the pad, which ends at " +
-                fixed(block.half_x_mm, 1) + ", " + fixed(block.half_y_mm, 1) +
-                " mm; give a larger --overhang, a smaller --margin or less --force");
+  if (contact.force_N > 0.0 &&
+      (std::abs(contact.x_mm) + room_mm > block.half_x_mm || std::abs(contact.y_mm) + room_mm > block.half_y_mm)) {
+    throw Error("a contact of " + fixed(radius_mm, 1) + " mm radius at " + fixed(contact.x_mm, 1) + ", " +
+                fixed(contact.y_mm, 1) + " mm leaves the pad, which ends at " + fixed(block.half_x_mm, 1) + ", " +
+                fixed(block.half_y_mm, 1) + " mm; give a larger --overhang, a smaller --margin or less --force");
   }
 }
 
@@ -397,13 +386,12 @@ std::string truth_path(const std::string &scenario_path) {
 }
 
 Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
-                       const ContactTable &second, const BlockTable *block, const std::string &path,
-                       bool replace, const std::function<void(double share)> &on_progress) {
+                       const ContactTable &second, const BlockTable *block, const std::string &path, bool replace,
+                       const std::function<void(double share)> &on_progress) {
   const ScenarioOptions &options = scenario.options;
   OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
   OutputFile file(path, replace, OutputFile::Appears::when_finished);
-  const bool temperature =
-      options.effects.count("temperature") + options.effects.count("branch") > 0;
+  const bool temperature = options.effects.count("temperature") + options.effects.count("branch") > 0;
   const std::size_t sensors = geometry.sensor_count;
   Pad pad(options.effects, sensors, layer.thickness_mm, AMBIENT_Pa, *options.pad_seed);
   const BestGaussian gaussian(table, layer.thickness_mm);
@@ -432,8 +420,7 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
     row.t_s = t_s;
     pad.report(t_s, base_Pa, row.sensors_Pa);
     row.temperature_degC = pad.temperature_degC(t_s);
-    written.peak_Pa =
-        std::max(written.peak_Pa, *std::max_element(row.sensors_Pa.begin(), row.sensors_Pa.end()));
+    written.peak_Pa = std::max(written.peak_Pa, *std::max_element(row.sensors_Pa.begin(), row.sensors_Pa.end()));
     writer.add(row);
   };
   double t_s = 0.0;
@@ -472,17 +459,13 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
           const double cosine = std::cos(contact.angle_rad), sine = std::sin(contact.angle_rad);
           for (std::size_t k = 0; k < sensors; k++) {
             const Pad::Seat &seat = pad.seats()[k];
-            const double dx =
-                (static_cast<double>(geometry.x_mm[k]) + seat.dx_mm - contact.x_mm) / seat.width;
-            const double dy =
-                (static_cast<double>(geometry.y_mm[k]) + seat.dy_mm - contact.y_mm) / seat.width;
+            const double dx = (static_cast<double>(geometry.x_mm[k]) + seat.dx_mm - contact.x_mm) / seat.width;
+            const double dy = (static_cast<double>(geometry.y_mm[k]) + seat.dy_mm - contact.y_mm) / seat.width;
             const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
-            base_Pa[k] +=
-                pressing.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
+            base_Pa[k] += pressing.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
             if (block) {
-              base_Pa[k] += block->added_Pa(
-                  k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm}, contact.x_mm,
-                  contact.y_mm);
+              base_Pa[k] += block->added_Pa(k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm},
+                                            contact.x_mm, contact.y_mm);
             }
             if (scenario.pulls) {
               const TractionTable::Load load{contact.force_N, contact.stuck_N,

@@ -65,14 +65,12 @@ Act grid(const Stage &stage, std::size_t n) {
   // Forces in turn: after some passes every place has had all of them in every way.
   const std::size_t turn = static_cast<std::size_t>(at) + pass + 2 * way;
   Act act = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row},
-                  stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s,
-                  ways[way].hold_s);
+                  stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
   act.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
   return act;
 }
 
-Act random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s,
-                 double hold_s) {
+Act random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
   Random random(stage.options.seed, TAPS, n);
   const Place place = stage.random_place(random);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
@@ -160,8 +158,7 @@ Act slip(const Stage &stage, std::size_t n) {
   act.speed_mm_s = stage.speed_mm_s(n, SLIP_SPEEDS_mm_s);
   Track track = track_at({x_mm, upward ? y_mm : -y_mm});
   track.along_y = upward ? 1.0 : -1.0;
-  track.grip = {stage.options.dead_travel_mm, stage.options.creep_share,
-                stage.options.stick_slip_mm};
+  track.grip = {stage.options.dead_travel_mm, stage.options.creep_share, stage.options.stick_slip_mm};
   track.angle_rad = Profile(random.uniform(-15.0, 15.0) * DEGREE);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
 
@@ -174,8 +171,7 @@ Act slip(const Stage &stage, std::size_t n) {
   track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), act.speed_mm_s, SPEED_UP_s);
   const double stop_s = track.pusher_mm.end_s();
   if (track.grip.dead_travel_mm > 0.0) {
-    phase(act, "dead_travel", time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s),
-          true);
+    phase(act, "dead_travel", time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s), true);
   }
   phase(act, "slip", stop_s, true);
   track.force_N.hold(stop_s - push_s + 0.5);
@@ -230,8 +226,7 @@ Act rolloff(const Stage &stage, std::size_t n) {
   Act act;
   act.press = "roll";
   act.speed_mm_s = stage.speed_mm_s(n, ROLL_SPEEDS_mm_s);
-  Track track =
-      track_at({random.uniform(-2.0, 2.0), random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
+  Track track = track_at({random.uniform(-2.0, 2.0), random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
   track.along_x = 1.0;
   track.along_y = 0.0;
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
@@ -242,8 +237,7 @@ Act rolloff(const Stage &stage, std::size_t n) {
   track.force_N.hold(random.uniform(0.4, 0.6));
   phase(act, "hold", track.force_N.end_s());
   track.pusher_mm.hold(track.force_N.end_s());
-  track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, act.speed_mm_s,
-                         SPEED_UP_s);
+  track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, act.speed_mm_s, SPEED_UP_s);
   track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
   phase(act, "roll", track.force_N.end_s());
   act.tracks.push_back(track);
@@ -254,16 +248,14 @@ Act two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
   // The far ones lie along the pad, which is too narrow for them.
-  const double direction =
-      distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0) : random.uniform(0.0, 180.0);
+  const double direction = distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0) : random.uniform(0.0, 180.0);
   const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
   const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
   const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
   const double one_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
   const double other_N = stage.forces.pick(n + 1, random.uniform(0.0, 1.0));
   Act act = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
-  act.tracks.push_back(
-      press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
+  act.tracks.push_back(press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
   return act;
 }
 
@@ -281,33 +273,26 @@ struct Kind {
 
 const std::vector<Kind> &all_kinds() {
   static const std::vector<Kind> all{
-      {{"grid", 200, "1,2.5,5,10,15",
-        "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart"},
-       grid},
+      {{"grid", 200, "1,2.5,5,10,15", "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart"}, grid},
       {{"taps", 120, "1..15", "short taps at random places"}, tap},
       {{"high", 120, "25..50", "strong presses at random places"}, high},
       {{"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place"}, poke},
-      {{"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor"},
-       cycle},
-      {{"slip", 120, "6", "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s"},
-       slip},
+      {{"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor"}, cycle},
+      {{"slip", 120, "6", "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s"}, slip},
       {{"twist", 60, "6", "a gripped object turns by 90 degrees about its contact"}, twist},
       {{"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s"}, rolloff},
-      {{"placements", 150, "3",
-        "one weight set down at random places for 2 s each, to calibrate from"},
+      {{"placements", 150, "3", "one weight set down at random places for 2 s each, to calibrate from"},
        placement,
        "sphere15",
        GRID_STEP_mm}, // to the outer sensors
-      {{"lift", 120, "6",
-        "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s"},
+      {{"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s"},
        lift,
        "sphere6",
        0.5 * GRID_STEP_mm,
        "0.3",
        USUAL_FRICTION,
        true},
-      {{"drag", 120, "3",
-        "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides"},
+      {{"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides"},
        drag,
        "sphere15",
        0.5 * GRID_STEP_mm,
@@ -343,14 +328,13 @@ const Kind &kind_of(const ScenarioOptions &options) {
     }
     names += (names.empty() ? "" : ", ") + one.kind.name;
   }
-  throw Error("there is no kind of scenario \"" + printable(options.kind) +
-              "\"; give one of: " + names);
+  throw Error("there is no kind of scenario \"" + printable(options.kind) + "\"; give one of: " + names);
 }
 
 void check(const char *option, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest)) {
-    throw Error(std::string(option) + " " + number(value) + " is out of range; give " +
-                number(lowest) + " to " + number(highest));
+    throw Error(std::string(option) + " " + number(value) + " is out of range; give " + number(lowest) + " to " +
+                number(highest));
   }
 }
 
@@ -361,9 +345,9 @@ void check_slide(const ScenarioOptions &options, double friction) {
   }
   const double grip_N = slide_force_N(mass_kg.highest, friction, options.kinetic_share);
   if (grip_N > ContactTable::FORCE_MAX_N) {
-    throw Error("--mass " + number(mass_kg.highest) + " needs a grip of up to " + number(grip_N) +
-                " N at --friction " + number(friction) + ", above " +
-                number(ContactTable::FORCE_MAX_N) + "; give less mass or more friction");
+    throw Error("--mass " + number(mass_kg.highest) + " needs a grip of up to " + number(grip_N) + " N at --friction " +
+                number(friction) + ", above " + number(ContactTable::FORCE_MAX_N) +
+                "; give less mass or more friction");
   }
 }
 
@@ -420,8 +404,7 @@ Forces::Forces(const std::string &text) {
   bool good = true;
   for (std::string_view part : parts) {
     const auto force_N = to_double(trim(part));
-    good = good && force_N && *force_N >= ContactTable::FORCE_MIN_N &&
-           *force_N <= ContactTable::FORCE_MAX_N;
+    good = good && force_N && *force_N >= ContactTable::FORCE_MIN_N && *force_N <= ContactTable::FORCE_MAX_N;
     values_.push_back(force_N.value_or(0.0));
   }
   if (!good || (range_ && values_[1] < values_[0])) {
@@ -432,8 +415,7 @@ Forces::Forces(const std::string &text) {
 }
 
 double Forces::pick(std::size_t turn, double random_share) const {
-  return range_ ? values_[0] + random_share * (values_[1] - values_[0])
-                : values_[turn % values_.size()];
+  return range_ ? values_[0] + random_share * (values_[1] - values_[0]) : values_[turn % values_.size()];
 }
 
 double Forces::largest() const {
@@ -443,18 +425,15 @@ double Forces::largest() const {
 Range::Range(const std::string &option, const std::string &text) {
   const std::size_t dots = text.find("..");
   const auto low = to_double(trim(std::string_view(text).substr(0, dots)));
-  const auto high =
-      dots == std::string::npos ? low : to_double(trim(std::string_view(text).substr(dots + 2)));
+  const auto high = dots == std::string::npos ? low : to_double(trim(std::string_view(text).substr(dots + 2)));
   if (!low || !high || !(*low <= *high)) {
-    throw Error(option + " \"" + printable(text) +
-                "\" is not possible; give a number, or any of a range as 0.1..0.4");
+    throw Error(option + " \"" + printable(text) + "\" is not possible; give a number, or any of a range as 0.1..0.4");
   }
   lowest = *low;
   highest = *high;
 }
 
-Tangential::Tangential(const std::string &text)
-    : share("--tangential", text.substr(0, text.find(','))) {
+Tangential::Tangential(const std::string &text) : share("--tangential", text.substr(0, text.find(','))) {
   const std::size_t comma = text.find(',');
   if (comma != std::string::npos) {
     angle_deg = to_double(trim(std::string_view(text).substr(comma + 1)));
@@ -483,8 +462,7 @@ Block block_around(const Layer &layer, double overhang_mm) {
 std::vector<Place> sensor_places() {
   std::vector<Place> places;
   for (std::size_t k = 0; k < geometry.sensor_count; k++) {
-    places.push_back(
-        {static_cast<double>(geometry.x_mm[k]), static_cast<double>(geometry.y_mm[k])});
+    places.push_back({static_cast<double>(geometry.x_mm[k]), static_cast<double>(geometry.y_mm[k])});
   }
   return places;
 }
@@ -546,8 +524,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
     check_slide(chosen, friction.lowest);
   }
   if (!chosen.second_indenter.empty() && chosen.kind != "two") {
-    throw Error("--second says nothing in a scenario of \"" + chosen.kind +
-                "\"; leave it out, or choose two");
+    throw Error("--second says nothing in a scenario of \"" + chosen.kind + "\"; leave it out, or choose two");
   }
   static_cast<void>(Forces(chosen.forces));
   return chosen;
@@ -571,8 +548,8 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
     }
   }
   if (stage.acts.empty()) {
-    throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" +
-                chosen.kind + "\"; leave it out for " + number(kind.kind.usual_seconds));
+    throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" + chosen.kind +
+                "\"; leave it out for " + number(kind.kind.usual_seconds));
   }
   scenario.acts = std::move(stage.acts);
   scenario.name = name_of(chosen);

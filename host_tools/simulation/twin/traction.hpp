@@ -21,7 +21,7 @@ inline double stuck_force_N(double force_N, double tangential_N, double friction
 
 // By dx, dy from the middle of the contact, along the same axes. along_x, along_y: under a traction
 // p along that axis, Pa.
-double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y,
-                            const TractionLoad &load, double dx_mm, double dy_mm);
+double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y, const TractionLoad &load,
+                            double dx_mm, double dy_mm);
 
 } // namespace fingertip::twin

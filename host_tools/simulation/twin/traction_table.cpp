@@ -17,8 +17,7 @@ enum class Axis { x, y };
 
 // Base pressure under a traction along an axis per base pressure under the like pressure, and the
 // transforms' norm.
-std::vector<std::complex<double>> response(const Transform &transform, const Layer &layer,
-                                           Axis axis) {
+std::vector<std::complex<double>> response(const Transform &transform, const Layer &layer, Axis axis) {
   const double unit = 2.0 * M_PI / (SIDE * ForcePlanes::STEP_mm); // per mm
   std::vector<std::complex<double>> made(transform.waves());
   for (int row = 0; row < SIDE; row++) {
@@ -28,8 +27,7 @@ std::vector<std::complex<double>> response(const Transform &transform, const Lay
       // The shortest waves look like their mirrors: they have no direction.
       const bool directed = along != 0 && along != SIDE / 2;
       const double share = tangential_share(unit * k * layer.thickness_mm, layer.poisson);
-      made[std::size_t(row * (SIDE / 2 + 1) + j)] = {
-          0.0, directed ? -along / k * share / (double(SIDE) * SIDE) : 0.0};
+      made[std::size_t(row * (SIDE / 2 + 1) + j)] = {0.0, directed ? -along / k * share / (double(SIDE) * SIDE) : 0.0};
     }
   }
   return made;
@@ -48,8 +46,7 @@ TractionTable::TractionTable(const ContactTable &table, const Layer &layer) {
     for (int f = 0; f < FORCES; f++) {
       for (int i = 0; i < SIDE; i++) {
         for (int j = 0; j < SIDE; j++) {
-          pressure[std::size_t(i * SIDE + j)] =
-              table.pressure().node(f, std::min(i, SIDE - i), std::min(j, SIDE - j));
+          pressure[std::size_t(i * SIDE + j)] = table.pressure().node(f, std::min(i, SIDE - i), std::min(j, SIDE - j));
         }
       }
       const double *base = transform.apply(pressure, answer);

@@ -90,9 +90,8 @@ double Profile::at(double t_s) const {
   if (t_s <= 0.0) {
     return pieces_.front().from;
   }
-  const auto piece =
-      std::upper_bound(pieces_.begin(), pieces_.end(), t_s,
-                       [](double t, const Piece &candidate) { return t < candidate.end_s; });
+  const auto piece = std::upper_bound(pieces_.begin(), pieces_.end(), t_s,
+                                      [](double t, const Piece &candidate) { return t < candidate.end_s; });
   const double length = piece->end_s - piece->begin_s;
   const double u = (t_s - piece->begin_s) / length;
   const double step = piece->to - piece->from;
@@ -138,8 +137,8 @@ Touch Track::at(double t_s) const {
   const double load_N = pull.load_N.at(t_s);
   if (load_N != 0.0) {
     contact.stuck_N = stuck_force_N(contact.force_N, std::abs(load_N), pull.friction.at(t_s));
-    const double moved = std::copysign(pull.travel_mm, load_N) *
-                         (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
+    const double moved =
+        std::copysign(pull.travel_mm, load_N) * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
     contact.x_mm += pull.along_x * moved;
     contact.y_mm += pull.along_y * moved;
   }
@@ -149,11 +148,9 @@ Touch Track::at(double t_s) const {
   return contact;
 }
 
-double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa,
-                   double radius_mm) {
+double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa, double radius_mm) {
   const double root = std::sqrt(1.0 - 1.5 * 3.0 * M_PI / 16.0 * std::abs(torque_share));
-  const double turn = 0.125 * (1.0 - root) * (3.0 - root) * friction_N /
-                      (shear_modulus_MPa * radius_mm * radius_mm);
+  const double turn = 0.125 * (1.0 - root) * (3.0 - root) * friction_N / (shear_modulus_MPa * radius_mm * radius_mm);
   return std::copysign(turn, torque_share);
 }
 

@@ -84,9 +84,8 @@ struct Touch {
   double pull_x_N = 0.0, pull_y_N = 0.0;
   double stuck_N = 0.0; // TractionTable::Load
   bool operator==(const Touch &other) const {
-    return force_N == other.force_N && x_mm == other.x_mm && y_mm == other.y_mm &&
-           angle_rad == other.angle_rad && pull_x_N == other.pull_x_N &&
-           pull_y_N == other.pull_y_N && stuck_N == other.stuck_N;
+    return force_N == other.force_N && x_mm == other.x_mm && y_mm == other.y_mm && angle_rad == other.angle_rad &&
+           pull_x_N == other.pull_x_N && pull_y_N == other.pull_y_N && stuck_N == other.stuck_N;
   }
 };
 
@@ -113,8 +112,7 @@ struct Track {
 // the torque at which all slides, (3 pi / 16) mu F a; -1..1. It is less than Lubkin's integrals
 // ("The torsion of elastic spheres in contact", J. Appl. Mech. 18, 1951) by 3 % at half of that, by
 // 14 % at 0.8; theirs grows beyond any bound at the end, as a logarithm, where this spins.
-double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa,
-                   double radius_mm);
+double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa, double radius_mm);
 
 // Share of a disc's area that lies before a straight edge, and how far the centre of that part lies
 // before the disc's, both for an edge `ahead` radii ahead of the centre (-1..1).

@@ -61,13 +61,11 @@ const double *Transform::apply_any(const std::vector<double> &field, const Respo
   return plans_->real;
 }
 
-const double *Transform::apply(const std::vector<double> &field,
-                               const std::vector<double> &response) {
+const double *Transform::apply(const std::vector<double> &field, const std::vector<double> &response) {
   return apply_any(field, response);
 }
 
-const double *Transform::apply(const std::vector<double> &field,
-                               const std::vector<std::complex<double>> &response) {
+const double *Transform::apply(const std::vector<double> &field, const std::vector<std::complex<double>> &response) {
   return apply_any(field, response);
 }
 

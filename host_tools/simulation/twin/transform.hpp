@@ -20,12 +20,10 @@ public:
 
   // field: [x][y]. The response holds the norm, 1 / nodes^2. The result stays until the next call.
   const double *apply(const std::vector<double> &field, const std::vector<double> &response);
-  const double *apply(const std::vector<double> &field,
-                      const std::vector<std::complex<double>> &response);
+  const double *apply(const std::vector<double> &field, const std::vector<std::complex<double>> &response);
 
 private:
-  template <typename Response>
-  const double *apply_any(const std::vector<double> &field, const Response &response);
+  template <typename Response> const double *apply_any(const std::vector<double> &field, const Response &response);
   struct Plans;
   int nodes_;
   std::unique_ptr<Plans> plans_;

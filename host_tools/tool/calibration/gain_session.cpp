@@ -35,8 +35,7 @@ std::uint16_t micrometres(double length_mm) {
 }
 
 std::int16_t to_both_sides(double value, int greatest) {
-  return static_cast<std::int16_t>(
-      std::lround(std::clamp(value, double(-greatest), double(greatest))));
+  return static_cast<std::int16_t>(std::lround(std::clamp(value, double(-greatest), double(greatest))));
 }
 
 } // namespace
@@ -55,8 +54,8 @@ Array array_of(const wire_info &info) {
   array.pitch_mm = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < array.sensors(); a++) {
     for (std::size_t b = 0; b < a; b++) {
-      array.pitch_mm = std::min(
-          array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
+      array.pitch_mm =
+          std::min(array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
     }
   }
   return array;
@@ -76,15 +75,13 @@ Frame frame_of(const wire_packet &packet) {
 
 void check_firmware(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_FIT)) {
-    throw Error(
-        what + ": its firmware (scene " + text_field(info.scene) +
-        ") computes no locations, so there is nothing to calibrate; flash one of scene grasp");
+    throw Error(what + ": its firmware (scene " + text_field(info.scene) +
+                ") computes no locations, so there is nothing to calibrate; flash one of scene grasp");
   }
   if (!(info.capabilities & WIRE_CAPABILITY_RAW_STREAM)) {
-    throw Error(
-        what + ": its firmware (scene " + text_field(info.scene) +
-        ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: "
-        "the calibration stays");
+    throw Error(what + ": its firmware (scene " + text_field(info.scene) +
+                ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: "
+                "the calibration stays");
   }
   if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * FRAME_RATE_MIN_Hz) {
     throw Error(what + ": " + fixed(info.rate_mHz / 1000.0, 1) +
@@ -135,8 +132,7 @@ std::string GainSession::advice() const {
     break;
   }
   if (finder_.refusal() == PlacementFinder::Refusal::light) {
-    return "too light: use a weight that makes at least " + fixed(LIGHT_Pa / 1000.0, 1) +
-           " kPa, about 1 N";
+    return "too light: use a weight that makes at least " + fixed(LIGHT_Pa / 1000.0, 1) + " kPa, about 1 N";
   }
   std::string text = "set the weight down on its round foot";
   if (wanted_) {
@@ -146,20 +142,18 @@ std::string GainSession::advice() const {
 }
 
 std::string GainSession::progress() const {
-  std::string text =
-      std::to_string(placements_.size()) + (placements_.size() == 1 ? " placement" : " placements");
+  std::string text = std::to_string(placements_.size()) + (placements_.size() == 1 ? " placement" : " placements");
   const Solution &solution = judgement_.solution;
   if (solution.solved) {
     const Fitted &last = solution.placements.back();
     text += ", the last at x " + fixed(last.x_mm, 1) + " y " + fixed(last.y_mm, 1) + " mm" +
-            (last.kept ? "" : " (fits no other)") + "; gains known to " +
-            percent(solution.worst_shape_sd()) + ", wanted " + percent(judgement_.wanted_sd);
+            (last.kept ? "" : " (fits no other)") + "; gains known to " + percent(solution.worst_shape_sd()) +
+            ", wanted " + percent(judgement_.wanted_sd);
   }
   return text;
 }
 
-calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale,
-                           std::uint32_t date_s) {
+calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale, std::uint32_t date_s) {
   calibration made{};
   made.date_s = date_s;
   made.placements = static_cast<std::uint16_t>(solution.kept);
@@ -172,8 +166,7 @@ calibration calibration_of(const Solution &solution, const std::optional<ForceSc
       std::lround(std::min(65536.0 * found.dip_share, double(CALIBRATION_DIP_SHARE_MAX_Q16))));
   made.dip_sd_um = made.dip_share_q16 > 0 ? micrometres(found.dip_sd_mm) : std::uint16_t(0);
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
-    made.sensors[k] = {static_cast<float>(solution.gain[k]),
-                       static_cast<float>(solution.reading_sd[k]),
+    made.sensors[k] = {static_cast<float>(solution.gain[k]), static_cast<float>(solution.reading_sd[k]),
                        to_both_sides(1e3 * solution.dx_mm[k], CALIBRATION_OFF_MAX_um),
                        to_both_sides(1e3 * solution.dy_mm[k], CALIBRATION_OFF_MAX_um),
                        to_both_sides(32768.0 * solution.own_width[k], CALIBRATION_WIDER_MAX_Q15)};
@@ -216,9 +209,9 @@ Shape GainSession::shape() const {
 
 Scatter GainSession::scatter(bool calibrated) const {
   const Solution &solution = judgement_.solution;
-  return calibrated ? calibrating::scatter(array_, placements_, solution, solution.gain, shape())
-                    : calibrating::scatter(array_, placements_, solution,
-                                           std::vector<double>(array_.sensors(), 1.0), prior_);
+  return calibrated
+             ? calibrating::scatter(array_, placements_, solution, solution.gain, shape())
+             : calibrating::scatter(array_, placements_, solution, std::vector<double>(array_.sensors(), 1.0), prior_);
 }
 
 } // namespace fingertip::calibrating

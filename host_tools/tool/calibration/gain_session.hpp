@@ -24,8 +24,7 @@ void check_firmware(const wire_info &info, const std::string &what);
 
 /* What a fingertip keeps of a solution; scale: none where the weight is not known. Its own ambient
  * pressure is not in it. */
-calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale,
-                           std::uint32_t date_s);
+calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale, std::uint32_t date_s);
 
 class GainSession {
 public:
@@ -61,8 +60,8 @@ private:
   Shape shape() const; /* that will act: found, but for a prior that the user has set */
 
   Array array_;
-  Shape prior_;      /* that the user has set */
-  bool has_profile_; /* a pad's profile acts: no width is assumed */
+  Shape prior_;             /* that the user has set */
+  bool has_profile_;        /* a pad's profile acts: no width is assumed */
   double ambient_Pa_ = 0.0; /* the mean zero at the last placement */
   PlacementFinder finder_;
   std::vector<Placement> placements_;

@@ -60,8 +60,7 @@ double force_share(const Array &array, const Solution &solution) {
   const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
   std::vector<double> forces;
   for (const Fitted &fitted : solution.placements) {
-    if (fitted.kept && fitted.x_mm >= *left && fitted.x_mm <= *right && fitted.y_mm >= *bottom &&
-        fitted.y_mm <= *top) {
+    if (fitted.kept && fitted.x_mm >= *left && fitted.x_mm <= *right && fitted.y_mm >= *bottom && fitted.y_mm <= *top) {
       forces.push_back(fitted.force);
     }
   }
@@ -135,8 +134,7 @@ void compare_halves(const Array &array, std::vector<Placement> placements, const
     squares += within * within / double(array.sensors());
     const double sd = std::hypot(odd.shape_sd[k], even.shape_sd[k]);
     if (sd <= HALVES_SD_MAX) {
-      judgement.halves_shape =
-          std::max(judgement.halves_shape, std::abs(shape[k]) - HALVES_SDS * sd);
+      judgement.halves_shape = std::max(judgement.halves_shape, std::abs(shape[k]) - HALVES_SDS * sd);
     }
   }
   const double gauge_sd = std::hypot(odd.gauge_sd, even.gauge_sd);
@@ -147,8 +145,7 @@ void compare_halves(const Array &array, std::vector<Placement> placements, const
   for (int half : {0, 1}) {
     const Solution &other = half == 0 ? even : odd;
     const Scatter raw = scatter(array, halves[half], from[half], ones, {});
-    const Scatter calibrated =
-        scatter(array, halves[half], from[half], other.gain, shape_of(other));
+    const Scatter calibrated = scatter(array, halves[half], from[half], other.gain, shape_of(other));
     better *= calibrated.location_mm * calibrated.force / (raw.location_mm * raw.force);
   }
   judgement.helps = better < 1.0;
@@ -156,8 +153,7 @@ void compare_halves(const Array &array, std::vector<Placement> placements, const
 
 /* What the placements lack where gains are not known: by where they are. Where they are not all
  * over the pad the dip seems to tell gains. */
-Reason lacking(const Array &array, const std::vector<Placement> &placements,
-               const Solution &solution) {
+Reason lacking(const Array &array, const std::vector<Placement> &placements, const Solution &solution) {
   if (placements.size() < PLACEMENTS_WANTED || !solution.solved) {
     return Reason::too_few;
   }
@@ -206,17 +202,13 @@ std::string text_of(const Judgement &j, std::size_t placements) {
              "by "
              "itself for a second, and lift it";
     }
-    return "too few placements (" + std::to_string(placements) +
-           "): place the weight at more places all over the pad";
+    return "too few placements (" + std::to_string(placements) + "): place the weight at more places all over the pad";
   case Reason::cluster:
-    return "all placements are near one place" + felt_too_little(j.unsure) +
-           ": place the weight all over the pad";
+    return "all placements are near one place" + felt_too_little(j.unsure) + ": place the weight all over the pad";
   case Reason::one_end:
-    return "part of the pad has no placements" + felt_too_little(j.unsure) +
-           ": place the weight there too";
+    return "part of the pad has no placements" + felt_too_little(j.unsure) + ": place the weight there too";
   case Reason::unsure:
-    return "the gains of sensors " + list_of(j.unsure) + " are only known to " +
-           percent(s.worst_shape_sd()) +
+    return "the gains of sensors " + list_of(j.unsure) + " are only known to " + percent(s.worst_shape_sd()) +
            ": place the weight near them; on thin rubber too few sensors feel a placement";
   case Reason::weights:
     return "the force differed by " + percent(j.force_share) +
@@ -237,8 +229,7 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "the readings are " + percent(s.residual_share) +
            " of the peak off that of one round foot: use one, and see that the pad is whole";
   case Reason::halves:
-    return "every other placement says other gains, by " +
-           percent(std::max(j.halves_shape, j.halves_gauge)) +
+    return "every other placement says other gains, by " + percent(std::max(j.halves_shape, j.halves_gauge)) +
            ": something changed meanwhile; begin again";
   case Reason::useless:
     return "what half of the placements say does not make the other half better, so the gains "
@@ -280,8 +271,8 @@ struct FirmwareFit {
       x.push_back(static_cast<float>(array.x_mm[k]));
       y.push_back(static_cast<float>(array.y_mm[k]));
     }
-    usable_array = fit_array_init(&of, static_cast<std::uint8_t>(array.sensors()), x.data(),
-                                  y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
+    usable_array = fit_array_init(&of, static_cast<std::uint8_t>(array.sensors()), x.data(), y.data(),
+                                  static_cast<float>(array.pitch_mm)) == FT_OK;
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
     settings.prior_sigma_mm = static_cast<float>(shape.sigma_mm);
@@ -290,12 +281,11 @@ struct FirmwareFit {
     settings.dip_sd_mm = static_cast<float>(shape.dip_sd_mm);
     settings.own = own.empty() ? nullptr : own.data();
   }
-  std::optional<fit_result> operator()(const Placement &placement,
-                                       const std::vector<double> &gain) {
+  std::optional<fit_result> operator()(const Placement &placement, const std::vector<double> &gain) {
     std::int32_t pressure[FT_MAX_SENSORS] = {};
     for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
-      pressure[k] = static_cast<std::int32_t>(
-          std::lround(std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
+      pressure[k] =
+          static_cast<std::int32_t>(std::lround(std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
     }
     fit_result result{};
     if (usable_array) {
@@ -346,9 +336,8 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     }
   }
   if (s.solved) {
-    const double of_all =
-        rms_beyond({std::begin(s.ellipse_of_all), std::end(s.ellipse_of_all)},
-                   {std::begin(s.ellipse_of_all_sd), std::end(s.ellipse_of_all_sd)});
+    const double of_all = rms_beyond({std::begin(s.ellipse_of_all), std::end(s.ellipse_of_all)},
+                                     {std::begin(s.ellipse_of_all_sd), std::end(s.ellipse_of_all_sd)});
     j.ellipse = std::hypot(of_all, s.spread.ellipse);
     j.force_share = force_share(array, s);
     j.kept_share = double(s.kept) / double(placements.size());
@@ -391,8 +380,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 }
 
 Shape shape_of(const Solution &solution) {
-  Shape shape{solution.sigma_mm,
-              std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
+  Shape shape{solution.sigma_mm, std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
               solution.dip_share, solution.dip_sd_mm};
   for (std::size_t k = 0; k < solution.own_width.size(); k++) {
     shape.own.push_back({solution.dx_mm[k], solution.dy_mm[k], solution.own_width[k]});
@@ -411,20 +399,17 @@ std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
   };
   std::vector<fit_own> made;
   for (const Own &own : shape.own) {
-    made.push_back(
-        {q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm), q15(own.wider)});
+    made.push_back({q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm), q15(own.wider)});
   }
   return made;
 }
 
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N,
-                                      const Shape &shape) {
+                                      const Solution &solution, double force_N, const Shape &shape) {
   FirmwareFit fit(array, shape);
   std::vector<double> forces, fadings;
   for (std::size_t i = 0; i < placements.size(); i++) {
-    const auto fitted =
-        solution.placements[i].kept ? fit(placements[i], solution.gain) : std::nullopt;
+    const auto fitted = solution.placements[i].kept ? fit(placements[i], solution.gain) : std::nullopt;
     if (fitted) {
       forces.push_back(static_cast<double>(fitted->force_N));
       fadings.push_back(placements[i].fading);
@@ -441,20 +426,18 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
   /* Of a median: 1.2533 of a mean's; of a normal spread: 1.4826 of the median deviation. */
   const double by_chance = 1.2533 * 1.4826 * median(off) / std::sqrt(double(off.size()));
   const double faded = FADED_BEFORE * median(fadings);
-  return ForceScale{force_N / middle,
-                    force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD, faded)};
+  return ForceScale{force_N / middle, force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD, faded)};
 }
 
-Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, const std::vector<double> &gain, const Shape &shape) {
+Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                const std::vector<double> &gain, const Shape &shape) {
   FirmwareFit fit(array, shape);
   std::vector<double> distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted = solution.placements[i].kept ? fit(placements[i], gain) : std::nullopt;
     if (fitted) {
-      distances.push_back(
-          std::hypot(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm,
-                     static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm));
+      distances.push_back(std::hypot(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm,
+                                     static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm));
       forces.push_back(static_cast<double>(fitted->force_N));
     }
   }

@@ -21,26 +21,25 @@ struct fit_own;
 
 namespace fingertip::calibrating {
 
-constexpr double SHAPE_SD_WANTED = 0.015;  /* largest sd of a gain outside the gauge */
-constexpr double GAUGE_SD_WANTED = 0.02;   /* rms sd of the gains within it */
-constexpr double HELPS_SHARE = 0.7;        /* of the gains' spread: half of its square is known */
-constexpr double RESIDUAL_MAX = 0.008;     /* rms, of the peak; the recording of
-                                              host_tools/report/real that chooses: 0.0065 at most */
-constexpr double KEPT_MIN = 0.7;           /* share of the placements */
-constexpr double HALVES_SHAPE_MAX = 0.025; /* odd and even placements: largest difference of a gain
-                                              outside the gauge, beyond two sds of it */
-constexpr double HALVES_GAUGE_MAX = 0.04;  /* and within */
-constexpr double FORCE_SPREAD_MAX = 0.065; /* rms of e within the array: one weight */
-constexpr double ELLIPSE_MAX = 0.05;       /* rms of q1, q2 beyond their sds: a round foot. Lying
-                                              cylinders of 6 by 12 mm have 0.053 and more, balls
-                                              0.031 at most (truth_calibration, seed 20000) */
-constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros */
-constexpr double DRIFT_MAX = 0.006;        /* the same, from first to last placement */
-constexpr double POSITION_MAX_mm = 0.5;    /* rms: sensors where the layout says */
+constexpr double SHAPE_SD_WANTED = 0.015;     /* largest sd of a gain outside the gauge */
+constexpr double GAUGE_SD_WANTED = 0.02;      /* rms sd of the gains within it */
+constexpr double HELPS_SHARE = 0.7;           /* of the gains' spread: half of its square is known */
+constexpr double RESIDUAL_MAX = 0.008;        /* rms, of the peak; the recording of
+                                                 host_tools/report/real that chooses: 0.0065 at most */
+constexpr double KEPT_MIN = 0.7;              /* share of the placements */
+constexpr double HALVES_SHAPE_MAX = 0.025;    /* odd and even placements: largest difference of a gain
+                                                 outside the gauge, beyond two sds of it */
+constexpr double HALVES_GAUGE_MAX = 0.04;     /* and within */
+constexpr double FORCE_SPREAD_MAX = 0.065;    /* rms of e within the array: one weight */
+constexpr double ELLIPSE_MAX = 0.05;          /* rms of q1, q2 beyond their sds: a round foot. Lying
+                                                 cylinders of 6 by 12 mm have 0.053 and more, balls
+                                                 0.031 at most (truth_calibration, seed 20000) */
+constexpr double OFFSET_MAX = 0.012;          /* rms over the sensors, of the peak: zeros */
+constexpr double DRIFT_MAX = 0.006;           /* the same, from first to last placement */
+constexpr double POSITION_MAX_mm = 0.5;       /* rms: sensors where the layout says */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */
-constexpr std::size_t PLACEMENTS_ENOUGH =
-    20;                                    /* more hardly make gains surer that are not by then */
-constexpr std::size_t PLACEMENTS_MAX = 60; /* who is not done by then never will be */
+constexpr std::size_t PLACEMENTS_ENOUGH = 20; /* more hardly make gains surer that are not by then */
+constexpr std::size_t PLACEMENTS_MAX = 60;    /* who is not done by then never will be */
 
 enum class Reason {
   none,
@@ -73,11 +72,11 @@ struct Judgement {
   double kept_share = 0.0, force_share = 0.0;    /* the latter: rms of e, of placements within the
                                                     array */
   double ellipse = 0.0;                          /* rms of q1, q2 beyond their sds */
-  double offset_share = 0.0, drift_share = 0.0; /* rms over the sensors beyond what is by chance, of
-                                                   the peak */
-  double wanted_sd = 0.0;                       /* of the gains outside the gauge, to be good */
-  std::vector<std::size_t> unsure; /* sensors whose gain is not known well enough yet */
-  std::vector<std::size_t> silent; /* of those, the ones without a reading in any placement */
+  double offset_share = 0.0, drift_share = 0.0;  /* rms over the sensors beyond what is by chance, of
+                                                    the peak */
+  double wanted_sd = 0.0;                        /* of the gains outside the gauge, to be good */
+  std::vector<std::size_t> unsure;               /* sensors whose gain is not known well enough yet */
+  std::vector<std::size_t> silent;               /* of those, the ones without a reading in any placement */
 };
 
 /* last: there will be no more placements, so what is not good is refused. */
@@ -115,7 +114,7 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
 struct Scatter {
   double location_mm = 0.0, force = 0.0;
 };
-Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, const std::vector<double> &gain, const Shape &shape);
+Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                const std::vector<double> &gain, const Shape &shape);
 
 } // namespace fingertip::calibrating

@@ -47,8 +47,7 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
     known += 2.0;
     count += 1.0;
     for (int j = 2; j < LOCAL; j++) {
-      squares[j] +=
-          std::min(locals[i][j] * locals[i][j], CAPPED * CAPPED * sd[j] * sd[j]) + own(j, j);
+      squares[j] += std::min(locals[i][j] * locals[i][j], CAPPED * CAPPED * sd[j] * sd[j]) + own(j, j);
       known += std::max(1.0 - own(j, j) / (sd[j] * sd[j]), 0.0);
     }
     const double t = model.tau(placements[i]);

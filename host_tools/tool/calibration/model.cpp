@@ -15,10 +15,8 @@ double huber_weight(double square) {
   return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square);
 }
 
-Model::Model(const Array &array, const std::vector<Placement> &placements,
-             const Assumptions &assumptions)
-    : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements),
-      assumed_(assumptions) {
+Model::Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions)
+    : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements), assumed_(assumptions) {
   double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
   std::vector<double> peaks;
   for (const Placement &placement : placements) {
@@ -99,25 +97,21 @@ Unknowns Model::first_guess() const {
     widths.push_back(array_.pitch_mm * std::sqrt(-0.5 / bend));
   }
   const auto median = [](std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2),
-                     values.end());
+    std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
     return values[values.size() / 2];
   };
-  first.global[layout.log_peak()] =
-      std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
+  first.global[layout.log_peak()] = std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
   first.global[layout.log_width()] = std::log(median(widths));
   first.global[layout.mixing()] = assumed_.mixing;
   first.global[layout.dip_width()] = std::log(DIP_PITCHES);
   return first;
 }
 
-Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
-                       double earlier_Pa) const {
+Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, double earlier_Pa) const {
   const double u = array_.x_mm[std::size_t(k)] + g[layout.dx(k)] - l[0];
   const double v = array_.y_mm[std::size_t(k)] + g[layout.dy(k)] - l[1];
   const double q1 = l[4] + g[layout.ellipse(0)], q2 = l[5] + g[layout.ellipse(1)];
-  const double square =
-      std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
+  const double square = std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
   const double width = std::exp(g[layout.log_width()] + g[layout.own_width(k)] + l[3]);
   const double m = g[layout.mixing()];
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);

@@ -54,13 +54,11 @@ double huber_weight(double square);
 class Model {
 public:
   /* placements: with earlier_Pa; they and the array outlive the model. */
-  Model(const Array &array, const std::vector<Placement> &placements,
-        const Assumptions &assumptions);
+  Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions);
 
   /* Each placement where the readings' logarithms have their peak, in pitches. */
   Unknowns first_guess() const;
-  Reading reading(const Eigen::VectorXd &g, const Local &l, int k, double tau,
-                  double earlier_Pa) const;
+  Reading reading(const Eigen::VectorXd &g, const Local &l, int k, double tau, double earlier_Pa) const;
   double tau(const Placement &placement) const { return (placement.t_s - middle_s_) / half_s_; }
   double expected_sd(const Placement &placement, double reading_Pa) const;
   double expected_sd(const Placement &placement, int k) const {

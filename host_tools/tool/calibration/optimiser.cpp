@@ -16,8 +16,7 @@ constexpr double COST_SETTLED = 1e-10; /* relative */
 } // namespace
 
 Optimiser::Optimiser(const Model &model)
-    : at(model.first_guess()), kept(model.placements().size(), true), model_(model),
-      placements_(model.placements()) {}
+    : at(model.first_guess()), kept(model.placements().size(), true), model_(model), placements_(model.placements()) {}
 
 void Optimiser::descend(int steps) {
   double damping = steps > 1 ? 1e-3 : 1e-6;
@@ -103,10 +102,9 @@ double Optimiser::cost(const Unknowns &unknowns) const {
     const double t = model_.tau(placements_[i]);
     for (int k = 0; kept[i] && k < model_.layout.sensors; k++) {
       if (placements_[i].usable >> k & 1u) {
-        const double r =
-            (placements_[i].reading_Pa[std::size_t(k)] -
-             model_.reading(g, l[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]).model) /
-            model_.expected_sd(placements_[i], k);
+        const double r = (placements_[i].reading_Pa[std::size_t(k)] -
+                          model_.reading(g, l[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]).model) /
+                         model_.expected_sd(placements_[i], k);
         sum += huber(r * r);
       }
     }
@@ -143,8 +141,7 @@ void Optimiser::assemble() {
       if (!(placements_[i].usable >> k & 1u)) {
         continue;
       }
-      const Reading r =
-          model_.reading(at.global, at.locals[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]);
+      const Reading r = model_.reading(at.global, at.locals[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]);
       const double per = 1.0 / model_.expected_sd(placements_[i], k);
       const double left = (placements_[i].reading_Pa[std::size_t(k)] - r.model) * per;
       const double weight = huber_weight(left * left) * per;

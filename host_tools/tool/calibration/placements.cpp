@@ -75,8 +75,7 @@ std::optional<Placement> PlacementFinder::take(const Frame &frame) {
 }
 
 /* Means over the slots that begin in this time; sensors that were measured often enough. */
-std::vector<double> PlacementFinder::mean_of(double begin_s, double end_s,
-                                             std::uint32_t *seen) const {
+std::vector<double> PlacementFinder::mean_of(double begin_s, double end_s, std::uint32_t *seen) const {
   std::vector<double> sums(sensors_, 0.0), counts(sensors_, 0.0);
   double frames = 0.0;
   for (const Slot &slot : slots_) {
@@ -223,8 +222,7 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   }
   const double noise = NOISE_Pa / std::sqrt(frames / slots);
   const bool still = std::abs(common) <= DECAY_MAX * sum + NOISE_SDS * noise &&
-                     shift <= SHIFT_MAX * peak + NOISE_SDS * noise &&
-                     sway <= SWAY_MAX * peak + SWAY_NOISES * noise;
+                     shift <= SHIFT_MAX * peak + NOISE_SDS * noise && sway <= SWAY_MAX * peak + SWAY_NOISES * noise;
   if (peak < LIGHT_Pa && still) {
     /* Rubber that comes back after a release is like that, too: the level to rest at now. */
     state_ = State::resting;

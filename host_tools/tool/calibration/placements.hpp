@@ -24,11 +24,9 @@
 
 namespace fingertip::calibrating {
 
-constexpr double TOUCH_Pa =
-    400.0; /* above what drift does in a second, and rubber after a release */
+constexpr double TOUCH_Pa = 400.0;  /* above what drift does in a second, and rubber after a release */
 constexpr double LIGHT_Pa = 1500.0; /* peak: with less, zeros weigh too much */
-constexpr double DECAY_MAX =
-    0.08; /* of all readings in half a second: 26 % in 8 s is 0.05 at 0.75 s */
+constexpr double DECAY_MAX = 0.08;  /* of all readings in half a second: 26 % in 8 s is 0.05 at 0.75 s */
 constexpr double SHIFT_MAX = 0.025; /* of a sensor against the others, of the peak: 9 to 26 % in 8 s
                                        differ by 0.015 */
 constexpr double SWAY_MAX = 0.005;  /* about a steady change, rms, of the peak */

@@ -12,15 +12,12 @@ namespace fingertip::calibrating {
 namespace {
 
 /* Warnings that say nothing against a load: its standard deviation has what they are about. */
-constexpr std::uint32_t HARMLESS =
-    CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_SENSOR_MASKED;
+constexpr std::uint32_t HARMLESS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_SENSOR_MASKED;
 
 /* Without its scale's own uncertainty, which is what is sought. */
 double sd_without_scale_N(const wire_contact &contact, const pad_profile &pad) {
-  const double size_N =
-      std::hypot(static_cast<double>(contact.qx_N), static_cast<double>(contact.qy_N));
-  const double of_scale_N =
-      size_N * static_cast<double>(pad.tangential_scale_sd / pad.tangential_scale);
+  const double size_N = std::hypot(static_cast<double>(contact.qx_N), static_cast<double>(contact.qy_N));
+  const double of_scale_N = size_N * static_cast<double>(pad.tangential_scale_sd / pad.tangential_scale);
   const auto sd_N = static_cast<double>(contact.q_sd_N);
   return std::sqrt(std::max(0.0, sd_N * sd_N - of_scale_N * of_scale_N));
 }
@@ -41,8 +38,7 @@ void check_pad(const wire_info &info, const std::string &what) {
   }
 }
 
-PullSession::PullSession(const wire_info &info, double known_N)
-    : pad_(info.pad), known_N_(known_N), finder_(known_N) {
+PullSession::PullSession(const wire_info &info, double known_N) : pad_(info.pad), known_N_(known_N), finder_(known_N) {
   judge(false);
 }
 
@@ -93,14 +89,14 @@ std::string PullSession::advice() const {
 std::string PullSession::last_pull_text() const {
   const Pull &pull = pulls_.back();
   const double degrees = std::atan2(pull.qy_N, pull.qx_N) * 180.0 / M_PI;
-  return "pull " + std::to_string(pulls_.size()) + " at x " + fixed(pull.x_mm, 1) + " y " +
-         fixed(pull.y_mm, 1) + " mm: reads " + fixed(std::hypot(pull.qx_N, pull.qy_N), 2) +
-         " N towards " + fixed(degrees, 0) + " degrees, under " + fixed(pull.force_N, 2) + " N";
+  return "pull " + std::to_string(pulls_.size()) + " at x " + fixed(pull.x_mm, 1) + " y " + fixed(pull.y_mm, 1) +
+         " mm: reads " + fixed(std::hypot(pull.qx_N, pull.qy_N), 2) + " N towards " + fixed(degrees, 0) +
+         " degrees, under " + fixed(pull.force_N, 2) + " N";
 }
 
 std::string PullSession::weak_text() const {
-  return fixed(known_N_, 2) + " N is small beside the fingertip's possible error there, " +
-         fixed(finder_.sd_N(), 2) + " N: pull harder, or calibrate the gains first";
+  return fixed(known_N_, 2) + " N is small beside the fingertip's possible error there, " + fixed(finder_.sd_N(), 2) +
+         " N: pull harder, or calibrate the gains first";
 }
 
 pad_profile PullSession::scaled(pad_profile pad) const {

@@ -84,16 +84,14 @@ std::optional<PullFrame> PullFinder::still(double span_s, double mean_s) const {
   if (frames_.front().t_s > begin_s) {
     return std::nullopt;
   }
-  const auto begin = std::find_if(frames_.begin(), frames_.end(),
-                                  [&](const PullFrame &each) { return each.t_s >= begin_s; });
+  const auto begin =
+      std::find_if(frames_.begin(), frames_.end(), [&](const PullFrame &each) { return each.t_s >= begin_s; });
   if (static_cast<double>(std::distance(begin, frames_.end())) < PULL_RATE_MIN_Hz * span_s) {
     return std::nullopt; /* too few of them came */
   }
   const auto middle = begin + std::distance(begin, frames_.end()) / 2;
   const Mean a = mean_of(begin, middle), b = mean_of(middle, frames_.end());
-  const auto chance = [&](double of_a, double of_b) {
-    return CHANCE_SDS * std::sqrt(of_a / a.count + of_b / b.count);
-  };
+  const auto chance = [&](double of_a, double of_b) { return CHANCE_SDS * std::sqrt(of_a / a.count + of_b / b.count); };
   const double q_N = std::hypot(b.mean.qx_N - a.mean.qx_N, b.mean.qy_N - a.mean.qy_N);
   const double force_N = std::abs(b.mean.force_N - a.mean.force_N);
   if (q_N > DRIFT_PULL_MAX * known_N_ + chance(a.q_variance, b.q_variance) ||
@@ -102,8 +100,7 @@ std::optional<PullFrame> PullFinder::still(double span_s, double mean_s) const {
     return std::nullopt;
   }
   const double mean_begin_s = frames_.back().t_s - mean_s;
-  return mean_of(std::find_if(begin, frames_.end(),
-                              [&](const PullFrame &each) { return each.t_s >= mean_begin_s; }),
+  return mean_of(std::find_if(begin, frames_.end(), [&](const PullFrame &each) { return each.t_s >= mean_begin_s; }),
                  frames_.end())
       .mean;
 }
@@ -130,8 +127,7 @@ std::optional<Pull> PullFinder::take(const PullFrame &frame) {
     refusal_ = Refusal::none;
     touch_s_ = frame.t_s;
   }
-  if (!frame.good || frame.t_s - touch_s_ < TOUCHED_s || state_ == State::taken ||
-      state_ == State::refused) {
+  if (!frame.good || frame.t_s - touch_s_ < TOUCHED_s || state_ == State::taken || state_ == State::refused) {
     return std::nullopt;
   }
   frames_.push_back(frame);
@@ -153,8 +149,7 @@ std::optional<Pull> PullFinder::take(const PullFrame &frame) {
   if (place_mm(frame, rest_) > MOVED_MAX_mm) {
     return refuse(Refusal::slid);
   }
-  const bool pulls =
-      std::hypot(frame.qx_N - rest_.qx_N, frame.qy_N - rest_.qy_N) > PULLED_MIN * known_N_;
+  const bool pulls = std::hypot(frame.qx_N - rest_.qx_N, frame.qy_N - rest_.qy_N) > PULLED_MIN * known_N_;
   state_ = pulls ? State::pulled : State::resting;
   if (!pulls) {
     frames_.clear();
@@ -165,11 +160,7 @@ std::optional<Pull> PullFinder::take(const PullFrame &frame) {
     return std::nullopt;
   }
   state_ = State::taken;
-  return Pull{frame.t_s,
-              pulled->qx_N - rest_.qx_N,
-              pulled->qy_N - rest_.qy_N,
-              pulled->force_N,
-              pulled->x_mm,
+  return Pull{frame.t_s,   pulled->qx_N - rest_.qx_N, pulled->qy_N - rest_.qy_N, pulled->force_N, pulled->x_mm,
               pulled->y_mm};
 }
 
@@ -183,8 +174,8 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
   };
   const State lacking = last ? State::refused : State::more;
   const auto lacks = [&](std::size_t there, std::size_t wanted, const std::string &of) {
-    return ends(lacking, std::to_string(there) + " of " + std::to_string(wanted) + " pulls" + of +
-                             (last ? "; pull more" : ""));
+    return ends(lacking,
+                std::to_string(there) + " of " + std::to_string(wanted) + " pulls" + of + (last ? "; pull more" : ""));
   };
   if (pulls.empty()) {
     return lacks(0, PULLS_WANTED, "");
@@ -204,16 +195,14 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
   }
   judgement.kept = all.count;
   judgement.reading = all.mean();
-  judgement.reading_sd =
-      std::hypot(std::sqrt(all.variance() / static_cast<double>(all.count)) / all.mean(), KNOWN_SD);
+  judgement.reading_sd = std::hypot(std::sqrt(all.variance() / static_cast<double>(all.count)) / all.mean(), KNOWN_SD);
   if (pulls.size() < PULLS_WANTED) {
     return lacks(pulls.size(), PULLS_WANTED, "");
   }
   if (static_cast<double>(all.count) < PULLS_KEPT_MIN * static_cast<double>(pulls.size())) {
-    return ends(State::refused,
-                "only " + std::to_string(all.count) + " of " + std::to_string(pulls.size()) +
-                    " pulls agree within " + fixed(100.0 * PULL_STRAY_MAX, 0) +
-                    " %; use one and the same weight, and keep the string level and free");
+    return ends(State::refused, "only " + std::to_string(all.count) + " of " + std::to_string(pulls.size()) +
+                                    " pulls agree within " + fixed(100.0 * PULL_STRAY_MAX, 0) +
+                                    " %; use one and the same weight, and keep the string level and free");
   }
   for (const std::size_t axis : {0U, 1U}) {
     const std::size_t there = ways[axis].count + ways[axis + 2].count;
@@ -230,16 +219,14 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
       const double variance = ways[a].variance() / static_cast<double>(ways[a].count) +
                               ways[b].variance() / static_cast<double>(ways[b].count);
       if (difference > WAYS_MAX + 2.0 * std::sqrt(variance) / all.mean()) {
-        return ends(State::refused, std::string("directions disagree: pulls towards ") + WAYS[b] +
-                                        " read " + fixed(ways[b].mean() * known_N, 2) +
-                                        " N, towards " + WAYS[a] + " " +
+        return ends(State::refused, std::string("directions disagree: pulls towards ") + WAYS[b] + " read " +
+                                        fixed(ways[b].mean() * known_N, 2) + " N, towards " + WAYS[a] + " " +
                                         fixed(ways[a].mean() * known_N, 2) +
                                         " N; keep the string level, and calibrate the gains first");
       }
     }
   }
-  return ends(State::good, "the tangential force's scale is known to " +
-                               fixed(100.0 * judgement.reading_sd, 1) + " %");
+  return ends(State::good, "the tangential force's scale is known to " + fixed(100.0 * judgement.reading_sd, 1) + " %");
 }
 
 } // namespace fingertip::calibrating

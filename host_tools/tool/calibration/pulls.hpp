@@ -87,8 +87,8 @@ private:
  * scales scatter by 0.7 % and claim 1.3. Where gains are off by 10 % pulls differ by 9 % rms. */
 constexpr std::size_t PULLS_WANTED = 8;
 constexpr std::size_t PULLS_OF_AN_AXIS = 3; /* within 45 degrees of x, and of y */
-constexpr double PULL_STRAY_MAX = 0.2;  /* from the median, of it: what is farther is left out */
-constexpr double PULLS_KEPT_MIN = 0.75; /* share */
+constexpr double PULL_STRAY_MAX = 0.2;      /* from the median, of it: what is farther is left out */
+constexpr double PULLS_KEPT_MIN = 0.75;     /* share */
 /* Between the means of the ways +x, +y, -x, -y that have two pulls at least, beyond two standard
  * deviations of the difference. */
 constexpr double WAYS_MAX = 0.1;

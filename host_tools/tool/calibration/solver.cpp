@@ -49,8 +49,8 @@ double overlap(const Bells &a, const Bells &b, double reach) {
   double sum = 0.0;
   for (const auto &[height, width] : a.bells) {
     for (const auto &[other_height, other_width] : b.bells) {
-      sum += height * other_height /
-             (1.0 / (width * width) + 1.0 / (other_width * other_width) + 1.0 / (reach * reach));
+      sum +=
+          height * other_height / (1.0 / (width * width) + 1.0 / (other_width * other_width) + 1.0 / (reach * reach));
     }
   }
   return sum;
@@ -145,8 +145,7 @@ void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
   for (std::size_t i = 0; i < model.placements().size(); i++) {
     const Fitted &fitted = solution.placements[i];
     optimiser.kept[i] = fitted.kept;
-    locals[i] << fitted.x_mm, fitted.y_mm, fitted.force, fitted.width, fitted.ellipse[0],
-        fitted.ellipse[1];
+    locals[i] << fitted.x_mm, fitted.y_mm, fitted.force, fitted.width, fitted.ellipse[0], fitted.ellipse[1];
   }
   model.assume(solution.spread, solution.excess);
 }
@@ -190,8 +189,7 @@ void remember(std::vector<Placement> &placements) {
       const double age_s = placements[i].t_s - placements[j].t_s;
       const double left = std::exp(-age_s / SLOW_s) + FAST_SHARE * std::exp(-age_s / FAST_s);
       for (std::size_t k = 0; k < placements[i].reading_Pa.size(); k++) {
-        placements[i].earlier_Pa[k] +=
-            placements[j].usable >> k & 1u ? left * placements[j].reading_Pa[k] : 0.0;
+        placements[i].earlier_Pa[k] += placements[j].usable >> k & 1u ? left * placements[j].reading_Pa[k] : 0.0;
       }
     }
   }
@@ -199,8 +197,8 @@ void remember(std::vector<Placement> &placements) {
 
 namespace {
 
-Solution solve_any(const Array &array, const std::vector<Placement> &given,
-                   const Assumptions &assumptions, bool keep_all, const Solution *from) {
+Solution solve_any(const Array &array, const std::vector<Placement> &given, const Assumptions &assumptions,
+                   bool keep_all, const Solution *from) {
   for (const Placement &placement : given) {
     if (placement.reading_Pa.size() != array.sensors()) {
       throw std::invalid_argument("a placement has as many readings as the array has sensors");
@@ -231,11 +229,9 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
       double left_squares = 0.0, misfit = 0.0, count = 0.0;
       for (int k = 0; k < layout.sensors; k++) {
         if (placements[i].usable >> k & 1u) {
-          const double left = placements[i].reading_Pa[std::size_t(k)] -
-                              model
-                                  .reading(global, local, k, model.tau(placements[i]),
-                                           placements[i].earlier_Pa[std::size_t(k)])
-                                  .model;
+          const double left =
+              placements[i].reading_Pa[std::size_t(k)] -
+              model.reading(global, local, k, model.tau(placements[i]), placements[i].earlier_Pa[std::size_t(k)]).model;
           const double expected = model.expected_sd(placements[i], k);
           left_squares += left * left;
           misfit += left * left / (expected * expected);
@@ -265,8 +261,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   }
   optimiser.descend();
   look();
-  for (int round = 0; !keep_all && !from && round < DROP_ROUNDS && misfits.size() > PLACEMENTS_MIN;
-       round++) {
+  for (int round = 0; !keep_all && !from && round < DROP_ROUNDS && misfits.size() > PLACEMENTS_MIN; round++) {
     const auto middle = misfits.begin() + std::ptrdiff_t(misfits.size() / 2);
     std::nth_element(misfits.begin(), middle, misfits.end());
     const double limit = DROP_MISFIT * std::max(*middle, 1.0);
@@ -284,9 +279,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
     look();
   }
   MatrixXd covariance = optimiser.covariance();
-  for (int round = 0; !from && round < LEARN_ROUNDS &&
-                      learn_spreads(model, optimiser, assumptions, covariance) > LEARNT;
-       round++) {
+  for (int round = 0;
+       !from && round < LEARN_ROUNDS && learn_spreads(model, optimiser, assumptions, covariance) > LEARNT; round++) {
     optimiser.descend(1);
     covariance = optimiser.covariance();
   }
@@ -353,11 +347,9 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   /* By the width and the mixing, which go against each other. */
   constexpr double STEP = 0.05;
   const double by_mixing =
-      (near(solution.mixing + STEP).width - near(solution.mixing - STEP).width) /
-      (2.0 * STEP * width);
+      (near(solution.mixing + STEP).width - near(solution.mixing - STEP).width) / (2.0 * STEP * width);
   const int at_width = layout.log_width(), at_mixing = layout.mixing();
-  const double variance = covariance(at_width, at_width) +
-                          2.0 * by_mixing * covariance(at_width, at_mixing) +
+  const double variance = covariance(at_width, at_width) + 2.0 * by_mixing * covariance(at_width, at_mixing) +
                           by_mixing * by_mixing * covariance(at_mixing, at_mixing);
   solution.sigma_sd_mm = solution.sigma_mm * std::sqrt(std::max(variance, 0.0));
   solution.solved = std::isfinite(solution.cost) && of_gains.allFinite();
@@ -366,13 +358,13 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
 
 } // namespace
 
-Solution solve(const Array &array, const std::vector<Placement> &placements,
-               const Assumptions &assumptions, bool keep_all) {
+Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions,
+               bool keep_all) {
   return solve_any(array, placements, assumptions, keep_all, nullptr);
 }
 
-Solution solve_from(const Array &array, const std::vector<Placement> &placements,
-                    const Solution &from, const Assumptions &assumptions) {
+Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from,
+                    const Assumptions &assumptions) {
   return solve_any(array, placements, assumptions, true, &from);
 }
 
@@ -401,10 +393,8 @@ Wanted next_place(const Array &array, const std::vector<Placement> &given, const
       double nearest = placements.empty() ? -std::hypot(x_mm[c], y_mm[c]) + 1e3 : 1e3;
       for (const Placement &placement : placements) {
         const auto strongest = static_cast<std::size_t>(
-            std::max_element(placement.reading_Pa.begin(), placement.reading_Pa.end()) -
-            placement.reading_Pa.begin());
-        nearest = std::min(
-            nearest, std::hypot(x_mm[c] - array.x_mm[strongest], y_mm[c] - array.y_mm[strongest]));
+            std::max_element(placement.reading_Pa.begin(), placement.reading_Pa.end()) - placement.reading_Pa.begin());
+        nearest = std::min(nearest, std::hypot(x_mm[c] - array.x_mm[strongest], y_mm[c] - array.y_mm[strongest]));
       }
       if (nearest > farthest) {
         farthest = nearest;
@@ -423,8 +413,7 @@ Wanted next_place(const Array &array, const std::vector<Placement> &given, const
   double lowest = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < x_mm.size(); c++) {
     const MatrixXd with = information + optimiser.information_at(x_mm[c], y_mm[c]);
-    const MatrixXd covariance =
-        with.ldlt().solve(MatrixXd::Identity(with.rows(), with.rows()).leftCols(n));
+    const MatrixXd covariance = with.ldlt().solve(MatrixXd::Identity(with.rows(), with.rows()).leftCols(n));
     const MatrixXd of_shape = outside * gain_covariance(covariance, n) * outside;
     const double worst = std::sqrt(of_shape.diagonal().maxCoeff());
     if (worst < lowest) {

@@ -58,7 +58,7 @@ struct Placement {
   std::uint32_t usable = 0;       /* bitmap of the sensors whose reading is a measurement */
   double noise_Pa = 0.0;          /* sd of a mean */
   std::vector<double> earlier_Pa; /* [sensor] M; empty: of the placements before it in the list */
-  double fading = 0.0; /* share of them that the readings together lose in the half second */
+  double fading = 0.0;            /* share of them that the readings together lose in the half second */
 };
 
 /* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,
@@ -78,20 +78,20 @@ constexpr double GRAVITY_N_PER_g = 9.80665e-3;
 
 /* What a session is expected to hold: standard deviations of the priors. */
 struct Assumptions {
-  double gain = 0.2;            /* of the log gains: real pads spread by 12 to 22 % */
-  double position_mm = 0.1;     /* of a sensor from its place in the layout, each way */
-  double offset_share = 0.0075; /* of the peak: zeros that were off, and how far they move from
-                                   first to last placement. A wide dip and such zeros look alike:
-                                   with more, gains of real pads suffer; with less, sessions of the
-                                   twin pass whose zeros were off (truth_calibration, seed 20000) */
-  double force = 0.025;         /* of the force between placements of one weight */
-  double width = 0.01;          /* of the width between places: a pad cast a little aslant */
-  double ellipse = 0.007;       /* of q1 and q2 from placement to placement; axes differ by 2 q */
-  double ellipse_of_all = 0.03; /* of their means: a foot is a foot, but its shape is not known */
-  double memory = 0.03;         /* of r: losing 17.5 % in 8 s makes 0.025 */
-  double own_width = 0.01;      /* of b: 0.035 to 0.07 on real pads, which a session shows */
-  double model_share = 0.002;   /* of the peak: what the profile leaves (above, and 0.13 % rms) */
-  double reading_share = 0.003; /* of a reading: what rubber does between 0.5 and 1 s */
+  double gain = 0.2;                    /* of the log gains: real pads spread by 12 to 22 % */
+  double position_mm = 0.1;             /* of a sensor from its place in the layout, each way */
+  double offset_share = 0.0075;         /* of the peak: zeros that were off, and how far they move from
+                                           first to last placement. A wide dip and such zeros look alike:
+                                           with more, gains of real pads suffer; with less, sessions of the
+                                           twin pass whose zeros were off (truth_calibration, seed 20000) */
+  double force = 0.025;                 /* of the force between placements of one weight */
+  double width = 0.01;                  /* of the width between places: a pad cast a little aslant */
+  double ellipse = 0.007;               /* of q1 and q2 from placement to placement; axes differ by 2 q */
+  double ellipse_of_all = 0.03;         /* of their means: a foot is a foot, but its shape is not known */
+  double memory = 0.03;                 /* of r: losing 17.5 % in 8 s makes 0.025 */
+  double own_width = 0.01;              /* of b: 0.035 to 0.07 on real pads, which a session shows */
+  double model_share = 0.002;           /* of the peak: what the profile leaves (above, and 0.13 % rms) */
+  double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
   double dip = 0.05;                    /* of h: 0.05 on real pads, 0 on the twin's */
   /* Of log B. So narrow because zeros and a model that is off look like another width where the
@@ -170,13 +170,13 @@ constexpr std::size_t PLACEMENTS_MIN = 3;
 
 /* Throws std::invalid_argument if a placement has another number of readings than the array has
  * sensors. keep_all: drop none, to compare with another solver. */
-Solution solve(const Array &array, const std::vector<Placement> &placements,
-               const Assumptions &assumptions = {}, bool keep_all = false);
+Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions = {},
+               bool keep_all = false);
 
 /* Of some of the placements of a session, with the spreads that all of it showed, beginning where
  * all of it ended; from.placements are theirs. A few placements alone may have a second optimum. */
-Solution solve_from(const Array &array, const std::vector<Placement> &placements,
-                    const Solution &from, const Assumptions &assumptions = {});
+Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from,
+                    const Assumptions &assumptions = {});
 
 /* The log gains with their mean, tilt and bowl taken out. */
 std::vector<double> outside_gauge(const Array &array, const std::vector<double> &gain);
@@ -194,7 +194,7 @@ struct Wanted {
   double x_mm, y_mm;
   double worst_shape_sd; /* then */
 };
-Wanted next_place(const Array &array, const std::vector<Placement> &placements,
-                  const Solution &solution, const Assumptions &assumptions = {});
+Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                  const Assumptions &assumptions = {});
 
 } // namespace fingertip::calibrating

@@ -32,10 +32,8 @@ void print_result(const GainSession &work, const calibration &made, std::optiona
               work.placements().size());
   print_gains(made, static_cast<std::uint8_t>(work.array().sensors()));
   std::printf("\nof the placements      before     after\n");
-  std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm,
-              after.location_mm);
-  std::printf("force differs by    %6.1f %%  %6.1f %%    median\n", 100.0 * before.force,
-              100.0 * after.force);
+  std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm, after.location_mm);
+  std::printf("force differs by    %6.1f %%  %6.1f %%    median\n", 100.0 * before.force, 100.0 * after.force);
   if (force_N) {
     std::printf("force scale         %9s %9s    sd %s\n", "1.000",
                 fixed(static_cast<double>(made.force_scale), 3).c_str(),
@@ -78,8 +76,7 @@ void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
 
 void show_placement(const GainSession &session) {
   const Placement &found = session.placements().back();
-  std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(),
-              found.t_s,
+  std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(), found.t_s,
               1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
 }
 
@@ -87,13 +84,11 @@ int show(const CalibrateOptions &options) {
   CalibratedDevice device(options);
   const wire_info &info = device.info();
   if (!(info.stored & WIRE_STORED_CALIBRATION)) {
-    std::printf("not calibrated%s\n",
-                info.stored & WIRE_STORED_DAMAGED ? "; what was stored cannot be read" : "");
+    std::printf("not calibrated%s\n", info.stored & WIRE_STORED_DAMAGED ? "; what was stored cannot be read" : "");
     return 0;
   }
-  std::printf("calibrated %s from %u placements, force scale %s sd %s\n",
-              date_text(info.calibration.date_s).c_str(), info.calibration.placements,
-              fixed(static_cast<double>(info.calibration.force_scale), 3).c_str(),
+  std::printf("calibrated %s from %u placements, force scale %s sd %s\n", date_text(info.calibration.date_s).c_str(),
+              info.calibration.placements, fixed(static_cast<double>(info.calibration.force_scale), 3).c_str(),
               fixed(static_cast<double>(info.calibration.force_scale_sd), 3).c_str());
   std::printf("%s\n", shape_text(info.calibration).c_str());
   print_gains(info.calibration, info.sensor_count);
@@ -123,13 +118,10 @@ void use_thickness(CalibratedDevice &device, const calibration &made,
     std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
                 "rubber ends\n",
                 fixed(for_profile->mm, 1).c_str());
-  } else if ((info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && (info.stored & WIRE_STORED_PAD) &&
-             found) {
-    const std::string other =
-        pad::disagreement(*found, static_cast<double>(info.pad.thickness_mm));
+  } else if ((info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && (info.stored & WIRE_STORED_PAD) && found) {
+    const std::string other = pad::disagreement(*found, static_cast<double>(info.pad.thickness_mm));
     if (!other.empty()) {
-      std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n",
-                   other.c_str());
+      std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n", other.c_str());
     }
   }
 }
@@ -146,8 +138,7 @@ int calibrate(const CalibrateOptions &options) {
     work_live(*device, *work, options.colour);
     info = device->info();
   } else {
-    calibrating::Recorded recorded =
-        calibrating::session_from(options.from, options.choice.device, show_placement);
+    calibrating::Recorded recorded = calibrating::session_from(options.from, options.choice.device, show_placement);
     work.emplace(std::move(recorded.session));
     info = recorded.info;
     calibrating::refuse_unless_good(work->judgement());

@@ -17,13 +17,12 @@ namespace fingertip {
 namespace {
 
 constexpr std::chrono::milliseconds DEVICE_POLL{20};
-constexpr std::int64_t PATIENCE_us = 5000000; /* without a frame */
+constexpr std::int64_t PATIENCE_us = 5000000;        /* without a frame */
 constexpr std::chrono::milliseconds ASKED_STOP{100}; /* until a stop is looked for */
 
 } // namespace
 
-void ask(const CalibrateOptions &options, const std::string &question,
-         const std::string &otherwise) {
+void ask(const CalibrateOptions &options, const std::string &question, const std::string &otherwise) {
   if (options.yes) {
     return;
   }
@@ -46,8 +45,7 @@ void ask(const CalibrateOptions &options, const std::string &question,
 
 CalibratedDevice::CalibratedDevice(const CalibrateOptions &options)
     : transport_(open_way(choose_way(options.choice))),
-      session_(*transport_, [this] { return !ending_ && stop_requested(); }),
-      info_(session_.info().body.info) {}
+      session_(*transport_, [this] { return !ending_ && stop_requested(); }), info_(session_.info().body.info) {}
 
 CalibratedDevice::~CalibratedDevice() {
   if (streaming_) {
@@ -56,8 +54,7 @@ CalibratedDevice::~CalibratedDevice() {
 }
 
 void CalibratedDevice::check_sensors() {
-  const std::uint32_t missing =
-      missing_sensors(session_.health().body.health.sensors_present, info_.sensor_count);
+  const std::uint32_t missing = missing_sensors(session_.health().body.health.sensors_present, info_.sensor_count);
   if (missing) {
     throw Error(name() + ": sensors do not answer: " + sensors_text(missing) +
                 "; mend their wiring first, a calibration is of all of them");
@@ -66,8 +63,8 @@ void CalibratedDevice::check_sensors() {
 
 void CalibratedDevice::check_is(const wire_info &recorded, const std::string &recording) const {
   if (std::strncmp(recorded.serial, info_.serial, WIRE_TEXT_BYTES) != 0) {
-    throw Error(printable(recording) + ": is of fingertip " + text_field(recorded.serial) +
-                ", and this is " + text_field(info_.serial) + "; calibrate each by its own");
+    throw Error(printable(recording) + ": is of fingertip " + text_field(recorded.serial) + ", and this is " +
+                text_field(info_.serial) + "; calibrate each by its own");
   }
 }
 

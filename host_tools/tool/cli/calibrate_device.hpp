@@ -11,8 +11,7 @@
 namespace fingertip {
 
 /* Throws Error with `otherwise` unless the answer is yes; Interrupted. */
-void ask(const CalibrateOptions &options, const std::string &question,
-         const std::string &otherwise);
+void ask(const CalibrateOptions &options, const std::string &question, const std::string &otherwise);
 
 class CalibratedDevice {
 public:
@@ -26,8 +25,7 @@ public:
 
   /* Streams, with a packet of this type for each frame, until goes_on() is false. Throws Error
    * where no frames come, Interrupted. */
-  void follow(std::uint8_t streams, std::uint8_t of_frames,
-              const std::function<void(const wire_packet &)> &take,
+  void follow(std::uint8_t streams, std::uint8_t of_frames, const std::function<void(const wire_packet &)> &take,
               const std::function<bool()> &goes_on);
 
   /* What is begun is done whole, whatever signals come. Throws Error where it was not kept. */

@@ -62,17 +62,15 @@ PullSession pull_session_from(const CalibrateOptions &options, wire_info &info) 
     throw Error(printable(options.from) + ": holds no frames");
   }
   if (work->pulls().empty()) {
-    throw Error("not calibrated: " + (weak.empty()
-                                          ? "no pull was found; leave the object alone for "
-                                            "a second, then pull and hold for two"
-                                          : weak));
+    throw Error("not calibrated: " + (weak.empty() ? "no pull was found; leave the object alone for "
+                                                     "a second, then pull and hold for two"
+                                                   : weak));
   }
   work->judge(true);
   return std::move(*work);
 }
 
-void check_same_pad(const pad_profile &recorded, const pad_profile &stored,
-                    const std::string &recording) {
+void check_same_pad(const pad_profile &recorded, const pad_profile &stored, const std::string &recording) {
   if (stored.thickness_mm != recorded.thickness_mm || stored.overhang_mm != recorded.overhang_mm ||
       stored.from_touch != recorded.from_touch) {
     throw Error(printable(recording) + ": is of a pad of " + shortest(recorded.thickness_mm) +
@@ -80,10 +78,8 @@ void check_same_pad(const pad_profile &recorded, const pad_profile &stored,
   }
 }
 
-void print_result(const PullSession &work, const pad_profile &before, const pad_profile &after,
-                  bool has_force_scale) {
-  std::printf("%s, from %zu of %zu pulls\n", work.judgement().text.c_str(), work.judgement().kept,
-              work.pulls().size());
+void print_result(const PullSession &work, const pad_profile &before, const pad_profile &after, bool has_force_scale) {
+  std::printf("%s, from %zu of %zu pulls\n", work.judgement().text.c_str(), work.judgement().kept, work.pulls().size());
   std::printf("tangential scale    %s sd %s before, %s sd %s now\n",
               fixed(static_cast<double>(before.tangential_scale), 3).c_str(),
               fixed(static_cast<double>(before.tangential_scale_sd), 3).c_str(),

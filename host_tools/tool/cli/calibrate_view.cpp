@@ -34,20 +34,17 @@ public:
     left_mm_ = *left - RIM_mm;
     top_mm_ = *top + RIM_mm;
     const double width_mm = *right + RIM_mm - left_mm_, height_mm = top_mm_ - *bottom + RIM_mm;
-    column_mm_ =
-        std::max(width_mm / std::max(columns, 4), height_mm / (CELL_ASPECT * std::max(rows, 4)));
+    column_mm_ = std::max(width_mm / std::max(columns, 4), height_mm / (CELL_ASPECT * std::max(rows, 4)));
     columns_ = static_cast<int>(std::lround(width_mm / column_mm_));
     rows_ = static_cast<int>(std::lround(height_mm / (CELL_ASPECT * column_mm_)));
   }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   int column(double x_mm) const {
-    return std::clamp(static_cast<int>(std::floor((x_mm - left_mm_) / column_mm_)), 0,
-                      columns_ - 1);
+    return std::clamp(static_cast<int>(std::floor((x_mm - left_mm_) / column_mm_)), 0, columns_ - 1);
   }
   int row(double y_mm) const {
-    return std::clamp(static_cast<int>(std::floor((top_mm_ - y_mm) / (CELL_ASPECT * column_mm_))),
-                      0, rows_ - 1);
+    return std::clamp(static_cast<int>(std::floor((top_mm_ - y_mm) / (CELL_ASPECT * column_mm_))), 0, rows_ - 1);
   }
 
 private:
@@ -84,13 +81,11 @@ Canvas draw(const GainSession &session, int columns, int rows) {
   };
   if (judgement) {
     for (const calibrating::Fitted &fitted : judgement->solution.placements) {
-      at(fitted.x_mm, fitted.y_mm, fitted.kept ? "●" : "x",
-         {fitted.kept ? ACCENT : WARNING, std::nullopt, false});
+      at(fitted.x_mm, fitted.y_mm, fitted.kept ? "●" : "x", {fitted.kept ? ACCENT : WARNING, std::nullopt, false});
     }
   }
   for (std::size_t k = 0; k < array.sensors(); k++) {
-    const bool unsure =
-        !judgement || std::count(judgement->unsure.begin(), judgement->unsure.end(), k) > 0;
+    const bool unsure = !judgement || std::count(judgement->unsure.begin(), judgement->unsure.end(), k) > 0;
     const double felt = std::clamp(session.finder().above_Pa()[k] / FULL_Pa, 0.0, 1.0);
     at(array.x_mm[k], array.y_mm[k], std::to_string(k),
        {unsure ? WARNING : GOOD, mix({0, 0, 0}, FELT, static_cast<float>(std::sqrt(felt))), true});
@@ -118,8 +113,7 @@ Canvas draw(const GainSession &session, int columns, int rows) {
     say("○ where the next one helps most", FAINT);
   }
   say("● placements, green numbers: sensors that are done", FAINT);
-  canvas.text(text_left, rows - 1, "q quit   u take the last one back",
-              {FAINT, std::nullopt, false});
+  canvas.text(text_left, rows - 1, "q quit   u take the last one back", {FAINT, std::nullopt, false});
   return canvas;
 }
 

@@ -10,11 +10,7 @@ namespace {
 
 std::size_t character_length(std::string_view text) {
   auto first = static_cast<unsigned char>(text[0]);
-  return std::min<std::size_t>(first < 0x80   ? 1
-                               : first < 0xE0 ? 2
-                               : first < 0xF0 ? 3
-                                              : 4,
-                               text.size());
+  return std::min<std::size_t>(first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4, text.size());
 }
 
 } // namespace
@@ -22,8 +18,7 @@ std::size_t character_length(std::string_view text) {
 Colour mix(Colour a, Colour b, float part) {
   part = std::clamp(part, 0.0f, 1.0f);
   auto channel = [&](std::uint8_t from, std::uint8_t to) {
-    return static_cast<std::uint8_t>(
-        std::lround(static_cast<float>(from) + part * static_cast<float>(to - from)));
+    return static_cast<std::uint8_t>(std::lround(static_cast<float>(from) + part * static_cast<float>(to - from)));
   };
   return {channel(a.r, b.r), channel(a.g, b.g), channel(a.b, b.b)};
 }
@@ -52,8 +47,7 @@ Canvas::Cell *Canvas::at(int column, int row) {
   if (column < 0 || column >= columns_ || row < 0 || row >= rows_) {
     return nullptr;
   }
-  return &cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                 static_cast<std::size_t>(column)];
+  return &cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
 }
 
 int Canvas::text(int column, int row, std::string_view text, const Style &style) {

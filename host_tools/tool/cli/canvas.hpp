@@ -11,9 +11,7 @@ namespace fingertip {
 
 struct Colour {
   std::uint8_t r, g, b;
-  bool operator==(const Colour &other) const {
-    return r == other.r && g == other.g && b == other.b;
-  }
+  bool operator==(const Colour &other) const { return r == other.r && g == other.g && b == other.b; }
 };
 
 /* Nothing means the terminal's own colour. */

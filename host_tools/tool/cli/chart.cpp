@@ -93,8 +93,7 @@ public:
 
   int rows() const { return 4 * height_; }
   Dots &cell(int column, int row) {
-    return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
-                  static_cast<std::size_t>(column)];
+    return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)];
   }
   void set(int dot, int row, const ChartPoint &point, Colour colour) {
     Dots &dots = cell(dot / 2, row / 4);
@@ -114,9 +113,8 @@ ChartPoint point_of(const Curve &curve, const Times &times, int dot) {
   times.each(curve.last, dot, [&](std::int64_t interval) {
     const ChartPoint here = curve.at(interval);
     bool better =
-        here.value &&
-        (!point.value || (point.doubtful && !here.doubtful) ||
-         (point.doubtful == here.doubtful && (curve.goes_both_ways || *here.value > *point.value)));
+        here.value && (!point.value || (point.doubtful && !here.doubtful) ||
+                       (point.doubtful == here.doubtful && (curve.goes_both_ways || *here.value > *point.value)));
     if (better) {
       point.value = here.value;
       point.doubtful = here.doubtful;
@@ -149,8 +147,7 @@ void draw_curves(Canvas &canvas, const Area &area, const Chart &chart, const Tim
         continue;
       }
       field.set(dot, row, point, curve.colour);
-      for (int between = before < 0 ? row : before; between != row;
-           between += between < row ? 1 : -1) {
+      for (int between = before < 0 ? row : before; between != row; between += between < row ? 1 : -1) {
         field.set(dot, between, point, curve.colour);
       }
       before = row;
@@ -175,8 +172,7 @@ void draw_time(Canvas &canvas, const Area &area, double span_s) {
   int free_until = area.left + area.width;
   for (double ago_s = 0; ago_s <= span_s; ago_s += step_s) {
     std::string text = ago_s > 0 ? "-" + fixed(ago_s, 0) : "0 s";
-    int at = area.left + area.width - 1 -
-             static_cast<int>(std::lround(ago_s / span_s * (area.width - 1)));
+    int at = area.left + area.width - 1 - static_cast<int>(std::lround(ago_s / span_s * (area.width - 1)));
     at = std::min(at - (ago_s > 0 ? 1 : 0), area.left + area.width - columns_of(text));
     if (at < area.left || at + columns_of(text) > free_until) {
       continue;
@@ -210,8 +206,7 @@ void each_shown(const Area &area, double interval_s, std::int64_t last,
   }
 }
 
-void draw_charts(Canvas &canvas, const Area &area, double interval_s,
-                 const std::vector<Chart> &charts) {
+void draw_charts(Canvas &canvas, const Area &area, double interval_s, const std::vector<Chart> &charts) {
   int columns = area.width - GUTTER;
   const Times times(interval_s, columns);
   int rows = area.height - 1, count = static_cast<int>(charts.size());

@@ -38,10 +38,8 @@ std::size_t letters_apart(const std::string &one, const std::string &other) {
 }
 
 Reach reach_from_text(const std::string &text) {
-  static const std::map<std::string, Reach> kinds = {{"auto", Reach::automatic},
-                                                     {"socket", Reach::socket},
-                                                     {"serial", Reach::serial},
-                                                     {"usb", Reach::usb}};
+  static const std::map<std::string, Reach> kinds = {
+      {"auto", Reach::automatic}, {"socket", Reach::socket}, {"serial", Reach::serial}, {"usb", Reach::usb}};
   auto kind = kinds.find(text);
   if (kind == kinds.end()) {
     wrong_value("--transport", text, "auto, socket, serial or usb");
@@ -63,8 +61,7 @@ ColourMode colour_from_text(const std::string &text) {
 
 } // namespace
 
-CommandLine::CommandLine(const std::string &description, const std::string &version)
-    : app_(description, "fingertip") {
+CommandLine::CommandLine(const std::string &description, const std::string &version) : app_(description, "fingertip") {
   app_.set_version_flag("--version", [version] {
     const std::string note = page_note(version);
     return "fingertip " + version + (note.empty() ? "" : "\n" + note);
@@ -73,8 +70,7 @@ CommandLine::CommandLine(const std::string &description, const std::string &vers
   speak_plainly(app_);
 }
 
-CLI::App *CommandLine::add(const std::string &name, const std::string &text,
-                           std::function<int()> run) {
+CLI::App *CommandLine::add(const std::string &name, const std::string &text, std::function<int()> run) {
   CLI::App *command = app_.add_subcommand(name, text);
   command->callback([this, run = std::move(run)] { chosen_ = run; });
   return command;
@@ -95,12 +91,10 @@ int CommandLine::run(int argc, char **argv) {
   }
   if (argc < 2 || (argv[1][0] != '-' && !is_known)) {
     if (!meant.empty()) {
-      throw WrongUsage("\"" + std::string(argv[1]) + "\" is no command; is " + meant +
-                       " meant? see fingertip --help");
+      throw WrongUsage("\"" + std::string(argv[1]) + "\" is no command; is " + meant + " meant? see fingertip --help");
     }
-    throw WrongUsage(
-        (argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") +
-        "; give one of " + commands + "; see fingertip --help");
+    throw WrongUsage((argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") +
+                     "; give one of " + commands + "; see fingertip --help");
   }
   try {
     app_.parse(argc, argv);
@@ -130,9 +124,7 @@ void with_port_only(CLI::App *command, Choice &choice) {
 }
 
 void with_port(CLI::App *command, Choice &choice) {
-  command
-      ->add_option("--device", choice.device,
-                   "Serial number of the fingertip; default: the only one there is")
+  command->add_option("--device", choice.device, "Serial number of the fingertip; default: the only one there is")
       ->type_name("SERIAL");
   with_port_only(command, choice);
 }

@@ -33,7 +33,6 @@ void with_port(CLI::App *command, Choice &choice);
 void with_colour(CLI::App *command, ColourMode &mode);
 
 /* Where an option's text is no value of it. */
-[[noreturn]] void wrong_value(const std::string &option, const std::string &text,
-                              const std::string &allowed);
+[[noreturn]] void wrong_value(const std::string &option, const std::string &text, const std::string &allowed);
 
 } // namespace fingertip

@@ -24,8 +24,8 @@ bool is_frame(const wire_packet &packet) {
 
 /* That a recording has a place for. */
 bool is_kept(const wire_packet &packet) {
-  return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO ||
-         packet.type == WIRE_ACK || packet.type == WIRE_SYNC;
+  return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO || packet.type == WIRE_ACK ||
+         packet.type == WIRE_SYNC;
 }
 
 void check_paths(const Conversion &conversion) {
@@ -81,8 +81,7 @@ void report_cut_short(const std::string &path, bool is_cut_short) {
 void report_losses(const std::string &path, const PacketFile &file) {
   std::string name = printable(path);
   if (file.skipped_lines() > 0) {
-    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", name.c_str(),
-                 static_cast<Count>(file.skipped_lines()));
+    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", name.c_str(), static_cast<Count>(file.skipped_lines()));
   }
   report_cut_short(path, file.is_cut_short());
 }
@@ -110,12 +109,10 @@ void convert_lines(const Conversion &conversion) {
     if (line.number > last + 1) {
       std::string lost = std::to_string(line.number - last - 1);
       if (!conversion.salvage) {
-        throw Error(ErrorCode::damaged_line, conversion.from + ": " + lost +
-                                                 " lines are missing before line " +
-                                                 std::to_string(line.number));
+        throw Error(ErrorCode::damaged_line,
+                    conversion.from + ": " + lost + " lines are missing before line " + std::to_string(line.number));
       }
-      std::fprintf(stderr, "%s: %s lines are lost before line %llu\n",
-                   printable(conversion.from).c_str(), lost.c_str(),
+      std::fprintf(stderr, "%s: %s lines are lost before line %llu\n", printable(conversion.from).c_str(), lost.c_str(),
                    static_cast<Count>(line.number));
     }
     last = line.number;
@@ -123,8 +120,8 @@ void convert_lines(const Conversion &conversion) {
     is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
     if (line.torn) {
       if (!conversion.salvage) {
-        throw Error(ErrorCode::damaged_line, conversion.from + ":" + std::to_string(line.number) +
-                                                 ": the last line is torn");
+        throw Error(ErrorCode::damaged_line,
+                    conversion.from + ":" + std::to_string(line.number) + ": the last line is torn");
       }
       std::fprintf(stderr, "%s: the last line is torn\n", printable(conversion.from).c_str());
       sink->torn_line(line.text);
@@ -140,18 +137,16 @@ void convert_lines(const Conversion &conversion) {
 void convert_packets(const Conversion &conversion) {
   check_paths(conversion);
   Contents contents = contents_of(conversion);
-  Metadata metadata = {{"recorded_by", "fingertip " FINGERTIP_VERSION},
-                       {"source", conversion.from}};
+  Metadata metadata = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", conversion.from}};
   for (const auto &[key, value] : contents.recorder) {
     bool told = key == "recorded_by" || key == "source" || key == "host_zero_us";
     if (!told) {
       metadata.emplace_back(key, value);
     }
   }
-  RecordingWriter writer(
-      conversion.to, conversion.overwrite, contents.info ? &*contents.info : nullptr,
-      contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}),
-      metadata, contents.sensor_count.has_value(), OutputFile::Appears::when_finished);
+  RecordingWriter writer(conversion.to, conversion.overwrite, contents.info ? &*contents.info : nullptr,
+                         contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}),
+                         metadata, contents.sensor_count.has_value(), OutputFile::Appears::when_finished);
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   while (auto item = file.next()) {
     if (item->kind == Kind::packet) {
@@ -166,8 +161,8 @@ void convert_packets(const Conversion &conversion) {
     std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n",
                  printable(conversion.from).c_str(), static_cast<Count>(contents.left_out));
   }
-  std::printf("%s: %llu frames, %s\n", printable(conversion.to).c_str(),
-              static_cast<Count>(writer.frames()), file.statistics().text().c_str());
+  std::printf("%s: %llu frames, %s\n", printable(conversion.to).c_str(), static_cast<Count>(writer.frames()),
+              file.statistics().text().c_str());
 }
 
 void convert_to_capture(const Conversion &conversion) {
@@ -185,8 +180,8 @@ void convert_to_capture(const Conversion &conversion) {
   }
   capture.finish();
   report_losses(conversion.from, file);
-  std::printf("%s: %llu packets, without the recorder's own lines\n",
-              printable(conversion.to).c_str(), static_cast<Count>(packets));
+  std::printf("%s: %llu packets, without the recorder's own lines\n", printable(conversion.to).c_str(),
+              static_cast<Count>(packets));
 }
 
 } // namespace fingertip

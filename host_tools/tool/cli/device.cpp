@@ -16,8 +16,7 @@ std::function<bool()> patience(const Transport &transport, const Session &sessio
   return [&transport, &session, begun_us = steady_now_us(), told = false]() mutable {
     if (!told && session.statistics().bytes == 0 && steady_now_us() - begun_us > SILENCE_us) {
       told = true;
-      std::fprintf(stderr, "%s: waiting for an answer\n",
-                   printable(transport.description()).c_str());
+      std::fprintf(stderr, "%s: waiting for an answer\n", printable(transport.description()).c_str());
     }
     return stop_requested();
   };

@@ -15,9 +15,8 @@ std::string words_of(std::uint32_t flag, float limit_mm) {
   case CONTACT_FLAG_FLAT:
     return "no peak, no location";
   case CONTACT_FLAG_UNCERTAIN:
-    return limit_mm > 0
-               ? "may be off by more than " + fixed(static_cast<double>(limit_mm), 2) + " mm"
-               : "may be off by more than the limit";
+    return limit_mm > 0 ? "may be off by more than " + fixed(static_cast<double>(limit_mm), 2) + " mm"
+                        : "may be off by more than the limit";
   case CONTACT_FLAG_MODEL:
     return "not one round contact";
   case CONTACT_FLAG_SATURATED:

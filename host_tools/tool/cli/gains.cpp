@@ -31,27 +31,25 @@ void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
   constexpr int HALF = 10;
   constexpr double PER_MARK = 0.02;
   const bool has_places =
-      std::any_of(calibration.sensors, calibration.sensors + sensor_count,
-                  [](const sensor_calibration &sensor) {
-                    return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
-                  });
+      std::any_of(calibration.sensors, calibration.sensors + sensor_count, [](const sensor_calibration &sensor) {
+        return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
+      });
   std::printf("\nsensor    gain    sd %%%s   -20 %%      mean      +20 %%\n",
               has_places ? "  off by x, y mm  wider by %" : "");
   for (int k = 0; k < sensor_count; k++) {
     const sensor_calibration &sensor = calibration.sensors[k];
     char place[64] = "";
     if (has_places) {
-      std::snprintf(place, sizeof place, "%+9.2f %+6.2f  %+10.1f", 1e-3 * sensor.off_x_um,
-                    1e-3 * sensor.off_y_um, 100.0 * std::expm1(sensor.wider_q15 / 32768.0));
+      std::snprintf(place, sizeof place, "%+9.2f %+6.2f  %+10.1f", 1e-3 * sensor.off_x_um, 1e-3 * sensor.off_y_um,
+                    100.0 * std::expm1(sensor.wider_q15 / 32768.0));
     }
     int marks =
-        std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)),
-                   -HALF, HALF);
+        std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)), -HALF, HALF);
     std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
     std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
     std::printf("%6d  %6.3f  %6.1f%s   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
-                100.0 * static_cast<double>(sensor.gain_sd), place,
-                HALF + 2 - static_cast<int>(below.size()), "", below.c_str(), above.c_str());
+                100.0 * static_cast<double>(sensor.gain_sd), place, HALF + 2 - static_cast<int>(below.size()), "",
+                below.c_str(), above.c_str());
   }
 }
 

@@ -71,8 +71,7 @@ Felt felt_by(const Model &model) {
   if (!(contact.flags & CONTACT_FLAG_FIT_VALID)) {
     return {contact.flags & CONTACT_FLAG_CONTACT ? std::nullopt : std::optional<float>(0)};
   }
-  return {contact.force_N, warnings_of(contact.flags) != 0,
-          (contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND) != 0};
+  return {contact.force_N, warnings_of(contact.flags) != 0, (contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND) != 0};
 }
 
 /* Its width; the pad below its name and state. */
@@ -84,8 +83,7 @@ int draw_fingertip(Canvas &canvas, const Area &area, const Model &model, std::si
   }
   std::string name = model.info() ? text_field(model.info()->serial) : printable(model.source());
   int room = std::max(width, 12);
-  int column =
-      canvas.text(area.left, area.top, SIDES[side], text_style(side == 0 ? LEFT : RIGHT, true)) + 1;
+  int column = canvas.text(area.left, area.top, SIDES[side], text_style(side == 0 ? LEFT : RIGHT, true)) + 1;
   canvas.text(column, area.top, "●", text_style(colour, true));
   column += 2;
   bool fine = model.state() == Model::State::replay || (colour == GOOD);
@@ -95,12 +93,10 @@ int draw_fingertip(Canvas &canvas, const Area &area, const Model &model, std::si
 }
 
 /* Filled up to the force, with a mark where it is wanted; the whole is the cap. */
-void draw_force(Canvas &canvas, const Area &area, const Felt &felt, float wanted_N, float cap_N,
-                Colour colour) {
+void draw_force(Canvas &canvas, const Area &area, const Felt &felt, float wanted_N, float cap_N, Colour colour) {
   float full_N = cap_N > 0 ? cap_N : 20;
   auto cells = [&](float force_N) {
-    return static_cast<int>(
-        std::lround(std::clamp(force_N / full_N, 0.0f, 1.0f) * static_cast<float>(area.width)));
+    return static_cast<int>(std::lround(std::clamp(force_N / full_N, 0.0f, 1.0f) * static_cast<float>(area.width)));
   };
   int filled = felt.force_N ? cells(*felt.force_N) : 0;
   bool over = felt.force_N && *felt.force_N > full_N;
@@ -117,8 +113,7 @@ void draw_force(Canvas &canvas, const Area &area, const Felt &felt, float wanted
   }
 }
 
-void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fingertips,
-                const GripModel &grip) {
+void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fingertips, const GripModel &grip) {
   int row = area.top, bottom = area.top + area.height;
   if (!grip.row()) {
     canvas.text(area.left, row, "nothing known of the gripper", text_style(FAINT));
@@ -128,12 +123,10 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   const auto &status = grip.row()->status;
   auto newton = [](double force_N) { return fixed(force_N, 2); };
   for (const std::string &line : flowed({state_text(report.state)}, " ", area.width)) {
-    canvas.text(area.left, row++, first_columns(line, area.width),
-                text_style(colour_of(report.state), true));
+    canvas.text(area.left, row++, first_columns(line, area.width), text_style(colour_of(report.state), true));
   }
-  int column = draw_quantity(
-      canvas, area.left, row,
-      {"width ", status ? std::optional(fixed(status->width_mm, 1)) : std::nullopt, 6, "mm"});
+  int column = draw_quantity(canvas, area.left, row,
+                             {"width ", status ? std::optional(fixed(status->width_mm, 1)) : std::nullopt, 6, "mm"});
   if (status && status->moving) {
     canvas.text(column + 1, row, "moving", text_style(WARNING));
   } else if (status && status->object) {
@@ -145,32 +138,25 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
     column = draw_quantity(
         canvas, area.left, row,
         {i == 0 ? "left  " : "right ",
-         felt.force_N ? std::optional((felt.at_least ? "≥" : "") + number(*felt.force_N, 2))
-                      : std::nullopt,
-         6, "N ", felt.doubtful});
+         felt.force_N ? std::optional((felt.at_least ? "≥" : "") + number(*felt.force_N, 2)) : std::nullopt, 6, "N ",
+         felt.doubtful});
     int width = area.left + area.width - column - 1;
     if (width >= 4) {
-      draw_force(canvas, {column + 1, row, width, 1}, felt,
-                 static_cast<float>(report.wanted_N), grip.cap_N(), i == 0 ? LEFT : RIGHT);
+      draw_force(canvas, {column + 1, row, width, 1}, felt, static_cast<float>(report.wanted_N), grip.cap_N(),
+                 i == 0 ? LEFT : RIGHT);
     }
   }
   column = draw_quantity(canvas, area.left, row, {"wanted", newton(report.wanted_N), 6, "N "});
   draw_quantity(canvas, column + 1, row, {"cap", number(grip.cap_N(), 1), 5, "N"});
   row++;
   bool loaded = report.load_N > 0;
-  column = draw_quantity(
-      canvas, area.left, row,
-      {"load  ", loaded ? std::optional(newton(report.load_N)) : std::nullopt, 6, "N "});
+  column = draw_quantity(canvas, area.left, row,
+                         {"load  ", loaded ? std::optional(newton(report.load_N)) : std::nullopt, 6, "N "});
   draw_quantity(canvas, column + 1, row,
-                {"margin",
-                 report.margin > 0 ? std::optional(fixed(report.margin, 2))
-                                            : std::nullopt,
-                 5, ""});
+                {"margin", report.margin > 0 ? std::optional(fixed(report.margin, 2)) : std::nullopt, 5, ""});
   row++;
-  column =
-      draw_quantity(canvas, area.left, row, {"slides", std::to_string(report.slides), 6, "  "});
-  column = draw_quantity(canvas, column + 1, row,
-                {"friction", fixed(report.friction, 2), 4, " "});
+  column = draw_quantity(canvas, area.left, row, {"slides", std::to_string(report.slides), 6, "  "});
+  column = draw_quantity(canvas, column + 1, row, {"friction", fixed(report.friction, 2), 4, " "});
   draw_quantity(canvas, column + 1, row, {"delay", fixed(1e3 * report.delay_s, 0), 3, "ms"});
   row++;
   column = area.left;
@@ -191,18 +177,17 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   }
 }
 
-Curve grip_curve(const GripModel &grip, bool GripModel::Sample::*there,
-                 float GripModel::Sample::*value, Colour colour) {
-  return {[&grip, there, value](std::int64_t interval) {
-            const GripModel::Sample &sample = grip.sample(interval);
-            return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt,
-                              false, sample.slipping};
-          },
-          grip.last_interval(), true, colour};
+Curve grip_curve(const GripModel &grip, bool GripModel::Sample::*there, float GripModel::Sample::*value,
+                 Colour colour) {
+  return {
+      [&grip, there, value](std::int64_t interval) {
+        const GripModel::Sample &sample = grip.sample(interval);
+        return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, false, sample.slipping};
+      },
+      grip.last_interval(), true, colour};
 }
 
-void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &fingertips,
-                    const GripModel &grip) {
+void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &fingertips, const GripModel &grip) {
   if (!has_room_for_charts(area)) {
     return;
   }
@@ -242,20 +227,18 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
 
 } // namespace
 
-Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip,
-                  const Caption &caption, int columns, int rows) {
+Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns,
+                  int rows) {
   Canvas canvas(columns, rows);
   if (columns < MONITOR_COLUMNS || rows < MONITOR_ROWS) {
     canvas.text(0, 0,
-                "window too small: " + std::to_string(columns) + "x" + std::to_string(rows) +
-                    ", needs " + std::to_string(MONITOR_COLUMNS) + "x" +
-                    std::to_string(MONITOR_ROWS),
+                "window too small: " + std::to_string(columns) + "x" + std::to_string(rows) + ", needs " +
+                    std::to_string(MONITOR_COLUMNS) + "x" + std::to_string(MONITOR_ROWS),
                 text_style(WARNING, true));
     int row = 1;
     for (const std::string &line :
-         flowed({state_text(grip.row() ? grip.row()->report.state : std::uint8_t{GRIP_IDLE}),
-                 grip_line(grip)},
-                "\n", columns)) {
+         flowed({state_text(grip.row() ? grip.row()->report.state : std::uint8_t{GRIP_IDLE}), grip_line(grip)}, "\n",
+                columns)) {
       canvas.text(0, row++, line);
     }
     draw_caption(canvas, caption);

@@ -12,7 +12,7 @@
 namespace fingertip {
 
 /* fingertips: left, right. As draw_monitor for small windows. */
-Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip,
-                  const Caption &caption, int columns, int rows);
+Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns,
+                  int rows);
 
 } // namespace fingertip

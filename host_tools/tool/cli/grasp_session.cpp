@@ -51,8 +51,7 @@ std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
   std::optional<Way> left = way_of(options.left, options.reach);
   std::optional<Way> right = way_of(options.right, options.reach);
   if (left && right) {
-    bool is_one = left->port.empty() ? is_same_serial(left->serial, right->serial)
-                                     : left->port == right->port;
+    bool is_one = left->port.empty() ? is_same_serial(left->serial, right->serial) : left->port == right->port;
     if (is_one) {
       throw WrongUsage("--left and --right name the same fingertip; name two");
     }
@@ -63,8 +62,7 @@ std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
   for (const Way &way : all_ways(options.reach)) {
     names += " " + (way.serial.empty() ? way.port : way.serial);
     const auto &named = left ? left : right;
-    bool is_named = named && (way.serial.empty() ? way.port == named->port
-                                                 : is_same_serial(way.serial, named->serial));
+    bool is_named = named && (way.serial.empty() ? way.port == named->port : is_same_serial(way.serial, named->serial));
     if (!is_named) {
       others.push_back(way);
     }
@@ -118,8 +116,7 @@ private:
   /* Both fingertips and the gripper are there, and fit for it. */
   void begin() {
     const auto ready = loop_.meet(stop_requested);
-    if (std::memcmp(ready[0].packet.body.info.serial, ready[1].packet.body.info.serial,
-                    WIRE_TEXT_BYTES) == 0) {
+    if (std::memcmp(ready[0].packet.body.info.serial, ready[1].packet.body.info.serial, WIRE_TEXT_BYTES) == 0) {
       throw Error(loop_.name(0) + ": is left and right; name two fingertips");
     }
     for (std::size_t i = 0; i < FINGERS; i++) {
@@ -128,8 +125,7 @@ private:
       models_[i].set_state(Model::State::live);
       check_for_grasp(loop_.name(i), info, ready[i].health);
       for (const std::string &lack : lacks_for_grasp(info, settings_.mode == GRIP_MODE_HOLD)) {
-        std::fprintf(stderr, "%s (%s) %s\n", SIDES[i], text_field(info.serial).c_str(),
-                     printable(lack).c_str());
+        std::fprintf(stderr, "%s (%s) %s\n", SIDES[i], text_field(info.serial).c_str(), printable(lack).c_str());
       }
     }
     GripperWay way = options_.gripper;
@@ -149,11 +145,8 @@ private:
       LiveOptions live;
       live.recording = options_.recording;
       live.overwrite = options_.overwrite;
-      keeper_ = make_keeper(live, {ready.begin(), ready.end()}, {loop_.name(0), loop_.name(1)},
-                            zero_us_, head);
-      keep([&] {
-        keeper_->comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns());
-      });
+      keeper_ = make_keeper(live, {ready.begin(), ready.end()}, {loop_.name(0), loop_.name(1)}, zero_us_, head);
+      keep([&] { keeper_->comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns()); });
     }
     loop_.begin(
         std::move(gripper), [way] { return open_gripper(way); }, settings_);
@@ -274,11 +267,10 @@ private:
 
   void take_step(const GraspNews &news) {
     const GripReport &report = news.report;
-    bool changed =
-        !last_ || report.state != last_->report.state || report.trouble != last_->report.trouble ||
-        report.slides != last_->report.slides || news.command.motion != last_->command.motion ||
-        news.command.width_mm != last_->command.width_mm ||
-        (news.status && (!last_->status || news.status->host_us != last_->status->host_us));
+    bool changed = !last_ || report.state != last_->report.state || report.trouble != last_->report.trouble ||
+                   report.slides != last_->report.slides || news.command.motion != last_->command.motion ||
+                   news.command.width_mm != last_->command.width_mm ||
+                   (news.status && (!last_->status || news.status->host_us != last_->status->host_us));
     if (last_ && report.state != last_->report.state) {
       state_since_us_ = news.host_us;
     }
@@ -297,8 +289,7 @@ private:
     }
     grip_.take(row);
     keep([&] {
-      keeper_->comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
-                       fixed(row.time_us, 1) + "," + grip_cells(row));
+      keeper_->comment(GRIP_ROW_KEY, static_cast<double>(news.host_us), fixed(row.time_us, 1) + "," + grip_cells(row));
     });
   }
 
@@ -328,14 +319,13 @@ private:
   bool should_end() {
     std::int64_t since_begin_us = steady_now_us() - zero_us_;
     if (!requested_ && since_begin_us > TARING_us) {
-      failure_ = std::string(SIDES[has_zero_[0] ? 1 : 0]) +
-                 ": no zero yet; see that its sensors answer (fingertip info)";
+      failure_ =
+          std::string(SIDES[has_zero_[0] ? 1 : 0]) + ": no zero yet; see that its sensors answer (fingertip info)";
     } else if (lost_fingers_ == FINGERS) {
       failure_ = "both fingertips are lost";
     }
     bool at_end = is_end_state(state()) && state_us() > TAIL_us;
-    bool is_inactive =
-        state() == GRIP_ACTIVATING && (last_->report.trouble & GRIP_GRIPPER_INACTIVE) != 0;
+    bool is_inactive = state() == GRIP_ACTIVATING && (last_->report.trouble & GRIP_GRIPPER_INACTIVE) != 0;
     inactive_since_us_ = is_inactive ? inactive_since_us_ : steady_now_us();
     bool never_active = steady_now_us() - inactive_since_us_ > INACTIVE_us;
     bool opened = state() == GRIP_OPEN && interrupts() > 1;
@@ -440,8 +430,7 @@ private:
       }
     }
     std::string width = last_ && last_->status ? fixed(last_->status->width_mm, 1) + " mm" : "?";
-    std::fprintf(stderr,
-                 "%s; the gripper keeps its position, %s (`fingertip gripper open` opens it)\n",
+    std::fprintf(stderr, "%s; the gripper keeps its position, %s (`fingertip gripper open` opens it)\n",
                  state_text(state_at_end_).c_str(), width.c_str());
     loop_.rethrow();
     if (!failure_.empty()) {
@@ -475,8 +464,7 @@ private:
 int run_grasp(const GraspOptions &options) {
   std::map<std::string, double> limits = options.limits;
   limits.insert(options.breaking.begin(), options.breaking.end()); // a limit of its own stays
-  const GripSettings settings =
-      typed([&] { return settings_for(gripper_traits(options.gripper.model), limits); });
+  const GripSettings settings = typed([&] { return settings_for(gripper_traits(options.gripper.model), limits); });
   if (!options.recording.empty()) {
     check_output(options.recording, options.overwrite);
   }

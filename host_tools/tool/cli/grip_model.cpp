@@ -13,8 +13,7 @@ namespace {
 constexpr const char *CAP_KEY = "grasp_cap", *GRIPPER_KEY = "grasp_gripper";
 
 bool is_controlled(std::uint8_t state) {
-  return state == GRIP_SQUEEZE || state == GRIP_READY || state == GRIP_HOLDING ||
-         state == GRIP_SLIPPING;
+  return state == GRIP_SQUEEZE || state == GRIP_READY || state == GRIP_HOLDING || state == GRIP_SLIPPING;
 }
 
 } // namespace
@@ -24,8 +23,7 @@ void GripModel::take(const GripRow &row) {
     state_since_us_ = row.time_us;
   }
   row_ = row;
-  auto interval =
-      static_cast<std::int64_t>(std::max(row.time_us, 0.0) / static_cast<double>(INTERVAL_us));
+  auto interval = static_cast<std::int64_t>(std::max(row.time_us, 0.0) / static_cast<double>(INTERVAL_us));
   if (samples_.empty() || interval < last_interval_) {
     samples_.assign(1, {});
   } else {
@@ -73,10 +71,8 @@ std::string grip_line(const GripModel &grip) {
   const GripRow &row = *grip.row();
   const GripReport &report = row.report;
   std::string text = fixed(grip.seconds(), 1) + " s  " + state_name(report.state) + "  width " +
-                     (row.status ? fixed(row.status->width_mm, 1) : "-") + " mm  force " +
-                     fixed(report.force_N, 2) + " N  wanted " +
-                     fixed(report.wanted_N, 2) + " N  load " +
-                     fixed(report.load_N, 2) + " N";
+                     (row.status ? fixed(row.status->width_mm, 1) : "-") + " mm  force " + fixed(report.force_N, 2) +
+                     " N  wanted " + fixed(report.wanted_N, 2) + " N  load " + fixed(report.load_N, 2) + " N";
   if (report.margin > 0) {
     text += "  margin " + fixed(report.margin, 2);
   }

@@ -25,19 +25,14 @@ std::string only_port() {
 } // namespace
 
 void with_gripper_line(CLI::App *command, GripperWay &way) {
-  command->add_option("--slave", way.slave, "Its address on the line; default: 9, of a servo 6")
-      ->type_name("N");
+  command->add_option("--slave", way.slave, "Its address on the line; default: 9, of a servo 6")->type_name("N");
   command
       ->add_option("--closed", way.closed_count,
                    "Position that it reports when its pads touch; default: 230, of a servo 2048")
       ->type_name("COUNT");
-  command
-      ->add_option("--open", way.open_count,
-                   "Position that it reports when it is open; default: 3, of a servo 2700")
+  command->add_option("--open", way.open_count, "Position that it reports when it is open; default: 3, of a servo 2700")
       ->type_name("COUNT");
-  command
-      ->add_option("--jaw", way.jaw_mm,
-                   "Of a servo: from its axis to the middle of the pad; default: 100 mm")
+  command->add_option("--jaw", way.jaw_mm, "Of a servo: from its axis to the middle of the pad; default: 100 mm")
       ->type_name("MM");
   command
       ->add_option_function<double>(

@@ -28,11 +28,9 @@ class OneKeeper : public Keeper {
 public:
   OneKeeper(const LiveOptions &options, const DeviceNews &ready, const std::string &port)
       : to_standard_output_(options.recording == STANDARD_OUTPUT),
-        writer_(options.recording, options.overwrite, &ready.packet.body.info,
-                ready.packet.body.info.sensor_count, metadata(ready, port),
-                raw_expected(ready.packet.body.info),
-                to_standard_output_ ? OutputFile::Appears::on_standard_output
-                                    : OutputFile::Appears::at_once) {
+        writer_(options.recording, options.overwrite, &ready.packet.body.info, ready.packet.body.info.sensor_count,
+                metadata(ready, port), raw_expected(ready.packet.body.info),
+                to_standard_output_ ? OutputFile::Appears::on_standard_output : OutputFile::Appears::at_once) {
     writer_.packet(ready.packet);
   }
 
@@ -78,8 +76,8 @@ private:
 
 class JointKeeper : public Keeper {
 public:
-  JointKeeper(const LiveOptions &options, const std::vector<DeviceNews> &ready,
-              std::int64_t host_zero_us, const Metadata &extra)
+  JointKeeper(const LiveOptions &options, const std::vector<DeviceNews> &ready, std::int64_t host_zero_us,
+              const Metadata &extra)
       : writer_(options.recording, options.overwrite, infos(ready), begun(extra), host_zero_us,
                 raw_expected(ready[0].packet.body.info), OutputFile::Appears::at_once) {
     for (std::size_t i = 0; i < ready.size(); i++) {
@@ -87,15 +85,9 @@ public:
     }
   }
 
-  void packet(const DeviceNews &news) override {
-    writer_.packet(news.device, news.packet, news.host_us);
-  }
-  void event(std::size_t device, const std::string &text) override {
-    writer_.event(device, text + " " + utc_now());
-  }
-  void clock(const DeviceNews &news) override {
-    writer_.clock(news.device, news.estimate, news.jumps);
-  }
+  void packet(const DeviceNews &news) override { writer_.packet(news.device, news.packet, news.host_us); }
+  void event(std::size_t device, const std::string &text) override { writer_.event(device, text + " " + utc_now()); }
+  void clock(const DeviceNews &news) override { writer_.clock(news.device, news.estimate, news.jumps); }
   void comment(const std::string &key, double host_us, const std::string &value) override {
     writer_.comment(key, host_us, value);
   }
@@ -124,8 +116,7 @@ private:
 std::string utc_now() {
   auto now = wall_now();
   std::time_t seconds = std::chrono::system_clock::to_time_t(now);
-  auto ms =
-      std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
+  auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
   std::tm parts{};
   gmtime_r(&seconds, &parts);
   char text[32];
@@ -135,10 +126,9 @@ std::string utc_now() {
   return whole;
 }
 
-std::unique_ptr<Keeper> make_keeper(const LiveOptions &options,
-                                    const std::vector<DeviceNews> &ready,
-                                    const std::vector<std::string> &ports,
-                                    std::int64_t host_zero_us, const Metadata &extra) {
+std::unique_ptr<Keeper> make_keeper(const LiveOptions &options, const std::vector<DeviceNews> &ready,
+                                    const std::vector<std::string> &ports, std::int64_t host_zero_us,
+                                    const Metadata &extra) {
   if (ready.size() == 1) {
     return std::make_unique<OneKeeper>(options, ready[0], ports[0]);
   }

@@ -25,8 +25,7 @@ public:
   virtual void event(std::size_t device, const std::string &text) = 0;
   virtual void clock(const DeviceNews &) {}
   /* The recorder's own, "# key: value" between the rows of several. */
-  virtual void comment(const std::string & /*key*/, double /*host_us*/,
-                       const std::string & /*value*/) {}
+  virtual void comment(const std::string & /*key*/, double /*host_us*/, const std::string & /*value*/) {}
   /* What waits to be put in order with news of other fingertips waits no longer, if it is older. */
   virtual void settle(double /*host_us*/) {}
   virtual void finish(const std::vector<LineStatistics> &statistics, const std::string &reason) = 0;
@@ -40,9 +39,8 @@ public:
 
 /* ready: the news of that kind of each fingertip, and its port. extra: for the head of a recording
  * of several. */
-std::unique_ptr<Keeper> make_keeper(const LiveOptions &options,
-                                    const std::vector<DeviceNews> &ready,
-                                    const std::vector<std::string> &ports,
-                                    std::int64_t host_zero_us, const Metadata &extra = {});
+std::unique_ptr<Keeper> make_keeper(const LiveOptions &options, const std::vector<DeviceNews> &ready,
+                                    const std::vector<std::string> &ports, std::int64_t host_zero_us,
+                                    const Metadata &extra = {});
 
 } // namespace fingertip

@@ -72,10 +72,9 @@ void KeyParser::take_special(char final_byte) {
     char final_byte;
     Key key;
   };
-  constexpr Special specials[] = {{"", 'A', KEY_UP},    {"", 'B', KEY_DOWN},  {"", 'C', KEY_RIGHT},
-                                  {"", 'D', KEY_LEFT},  {"", 'H', KEY_HOME},  {"", 'F', KEY_END},
-                                  {"1", '~', KEY_HOME}, {"7", '~', KEY_HOME}, {"4", '~', KEY_END},
-                                  {"8", '~', KEY_END}};
+  constexpr Special specials[] = {{"", 'A', KEY_UP},   {"", 'B', KEY_DOWN}, {"", 'C', KEY_RIGHT}, {"", 'D', KEY_LEFT},
+                                  {"", 'H', KEY_HOME}, {"", 'F', KEY_END},  {"1", '~', KEY_HOME}, {"7", '~', KEY_HOME},
+                                  {"4", '~', KEY_END}, {"8", '~', KEY_END}};
   for (const Special &special : specials) {
     if (!pasting_ && final_byte == special.final_byte && parameters_ == special.parameters) {
       keys_.push_back(special.key);

@@ -31,8 +31,8 @@ constexpr milliseconds POLL{20};
 class Live {
 public:
   Live(const LiveOptions &options, const std::vector<Way> &ways)
-      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()),
-        taring_(ways.size()), accepted_(ways.size()), told_missing_(ways.size()) {
+      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()), taring_(ways.size()),
+        accepted_(ways.size()), told_missing_(ways.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
     wanted.follow_clock = several();
@@ -140,8 +140,7 @@ private:
       break;
     case Kind::bytes:
       if (!raw_bytes_) {
-        raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite,
-                                                  OutputFile::Appears::at_once);
+        raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite, OutputFile::Appears::at_once);
       }
       raw_bytes_->append(news.bytes.data(), news.bytes.size());
       break;
@@ -259,9 +258,8 @@ private:
       }
     } else if (key == 'q') {
       quit_ = true;
-    } else if (key == 't' && std::all_of(models_.begin(), models_.end(), [](const Model &model) {
-                 return model.state() == Model::State::live;
-               })) {
+    } else if (key == 't' && std::all_of(models_.begin(), models_.end(),
+                                         [](const Model &model) { return model.state() == Model::State::live; })) {
       tare_.ask(now);
     }
   }
@@ -281,12 +279,10 @@ private:
             "not tared: " + refusal(device, packet.body.ack.result));
       }
     } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
-      std::uint32_t flags =
-          packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
+      std::uint32_t flags = packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
       if (flags & CONTACT_FLAG_TARED) {
         accepted_[device] = taring_[device] = false;
-        if (!is_refused() &&
-            std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
+        if (!is_refused() && std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
           say("tared");
         }
       }
@@ -335,9 +331,7 @@ private:
     told_missing_[device] = missing;
     std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "",
                  printable(loops_[device]->name()).c_str(),
-                 missing ? ("sensors missing: " + sensors_text(missing) +
-                            "; see their wiring (fingertip info)")
-                               .c_str()
+                 missing ? ("sensors missing: " + sensors_text(missing) + "; see their wiring (fingertip info)").c_str()
                          : "all sensors answer");
   }
 
@@ -353,8 +347,7 @@ private:
     }
     std::string name = keeper_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
     if (!several()) {
-      std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(),
-                   summary_text(models_[0]).c_str());
+      std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(), summary_text(models_[0]).c_str());
       return;
     }
     if (!keeper_) {
@@ -370,15 +363,14 @@ private:
       edges += edges_text(models_[i]);
     }
     const double edges_us = keeper_->edges_alignment_us();
-    const std::string by_edges =
-        edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
+    const std::string by_edges = edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
     std::fprintf(stderr,
                  "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets "
                  "dropped, %llu CRC errors%s\n",
                  name.c_str(), static_cast<unsigned long long>(frames), models_.size(),
                  fixed(keeper_->alignment_us(), 0).c_str(), by_edges.c_str(),
-                 static_cast<unsigned long long>(sum.dropped_packets),
-                 static_cast<unsigned long long>(sum.crc_errors), edges.c_str());
+                 static_cast<unsigned long long>(sum.dropped_packets), static_cast<unsigned long long>(sum.crc_errors),
+                 edges.c_str());
   }
 
   const LiveOptions &options_;
@@ -414,8 +406,7 @@ void check_outputs(const LiveOptions &options) {
       check_output(path, options.overwrite);
     }
   }
-  if (!options.recording.empty() && !options.raw_bytes.empty() &&
-      is_same_file(options.recording, options.raw_bytes)) {
+  if (!options.recording.empty() && !options.raw_bytes.empty() && is_same_file(options.recording, options.raw_bytes)) {
     throw Error(options.raw_bytes + ": is the recording too; give --raw-bytes another name");
   }
 }

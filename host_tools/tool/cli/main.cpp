@@ -13,19 +13,17 @@
 int main(int argc, char **argv) {
   using namespace fingertip;
   try {
-    CommandLine line(
-        "Talks to Fingertip tactile sensors: shows, records and replays what they feel.",
-        FINGERTIP_VERSION);
-    for (auto add : {add_list, add_info, add_doctor, add_monitor, add_record, add_replay,
-                     add_convert, add_tare, add_calibrate, add_validate, add_pad, add_set, add_serve, add_simulate,
-                     add_web, add_gripper, add_grasp, add_loader, add_flash, add_rule}) {
+    CommandLine line("Talks to Fingertip tactile sensors: shows, records and replays what they feel.",
+                     FINGERTIP_VERSION);
+    for (auto add : {add_list, add_info,      add_doctor,   add_monitor, add_record, add_replay, add_convert,
+                     add_tare, add_calibrate, add_validate, add_pad,     add_set,    add_serve,  add_simulate,
+                     add_web,  add_gripper,   add_grasp,    add_loader,  add_flash,  add_rule}) {
       add(line);
     }
     const int status = line.run(argc, argv);
     /* A reader that has left, as head does, has what it wanted. std::cout is what help goes to. */
     if ((std::fflush(stdout) != 0 || !std::cout) && errno != EPIPE) {
-      throw Error(ErrorCode::cannot_write,
-                  std::string("cannot write to standard output: ") + std::strerror(errno));
+      throw Error(ErrorCode::cannot_write, std::string("cannot write to standard output: ") + std::strerror(errno));
     }
     return status;
   } catch (const WrongUsage &error) {

@@ -90,8 +90,7 @@ void Model::sample(const wire_contact &contact, std::uint64_t t_us) {
   if (samples_.empty() || interval < last_interval_) {
     samples_.assign(1, {});
   } else {
-    for (std::uint64_t i = std::min<std::uint64_t>(interval - last_interval_, SAMPLES); i > 0;
-         i--) {
+    for (std::uint64_t i = std::min<std::uint64_t>(interval - last_interval_, SAMPLES); i > 0; i--) {
       samples_.emplace_back();
     }
   }
@@ -135,19 +134,15 @@ bool Model::is_current() const {
 }
 
 bool Model::is_tared() const {
-  return raw_ ? raw_->flags & CONTACT_FLAG_TARED
-              : contact_ && (contact_->flags & CONTACT_FLAG_TARED);
+  return raw_ ? raw_->flags & CONTACT_FLAG_TARED : contact_ && (contact_->flags & CONTACT_FLAG_TARED);
 }
 
 std::uint32_t Model::missing_sensors() const {
-  return info_ && health_
-             ? fingertip::missing_sensors(health_->sensors_present, info_->sensor_count)
-             : 0;
+  return info_ && health_ ? fingertip::missing_sensors(health_->sensors_present, info_->sensor_count) : 0;
 }
 
 bool Model::is_without_sensors() const {
-  return info_ && info_->sensor_count > 0 &&
-         missing_sensors() == fingertip::missing_sensors(0, info_->sensor_count);
+  return info_ && info_->sensor_count > 0 && missing_sensors() == fingertip::missing_sensors(0, info_->sensor_count);
 }
 
 double Model::seconds() const {
@@ -158,8 +153,7 @@ double Model::frames_per_s() const {
   if (recent_us_.size() < 2) {
     return 0;
   }
-  return static_cast<double>(recent_us_.size() - 1) * 1e6 /
-         static_cast<double>(recent_us_.back() - recent_us_.front());
+  return static_cast<double>(recent_us_.size() - 1) * 1e6 / static_cast<double>(recent_us_.back() - recent_us_.front());
 }
 
 double Model::mean_frames_per_s() const {

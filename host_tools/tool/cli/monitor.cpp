@@ -35,8 +35,7 @@ void draw_header(Canvas &canvas, const Area &area, const Model &model, bool alon
     column = canvas.text(column, area.top, "FINGERTIP ", {WHITE, BAR, true});
   }
   if (model.info()) {
-    column =
-        canvas.text(column, area.top, text_field(model.info()->serial) + " ", {INK, BAR, !alone});
+    column = canvas.text(column, area.top, text_field(model.info()->serial) + " ", {INK, BAR, !alone});
     canvas.text(column, area.top, text_field(model.info()->board) + " ", {FAINT, BAR, false});
   } else {
     canvas.text(column, area.top, printable(model.source()), {FAINT, BAR, false});
@@ -56,8 +55,8 @@ struct Numbers {
 };
 
 std::string contact_in_words(float x_mm, float y_mm, float sd_mm, float force_N) {
-  return signed_number(x_mm, 1) + ", " + signed_number(y_mm, 1) + " mm, sd " + number(sd_mm, 2) +
-         "; " + number(force_N, 2) + " N";
+  return signed_number(x_mm, 1) + ", " + signed_number(y_mm, 1) + " mm, sd " + number(sd_mm, 2) + "; " +
+         number(force_N, 2) + " N";
 }
 
 Numbers numbers_of(const Model &model) {
@@ -94,15 +93,12 @@ Numbers numbers_of(const Model &model) {
     }
   }
   if (contact.flags & CONTACT_FLAG_TWO_CONTACTS) {
-    numbers.stronger =
-        contact_in_words(contact.x1_mm, contact.y1_mm, contact.location1_sd_mm, contact.force1_N);
-    numbers.weaker =
-        contact_in_words(contact.x2_mm, contact.y2_mm, contact.location2_sd_mm, contact.force2_N);
+    numbers.stronger = contact_in_words(contact.x1_mm, contact.y1_mm, contact.location1_sd_mm, contact.force1_N);
+    numbers.weaker = contact_in_words(contact.x2_mm, contact.y2_mm, contact.location2_sd_mm, contact.force2_N);
   }
   if (contact.flags & CONTACT_FLAG_EDGE) {
-    numbers.edge = signed_number(contact.edge_angle_deg, 1) + "°, sd " +
-                   number(contact.edge_angle_sd_deg, 1) + "; " + number(contact.edge_length_mm, 1) +
-                   " mm";
+    numbers.edge = signed_number(contact.edge_angle_deg, 1) + "°, sd " + number(contact.edge_angle_sd_deg, 1) + "; " +
+                   number(contact.edge_length_mm, 1) + " mm";
   }
   return numbers;
 }
@@ -120,10 +116,8 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const N
     return;
   }
   if ((flags & CONTACT_FLAG_CONTACT) && !(flags & CONTACT_FLAG_FIT_VALID)) {
-    canvas.text(area.left, area.top, first_columns("contact, no location", area.width),
-                text_style(WARNING, true));
-    draw_warnings(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model,
-                  numbers_of_warnings(flags));
+    canvas.text(area.left, area.top, first_columns("contact, no location", area.width), text_style(WARNING, true));
+    draw_warnings(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model, numbers_of_warnings(flags));
     return;
   }
   auto words = warnings_in_words(flags, model.info() ? model.info()->location_limit_mm : 0);
@@ -141,8 +135,7 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const N
     std::string text = lines[static_cast<std::size_t>(i)];
     bool last = cut && i + 1 == area.height;
     canvas.text(area.left, area.top + i,
-                last ? first_columns(text, area.width - 4) + " ..."
-                     : first_columns(text, area.width),
+                last ? first_columns(text, area.width - 4) + " ..." : first_columns(text, area.width),
                 text_style(WARNING, true));
   }
 }
@@ -167,14 +160,13 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     column = draw_lamp(canvas, column, row, moved, "MOVING", WARNING);
     return draw_lamp(canvas, column + 2, row, slid, "SLIDING", BAD);
   };
-  auto quantity = [&](int column, const char *label, const std::optional<std::string> &value,
-                      int width, const char *unit, bool may_doubt) {
+  auto quantity = [&](int column, const char *label, const std::optional<std::string> &value, int width,
+                      const char *unit, bool may_doubt) {
     return draw_quantity(canvas, column, row, {label, value, width, unit, may_doubt && doubtful});
   };
   auto line = [&](const char *label, const std::optional<std::string> &text) {
     int column = canvas.text(left, row, label, text_style(FAINT));
-    canvas.text(column, row, first_columns(*text, area.left + area.width - column),
-                text_style(INK));
+    canvas.text(column, row, first_columns(*text, area.left + area.width - column), text_style(INK));
     row++;
   };
   if (area.width < WIDE - 20) {
@@ -192,8 +184,7 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     row++;
     quantity(left, "slip ", numbers.slip, 8, "mm", true);
     row++;
-    draw_lamp(canvas, draw_lamp(canvas, left, row, contact, "CONTACT", GOOD) + 2, row, slipped,
-              "SLIP", BAD);
+    draw_lamp(canvas, draw_lamp(canvas, left, row, contact, "CONTACT", GOOD) + 2, row, slipped, "SLIP", BAD);
     row++;
     if (!model.tells_tangential()) {
       return row;
@@ -255,8 +246,7 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
   column = draw_lamp(canvas, column + 2, row, slipped, "SLIP", BAD);
   column = quantity(column + 1, "", numbers.slip, 5, of.c_str(), true);
   std::string zero = model.is_tared() ? "tared" : "no zero yet";
-  canvas.text(column + 2, row, model.is_current() ? zero : "",
-              text_style(model.is_tared() ? FAINT : WARNING));
+  canvas.text(column + 2, row, model.is_current() ? zero : "", text_style(model.is_tared() ? FAINT : WARNING));
   return row + 1;
 }
 
@@ -289,9 +279,8 @@ std::vector<Item> items_of(const Model &model) {
     const wire_stages &stages = model.contact()->stages;
     items.push_back({"one frame", std::to_string(stages.total_us) + " µs", 8});
     const std::pair<const char *, std::uint16_t> all[] = {
-        {"convert", stages.convert_us}, {"read", stages.read_us},
-        {"queue", stages.queue_us},     {"condition", stages.condition_us},
-        {"fit", stages.fit_us},         {"contact", stages.contact_us}};
+        {"convert", stages.convert_us},     {"read", stages.read_us}, {"queue", stages.queue_us},
+        {"condition", stages.condition_us}, {"fit", stages.fit_us},   {"contact", stages.contact_us}};
     for (const auto &[name, us] : all) {
       items.push_back(count(name, us, false, 4));
     }
@@ -337,9 +326,8 @@ void draw_fingertip(Canvas &canvas, const Area &area, const Model &model, bool a
   Area body = {area.left, area.top + 1, area.width, area.height - 1};
   int bottom = body.top + body.height;
   bool wide = area.width >= WIDE;
-  int item_rows =
-      std::min(draw_items(nullptr, {0, 0, area.width - 2, 0}, items),
-               wide ? std::max(2, (body.height + 3) / 6) : std::max(2, body.height / 10));
+  int item_rows = std::min(draw_items(nullptr, {0, 0, area.width - 2, 0}, items),
+                           wide ? std::max(2, (body.height + 3) / 6) : std::max(2, body.height / 10));
   Area pad = {body.left, body.top, 0, 0};
   if (model.info() && model.info()->sensor_count > 0) {
     int columns = wide ? std::min(area.width - 50, area.width * 2 / 5) : area.width * 2 / 5;
@@ -365,29 +353,24 @@ void draw_fingertip(Canvas &canvas, const Area &area, const Model &model, bool a
     draw_traces(canvas, {left, row, right.width - 1, traces_end - row}, model);
   } else {
     draw_warnings(canvas, {left, row, right.width - 1, below - row}, model, numbers);
-    draw_traces(
-        canvas,
-        {area.left, std::max(below, row), area.width - 1, traces_end - std::max(below, row)},
-        model);
+    draw_traces(canvas, {area.left, std::max(below, row), area.width - 1, traces_end - std::max(below, row)}, model);
   }
 }
 
 void draw_small(Canvas &canvas, const std::vector<Model> &models, const Caption &caption) {
   int row = 0;
   canvas.text(0, row++,
-              "window too small: " + std::to_string(canvas.columns()) + "x" +
-                  std::to_string(canvas.rows()) + ", needs " + std::to_string(MONITOR_COLUMNS) +
-                  "x" + std::to_string(MONITOR_ROWS),
+              "window too small: " + std::to_string(canvas.columns()) + "x" + std::to_string(canvas.rows()) +
+                  ", needs " + std::to_string(MONITOR_COLUMNS) + "x" + std::to_string(MONITOR_ROWS),
               text_style(WARNING, true));
   for (const Model &model : models) {
     Numbers numbers = numbers_of(model);
     auto [state, colour] = state_of(model);
-    canvas.text(0, row++, (model.info() ? text_field(model.info()->serial) + " " : "") + state,
-                text_style(colour));
+    canvas.text(0, row++, (model.info() ? text_field(model.info()->serial) + " " : "") + state, text_style(colour));
     int column = 0;
-    for (const Quantity &quantity : {Quantity{"force", numbers.force, 6, "N ", numbers.doubtful},
-                                     Quantity{"x", numbers.x, 6, "", numbers.doubtful},
-                                     Quantity{"y", numbers.y, 6, "", numbers.doubtful}}) {
+    for (const Quantity &quantity :
+         {Quantity{"force", numbers.force, 6, "N ", numbers.doubtful},
+          Quantity{"x", numbers.x, 6, "", numbers.doubtful}, Quantity{"y", numbers.y, 6, "", numbers.doubtful}}) {
       column = draw_quantity(canvas, column, row, quantity);
     }
     row++;
@@ -397,8 +380,7 @@ void draw_small(Canvas &canvas, const std::vector<Model> &models, const Caption 
 
 } // namespace
 
-Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, int columns,
-                    int rows) {
+Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, int columns, int rows) {
   Canvas canvas(columns, rows);
   if (columns < MONITOR_COLUMNS || rows < MONITOR_ROWS) {
     draw_small(canvas, models, caption);
@@ -416,15 +398,14 @@ Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, in
   draw_bar(canvas, {0, 0, columns, 1});
   int column = canvas.text(1, 0, "FINGERTIP ", {WHITE, BAR, true});
   canvas.text(column, 0,
-              shown < count ? std::to_string(shown) + " of " + std::to_string(count) +
-                                  " fingertips, a larger window shows more"
-                            : std::to_string(count) + " fingertips",
+              shown < count
+                  ? std::to_string(shown) + " of " + std::to_string(count) + " fingertips, a larger window shows more"
+                  : std::to_string(count) + " fingertips",
               {shown < count ? WARNING : FAINT, BAR, false});
   int width = columns / across, height = (rows - 2) / down;
   for (int i = 0; i < shown; i++) {
-    draw_fingertip(
-        canvas, {i % across * width, 1 + i / across * height, width - (across > 1 ? 1 : 0), height},
-        models[static_cast<std::size_t>(i)], false);
+    draw_fingertip(canvas, {i % across * width, 1 + i / across * height, width - (across > 1 ? 1 : 0), height},
+                   models[static_cast<std::size_t>(i)], false);
   }
   draw_caption(canvas, caption);
   return canvas;

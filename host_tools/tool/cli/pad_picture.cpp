@@ -35,8 +35,7 @@ Colour heat(float part) {
   constexpr Colour stops[] = {PAD,           {44, 18, 92},   {104, 24, 112}, {164, 46, 98},
                               {216, 76, 62}, {246, 130, 26}, {250, 196, 44}, {253, 252, 180}};
   constexpr int last = static_cast<int>(sizeof stops / sizeof *stops) - 1;
-  float at =
-      std::round(std::clamp(part, 0.0f, 1.0f) * HEAT_STEPS) / HEAT_STEPS * static_cast<float>(last);
+  float at = std::round(std::clamp(part, 0.0f, 1.0f) * HEAT_STEPS) / HEAT_STEPS * static_cast<float>(last);
   int below = std::min(static_cast<int>(at), last - 1);
   return mix(stops[below], stops[below + 1], at - static_cast<float>(below));
 }
@@ -59,9 +58,8 @@ public:
     top_mm_ = *y_high + RIM_mm;
     float width_mm = *x_high + RIM_mm - left_mm_;
     float height_mm = top_mm_ - *y_low + RIM_mm;
-    pixel_mm_ =
-        std::max({width_mm / static_cast<float>(std::max(columns_available, 4)),
-                  height_mm / static_cast<float>(2 * std::max(rows_available, 2)), FINEST_mm});
+    pixel_mm_ = std::max({width_mm / static_cast<float>(std::max(columns_available, 4)),
+                          height_mm / static_cast<float>(2 * std::max(rows_available, 2)), FINEST_mm});
     columns_ = static_cast<int>(std::lround(width_mm / pixel_mm_));
     rows_ = static_cast<int>(std::lround(height_mm / pixel_mm_ / 2));
     pixels_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) * 2, PAD);
@@ -69,18 +67,10 @@ public:
 
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  float x_mm(int column) const {
-    return left_mm_ + (static_cast<float>(column) + 0.5f) * pixel_mm_;
-  }
-  float y_mm(int pixel_row) const {
-    return top_mm_ - (static_cast<float>(pixel_row) + 0.5f) * pixel_mm_;
-  }
-  int column_of(float x_mm) const {
-    return static_cast<int>(std::floor((x_mm - left_mm_) / pixel_mm_));
-  }
-  int pixel_row_of(float y_mm) const {
-    return static_cast<int>(std::floor((top_mm_ - y_mm) / pixel_mm_));
-  }
+  float x_mm(int column) const { return left_mm_ + (static_cast<float>(column) + 0.5f) * pixel_mm_; }
+  float y_mm(int pixel_row) const { return top_mm_ - (static_cast<float>(pixel_row) + 0.5f) * pixel_mm_; }
+  int column_of(float x_mm) const { return static_cast<int>(std::floor((x_mm - left_mm_) / pixel_mm_)); }
+  int pixel_row_of(float y_mm) const { return static_cast<int>(std::floor((top_mm_ - y_mm) / pixel_mm_)); }
   float pixel_mm() const { return pixel_mm_; }
   int cells_of(float mm) const { return static_cast<int>(mm / pixel_mm_); }
   Colour *pixel(int column, int pixel_row) {
@@ -104,15 +94,13 @@ private:
 
 /* The fit that may be drawn. */
 const wire_contact *fit_of(const Model &model) {
-  return model.is_current() && model.contact() && (model.contact()->flags & CONTACT_FLAG_FIT_VALID)
-             ? &*model.contact()
-             : nullptr;
+  return model.is_current() && model.contact() && (model.contact()->flags & CONTACT_FLAG_FIT_VALID) ? &*model.contact()
+                                                                                                    : nullptr;
 }
 
 float fitted_Pa(const wire_contact &contact, float x_mm, float y_mm) {
   float dx = x_mm - contact.x_mm, dy = y_mm - contact.y_mm;
-  return contact.p0_Pa *
-         std::exp(-0.5f * (dx * dx + dy * dy) / (contact.sigma_mm * contact.sigma_mm));
+  return contact.p0_Pa * std::exp(-0.5f * (dx * dx + dy * dy) / (contact.sigma_mm * contact.sigma_mm));
 }
 
 void paint_fit(Picture &picture, const Model &model, const wire_contact &contact) {
@@ -157,12 +145,11 @@ struct Arrow {
   float covers(float dx_mm, float dy_mm, float pixel_mm) const {
     float ahead_mm = dx_mm * along_x + dy_mm * along_y;
     float aside_mm = std::abs(dx_mm * along_y - dy_mm * along_x);
-    if (has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm - sd_mm &&
-        aside_mm <= 0.5f * pixel_mm) {
+    if (has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm - sd_mm && aside_mm <= 0.5f * pixel_mm) {
       return part;
     }
-    bool in_cone = has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm &&
-                   aside_mm <= sd_mm * ahead_mm / length_mm;
+    bool in_cone =
+        has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm && aside_mm <= sd_mm * ahead_mm / length_mm;
     float from_end_mm = std::hypot(dx_mm - length_mm * along_x, dy_mm - length_mm * along_y);
     return in_cone || from_end_mm <= std::max(sd_mm, 0.5f * pixel_mm) ? UNSURE_PART * part : 0;
   }
@@ -181,9 +168,9 @@ std::optional<Arrow> arrow_of(const wire_contact &contact) {
 void paint_arrow(Picture &picture, const wire_contact &contact, const Arrow &arrow) {
   for (int row = 0; row < 2 * picture.rows(); row++) {
     for (int column = 0; column < picture.columns(); column++) {
-      picture.paint(column, row, arrow.colour,
-                    arrow.covers(picture.x_mm(column) - contact.x_mm,
-                                 picture.y_mm(row) - contact.y_mm, picture.pixel_mm()));
+      picture.paint(
+          column, row, arrow.colour,
+          arrow.covers(picture.x_mm(column) - contact.x_mm, picture.y_mm(row) - contact.y_mm, picture.pixel_mm()));
     }
   }
 }
@@ -217,24 +204,18 @@ struct Mark {
     int column = picture.column_of(contact.x_mm), row = picture.pixel_row_of(contact.y_mm) / 2;
     if (contact.flags & CONTACT_FLAG_TWO_CONTACTS) {
       colour = WARNING;
-      const float places_mm[2][2] = {{contact.x1_mm, contact.y1_mm},
-                                     {contact.x2_mm, contact.y2_mm}};
+      const float places_mm[2][2] = {{contact.x1_mm, contact.y1_mm}, {contact.x2_mm, contact.y2_mm}};
       for (const auto &[x_mm, y_mm] : places_mm) {
         column = picture.column_of(x_mm), row = picture.pixel_row_of(y_mm) / 2;
-        cells.insert(cells.end(),
-                     {{column - 1, row, "─"}, {column, row, "┼"}, {column + 1, row, "─"}});
+        cells.insert(cells.end(), {{column - 1, row, "─"}, {column, row, "┼"}, {column + 1, row, "─"}});
       }
     } else if (warnings_of(contact.flags)) {
       colour = WARNING;
-      cells = {{column - 2, row, "("},
-               {column + 2, row, ")"},
-               {column, row - 1, "╌"},
-               {column, row + 1, "╌"}};
+      cells = {{column - 2, row, "("}, {column + 2, row, ")"}, {column, row - 1, "╌"}, {column, row + 1, "╌"}};
     } else {
       colour = WHITE;
-      cells = {{column - 2, row, "─"}, {column - 1, row, "─"}, {column, row, "┼"},
-               {column + 1, row, "─"}, {column + 2, row, "─"}, {column, row - 1, "│"},
-               {column, row + 1, "│"}};
+      cells = {{column - 2, row, "─"}, {column - 1, row, "─"}, {column, row, "┼"},    {column + 1, row, "─"},
+               {column + 2, row, "─"}, {column, row - 1, "│"}, {column, row + 1, "│"}};
     }
   }
 };
@@ -242,8 +223,7 @@ struct Mark {
 void draw_picture(Canvas &canvas, Picture &picture, int left, int top) {
   for (int row = 0; row < picture.rows(); row++) {
     for (int column = 0; column < picture.columns(); column++) {
-      canvas.halves(left + column, top + row, *picture.pixel(column, 2 * row),
-                    *picture.pixel(column, 2 * row + 1));
+      canvas.halves(left + column, top + row, *picture.pixel(column, 2 * row), *picture.pixel(column, 2 * row + 1));
     }
   }
 }
@@ -288,8 +268,7 @@ Reading reading_of(const Model &model, int k) {
   return {kPa(*pressure_Pa), *pressure_Pa > NOTED_Pa ? WHITE : INK, pressure_Pa};
 }
 
-void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int k, int left,
-                 int top) {
+void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int k, int left, int top) {
   const wire_info &info = *model.info();
   float pitch_mm = info.pitch_mm > 0 ? info.pitch_mm : 2 * RIM_mm;
   int width = std::clamp(picture.cells_of(pitch_mm) - 1, 3, 5);
@@ -299,8 +278,7 @@ void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int
   Reading reading = reading_of(model, k);
   bool doubtful = model.is_current() && model.raw() && (model.raw()->doubtful >> k & 1u);
   std::string name = std::to_string(k) + (doubtful ? "?" : "");
-  auto put = [&](int line, const std::string &text, Colour colour, bool bold,
-                 std::optional<Colour> back) {
+  auto put = [&](int line, const std::string &text, Colour colour, bool bold, std::optional<Colour> back) {
     int pad = std::max(0, (width - columns_of(text) + 1) / 2);
     for (int i = 0; back && i < width; i++) {
       canvas.text(column + i, row + line, " ", {std::nullopt, back, false});
@@ -322,10 +300,9 @@ void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int
   const wire_contact *fit = fit_of(model);
   if (has_room_for_fit && fit) {
     const Canvas::Cell &behind =
-        canvas.cell(std::clamp(column + width / 2, 0, canvas.columns() - 1),
-                    std::clamp(row + 2, 0, canvas.rows() - 1));
-    put(2, kPa(fitted_Pa(*fit, info.x_mm[k], info.y_mm[k])),
-        is_bright(behind.style.back) ? BLACK : ACCENT, false, std::nullopt);
+        canvas.cell(std::clamp(column + width / 2, 0, canvas.columns() - 1), std::clamp(row + 2, 0, canvas.rows() - 1));
+    put(2, kPa(fitted_Pa(*fit, info.x_mm[k], info.y_mm[k])), is_bright(behind.style.back) ? BLACK : ACCENT, false,
+        std::nullopt);
   }
 }
 
@@ -369,8 +346,7 @@ void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
     std::string text = std::to_string(tick_kPa);
     float part = heat_part(static_cast<float>(tick_kPa) * 1000);
     auto length = static_cast<int>(text.size());
-    int at = std::min(left + static_cast<int>(std::lround(part * static_cast<float>(width - 1))) -
-                          length / 2,
+    int at = std::min(left + static_cast<int>(std::lround(part * static_cast<float>(width - 1))) - length / 2,
                       left + width - length);
     if (at >= free_from) {
       Colour behind = heat(part);
@@ -416,11 +392,9 @@ Area draw_pad(Canvas &canvas, const Area &available, const Model &model) {
   if (arrow) {
     /* At the end, or as near to it as there is room, outside of the location's own cell. */
     bool placed = false;
-    for (float mm = arrow->length_mm; !placed && mm > 2 * picture.pixel_mm();
-         mm -= picture.pixel_mm()) {
+    for (float mm = arrow->length_mm; !placed && mm > 2 * picture.pixel_mm(); mm -= picture.pixel_mm()) {
       placed = place(picture.column_of(fit->x_mm + mm * arrow->along_x),
-                     picture.pixel_row_of(fit->y_mm + mm * arrow->along_y) / 2, arrow->head(),
-                     arrow->colour);
+                     picture.pixel_row_of(fit->y_mm + mm * arrow->along_y) / 2, arrow->head(), arrow->colour);
     }
   }
   if (fit) {

@@ -45,8 +45,8 @@ std::string page_note(const std::string &tool_version) {
     return "";
   }
   return "the page beside this tool is of " +
-         (version.empty() ? "an unknown version" : "version " + printable(version)) +
-         ", the tool of version " + tool_version + "; install both from one release";
+         (version.empty() ? "an unknown version" : "version " + printable(version)) + ", the tool of version " +
+         tool_version + "; install both from one release";
 }
 
 } // namespace fingertip

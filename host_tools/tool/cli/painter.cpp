@@ -21,14 +21,12 @@ int palette_index(Colour colour) {
     return best;
   };
   auto distance = [&](int r, int g, int b) {
-    return (r - colour.r) * (r - colour.r) + (g - colour.g) * (g - colour.g) +
-           (b - colour.b) * (b - colour.b);
+    return (r - colour.r) * (r - colour.r) + (g - colour.g) * (g - colour.g) + (b - colour.b) * (b - colour.b);
   };
   int r = nearest(colour.r), g = nearest(colour.g), b = nearest(colour.b);
   int grey = std::clamp(((colour.r + colour.g + colour.b) / 3 - 3) / 10, 0, 23);
   int grey_level = 8 + 10 * grey;
-  bool grey_is_nearer =
-      distance(grey_level, grey_level, grey_level) < distance(levels[r], levels[g], levels[b]);
+  bool grey_is_nearer = distance(grey_level, grey_level, grey_level) < distance(levels[r], levels[g], levels[b]);
   return grey_is_nearer ? 232 + grey : 16 + 36 * r + 6 * g + b;
 }
 
@@ -37,28 +35,24 @@ constexpr const char *LOWER_HALF = "▄";
 
 /* U+2800 to U+28FF: dots in four rows. */
 bool is_braille(const std::string &character) {
-  return character.size() == 3 && character[0] == '\xE2' &&
-         (static_cast<unsigned char>(character[1]) & 0xFC) == 0xA0;
+  return character.size() == 3 && character[0] == '\xE2' && (static_cast<unsigned char>(character[1]) & 0xFC) == 0xA0;
 }
 
 char ascii_of_braille(const std::string &character) {
-  unsigned dots = (static_cast<unsigned char>(character[1]) & 3u) << 6 |
-                  (static_cast<unsigned char>(character[2]) & 0x3Fu);
+  unsigned dots =
+      (static_cast<unsigned char>(character[1]) & 3u) << 6 | (static_cast<unsigned char>(character[2]) & 0x3Fu);
   constexpr unsigned upper = 0x1B, lower = 0xE4; /* two rows each */
   return dots & upper ? (dots & lower ? ':' : '\'') : dots & lower ? '.' : ' ';
 }
 
 char ascii_of(const std::string &character) {
   static const std::map<std::string, char> nearest = {
-      {"─", '-'}, {"│", '|'}, {"┤", '|'},  {"╌", '-'},  {"┼", '+'}, {"╭", '+'}, {"╮", '+'},
-      {"╰", '+'}, {"╯", '+'}, {"●", '*'},  {"○", 'o'},  {"·", '.'}, {"×", 'x'}, {"σ", 's'},
-      {"µ", 'u'}, {"±", '~'}, {"≥", '>'},  {"←", '<'},  {"→", '>'}, {"↑", '^'}, {"↓", 'v'},
-      {"↗", '/'}, {"↙", '/'}, {"↖", '\\'}, {"↘", '\\'}, {"▏", ' '}, {"▎", ' '}, {"▍", ' '},
-      {"▌", '#'}, {"▋", '#'}, {"▊", '#'},  {"▉", '#'},  {"█", '#'}};
+      {"─", '-'}, {"│", '|'}, {"┤", '|'}, {"╌", '-'}, {"┼", '+'}, {"╭", '+'},  {"╮", '+'},  {"╰", '+'}, {"╯", '+'},
+      {"●", '*'}, {"○", 'o'}, {"·", '.'}, {"×", 'x'}, {"σ", 's'}, {"µ", 'u'},  {"±", '~'},  {"≥", '>'}, {"←", '<'},
+      {"→", '>'}, {"↑", '^'}, {"↓", 'v'}, {"↗", '/'}, {"↙", '/'}, {"↖", '\\'}, {"↘", '\\'}, {"▏", ' '}, {"▎", ' '},
+      {"▍", ' '}, {"▌", '#'}, {"▋", '#'}, {"▊", '#'}, {"▉", '#'}, {"█", '#'}};
   auto found = nearest.find(character);
-  return found != nearest.end()  ? found->second
-         : is_braille(character) ? ascii_of_braille(character)
-                                 : '?';
+  return found != nearest.end() ? found->second : is_braille(character) ? ascii_of_braille(character) : '?';
 }
 
 /* From dark to bright. */
@@ -89,8 +83,7 @@ std::int32_t Painter::code(const std::optional<Colour> &colour) const {
   if (!colour || depth_ == ColourDepth::none) {
     return TERMINALS_OWN;
   }
-  return depth_ == ColourDepth::palette_256 ? palette_index(*colour)
-                                            : colour->r << 16 | colour->g << 8 | colour->b;
+  return depth_ == ColourDepth::palette_256 ? palette_index(*colour) : colour->r << 16 | colour->g << 8 | colour->b;
 }
 
 Painter::Shown Painter::shown(const Canvas::Cell &cell) const {
@@ -99,8 +92,7 @@ Painter::Shown Painter::shown(const Canvas::Cell &cell) const {
     bool as_it_is = characters_ == Characters::utf_8 || cell.character.size() == 1;
     std::string character = as_it_is ? cell.character : std::string(1, ascii_of(cell.character));
     /* a blank's front cannot be seen */
-    return {character, character == " " ? TERMINALS_OWN : code(front), code(back),
-            character != " " && bold};
+    return {character, character == " " ? TERMINALS_OWN : code(front), code(back), character != " " && bold};
   }
   Colour mean = mix(*front, *back, 0.5f);
   if (depth_ == ColourDepth::none) {
@@ -149,8 +141,8 @@ std::string Painter::paint(const Canvas &canvas) {
   for (int row = 0; row < rows_; row++) {
     for (int column = 0; column < columns_; column++) {
       Shown wanted = shown(canvas.cell(column, row));
-      Shown &there = shown_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                            static_cast<std::size_t>(column)];
+      Shown &there =
+          shown_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
       if (wanted == there) {
         continue;
       }

@@ -40,8 +40,7 @@ private:
     std::int32_t front = TERMINALS_OWN, back = TERMINALS_OWN;
     bool bold = false;
     bool operator==(const Shown &other) const {
-      return character == other.character && front == other.front && back == other.back &&
-             bold == other.bold;
+      return character == other.character && front == other.front && back == other.back && bold == other.bold;
     }
   };
 

@@ -36,8 +36,7 @@ Told state_of(const Model &model) {
 }
 
 void draw_bar(Canvas &canvas, const Area &area) {
-  canvas.text(area.left, area.top, std::string(static_cast<std::size_t>(area.width), ' '),
-              {FAINT, BAR, false});
+  canvas.text(area.left, area.top, std::string(static_cast<std::size_t>(area.width), ' '), {FAINT, BAR, false});
 }
 
 int draw_quantity(Canvas &canvas, int column, int row, const Quantity &quantity) {
@@ -49,14 +48,12 @@ int draw_quantity(Canvas &canvas, int column, int row, const Quantity &quantity)
   return canvas.text(column, row, quantity.unit, text_style(FAINT));
 }
 
-int draw_lamp(Canvas &canvas, int column, int row, bool on, const std::string &name,
-              Colour colour) {
+int draw_lamp(Canvas &canvas, int column, int row, bool on, const std::string &name, Colour colour) {
   column = canvas.text(column, row, on ? "● " : "○ ", text_style(on ? colour : RULE, true));
   return canvas.text(column, row, name, text_style(on ? colour : FAINT, on));
 }
 
-std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator,
-                                int columns) {
+std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator, int columns) {
   std::vector<std::string> lines;
   for (const std::string &part : parts) {
     std::string longer = lines.empty() ? part : lines.back() + separator + part;

@@ -38,8 +38,7 @@ void draw_bar(Canvas &canvas, const Area &area);
 void draw_caption(Canvas &canvas, const Caption &caption);
 
 /* Lines of at most this many columns out of parts that stay whole. */
-std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator,
-                                int columns);
+std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator, int columns);
 std::string right_aligned(const std::string &text, int width);
 
 } // namespace fingertip

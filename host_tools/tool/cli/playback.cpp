@@ -35,8 +35,7 @@ double Track::Clock::take(std::uint64_t t_us) {
   return before_us + static_cast<double>(t_us - zero_us);
 }
 
-Track::Track(const std::string &path, bool salvage, const std::string &device)
-    : file_(path, salvage, device) {
+Track::Track(const std::string &path, bool salvage, const std::string &device) : file_(path, salvage, device) {
   read_next();
 }
 
@@ -69,9 +68,8 @@ void Track::go_back(double time_us, Model &model) {
   if (time_us >= last_us_) {
     return;
   }
-  auto after =
-      std::upper_bound(marks_.begin(), marks_.end(), time_us,
-                       [](double wanted, const Mark &mark) { return wanted < mark.time_us; });
+  auto after = std::upper_bound(marks_.begin(), marks_.end(), time_us,
+                                [](double wanted, const Mark &mark) { return wanted < mark.time_us; });
   if (marks_.empty()) {
     return;
   }
@@ -109,16 +107,15 @@ void GripTrack::go_back(double time_us, GripModel &model) {
   if (time_us >= last_us_ || marks_.empty()) {
     return;
   }
-  auto mark = std::find_if(marks_.rbegin(), marks_.rend() - 1,
-                           [&](const Mark &each) { return each.time_us <= time_us; });
+  auto mark =
+      std::find_if(marks_.rbegin(), marks_.rend() - 1, [&](const Mark &each) { return each.time_us <= time_us; });
   reader_.go_to(mark->place);
   model = mark->model;
   next_ = mark->next;
   last_us_ = mark->last_us;
 }
 
-Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed)
-    : speed_(speed) {
+Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed) : speed_(speed) {
   std::vector<std::string> devices = {device};
   if (device.empty()) {
     auto all = fingertips_in(path);
@@ -174,14 +171,12 @@ HostTime Playback::next_step(HostTime now) const {
     return now + patience;
   }
   auto due = std::chrono::duration<double, std::micro>((due_us - time_us_) / speed_);
-  return now +
-         std::min<HostTime::duration>(patience, std::chrono::duration_cast<HostTime::duration>(due));
+  return now + std::min<HostTime::duration>(patience, std::chrono::duration_cast<HostTime::duration>(due));
 }
 
 bool Playback::is_over() const {
   return quit_ || (!paused_ && is_there_ && (!grip_track_ || grip_track_->is_ended()) &&
-                   std::all_of(tracks_.begin(), tracks_.end(),
-                               [](const Track &track) { return track.is_ended(); }));
+                   std::all_of(tracks_.begin(), tracks_.end(), [](const Track &track) { return track.is_ended(); }));
 }
 
 void Playback::seek(double time_us) {
@@ -233,8 +228,7 @@ Caption Playback::caption(const std::string &name) const {
     shown_us = std::max(shown_us, track.last_us());
   }
   std::string note = is_there_ && paused_ ? "PAUSED at " : is_there_ ? "at " : "reading, at ";
-  return {std::string("q quit  space ") + (paused_ ? "play " : "pause") +
-              "  ← → 5 s  ↑ ↓ 1 min  home end",
+  return {std::string("q quit  space ") + (paused_ ? "play " : "pause") + "  ← → 5 s  ↑ ↓ 1 min  home end",
           note + fixed((is_there_ ? time_us_ : shown_us) / 1e6, 1) + " s of " + name, ""};
 }
 

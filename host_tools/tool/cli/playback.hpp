@@ -92,7 +92,6 @@ private:
 
 class Playback {
 public:
-
   /* speed: times the recorded one; 0: as fast as it can be read. Of a joint recording without a
    * device all of its fingertips. */
   Playback(const std::string &path, bool salvage, const std::string &device, double speed);

@@ -17,9 +17,7 @@ double seconds_from_text(const std::string &text) {
 } // namespace
 
 void with_several(CLI::App *command, Several &several) {
-  command
-      ->add_option("--device", several.devices,
-                   "Serial number of the fingertip; several are taken on one clock")
+  command->add_option("--device", several.devices, "Serial number of the fingertip; several are taken on one clock")
       ->take_all()
       ->expected(1)
       ->type_name("SERIAL");
@@ -47,19 +45,16 @@ std::vector<Way> ways_of(const Several &several) {
 void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help) {
   command
       ->add_option_function<std::string>(
-          "--seconds", [&seconds](const std::string &text) { seconds = seconds_from_text(text); },
-          help)
+          "--seconds", [&seconds](const std::string &text) { seconds = seconds_from_text(text); }, help)
       ->type_name("S");
 }
 
 void with_recording(CLI::App *command, LiveOptions &options) {
   with_seconds(command, options.seconds, "End after this much device time");
-  command
-      ->add_option("--raw-bytes", options.raw_bytes, "Also keep the bytes of the line as they came")
+  command->add_option("--raw-bytes", options.raw_bytes, "Also keep the bytes of the line as they came")
       ->type_name("FILE.ftr");
   command->add_flag("--overwrite", options.overwrite, "Replace files that exist");
-  command->add_flag("--until-gone", options.until_gone,
-                    "End when the port vanishes, instead of waiting for it");
+  command->add_flag("--until-gone", options.until_gone, "End when the port vanishes, instead of waiting for it");
 }
 
 } // namespace fingertip

@@ -117,10 +117,8 @@ std::optional<ColourDepth> screen_depth(ColourMode mode) {
     return ColourDepth::none;
   }
   const char *colours = std::getenv("COLORTERM");
-  bool truecolour =
-      colours && (!std::strcmp(colours, "truecolor") || !std::strcmp(colours, "24bit"));
-  return mode == ColourMode::automatic && truecolour ? ColourDepth::truecolour
-                                                     : ColourDepth::palette_256;
+  bool truecolour = colours && (!std::strcmp(colours, "truecolor") || !std::strcmp(colours, "24bit"));
+  return mode == ColourMode::automatic && truecolour ? ColourDepth::truecolour : ColourDepth::palette_256;
 }
 
 Characters screen_characters() {
@@ -140,8 +138,7 @@ Characters screen_characters() {
   }
   std::transform(charset.begin(), charset.end(), charset.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  bool utf_8 =
-      charset.find("utf-8") != std::string::npos || charset.find("utf8") != std::string::npos;
+  bool utf_8 = charset.find("utf-8") != std::string::npos || charset.find("utf8") != std::string::npos;
   return utf_8 ? Characters::utf_8 : Characters::ascii;
 }
 

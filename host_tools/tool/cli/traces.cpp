@@ -24,8 +24,8 @@ using Sample = Model::Sample;
 
 const Sample &sample_of(const Model &model, std::int64_t interval) {
   static const Sample none{};
-  std::int64_t oldest = static_cast<std::int64_t>(model.last_interval()) -
-                        static_cast<std::int64_t>(model.samples().size()) + 1;
+  std::int64_t oldest =
+      static_cast<std::int64_t>(model.last_interval()) - static_cast<std::int64_t>(model.samples().size()) + 1;
   bool there = interval >= oldest && interval <= static_cast<std::int64_t>(model.last_interval());
   return there ? model.samples()[static_cast<std::size_t>(interval - oldest)] : none;
 }
@@ -35,8 +35,8 @@ Curve curve_of(const Model &model, bool Sample::*there, float Sample::*value, bo
                bool Sample::*alarm) {
   return {[&model, there, value, alarm](std::int64_t interval) {
             const Sample &sample = sample_of(model, interval);
-            return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt,
-                              sample.doubtful, alarm && sample.*alarm};
+            return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, sample.doubtful,
+                              alarm && sample.*alarm};
           },
           static_cast<std::int64_t>(model.last_interval()), goes_both_ways};
 }
@@ -81,13 +81,11 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
   bool good_ones = force_N > 1;
   force_N = good_ones ? force_N : doubtful_N;
   pull_N = round_above(pull_N);
-  std::vector<Chart> charts = {
-      {"force", "N", 0, round_above(force_N), std::nullopt, {force_curve(model)}}};
+  std::vector<Chart> charts = {{"force", "N", 0, round_above(force_N), std::nullopt, {force_curve(model)}}};
   const bool three_axes = model.has_pad();
-  const auto signed_chart = [&](const char *name, const char *unit, float reach,
-                                bool Sample::*there, float Sample::*value, bool Sample::*alarm) {
-    charts.push_back(
-        {name, unit, -reach, reach, 0.0f, {curve_of(model, there, value, true, alarm)}});
+  const auto signed_chart = [&](const char *name, const char *unit, float reach, bool Sample::*there,
+                                float Sample::*value, bool Sample::*alarm) {
+    charts.push_back({name, unit, -reach, reach, 0.0f, {curve_of(model, there, value, true, alarm)}});
   };
   if (three_axes) {
     signed_chart("qx", "N", pull_N, &Sample::pulled, &Sample::qx_N, &Sample::sliding);
@@ -98,13 +96,12 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
     signed_chart("x", "mm", x_mm, &Sample::fitted, &Sample::x_mm, nullptr);
     signed_chart("y", "mm", y_mm, &Sample::fitted, &Sample::y_mm, nullptr);
   }
-  charts.push_back(
-      {"slip",
-       "mm",
-       0,
-       round_above(slip_mm),
-       threshold_mm > 0 ? std::optional<float>(threshold_mm) : std::nullopt,
-       {curve_of(model, &Sample::slip_valid, &Sample::slip_mm, false, &Sample::slip)}});
+  charts.push_back({"slip",
+                    "mm",
+                    0,
+                    round_above(slip_mm),
+                    threshold_mm > 0 ? std::optional<float>(threshold_mm) : std::nullopt,
+                    {curve_of(model, &Sample::slip_valid, &Sample::slip_mm, false, &Sample::slip)}});
   draw_charts(canvas, area, SAMPLE_INTERVAL_s, charts);
 }
 

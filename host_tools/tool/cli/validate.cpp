@@ -47,12 +47,11 @@ nlohmann::json json_of(const Card &card) {
   nlohmann::json figures = nlohmann::json::object(), findings = nlohmann::json::array(),
                  presses = nlohmann::json::array();
   for (const validating::Figure &figure : card.figures) {
-    figures[figure.key] = std::round(figure.value * std::pow(10.0, figure.digits + 2)) /
-                          std::pow(10.0, figure.digits + 2);
+    figures[figure.key] =
+        std::round(figure.value * std::pow(10.0, figure.digits + 2)) / std::pow(10.0, figure.digits + 2);
   }
   for (const validating::Finding &finding : card.findings) {
-    findings.push_back(
-        {{"finding", finding.code}, {"sensors", finding.sensors}, {"text", finding.text}});
+    findings.push_back({{"finding", finding.code}, {"sensors", finding.sensors}, {"text", finding.text}});
   }
   for (std::size_t i = 0; i < card.measured.presses.size(); i++) {
     const validating::Press &press = card.measured.presses[i];
@@ -91,17 +90,14 @@ nlohmann::json json_of(const Card &card) {
 
 bool is_pdf(const std::string &path) {
   const std::string ends = ".pdf";
-  return path.size() > ends.size() &&
-         path.compare(path.size() - ends.size(), ends.size(), ends) == 0;
+  return path.size() > ends.size() && path.compare(path.size() - ends.size(), ends.size(), ends) == 0;
 }
 
 void print(const Card &card) {
   for (const validating::Figure &figure : card.figures) {
-    std::printf("%9s %-7s %s\n", fixed(figure.value, figure.digits).c_str(), figure.unit.c_str(),
-                figure.says.c_str());
+    std::printf("%9s %-7s %s\n", fixed(figure.value, figure.digits).c_str(), figure.unit.c_str(), figure.says.c_str());
   }
-  std::printf("%s\n",
-              card.findings.empty() ? "\nnothing is wrong that this validation can see" : "");
+  std::printf("%s\n", card.findings.empty() ? "\nnothing is wrong that this validation can see" : "");
   if (!card.pull_note.empty()) {
     std::printf("%s\n", card.pull_note.c_str());
   }
@@ -129,13 +125,12 @@ int run_validate(const ValidateOptions &options) {
     const calibrating::Array array = calibrating::array_of(pad::own_sensors());
     write_text(options.sheet, options.overwrite,
                is_pdf(options.sheet) ? validating::sheet_pdf(array) : validating::sheet_svg(array));
-    std::printf("%s: print it at 100 %%, and measure its line of %s mm\n",
-                printable(options.sheet).c_str(), fixed(validating::RULER_mm, 0).c_str());
+    std::printf("%s: print it at 100 %%, and measure its line of %s mm\n", printable(options.sheet).c_str(),
+                fixed(validating::RULER_mm, 0).c_str());
     return 0;
   }
-  const Card card =
-      validating::assess(options.from.empty() ? validate_live(options) : measured_in(options),
-                         printable(options.from.empty() ? options.recording : options.from));
+  const Card card = validating::assess(options.from.empty() ? validate_live(options) : measured_in(options),
+                                       printable(options.from.empty() ? options.recording : options.from));
   if (!options.card.empty()) {
     write_text(options.card, options.overwrite, validating::card_html(card, FINGERTIP_VERSION));
   }

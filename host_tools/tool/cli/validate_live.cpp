@@ -55,8 +55,7 @@ public:
     canvas.text(2, 1, "fingertip validate", text_style(INK, true));
     canvas.text(2, 3, advice, text_style(WHITE, true));
     canvas.text(2, 5, std::string(static_cast<std::size_t>(done), '='), text_style(GOOD));
-    canvas.text(2 + done, 5, std::string(static_cast<std::size_t>(bar - done), '-'),
-                text_style(RULE));
+    canvas.text(2 + done, 5, std::string(static_cast<std::size_t>(bar - done), '-'), text_style(RULE));
     canvas.text(2, screen_->rows() - 1, "q quit   u take the last one back", text_style(FAINT));
     screen_->draw(canvas);
   }
@@ -97,8 +96,7 @@ validating::Measured validate_live(const ValidateOptions &options) {
   wire_packet ready = device.session.info();
   info = ready.body.info;
   calibrating::check_firmware(info, name);
-  if (const std::string why = validating::why_no_pull(info);
-      options.pulling.weight_g > 0.0 && !why.empty()) {
+  if (const std::string why = validating::why_no_pull(info); options.pulling.weight_g > 0.0 && !why.empty()) {
     std::fprintf(stderr, "fingertip: %s\n", why.c_str());
   }
   if (!options.serial) {
@@ -107,8 +105,7 @@ validating::Measured validate_live(const ValidateOptions &options) {
   Walk walk(info, options.weight_g, options.skin_mm, options.pulling);
   /* Nothing but what was measured: no port, no place, no name. */
   RecordingWriter writer(options.recording, options.overwrite, &info, info.sensor_count,
-                         Metadata{{"recorded_by", "fingertip " FINGERTIP_VERSION}}, true,
-                         OutputFile::Appears::at_once);
+                         Metadata{{"recorded_by", "fingertip " FINGERTIP_VERSION}}, true, OutputFile::Appears::at_once);
   ready.body.info = info;
   writer.packet(ready);
   Guide guide(options.colour);

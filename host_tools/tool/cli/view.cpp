@@ -18,7 +18,6 @@ namespace fingertip {
 
 namespace {
 
-
 class Interval {
 public:
   explicit Interval(std::chrono::milliseconds length) : length_(length) {}
@@ -70,19 +69,16 @@ std::string state_text(const Model &model) {
 
 std::string status_line(const Model &model) {
   const LineStatistics &line = model.statistics();
-  std::string text =
-      fixed(model.seconds(), 1) + " s  " + std::to_string(model.frames()) + " frames  " +
-      (model.state() == Model::State::gone ? "" : fixed(model.frames_per_s(), 1) + "/s  ") +
-      "dropped " + std::to_string(line.dropped_packets) + "  CRC errors " +
-      std::to_string(line.crc_errors);
+  std::string text = fixed(model.seconds(), 1) + " s  " + std::to_string(model.frames()) + " frames  " +
+                     (model.state() == Model::State::gone ? "" : fixed(model.frames_per_s(), 1) + "/s  ") + "dropped " +
+                     std::to_string(line.dropped_packets) + "  CRC errors " + std::to_string(line.crc_errors);
   std::string state = state_text(model);
   return state.empty() ? text : text + "  " + state;
 }
 
 class ScreenView : public View {
 public:
-  using Draw = std::function<Canvas(const std::vector<Model> &models, const Caption &caption,
-                                    int columns, int rows)>;
+  using Draw = std::function<Canvas(const std::vector<Model> &models, const Caption &caption, int columns, int rows)>;
   ScreenView(ColourDepth depth, Draw draw) : screen_(depth), draw_(std::move(draw)) {}
   void update(const std::vector<Model> &models, const Caption &caption) override {
     if (interval_.is_due(hurry_)) {
@@ -110,9 +106,8 @@ std::string contact_text(const Model &model) {
   if (contact.flags & CONTACT_FLAG_FIT_VALID) {
     bool least = contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND;
     text = std::string(warnings_of(contact.flags) ? "  doubtful:" : "") + "  x " +
-           fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " +
-           fixed(static_cast<double>(contact.y_mm), 2) + " mm  force " +
-           (least ? "at least " : "") + fixed(static_cast<double>(contact.force_N), 2) + " N";
+           fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " + fixed(static_cast<double>(contact.y_mm), 2) +
+           " mm  force " + (least ? "at least " : "") + fixed(static_cast<double>(contact.force_N), 2) + " N";
   }
   return text + "  " + flags_text(contact.flags);
 }
@@ -129,12 +124,9 @@ public:
     }
     for (const Model &model : models) {
       std::string name =
-          models.size() < 2
-              ? ""
-              : printable(model.info() ? text_field(model.info()->serial) : model.source()) + "  ";
-      std::printf("%s%s%s%s%s\n", name.c_str(), status_line(model).c_str(),
-                  contact_text(model).c_str(), caption.note.empty() ? "" : "  ",
-                  caption.note.c_str());
+          models.size() < 2 ? "" : printable(model.info() ? text_field(model.info()->serial) : model.source()) + "  ";
+      std::printf("%s%s%s%s%s\n", name.c_str(), status_line(model).c_str(), contact_text(model).c_str(),
+                  caption.note.empty() ? "" : "  ", caption.note.c_str());
     }
     std::fflush(stdout);
   }
@@ -158,8 +150,7 @@ public:
       return;
     }
     std::FILE *to = quiet_ ? stderr : stdout;
-    std::fprintf(to, "%s%s%s\n", grip_line(grip_).c_str(), caption.note.empty() ? "" : "  ",
-                 caption.note.c_str());
+    std::fprintf(to, "%s%s%s\n", grip_line(grip_).c_str(), caption.note.empty() ? "" : "  ", caption.note.c_str());
     std::fflush(to);
   }
 
@@ -224,9 +215,9 @@ std::unique_ptr<View> make_monitor_view(ColourMode mode) {
 
 std::unique_ptr<View> make_grasp_view(ColourMode mode, const GripModel &grip) {
   if (auto depth = screen_depth(mode)) {
-    return std::make_unique<ScreenView>(
-        *depth, [&grip](const std::vector<Model> &models, const Caption &caption, int columns,
-                        int rows) { return draw_grasp(models, grip, caption, columns, rows); });
+    return std::make_unique<ScreenView>(*depth,
+                                        [&grip](const std::vector<Model> &models, const Caption &caption, int columns,
+                                                int rows) { return draw_grasp(models, grip, caption, columns, rows); });
   }
   return std::make_unique<GraspLineView>(grip, false);
 }
@@ -246,9 +237,9 @@ std::unique_ptr<View> make_state_view() {
 std::string summary_text(const Model &model) {
   const LineStatistics &line = model.statistics();
   return std::to_string(model.frames()) + " frames in " + fixed(model.seconds(), 2) + " s (" +
-         fixed(model.mean_frames_per_s(), 1) + "/s), " + std::to_string(line.dropped_packets) +
-         " packets dropped, " + std::to_string(line.crc_errors) + " CRC errors, " +
-         std::to_string(line.format_errors) + " format errors" + edges_text(model);
+         fixed(model.mean_frames_per_s(), 1) + "/s), " + std::to_string(line.dropped_packets) + " packets dropped, " +
+         std::to_string(line.crc_errors) + " CRC errors, " + std::to_string(line.format_errors) + " format errors" +
+         edges_text(model);
 }
 
 std::string edges_text(const Model &model) {

@@ -35,8 +35,7 @@ std::string exception_text(unsigned number) {
   }
   /* RP2040 datasheet 2.3.2, and boards/rp2040/nvic.h for the last */
   static constexpr std::pair<unsigned, const char *> names[] = {
-      {0, "sensors' timer"}, {1, "USB's timer"}, {5, "USB"},         {7, "PIO"},
-      {11, "DMA"},           {23, "I2C"},        {26, "USB service"}};
+      {0, "sensors' timer"}, {1, "USB's timer"}, {5, "USB"}, {7, "PIO"}, {11, "DMA"}, {23, "I2C"}, {26, "USB service"}};
   std::string text = "interrupt " + std::to_string(number - FIRST_INTERRUPT);
   for (auto [interrupt, name] : names) {
     if (interrupt == number - FIRST_INTERRUPT) {
@@ -62,9 +61,7 @@ std::string activity_text(unsigned activity) {
 
 std::string stuck_text(unsigned stuck) {
   static constexpr std::pair<unsigned, const char *> names[] = {
-      {CRASH_STUCK_MAIN, "the main loop"},
-      {CRASH_STUCK_SCAN, "the scan of the sensors"},
-      {CRASH_STUCK_USB, "USB"}};
+      {CRASH_STUCK_MAIN, "the main loop"}, {CRASH_STUCK_SCAN, "the scan of the sensors"}, {CRASH_STUCK_USB, "USB"}};
   std::string text;
   for (auto [bit, name] : names) {
     if (stuck & bit) {
@@ -89,9 +86,9 @@ std::string at_text(const Crash &crash) {
 }
 
 std::string where_text(const crash_record &record) {
-  return record.exception == 0 ? ", in the main loop, " + activity_text(record.activity)
-                               : ", in " + exception_text(record.exception) + ", the main loop " +
-                                     activity_text(record.activity);
+  return record.exception == 0
+             ? ", in the main loop, " + activity_text(record.activity)
+             : ", in " + exception_text(record.exception) + ", the main loop " + activity_text(record.activity);
 }
 
 std::string event_text(unsigned code, unsigned detail) {
@@ -125,8 +122,7 @@ std::string event_text(unsigned code, unsigned detail) {
 
 std::string crash_text(const Crash &crash) {
   const crash_record &record = crash.record;
-  std::string since =
-      ", " + duration_text(static_cast<double>(record.t_us) / 1e6) + " after its start";
+  std::string since = ", " + duration_text(static_cast<double>(record.t_us) / 1e6) + " after its start";
   switch (record.kind) {
   case CRASH_FAULT:
     return "a hard fault" + at_text(crash) + where_text(record) + since;
@@ -135,15 +131,14 @@ std::string crash_text(const Crash &crash) {
   case CRASH_PANIC:
     return "a panic" + at_text(crash) + where_text(record) + since;
   case CRASH_EXCEPTION:
-    return exception_text(record.vector) + " came, which has no handler," + at_text(crash) +
-           where_text(record) + since;
+    return exception_text(record.vector) + " came, which has no handler," + at_text(crash) + where_text(record) + since;
   case CRASH_WATCHDOG:
     if (record.stuck & CRASH_STUCK_INTERRUPTS) {
       return "the watchdog struck: nothing went on, interrupts neither, the main loop " +
              activity_text(record.activity) + since;
     }
-    return "the watchdog struck: " + stuck_text(record.stuck) + " stood still; the processor was" +
-           at_text(crash) + where_text(record) + since;
+    return "the watchdog struck: " + stuck_text(record.stuck) + " stood still; the processor was" + at_text(crash) +
+           where_text(record) + since;
   case CRASH_START:
     return "a start that gave up: clocks that did not come, or a fault in the start-up code";
   default:
@@ -158,8 +153,7 @@ double event_age_s(const crash_record &record, unsigned event) {
 std::string events_text(const crash_record &record) {
   std::string text;
   for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
-    text += (text.empty() ? "" : ", ") +
-            event_text(record.event_codes[i], record.event_details[i]) + " " +
+    text += (text.empty() ? "" : ", ") + event_text(record.event_codes[i], record.event_details[i]) + " " +
             duration_text(event_age_s(record, i));
   }
   return text;

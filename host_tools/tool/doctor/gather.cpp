@@ -58,8 +58,7 @@ Crash told_crash(const crash_record &record, const wire_info &info, const std::s
   auto is_marked = [&](const std::string &mark, const char *field) {
     return symbols.holds("fingertip-" + mark + "=" + text_field(field) + '\0');
   };
-  if (is_marked("git", info.git_hash) && is_marked("board", info.board) &&
-      is_marked("scene", info.scene)) {
+  if (is_marked("git", info.git_hash) && is_marked("board", info.board) && is_marked("scene", info.scene)) {
     return with_places(record, symbols);
   }
   Crash crash = with_places(record, std::nullopt);
@@ -81,8 +80,8 @@ void ask_for_crash(Session &session, Facts &facts, const std::string &elf) {
   }
 }
 
-void measure(Session &session, Facts &facts, const std::string &elf, double seconds,
-             const std::function<bool()> &stop, const std::function<void(double)> &progress) {
+void measure(Session &session, Facts &facts, const std::string &elf, double seconds, const std::function<bool()> &stop,
+             const std::function<void(double)> &progress) {
   RestMeter meter;
   std::int64_t last_us = steady_now_us();
   session.on_packet([&](const wire_packet &packet) {
@@ -94,9 +93,7 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
   facts.before = session.health().body.health;
   ask_for_crash(session, facts, elf);
   LineStatistics before = session.statistics();
-  session.command(
-      command_stream(possible_streams(*facts.info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)),
-      PATIENCE);
+  session.command(command_stream(possible_streams(*facts.info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)), PATIENCE);
   while (meter.seconds() < seconds && steady_now_us() - last_us < SILENCE_MAX_us) {
     if (stop()) {
       throw Interrupted();

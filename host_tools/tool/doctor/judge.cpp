@@ -37,7 +37,7 @@ constexpr double DRIFT_SURE_sd = 3;
 /* Each temperature moves a sensor's pressures until the next one comes, 2 s later at most (scan.h),
  * by its noise: 240 Pa/degC (readings.h), and rms of the data sheet by OSR. */
 constexpr double TEMPERATURE_Pa_per_degC = 240, TEMPERATURE_INTERVAL_MAX_s = 2;
-#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                             \
+#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                                                 \
   { ratio, noise_degC }
 constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TABLE(ROW)};
 #undef ROW
@@ -125,29 +125,26 @@ public:
   }
 
 private:
-  void add(Verdict verdict, const char *check, const std::string &text,
-           const std::string &advice = "", const std::vector<unsigned> &sensors = {}) {
+  void add(Verdict verdict, const char *check, const std::string &text, const std::string &advice = "",
+           const std::vector<unsigned> &sensors = {}) {
     findings_.push_back({verdict, check, text, advice, sensors});
   }
 
   /* "sensor 7 (strip 1, ...)" */
   std::string named(unsigned sensor) const {
     std::string text = list({sensor});
-    return wiring_ && sensor < wiring_->sensor_count
-               ? text + " (" + wiring_->place_text(sensor) + ")"
-               : text;
+    return wiring_ && sensor < wiring_->sensor_count ? text + " (" + wiring_->place_text(sensor) + ")" : text;
   }
 
   std::string check_of(unsigned sensor) const {
     return wiring_ && sensor < wiring_->sensor_count ? wiring_->check_sensor(sensor)
-                                                       : "check its supply, data line and clock";
+                                                     : "check its supply, data line and clock";
   }
 
   void rule() {
     bool denied = facts_.failure && facts_.failure->code == ErrorCode::permission_denied;
     if (facts_.rule.empty()) {
-      add(denied ? Verdict::bad : Verdict::warn, "rule",
-          "no udev rule lets users without privileges open fingertips",
+      add(denied ? Verdict::bad : Verdict::warn, "rule", "no udev rule lets users without privileges open fingertips",
           advice(ErrorCode::permission_denied));
     } else if (denied) {
       add(Verdict::ok, "rule", facts_.rule + "; it acts on what is plugged in from now on");
@@ -159,8 +156,7 @@ private:
   std::string holders_text() const {
     std::string text;
     for (const Holder &holder : facts_.holders.seen) {
-      text += (text.empty() ? "" : ", ") + holder.name + " (process " +
-              std::to_string(holder.process) + ")";
+      text += (text.empty() ? "" : ", ") + holder.name + " (process " + std::to_string(holder.process) + ")";
     }
     return text;
   }
@@ -169,14 +165,11 @@ private:
     std::string holders = holders_text();
     if (!facts_.failure) {
       if (facts_.is_shared) {
-        add(Verdict::ok, "port",
-            facts_.port + (holders.empty() ? ", shared" : ", shared by " + holders));
+        add(Verdict::ok, "port", facts_.port + (holders.empty() ? ", shared" : ", shared by " + holders));
       } else if (holders.empty()) {
-        add(Verdict::ok, "port",
-            facts_.port + (facts_.knows_computer ? ", no other program has it open" : ""));
+        add(Verdict::ok, "port", facts_.port + (facts_.knows_computer ? ", no other program has it open" : ""));
       } else {
-        add(Verdict::warn, "port", facts_.port + ": also open in " + holders,
-            "end it: it takes bytes away");
+        add(Verdict::warn, "port", facts_.port + ": also open in " + holders, "end it: it takes bytes away");
       }
       return;
     }
@@ -184,10 +177,8 @@ private:
     switch (failure.code) {
     case ErrorCode::port_in_use:
       if (holders.empty()) {
-        add(Verdict::bad, "port",
-            failure.text + (facts_.holders.all_seen ? "" : ", one of another user"),
-            facts_.holders.all_seen ? advice(failure.code)
-                                    : "end that one; `sudo fingertip doctor` names it");
+        add(Verdict::bad, "port", failure.text + (facts_.holders.all_seen ? "" : ", one of another user"),
+            facts_.holders.all_seen ? advice(failure.code) : "end that one; `sudo fingertip doctor` names it");
       } else {
         add(Verdict::bad, "port", failure.text + ": " + holders, "end that one first");
       }
@@ -212,22 +203,19 @@ private:
     const wire_info &info = *facts_.info;
     add(Verdict::ok, "protocol", "version " + std::to_string(WIRE_VERSION));
     auto version = [](const auto &parts) {
-      return std::to_string(parts[0]) + "." + std::to_string(parts[1]) + "." +
-             std::to_string(parts[2]);
+      return std::to_string(parts[0]) + "." + std::to_string(parts[1]) + "." + std::to_string(parts[2]);
     };
-    std::string text = version(info.firmware_version) + " (" + text_field(info.git_hash) +
-                       "), board " + text_field(info.board) + ", scene " + text_field(info.scene);
+    std::string text = version(info.firmware_version) + " (" + text_field(info.git_hash) + "), board " +
+                       text_field(info.board) + ", scene " + text_field(info.scene);
     if (std::equal(facts_.tool_version.begin(), facts_.tool_version.end(), info.firmware_version)) {
       add(Verdict::ok, "firmware", text);
     } else {
-      add(Verdict::warn, "firmware",
-          text + "; this tool is of version " + version(facts_.tool_version),
+      add(Verdict::warn, "firmware", text + "; this tool is of version " + version(facts_.tool_version),
           "install this tool's with `fingertip flash`, or use the other's tool");
     }
     if (!wiring_ || wiring_->sensor_count != info.sensor_count) {
       add(Verdict::warn, "board",
-          text_field(info.board) + " with " + count(info.sensor_count, "sensor") +
-              " is unknown to this tool",
+          text_field(info.board) + " with " + count(info.sensor_count, "sensor") + " is unknown to this tool",
           "pins and the rate to expect are those of its own documents");
       wiring_.reset();
     }
@@ -247,15 +235,13 @@ private:
 
   void missing_sensors() {
     if (missing_ == all_) {
-      add(Verdict::bad, "sensors",
-          "none of the " + std::to_string(facts_.info->sensor_count) + " sensors answers",
+      add(Verdict::bad, "sensors", "none of the " + std::to_string(facts_.info->sensor_count) + " sensors answers",
           wiring_ ? wiring_->check_all() : "check supply and clock", sensors_in(missing_));
       return;
     }
     std::uint32_t left = missing_;
     if (wiring_ && wiring_->has_multiplexers()) {
-      for (unsigned strip = 0; strip * wiring_->sensors_of_strip < wiring_->sensor_count;
-           strip++) {
+      for (unsigned strip = 0; strip * wiring_->sensors_of_strip < wiring_->sensor_count; strip++) {
         std::uint32_t of_strip = wiring_->sensors_of(strip);
         if ((left & of_strip) == of_strip) {
           left &= ~of_strip;
@@ -272,12 +258,10 @@ private:
    * the firmware tries it ever more rarely: so since start. */
   void missing_strip(unsigned strip, std::uint32_t sensors) {
     char address[8];
-    std::snprintf(address, sizeof address, "0x%02x",
-                  *wiring_->place(strip * wiring_->sensors_of_strip).multiplexer);
+    std::snprintf(address, sizeof address, "0x%02x", *wiring_->place(strip * wiring_->sensors_of_strip).multiplexer);
     std::string who = "strip " + std::to_string(strip) + ", " + list(sensors_in(sensors)) + ": ";
     if (facts_.after->bus_timeouts > 0) {
-      add(Verdict::bad, "sensors",
-          who + "a line behind multiplexer " + address + " is held low, it is kept shut",
+      add(Verdict::bad, "sensors", who + "a line behind multiplexer " + address + " is held low, it is kept shut",
           "take the sensors of that strip off one by one, or measure its SDn and SCn: 3.3 V at "
           "rest",
           sensors_in(sensors));
@@ -312,8 +296,7 @@ private:
     bool memory_bad = facts_.after->sensors_prom_bad >> k & 1u;
     if (sensor.valid_share < 1 - ABSENT_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors",
-          named(k) + " has readings in " + percent(sensor.valid_share) + " of the frames only",
-          check_of(k), {k});
+          named(k) + " has readings in " + percent(sensor.valid_share) + " of the frames only", check_of(k), {k});
     }
     if (sensor.saturated_share > 0) {
       add(Verdict::warn, "sensors", named(k) + " reads beyond its range, 1980 mbar",
@@ -326,17 +309,14 @@ private:
     }
     double apart_Pa = sensor.mean_Pa - middle_Pa();
     if (sensor.readings > 0 && std::abs(apart_Pa) > APART_MAX_Pa) {
-      add(Verdict::warn, "sensors",
-          named(k) + " reads " + fixed(apart_Pa / 1000, 0) + " kPa apart from the others",
+      add(Verdict::warn, "sensors", named(k) + " reads " + fixed(apart_Pa / 1000, 0) + " kPa apart from the others",
           "release the pad; if it stays, rubber presses on it or it is damaged", {k});
     }
   }
 
   bool are_of_another_type() const {
     const double middle = middle_Pa();
-    auto is_air = [](double pressure_Pa) {
-      return pressure_Pa >= AIR_MIN_Pa && pressure_Pa <= AIR_MAX_Pa;
-    };
+    auto is_air = [](double pressure_Pa) { return pressure_Pa >= AIR_MIN_Pa && pressure_Pa <= AIR_MAX_Pa; };
     return is_air(middle * OF_ANOTHER_TYPE) || is_air(middle / OF_ANOTHER_TYPE);
   }
 
@@ -374,20 +354,17 @@ private:
     std::uint32_t nacks = now.bus_nacks - then.bus_nacks;
     std::uint32_t timeouts = now.bus_timeouts - then.bus_timeouts;
     std::uint32_t recoveries = now.bus_recoveries - then.bus_recoveries;
-    std::uint32_t odd = now.implausible_readings - then.implausible_readings + now.zero_readings -
-                        then.zero_readings;
+    std::uint32_t odd = now.implausible_readings - then.implausible_readings + now.zero_readings - then.zero_readings;
     std::string text = fixed(nacks / seconds(), 1) + " NACKs/s, " + std::to_string(recoveries) +
-                       (recoveries == 1 ? " recovery, " : " recoveries, ") +
-                       count(timeouts, "timeout") + ", " + count(odd, "reading") + " left out";
+                       (recoveries == 1 ? " recovery, " : " recoveries, ") + count(timeouts, "timeout") + ", " +
+                       count(odd, "reading") + " left out";
     if (nacks + timeouts + recoveries + odd == 0) {
       add(Verdict::ok, "bus",
-          text + "; since its start " + count(now.bus_nacks, "NACK") + " and " +
-              count(now.bus_timeouts, "timeout"));
+          text + "; since its start " + count(now.bus_nacks, "NACK") + " and " + count(now.bus_timeouts, "timeout"));
     } else if (missing_) {
       add(Verdict::warn, "bus", text, "see to the missing sensors first");
     } else {
-      add(Verdict::warn, "bus", text,
-          "check wires, pull-ups and supply; keep motor cables away from them");
+      add(Verdict::warn, "bus", text, "check wires, pull-ups and supply; keep motor cables away from them");
     }
   }
 
@@ -424,8 +401,7 @@ private:
   void processor() {
     const wire_health &now = *facts_.after;
     std::uint32_t skipped = facts_.before ? now.frames_skipped - facts_.before->frames_skipped : 0;
-    std::string text =
-        fixed(now.cpu_busy_permille / 10.0, 1) + " % busy, " + count(skipped, "frame") + " skipped";
+    std::string text = fixed(now.cpu_busy_permille / 10.0, 1) + " % busy, " + count(skipped, "frame") + " skipped";
     bool busy = now.cpu_busy_permille > BUSY_MAX_permille || skipped > 0;
     add(busy ? Verdict::warn : Verdict::ok, "processor", text,
         busy ? "choose a larger osr or a lower rate; missing sensors make the fit slower" : "");
@@ -453,14 +429,11 @@ private:
       add(Verdict::ok, "rate", text);
       return;
     }
-    text +=
-        ", " + fixed(*expected_Hz, 1) + " expected (" +
-        (info.rate_mHz ? fixed(info.rate_mHz / 1000.0, 1) + " asked for" : "as fast as it can") +
-        ", OSR " + std::to_string(info.osr) + ")";
+    text += ", " + fixed(*expected_Hz, 1) + " expected (" +
+            (info.rate_mHz ? fixed(info.rate_mHz / 1000.0, 1) + " asked for" : "as fast as it can") + ", OSR " +
+            std::to_string(info.osr) + ")";
     double share = rate_Hz / *expected_Hz;
-    Verdict verdict = share < RATE_SHARE_BAD   ? Verdict::bad
-                      : share < RATE_SHARE_MIN ? Verdict::warn
-                                               : Verdict::ok;
+    Verdict verdict = share < RATE_SHARE_BAD ? Verdict::bad : share < RATE_SHARE_MIN ? Verdict::warn : Verdict::ok;
     add(verdict, "rate", text,
         verdict == Verdict::ok ? ""
         : missing_             ? "see to the missing sensors first"
@@ -470,16 +443,14 @@ private:
   void packets() {
     const LineStatistics &line = facts_.line;
     std::uint64_t damaged = line.crc_errors + line.format_errors;
-    std::uint32_t dropped = facts_.before && facts_.after
-                                ? facts_.after->packets_dropped - facts_.before->packets_dropped
-                                : 0;
-    std::string text = count(line.packets, "packet") + ", " + std::to_string(line.dropped_packets) +
-                       " lost, " + std::to_string(damaged) + " damaged";
+    std::uint32_t dropped =
+        facts_.before && facts_.after ? facts_.after->packets_dropped - facts_.before->packets_dropped : 0;
+    std::string text = count(line.packets, "packet") + ", " + std::to_string(line.dropped_packets) + " lost, " +
+                       std::to_string(damaged) + " damaged";
     if (line.dropped_packets + damaged == 0) {
       add(Verdict::ok, "packets", text);
     } else if (dropped > 0) {
-      add(Verdict::warn, "packets",
-          text + ", " + std::to_string(dropped) + " of them dropped by the fingertip",
+      add(Verdict::warn, "packets", text + ", " + std::to_string(dropped) + " of them dropped by the fingertip",
           "this computer or its hub does not take them fast enough");
     } else {
       add(Verdict::warn, "packets", text, "try another cable, and no hub");
@@ -488,8 +459,7 @@ private:
 
   void sync() {
     const Rest &rest = *facts_.rest;
-    std::string text = count(rest.edges, "edge") + " at the sync pin in " +
-                       fixed(rest.seconds, 1) + " s";
+    std::string text = count(rest.edges, "edge") + " at the sync pin in " + fixed(rest.seconds, 1) + " s";
     if (rest.edges_missing > 0) {
       add(Verdict::warn, "sync", text + ", " + std::to_string(rest.edges_missing) + " missing",
           "slower pulses; a ringing wire gives edges too: join the grounds, keep it short");
@@ -532,8 +502,7 @@ private:
     if (!typical_Pa) {
       return false;
     }
-    std::string sheet =
-        fixed(*typical_Pa, 1) + " Pa in the data sheet at OSR " + std::to_string(facts_.info->osr);
+    std::string sheet = fixed(*typical_Pa, 1) + " Pa in the data sheet at OSR " + std::to_string(facts_.info->osr);
     double most_Pa = 0;
     bool any = false, dead = false;
     for (unsigned k = 0; k < facts_.rest->sensors.size(); k++) {
@@ -542,8 +511,7 @@ private:
         continue;
       }
       double times = *sensor.noise_Pa / *typical_Pa;
-      std::string text =
-          named(k) + " has a noise of " + fixed(*sensor.noise_Pa, 1) + " Pa rms, " + sheet;
+      std::string text = named(k) + " has a noise of " + fixed(*sensor.noise_Pa, 1) + " Pa rms, " + sheet;
       if (times < NOISE_DEAD) {
         dead = true;
         add(Verdict::bad, "noise", text + ": it stands still", "replace the sensor", {k});
@@ -566,17 +534,15 @@ private:
       return;
     }
     if (rest.frames_touched > 0) {
-      double share =
-          static_cast<double>(rest.frames_touched) / static_cast<double>(rest.frames_received);
+      double share = static_cast<double>(rest.frames_touched) / static_cast<double>(rest.frames_received);
       add(Verdict::warn, "zero",
-          std::string(noisy ? "contact is felt in " : "something touches the pad in ") +
-              percent(share) + " of the frames: drift was not measured",
+          std::string(noisy ? "contact is felt in " : "something touches the pad in ") + percent(share) +
+              " of the frames: drift was not measured",
           noisy ? "see to the noise first; else let go of the pad and run this again"
                 : "let go of the pad and run this again; where nothing touches it, `fingertip tare "
                   "--force`");
     } else if (!(rest.last_flags & CONTACT_FLAG_TARED)) {
-      add(Verdict::warn, "zero", "not every sensor has one",
-          "let go of the pad, then `fingertip tare`");
+      add(Verdict::warn, "zero", "not every sensor has one", "let go of the pad, then `fingertip tare`");
     } else if (rest.last_flags & CONTACT_FLAG_ZERO_DOUBTFUL) {
       add(Verdict::warn, "zero", "the pressure may be a zero that has moved",
           "`fingertip tare` where nothing touches the pad");
@@ -589,8 +555,8 @@ private:
   double temperature_sd_Pa_per_s() const {
     for (auto [osr, noise_degC] : TEMPERATURE_NOISE_degC) {
       if (osr == facts_.info->osr) {
-        return TEMPERATURE_Pa_per_degC * noise_degC *
-               std::sqrt(12 * TEMPERATURE_INTERVAL_MAX_s / seconds()) / seconds();
+        return TEMPERATURE_Pa_per_degC * noise_degC * std::sqrt(12 * TEMPERATURE_INTERVAL_MAX_s / seconds()) /
+               seconds();
       }
     }
     return 0;
@@ -604,8 +570,7 @@ private:
   void drift() {
     const Rest &rest = *facts_.rest;
     if (rest.seconds < DRIFT_SECONDS_MIN) {
-      add(Verdict::ok, "drift",
-          "not measured: it takes " + fixed(DRIFT_SECONDS_MIN, 0) + " s at least");
+      add(Verdict::ok, "drift", "not measured: it takes " + fixed(DRIFT_SECONDS_MIN, 0) + " s at least");
       return;
     }
     std::string followed = "; the zero follows " + fixed(DRIFT_MAX_Pa_per_s, 1);
@@ -619,23 +584,19 @@ private:
       most_Pa_per_s = std::max(most_Pa_per_s, std::abs(slope.Pa_per_s));
       if (is_steep(slope)) {
         any = true;
-        add(Verdict::warn, "drift",
-            named(k) + " drifts by " + fixed(slope.Pa_per_s, 1) + " Pa/s" + followed,
-            "let it rest and warm up for some minutes; if it stays, check the joints under it",
-            {k});
+        add(Verdict::warn, "drift", named(k) + " drifts by " + fixed(slope.Pa_per_s, 1) + " Pa/s" + followed,
+            "let it rest and warm up for some minutes; if it stays, check the joints under it", {k});
       }
     }
     if (rest.common_drift && is_steep(*rest.common_drift)) {
       any = true;
       add(Verdict::warn, "drift",
-          "all sensors together drift by " + fixed(rest.common_drift->Pa_per_s, 1) + " Pa/s" +
-              followed,
+          "all sensors together drift by " + fixed(rest.common_drift->Pa_per_s, 1) + " Pa/s" + followed,
           "let it warm up for some minutes; the air of the room may move too");
     }
     if (!any) {
       add(Verdict::ok, "drift",
-          "at most " + fixed(most_Pa_per_s, 2) + " Pa/s, known to " +
-              fixed(temperature_sd_Pa_per_s(), 2) + followed);
+          "at most " + fixed(most_Pa_per_s, 2) + " Pa/s, known to " + fixed(temperature_sd_Pa_per_s(), 2) + followed);
     }
   }
 

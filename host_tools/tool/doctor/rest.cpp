@@ -110,8 +110,7 @@ std::vector<double> RestMeter::steps_together() const {
     steps_Pa.clear();
     for (unsigned k = 0; k < sensor_count_; k++) {
       if (has(readings_[i].valid & readings_[i - 1].valid, k)) {
-        steps_Pa.push_back(
-            static_cast<double>(readings_[i].pressure_Pa[k] - readings_[i - 1].pressure_Pa[k]));
+        steps_Pa.push_back(static_cast<double>(readings_[i].pressure_Pa[k] - readings_[i - 1].pressure_Pa[k]));
       }
     }
     together.push_back(steps_Pa.size() < COMPANY_MIN ? 0 : median(steps_Pa));
@@ -124,8 +123,7 @@ std::optional<double> RestMeter::noise(unsigned sensor, const std::vector<double
   double squares = 0;
   for (std::size_t i = 1; i < readings_.size(); i++) {
     if (has(readings_[i].valid & readings_[i - 1].valid, sensor)) {
-      double step_Pa = static_cast<double>(readings_[i].pressure_Pa[sensor] -
-                                           readings_[i - 1].pressure_Pa[sensor]) -
+      double step_Pa = static_cast<double>(readings_[i].pressure_Pa[sensor] - readings_[i - 1].pressure_Pa[sensor]) -
                        together[i - 1];
       steps_Pa.push_back(std::abs(step_Pa));
       squares += step_Pa * step_Pa;
@@ -134,9 +132,8 @@ std::optional<double> RestMeter::noise(unsigned sensor, const std::vector<double
   if (steps_Pa.empty()) {
     return std::nullopt;
   }
-  return counted_.frames_touched == 0
-             ? std::sqrt(squares / 2 / static_cast<double>(steps_Pa.size()))
-             : median(steps_Pa) * NOISE_OF_MEDIAN_STEP;
+  return counted_.frames_touched == 0 ? std::sqrt(squares / 2 / static_cast<double>(steps_Pa.size()))
+                                      : median(steps_Pa) * NOISE_OF_MEDIAN_STEP;
 }
 
 Rest RestMeter::result() const {

@@ -35,9 +35,9 @@ struct Rest {
   std::uint32_t frames_made = 0;  /* in that time, by their numbers */
   std::size_t frames_touched = 0; /* of those received: in contact */
   std::size_t frames_received = 0;
-  std::uint32_t last_flags = 0;      /* enum contact_flag */
-  std::vector<SensorAtRest> sensors; /* none where no readings are streamed */
-  std::optional<Slope> common_drift; /* of all sensors together */
+  std::uint32_t last_flags = 0;               /* enum contact_flag */
+  std::vector<SensorAtRest> sensors;          /* none where no readings are streamed */
+  std::optional<Slope> common_drift;          /* of all sensors together */
   std::uint64_t edges = 0, edges_missing = 0; /* at the sync pin, by EdgeCounter */
 };
 

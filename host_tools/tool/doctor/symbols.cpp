@@ -19,8 +19,7 @@ namespace {
 /* An assembler's label without a size reaches to the next function, but no farther than this. */
 constexpr std::uint32_t UNSIZED_MAX_bytes = 4096;
 
-template <typename Part>
-Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::string &name) {
+template <typename Part> Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::string &name) {
   Part part;
   if (at > file.size() || file.size() - at < sizeof part) {
     throw Error(name + ": is cut short; give the ELF file of this firmware");
@@ -36,8 +35,7 @@ Symbols Symbols::of_file(const std::string &path) {
     throw Error(ErrorCode::is_folder, path + ": is a folder");
   }
   std::ifstream stream(path, std::ios::binary);
-  std::vector<std::uint8_t> file((std::istreambuf_iterator<char>(stream)),
-                                 std::istreambuf_iterator<char>());
+  std::vector<std::uint8_t> file((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   if (!stream.is_open() || stream.bad()) {
     throw Error(ErrorCode::cannot_read, path + ": cannot be read (" + std::strerror(errno) + ")");
   }
@@ -63,13 +61,11 @@ Symbols::Symbols(std::vector<std::uint8_t> file, const std::string &name) : file
     for (std::size_t at = 0; at + sizeof(Elf32_Sym) <= table.sh_size; at += sizeof(Elf32_Sym)) {
       auto symbol = part_at<Elf32_Sym>(file_, table.sh_offset + at, name);
       std::size_t text_at = std::size_t{names.sh_offset} + symbol.st_name;
-      if (ELF32_ST_TYPE(symbol.st_info) != STT_FUNC || symbol.st_name >= names.sh_size ||
-          text_at >= file_.size()) {
+      if (ELF32_ST_TYPE(symbol.st_info) != STT_FUNC || symbol.st_name >= names.sh_size || text_at >= file_.size()) {
         continue;
       }
       auto text = file_.begin() + static_cast<std::ptrdiff_t>(text_at);
-      functions_[symbol.st_value & ~1u] = {symbol.st_size,
-                                           std::string(text, std::find(text, file_.end(), '\0'))};
+      functions_[symbol.st_value & ~1u] = {symbol.st_size, std::string(text, std::find(text, file_.end(), '\0'))};
     }
   }
 }

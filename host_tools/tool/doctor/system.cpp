@@ -16,9 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /* udev(7), and where a local cmake --install puts it. */
-constexpr const char *RULE_FOLDERS[] = {"etc/udev/rules.d", "run/udev/rules.d",
-                                        "usr/local/lib/udev/rules.d", "usr/lib/udev/rules.d",
-                                        "lib/udev/rules.d"};
+constexpr const char *RULE_FOLDERS[] = {"etc/udev/rules.d", "run/udev/rules.d", "usr/local/lib/udev/rules.d",
+                                        "usr/lib/udev/rules.d", "lib/udev/rules.d"};
 
 bool is_of_our_ports(const std::string &line) {
   char vendor[32], product[32];
@@ -37,8 +36,7 @@ bool holds(const fs::path &descriptors, dev_t device, bool *readable) {
   }
   return std::any_of(begin(all), end(all), [&](const fs::directory_entry &descriptor) {
     struct stat status;
-    return stat(descriptor.path().c_str(), &status) == 0 && S_ISCHR(status.st_mode) &&
-           status.st_rdev == device;
+    return stat(descriptor.path().c_str(), &status) == 0 && S_ISCHR(status.st_mode) && status.st_rdev == device;
   });
 }
 

@@ -53,8 +53,7 @@ std::string Wiring::place_text(unsigned sensor) const {
   Place at = place(sensor);
   std::string text = "strip " + std::to_string(at.strip) + ", ";
   return at.multiplexer
-             ? text + "channel " + std::to_string(at.position) + " of multiplexer " +
-                   address_text(*at.multiplexer)
+             ? text + "channel " + std::to_string(at.position) + " of multiplexer " + address_text(*at.multiplexer)
              : text + "position " + std::to_string(at.position) + ", SDA on " + pin_text(*at.gpio);
 }
 
@@ -70,8 +69,8 @@ std::string Wiring::check_sensor(unsigned sensor) const {
 }
 
 std::string Wiring::check_multiplexer(unsigned strip) const {
-  return "check the supply and address pins of that multiplexer, its RESET on " +
-         pin_text(*pin_mux_reset_0 + strip) + ", and its SDA and SCL";
+  return "check the supply and address pins of that multiplexer, its RESET on " + pin_text(*pin_mux_reset_0 + strip) +
+         ", and its SDA and SCL";
 }
 
 std::string Wiring::check_all() const {

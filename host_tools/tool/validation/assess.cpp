@@ -100,11 +100,10 @@ private:
     }
     for (std::size_t k : numb) {
       dead_ |= 1u << k;
-      finding(
-          "dead_sensor", {k},
-          named({k}) + " answers, but felt " + percent(card_.fit.sensors[k].gain) +
-              " of what the others feel. See that rubber fills the hole of its lid, and that it "
-              "is glued to nothing but the board; else replace it.");
+      finding("dead_sensor", {k},
+              named({k}) + " answers, but felt " + percent(card_.fit.sensors[k].gain) +
+                  " of what the others feel. See that rubber fills the hole of its lid, and that it "
+                  "is glued to nothing but the board; else replace it.");
     }
   }
 
@@ -114,8 +113,7 @@ private:
       if (other > k && place_of(other) == k) {
         finding("swapped_wires", {k, other},
                 named({k, other}) + " answer from each other's place: each is found " +
-                    fixed(card_.fit.sensors[k].off_mm, 1) + " and " +
-                    fixed(card_.fit.sensors[other].off_mm, 1) +
+                    fixed(card_.fit.sensors[k].off_mm, 1) + " and " + fixed(card_.fit.sensors[other].off_mm, 1) +
                     " mm from where the layout has it. Exchange their wires, and compare the "
                     "others with the board's table.");
       } else if (other != k && place_of(other) != k) {
@@ -157,8 +155,7 @@ private:
         residuals.push_back(card_.fit.sensors[k].residual_share);
       }
     }
-    const double usual_noise_Pa =
-        card_.measured.empty ? median(card_.measured.empty->noise_Pa) : 0.0;
+    const double usual_noise_Pa = card_.measured.empty ? median(card_.measured.empty->noise_Pa) : 0.0;
     for (std::size_t k = 0; k < sensors_; k++) {
       const double noise_Pa = card_.measured.empty ? card_.measured.empty->noise_Pa[k] : 0.0;
       std::string evidence;
@@ -167,14 +164,13 @@ private:
       } else if (card_.measured.answered[k] < ANSWERS_STEADY) {
         evidence = "answered in " + percent(card_.measured.answered[k], 1) + " of the frames only";
       } else if ((without >> k & 1u) && card_.fit.sensors[k].scatter_share > LOOSE_SCATTER) {
-        evidence =
-            "feels the same press differently each time: its readings leave the profile that "
-            "the others teach by " +
-            percent(card_.fit.sensors[k].residual_share, 1) + " rms, the others by " +
-            percent(median(residuals), 1);
+        evidence = "feels the same press differently each time: its readings leave the profile that "
+                   "the others teach by " +
+                   percent(card_.fit.sensors[k].residual_share, 1) + " rms, the others by " +
+                   percent(median(residuals), 1);
       } else if (usual_noise_Pa > 0.0 && noise_Pa > NOISY_OVER_MEDIAN * usual_noise_Pa) {
-        evidence = "is noisy with nothing on the pad: " + fixed(noise_Pa, 1) + " Pa, the others " +
-                   fixed(usual_noise_Pa, 1);
+        evidence =
+            "is noisy with nothing on the pad: " + fixed(noise_Pa, 1) + " Pa, the others " + fixed(usual_noise_Pa, 1);
       }
       if (!evidence.empty()) {
         loose_ |= 1u << k;
@@ -205,8 +201,7 @@ private:
     double most = 0.0;
     for (std::size_t k : candidates) {
       MarksFit other = fit_marks(card_.measured, without | 1u << k);
-      const double odd =
-          other.sensors[k].residual_share / residual_of_rest(other, without | 1u << k);
+      const double odd = other.sensors[k].residual_share / residual_of_rest(other, without | 1u << k);
       if (odd > most) {
         most = odd;
         best = without | 1u << k;
@@ -285,19 +280,16 @@ private:
       spread.push_back(std::log(card_.gain[k]));
       sds.push_back(card_.gain_sd[k]);
       if (card_.is_calibrated) {
-        left.push_back(std::log(
-            card_.gain[k] / static_cast<double>(card_.measured.info.calibration.sensors[k].gain)));
+        left.push_back(std::log(card_.gain[k] / static_cast<double>(card_.measured.info.calibration.sensors[k].gain)));
       }
     }
-    figure("gain_spread_percent", "gains of the sensors differ by, sd", "%", 100.0 * sd_of(spread),
-           1);
+    figure("gain_spread_percent", "gains of the sensors differ by, sd", "%", 100.0 * sd_of(spread), 1);
     figure("gain_sd_percent", "each is known to, median sd", "%", 100.0 * median(sds), 1);
     if (card_.is_calibrated) {
-      figure("gain_left_percent", "they differ from the stored calibration by, sd", "%",
-             100.0 * sd_of(left), 1);
+      figure("gain_left_percent", "they differ from the stored calibration by, sd", "%", 100.0 * sd_of(left), 1);
     }
-    if (const auto scale = calibrating::force_scale(card_.measured.array, placements, solution,
-                                                    weight_N(), calibrating::shape_of(solution))) {
+    if (const auto scale = calibrating::force_scale(card_.measured.array, placements, solution, weight_N(),
+                                                    calibrating::shape_of(solution))) {
       scale_ = scale->scale;
     }
   }
@@ -330,8 +322,7 @@ private:
         const double square = location.x_mm * location.x_mm + location.y_mm * location.y_mm;
         location.off_mm = std::sqrt(std::max(square, 0.0));
         off.push_back(location.off_mm);
-        as_pressed.push_back(std::hypot(press.estimate.x_mm - found.mark_x_mm,
-                                        press.estimate.y_mm - found.mark_y_mm));
+        as_pressed.push_back(std::hypot(press.estimate.x_mm - found.mark_x_mm, press.estimate.y_mm - found.mark_y_mm));
         forces.push_back(press.estimate.force_N / weight_N());
         warned += press.estimate.warned;
         of_mark.resize(std::max(of_mark.size(), press.mark + 1));
@@ -350,20 +341,17 @@ private:
         y += card_.locations[i].y_mm / double(presses.size());
       }
       for (std::size_t i : presses) {
-        squares +=
-            std::pow(card_.locations[i].x_mm - x, 2) + std::pow(card_.locations[i].y_mm - y, 2);
+        squares += std::pow(card_.locations[i].x_mm - x, 2) + std::pow(card_.locations[i].y_mm - y, 2);
         freedom += 2.0 * double(presses.size() - 1) / double(presses.size());
       }
     }
     figure("location_error_mm", "location off by, median", "mm", median(off), 2);
     figure("location_p90_mm", "one in ten is off by more than", "mm", quantile(off, 0.9), 2);
-    figure("as_pressed_mm", "from the marks themselves, with the hand's error, median", "mm",
-           median(as_pressed), 2);
+    figure("as_pressed_mm", "from the marks themselves, with the hand's error, median", "mm", median(as_pressed), 2);
     figure("hand_mm", "the hand missed the marks by, sd each way", "mm", card_.fit.hand_sd_mm, 2);
     figure("repeatability_mm", "the same place again differs by, sd each way", "mm",
            freedom > 0.0 ? std::sqrt(squares / freedom) : 0.0, 2);
-    figure("warned_percent", "presses with a warning", "%",
-           100.0 * double(warned) / double(off.size()), 0);
+    figure("warned_percent", "presses with a warning", "%", 100.0 * double(warned) / double(off.size()), 0);
     const double middle = median(forces);
     for (double &force : forces) {
       force = force / middle - 1.0;
@@ -377,15 +365,14 @@ private:
     const MarksFit &fit = card_.fit;
     const double slope = std::hypot(fit.slope_x, fit.slope_y);
     const double sd = std::hypot(fit.slope_x_sd, fit.slope_y_sd);
-    figure("width_slope_percent", "width grows from the middle to an end by", "%", 100.0 * slope,
-           1);
+    figure("width_slope_percent", "width grows from the middle to an end by", "%", 100.0 * slope, 1);
     if (slope > TILT_MIN && slope > TILT_SDS * sd) {
       is_tilted_ = true;
       const bool is_x = std::abs(fit.slope_x) > std::abs(fit.slope_y);
       const double main = is_x ? fit.slope_x : fit.slope_y;
       finding("tilted_skin", {},
-              "The skin is thicker towards " + std::string(main > 0.0 ? "+" : "-") +
-                  (is_x ? "x" : "y") + ": its response is wider there by " + percent(slope) +
+              "The skin is thicker towards " + std::string(main > 0.0 ? "+" : "-") + (is_x ? "x" : "y") +
+                  ": its response is wider there by " + percent(slope) +
                   " than in the middle, and as much narrower at the other end. Level the mould and "
                   "cast it again, or clamp it evenly.");
     }
@@ -418,9 +405,9 @@ private:
         return;
       }
       const Figure *thickness = card_.figure("thickness_mm");
-      const double layer_mm = std::clamp(thickness ? thickness->value : card_.measured.skin_mm,
-                                         static_cast<double>(PAD_THICKNESS_MIN_mm),
-                                         static_cast<double>(PAD_THICKNESS_MAX_mm));
+      const double layer_mm =
+          std::clamp(thickness ? thickness->value : card_.measured.skin_mm, static_cast<double>(PAD_THICKNESS_MIN_mm),
+                     static_cast<double>(PAD_THICKNESS_MAX_mm));
       const pad_profile profile = pad::profile_of({layer_mm}, card_.measured.info);
       ratio = 1.0 / (scale_ * static_cast<double>(profile.force_ratio) * READS_OF_FORCE);
     }
@@ -430,9 +417,8 @@ private:
     const bool tells = card_.is_calibrated ? !is_thin_ : !is_tilted_;
     if (tells && std::abs(ratio - 1.0) > WEIGHT_OFF_MAX) {
       finding("wrong_weight", {},
-              "The readings are those of " + fixed(ratio * card_.measured.weight_g, 0) +
-                  " g, not of " + fixed(card_.measured.weight_g, 0) +
-                  ". Weigh the weight with its foot; if it is right, " +
+              "The readings are those of " + fixed(ratio * card_.measured.weight_g, 0) + " g, not of " +
+                  fixed(card_.measured.weight_g, 0) + ". Weigh the weight with its foot; if it is right, " +
                   (card_.is_calibrated ? "calibrate again, with --weight."
                                        : "the rubber passes on another share of the force, which "
                                          "fingertip calibrate --weight corrects."));
@@ -457,8 +443,7 @@ private:
     }
     figure("noise_Pa", "noise of a reading, median of the sensors", "Pa", median(noise_Pa), 1);
     figure("noise_worst_Pa", "the noisiest", "Pa", largest(noise_Pa), 1);
-    figure("drift_Pa_min", "a zero moves against the others by at most", "Pa/min",
-           std::abs(largest(drift_Pa_min)), 1);
+    figure("drift_Pa_min", "a zero moves against the others by at most", "Pa/min", std::abs(largest(drift_Pa_min)), 1);
     figure("drift_all_Pa_min", "all together, as the weather does", "Pa/min", all, 1);
     std::vector<std::size_t> moving;
     double most = 0.0;
@@ -470,8 +455,7 @@ private:
       }
     }
     if (!moving.empty()) {
-      const std::string who =
-          moving.size() > 3 ? std::to_string(moving.size()) + " sensors" : named(moving);
+      const std::string who = moving.size() > 3 ? std::to_string(moving.size()) + " sensors" : named(moving);
       finding("drift", moving,
               who + ": their zeros move by up to " + fixed(most, 0) +
                   " Pa a minute with nothing on the pad. Let it warm up for ten minutes, away from "
@@ -491,12 +475,10 @@ private:
       late += std::max(hold.late_Pa[k], 0.0);
       strongest = std::max(strongest, hold.early_Pa[k]);
     }
-    figure("hold_loss_percent", "readings fade in the hold by", "%", 100.0 * (1.0 - late / early),
-           1);
+    figure("hold_loss_percent", "readings fade in the hold by", "%", 100.0 * (1.0 - late / early), 1);
     const char *const keys[] = {"after_1s_percent", "after_10s_percent", "after_25s_percent"};
-    const char *const says[] = {
-        "a sensor stands off 1 s after the release by at most, of what it felt",
-        "the same after 10 s", "the same after 25 s"};
+    const char *const says[] = {"a sensor stands off 1 s after the release by at most, of what it felt",
+                                "the same after 10 s", "the same after 25 s"};
     for (std::size_t a = 0; a < hold.after.size(); a++) {
       double most = 0.0;
       for (std::size_t k = 0; k < hold.after[a].left_Pa.size(); k++) {
@@ -526,8 +508,7 @@ private:
 } // namespace
 
 const Figure *Card::figure(const std::string &key) const {
-  const auto at = std::find_if(figures.begin(), figures.end(),
-                               [&](const Figure &each) { return each.key == key; });
+  const auto at = std::find_if(figures.begin(), figures.end(), [&](const Figure &each) { return each.key == key; });
   return at == figures.end() ? nullptr : &*at;
 }
 

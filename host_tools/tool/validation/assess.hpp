@@ -40,8 +40,8 @@ constexpr double READS_OF_FORCE = 0.87;
 constexpr double WEIGHT_OFF_MAX = 0.22; /* force by the readings, over the weight, less 1 */
 
 struct Finding {
-  std::string code; /* dead_sensor, loose_sensor, swapped_wires, tilted_skin, thin_skin, drift,
-                       wrong_weight */
+  std::string code;                 /* dead_sensor, loose_sensor, swapped_wires, tilted_skin, thin_skin, drift,
+                                       wrong_weight */
   std::vector<std::size_t> sensors; /* which; empty: the pad as a whole */
   std::string text;                 /* with the evidence, and what to do: two sentences */
 };

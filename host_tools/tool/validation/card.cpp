@@ -19,39 +19,36 @@ constexpr double BLIND_REACH_mm = 3.0, PULL_REACH = 0.6; /* of the picture of pu
 constexpr std::size_t TWIN_SENSORS = 15;
 constexpr double TWIN_PITCH_mm = 9.0;
 
-const char *const STYLE =
-    "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 "
-    "1rem;color:#1c1d22;background:#fff}"
-    "h1{font-size:1.6rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem}p{margin:.4rem 0}"
-    "table{border-collapse:collapse;width:100%}td,th{text-align:left;padding:.25rem "
-    ".6rem;border-bottom:1px solid #ddd;vertical-align:top}"
-    "td.n,th.n{text-align:right;white-space:nowrap}.faint{color:#60626b}"
-    ".find{border-left:4px solid #c62828;padding:.2rem .8rem;margin:.5rem 0;background:#fdecea}"
-    ".note{border-left:4px solid #999;padding:.2rem .8rem;margin:.5rem 0}"
-    ".good{border-left:4px solid #2e7d32;padding:.2rem .8rem;margin:.5rem 0;background:#e9f5ea}"
-    ".pictures{display:flex;flex-wrap:wrap;gap:1.2rem}figure{margin:0;max-width:100%}figcaption{"
-    "max-width:28rem;font-size:.9rem;color:#444}"
-    "svg{max-width:100%;height:auto}svg text{font:11px system-ui,sans-serif;fill:#333}svg "
-    ".frame{fill:#fafafa;stroke:#999}"
-    "svg .tick{stroke:#999}svg .ours{fill:none;stroke:#1565c0;stroke-width:1.5}svg "
-    ".thin{fill:none;stroke:#1565c0;stroke-opacity:.45}"
-    "svg .red{fill:none;stroke:#c62828;stroke-width:1.5}svg .dot{fill:#1565c0}svg "
-    ".mark{fill:none;stroke:#333}"
-    "svg .open{fill:none;stroke:#c62828;stroke-width:1.5}svg .bar{fill:#90b4dc}svg "
-    ".badbar{fill:#c62828}svg .sensor{fill:none;stroke:#bbb}"
-    "svg .grey{fill:none;stroke:#888;stroke-dasharray:4 3}svg .error{stroke:#333}"
-    "@media(prefers-color-scheme:dark){body{color:#dedee4;background:#14151c}td,th{border-color:#"
-    "34364a}.faint,figcaption{color:#9a9cab}"
-    ".find{background:#3a1d1d}.good{background:#1b3320}svg text{fill:#c8c8d0}svg "
-    ".frame{fill:#1b1c26;stroke:#666}"
-    "svg .mark,svg .error{stroke:#ddd}svg .sensor{stroke:#555}}";
+const char *const STYLE = "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 "
+                          "1rem;color:#1c1d22;background:#fff}"
+                          "h1{font-size:1.6rem;margin:0}h2{font-size:1.15rem;margin:2rem 0 .4rem}p{margin:.4rem 0}"
+                          "table{border-collapse:collapse;width:100%}td,th{text-align:left;padding:.25rem "
+                          ".6rem;border-bottom:1px solid #ddd;vertical-align:top}"
+                          "td.n,th.n{text-align:right;white-space:nowrap}.faint{color:#60626b}"
+                          ".find{border-left:4px solid #c62828;padding:.2rem .8rem;margin:.5rem 0;background:#fdecea}"
+                          ".note{border-left:4px solid #999;padding:.2rem .8rem;margin:.5rem 0}"
+                          ".good{border-left:4px solid #2e7d32;padding:.2rem .8rem;margin:.5rem 0;background:#e9f5ea}"
+                          ".pictures{display:flex;flex-wrap:wrap;gap:1.2rem}figure{margin:0;max-width:100%}figcaption{"
+                          "max-width:28rem;font-size:.9rem;color:#444}"
+                          "svg{max-width:100%;height:auto}svg text{font:11px system-ui,sans-serif;fill:#333}svg "
+                          ".frame{fill:#fafafa;stroke:#999}"
+                          "svg .tick{stroke:#999}svg .ours{fill:none;stroke:#1565c0;stroke-width:1.5}svg "
+                          ".thin{fill:none;stroke:#1565c0;stroke-opacity:.45}"
+                          "svg .red{fill:none;stroke:#c62828;stroke-width:1.5}svg .dot{fill:#1565c0}svg "
+                          ".mark{fill:none;stroke:#333}"
+                          "svg .open{fill:none;stroke:#c62828;stroke-width:1.5}svg .bar{fill:#90b4dc}svg "
+                          ".badbar{fill:#c62828}svg .sensor{fill:none;stroke:#bbb}"
+                          "svg .grey{fill:none;stroke:#888;stroke-dasharray:4 3}svg .error{stroke:#333}"
+                          "@media(prefers-color-scheme:dark){body{color:#dedee4;background:#14151c}td,th{border-color:#"
+                          "34364a}.faint,figcaption{color:#9a9cab}"
+                          ".find{background:#3a1d1d}.good{background:#1b3320}svg text{fill:#c8c8d0}svg "
+                          ".frame{fill:#1b1c26;stroke:#666}"
+                          "svg .mark,svg .error{stroke:#ddd}svg .sensor{stroke:#555}}";
 
-std::string row(const std::vector<std::string> &cells, const std::vector<bool> &is_number,
-                const char *tag) {
+std::string row(const std::vector<std::string> &cells, const std::vector<bool> &is_number, const char *tag) {
   std::string text = "<tr>";
   for (std::size_t i = 0; i < cells.size(); i++) {
-    text += std::string("<") + tag + (is_number[i] ? " class=\"n\">" : ">") + cells[i] + "</" +
-            tag + ">";
+    text += std::string("<") + tag + (is_number[i] ? " class=\"n\">" : ">") + cells[i] + "</" + tag + ">";
   }
   return text + "</tr>\n";
 }
@@ -88,8 +85,8 @@ public:
 
 private:
   void picture(const Plot &plot, const std::string &title, const std::string &says) {
-    text_ += "<figure>" + plot.svg(title) + "<figcaption><b>" + escaped(title) + ".</b> " +
-             escaped(says) + "</figcaption></figure>\n";
+    text_ += "<figure>" + plot.svg(title) + "<figcaption><b>" + escaped(title) + ".</b> " + escaped(says) +
+             "</figcaption></figure>\n";
   }
 
   void head() {
@@ -97,14 +94,12 @@ private:
     const wire_info &info = measured.info;
     const std::string serial = text_field(info.serial);
     text_ += "<h1>A pad's report card</h1>\n<p class=\"faint\">" +
-             escaped((serial.empty() ? "" : "Fingertip " + serial + ", ") + "board " +
-                     text_field(info.board) + ", " + std::to_string(measured.array.sensors()) +
-                     " sensors, firmware " + std::to_string(info.firmware_version[0]) + "." +
-                     std::to_string(info.firmware_version[1]) + "." +
+             escaped((serial.empty() ? "" : "Fingertip " + serial + ", ") + "board " + text_field(info.board) + ", " +
+                     std::to_string(measured.array.sensors()) + " sensors, firmware " +
+                     std::to_string(info.firmware_version[0]) + "." + std::to_string(info.firmware_version[1]) + "." +
                      std::to_string(info.firmware_version[2]) + ", " +
-                     (card_.is_calibrated ? "calibrated" : "never calibrated") +
-                     ", rubber stated as " + fixed(measured.skin_mm, 0) + " mm. " +
-                     std::to_string(measured.presses.size()) + " presses of " +
+                     (card_.is_calibrated ? "calibrated" : "never calibrated") + ", rubber stated as " +
+                     fixed(measured.skin_mm, 0) + " mm. " + std::to_string(measured.presses.size()) + " presses of " +
                      fixed(measured.weight_g, 0) + " g. Made by fingertip " + version_ + ".") +
              "</p>\n";
   }
@@ -134,8 +129,8 @@ private:
 
   bool is_pulled_as_twin() const {
     const auto &pulls = card_.measured.pulls;
-    return !pulls.empty() && std::abs(pulls.back().pulling.weight_g / card_.measured.weight_g -
-                                      TWIN_PULL) < TWIN_PULL_OFF;
+    return !pulls.empty() &&
+           std::abs(pulls.back().pulling.weight_g / card_.measured.weight_g - TWIN_PULL) < TWIN_PULL_OFF;
   }
 
   std::string about_twin() const {
@@ -160,8 +155,7 @@ private:
       const auto shown = [&](double value) {
         return fixed(value, figure.digits) + (figure.unit.empty() ? "" : " " + figure.unit);
       };
-      const bool is_compared =
-          is_like_twin() && (figure.key.rfind("pull_", 0) != 0 || is_pulled_as_twin());
+      const bool is_compared = is_like_twin() && (figure.key.rfind("pull_", 0) != 0 || is_pulled_as_twin());
       const auto twin = is_compared ? twin_says(figure.key, card_.is_calibrated) : std::nullopt;
       text_ += row({escaped(figure.says), shown(figure.value), twin ? shown(twin->middle) : "",
                     twin ? fixed(twin->low, figure.digits) + " to " + shown(twin->high) : ""},
@@ -173,15 +167,12 @@ private:
   void pad() {
     const calibrating::Array &array = card_.measured.array;
     std::vector<double> x = array.x_mm, y = array.y_mm;
-    const Range rx = {*std::min_element(x.begin(), x.end()) - ROOM_mm,
-                      *std::max_element(x.begin(), x.end()) + ROOM_mm};
-    const Range ry = {*std::min_element(y.begin(), y.end()) - ROOM_mm,
-                      *std::max_element(y.begin(), y.end()) + ROOM_mm};
+    const Range rx = {*std::min_element(x.begin(), x.end()) - ROOM_mm, *std::max_element(x.begin(), x.end()) + ROOM_mm};
+    const Range ry = {*std::min_element(y.begin(), y.end()) - ROOM_mm, *std::max_element(y.begin(), y.end()) + ROOM_mm};
     Plot plot(420, 520, rx, ry, "x, mm", "y, mm", true);
     const double half = 0.5 * PACKAGE_mm;
     for (std::size_t k = 0; k < array.sensors(); k++) {
-      const double l = array.x_mm[k] - half, r = l + PACKAGE_mm, b = array.y_mm[k] - half,
-                   t = b + PACKAGE_mm;
+      const double l = array.x_mm[k] - half, r = l + PACKAGE_mm, b = array.y_mm[k] - half, t = b + PACKAGE_mm;
       plot.line({{l, b}, {r, b}, {r, t}, {l, t}, {l, b}}, named_ >> k & 1u ? "red" : "sensor");
       plot.text(array.x_mm[k], array.y_mm[k] - half - 2.2, std::to_string(k));
     }
@@ -190,16 +181,13 @@ private:
       const Location &location = card_.locations[i];
       plot.dot(press.x_mm, press.y_mm, 2.0, "mark");
       if (location.off_mm >= 0.0) {
-        const double to_x = press.x_mm + MAGNIFIED * location.x_mm,
-                     to_y = press.y_mm + MAGNIFIED * location.y_mm;
-        plot.line({{press.x_mm, press.y_mm}, {to_x, to_y}},
-                  card_.measured.presses[i].estimate.warned ? "red" : "ours");
+        const double to_x = press.x_mm + MAGNIFIED * location.x_mm, to_y = press.y_mm + MAGNIFIED * location.y_mm;
+        plot.line({{press.x_mm, press.y_mm}, {to_x, to_y}}, card_.measured.presses[i].estimate.warned ? "red" : "ours");
       }
     }
-    picture(
-        plot, "Where it was pressed, and where the fingertip says",
-        "Circles: presses. Lines: to the estimate, five times as long as the error; red where the "
-        "fingertip warned. Squares: sensors; red where something is wrong.");
+    picture(plot, "Where it was pressed, and where the fingertip says",
+            "Circles: presses. Lines: to the estimate, five times as long as the error; red where the "
+            "fingertip warned. Squares: sensors; red where something is wrong.");
   }
 
   void forces() {
@@ -211,14 +199,12 @@ private:
       }
     }
     const double count = double(card_.measured.presses.size());
-    Plot plot(440, 240, {0.0, count + 1.0}, range_of(values, true), "press",
-              "force over the weight");
+    Plot plot(440, 240, {0.0, count + 1.0}, range_of(values, true), "press", "force over the weight");
     plot.line({{0.0, 1.0}, {count + 1.0, 1.0}}, "grey");
     for (std::size_t i = 0; i < card_.measured.presses.size(); i++) {
       const Press &press = card_.measured.presses[i];
       if (press.estimate.frames > 0) {
-        plot.dot(double(i + 1), press.estimate.force_N / weight_N, 3.0,
-                 press.estimate.warned ? "open" : "dot");
+        plot.dot(double(i + 1), press.estimate.force_N / weight_N, 3.0, press.estimate.warned ? "open" : "dot");
       }
     }
     picture(plot, "Force of each press", "Open: with a warning. The dashed line is the weight.");
@@ -232,8 +218,7 @@ private:
         values.push_back(card_.gain[k] * (1.0 - 2.0 * card_.gain_sd[k]));
       }
     }
-    Plot plot(440, 240, {-0.7, double(card_.gain.size()) - 0.3}, range_of(values), "sensor",
-              "gain");
+    Plot plot(440, 240, {-0.7, double(card_.gain.size()) - 0.3}, range_of(values), "sensor", "gain");
     plot.bars_from(1.0);
     for (std::size_t k = 0; k < card_.gain.size(); k++) {
       if (!(card_.gain[k] > 0.0)) {
@@ -243,14 +228,12 @@ private:
       plot.bar(at, 0.35, card_.gain[k], named_ >> k & 1u ? "badbar" : "bar");
       plot.line({{at, card_.gain[k] - 2.0 * sd}, {at, card_.gain[k] + 2.0 * sd}}, "error");
       if (card_.is_calibrated) {
-        plot.dot(at, static_cast<double>(card_.measured.info.calibration.sensors[k].gain), 3.0,
-                 "open");
+        plot.dot(at, static_cast<double>(card_.measured.info.calibration.sensors[k].gain), 3.0, "open");
       }
     }
-    picture(
-        plot, "Gains of the sensors",
-        std::string("Lines: two standard deviations. A sensor that is dead or loose has none.") +
-            (card_.is_calibrated ? " Circles: the stored calibration." : ""));
+    picture(plot, "Gains of the sensors",
+            std::string("Lines: two standard deviations. A sensor that is dead or loose has none.") +
+                (card_.is_calibrated ? " Circles: the stored calibration." : ""));
   }
 
   void profile() {
@@ -258,8 +241,7 @@ private:
     if (!solution.solved || !(solution.peak_Pa > 0.0)) {
       return;
     }
-    Plot plot(440, 260, {0.0, 30.0}, {-0.1, 1.15}, "distance from the press, mm",
-              "reading over gain, of the peak");
+    Plot plot(440, 260, {0.0, 30.0}, {-0.1, 1.15}, "distance from the press, mm", "reading over gain, of the peak");
     for (std::size_t i = 0; i < card_.measured.presses.size(); i++) {
       const Press &press = card_.measured.presses[i];
       for (std::size_t k = 0; k < card_.gain.size(); k++) {
@@ -302,8 +284,7 @@ private:
       }
       plot.line(line, named_ >> k & 1u ? "red" : "thin");
     }
-    picture(plot, "The empty minute",
-            "One line a sensor, from its first second; red where something is wrong.");
+    picture(plot, "The empty minute", "One line a sensor, from its first second; red where something is wrong.");
   }
 
   void hold() {
@@ -317,11 +298,9 @@ private:
       times.push_back(t_s);
       values.push_back(1e-3 * sum_Pa);
     }
-    Plot plot(440, 240, range_of(times), range_of(values, true), "s after the touch",
-              "all sensors, kPa");
+    Plot plot(440, 240, range_of(times), range_of(values, true), "s after the touch", "all sensors, kPa");
     plot.line(line, "ours");
-    picture(plot, "The hold, the release and the rest",
-            "Readings above those before the touch, summed.");
+    picture(plot, "The hold, the release and the rest", "Readings above those before the touch, summed.");
   }
 
   void pulls() {
@@ -331,8 +310,7 @@ private:
     const bool is_blind = card_.figure("pull_true") == nullptr;
     const double reach = is_blind ? BLIND_REACH_mm : PULL_REACH;
     Plot plot(330, 330, {-reach, reach}, {-reach, reach},
-              is_blind ? "location against the rest, x, mm" : "pull over force, x",
-              is_blind ? "y, mm" : "y", true);
+              is_blind ? "location against the rest, x, mm" : "pull over force, x", is_blind ? "y, mm" : "y", true);
     for (const Pulled &pulled : card_.measured.pulls) {
       const Estimate &rest = pulled.rest, &pull = pulled.pull;
       if (rest.frames == 0 || pull.frames == 0) {
@@ -352,10 +330,9 @@ private:
       }
     }
     picture(plot, "The pulls",
-            is_blind
-                ? "Lines: how each pull moves the location. The fingertip estimates no pull."
-                : "Lines: the pull that is found, from the rest before to each pull; red where "
-                  "the fingertip warned. Circles: the pull of the thread.");
+            is_blind ? "Lines: how each pull moves the location. The fingertip estimates no pull."
+                     : "Lines: the pull that is found, from the rest before to each pull; red where "
+                       "the fingertip warned. Circles: the pull of the thread.");
   }
 
   void notes() {

@@ -113,19 +113,16 @@ void Gatherer::raw(const wire_packet &packet) {
     press.mark = step_.mark;
     press.at = step_.at;
     press.placement = std::move(*found);
-    press.estimate = estimate_of(contacts_, press.placement.t_s - HALF_READ_s,
-                                 press.placement.t_s + HALF_READ_s);
+    press.estimate = estimate_of(contacts_, press.placement.t_s - HALF_READ_s, press.placement.t_s + HALF_READ_s);
     measured_.presses.push_back(std::move(press));
     has_done_ = true;
   } else if (step_.kind == Step::Kind::pull) {
     const bool is_free = finder_.state() == calibrating::PlacementFinder::State::resting;
     if (pull_watch_.take(frame, is_free, contacts_)) {
-      measured_.pulls.push_back(
-          {step_.toward_deg, step_.pulling, pull_watch_.rest(), pull_watch_.pull()});
+      measured_.pulls.push_back({step_.toward_deg, step_.pulling, pull_watch_.rest(), pull_watch_.pull()});
       has_done_ = true;
     }
-  } else if (step_.kind == Step::Kind::empty || step_.kind == Step::Kind::hold ||
-             step_.kind == Step::Kind::rest) {
+  } else if (step_.kind == Step::Kind::empty || step_.kind == Step::Kind::hold || step_.kind == Step::Kind::rest) {
     rows_.push_back({frame.t_s, frame.valid, frame.pressure_Pa});
     if (step_.kind != Step::Kind::empty) {
       follow_hold(was_resting);
@@ -266,8 +263,7 @@ Measured Gatherer::finish() {
     finish_hold();
   }
   for (std::size_t frames : valid_frames_) {
-    measured_.answered.push_back(measured_.frames ? double(frames) / double(measured_.frames)
-                                                  : 0.0);
+    measured_.answered.push_back(measured_.frames ? double(frames) / double(measured_.frames) : 0.0);
   }
   return std::move(measured_);
 }

@@ -42,8 +42,7 @@ struct Hold {
     std::vector<double> left_Pa; /* [sensor] above before, mean of a second; empty: not measured */
   };
   std::array<After, 3> after{{{1.0, {}}, {10.0, {}}, {25.0, {}}}};
-  std::vector<std::array<double, 2>>
-      sum_Pa; /* [tenth of a second] time from the touch, all sensors */
+  std::vector<std::array<double, 2>> sum_Pa; /* [tenth of a second] time from the touch, all sensors */
 };
 
 struct Measured {

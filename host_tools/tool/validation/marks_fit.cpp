@@ -51,8 +51,7 @@ double scatter_of(const std::map<std::size_t, std::vector<Felt>> &of_mark) {
     }
     for (const Felt &press : presses) {
       const double weight = std::pow(press.variance + LOOSE_SCATTER * LOOSE_SCATTER, -2.0);
-      unexplained +=
-          weight * (std::pow(press.ratio - mean, 2) - press.variance * (1.0 - 1.0 / count));
+      unexplained += weight * (std::pow(press.ratio - mean, 2) - press.variance * (1.0 - 1.0 / count));
       weights += weight * (1.0 - 1.0 / count);
     }
   }
@@ -63,11 +62,9 @@ double scatter_of(const std::map<std::size_t, std::vector<Felt>> &of_mark) {
  * the layout's axes, but for what hands and solder do, and the print shifted and turned. */
 class Fit {
 public:
-  Fit(const Measured &measured, std::vector<calibrating::Placement> placements,
-      std::uint32_t without)
+  Fit(const Measured &measured, std::vector<calibrating::Placement> placements, std::uint32_t without)
       : measured_(measured), placements_(std::move(placements)), without_(without),
-        sensors_(static_cast<int>(measured.array.sensors())),
-        presses_(static_cast<int>(measured.presses.size())),
+        sensors_(static_cast<int>(measured.array.sensors())), presses_(static_cast<int>(measured.presses.size())),
         print_(COMMON + OF_SENSOR * sensors_ + OF_PRESS * presses_), unknowns_(print_ + PRINT) {
     for (const Press &press : measured.presses) {
       reach_x_ = std::max(reach_x_, std::abs(press.at.x_mm));
@@ -118,14 +115,10 @@ public:
 private:
   int of_sensor(int k) const { return COMMON + OF_SENSOR * k; }
   int of_press(int i) const { return COMMON + OF_SENSOR * sensors_ + OF_PRESS * i; }
-  const calibrating::Placement &placement(int i) const {
-    return placements_[static_cast<std::size_t>(i)];
-  }
+  const calibrating::Placement &placement(int i) const { return placements_[static_cast<std::size_t>(i)]; }
   const Mark &mark(int i) const { return measured_.presses[static_cast<std::size_t>(i)].at; }
   bool is_usable(int i, int k) const { return placement(i).usable >> k & 1u; }
-  double reading(int i, int k) const {
-    return placement(i).reading_Pa[static_cast<std::size_t>(k)];
-  }
+  double reading(int i, int k) const { return placement(i).reading_Pa[static_cast<std::size_t>(k)]; }
 
   void begin() {
     value_ = Eigen::VectorXd::Zero(unknowns_);
@@ -155,8 +148,8 @@ private:
       }
       const auto at = static_cast<std::size_t>(k);
       const bool feels = most > FELT_SHARE * FELT_SHARE * strongest;
-      begin_places_[at] = feels ? Mark{x / weight, y / weight}
-                                : Mark{measured_.array.x_mm[at], measured_.array.y_mm[at]};
+      begin_places_[at] =
+          feels ? Mark{x / weight, y / weight} : Mark{measured_.array.x_mm[at], measured_.array.y_mm[at]};
       value_[of_sensor(k)] = most / strongest;
       value_[of_sensor(k) + 4] = MEMORY_0;
       value_[of_sensor(k) + 1] = begin_places_[at].x_mm;
@@ -186,8 +179,7 @@ private:
     const double height = (1.0 - hidden.by_felt) * full, scale = v[s] * height;
     if (by) {
       /* profile by the square of the distance, and by the log of the width */
-      const double by_square =
-          -0.5 * ((1.0 - v[MIXING]) * a * own + v[MIXING] * b * narrow - v[DIP] * c * outer);
+      const double by_square = -0.5 * ((1.0 - v[MIXING]) * a * own + v[MIXING] * b * narrow - v[DIP] * c * outer);
       const double by_width = square * ((1.0 - v[MIXING]) * a * own + v[MIXING] * b * narrow);
       by[LOG_PEAK] = scale * profile;
       by[LOG_WIDTH] = scale * by_width;
@@ -209,8 +201,7 @@ private:
   }
 
   double sd_of(int i, int k) const {
-    return std::hypot(std::hypot(MODEL_SHARE * peak_Pa_, READING_SHARE * reading(i, k)),
-                      placement(i).noise_Pa);
+    return std::hypot(std::hypot(MODEL_SHARE * peak_Pa_, READING_SHARE * reading(i, k)), placement(i).noise_Pa);
   }
 
   /* The cost, half of the squares, with its normal equations. */
@@ -288,8 +279,7 @@ private:
   }
 
   /* The hand aims at the mark. */
-  void aim(const Eigen::VectorXd &v, int i, double *cost, Eigen::MatrixXd *square,
-           Eigen::VectorXd *slope) const {
+  void aim(const Eigen::VectorXd &v, int i, double *cost, Eigen::MatrixXd *square, Eigen::VectorXd *slope) const {
     const Mark at = printed(v, i);
     const double x = at.x_mm - v[print_ + SHIFT_X], y = at.y_mm - v[print_ + SHIFT_Y];
     const int p = of_press(i);
@@ -317,8 +307,8 @@ private:
     for (int i = 0; i < presses_; i++) {
       const int p = of_press(i);
       const Mark at = printed(value_, i);
-      sum += std::pow(value_[p] - at.x_mm, 2) + std::pow(value_[p + 1] - at.y_mm, 2) +
-             covariance_(p, p) + covariance_(p + 1, p + 1);
+      sum += std::pow(value_[p] - at.x_mm, 2) + std::pow(value_[p + 1] - at.y_mm, 2) + covariance_(p, p) +
+             covariance_(p + 1, p + 1);
     }
     hand_mm_ = std::max(std::sqrt(0.5 * sum / presses_), HAND_MIN_mm);
   }
@@ -329,8 +319,8 @@ private:
     double variance = 0.0;
     for (int a = 0; a < OF_PRESS; a++) {
       for (int b = 0; b < OF_PRESS; b++) {
-        variance += by[COMMON + OF_SENSOR + a] * by[COMMON + OF_SENSOR + b] *
-                    covariance_(of_press(i) + a, of_press(i) + b);
+        variance +=
+            by[COMMON + OF_SENSOR + a] * by[COMMON + OF_SENSOR + b] * covariance_(of_press(i) + a, of_press(i) + b);
       }
     }
     return variance;
@@ -359,12 +349,10 @@ void Fit::align(MarksFit &fit) const {
     std::vector<double> weights;
     for (std::size_t k = 0; k < fit.sensors.size(); k++) {
       const FoundSensor &sensor = fit.sensors[k];
-      const double off =
-          std::hypot(c * sensor.x_mm - s * sensor.y_mm + fit.shift_x_mm - array.x_mm[k],
-                     s * sensor.x_mm + c * sensor.y_mm + fit.shift_y_mm - array.y_mm[k]);
-      const double own = sensor.answers && sensor.gain > FEELS_NOTHING
-                             ? 1.0 / (1.0 + off * off / (CAUCHY_mm * CAUCHY_mm))
-                             : 0.0;
+      const double off = std::hypot(c * sensor.x_mm - s * sensor.y_mm + fit.shift_x_mm - array.x_mm[k],
+                                    s * sensor.x_mm + c * sensor.y_mm + fit.shift_y_mm - array.y_mm[k]);
+      const double own =
+          sensor.answers && sensor.gain > FEELS_NOTHING ? 1.0 / (1.0 + off * off / (CAUCHY_mm * CAUCHY_mm)) : 0.0;
       weights.push_back(own);
       weight += own;
       fx += own * sensor.x_mm;
@@ -429,8 +417,7 @@ MarksFit Fit::result() const {
       measured += is_usable(i, k);
       double by[TOUCHED];
       const double expected = model(value_, i, k, by);
-      if (is_usable(i, k) &&
-          expected > FELT_SHARE * value_[of_sensor(k)] * std::exp(value_[LOG_PEAK])) {
+      if (is_usable(i, k) && expected > FELT_SHARE * value_[of_sensor(k)] * std::exp(value_[LOG_PEAK])) {
         squares += std::pow((reading(i, k) - expected) / expected, 2);
         felt += 1.0;
         of_mark[measured_.presses[static_cast<std::size_t>(i)].mark].push_back(
@@ -471,8 +458,7 @@ MarksFit Fit::result() const {
   for (int i = 0; i < presses_; i++) {
     const int p = of_press(i);
     const Mark at = printed(value_, i);
-    fit.presses.push_back({value_[p], value_[p + 1],
-                           std::sqrt(0.5 * (covariance_(p, p) + covariance_(p + 1, p + 1))),
+    fit.presses.push_back({value_[p], value_[p + 1], std::sqrt(0.5 * (covariance_(p, p) + covariance_(p + 1, p + 1))),
                            at.x_mm, at.y_mm, value_[p + 2]});
   }
   if (!is_seated_) {
@@ -518,8 +504,7 @@ void Fit::seat(const MarksFit &found) {
   hand_mm_ = HAND_BEGIN_mm;
   for (int k = 0; k < sensors_; k++) {
     const auto at = found.sensors[static_cast<std::size_t>(k)].place;
-    begin_places_[static_cast<std::size_t>(k)] = {measured_.array.x_mm[at],
-                                                  measured_.array.y_mm[at]};
+    begin_places_[static_cast<std::size_t>(k)] = {measured_.array.x_mm[at], measured_.array.y_mm[at]};
     value_[of_sensor(k) + 1] = measured_.array.x_mm[at];
     value_[of_sensor(k) + 2] = measured_.array.y_mm[at];
   }

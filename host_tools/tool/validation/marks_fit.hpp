@@ -38,10 +38,10 @@ struct FoundSensor {
                                     further from it than SWAPPED_PITCHES and nearer to another */
   double residual_share = 0.0;   /* rms of what the picture leaves, of its own readings that are at
                                     least FELT_SHARE of the strongest */
-  double scatter_share = 0.0; /* of the same readings over the expected ones, sd among the presses
-                                 of one mark: what the picture itself is off by is not in it, nor
-                                 what is not known of where and how hard each press was */
-  std::size_t felt = 0;       /* presses in which it was expected to read at least that */
+  double scatter_share = 0.0;    /* of the same readings over the expected ones, sd among the presses
+                                    of one mark: what the picture itself is off by is not in it, nor
+                                    what is not known of where and how hard each press was */
+  std::size_t felt = 0;          /* presses in which it was expected to read at least that */
 };
 
 struct FoundPress {

@@ -18,8 +18,8 @@ Range range_of(const std::vector<double> &values, bool from_zero = false);
 class Plot {
 public:
   /* px of the picture; equal: a unit is as long in y as in x. */
-  Plot(int width, int height, Range x, Range y, const std::string &x_name,
-       const std::string &y_name, bool equal = false);
+  Plot(int width, int height, Range x, Range y, const std::string &x_name, const std::string &y_name,
+       bool equal = false);
 
   void line(const std::vector<std::pair<double, double>> &points, const std::string &style);
   void dot(double x, double y, double radius_px, const std::string &style);

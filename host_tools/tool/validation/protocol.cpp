@@ -11,8 +11,7 @@ namespace fingertip::validating {
 namespace {
 
 constexpr const char *BEGINS = "validate: ";
-constexpr std::array<const char *, 8> KINDS = {"begin", "empty", "press", "take_back",
-                                               "hold",  "rest",  "pull",  "end"};
+constexpr std::array<const char *, 8> KINDS = {"begin", "empty", "press", "take_back", "hold", "rest", "pull", "end"};
 /* Of the marks sorted by columns, the next one in their order: far from the one before. */
 constexpr std::size_t STRIDE_MIN = 7;
 /* In pitches: how far apart two sensors across a cell of a grid are. */
@@ -32,25 +31,22 @@ std::vector<Mark> marks_of(const calibrating::Array &array) {
   std::vector<Mark> marks;
   const auto add = [&](double x_mm, double y_mm) {
     const Mark mark{half_millimetres(x_mm), half_millimetres(y_mm)};
-    if (std::none_of(marks.begin(), marks.end(), [&](const Mark &other) {
-          return other.x_mm == mark.x_mm && other.y_mm == mark.y_mm;
-        })) {
+    if (std::none_of(marks.begin(), marks.end(),
+                     [&](const Mark &other) { return other.x_mm == mark.x_mm && other.y_mm == mark.y_mm; })) {
       marks.push_back(mark);
     }
   };
   for (std::size_t k = 0; k < array.sensors(); k++) {
     add(array.x_mm[k], array.y_mm[k]);
     for (std::size_t j = 0; j < k; j++) {
-      const double pitches =
-          std::hypot(array.x_mm[k] - array.x_mm[j], array.y_mm[k] - array.y_mm[j]) / array.pitch_mm;
+      const double pitches = std::hypot(array.x_mm[k] - array.x_mm[j], array.y_mm[k] - array.y_mm[j]) / array.pitch_mm;
       if (pitches > ACROSS_MIN && pitches < ACROSS_MAX) {
         add(0.5 * (array.x_mm[k] + array.x_mm[j]), 0.5 * (array.y_mm[k] + array.y_mm[j]));
       }
     }
   }
-  std::sort(marks.begin(), marks.end(), [](const Mark &a, const Mark &b) {
-    return a.x_mm != b.x_mm ? a.x_mm < b.x_mm : a.y_mm > b.y_mm;
-  });
+  std::sort(marks.begin(), marks.end(),
+            [](const Mark &a, const Mark &b) { return a.x_mm != b.x_mm ? a.x_mm < b.x_mm : a.y_mm > b.y_mm; });
   std::size_t stride = STRIDE_MIN;
   while (std::gcd(stride, marks.size()) > 1) {
     stride++;
@@ -67,11 +63,10 @@ std::string event_of(const Step &step) {
   if (step.kind == Step::Kind::begin) {
     text += " weight_g=" + number(step.weight_g) + " skin_mm=" + number(step.skin_mm);
   } else if (step.kind == Step::Kind::press) {
-    text += " mark=" + std::to_string(step.mark + 1) + " x_mm=" + number(step.at.x_mm) +
-            " y_mm=" + number(step.at.y_mm);
+    text +=
+        " mark=" + std::to_string(step.mark + 1) + " x_mm=" + number(step.at.x_mm) + " y_mm=" + number(step.at.y_mm);
   } else if (step.kind == Step::Kind::pull) {
-    text += " toward_deg=" + number(step.toward_deg) +
-            " weight_g=" + number(step.pulling.weight_g) +
+    text += " toward_deg=" + number(step.toward_deg) + " weight_g=" + number(step.pulling.weight_g) +
             " height_mm=" + number(step.pulling.height_mm);
   }
   return text;
@@ -92,8 +87,7 @@ std::optional<Step> step_of(const std::string &event) {
   std::size_t known = 0;
   for (std::size_t i = 1; i < words.size(); i++) {
     const std::size_t equals = words[i].find('=');
-    const auto value =
-        equals == std::string_view::npos ? std::nullopt : to_double(words[i].substr(equals + 1));
+    const auto value = equals == std::string_view::npos ? std::nullopt : to_double(words[i].substr(equals + 1));
     if (!value) {
       continue;
     }
@@ -129,8 +123,7 @@ std::string way_of(double toward_deg) {
   return WAYS[static_cast<std::size_t>(std::lround(toward_deg / 90.0)) % std::size(WAYS)];
 }
 
-std::vector<Step> steps_of(const std::vector<Mark> &marks, double weight_g, double skin_mm,
-                           const Pulling &pulling) {
+std::vector<Step> steps_of(const std::vector<Mark> &marks, double weight_g, double skin_mm, const Pulling &pulling) {
   Step begin{Step::Kind::begin};
   begin.weight_g = weight_g;
   begin.skin_mm = skin_mm;

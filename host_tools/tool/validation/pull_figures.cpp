@@ -28,10 +28,9 @@ double sd_of(const std::vector<double> &values) {
   return values.size() < 2 ? 0.0 : std::sqrt(squares / double(values.size() - 1));
 }
 
-struct Found { /* [pull] */
-  std::vector<double> over_thread, stated_sd, off_deg_squared,
-      zero;                            /* of those that are estimated */
-  std::vector<double> moves_mm, force; /* of all that have a location */
+struct Found {                                                       /* [pull] */
+  std::vector<double> over_thread, stated_sd, off_deg_squared, zero; /* of those that are estimated */
+  std::vector<double> moves_mm, force;                               /* of all that have a location */
   std::size_t warned = 0;
 };
 
@@ -89,29 +88,23 @@ PullFigures pull_figures(const Measured &measured) {
     return made;
   }
   const bool is_blind = found.over_thread.empty();
-  const auto figure = [&](const char *key, const char *says, const char *unit, double value,
-                          int digits) {
-    made.figures.push_back(
-        {std::string(is_blind ? "pull_blind_" : "pull_") + key, says, unit, value, digits});
+  const auto figure = [&](const char *key, const char *says, const char *unit, double value, int digits) {
+    made.figures.push_back({std::string(is_blind ? "pull_blind_" : "pull_") + key, says, unit, value, digits});
   };
   figure("true", "pull of the thread, over the weight", "", share, 3);
   if (!is_blind) {
-    figure("over_thread", "pull found over that of the thread, mean of the pulls", "",
-           mean_of(found.over_thread), 3);
+    figure("over_thread", "pull found over that of the thread, mean of the pulls", "", mean_of(found.over_thread), 3);
     figure("scatter", "that scatters by, sd", "", sd_of(found.over_thread), 3);
-    figure("direction_deg", "direction of the pull off by, rms", "deg",
-           std::sqrt(mean_of(found.off_deg_squared)), 1);
+    figure("direction_deg", "direction of the pull off by, rms", "deg", std::sqrt(mean_of(found.off_deg_squared)), 1);
     figure("stated_sd", "standard deviation that the fingertip states, of the force, median", "",
            upper_median(found.stated_sd), 3);
-    figure("zero", "pull found before each pull, of the force, median", "",
-           upper_median(found.zero), 3);
+    figure("zero", "pull found before each pull, of the force, median", "", upper_median(found.zero), 3);
   }
   figure("moves_mm", "a pull moves the location along by, mean", "mm", mean_of(found.moves_mm), 2);
   figure("moves_scatter_mm", "that scatters by, sd", "mm", sd_of(found.moves_mm), 2);
-  figure("force_percent", "a pull changes the force by, mean", "%", 100.0 * mean_of(found.force),
-         1);
-  figure("warned_percent", "pulls with a warning", "%",
-         100.0 * double(found.warned) / double(found.moves_mm.size()), 0);
+  figure("force_percent", "a pull changes the force by, mean", "%", 100.0 * mean_of(found.force), 1);
+  figure("warned_percent", "pulls with a warning", "%", 100.0 * double(found.warned) / double(found.moves_mm.size()),
+         0);
   made.note = is_blind ? why_no_pull(measured.info) : "";
   if (made.note.empty() && found.over_thread.size() < measured.pulls_asked) {
     made.note = "The fingertip estimated " + std::to_string(found.over_thread.size()) + " of " +

@@ -138,8 +138,7 @@ bool PullWatch::take(const calibrating::Frame &frame, bool is_free, const Contac
     return false;
   }
   const std::vector<double> last_Pa = above(t_s - 0.5 * PULL_s, t_s);
-  if (t_s < pulled_s_ + PULL_s + NOW_s ||
-      difference(above(t_s - PULL_s, t_s - 0.5 * PULL_s), last_Pa) > STILL_SHAPE) {
+  if (t_s < pulled_s_ + PULL_s + NOW_s || difference(above(t_s - PULL_s, t_s - 0.5 * PULL_s), last_Pa) > STILL_SHAPE) {
     return false;
   }
   pull_ = estimate_of(contacts, t_s - PULL_s, t_s);

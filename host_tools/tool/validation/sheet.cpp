@@ -78,12 +78,11 @@ void draw(const calibrating::Array &array, Pen &pen) {
 class SvgPen : public Pen {
 public:
   void line(double x, double y, double to_x, double to_y) override {
-    body += "  <path d=\"M" + fixed(x, 2) + " " + fixed(-y, 2) + "L" + fixed(to_x, 2) + " " +
-            fixed(-to_y, 2) + "\"/>\n";
+    body +=
+        "  <path d=\"M" + fixed(x, 2) + " " + fixed(-y, 2) + "L" + fixed(to_x, 2) + " " + fixed(-to_y, 2) + "\"/>\n";
   }
   void circle(double x, double y, double radius) override {
-    body += "  <circle cx=\"" + fixed(x, 2) + "\" cy=\"" + fixed(-y, 2) + "\" r=\"" +
-            fixed(radius, 2) + "\"/>\n";
+    body += "  <circle cx=\"" + fixed(x, 2) + "\" cy=\"" + fixed(-y, 2) + "\" r=\"" + fixed(radius, 2) + "\"/>\n";
   }
   void text(double x, double y, const std::string &words) override {
     body += "  <text x=\"" + fixed(x, 2) + "\" y=\"" + fixed(-y, 2) + "\">" + words + "</text>\n";
@@ -98,14 +97,13 @@ public:
   }
   void circle(double x, double y, double r) override {
     const double c = CIRCLE * r;
-    body += at(x + r, y) + " m " + at(x + r, y + c) + " " + at(x + c, y + r) + " " + at(x, y + r) +
-            " c " + at(x - c, y + r) + " " + at(x - r, y + c) + " " + at(x - r, y) + " c " +
-            at(x - r, y - c) + " " + at(x - c, y - r) + " " + at(x, y - r) + " c " +
-            at(x + c, y - r) + " " + at(x + r, y - c) + " " + at(x + r, y) + " c S\n";
+    body += at(x + r, y) + " m " + at(x + r, y + c) + " " + at(x + c, y + r) + " " + at(x, y + r) + " c " +
+            at(x - c, y + r) + " " + at(x - r, y + c) + " " + at(x - r, y) + " c " + at(x - r, y - c) + " " +
+            at(x - c, y - r) + " " + at(x, y - r) + " c " + at(x + c, y - r) + " " + at(x + r, y - c) + " " +
+            at(x + r, y) + " c S\n";
   }
   void text(double x, double y, const std::string &words) override {
-    body += "BT /F " + fixed(SMALL_mm * POINTS_PER_mm, 2) + " Tf " + at(x, y) + " Td (" + words +
-            ") Tj ET\n";
+    body += "BT /F " + fixed(SMALL_mm * POINTS_PER_mm, 2) + " Tf " + at(x, y) + " Td (" + words + ") Tj ET\n";
   }
   std::string body = fixed(LINE_mm * POINTS_PER_mm, 3) + " w\n";
 
@@ -123,14 +121,12 @@ std::string sheet_svg(const calibrating::Array &array) {
   SvgPen pen;
   draw(array, pen);
   const std::string width = fixed(2.0 * reach.x, 2), height = fixed(2.0 * reach.y, 2);
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + width + "mm\" height=\"" + height +
-         "mm\" viewBox=\"" + fixed(-reach.x, 2) + " " + fixed(-reach.y, 2) + " " + width + " " +
-         height + "\">\n  <title>Template of a validation, 1:1</title>\n  <style>text { font: " +
-         fixed(SMALL_mm, 1) +
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + width + "mm\" height=\"" + height + "mm\" viewBox=\"" +
+         fixed(-reach.x, 2) + " " + fixed(-reach.y, 2) + " " + width + " " + height +
+         "\">\n  <title>Template of a validation, 1:1</title>\n  <style>text { font: " + fixed(SMALL_mm, 1) +
          "px sans-serif } path, circle { stroke: #000; stroke-width: " + fixed(LINE_mm, 2) +
-         "; fill: none }</style>\n  <rect x=\"" + fixed(-reach.x, 2) + "\" y=\"" +
-         fixed(-reach.y, 2) + "\" width=\"" + width + "\" height=\"" + height +
-         "\" fill=\"#fff\"/>\n" + pen.body + "</svg>\n";
+         "; fill: none }</style>\n  <rect x=\"" + fixed(-reach.x, 2) + "\" y=\"" + fixed(-reach.y, 2) + "\" width=\"" +
+         width + "\" height=\"" + height + "\" fill=\"#fff\"/>\n" + pen.body + "</svg>\n";
 }
 
 std::string sheet_pdf(const calibrating::Array &array) {
@@ -139,9 +135,8 @@ std::string sheet_pdf(const calibrating::Array &array) {
   const std::string objects[] = {
       "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
       "<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-      "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 " + fixed(PAGE_WIDTH_mm * POINTS_PER_mm, 3) +
-          " " + fixed(PAGE_HEIGHT_mm * POINTS_PER_mm, 3) +
-          "] /Resources << /Font << /F 4 0 R >> >> /Contents 5 0 R >>",
+      "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 " + fixed(PAGE_WIDTH_mm * POINTS_PER_mm, 3) + " " +
+          fixed(PAGE_HEIGHT_mm * POINTS_PER_mm, 3) + "] /Resources << /Font << /F 4 0 R >> >> /Contents 5 0 R >>",
       "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>",
       "<< /Length " + std::to_string(pen.body.size()) + " >>\nstream\n" + pen.body + "endstream",
   };
@@ -155,8 +150,8 @@ std::string sheet_pdf(const calibrating::Array &array) {
     text += std::to_string(++number) + " 0 obj\n" + object + "\nendobj\n";
   }
   const std::string count = std::to_string(number + 1);
-  return text + "xref\n0 " + count + "\n" + places + "trailer\n<< /Size " + count +
-         " /Root 1 0 R >>\nstartxref\n" + std::to_string(text.size()) + "\n%%EOF\n";
+  return text + "xref\n0 " + count + "\n" + places + "trailer\n<< /Size " + count + " /Root 1 0 R >>\nstartxref\n" +
+         std::to_string(text.size()) + "\n%%EOF\n";
 }
 
 } // namespace fingertip::validating

@@ -127,17 +127,14 @@ std::string Walk::advice() const {
     }
     const std::size_t turn = (next_ - 3) / marks_;
     return (finder.refusal() == Finder::Refusal::light ? "too light. " : "") +
-           std::string("set the weight down on mark ") + std::to_string(now().mark + 1) +
-           ", turn " + std::to_string(turn + 1) + " of " + std::to_string(TURNS);
+           std::string("set the weight down on mark ") + std::to_string(now().mark + 1) + ", turn " +
+           std::to_string(turn + 1) + " of " + std::to_string(TURNS);
   }
   case Step::Kind::hold:
-    return gatherer_.touched_s() > 0.0
-               ? "let it stand: " + seconds_left(HOLD_s, gatherer_.touched_s())
-               : "set the weight down in the middle, and let it stand";
+    return gatherer_.touched_s() > 0.0 ? "let it stand: " + seconds_left(HOLD_s, gatherer_.touched_s())
+                                       : "set the weight down in the middle, and let it stand";
   case Step::Kind::rest:
-    return gatherer_.released_s() > 0.0
-               ? "leave it alone: " + seconds_left(REST_s, gatherer_.released_s())
-               : "lift it";
+    return gatherer_.released_s() > 0.0 ? "leave it alone: " + seconds_left(REST_s, gatherer_.released_s()) : "lift it";
   case Step::Kind::pull:
     return pull_advice();
   case Step::Kind::begin:

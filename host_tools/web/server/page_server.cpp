@@ -79,22 +79,19 @@ std::string host_of(const std::string &header) {
 
 bool is_address(const std::string &text) {
   in6_addr any{};
-  return inet_pton(AF_INET, text.c_str(), &any) == 1 ||
-         inet_pton(AF_INET6, text.c_str(), &any) == 1;
+  return inet_pton(AF_INET, text.c_str(), &any) == 1 || inet_pton(AF_INET6, text.c_str(), &any) == 1;
 }
 
 std::string why_not(const std::string &address, unsigned port) {
   std::string place = "port " + std::to_string(port) + " of " + address;
   switch (errno) {
   case EADDRINUSE:
-    return place +
-           " is taken by another program; end that one, or choose another --port (a browser asks "
-           "for fingertips again there)";
+    return place + " is taken by another program; end that one, or choose another --port (a browser asks "
+                   "for fingertips again there)";
   case EACCES:
     return place + " needs privileges; choose another --port, from 1024 on";
   default:
-    return place + " cannot be had" +
-           (errno ? std::string(" (") + std::strerror(errno) + ")" : "") +
+    return place + " cannot be had" + (errno ? std::string(" (") + std::strerror(errno) + ")" : "") +
            "; is it an address of this machine?";
   }
 }
@@ -112,11 +109,10 @@ bool is_loopback(const std::string &address) {
 PageServer::PageServer(const fs::path &folder, const std::string &address, unsigned port)
     : server_(std::make_unique<httplib::Server>()) {
   std::error_code failed;
-  for (fs::recursive_directory_iterator entry(folder, failed), end; !failed && entry != end;
-       entry.increment(failed)) {
+  for (fs::recursive_directory_iterator entry(folder, failed), end; !failed && entry != end; entry.increment(failed)) {
     if (entry->is_regular_file()) {
-      files_["/" + entry->path().lexically_relative(folder).generic_string()] = {
-          type_of(entry->path()), content(entry->path())};
+      files_["/" + entry->path().lexically_relative(folder).generic_string()] = {type_of(entry->path()),
+                                                                                 content(entry->path())};
     }
   }
   if (failed) {
@@ -135,34 +131,33 @@ PageServer::PageServer(const fs::path &folder, const std::string &address, unsig
     int yes = 1;
     setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   });
-  server_->set_pre_routing_handler(
-      [this](const httplib::Request &request, httplib::Response &response) {
-        std::string host = host_of(request.get_header_value("Host"));
-        auto refuse = [&](int status, const char *text) {
-          response.status = status;
-          response.set_content(text, "text/plain; charset=utf-8");
-        };
-        auto file = files_.find(request.path == "/" ? "/index.html" : request.path);
-        if (host != "localhost" && !is_address(host)) {
-          refuse(MISDIRECTED_REQUEST, "ask for it by its address\n");
-        } else if (simulations_ && Simulations::is_for(request.path)) {
-          if (Simulations::is_from_page(request)) {
-            return httplib::Server::HandlerResponse::Unhandled;
-          }
-          refuse(FORBIDDEN, "only the page itself may ask\n");
-        } else if (request.method != "GET" && request.method != "HEAD") {
-          response.set_header("Allow", "GET, HEAD");
-          refuse(METHOD_NOT_ALLOWED, "it is only to be read\n");
-        } else if (file == files_.end()) {
-          refuse(NOT_FOUND, "the page has no such file\n");
-        } else {
-          response.set_content(file->second.bytes, file->second.type);
-        }
-        return httplib::Server::HandlerResponse::Handled;
-      });
+  server_->set_pre_routing_handler([this](const httplib::Request &request, httplib::Response &response) {
+    std::string host = host_of(request.get_header_value("Host"));
+    auto refuse = [&](int status, const char *text) {
+      response.status = status;
+      response.set_content(text, "text/plain; charset=utf-8");
+    };
+    auto file = files_.find(request.path == "/" ? "/index.html" : request.path);
+    if (host != "localhost" && !is_address(host)) {
+      refuse(MISDIRECTED_REQUEST, "ask for it by its address\n");
+    } else if (simulations_ && Simulations::is_for(request.path)) {
+      if (Simulations::is_from_page(request)) {
+        return httplib::Server::HandlerResponse::Unhandled;
+      }
+      refuse(FORBIDDEN, "only the page itself may ask\n");
+    } else if (request.method != "GET" && request.method != "HEAD") {
+      response.set_header("Allow", "GET, HEAD");
+      refuse(METHOD_NOT_ALLOWED, "it is only to be read\n");
+    } else if (file == files_.end()) {
+      refuse(NOT_FOUND, "the page has no such file\n");
+    } else {
+      response.set_content(file->second.bytes, file->second.type);
+    }
+    return httplib::Server::HandlerResponse::Handled;
+  });
 
   errno = 0;
-  int bound = port == 0 ? server_->bind_to_any_port(address)
+  int bound = port == 0                                                ? server_->bind_to_any_port(address)
               : server_->bind_to_port(address, static_cast<int>(port)) ? static_cast<int>(port)
                                                                        : -1;
   if (bound < 0) {

@@ -67,8 +67,7 @@ void refuse(httplib::Response &response, int status, const std::string &why) {
 }
 
 bool is_client(const std::string &text) {
-  return text.size() >= 8 && text.size() <= 32 &&
-         text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return text.size() >= 8 && text.size() <= 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
 /* "press 1 2 3" of the page for this side; none: it is neither that nor "lift". */
@@ -164,9 +163,8 @@ private:
       const auto member = [&](const char *name, std::size_t i) {
         return "\"" + std::string(name) + "\": " + std::string(words[i]);
       };
-      newest_ = "{" + member("t_us", 2) + ", " + member("x_mm", 3) + ", " + member("y_mm", 4) +
-                ", " + member("force_N", 5) + ", " + member("qx_N", 6) + ", " + member("qy_N", 7) +
-                "}";
+      newest_ = "{" + member("t_us", 2) + ", " + member("x_mm", 3) + ", " + member("y_mm", 4) + ", " +
+                member("force_N", 5) + ", " + member("qx_N", 6) + ", " + member("qy_N", 7) + "}";
     }
   }
 
@@ -203,16 +201,11 @@ void Simulations::serve(httplib::Server &server) {
     response.set_content("[" + list + "]", "application/json");
   });
   const std::string line = std::string(PATH) + "/line";
-  server.Get(line, [this](const httplib::Request &request, httplib::Response &response) {
-    open_line(request, response);
-  });
-  server.Post(line, [this](const httplib::Request &request, httplib::Response &response) {
-    send(request, response);
-  });
+  server.Get(line,
+             [this](const httplib::Request &request, httplib::Response &response) { open_line(request, response); });
+  server.Post(line, [this](const httplib::Request &request, httplib::Response &response) { send(request, response); });
   server.Post(std::string(PATH) + "/hand",
-              [this](const httplib::Request &request, httplib::Response &response) {
-                hand(request, response);
-              });
+              [this](const httplib::Request &request, httplib::Response &response) { hand(request, response); });
 }
 
 void Simulations::open_line(const httplib::Request &request, httplib::Response &response) {
@@ -241,16 +234,14 @@ void Simulations::open_line(const httplib::Request &request, httplib::Response &
       }
     }
     response.set_chunked_content_provider(
-        "application/octet-stream",
-        [session](std::size_t, httplib::DataSink &sink) { return session->pass_on(sink); },
+        "application/octet-stream", [session](std::size_t, httplib::DataSink &sink) { return session->pass_on(sink); },
         [this, client](bool) {
           const std::lock_guard<std::mutex> lock(mutex_);
           sessions_.erase(client);
         });
     return;
   }
-  refuse(response, NOT_FOUND,
-         "no simulated fingertip has this serial number; start fingertip simulate");
+  refuse(response, NOT_FOUND, "no simulated fingertip has this serial number; start fingertip simulate");
 }
 
 std::shared_ptr<Simulations::Session> Simulations::session(const httplib::Request &request,

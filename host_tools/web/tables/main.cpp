@@ -13,8 +13,7 @@ int main(int argc, char **argv) {
     }
     const auto bytes = fingertip::web::written(fingertip::web::objects_of_twin(argv[2]));
     std::ofstream out(argv[1], std::ios::binary);
-    out.write(reinterpret_cast<const char *>(bytes.data()),
-              static_cast<std::streamsize>(bytes.size()));
+    out.write(reinterpret_cast<const char *>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     out.close();
     if (!out) {
       throw std::runtime_error(std::string(argv[1]) + ": cannot be written");

@@ -12,15 +12,14 @@ using twin::ForcePlanes;
 using Symmetry = ForcePlanes::Symmetry;
 
 // pressure_Pa(force_N, x_mm, y_mm) at the file's nodes.
-template <typename Pressure>
-ForcePlanes coarser(const Pressure &pressure_Pa, Symmetry in_x, Symmetry in_y) {
+template <typename Pressure> ForcePlanes coarser(const Pressure &pressure_Pa, Symmetry in_x, Symmetry in_y) {
   std::vector<float> values;
   for (int f = 0; f < ForcePlanes::FORCES; f++) {
     const double force_N = ForcePlanes::force_at(f);
     for (int i = 0; i < ObjectsFile::NODES; i++) {
       for (int j = 0; j < ObjectsFile::NODES; j++) {
-        values.push_back(static_cast<float>(
-            pressure_Pa(force_N, ObjectsFile::STEP_mm * i, ObjectsFile::STEP_mm * j) / force_N));
+        values.push_back(
+            static_cast<float>(pressure_Pa(force_N, ObjectsFile::STEP_mm * i, ObjectsFile::STEP_mm * j) / force_N));
       }
     }
   }
@@ -38,13 +37,12 @@ Object object_of(const std::string &name, const std::filesystem::path &cache) {
     object.radius_mm.push_back(static_cast<float>(table.contact_radius_mm(force_N)));
     object.indentation_mm.push_back(static_cast<float>(table.indentation_mm(force_N)));
   }
-  object.normal = coarser([&](double force_N, double x_mm,
-                              double y_mm) { return table.base_pressure_Pa(force_N, x_mm, y_mm); },
-                          Symmetry::even, Symmetry::even);
+  object.normal =
+      coarser([&](double force_N, double x_mm, double y_mm) { return table.base_pressure_Pa(force_N, x_mm, y_mm); },
+              Symmetry::even, Symmetry::even);
   const auto pulled = [&](double x_share, double y_share) {
     return [&traction, x_share, y_share](double force_N, double x_mm, double y_mm) {
-      return traction.base_pressure_Pa({force_N, 0.0, x_share * force_N, y_share * force_N}, x_mm,
-                                       y_mm);
+      return traction.base_pressure_Pa({force_N, 0.0, x_share * force_N, y_share * force_N}, x_mm, y_mm);
     };
   };
   object.along_x = coarser(pulled(1.0, 0.0), Symmetry::odd, Symmetry::even);
@@ -55,8 +53,7 @@ Object object_of(const std::string &name, const std::filesystem::path &cache) {
 } // namespace
 
 const std::vector<std::string> &object_names() {
-  static const std::vector<std::string> names{"sphere15", "sphere6",    "cube12",
-                                              "cube24",   "cylinder24", "lime"};
+  static const std::vector<std::string> names{"sphere15", "sphere6", "cube12", "cube24", "cylinder24", "lime"};
   return names;
 }
 

@@ -12,16 +12,7 @@ const INFO = 0x03;
 const VALUES = 8192;
 const BYTES = 1 << 16;
 const TEXT_BYTES = 512;
-const COUNTS = [
-  'bytes',
-  'packets',
-  'dropped_packets',
-  'out_of_order',
-  'crc_errors',
-  'format_errors',
-  'version_errors',
-  'unknown_types',
-];
+const COUNTS = ['bytes', 'packets', 'dropped_packets', 'out_of_order', 'crc_errors', 'format_errors', 'version_errors', 'unknown_types'];
 
 /** What the library refused: its words, and enum fingertip_status. */
 export class CoreError extends Error {
@@ -71,15 +62,7 @@ class Decoder {
     for (let from = 0; from < bytes.length; ) {
       const part = bytes.subarray(from, from + BYTES);
       core.wasm.bytes(core.bytes, part.length).set(part);
-      from += core.wasm.call(
-        'fingertip_decoder_feed',
-        this.handle,
-        core.bytes,
-        part.length,
-        core.values,
-        VALUES,
-        core.count,
-      );
+      from += core.wasm.call('fingertip_decoder_feed', this.handle, core.bytes, part.length, core.values, VALUES, core.count);
       const filled = core.counted();
       values.set(core.wasm.doubles(core.values, filled));
       for (let at = 0; at < filled; at += 1 + core.types.get(values[at]).count) {
@@ -200,9 +183,7 @@ class Writer {
     this.core = core;
     core.put(core.types.get(INFO), info);
     const lines = comments.map(([key, value]) => `${key}: ${value}\n`).join('');
-    const handle = core.withText(lines, (text) =>
-      core.wasm.call('fingertip_writer_new', kind === 'mcap' ? MCAP : CSV, core.values, text),
-    );
+    const handle = core.withText(lines, (text) => core.wasm.call('fingertip_writer_new', kind === 'mcap' ? MCAP : CSV, core.values, text));
     if (handle === 0) {
       throw core.error(0);
     }
@@ -379,9 +360,7 @@ class Core {
     wasm.bytes(at, bytes.length).set(bytes);
     const told = [0, 1, 2].map((i) => text + SIZE * i);
     try {
-      this.checked(
-        this.withText(name, (name_at) => wasm.call('fingertip_firmware', name_at, at, bytes.length, ...told, SIZE)),
-      );
+      this.checked(this.withText(name, (name_at) => wasm.call('fingertip_firmware', name_at, at, bytes.length, ...told, SIZE)));
     } finally {
       wasm.call('free', at);
     }

@@ -111,8 +111,8 @@ EXPORT(errors_begin) char *errors_begin(unsigned bytes) {
 EXPORT(world_begin) void world_begin(double seed) {
   ObjectsFile read = read_objects(file.data(), file.size());
   pad_command = std::move(read.pad_command);
-  world = std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors),
-                                  static_cast<std::uint64_t>(seed));
+  world =
+      std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors), static_cast<std::uint64_t>(seed));
   file = {};
 }
 // The command that tells the firmware its pad.
@@ -143,9 +143,8 @@ EXPORT(world_friction) void world_friction(double friction) {
 }
 EXPORT(world_truth) const double *world_truth() {
   const Truth &now = world->truth();
-  const double values[] = {
-      now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N, now.qx_N,
-      now.qy_N, now.slips ? 1.0 : 0.0};
+  const double values[] = {now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N, now.qx_N,
+                           now.qy_N, now.slips ? 1.0 : 0.0};
   std::copy(std::begin(values), std::end(values), truth);
   return truth;
 }
@@ -165,8 +164,7 @@ EXPORT(flash_bytes) unsigned flash_bytes() {
 // bytes in line_bytes. 1: it is none.
 EXPORT(pad_of_command) int pad_of_command(unsigned length) {
   wire_packet packet;
-  if (length < 1 || wire_decode(wire_commands, line, length - 1, &packet) != FT_OK ||
-      packet.type != WIRE_CMD_PAD) {
+  if (length < 1 || wire_decode(wire_commands, line, length - 1, &packet) != FT_OK || packet.type != WIRE_CMD_PAD) {
     return 1;
   }
   profile = packet.body.cmd_pad.profile;
@@ -175,8 +173,7 @@ EXPORT(pad_of_command) int pad_of_command(unsigned length) {
 
 // Power-up at time 0. of_rows: the scenario acts, else the pad. A module powers up once.
 EXPORT(power_up)
-void power_up(double seed, double noise, double prom_spread, int parallel_bus, int of_rows,
-              int keeps) {
+void power_up(double seed, double noise, double prom_spread, int parallel_bus, int of_rows, int keeps) {
   native_set_serial_number(serial);
   native_fingertip_settings settings{};
   settings.seed = static_cast<std::uint64_t>(seed);

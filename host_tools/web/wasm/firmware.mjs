@@ -39,9 +39,7 @@ export class Firmware {
 
   /** The command that tells the firmware its pad; not before setWorld. */
   padCommand() {
-    return this.wasm
-      .bytes(this.wasm.call('pad_command_at'), this.wasm.call('pad_command_bytes'))
-      .slice();
+    return this.wasm.bytes(this.wasm.call('pad_command_at'), this.wasm.call('pad_command_bytes')).slice();
   }
 
   /** Acts from power-up on without being kept: a command as padCommand's. */
@@ -73,10 +71,7 @@ export class Firmware {
   }
 
   truth() {
-    const [t_s, contact, x_mm, y_mm, force_N, qx_N, qy_N, slips] = this.wasm.doubles(
-      this.wasm.call('world_truth'),
-      8,
-    );
+    const [t_s, contact, x_mm, y_mm, force_N, qx_N, qy_N, slips] = this.wasm.doubles(this.wasm.call('world_truth'), 8);
     return {
       t_us: Math.round(1e6 * t_s),
       contact: contact !== 0,
@@ -92,9 +87,7 @@ export class Firmware {
   /** Time 0. kept: of an earlier one's kept(). */
   powerUp({ serial, seed = 1, noise = 1, promSpread = 0.03, parallelBus = false, kept = null }) {
     if (serial) {
-      this.wasm
-        .bytes(this.wasm.call('serial_number'), 16)
-        .set(new TextEncoder().encode(serial).subarray(0, 16));
+      this.wasm.bytes(this.wasm.call('serial_number'), 16).set(new TextEncoder().encode(serial).subarray(0, 16));
     }
     if (kept) {
       this.wasm.bytes(this.wasm.call('flash_to_start_with'), kept.length).set(kept);
@@ -151,8 +144,6 @@ export class Firmware {
 
   /** A copy of what it keeps without power. */
   kept() {
-    return this.wasm
-      .bytes(this.wasm.call('flash_now'), this.wasm.call('flash_bytes'))
-      .slice();
+    return this.wasm.bytes(this.wasm.call('flash_now'), this.wasm.call('flash_bytes')).slice();
   }
 }

@@ -35,9 +35,7 @@ public:
     }
     return end_list();
   }
-  template <typename Value> Json &field(std::string_view key, const Value &content) {
-    return name(key).value(content);
-  }
+  template <typename Value> Json &field(std::string_view key, const Value &content) { return name(key).value(content); }
   Json &null() { return bare("null"); }
   const std::string &text() const { return text_; }
 

@@ -126,8 +126,7 @@ EXPORT(gains_free) void gains_free(GainSession *session) {
 }
 // 1: a placement was completed, and judged.
 EXPORT(gains_take) int gains_take(GainSession *session) {
-  if (session->judgement().state != calibrating::Judgement::State::more ||
-      !session->take(packet())) {
+  if (session->judgement().state != calibrating::Judgement::State::more || !session->take(packet())) {
     return 0;
   }
   session->judge(false);
@@ -171,9 +170,8 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   if (session->judgement().state != calibrating::Judgement::State::good) {
     throw Error("not calibrated: " + session->judgement().text);
   }
-  const calibration made =
-      session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N),
-                    static_cast<std::uint32_t>(date_s));
+  const calibration made = session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N),
+                                         static_cast<std::uint32_t>(date_s));
   std::vector<float> gain, gain_sd;
   std::vector<int> off_x_um, off_y_um, wider_q15;
   for (std::size_t k = 0; k < session->array().sensors(); k++) {
@@ -212,8 +210,7 @@ EXPORT(pulls_free) void pulls_free(PullSession *session) {
 }
 // 1: a pull was completed, and judged.
 EXPORT(pulls_take) int pulls_take(PullSession *session) {
-  if (session->judgement().state != calibrating::PullJudgement::State::more ||
-      !session->take(packet())) {
+  if (session->judgement().state != calibrating::PullJudgement::State::more || !session->take(packet())) {
     return 0;
   }
   session->judge(false);
@@ -291,8 +288,8 @@ EXPORT(doctor_seconds) double doctor_seconds(const Examined *examined) {
   return examined->rest.seconds();
 }
 EXPORT(doctor_line)
-void doctor_line(Examined *examined, double bytes, double packets, double dropped_packets,
-                 double out_of_order, double crc_errors, double format_errors) {
+void doctor_line(Examined *examined, double bytes, double packets, double dropped_packets, double out_of_order,
+                 double crc_errors, double format_errors) {
   LineStatistics &line = examined->facts.line;
   line.bytes = static_cast<std::uint64_t>(bytes);
   line.packets = static_cast<std::uint64_t>(packets);

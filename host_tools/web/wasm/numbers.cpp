@@ -15,27 +15,22 @@ namespace {
 // anything but 0.
 template <typename Number>
 std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
-  if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos ||
-      text[0] == '+') {
+  if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos || text[0] == '+') {
     return std::nullopt;
   }
   const std::string copy(text);
   char *end = nullptr;
   const Number value = convert(copy.c_str(), &end);
-  const bool vanished =
-      value == Number(0) && text.substr(0, text.find_first_of("eE")).find_first_of("123456789") !=
-                                std::string_view::npos;
-  return end == copy.c_str() + copy.size() && std::isfinite(value) && !vanished
-             ? std::optional(value)
-             : std::nullopt;
+  const bool vanished = value == Number(0) &&
+                        text.substr(0, text.find_first_of("eE")).find_first_of("123456789") != std::string_view::npos;
+  return end == copy.c_str() + copy.size() && std::isfinite(value) && !vanished ? std::optional(value) : std::nullopt;
 }
 
 template <typename Integer> std::optional<Integer> whole(std::string_view text) {
   Integer value{};
   const char *end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, value);
-  return !text.empty() && result.ec == std::errc() && result.ptr == end ? std::optional(value)
-                                                                        : std::nullopt;
+  return !text.empty() && result.ec == std::errc() && result.ptr == end ? std::optional(value) : std::nullopt;
 }
 
 } // namespace

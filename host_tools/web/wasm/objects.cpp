@@ -34,8 +34,7 @@ void put_field(std::vector<std::uint8_t> &bytes, const ForcePlanes &planes) {
     put(bytes, &scale, sizeof scale);
     for (int node = 0; node < NODES * NODES; node++) {
       const double value = planes.node(f, node / NODES, node % NODES);
-      const auto part =
-          static_cast<std::int16_t>(largest > 0.0 ? std::lround(PARTS * value / largest) : 0);
+      const auto part = static_cast<std::int16_t>(largest > 0.0 ? std::lround(PARTS * value / largest) : 0);
       put(bytes, &part, sizeof part);
     }
   }

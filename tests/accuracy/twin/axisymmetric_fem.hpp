@@ -15,10 +15,9 @@ namespace fingertip::twin {
 class AxisymmetricFem {
 public:
   // r_mm: edges of the elements from the axis outwards, the last one free; layers: along z.
-  AxisymmetricFem(std::vector<double> r_mm, double thickness_mm, int layers, double young_Pa,
-                  double poisson)
-      : r_(std::move(r_mm)), h_(thickness_mm), columns_(static_cast<int>(r_.size()) - 1),
-        layers_(layers), young_(young_Pa), poisson_(poisson) {}
+  AxisymmetricFem(std::vector<double> r_mm, double thickness_mm, int layers, double young_Pa, double poisson)
+      : r_(std::move(r_mm)), h_(thickness_mm), columns_(static_cast<int>(r_.size()) - 1), layers_(layers),
+        young_(young_Pa), poisson_(poisson) {}
 
   // Solves under this pressure on the surface (Pa, downward), a function of r in mm.
   void load(const std::function<double(double)> &pressure_Pa) {
@@ -137,8 +136,7 @@ private:
     const Element nodes = nodes_of(c, l);
     for (int i = 0; i < 16; i++) {
       for (int j = 0; j < 16; j++) {
-        entries.emplace_back(2 * nodes[at(i / 2)] + i % 2, 2 * nodes[at(j / 2)] + j % 2,
-                             stiffness(i, j));
+        entries.emplace_back(2 * nodes[at(i / 2)] + i % 2, 2 * nodes[at(j / 2)] + j % 2, stiffness(i, j));
       }
     }
   }

@@ -17,8 +17,7 @@ class BlockFem {
 public:
   using Vector3 = Eigen::Vector3d;
   // Edges of the elements, mm, from the middle (from the base) on; the last ones are free.
-  BlockFem(const std::array<std::vector<double>, 3> &edges_mm, double poisson, bool odd_x,
-           bool odd_y)
+  BlockFem(const std::array<std::vector<double>, 3> &edges_mm, double poisson, bool odd_x, bool odd_y)
       : edges_(edges_mm), poisson_(poisson) {
     for (std::size_t d = 0; d < 3; d++) {
       elements_[d] = static_cast<int>(edges_[d].size()) - 1;
@@ -52,10 +51,8 @@ public:
   // Solves under this traction on the surface, per shear modulus, of x and y.
   void load(const std::function<Vector3(double, double)> &traction) {
     Eigen::VectorXd force = Eigen::VectorXd::Zero(unknowns_);
-    constexpr double POINT[4] = {-0.8611363115940526, -0.3399810435848563, 0.3399810435848563,
-                                 0.8611363115940526};
-    constexpr double WEIGHT[4] = {0.3478548451374538, 0.6521451548625461, 0.6521451548625461,
-                                  0.3478548451374538};
+    constexpr double POINT[4] = {-0.8611363115940526, -0.3399810435848563, 0.3399810435848563, 0.8611363115940526};
+    constexpr double WEIGHT[4] = {0.3478548451374538, 0.6521451548625461, 0.6521451548625461, 0.3478548451374538};
     for_each_element([&](const std::array<int, 3> &e) {
       if (e[2] != elements_[2] - 1) {
         return;
@@ -63,8 +60,8 @@ public:
       const std::array<int, 60> at = unknowns(e);
       for (std::size_t q = 0; q < 16; q++) {
         const Vector3 s(POINT[q / 4], POINT[q % 4], 1.0);
-        const Vector3 t = traction(place(e, s, 0), place(e, s, 1)) * WEIGHT[q / 4] * WEIGHT[q % 4] *
-                          size(e, 0) * size(e, 1) / 4.0;
+        const Vector3 t =
+            traction(place(e, s, 0), place(e, s, 1)) * WEIGHT[q / 4] * WEIGHT[q % 4] * size(e, 0) * size(e, 1) / 4.0;
         for (int i = 0; i < 60; i++) {
           if (at[std::size_t(i)] >= 0) {
             force[at[std::size_t(i)]] += t[i % 3] * shape(i / 3, s);

@@ -11,9 +11,7 @@ LayerWave solve_layer_wave(double H, double poisson, int order) {
   // Trefethen, Spectral Methods in MATLAB, SIAM 2000, chapter 6.
   Eigen::MatrixXd d(n, n);
   const auto point = [&](int i) { return std::cos(M_PI * i / order); };
-  const auto weight = [&](int i) {
-    return (i == 0 || i == order ? 2.0 : 1.0) * (i % 2 == 0 ? 1.0 : -1.0);
-  };
+  const auto weight = [&](int i) { return (i == 0 || i == order ? 2.0 : 1.0) * (i % 2 == 0 ? 1.0 : -1.0); };
   for (int i = 0; i < n; i++) {
     for (int j = 0; j < n; j++) {
       d(i, j) = i == j ? 0.0 : weight(i) / (weight(j) * (point(i) - point(j)));

@@ -56,13 +56,12 @@ struct Traction {
 class PartialSlip {
 public:
   PartialSlip(const Layer &layer, const Grid &grid)
-      : layer_(layer), grid_(grid), transform_(grid.nodes), xx_(transform_.waves()),
-        xy_(transform_.waves()), yy_(transform_.waves()), base_(transform_.waves()),
-        rise_x_(transform_.waves()), base_x_(transform_.waves()), base_y_(transform_.waves()) {
+      : layer_(layer), grid_(grid), transform_(grid.nodes), xx_(transform_.waves()), xy_(transform_.waves()),
+        yy_(transform_.waves()), base_(transform_.waves()), rise_x_(transform_.waves()), base_x_(transform_.waves()),
+        base_y_(transform_.waves()) {
     const double unit = 2.0 * M_PI / (grid.nodes * grid.step_mm);
     const double norm = 1.0 / (double(grid.nodes) * grid.nodes);
-    const double h_per_G =
-        layer.thickness_mm * 2.0 * (1.0 + layer.poisson) / layer.youngs_modulus_Pa;
+    const double h_per_G = layer.thickness_mm * 2.0 * (1.0 + layer.poisson) / layer.youngs_modulus_Pa;
     for (int row = 0; row < grid.nodes; row++) {
       for (int j = 0; j <= grid.nodes / 2; j++) {
         const int i = transform_.i_of(row);
@@ -120,9 +119,7 @@ public:
   }
 
   // Pressure on the base under one on the surface.
-  std::vector<double> under_pressure_Pa(const std::vector<double> &pressure_Pa) {
-    return answer(pressure_Pa, base_);
-  }
+  std::vector<double> under_pressure_Pa(const std::vector<double> &pressure_Pa) { return answer(pressure_Pa, base_); }
 
   // Upward displacement of the surface under a traction along x.
   std::vector<double> rise_mm(const std::vector<double> &x_Pa) { return answer(x_Pa, rise_x_); }
@@ -136,8 +133,7 @@ public:
   }
 
 private:
-  template <typename Response>
-  std::vector<double> answer(const std::vector<double> &field, const Response &response) {
+  template <typename Response> std::vector<double> answer(const std::vector<double> &field, const Response &response) {
     const double *values = transform_.apply(field, response);
     return {values, values + field.size()};
   }

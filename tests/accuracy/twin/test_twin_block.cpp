@@ -36,8 +36,7 @@ struct LayerField {
       ahead += tangential_transfer(H, layer.poisson) * ::j1(H * r / h) * wave;
     }
     const double norm = 1.0 / (2.0 * M_PI * h * h);
-    return {r > 0.0 ? norm * ahead * dx / r : 0.0, r > 0.0 ? norm * ahead * dy / r : 0.0,
-            norm * down};
+    return {r > 0.0 ? norm * ahead * dx / r : 0.0, r > 0.0 ? norm * ahead * dy / r : 0.0, norm * down};
   }
   // Largest pressure under a force down, along x or y.
   Eigen::Vector3d peak() const {
@@ -57,8 +56,7 @@ Eigen::Vector3d node(const BlockAnswer &answer, int i, int j) {
 }
 
 // A load spread as LayerField's on the block's surface.
-Eigen::Vector3d spread(const BlockAnswer &answer, const Block &block, const Place &load,
-                       double s_mm) {
+Eigen::Vector3d spread(const BlockAnswer &answer, const Block &block, const Place &load, double s_mm) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double weights = 0.0;
   for (int i = 0; i < answer.nodes_x; i++) {
@@ -82,10 +80,9 @@ double bell(double dx, double dy, double s_mm) {
 TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
   const Block block = around(12.0, 6.0);
   const double load_mm = 2.2, felt_mm = 1.5;
-  const std::array<std::vector<double>, 3> edges{
-      std::vector<double>{0, 2.3, 4.6, 6.9, 9.2, 11.4, 13.4, 14.4, 15},
-      {0, 3, 6, 9, 11.5, 13.5, 15.5, 17.5, 19.5, 21.5, 23, 24},
-      {0, 0.6, 1.8, 3.8, 6.4, 9.2, 12}};
+  const std::array<std::vector<double>, 3> edges{std::vector<double>{0, 2.3, 4.6, 6.9, 9.2, 11.4, 13.4, 14.4, 15},
+                                                 {0, 3, 6, 9, 11.5, 13.5, 15.5, 17.5, 19.5, 21.5, 23, 24},
+                                                 {0, 0.6, 1.8, 3.8, 6.4, 9.2, 12}};
   const std::array<Place, 4> places{{{0, 0}, {9, 0}, {0, 18}, {9, 18}}};
   const std::array<Place, 2> loads{{{4.0, 5.0}, {7.5, 14.0}}};
   std::array<std::array<Eigen::Vector3d, 2>, 4> found;
@@ -108,8 +105,7 @@ TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
       };
       for (std::size_t n = 0; n < loads.size(); n++) {
         for (int along = 0; along < 3; along++) {
-          const auto field =
-              images(loads[n], load_mm, odd_x != (along == 0), odd_y != (along == 1));
+          const auto field = images(loads[n], load_mm, odd_x != (along == 0), odd_y != (along == 1));
           fem.load([&](double x, double y) -> Eigen::Vector3d {
             return (along == 2 ? -0.25 : 0.25) * field(x, y) * Eigen::Vector3d::Unit(along);
           });
@@ -124,8 +120,7 @@ TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
   const double away_mm = std::sqrt(2.0) * felt_mm;
   std::vector<Place> around_them;
   for (const Place &place : places) {
-    for (const auto &[dx, dy] :
-         {std::pair{away_mm, 0.0}, {-away_mm, 0.0}, {0.0, away_mm}, {0.0, -away_mm}}) {
+    for (const auto &[dx, dy] : {std::pair{away_mm, 0.0}, {-away_mm, 0.0}, {0.0, away_mm}, {0.0, -away_mm}}) {
       around_them.push_back({place.x_mm + dx, place.y_mm + dy});
     }
   }
@@ -139,8 +134,7 @@ TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
       for (std::size_t m = 4 * p; m < 4 * p + 4; m++) {
         added += 0.25e-6 * spread(answers[m], block, loads[n], load_mm);
       }
-      const Eigen::Vector3d whole =
-          layer.at(places[p].x_mm - loads[n].x_mm, places[p].y_mm - loads[n].y_mm) + added;
+      const Eigen::Vector3d whole = layer.at(places[p].x_mm - loads[n].x_mm, places[p].y_mm - loads[n].y_mm) + added;
       const Eigen::Vector3d o = (whole - found[p][n]).cwiseQuotient(peak);
       off = off.cwiseMax(o.cwiseAbs());
       difference = difference.cwiseMax(added.cwiseQuotient(peak).cwiseAbs());
@@ -151,16 +145,14 @@ TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
 }
 
 // Largest difference of the answers, and largest of the second, in parts of the layer's peaks.
-std::pair<double, double> off_and_size(const std::vector<BlockAnswer> &a,
-                                       const std::vector<BlockAnswer> &b,
+std::pair<double, double> off_and_size(const std::vector<BlockAnswer> &a, const std::vector<BlockAnswer> &b,
                                        const Eigen::Vector3d &peak) {
   double off = 0.0, size = 0.0;
   for (std::size_t n = 0; n < a.size(); n++) {
     for (int i = 0; i < a[n].nodes_x; i++) {
       for (int j = 0; j < a[n].nodes_y; j++) {
         const Eigen::Vector3d here = 1e-6 * node(b[n], i, j).cwiseQuotient(peak);
-        off = std::max(
-            off, (1e-6 * node(a[n], i, j).cwiseQuotient(peak) - here).lpNorm<Eigen::Infinity>());
+        off = std::max(off, (1e-6 * node(a[n], i, j).cwiseQuotient(peak) - here).lpNorm<Eigen::Infinity>());
         size = std::max(size, here.lpNorm<Eigen::Infinity>());
       }
     }
@@ -175,8 +167,7 @@ TEST(TwinBlock, SettlesAsElementsGrowSmaller) {
   const Eigen::Vector3d peak = LayerField{block.layer, 0.0}.peak();
   const auto fine = solve_block(block, places, FIELD_STEP_mm, {7, 6.0, 0.5, 0.008, 3.0});
   const auto [usual, size] = off_and_size(solve_block(block, places, FIELD_STEP_mm), fine, peak);
-  const double coarse =
-      off_and_size(solve_block(block, places, FIELD_STEP_mm, COARSE), fine, peak).first;
+  const double coarse = off_and_size(solve_block(block, places, FIELD_STEP_mm, COARSE), fine, peak).first;
   EXPECT_LT(usual, 5e-4);
   EXPECT_GT(coarse, 2.0 * usual);
   EXPECT_GT(size, 0.3);
@@ -232,16 +223,15 @@ TEST(TwinBlock, TheBaseCarriesForceAndMoment) {
       areas.push_back(line[i].second * line[j].second);
     }
   }
-  const std::vector<BlockAnswer> answers =
-      solve_block(block, places, FIELD_STEP_mm, {5, 2.5, 0.5, 0.03, 3.0});
+  const std::vector<BlockAnswer> answers = solve_block(block, places, FIELD_STEP_mm, {5, 2.5, 0.5, 0.03, 3.0});
   const double s_mm = 1.0;
   const LayerField layer{block.layer, s_mm};
   for (const Place &load : {Place{0.0, 0.0}, Place{4.0, 2.0}}) {
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), moment = force, of_layer = force;
     const auto feel = [&](std::size_t n, double sign_x, double sign_y, bool is_turned) {
       // A mirrored place feels what this one does of the mirrored load.
-      const Place mirror = is_turned ? Place{sign_y * load.y_mm, sign_x * load.x_mm}
-                                     : Place{sign_x * load.x_mm, sign_y * load.y_mm};
+      const Place mirror =
+          is_turned ? Place{sign_y * load.y_mm, sign_x * load.x_mm} : Place{sign_x * load.x_mm, sign_y * load.y_mm};
       Eigen::Vector3d added = 1e-6 * spread(answers[n], block, mirror, s_mm);
       double x = places[n].x_mm, y = places[n].y_mm;
       if (is_turned) {
@@ -282,16 +272,16 @@ TEST(TwinBlock, FourPointsStandForTheContact) {
     const char *name;
     double overhang_mm, allowed, middle_costs;
   };
-  for (const Case &one : {Case{"sphere6", 9.0, 0.001, 0.003}, Case{"sphere15", 9.0, 0.003, 0.006},
-                          Case{"sphere6", 6.0, 0.004, 0.015}, Case{"sphere15", 6.0, 0.013, 0.03},
-                          Case{"cube6", 6.0, 0.011, 0.04}}) {
+  for (const Case &one :
+       {Case{"sphere6", 9.0, 0.001, 0.003}, Case{"sphere15", 9.0, 0.003, 0.006}, Case{"sphere6", 6.0, 0.004, 0.015},
+        Case{"sphere15", 6.0, 0.013, 0.03}, Case{"cube6", 6.0, 0.011, 0.04}}) {
     const double force_N = 8.0;
     const Place middle{9.0, 18.0};
     const std::vector<Place> sensors = sensor_places();
     const Block block = around(12.0, one.overhang_mm);
     const BlockTable table = BlockTable::load_or_build(block, sensors, CACHE);
-    const double radius_mm = ContactTable::load_or_build(indenter(one.name), block.layer, CACHE)
-                                 .contact_radius_mm(force_N);
+    const double radius_mm =
+        ContactTable::load_or_build(indenter(one.name), block.layer, CACHE).contact_radius_mm(force_N);
     const Grid grid{192, 0.25};
     const Contact contact = ContactSolver(indenter(one.name), block.layer, grid).solve(force_N);
     const Eigen::Vector3d peak = LayerField{block.layer, 0.0}.peak();
@@ -302,8 +292,8 @@ TEST(TwinBlock, FourPointsStandForTheContact) {
       }
       for (int c = 0; c < 3; c++) {
         const auto added = [&](double radius, double dx, double dy) {
-          return 1e-6 * table.added_Pa(k, {double(c == 2), double(c == 0), double(c == 1), radius},
-                                       middle.x_mm + dx, middle.y_mm + dy);
+          return 1e-6 * table.added_Pa(k, {double(c == 2), double(c == 0), double(c == 1), radius}, middle.x_mm + dx,
+                                       middle.y_mm + dy);
         };
         double sum = 0.0;
         for (int i = 0; i < grid.nodes; i++) {
@@ -311,8 +301,7 @@ TEST(TwinBlock, FourPointsStandForTheContact) {
             const double p_Pa = contact.pressure_Pa[std::size_t(i * grid.nodes + j)];
             if (p_Pa > 0.0) {
               sum += 1e-6 * grid.step_mm * grid.step_mm * p_Pa / force_N *
-                     added(0.0, (i - grid.nodes / 2) * grid.step_mm,
-                           (j - grid.nodes / 2) * grid.step_mm);
+                     added(0.0, (i - grid.nodes / 2) * grid.step_mm, (j - grid.nodes / 2) * grid.step_mm);
             }
           }
         }
@@ -331,8 +320,7 @@ TEST(TwinBlock, TheTableIsTheSolution) {
   std::filesystem::remove_all(folder);
   int told = 0;
   const std::vector<Place> sensors{{9, 18}, {-9, 18}, {-9, -18}, {0, 9}};
-  const BlockTable table =
-      BlockTable::load_or_build(block, sensors, folder, [&](double) { told++; });
+  const BlockTable table = BlockTable::load_or_build(block, sensors, folder, [&](double) { told++; });
   EXPECT_EQ(told, 2);                                                // places, but for mirrors
   const BlockAnswer answer = solve_block(block, {{-9, 18}}, 0.7)[0]; // other nodes, no mirror
   const Eigen::Vector3d peak = 1e6 * LayerField{block.layer, 0.0}.peak();
@@ -341,25 +329,20 @@ TEST(TwinBlock, TheTableIsTheSolution) {
     for (int j = 0; j < answer.nodes_y; j++) {
       const double x = block.half_x_mm * (2.0 * i / (answer.nodes_x - 1) - 1.0);
       const double y = block.half_y_mm * (2.0 * j / (answer.nodes_y - 1) - 1.0);
-      const Eigen::Vector3d here{table.added_Pa(1, {0, 1, 0, 0}, x, y),
-                                 table.added_Pa(1, {0, 0, 1, 0}, x, y),
+      const Eigen::Vector3d here{table.added_Pa(1, {0, 1, 0, 0}, x, y), table.added_Pa(1, {0, 0, 1, 0}, x, y),
                                  table.added_Pa(1, {1, 0, 0, 0}, x, y)};
-      off =
-          std::max(off, (here - node(answer, i, j)).cwiseQuotient(peak).lpNorm<Eigen::Infinity>());
+      off = std::max(off, (here - node(answer, i, j)).cwiseQuotient(peak).lpNorm<Eigen::Infinity>());
     }
   }
   EXPECT_LT(off, 5e-4);
-  const BlockTable::Load load{2.0, 0.5, -0.3, 1.0}, mirror_x{2.0, -0.5, -0.3, 1.0},
-      mirror_both{2.0, -0.5, 0.3, 1.0};
+  const BlockTable::Load load{2.0, 0.5, -0.3, 1.0}, mirror_x{2.0, -0.5, -0.3, 1.0}, mirror_both{2.0, -0.5, 0.3, 1.0};
   EXPECT_NEAR(table.added_Pa(0, load, 3.0, 7.0), table.added_Pa(1, mirror_x, -3.0, 7.0), 1e-9);
   EXPECT_NEAR(table.added_Pa(0, load, 3.0, 7.0), table.added_Pa(2, mirror_both, -3.0, -7.0), 1e-9);
-  EXPECT_EQ(table.added_Pa(0, {1, 0, 0, 0}, 99.0, 7.0),
-            table.added_Pa(0, {1, 0, 0, 0}, block.half_x_mm, 7.0));
+  EXPECT_EQ(table.added_Pa(0, {1, 0, 0, 0}, 99.0, 7.0), table.added_Pa(0, {1, 0, 0, 0}, block.half_x_mm, 7.0));
   // From the cache, and again where it is damaged.
   const auto again = [&] {
     told = 0;
-    const BlockTable read =
-        BlockTable::load_or_build(block, sensors, folder, [&](double) { told++; });
+    const BlockTable read = BlockTable::load_or_build(block, sensors, folder, [&](double) { told++; });
     EXPECT_EQ(read.added_Pa(3, load, -1.0, 2.0), table.added_Pa(3, load, -1.0, 2.0));
     return told;
   };

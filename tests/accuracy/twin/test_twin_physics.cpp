@@ -13,8 +13,7 @@ namespace {
 const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
 
 std::size_t at(const Grid &grid, int i, int j) {
-  return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) +
-         std::size_t(grid.nodes / 2 + j);
+  return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) + std::size_t(grid.nodes / 2 + j);
 }
 
 double sum(const std::vector<double> &values) {
@@ -32,8 +31,7 @@ TEST(TwinLayer, ShortAndLongWavesHaveTheirLimits) {
     EXPECT_LT(base_transfer(1.0, nu), 1.0);
     // Short waves: 4 (1-nu) / (3-4nu) (2 (1-nu) + H) exp(-H).
     const double a = 2.0 * (1.0 - nu);
-    EXPECT_NEAR(base_transfer(20.0, nu) * std::exp(20.0), 2.0 * a * (a + 20.0) / (3.0 - 4.0 * nu),
-                1e-6);
+    EXPECT_NEAR(base_transfer(20.0, nu) * std::exp(20.0), 2.0 * a * (a + 20.0) / (3.0 - 4.0 * nu), 1e-6);
     EXPECT_EQ(base_transfer(1e6, nu), 0.0);
     const double bulk = (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu) * (1.0 - nu));
     EXPECT_NEAR(surface_compliance(0.0, nu), bulk, 1e-12);
@@ -48,10 +46,8 @@ TEST(TwinLayer, CollocationAgrees) {
     for (double H : {1e-3, 0.01, 0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0}) {
       const LayerWave wave = solve_layer_wave(H, nu, 36);
       EXPECT_NEAR(wave.base_per_pressure, base_transfer(H, nu), 1e-10) << "H " << H << " nu " << nu;
-      EXPECT_NEAR(wave.base_per_traction, tangential_transfer(H, nu), 1e-10)
-          << "H " << H << " nu " << nu;
-      EXPECT_NEAR(wave.sinks_per_pressure, (1.0 - nu) * surface_compliance(H, nu), 1e-10)
-          << "H " << H << " nu " << nu;
+      EXPECT_NEAR(wave.base_per_traction, tangential_transfer(H, nu), 1e-10) << "H " << H << " nu " << nu;
+      EXPECT_NEAR(wave.sinks_per_pressure, (1.0 - nu) * surface_compliance(H, nu), 1e-10) << "H " << H << " nu " << nu;
     }
   }
 }
@@ -63,8 +59,8 @@ TEST(TwinLayer, TractionHasItsLimits) {
     EXPECT_NEAR(tangential_transfer(1e-9, nu), 1e-9, 1e-20);
     EXPECT_NEAR(tangential_share(1e-9, nu), 1e-9, 1e-20);
     const double a = 2.0 * (1.0 - nu);
-    EXPECT_NEAR(tangential_transfer(20.0, nu) * std::exp(20.0),
-                2.0 * a * (20.0 + 1.0 - 2.0 * nu) / (3.0 - 4.0 * nu), 1e-6);
+    EXPECT_NEAR(tangential_transfer(20.0, nu) * std::exp(20.0), 2.0 * a * (20.0 + 1.0 - 2.0 * nu) / (3.0 - 4.0 * nu),
+                1e-6);
     EXPECT_EQ(tangential_transfer(1e6, nu), 0.0);
     EXPECT_NEAR(tangential_share(1e6, nu), 1.0, 1e-6);
     for (double H : {0.2, 1.0, 3.0, 10.0}) { // as one fraction
@@ -92,8 +88,7 @@ TEST(TwinContact, DiscOnAThickLayerSinksAsBoussinesqSays) {
       // The share of the cell inside.
       int inside = 0;
       for (int k = 0; k < 64; k++) {
-        inside +=
-            std::hypot(i + (k % 8 - 3.5) / 8, j + (k / 8 - 3.5) / 8) * grid.step_mm <= radius_mm;
+        inside += std::hypot(i + (k % 8 - 3.5) / 8, j + (k / 8 - 3.5) / 8) * grid.step_mm <= radius_mm;
       }
       pressure[at(grid, i, j)] = 1e5 * inside / 64;
     }
@@ -200,11 +195,9 @@ TEST(TwinContact, FiniteElementsAgree) {
           << "r " << fem.middle_mm(c) << " mm, layer " << thickness_mm << " mm";
     }
     for (int c = 0; c < columns; c++) {
-      if (along_x(contact.pressure_Pa, edges[std::size_t(c)]) >
-          0.1 * contact.pressure_Pa[at(grid, 0, 0)]) {
+      if (along_x(contact.pressure_Pa, edges[std::size_t(c)]) > 0.1 * contact.pressure_Pa[at(grid, 0, 0)]) {
         const double height = sphere.profile_mm(edges[std::size_t(c)], 0.0);
-        EXPECT_NEAR(fem.surface_mm(c) + height, contact.indentation_mm,
-                    0.02 * contact.indentation_mm);
+        EXPECT_NEAR(fem.surface_mm(c) + height, contact.indentation_mm, 0.02 * contact.indentation_mm);
       }
     }
   }
@@ -213,8 +206,7 @@ TEST(TwinContact, FiniteElementsAgree) {
 // What the fit sees of it: a Gaussian of sigma 0.45 h that holds 0.9 of the force.
 TEST(TwinTable, ThePressureIsNearlyTheGaussianOfTheFit) {
   for (double thickness_mm : {12.0, 6.0}) {
-    const ContactTable table =
-        ContactTable::load_or_build(indenter("sphere6"), silicone(thickness_mm), CACHE);
+    const ContactTable table = ContactTable::load_or_build(indenter("sphere6"), silicone(thickness_mm), CACHE);
     const BestGaussian::Fit best = BestGaussian(table, thickness_mm).at(2.0);
     EXPECT_NEAR(best.sigma_mm / thickness_mm, 0.45, 0.03);
     EXPECT_NEAR(2e-6 * M_PI * best.p0_Pa * best.sigma_mm * best.sigma_mm / 2.0, 0.9, 0.02);
@@ -237,13 +229,11 @@ TEST(TwinTable, InterpolatesToTwoThousandthsOfThePeak) {
               << name << " " << force_N << " N";
         }
       }
-      EXPECT_NEAR(table.indentation_mm(force_N), contact.indentation_mm,
-                  0.01 * contact.indentation_mm);
+      EXPECT_NEAR(table.indentation_mm(force_N), contact.indentation_mm, 0.01 * contact.indentation_mm);
     }
     EXPECT_EQ(table.base_pressure_Pa(0.0, 1.0, 1.0), 0.0);
     EXPECT_EQ(table.base_pressure_Pa(1.0, 46.0, 0.0), 0.0);
-    EXPECT_NEAR(table.base_pressure_Pa(1e-3, 1.0, 2.0),
-                0.05 * table.base_pressure_Pa(0.02, 1.0, 2.0), 1e-6);
+    EXPECT_NEAR(table.base_pressure_Pa(1e-3, 1.0, 2.0), 0.05 * table.base_pressure_Pa(0.02, 1.0, 2.0), 1e-6);
   }
 }
 
@@ -262,8 +252,7 @@ TEST(TwinTable, ADamagedFileIsSolvedAnew) {
     damaged.seekp(100000);
     damaged.put('x');
   }
-  const ContactTable again =
-      ContactTable::load_or_build(body, layer, cache, [&](double) { progress++; });
+  const ContactTable again = ContactTable::load_or_build(body, layer, cache, [&](double) { progress++; });
   EXPECT_GT(progress, 0);
   EXPECT_EQ(again.base_pressure_Pa(3, 2, 1), good);
 }

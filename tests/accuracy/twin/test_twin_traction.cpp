@@ -34,8 +34,7 @@ const Pair &tables_of(const std::string &name, double thickness_mm) {
 }
 
 std::size_t at(const Grid &grid, int i, int j) {
-  return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) +
-         std::size_t(grid.nodes / 2 + j);
+  return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) + std::size_t(grid.nodes / 2 + j);
 }
 
 double largest(const std::vector<double> &field) {
@@ -84,8 +83,7 @@ TEST(TwinTraction, TheTableIsTheTransformOfTheTraction) {
           slides ? times(whole.pressure_Pa, friction) : stuck_within(whole, stuck, friction);
       const double carried_N = friction * (slides ? force_N : force_N - stuck_N);
       for (bool along_x : {true, false}) {
-        const std::vector<double> base =
-            surface.base_Pa(along_x ? Traction{traction, none} : Traction{none, traction});
+        const std::vector<double> base = surface.base_Pa(along_x ? Traction{traction, none} : Traction{none, traction});
         const TractionTable::Load load{force_N, slides ? 0.0 : stuck_N, along_x ? carried_N : 0.0,
                                        along_x ? 0.0 : carried_N};
         const double peak = largest(base);
@@ -120,8 +118,7 @@ TEST(TwinTraction, ARoundContactIsItsHankelTransform) {
     double p_of_k = 0.0;
     for (int i = 1; i < 60; i++) {
       const double r = i * grid.step_mm;
-      p_of_k +=
-          contact.pressure_Pa[at(grid, i, 0)] * std::cyl_bessel_j(0, k * r) * r * grid.step_mm;
+      p_of_k += contact.pressure_Pa[at(grid, i, 0)] * std::cyl_bessel_j(0, k * r) * r * grid.step_mm;
     }
     response.push_back(tangential_transfer(k * layer.thickness_mm, layer.poisson) * p_of_k);
   }
@@ -138,8 +135,8 @@ TEST(TwinTraction, ARoundContactIsItsHankelTransform) {
   for (double r = 0.4; r < 30.0; r += 1.1) {
     peak = std::max(peak, exact(r));
     for (double angle : {0.0, 0.7, 2.6}) {
-      const double found = table.base_pressure_Pa({force_N, 0.0, force_N, 0.0}, r * std::cos(angle),
-                                                  r * std::sin(angle));
+      const double found =
+          table.base_pressure_Pa({force_N, 0.0, force_N, 0.0}, r * std::cos(angle), r * std::sin(angle));
       off = std::max(off, std::abs(found - exact(r) * std::cos(angle)));
     }
   }
@@ -184,15 +181,13 @@ TEST(TwinTraction, IsOddAlongItselfAndEvenAcross) {
       }
       EXPECT_NEAR(round.base_pressure_Pa(along, x, y), round.base_pressure_Pa(across, y, x), 0.1);
       // A quarter turn of load and place together.
-      EXPECT_NEAR(round.base_pressure_Pa(along, x, y),
-                  round.base_pressure_Pa({5.0, 2.0, 0.0, 1.5}, -y, x), 0.1);
+      EXPECT_NEAR(round.base_pressure_Pa(along, x, y), round.base_pressure_Pa({5.0, 2.0, 0.0, 1.5}, -y, x), 0.1);
     }
   }
   // Smooth through the middle.
   const TractionTable::Load load{5.0, 0.0, 1.5, 0.0};
   EXPECT_NEAR(round.base_pressure_Pa(load, 0.0, 2.0), 0.0, 1e-9);
-  EXPECT_NEAR(round.base_pressure_Pa(load, 1e-4, 0.0),
-              1e-3 * round.base_pressure_Pa(load, 0.1, 0.0), 1e-3);
+  EXPECT_NEAR(round.base_pressure_Pa(load, 1e-4, 0.0), 1e-3 * round.base_pressure_Pa(load, 0.1, 0.0), 1e-3);
 }
 
 // A ring of small contacts, each dragged along the ring: what one presses another relieves.
@@ -230,8 +225,7 @@ TEST(TwinTraction, NoLoadIsNothingAndAFullOneSlides) {
   EXPECT_EQ(table.base_pressure_Pa({5.0, 0.0, 0.0, 0.0}, 3.0, 2.0), 0.0);
   // Next to nothing, too, presses in proportion.
   const auto per_newton = [&](double tangential_N) {
-    return table.base_pressure_Pa({5.0, stuck_force_N(5.0, tangential_N, 0.5), tangential_N, 0.0},
-                                  6.0, 0.0) /
+    return table.base_pressure_Pa({5.0, stuck_force_N(5.0, tangential_N, 0.5), tangential_N, 0.0}, 6.0, 0.0) /
            tangential_N;
   };
   EXPECT_NEAR(per_newton(1e-7) / per_newton(1e-2), 1.0, 1e-3);
@@ -252,9 +246,7 @@ TEST(TwinTraction, OnAThickLayerSpheresSlipAsMindlinSays) {
   const Contact stuck = solver.solve(stuck_force_N(force_N, tangential_N, friction));
   const std::vector<double> traction = stuck_within(whole, stuck, friction);
   for (double r = 0.0; r < 1.2 * a; r += 0.1) {
-    const auto cap = [&](double edge) {
-      return r < edge ? std::sqrt(1.0 - r * r / (edge * edge)) : 0.0;
-    };
+    const auto cap = [&](double edge) { return r < edge ? std::sqrt(1.0 - r * r / (edge * edge)) : 0.0; };
     const int i = static_cast<int>(std::lround(r / grid.step_mm));
     if (std::abs(r - a) > 0.06 && std::abs(r - c) > 0.06) { // where the slope has no end
       EXPECT_NEAR(traction[at(grid, i, 0)], peak * (cap(a) - c / a * cap(c)), 0.02 * peak) << r;
@@ -264,8 +256,7 @@ TEST(TwinTraction, OnAThickLayerSpheresSlipAsMindlinSays) {
 
 TEST(TwinTraction, CollocationAgreesOnTheShiftOfTheSurface) {
   for (double H : {0.01, 0.5, 2.0, 8.0}) {
-    EXPECT_NEAR(solve_layer_wave(H, 0.49, 36).moves_per_traction, surface_shift_along(H, 0.49),
-                1e-10);
+    EXPECT_NEAR(solve_layer_wave(H, 0.49, 36).moves_per_traction, surface_shift_along(H, 0.49), 1e-10);
     EXPECT_NEAR(solve_layer_wave(H, 0.49, 36).rises_per_traction, surface_rise(H, 0.49), 1e-10);
   }
 }
@@ -275,8 +266,7 @@ TEST(TwinTraction, CollocationAgreesOnTheShiftOfTheSurface) {
 TEST(TwinTraction, AFallenLoadLeavesLittle) {
   const double force_N = 6.0, friction = 0.5, load_N = 1.8;
   const auto shape = [&](double tangential_N) {
-    return TractionTable::Load{force_N, stuck_force_N(force_N, tangential_N, friction),
-                               tangential_N, 0.0};
+    return TractionTable::Load{force_N, stuck_force_N(force_N, tangential_N, friction), tangential_N, 0.0};
   };
   for (const auto &[name, thickness_mm, allowed] :
        {std::tuple{"sphere6", 12.0, 0.01}, {"sphere15", 12.0, 0.025}, {"sphere15", 6.0, 0.07}}) {
@@ -285,16 +275,14 @@ TEST(TwinTraction, AFallenLoadLeavesLittle) {
     for (double x = 0.0; x < 30.0; x += 0.25) {
       const double loaded = table.base_pressure_Pa(shape(load_N), x, 0.0);
       peak = std::max(peak, loaded);
-      left = std::max(left,
-                      std::abs(loaded - 2.0 * table.base_pressure_Pa(shape(0.5 * load_N), x, 0.0)));
+      left = std::max(left, std::abs(loaded - 2.0 * table.base_pressure_Pa(shape(0.5 * load_N), x, 0.0)));
     }
     EXPECT_LT(left, allowed * peak) << name << " on " << thickness_mm << " mm";
   }
 }
 
 // The closest pressure that pulls nowhere and has this sum over the nodes that can touch.
-std::vector<double> possible(std::vector<double> pressure, const std::vector<double> &height_mm,
-                             double sum) {
+std::vector<double> possible(std::vector<double> pressure, const std::vector<double> &height_mm, double sum) {
   std::vector<double> sorted;
   for (std::size_t n = 0; n < pressure.size(); n++) {
     if (std::isfinite(height_mm[n])) {
@@ -324,9 +312,8 @@ TEST(TwinTraction, ThePressureHardlyMovesWithTheTraction) {
     double thickness_mm, force_N, least, most;
   };
   const double share = 0.3;
-  for (const Case &one :
-       {Case{"sphere6", 12.0, 8.0, 0.0, 0.003}, Case{"sphere15", 12.0, 8.0, 0.009, 0.015},
-        Case{"sphere15", 6.0, 8.0, 0.10, 0.14}}) {
+  for (const Case &one : {Case{"sphere6", 12.0, 8.0, 0.0, 0.003}, Case{"sphere15", 12.0, 8.0, 0.009, 0.015},
+                          Case{"sphere15", 6.0, 8.0, 0.10, 0.14}}) {
     const Layer layer = silicone(one.thickness_mm);
     const Grid grid{192, 0.25};
     const Indenter &object = indenter(one.name);
@@ -346,8 +333,7 @@ TEST(TwinTraction, ThePressureHardlyMovesWithTheTraction) {
     for (double H = 0.0; H < 20.0; H += 0.01) {
       softest = std::max(softest, surface_compliance(H, layer.poisson));
     }
-    softest *=
-        2.0 * (1.0 - layer.poisson * layer.poisson) * layer.thickness_mm / layer.youngs_modulus_Pa;
+    softest *= 2.0 * (1.0 - layer.poisson * layer.poisson) * layer.thickness_mm / layer.youngs_modulus_Pa;
     std::vector<double> p = alone.pressure_Pa, ahead = p;
     double t = 1.0;
     for (int step = 0; step < 400; step++) {
@@ -355,9 +341,7 @@ TEST(TwinTraction, ThePressureHardlyMovesWithTheTraction) {
       const std::vector<double> risen = surface.rise_mm(times(ahead, share));
       std::vector<double> next(size);
       for (std::size_t n = 0; n < size; n++) {
-        next[n] = std::isfinite(height_mm[n])
-                      ? ahead[n] - (sunk[n] - risen[n] + height_mm[n]) / softest
-                      : 0.0;
+        next[n] = std::isfinite(height_mm[n]) ? ahead[n] - (sunk[n] - risen[n] + height_mm[n]) / softest : 0.0;
       }
       next = possible(std::move(next), height_mm, sum);
       const double after = 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * t * t));
@@ -396,10 +380,9 @@ TEST(TwinTraction, WhatSticksOnALayerIsNearlyTheContactOfLessForce) {
     double thickness_mm, force_N, shift_mm, allowed;
   };
   const double friction = 0.5;
-  for (const Case &one :
-       {Case{"sphere6", 12.0, 5.0, 0.35, 0.002}, Case{"sphere15", 12.0, 8.0, 0.5, 0.005},
-        Case{"sphere15", 6.0, 8.0, 0.5, 0.013}, Case{"cube6", 12.0, 5.0, 0.4, 0.012},
-        Case{"cube6", 6.0, 5.0, 0.4, 0.03}}) {
+  for (const Case &one : {Case{"sphere6", 12.0, 5.0, 0.35, 0.002}, Case{"sphere15", 12.0, 8.0, 0.5, 0.005},
+                          Case{"sphere15", 6.0, 8.0, 0.5, 0.013}, Case{"cube6", 12.0, 5.0, 0.4, 0.012},
+                          Case{"cube6", 6.0, 5.0, 0.4, 0.03}}) {
     const Layer layer = silicone(one.thickness_mm);
     const Grid grid{192, 0.25};
     ContactSolver solver(indenter(one.name), layer, grid);
@@ -469,12 +452,10 @@ double slope(double thickness_mm, double ratio, double force_N) {
           plain[k] = tables.pressure.base_pressure_Pa(force_N, dx, dy);
           loaded[k] = plain[k] + tables.traction.base_pressure_Pa({force_N, 0.0, qx, qy}, dx, dy);
         }
-        const Gaussian start{*std::max_element(plain.begin(), plain.end()), x, y,
-                             0.45 * thickness_mm};
+        const Gaussian start{*std::max_element(plain.begin(), plain.end()), x, y, 0.45 * thickness_mm};
         const Gaussian before = fit(plain, start), after = fit(loaded, start);
-        slopes.push_back(
-            ((after.x - before.x) * std::cos(angle) + (after.y - before.y) * std::sin(angle)) /
-            (ratio * thickness_mm));
+        slopes.push_back(((after.x - before.x) * std::cos(angle) + (after.y - before.y) * std::sin(angle)) /
+                         (ratio * thickness_mm));
       }
     }
   }
@@ -493,8 +474,7 @@ TEST(TwinTraction, MovesTheGaussianOfTheFit) {
 // To the first order, with sensors everywhere.
 TEST(TwinTraction, MovesTheClosestGaussianByAShareOfTheThickness) {
   // On 6 mm the contact is not small beside the thickness.
-  for (const auto &[thickness_mm, expected] :
-       {std::pair{6.0, 0.296}, {9.0, 0.28}, {12.0, 0.28}, {15.0, 0.28}}) {
+  for (const auto &[thickness_mm, expected] : {std::pair{6.0, 0.296}, {9.0, 0.28}, {12.0, 0.28}, {15.0, 0.28}}) {
     const Pair &tables = tables_of("sphere6", thickness_mm);
     const double force_N = 5.0;
     const BestGaussian::Fit g = BestGaussian(tables.pressure, thickness_mm).at(force_N);

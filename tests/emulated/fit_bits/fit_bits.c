@@ -43,8 +43,7 @@ static struct pad_profile layer_of(float thickness_mm) {
 
 void fit_bits_init(void) {
   float x_mm[FT_MAX_SENSORS], y_mm[FT_MAX_SENSORS];
-  stop_unless(fit_array_init(&layouts[0], geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                             geometry.pitch_mm));
+  stop_unless(fit_array_init(&layouts[0], geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm));
   for (int k = 0; k < 4; k++) { /* a line */
     x_mm[k] = 6.0f * (float)k;
     y_mm[k] = 3.0f;
@@ -84,13 +83,10 @@ static int32_t to_int32(int64_t value) {
 }
 
 /* A press near the array, of every width and height, and its noise. */
-static void draw_press(const struct fit_array *array, int64_t height_q16, int32_t noise,
-                       int32_t *pressure_Pa_q10) {
+static void draw_press(const struct fit_array *array, int64_t height_q16, int32_t noise, int32_t *pressure_Pa_q10) {
   uint8_t last = (uint8_t)(array->sensor_count - 1);
-  int32_t x = draw_between((int32_t)(array->x[0] * 65536.0f) - ONE_Q16,
-                           (int32_t)(array->x[last] * 65536.0f) + ONE_Q16);
-  int32_t y = draw_between((int32_t)(array->y[0] * 65536.0f) - ONE_Q16,
-                           (int32_t)(array->y[last] * 65536.0f) + ONE_Q16);
+  int32_t x = draw_between((int32_t)(array->x[0] * 65536.0f) - ONE_Q16, (int32_t)(array->x[last] * 65536.0f) + ONE_Q16);
+  int32_t y = draw_between((int32_t)(array->y[0] * 65536.0f) - ONE_Q16, (int32_t)(array->y[last] * 65536.0f) + ONE_Q16);
   int64_t peak = (int64_t)draw_between(ONE_Q16, 2 * ONE_Q16) << draw_between(0, 14);
   for (uint8_t k = 0; k <= last; k++) {
     int64_t dx = (int64_t)(array->x[k] * 65536.0f) - x;
@@ -116,8 +112,8 @@ static void pull(const struct fit_array *array, int32_t *pressure_Pa_q10) {
 }
 
 /* A press, every other time with a second one, held for as many frames as an answer takes. */
-static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable,
-                               const struct fit_settings *settings, int32_t *pressure_Pa_q10) {
+static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable, const struct fit_settings *settings,
+                               int32_t *pressure_Pa_q10) {
   struct fit_result fit;
   struct fit_shapes_state state;
   static struct fit_shapes_result found[SHAPES_FRAMES];
@@ -145,8 +141,7 @@ uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();
-  bool other = (kernel == FIT_BITS_GENERAL && press % 2) ||
-               (kernel == FIT_BITS_LOAD && press % 16 == 1);
+  bool other = (kernel == FIT_BITS_GENERAL && press % 2) || (kernel == FIT_BITS_LOAD && press % 16 == 1);
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 
   const bool on_a_pad = kernel == FIT_BITS_TANGENTIAL || kernel == FIT_BITS_SHAPES;
@@ -250,8 +245,8 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     memset(&tangential_state, 0, sizeof tangential_state);
     for (int frame = 0; frame < FRAMES; frame++) {
       fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-      fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result,
-                          &tangential_state, &found[frame]);
+      fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &tangential_state,
+                          &found[frame]);
       for (uint8_t k = 0; k < array->sensor_count; k++) {
         pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 64 * draw_between(0, 1);
       }

@@ -1,4 +1,5 @@
-/* Presses whose fits are compared bit by bit between machines. They are drawn from their number with integers alone, so that every machine has the same.
+/* Presses whose fits are compared bit by bit between machines. They are drawn from their number with integers alone, so
+ * that every machine has the same.
  */
 #ifndef FIT_BITS_FIT_BITS_H
 #define FIT_BITS_FIT_BITS_H
@@ -13,7 +14,7 @@ enum fit_bits_kernel {
   FIT_BITS_TANGENTIAL, /* fit_tangential after fit_gaussian: pads of 5 to 20 mm, every sensor or not
                         */
   FIT_BITS_LOAD,       /* a look of fit_load after fit_gaussian: mostly the array of the firmware */
-  FIT_BITS_SHAPES, /* fit_shapes after fit_gaussian: one press or two on 12 mm, every sensor or not */
+  FIT_BITS_SHAPES,     /* fit_shapes after fit_gaussian: one press or two on 12 mm, every sensor or not */
   FIT_BITS_KERNELS
 };
 

@@ -9,6 +9,7 @@ Compared with the host build:
 - those of float32 take a million cycles a fit there. The emulator does the first 200, and QEMU's Cortex-M0 (microbit),
   which has not the RP2040's divider but needs none for this kernel, does all with the same objects.
 """
+
 import argparse
 import functools
 import pathlib
@@ -24,7 +25,9 @@ TOOLS = argparse.Namespace()
 
 def presses_in_emulator():
     return {kernel: min(presses, TOOLS.in_emulator) for kernel, presses in PRESSES.items()} | {
-        "general": 200, "shapes": min(PRESSES["shapes"], TOOLS.in_emulator // 5)}
+        "general": 200,
+        "shapes": min(PRESSES["shapes"], TOOLS.in_emulator // 5),
+    }
 
 
 def output_of(*command):
@@ -44,9 +47,22 @@ def in_emulator(kernel, presses, *core):
 
 
 def in_qemu(machine, image, kernel):
-    return output_of(TOOLS.qemu, "-M", machine, "-nographic", "-monitor", "none", "-serial", "none", "-kernel", image,
-                     "-chardev", "stdio,id=host", "-semihosting-config",
-                     f"enable=on,target=native,chardev=host,arg=fit,arg={KERNELS.index(kernel)}")
+    return output_of(
+        TOOLS.qemu,
+        "-M",
+        machine,
+        "-nographic",
+        "-monitor",
+        "none",
+        "-serial",
+        "none",
+        "-kernel",
+        image,
+        "-chardev",
+        "stdio,id=host",
+        "-semihosting-config",
+        f"enable=on,target=native,chardev=host,arg=fit,arg={KERNELS.index(kernel)}",
+    )
 
 
 class SameBits(unittest.TestCase):

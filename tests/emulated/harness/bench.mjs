@@ -22,7 +22,22 @@ export function build(source) {
     const gcc = (...args) => execFileSync('arm-none-eabi-gcc', [...CPU, ...args], { stdio: 'pipe' });
     const binary = (elf, bin) => execFileSync('arm-none-eabi-objcopy', ['-O', 'binary', path(elf), path(bin)]);
     gcc('-c', join(RIG, 'boot2.S'), '-o', path('boot2.o'));
-    gcc('-O2', '-ffreestanding', '-nostdlib', '-fno-tree-loop-distribute-patterns', '-Wall', '-Werror', '--param=min-pagesize=0', '-fno-delete-null-pointer-checks', `-I${RIG}`, `-T${join(RIG, 'rig.ld')}`, path('main.c'), '-lgcc', '-o', path('main.elf'));
+    gcc(
+      '-O2',
+      '-ffreestanding',
+      '-nostdlib',
+      '-fno-tree-loop-distribute-patterns',
+      '-Wall',
+      '-Werror',
+      '--param=min-pagesize=0',
+      '-fno-delete-null-pointer-checks',
+      `-I${RIG}`,
+      `-T${join(RIG, 'rig.ld')}`,
+      path('main.c'),
+      '-lgcc',
+      '-o',
+      path('main.elf'),
+    );
     binary('boot2.o', 'boot2.bin');
     binary('main.elf', 'main.bin');
     const main = readFileSync(path('main.bin'));
@@ -40,7 +55,10 @@ export const HEADER = `t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,${Array
 
 /** A scenario in which sensor k feels `pressures_Pa[k]` above ambient at all times. */
 export function steady(pressures_Pa = new Array(15).fill(0), temperature_degC = 25) {
-  return parseScenario(`# fingertip-scenario 1\n# ambient_Pa: 100000\n# temperature_degC: ${temperature_degC}\n${HEADER}\n0,0,0,0,0,0,0,0,${pressures_Pa.join(',')}\n`, 'steady.csv');
+  return parseScenario(
+    `# fingertip-scenario 1\n# ambient_Pa: 100000\n# temperature_degC: ${temperature_degC}\n${HEADER}\n0,0,0,0,0,0,0,0,${pressures_Pa.join(',')}\n`,
+    'steady.csv',
+  );
 }
 
 export function makeMachine(source, options = {}) {

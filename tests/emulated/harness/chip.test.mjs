@@ -71,7 +71,10 @@ test('so does the null page, for loads too', () => {
   assert.equal(results[0], 7);
 });
 
-for (const [what, base, log2, at] of [['in SRAM', '0x20020000', 12, '0x20020101'], ['at 0', '0', 8, '0x11']]) {
+for (const [what, base, log2, at] of [
+  ['in SRAM', '0x20020000', 12, '0x20020101'],
+  ['at 0', '0', 8, '0x11'],
+]) {
   test(`and so does a jump there, ${what}`, () => {
     const { results } = run(`void isr(void) { RESULT(0) = 7; done(); }
       void main(void) { RESULT(0) = 0; ${DENY(base, log2)} ((void (*)(void))${at})(); }`);
@@ -83,7 +86,11 @@ for (const [what, base, log2, at] of [['in SRAM', '0x20020000', 12, '0x20020101'
 const READ_ONLY = `REG(0xe000ed9c) = 0x20000000 | 16 | 0; REG(0xe000eda0) = 6 << 24 | 1 << 17 | 0xfc00 | 17 << 1 | 1;
   REG(0xe000ed9c) = 0x20010000 | 16 | 1; REG(0xe000eda0) = 6 << 24 | 1 << 17 | 0xfe00 | 14 << 1 | 1; REG(0xe000ed94) = 5;`;
 
-for (const [at, last] of [['0x20010ffc', 1], ['0x20008000', 1], ['0x20011000', 2]]) {
+for (const [at, last] of [
+  ['0x20010ffc', 1],
+  ['0x20008000', 1],
+  ['0x20011000', 2],
+]) {
   test(`a write to ${at}, where memory is read-only up to 0x20011000, ${last === 1 ? 'faults' : 'does not'}; reading does not`, () => {
     const { results } = run(`void isr(void) { RESULT(1) = REG(${at}); done(); }
       void main(void) { REG(${at}) = 7; RESULT(1) = 1; ${READ_ONLY} RESULT(0) = REG(${at}); REG(${at}) = 8; RESULT(1) = 2; done(); }`);
@@ -97,8 +104,11 @@ failsWith('MPU with read-only memory elsewhere', region('6 << 24 | 1 << 17'), /f
 failsWith('MPU with code in strongly ordered memory', region('6 << 24'), /nothing executes/);
 
 test('before its clocks the watchdog counts ticks of the ring oscillator', () => {
-  const { machine } = run(`void main(void) { SET(0x4000c000) = 1 << 21; REG(0x40010008) = 0x1fffc; REG(0x4005802c) = 0x200 | 12;
-    REG(0x40058004) = 20000; SET(0x40058000) = 1 << 30; for (;;) { } }`, { seconds: 0.03, allowWatchdog: true });
+  const { machine } = run(
+    `void main(void) { SET(0x4000c000) = 1 << 21; REG(0x40010008) = 0x1fffc; REG(0x4005802c) = 0x200 | 12;
+    REG(0x40058004) = 20000; SET(0x40058000) = 1 << 30; for (;;) { } }`,
+    { seconds: 0.03, allowWatchdog: true },
+  );
   assert.equal(machine.reboots, 1); // after 10000 ticks of 12 / 6.5 MHz
 });
 
@@ -113,7 +123,9 @@ test('cycles: push/pop, exception entry and exit are charged as the hardware doe
   const { chip } = machine;
   // push {r4, lr} (0xb510) is unique in this image.
   let at = 0;
-  for (let i = 0; i < machine.image.length; i += 2) if (machine.image[i] === 0x10 && machine.image[i + 1] === 0xb5 && machine.image[i + 2] === 0x10 && machine.image[i + 3] === 0xbd) at = 0x10000000 + i;
+  for (let i = 0; i < machine.image.length; i += 2)
+    if (machine.image[i] === 0x10 && machine.image[i + 1] === 0xb5 && machine.image[i + 2] === 0x10 && machine.image[i + 3] === 0xbd)
+      at = 0x10000000 + i;
   assert.ok(at);
   const stamps = [];
   chip.onCall(at, (c) => stamps.push([c.core.cycles, c.core.LR & ~1]));
@@ -148,7 +160,8 @@ const STACK = 0x20004000;
 const EDGES = [0, 1, 2, 31, 32, 33, 0x7fffffff, 0x80000000, 0x80000001, 0xfffffffe, 0xffffffff];
 const random = new Prng(99);
 const bits = (mask) => random.uint32() & mask;
-const someWord = () => (random.uniform() < 0.3 ? EDGES[random.uint32() % EDGES.length] : random.uniform() < 0.5 ? random.uint32() : bits(0xff));
+const someWord = () =>
+  random.uniform() < 0.3 ? EDGES[random.uint32() % EDGES.length] : random.uniform() < 0.5 ? random.uint32() : bits(0xff);
 
 /** A core with an instruction at CODE; `state` of two of them is comparable after each executed it. */
 class Bench {
@@ -190,15 +203,21 @@ const CLASSES = {
   'MOVS, CMP, ADDS, SUBS with a byte': [() => 0x2000 | bits(0x1fff)],
   'data processing': [() => 0x4000 | ([0, 1, 8, 9, 10, 11, 12, 13, 14, 15][random.uint32() % 10] << 6) | bits(0x3f)],
   'ADD, CMP, MOV of high registers, pc': [() => 0x4400 + (random.uint32() % 0x300)],
-  'BX, BLX': [() => 0x4700 | bits(0x80) | ((random.uint32() % 13) << 3), (registers) => registers.forEach((_, k) => k < 13 && (registers[k] = CODE + 1 + 2 * bits(0x1ff)))],
+  'BX, BLX': [
+    () => 0x4700 | bits(0x80) | ((random.uint32() % 13) << 3),
+    (registers) => registers.forEach((_, k) => k < 13 && (registers[k] = CODE + 1 + 2 * bits(0x1ff))),
+  ],
   'LDR literal': [() => 0x4800 | bits(0x7ff)],
-  'load, store, register offset': [() => {
-    const [base, offset] = [bits(7), bits(7)];
-    return 0x5000 | bits(0xe07) | (base << 3) | ((offset === base ? base ^ 1 : offset) << 6);
-  }, (registers, op) => {
-    DATA(registers);
-    registers[(op >>> 6) & 7] = 4 * bits(0xff);
-  }],
+  'load, store, register offset': [
+    () => {
+      const [base, offset] = [bits(7), bits(7)];
+      return 0x5000 | bits(0xe07) | (base << 3) | ((offset === base ? base ^ 1 : offset) << 6);
+    },
+    (registers, op) => {
+      DATA(registers);
+      registers[(op >>> 6) & 7] = 4 * bits(0xff);
+    },
+  ],
   'load, store of words and bytes': [() => 0x6000 | bits(0x1fff), DATA],
   'load, store of halfwords': [() => 0x8000 | bits(0xfff), DATA],
   'load, store on the stack': [() => 0x9000 | bits(0xfff)],
@@ -209,11 +228,14 @@ const CLASSES = {
   POP: [() => 0xbc00 | (bits(0xff) || 1)],
   'POP with pc': [() => 0xbd00 | bits(0xff)],
   reverse: [() => 0xba00 | ([0, 1, 3][random.uint32() % 3] << 6) | bits(0x3f)],
-  'STM, LDM': [() => {
-    const base = bits(7);
-    const op = 0xc000 | bits(0x800) | (base << 8) | bits(0xff);
-    return (op & 0x800 ? op : op & ~(1 << base)) | (1 << (base ^ 1)); // STM with its base in the list: rp2040js differs
-  }, DATA],
+  'STM, LDM': [
+    () => {
+      const base = bits(7);
+      const op = 0xc000 | bits(0x800) | (base << 8) | bits(0xff);
+      return (op & 0x800 ? op : op & ~(1 << base)) | (1 << (base ^ 1)); // STM with its base in the list: rp2040js differs
+    },
+    DATA,
+  ],
   'B conditional': [() => 0xd000 | (random.uint32() % 0xe00)],
   B: [() => 0xe000 | bits(0x7ff)],
   BL: [() => 0xf000 | bits(0x7ff), null, () => 0xd000 | bits(0x2fff)],
@@ -226,7 +248,7 @@ test('the fast decoder agrees with rp2040js: every class, random operands and fl
   for (const [name, [encode, prepare, second]] of Object.entries(CLASSES)) {
     for (const bench of [fast, stock]) {
       // Odd, and not 0xf0000000 or above: what POP loads into pc must be a Thumb address.
-      for (let at = 0x1000; at < 0x5000; at += 4) bench.memory.setUint32(at, Math.imul(at, 2654435761) >>> 4 | 1, true);
+      for (let at = 0x1000; at < 0x5000; at += 4) bench.memory.setUint32(at, (Math.imul(at, 2654435761) >>> 4) | 1, true);
     }
     for (let i = 0; i < 3000; i++) {
       const op = encode();
@@ -270,9 +292,12 @@ test('the fast decoder follows the manual where rp2040js does not: ADCS, SBCS, s
     const registers = [...Array.from({ length: 13 }, someWord), STACK, 1];
     const flags = someFlags();
     const [a, b] = [registers[d], registers[m]];
-    const expected = kind === 5 ? addWithCarry(a, b, flags[2] ? 1 : 0)
-      : kind === 6 ? addWithCarry(a, ~b, flags[2] ? 1 : 0)
-        : { ...shiftBits(KINDS[kind], a, b & 0xff, flags[2]), V: flags[3] };
+    const expected =
+      kind === 5
+        ? addWithCarry(a, b, flags[2] ? 1 : 0)
+        : kind === 6
+          ? addWithCarry(a, ~b, flags[2] ? 1 : 0)
+          : { ...shiftBits(KINDS[kind], a, b & 0xff, flags[2]), V: flags[3] };
     const op = 0x4000 | (kind << 6) | (m << 3) | d;
     const which = `${op.toString(16)} on ${a.toString(16)}, ${b.toString(16)}, ${flags}`;
     assert.equal(fast.execute([op], registers, flags), 1, which);
@@ -283,7 +308,10 @@ test('the fast decoder follows the manual where rp2040js does not: ADCS, SBCS, s
   // STM r1!, {r1, r2}: the base is the lowest in the list, so its old value is stored.
   const registers = [0, 0x20002000, 7, ...new Array(10).fill(0), STACK, 1];
   assert.equal(fast.execute([0xc106], registers, someFlags()), 3);
-  assert.deepEqual([fast.memory.getUint32(0x2000, true), fast.memory.getUint32(0x2004, true), fast.core.registers[1]], [0x20002000, 7, 0x20002008]);
+  assert.deepEqual(
+    [fast.memory.getUint32(0x2000, true), fast.memory.getUint32(0x2004, true), fast.core.registers[1]],
+    [0x20002000, 7, 0x20002008],
+  );
 });
 
 failsWith('read of an unmapped address', main('(void)REG(0x30000000);'), /read of 0x30000000, where nothing is/);
@@ -295,8 +323,13 @@ failsWith('undefined instruction', main('__asm volatile("udf #7");'), /undefined
 failsWith('peripheral held in reset', main('REG(0x40044000) = 0x65;'), /while I2C0 is held in reset/);
 failsWith('USB memory held in reset', main('REG(0x50100000) = 0;'), /while USBCTRL is held in reset/);
 failsWith('timer read without a tick', main('(void)now_us();'), /no tick runs/);
-failsWith('PLL before the crystal is stable', main('unreset(1 << 12); REG(0x40028008) = 125; CLR(0x40028004) = 33;'), /before the crystal oscillator was stable/);
-const restartPll = (reset) => main(`start_clocks(); REG(0x4000803c) = 0; SET(0x40028004) = 45; ${reset} REG(0x40028008) = 125; REG(0x4002800c) = 6 << 16 | 2 << 12;
+failsWith(
+  'PLL before the crystal is stable',
+  main('unreset(1 << 12); REG(0x40028008) = 125; CLR(0x40028004) = 33;'),
+  /before the crystal oscillator was stable/,
+);
+const restartPll = (reset) =>
+  main(`start_clocks(); REG(0x4000803c) = 0; SET(0x40028004) = 45; ${reset} REG(0x40028008) = 125; REG(0x4002800c) = 6 << 16 | 2 << 12;
   CLR(0x40028004) = 33; while (!(REG(0x40028000) & 0x80000000)) { } CLR(0x40028004) = 8; done();`);
 failsWith('PLL started again that still says it is locked', restartPll(''), /before the PLL locked/);
 test('a reset of its block takes the lock of a PLL', () => {
@@ -306,7 +339,11 @@ failsWith('clk_sys from a dead PLL', main('REG(0x4000803c) = 1;'), /clk_sys swit
 failsWith('wrong tick divider', main('start_clocks(); REG(0x4005802c) = 0x200 | 10;'), /must be 1 MHz/);
 failsWith('WFI with no interrupt enabled', main('__asm volatile("wfi");'), /firmware hung/);
 failsWith('asleep for ever', main('REG(0xe000e100) = 1; __asm volatile("wfi");'), /asleep for 2 s/, { seconds: 3 });
-failsWith('divider result read too early', main('REG(0xd0000060) = 100; REG(0xd0000064) = 7; RESULT(0) = REG(0xd0000070);'), /before its 8 cycles/);
+failsWith(
+  'divider result read too early',
+  main('REG(0xd0000060) = 100; REG(0xd0000064) = 7; RESULT(0) = REG(0xd0000070);'),
+  /before its 8 cycles/,
+);
 
 test('a corrupt second stage is not started', () => {
   const machine = makeMachine(main(''));
@@ -331,7 +368,11 @@ test('watchdog: unfed reboots the chip and is reported; scratch and reason survi
   assert.deepEqual(run(source, { allowWatchdog: true }).result.warnings, []);
 });
 
-failsWith('watchdog without PSM_WDSEL', main('start_clocks(); REG(0x40058004) = 2000; SET(0x40058000) = 1 << 30; for (;;) { }'), /PSM_WDSEL/);
+failsWith(
+  'watchdog without PSM_WDSEL',
+  main('start_clocks(); REG(0x40058004) = 2000; SET(0x40058000) = 1 << 30; for (;;) { }'),
+  /PSM_WDSEL/,
+);
 
 const READ_ID = (fill) => `
   __attribute__((noinline, section(".ramcode"))) static void read_id(void) {
@@ -349,10 +390,16 @@ const READ_ID = (fill) => `
     ((void (*)(void))(0x20008001 + ((uint32_t)read_id & 2)))(); done(); }`;
 
 test('the flash unique id is read over the SSI from SRAM and execute-in-place comes back', () => {
-  const { finished, result, machine } = run(READ_ID('if (sent < 13 && sent - got < 14) { REG(0x18000060) = sent ? 0 : 0x4b; sent++; }'), { serial: '0123456789abcdef' });
+  const { finished, result, machine } = run(READ_ID('if (sent < 13 && sent - got < 14) { REG(0x18000060) = sent ? 0 : 0x4b; sent++; }'), {
+    serial: '0123456789abcdef',
+  });
   assert.deepEqual(result.warnings, []);
   assert.ok(finished);
   assert.equal(Buffer.from(machine.chip.sram.subarray(0x30000, 0x30008)).toString('hex'), '0123456789abcdef');
 });
 
-failsWith('flash code while the SSI is reconfigured', main('REG(0x18000008) = 0; RESULT(0) = 1;'), /read of flash at .* while the SSI is disabled/);
+failsWith(
+  'flash code while the SSI is reconfigured',
+  main('REG(0x18000008) = 0; RESULT(0) = 1;'),
+  /read of flash at .* while the SSI is disabled/,
+);

@@ -27,12 +27,18 @@ const file = (name, content) => {
   return join(folder, name);
 };
 const image = file('echo.bin', build('#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'));
-const stream = file('stream.bin', build('#define STREAM\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'));
+const stream = file(
+  'stream.bin',
+  build('#define STREAM\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'),
+);
 /** Asleep most of the time, so that its emulation keeps up with the wall. */
-const sleeper = file('sleeper.bin', build(`#include "cdc.h"
+const sleeper = file(
+  'sleeper.bin',
+  build(`#include "cdc.h"
   void isr(void) { usb_poll(); }
   void main(void) { start_clocks(); usb_start(); REG(0x50110090) = 1 << 4 | 1 << 12 | 1 << 16; REG(0xe000e100) = 1 << 5;
-    for (;;) __asm volatile("wfi"); }`));
+    for (;;) __asm volatile("wfi"); }`),
+);
 const broken = file('null.bin', build('void main(void) { start_clocks(); REG(0) = 1; done(); }'));
 const scenario = file('s.csv', `# fingertip-scenario 1\n${HEADER}\n0${',0'.repeat(22)}\n0.2${',0'.repeat(22)}\n`);
 const base = ['--board', 'pico_mux', '--scenario', scenario, '--fast-enumeration'];
@@ -41,7 +47,21 @@ const run = (...args) => spawnSync(process.execPath, [MAIN, ...args], { encoding
 test('a host script drives the port; capture, logs and report are written; exit 0', () => {
   const script = file('script', '0.1 dtr 1\n0.12 0102ff\n');
   const out = (name) => join(folder, name);
-  const { status, stderr } = run('--image', image, ...base, '--host-script', script, '--capture', out('c.bin'), '--usb-log', out('u.csv'), '--bus-log', out('b.csv'), '--report', out('r.json'));
+  const { status, stderr } = run(
+    '--image',
+    image,
+    ...base,
+    '--host-script',
+    script,
+    '--capture',
+    out('c.bin'),
+    '--usb-log',
+    out('u.csv'),
+    '--bus-log',
+    out('b.csv'),
+    '--report',
+    out('r.json'),
+  );
   assert.equal(status, 0, stderr);
   assert.deepEqual([...readFileSync(out('c.bin'))], [1, 2, 255]);
   const report = JSON.parse(readFileSync(out('r.json')));
@@ -83,8 +103,16 @@ test('a failing image ends with 1 and one line', () => {
 });
 
 for (const [name, args, message] of [
-  ['unknown board', ['--image', image, '--board', 'x', '--scenario', scenario], /^error: unknown board "x"; known: pico_mux, pico_parallel\n$/],
-  ['missing image', ['--image', '/nowhere', ...base], /^error: \/nowhere: cannot read the image \(no such file or directory\); build it first\n$/],
+  [
+    'unknown board',
+    ['--image', image, '--board', 'x', '--scenario', scenario],
+    /^error: unknown board "x"; known: pico_mux, pico_parallel\n$/,
+  ],
+  [
+    'missing image',
+    ['--image', '/nowhere', ...base],
+    /^error: \/nowhere: cannot read the image \(no such file or directory\); build it first\n$/,
+  ],
   ['folder for an image', ['--image', folder, ...base], /^error: .*: cannot read the image \(illegal operation on a directory\)/],
   ['missing option', ['--image', image], /^error: --board is missing/],
   ['unknown option', ['--frobnicate'], /^error: Unknown option '--frobnicate'/],
@@ -97,7 +125,11 @@ for (const [name, args, message] of [
   ['two ports', ['--image', image, ...base, '--stepped', '--pty', 'x'], /^error: --pty and --stepped exclude each other\n$/],
   ['steps that no program asks for', ['--image', image, ...base, '--stepped'], /^error: the program on standard input is gone\n$/],
   ['a reader without a port', ['--image', image, ...base, '--wait-reader'], /^error: --wait-reader needs --pty\n$/],
-  ['report nowhere', ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'], /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/],
+  [
+    'report nowhere',
+    ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'],
+    /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/,
+  ],
   ['bad scenario', ['--image', image, '--board', 'pico_mux', '--scenario', image], /^error: .*:1: not a scenario/],
 ]) {
   test(`exit 2: ${name}`, () => {
@@ -135,7 +167,9 @@ sys.exit(0 if got == data else 1)
 /** An emulator that serves `link`: waits for the link; `end()` interrupts it and gives its exit code. */
 async function serve(link, ...args) {
   const watcher = watch(folder);
-  const emulator = spawn(process.execPath, [MAIN, ...base, '--seconds', '3600', '--pty', link, '--wait-open', ...args], { stdio: ['ignore', 'ignore', 'pipe'] });
+  const emulator = spawn(process.execPath, [MAIN, ...base, '--seconds', '3600', '--pty', link, '--wait-open', ...args], {
+    stdio: ['ignore', 'ignore', 'pipe'],
+  });
   serving.add(emulator);
   let stderr = '';
   emulator.stderr.on('data', (d) => (stderr += d));
@@ -188,7 +222,18 @@ for i in range(50):
 test('pseudo-terminal at the pace of the wall: no question is heard before it was asked, no answer early', async () => {
   const link = join(folder, 'wall');
   const out = (name) => join(folder, name);
-  const emulator = await serve(link, '--image', sleeper, '--pace', 'wall', '--usb-log', out('wall.csv'), '--report', out('wall.json'), '--progress');
+  const emulator = await serve(
+    link,
+    '--image',
+    sleeper,
+    '--pace',
+    'wall',
+    '--usb-log',
+    out('wall.csv'),
+    '--report',
+    out('wall.json'),
+    '--progress',
+  );
   const { code, stdout } = await runClient(ASKING, link, emulator.reach(ENUMERATED_s));
   emulator.signal('SIGSTOP');
   await new Promise((r) => setTimeout(r, 1100)); // the lag, of which the report must speak
@@ -199,13 +244,22 @@ test('pseudo-terminal at the pace of the wall: no question is heard before it wa
   const report = JSON.parse(readFileSync(out('wall.json')));
   assert.ok(report.wall_lag_s.length > 2 && Math.max(...report.wall_lag_s) > 1, `lag ${report.wall_lag_s}`);
   const zero_ns = report.wall_zero_us * 1e3;
-  const rows = readFileSync(out('wall.csv'), 'utf8').split('\n').map((line) => line.split(',')).filter(([, endpoint, , length]) => endpoint === '2' && length === '1');
+  const rows = readFileSync(out('wall.csv'), 'utf8')
+    .split('\n')
+    .map((line) => line.split(','))
+    .filter(([, endpoint, , length]) => endpoint === '2' && length === '1');
   const heard = (dir) => rows.filter((row) => row[2] === dir).map((row) => zero_ns + Number(row[0]));
   const [questions, answers] = [heard('out'), heard('in')];
-  const seen = stdout.trim().split('\n').map((line) => line.split(' ').map(Number));
+  const seen = stdout
+    .trim()
+    .split('\n')
+    .map((line) => line.split(' ').map(Number));
   assert.equal(seen.length, 50);
   seen.forEach(([asked_ns, answered_ns], i) => {
-    assert.ok(asked_ns <= questions[i] && questions[i] <= answers[i] && answers[i] <= answered_ns, `${[asked_ns, questions[i], answers[i], answered_ns]}`);
+    assert.ok(
+      asked_ns <= questions[i] && questions[i] <= answers[i] && answers[i] <= answered_ns,
+      `${[asked_ns, questions[i], answers[i], answered_ns]}`,
+    );
   });
 });
 
@@ -243,7 +297,10 @@ test('pseudo-terminal: a client that does not read stops the stream, loses nothi
   assert.equal(ended.code, 0, ended.stderr);
   assert.equal(code, 0);
   assert.ok(Number(stdout) >= 100000, stdout);
-  const packets = readFileSync(log, 'utf8').split('\n').filter((line) => /^\d+,2,in,[1-9]/.test(line)).map((line) => line.split(',').map(Number));
+  const packets = readFileSync(log, 'utf8')
+    .split('\n')
+    .filter((line) => /^\d+,2,in,[1-9]/.test(line))
+    .map((line) => line.split(',').map(Number));
   let paused = 1;
   for (let i = 2; i < packets.length; i++) if (packets[i][0] - packets[i - 1][0] > packets[paused][0] - packets[paused - 1][0]) paused = i;
   const pause_s = (packets[paused][0] - packets[paused - 1][0]) / 1e9;
@@ -255,11 +312,17 @@ test('pseudo-terminal: a client that does not read stops the stream, loses nothi
 
 test('pseudo-terminal: a client that has not taken what lies ready is waited for, 2 s at most', () => {
   const port = Object.assign(Object.create(PtyPort.prototype), { isOpen: true, outstanding: 16384, full_ms: null });
-  assert.deepEqual([0, 1999, 2000, 9000].map((ms) => port.waitsForReader(ms)), [true, true, false, false]);
+  assert.deepEqual(
+    [0, 1999, 2000, 9000].map((ms) => port.waitsForReader(ms)),
+    [true, true, false, false],
+  );
   port.outstanding--;
   assert.equal(port.waitsForReader(9001), false);
   port.outstanding++;
-  assert.deepEqual([9002, 11002].map((ms) => port.waitsForReader(ms)), [true, false]);
+  assert.deepEqual(
+    [9002, 11002].map((ms) => port.waitsForReader(ms)),
+    [true, false],
+  );
   port.isOpen = false;
   assert.equal(port.waitsForReader(20000), false);
 });

@@ -8,9 +8,15 @@ const [TYPE_HEALTH, TYPE_CRASH] = [0x04, 0x06];
 export class CrashBench extends ImageBench {
   constructor(images, tools, name, options) {
     super(images, tools, name, options);
-    const lines = execFileSync('arm-none-eabi-nm', ['-S', this.elf], { encoding: 'utf8' }).trim().split('\n').map((l) => l.split(' '));
+    const lines = execFileSync('arm-none-eabi-nm', ['-S', this.elf], { encoding: 'utf8' })
+      .trim()
+      .split('\n')
+      .map((l) => l.split(' '));
     this.symbols = new Map(lines.map((words) => [words.at(-1), parseInt(words[0], 16) & ~1]));
-    this.functions = lines.filter((words) => /^[tT]$/.test(words.at(-2)) && !words.at(-1).startsWith('$')).map((words) => [parseInt(words[0], 16) & ~1, words.at(-1)]).sort((a, b) => a[0] - b[0]);
+    this.functions = lines
+      .filter((words) => /^[tT]$/.test(words.at(-2)) && !words.at(-1).startsWith('$'))
+      .map((words) => [parseInt(words[0], 16) & ~1, words.at(-1)])
+      .sort((a, b) => a[0] - b[0]);
   }
 
   address(name) {
@@ -86,5 +92,22 @@ function decoded(body) {
   const words = Array.from({ length: 9 + 8 }, (_, i) => body.readUInt32LE(21 + 4 * i));
   const [r0, r1, r2, r3, r12, lr, pc, xpsr, sp] = words;
   const events = Array.from({ length: 8 }, (_, i) => [body[5 + i], body[13 + i], words[9 + i] * 1.024]).filter(([code]) => code);
-  return { kind, exception, vector, activity, stuck, r0, r1, r2, r3, r12, lr, pc, xpsr, sp, events, t_us: Number(body.readBigUInt64LE(89)) };
+  return {
+    kind,
+    exception,
+    vector,
+    activity,
+    stuck,
+    r0,
+    r1,
+    r2,
+    r3,
+    r12,
+    lr,
+    pc,
+    xpsr,
+    sp,
+    events,
+    t_us: Number(body.readBigUInt64LE(89)),
+  };
 }

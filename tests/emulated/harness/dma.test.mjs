@@ -11,12 +11,21 @@ const PIO0 = 0x50200000;
 const [PIO_CTRL, FLEVEL, TXF0, RXF0] = [0, 0xc, 0x10, 0x20].map((o) => PIO0 + o);
 const [TX0, RX0, UNPACED] = [0, 4, 0x3f];
 
-const EN = 1, WORDS = 2 << 2, HALVES = 1 << 2, BYTES = 0, INCR_READ = 16, INCR_WRITE = 32, QUIET = 1 << 21, BSWAP = 1 << 22, BUSY = 1 << 24;
+const EN = 1,
+  WORDS = 2 << 2,
+  HALVES = 1 << 2,
+  BYTES = 0,
+  INCR_READ = 16,
+  INCR_WRITE = 32,
+  QUIET = 1 << 21,
+  BSWAP = 1 << 22,
+  BUSY = 1 << 24;
 const ring = (size, write) => (size << 6) | (write ? 1 << 10 : 0);
 const chain = (to) => to << 11;
 const paced = (treq) => treq << 15;
 
-const A = 0x20010000, B = 0x20020000;
+const A = 0x20010000,
+  B = 0x20020000;
 
 class Bench extends ChipBench {
   /** Accesses from here fall in the middle of a cycle. */
@@ -73,7 +82,12 @@ test('memory to memory: one word a cycle after the first; TRANS_COUNT counts dow
 });
 
 test('bytes and halfwords, with and without swapping', () => {
-  for (const [size, bytes, swap] of [[BYTES, 1, 0], [HALVES, 2, 0], [HALVES, 2, BSWAP], [WORDS, 4, BSWAP]]) {
+  for (const [size, bytes, swap] of [
+    [BYTES, 1, 0],
+    [HALVES, 2, 0],
+    [HALVES, 2, BSWAP],
+    [WORDS, 4, BSWAP],
+  ]) {
     const b = new Bench();
     b.fill(A, 12);
     b.setUp(0, { count: 12 / bytes, ctrl: size | swap | INCR_READ | INCR_WRITE | paced(UNPACED) });
@@ -116,7 +130,10 @@ test('transmit requests: as many words as the FIFO has room for, then one for ea
     words.push(b.chip.pio[0].machines[0].x);
   }
   words = [...new Set(words)].filter((x) => x >= 1000);
-  assert.deepEqual(words, Array.from({ length: 20 }, (_, i) => 1000 + i));
+  assert.deepEqual(
+    words,
+    Array.from({ length: 20 }, (_, i) => 1000 + i),
+  );
   assert.ok(!b.busy(0));
   assert.deepEqual(b.warnings, [], 'no FIFO overflow');
   assert.deepEqual([...levels].sort(), [0, 1, 2, 3, 4]);
@@ -236,8 +253,12 @@ refuses('held in reset', /while DMA is held in reset/, (b) => b.write(INTE0, 1),
 refuses('request that is not modelled', /request 20 is not modelled/, (b) => b.setUp(0, { count: 1, ctrl: WORDS | paced(20) }));
 refuses('misaligned address', /not aligned to 4 bytes/, (b) => b.setUp(0, { from: A + 2, count: 1, ctrl: WORDS | paced(UNPACED) }));
 refuses('data size 3', /DATA_SIZE 3/, (b) => b.setUp(0, { count: 1, ctrl: 3 << 2 }));
-refuses('two channels on one request', /as busy channel 0 is/, (b) => [0, 1].forEach((c) => b.setUp(c, { to: TXF0, count: 9, ctrl: WORDS | paced(TX0) })));
-refuses('address written while busy', /READ_ADDR written while the channel is busy/, (b) => [0, 1].forEach(() => b.setUp(0, { to: TXF0, count: 9, ctrl: WORDS | paced(TX0) })));
+refuses('two channels on one request', /as busy channel 0 is/, (b) =>
+  [0, 1].forEach((c) => b.setUp(c, { to: TXF0, count: 9, ctrl: WORDS | paced(TX0) })),
+);
+refuses('address written while busy', /READ_ADDR written while the channel is busy/, (b) =>
+  [0, 1].forEach(() => b.setUp(0, { to: TXF0, count: 9, ctrl: WORDS | paced(TX0) })),
+);
 refuses('SIO as a target', /which DMA cannot reach/, (b) => {
   b.setUp(0, { to: 0xd0000010, count: 1, ctrl: WORDS | paced(UNPACED) });
   b.run(10);

@@ -17,14 +17,27 @@ const onEach = (count) => sum(BOARDS.map(count));
 const writes = BOARDS.map((board) => storms.codeWrites(board));
 const collisions = storms.promCollisions('pico_parallel', 30);
 const resets = BOARDS.flatMap((board) =>
-  [[6.5e6, 10], [12e6, 10], [12e6, 100]].flatMap(([rosc_hz, after_ms]) => ['fault', 'unfed'].map((how) => storms.eraseResetRecovered(board, rosc_hz, after_ms, how))),
+  [
+    [6.5e6, 10],
+    [12e6, 10],
+    [12e6, 100],
+  ].flatMap(([rosc_hz, after_ms]) => ['fault', 'unfed'].map((how) => storms.eraseResetRecovered(board, rosc_hz, after_ms, how))),
 );
 const example = streamExample(sensor_images, tools);
 
 process.stdout.write(
   JSON.stringify({
     ehci_detaches: onEach((board) => storms.ehciDetaches(board, 1) + storms.ehciDetaches(board, 2)),
-    se0_bites: onEach((board) => sum([[1, 920], [2, 920], [1, 3000], [2, 3000]].map(([revision, ms]) => storms.se0Bites(board, revision, ms)))),
+    se0_bites: onEach((board) =>
+      sum(
+        [
+          [1, 920],
+          [2, 920],
+          [1, 3000],
+          [2, 3000],
+        ].map(([revision, ms]) => storms.se0Bites(board, revision, ms)),
+      ),
+    ),
     code_writes_tried: sum(writes.map(({ tried }) => tried)),
     code_writes_trapped: writes.every(({ tried, trapped }) => tried === trapped) ? 1 : 0,
     resumes: 2 * 100,

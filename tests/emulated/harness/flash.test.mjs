@@ -71,7 +71,10 @@ test('programming clears bits, erasing sets them, each takes its time and ends w
   driver.memory.bytes.fill(0, AT - 1, AT + 4097);
   const sector_ns = driver.change(ERASE(AT + 77));
   assert.ok(Math.abs(sector_ns - 45e6) < 100e3, `${sector_ns}`);
-  assert.deepEqual([...driver.memory.bytes.subarray(AT - 1, AT + 1), ...driver.memory.bytes.subarray(AT + 4095, AT + 4097)], [0, 0xff, 0xff, 0]);
+  assert.deepEqual(
+    [...driver.memory.bytes.subarray(AT - 1, AT + 1), ...driver.memory.bytes.subarray(AT + 4095, AT + 4097)],
+    [0, 0xff, 0xff, 0],
+  );
 });
 
 test('bytes take bus time', () => {
@@ -92,19 +95,52 @@ test('write enable shows in the status and is needed again each time', () => {
 
 fails('page program without write enable', (d) => d.command(PROGRAM(AT, 0)), /page programmed without write enable/);
 fails('sector erase without write enable', (d) => d.command(ERASE(AT)), /sector erased without write enable/);
-fails('a second program without write enable', (d) => { d.change(PROGRAM(AT, 0)); d.command(PROGRAM(AT, 0)); }, /without write enable/);
-fails('reading while busy', (d) => { d.command([0x06]); d.command(ERASE(AT)); d.bytes(AT, 1); }, /0x3 while the flash is busy/);
-fails('beyond the end of a page', (d) => { d.command([0x06]); d.command(PROGRAM(AT + 250, ...new Array(7).fill(0))); }, /passes the end of the page/);
-fails('page program without data', (d) => { d.command([0x06]); d.command(PROGRAM(AT)); }, /without data/);
+fails(
+  'a second program without write enable',
+  (d) => {
+    d.change(PROGRAM(AT, 0));
+    d.command(PROGRAM(AT, 0));
+  },
+  /without write enable/,
+);
+fails(
+  'reading while busy',
+  (d) => {
+    d.command([0x06]);
+    d.command(ERASE(AT));
+    d.bytes(AT, 1);
+  },
+  /0x3 while the flash is busy/,
+);
+fails(
+  'beyond the end of a page',
+  (d) => {
+    d.command([0x06]);
+    d.command(PROGRAM(AT + 250, ...new Array(7).fill(0)));
+  },
+  /passes the end of the page/,
+);
+fails(
+  'page program without data',
+  (d) => {
+    d.command([0x06]);
+    d.command(PROGRAM(AT));
+  },
+  /without data/,
+);
 fails('an unknown command', (d) => d.command([0xd8]), /0xd8 is not modelled/);
-fails('execution in place while busy', (d) => {
-  d.command([0x06]);
-  d.command(ERASE(AT));
-  d.write(0x18000008, 0);
-  d.write(0x18000000, (31 << 16) | (3 << 8));
-  d.write(0x18000008, 1);
-  d.read(0x10000000);
-}, /read of flash at .* while the flash is busy/);
+fails(
+  'execution in place while busy',
+  (d) => {
+    d.command([0x06]);
+    d.command(ERASE(AT));
+    d.write(0x18000008, 0);
+    d.write(0x18000000, (31 << 16) | (3 << 8));
+    d.write(0x18000008, 1);
+    d.read(0x10000000);
+  },
+  /read of flash at .* while the flash is busy/,
+);
 
 /** Erases or programs on a memory without a chip, cut after part of the time. */
 function cut(seed, command, share, prepare = () => {}) {
@@ -129,14 +165,20 @@ function cut(seed, command, share, prepare = () => {}) {
 const DATA = Array.from({ length: 100 }, (_, i) => (i * 37) & 0xff);
 
 test('a page program that is cut short changes only bits that it was to clear', () => {
-  let torn = 0, differing = 0, outcomes = new Set();
+  let torn = 0,
+    differing = 0,
+    outcomes = new Set();
   for (let seed = 1; seed <= 60; seed++) {
     const { memory, before, give } = cut(seed, PROGRAM(AT + 8, ...DATA), 0.5);
     for (let i = 0; i < FLASH_BYTES; i += i < AT || i >= AT + 256 ? 997 : 1) {
       const to = i >= AT + 8 && i < AT + 108 ? DATA[i - AT - 8] : 0xff;
       assert.equal(memory.bytes[i] & to, to & before[i], `byte ${i}`);
     }
-    const readings = [1, 2, 3].map(() => give([...READ(AT + 8), ...new Array(100).fill(0)]).slice(4).join());
+    const readings = [1, 2, 3].map(() =>
+      give([...READ(AT + 8), ...new Array(100).fill(0)])
+        .slice(4)
+        .join(),
+    );
     torn += memory.unstable.size > 0 ? 1 : 0;
     differing += new Set(readings).size > 1 ? 1 : 0;
     outcomes.add(readings[0]);
@@ -153,7 +195,8 @@ test('a page program that is cut short changes only bits that it was to clear', 
 
 test('an erase that is cut short stays in its sector', () => {
   const old = (memory) => memory.bytes.fill(0x5a, AT - 4096, AT + 8192);
-  let whole = 0, gone = 0;
+  let whole = 0,
+    gone = 0;
   for (let seed = 1; seed <= 40; seed++) {
     const { memory } = cut(seed, ERASE(AT), 0.3, old);
     assert.ok(memory.bytes.subarray(AT - 4096, AT).every((b) => b === 0x5a));
@@ -197,7 +240,10 @@ test('a reset does not reach the flash: the boot ROM waits for it, for so many c
 });
 
 test('at its fast corner the ring oscillator makes the boot ROM give up before the slowest erase ends', () => {
-  for (const [busy_ms, gives_up] of [[250, false], [260, true]]) {
+  for (const [busy_ms, gives_up] of [
+    [250, false],
+    [260, true],
+  ]) {
     const machine = makeMachine('void main(void) { for (;;) { } }', { rosc_hz: 12e6 });
     machine.run(2e6);
     machine.memory.operation = { kind: 'erase', at: AT };

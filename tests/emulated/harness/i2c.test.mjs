@@ -3,7 +3,8 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { run } from './bench.mjs';
 
-const main = (body) => `void main(void) { start_clocks(); start_i2c(); uint8_t b[16] = {0}; uint8_t in[16]; (void)in; (void)b; ${body} done(); }`;
+const main = (body) =>
+  `void main(void) { start_clocks(); start_i2c(); uint8_t b[16] = {0}; uint8_t in[16]; (void)in; (void)b; ${body} done(); }`;
 
 function failsWith(name, source, pattern) {
   test(`fails: ${name}`, () => {
@@ -19,15 +20,20 @@ test('a transfer takes its bus time', () => {
   assert.deepEqual(result.warnings, []);
   const bit_ns = (126 + 11 + 7 + 187 + 1) * 8 + 100;
   const expected = 18 * bit_ns + (126 + 11 + 7) * 8 + bit_ns;
-  assert.ok(Math.abs(transfers[0].end_ns - transfers[0].start_ns - expected) < 100, `${transfers[0].end_ns - transfers[0].start_ns} ${expected}`);
+  assert.ok(
+    Math.abs(transfers[0].end_ns - transfers[0].start_ns - expected) < 100,
+    `${transfers[0].end_ns - transfers[0].start_ns} ${expected}`,
+  );
 });
 
 test('select, reset, PROM and conversion through multiplexer 2, channel 3 reach sensor 13', () => {
-  const { results, machine, result } = run(main(`
+  const { results, machine, result } = run(
+    main(`
     b[0] = 1 << 3; RESULT(0) = i2c_run(0x72, b, 1, 0, 0); b[0] = 0x1e; RESULT(1) = i2c_run(0x76, b, 1, 0, 0); wait_us(3000);
     for (int i = 0; i < 7; i++) { b[0] = (uint8_t)(0xa0 + 2 * i); i2c_run(0x76, b, 1, in, 2); RESULT(2 + i) = (uint32_t)in[0] << 8 | in[1]; }
     b[0] = 0x44; i2c_run(0x76, b, 1, 0, 0); wait_us(2300); b[0] = 0; i2c_run(0x76, b, 1, in, 3);
-    RESULT(9) = (uint32_t)in[0] << 16 | in[1] << 8 | in[2];`));
+    RESULT(9) = (uint32_t)in[0] << 16 | in[1] << 8 | in[2];`),
+  );
   assert.deepEqual(result.warnings, []);
   assert.deepEqual(results.slice(0, 2), [0, 0]);
   assert.deepEqual(results.slice(2, 9), machine.board.sensors[13].prom);
@@ -35,17 +41,21 @@ test('select, reset, PROM and conversion through multiplexer 2, channel 3 reach 
 });
 
 test('address not acknowledged: source, flush, STOP; data not acknowledged: the same', () => {
-  const { results } = run(main(`RESULT(0) = i2c_run(0x76, b, 3, 0, 0); b[0] = 1; i2c_run(0x70, b, 1, 0, 0);
-    b[0] = 0xae; b[1] = 1; RESULT(1) = i2c_run(0x76, b, 2, 0, 0);`));
+  const { results } = run(
+    main(`RESULT(0) = i2c_run(0x76, b, 3, 0, 0); b[0] = 1; i2c_run(0x70, b, 1, 0, 0);
+    b[0] = 0xae; b[1] = 1; RESULT(1) = i2c_run(0x76, b, 2, 0, 0);`),
+  );
   assert.equal(results[0] & 0xffff, 1);
   assert.equal(results[0] >>> 23, 3);
   assert.equal(results[1] & 0xffff, 8);
 });
 
 test('writes to the FIFO are lost until the abort is cleared, by its own register', () => {
-  const { results } = run(main(`REG(0x40044004) = 0x33; REG(0x4004406c) = 1; REG(0x40044010) = 0x200;
+  const { results } = run(
+    main(`REG(0x40044004) = 0x33; REG(0x4004406c) = 1; REG(0x40044010) = 0x200;
     while (!(REG(0x40044034) & 64)) { } (void)REG(0x40044040); REG(0x40044010) = 0x201; RESULT(0) = REG(0x40044074); (void)REG(0x40044054);
-    while (REG(0x40044070) & 32) { } REG(0x40044010) = 0x202; RESULT(1) = REG(0x40044070) >> 5 & 1;`));
+    while (REG(0x40044070) & 32) { } REG(0x40044010) = 0x202; RESULT(1) = REG(0x40044070) >> 5 & 1;`),
+  );
   assert.deepEqual(results.slice(0, 2), [0, 1]);
 });
 
@@ -53,29 +63,52 @@ const STUCK = [{ type: 'sda_stuck_low', sensor: 0, from_s: 0.01 }];
 const SELECT = 'b[0] = 1; i2c_run(0x70, b, 1, 0, 0); wait_us(20000);';
 
 test('a stuck SDA keeps the bus busy; nine GPIO clocks free it', () => {
-  const { results, result } = run(main(`${SELECT}
+  const { results, result } = run(
+    main(`${SELECT}
     REG(0x4004406c) = 0; REG(0x40044004) = 0x70; REG(0x4004406c) = 1; REG(0x40044010) = 0x200; wait_us(1000);
     RESULT(0) = REG(0x40044070) >> 5 & 1; REG(0x4004406c) = 0; while (REG(0x4004409c) & 1) { }
     REG(0xd000002c) = 0; REG(0x4001402c) = 5; REG(0x40014024) = 5;
     RESULT(1) = REG(0xd0000004) >> 4 & 3;
     for (int i = 0; i < 9; i++) { REG(0xd0000024) = 1 << 5; wait_us(5); REG(0xd0000028) = 1 << 5; wait_us(5); RESULT(2 + i) = REG(0xd0000004) >> 4 & 3; }
-    REG(0x4001402c) = 3; REG(0x40014024) = 3; b[0] = 2; RESULT(11) = i2c_run(0x70, b, 1, 0, 0);`), { faults: STUCK });
+    REG(0x4001402c) = 3; REG(0x40014024) = 3; b[0] = 2; RESULT(11) = i2c_run(0x70, b, 1, 0, 0);`),
+    { faults: STUCK },
+  );
   assert.deepEqual(result.warnings, []);
   assert.deepEqual(results.slice(0, 12), [1, 2, 2, 2, 2, 2, 2, 2, 2, 2, 3, 0]);
 });
 
 test('a RESET pulse frees the bus and a stuck multiplexer', () => {
-  const pulse = (gpio) => `REG(${0x40014004 + 8 * gpio}) = 5; REG(0xd0000024) = 1 << ${gpio}; wait_us(2); REG(0xd0000028) = 1 << ${gpio}; wait_us(2);`;
-  const { results } = run(main(`${SELECT} RESULT(0) = REG(0xd0000004) >> 4 & 1; ${pulse(6)} RESULT(1) = REG(0xd0000004) >> 4 & 1;
-    b[0] = 1; RESULT(2) = i2c_run(0x71, b, 1, 0, 0); ${pulse(7)} RESULT(3) = i2c_run(0x71, b, 1, 0, 0);`), { faults: [...STUCK, { type: 'mux_stuck', mux: 1, from_s: 0.01 }] });
+  const pulse = (gpio) =>
+    `REG(${0x40014004 + 8 * gpio}) = 5; REG(0xd0000024) = 1 << ${gpio}; wait_us(2); REG(0xd0000028) = 1 << ${gpio}; wait_us(2);`;
+  const { results } = run(
+    main(`${SELECT} RESULT(0) = REG(0xd0000004) >> 4 & 1; ${pulse(6)} RESULT(1) = REG(0xd0000004) >> 4 & 1;
+    b[0] = 1; RESULT(2) = i2c_run(0x71, b, 1, 0, 0); ${pulse(7)} RESULT(3) = i2c_run(0x71, b, 1, 0, 0);`),
+    { faults: [...STUCK, { type: 'mux_stuck', mux: 1, from_s: 0.01 }] },
+  );
   assert.deepEqual([results[0], results[1], results[2] & 1, results[3]], [0, 1, 1, 0]);
 });
 
-failsWith('IC_TAR written while enabled', main('REG(0x4004406c) = 1; REG(0x40044004) = 0x70;'), /IC_TAR written while the block is enabled/);
+failsWith(
+  'IC_TAR written while enabled',
+  main('REG(0x4004406c) = 1; REG(0x40044004) = 0x70;'),
+  /IC_TAR written while the block is enabled/,
+);
 failsWith('command while disabled', main('REG(0x40044010) = 0;'), /while the block is disabled/);
 failsWith('too fast for the sensors', main('REG(0x40044020) = 100; REG(0x4004406c) = 1;'), /fast mode needs/);
-failsWith('no pull-up', main('REG(0x4001c014) = 0x42; REG(0x4004406c) = 1; REG(0x40044010) = 0x200; wait_us(1);'), /GPIO4 \(SDA\) has no pull-up/);
-failsWith('no I2C function', main('REG(0x4001402c) = 5; REG(0x4004406c) = 1; REG(0x40044010) = 0x200; wait_us(1);'), /GPIO5 \(SCL\) has function 5/);
+failsWith(
+  'no pull-up',
+  main('REG(0x4001c014) = 0x42; REG(0x4004406c) = 1; REG(0x40044010) = 0x200; wait_us(1);'),
+  /GPIO4 \(SDA\) has no pull-up/,
+);
+failsWith(
+  'no I2C function',
+  main('REG(0x4001402c) = 5; REG(0x4004406c) = 1; REG(0x40044010) = 0x200; wait_us(1);'),
+  /GPIO5 \(SCL\) has function 5/,
+);
 failsWith('bus line driven high', main('REG(0x40014024) = 5; REG(0xd0000014) = 1 << 4; REG(0xd0000024) = 1 << 4;'), /drives the bus high/);
 failsWith('receive FIFO underflow', main('REG(0x4004406c) = 1; (void)REG(0x40044010);'), /receive FIFO is empty/);
-failsWith('transmit FIFO overflow', main('REG(0x4004406c) = 1; for (int i = 0; i < 20; i++) REG(0x40044010) = 0;'), /transmit FIFO overflow/);
+failsWith(
+  'transmit FIFO overflow',
+  main('REG(0x4004406c) = 1; for (int i = 0; i < 20; i++) REG(0x40044010) = 0;'),
+  /transmit FIFO overflow/,
+);

@@ -21,7 +21,11 @@ export class ImageBench {
     this.received = [];
     this.bytes = 0;
     this.machine = new Machine({
-      image: readFileSync(join(folder, `fingertip-${name}.bin`)), Board, scenario: steady(), fastEnumeration: true, allowWatchdog: true,
+      image: readFileSync(join(folder, `fingertip-${name}.bin`)),
+      Board,
+      scenario: steady(),
+      fastEnumeration: true,
+      allowWatchdog: true,
       faults: parseFaults(JSON.stringify(faults), 'faults', Board),
       onData: (bytes) => {
         this.received.push(Buffer.from(bytes));
@@ -35,7 +39,8 @@ export class ImageBench {
   /** The bytes of a command. */
   encoded(...command) {
     const words = command.join(' ');
-    if (!commands.has(words)) commands.set(words, Buffer.from(execFileSync(this.tools.command_frame, command, { encoding: 'utf8' }).trim(), 'hex'));
+    if (!commands.has(words))
+      commands.set(words, Buffer.from(execFileSync(this.tools.command_frame, command, { encoding: 'utf8' }).trim(), 'hex'));
     return commands.get(words);
   }
 
@@ -92,12 +97,20 @@ export class ImageBench {
     this.machine.client.write(this.encoded('health'));
     this.run(20);
     const line = this.recording().findLast((l) => l.startsWith('# packet: health'));
-    return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
+    return Object.fromEntries(
+      line
+        .split(' ')
+        .slice(3)
+        .map((pair) => pair.split('='))
+        .map(([key, value]) => [key, Number(value)]),
+    );
   }
 
   /** The last frame of the recording that was measured, and came with both packets, by column. */
   lastRow() {
-    const [head, ...rows] = this.recording().filter((l) => !l.startsWith('#')).map((l) => l.split(','));
+    const [head, ...rows] = this.recording()
+      .filter((l) => !l.startsWith('#'))
+      .map((l) => l.split(','));
     const flags = head.indexOf('raw_flags');
     const values = rows.findLast((cells) => cells[flags] !== '' && !(Number(cells[flags]) & HELD));
     return Object.fromEntries(head.map((name, i) => [name, Number(values[i])]));

@@ -40,7 +40,18 @@ function sensorBench(options = {}) {
     const [a, b, c] = read(0x76, 3);
     return (a << 16) | (b << 8) | c;
   };
-  return { sensor, bus, report, write, read, adc, wait: (ms) => { now += ms * 1e6; }, now: () => now };
+  return {
+    sensor,
+    bus,
+    report,
+    write,
+    read,
+    adc,
+    wait: (ms) => {
+      now += ms * 1e6;
+    },
+    now: () => now,
+  };
 }
 
 test('compensation matches the worked example of the MS5837-02BA datasheet, page 7', () => {
@@ -149,7 +160,10 @@ test('sensor: the early-read trap returns 0 and spoils the conversion', () => {
 });
 
 test('sensor: conversion time stays below the maximum, differs between parts, samples in the middle', () => {
-  const factors = Array.from({ length: 50 }, (_, i) => new Ms5840({ index: i, prng: new Prng(i), now_ns: () => 0, report: new Report(), stimulus: () => ({}) }).timeFactor);
+  const factors = Array.from(
+    { length: 50 },
+    (_, i) => new Ms5840({ index: i, prng: new Prng(i), now_ns: () => 0, report: new Report(), stimulus: () => ({}) }).timeFactor,
+  );
   assert.ok(Math.max(...factors) < 1 && Math.min(...factors) > 0.92);
   assert.ok(Math.max(...factors) - Math.min(...factors) > 0.04);
   const asked = [];
@@ -166,7 +180,14 @@ test('sensor: conversion time stays below the maximum, differs between parts, sa
 test('sensor: noise has the rms of its oversampling and repeats with its seed', () => {
   const sample = (seed, faults) => {
     let now = 0;
-    const s = new Ms5840({ index: 0, prng: new Prng(seed), now_ns: () => now, report: new Report(), stimulus: () => ({ pressure_Pa: 1e5, temperature_degC: 25 }), faults });
+    const s = new Ms5840({
+      index: 0,
+      prng: new Prng(seed),
+      now_ns: () => now,
+      report: new Report(),
+      stimulus: () => ({ pressure_Pa: 1e5, temperature_degC: 25 }),
+      faults,
+    });
     s.wasReset = true;
     const d2 = codesFor(s.prom, 1e5, 25).d2;
     return Array.from({ length: 2000 }, () => {
@@ -193,7 +214,13 @@ test('sensor: noise has the rms of its oversampling and repeats with its seed', 
 function muxBench() {
   const b = sensorBench();
   const mux = new Tca9548a(0x70, 0);
-  const other = new Ms5840({ index: 1, prng: QUIET, now_ns: b.now, report: b.report, stimulus: () => ({ pressure_Pa: 101325, temperature_degC: 25 }) });
+  const other = new Ms5840({
+    index: 1,
+    prng: QUIET,
+    now_ns: b.now,
+    report: b.report,
+    stimulus: () => ({ pressure_Pa: 101325, temperature_degC: 25 }),
+  });
   mux.connect(0, b.sensor);
   mux.connect(1, other);
   b.bus.targets = [mux];
@@ -286,7 +313,11 @@ test('scenario: temperature column', () => {
 });
 
 test('scenario: the truth of a tangential force stands beside the temperature, in any order', () => {
-  for (const [names, cells] of [['Qx_N,Qy_N', '1,2'], ['Qx_N,Qy_N,temperature_degC', '1,2,20'], ['temperature_degC,Qy_N,Qx_N', '20,1,2']]) {
+  for (const [names, cells] of [
+    ['Qx_N,Qy_N', '1,2'],
+    ['Qx_N,Qy_N,temperature_degC', '1,2,20'],
+    ['temperature_degC,Qy_N,Qx_N', '20,1,2'],
+  ]) {
     const s = scenario('# fingertip-scenario 1', `${HEADER},${names}`, `${row(0, 7)},${cells}`);
     assert.equal(s.at_ns(14, 0).temperature_degC, names.includes('temperature') ? 20 : 25);
     assert.equal(s.at_ns(14, 0).pressure_Pa, 101332);
@@ -302,40 +333,66 @@ for (const [name, lines, expected] of [
   ['equal times', ['# fingertip-scenario 1', HEADER, row(1), row(1)], /^s\.csv:4: t_s 1 does not increase/],
   ['missing column', ['# fingertip-scenario 1', HEADER, row(0).slice(0, -2)], /^s\.csv:3: 22 columns; the header has 23/],
   ['wrong header', ['# fingertip-scenario 1', HEADER.replace('sigma_mm', 'sigma'), row(0)], /^s\.csv:2: column 7 is "sigma"/],
-  ['unknown column', ['# fingertip-scenario 1', `${HEADER},Qz_N`, `${row(0)},1`], /^s\.csv:2: column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC/],
+  [
+    'unknown column',
+    ['# fingertip-scenario 1', `${HEADER},Qz_N`, `${row(0)},1`],
+    /^s\.csv:2: column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC/,
+  ],
   ['column given twice', ['# fingertip-scenario 1', `${HEADER},Qx_N,Qx_N`, `${row(0)},1,1`], /^s\.csv:2: column 25 is "Qx_N"/],
   ['no rows', ['# fingertip-scenario 1', HEADER], /no rows/],
   ['no header', ['# fingertip-scenario 1'], /no header/],
-  ['pressure no sensor takes', ['# fingertip-scenario 1', HEADER, row(0), row(1, -1.1e7)], /^s\.csv:4: column "s0_Pa" is -11000000; give at most 1e7 Pa/],
-  ['ambient pressure', ['# fingertip-scenario 1', '# ambient_Pa: 2e7', HEADER, row(0)], /^s\.csv:3: metadata "ambient_Pa" is "2e7"; give at most 1e7 Pa/],
+  [
+    'pressure no sensor takes',
+    ['# fingertip-scenario 1', HEADER, row(0), row(1, -1.1e7)],
+    /^s\.csv:4: column "s0_Pa" is -11000000; give at most 1e7 Pa/,
+  ],
+  [
+    'ambient pressure',
+    ['# fingertip-scenario 1', '# ambient_Pa: 2e7', HEADER, row(0)],
+    /^s\.csv:3: metadata "ambient_Pa" is "2e7"; give at most 1e7 Pa/,
+  ],
 ]) {
   test(`scenario: ${name} is refused with its place`, () => {
-    assert.throws(() => scenario(...lines), (e) => e instanceof InputError && expected.test(e.message) && !e.message.includes('\n'));
+    assert.throws(
+      () => scenario(...lines),
+      (e) => e instanceof InputError && expected.test(e.message) && !e.message.includes('\n'),
+    );
   });
 }
 
 test('scenario: pressures up to the limit are taken, a file cut off in its last line is not', () => {
   assert.equal(scenario('# fingertip-scenario 1', '# ambient_Pa: 0', HEADER, row(0, 1e7)).at_ns(0, 0).pressure_Pa, 1e7);
   const text = `# fingertip-scenario 1\n${HEADER}\n${row(0)}\n${row(1, 1000)}`;
-  assert.throws(() => parseScenario(text, 's.csv'), (e) => e instanceof InputError && /^s\.csv:4: the file ends within a line/.test(e.message));
+  assert.throws(
+    () => parseScenario(text, 's.csv'),
+    (e) => e instanceof InputError && /^s\.csv:4: the file ends within a line/.test(e.message),
+  );
 });
 
 test('faults and host script: what is wrong is named', () => {
   const limits = { sensors: 15, muxes: 3 };
   assert.equal(parseFaults('[{"type":"sensor_dead","sensor":14,"from_s":0.5,"to_s":1}]', 'f', limits)[0].to_ns, 1e9);
   for (const [text, message] of [
-    ['{', /not JSON/], ['{}', /must be a list/], ['[{"type":"x"}]', /unknown type "x"/],
-    ['[{"sensor":3,"from_s":1}]', /fault 1: "type" is missing; known: sensor_dead,/], ['[[]]', /fault 1: must be an object/],
+    ['{', /not JSON/],
+    ['{}', /must be a list/],
+    ['[{"type":"x"}]', /unknown type "x"/],
+    ['[{"sensor":3,"from_s":1}]', /fault 1: "type" is missing; known: sensor_dead,/],
+    ['[[]]', /fault 1: must be an object/],
     ['[{"type":"constructor","from_s":1}]', /unknown type "constructor"/],
     ['[{"type":"sensor_dead","sensor":15,"from_s":0}]', /"sensor" must be 0..14/],
-    ['[{"type":"mux_stuck","mux":0}]', /"from_s"/], ['[{"type":"host_stall","from_s":2,"to_s":1}]', /"to_s"/],
+    ['[{"type":"mux_stuck","mux":0}]', /"from_s"/],
+    ['[{"type":"host_stall","from_s":2,"to_s":1}]', /"to_s"/],
     ['[{"type":"host_stall","from_s":2,"mux":1}]', /key "mux"/],
     ['[{"type":"sram_upset","from_s":1,"address":536870912,"bytes":"f"}]', /"bytes" must be pairs of hexadecimal digits/],
     ['[{"type":"sram_upset","from_s":1,"address":268435456,"bytes":"ff"}]', /"address" must be one of SRAM/],
     ['[{"type":"sram_upset","from_s":1,"address":537141247,"bytes":"ffff"}]', /"address" must be one of SRAM/],
     ['[{"type":"sram_upset","from_s":1,"address":536870912,"bytes":"ff","to_s":2}]', /key "to_s"/],
-  ]) assert.throws(() => parseFaults(text, 'f', limits), message);
-  assert.deepEqual(parseHostScript('# a\n1 dtr 1\n\n2 0aff # b\n3 baud 1200', 'h').map((s) => s.t_s), [1, 2, 3]);
+  ])
+    assert.throws(() => parseFaults(text, 'f', limits), message);
+  assert.deepEqual(
+    parseHostScript('# a\n1 dtr 1\n\n2 0aff # b\n3 baud 1200', 'h').map((s) => s.t_s),
+    [1, 2, 3],
+  );
   for (const bad of ['x dtr 1', '1 dtr 2', '1 0a f', '1 baud 0', '1']) assert.throws(() => parseHostScript(bad, 'h'), /^Error: h:1:|h:1:/);
   assert.throws(() => findBoard('pico'), /unknown board "pico"; known: pico_mux/);
 });

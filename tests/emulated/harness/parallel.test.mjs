@@ -18,7 +18,11 @@ class Controller extends ChipBench {
     this.transfers = [];
     this.faulty = new Map();
     this.board = new (findBoard('pico_parallel'))({
-      scope: this.time.scope(), report: this.report, seed: 5, rise_ns, onLevels,
+      scope: this.time.scope(),
+      report: this.report,
+      seed: 5,
+      rise_ns,
+      onLevels,
       stimulus: () => ({ pressure_Pa: 101325, temperature_degC: 25 }),
       faults: () => ({ sensor: (i) => this.faulty.get(i) ?? {} }),
       onTransfer: (t) => this.transfers.push(t),
@@ -125,7 +129,11 @@ test('every sensor hears the same command and answers on its own line, without a
   assert.deepEqual(c.warnings, []);
   assert.equal(c.transfers.length, 45);
   const of3 = c.transfers.filter((t) => t.muxes === 'SDA3').map((t) => [t.address, t.read, t.bytes, t.acknowledged]);
-  assert.deepEqual(of3, [[0x76, false, [0x1e], true], [0x76, false, [0xa2], true], [0x76, true, [words[3] >> 8, words[3] & 255], true]]);
+  assert.deepEqual(of3, [
+    [0x76, false, [0x1e], true],
+    [0x76, false, [0xa2], true],
+    [0x76, true, [words[3] >> 8, words[3] & 255], true],
+  ]);
   assert.deepEqual(c.board.statistics, { transactions: 45, nacks: 0 });
 });
 
@@ -188,10 +196,13 @@ test('faults of single lines cost those sensors only', () => {
 /** The times of the controller are judged on line k again. */
 function isJudged(c, k) {
   assert.deepEqual(c.warnings, []);
-  assert.equal(c.command(0x1e) >> k & 1, 1, 'it answers');
+  assert.equal((c.command(0x1e) >> k) & 1, 1, 'it answers');
   c.slack_ns = -200;
   c.command(0x44);
-  assert.ok(c.warnings.some((w) => w.startsWith(`SDA${k}: tHD_STA is 400 ns`)), c.warnings.join('\n'));
+  assert.ok(
+    c.warnings.some((w) => w.startsWith(`SDA${k}: tHD_STA is 400 ns`)),
+    c.warnings.join('\n'),
+  );
 }
 
 test('a line that is no longer tied to VDD and falls in a bit of the controller is no START of its: excused up to the next', () => {
@@ -202,7 +213,7 @@ test('a line that is no longer tied to VDD and falls in a bit of the controller 
   c.drive(SCL | ALL, 900);
   c.drive(ALL, 440);
   c.fault('line_stuck_high', 12, false);
-  assert.equal(c.levels & (SCL | 1 << 12), SCL);
+  assert.equal(c.levels & (SCL | (1 << 12)), SCL);
   c.wait_ns(260);
   c.drive(SCL | ALL, 350);
   for (let i = 0; i < 8; i++) c.bit(0);
@@ -230,7 +241,10 @@ test('a sensor that comes back has no PROM before its reset', () => {
   c.wait_ns(1e5);
   c.fault('sensor_missing', 4, false);
   assert.equal(c.command(0x44), ALL);
-  assert.deepEqual(c.read16(0xa2).words, proms(c).map((word, k) => (k === 4 ? 0 : word)));
+  assert.deepEqual(
+    c.read16(0xa2).words,
+    proms(c).map((word, k) => (k === 4 ? 0 : word)),
+  );
   c.command(0x1e);
   c.wait_ns(3e6);
   assert.deepEqual(c.read16(0xa2).words, proms(c));
@@ -307,7 +321,10 @@ test('SDA and SCL at one moment: no set-up time', () => {
   c.drive(0, 700);
   c.drive(SCL, 900);
   c.drive(1, 700);
-  assert.deepEqual(c.warnings, ['SDA0: tSU_DAT is 0 ns; fast mode allows at least 100 ns', 'SDA0: tVD_DAT is 1300 ns; fast mode allows at most 900 ns']);
+  assert.deepEqual(c.warnings, [
+    'SDA0: tSU_DAT is 0 ns; fast mode allows at least 100 ns',
+    'SDA0: tVD_DAT is 1300 ns; fast mode allows at most 900 ns',
+  ]);
 });
 
 test('a STOP within a byte, a bit of the sensor that the controller pulls: warned of', () => {
@@ -320,7 +337,7 @@ test('a STOP within a byte, a bit of the sensor that the controller pulls: warne
   d.start();
   d.byte(0xed);
   for (let i = 0; i < 8; i++) d.bit(1 << 2);
-  assert.deepEqual(d.warnings, ['SDA2: the controller pulls SDA in a bit that is the sensor\'s']);
+  assert.deepEqual(d.warnings, ["SDA2: the controller pulls SDA in a bit that is the sensor's"]);
 });
 
 test('fails: a line driven high', () => {
@@ -334,17 +351,30 @@ test('faults: those of lines need a board that has them', () => {
   const one = (type, extra = {}) => JSON.stringify([{ type, from_s: 1, ...extra }]);
   for (const type of ['line_stuck_high', 'sensor_missing', 'clock_glitch']) {
     assert.equal(parseFaults(one(type, { sensor: 14 }), 'f', findBoard('pico_parallel')).length, 1);
-    assert.throws(() => parseFaults(one(type, { sensor: 1 }), 'f', findBoard('pico_mux')), /needs a board with a data line for each sensor/);
+    assert.throws(
+      () => parseFaults(one(type, { sensor: 1 }), 'f', findBoard('pico_mux')),
+      /needs a board with a data line for each sensor/,
+    );
   }
   assert.equal(parseFaults(one('scl_stuck_low'), 'f', findBoard('pico_parallel')).length, 1);
-  for (const board of ['pico_parallel', 'pico_mux']) assert.equal(parseFaults(one('line_stuck_low', { sensor: 14 }), 'f', findBoard(board)).length, 1);
+  for (const board of ['pico_parallel', 'pico_mux'])
+    assert.equal(parseFaults(one('line_stuck_low', { sensor: 14 }), 'f', findBoard(board)).length, 1);
   assert.throws(() => parseFaults(one('mux_stuck', { mux: 0 }), 'f', findBoard('pico_parallel')), /needs a board with multiplexers/);
 });
 
 test('a dump holds the window asked for, the levels at its beginning, and its end', () => {
   let text = '';
   const file = { write: (bytes) => (text += bytes) };
-  const dump = new VcdDump({ file, probes: [['SDA', 1], ['SCL', 2]], comment: 'c', from_ns: 100, to_ns: 200 });
+  const dump = new VcdDump({
+    file,
+    probes: [
+      ['SDA', 1],
+      ['SCL', 2],
+    ],
+    comment: 'c',
+    from_ns: 100,
+    to_ns: 200,
+  });
   dump.change(3, 10);
   dump.change(1, 50.2);
   dump.change(0, 120.4);
@@ -352,6 +382,9 @@ test('a dump holds the window asked for, the levels at its beginning, and its en
   dump.change(3, 120.7);
   dump.change(1, 300);
   dump.close(400);
-  assert.equal(text, '$comment c $end\n$timescale 1 ns $end\n$var wire 1 ! SDA $end\n$var wire 1 " SCL $end\n$enddefinitions $end\n'
-    + '#100\n$dumpvars\n1!\n0"\n$end\n#120\n0!\n#121\n1"\n1!\n#200\n');
+  assert.equal(
+    text,
+    '$comment c $end\n$timescale 1 ns $end\n$var wire 1 ! SDA $end\n$var wire 1 " SCL $end\n$enddefinitions $end\n' +
+      '#100\n$dumpvars\n1!\n0"\n$end\n#120\n0!\n#121\n1"\n1!\n#200\n',
+  );
 });

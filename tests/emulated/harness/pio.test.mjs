@@ -6,7 +6,9 @@ import { ChipBench } from './chip_bench.mjs';
 import { ReferencePio } from './pio_reference.mjs';
 
 const PIO0 = 0x50200000;
-const [CTRL, FSTAT, FDEBUG, FLEVEL, TXF0, RXF0, IRQ, BYPASS, INSTR_MEM0, INTR, IRQ0_INTE] = [0, 4, 8, 0xc, 0x10, 0x20, 0x30, 0x38, 0x48, 0x128, 0x12c].map((o) => PIO0 + o);
+const [CTRL, FSTAT, FDEBUG, FLEVEL, TXF0, RXF0, IRQ, BYPASS, INSTR_MEM0, INTR, IRQ0_INTE] = [
+  0, 4, 8, 0xc, 0x10, 0x20, 0x30, 0x38, 0x48, 0x128, 0x12c,
+].map((o) => PIO0 + o);
 const SM = (m, offset) => PIO0 + 0xc8 + 0x18 * m + offset;
 const [CLKDIV, EXECCTRL, SHIFTCTRL, ADDR, INSTR, PINCTRL] = [0, 4, 8, 0xc, 0x10, 0x14];
 
@@ -20,9 +22,17 @@ const pull = (flags = 1, field) => op(4, 4 | flags, 0, field);
 const mov = (destination, source, how = 0, field) => op(5, destination, (how << 3) | source, field);
 const irq = (flags, index, field) => op(6, flags, index, field);
 const set = (destination, value, field) => op(7, destination, value, field);
-const PINS = 0, X = 1, Y = 2, PINDIRS = 4, ISR = 6, EXEC = 7;
+const PINS = 0,
+  X = 1,
+  Y = 2,
+  PINDIRS = 4,
+  ISR = 6,
+  EXEC = 7;
 
-const AUTOPUSH = 1 << 16, AUTOPULL = 1 << 17, IN_RIGHT = 1 << 18, OUT_RIGHT = 1 << 19;
+const AUTOPUSH = 1 << 16,
+  AUTOPULL = 1 << 17,
+  IN_RIGHT = 1 << 18,
+  OUT_RIGHT = 1 << 19;
 
 /** A bench with `program` at 0 in SM0: wrap around it, all pin groups from GPIO0, pins 0 to 15 with PIO0. */
 function bench(program, { shift = IN_RIGHT | OUT_RIGHT, clkdiv = 1 << 16, exec = 0, pin = (16 << 20) | (5 << 26), start = true } = {}) {
@@ -57,15 +67,24 @@ test('agrees in every cycle with a plain model of the datasheet: random programs
   const instruction = () => {
     const field = random.uniform() < 0.5 ? 0 : below(32);
     switch (below(9)) {
-      case 0: return jmp(below(32), below(8), field);
-      case 1: return wait(below(2), pick([0, 1, 2]), below(2) ? below(8) | (below(2) << 4) : 16 + below(8), field) & (0x3fff & ~8);
-      case 2: return inn(pick([0, 1, 2, 3, 6, 7]), below(32), field);
-      case 3: return out(pick([0, 1, 2, 3, 4, 5, 6]), below(32), field);
-      case 4: return push(below(4), field);
-      case 5: return pull(below(4), field);
-      case 6: return mov(pick([0, 1, 2, 5, 6, 7]), pick([0, 1, 2, 3, 5, 6, 7]), below(3), field);
-      case 7: return irq(below(4), below(8) | (below(2) << 4), field);
-      default: return set(pick([0, 1, 2, 4]), below(32), field);
+      case 0:
+        return jmp(below(32), below(8), field);
+      case 1:
+        return wait(below(2), pick([0, 1, 2]), below(2) ? below(8) | (below(2) << 4) : 16 + below(8), field) & (0x3fff & ~8);
+      case 2:
+        return inn(pick([0, 1, 2, 3, 6, 7]), below(32), field);
+      case 3:
+        return out(pick([0, 1, 2, 3, 4, 5, 6]), below(32), field);
+      case 4:
+        return push(below(4), field);
+      case 5:
+        return pull(below(4), field);
+      case 6:
+        return mov(pick([0, 1, 2, 5, 6, 7]), pick([0, 1, 2, 3, 5, 6, 7]), below(3), field);
+      case 7:
+        return irq(below(4), below(8) | (below(2) << 4), field);
+      default:
+        return set(pick([0, 1, 2, 4]), below(32), field);
     }
   };
   const executed = new Set();
@@ -81,15 +100,59 @@ test('agrees in every cycle with a plain model of the datasheet: random programs
       const sideEnable = below(2);
       const sideCount = below(3) ? 0 : sideEnable + below(6 - sideEnable);
       const c = {
-        divisor: pick([256, 256, 512, 640, 257, 1280, 1000]), wrapTop: below(32), wrapBottom: below(32), jumpPin: below(30), sideEnable, sideCount,
-        sideToDirections: below(2), sideBase: below(32), autopush: below(2), autopull: below(2), inRight: below(2), outRight: below(2),
-        pushThreshold: 1 + below(32), pullThreshold: 1 + below(32), inBase: below(32), outBase: below(32), outCount: below(33), setBase: below(32), setCount: below(6),
-        statusReceive: below(2), statusN: below(10), rxDepth: 4,
+        divisor: pick([256, 256, 512, 640, 257, 1280, 1000]),
+        wrapTop: below(32),
+        wrapBottom: below(32),
+        jumpPin: below(30),
+        sideEnable,
+        sideCount,
+        sideToDirections: below(2),
+        sideBase: below(32),
+        autopush: below(2),
+        autopull: below(2),
+        inRight: below(2),
+        outRight: below(2),
+        pushThreshold: 1 + below(32),
+        pullThreshold: 1 + below(32),
+        inBase: below(32),
+        outBase: below(32),
+        outCount: below(33),
+        setBase: below(32),
+        setCount: below(6),
+        statusReceive: below(2),
+        statusN: below(10),
+        rxDepth: 4,
       };
       b.write(SM(m, CLKDIV), c.divisor << 8);
-      b.write(SM(m, EXECCTRL), (sideEnable << 30) | (c.sideToDirections << 29) | (c.jumpPin << 24) | (c.wrapTop << 12) | (c.wrapBottom << 7) | (c.statusReceive << 4) | c.statusN);
-      b.write(SM(m, SHIFTCTRL), (c.autopush << 16) | (c.autopull << 17) | (c.inRight << 18) | (c.outRight << 19) | ((c.pushThreshold & 31) << 20) | ((c.pullThreshold & 31) << 25));
-      b.write(SM(m, PINCTRL), c.outBase | (c.setBase << 5) | (c.sideBase << 10) | (c.inBase << 15) | (c.outCount << 20) | (c.setCount << 26) | (c.sideCount << 29));
+      b.write(
+        SM(m, EXECCTRL),
+        (sideEnable << 30) |
+          (c.sideToDirections << 29) |
+          (c.jumpPin << 24) |
+          (c.wrapTop << 12) |
+          (c.wrapBottom << 7) |
+          (c.statusReceive << 4) |
+          c.statusN,
+      );
+      b.write(
+        SM(m, SHIFTCTRL),
+        (c.autopush << 16) |
+          (c.autopull << 17) |
+          (c.inRight << 18) |
+          (c.outRight << 19) |
+          ((c.pushThreshold & 31) << 20) |
+          ((c.pullThreshold & 31) << 25),
+      );
+      b.write(
+        SM(m, PINCTRL),
+        c.outBase |
+          (c.setBase << 5) |
+          (c.sideBase << 10) |
+          (c.inBase << 15) |
+          (c.outCount << 20) |
+          (c.setCount << 26) |
+          (c.sideCount << 29),
+      );
       return c;
     });
     const reference = new ReferencePio(memory, configurations);
@@ -133,17 +196,26 @@ test('agrees in every cycle with a plain model of the datasheet: random programs
 test('a divider with a fraction: periods of 2 and 3 cycles make 2.5', () => {
   const b = bench([set(PINS, 1), set(PINS, 0)], { clkdiv: (2 << 16) | (128 << 8) });
   b.run(14);
-  assert.deepEqual(b.trace.map(([cycle]) => cycle), [1, 3, 6, 8, 11, 13]);
+  assert.deepEqual(
+    b.trace.map(([cycle]) => cycle),
+    [1, 3, 6, 8, 11, 13],
+  );
 });
 
 test('delays count in cycles of the machine; a stall comes before its delay', () => {
   const b = bench([set(PINS, 1, 3), set(PINS, 0, 1), pull(1, 2)], { clkdiv: 5 << 16 });
   b.run(100);
-  assert.deepEqual(b.trace, [[1, 1], [21, 0]]);
+  assert.deepEqual(b.trace, [
+    [1, 1],
+    [21, 0],
+  ]);
   b.write(TXF0, 0);
   b.run(60);
   // In cycle 101 the pull; two cycles of delay.
-  assert.deepEqual(b.trace.slice(2), [[116, 1], [136, 0]]);
+  assert.deepEqual(b.trace.slice(2), [
+    [116, 1],
+    [136, 0],
+  ]);
 });
 
 test('autopull: an empty OSR takes the word and outputs it a cycle later; later words follow without a gap', () => {
@@ -154,7 +226,11 @@ test('autopull: an empty OSR takes the word and outputs it a cycle later; later 
   b.write(TXF0, 0x22);
   b.write(TXF0, 0x33);
   b.run(10);
-  assert.deepEqual(b.trace, [[12, 0x11], [13, 0x22], [14, 0x33]]);
+  assert.deepEqual(b.trace, [
+    [12, 0x11],
+    [13, 0x22],
+    [14, 0x33],
+  ]);
 });
 
 test('side-set happens at once though the instruction stalls, and wins over OUT and SET', () => {
@@ -163,11 +239,18 @@ test('side-set happens at once though the instruction stalls, and wins over OUT 
   assert.deepEqual(b.trace, [[1, 1]]);
   b.write(TXF0, 0);
   b.run(3);
-  assert.deepEqual(b.trace, [[1, 1], [5, 2], [6, 3]]);
+  assert.deepEqual(b.trace, [
+    [1, 1],
+    [5, 2],
+    [6, 3],
+  ]);
 });
 
 test('inputs are two cycles late, unless bypassed', () => {
-  for (const [bypass, late] of [[0, 3], [1 << 20, 1]]) {
+  for (const [bypass, late] of [
+    [0, 3],
+    [1 << 20, 1],
+  ]) {
     const b = bench([wait(1, 0, 20), set(PINS, 1), jmp(2)]);
     b.chip.pins.setLevels(1 << 20, 0);
     b.write(BYPASS, bypass);
@@ -213,7 +296,10 @@ test('OUT EXEC: the instruction follows in the next cycle and keeps its delay, t
   b.write(TXF0, set(PINS, 1, 3));
   b.run(20);
   // Cycle 1 pulls, 2 is the OUT, 3 the executee with three cycles of delay.
-  assert.deepEqual(b.trace, [[3, 1], [7, 2]]);
+  assert.deepEqual(b.trace, [
+    [3, 1],
+    [7, 2],
+  ]);
 });
 
 test('joined FIFOs: eight deep on one side, none on the other; changing it empties them', () => {
@@ -270,7 +356,10 @@ test('SM_RESTART clears counters, stall and delay, not pc, x, osr; disabling hol
   b.run(18);
   assert.deepEqual(b.trace, [], 'two cycles of the delay had passed');
   b.run(1);
-  assert.deepEqual(b.trace.map(([, pins]) => pins), [1]);
+  assert.deepEqual(
+    b.trace.map(([, pins]) => pins),
+    [1],
+  );
   b.write(CTRL, 0x10);
   assert.deepEqual([b.sm.pc, b.sm.x, b.sm.isrCount, b.sm.osrCount], [3, 3, 0, 32]);
 });
@@ -289,7 +378,14 @@ test('a change of clk_sys moves the edges, not the count', () => {
   assert.equal(b.trace.length, 2);
 });
 
-for (const [name, instruction] of [['MOV to destination 3', mov(3, 0)], ['MOV operation 3', mov(1, 1, 3)], ['SET to destination 3', set(3, 0)], ['WAIT on source 3', wait(0, 3, 0)], ['IN from source 4', inn(4, 1)], ['PUSH with a low bit', push() | 1]]) {
+for (const [name, instruction] of [
+  ['MOV to destination 3', mov(3, 0)],
+  ['MOV operation 3', mov(1, 1, 3)],
+  ['SET to destination 3', set(3, 0)],
+  ['WAIT on source 3', wait(0, 3, 0)],
+  ['IN from source 4', inn(4, 1)],
+  ['PUSH with a low bit', push() | 1],
+]) {
   test(`fails: ${name} is reserved`, () => {
     const b = bench([instruction]);
     assert.throws(() => b.run(2), /failure/);
@@ -297,7 +393,13 @@ for (const [name, instruction] of [['MOV to destination 3', mov(3, 0)], ['MOV op
   });
 }
 
-for (const [name, offset, value] of [['OUT_STICKY', EXECCTRL, 1 << 17], ['INLINE_OUT_EN', EXECCTRL, 1 << 18], ['both joins', SHIFTCTRL, 3 << 30], ['FRAC without INT', CLKDIV, 1 << 8], ['33 OUT pins', PINCTRL, 33 << 20]]) {
+for (const [name, offset, value] of [
+  ['OUT_STICKY', EXECCTRL, 1 << 17],
+  ['INLINE_OUT_EN', EXECCTRL, 1 << 18],
+  ['both joins', SHIFTCTRL, 3 << 30],
+  ['FRAC without INT', CLKDIV, 1 << 8],
+  ['33 OUT pins', PINCTRL, 33 << 20],
+]) {
   test(`fails: ${name}`, () => {
     const b = bench([jmp(0)], { start: false });
     assert.throws(() => b.write(SM(0, offset), value), /failure/);

@@ -3,11 +3,27 @@
  * state machine is looked at in every cycle, nothing is scheduled. No EXEC, no INSTR, no reserved encodings.
  */
 const mask = (n) => (n === 32 ? -1 : (1 << n) - 1);
-const rotate = (v, n) => (n % 32 === 0 ? v | 0 : (v << n % 32) | (v >>> (32 - (n % 32))));
+const rotate = (v, n) => (n % 32 === 0 ? v | 0 : (v << (n % 32)) | (v >>> (32 - (n % 32))));
 
 class Machine {
   constructor(block, index, c) {
-    Object.assign(this, { block, index, c, pc: 0, x: 0, y: 0, isr: 0, osr: 0, isrCount: 0, osrCount: 32, tx: [], rx: [], delay: 0, due: 0, raised: false });
+    Object.assign(this, {
+      block,
+      index,
+      c,
+      pc: 0,
+      x: 0,
+      y: 0,
+      isr: 0,
+      osr: 0,
+      isrCount: 0,
+      osrCount: 32,
+      tx: [],
+      rx: [],
+      delay: 0,
+      due: 0,
+      raised: false,
+    });
   }
 
   cycle(n) {
@@ -62,9 +78,15 @@ class Machine {
       let take;
       if (arg === 0) take = true;
       if (arg === 1) take = this.x === 0;
-      if (arg === 2) { take = this.x !== 0; this.x = (this.x - 1) | 0; }
+      if (arg === 2) {
+        take = this.x !== 0;
+        this.x = (this.x - 1) | 0;
+      }
       if (arg === 3) take = this.y === 0;
-      if (arg === 4) { take = this.y !== 0; this.y = (this.y - 1) | 0; }
+      if (arg === 4) {
+        take = this.y !== 0;
+        this.y = (this.y - 1) | 0;
+      }
       if (arg === 5) take = this.x !== this.y;
       if (arg === 6) take = ((block.seen >>> c.jumpPin) & 1) === 1;
       if (arg === 7) take = this.osrCount < c.pullThreshold;

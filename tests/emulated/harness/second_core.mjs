@@ -18,7 +18,10 @@ function press() {
   });
   const row = (t_s, values) => `${t_s},0,0,0,0,0,0,0,${values.join(',')}\n`;
   const none = new Array(15).fill(0);
-  return parseScenario(`# fingertip-scenario 1\n# ambient_Pa: 100000\n# temperature_degC: 25\n${HEADER}\n${row(0, none)}${row(PRESS_s, none)}${row(PRESS_s + 0.01, pressures)}`, 'press.csv');
+  return parseScenario(
+    `# fingertip-scenario 1\n# ambient_Pa: 100000\n# temperature_degC: 25\n${HEADER}\n${row(0, none)}${row(PRESS_s, none)}${row(PRESS_s + 0.01, pressures)}`,
+    'press.csv',
+  );
 }
 
 /** folder: of the image; tools: as ImageBench. */
@@ -26,7 +29,11 @@ export class SecondCoreBench extends CrashBench {
   constructor(folder, tools, options) {
     super(null, tools, 'pico_parallel', { folder, scenario: press(), ...options });
     this.stream();
-    for (const command of [['osr', '256'], ['pad', '12', '0'], ['stream', 'contact']]) {
+    for (const command of [
+      ['osr', '256'],
+      ['pad', '12', '0'],
+      ['stream', 'contact'],
+    ]) {
       this.run(20);
       this.machine.client.write(this.encoded(...command));
     }
@@ -44,7 +51,9 @@ export class SecondCoreBench extends CrashBench {
   frames() {
     const bytes = Buffer.concat(this.received);
     const whole = bytes.lastIndexOf(0) + 1; // the rest is of a packet under way
-    const frames = split(bytes.subarray(0, whole)).filter((packet) => packet[1] === CONTACT && packet.length > 20).map((packet) => [packet.readUInt32LE(12), packet.readUInt32LE(16)]);
+    const frames = split(bytes.subarray(0, whole))
+      .filter((packet) => packet[1] === CONTACT && packet.length > 20)
+      .map((packet) => [packet.readUInt32LE(12), packet.readUInt32LE(16)]);
     for (const [number] of frames) {
       this.lost += this.last === null ? 0 : number - this.last - 1;
       this.last = number;

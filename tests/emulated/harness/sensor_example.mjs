@@ -23,16 +23,25 @@ function rowsOf(lines) {
 /** What 0.3 s of it bring: the codes on the bus, the rows of the recording, and how many pressures and temperatures are not the example's. */
 export function streamExample(images, tools) {
   const { pressure_Pa, temperature_cdegC } = compensate(WORDS, D1, D2, findSensor(SENSOR));
-  const scenario = parseScenario(`# fingertip-scenario 1\n# ambient_Pa: ${pressure_Pa}\n# temperature_degC: ${temperature_cdegC / 100}\n${HEADER}\n0${',0'.repeat(22)}\n`, 'example.csv');
+  const scenario = parseScenario(
+    `# fingertip-scenario 1\n# ambient_Pa: ${pressure_Pa}\n# temperature_degC: ${temperature_cdegC / 100}\n${HEADER}\n0${',0'.repeat(22)}\n`,
+    'example.csv',
+  );
   const transfers = [];
-  const bench = new ImageBench(images, tools, 'pico_parallel', { scenario, sensor: SENSOR, onBusTransfer: (transfer) => transfers.push(transfer) });
+  const bench = new ImageBench(images, tools, 'pico_parallel', {
+    scenario,
+    sensor: SENSOR,
+    onBusTransfer: (transfer) => transfers.push(transfer),
+  });
   for (const sensor of bench.machine.board.sensors) {
     sensor.prom = WORDS;
     sensor.prng = { normal: () => 0, range: () => 0 };
   }
   bench.stream();
   bench.run(300);
-  const codes = new Set(transfers.filter(({ read, bytes }) => read && bytes.length === 3).map(({ bytes }) => (bytes[0] << 16) | (bytes[1] << 8) | bytes[2]));
+  const codes = new Set(
+    transfers.filter(({ read, bytes }) => read && bytes.length === 3).map(({ bytes }) => (bytes[0] << 16) | (bytes[1] << 8) | bytes[2]),
+  );
   const rows = rowsOf(bench.recording());
   let wrong = 0;
   for (const row of rows) {

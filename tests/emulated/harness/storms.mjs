@@ -200,7 +200,8 @@ export class Storms {
         }
         const { d1, d2 } = codesFor(prom, pressure_Pa, temperature_degC);
         const read = compensate(collidingProm, d1, d2);
-        const isWrong = Math.abs(read.pressure_Pa - pressure_Pa) > wrong_Pa || Math.abs(read.temperature_cdegC / 100 - temperature_degC) > wrong_degC;
+        const isWrong =
+          Math.abs(read.pressure_Pa - pressure_Pa) > wrong_Pa || Math.abs(read.temperature_cdegC / 100 - temperature_degC) > wrong_degC;
         found.planted += 1;
         found.wrong += isWrong ? 1 : 0;
         found.undoubted += isWrong && has('valid') && !has('saturated') && !has('doubtful') ? 1 : 0;
@@ -223,7 +224,7 @@ export class Storms {
     let torn = 0;
     for (let i = 0; i < times; i++) {
       bench.stream();
-      bench.run(20 + (i * 1.237) % 5);
+      bench.run(20 + ((i * 1.237) % 5));
       cutting = true;
       bench.until(() => !cutting, 100, 'frame of several packets');
       bench.run(13);
@@ -231,7 +232,9 @@ export class Storms {
       bench.run(40);
       machine.client.write(bench.encoded('health'));
       bench.run(20);
-      const [first, second] = split(Buffer.concat(bench.received)).slice(-2).map((packet) => packet[1]);
+      const [first, second] = split(Buffer.concat(bench.received))
+        .slice(-2)
+        .map((packet) => packet[1]);
       torn += first === TYPE_ACK && second === TYPE_HEALTH ? 0 : 1;
       bench.received = [];
     }

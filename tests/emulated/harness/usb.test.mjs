@@ -4,7 +4,8 @@ import { test } from 'node:test';
 import { scheduleHostScript } from '../../../host_tools/simulation/emulator/port/host_script.mjs';
 import { makeMachine } from './bench.mjs';
 
-const device = (defines = '', body = '') => `${defines}\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); ${body} for (;;) usb_poll(); }`;
+const device = (defines = '', body = '') =>
+  `${defines}\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); ${body} for (;;) usb_poll(); }`;
 
 function session(source, steps, seconds, { onArrival = () => {}, ...options } = {}) {
   const bytes = [];
@@ -20,15 +21,33 @@ function session(source, steps, seconds, { onArrival = () => {}, ...options } = 
 }
 
 test('enumeration as Linux does it, then echo', () => {
-  const { bytes, packets, result } = session(device(), [{ t_s: 0.2, dtr: true }, { t_s: 0.3, bytes: Uint8Array.of(1, 2, 3) }], 0.4);
+  const { bytes, packets, result } = session(
+    device(),
+    [
+      { t_s: 0.2, dtr: true },
+      { t_s: 0.3, bytes: Uint8Array.of(1, 2, 3) },
+    ],
+    0.4,
+  );
   assert.deepEqual(result.warnings, []);
   assert.deepEqual(bytes, [1, 2, 3]);
   assert.equal(result.usb.resets, 2);
   assert.deepEqual(result.usb.strings, { product: 'Pr', manufacturer: 'Mf', serial: 'S1' });
   const setups = packets.filter((p) => p.setup).map((p) => Buffer.from(p.data).toString('hex'));
   assert.deepEqual(setups, [
-    '8006000100004000', '0005050000000000', '8006000100001200', '8006000600000a00', '8006000200000900', '8006000200004300',
-    '800600030000ff00', '800602030904ff00', '800601030904ff00', '800603030904ff00', '0009010000000000', '2120000000000700', '2122030000000000',
+    '8006000100004000',
+    '0005050000000000',
+    '8006000100001200',
+    '8006000600000a00',
+    '8006000200000900',
+    '8006000200004300',
+    '800600030000ff00',
+    '800602030904ff00',
+    '800601030904ff00',
+    '800603030904ff00',
+    '0009010000000000',
+    '2120000000000700',
+    '2122030000000000',
   ]);
 });
 
@@ -38,10 +57,21 @@ test('realistic waits: the first request comes 160 ms after the pull-up', () => 
 });
 
 test('baud rate and DTR reach the device; a closed port is not read', () => {
-  const { machine, bytes } = session(device('#define STREAM'), [{ t_s: 0.2, dtr: true }, { t_s: 0.3, dtr: false }, { t_s: 0.31, baud: 1200 }], 0.5);
+  const { machine, bytes } = session(
+    device('#define STREAM'),
+    [
+      { t_s: 0.2, dtr: true },
+      { t_s: 0.3, dtr: false },
+      { t_s: 0.31, baud: 1200 },
+    ],
+    0.5,
+  );
   const n = bytes.length;
   assert.ok(n > 1000);
-  assert.ok(bytes.every((b, i) => b === (i & 255)), 'no byte lost or repeated');
+  assert.ok(
+    bytes.every((b, i) => b === (i & 255)),
+    'no byte lost or repeated',
+  );
   assert.equal(machine.client.baud, 1200);
   machine.run(0.6e9);
   assert.equal(bytes.length, n);
@@ -50,7 +80,8 @@ test('baud rate and DTR reach the device; a closed port is not read', () => {
 test('full speed carries at most 19 packets of 64 bytes in a frame', () => {
   const { packets } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], 0.3);
   const perFrame = new Map();
-  for (const p of packets) if (p.endpoint === 2 && p.isIn) perFrame.set(Math.floor(p.t_ns / 1e6), (perFrame.get(Math.floor(p.t_ns / 1e6)) ?? 0) + 1);
+  for (const p of packets)
+    if (p.endpoint === 2 && p.isIn) perFrame.set(Math.floor(p.t_ns / 1e6), (perFrame.get(Math.floor(p.t_ns / 1e6)) ?? 0) + 1);
   assert.ok(Math.max(...perFrame.values()) <= 20, `${Math.max(...perFrame.values())}`);
   const total = [...perFrame.values()].reduce((a, n) => a + n, 0);
   assert.ok(total / perFrame.size <= 19 && total / perFrame.size > 5);
@@ -65,19 +96,26 @@ function assertCounts(bytes, first = 0) {
 /** What `seconds` of the stream device give; `pauseAt` is the number of bytes before the longest time without any. */
 function streamThrough(faults, seconds) {
   const arrivals = [];
-  const { bytes, packets, result } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], seconds, { faults, onArrival: (t_ns, total) => arrivals.push({ t_ns, total }) });
+  const { bytes, packets, result } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], seconds, {
+    faults,
+    onArrival: (t_ns, total) => arrivals.push({ t_ns, total }),
+  });
   let longest = 1;
   const wait_ns = (i) => arrivals[i].t_ns - arrivals[i - 1].t_ns;
   for (let i = 2; i < arrivals.length; i++) if (wait_ns(i) > wait_ns(longest)) longest = i;
   return { bytes, packets, result, pauseAt: arrivals[longest - 1].total };
 }
 
-for (const [name, from_s, to_s] of [['in mid-stream', 0.2, 0.3], ['from before the port opens', 0.05, 0.2]]) {
+for (const [name, from_s, to_s] of [
+  ['in mid-stream', 0.2, 0.3],
+  ['from before the port opens', 0.05, 0.2],
+]) {
   test(`a host that stalls ${name} stops the stream without losing or repeating a byte`, () => {
     const { bytes, packets, result } = streamThrough([{ type: 'host_stall', from_s, to_s }], 0.4);
     assert.deepEqual(result.warnings, []);
     assertCounts(bytes);
-    const taken = (begin_s, end_s) => packets.filter((p) => p.endpoint === 2 && p.isIn && p.t_ns > begin_s * 1e9 && p.t_ns < end_s * 1e9).length;
+    const taken = (begin_s, end_s) =>
+      packets.filter((p) => p.endpoint === 2 && p.isIn && p.t_ns > begin_s * 1e9 && p.t_ns < end_s * 1e9).length;
     assert.equal(taken(from_s + 1e-4, to_s), 0, 'no packet was taken in between');
     assert.ok(taken(to_s, 0.4) > 100, 'the stream went on');
     assert.ok(result.usb.in_bytes - bytes.length <= 64, 'all but a read under way was delivered');
@@ -107,10 +145,19 @@ for (const [name, defines, pattern, body] of [
   ['controller without VBUS', '#define POWER 0', /USB_PWR does not say that VBUS/],
   ['EP0 interrupt per buffer off: requests time out or lack an address', '#define PULLUP_BITS (1u << 16)', /no answer|not finished/],
   ['AVAILABLE in the same write', '#define ARM(c, v) (c) = (v) | 1 << 10', /same write as the other fields/],
-  ['AVAILABLE too soon', '#define ARM(c, v) do { volatile uint32_t *q = &(c); uint32_t w = (v), a = w | 1 << 10; __asm volatile("str %1, [%0]\\n str %2, [%0]" :: "l"(q), "l"(w), "l"(a) : "memory"); } while (0)', /ns after the other fields/],
+  [
+    'AVAILABLE too soon',
+    '#define ARM(c, v) do { volatile uint32_t *q = &(c); uint32_t w = (v), a = w | 1 << 10; __asm volatile("str %1, [%0]\\n str %2, [%0]" :: "l"(q), "l"(w), "l"(a) : "memory"); } while (0)',
+    /ns after the other fields/,
+  ],
   ['address never set', '#define NO_ADDRESS', /no answer to SETUP .* at address 5/],
   ['endpoints not enabled', '#define NO_ENABLE', /is the endpoint enabled/],
-  ['wrong data PID', '', /sent DATA1, expected DATA0/, 'for (;;) { usb_poll(); if (dtr) { pid_in2 = 1; const uint8_t x = 0; bulk_in(&x, 1); for (;;) usb_poll(); } }'],
+  [
+    'wrong data PID',
+    '',
+    /sent DATA1, expected DATA0/,
+    'for (;;) { usb_poll(); if (dtr) { pid_in2 = 1; const uint8_t x = 0; bulk_in(&x, 1); for (;;) usb_poll(); } }',
+  ],
   ['buffer not aligned', '', /not 64-byte aligned/, 'REG(0x50100010) = 1u << 31 | 2 << 26 | 0x1e8;'],
   ['buffer taken back from the controller', '', /owns the buffer/, 'for (;;) { usb_poll(); if (dtr) { OUT_CTL(2) = 0; } }'],
 ]) {

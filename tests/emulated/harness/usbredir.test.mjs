@@ -6,17 +6,31 @@ import { connect, createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
-import { encodeDeviceConnect, encodeEndpointInfo, encodeHello, encodeInterfaceInfo, encodeMessage, MessageReader, UsbRedirServer } from '../../../host_tools/simulation/emulator/usb/usbredir.mjs';
+import {
+  encodeDeviceConnect,
+  encodeEndpointInfo,
+  encodeHello,
+  encodeInterfaceInfo,
+  encodeMessage,
+  MessageReader,
+  UsbRedirServer,
+} from '../../../host_tools/simulation/emulator/usb/usbredir.mjs';
 import { makeMachine } from './bench.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'usbredir-'));
 after(() => rmSync(folder, { recursive: true }));
 
 const DEVICE = {
-  device: Uint8Array.of(18, 1, 0, 2, 0xef, 2, 1, 64, 9, 0x12, 1, 0, 0x34, 0x12, 1, 2, 3, 1), vendor: 0x1209, product: 1,
-  interfaces: [{ number: 0, class: 2, subclass: 2, protocol: 0 }, { number: 1, class: 10, subclass: 0, protocol: 0 }],
+  device: Uint8Array.of(18, 1, 0, 2, 0xef, 2, 1, 64, 9, 0x12, 1, 0, 0x34, 0x12, 1, 2, 3, 1),
+  vendor: 0x1209,
+  product: 1,
+  interfaces: [
+    { number: 0, class: 2, subclass: 2, protocol: 0 },
+    { number: 1, class: 10, subclass: 0, protocol: 0 },
+  ],
   endpoints: [
-    { address: 0x81, type: 3, maxPacket: 16, interval: 16, interface: 0 }, { address: 0x02, type: 2, maxPacket: 64, interval: 0, interface: 1 },
+    { address: 0x81, type: 3, maxPacket: 16, interval: 16, interface: 0 },
+    { address: 0x02, type: 2, maxPacket: 64, interval: 0, interface: 1 },
     { address: 0x82, type: 2, maxPacket: 64, interval: 0, interface: 1 },
   ],
 };
@@ -41,7 +55,11 @@ test('a message may come in any pieces; a first message that is no hello is refu
   const seen = [];
   const reader = new MessageReader((type, id, payload) => seen.push([type, id, payload.length]));
   for (const byte of stream) reader.take(Buffer.of(byte));
-  assert.deepEqual(seen, [[0, 0n, 68], [3, 7n, 0], [101, 2n ** 40n, 3]]);
+  assert.deepEqual(seen, [
+    [0, 0n, 68],
+    [3, 7n, 0],
+    [101, 2n ** 40n, 3],
+  ]);
   assert.throws(() => new MessageReader(() => {}).take(encodeMessage(3, 7n)));
 });
 
@@ -51,7 +69,8 @@ async function session(script, warnings = /^$/) {
   const server = await UsbRedirServer.start(path);
   const packets = [];
   const machine = makeMachine('#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }', {
-    makeClient: (parts) => server.attachTo(parts), onUsbPacket: (p) => packets.push(p),
+    makeClient: (parts) => server.attachTo(parts),
+    onUsbPacket: (p) => packets.push(p),
   });
   const socket = connect(path);
   await once(socket, 'connect');
@@ -61,7 +80,10 @@ async function session(script, warnings = /^$/) {
   const hello = encodeHello();
   hello.writeUInt32LE(0xff, 12 + 64);
   const vm = {
-    machine, packets, server, socket,
+    machine,
+    packets,
+    server,
+    socket,
     send: (type, id, payload) => socket.write(encodeMessage(type, id, payload)),
     setup: (id, hex, data = Buffer.alloc(0)) => {
       const s = Buffer.from(hex, 'hex');
@@ -109,66 +131,88 @@ async function session(script, warnings = /^$/) {
   assert.ok(!existsSync(path));
 }
 
-test('a device connects once it is enumerated; requests, data and stalls go through', () => session(async (vm) => {
-  vm.setup(1n, '8006000100001200');
-  const device = await vm.expect(100, 1n);
-  assert.deepEqual([device[3], device.readUInt16LE(8), device.length], [0, 18, 28]);
-  vm.setup(2n, '8006000600000a00');
-  const qualifier = await vm.expect(100, 2n);
-  assert.deepEqual([qualifier[3], qualifier.readUInt16LE(8), qualifier.length], [4, 0, 10]);
-  vm.setup(4n, '2122030000000000');
-  assert.equal((await vm.expect(100, 4n))[3], 0);
-  vm.bulk(5n, 0x82, 128);
-  vm.bulk(6n, 0x02, 3, Buffer.from('abc'));
-  const answers = [await vm.next(), await vm.next()].sort((a, b) => a.payload[0] - b.payload[0]);
-  assert.deepEqual(answers.map((a) => [a.id, a.payload[1], a.payload.readUInt16LE(2), a.payload.subarray(10).toString()]), [[6n, 0, 3, ''], [5n, 0, 3, 'abc']]);
-}));
+test('a device connects once it is enumerated; requests, data and stalls go through', () =>
+  session(async (vm) => {
+    vm.setup(1n, '8006000100001200');
+    const device = await vm.expect(100, 1n);
+    assert.deepEqual([device[3], device.readUInt16LE(8), device.length], [0, 18, 28]);
+    vm.setup(2n, '8006000600000a00');
+    const qualifier = await vm.expect(100, 2n);
+    assert.deepEqual([qualifier[3], qualifier.readUInt16LE(8), qualifier.length], [4, 0, 10]);
+    vm.setup(4n, '2122030000000000');
+    assert.equal((await vm.expect(100, 4n))[3], 0);
+    vm.bulk(5n, 0x82, 128);
+    vm.bulk(6n, 0x02, 3, Buffer.from('abc'));
+    const answers = [await vm.next(), await vm.next()].sort((a, b) => a.payload[0] - b.payload[0]);
+    assert.deepEqual(
+      answers.map((a) => [a.id, a.payload[1], a.payload.readUInt16LE(2), a.payload.subarray(10).toString()]),
+      [
+        [6n, 0, 3, ''],
+        [5n, 0, 3, 'abc'],
+      ],
+    );
+  }));
 
-for (const [type, length] of [[100, 3], [101, 9], [6, 0], [8, 1]]) {
-  test(`a message of type ${type} and ${length} bytes is too short: it ends the connection and not the machine`, () => session(async (vm) => {
-    vm.send(type, 1n, Buffer.alloc(length));
-    await vm.quiet();
-    assert.ok(vm.socket.closed);
-    assert.equal(vm.machine.endReason ?? null, null);
-  }, /^.*: message of type \d+ and \d+ bytes$/));
+for (const [type, length] of [
+  [100, 3],
+  [101, 9],
+  [6, 0],
+  [8, 1],
+]) {
+  test(`a message of type ${type} and ${length} bytes is too short: it ends the connection and not the machine`, () =>
+    session(async (vm) => {
+      vm.send(type, 1n, Buffer.alloc(length));
+      await vm.quiet();
+      assert.ok(vm.socket.closed);
+      assert.equal(vm.machine.endReason ?? null, null);
+    }, /^.*: message of type \d+ and \d+ bytes$/));
 }
 
-test('a cancelled read is answered once and takes no data', () => session(async (vm) => {
-  vm.setup(2n, '2122030000000000');
-  await vm.expect(100, 2n);
-  vm.bulk(3n, 0x82, 128);
-  await vm.quiet();
-  vm.send(21, 3n);
-  assert.equal((await vm.expect(101, 3n))[1], 1);
-  vm.send(21, 3n);
-  await vm.quiet();
-  vm.bulk(4n, 0x82, 128);
-  vm.bulk(5n, 0x02, 1, Buffer.from('x'));
-  const answers = [await vm.next(), await vm.next()];
-  assert.equal(answers.find((a) => a.id === 4n).payload.subarray(10).toString(), 'x');
-}));
+test('a cancelled read is answered once and takes no data', () =>
+  session(async (vm) => {
+    vm.setup(2n, '2122030000000000');
+    await vm.expect(100, 2n);
+    vm.bulk(3n, 0x82, 128);
+    await vm.quiet();
+    vm.send(21, 3n);
+    assert.equal((await vm.expect(101, 3n))[1], 1);
+    vm.send(21, 3n);
+    await vm.quiet();
+    vm.bulk(4n, 0x82, 128);
+    vm.bulk(5n, 0x02, 1, Buffer.from('x'));
+    const answers = [await vm.next(), await vm.next()];
+    assert.equal(
+      answers
+        .find((a) => a.id === 4n)
+        .payload.subarray(10)
+        .toString(),
+      'x',
+    );
+  }));
 
-test('resets that follow each other are one, and the device has an address afterwards', () => session(async (vm) => {
-  const { resets } = vm.machine.host.statistics;
-  vm.bulk(1n, 0x82, 128);
-  vm.send(3, 2n);
-  vm.send(3, 3n);
-  assert.equal((await vm.expect(101, 1n))[1], 1);
-  vm.setup(4n, '8006000100001200');
-  assert.equal((await vm.expect(100, 4n))[3], 0);
-  assert.equal(vm.machine.host.statistics.resets, resets + 1);
-}));
+test('resets that follow each other are one, and the device has an address afterwards', () =>
+  session(async (vm) => {
+    const { resets } = vm.machine.host.statistics;
+    vm.bulk(1n, 0x82, 128);
+    vm.send(3, 2n);
+    vm.send(3, 3n);
+    assert.equal((await vm.expect(101, 1n))[1], 1);
+    vm.setup(4n, '8006000100001200');
+    assert.equal((await vm.expect(100, 4n))[3], 0);
+    assert.equal(vm.machine.host.statistics.resets, resets + 1);
+  }));
 
-test('a pulled cable ends every transfer without an answer; pushed in, the device connects again', () => session(async (vm) => {
-  vm.bulk(1n, 0x82, 128);
-  await vm.quiet();
-  vm.server.setPlugged(false);
-  await vm.expect(2, 0n);
-  vm.setup(2n, '8006000100001200');
-  await vm.quiet();
-  vm.server.setPlugged(true);
-  for (const type of [4, 5, 1]) await vm.expect(type, 0n);
-}));
+test('a pulled cable ends every transfer without an answer; pushed in, the device connects again', () =>
+  session(async (vm) => {
+    vm.bulk(1n, 0x82, 128);
+    await vm.quiet();
+    vm.server.setPlugged(false);
+    await vm.expect(2, 0n);
+    vm.setup(2n, '8006000100001200');
+    await vm.quiet();
+    vm.server.setPlugged(true);
+    for (const type of [4, 5, 1]) await vm.expect(type, 0n);
+  }));
 
 test('a path that something else holds is refused in words', async () => {
   const file = join(folder, 'file');
@@ -184,24 +228,28 @@ test('a path that something else holds is refused in words', async () => {
   await assert.rejects(UsbRedirServer.start(join(folder, 'nowhere', 'a.sock')), /cannot listen \(/);
 });
 
-test('emulated time waits two seconds for a reader that is late, never for what it has asked for', () => session(async (vm) => {
-  const { server } = vm;
-  vm.setup(2n, '2122030000000000');
-  await vm.expect(100, 2n);
-  assert.equal(server.waitsForReader(0), false, 'nothing lies ready');
-  vm.bulk(3n, 0x02, 3, Buffer.from('abc'));
-  await vm.expect(101, 3n);
-  await vm.quiet();
-  assert.deepEqual([10, 2009, 2010, 9000].map((now_ms) => server.waitsForReader(now_ms)), [true, true, false, false]);
-  vm.bulk(4n, 0x82, 128);
-  assert.equal((await vm.expect(101, 4n)).subarray(10).toString(), 'abc');
-  assert.equal(server.waitsForReader(9001), false, 'it was read');
-  vm.bulk(5n, 0x02, 1, Buffer.from('d'));
-  await vm.expect(101, 5n);
-  await vm.quiet();
-  assert.equal(server.waitsForReader(9002), true, 'a reader again, so it gets its time again');
-  vm.setup(6n, '8006000100001200');
-  while (!server.arrived.length) await new Promise((resolve) => setImmediate(resolve));
-  assert.equal(server.waitsForReader(9003), false, 'what the machine asked for comes first');
-  await vm.expect(100, 6n);
-}));
+test('emulated time waits two seconds for a reader that is late, never for what it has asked for', () =>
+  session(async (vm) => {
+    const { server } = vm;
+    vm.setup(2n, '2122030000000000');
+    await vm.expect(100, 2n);
+    assert.equal(server.waitsForReader(0), false, 'nothing lies ready');
+    vm.bulk(3n, 0x02, 3, Buffer.from('abc'));
+    await vm.expect(101, 3n);
+    await vm.quiet();
+    assert.deepEqual(
+      [10, 2009, 2010, 9000].map((now_ms) => server.waitsForReader(now_ms)),
+      [true, true, false, false],
+    );
+    vm.bulk(4n, 0x82, 128);
+    assert.equal((await vm.expect(101, 4n)).subarray(10).toString(), 'abc');
+    assert.equal(server.waitsForReader(9001), false, 'it was read');
+    vm.bulk(5n, 0x02, 1, Buffer.from('d'));
+    await vm.expect(101, 5n);
+    await vm.quiet();
+    assert.equal(server.waitsForReader(9002), true, 'a reader again, so it gets its time again');
+    vm.setup(6n, '8006000100001200');
+    while (!server.arrived.length) await new Promise((resolve) => setImmediate(resolve));
+    assert.equal(server.waitsForReader(9003), false, 'what the machine asked for comes first');
+    await vm.expect(100, 6n);
+  }));

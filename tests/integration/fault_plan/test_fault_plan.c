@@ -104,8 +104,7 @@ static void look_at(const struct wire_packet *packet) {
 static void send(struct wire_packet *packet) {
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length;
-  TEST_ASSERT_EQUAL_INT(
-      FT_OK, wire_encode(wire_find_layout(wire_commands, packet->type), packet, frame, &length));
+  TEST_ASSERT_EQUAL_INT(FT_OK, wire_encode(wire_find_layout(wire_commands, packet->type), packet, frame, &length));
   TEST_ASSERT_EQUAL_INT(FT_OK, native_cdc_send(frame, length));
 }
 
@@ -154,8 +153,7 @@ void tearDown(void) {
 
 static void complain(const char *what, uint32_t transfer) {
   const size_t length = strlen(problems);
-  snprintf(problems + length, sizeof problems - length, "transfer %u: %s; ", (unsigned)transfer,
-           what);
+  snprintf(problems + length, sizeof problems - length, "transfer %u: %s; ", (unsigned)transfer, what);
 }
 
 /* One run with the fault set in array.fault. */
@@ -186,8 +184,7 @@ static void run_to_recovery(bool wrong_is_unseen) {
 }
 
 static bool reads_adc(uint32_t transfer) {
-  return transfer > place.startup - SENSORS && transfer != place.frame &&
-         transfer != place.temperature;
+  return transfer > place.startup - SENSORS && transfer != place.frame && transfer != place.temperature;
 }
 
 static void at_places(struct sim_fault fault, uint32_t first, uint32_t last) {

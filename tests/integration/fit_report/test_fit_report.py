@@ -2,6 +2,7 @@
 
 usage: test_fit_report.py --build BUILD --boards BOARDS
 """
+
 import argparse
 import csv
 import json
@@ -17,9 +18,24 @@ from boards import fit_cycles_of  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 FIGURES = (
-    "observable_presses", "p99_9_um", "shipped_p99_9_um", "shipped_above_100um", "above_100um", "masked_p99_9_um", "masked_p99_um_d", "masked_peak_p99_um",
-    "masked_peak_above_100um_d", "bad_unflagged_percent_worst", "good_flagged_percent_c", "good_flagged_percent_d", "cold_cycles",
-    "masked_cycles", "speed_vs_ceres", "speed_vs_tinysolver", "speed_vs_cminpack")
+    "observable_presses",
+    "p99_9_um",
+    "shipped_p99_9_um",
+    "shipped_above_100um",
+    "above_100um",
+    "masked_p99_9_um",
+    "masked_p99_um_d",
+    "masked_peak_p99_um",
+    "masked_peak_above_100um_d",
+    "bad_unflagged_percent_worst",
+    "good_flagged_percent_c",
+    "good_flagged_percent_d",
+    "cold_cycles",
+    "masked_cycles",
+    "speed_vs_ceres",
+    "speed_vs_tinysolver",
+    "speed_vs_cminpack",
+)
 # Worst over the presses measured here; the goals are in fit.py.
 COLD_CYCLES_MAX = 31000
 MASKED_CYCLES_MAX = 62000
@@ -27,8 +43,26 @@ MASKED_CYCLES_MAX = 62000
 
 def report(folder, *more):
     return subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--boards", OPTIONS.boards,
-         "-o", str(folder), "--limit", "600", "--budget", "0.25", "--passes", "1", *more], capture_output=True, text=True)
+        [
+            sys.executable,
+            str(ROOT / "host_tools/report/fit/fit.py"),
+            "--build",
+            OPTIONS.build,
+            "--boards",
+            OPTIONS.boards,
+            "-o",
+            str(folder),
+            "--limit",
+            "600",
+            "--budget",
+            "0.25",
+            "--passes",
+            "1",
+            *more,
+        ],
+        capture_output=True,
+        text=True,
+    )
 
 
 class Report(unittest.TestCase):
@@ -76,9 +110,24 @@ class Report(unittest.TestCase):
 
     def test_cycles_are_deterministic(self):
         again = self.folder / "again.csv"
-        subprocess.run(["node", str(ROOT / "host_tools/report/fit/on_chip/bench.mjs"), "--image", str(fit_cycles_of(OPTIONS.boards)), "--jobs",
-                        str(self.folder / "fit_jobs.json"), "--out", str(again), "--budget", "0.25", "--kernel", "fit"],
-                       check=True, capture_output=True)
+        subprocess.run(
+            [
+                "node",
+                str(ROOT / "host_tools/report/fit/on_chip/bench.mjs"),
+                "--image",
+                str(fit_cycles_of(OPTIONS.boards)),
+                "--jobs",
+                str(self.folder / "fit_jobs.json"),
+                "--out",
+                str(again),
+                "--budget",
+                "0.25",
+                "--kernel",
+                "fit",
+            ],
+            check=True,
+            capture_output=True,
+        )
         with open(again, newline="") as file:
             for row in csv.DictReader(file):
                 self.assertEqual(row, self.cycles[row["kernel"], row["variant"]])
@@ -108,8 +157,19 @@ class Report(unittest.TestCase):
 
     def test_a_missing_image_is_one_line(self):
         done = subprocess.run(
-            [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--boards",
-             str(self.folder), "-o", str(self.folder / "other")], capture_output=True, text=True)
+            [
+                sys.executable,
+                str(ROOT / "host_tools/report/fit/fit.py"),
+                "--build",
+                OPTIONS.build,
+                "--boards",
+                str(self.folder),
+                "-o",
+                str(self.folder / "other"),
+            ],
+            capture_output=True,
+            text=True,
+        )
         self.assertEqual(done.returncode, 1)
         self.assertEqual(len(done.stderr.strip().split("\n")), 1)
         self.assertIn("fit_cycles.bin is not there; build it", done.stderr)

@@ -2,6 +2,7 @@
 
 usage: test_grasp.py FINGERTIP FAKE_CELL TIME_KEEPER [unittest arguments]
 """
+
 import contextlib
 import os
 import pathlib
@@ -97,13 +98,16 @@ class GraspTest(unittest.TestCase):
 
 class Usage(GraspTest):
     def test_limits_are_checked_before_a_port_is_opened(self):
-        for arguments, words in ((("--cap", "0.1"), '--cap "0.1" is not possible; give N, 0.5 to 100'),
-                                 (("--approach", "9"), "mm/s, 0.5 to 8"), (("--margin", "x"), "give 1 to 5"),
-                                 (("--fixed", "nan"), "N, 0.1 to 100"),
-                                 (("--preset", "anvil"), "no preset anvil; there are egg, strawberry, cup"),
-                                 (("--preset", "crisp"), "the least move of a 2f85, 0.75 mm, may press with"),
-                                 (("--fixed", "6", "--cap", "5"), "--fixed is not possible; it is above --cap"),
-                                 (("--open-width", "90"), "2f85 opens to 85.0 mm")):
+        for arguments, words in (
+            (("--cap", "0.1"), '--cap "0.1" is not possible; give N, 0.5 to 100'),
+            (("--approach", "9"), "mm/s, 0.5 to 8"),
+            (("--margin", "x"), "give 1 to 5"),
+            (("--fixed", "nan"), "N, 0.1 to 100"),
+            (("--preset", "anvil"), "no preset anvil; there are egg, strawberry, cup"),
+            (("--preset", "crisp"), "the least move of a 2f85, 0.75 mm, may press with"),
+            (("--fixed", "6", "--cap", "5"), "--fixed is not possible; it is above --cap"),
+            (("--open-width", "90"), "2f85 opens to 85.0 mm"),
+        ):
             _, err = self.run_grasp(*arguments, status=2)
             self.assertIn(words, err)
         err = self.run_cli("grasp", "--gripper", "claw", "--gripper-port", "x", status=2)[1]
@@ -111,8 +115,14 @@ class Usage(GraspTest):
 
     def test_help_has_the_exit_statuses(self):
         out, _ = self.run_cli("grasp", "--help")
-        for status, words in ((0, "as asked"), (1, "an error"), (2, "wrong usage"), (MISSED, "it closed, and nothing was there"), (DROPPED, "the object fell"),
-                              (FAULT, "the gripper failed, was not active, or did not answer at the end")):
+        for status, words in (
+            (0, "as asked"),
+            (1, "an error"),
+            (2, "wrong usage"),
+            (MISSED, "it closed, and nothing was there"),
+            (DROPPED, "the object fell"),
+            (FAULT, "the gripper failed, was not active, or did not answer at the end"),
+        ):
             self.assertRegex(out, rf"(?m)^ +{status}  {words}")
 
     def test_two_fingertips_are_needed_and_two_different_ones(self):
@@ -460,8 +470,14 @@ class Recorded(GraspTest):
         rows = self.rows()
         # every state in its order, at least every 10 ms and a little
         states = [str(state) for i, state in enumerate(rows["state"]) if i == 0 or state != rows["state"][i - 1]]
-        for earlier, later in (("idle", "approach"), ("approach", "squeeze"), ("squeeze", "ready"), ("ready", "holding"), ("holding", "slipping"),
-                               ("slipping", "still")):
+        for earlier, later in (
+            ("idle", "approach"),
+            ("approach", "squeeze"),
+            ("squeeze", "ready"),
+            ("ready", "holding"),
+            ("holding", "slipping"),
+            ("slipping", "still"),
+        ):
             self.assertLess(states.index(earlier), len(states) - 1 - states[::-1].index(later), states)
         self.assertTrue((np.diff(rows["time_us"]) >= 0).all())
         self.assertLess(np.median(np.diff(rows["time_us"])), 10500)
@@ -493,20 +509,30 @@ class Recorded(GraspTest):
         self.assertTrue(plain[0].startswith("time_us,state,trouble,width_mm,"))
 
         picture = os.path.join(self.folder, "grasp.png")
-        done = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "-o", picture], capture_output=True, text=True,
-                              env=self.environment, timeout=PLOT_PATIENCE_s)
+        done = subprocess.run(
+            [sys.executable, PYTHON_TOOLS, "plot", self.csv, "-o", picture],
+            capture_output=True,
+            text=True,
+            env=self.environment,
+            timeout=PLOT_PATIENCE_s,
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, r"grasp\.png: 1 slide, held by at most \d+\.\d N, at last still")
         with open(picture, "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
-        done = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", "AAAA", "-o", picture], capture_output=True, text=True,
-                              env=self.environment, timeout=PLOT_PATIENCE_s)
+        done = subprocess.run(
+            [sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", "AAAA", "-o", picture],
+            capture_output=True,
+            text=True,
+            env=self.environment,
+            timeout=PLOT_PATIENCE_s,
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("frames in", done.stdout)
 
         # what is damaged is named, and salvaged
         text = pathlib.Path(self.csv).read_text(encoding="utf-8")
-        number = text[:text.index("# grip: ", text.index(",holding,") - 40)].count("\n") + 1
+        number = text[: text.index("# grip: ", text.index(",holding,") - 40)].count("\n") + 1
         pathlib.Path(self.csv).write_text(text.replace(",holding,", ",hodling,", 1), encoding="utf-8")
         _, err = self.run_cli("replay", self.csv, "--speed", "max", status=1)
         self.assertRegex(err, rf':{number}: state is "hodling"; use --salvage')
@@ -519,7 +545,9 @@ class Recorded(GraspTest):
 class Live(GraspTest):
     def on_terminal(self, *arguments, steps, size=(80, 24)):
         """Each step: what the screen shows before the keys are typed. Exit status; self.shown is the last screen."""
-        with Terminal(self.world, [FINGERTIP, *arguments], {**self.environment, "COLORTERM": "truecolor", "TERM": "xterm"}, size) as terminal:
+        with Terminal(
+            self.world, [FINGERTIP, *arguments], {**self.environment, "COLORTERM": "truecolor", "TERM": "xterm"}, size
+        ) as terminal:
             for pattern, action in steps:
                 terminal.until(pattern)
                 action() if callable(action) else terminal.type(action)
@@ -530,33 +558,75 @@ class Live(GraspTest):
     def test_shows_both_pads_and_the_gripper_and_obeys_keys(self):
         for size in ((80, 24), (160, 50)):
             with self.cell():
-                status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", "-o", self.csv, "--overwrite", size=size, steps=[
-                    (r"HOLDING.*wanted +\d\.\d\d N", lambda: self.tell("load 2")),
-                    (r"load +1\.0\d N .*margin +\d\.\d\d", lambda: None),
-                    (r"q end, holding  o open  h hold  g grasp", b"h"),
-                    (r"STILL", b"g"), (r"HOLDING", b"o"), (r"RELEASE", b"h"), (r"STILL", b"q")])
+                status = self.on_terminal(
+                    *self.ARGUMENTS,
+                    f"{self.folder}/gripper",
+                    "-o",
+                    self.csv,
+                    "--overwrite",
+                    size=size,
+                    steps=[
+                        (r"HOLDING.*wanted +\d\.\d\d N", lambda: self.tell("load 2")),
+                        (r"load +1\.0\d N .*margin +\d\.\d\d", lambda: None),
+                        (r"q end, holding  o open  h hold  g grasp", b"h"),
+                        (r"STILL", b"g"),
+                        (r"HOLDING", b"o"),
+                        (r"RELEASE", b"h"),
+                        (r"STILL", b"q"),
+                    ],
+                )
             self.assertEqual(status, 0)
-            for word in ("left ● AAAA", "right ● BBBB", "width", "cap  21.0 N", "slides", "friction", "SLIP left", "grasp  2f85", "kPa", "force ", " N┤",
-                         "0 s"):
+            for word in (
+                "left ● AAAA",
+                "right ● BBBB",
+                "width",
+                "cap  21.0 N",
+                "slides",
+                "friction",
+                "SLIP left",
+                "grasp  2f85",
+                "kPa",
+                "force ",
+                " N┤",
+                "0 s",
+            ):
                 self.assertIn(word, self.shown)
-            after = self.output[self.output.rfind(b"\x1b[?1049l") + 8:].decode()
+            after = self.output[self.output.rfind(b"\x1b[?1049l") + 8 :].decode()
             self.assertNotIn("\x1b", after)
             self.assertIn("the gripper keeps its position", after)
-            status = self.on_terminal("replay", self.csv, size=size, steps=[(r"grasp  2f85.*left ● AAAA.*space pause", b" "), ("PAUSED", b"\x1b[F"),
-                                                                             (r"STILL.*PAUSED", b"\x1b[H"), (r"IDLE.*PAUSED at 0", b"q")])
+            status = self.on_terminal(
+                "replay",
+                self.csv,
+                size=size,
+                steps=[
+                    (r"grasp  2f85.*left ● AAAA.*space pause", b" "),
+                    ("PAUSED", b"\x1b[F"),
+                    (r"STILL.*PAUSED", b"\x1b[H"),
+                    (r"IDLE.*PAUSED at 0", b"q"),
+                ],
+            )
             self.assertEqual(status, 0)
 
     def test_pasted_text_and_a_terminals_answers_are_no_keys(self):
         with self.cell():
-            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", steps=[
-                ("HOLDING", b"\x1b[200~ohoq\x1b[201~\x1b[8;24;80t"), ("HOLDING", lambda: self.world.sleep(0.5)), ("HOLDING", b"q")])
+            status = self.on_terminal(
+                *self.ARGUMENTS,
+                f"{self.folder}/gripper",
+                steps=[("HOLDING", b"\x1b[200~ohoq\x1b[201~\x1b[8;24;80t"), ("HOLDING", lambda: self.world.sleep(0.5)), ("HOLDING", b"q")],
+            )
             self.assertEqual(status, 0)
             self.assertGreater(self.tell()[1], 0.8)
 
     def test_ctrl_c_on_a_terminal_and_a_window_that_is_too_small(self):
         with self.cell():
-            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", "--open-width", "45", size=(79, 24), steps=[
-                (r"needs 80x24.*holding", b"\x03"), (r"Ctrl-C: the width stays", b"\x03")])
+            status = self.on_terminal(
+                *self.ARGUMENTS,
+                f"{self.folder}/gripper",
+                "--open-width",
+                "45",
+                size=(79, 24),
+                steps=[(r"needs 80x24.*holding", b"\x03"), (r"Ctrl-C: the width stays", b"\x03")],
+            )
         self.assertEqual(status, 0)
 
 

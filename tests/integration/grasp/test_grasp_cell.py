@@ -4,6 +4,7 @@ usage: test_grasp_cell.py FINGERTIP FINGERTIP_SIMULATE TIME_KEEPER TABLES [unitt
 
 Judged by the cell's truth.
 """
+
 import contextlib
 import os
 import pathlib
@@ -18,7 +19,10 @@ import unittest
 import numpy as np
 
 FINGERTIP, FINGERTIP_SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:5])
-sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
+sys.path[:0] = [
+    str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"),
+    str(pathlib.Path(__file__).resolve().parents[2] / "support"),
+]
 from fingertip import files  # noqa: E402
 from simulated_time import SimulatedTime  # noqa: E402
 
@@ -40,7 +44,11 @@ class CellTest(unittest.TestCase):
         self.folder = folder.name
         self.csv, self.truth_csv = f"{self.folder}/grasp.csv", f"{self.folder}/truth.csv"
         self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
-        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right"}
+        self.environment |= {
+            "LC_ALL": "C.UTF-8",
+            "XDG_RUNTIME_DIR": self.folder,
+            "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right",
+        }
         self.begin_world()
 
     def begin_world(self):
@@ -50,8 +58,22 @@ class CellTest(unittest.TestCase):
     @contextlib.contextmanager
     def cell(self, *options, model="2f85"):
         self.model = model
-        process = self.world.start([FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", model, "--cache", TABLES, "--truth", self.truth_csv, *options],
-                                   stdin=subprocess.PIPE)
+        process = self.world.start(
+            [
+                FINGERTIP_SIMULATE,
+                "--lift",
+                "--ports",
+                self.folder,
+                "--gripper",
+                model,
+                "--cache",
+                TABLES,
+                "--truth",
+                self.truth_csv,
+                *options,
+            ],
+            stdin=subprocess.PIPE,
+        )
         self.process = process
         try:
             ready = process.readline()
@@ -93,6 +115,7 @@ class CellTest(unittest.TestCase):
         def is_so():
             self.assertIsNone(self.process.poll(), what)
             return condition()
+
         try:
             self.world.until(is_so, PATIENCE_s)
         except AssertionError as error:
@@ -102,6 +125,7 @@ class CellTest(unittest.TestCase):
         def has_come():
             with open(self.truth_csv, encoding="ascii") as file:
                 return any(line.startswith("# event: ") and line.split(",", 1)[1].startswith(word) for line in file)
+
         self.wait_for(has_come, f"{word} never came")
 
     def pass_time(self, seconds):
@@ -114,8 +138,13 @@ class CellTest(unittest.TestCase):
         self.err = open(f"{self.folder}/err", "w+", encoding="utf-8")
         self.addCleanup(self.out.close)
         self.addCleanup(self.err.close)
-        return self.world.start([FINGERTIP, "grasp", "--gripper", self.model, "--gripper-port", f"{self.folder}/gripper", *arguments],
-                                env=self.environment, stdout=self.out, stderr=self.err, **how)
+        return self.world.start(
+            [FINGERTIP, "grasp", "--gripper", self.model, "--gripper-port", f"{self.folder}/gripper", *arguments],
+            env=self.environment,
+            stdout=self.out,
+            stderr=self.err,
+            **how,
+        )
 
     def said(self):
         return "".join(pathlib.Path(f"{self.folder}/{name}").read_text(encoding="utf-8") for name in ("out", "err"))
@@ -124,6 +153,7 @@ class CellTest(unittest.TestCase):
         def are_said():
             done = process.poll() is not None
             return words in self.said() or (done and self.fail(f"ended without {words!r}: {self.said()}"))
+
         self.wait_for(are_said, f"{words!r} was never said: {self.said()}")
 
 
@@ -133,6 +163,7 @@ class Programs(CellTest):
             status, out, err = self.world.run([FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--cache", TABLES, *arguments])
             self.assertNotEqual(status, 0)
             return err + out
+
         self.assertIn("is no disturbance; give pour:", run("--then", "earthquake:9"))
         self.assertIn("is no disturbance", run("--then", "slick:1.2"))
         self.assertIn("2f85 opens to 85.0 mm", run("--width", "84"))
@@ -184,7 +215,7 @@ class Course(CellTest):
             self.assertEqual(process.wait(), DONE, self.said())
         truth, events = self.truth()
         order = [text.split()[0] for _, text in events]
-        self.assertEqual(order[order.index("slick"):][:3], ["slick", "slip", "caught"])
+        self.assertEqual(order[order.index("slick") :][:3], ["slick", "slip", "caught"])
         self.assertEqual(truth["dropped"].max(), 0)
         cap_N = 20
         self.assertLess(truth["peak_N"].max(), OVER_CAP * cap_N)
@@ -253,6 +284,7 @@ class Again(CellTest):
                 self.world.sleep(2)
                 os.kill(each.pid, signal.SIGSTOP)
                 threading.Timer(STOPS_s, os.kill, (each.pid, signal.SIGCONT)).start()
+
         self.assertTrue(first == self.grasp(stop), "it matters how long a process is stopped")
 
 
@@ -263,7 +295,20 @@ class Faults:
 
     CAP_N = 4.0
     # Of 50 g, which gives way by 0.2 mm a newton.
-    CUP = ("--mass", "0.05", "--stiffness", "5", "--crushes", str(OVER_CAP * CAP_N), "--friction", "0.6", "--lift-time", "0.3", "--opens", "2")
+    CUP = (
+        "--mass",
+        "0.05",
+        "--stiffness",
+        "5",
+        "--crushes",
+        str(OVER_CAP * CAP_N),
+        "--friction",
+        "0.6",
+        "--lift-time",
+        "0.3",
+        "--opens",
+        "2",
+    )
     RESTS_s = 0.6  # of the world, after what happened
 
     @contextlib.contextmanager

@@ -3,6 +3,7 @@ paper cup is crushed.
 
 usage: test_grasp_faults.py FINGERTIP_GRASP_FAULTS TABLES [unittest arguments]
 """
+
 import json
 import pathlib
 import subprocess

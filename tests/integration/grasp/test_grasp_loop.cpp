@@ -20,8 +20,7 @@ protected:
 
   test::Feel feel() {
     test::Feel feel;
-    feel.force_N =
-        static_cast<float>(std::max(0.0, STIFFNESS_N_mm * (object_mm_ - state_->width_mm()) / 2));
+    feel.force_N = static_cast<float>(std::max(0.0, STIFFNESS_N_mm * (object_mm_ - state_->width_mm()) / 2));
     feel.qy_N = load_N_;
     return feel;
   }
@@ -29,8 +28,8 @@ protected:
     return [state = state_] { return std::make_unique<test::FakeGripper>(state); };
   }
   void begin(GraspLoop::Options options = {}) {
-    loop_ = std::make_unique<GraspLoop>(
-        std::array<Way, 2>{Way{"", left_.link(), false}, Way{"", right_.link(), false}}, options);
+    loop_ = std::make_unique<GraspLoop>(std::array<Way, 2>{Way{"", left_.link(), false}, Way{"", right_.link(), false}},
+                                        options);
     const auto met = loop_->meet([] { return false; });
     EXPECT_EQ(met[0].packet.body.info.serial[0], 'A');
     EXPECT_EQ(met[1].packet.body.info.serial[0], 'B');
@@ -55,14 +54,11 @@ protected:
         }
       }
     }
-    ADD_FAILURE() << "waited too long in state " << int{last_.report.state} << ", trouble "
-                  << last_.report.trouble;
+    ADD_FAILURE() << "waited too long in state " << int{last_.report.state} << ", trouble " << last_.report.trouble;
     return false;
   }
   bool until_state(std::uint8_t state) {
-    return until([state](const GraspNews &news) {
-      return news.kind == Kind::step && news.report.state == state;
-    });
+    return until([state](const GraspNews &news) { return news.kind == Kind::step && news.report.state == state; });
   }
   bool until_trouble(std::uint32_t bit, bool on) {
     return until([bit, on](const GraspNews &news) {
@@ -110,9 +106,7 @@ TEST_F(GraspLoopTest, NothingMovesBeforeItIsRequestedThenTheObjectIsHeldAsItsLoa
   until([&](const GraspNews &) { return std::abs(force_N() - static_cast<float>(settings_.start_N)) < 0.4f; });
   load_N_ = 3.0f;
   const float needed_N = static_cast<float>(3.0 * settings_.margin / settings_.friction);
-  until([&](const GraspNews &news) {
-    return force_N() > 0.95f * needed_N && news.report.load_N > 2.7;
-  });
+  until([&](const GraspNews &news) { return force_N() > 0.95f * needed_N && news.report.load_N > 2.7; });
   EXPECT_LT(force_N(), 2.0f * needed_N);
   EXPECT_EQ(state_->activations, 0);
   end();
@@ -160,8 +154,7 @@ TEST_F(GraspLoopTest, FingertipsThatGoNeverOpenNorTightenItAndComeBack) {
   left_.plug_in();
   right_.plug_in();
   ASSERT_TRUE(until([](const GraspNews &news) {
-    return news.kind == Kind::step &&
-           (news.report.trouble & (GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE)) == 0;
+    return news.kind == Kind::step && (news.report.trouble & (GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE)) == 0;
   }));
   EXPECT_TRUE(last_.report.state == GRIP_HOLDING || last_.report.state == GRIP_SLIPPING);
   end();
@@ -183,14 +176,12 @@ TEST_F(GraspLoopTest, ASilentGripperIsToldAndTakenUpAgain) {
   begin();
   ASSERT_TRUE(grasp());
   state_->silent = true;
-  ASSERT_TRUE(until([](const GraspNews &news) {
-    return news.kind == Kind::gripper && news.text == "fake: no answer";
-  }));
+  ASSERT_TRUE(
+      until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text == "fake: no answer"; }));
   ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, true));
   EXPECT_EQ(last_.command.motion, GRIP_STAY);
   state_->silent = false;
-  ASSERT_TRUE(
-      until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text.empty(); }));
+  ASSERT_TRUE(until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text.empty(); }));
   ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, false));
   EXPECT_EQ(last_.report.state, GRIP_HOLDING);
   end();

@@ -2,6 +2,7 @@
 
 usage: test_grasp_realtime.py FINGERTIP FINGERTIP_SIMULATE TABLES [unittest arguments]
 """
+
 # real time: the tool as people run it, its clock, threads and serial ports, and a process that the kernel stops.
 import faulthandler
 import os
@@ -30,16 +31,23 @@ class Stopped(unittest.TestCase):
         self.folder = folder.name
         self.csv = f"{self.folder}/grasp.csv"
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("LC_")}
-        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right"}
+        self.environment |= {
+            "LC_ALL": "C.UTF-8",
+            "XDG_RUNTIME_DIR": self.folder,
+            "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right",
+        }
         faulthandler.dump_traceback_later(PATIENCE_s, exit=True)
         self.addCleanup(faulthandler.cancel_dump_traceback_later)
 
     def start(self, *arguments):
-        process = subprocess.Popen(arguments, env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            arguments, env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
 
         def end():
             process.kill()
             process.communicate()
+
         self.addCleanup(end)
         return process
 
@@ -52,7 +60,9 @@ class Stopped(unittest.TestCase):
         return lines[-1]
 
     def test_the_tool_and_then_the_cell(self):
-        cell = self.start(FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES)  # which stands on the table
+        cell = self.start(
+            FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES
+        )  # which stands on the table
         self.until(cell, "ready: ")
         tool = self.start(FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", f"{self.folder}/gripper", "-o", self.csv, *HELD_UP)
         self.until(tool, " s  holding ")

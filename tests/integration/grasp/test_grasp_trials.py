@@ -2,6 +2,7 @@
 
 usage: test_grasp_trials.py FINGERTIP_GRASP_TRIALS TABLES [unittest arguments]
 """
+
 import json
 import subprocess
 import sys
@@ -49,8 +50,10 @@ class GraspTrials(unittest.TestCase):
         self.assertNotIn("drops_percent", found)
 
     def test_what_the_grippers_steps_allow_is_better_than_ours(self):
-        rms = {mode: trials("--mode", mode, "--count", "24", "--gripper", "2f85", "--seed", "3")["by_set"]["8 N and more"]["rms_p50_percent"]
-               for mode in ("still", "still-oracle")}
+        rms = {
+            mode: trials("--mode", mode, "--count", "24", "--gripper", "2f85", "--seed", "3")["by_set"]["8 N and more"]["rms_p50_percent"]
+            for mode in ("still", "still-oracle")
+        }
         self.assertLess(rms["still-oracle"], 0.8 * rms["still"])
 
     def test_a_trace_has_a_value_for_each_moment(self):
@@ -60,8 +63,18 @@ class GraspTrials(unittest.TestCase):
         self.assertGreater(lengths.pop(), 500)
 
     def test_wrong_usage_is_one_line(self):
-        for options in (("--count", "0"), ("--gripper", "banana"), ("--objects", "bananas"), ("--mode", "firm"), ("--rate", "x"), ("--rate", "0"), ("--set", "grip=1"),
-                        ("--set", "fixed"), ("--jobs", "0"), ("--what", "1")):
+        for options in (
+            ("--count", "0"),
+            ("--gripper", "banana"),
+            ("--objects", "bananas"),
+            ("--mode", "firm"),
+            ("--rate", "x"),
+            ("--rate", "0"),
+            ("--set", "grip=1"),
+            ("--set", "fixed"),
+            ("--jobs", "0"),
+            ("--what", "1"),
+        ):
             done = run(*options)
             self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), options)
 

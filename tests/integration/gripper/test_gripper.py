@@ -2,6 +2,7 @@
 
 usage: test_gripper.py FINGERTIP GRIPPER TIME_KEEPER [unittest's]
 """
+
 import contextlib
 import os
 import pathlib
@@ -47,7 +48,9 @@ class Tool(unittest.TestCase):
                 options = ("--model", model, "--port", port)
                 self.assertRegex(self.tool("info", *options), r"(?m)^active +no$")
                 self.assertIn("is not active", self.tool("open", *options, expect=1))
-                self.assertRegex(self.tool("open", "--activate", *options), r"^activated at [\d.]+ mm\nstands at [\d.]+ mm, without an object\n$")
+                self.assertRegex(
+                    self.tool("open", "--activate", *options), r"^activated at [\d.]+ mm\nstands at [\d.]+ mm, without an object\n$"
+                )
                 said = re.fullmatch(r"holds an object at ([\d.]+) mm, asked for 0.0 mm\n", self.tool("close", *options))
                 self.assertTrue(said)
                 self.assertLess(float(said[1]), 30)
@@ -74,9 +77,13 @@ class Tool(unittest.TestCase):
 
     def test_what_is_wrong_is_said(self):
         usual = ("--model", "2f85")
-        for fault, said in (("silent", "no answer from slave 9 within 50 ms; is it powered"), ("garbage", "look for a second program"),
-                            ("damaged", "an answer is damaged \\(CRC\\)"), ("other_slave", "another slave answers"),
-                            ("refused", "refused with Modbus exception 1")):
+        for fault, said in (
+            ("silent", "no answer from slave 9 within 50 ms; is it powered"),
+            ("garbage", "look for a second program"),
+            ("damaged", "an answer is damaged \\(CRC\\)"),
+            ("other_slave", "another slave answers"),
+            ("refused", "refused with Modbus exception 1"),
+        ):
             with self.subTest(fault), self.simulated("--model", "2f85", "--line", fault) as port:
                 self.assertRegex(self.tool("info", *usual, "--port", port, expect=1), said)
         with self.simulated("--model", "2f85", "--fault", "14") as port:
@@ -84,18 +91,22 @@ class Tool(unittest.TestCase):
 
     def test_usage(self):
         for arguments, said in (
-                (("fold",), 'there is no "fold"'),
-                (("open",), "--model is missing"),
-                (("move", "--model", "2f85"), "WIDTH is missing"),
-                (("open", "3", "--model", "2f85"), "only move takes a WIDTH"),
-                (("open", "--model", "3f"), "there are 2f85, 2f140, hande, sts3215"),
-                (("open", "--model", "2f85", "--port", "x", "--slave", "300"), "a slave is a number from 1 to 247"),
-                (("open", "--model", "2f85", "--port", "x", "--closed", "2"), "grows while it closes")):
+            (("fold",), 'there is no "fold"'),
+            (("open",), "--model is missing"),
+            (("move", "--model", "2f85"), "WIDTH is missing"),
+            (("open", "3", "--model", "2f85"), "only move takes a WIDTH"),
+            (("open", "--model", "3f"), "there are 2f85, 2f140, hande, sts3215"),
+            (("open", "--model", "2f85", "--port", "x", "--slave", "300"), "a slave is a number from 1 to 247"),
+            (("open", "--model", "2f85", "--port", "x", "--closed", "2"), "grows while it closes"),
+        ):
             self.assertIn(said, self.tool(*arguments, expect=2))
         self.assertIn("no such port; plug its adapter in", self.tool("open", "--model", "2f85", "--port", "/dev/none", expect=1))
         with self.simulated("--model", "2f85") as port:
-            for arguments, said in ((("move", "90"), "WIDTH goes from 0 to 85 mm"), (("open", "--speed", "1"), "--speed goes from 20 to 150 mm/s"),
-                                    (("open", "--force", "300"), "--force goes from 20 to 235 N")):
+            for arguments, said in (
+                (("move", "90"), "WIDTH goes from 0 to 85 mm"),
+                (("open", "--speed", "1"), "--speed goes from 20 to 150 mm/s"),
+                (("open", "--force", "300"), "--force goes from 20 to 235 N"),
+            ):
                 self.assertIn(said, self.tool(*arguments, "--model", "2f85", "--port", port, expect=2))
 
 

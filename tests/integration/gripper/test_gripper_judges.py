@@ -4,6 +4,7 @@ grippers, pymodbus is their client and our tool's server.
 
 usage: test_gripper_judges.py FINGERTIP CELL_GRIPPER [unittest's]
 """
+
 # real time: these programs wait by clocks of their own, and open a serial port, which here is a pseudo-terminal.
 import asyncio
 import contextlib
@@ -77,8 +78,10 @@ class Robotiq(unittest.TestCase):
             self.assertEqual(client.read_input_registers(2000, count=3, device_id=9).registers, expected)
             self.assertEqual(client.read_holding_registers(2000, count=3, device_id=9).registers, expected)
             self.assertFalse(client.write_registers(1001, [0x55, 0], device_id=9).isError())
-            self.assertEqual(client.readwrite_registers(read_address=2000, read_count=3, write_address=1001, values=[0x66, 0],
-                                                        device_id=9).registers, [0, 0x66, 3 << 8])
+            self.assertEqual(
+                client.readwrite_registers(read_address=2000, read_count=3, write_address=1001, values=[0x66, 0], device_id=9).registers,
+                [0, 0x66, 3 << 8],
+            )
             client.close()
 
     def test_pymodbus_serves_our_tool(self):
@@ -169,7 +172,8 @@ class PymodbusServer:
     def trace(self, sending, pdu):
         if not sending:
             address, values = {16: lambda: (pdu.address, pdu.registers), 23: lambda: (pdu.write_address, pdu.write_registers)}.get(
-                pdu.function_code, lambda: (0, []))()
+                pdu.function_code, lambda: (0, [])
+            )()
             self.told.update(enumerate(values, address))
         return pdu
 
@@ -177,8 +181,10 @@ class PymodbusServer:
         return [self.told.get(at, 0) for at in range(address, address + count)]
 
     async def serve(self, ready):
-        device = SimDevice(9, [SimData(1000, values=[0, 0, 0], datatype=DataType.REGISTERS),
-                               SimData(2000, values=self.status, datatype=DataType.REGISTERS)])
+        device = SimDevice(
+            9,
+            [SimData(1000, values=[0, 0, 0], datatype=DataType.REGISTERS), SimData(2000, values=self.status, datatype=DataType.REGISTERS)],
+        )
         self.server = ModbusSerialServer(device, framer=FramerType.RTU, port=self.port, baudrate=115200, trace_pdu=self.trace)
         self.loop = asyncio.get_running_loop()
         await self.server.serve_forever(background=True)

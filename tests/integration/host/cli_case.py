@@ -1,4 +1,5 @@
 """What the tests of the fingertip command share, on simulated time; they are called with FINGERTIP, FAKE_DEVICE and TIME_KEEPER first."""
+
 import contextlib
 import os
 import pathlib
@@ -57,8 +58,10 @@ class CliTest(unittest.TestCase):
         self.assertTrue(err.startswith("fingertip: "), err)
         return err
 
-    RULE = "permission denied; install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, " \
-           "then sudo udevadm control --reload, and plug it in again"
+    RULE = (
+        "permission denied; install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, "
+        "then sudo udevadm control --reload, and plug it in again"
+    )
 
     def other_user(self):
         """The tool where every user may run it, and what makes it run as one who owns nothing, if this one is root."""

@@ -1,5 +1,6 @@
 """Calibrating, from the twin's scenario to what the fingertip keeps: usage
 test_calibrate.py FINGERTIP FAKE_DEVICE TIME_KEEPER TWIN PLAYER TABLES [unittest arguments]."""
+
 import os
 import pathlib
 import re
@@ -31,8 +32,11 @@ def setUpModule():
 def make_recording(name, kind, *options, raw=True, rate="40"):
     scenario, played = (os.path.join(folder.name, name + end) for end in (".csv", ".recording.csv"))
     subprocess.run([TWIN, "scenario", kind, *options, "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
-    subprocess.run([PLAYER, "play", scenario, "-o", played, "--quiet", "--rate", rate, *(["--raw"] if raw else [])],
-                   check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [PLAYER, "play", scenario, "-o", played, "--quiet", "--rate", rate, *(["--raw"] if raw else [])],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return played, scenario
 
 
@@ -124,10 +128,11 @@ class FromRecording(CalibrateTest):
 
     def test_refuses_with_the_reason(self):
         for name, options, reason in (
-                ("weights", ("placements", "--gain", "10", "--force", "2.5,3.5"), "use one and the same weight"),
-                ("cube", ("placements", "--indenter", "cube6", "--force", "12", "--layer", "12", "--seconds", "30"), "too few placements"),
-                ("hand", ("pokes", "--gain", "10"), "no placement was found"),
-                ("middle", ("placements", "--margin", "0", "--seconds", "100"), "are only known to 1.")):
+            ("weights", ("placements", "--gain", "10", "--force", "2.5,3.5"), "use one and the same weight"),
+            ("cube", ("placements", "--indenter", "cube6", "--force", "12", "--layer", "12", "--seconds", "30"), "too few placements"),
+            ("hand", ("pokes", "--gain", "10"), "no placement was found"),
+            ("middle", ("placements", "--margin", "0", "--seconds", "100"), "are only known to 1."),
+        ):
             with self.subTest(name):
                 played, _ = make_recording(name, *options)
                 _, err = self.calibrate("--from", played, "--dry-run", status=1)
@@ -160,10 +165,11 @@ class Live(CalibrateTest):
 
     def test_what_cannot_be_calibrated_is_told(self):
         for options, reason in (
-                (("capabilities=3",), "sends no pressures; flash one of scene grasp"),
-                (("capabilities=4",), "computes no locations"),
-                (("absent=3",), "sensors do not answer: 3; mend their wiring"),
-                (("version=3",), "version")):
+            (("capabilities=3",), "sends no pressures; flash one of scene grasp"),
+            (("capabilities=4",), "computes no locations"),
+            (("absent=3",), "sensors do not answer: 3; mend their wiring"),
+            (("version=3",), "version"),
+        ):
             with self.subTest(reason), self.device(*options):
                 _, err = self.calibrate("--port", self.port, "--yes", status=1)
                 self.assertIn(reason, err)
@@ -188,7 +194,9 @@ class Live(CalibrateTest):
     def test_on_a_terminal_draws_the_pad_and_asks(self):
         for answer, written in ((b"n\n", False), (b"y\n", True)):
             with self.subTest(answer), self.device(f"play={recording}"):
-                with Terminal(self.world, [cli_case.FINGERTIP, "calibrate", "--port", self.port], {**self.environment, "TERM": "xterm-256color"}) as terminal:
+                with Terminal(
+                    self.world, [cli_case.FINGERTIP, "calibrate", "--port", self.port], {**self.environment, "TERM": "xterm-256color"}
+                ) as terminal:
                     self.world.until(lambda: (terminal.look(), b"[y/N]" in terminal.output)[1])
                     terminal.type(answer)
                     status, shown = terminal.wait(), terminal.output
@@ -196,16 +204,20 @@ class Live(CalibrateTest):
                 self.assertIn("●", text)
                 self.assertIn("○", text)
                 self.assertGreater(text.rfind("\x1b[?1049l"), text.rfind("\x1b[?1049h"))
-                self.assert_gains(text[text.rfind("\x1b[?1049l"):].replace("\r", ""))
+                self.assert_gains(text[text.rfind("\x1b[?1049l") :].replace("\r", ""))
                 self.assertEqual(status, 0 if written else 1)
                 self.assertEqual(self.calibrate("--show", "--port", self.port)[0].startswith("calibrated 20"), written)
 
 
 class Usage(CalibrateTest):
     def test_wrong_words(self):
-        for arguments, reason in ((("--dry-run",), "--dry-run goes with --from"), (("--weight", "x"), "10.2 to 5099"),
-                                  (("--force", "0"), "0.1 to 50"), (("--force", "3", "--weight", "300"), "excludes"),
-                                  (("--show", "--erase"), "excludes")):
+        for arguments, reason in (
+            (("--dry-run",), "--dry-run goes with --from"),
+            (("--weight", "x"), "10.2 to 5099"),
+            (("--force", "0"), "0.1 to 50"),
+            (("--force", "3", "--weight", "300"), "excludes"),
+            (("--show", "--erase"), "excludes"),
+        ):
             self.assertIn(reason, self.error("calibrate", *arguments, status=2))
         self.assertIn("absent.csv", self.error("calibrate", "--from", os.path.join(self.folder, "absent.csv"), "--dry-run"))
 

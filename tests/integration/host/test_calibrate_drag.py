@@ -1,5 +1,6 @@
 """The tangential force's scale, from the twin's drags to what the fingertip keeps: usage
 test_calibrate_drag.py FINGERTIP FAKE_DEVICE TIME_KEEPER TWIN PLAYER TABLES [unittest arguments]."""
+
 import os
 import pathlib
 import re
@@ -32,8 +33,11 @@ def setUpModule():
 
 def make_recording(name, *options, pad=("--pad", "12"), kind="drag", force_N=FORCE_N, seconds=100):
     scenario, played = (os.path.join(folder.name, name + end) for end in (".csv", ".recording.csv"))
-    subprocess.run([TWIN, "scenario", kind, "--force", str(force_N), "--seconds", str(seconds), *options, "-o", scenario, "--cache", TABLES],
-                   check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [TWIN, "scenario", kind, "--force", str(force_N), "--seconds", str(seconds), *options, "-o", scenario, "--cache", TABLES],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     subprocess.run([PLAYER, "play", scenario, "-o", played, "--quiet", "--rate", "50", *pad], check=True, stdout=subprocess.DEVNULL)
     return played, scenario
 
@@ -72,8 +76,11 @@ class DragTest(cli_case.CliTest):
 
 class FromRecording(DragTest):
     def test_finds_the_scale_within_its_sd(self):
-        for name, thickness, *options in (("equal gains", "12", "--gain", "0", "--seed", "32"), ("unequal gains", "12", "--gain", "2", "--seed", "33"),
-                                          ("another thickness than it is told", "11", "--gain", "2", "--seed", "34")):
+        for name, thickness, *options in (
+            ("equal gains", "12", "--gain", "0", "--seed", "32"),
+            ("unequal gains", "12", "--gain", "2", "--seed", "33"),
+            ("another thickness than it is told", "11", "--gain", "2", "--seed", "34"),
+        ):
             with self.subTest(name):
                 played, scenario = make_recording(name, *options, pad=("--pad", thickness))
                 out, err = self.calibrate("--from", played, "--dry-run")
@@ -87,7 +94,9 @@ class FromRecording(DragTest):
         twice, _ = self.scale(self.calibrate("--from", recording, "--dry-run", pull=("--force", str(2 * PULL_N)))[0])
         self.assertAlmostEqual(twice, 2 * scale, delta=0.005)
         grams = f"{PULL_N / 9.80665e-3:.3f}"
-        self.assertAlmostEqual(self.scale(self.calibrate("--from", recording, "--dry-run", pull=("--weight", grams))[0])[0], scale, delta=0.002)
+        self.assertAlmostEqual(
+            self.scale(self.calibrate("--from", recording, "--dry-run", pull=("--weight", grams))[0])[0], scale, delta=0.002
+        )
         self.assertIn("the readings are not those of 3.80 N", self.refused(recording, pull=("--force", "3.8")))
 
     def test_writes_the_scale_and_nothing_else_of_the_pad(self):
@@ -106,9 +115,12 @@ class FromRecording(DragTest):
             self.assertEqual(others(after), others(before))
 
     def test_only_into_the_fingertip_and_the_pad_that_it_is_of(self):
-        for options, thickness, reason in (((f"serial={serial}", GRASP), "15", "is of a pad of 12 mm"), ((GRASP,), "12", "is of fingertip"),
-                                           ((f"serial={serial}", GRASP), None, "no pad profile; fingertip pad --thickness MM first"),
-                                           ((f"serial={serial}", SLIP), None, "reports no tangential load; flash one of scene grasp")):
+        for options, thickness, reason in (
+            ((f"serial={serial}", GRASP), "15", "is of a pad of 12 mm"),
+            ((GRASP,), "12", "is of fingertip"),
+            ((f"serial={serial}", GRASP), None, "no pad profile; fingertip pad --thickness MM first"),
+            ((f"serial={serial}", SLIP), None, "reports no tangential load; flash one of scene grasp"),
+        ):
             with self.subTest(reason), self.device(*options):
                 if thickness:
                     self.run_cli("pad", "--thickness", thickness, "--port", self.port)
@@ -140,7 +152,9 @@ class FromRecording(DragTest):
 
     def test_refuses_with_the_reason(self):
         weak, _ = make_recording("weak", "--gain", "10", "--seed", "2", "--tangential", "0.05")
-        self.assertRegex(self.refused(weak, pull=("--force", "0.15")), r"0\.15 N is small beside .* possible error there, 0\.\d\d N: pull harder")
+        self.assertRegex(
+            self.refused(weak, pull=("--force", "0.15")), r"0\.15 N is small beside .* possible error there, 0\.\d\d N: pull harder"
+        )
         one_way, _ = make_recording("one way", "--gain", "0", "--tangential", f"{SHARE},0")
         self.assertIn("0 of 3 pulls along y; pull more", self.refused(one_way))
         weights, _ = make_recording("weights", "--gain", "0", "--tangential", "0.15..0.45")
@@ -157,8 +171,14 @@ class Live(DragTest):
         with self.device(f"play={recording}", GRASP, "pad=1"):
             out, err = self.calibrate("--port", self.port, "--yes")
             self.assertEqual(err, "")
-            for advice in ("set the object down, its string slack\n", "release it, and leave it alone\n", "pull: hang the weight on its string\n",
-                           "hold on\n", "taken: take it off the pad\n", "; 7 of 8 pulls\n"):
+            for advice in (
+                "set the object down, its string slack\n",
+                "release it, and leave it alone\n",
+                "pull: hang the weight on its string\n",
+                "hold on\n",
+                "taken: take it off the pad\n",
+                "; 7 of 8 pulls\n",
+            ):
                 self.assertIn(advice, out)
             self.assertNotIn("\x1b", out)
             self.assertIn("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n", out)
@@ -174,7 +194,11 @@ class Live(DragTest):
             self.assertNotIn("do this again", out)
 
     def test_what_cannot_be_calibrated_is_told(self):
-        for options, reason in (((SLIP,), "reports no tangential load"), ((GRASP,), "no pad profile"), ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3")):
+        for options, reason in (
+            ((SLIP,), "reports no tangential load"),
+            ((GRASP,), "no pad profile"),
+            ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3"),
+        ):
             with self.subTest(reason), self.device(*options):
                 _, err = self.calibrate("--port", self.port, "--yes", status=1)
                 self.assertIn(reason, err)

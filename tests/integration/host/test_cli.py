@@ -1,4 +1,5 @@
 """The fingertip command against a fake device: usage test_cli.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import json
 import os
 import pathlib
@@ -28,8 +29,33 @@ class Usage(CliTest):
     def test_help_and_version(self):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
-        self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "simulate", "validate", "web", "flash", "rule", "loader"]))
+        self.assertEqual(
+            sorted(commands),
+            sorted(
+                [
+                    "list",
+                    "info",
+                    "doctor",
+                    "monitor",
+                    "record",
+                    "replay",
+                    "convert",
+                    "grasp",
+                    "gripper",
+                    "tare",
+                    "calibrate",
+                    "pad",
+                    "set",
+                    "serve",
+                    "simulate",
+                    "validate",
+                    "web",
+                    "flash",
+                    "rule",
+                    "loader",
+                ]
+            ),
+        )
         for command in set(commands) - {"simulate"}:  # whose program is another: test_simulate.py
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
 
@@ -37,7 +63,11 @@ class Usage(CliTest):
         self.assertIn("see fingertip --help", self.error(status=2))
         self.assertIn("see fingertip record --help", self.error("record", status=2))
         self.error("monitor", "--bogus", status=2)
-        for words, problem in (([], "a command is missing"), (["touched"], '"touched" is no command'), (["touched", "--port", "x"], "is no command")):
+        for words, problem in (
+            ([], "a command is missing"),
+            (["touched"], '"touched" is no command'),
+            (["touched", "--port", "x"], "is no command"),
+        ):
             self.assertRegex(self.error(*words, status=2), f"{problem}; give one of list, info, doctor, monitor, .*; see fingertip --help")
         for word, meant in (("recrod", "record"), ("moniter", "monitor"), ("inf", "info"), ("gripper1", "gripper"), ("seet", "set")):
             self.assertEqual(self.error(word, status=2), f'fingertip: "{word}" is no command; is {meant} meant? see fingertip --help\n')
@@ -47,14 +77,17 @@ class Usage(CliTest):
             self.assertIn("give a number from 0.001", self.error("record", self.csv, f"--seconds={value}", status=2))
         for value in ("pink", "0"):
             err = self.error("monitor", "--colour", value, status=2)
-            self.assertEqual(err, f'fingertip: --colour "{value}" is not possible; give auto, truecolour, 256 or plain; '
-                                  "see fingertip monitor --help\n")
+            self.assertEqual(
+                err, f'fingertip: --colour "{value}" is not possible; give auto, truecolour, 256 or plain; see fingertip monitor --help\n'
+            )
         for value in ("abc", "0", "nan", "-1", "1001"):
             self.assertIn("give 0.01 to 1000, or max", self.error("replay", self.csv, "--speed", value, status=2))
 
     def test_what_the_parser_says_is_for_people(self):
-        self.assertEqual(self.error("info", "--port", "a", "--port", "b", status=2),
-                         "fingertip: --port is given twice; give it once; see fingertip info --help\n")
+        self.assertEqual(
+            self.error("info", "--port", "a", "--port", "b", status=2),
+            "fingertip: --port is given twice; give it once; see fingertip info --help\n",
+        )
         self.assertEqual(self.error("list", "--port", "a", status=2), 'fingertip: "--port" is no option of it; see fingertip list --help\n')
         self.assertEqual(self.error("list", "a", "b", status=2), 'fingertip: "a" is one word too many; see fingertip list --help\n')
         self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|FILE.mcap|- is missing; see fingertip record --help\n")
@@ -64,8 +97,10 @@ class Usage(CliTest):
             with open("/dev/full", "w") as full:
                 process = self.start(*words, stdout=full)
                 _, err = process.communicate()
-            self.assertEqual((process.returncode, err), (
-                1, "fingertip: cannot write to standard output: No space left on device; choose another place\n"))
+            self.assertEqual(
+                (process.returncode, err),
+                (1, "fingertip: cannot write to standard output: No space left on device; choose another place\n"),
+            )
 
     def test_help_fits_into_80_columns(self):
         pages = {(): self.run_cli("--help")[0]}
@@ -81,14 +116,18 @@ class Usage(CliTest):
 
     def test_the_help_of_grasp_knows_what_its_errors_know(self):
         page = " ".join(self.run_cli("grasp", "--help")[0].split())
-        sections = page[page.index(" Limits: "):page.index(" Keys, ")].split(" --")[1:]
-        limits = [each.groups() for each in (re.fullmatch(r"([\w-]+) .*: ([0-9.]+ to [0-9.]+)(?:; default .*)?", section) for section in sections) if each]
+        sections = page[page.index(" Limits: ") : page.index(" Keys, ")].split(" --")[1:]
+        limits = [
+            each.groups()
+            for each in (re.fullmatch(r"([\w-]+) .*: ([0-9.]+ to [0-9.]+)(?:; default .*)?", section) for section in sections)
+            if each
+        ]
         self.assertGreater(len(limits), 20)
         for option, most in limits:
             self.assertIn(f"{most}; see fingertip grasp --help", self.error("grasp", f"--{option}=-1", status=2), option)
         self.assertIn("Speed of opening: 0.5 to 100; default 10 ", page)
         for key in ("q end", "o open", "h hold", "g grasp"):
-            self.assertIn(key, page[page.index(" Keys, "):page.index(" Exit status: ")])
+            self.assertIn(key, page[page.index(" Keys, ") : page.index(" Exit status: ")])
 
     def test_names_cannot_speak_to_the_terminal(self):
         name = self.folder + "/\x1b[31m\n.csv"
@@ -103,17 +142,23 @@ class Usage(CliTest):
         self.environment["FINGERTIP_PORT"] = "/tmp/a:/tmp/b"
         self.assertIn("several fingertips found", self.error("info"))
         self.environment["FINGERTIP_PORT"] = self.port + ":" + self.folder
-        self.assertRegex(self.run_cli("list")[0],
-                         f"-\t-\t-\tport {self.port} \\(.*no such port; plug .*\\)\n-\t-\t-\tport {self.folder} \\(.*\\)\n")
+        self.assertRegex(
+            self.run_cli("list")[0], f"-\t-\t-\tport {self.port} \\(.*no such port; plug .*\\)\n-\t-\t-\tport {self.folder} \\(.*\\)\n"
+        )
         self.assertIn("no fingertip 1234 here", self.error("info", "--device", "1234"))
         self.assertIn("choose the fingertip with --device", self.error("info", "--port", self.port, "--transport", "usb"))
         self.assertIn("give auto, socket, serial or usb", self.error("info", "--transport", "bluetooth", status=2))
 
     def test_ranges_are_found_before_a_port_is_opened(self):
-        for setting, allowed in [("rate=0", "0.1 to 2000 Hz, or max"), ("rate=x", "0.1 to 2000 Hz, or max"),
-                                 ("osr=1000", "256, 512, 1024, 2048, 4096 or 8192"),
-                                 ("slip_threshold=0", "0.01 to 50 mm"), ("slip_window=1001", "5 to 1000 ms"),
-                                 ("colour=red", "rate=HZ|max"), ("rate", "0.1 to 2000 Hz")]:
+        for setting, allowed in [
+            ("rate=0", "0.1 to 2000 Hz, or max"),
+            ("rate=x", "0.1 to 2000 Hz, or max"),
+            ("osr=1000", "256, 512, 1024, 2048, 4096 or 8192"),
+            ("slip_threshold=0", "0.01 to 50 mm"),
+            ("slip_window=1001", "5 to 1000 ms"),
+            ("colour=red", "rate=HZ|max"),
+            ("rate", "0.1 to 2000 Hz"),
+        ]:
             self.assertIn(allowed, self.error("set", "--port", self.port, setting, status=2))
 
 
@@ -127,8 +172,9 @@ class Several(CliTest):
 
     def test_list_shows_each_and_what_is_in_use(self):
         with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
-            self.assertEqual(self.run_cli("list")[0], f"AAAA\tpico_mux\t1.20.3\tport {self.port}\n"
-                                                      f"BBBB\tpico_mux\t1.20.3\tport {self.other}\n")
+            self.assertEqual(
+                self.run_cli("list")[0], f"AAAA\tpico_mux\t1.20.3\tport {self.port}\nBBBB\tpico_mux\t1.20.3\tport {self.other}\n"
+            )
             process = self.start("record", self.csv, "--device", "AAAA")
             self.world.until(lambda: os.path.exists(self.csv))
             first, second = self.run_cli("list")[0].splitlines()
@@ -143,11 +189,15 @@ class Several(CliTest):
                 out = self.run_cli("info", "--device", serial)[0]
                 self.assertRegex(out, f"(?m)^port +{port}$")
                 self.assertRegex(out, f"(?m)^serial +{serial.upper()}$")
-            self.assertEqual(self.error("info", "--device", "CCCC"), "fingertip: no fingertip CCCC here, there are: AAAA BBBB; plug it in, then see `fingertip list`\n")
-            self.assertEqual(self.error("info"), f"fingertip: several fingertips found: AAAA ({self.port}), BBBB ({self.other}); "
-                                                 "choose one with --device SERIAL\n")
+            self.assertEqual(
+                self.error("info", "--device", "CCCC"),
+                "fingertip: no fingertip CCCC here, there are: AAAA BBBB; plug it in, then see `fingertip list`\n",
+            )
+            self.assertEqual(
+                self.error("info"),
+                f"fingertip: several fingertips found: AAAA ({self.port}), BBBB ({self.other}); choose one with --device SERIAL\n",
+            )
             self.assertIn("is fingertip AAAA, not BBBB", self.error("info", "--port", self.port, "--device", "BBBB"))
-
 
     ALIGNMENT_SECONDS = int(os.environ.get("FINGERTIP_ALIGNMENT_SECONDS", "3"))
 
@@ -177,8 +227,10 @@ class Several(CliTest):
         zeros = [os.path.join(self.folder, name) for name in ("zero_a", "zero_b")]
         rates = (1 + 25e-6, 1 - 25e-6)
         life = f"life={self.ALIGNMENT_SECONDS + 60}"
-        with self.device("serial=AAAA", "clock_ppm=25", "started=1000", f"zero_log={zeros[0]}", life), \
-                self.device("serial=BBBB", "clock_ppm=-25", "started=7", f"zero_log={zeros[1]}", life, port=self.other):
+        with (
+            self.device("serial=AAAA", "clock_ppm=25", "started=1000", f"zero_log={zeros[0]}", life),
+            self.device("serial=BBBB", "clock_ppm=-25", "started=7", f"zero_log={zeros[1]}", life, port=self.other),
+        ):
             self.run_cli("record", self.csv, "--all", "--seconds", str(self.ALIGNMENT_SECONDS))
         one, two = (files.read_recording(self.csv, serial=serial) for serial in ("AAAA", "bbbb"))
         host_zero_us = float(one.metadata["host_zero_us"])
@@ -209,7 +261,10 @@ class Several(CliTest):
         report(alignment_fake_devices_us=round(alignment_us, 1), alignment_fake_devices_seconds=self.ALIGNMENT_SECONDS)
         self.assert_in_order()
         # replay and conversion take one of them
-        self.assertIn("holds several fingertips: AAAA BBBB; choose one with --device SERIAL", self.run_cli("replay", self.csv, "--to-csv", self.csv + "2", status=1)[1])
+        self.assertIn(
+            "holds several fingertips: AAAA BBBB; choose one with --device SERIAL",
+            self.run_cli("replay", self.csv, "--to-csv", self.csv + "2", status=1)[1],
+        )
         self.assertIn("no fingertip CCCC in it", self.run_cli("replay", self.csv, "--device", "CCCC", status=1)[1])
         self.assertIn(f" {len(errors[1])} frames in", self.run_cli("replay", self.csv, "--device", "BBBB", "--speed", "max")[0])
         converted = os.path.join(self.folder, "c.csv")
@@ -263,8 +318,12 @@ class Several(CliTest):
                 if path == self.csv:
                     self.assertEqual(again.end["packets"], end[2])
                 self.assertIn(" 0 packets dropped", self.run_cli("replay", converted, "--speed", "max")[0])
-            drawn = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", serial, "-o",
-                                    os.path.join(self.folder, f"{serial}.png")], capture_output=True, text=True, check=True).stdout
+            drawn = subprocess.run(
+                [sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", serial, "-o", os.path.join(self.folder, f"{serial}.png")],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
             self.assertRegex(drawn, rf": {end[1]} frames in [\d.]+ s  ·  dropped packets: 0\n$")
 
     def test_errors_of_several(self):
@@ -292,9 +351,10 @@ class ErrorsPeopleMeet(CliTest):
             process = self.start("record", self.csv, "--port", self.port)
             self.world.until(lambda: os.path.exists(self.csv))
             for command in (["info"], ["monitor"], ["record", self.ftr]):
-                self.assertEqual(self.error(*command, "--port", self.port),
-                                 f"fingertip: {self.port}: in use by another program; end that one first "
-                                 "(`fingertip doctor` names it)\n")
+                self.assertEqual(
+                    self.error(*command, "--port", self.port),
+                    f"fingertip: {self.port}: in use by another program; end that one first (`fingertip doctor` names it)\n",
+                )
             process.send_signal(signal.SIGINT)
             process.communicate()
 
@@ -311,30 +371,41 @@ class ErrorsPeopleMeet(CliTest):
         with self.device("serial=AAAA"), self.device("serial=BBBB", port=other):
             self.environment["FINGERTIP_PORT"] = self.port + ":" + other
             for command in (["info"], ["monitor"], ["record", self.csv], ["tare"]):
-                self.assertEqual(self.error(*command), f"fingertip: several fingertips found: AAAA ({self.port}), BBBB ({other}); "
-                                                       "choose one with --device SERIAL\n")
+                self.assertEqual(
+                    self.error(*command),
+                    f"fingertip: several fingertips found: AAAA ({self.port}), BBBB ({other}); choose one with --device SERIAL\n",
+                )
 
     def test_wrong_device(self):
         with self.device("mute=1"):
             _, err = self.run_cli("info", "--port", self.port, status=1)
-            self.assertEqual(err, f'{self.port}: waiting for an answer\n'
-                                  f'fingertip: {self.port}: no answer to "info"; is it a fingertip? unplug it and plug it in again\n')
+            self.assertEqual(
+                err,
+                f"{self.port}: waiting for an answer\n"
+                f'fingertip: {self.port}: no answer to "info"; is it a fingertip? unplug it and plug it in again\n',
+            )
         with self.device("serial=AAAA"):
-            self.assertEqual(self.error("info", "--port", self.port, "--device", "BBBB"),
-                             f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n")
+            self.assertEqual(
+                self.error("info", "--port", self.port, "--device", "BBBB"),
+                f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n",
+            )
 
     def test_older_or_newer_protocol_version(self):
         for version in (1, 8, 10):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
-                    self.assertEqual(self.error(*command, "--port", self.port),
-                                     f"fingertip: {self.port}: speaks protocol version {version}, not 9; install "
-                                     "this tool's firmware with `fingertip flash`, or use the other's tool\n")
+                    self.assertEqual(
+                        self.error(*command, "--port", self.port),
+                        f"fingertip: {self.port}: speaks protocol version {version}, not 9; install "
+                        "this tool's firmware with `fingertip flash`, or use the other's tool\n",
+                    )
 
     def test_cable_pulled(self):
         with self.device("pulled=1"):
-            self.assertEqual(self.error("info", "--port", self.port),
-                             f'fingertip: {self.port}: vanished before it answered "info"; plug it in and try again\n')
+            self.assertEqual(
+                self.error("info", "--port", self.port),
+                f'fingertip: {self.port}: vanished before it answered "info"; plug it in and try again\n',
+            )
         for command, told in (["record", self.csv], "stderr"), (["monitor"], "stdout"), (["record", self.ftr, "--all"], "stderr"):
             self.environment["FINGERTIP_PORT"] = self.port
             with self.device() as device:
@@ -351,11 +422,17 @@ class ErrorsPeopleMeet(CliTest):
 
     def test_disk_full(self):
         with self.device():
-            for command in (["record", "/dev/full", "--overwrite"], ["record", self.csv, "--raw-bytes", "/dev/full", "--overwrite"],
-                            ["monitor", "--record", "/dev/full", "--overwrite"]):
+            for command in (
+                ["record", "/dev/full", "--overwrite"],
+                ["record", self.csv, "--raw-bytes", "/dev/full", "--overwrite"],
+                ["monitor", "--record", "/dev/full", "--overwrite"],
+            ):
                 err = self.run_cli(*command, "--port", self.port, status=1)[1]
-                self.assertRegex(err.splitlines()[-1], "^fingertip: /dev/full: No space left on device; .*make room and start a new file$|"
-                                                       "^fingertip: /dev/full: No space left on device; .*--salvage$")
+                self.assertRegex(
+                    err.splitlines()[-1],
+                    "^fingertip: /dev/full: No space left on device; .*make room and start a new file$|"
+                    "^fingertip: /dev/full: No space left on device; .*--salvage$",
+                )
 
 
 class Commands(CliTest):
@@ -366,7 +443,9 @@ class Commands(CliTest):
             self.assertRegex(out, r"(?m)^sensors_present +15 of 15$")
             self.assertRegex(out, r"(?m)^sensors_prom_bad +0 1 2 3$")
             self.assertRegex(out, r"(?m)^rate_mHz +20000$")
-            self.assertRegex(out, r"(?m)^its firmware is of version 1\.20\.3, this tool of version [0-9.]+; install this tool's with `fingertip flash`")
+            self.assertRegex(
+                out, r"(?m)^its firmware is of version 1\.20\.3, this tool of version [0-9.]+; install this tool's with `fingertip flash`"
+            )
             self.environment["FINGERTIP_PORT"] = self.port
             out = self.run_cli("set", "rate=max", "osr=256", "slip_threshold=0.5")[0]
             self.assertEqual(out, "rate=max osr=256 slip_threshold=0.5 slip_window=100 prior=3.1:0.5 limit=0.6\n")
@@ -467,7 +546,9 @@ class Commands(CliTest):
 
     def test_refusal(self):
         with self.device("refuse=1"):
-            self.assertIn("not tared, it reports a contact of 5.00 N; let go of the pad, or --force", self.error("tare", "--port", self.port))
+            self.assertIn(
+                "not tared, it reports a contact of 5.00 N; let go of the pad, or --force", self.error("tare", "--port", self.port)
+            )
             self.assertIn('refused "rate": not possible now', self.error("set", "rate=100", "--port", self.port))
 
     def test_no_answer_can_be_interrupted(self):
@@ -486,6 +567,7 @@ class Commands(CliTest):
             self.assertIn("in use by another program", self.error("info", "--port", self.port))
             process.send_signal(signal.SIGINT)
             process.communicate()
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[4:]])

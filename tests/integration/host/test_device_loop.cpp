@@ -17,8 +17,7 @@ namespace {
 /* Answers every command on a port; while it streams, ten frames a millisecond. */
 class Answering {
 public:
-  explicit Answering(bool refuses = false)
-      : refuses_(refuses), port_(""), thread_([this] { run(); }) {}
+  explicit Answering(bool refuses = false) : refuses_(refuses), port_(""), thread_([this] { run(); }) {}
   ~Answering() {
     ended_ = true;
     thread_.join();
@@ -47,8 +46,8 @@ private:
   }
   void obey(const wire_packet &command) {
     bool refused = refuses_ && command.type == WIRE_CMD_STREAM;
-    say(test::make_ack(0, 1, command.type, refused ? WIRE_RESULT_NOT_NOW : WIRE_RESULT_DONE,
-                       command.sequence, command.t_us));
+    say(test::make_ack(0, 1, command.type, refused ? WIRE_RESULT_NOT_NOW : WIRE_RESULT_DONE, command.sequence,
+                       command.t_us));
     if (command.type == WIRE_CMD_INFO) {
       say(test::make_info(0, 1));
     } else if (command.type == WIRE_CMD_HEALTH) {
@@ -147,8 +146,7 @@ TEST(DeviceLoop, AnErrorEndsItAndIsThrownToWhoAsks) {
   DeviceLoop loop(0, {"", fingertip.path(), false}, streaming(), feed);
   std::vector<Kind> kinds;
   auto patience = host_now() + std::chrono::seconds(20);
-  while ((kinds.empty() || kinds.back() != Kind::ended) &&
-         host_now() < patience) {
+  while ((kinds.empty() || kinds.back() != Kind::ended) && host_now() < patience) {
     for (const DeviceNews &news : feed.take(milliseconds(100))) {
       kinds.push_back(news.kind);
       if (news.kind == Kind::ready) {

@@ -1,4 +1,5 @@
 """`fingertip doctor` against a fake device: usage test_doctor.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import json
 import os
 import pathlib
@@ -32,7 +33,9 @@ class DoctorTest(CliTest):
 
     def examine(self, *arguments, tool=FINGERTIP, **options):
         """Exit status, output and errors."""
-        return self.world.run([tool, *self.ARGUMENTS, "--port", self.port, "--root", self.folder, *arguments], env=self.environment, **options)
+        return self.world.run(
+            [tool, *self.ARGUMENTS, "--port", self.port, "--root", self.folder, *arguments], env=self.environment, **options
+        )
 
     def findings(self, *arguments, **options):
         """[(verdict, check, text)] of the lines."""
@@ -100,7 +103,9 @@ class DoctorTest(CliTest):
         self.assertEqual(self.finding("restarts")[0], "warn")
         verdict, text = self.finding("crash")
         self.assertEqual(verdict, "bad")
-        self.assertRegex(text, "a hard fault at 0x20001000, .* fitting, .*; before that: command stream 1.50 s, started 4 min; r0 0x00000001")
+        self.assertRegex(
+            text, "a hard fault at 0x20001000, .* fitting, .*; before that: command stream 1.50 s, started 4 min; r0 0x00000001"
+        )
 
     def test_an_elf_file_that_is_none_is_an_error(self):
         self.plug_in()
@@ -115,8 +120,7 @@ class DoctorTest(CliTest):
         self.assertEqual((told["verdict"], told["board"], told["serial"]), ("bad", "pico_mux", "E660583883265A2C"))
         self.assertEqual(status, 1)
         missing = [finding for finding in told["findings"] if finding["check"] == "sensors" and finding["verdict"] == "bad"]
-        self.assertEqual([finding["sensors"] for finding in missing],
-                         [[{"sensor": 3, "strip": 0, "channel": 3, "multiplexer": 0x70}]])
+        self.assertEqual([finding["sensors"] for finding in missing], [[{"sensor": 3, "strip": 0, "channel": 3, "multiplexer": 0x70}]])
         self.assertEqual(len(told["measured"]["sensors"]), 15)
         self.assertAlmostEqual(told["measured"]["rate_Hz"], 200, delta=20)
         self.assertEqual(told["health"]["stack_free_bytes"], 18)

@@ -1,4 +1,5 @@
 """`fingertip flash` against a fake loader: usage test_flash.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import os
 import pathlib
 import subprocess
@@ -69,18 +70,23 @@ class Flash(CliTest):
         os.chmod(self.volume, 0o777)
         with self.device():
             err = self.without_permission("flash", self.image, "--volume", self.volume, status=0)
-        self.assertEqual(err, "writing 9.8.7 abcdef012345 for pico_mux\n"
-                              f"written, and it came back; its version was not read: {self.port}: {self.RULE}\n")
+        self.assertEqual(
+            err, f"writing 9.8.7 abcdef012345 for pico_mux\nwritten, and it came back; its version was not read: {self.port}: {self.RULE}\n"
+        )
         with open(os.path.join(self.volume, "fingertip.uf2"), "rb") as written, open(self.image, "rb") as image:
             self.assertEqual(written.read(), image.read())
 
     def test_another_version_came_back(self):
-        self.assertIn("came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL",
-                      self.flash(after=(), status=1)[1])
+        self.assertIn(
+            "came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL",
+            self.flash(after=(), status=1)[1],
+        )
 
     def test_another_board_is_refused_before_anything_happens(self):
-        self.assertIn("for board pico_mux, but fingertip E660583883265A2C is a pico_parallel; give fingertip-pico_parallel.uf2",
-                      self.flash("board=pico_parallel", status=1)[1])
+        self.assertIn(
+            "for board pico_mux, but fingertip E660583883265A2C is a pico_parallel; give fingertip-pico_parallel.uf2",
+            self.flash("board=pico_parallel", status=1)[1],
+        )
         self.assertFalse(os.path.exists(self.volume))
 
     def test_nothing_there_says_what_to_press(self):
@@ -91,9 +97,11 @@ class Flash(CliTest):
 
     def test_a_folder_that_is_no_boot_volume_is_refused_before_anything_happens(self):
         with self.device("loader=1") as device:
-            self.assertEqual(self.error("flash", self.image, "--volume", self.folder),
-                             f"fingertip: {self.folder}: no RP2040 boot volume (no INFO_UF2.TXT); "
-                             "leave out --volume, or give that of the drive RPI-RP2\n")
+            self.assertEqual(
+                self.error("flash", self.image, "--volume", self.folder),
+                f"fingertip: {self.folder}: no RP2040 boot volume (no INFO_UF2.TXT); "
+                "leave out --volume, or give that of the drive RPI-RP2\n",
+            )
             self.assertIsNone(device.poll())
         self.assertFalse(os.path.exists(os.path.join(self.folder, "fingertip.uf2")))
 
@@ -109,7 +117,7 @@ class Flash(CliTest):
 
         def with_word(block, word, value):
             at = 512 * block + 4 * word
-            return good[:at] + value.to_bytes(4, "little") + good[at + 4:]
+            return good[:at] + value.to_bytes(4, "little") + good[at + 4 :]
 
         refused("no UF2 file", b"")
         refused("no UF2 file", b"\x7fELF" + good)

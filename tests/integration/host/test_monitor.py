@@ -1,4 +1,5 @@
 """The live view on pseudo-terminals: usage test_monitor.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import contextlib
 import os
 import pathlib
@@ -45,7 +46,7 @@ class Monitor(CliTest):
         self.assertGreater(last_enter, -1)
         self.assertGreater(last_leave, last_enter)
         self.assertGreater(output.rfind("\x1b[?25h"), output.rfind("\x1b[?25l"))
-        self.assertNotIn("\x1b", output[last_leave + 8:])
+        self.assertNotIn("\x1b", output[last_leave + 8 :])
         self.assertRegex(output[last_leave:], r"\d+ frames in")
 
     def test_every_way_out_restores_the_terminal(self):
@@ -61,9 +62,29 @@ class Monitor(CliTest):
         for size in ((80, 24), (120, 40), (200, 60)):
             with self.device():
                 output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until=r"frames +\d\d", then=b"q", size=size)
-            for word in ("FINGERTIP", "E660583883265A2C", "pico_mux", "● live", "force      5.00 N", "CONTACT", "SLIP", "0.75 of 0.75 mm",
-                         "frames/s", "dropped", "CRC errors", "convert 2501", "no fit  13", "q quit  t tare", "tared", "kPa",
-                         "force  5 N┤", "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤", " 0 s"):
+            for word in (
+                "FINGERTIP",
+                "E660583883265A2C",
+                "pico_mux",
+                "● live",
+                "force      5.00 N",
+                "CONTACT",
+                "SLIP",
+                "0.75 of 0.75 mm",
+                "frames/s",
+                "dropped",
+                "CRC errors",
+                "convert 2501",
+                "no fit  13",
+                "q quit  t tare",
+                "tared",
+                "kPa",
+                "force  5 N┤",
+                "x    15 mm┤",
+                "y    24 mm┤",
+                "slip  1 mm┤",
+                " 0 s",
+            ):
                 self.assertIn(word, self.shown)
             for sensor in range(15):
                 self.assertRegex(self.shown, rf"[ ▀▄]{sensor}[ ?▀▄]")
@@ -71,20 +92,27 @@ class Monitor(CliTest):
 
     def test_other_sizes(self):
         with self.device():
-            self.on_terminal("monitor", "--port", self.port, until="window too small: 79x24, needs 80x24.*force +5.00", then=b"q", size=(79, 24))
+            self.on_terminal(
+                "monitor", "--port", self.port, until="window too small: 79x24, needs 80x24.*force +5.00", then=b"q", size=(79, 24)
+            )
 
     def test_without_colour(self):
         for environment in ((("NO_COLOR", "1"), *self.COLOURS), (("NO_COLOR", "yes"), ("TERM", "xterm-256color"))):
             with self.device():
-                output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until=r"frames +\d\d", then=b"q", environment=environment)
+                output, _, _, _ = self.on_terminal(
+                    "monitor", "--port", self.port, until=r"frames +\d\d", then=b"q", environment=environment
+                )
             self.assertNotRegex(output, r"\x1b\[[0-9;]*[34]8;")
             self.assertNotRegex(output, r"\x1b\[(\d+;)*([34][0-7]|9[0-7]|10[0-7])m")
             self.assertIn("┼", "".join(self.seen))
-        for environment, arguments in (((("NO_COLOR", ""), *self.COLOURS), ()),
-                                       ((("NO_COLOR", "1"), *self.COLOURS), ("--colour", "truecolour"))):
+        for environment, arguments in (
+            ((("NO_COLOR", ""), *self.COLOURS), ()),
+            ((("NO_COLOR", "1"), *self.COLOURS), ("--colour", "truecolour")),
+        ):
             with self.device():
-                output, _, _, _ = self.on_terminal("monitor", "--port", self.port, *arguments, until=r"frames +\d\d", then=b"q",
-                                                   environment=environment)
+                output, _, _, _ = self.on_terminal(
+                    "monitor", "--port", self.port, *arguments, until=r"frames +\d\d", then=b"q", environment=environment
+                )
             self.assertIn("38;2;", output)
 
     CONTACT, FIT_VALID, TARED, UNCERTAIN, FORCE_LOWER_BOUND, AT_BOUND = 1, 2, 32, 1 << 10, 1 << 13, 1 << 15
@@ -100,8 +128,10 @@ class Monitor(CliTest):
         self.assertIn("UNCERTAIN, may be off by more than 0.60 mm", self.shown)
         self.assertIn("FORCE_LOWER_BOUND, the force is at least this", self.shown)
         self.assertNotIn("┼", "".join(self.seen))
-        for flags, words in ((good | self.AT_BOUND | self.FORCE_LOWER_BOUND, r"doubtful:  x -?\d.* force at least 5\.00 N  CONTACT .*AT_BOUND"),
-                             (good, r"dropped 0  CRC errors 0  x ")):
+        for flags, words in (
+            (good | self.AT_BOUND | self.FORCE_LOWER_BOUND, r"doubtful:  x -?\d.* force at least 5\.00 N  CONTACT .*AT_BOUND"),
+            (good, r"dropped 0  CRC errors 0  x "),
+        ):
             with self.device("frames=300", f"flags={flags}"):
                 self.assertRegex(self.run_cli("monitor", "--port", self.port, "--until-gone")[0], words)
 
@@ -122,8 +152,16 @@ class Monitor(CliTest):
         self.environment["FINGERTIP_PORT"] = self.port + ":" + other
         for size in ((80, 24), (200, 60)):
             with self.device("serial=AAAA"), self.device("serial=BBBB", f"flags={self.CONTACT | self.TARED}", port=other):
-                output, status, _, _ = self.on_terminal("monitor", "--all", "--record", self.csv, "--overwrite", size=size,
-                                                        until=r"5\.00 N.*frames/s +\d.*frames/s +\d", then=b"q")
+                output, status, _, _ = self.on_terminal(
+                    "monitor",
+                    "--all",
+                    "--record",
+                    self.csv,
+                    "--overwrite",
+                    size=size,
+                    until=r"5\.00 N.*frames/s +\d.*frames/s +\d",
+                    then=b"q",
+                )
             self.assertEqual(status, 0, output[-500:])
             self.assertRegex(self.shown, "AAAA pico_mux .*● live .*BBBB pico_mux .*● live")
             self.assertRegex(self.shown, r"force +5\.00 N.* force +- N")
@@ -151,8 +189,13 @@ class Monitor(CliTest):
         last_us = max(int(line.split(",")[0]) for line in lines if line[0].isdigit())
         end_s = 20 * (last_us - first_us) / 1e6  # 40, or more of a machine that is busy
         back = "|".join(f"{end_s - 5 + tenth / 10:.1f}" for tenth in range(-2, 3))
-        output, status, _, _ = self.on_terminal("replay", self.csv, until="space pause.* at 0", then=[
-            b" ", b"\x1b[C", b"\x1bOC", b"\x1b[D", b"\x1b[H", b"\x1b[F", b"\x1b[D"], finally_=f"PAUSED at ({back})")
+        output, status, _, _ = self.on_terminal(
+            "replay",
+            self.csv,
+            until="space pause.* at 0",
+            then=[b" ", b"\x1b[C", b"\x1bOC", b"\x1b[D", b"\x1b[H", b"\x1b[F", b"\x1b[D"],
+            finally_=f"PAUSED at ({back})",
+        )
         self.assertEqual(status, 0, output[-300:])
         places = [float(at) for line in self.seen for at in re.findall(r"PAUSED at (\d+\.\d) s of", line)]
         begin = places[0]
@@ -165,23 +208,26 @@ class Monitor(CliTest):
 
     def test_256_colours(self):
         with self.device():
-            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="live", then=b"q",
-                                               environment=(("TERM", "xterm-256color"), ("COLORTERM", "")))
+            output, _, _, _ = self.on_terminal(
+                "monitor", "--port", self.port, until="live", then=b"q", environment=(("TERM", "xterm-256color"), ("COLORTERM", ""))
+            )
         self.assertIn("38;5;", output)
         self.assertNotIn("38;2;", output)
 
     def test_a_terminal_without_utf_8_gets_ascii(self):
         for language in ("C", "POSIX"):
             with self.device():
-                output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="live", then=b"q",
-                                                   environment=(("TERM", "xterm"), ("LC_ALL", language)))
+                output, _, _, _ = self.on_terminal(
+                    "monitor", "--port", self.port, until="live", then=b"q", environment=(("TERM", "xterm"), ("LC_ALL", language))
+                )
             self.assertTrue(output.isascii(), re.sub("[ -~]", "", output)[:200])
             self.assertIn("CONTACT", self.shown)
             self.assertIn(" us ", self.shown)
         # a locale that this system does not have is known by its name
         with self.device():
-            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="live", then=b"q",
-                                               environment=(("TERM", "xterm"), ("LC_ALL", "xx_XX.utf8")))
+            output, _, _, _ = self.on_terminal(
+                "monitor", "--port", self.port, until="live", then=b"q", environment=(("TERM", "xterm"), ("LC_ALL", "xx_XX.utf8"))
+            )
         self.assertIn("▀", output)
 
     def test_flags_move_nothing(self):
@@ -189,8 +235,10 @@ class Monitor(CliTest):
             with self.device(*options):
                 self.on_terminal("monitor", "--port", self.port, until=r"frames +\d\d", then=b"q")
             lines = self.shown.split("\n")
-            return lines, [next((i, line.index(word)) for i, line in enumerate(lines) if word in line)
-                           for word in ("force", "slip ", "frames/s", "dropped", "one frame", "CPU", "q quit")]
+            return lines, [
+                next((i, line.index(word)) for i, line in enumerate(lines) if word in line)
+                for word in ("force", "slip ", "frames/s", "dropped", "one frame", "CPU", "q quit")
+            ]
 
         _, few_places = places("flags=0")
         many, many_places = places(f"flags={0x7FFFF}")
@@ -200,8 +248,9 @@ class Monitor(CliTest):
 
     def test_a_dumb_terminal_gets_lines(self):
         with self.device():
-            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="FIT_VALID", then=signal.SIGINT,
-                                               environment=(("TERM", "dumb"),))
+            output, _, _, _ = self.on_terminal(
+                "monitor", "--port", self.port, until="FIT_VALID", then=signal.SIGINT, environment=(("TERM", "dumb"),)
+            )
         self.assertNotIn("\x1b", output)
 
     def test_a_stall_shows(self):
@@ -225,12 +274,13 @@ class Monitor(CliTest):
 
     def test_an_error_restores_the_terminal(self):
         with self.device("frames=30"):
-            output, status, _, _ = self.on_terminal("monitor", "--port", self.port, "--record", "/dev/full", "--overwrite",
-                                                    until="never", then=b"q")
+            output, status, _, _ = self.on_terminal(
+                "monitor", "--port", self.port, "--record", "/dev/full", "--overwrite", until="never", then=b"q"
+            )
         self.assertEqual(status, 1)
         self.assertIn("\x1b[?1049h", output)
         self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
-        self.assertIn("No space left on device", output[output.rfind("\x1b[?1049l"):])
+        self.assertIn("No space left on device", output[output.rfind("\x1b[?1049l") :])
 
     def on_terminal_tare(self, keys, until, *options):
         """Whether pressing these keys, a moment after each other, tares; and what the screen said."""
@@ -252,17 +302,30 @@ class Monitor(CliTest):
             self.assertFalse(done)
 
     def test_nothing_but_a_person_tares(self):
-        for keys in ([b"t", b"n"], [b"ty"], [b"tytytyty\n"], [b"t", b"ty"], [b"\x1b[200~t\x1b[201~", b"y"], [b"\x1b[8;24;80t", b"y"],
-                     [b"\x1b]11;rgb:t/t/t\x07", b"y"]):
+        for keys in (
+            [b"t", b"n"],
+            [b"ty"],
+            [b"tytytyty\n"],
+            [b"t", b"ty"],
+            [b"\x1b[200~t\x1b[201~", b"y"],
+            [b"\x1b[8;24;80t", b"y"],
+            [b"\x1b]11;rgb:t/t/t\x07", b"y"],
+        ):
             self.assertFalse(self.on_terminal_tare(keys, None)[0], keys)
 
     def test_a_recording_that_cannot_be_gives_the_terminal_back(self):
-        pathlib.Path(self.csv).write_text("# fingertip-recording 1\n" + self.header_without_sensors() + "\n# event: then\n1000,1"
-                                          + (len(files.RECORDING_COLUMNS) - 8) * "," + ",7,0,0,0,0,20.00\n", encoding="utf-8")
+        pathlib.Path(self.csv).write_text(
+            "# fingertip-recording 1\n"
+            + self.header_without_sensors()
+            + "\n# event: then\n1000,1"
+            + (len(files.RECORDING_COLUMNS) - 8) * ","
+            + ",7,0,0,0,0,20.00\n",
+            encoding="utf-8",
+        )
         output, status, before, after = self.on_terminal("replay", self.csv, until="never", then=b"q")
         self.assertEqual(status, 1)
         self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
-        self.assertIn("pressures in a recording without sensors", output[output.rfind("\x1b[?1049l"):])
+        self.assertIn("pressures in a recording without sensors", output[output.rfind("\x1b[?1049l") :])
         if after:
             self.assertEqual(before, after)
 
@@ -274,8 +337,12 @@ class Monitor(CliTest):
         with self.device("frames=300"):
             out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone")
         self.assertNotIn("\x1b", out)
-        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID "
-                         r"TANGENTIAL_VALID VELOCITY_VALID SHAPE_VALID EDGE$")
+        self.assertRegex(
+            out,
+            r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID "
+            r"TANGENTIAL_VALID VELOCITY_VALID SHAPE_VALID EDGE$",
+        )
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[4:]])

@@ -2,6 +2,7 @@
 
 usage: test_real_port.py FINGERTIP FAKE_DEVICE [unittest arguments]
 """
+
 # real time: the kernel passes on the bytes of a pseudo-terminal, and locks it, in its own time
 import os
 import pathlib
@@ -31,6 +32,7 @@ class RealPort:
 
     def there(self, device, port):
         """Once its port is."""
+
         class There:
             def __enter__(there):
                 process = device.__enter__()
@@ -39,6 +41,7 @@ class RealPort:
 
             def __exit__(there, *error):
                 return device.__exit__(*error)
+
         return There()
 
 
@@ -57,11 +60,16 @@ class Port(RealPort, CliTest):
         with self.device():
             process = self.start("record", self.csv, "--port", self.port)
             self.world.until(lambda: os.path.exists(self.csv))
-            self.assertEqual(self.error("info", "--port", self.port),
-                             f"fingertip: {self.port}: in use by another program; end that one first (`fingertip doctor` names it)\n")
+            self.assertEqual(
+                self.error("info", "--port", self.port),
+                f"fingertip: {self.port}: in use by another program; end that one first (`fingertip doctor` names it)\n",
+            )
             _, out, _ = self.world.run([FINGERTIP, "doctor", "--seconds", "1", "--port", self.port], env=self.environment)
-            self.assertRegex(out, rf"port .* in use by fingertip \(process {process.pid}\)|in use by another program: fingertip \(process {process.pid}\)"
-                                  rf"|fingertip.*{process.pid}")
+            self.assertRegex(
+                out,
+                rf"port .* in use by fingertip \(process {process.pid}\)|in use by another program: fingertip \(process {process.pid}\)"
+                rf"|fingertip.*{process.pid}",
+            )
             process.kill()
             process.communicate()
             self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^serial +E660583883265A2C$")
@@ -103,19 +111,31 @@ class Install(RealPort, CliTest):
     def test_the_build_installs_all_of_the_tool(self):
         build = pathlib.Path(FINGERTIP).parents[2]
         subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
-        installed = {os.path.relpath(os.path.join(folder, name), self.folder)
-                     for folder, _, names in os.walk(self.folder) for name in names}
+        installed = {
+            os.path.relpath(os.path.join(folder, name), self.folder) for folder, _, names in os.walk(self.folder) for name in names
+        }
         page = {path for path in installed if path.startswith("share/fingertip/web/")}
         if page:  # only where it was built
             self.assertIn("share/fingertip/web/index.html", page)
         tables = {path for path in installed if re.fullmatch(r"share/fingertip/tables/sphere(15|18)-.*\.table", path)}
         self.assertEqual(len(tables), 2)
-        self.assertEqual(installed - page - tables, {
-            "bin/fingertip", "libexec/fingertip/fingertip-simulate", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
-            "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
-            "share/fish/vendor_completions.d/fingertip.fish", "lib/systemd/user/fingertip.service"})
-        self.assertEqual(subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True,
-                                        check=True).stdout, self.run_cli("--version")[0])
+        self.assertEqual(
+            installed - page - tables,
+            {
+                "bin/fingertip",
+                "libexec/fingertip/fingertip-simulate",
+                "lib/udev/rules.d/60-fingertip.rules",
+                "share/man/man1/fingertip.1",
+                "share/bash-completion/completions/fingertip",
+                "share/zsh/site-functions/_fingertip",
+                "share/fish/vendor_completions.d/fingertip.fish",
+                "lib/systemd/user/fingertip.service",
+            },
+        )
+        self.assertEqual(
+            subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True).stdout,
+            self.run_cli("--version")[0],
+        )
         with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
             self.assertEqual(file.read(), self.run_cli("rule")[0])
 
@@ -125,12 +145,20 @@ class Install(RealPort, CliTest):
         page = pathlib.Path(self.folder) / "share/fingertip/web/index.html"
         page.parent.mkdir(parents=True, exist_ok=True)
         version = self.run_cli("--version")[0].split()[1]
-        for head, told in ((f'<meta name="fingertip-version" content="{version}">', ""),
-                           ('<meta name="fingertip-version" content="9.8.7">', "version 9.8.7"), ("<meta>", "an unknown version")):
+        for head, told in (
+            (f'<meta name="fingertip-version" content="{version}">', ""),
+            ('<meta name="fingertip-version" content="9.8.7">', "version 9.8.7"),
+            ("<meta>", "an unknown version"),
+        ):
             page.write_text(f"<html><head>{head}</head></html>")
-            said = subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True).stdout
-            self.assertEqual(said.splitlines(), [f"fingertip {version}"] + [
-                f"the page beside this tool is of {told}, the tool of version {version}; install both from one release"] * bool(told))
+            said = subprocess.run(
+                [os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True
+            ).stdout
+            self.assertEqual(
+                said.splitlines(),
+                [f"fingertip {version}"]
+                + [f"the page beside this tool is of {told}, the tool of version {version}; install both from one release"] * bool(told),
+            )
 
     def test_the_rule_is_for_our_ids(self):
         rule = self.run_cli("rule")[0]
@@ -153,11 +181,14 @@ class Install(RealPort, CliTest):
 
     def test_bash_completes(self):
         def complete(*words):
-            script = f'. {self.INSTALL}/fingertip.bash; COMP_WORDS=({" ".join(words)} ""); COMP_CWORD={len(words)}; ' \
-                     'COMP_WORDS[COMP_CWORD]=$1; _fingertip; echo ${COMPREPLY[@]}'
+            script = (
+                f'. {self.INSTALL}/fingertip.bash; COMP_WORDS=({" ".join(words)} ""); COMP_CWORD={len(words)}; '
+                "COMP_WORDS[COMP_CWORD]=$1; _fingertip; echo ${COMPREPLY[@]}"
+            )
             environment = {**self.environment, "PATH": os.path.dirname(FINGERTIP) + ":" + self.environment["PATH"]}
-            return lambda start: subprocess.run(["bash", "-c", script, "bash", start], env=environment, capture_output=True, text=True,
-                                                check=True).stdout.split()
+            return lambda start: subprocess.run(
+                ["bash", "-c", script, "bash", start], env=environment, capture_output=True, text=True, check=True
+            ).stdout.split()
 
         self.assertEqual(sorted(complete("fingertip")("")), sorted(self.commands()))
         self.assertEqual(complete("fingertip")("mon"), ["monitor"])
@@ -168,6 +199,7 @@ class Install(RealPort, CliTest):
         self.environment["FINGERTIP_PORT"] = self.port
         with self.device("serial=AAAA"):
             self.assertEqual(complete("fingertip", "info", "--device")(""), ["AAAA"])
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[4:]])

@@ -1,4 +1,5 @@
 """`fingertip record`, `stream` and `replay` against a fake device: usage test_recording.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import os
 import pathlib
 import resource
@@ -27,7 +28,7 @@ class Recording(CliTest):
         converted = os.path.join(self.folder, "c.csv")
         self.run_cli("replay", self.ftr, "--to-csv", converted)
         again, _ = self.rows(converted)
-        self.assertEqual(again[:len(rows) - 1], rows[:-1])
+        self.assertEqual(again[: len(rows) - 1], rows[:-1])
 
     def test_the_same_twice_is_the_same_to_the_byte(self):
         def recorded():
@@ -209,7 +210,9 @@ class LiveData(CliTest):
         self.assertIn("--raw-bytes needs a file", self.error("record", self.csv, "--raw-bytes", "-", status=2))
         self.assertIn("use `fingertip record -`", self.error("monitor", "--record", "-", status=2))
         with self.device(), open("/dev/full", "w", encoding="ascii") as full:
-            self.assertIn("fingertip: -: No space left on device", self.run_cli("record", "-", "--port", self.port, status=1, stdout=full)[1])
+            self.assertIn(
+                "fingertip: -: No space left on device", self.run_cli("record", "-", "--port", self.port, status=1, stdout=full)[1]
+            )
 
     def test_a_file_it_is_appended_to_keeps_what_it_had(self):
         def limit():
@@ -307,9 +310,12 @@ class Replay(CliTest):
         self.record()
         text = pathlib.Path(self.csv).read_text(encoding="utf-8")
         bad = os.path.join(self.folder, "bad.csv")
-        for content, problem in ((text.replace("t_us,frame", "t_us,fame"), "unknown header"), (text.split("t_us,frame")[0], "no header line"),
-                                 (text.replace("recording 1", "recording 9"), 'recording format "9" is unknown'),
-                                 (text.replace("recording 1", "scenario 1"), "a scenario, not a recording")):
+        for content, problem in (
+            (text.replace("t_us,frame", "t_us,fame"), "unknown header"),
+            (text.split("t_us,frame")[0], "no header line"),
+            (text.replace("recording 1", "recording 9"), 'recording format "9" is unknown'),
+            (text.replace("recording 1", "scenario 1"), "a scenario, not a recording"),
+        ):
             pathlib.Path(bad).write_text(content, encoding="utf-8")
             for option in ([], ["--salvage"]):
                 err = self.run_cli("replay", bad, "--speed", "max", *option, status=1)[1]
@@ -331,8 +337,10 @@ class Replay(CliTest):
         for key in ("started_utc", "started_device_us", "started_uncertainty_us", "port", "serial"):
             self.assertEqual(after.metadata[key], before.metadata[key])
         self.assertEqual(after.metadata["source"], self.csv)
-        self.assertEqual({key: value for key, value in after.end.items() if key != "reason"},
-                         {key: value for key, value in before.end.items() if key != "reason"})
+        self.assertEqual(
+            {key: value for key, value in after.end.items() if key != "reason"},
+            {key: value for key, value in before.end.items() if key != "reason"},
+        )
         # once more, and still each key once
         twice = os.path.join(self.folder, "d.csv")
         self.run_cli("replay", converted, "--to-csv", twice)
@@ -361,6 +369,7 @@ class Replay(CliTest):
             for option in ([], ["--to-csv", self.csv]):
                 self.assertIn("neither a recording nor bytes of a fingertip's line", self.error("replay", text, *option))
         self.assertIn("No such file", self.run_cli("replay", self.folder + "/absent.csv", status=1)[1])
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[4:]])

@@ -1,5 +1,6 @@
 """A lift, played by the firmware on the host, as a replay shows it on a terminal: usage
 test_replay_pull.py FINGERTIP TWIN PLAYER TABLES [unittest arguments]."""
+
 import pathlib
 import re
 import subprocess
@@ -23,8 +24,29 @@ def setUpModule():
     unittest.addModuleCleanup(temporary.cleanup)
     folder = pathlib.Path(temporary.name)
     scenario = folder / "lift.csv"
-    subprocess.run([TWIN, "scenario", "lift", "--seconds", "6", "--force", f"{FORCE_N}", "--tangential", f"{SHARE},0", "--gain", "0", "--seed", "5",
-                    "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [
+            TWIN,
+            "scenario",
+            "lift",
+            "--seconds",
+            "6",
+            "--force",
+            f"{FORCE_N}",
+            "--tangential",
+            f"{SHARE},0",
+            "--gain",
+            "0",
+            "--seed",
+            "5",
+            "-o",
+            scenario,
+            "--cache",
+            TABLES,
+        ],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 class ReplayPull(unittest.TestCase):
@@ -68,7 +90,26 @@ class ReplayPull(unittest.TestCase):
     def test_a_picture_that_moves(self):
         self.shown()
         out = folder / "moving.png"
-        self.assertEqual(picture.main([str(folder / ".csv"), "-o", str(out), "--at", "1", "--until", "4", "--every", "0.5", "--size", "100x30", "--tool", FINGERTIP]), 0)
+        self.assertEqual(
+            picture.main(
+                [
+                    str(folder / ".csv"),
+                    "-o",
+                    str(out),
+                    "--at",
+                    "1",
+                    "--until",
+                    "4",
+                    "--every",
+                    "0.5",
+                    "--size",
+                    "100x30",
+                    "--tool",
+                    FINGERTIP,
+                ]
+            ),
+            0,
+        )
         with Image.open(out) as moving:
             self.assertEqual((moving.n_frames, moving.size), (7, (100 * picture.WIDTH, 30 * picture.HEIGHT)))
             frames = []
@@ -88,9 +129,12 @@ class ReplayPull(unittest.TestCase):
             picture.replayed(replay, 100, 30, [0.2], 0, 1)
 
     def test_pictures_that_cannot_be(self):
-        for words, said in ((("-o", "p.png"), "ends in .svg; with --until one that ends in .png"), (("-o", "p.png", "--at", "3", "--until", "2"), "later than --at"),
-                            (("-o", "p.png", "--until", "2", "--every", "0.05"), "--every at least 0.1"),
-                            (("-o", "p.svg", "--until", "2"), "ends in .png")):
+        for words, said in (
+            (("-o", "p.png"), "ends in .svg; with --until one that ends in .png"),
+            (("-o", "p.png", "--at", "3", "--until", "2"), "later than --at"),
+            (("-o", "p.png", "--until", "2", "--every", "0.05"), "--every at least 0.1"),
+            (("-o", "p.svg", "--until", "2"), "ends in .png"),
+        ):
             with self.assertRaisesRegex(picture.InputError, said):
                 picture.main(["lift.csv", *words])
 

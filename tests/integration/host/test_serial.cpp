@@ -68,8 +68,7 @@ TEST_F(Terminal, EveryByteArrivesUnchangedBothWaysWithoutEcho) {
   ASSERT_EQ(write(master_, all, sizeof all), 256);
   std::uint8_t got[512];
   std::size_t total = 0, length = 0;
-  while (total < 256 && transport.read(got + total, sizeof got - total, &length, PATIENCE) ==
-                            Transport::Result::data) {
+  while (total < 256 && transport.read(got + total, sizeof got - total, &length, PATIENCE) == Transport::Result::data) {
     total += length;
   }
   ASSERT_EQ(total, 256u);
@@ -122,8 +121,7 @@ TEST_F(Terminal, GoneAndBack) {
   close(master_);
   unlink(link_.c_str());
   Transport::Result result;
-  while ((result = transport.read(bytes, sizeof bytes, &length, milliseconds(100))) ==
-         Transport::Result::data) {
+  while ((result = transport.read(bytes, sizeof bytes, &length, milliseconds(100))) == Transport::Result::data) {
   }
   EXPECT_EQ(result, Transport::Result::gone);
   EXPECT_EQ(transport.read(bytes, sizeof bytes, &length, milliseconds(0)), Transport::Result::gone);

@@ -1,4 +1,5 @@
 """Several programs on one fingertip, through fingertip serve: usage test_serve.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+
 import contextlib
 import grp
 import os
@@ -70,13 +71,29 @@ class Sharing(ServeTest):
                 first, first_csv = self.recording("first.csv", "--raw-bytes", self.ftr)
                 second, second_csv = self.recording("second.csv")
                 monitor = self.start("monitor", "--until-gone")
-                together = [self.start(*command) for command in (
-                    ["tare"], ["set", "osr=256"], ["set", "rate=400"], ["info"], ["list"], ["set", "limit=0.5", "--keep"],
-                    ["info", "--device", SERIAL.lower()], ["set", "slip_threshold=0.25"])]
+                together = [
+                    self.start(*command)
+                    for command in (
+                        ["tare"],
+                        ["set", "osr=256"],
+                        ["set", "rate=400"],
+                        ["info"],
+                        ["list"],
+                        ["set", "limit=0.5", "--keep"],
+                        ["info", "--device", SERIAL.lower()],
+                        ["set", "slip_threshold=0.25"],
+                    )
+                ]
                 for process in together:
                     self.finished(process)
                 out = self.run_cli("info")[0]
-                for said in (r"osr +256", r"rate_mHz +400000", r"location_limit_mm +0.5", r"slip_threshold_mm +0.25", f"port +{self.socket_of()}"):
+                for said in (
+                    r"osr +256",
+                    r"rate_mHz +400000",
+                    r"location_limit_mm +0.5",
+                    r"slip_threshold_mm +0.25",
+                    f"port +{self.socket_of()}",
+                ):
                     self.assertRegex(out, rf"(?m)^{said}$")
                 for process in (first, second, monitor):
                     self.finished(process)
@@ -88,7 +105,9 @@ class Sharing(ServeTest):
             rows, comments = self.rows_but_numbers(path), self.rows(path)[1]
             begin = int(rows[0]["frame"])
             self.assertTrue(rows == [row for row in expected if int(row["frame"]) >= begin], path)
-            self.assertRegex(comments[-1], rf"reason=gone frames={len(rows)} .*dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0")
+            self.assertRegex(
+                comments[-1], rf"reason=gone frames={len(rows)} .*dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0"
+            )
             self.assertIn(f" {701 - begin} frames in ", self.run_cli("replay", path, "--speed", "max")[0])
             self.assertTrue(any(c.startswith(f"# port: {self.socket_of()}") for c in comments))
             # its own exchanges alone: before, the streams on, and none of the others' answers
@@ -103,9 +122,11 @@ class Sharing(ServeTest):
         other = self.port + "2"
         self.environment["FINGERTIP_PORT"] = self.port + ":" + other
         with self.device("serial=AAAA"), self.device("serial=BBBB", port=other), self.served(serials=("AAAA", "BBBB")):
-            self.assertEqual(self.run_cli("list")[0],
-                             f"AAAA\tpico_mux\t1.20.3\tsocket {self.socket_of('AAAA')}, port {self.port}\n"
-                             f"BBBB\tpico_mux\t1.20.3\tsocket {self.socket_of('BBBB')}, port {other}\n")
+            self.assertEqual(
+                self.run_cli("list")[0],
+                f"AAAA\tpico_mux\t1.20.3\tsocket {self.socket_of('AAAA')}, port {self.port}\n"
+                f"BBBB\tpico_mux\t1.20.3\tsocket {self.socket_of('BBBB')}, port {other}\n",
+            )
             joint = [self.start("record", self.path(name), "--all", "--seconds", "1.5") for name in ("j.csv", "k.csv")]
             self.assertEqual(self.run_cli("tare", "--device", "BBBB")[0], "tared\n")
             for process in joint:
@@ -137,7 +158,7 @@ class Sharing(ServeTest):
             end = {key: int(value) for key, value in re.findall(r"(\w+)=(\d+)", comments[-1])}
             torn = end["crc_errors"] + end["format_errors"]  # the latter where the bit is one of the coding
             self.assertIn(torn - damaged, range(1 + early), comments[-1])
-            self.assertIn(end["dropped_packets"] - torn - dropped, (0, 2)[:1 + early], comments[-1])
+            self.assertIn(end["dropped_packets"] - torn - dropped, (0, 2)[: 1 + early], comments[-1])
             self.assertEqual(end["out_of_order"], 0)
 
     def test_a_fingertip_that_goes_and_comes_back(self):
@@ -278,8 +299,11 @@ class Server(ServeTest):
 
     def test_a_second_one_is_refused(self):
         with self.device(), self.served():
-            self.assertEqual(self.error("serve"), f"fingertip: {self.socket_of()}: another program shares this fingertip; "
-                                                  "use it as if it were your own, or end that one first\n")
+            self.assertEqual(
+                self.error("serve"),
+                f"fingertip: {self.socket_of()}: another program shares this fingertip; "
+                "use it as if it were your own, or end that one first\n",
+            )
             self.run_cli("info")
 
     def test_what_a_killed_one_leaves_is_replaced(self):
@@ -325,8 +349,11 @@ class Server(ServeTest):
             self.assertEqual(denied[:2], (1, ""))
             os.chmod(self.sockets, 0o755)
             denied = self.as_nobody("info", group=65534)
-            self.assertEqual(denied[2], f"fingertip: {self.socket_of()}: permission denied: it is its owner's and group's; "
-                                            "join the group, or share it with serve --group\n")
+            self.assertEqual(
+                denied[2],
+                f"fingertip: {self.socket_of()}: permission denied: it is its owner's and group's; "
+                "join the group, or share it with serve --group\n",
+            )
 
     def test_wrong_places_and_names(self):
         self.assertIn('--group "no such" is not possible; give the name of a group', self.error("serve", "--group", "no such", status=2))

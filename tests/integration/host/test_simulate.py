@@ -2,6 +2,7 @@
 
 usage: test_simulate.py FINGERTIP SIMULATE TIME_KEEPER TABLES [unittest arguments]
 """
+
 import contextlib
 import csv
 import json
@@ -44,8 +45,12 @@ class Presses(SimulateTest):
             lines = [line for line in file if not line.startswith("#")]
         zero_us = int(files.read_recording(self.csv, serial=LEFT).metadata["host_zero_us"])
         for side, serial in (("left", LEFT), ("right", RIGHT)):
-            time_us, x_mm, y_mm, force_N = np.array([[float(row[name] or "nan") for name in ("time_us", f"{side}_x_mm", f"{side}_y_mm", f"{side}_force_N")]
-                                                     for row in csv.DictReader(lines)]).T
+            time_us, x_mm, y_mm, force_N = np.array(
+                [
+                    [float(row[name] or "nan") for name in ("time_us", f"{side}_x_mm", f"{side}_y_mm", f"{side}_force_N")]
+                    for row in csv.DictReader(lines)
+                ]
+            ).T
             felt = files.read_recording(self.csv, serial=serial)
             # of the time that it stood, and of the time that nothing touched, what lies 0.2 s within
             at = np.searchsorted(time_us, felt.time_us + zero_us).clip(100, len(time_us) - 101)
@@ -96,7 +101,9 @@ class Presses(SimulateTest):
             process = self.world.start([SIMULATE, "--cache", TABLES], env=self.environment)
             _, err = process.communicate()
             self.assertEqual(process.returncode, 1)
-            self.assertRegex(err, "^fingertip: .*/fingertip/simulated: another simulation has its ports there; end that one, or choose another folder")
+            self.assertRegex(
+                err, "^fingertip: .*/fingertip/simulated: another simulation has its ports there; end that one, or choose another folder"
+            )
         self.assertIn("sim:: nothing is simulated there; start `fingertip simulate`", self.error("info", "--port", "sim:"))
         with self.simulated():  # what was left is in nobody's way
             pass
@@ -117,10 +124,15 @@ class Usage(SimulateTest):
         self.assertLessEqual(max(map(len, page.splitlines())), 80)
 
     def test_wrong_usage(self):
-        for options, problem in ((["--bogus"], '"--bogus" is no option of it'), (["--lift", "--press"], "--press excludes --lift"),
-                                 (["--mass", "1"], "--mass requires --lift"), (["--fingertips", "3"], '--fingertips takes 1 to 2, not "3"'),
-                                 (["--lift", "--mass", "x"], '--mass takes 0.001 to 10 kg, not "x"'), (["--lift", "--crushes", "0"], '--crushes takes 0.1 to 1000000 newtons, not "0"'),
-                                 (["--lift", "--gripper", "hand"], '--gripper takes 2f85, 2f140, hande or sts3215, not "hand"')):
+        for options, problem in (
+            (["--bogus"], '"--bogus" is no option of it'),
+            (["--lift", "--press"], "--press excludes --lift"),
+            (["--mass", "1"], "--mass requires --lift"),
+            (["--fingertips", "3"], '--fingertips takes 1 to 2, not "3"'),
+            (["--lift", "--mass", "x"], '--mass takes 0.001 to 10 kg, not "x"'),
+            (["--lift", "--crushes", "0"], '--crushes takes 0.1 to 1000000 newtons, not "0"'),
+            (["--lift", "--gripper", "hand"], '--gripper takes 2f85, 2f140, hande or sts3215, not "hand"'),
+        ):
             self.assertEqual(self.run_simulate(*options, status=2), ("", f"fingertip: {problem}; see fingertip simulate --help\n"))
 
 

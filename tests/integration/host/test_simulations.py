@@ -3,6 +3,7 @@ test_simulations.py FINGERTIP [unittest arguments].
 
 real time: a simulation, a server and clients on the kernel's sockets. Waits are for what they say.
 """
+
 import contextlib
 import http.client
 import json
@@ -55,7 +56,9 @@ class SimulationsTest(unittest.TestCase):
         """Status and body; a POST if there is a body."""
         connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
         try:
-            connection.request("GET" if body is None else "POST", path, body, {name.replace("_", "-"): value for name, value in headers.items()})
+            connection.request(
+                "GET" if body is None else "POST", path, body, {name.replace("_", "-"): value for name, value in headers.items()}
+            )
             answer = connection.getresponse()
             return answer.status, answer.read().decode()
         finally:
@@ -123,15 +126,27 @@ class Hand(SimulationsTest):
             self.assertEqual(json.loads(self.ask("/simulated")[1]), [{"serial": LEFT, "hand": False}])
             self.until(lambda: self.hand()["force_N"] > 2)  # its weight
             self.hand("press 0 0 1")
-            self.until(lambda: (409, "no hand presses here; start fingertip simulate --mouse\n") == self.ask(f"/simulated/hand?client={ONE}", "lift"))
+            self.until(
+                lambda: (
+                    (409, "no hand presses here; start fingertip simulate --mouse\n") == self.ask(f"/simulated/hand?client={ONE}", "lift")
+                )
+            )
 
 
 class Lift(SimulationsTest):
     def test_the_truth_has_the_pull(self):
         """An object's weight, which both carry, is along y."""
         with self.served(), self.run_tool("simulate", "--lift", "--mass", "0.2"):
-            with subprocess.Popen([FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", "sim:gripper"], env=self.environment,
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as grasp, self.line(), self.line(OTHER, RIGHT):
+            with (
+                subprocess.Popen(
+                    [FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", "sim:gripper"],
+                    env=self.environment,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                ) as grasp,
+                self.line(),
+                self.line(OTHER, RIGHT),
+            ):
                 try:
                     self.until(lambda: self.hand()["qy_N"] > 0.9 * 0.1 * 9.81)
                     truth = self.hand()
@@ -167,10 +182,19 @@ class Strangers(SimulationsTest):
     def test_only_the_page_may_ask(self):
         with self.served(), self.run_tool("simulate", "--mouse"), self.line():
             here = f"http://{self.host}:{self.port}"
-            for headers in ({"Origin": "http://evil.example"}, {"Origin": "null"}, {"Sec_Fetch_Site": "cross-site"}, {"Sec_Fetch_Site": "same-site"},
-                            {"Origin": f"http://{self.host}:{self.port + 1}"}):
-                for path, body in (("/simulated", None), (f"/simulated/line?serial={LEFT}&client={OTHER}", None), (f"/simulated/hand?client={ONE}", "press 0 0 9"),
-                                   (f"/simulated/line?client={ONE}", "x")):
+            for headers in (
+                {"Origin": "http://evil.example"},
+                {"Origin": "null"},
+                {"Sec_Fetch_Site": "cross-site"},
+                {"Sec_Fetch_Site": "same-site"},
+                {"Origin": f"http://{self.host}:{self.port + 1}"},
+            ):
+                for path, body in (
+                    ("/simulated", None),
+                    (f"/simulated/line?serial={LEFT}&client={OTHER}", None),
+                    (f"/simulated/hand?client={ONE}", "press 0 0 9"),
+                    (f"/simulated/line?client={ONE}", "x"),
+                ):
                     self.assertEqual(self.ask(path, body, **headers)[0], 403, (path, headers))
             self.assertEqual(self.ask("/simulated", Host="evil.example")[0], 421)
             self.assertEqual(self.ask("/simulated", Origin=here, Sec_Fetch_Site="same-origin")[0], 200)
@@ -178,11 +202,16 @@ class Strangers(SimulationsTest):
 
     def test_what_is_wrong_is_said(self):
         with self.served(), self.run_tool("simulate"), self.line():
-            for path, body, status, words in ((f"/simulated/line?serial={RIGHT}&client={OTHER}", None, 404, "start fingertip simulate"),
-                                              (f"/simulated/line?serial={LEFT}&client=../..", None, 400, "hexadecimal"), (f"/simulated/line?serial={LEFT}", None, 400, "hexadecimal"),
-                                              (f"/simulated/line?serial={LEFT}&client={ONE}", None, 409, "a line already"),
-                                              (f"/simulated/hand?client={OTHER}", "lift", 404, "open one first"), (f"/simulated/line?client={OTHER}", "x", 404, "open one first"),
-                                              (f"/simulated/line?client={ONE}", "x" * 5000, 400, "more than"), ("/simulated/more", None, 404, "")):
+            for path, body, status, words in (
+                (f"/simulated/line?serial={RIGHT}&client={OTHER}", None, 404, "start fingertip simulate"),
+                (f"/simulated/line?serial={LEFT}&client=../..", None, 400, "hexadecimal"),
+                (f"/simulated/line?serial={LEFT}", None, 400, "hexadecimal"),
+                (f"/simulated/line?serial={LEFT}&client={ONE}", None, 409, "a line already"),
+                (f"/simulated/hand?client={OTHER}", "lift", 404, "open one first"),
+                (f"/simulated/line?client={OTHER}", "x", 404, "open one first"),
+                (f"/simulated/line?client={ONE}", "x" * 5000, 400, "more than"),
+                ("/simulated/more", None, 404, ""),
+            ):
                 found, said = self.ask(path, body)
                 self.assertEqual(found, status, (path, said))
                 self.assertIn(words, said)

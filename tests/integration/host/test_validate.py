@@ -2,6 +2,7 @@
 
 usage: test_validate.py FINGERTIP SIMULATE TIME_KEEPER NEWCOMER_VALIDATED TABLES [unittest arguments]
 """
+
 import getpass
 import json
 import math
@@ -57,9 +58,16 @@ class Live(ValidateTest):
         self.assertEqual(rate.findall(after), rate.findall(before))
         process.send_signal(signal.SIGINT)
         process.communicate()
-        for words in ("leave it alone", "set the weight down on mark 1, turn 1 of 2", "set the weight down on mark 23, turn 2 of 2", "lift it",
-                      "set the weight down in the middle, its thread slack towards +x", "hang the other weight on the thread towards -y",
-                      "location off by, median", "nothing is wrong that this validation can see"):
+        for words in (
+            "leave it alone",
+            "set the weight down on mark 1, turn 1 of 2",
+            "set the weight down on mark 23, turn 2 of 2",
+            "lift it",
+            "set the weight down in the middle, its thread slack towards +x",
+            "hang the other weight on the thread towards -y",
+            "location off by, median",
+            "nothing is wrong that this validation can see",
+        ):
             self.assertIn(words, out)
         # the recording holds what was measured, and the card can be made from it again
         recording = self.read(self.csv)
@@ -80,7 +88,9 @@ class FromARecording(ValidateTest):
     def test_location_and_gains_are_what_is_true(self):
         truth = self.recorded("--seed", "31")
         said, out = self.carded()
-        off_mm = [math.hypot(one["x_mm"] - press["x_mm"], one["y_mm"] - press["y_mm"]) for one, press in zip(said["presses"], truth["presses"])]
+        off_mm = [
+            math.hypot(one["x_mm"] - press["x_mm"], one["y_mm"] - press["y_mm"]) for one, press in zip(said["presses"], truth["presses"])
+        ]
         self.assertEqual(len(off_mm), 46)
         self.assertAlmostEqual(said["figures"]["location_error_mm"] / statistics.median(off_mm), 1, delta=0.25)
         errors = [math.log(gain / true) for gain, true in zip(said["gain"], truth["gains"])]
@@ -96,8 +106,19 @@ class FromARecording(ValidateTest):
     def test_faults_are_found_with_their_sensors(self):
         # dead: where the presses beside it are hardly known; loose: along an edge, at a corner, at a corner where the presses follow it; thin:
         # where presses follow a sensor that is not loose; drift: beside a sensor that is odd by the same each time
-        for fault, seed in (("dead_sensor", 32), ("dead_sensor", 33), ("dead_sensor", 953), ("loose_sensor", 32), ("loose_sensor", 38),
-                            ("loose_sensor", 890), ("tilted_skin", 32), ("thin_skin", 852), ("drift", 945), ("wrong_weight", 32), ("swapped_wires", 32)):
+        for fault, seed in (
+            ("dead_sensor", 32),
+            ("dead_sensor", 33),
+            ("dead_sensor", 953),
+            ("loose_sensor", 32),
+            ("loose_sensor", 38),
+            ("loose_sensor", 890),
+            ("tilted_skin", 32),
+            ("thin_skin", 852),
+            ("drift", 945),
+            ("wrong_weight", 32),
+            ("swapped_wires", 32),
+        ):
             with self.subTest(fault=fault, seed=seed):
                 truth = self.recorded("--fault", fault, "--seed", str(seed))
                 said, out = self.carded()
@@ -108,7 +129,9 @@ class FromARecording(ValidateTest):
     def test_pulls_are_what_is_true(self):
         for height_mm in ("0", "5"):
             with self.subTest(height_mm=height_mm):
-                truth = self.recorded("--seed", "31", "--calibrated", "--known-pad", "--plain", "--pull", "90", "--thread-height", height_mm)
+                truth = self.recorded(
+                    "--seed", "31", "--calibrated", "--known-pad", "--plain", "--pull", "90", "--thread-height", height_mm
+                )
                 said, out = self.carded()
                 figures = said["figures"]
                 self.assertEqual(len(said["pulls"]), 4)
@@ -121,12 +144,16 @@ class FromARecording(ValidateTest):
                 self.assertIn("pull found over that of the thread", out)
         page = self.read(self.card)
         self.assertEqual(page.count("<figure>"), 7)
-        self.assertRegex(page, r"pull found over that of the thread, mean of the pulls</td><td class=\"n\">[0-9.]+</td><td class=\"n\">[0-9.]+</td>")
+        self.assertRegex(
+            page, r"pull found over that of the thread, mean of the pulls</td><td class=\"n\">[0-9.]+</td><td class=\"n\">[0-9.]+</td>"
+        )
 
     def test_force_is_that_of_the_weight_beside_a_profile(self):
         """Of rubber with a dip, which the scale of the force has to have as the firmware's fit has it: without it 1.18 to 1.24."""
         self.recorded("--seed", "33", "--calibrated", "--known-pad")
-        self.assertAlmostEqual(self.carded()[0]["figures"]["force_over_weight"], 1, delta=0.1)  # 1.02 to 1.05 on four other seeds: rubber relaxes
+        self.assertAlmostEqual(
+            self.carded()[0]["figures"]["force_over_weight"], 1, delta=0.1
+        )  # 1.02 to 1.05 on four other seeds: rubber relaxes
 
     def test_what_estimates_no_pull_says_so(self):
         self.recorded("--seed", "31", "--calibrated", "--pull", "100")
@@ -141,14 +168,24 @@ class FromARecording(ValidateTest):
         tangential = 1 << 3  # WIRE_CAPABILITY_TANGENTIAL
         self.assertTrue(capabilities & tangential)
         with open(self.csv, "w", encoding="utf-8") as file:
-            file.write(re.sub(r"(?m)^# capabilities: .*$", f"# capabilities: {capabilities - tangential}", recording.replace("# scene: grasp", "# scene: slip")))
+            file.write(
+                re.sub(
+                    r"(?m)^# capabilities: .*$",
+                    f"# capabilities: {capabilities - tangential}",
+                    recording.replace("# scene: grasp", "# scene: slip"),
+                )
+            )
         self.assertIn("Scene slip estimates no pull", self.carded()[1])
 
     def test_a_pull_that_was_not_done_is_not_seen(self):
         self.recorded("--seed", "31")
         recording = self.read(self.csv)
         with open(self.csv, "w", encoding="utf-8") as file:
-            file.write(recording.replace("# event: validate: rest\n", "# event: validate: rest\n# event: validate: pull toward_deg=0 weight_g=100 height_mm=2\n"))
+            file.write(
+                recording.replace(
+                    "# event: validate: rest\n", "# event: validate: rest\n# event: validate: pull toward_deg=0 weight_g=100 height_mm=2\n"
+                )
+            )
         said, out = self.carded()
         self.assertEqual(said["pulls"], [])
         self.assertIn("No pull was seen: let the weight stand for two seconds", out)
@@ -164,8 +201,10 @@ class FromARecording(ValidateTest):
     def test_what_is_no_validation_is_refused(self):
         self.recorded("--seed", "35")
         lines = self.read(self.csv).splitlines(keepends=True)
-        for kept, words in ((lambda line: "validate:" not in line, "holds no validation; record one with `fingertip validate`"),
-                            (lambda line: not re.search("press mark=([6-9]|[12][0-9])", line), "holds presses at 5 marks, and a card needs 6")):
+        for kept, words in (
+            (lambda line: "validate:" not in line, "holds no validation; record one with `fingertip validate`"),
+            (lambda line: not re.search("press mark=([6-9]|[12][0-9])", line), "holds presses at 5 marks, and a card needs 6"),
+        ):
             with open(self.csv, "w", encoding="utf-8") as file:
                 file.writelines(filter(kept, lines))
             self.assertIn(words, self.error("validate", "--from", self.csv, "-o", self.card))
@@ -189,18 +228,30 @@ class Template(ValidateTest):
         start = int(re.search(rb"startxref\n(\d+)\n%%EOF\n$", page).group(1))
         self.assertTrue(page[start:].startswith(b"xref\n0 6\n"))
         for number, place in enumerate(re.findall(rb"(\d{10}) 00000 n ", page), 1):
-            self.assertTrue(page[int(place):].startswith(b"%d 0 obj\n" % number))
+            self.assertTrue(page[int(place) :].startswith(b"%d 0 obj\n" % number))
         point_mm = 25.4 / 72
-        drawn = [(round(float(x) * point_mm - 105 - 2, 1), round(float(y) * point_mm - 148.5, 1))
-                 for x, y in re.findall(rb"(?m)^([0-9.]+) ([0-9.]+) m [^l\n]* c S$", page)]
+        drawn = [
+            (round(float(x) * point_mm - 105 - 2, 1), round(float(y) * point_mm - 148.5, 1))
+            for x, y in re.findall(rb"(?m)^([0-9.]+) ([0-9.]+) m [^l\n]* c S$", page)
+        ]
         self.assertEqual(sorted(drawn), sorted(circles))
 
     def test_usage(self):
-        for options, words in (([], "give -o CARD.html, or --template"), (["-o", "c.html"], "give --weight GRAMS, or --from"),
-                               (["-o", "c.html", "--weight", "300"], "give --record FILE.csv"), (["--template", "a.pdf", "--weight", "300"], "excludes"),
-                               (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "20"], "is 0.07 of the weight; give --pull from 45 to 150 grams"),
-                               (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "5"], '--pull takes 10 to 1000 grams, not "5"; see fingertip validate --help'),
-                               (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--thread-height", "3"], "pull")):
+        for options, words in (
+            ([], "give -o CARD.html, or --template"),
+            (["-o", "c.html"], "give --weight GRAMS, or --from"),
+            (["-o", "c.html", "--weight", "300"], "give --record FILE.csv"),
+            (["--template", "a.pdf", "--weight", "300"], "excludes"),
+            (
+                ["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "20"],
+                "is 0.07 of the weight; give --pull from 45 to 150 grams",
+            ),
+            (
+                ["-o", "c.html", "--weight", "300", "--record", "r.csv", "--pull", "5"],
+                '--pull takes 10 to 1000 grams, not "5"; see fingertip validate --help',
+            ),
+            (["-o", "c.html", "--weight", "300", "--record", "r.csv", "--thread-height", "3"], "pull"),
+        ):
             self.assertIn(words, self.error("validate", *options, status=2))
 
 

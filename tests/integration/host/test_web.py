@@ -2,6 +2,7 @@
 
 usage: test_web.py --fingertip TOOL
 """
+
 import argparse
 import contextlib
 import http.client
@@ -21,10 +22,13 @@ from fingertip.version import __version__  # noqa: E402
 
 TOOLS = argparse.Namespace()
 PATIENCE_s = 300
-FILES = {"index.html": ("text/html; charset=utf-8", f'<meta name="fingertip-version" content="{__version__}">'.encode()),
-         "app.js": ("text/javascript; charset=utf-8", b"0;"),
-         "app.css": ("text/css; charset=utf-8", b"a{}"), "assets/simulated.wasm": ("application/wasm", b"\0asm\1\0\0\0"),
-         "assets/pad.bin": ("application/octet-stream", bytes(range(256)) * 4096)}
+FILES = {
+    "index.html": ("text/html; charset=utf-8", f'<meta name="fingertip-version" content="{__version__}">'.encode()),
+    "app.js": ("text/javascript; charset=utf-8", b"0;"),
+    "app.css": ("text/css; charset=utf-8", b"a{}"),
+    "assets/simulated.wasm": ("application/wasm", b"\0asm\1\0\0\0"),
+    "assets/pad.bin": ("application/octet-stream", bytes(range(256)) * 4096),
+}
 
 
 class Web(unittest.TestCase):
@@ -45,8 +49,13 @@ class Web(unittest.TestCase):
     def served(self, *options, **environment):
         """Host and port of a server, and its process."""
         without = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-        process = subprocess.Popen([self.tool, "web", "--port", "0", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   env={**without, **environment})
+        process = subprocess.Popen(
+            [self.tool, "web", "--port", "0", *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**without, **environment},
+        )
         try:
             url = process.stdout.readline().strip()
             self.assertTrue(url, process.stderr.read() if process.poll() is not None else "")
@@ -78,8 +87,19 @@ class Web(unittest.TestCase):
 
     def test_nothing_else_is(self):
         with self.served() as (host, port, _):
-            for path in ("/../secret", "/%2e%2e/secret", "/..%2fsecret", "/assets/../../secret", "//etc/passwd", "/assets", "/assets/", "/index.html/",
-                         "/%00", "/index.html%00.js", "/" + "a" * 3000):
+            for path in (
+                "/../secret",
+                "/%2e%2e/secret",
+                "/..%2fsecret",
+                "/assets/../../secret",
+                "//etc/passwd",
+                "/assets",
+                "/assets/",
+                "/index.html/",
+                "/%00",
+                "/index.html%00.js",
+                "/" + "a" * 3000,
+            ):
                 status, headers, body = self.ask(host, port, path)
                 self.assertIn(status, (400, 404), path)
                 self.assertNotIn(b"secret", body)
@@ -102,7 +122,16 @@ class Web(unittest.TestCase):
 
     def test_a_name_that_leads_here_is_refused(self):
         with self.served() as (host, port, _):
-            for name in ("evil.example", f"evil.example:{port}", f"localhost.evil.example:{port}", f"127.0.0.1.evil.example:{port}", "", "[evil]", "[", "127.1"):
+            for name in (
+                "evil.example",
+                f"evil.example:{port}",
+                f"localhost.evil.example:{port}",
+                f"127.0.0.1.evil.example:{port}",
+                "",
+                "[evil]",
+                "[",
+                "127.1",
+            ):
                 status, _, body = self.ask(host, port, Host=name)
                 self.assertIn(status, (400, 421), name)
                 self.assertNotIn(FILES["index.html"][1], body)
@@ -136,9 +165,14 @@ class Web(unittest.TestCase):
 
     def test_what_cannot_be_served_is_said(self):
         with self.served() as (_, port, _):
-            self.assertEqual(self.refused("--port", str(port)),
-                             (1, f"fingertip: port {port} of 127.0.0.1 is taken by another program; end that one, or choose another --port "
-                                 "(a browser asks for fingertips again there)\n"))
+            self.assertEqual(
+                self.refused("--port", str(port)),
+                (
+                    1,
+                    f"fingertip: port {port} of 127.0.0.1 is taken by another program; end that one, or choose another --port "
+                    "(a browser asks for fingertips again there)\n",
+                ),
+            )
         for address in ("192.0.2.1", "no.such.name.invalid", "1.2.3"):
             status, said = self.refused("--address", address, "--port", "0")
             self.assertEqual(status, 1, address)

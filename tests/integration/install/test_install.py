@@ -2,6 +2,7 @@
 
 usage: test_install.py --cmake CMAKE --build FOLDER --fake-device PROGRAM [--node NODE --image pico_mux.bin]
 """
+
 # real time: installed programs on pseudo-terminals
 import argparse
 import os
@@ -17,16 +18,44 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 EXAMPLE = ROOT / "host_tools/library/libfingertip/example"
 TOOLS = argparse.Namespace()
 PATIENCE_s = 300
-PUBLIC = {"clock.hpp", "clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "fingertip.h", "line_source.hpp", "names.hpp",
-          "packet_fields.hpp", "packet_file.hpp", "recording_reader.hpp", "session.hpp", "transport.hpp", "wire.hpp",
-          "common/calibration.h", "common/contact_flags.h", "common/crash.h", "common/limits.h", "common/pad_profile.h", "common/status.h",
-          "wire/bodies.h", "wire/packet.h"}
+PUBLIC = {
+    "clock.hpp",
+    "clock_fit.hpp",
+    "command.hpp",
+    "connection.hpp",
+    "decoder.hpp",
+    "device_loop.hpp",
+    "discovery.hpp",
+    "error.hpp",
+    "fingertip.h",
+    "line_source.hpp",
+    "names.hpp",
+    "packet_fields.hpp",
+    "packet_file.hpp",
+    "recording_reader.hpp",
+    "session.hpp",
+    "transport.hpp",
+    "wire.hpp",
+    "common/calibration.h",
+    "common/contact_flags.h",
+    "common/crash.h",
+    "common/limits.h",
+    "common/pad_profile.h",
+    "common/status.h",
+    "wire/bodies.h",
+    "wire/packet.h",
+}
 FLAG_CONTACT, FLAG_FIT_VALID, FLAG_UNCERTAIN = 1 << 0, 1 << 1, 1 << 10
 
 
 def run(*command, **environment):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=PATIENCE_s,
-                          env={**os.environ, **{name: str(value) for name, value in environment.items()}})
+    done = subprocess.run(
+        [str(part) for part in command],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_s,
+        env={**os.environ, **{name: str(value) for name, value in environment.items()}},
+    )
     if done.returncode:
         raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
     return done.stdout
@@ -63,8 +92,21 @@ class Install(unittest.TestCase):
 
     def test_everything_is_there(self):
         names = {path.relative_to(self.prefix).name for path in self.installed()}
-        self.assertLessEqual({"fingertip", "60-fingertip.rules", "fingertip.1", "_fingertip", "fingertip.fish", "fingertip.pc",
-                              "fingertipConfig.cmake", "fingertipConfigVersion.cmake", "fingertipTargets.cmake", "PROTOCOL.md"}, names)
+        self.assertLessEqual(
+            {
+                "fingertip",
+                "60-fingertip.rules",
+                "fingertip.1",
+                "_fingertip",
+                "fingertip.fish",
+                "fingertip.pc",
+                "fingertipConfig.cmake",
+                "fingertipConfigVersion.cmake",
+                "fingertipTargets.cmake",
+                "PROTOCOL.md",
+            },
+            names,
+        )
         headers = self.prefix / "include/fingertip"
         self.assertEqual({str(path.relative_to(headers)) for path in headers.rglob("*") if path.is_file()}, PUBLIC)
 
@@ -94,7 +136,8 @@ class Install(unittest.TestCase):
         project = self.folder / "wrong"
         project.mkdir()
         (project / "CMakeLists.txt").write_text(
-            "cmake_minimum_required(VERSION 3.16)\nproject(wrong LANGUAGES CXX)\nfind_package(fingertip 99.0 REQUIRED)\n")
+            "cmake_minimum_required(VERSION 3.16)\nproject(wrong LANGUAGES CXX)\nfind_package(fingertip 99.0 REQUIRED)\n"
+        )
         with self.assertRaisesRegex(AssertionError, "99.0"):
             run(TOOLS.cmake, "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}")
 
@@ -103,14 +146,42 @@ class Install(unittest.TestCase):
             language = "c++" if header.endswith(".hpp") else "c"
             source = self.folder / f"alone.{language}"
             source.write_text(f"#include <fingertip/{header}>\n")
-            run("cc", "-x", language, f"-std={'c++17' if language == 'c++' else 'c11'}", "-Wall", "-Wextra", "-Werror", "-fsyntax-only",
-                f"-I{self.prefix / 'include'}", source)
+            run(
+                "cc",
+                "-x",
+                language,
+                f"-std={'c++17' if language == 'c++' else 'c11'}",
+                "-Wall",
+                "-Wextra",
+                "-Werror",
+                "-fsyntax-only",
+                f"-I{self.prefix / 'include'}",
+                source,
+            )
 
     def test_only_the_public_is_visible(self):
         symbols = run("nm", "-DC", "--defined-only", self.library)
         ours = {part for name in re.findall(r"^\S+ [TDR] ((?:\w+::)*\w+)", symbols, re.M) for part in name.split("::")}
-        for name in ("Session", "Decoder", "DeviceLoop", "PacketFile", "RecordingReader", "choose_way", "open_way", "find_usb",
-                     "command_stream", "setting_from_text", "flags_text", "warning_flags", "info_metadata", "wire_encode", "wire_decode", "fingertip_decoder_feed", "fingertip_reader_next", "fingertip_writer_new"):
+        for name in (
+            "Session",
+            "Decoder",
+            "DeviceLoop",
+            "PacketFile",
+            "RecordingReader",
+            "choose_way",
+            "open_way",
+            "find_usb",
+            "command_stream",
+            "setting_from_text",
+            "flags_text",
+            "warning_flags",
+            "info_metadata",
+            "wire_encode",
+            "wire_decode",
+            "fingertip_decoder_feed",
+            "fingertip_reader_next",
+            "fingertip_writer_new",
+        ):
             self.assertIn(name, ours)
         for name in ("SerialTransport", "UsbTransport", "RecordingWriter", "ProgressBar", "OutputFile", "read_firmware", "printable"):
             self.assertNotIn(name, ours)
@@ -151,8 +222,7 @@ class Install(unittest.TestCase):
                 self.assertEqual(force_N, 5)
 
     def test_the_example_heeds_flags(self):
-        for flags, expected in ((FLAG_CONTACT, set()),
-                                (FLAG_CONTACT | FLAG_FIT_VALID | FLAG_UNCERTAIN, {"not to be trusted: UNCERTAIN"})):
+        for flags, expected in ((FLAG_CONTACT, set()), (FLAG_CONTACT | FLAG_FIT_VALID | FLAG_UNCERTAIN, {"not to be trusted: UNCERTAIN"})):
             port = self.folder / f"tty-{flags}"
             self.wait_for(port, self.start(TOOLS.fake_device, port, "frames=20", f"flags={flags}"))
             self.assertEqual(set(self.follow(self.by_pkg_config, port)), expected)
@@ -164,13 +234,35 @@ class Install(unittest.TestCase):
         truth = "contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip"
         sensors_mm = [(9 * (k // 5 - 1), 9 * (k % 5 - 2)) for k in range(15)]
         p0_Pa, sigma_mm, at_mm = 20000, 7, (2, -3)
-        pressed = [p0_Pa * 2.718281828 ** (-((x - at_mm[0]) ** 2 + (y - at_mm[1]) ** 2) / 2 / sigma_mm ** 2) for x, y in sensors_mm]
+        pressed = [p0_Pa * 2.718281828 ** (-((x - at_mm[0]) ** 2 + (y - at_mm[1]) ** 2) / 2 / sigma_mm**2) for x, y in sensors_mm]
         rows = [(t_s, *[0] * 7, *(pressed if touched else [0] * 15)) for t_s, touched in ((0, 0), (0.5, 0), (0.6, 1), (3, 1))]
-        scenario.write_text("\n".join(["# fingertip-scenario 1", f"t_s,{truth}," + ",".join(f"s{k}_Pa" for k in range(15)),
-                                       *(",".join(map(str, row)) for row in rows)]) + "\n")
+        scenario.write_text(
+            "\n".join(
+                [
+                    "# fingertip-scenario 1",
+                    f"t_s,{truth}," + ",".join(f"s{k}_Pa" for k in range(15)),
+                    *(",".join(map(str, row)) for row in rows),
+                ]
+            )
+            + "\n"
+        )
         port = self.folder / "tty-emulated"
-        emulator = self.start(TOOLS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", TOOLS.image,
-                              "--scenario", scenario, "--seconds", "3", "--pty", port, "--wait-open", "--fast-enumeration")
+        emulator = self.start(
+            TOOLS.node,
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            "pico_mux",
+            "--image",
+            TOOLS.image,
+            "--scenario",
+            scenario,
+            "--seconds",
+            "3",
+            "--pty",
+            port,
+            "--wait-open",
+            "--fast-enumeration",
+        )
         self.wait_for(port, emulator)
         lines = self.follow(self.by_cmake, port)
         located = [tuple(map(float, found.groups())) for line in lines if (found := re.fullmatch(r"(\S+) mm (\S+) mm (\S+) N", line))]

@@ -3,6 +3,7 @@
 usage: test_lerobot.py FAKE_DEVICE [unittest arguments]. Where LeRobot is installed it is that which is plugged into, else a stand-in beside
 this file.
 """
+
 # real time: the plugin as a robot program calls it, on pseudo-terminals
 import contextlib
 import dataclasses
@@ -32,7 +33,7 @@ from fingertip.clock import NO_CLOCK  # noqa: E402
 PATIENCE_s = 300
 SERIALS = {"left": "AAAAAAAAAAAAAAA1", "right": "AAAAAAAAAAAAAAA2"}
 TRUSTED = Flag.CONTACT | Flag.FIT_VALID | Flag.TARED | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID
-PRETENDED = '''
+PRETENDED = """
 import dataclasses
 from lerobot.robots import Robot, RobotConfig
 
@@ -64,7 +65,7 @@ class Pretended(Robot):
         return action
     def disconnect(self):
         self.is_connected = False
-'''
+"""
 
 
 class Plugin(unittest.TestCase):
@@ -80,7 +81,7 @@ class Plugin(unittest.TestCase):
         backend = f"from setuptools import build_meta as b; b.build_wheel({str(cls.folder)!r})"
         done = subprocess.run([sys.executable, "-c", backend], cwd=source, capture_output=True, text=True, timeout=PATIENCE_s)
         assert done.returncode == 0, done.stderr
-        wheel, = cls.folder.glob("*.whl")
+        (wheel,) = cls.folder.glob("*.whl")
         zipfile.ZipFile(wheel).extractall(site)
         other = site / "lerobot_robot_pretended-1.dist-info"
         other.mkdir()
@@ -89,7 +90,7 @@ class Plugin(unittest.TestCase):
         (site / "lerobot_robot_pretended/config_pretended.py").write_text(PRETENDED)
         (site / "lerobot_robot_pretended/__init__.py").write_text("from .config_pretended import Pretended, PretendedConfig\n")
         sys.path.insert(0, str(site))
-        cls.metadata, = (path.read_text() for path in site.glob("lerobot_robot_fingertip-*.dist-info/METADATA"))
+        (cls.metadata,) = (path.read_text() for path in site.glob("lerobot_robot_fingertip-*.dist-info/METADATA"))
         importlib.import_module("lerobot.utils.import_utils").register_third_party_plugins()
         cls.robots = importlib.import_module("lerobot.robots")
         cls.observation = importlib.import_module("lerobot_robot_fingertip.observation")
@@ -148,7 +149,9 @@ class Plugin(unittest.TestCase):
         self.assertEqual(found(TRUSTED | Flag.TANGENTIAL_VALID, qx_N=0.5, qy_N=-1.0), [1, 1, 1, *trusted, 0.5, -1.0, *pressures])
         since_touch = TRUSTED | Flag.TANGENTIAL_VALID | Flag.TANGENTIAL_FROM_TOUCH
         self.assertEqual(found(since_touch, qx_N=0.5, qy_N=-1.0), [1, 1, 0, *trusted, 0, 0, *pressures])
-        self.assertEqual(found(TRUSTED | Flag.UNCERTAIN | Flag.TANGENTIAL_VALID, qx_N=0.5, qy_N=-1.0), [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, *pressures])
+        self.assertEqual(
+            found(TRUSTED | Flag.UNCERTAIN | Flag.TANGENTIAL_VALID, qx_N=0.5, qy_N=-1.0), [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, *pressures]
+        )
         self.assertEqual(found(Flag.TARED), [0] * 10 + pressures)
         self.assertEqual(found(TRUSTED, slip_mm=math.nan)[7], 0)
         self.assertEqual(found(Flag.CONTACT), [1] + [0] * 12)  # of no zero yet
@@ -196,8 +199,10 @@ class Plugin(unittest.TestCase):
             robot.disconnect()
 
     def test_what_is_wrong_is_said_before_the_robot_moves(self):
-        for options, said in (({"fingertips": {"left": "/nowhere"}}, "fingertip left: .*nowhere"),
-                              ({"fingertips": {"left": self.device("left")}, "sensors": 9}, "has 15 sensors; give --robot.sensors")):
+        for options, said in (
+            ({"fingertips": {"left": "/nowhere"}}, "fingertip left: .*nowhere"),
+            ({"fingertips": {"left": self.device("left")}, "sensors": 9}, "has 15 sensors; give --robot.sensors"),
+        ):
             robot = self.make(**options)
             with self.assertRaisesRegex(self.not_connected, said):
                 robot.connect()
@@ -214,8 +219,13 @@ class Plugin(unittest.TestCase):
 
         ports = {name: self.device(name, f"flags={int(TRUSTED)}") for name in SERIALS}
         fingertips = ", ".join(f"{name}: {port}" for name, port in ports.items())
-        words = ["--robot.type=fingertip", "--robot.id=black", f"--robot.calibration_dir={self.folder}",
-                 f"--robot.robot={{type: pretended, joints: 3, calibration_dir: {self.folder}}}", f"--robot.fingertips={{{fingertips}}}"]
+        words = [
+            "--robot.type=fingertip",
+            "--robot.id=black",
+            f"--robot.calibration_dir={self.folder}",
+            f"--robot.robot={{type: pretended, joints: 3, calibration_dir: {self.folder}}}",
+            f"--robot.fingertips={{{fingertips}}}",
+        ]
         robot = self.robots.make_robot_from_config(draccus.parse(Recording, args=words).robot)
         robot.connect()
         kinds = hw_to_dataset_features(robot.observation_features, "observation")

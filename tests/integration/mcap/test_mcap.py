@@ -1,4 +1,5 @@
 """MCAP recordings of the tool and of the Python package, by readers of others: usage test_mcap.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+
 # real time: a recorder that is killed while it writes
 import contextlib
 import os
@@ -33,7 +34,7 @@ class TestMcap(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-")))
         cls.enterClassContext(mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": str(cls.folder), "NO_COLOR": "1"}))
-        cls.bag, cls.capture = bags.record(FINGERTIP, FAKE_DEVICE, cls.folder, 0.4, calibrated=1, pad=1, drop=50, health=60, flags=0x17ff)
+        cls.bag, cls.capture = bags.record(FINGERTIP, FAKE_DEVICE, cls.folder, 0.4, calibrated=1, pad=1, drop=50, health=60, flags=0x17FF)
         cls.csv = cls.convert(cls.bag, "bag.csv")
         cls.random_csv = cls.folder / "random.csv"
         bags.write_random(cls.random_csv, 1234, 300)
@@ -99,8 +100,14 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(bags.contents(self.bag), bags.contents(self.convert(self.csv, "again.mcap")), "as it came and converted")
 
     def test_nothing_is_lost_on_the_way_and_back(self):
-        ways = [(self.csv, ".mcap"), (self.random_csv, ".mcap"), (self.several_csv, ".mcap"), (self.bag, ".csv"), (self.capture, ".mcap"),
-                (self.capture, ".csv")]
+        ways = [
+            (self.csv, ".mcap"),
+            (self.random_csv, ".mcap"),
+            (self.several_csv, ".mcap"),
+            (self.bag, ".csv"),
+            (self.capture, ".mcap"),
+            (self.capture, ".csv"),
+        ]
         for start, middle in ways:
             there = self.convert(start, f"there{middle}")
             back = self.convert(there, f"back{start.suffix}")
@@ -113,15 +120,17 @@ class TestMcap(unittest.TestCase):
             data = bytearray(text)
             for _ in range(2):
                 at = prng.randrange(24, len(data))
-                data[at:at + prng.randrange(3)] = prng.choice((b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", "µ".encode()))
-            data = data[:prng.randrange(len(data) // 2, len(data) + 1)]
+                data[at : at + prng.randrange(3)] = prng.choice((b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", "µ".encode()))
+            data = data[: prng.randrange(len(data) // 2, len(data) + 1)]
             path = self.folder / "edited.csv"
             path.write_bytes(data)
             try:
                 data.decode("utf-8")
             except UnicodeDecodeError:
                 continue
-            self.assertEqual(self.convert(self.convert(path, "edited.mcap", "--salvage"), "edited_back.csv", "--salvage").read_bytes(), data, number)
+            self.assertEqual(
+                self.convert(self.convert(path, "edited.mcap", "--salvage"), "edited_back.csv", "--salvage").read_bytes(), data, number
+            )
         path.write_bytes(text + b"# note: \xff\n")
         self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
 
@@ -146,7 +155,10 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(names, ["calibration_0001ABCD.json", "calibration_0002ABCD.json"])
         bag = self.convert(self.several_csv, "two.mcap")
         rows = [line.split(",")[0] for line in self.several_csv.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
-        counts = {topic: sum(each[0] == topic for each in bags.by_rosbags(bag)) for topic in ("/fingertip/AAAA/contact", "/fingertip/BBBB/contact")}
+        counts = {
+            topic: sum(each[0] == topic for each in bags.by_rosbags(bag))
+            for topic in ("/fingertip/AAAA/contact", "/fingertip/BBBB/contact")
+        }
         self.assertEqual(list(counts.values()), [rows.count("0"), rows.count("1")])
 
     def test_a_torn_recording_is_converted_with_salvage_only(self):
@@ -157,10 +169,14 @@ class TestMcap(unittest.TestCase):
         for out in ("torn_out.csv", "torn_out.mcap"):
             self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", self.refused("convert", torn, self.folder / out))
             self.assertFalse((self.folder / out).exists())
-            self.assertEqual(bags.call(FINGERTIP, "convert", torn, self.folder / out, "--salvage").stderr,
-                             f"{torn}: the last line is torn\n{torn}: no end line: the recording was cut short, its recorder killed or its disk full\n")
-        self.assertEqual(bags.call(FINGERTIP, "convert", uncut, self.folder / "unended_out.csv").stderr,
-                         f"{uncut}: no end line: the recording was cut short, its recorder killed or its disk full\n")
+            self.assertEqual(
+                bags.call(FINGERTIP, "convert", torn, self.folder / out, "--salvage").stderr,
+                f"{torn}: the last line is torn\n{torn}: no end line: the recording was cut short, its recorder killed or its disk full\n",
+            )
+        self.assertEqual(
+            bags.call(FINGERTIP, "convert", uncut, self.folder / "unended_out.csv").stderr,
+            f"{uncut}: no end line: the recording was cut short, its recorder killed or its disk full\n",
+        )
         self.assertEqual(bags.call(FINGERTIP, "convert", self.csv, self.folder / "ended_out.csv").stderr, "")
 
     def test_cut_anywhere_a_chunk_is_lost(self):
@@ -227,8 +243,11 @@ class TestMcap(unittest.TestCase):
         writer.finish()
         with contextlib.suppress(FileNotFoundError):
             (self.folder / "out.csv").unlink()
-        for words, said in (((other,), "an MCAP file, but no recording of a fingertip; give a file that `fingertip record` wrote"),
-                            ((self.folder / "none.mcap",), "No such file or directory; check the path"), ((__file__,), "neither a recording nor bytes")):
+        for words, said in (
+            ((other,), "an MCAP file, but no recording of a fingertip; give a file that `fingertip record` wrote"),
+            ((self.folder / "none.mcap",), "No such file or directory; check the path"),
+            ((__file__,), "neither a recording nor bytes"),
+        ):
             self.assertIn(said, self.refused("convert", *words, self.folder / "out.csv"))
         self.assertIn("is the file to read", self.refused("convert", self.bag, self.bag, "--overwrite"))
         head = self.folder / "head.mcap"
@@ -237,8 +256,15 @@ class TestMcap(unittest.TestCase):
         with self.assertRaisesRegex(InputError, "no recording of a fingertip"):
             read_recording(other)
         huge = self.folder / "huge.mcap"  # a chunk that says it is 2^62 bytes
-        huge.write_bytes(MCAP0_MAGIC + struct.pack("<BQ", Opcode.CHUNK, 48) + struct.pack("<QQQI", 0, 0, 1 << 62, 0) + struct.pack("<I", 4) +
-                         b"zstd" + struct.pack("<Q", 4) + bytes(4))
+        huge.write_bytes(
+            MCAP0_MAGIC
+            + struct.pack("<BQ", Opcode.CHUNK, 48)
+            + struct.pack("<QQQI", 0, 0, 1 << 62, 0)
+            + struct.pack("<I", 4)
+            + b"zstd"
+            + struct.pack("<Q", 4)
+            + bytes(4)
+        )
         self.assertIn("a chunk of 4611686018427387904 bytes", self.refused("convert", huge, self.folder / "out.csv"))
         self.assertFalse((self.folder / "out.csv").exists())
 
@@ -279,7 +305,9 @@ class TestMcap(unittest.TestCase):
                 read_recording(self.bag)
         self.assertFalse((self.folder / "without.mcap").exists())
         system = "/usr/bin/python3", "-c", "import fingertip.files as f, sys; print(len(f.read_recording(sys.argv[1])['t_us']))"
-        done = subprocess.run([*system, self.csv], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT / "host_tools/python")})
+        done = subprocess.run(
+            [*system, self.csv], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT / "host_tools/python")}
+        )
         self.assertGreater(int(done.stdout), 100, done.stderr)
 
 

@@ -2,6 +2,7 @@
 
 usage: test_package.py --cpack CPACK --build FOLDER --fingertip PROGRAM --fake-device PROGRAM
 """
+
 # real time: an installed package records from a pseudo-terminal
 import argparse
 import os
@@ -54,8 +55,13 @@ class Package(unittest.TestCase):
         for package in self.packages:
             self.assertEqual(run("dpkg-deb", "--field", package, "Version").strip(), version)
         held = run("dpkg-deb", "--contents", self.packages[0])
-        for path in ("bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "lib/systemd/user/fingertip.service", "share/man/man1/fingertip.1.gz",
-                     "share/bash-completion/completions/fingertip"):
+        for path in (
+            "bin/fingertip",
+            "lib/udev/rules.d/60-fingertip.rules",
+            "lib/systemd/user/fingertip.service",
+            "share/man/man1/fingertip.1.gz",
+            "share/bash-completion/completions/fingertip",
+        ):
             self.assertIn(f"./usr/{path}\n", held)
         for path in (pathlib.Path(TOOLS.build) / "host_tools/web/page").rglob("*.*"):  # where it was built
             self.assertIn(f"./usr/share/fingertip/web/{path.relative_to(pathlib.Path(TOOLS.build) / 'host_tools/web/page')}\n", held)
@@ -79,14 +85,32 @@ class Package(unittest.TestCase):
         (scripts / "post_install_fingertip").write_text(USE.format(packages=packages))
         (scripts / "post_install_fingertip").chmod(0o755)
         mirror = run("apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages").splitlines()[0]
-        run("piuparts", "-D", system("ID"), "-d", system("VERSION_CODENAME"), "-m", f"{mirror} main", "--no-eatmydata", "--no-upgrade-test",
-            "--bindmount", packages, "--testdebs-repo", packages, "--scriptsdir", scripts, *self.packages)
+        run(
+            "piuparts",
+            "-D",
+            system("ID"),
+            "-d",
+            system("VERSION_CODENAME"),
+            "-m",
+            f"{mirror} main",
+            "--no-eatmydata",
+            "--no-upgrade-test",
+            "--bindmount",
+            packages,
+            "--testdebs-repo",
+            packages,
+            "--scriptsdir",
+            scripts,
+            *self.packages,
+        )
         self.assertEqual((packages / "version").read_text(), run(TOOLS.fingertip, "--version"))
         self.assertEqual((packages / "rule").read_text(), run(TOOLS.fingertip, "rule"))
         self.assertIn("libfingertip.so", (packages / "libraries").read_text())
         run(TOOLS.fingertip, "replay", recording, "--to-csv", self.folder / "again.csv")
-        there, here = ([line for line in path.read_text().splitlines() if "press.csv" not in line]  # where it came from
-                       for path in (packages / "again.csv", self.folder / "again.csv"))
+        there, here = (
+            [line for line in path.read_text().splitlines() if "press.csv" not in line]  # where it came from
+            for path in (packages / "again.csv", self.folder / "again.csv")
+        )
         self.assertEqual(there, here)
         self.assertGreater(len(here), 100)
 

@@ -71,10 +71,7 @@ class SpokenLine implements Line {
 
   say(packet: object & { type: number }): void {
     this.device_us += 100;
-    this.receive(
-      core.encode({ t_us: this.device_us, ...packet, sequence: this.sequence++ & 0xffff }),
-      performance.now(),
-    );
+    this.receive(core.encode({ t_us: this.device_us, ...packet, sequence: this.sequence++ & 0xffff }), performance.now());
   }
 
   send(frame: Uint8Array): Promise<void> {
@@ -168,7 +165,10 @@ test('it opens: info, streams, then live; frames reach model, history and taps',
   line.say(contactOf(2, 6_001_000, { flags: 0 }));
   end();
   line.say(contactOf(3, 6_002_000));
-  assert.deepEqual(seen.map(([type]) => type), [1, 2, 1]);
+  assert.deepEqual(
+    seen.map(([type]) => type),
+    [1, 2, 1],
+  );
   assert.ok(seen.every(([, length]) => length > 30));
   assert.equal(fingertip.lost, 4);
   assert.deepEqual([fingertip.contacts, fingertip.raws], [3, 1]);

@@ -60,8 +60,7 @@ function session(): DevicePacket[] {
   const info = infoOf('info_grasp');
   const packets: DevicePacket[] = [{ ...info, sequence: 0 }];
   let sequence = 1;
-  const VALID =
-    Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID | Flag.WIDTHS_VALID | Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID;
+  const VALID = Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID | Flag.WIDTHS_VALID | Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID;
   for (let frame = 1; frame < 600; frame++) {
     const t_us = 1_000_000 + 765 * frame + (frame > 400 ? -300_000 : 0);
     const flags = (integer(2 ** 25) & (random() < 0.5 ? ~0 : ~VALID)) | (random() < 0.3 ? VALID : 0);
@@ -188,8 +187,7 @@ test("CSV: rows and comments are the tool's, byte by byte", async () => {
   convert('a.ftr', 'tool.csv');
   const own = Buffer.from(recorded('csv')).toString().split('\n');
   // The tool says who converted; events are not in a capture; its end line counts its own reading.
-  const plain = (lines: string[]): string[] =>
-    lines.filter((line) => !/^# (recorded_by|started_utc|source|event|end):/.test(line));
+  const plain = (lines: string[]): string[] => lines.filter((line) => !/^# (recorded_by|started_utc|source|event|end):/.test(line));
   assert.deepEqual(plain(own), plain(readFileSync(path('tool.csv'), 'utf8').split('\n')));
 });
 
@@ -302,7 +300,12 @@ test('torn and foreign files: a sentence, and what came before', async () => {
     ['begin.mcap', mcap.subarray(0, 1000), /breaks off before/, false],
     ['chunk.mcap', Buffer.from(mcap.map((byte, i) => (i === Math.floor(mcap.length / 2) ? byte ^ 1 : byte))), /chunk\.mcap: /, false],
     ['noise.ftr', Buffer.alloc(500), /holds no packet/, false],
-    ['damaged.ftr', Buffer.from(frames(packets).map((byte, i) => (i === 5000 ? byte ^ 2 || 3 : byte))), /has 1 damaged packets, which are left out/, true],
+    [
+      'damaged.ftr',
+      Buffer.from(frames(packets).map((byte, i) => (i === 5000 ? byte ^ 2 || 3 : byte))),
+      /has 1 damaged packets, which are left out/,
+      true,
+    ],
   ] as const) {
     const [problem, count] = await problemOf(name, bytes);
     assert.match(problem, words, name);

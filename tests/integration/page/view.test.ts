@@ -157,7 +157,10 @@ test('a line is broken where frames were lost, and where none came, and nowhere 
   const good = chart.curves.get('force_N')?.good ?? [];
   const broken = chart.t_s.filter((_, i) => good[i] === null);
   assert.equal(chart.t_s.length, good.length);
-  assert.deepEqual(broken.map((t_s) => Math.round(t_s * 100)), [100, 240]);
+  assert.deepEqual(
+    broken.map((t_s) => Math.round(t_s * 100)),
+    [100, 240],
+  );
   assert.deepEqual(
     spansOf(buckets, 'lost', first, last, 0.02).map(({ from_s }) => Math.round(from_s * 100)),
     [100, 240],
@@ -192,7 +195,11 @@ test('limits of axes and intervals are round', () => {
   assert.equal(roundAbove(1), 1);
   assert.equal(roundAbove(5.01), 10);
   assert.equal(roundAbove(NaN), 1);
-  for (const [span_s, pixels] of [[20, 900], [180, 333], [5, 5000]] as const) {
+  for (const [span_s, pixels] of [
+    [20, 900],
+    [180, 333],
+    [5, 5000],
+  ] as const) {
     const width_s = intervalOf(span_s, pixels);
     assert.ok(width_s >= span_s / pixels - 1e-12 && width_s <= Math.max(2.5 * (span_s / pixels), 0.001));
   }
@@ -209,7 +216,12 @@ test('what is picked is what is seen there, from every side', () => {
     for (const tilt_deg of [12, 40, 75, 90]) {
       for (const aspect of [0.4, 1, 2.6]) {
         const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX);
-        for (const [x_mm, y_mm, z_mm] of [[0, 0, 0], [9, -18, 0], [-14.5, 23, 0], [4, 2, 10]] as const) {
+        for (const [x_mm, y_mm, z_mm] of [
+          [0, 0, 0],
+          [9, -18, 0],
+          [-14.5, 23, 0],
+          [4, 2, 10],
+        ] as const) {
           const { right, up } = seen(camera, [x_mm, y_mm, z_mm]);
           const at = picked(camera, right, up, z_mm);
           assert.ok(at);
@@ -331,7 +343,14 @@ test('two contacts are two spots, and a long one has its ends', () => {
     { x_mm: 4, y_mm: -2, sd_mm: 0.5 },
   ]);
   assert.ok(both?.doubtful && both.edge === null);
-  const long = sceneOf(LAYOUT, contactOf({ edge_angle_deg: -90, edge_length_mm: 20, flags: FITTED | Flag.SHAPE_VALID | Flag.EDGE }), READINGS, [], null, true).fit;
+  const long = sceneOf(
+    LAYOUT,
+    contactOf({ edge_angle_deg: -90, edge_length_mm: 20, flags: FITTED | Flag.SHAPE_VALID | Flag.EDGE }),
+    READINGS,
+    [],
+    null,
+    true,
+  ).fit;
   assert.deepEqual([long?.edge?.x_mm.toFixed(3), long?.edge?.y_mm, long?.two, long?.doubtful], ['0.000', -10, [], false]);
 });
 

@@ -3,6 +3,7 @@ emulated chip byte by byte.
 
 usage: test_player.py --player PROGRAM --fingertip PROGRAM [--node PROGRAM --image FILE.bin]
 """
+
 import argparse
 import json
 import math
@@ -85,8 +86,14 @@ class Player(unittest.TestCase):
         """5 N on a pad of 12 mm that is pulled along by 1.5 N from 1.5 s on: the field of the layer as
         firmware/common/pad_profile.h describes it."""
         path = self.folder / "sheared.csv"
-        rows = ["# fingertip-scenario 1", "# name: sheared", "# ambient_Pa: 101325", "# temperature_degC: 25", "# sensors: 15",
-                "t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip," + ",".join(f"s{k}_Pa" for k in range(15))]
+        rows = [
+            "# fingertip-scenario 1",
+            "# name: sheared",
+            "# ambient_Pa: 101325",
+            "# temperature_degC: 25",
+            "# sensors: 15",
+            "t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip," + ",".join(f"s{k}_Pa" for k in range(15)),
+        ]
         normal = ((0.0952, 0.2962), (0.8216, 0.4781))
         pulled = ((0.0936, 0.4045), (0.3359, 0.6659), (0.4635, 1.6992))
         for ms in range(2001):
@@ -136,15 +143,20 @@ class Player(unittest.TestCase):
         rows = [i for i, line in enumerate(good) if line[0].isdigit()]
         cases = {
             "no scenario": (["t_s,contact\n"], ":1: not a scenario"),
-            "cut off": (good[:rows[3]] + [good[rows[3]][:20]], "ends within a line"),
-            "no number": (good[:rows[3]] + [good[rows[3]].replace(",", ",x", 1)], f":{rows[3] + 1}: column"),
-            "time goes back": (good[:rows[3]] + [good[rows[0]]], "does not increase"),
-            "no rows": (good[:rows[0]], "no rows"),
-            "too far": (good[:rows[3]] + [",".join(good[rows[3]].split(",")[:8] + ["2e7"] * 15) + "\n"], "at most 1e7"),
-            "no such air": (good[:rows[0] - 1] + ["# ambient_Pa: 1e300\n"] + good[rows[0] - 1:rows[3]], "at most 1e7"),
-            "too hot": (good[:rows[0] - 1] + ["# temperature_degC: 1e300\n"] + good[rows[0] - 1:rows[3]], "at most 1000 degC"),
-            "too hot in a row": ([line.rstrip("\n") + (",temperature_degC\n" if line[0] == "t" else ",1e300\n" if line[0].isdigit() else "\n")
-                                  for line in good[:rows[3]]], "at most 1000 degC"),
+            "cut off": (good[: rows[3]] + [good[rows[3]][:20]], "ends within a line"),
+            "no number": (good[: rows[3]] + [good[rows[3]].replace(",", ",x", 1)], f":{rows[3] + 1}: column"),
+            "time goes back": (good[: rows[3]] + [good[rows[0]]], "does not increase"),
+            "no rows": (good[: rows[0]], "no rows"),
+            "too far": (good[: rows[3]] + [",".join(good[rows[3]].split(",")[:8] + ["2e7"] * 15) + "\n"], "at most 1e7"),
+            "no such air": (good[: rows[0] - 1] + ["# ambient_Pa: 1e300\n"] + good[rows[0] - 1 : rows[3]], "at most 1e7"),
+            "too hot": (good[: rows[0] - 1] + ["# temperature_degC: 1e300\n"] + good[rows[0] - 1 : rows[3]], "at most 1000 degC"),
+            "too hot in a row": (
+                [
+                    line.rstrip("\n") + (",temperature_degC\n" if line[0] == "t" else ",1e300\n" if line[0].isdigit() else "\n")
+                    for line in good[: rows[3]]
+                ],
+                "at most 1000 degC",
+            ),
         }
         for name, (lines, message) in cases.items():
             with self.subTest(name):
@@ -165,8 +177,10 @@ class Player(unittest.TestCase):
         out = ("--force", "3", "-o", self.folder / "found.commands")
         self.assertIn("has no pressures to calibrate from", self.refused("calibrate", self.play("contact.csv", "--seconds", "2"), *out))
         self.assertIn("not calibrated: ", self.refused("calibrate", self.play("pressures.csv", "--seconds", "2", "--raw"), *out))
-        self.assertIn("holds no commands; make it with fingertip_player calibrate",
-                      self.refused("play", self.scenario, "-o", self.folder / "never.csv", "--first", self.scenario))
+        self.assertIn(
+            "holds no commands; make it with fingertip_player calibrate",
+            self.refused("play", self.scenario, "-o", self.folder / "never.csv", "--first", self.scenario),
+        )
         for path in (out[-1], self.folder / "never.csv"):
             self.assertFalse(path.exists())
 
@@ -177,8 +191,23 @@ class Player(unittest.TestCase):
         words = [must(OPTIONS.command_frame, *command.split()).strip() for command in commands]
         script.write_text("0.5 dtr 1\n" + "".join(f"{0.52 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(words)))
         path = self.folder / name
-        must(OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", OPTIONS.image,
-             "--scenario", self.scenario, "--host-script", script, "--capture", path, "--seconds", "1.6", "--fast-enumeration")
+        must(
+            OPTIONS.node,
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            "pico_mux",
+            "--image",
+            OPTIONS.image,
+            "--scenario",
+            self.scenario,
+            "--host-script",
+            script,
+            "--capture",
+            path,
+            "--seconds",
+            "1.6",
+            "--fast-enumeration",
+        )
         return path
 
     def test_the_chip_sends_what_this_machine_computes(self):

@@ -2,6 +2,7 @@
 
 usage: test_package.py FINGERTIP SIMULATED_FINGERTIP SIMULATED_DEVICE TIME_KEEPER [unittest arguments]
 """
+
 import contextlib
 import importlib
 import math
@@ -41,7 +42,7 @@ def vectors():
     for path in sorted((ROOT / "tests/vectors/wire").glob("*.txt")):
         words = [word for line in path.read_text(encoding="utf-8").splitlines() for word in line.split("#")[0].split()]
         middle = words.index("frame")
-        found[path.stem] = {"packet": bytes.fromhex("".join(words[1:middle])), "frame": bytes.fromhex("".join(words[middle + 1:]))}
+        found[path.stem] = {"packet": bytes.fromhex("".join(words[1:middle])), "frame": bytes.fromhex("".join(words[middle + 1 :]))}
     return found
 
 
@@ -57,7 +58,7 @@ def some_value(wire_field, prng, sensors):
     elif wire_field.code == "f":
         values = [float(np.float32(prng.choice((0.0, 1.5, -3e-9, 2e30, prng.gauss(0, 100))))) for _ in range(count)]
     else:
-        values = ["pico mux+"[:prng.randrange(10)]]
+        values = ["pico mux+"[: prng.randrange(10)]]
     return tuple(values) if wire_field.times > 1 else values[0]
 
 
@@ -110,8 +111,12 @@ class Folder(unittest.TestCase):
         """What the C codec and the C++ recorder make of these bytes."""
         with open(self.path(name + ".ftr"), "wb") as file:
             file.write(line)
-        done = subprocess.run([FINGERTIP, "replay", self.path(name + ".ftr"), "--to-csv", self.path(name + ".csv")], capture_output=True,
-                              text=True, timeout=PATIENCE_s)
+        done = subprocess.run(
+            [FINGERTIP, "replay", self.path(name + ".ftr"), "--to-csv", self.path(name + ".csv")],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_s,
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         return fingertip.read_recording(self.path(name + ".csv"))
 
@@ -135,13 +140,17 @@ class Codec(Folder):
     def test_what_the_vectors_say(self):
         found = {name: wire.decode(each["frame"][:-1]) for name, each in vectors().items()}
         contact = found["contact_grasp"].body
-        self.assertEqual((contact.x_mm, contact.y_mm, contact.force_N, contact.slip_mm, contact.qx_N, contact.vy_mm_s, contact.fit_us),
-                         (-4.5, 12.25, 1.5, 0.375, -0.4375, 2.25, 2760))
+        self.assertEqual(
+            (contact.x_mm, contact.y_mm, contact.force_N, contact.slip_mm, contact.qx_N, contact.vy_mm_s, contact.fit_us),
+            (-4.5, 12.25, 1.5, 0.375, -0.4375, 2.25, 2760),
+        )
         self.assertTrue(math.isnan(found["contact_none"].body.x_mm) and math.isnan(found["contact"].body.qx_N))
         calibration = found["info"].body.calibration
         self.assertEqual((calibration.gains, calibration.gain_sds), ((0.875, 1.125), (0.0078125, 0.015625)))
         self.assertEqual((calibration.off_x_um, calibration.off_y_um, calibration.wider_q15), ((250, -2000), (-125, 2000), (1638, -9830)))
-        self.assertEqual((found["info"].body.serial, found["info"].body.x_mm, found["info"].body.firmware), ("E66058388347A12C", (-4.5, 4.5), (1, 2, 3)))
+        self.assertEqual(
+            (found["info"].body.serial, found["info"].body.x_mm, found["info"].body.firmware), ("E66058388347A12C", (-4.5, 4.5), (1, 2, 3))
+        )
         self.assertIsNone(found["info_raw"].body.slip_window_ms)
         self.assertEqual((found["command_slip"].body, found["command_slip"].t_us), (wire.SetSlip(0.75, 100), 0x1122334455667788))
         self.assertIsNone(found["health_raw"].body.fit_failures)
@@ -154,7 +163,7 @@ class Codec(Folder):
         sent = some_line(prng)
         line = b"\0" + b"".join(map(wire.encode, sent))
         decoder = wire.Decoder()
-        got = [packet for at in range(0, len(line), 997) for packet in decoder.feed(line[at:at + 997])]
+        got = [packet for at in range(0, len(line), 997) for packet in decoder.feed(line[at : at + 997])]
         self.assertTrue(same(got, sent))
         recording = self.by_c("line", line)
         self.assertEqual({name: int(recording.end[name]) for name in COUNTS}, {name: getattr(decoder.statistics, name) for name in COUNTS})
@@ -176,11 +185,26 @@ class Codec(Folder):
         numbers = lambda text: [float(word) for word in text.split()]
         for key in ("serial", "board", "firmware", "git"):
             self.assertEqual(again.metadata.get(key), recording.metadata.get(key), key)
-        for key in set(recording.metadata) & set(again.metadata) - {"serial", "board", "scene", "firmware", "git", "recorded_by", "started_utc", "port"}:
-            np.testing.assert_array_equal(np.float32(numbers(again.metadata[key])), np.float32(numbers(recording.metadata[key])), err_msg=key)
+        for key in set(recording.metadata) & set(again.metadata) - {
+            "serial",
+            "board",
+            "scene",
+            "firmware",
+            "git",
+            "recorded_by",
+            "started_utc",
+            "port",
+        }:
+            np.testing.assert_array_equal(
+                np.float32(numbers(again.metadata[key])), np.float32(numbers(recording.metadata[key])), err_msg=key
+            )
         # the C++ reader takes it, and loses nothing
-        done = subprocess.run([FINGERTIP, "replay", self.path("python.csv"), "--to-csv", self.path("back.csv")], capture_output=True, text=True,
-                              timeout=PATIENCE_s)
+        done = subprocess.run(
+            [FINGERTIP, "replay", self.path("python.csv"), "--to-csv", self.path("back.csv")],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_s,
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         back = fingertip.read_recording(self.path("back.csv"))
         for name, values in recording.columns.items():
@@ -198,7 +222,7 @@ class Codec(Folder):
                 if kind < 3:
                     frame[place] ^= 1 << prng.randrange(8)
                 elif kind == 3:
-                    del frame[place:place + prng.randrange(1, 20)]
+                    del frame[place : place + prng.randrange(1, 20)]
                 elif kind == 4:
                     frame = frame[:-1] + bytes([7]) * prng.choice((1, 800, 2000)) + b"\0"
                 elif kind == 5:
@@ -211,9 +235,9 @@ class Codec(Folder):
                     data = bytes([version, number]) + data[2:]
                     frame = bytearray(wire.cobs_encode(data + zlib.crc32(data).to_bytes(4, "little")) + b"\0")
                 frames[at] = bytes(frame)
-            line = b"".join(frames)[prng.randrange(3):]
+            line = b"".join(frames)[prng.randrange(3) :]
             decoder = wire.Decoder()
-            packets = [packet for at in range(0, len(line), 333) for packet in decoder.feed(line[at:at + 333])]
+            packets = [packet for at in range(0, len(line), 333) for packet in decoder.feed(line[at : at + 333])]
             end = self.by_c(f"damaged{seed}", line).end
             self.assertEqual({name: int(end[name]) for name in COUNTS}, {name: getattr(decoder.statistics, name) for name in COUNTS}, seed)
             self.assertEqual(len(packets), decoder.statistics.packets)
@@ -221,9 +245,13 @@ class Codec(Folder):
 
     def test_values_that_the_protocol_forbids(self):
         contact = wire.decode(vectors()["contact"]["frame"][:-1])
-        for bad in (contact._replace(body=contact.body._replace(x_mm=math.inf)), contact._replace(sequence=65536),
-                    contact._replace(body=contact.body._replace(frame=-1)),
-                    wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 33, (0,) * 66)), wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 2, (0,) * 3))):
+        for bad in (
+            contact._replace(body=contact.body._replace(x_mm=math.inf)),
+            contact._replace(sequence=65536),
+            contact._replace(body=contact.body._replace(frame=-1)),
+            wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 33, (0,) * 66)),
+            wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 2, (0,) * 3)),
+        ):
             with self.assertRaises(errors.FormatError):
                 wire.encode(bad)
         data = bytearray(vectors()["contact"]["packet"][:-4])
@@ -450,14 +478,18 @@ class Streaming(DeviceTest):
             with tip.record(self.path("r.csv")) as writer:
                 frames = self.until_gone(tip)
             self.assertRaises(fingertip.InputError, fingertip.RecordingWriter, writer.path, tip.info)
-        done = subprocess.run([FINGERTIP, "replay", self.path("r.csv"), "--speed", "max"], capture_output=True, text=True, timeout=PATIENCE_s)
+        done = subprocess.run(
+            [FINGERTIP, "replay", self.path("r.csv"), "--speed", "max"], capture_output=True, text=True, timeout=PATIENCE_s
+        )
         self.assertEqual(done.returncode, 0, done.stderr)
         recording = fingertip.read_recording(self.path("r.csv"))
         self.assertEqual((recording.end["reason"], recording.end["dropped_packets"]), ("gone", "0"))
         recorded = {int(frame): i for i, frame in enumerate(recording["frame"])}
         rows = [recorded[frame.frame] for frame in frames if frame.frame in recorded]
         self.assertGreater(len(rows), 200)
-        np.testing.assert_array_equal(np.float32(recording["x_mm"][rows]), np.float32([frame.x_mm for frame in frames if frame.frame in recorded]))
+        np.testing.assert_array_equal(
+            np.float32(recording["x_mm"][rows]), np.float32([frame.x_mm for frame in frames if frame.frame in recorded])
+        )
         self.assertEqual(recording.metadata["gains"].split()[0], f"{tip.info.calibration.gains[0]:g}")
 
     def test_edges_at_the_sync_pin(self):
@@ -477,7 +509,7 @@ class Streaming(DeviceTest):
             self.assertLess(abs(edge.time_us - frames[10 * edge.number].host_us), 1000)
         recording = fingertip.read_recording(self.path("r.csv"))
         recorded = recording.sync_edges
-        self.assertEqual([edge[:3] for edge in recorded], [edge[:3] for edge in edges][-len(recorded):])
+        self.assertEqual([edge[:3] for edge in recorded], [edge[:3] for edge in edges][-len(recorded) :])
         self.assertTrue(len(recorded) >= 8 and math.isnan(recorded[0].time_us))
         self.assertEqual((recording.end["edges"], recording.end["edges_missing"]), (str(len(recorded)), "1"))
 
@@ -488,8 +520,10 @@ class Commands(DeviceTest):
             tip.tare()
             self.world.until(lambda: os.path.exists(self.path("tared")))  # the device answers before it tares
             info = tip.set(rate_Hz=400, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3, location_limit_mm=0.5, keep=True)
-            self.assertEqual((info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
-                             (400000, 256, 0.25, 3.0, 0.5, 0.5))
+            self.assertEqual(
+                (info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
+                (400000, 256, 0.25, 3.0, 0.5, 0.5),
+            )
             self.assertEqual(info.slip_window_ms, 100)  # it travels with the threshold
             self.assertTrue(info.stored & fingertip.Stored.SETTINGS)
             self.assertEqual(tip.set(prior_sigma_mm=0).prior_sigma_mm, 0)
@@ -499,9 +533,17 @@ class Commands(DeviceTest):
     def test_wrong_values_are_named_and_nothing_is_sent(self):
         with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             sent = tip.read_info()
-            for wrong, said in (({"osr": 300}, "256, 512"), ({"rate_Hz": 3000}, "0.1 to 2000 Hz"), ({"rate_Hz": math.nan}, "out of range"),
-                                ({"slip_window_ms": 2}, "5 to 1000 ms"), ({"prior_sigma_mm": 0.1}, "0.5 to 100 mm"), ({"prior_width_mm": 1}, "needs"),
-                                ({"location_limit_mm": 0}, "0.01 to 100 mm"), ({}, "nothing to set"), ({"osr": 512, "rate_Hz": -1}, "rate_Hz -1")):
+            for wrong, said in (
+                ({"osr": 300}, "256, 512"),
+                ({"rate_Hz": 3000}, "0.1 to 2000 Hz"),
+                ({"rate_Hz": math.nan}, "out of range"),
+                ({"slip_window_ms": 2}, "5 to 1000 ms"),
+                ({"prior_sigma_mm": 0.1}, "0.5 to 100 mm"),
+                ({"prior_width_mm": 1}, "needs"),
+                ({"location_limit_mm": 0}, "0.01 to 100 mm"),
+                ({}, "nothing to set"),
+                ({"osr": 512, "rate_Hz": -1}, "rate_Hz -1"),
+            ):
                 with self.assertRaisesRegex(fingertip.BadValueError, said):
                     tip.set(**wrong)
             self.assertEqual(tip.read_info()._replace(measured_rate_mHz=0), sent._replace(measured_rate_mHz=0))
@@ -535,8 +577,11 @@ class Choosing(DeviceTest):
         self.assertRaises(fingertip.NotSharedError, Fingertip, self.path("x"), share=True)
 
     def test_reasons_of_the_system(self):
-        for error, kind in ((PermissionError(13, "x"), errors.PermissionDeniedError), (OSError(16, "x"), errors.PortInUseError),
-                            (OSError(None, "could not open port 'COM9': FileNotFoundError(2, 'x')"), errors.NoSuchPortError)):
+        for error, kind in (
+            (PermissionError(13, "x"), errors.PermissionDeniedError),
+            (OSError(16, "x"), errors.PortInUseError),
+            (OSError(None, "could not open port 'COM9': FileNotFoundError(2, 'x')"), errors.NoSuchPortError),
+        ):
             self.assertIs(type(transport._port_error("p", error)), kind)
 
     def test_one_port_one_program(self):
@@ -634,8 +679,12 @@ class Together(DeviceTest):
         for serial in ("AAAA", "BBBB"):
             recording = fingertip.read_recording(self.path("j.csv"), serial=serial)
             self.assertEqual((recording.end["dropped_packets"], recording.end["reason"]), ("0", "closed"))
-            done = subprocess.run([FINGERTIP, "replay", self.path("j.csv"), "--device", serial, "--to-csv", self.path(serial)], capture_output=True,
-                                  text=True, timeout=PATIENCE_s)
+            done = subprocess.run(
+                [FINGERTIP, "replay", self.path("j.csv"), "--device", serial, "--to-csv", self.path(serial)],
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE_s,
+            )
             self.assertEqual(done.returncode, 0, done.stderr)
             alone = fingertip.read_recording(self.path(serial))
             np.testing.assert_array_equal(alone["x_mm"], recording["x_mm"])

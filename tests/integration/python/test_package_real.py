@@ -2,6 +2,7 @@
 
 usage: test_package_real.py FINGERTIP FAKE_DEVICE FINGERTIP_SIMULATE [unittest arguments]
 """
+
 # real time: asyncio and pyserial wait by clocks of their own
 import asyncio
 import contextlib
@@ -119,10 +120,14 @@ class Simulated(DeviceTest):
             lines, err = newcomer.run_example(environment)
         self.assertEqual(err, "")
         self.assertTrue(newcomer.runs(lines), lines)
-        self.assertFalse(newcomer.runs(lines[:-1]) or newcomer.runs([*lines[:-1], "nan nan nan"]) or newcomer.runs([*lines[:-1], "0 0 nothing"]))
+        self.assertFalse(
+            newcomer.runs(lines[:-1]) or newcomer.runs([*lines[:-1], "nan nan nan"]) or newcomer.runs([*lines[:-1], "0 0 nothing"])
+        )
 
     def test_names(self):
-        self.assertRaisesRegex(fingertip.NoFingertipError, "sim:: nothing is simulated there; start `fingertip simulate`", Fingertip, "sim:")
+        self.assertRaisesRegex(
+            fingertip.NoFingertipError, "sim:: nothing is simulated there; start `fingertip simulate`", Fingertip, "sim:"
+        )
         with newcomer.simulated(FINGERTIP, newcomer.environment_of(self.folder), "--fingertips", "2"):
             serials = []
             for name in ("sim:", "sim:left", "sim:right"):
@@ -138,8 +143,12 @@ class Firmware(DeviceTest):
 
     def test_a_grip_is_felt_and_no_zero(self):
         cell = self.path("cell")
-        process = subprocess.Popen([FINGERTIP_SIMULATE, "--lift", "--ports", cell, "--lift-after", "1000", "--seconds", str(PATIENCE_s)], stdin=subprocess.PIPE,
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            [FINGERTIP_SIMULATE, "--lift", "--ports", cell, "--lift-after", "1000", "--seconds", str(PATIENCE_s)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         try:
             self.wait_for(lambda: os.path.lexists(os.path.join(cell, "gripper")))
             with Fingertips([os.path.join(cell, side) for side in ("left", "right")], timeout_s=PATIENCE_s) as both:
@@ -148,7 +157,19 @@ class Firmware(DeviceTest):
                     self.wait_for(lambda tip=tip: Flag.TARED in tip.latest().flags)
                     block = tip.read_block(60)
                     self.assertTrue(np.isnan(block.force_N).all() and not block.flag(Flag.CONTACT).any())
-                grip = [FINGERTIP, "gripper", "move", "30", "--force", "30", "--activate", "--model", "2f85", "--port", os.path.join(cell, "gripper")]
+                grip = [
+                    FINGERTIP,
+                    "gripper",
+                    "move",
+                    "30",
+                    "--force",
+                    "30",
+                    "--activate",
+                    "--model",
+                    "2f85",
+                    "--port",
+                    os.path.join(cell, "gripper"),
+                ]
                 # on a busy computer an answer may come too late
                 self.wait_for(lambda: subprocess.run(grip, capture_output=True, timeout=PATIENCE_s).returncode == 0)
                 self.wait_for(lambda: all(frame.force_N > 25 and Flag.SATURATED in frame.warnings for frame in both.latest().values()))
@@ -171,8 +192,10 @@ class Examples(DeviceTest):
 
     def setUp(self):
         super().setUp()
-        for patch in (mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s}),
-                      mock.patch.dict(os.environ, {"ROS_LOCALHOST_ONLY": "1"})):
+        for patch in (
+            mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s}),
+            mock.patch.dict(os.environ, {"ROS_LOCALHOST_ONLY": "1"}),
+        ):
             patch.start()
             self.addCleanup(patch.stop)
 
@@ -191,7 +214,9 @@ class Examples(DeviceTest):
                 with contextlib.suppress(fingertip.GoneError):
                     exec(compile(code, "README.md", "exec"), {"print": lambda *values: shown.append(values), "__name__": "__main__"})
                 self.assertTrue(shown, code)
-                self.assertFalse([values for values in shown if any(isinstance(value, float) and math.isnan(value) for value in values)], code)
+                self.assertFalse(
+                    [values for values in shown if any(isinstance(value, float) and math.isnan(value) for value in values)], code
+                )
 
     def test_readme(self):
         """Frames with a warning are not shown, whichever it is."""
@@ -205,7 +230,10 @@ class Examples(DeviceTest):
                 shown = []
                 flags = int(Flag.CONTACT | Flag.FIT_VALID) | (0 if bit is None else 1 << bit)
                 with self.device("rate=1000", "frames=300", f"flags={flags}"), self.assertRaises(fingertip.GoneError):
-                    exec(compile(code.replace("seconds=10", "seconds=0.1"), "README.md", "exec"), {"print": lambda *values: shown.append(values)})
+                    exec(
+                        compile(code.replace("seconds=10", "seconds=0.1"), "README.md", "exec"),
+                        {"print": lambda *values: shown.append(values)},
+                    )
                 self.assertEqual(bool(shown), bit is None, bit)
         t_s, force_N = plots.pyplot.plot.call_args.args
         self.assertEqual(len(t_s), len(force_N))

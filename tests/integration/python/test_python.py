@@ -1,4 +1,5 @@
 """Scenarios, evaluation and plots on data whose answer is known."""
+
 import contextlib
 import importlib
 import io
@@ -37,7 +38,11 @@ class ToolTest(unittest.TestCase):
         """What the console command does and says, in this process: a Python with matplotlib takes half a second to start."""
         stdout, stderr = io.StringIO(), io.StringIO()
         command = importlib.import_module(f"fingertip.{name}").command
-        with mock.patch.object(sys, "argv", [name, *map(str, arguments)]), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+        with (
+            mock.patch.object(sys, "argv", [name, *map(str, arguments)]),
+            contextlib.redirect_stdout(stdout),
+            contextlib.redirect_stderr(stderr),
+        ):
             found = command()
         plot.plt.close("all")
         self.assertEqual(found, status, stderr.getvalue())
@@ -53,15 +58,22 @@ class ToolTest(unittest.TestCase):
         self.tool("scenario", name, "-o", path, *arguments)
         return path
 
-    def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=files.RECORDING_COLUMNS):
+    def recording(
+        self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=files.RECORDING_COLUMNS
+    ):
         """What a perfect fingertip would record of a scenario, after change(row)."""
         truth = files.read_scenario(scenario)
         window_us, threshold_mm = 100000, 0.75
         path = self.folder / "recording.csv"
         names = [*columns, *(f"s{k}_Pa" for k in range(15)), *(f"tare{k}_Pa" for k in range(15))]
-        lines = ["# fingertip-recording 1", "# serial: 0123456789ABCDEF", "# slip_window_ms: 100",
-                 "# x_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_X_mm),
-                 "# y_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_Y_mm), ",".join(names)]
+        lines = [
+            "# fingertip-recording 1",
+            "# serial: 0123456789ABCDEF",
+            "# slip_window_ms: 100",
+            "# x_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_X_mm),
+            "# y_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_Y_mm),
+            ",".join(names),
+        ]
         past = []
         t_us = np.round(np.arange(0.1, (until_s or truth.t_s[-1]) - zero_s, 1 / rate_Hz) * 1e6).astype(int)
         keys = ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")
@@ -131,7 +143,7 @@ class Scenarios(ToolTest):
         x, y, p0, sigma = (truth.truth[key][row] for key in ("x_mm", "y_mm", "p0_Pa", "sigma_mm"))
         for k in range(15):
             distance = math.hypot((k // 5 - 1) * 9 - x, (k % 5 - 2) * 9 - y)
-            self.assertAlmostEqual(truth.sensors_Pa[row, k], p0 * math.exp(-distance**2 / (2 * sigma**2)), delta=0.002 * p0 + 0.01)
+            self.assertAlmostEqual(truth.sensors_Pa[row, k], p0 * math.exp(-(distance**2) / (2 * sigma**2)), delta=0.002 * p0 + 0.01)
 
     def test_ideal_covers_place_and_force_and_does_not_slip(self):
         truth = files.read_scenario(self.scenario("ideal"))
@@ -167,9 +179,20 @@ class Evaluation(ToolTest):
         self.assertLess(summary["force_mape_percent"], 1e-2)
         self.assertLess(summary["force_rmse_N"], 1e-4)
         self.assertAlmostEqual(summary["frames_per_s"], 200, delta=0.1)
-        for key, value in {"contact_missed": 0, "contact_false": 0, "slip_found": 3, "slip_missed": 0, "slip_valid_lost": 0, "slip_false": 0,
-                           "stages_sum_wrong": 0, "dropped_packets": 3, "crc_errors": 2, "format_errors": 1,
-                           "emulator_warnings": 2, "total_us_median": 12850}.items():
+        for key, value in {
+            "contact_missed": 0,
+            "contact_false": 0,
+            "slip_found": 3,
+            "slip_missed": 0,
+            "slip_valid_lost": 0,
+            "slip_false": 0,
+            "stages_sum_wrong": 0,
+            "dropped_packets": 3,
+            "crc_errors": 2,
+            "format_errors": 1,
+            "emulator_warnings": 2,
+            "total_us_median": 12850,
+        }.items():
             self.assertEqual(summary[key], value, key)
 
     def test_known_errors_come_out(self):
@@ -197,23 +220,33 @@ class Evaluation(ToolTest):
         scenario = self.scenario()
         truth = files.read_scenario(scenario)
         recorded = truth.t_s >= 0.35
-        missed = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": TARED if row["frame"] % 2 else row["flags"]}),
-                              scenario, "--run", self.run_report())
+        missed = self.summary(
+            self.recording(scenario, change=lambda row: {**row, "flags": TARED if row["frame"] % 2 else row["flags"]}),
+            scenario,
+            "--run",
+            self.run_report(),
+        )
         strong = (truth.truth["force_N"][recorded] > 0.2).mean()
         self.assertAlmostEqual(missed["contact_missed"] / missed["frames"], strong / 2, delta=0.01)
-        false = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] | CONTACT}),
-                             scenario, "--run", self.run_report())
+        false = self.summary(
+            self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] | CONTACT}), scenario, "--run", self.run_report()
+        )
         self.assertAlmostEqual(false["contact_false"] / false["frames"], 1 - truth.truth["contact"][recorded].mean(), delta=0.01)
         self.assertEqual(false["contact_missed"], 0)
 
     def test_slips_missed_and_false(self):
         scenario = self.scenario()
-        none = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] & ~SLIP}),
-                            scenario, "--run", self.run_report())
+        none = self.summary(
+            self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] & ~SLIP}), scenario, "--run", self.run_report()
+        )
         self.assertEqual((none["slip_found"], none["slip_missed"], none["slip_false"]), (0, 3, 0))
         # one frame of slip well before the first true one
-        one = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] | (SLIP if row["frame"] == 500 else 0)}),
-                           scenario, "--run", self.run_report())
+        one = self.summary(
+            self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] | (SLIP if row["frame"] == 500 else 0)}),
+            scenario,
+            "--run",
+            self.run_report(),
+        )
         self.assertEqual((one["slip_found"], one["slip_false"]), (3, 1))
         # a slip after the end of the recording is neither found nor missed
         short = self.summary(self.recording(scenario, until_s=4), scenario, "--run", self.run_report())
@@ -247,8 +280,9 @@ class Evaluation(ToolTest):
 
     def test_stages_that_do_not_add_up(self):
         scenario = self.scenario()
-        summary = self.summary(self.recording(scenario, change=lambda row: {**row, "fit_us": 7000 + (row["frame"] < 7)}),
-                               scenario, "--run", self.run_report())
+        summary = self.summary(
+            self.recording(scenario, change=lambda row: {**row, "fit_us": 7000 + (row["frame"] < 7)}), scenario, "--run", self.run_report()
+        )
         self.assertEqual(summary["stages_sum_wrong"], 7)
 
     def test_rows_without_contact_packet_are_left_out(self):
@@ -266,8 +300,14 @@ class Evaluation(ToolTest):
         recording = self.recording(scenario, end=False)
         summary = self.summary(recording, scenario, "--run", self.run_report())
         self.assertIsNone(summary["dropped_packets"])
-        self.assertEqual({key: value for key, value in self.summary(self.recording(scenario), scenario, "--run", self.run_report()).items()
-                          if value != summary[key]}, {"dropped_packets": 3, "crc_errors": 2, "format_errors": 1})
+        self.assertEqual(
+            {
+                key: value
+                for key, value in self.summary(self.recording(scenario), scenario, "--run", self.run_report()).items()
+                if value != summary[key]
+            },
+            {"dropped_packets": 3, "crc_errors": 2, "format_errors": 1},
+        )
         self.tool("plot", recording, "-o", self.folder / "p.png")
 
     def test_unrelated_files(self):
@@ -282,7 +322,9 @@ class Evaluation(ToolTest):
 
     def test_time_that_runs_backwards(self):
         scenario = self.scenario()
-        recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] if row["frame"] < 600 else row["t_us"] - 3000000})
+        recording = self.recording(
+            scenario, change=lambda row: {**row, "t_us": row["t_us"] if row["frame"] < 600 else row["t_us"] - 3000000}
+        )
         self.assert_restart(recording, scenario, 600)
 
     def test_a_restart_that_only_the_frame_numbers_tell(self):
@@ -298,8 +340,13 @@ class Evaluation(ToolTest):
         self.assertEqual(list(files.restart_rows(t_us, frame[::-1])), [1, 2, 3])
 
     def assert_restart(self, recording, scenario, frame):
-        line = recording.read_text(encoding="utf-8").split("\n").index(",".join(files.RECORDING_COLUMNS + tuple(
-            [f"s{k}_Pa" for k in range(15)] + [f"tare{k}_Pa" for k in range(15)]))) + 2 + frame
+        line = (
+            recording.read_text(encoding="utf-8")
+            .split("\n")
+            .index(",".join(files.RECORDING_COLUMNS + tuple([f"s{k}_Pa" for k in range(15)] + [f"tare{k}_Pa" for k in range(15)])))
+            + 2
+            + frame
+        )
         self.tool("plot", recording, "-o", self.folder / "restarted.png")
         for arguments in (("evaluate", recording, scenario), ("plot", recording, "--truth", scenario)):
             err = self.error(*arguments, "--run", self.run_report(), "-o", self.folder / "p.png")
@@ -307,17 +354,23 @@ class Evaluation(ToolTest):
         self.assertFalse((self.folder / "p.png").exists())
         # what it advises to do works
         lines = recording.read_text(encoding="utf-8").split("\n")
-        recording.write_text("\n".join(lines[:line - 1]) + "\n", encoding="utf-8")
+        recording.write_text("\n".join(lines[: line - 1]) + "\n", encoding="utf-8")
         self.tool("plot", recording, "--truth", scenario, "-o", self.folder / "p.png")
 
     def test_a_time_that_repeats(self):
         scenario = self.scenario()
         recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] - 5000 * (row["frame"] == 600)})
-        self.assertRegex(self.error("evaluate", recording, scenario, "-o", self.folder / "s"), r"\.csv:\d+: a second frame of the same time")
+        self.assertRegex(
+            self.error("evaluate", recording, scenario, "-o", self.folder / "s"), r"\.csv:\d+: a second frame of the same time"
+        )
 
     def test_out_of_the_source_tree(self):
         recording = self.recording(self.scenario("demo", "--seconds", "2"))
-        for words, status, said in (("plot", recording, "-o", self.folder / "p.png"), 0, ""), (("plot", recording, "-o", "p"), 1, "ends in .png"), (("fly",), 1, "plot|scenario"):
+        for words, status, said in (
+            (("plot", recording, "-o", self.folder / "p.png"), 0, ""),
+            (("plot", recording, "-o", "p"), 1, "ends in .png"),
+            (("fly",), 1, "plot|scenario"),
+        ):
             done = subprocess.run([sys.executable, TOOLS, *map(str, words)], capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, status, done.stderr)
             self.assertIn(said, done.stderr)
@@ -380,9 +433,15 @@ class MalformedFiles(ToolTest):
 
     def test_scenarios(self):
         path = self.scenario("demo", "--seconds", "1")
-        for change, expected in [(lambda s: "nan," + s.split(",", 1)[1], "t_s"), (lambda s: "-0.001," + s.split(",", 1)[1], "time starts at 0"),
-                                 (lambda s: s + ",1", "columns"), (lambda s: s[:30], "columns"), (lambda s: s.rsplit(",", 1)[0] + ",inf", "s14_Pa"),
-                                 (lambda s: s.rsplit(",", 1)[0] + ",", "s14_Pa"), (lambda s: "0.001," + s.split(",", 1)[1], "does not increase")]:
+        for change, expected in [
+            (lambda s: "nan," + s.split(",", 1)[1], "t_s"),
+            (lambda s: "-0.001," + s.split(",", 1)[1], "time starts at 0"),
+            (lambda s: s + ",1", "columns"),
+            (lambda s: s[:30], "columns"),
+            (lambda s: s.rsplit(",", 1)[0] + ",inf", "s14_Pa"),
+            (lambda s: s.rsplit(",", 1)[0] + ",", "s14_Pa"),
+            (lambda s: "0.001," + s.split(",", 1)[1], "does not increase"),
+        ]:
             self.assert_damage(files.read_scenario, path, 100, change, expected)
         self.assert_damage(files.read_scenario, path, 8, lambda s: s.replace("force_N", "force"), "wrong header")
         self.assert_damage(files.read_scenario, path, 1, lambda s: "# fingertip-scenario 2", "format 2 is unknown")
@@ -391,9 +450,14 @@ class MalformedFiles(ToolTest):
 
     def test_recordings(self):
         path = self.recording(self.scenario("demo", "--seconds", "2"))
-        for change, expected in [(lambda s: "nan," + s.split(",", 1)[1], "t_us"), (lambda s: "-5," + s.split(",", 1)[1], 't_us is "-5"'),
-                                 (lambda s: s[:30], "columns"), (lambda s: s.rsplit(",", 1)[0] + ",x", "tare14_Pa"),
-                                 (lambda s: s.rsplit(",", 1)[0] + ",inf", "tare14_Pa"), (lambda s: "," + s.split(",", 1)[1], "t_us")]:
+        for change, expected in [
+            (lambda s: "nan," + s.split(",", 1)[1], "t_us"),
+            (lambda s: "-5," + s.split(",", 1)[1], 't_us is "-5"'),
+            (lambda s: s[:30], "columns"),
+            (lambda s: s.rsplit(",", 1)[0] + ",x", "tare14_Pa"),
+            (lambda s: s.rsplit(",", 1)[0] + ",inf", "tare14_Pa"),
+            (lambda s: "," + s.split(",", 1)[1], "t_us"),
+        ]:
             bad = self.assert_damage(files.read_recording, path, 50, change, expected)
             salvaged = files.read_recording(bad, salvage=True)
             self.assertEqual(salvaged.skipped_lines, 1)
@@ -453,9 +517,15 @@ class TangentialLoad(ToolTest):
         def change(row):
             if row["flags"] & FIT_VALID:
                 q_N = share * row["force_N"]
-                row.update(flags=row["flags"] | flags, qx_N=q_N * math.cos(math.radians(degrees)), qy_N=q_N * math.sin(math.radians(degrees)),
-                           q_sd_N=0.1, tangential_ratio=share)
+                row.update(
+                    flags=row["flags"] | flags,
+                    qx_N=q_N * math.cos(math.radians(degrees)),
+                    qy_N=q_N * math.sin(math.radians(degrees)),
+                    q_sd_N=0.1,
+                    tangential_ratio=share,
+                )
             return row
+
         return self.recording(scenario, change=change)
 
     def evaluated(self, *arguments, **options):
@@ -480,7 +550,10 @@ class TangentialLoad(ToolTest):
 
     def test_nothing_is_said_without_a_truth_or_a_load(self):
         keys = [f"tangential_{key}" for key in ("frames", "ratio_error_p50", "ratio_error_p95", "direction_p90_deg", "from_touch")]
-        for found in (self.evaluated(flags=0), self.summary(self.pulled_recording(self.scenario()), self.scenario(), "--run", self.run_report())):
+        for found in (
+            self.evaluated(flags=0),
+            self.summary(self.pulled_recording(self.scenario()), self.scenario(), "--run", self.run_report()),
+        ):
             self.assertEqual([found[key] for key in keys], [None] * 5)
 
     def panels(self, recording, *arguments):
@@ -528,8 +601,12 @@ class TangentialLoad(ToolTest):
         shutil.copy(self.recording(scenario, change=lambda row: {**row, "force_N": 0.8 * row["force_N"]}), other)
         one = self.recording(scenario)
         self.assertIn("--beside compares with a truth", self.error("plot", one, "--beside", "AAAA", "-o", self.folder / "p.png"))
-        with mock.patch.object(plot, "load_recording", lambda options, **how: files.read_recording(other if options.device == "BBBB" else one)):
-            panels = self.panels(one, "--truth", scenario, "--run", self.run_report(), "--beside", "BBBB", "--beside-run", self.run_report())
+        with mock.patch.object(
+            plot, "load_recording", lambda options, **how: files.read_recording(other if options.device == "BBBB" else one)
+        ):
+            panels = self.panels(
+                one, "--truth", scenario, "--run", self.run_report(), "--beside", "BBBB", "--beside-run", self.run_report()
+            )
         drawn = {line.get_label(): np.nanmax(line.get_ydata()) for line in panels["force, N"].lines if len(line.get_ydata())}
         self.assertAlmostEqual(drawn["BBBB"], 0.8 * drawn["measured"], delta=0.01 * drawn["measured"])
         texts = " ".join(text.get_text() for text in panels["force, N"].figure.texts)
@@ -582,8 +659,12 @@ class Plots(ToolTest):
         self.assert_png(picture)
 
     def test_runs_of_a_restarted_fingertip_follow_one_another(self):
-        recording = files.read_recording(self.recording(self.scenario(), change=lambda row: {
-            **row, "t_us": row["t_us"] - 3000000 * (row["frame"] >= 600), "frame": row["frame"] % 600}))
+        recording = files.read_recording(
+            self.recording(
+                self.scenario(),
+                change=lambda row: {**row, "t_us": row["t_us"] - 3000000 * (row["frame"] >= 600), "frame": row["frame"] % 600},
+            )
+        )
         t_s, restarts_s = plot.continuous_time_s(recording, recording.has_contact)
         self.assertTrue((np.diff(t_s) > 0).all())
         self.assertAlmostEqual(np.diff(t_s)[599], 0.005, delta=1e-9)
@@ -592,8 +673,13 @@ class Plots(ToolTest):
     def test_where_nothing_can_be_written(self):
         recording = self.recording(self.scenario())
         (self.folder / "d.png").mkdir()
-        for name, expected in (("no/p.png", "there is no folder"), ("p.xyz", "ends in .png"), ("p", "ends in .png"),
-                               ("d.png", "is a folder"), ("/proc/p.png", "choose another place")):
+        for name, expected in (
+            ("no/p.png", "there is no folder"),
+            ("p.xyz", "ends in .png"),
+            ("p", "ends in .png"),
+            ("d.png", "is a folder"),
+            ("/proc/p.png", "choose another place"),
+        ):
             self.assertIn(expected, self.error("plot", recording, "-o", self.folder / name))
         full = self.folder / "full.png"
         full.symlink_to("/dev/full")

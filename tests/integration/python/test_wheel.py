@@ -1,4 +1,5 @@
 """Wheel and source distribution of the Python package, and its types: usage test_wheel.py FAKE_DEVICE [unittest arguments]."""
+
 # real time: an installed wheel reads a pseudo-terminal
 import os
 import pathlib
@@ -37,15 +38,15 @@ class Distribution(unittest.TestCase):
         cls.dist.mkdir()
         backend = f"from setuptools import build_meta as b; b.build_sdist({str(cls.dist)!r}); b.build_wheel({str(cls.dist)!r})"
         run(sys.executable, "-c", backend, cwd=cls.source)
-        cls.wheel, = cls.dist.glob("*.whl")
-        cls.sdist, = cls.dist.glob("*.tar.gz")
+        (cls.wheel,) = cls.dist.glob("*.whl")
+        (cls.sdist,) = cls.dist.glob("*.tar.gz")
 
     def test_names(self):
         self.assertRegex(self.wheel.name, r"^fingertip_tactile-\d+\.\d+\.\d+-py3-none-any\.whl$")
         self.assertRegex(self.sdist.name, r"^fingertip[-_]tactile-\d+\.\d+\.\d+\.tar\.gz$")
         with zipfile.ZipFile(self.wheel) as wheel:
             names = set(wheel.namelist())
-            metadata, = (wheel.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
+            (metadata,) = (wheel.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
         modules = {f"fingertip/{path.name}" for path in (PACKAGE / "fingertip").iterdir() if path.is_file()}
         modules |= {str(path.relative_to(PACKAGE)) for path in (PACKAGE / "fingertip/msg").rglob("*.msg")}
         self.assertEqual({name for name in names if ".dist-info/" not in name}, modules)
@@ -56,18 +57,31 @@ class Distribution(unittest.TestCase):
     def test_the_source_distribution_builds_the_same_wheel(self):
         with tarfile.open(self.sdist) as file:
             file.extractall(self.folder / "sdist")
-        unpacked, = (self.folder / "sdist").iterdir()
+        (unpacked,) = (self.folder / "sdist").iterdir()
         again = self.folder / "again"
         again.mkdir()
         run(sys.executable, "-c", f"from setuptools import build_meta as b; b.build_wheel({str(again)!r})", cwd=unpacked)
-        contents = [{name: wheel.read(name) for name in wheel.namelist()} for wheel in map(zipfile.ZipFile, (self.wheel, *again.glob("*.whl")))]
+        contents = [
+            {name: wheel.read(name) for name in wheel.namelist()} for wheel in map(zipfile.ZipFile, (self.wheel, *again.glob("*.whl")))
+        ]
         self.assertEqual(*contents)
 
     def test_in_a_clean_environment(self):
         clean = self.folder / "clean"
         run("/usr/bin/python3", "-m", "venv", "--without-pip", clean)
-        run(sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", clean / "bin/python", "install", "--no-index", "--no-deps", self.wheel)
-        site, = clean.glob("lib/python3*/site-packages")
+        run(
+            sys.executable,
+            "-m",
+            "pip",
+            "--disable-pip-version-check",
+            "--python",
+            clean / "bin/python",
+            "install",
+            "--no-index",
+            "--no-deps",
+            self.wheel,
+        )
+        (site,) = clean.glob("lib/python3*/site-packages")
         for module in ("numpy", "serial"):  # what pip would fetch
             place = pathlib.Path(run(sys.executable, "-c", f"import {module}; print({module}.__file__)").strip()).parent
             (site / module).symlink_to(place)
@@ -77,9 +91,10 @@ class Distribution(unittest.TestCase):
         run(clean / "bin/fingertip-scenario", "demo", "-o", scenario, "--seconds", "1", cwd=self.folder)
         self.assertTrue(scenario.read_text(encoding="utf-8").startswith("# fingertip-scenario 1\n"))
         self.assertIn("usage: fingertip-evaluate", run(clean / "bin/fingertip-evaluate", "--help", cwd=self.folder))
-        done = subprocess.run([clean / "bin/fingertip-plot", "x.csv", "-o", "x.png"], capture_output=True, text=True, cwd=self.folder, timeout=PATIENCE_s)
-        self.assertEqual((done.returncode, done.stderr),
-                         (1, 'fingertip-plot: matplotlib is not installed: pip install matplotlib\n'))
+        done = subprocess.run(
+            [clean / "bin/fingertip-plot", "x.csv", "-o", "x.png"], capture_output=True, text=True, cwd=self.folder, timeout=PATIENCE_s
+        )
+        self.assertEqual((done.returncode, done.stderr), (1, "fingertip-plot: matplotlib is not installed: pip install matplotlib\n"))
         port = self.folder / "tty"
         fake = subprocess.Popen([FAKE_DEVICE, port])
         try:
@@ -98,8 +113,13 @@ class Types(unittest.TestCase):
     def test_strict(self):
         for platform in ("linux", "darwin", "win32"):
             with self.subTest(platform), tempfile.TemporaryDirectory(prefix="fingertip-test-") as folder:
-                done = subprocess.run([sys.executable, "-m", "mypy", "--platform", platform, "--cache-dir", folder], cwd=PACKAGE,
-                                      capture_output=True, text=True, timeout=PATIENCE_s)
+                done = subprocess.run(
+                    [sys.executable, "-m", "mypy", "--platform", platform, "--cache-dir", folder],
+                    cwd=PACKAGE,
+                    capture_output=True,
+                    text=True,
+                    timeout=PATIENCE_s,
+                )
                 self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
                 self.assertTrue(re.search(r"no issues found in \d\d source files", done.stdout), done.stdout)
 

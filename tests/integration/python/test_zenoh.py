@@ -1,4 +1,5 @@
 """The bridge and the recorder on Zenoh, with fake devices: usage test_zenoh.py FAKE_DEVICE [unittest arguments]."""
+
 # real time: routers, bridges and recorders are processes on a network
 import contextlib
 import json
@@ -194,12 +195,20 @@ class Clocks(unittest.TestCase):
 
     def judge(self, hosts, bound_us, may_be_undisciplined=False):
         """hosts: (boot, bound_us or None, ahead_us) each, answered after 200 us there and 200 us back."""
+
         def ask(_, key):
             serial = network.parts_of(key)[0]
             boot, bound, ahead_us = hosts[int(serial)]
             clock = {"disciplined": bound is not None, "bound_us": bound, "text": "clock not disciplined" if bound is None else "chrony"}
             now_ns = 10**18 + round(ahead_us * 1000)
-            return {serial: (json.dumps({"host": f"host{serial}", "boot": boot, "clock": clock, "now_ns": now_ns}).encode(), 10**18 - 200_000, 10**18 + 200_000)}
+            return {
+                serial: (
+                    json.dumps({"host": f"host{serial}", "boot": boot, "clock": clock, "now_ns": now_ns}).encode(),
+                    10**18 - 200_000,
+                    10**18 + 200_000,
+                )
+            }
+
         with mock.patch.object(recorder, "ask", ask):
             return recorder.judge_clocks(None, [str(number) for number in range(len(hosts))], bound_us, may_be_undisciplined)
 
@@ -300,7 +309,9 @@ class OnZenoh(unittest.TestCase):
             router = stack.enter_context(self.session("router"))
             for serial, options in (("AAAA", ()), ("BBBB", ("drop=50",))):
                 self.bridge("--connect", self.endpoint, "--port", self.device(serial, "rate=100", *options))
-            recording = self.recorder(path, "--connect", self.endpoint, "--expect", "2", "--wait", PATIENCE_s, "--patience", PATIENCE_s, "--json")
+            recording = self.recorder(
+                path, "--connect", self.endpoint, "--expect", "2", "--wait", PATIENCE_s, "--patience", PATIENCE_s, "--json"
+            )
             self.wait_for(lambda: self.lines(path) > 60 or recording.poll() is not None)
             router.close()
             time.sleep(1)
@@ -321,7 +332,11 @@ class OnZenoh(unittest.TestCase):
         self.assertGreater(told["BBBB"]["lost"], 0)
 
     def test_the_manual_s_subscriber(self):
-        code, = (block for block in re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(encoding="utf-8"), re.S) if "import zenoh" in block)
+        (code,) = (
+            block
+            for block in re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(encoding="utf-8"), re.S)
+            if "import zenoh" in block
+        )
         config = zenoh.Config()
         config.insert_json5("mode", '"client"')
         config.insert_json5("connect/endpoints", json.dumps([self.endpoint]))
@@ -339,6 +354,7 @@ class OnZenoh(unittest.TestCase):
 
     def test_unplugged_and_back(self):
         path = self.folder / "one.mcap"
+
         def is_alive():
             return bool(list(router.liveliness().get("fingertip/AAAA/alive")))
 
@@ -346,7 +362,9 @@ class OnZenoh(unittest.TestCase):
             device = self.start(FAKE_DEVICE, self.folder / "AAAA", "serial=AAAA", "rate=100", "life=600")
             self.wait_for((self.folder / "AAAA").is_symlink)
             self.bridge("--connect", self.endpoint, "--port", self.folder / "AAAA")
-            recording = self.recorder(path, "--connect", self.endpoint, "--wait", PATIENCE_s, "--patience", PATIENCE_s, "--json", "--undisciplined")
+            recording = self.recorder(
+                path, "--connect", self.endpoint, "--wait", PATIENCE_s, "--patience", PATIENCE_s, "--json", "--undisciplined"
+            )
             self.wait_for(lambda: self.lines(path) > 30 or recording.poll() is not None)
             device.terminate()
             self.wait_for(lambda: not is_alive())
@@ -368,7 +386,11 @@ class OnZenoh(unittest.TestCase):
         with self.session("router") as session:
             self.chrony(Clocks.TRACKING.format("Not synchronised"))
             self.bridge("--connect", self.endpoint, "--port", self.device("AAAA", f"tared={tared}"))
-            self.wait_for(lambda: [reply for reply in session.liveliness().get("fingertip/*/alive") if str(reply.ok.key_expr) == "fingertip/AAAA/alive"])
+            self.wait_for(
+                lambda: [
+                    reply for reply in session.liveliness().get("fingertip/*/alive") if str(reply.ok.key_expr) == "fingertip/AAAA/alive"
+                ]
+            )
             self.assertEqual(self.ask(session, "fingertip/AAAA/info").serial, "AAAA")
             self.assertEqual(self.ask(session, "fingertip/AAAA/set?osr=512;rate_Hz=50").osr, 512)
             self.assertIn("256, 512", self.ask(session, "fingertip/AAAA/set?osr=500"))
@@ -390,8 +412,13 @@ class OnZenoh(unittest.TestCase):
     def example(self, name, own, **replaced):
         """A configuration out of host_tools/python/zenoh, with our files and port."""
         text = (PACKAGE / "zenoh" / name).read_text(encoding="utf-8")
-        for old, new in {"/etc/fingertip/zenoh/own": f"{self.folder}/{own}", "/etc/fingertip/zenoh": str(self.folder), "0.0.0.0:7447": f"127.0.0.1:{self.port}",
-                         "router.example:7447": f"localhost:{self.port}", **replaced}.items():
+        for old, new in {
+            "/etc/fingertip/zenoh/own": f"{self.folder}/{own}",
+            "/etc/fingertip/zenoh": str(self.folder),
+            "0.0.0.0:7447": f"127.0.0.1:{self.port}",
+            "router.example:7447": f"localhost:{self.port}",
+            **replaced,
+        }.items():
             text = text.replace(old, new)
         path = self.folder / f"{own}.json5"
         path.write_text(text, encoding="utf-8")
@@ -405,15 +432,19 @@ class OnZenoh(unittest.TestCase):
             self.certificate(name)
         with zenoh.open(zenoh.Config.from_file(self.example("router.json5", "router"))):
             self.bridge("--config", self.example("client.json5", "bridge"), "--port", self.device("AAAA", f"tared={tared}"))
-            with zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer"))) as viewer, \
-                    zenoh.open(zenoh.Config.from_file(self.example("client.json5", "operator"))) as operator:
+            with (
+                zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer"))) as viewer,
+                zenoh.open(zenoh.Config.from_file(self.example("client.json5", "operator"))) as operator,
+            ):
                 self.wait_for(lambda: self.ask(viewer, "fingertip/AAAA/info"))
                 heard = []
                 subscriber = viewer.declare_subscriber("fingertip/*/contact", heard.append)
                 self.wait_for(lambda: heard)
                 self.assertEqual(wire.decode(heard[0].payload.to_bytes()).body.force_N, 5)
                 subscriber.undeclare()
-                recording = self.recorder(self.folder / "one.mcap", "--config", self.example("client.json5", "recorder"), "--undisciplined", "--seconds", "1")
+                recording = self.recorder(
+                    self.folder / "one.mcap", "--config", self.example("client.json5", "recorder"), "--undisciplined", "--seconds", "1"
+                )
                 recording.communicate(timeout=PATIENCE_s)
                 self.assertEqual(recording.returncode, 0)
                 for name in ("viewer", "recorder", "bridge", "unlisted"):
@@ -432,7 +463,9 @@ class OnZenoh(unittest.TestCase):
                 with self.assertRaises(zenoh.ZError, msg=own):
                     zenoh.open(config).close()
             once["timeout_ms: -1"] = f"timeout_ms: {PATIENCE_s * 1000}"
-            zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer", **once))).close()  # the others were refused for their certificates
+            zenoh.open(
+                zenoh.Config.from_file(self.example("client.json5", "viewer", **once))
+            ).close()  # the others were refused for their certificates
 
 
 if __name__ == "__main__":

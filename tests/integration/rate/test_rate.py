@@ -2,6 +2,7 @@
 
 usage: test_rate.py --build BUILD --boards BOARDS
 """
+
 import argparse
 import json
 import pathlib
@@ -18,9 +19,24 @@ import scenes  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 FIGURES = (
-    "parallel_fps_osr256", "parallel_fps_osr1024", "mux_fps_osr256", "mux_fps_osr1024", "latency_parallel_us",
-    "latency_parallel_median_us", "latency_parallel_p99_us", "latency_parallel_p99_9_us", "latency_parallel_max_us", "idle_sleep_percent",
-    "contact_sleep_percent", "flash_bytes", "ram_bytes", "code_in_sram_bytes", "stack_bytes", "raw_flash_bytes", "dropped")
+    "parallel_fps_osr256",
+    "parallel_fps_osr1024",
+    "mux_fps_osr256",
+    "mux_fps_osr1024",
+    "latency_parallel_us",
+    "latency_parallel_median_us",
+    "latency_parallel_p99_us",
+    "latency_parallel_p99_9_us",
+    "latency_parallel_max_us",
+    "idle_sleep_percent",
+    "contact_sleep_percent",
+    "flash_bytes",
+    "ram_bytes",
+    "code_in_sram_bytes",
+    "stack_bytes",
+    "raw_flash_bytes",
+    "dropped",
+)
 
 
 def report(*options):
@@ -122,8 +138,10 @@ class Rate(unittest.TestCase):
             self.assertEqual(len({line.count("|") for line in table.strip().split("\n")}), 1, table)
 
     def test_a_missing_build_and_a_wrong_number_are_one_line(self):
-        for options, message in ((("--build", str(self.folder / "none"), "--boards", OPTIONS.boards), "is not there; build it"),
-                                 (("--build", OPTIONS.build, "--boards", OPTIONS.boards, "--seconds", "0"), "give 1 to 600")):
+        for options, message in (
+            (("--build", str(self.folder / "none"), "--boards", OPTIONS.boards), "is not there; build it"),
+            (("--build", OPTIONS.build, "--boards", OPTIONS.boards, "--seconds", "0"), "give 1 to 600"),
+        ):
             done = report(*options, "-o", str(self.folder / "other"))
             self.assertEqual(done.returncode, 1)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)

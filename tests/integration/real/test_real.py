@@ -1,4 +1,5 @@
 """real.py on recordings made here, of which the truth is known; the real ones are of others."""
+
 import hashlib
 import json
 import math
@@ -29,8 +30,13 @@ def write_grid(path, gains=(1.0,) * 8):
             at = (column - 7.5, row - 14.0)
             stage = (math.cos(TURN) * at[0] - math.sin(TURN) * at[1] + 14.0, math.sin(TURN) * at[0] + math.cos(TURN) * at[1] + 16.0)
             stage = (round(stage[0], 6), float(row))  # rows are told apart by the stage's y
-            at = (math.cos(TURN) * (stage[0] - 14.0) + math.sin(TURN) * (stage[1] - 16.0), -math.sin(TURN) * (stage[0] - 14.0) + math.cos(TURN) * (stage[1] - 16.0))
-            readings = [gain * PEAK_PA * math.exp(-((x - at[0])**2 + (y - at[1])**2) / (2 * WIDTH_MM**2)) for gain, (x, y) in zip(gains, layout)]
+            at = (
+                math.cos(TURN) * (stage[0] - 14.0) + math.sin(TURN) * (stage[1] - 16.0),
+                -math.sin(TURN) * (stage[0] - 14.0) + math.cos(TURN) * (stage[1] - 16.0),
+            )
+            readings = [
+                gain * PEAK_PA * math.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * WIDTH_MM**2)) for gain, (x, y) in zip(gains, layout)
+            ]
             lines.append(",".join(f"{value:.9e}" for value in (*stage, *(reading / grids.PA_PER_PSI for reading in readings))))
     path.write_text("\n".join(lines) + "\n")
 
@@ -45,7 +51,11 @@ class Real(unittest.TestCase):
         write_grid(self.grid)
         self.sources = {
             name: {"repository": "a/b", "commit": "c", "terms": "ours", "what": "made by a test", "files": files}
-            for name, files in (("grids", [{"name": "grid.csv", "key": "made", "pitch_mm": PITCH_MM, "part": "judges", "sha256": self.checksum()}]), ("strips", []))}
+            for name, files in (
+                ("grids", [{"name": "grid.csv", "key": "made", "pitch_mm": PITCH_MM, "part": "judges", "sha256": self.checksum()}]),
+                ("strips", []),
+            )
+        }
 
     def checksum(self):
         return hashlib.sha256(self.grid.read_bytes()).hexdigest()
@@ -53,8 +63,24 @@ class Real(unittest.TestCase):
     def run_tool(self, *options):
         path = self.folder / "sources.json"
         path.write_text(json.dumps(self.sources))
-        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/real/real.py"), "--build", str(BUILD), "-o", str(self.folder / "out"),
-                               "--pads", "1", "--sources", str(path), str(self.folder / "data"), *options], capture_output=True, text=True)
+        return subprocess.run(
+            [
+                sys.executable,
+                str(ROOT / "host_tools/report/real/real.py"),
+                "--build",
+                str(BUILD),
+                "-o",
+                str(self.folder / "out"),
+                "--pads",
+                "1",
+                "--sources",
+                str(path),
+                str(self.folder / "data"),
+                *options,
+            ],
+            capture_output=True,
+            text=True,
+        )
 
     def test_the_layout_is_found_turned(self):
         grid = grids.Grid(self.grid, PITCH_MM)

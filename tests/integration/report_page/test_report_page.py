@@ -1,4 +1,5 @@
 """The page of all reports: every figure, table and picture is in, and what is missing is said."""
+
 import base64
 import html.parser
 import json
@@ -24,8 +25,17 @@ import truth  # noqa: E402
 import validation  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 
-GOALS = {"fit": fit.GOALS, "rate": rate.GOALS, "validation": validation.GOALS, "truth": truth.GOALS, "shear": shear.GOALS, "grasp": grasp.GOALS, "tools": tools.GOALS, "suite": suite.GOALS,
-         "reliability": tuple(goal for part in reliability.PARTS for goal in part.GOALS)}
+GOALS = {
+    "fit": fit.GOALS,
+    "rate": rate.GOALS,
+    "validation": validation.GOALS,
+    "truth": truth.GOALS,
+    "shear": shear.GOALS,
+    "grasp": grasp.GOALS,
+    "tools": tools.GOALS,
+    "suite": suite.GOALS,
+    "reliability": tuple(goal for part in reliability.PARTS for goal in part.GOALS),
+}
 VOID = {"meta", "img", "br", "hr"}
 PARTS = {part.name: part for part in parts.PARTS if part.page}
 
@@ -46,8 +56,13 @@ class TestParts(unittest.TestCase):
         self.assertEqual(judged[-1], "/recordings")
 
     def test_what_cannot_run_is_said(self):
-        for arguments, said in ((("nothing",), "there is no part nothing"), (("usb",), "there is no part usb"), (("real",), "needs the folder"),
-                                (("fit", "/recordings"), "takes no folder"), (("all", "/recordings"), "takes no folder")):
+        for arguments, said in (
+            (("nothing",), "there is no part nothing"),
+            (("usb",), "there is no part usb"),
+            (("real",), "needs the folder"),
+            (("fit", "/recordings"), "takes no folder"),
+            (("all", "/recordings"), "takes no folder"),
+        ):
             with self.assertRaisesRegex(parts.InputError, said):
                 parts.steps(*arguments)
 
@@ -100,7 +115,7 @@ class Reader(html.parser.HTMLParser):
 
     def row(self, *begin):
         """The first row that begins so."""
-        return next((row for row in self.rows if tuple(row[:len(begin)]) == begin), None)
+        return next((row for row in self.rows if tuple(row[: len(begin)]) == begin), None)
 
 
 def names_in(value):
@@ -128,8 +143,15 @@ class Page(unittest.TestCase):
         for number, (name, part) in enumerate(PARTS.items()):
             goals = GOALS.get(name, ())
             found = {figure: 0.125 for figure, _, limit in goals}
-            found |= {f"{name}_text": "a < b & c", f"{name}_list": [1, 2.5, None], f"{name}_nested": {"inner_of_nested": {"deepest": 77000 + number}},
-                      f"{name}_rows": [{"first_column": 1, "inside": {"of_a_row": 2}}, {"second_column": "only here", "deep_rows": [{"in_rows": 3}]}]}
+            found |= {
+                f"{name}_text": "a < b & c",
+                f"{name}_list": [1, 2.5, None],
+                f"{name}_nested": {"inner_of_nested": {"deepest": 77000 + number}},
+                f"{name}_rows": [
+                    {"first_column": 1, "inside": {"of_a_row": 2}},
+                    {"second_column": "only here", "deep_rows": [{"in_rows": 3}]},
+                ],
+            }
             found |= {limit: 0.125 for _, _, limit in goals if isinstance(limit, str)}
             judged = judge(found, [(figure, sign, 1000 if sign == "<=" else -1000) for figure, sign, _ in goals]) if goals else found
             self.write(name, judged)
@@ -137,7 +159,9 @@ class Page(unittest.TestCase):
             for picture, caption in part.page.pictures:
                 (self.folder / picture).write_bytes(f"picture {picture}".encode())
             for table, _ in part.page.tables:
-                (self.folder / table).write_text('{"cases": [{"case_of_json": "hard"}]}' if table.endswith("json") else "csv_column,other\ncsv cell,5\n")
+                (self.folder / table).write_text(
+                    '{"cases": [{"case_of_json": "hard"}]}' if table.endswith("json") else "csv_column,other\ncsv cell,5\n"
+                )
         return every
 
     def read(self):
@@ -178,20 +202,49 @@ class Page(unittest.TestCase):
         self.assertEqual(shown.row("dropped"), ["dropped", "", "<= 0", "not measured", "emulated"])
         self.assertEqual(shown.row("flash_bytes")[4], "read from the image")
         words = "".join(shown.words)
-        self.assertRegex(words, r"Rate, latency and cost: 9 met, 11 missed \(parallel_fps_osr256, .*, unfitted, .*\), 1 not measured \(dropped\)")
+        self.assertRegex(
+            words, r"Rate, latency and cost: 9 met, 11 missed \(parallel_fps_osr256, .*, unfitted, .*\), 1 not measured \(dropped\)"
+        )
 
     def test_how_and_from_which_command(self):
         every = self.write_all()
         shown = self.read()
         how = {row[0]: row[4] for row in shown.rows if len(row) == 5 and row[3] in ("met", "missed", "not measured")}
         self.assertEqual(set(how), {name for goals in GOALS.values() for name, _, _ in goals})
-        self.assertEqual({name for name, said in how.items() if said == "from recordings"}, {name for name in how if name.startswith("real_")})
-        self.assertEqual({name: how[name] for name in ("p99_9_um", "cold_cycles", "speed_vs_ceres", "samples", "emulated_frames_different",
-                                                       "false_contacts", "flash_lost", "seconds",
-                                                       "vector_error_p95", "chip_fps_osr256", "shear_cycles")},
-                         {"p99_9_um": "simulated", "cold_cycles": "emulated", "speed_vs_ceres": "timed on this computer", "samples": "simulated",
-                          "emulated_frames_different": "emulated", "false_contacts": "simulated", "flash_lost": "emulated",
-                          "seconds": "timed on this computer", "vector_error_p95": "simulated", "chip_fps_osr256": "emulated", "shear_cycles": "emulated"})
+        self.assertEqual(
+            {name for name, said in how.items() if said == "from recordings"}, {name for name in how if name.startswith("real_")}
+        )
+        self.assertEqual(
+            {
+                name: how[name]
+                for name in (
+                    "p99_9_um",
+                    "cold_cycles",
+                    "speed_vs_ceres",
+                    "samples",
+                    "emulated_frames_different",
+                    "false_contacts",
+                    "flash_lost",
+                    "seconds",
+                    "vector_error_p95",
+                    "chip_fps_osr256",
+                    "shear_cycles",
+                )
+            },
+            {
+                "p99_9_um": "simulated",
+                "cold_cycles": "emulated",
+                "speed_vs_ceres": "timed on this computer",
+                "samples": "simulated",
+                "emulated_frames_different": "emulated",
+                "false_contacts": "simulated",
+                "flash_lost": "emulated",
+                "seconds": "timed on this computer",
+                "vector_error_p95": "simulated",
+                "chip_fps_osr256": "emulated",
+                "shear_cycles": "emulated",
+            },
+        )
         words = "".join(shown.words)
         for part in PARTS.values():
             self.assertIn(part.command, words)
@@ -231,8 +284,22 @@ class Page(unittest.TestCase):
 
     def test_the_text_of_a_report_is_in_without_what_the_page_has_itself(self):
         every = self.write_all()
-        lines = ["# Title of the text", "", "Written.", "", "![Some picture](rate.png)", "", *goal_table_md(every["rate"]), "", "## By OSR", "",
-                 "| board | OSR |", "|---|---|", "| of the text | 256 |", ""]
+        lines = [
+            "# Title of the text",
+            "",
+            "Written.",
+            "",
+            "![Some picture](rate.png)",
+            "",
+            *goal_table_md(every["rate"]),
+            "",
+            "## By OSR",
+            "",
+            "| board | OSR |",
+            "|---|---|",
+            "| of the text | 256 |",
+            "",
+        ]
         (self.folder / "rate.md").write_text("\n".join(lines))
         shown = self.read()
         self.assertIsNotNone(shown.row("of the text", "256"))
@@ -250,7 +317,9 @@ class Page(unittest.TestCase):
         self.assertIn('name="viewport" content="width=device-width', text)
 
     def test_a_wrong_folder_is_one_line(self):
-        done = subprocess.run([sys.executable, str(REPORT / "shared/page.py"), "-o", str(self.folder / "none")], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, str(REPORT / "shared/page.py"), "-o", str(self.folder / "none")], capture_output=True, text=True
+        )
         self.assertEqual(done.returncode, 1)
         self.assertEqual(done.stderr, f"page.py: {self.folder / 'none'}: there is no such folder; run a report first\n")
 

@@ -65,16 +65,14 @@ public:
 
 std::string wrench_row(Bytes message) {
   eprosima::fastcdr::FastBuffer buffer(message.data(), message.size());
-  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN,
-                             eprosima::fastcdr::Cdr::DDS_CDR);
+  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
   int32_t sec = 0;
   uint32_t nanosec = 0;
   std::string frame_id;
   cdr.read_encapsulation();
   cdr >> sec >> nanosec >> frame_id;
   std::ostringstream row;
-  row << std::setprecision(std::numeric_limits<double>::max_digits10) << sec << ',' << nanosec
-      << ',' << frame_id;
+  row << std::setprecision(std::numeric_limits<double>::max_digits10) << sec << ',' << nanosec << ',' << frame_id;
   for (int i = 0; i < 6; ++i) {
     double value = 0;
     cdr >> value;
@@ -86,8 +84,7 @@ std::string wrench_row(Bytes message) {
 class Ear : public DataReaderListener {
 public:
   Ear(std::string topic, const std::string &folder, size_t number, std::ofstream *wrenches)
-      : topic_(std::move(topic)), file_(folder + "/" + std::to_string(number) + ".bin"),
-        wrenches_(wrenches) {}
+      : topic_(std::move(topic)), file_(folder + "/" + std::to_string(number) + ".bin"), wrenches_(wrenches) {}
 
   void on_subscription_matched(DataReader *, const SubscriptionMatchedStatus &status) override {
     const std::lock_guard lock(shared_);
@@ -130,8 +127,7 @@ DomainParticipantQos loopback_only() {
 
 int listen(int domain, const std::string &folder, const std::vector<std::string> &wanted) {
   auto *factory = DomainParticipantFactory::get_instance();
-  DomainParticipant *participant =
-      factory->create_participant(static_cast<DomainId_t>(domain), loopback_only());
+  DomainParticipant *participant = factory->create_participant(static_cast<DomainId_t>(domain), loopback_only());
   if (!participant) {
     std::cerr << "no participant\n";
     return 1;

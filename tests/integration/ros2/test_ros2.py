@@ -2,6 +2,7 @@
 
 usage: test_ros2.py FAKE_DEVICE FAST_DDS_LISTENER [unittest arguments]. DDS stays on the loopback interface.
 """
+
 # real time: discovery and delivery by DDS on a network
 import csv
 import math
@@ -41,8 +42,19 @@ class Topics(unittest.TestCase):
         environment.start()
         cls.addClassCleanup(environment.stop)
         cls.sent = []
-        flags = int(Flag.CONTACT | Flag.FIT_VALID | Flag.TARED | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID | Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID)
-        with fake_device(FAKE_DEVICE, cls.folder, "rate=200", "health=50", f"flags={flags}", "absent=3") as port, Fingertip(port) as fingertip:
+        flags = int(
+            Flag.CONTACT
+            | Flag.FIT_VALID
+            | Flag.TARED
+            | Flag.UNCERTAINTY_VALID
+            | Flag.SLIP_VALID
+            | Flag.TANGENTIAL_VALID
+            | Flag.VELOCITY_VALID
+        )
+        with (
+            fake_device(FAKE_DEVICE, cls.folder, "rate=200", "health=50", f"flags={flags}", "absent=3") as port,
+            Fingertip(port) as fingertip,
+        ):
             with ros2.Publisher() as publisher:
                 ears = Ears(LISTENER, cls.folder)
                 cls.addClassCleanup(ears.process.kill)
@@ -107,7 +119,9 @@ class Topics(unittest.TestCase):
                 self.assertTrue(math.isnan(z_N))
             else:
                 self.assertEqual([x_N, y_N, z_N], [frame.qx_N, frame.qy_N, -frame.force_N])
-                for got, wanted in zip(torques, (-frame.y_mm * frame.force_N, frame.x_mm * frame.force_N, frame.x_mm * frame.qy_N - frame.y_mm * frame.qx_N)):
+                for got, wanted in zip(
+                    torques, (-frame.y_mm * frame.force_N, frame.x_mm * frame.force_N, frame.x_mm * frame.qy_N - frame.y_mm * frame.qx_N)
+                ):
                     self.assertAlmostEqual(got, wanted / 1000, places=9)
         self.assertFalse(self.sent[-1].flags & WARNINGS)
 
@@ -134,8 +148,14 @@ class Command(unittest.TestCase):
         self.environment = {**os.environ, **LOCAL, "PYTHONPATH": str(PACKAGE), "XDG_RUNTIME_DIR": holder.name}
 
     def ros2(self, *options, **more):
-        command = subprocess.Popen([sys.executable, "-m", "fingertip.ros2", *map(str, options)], env={**self.environment, **more}, stdout=subprocess.PIPE,
-                                stderr=subprocess.PIPE, text=True, cwd=self.folder)
+        command = subprocess.Popen(
+            [sys.executable, "-m", "fingertip.ros2", *map(str, options)],
+            env={**self.environment, **more},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=self.folder,
+        )
         self.addCleanup(command.communicate)
         self.addCleanup(command.kill)
         return command
@@ -157,16 +177,19 @@ class Command(unittest.TestCase):
         self.assertEqual((command.returncode, error), (0, ""))
         self.assertRegex(out, rf"(?m)^/fingertip/{SERIAL}/wrench: \d+ messages$")
         said = [decode("diagnostic_msgs/DiagnosticArray", data)["status"][0] for data in ears.close()["/diagnostics"]]
-        self.assertEqual([(each["level"], each["message"]) for each in said if each["name"].endswith("line")],
-                         [(2, "gone; it is waited for"), (0, "there again")])
+        self.assertEqual(
+            [(each["level"], each["message"]) for each in said if each["name"].endswith("line")],
+            [(2, "gone; it is waited for"), (0, "there again")],
+        )
 
     def test_what_is_wrong_is_said(self):
         with fake_device(FAKE_DEVICE, self.folder) as port:
             for options, environment, said in (
-                    (("--port", self.folder / "nothing"), {}, r"fingertip-ros2: .*nothing.*\n"),
-                    (("--port", port), {"ROS_DOMAIN_ID": "-1"}, r"fingertip-ros2: ROS_DOMAIN_ID -1 is out of range; give 0 to 232\n"),
-                    (("--port", port, "--domain", "233"), {}, r"fingertip-ros2: domain 233 is out of range; give 0 to 232\n"),
-                    (("--port", port), {"CYCLONEDDS_URI": "<no"}, r"fingertip-ros2: DDS domain .* is CYCLONEDDS_URI right\?\n")):
+                (("--port", self.folder / "nothing"), {}, r"fingertip-ros2: .*nothing.*\n"),
+                (("--port", port), {"ROS_DOMAIN_ID": "-1"}, r"fingertip-ros2: ROS_DOMAIN_ID -1 is out of range; give 0 to 232\n"),
+                (("--port", port, "--domain", "233"), {}, r"fingertip-ros2: domain 233 is out of range; give 0 to 232\n"),
+                (("--port", port), {"CYCLONEDDS_URI": "<no"}, r"fingertip-ros2: DDS domain .* is CYCLONEDDS_URI right\?\n"),
+            ):
                 command = self.ros2(*options, **environment)
                 out, error = command.communicate(timeout=PATIENCE_s)
                 self.assertEqual((command.returncode, out), (1, ""), error)
@@ -175,8 +198,9 @@ class Command(unittest.TestCase):
     def test_without_cyclonedds(self):
         (self.folder / "cyclonedds.py").write_text("raise ImportError\n")
         command = self.ros2()
-        self.assertEqual(command.communicate(timeout=PATIENCE_s)[1],
-                         'fingertip-ros2: ROS 2 topics need the package cyclonedds; pip install cyclonedds\n')
+        self.assertEqual(
+            command.communicate(timeout=PATIENCE_s)[1], "fingertip-ros2: ROS 2 topics need the package cyclonedds; pip install cyclonedds\n"
+        )
         self.assertEqual(command.returncode, 1)
 
     def test_a_reader_that_stalls_delays_nobody(self):

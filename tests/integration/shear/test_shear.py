@@ -1,4 +1,5 @@
 """shear.py with programs in the place of its parts: what it merges, judges, writes and refuses."""
+
 import pathlib
 import sys
 import unittest
@@ -6,18 +7,53 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
 from report_of_programs import ReportOfPrograms  # noqa: E402
 
-ROW = {"case": "10 %, calibrated, Q/F 0.3", "touches": 10, "valid_percent": 100.0, "ratio_error_p50": 0.011, "ratio_error_p95": 0.04, "vector_error_p50": 0.019,
-       "vector_error_p95": 0.056, "direction_p90_deg": 5.9, "location_p50_mm": 0.08, "location_p95_mm": 0.25, "pad": "10 %, calibrated", "load": 0.3}
-TAP = {"pad": "equal gains", "load": 0.3, "location_without_p50_mm": 1.03, "location_without_p95_mm": 1.3, "location_p50_mm": 0.0612, "location_p95_mm": 0.1,
-       "force_without_p50_percent": 9.1, "force_p50_percent": 0.2, "force_scaled_without_p50_percent": 0.6, "force_scaled_p50_percent": 0.1,
-       "elongated_percent": 40.0}
+ROW = {
+    "case": "10 %, calibrated, Q/F 0.3",
+    "touches": 10,
+    "valid_percent": 100.0,
+    "ratio_error_p50": 0.011,
+    "ratio_error_p95": 0.04,
+    "vector_error_p50": 0.019,
+    "vector_error_p95": 0.056,
+    "direction_p90_deg": 5.9,
+    "location_p50_mm": 0.08,
+    "location_p95_mm": 0.25,
+    "pad": "10 %, calibrated",
+    "load": 0.3,
+}
+TAP = {
+    "pad": "equal gains",
+    "load": 0.3,
+    "location_without_p50_mm": 1.03,
+    "location_without_p95_mm": 1.3,
+    "location_p50_mm": 0.0612,
+    "location_p95_mm": 0.1,
+    "force_without_p50_percent": 9.1,
+    "force_p50_percent": 0.2,
+    "force_scaled_without_p50_percent": 0.6,
+    "force_scaled_p50_percent": 0.1,
+    "elongated_percent": 40.0,
+}
 MISS = {**ROW, "case": "lime, corner", "off_by_0_05_percent": 50.0, "off_by_5_deg_percent": 60.0}
 FOUND = {
-    "static": {"ratio_error_p50": 0.011, "vector_error_p95": 0.056, "elongated_false_percent": 14.0, "screw_ratio": 0.015, "by_pad_and_load": [ROW],
-               "bounds": [{**{name: ROW[name] for name in ROW if name not in ("pad", "load", "valid_percent")}, "case": "noise; priors"}], "taps": [TAP],
-               "where_misses_lie": [MISS]},
-    "motion": {"slide_found_percent": 98.5, "slide_latency_p95_ms": 30.0, "lift_false_slides_100ms": 0, "lift_false_slides_1s": 2,
-               "slides": [{"speed_mm_s": 20, "found": "all of them"}]}}
+    "static": {
+        "ratio_error_p50": 0.011,
+        "vector_error_p95": 0.056,
+        "elongated_false_percent": 14.0,
+        "screw_ratio": 0.015,
+        "by_pad_and_load": [ROW],
+        "bounds": [{**{name: ROW[name] for name in ROW if name not in ("pad", "load", "valid_percent")}, "case": "noise; priors"}],
+        "taps": [TAP],
+        "where_misses_lie": [MISS],
+    },
+    "motion": {
+        "slide_found_percent": 98.5,
+        "slide_latency_p95_ms": 30.0,
+        "lift_false_slides_100ms": 0,
+        "lift_false_slides_1s": 2,
+        "slides": [{"speed_mm_s": 20, "found": "all of them"}],
+    },
+}
 
 
 class Shear(ReportOfPrograms):

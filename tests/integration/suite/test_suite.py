@@ -1,4 +1,5 @@
 """The report on the test suite counts what ctest counts, on small suites."""
+
 import io
 import os
 import pathlib
@@ -52,8 +53,11 @@ class Suite(unittest.TestCase):
         self.assertIn("failed: bad", said)
 
     def test_what_cannot_be_run_has_failed(self):
-        for bad in ("/nowhere/program", "true)\nadd_test(NAME set_up COMMAND false)\nset_tests_properties(set_up PROPERTIES FIXTURES_SETUP rubber)\n"
-                    "set_tests_properties(bad PROPERTIES FIXTURES_REQUIRED rubber"):
+        for bad in (
+            "/nowhere/program",
+            "true)\nadd_test(NAME set_up COMMAND false)\nset_tests_properties(set_up PROPERTIES FIXTURES_SETUP rubber)\n"
+            "set_tests_properties(bad PROPERTIES FIXTURES_REQUIRED rubber",
+        ):
             figures, _ = self.figures(self.small(bad), whole=1)
             self.assertIn("bad", figures["whole_failed"])
             self.assertEqual((figures["whole_failures"], figures["skipped"]), (1, ["absent"]))
@@ -65,13 +69,21 @@ class Suite(unittest.TestCase):
         self.assertIn("the reason", (build / "failed/whole-1-quiet-bad.txt").read_text())
 
     def test_a_run_that_ctest_does_not_end_has_failed(self):
-        figures, said = self.figures(self.small("sh -c \"kill -9 $PPID\""), whole=1, quick=1)
+        figures, said = self.figures(self.small('sh -c "kill -9 $PPID"'), whole=1, quick=1)
         self.assertEqual((figures["whole_failures"], figures["whole_failed"], figures["quick_failures"]), (1, ["ctest"], 0))
         self.assertIn("failed: ctest", said)
 
     def test_tests_that_skip_a_part_are_named_with_how_many(self):
-        said = {"OK (skipped=2)": 2, "OK (expected failures=1, skipped=3)": 3, "[  SKIPPED ] 1 test, listed below:": 1, "# skipped 4": 4,
-                "12 Tests 0 Failures 5 Ignored": 5, "OK": 0, "# skipped 0": 0, "12 Tests 0 Failures 0 Ignored": 0}
+        said = {
+            "OK (skipped=2)": 2,
+            "OK (expected failures=1, skipped=3)": 3,
+            "[  SKIPPED ] 1 test, listed below:": 1,
+            "# skipped 4": 4,
+            "12 Tests 0 Failures 5 Ignored": 5,
+            "OK": 0,
+            "# skipped 0": 0,
+            "12 Tests 0 Failures 0 Ignored": 0,
+        }
         tests = {line: suite.Test(1.0, "run", f"before\n{line}\nafter") for line in said}
         self.assertEqual(suite.skipped_in_part([(True, 1.0, tests)]), {line: parts for line, parts in said.items() if parts})
 
@@ -82,7 +94,9 @@ class Suite(unittest.TestCase):
     def test_the_busy_machine_is_quiet_again_even_if_the_report_is_killed(self):
         with tempfile.TemporaryDirectory() as folder:
             code = f"import os, suite\nwith suite.busy_machine({folder!r}):\n    os.kill(os.getpid(), 9)"
-            killed = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}, stdout=subprocess.PIPE)
+            killed = subprocess.Popen(
+                [sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}, stdout=subprocess.PIPE
+            )
             killed.communicate(timeout=PATIENCE_s)  # all that it started holds this open
 
     def test_seconds_are_of_quiet_runs(self):
@@ -90,7 +104,9 @@ class Suite(unittest.TestCase):
             return {"a": suite.Test(a_s, "run", ""), "b": suite.Test(b_s, b_status, "")}
 
         quiet, busy = tests(1.0, 2.0), tests(50.0, 60.0, "fail")
-        figures = suite.summary([(True, 120.0, quiet), (False, 600.0, busy)], [(True, 30.0, quiet), (False, 90.0, quiet)], {"a": "quick", "b": "host"})
+        figures = suite.summary(
+            [(True, 120.0, quiet), (False, 600.0, busy)], [(True, 30.0, quiet), (False, 90.0, quiet)], {"a": "quick", "b": "host"}
+        )
         self.assertEqual((figures["whole_test_seconds"], figures["whole_minutes"], figures["quick_seconds"]), (3.0, 2.0, 30.0))
         self.assertEqual((figures["whole_failures"], figures["whole_minutes_busy"], figures["longest"]), (1, 10.0, {"b": 2.0, "a": 1.0}))
 
@@ -100,10 +116,16 @@ class Suite(unittest.TestCase):
     def test_what_ran_before_an_interruption_is_written(self):
         build = self.small("true")
         reports = []
-        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()), unittest.mock.patch.object(
-                suite, "write_json", lambda path, figures: reports.append(figures)):
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            redirect_stdout(io.StringIO()),
+            unittest.mock.patch.object(suite, "write_json", lambda path, figures: reports.append(figures)),
+        ):
             suite.main(["--build", os.path.relpath(build), "-o", folder, "--whole", "2", "--quick", "1"])
-        self.assertEqual([(report["quick_runs"], report["whole_runs"], report["whole_failures"]) for report in reports], [(1, 0, 0), (1, 1, 0), (1, 2, 0)])
+        self.assertEqual(
+            [(report["quick_runs"], report["whole_runs"], report["whole_failures"]) for report in reports],
+            [(1, 0, 0), (1, 1, 0), (1, 2, 0)],
+        )
 
     def test_no_test_at_all_is_an_error(self):
         with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:

@@ -1,4 +1,5 @@
 """A short run of the tools' report: usage test_tools.py BUILD [unittest arguments]."""
+
 import json
 import pathlib
 import subprocess
@@ -15,7 +16,9 @@ import tools  # noqa: E402
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, str(ROOT / "host_tools/report/tools/tools.py"), "--build", BUILD, *arguments], capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, str(ROOT / "host_tools/report/tools/tools.py"), "--build", BUILD, *arguments], capture_output=True, text=True
+    )
 
 
 class Tools(unittest.TestCase):

@@ -1,4 +1,5 @@
 """truth.py with programs in the place of its parts: what it merges, judges, writes and refuses."""
+
 import pathlib
 import sys
 import unittest
@@ -6,14 +7,28 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
 from report_of_programs import ReportOfPrograms  # noqa: E402
 
-CASE = {"case": "12 mm, calibrated", "error_p50_mm": 0.14, "cover_1sd": 64.5, "cover_2sd": 97.6, "warned": 4.1, "bad": 0.2, "bad_unflagged": 0.01}
+CASE = {
+    "case": "12 mm, calibrated",
+    "error_p50_mm": 0.14,
+    "cover_1sd": 64.5,
+    "cover_2sd": 97.6,
+    "warned": 4.1,
+    "bad": 0.2,
+    "bad_unflagged": 0.01,
+}
 FOUND = {
     "fit": {
-        "cover_1sd_min": 60.0, "cover_1sd_max": 76.0, "cases": [CASE],
-        "iterations": [{"case": "12 mm", "layer_mm": 12, "gain_percent": 0.0, "iterations": k, "error_p50_mm": 0.1} for k in (3, 4)]},
+        "cover_1sd_min": 60.0,
+        "cover_1sd_max": 76.0,
+        "cases": [CASE],
+        "iterations": [{"case": "12 mm", "layer_mm": 12, "gain_percent": 0.0, "iterations": k, "error_p50_mm": 0.1} for k in (3, 4)],
+    },
     "calibration": {
-        "cal_median_mm": 0.12, "before_cal_median_mm": 0.4,
-        "truth_calibration": {"by_placements": [{"placements": 20, "median_mm": 0.12}]}}}
+        "cal_median_mm": 0.12,
+        "before_cal_median_mm": 0.4,
+        "truth_calibration": {"by_placements": [{"placements": 20, "median_mm": 0.12}]},
+    },
+}
 
 
 class Truth(ReportOfPrograms):
@@ -46,8 +61,14 @@ class Truth(ReportOfPrograms):
     def test_what_goes_wrong_is_one_line(self):
         self.program("fit", "sys.exit(3)")
         self.program("calibration", "print('no figures')")
-        self.fails_in_one_line((("fit", "ended with status 3"), ("calibration", "wrote no JSON"), ("gate", "is not there; build it"),
-                                ("thumb", "thumb is none of")))
+        self.fails_in_one_line(
+            (
+                ("fit", "ended with status 3"),
+                ("calibration", "wrote no JSON"),
+                ("gate", "is not there; build it"),
+                ("thumb", "thumb is none of"),
+            )
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES PLAYER [unittest arguments]."""
+
 import csv
 import json
 import math
@@ -61,25 +62,53 @@ class TwinTest(unittest.TestCase):
 class Files(TwinTest):
     def test_every_kind_is_read_by_python_and_emulator_alike(self):
         names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
-        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "two", "lift", "drag", "slide", "screw"]))
+        self.assertEqual(
+            sorted(names),
+            sorted(
+                [
+                    "grid",
+                    "taps",
+                    "high",
+                    "pokes",
+                    "cycle",
+                    "slip",
+                    "twist",
+                    "rolloff",
+                    "placements",
+                    "two",
+                    "lift",
+                    "drag",
+                    "slide",
+                    "screw",
+                ]
+            ),
+        )
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
                 self.scenario(kind, "--seconds", str(seconds), "--effects", "all", "--overwrite")
                 scenario = files.read_scenario(self.csv)
                 times = [0, 1.8, 7.3, seconds]
-                done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times)],
-                                      capture_output=True, text=True, check=True, timeout=PATIENCE_s)
+                done = subprocess.run(
+                    ["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times)],
+                    capture_output=True,
+                    text=True,
+                    check=True,
+                    timeout=PATIENCE_s,
+                )
                 emulator = json.loads(done.stdout)
                 self.assertEqual(emulator["end_s"], seconds)
                 self.assertEqual(emulator["rows"], len(scenario.t_s))
                 self.assertEqual(emulator["metadata"], scenario.metadata)
-                self.assertEqual(scenario.metadata["name"],
-                                 f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-dip-widths-places-drift-relaxation-hysteresis-aftereffect-creep-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}")
+                self.assertEqual(
+                    scenario.metadata["name"],
+                    f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-dip-widths-places-drift-relaxation-hysteresis-aftereffect-creep-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}",
+                )
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
-                            sensor["pressure_Pa"] - 101325, files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
+                            sensor["pressure_Pa"] - 101325, files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k]), places=6
+                        )
                         self.assertTrue(5 <= sensor["temperature_degC"] < 31)
                 events = self.events()
                 held = [row for row in events if float(row["force_N"]) > 0 or float(row["force_end_N"]) > 0]
@@ -125,12 +154,19 @@ class Files(TwinTest):
         self.assertGreater(scenario.truth["Qy_N"].max(), 1.49)
         row = max(self.events(), key=lambda row: float(row["Qy_N"]))
         self.assertEqual((row["Qx_N"], row["Qy_N"]), ("0.00000", "1.50000"))
-        done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, "1.8"],
-                              capture_output=True, text=True, check=True, timeout=PATIENCE_s)
+        done = subprocess.run(
+            ["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, "1.8"],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=PATIENCE_s,
+        )
         for k, sensor in enumerate(json.loads(done.stdout)["at"][0]):
             self.assertAlmostEqual(sensor["pressure_Pa"] - 101325, files.np.interp(1.8, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
         recording = str(self.folder / "recording.csv")
-        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        subprocess.run(
+            [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s
+        )
         played = files.read_recording(recording)
         t_s = played["t_us"] * 1e-6
         pressed = (scenario.at("force_N", t_s) > 4.9) & ~files.np.isnan(played["y_mm"])
@@ -138,10 +174,14 @@ class Files(TwinTest):
         off_mm = (played["y_mm"] - scenario.at("y_mm", t_s))[pressed]
         self.assertAlmostEqual(files.np.median(off_mm), 1.05, delta=0.15)
         text = pathlib.Path(self.csv).read_text()
-        for name, what in (("Qz_N", 'column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC'),
-                           ("Qy_N", 'column 25 is "Qy_N"; after the sensors')):
+        for name, what in (
+            ("Qz_N", 'column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC'),
+            ("Qy_N", 'column 25 is "Qy_N"; after the sensors'),
+        ):
             pathlib.Path(self.csv).write_text(text.replace("Qx_N", name, 1))
-            refused = subprocess.run([PLAYER, "play", self.csv, "-o", recording + "2", "--quiet"], capture_output=True, text=True, timeout=PATIENCE_s)
+            refused = subprocess.run(
+                [PLAYER, "play", self.csv, "-o", recording + "2", "--quiet"], capture_output=True, text=True, timeout=PATIENCE_s
+            )
             self.assertEqual(refused.returncode, 1)
             self.assertIn(what, refused.stderr)
             with self.assertRaisesRegex(files.InputError, "wrong header.*once each, any of Qx_N, Qy_N, temperature_degC"):
@@ -171,7 +211,9 @@ class Files(TwinTest):
                 self.assertAlmostEqual(scenario.t_s[sliding][-1], float(told[-1]["t_end_s"]), delta=0.0021)
         self.assertGreater(slid, 4)
         recording = str(self.folder / "recording.csv")
-        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        subprocess.run(
+            [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s
+        )
         self.assertGreater(files.read_recording(recording).has_contact.sum(), 1000)
 
     def test_a_pad_that_ends_reads_more_near_its_edge(self):
@@ -187,13 +229,16 @@ class Files(TwinTest):
         def largest(text):
             rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
             return max(float(row[f"s{k}_Pa"]) for row in rows for k in range(15))
+
         self.assertGreater(abs(largest(ends) - largest(endless)), 10.0)
 
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
         # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
         self.scenario("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
         recording = str(self.folder / "recording.csv")
-        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        subprocess.run(
+            [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s
+        )
         scenario, played = files.read_scenario(self.csv), files.read_recording(recording)
         t_s, read_Pa = played["t_us"] * 1e-6, played.sensors_Pa - 101325
         crossing_s = 10 * (9.665 - 7)
@@ -217,8 +262,12 @@ class Files(TwinTest):
         self.assertEqual(sorted(os.listdir(self.folder)), ["played.csv", "played.truth.csv"])
 
     def test_an_interrupt_leaves_nothing(self):
-        twin = subprocess.Popen([TWIN, "scenario", "slip", "--seconds", "7200", "--effects", "all", "-o", self.csv, "--cache", TABLES],
-                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        twin = subprocess.Popen(
+            [TWIN, "scenario", "slip", "--seconds", "7200", "--effects", "all", "-o", self.csv, "--cache", TABLES],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         RealTime().until(lambda: any(path.stat().st_size for path in self.folder.iterdir()))
         twin.send_signal(signal.SIGINT)
         out, err = twin.communicate(timeout=PATIENCE_s)
@@ -256,13 +305,15 @@ class Usage(TwinTest):
         self.assertEqual(list(found), ["sigma_mm", "force_share", "peak_kPa"])
         self.assertAlmostEqual(float(found["sigma_mm"]), 0.45 * 12, delta=0.36)
         self.assertAlmostEqual(float(found["force_share"]), 0.9, delta=0.02)
-        peak_kPa = 2 * float(found["force_share"]) / (2 * math.pi * float(found["sigma_mm"])**2) * 1000
+        peak_kPa = 2 * float(found["force_share"]) / (2 * math.pi * float(found["sigma_mm"]) ** 2) * 1000
         self.assertAlmostEqual(float(found["peak_kPa"]), peak_kPa, delta=0.01 * peak_kPa)
 
     def test_width_hardly_depends_on_hardness(self):
         widths = []
         for shore in ("10", "40"):
-            out, _ = self.run_twin("width", "--indenter", "sphere15", "--layer", "12", "--force", "5", "--shore", shore, "--cache", str(self.folder))
+            out, _ = self.run_twin(
+                "width", "--indenter", "sphere15", "--layer", "12", "--force", "5", "--shore", shore, "--cache", str(self.folder)
+            )
             widths.append(float(out.split()[0].removeprefix("sigma_mm=")))
         self.assertLess(widths[1], widths[0])  # a ball sinks deeper into softer rubber
         self.assertGreater(widths[1], 0.95 * widths[0])
@@ -307,15 +358,27 @@ class Usage(TwinTest):
             ("lift", "--friction", "9"): "--friction 9 is out of range; give 0.05 to 5",
             ("lift", "--mass", "0.2"): '--mass says nothing in a scenario of "lift"; leave it out, or choose slide',
             ("slide", "--tangential", "0.2"): "--tangential says nothing",
-            ("slide", "--mass", "2", "--friction", "0.3"): "--mass 2 needs a grip of up to 81.75 N at --friction 0.3, above 50; give less mass or more friction",
+            (
+                "slide",
+                "--mass",
+                "2",
+                "--friction",
+                "0.3",
+            ): "--mass 2 needs a grip of up to 81.75 N at --friction 0.3, above 50; give less mass or more friction",
             ("slide", "--speed", "300"): "--speed 300 is out of range; give 1 to 200",
         }.items():
             self.assertIn(what, self.scenario_error(*arguments))
             self.assertEqual(os.listdir(self.folder), [])
         self.assertIn("/no/such/place.csv: No such file or directory", self.error("scenario", "taps", "-o", "/no/such/place.csv"))
-        for arguments in (("scenario",), ("scenario", "taps"), ("draw",), ("scenario", "taps", "-o", self.csv, "--seed", "-1"),
-                          ("scenario", "taps", "-o", self.csv, "--pad", "1.5"),
-                          ("scenario", "taps", "-o", self.csv, "--seconds", "x"), ()):
+        for arguments in (
+            ("scenario",),
+            ("scenario", "taps"),
+            ("draw",),
+            ("scenario", "taps", "-o", self.csv, "--seed", "-1"),
+            ("scenario", "taps", "-o", self.csv, "--pad", "1.5"),
+            ("scenario", "taps", "-o", self.csv, "--seconds", "x"),
+            (),
+        ):
             self.error(*arguments, status=2)
 
     def test_a_cache_that_cannot_be_is_told(self):

@@ -1,4 +1,5 @@
 """two.py with a program in the place of its touches: what it judges, writes and refuses."""
+
 import pathlib
 import sys
 import unittest
@@ -7,14 +8,37 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
 from report_of_programs import ReportOfPrograms  # noqa: E402
 
 CALLED = {"one": 0.0, "pulled": 0.0, "long": 40.0, "two": 60.0, "none": 0.0, "undecided": 0.0}
-ROWS = [{"case": f"two, {apart} mm, {ratio}", **CALLED, "two_and_right": 59.0, "possible": 70.0, "possible_rubber_known": 90.0, "off_p50_mm": 0.2, "off_p95_mm": 0.9}
-        for ratio in ("1:1", "3:1") for apart in (6, 8, 10, 12, 15, 20)]
+ROWS = [
+    {
+        "case": f"two, {apart} mm, {ratio}",
+        **CALLED,
+        "two_and_right": 59.0,
+        "possible": 70.0,
+        "possible_rubber_known": 90.0,
+        "off_p50_mm": 0.2,
+        "off_p95_mm": 0.9,
+    }
+    for ratio in ("1:1", "3:1")
+    for apart in (6, 8, 10, 12, 15, 20)
+]
 
 
 class Two(ReportOfPrograms):
-    NAME, FOUND = "two", {"touches": {"two_right_percent_8mm": 59.0, "one_called_two_percent": 0.1, "touches": ROWS,
-                                 **{f"two_possible_{kind}_{pair}": 61.25 for kind in ("percent", "model_halved_percent", "model_quartered_percent", "rubber_known_percent")
-                                    for pair in ("8mm", "12mm", "10mm_3to1")}}}
+    NAME, FOUND = (
+        "two",
+        {
+            "touches": {
+                "two_right_percent_8mm": 59.0,
+                "one_called_two_percent": 0.1,
+                "touches": ROWS,
+                **{
+                    f"two_possible_{kind}_{pair}": 61.25
+                    for kind in ("percent", "model_halved_percent", "model_quartered_percent", "rubber_known_percent")
+                    for pair in ("8mm", "12mm", "10mm_3to1")
+                },
+            }
+        },
+    )
 
     def test_figures_are_judged_and_written(self):
         done = self.run_tool("--parts", "touches")

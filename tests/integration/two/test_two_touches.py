@@ -2,6 +2,7 @@
 
 usage: test_two_touches.py TWO_TOUCHES [unittest arguments]
 """
+
 import json
 import subprocess
 import sys
@@ -9,8 +10,14 @@ import unittest
 
 # (key, least, most): what a full run finds on seed 40000, with room for a tenth of its pads.
 FOUND = (
-    ("two_right_percent_8mm", 27, 100), ("two_right_percent_12mm", 94, 100), ("two_right_percent_10mm_3to1", 80, 100), ("one_called_two_percent", 0, 1),
-    ("edge_angle_p50_deg_20mm", 0, 1.5), ("edge_angle_p50_deg_10mm", 0, 3), ("silent_over_1mm_percent", 0, 2.5))
+    ("two_right_percent_8mm", 27, 100),
+    ("two_right_percent_12mm", 94, 100),
+    ("two_right_percent_10mm_3to1", 80, 100),
+    ("one_called_two_percent", 0, 1),
+    ("edge_angle_p50_deg_20mm", 0, 1.5),
+    ("edge_angle_p50_deg_10mm", 0, 3),
+    ("silent_over_1mm_percent", 0, 2.5),
+)
 
 
 def run(*options):
@@ -46,7 +53,9 @@ class TwoTouches(unittest.TestCase):
         for name, row in rows.items():
             if name.startswith("two"):
                 with self.subTest(name):
-                    rising = [row[name] for name in ("possible", "possible_model_halved", "possible_model_quartered", "possible_rubber_known")]
+                    rising = [
+                        row[name] for name in ("possible", "possible_model_halved", "possible_model_quartered", "possible_rubber_known")
+                    ]
                     self.assertEqual(rising, sorted(rising))
         near = rows["two, 8 mm, 1:1"]
         self.assertLess(near["possible"], near["possible_rubber_known"] - 20)
@@ -68,7 +77,9 @@ class TwoTouches(unittest.TestCase):
 
     def test_repeatable_and_seeded(self):
         self.assertEqual(run(*self.options).stdout, self.text)
-        self.assertNotEqual(json.loads(run("--pads", "1", "--seed", "4").stdout)["touches"], json.loads(run("--pads", "1", "--seed", "3").stdout)["touches"])
+        self.assertNotEqual(
+            json.loads(run("--pads", "1", "--seed", "4").stdout)["touches"], json.loads(run("--pads", "1", "--seed", "3").stdout)["touches"]
+        )
 
     def test_no_pads_is_an_error(self):
         done = run("--pads", "0")

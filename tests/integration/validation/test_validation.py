@@ -2,6 +2,7 @@
 
 usage: test_validation.py --build BUILD --boards BOARDS
 """
+
 import argparse
 import json
 import pathlib
@@ -16,9 +17,30 @@ OPTIONS = argparse.Namespace()
 
 def validate(folder, *more):
     return subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", OPTIONS.build, "--boards", OPTIONS.boards, "-o", str(folder),
-         "--tables", str(pathlib.Path(OPTIONS.build) / "contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05", "--pads", "2",
-         "--emulated-seconds", "4", *more], capture_output=True, text=True)
+        [
+            sys.executable,
+            str(ROOT / "host_tools/report/validation/validation.py"),
+            "--build",
+            OPTIONS.build,
+            "--boards",
+            OPTIONS.boards,
+            "-o",
+            str(folder),
+            "--tables",
+            str(pathlib.Path(OPTIONS.build) / "contact_tables"),
+            "--indenters",
+            "sphere6,cube6,sphere12",
+            "--scale",
+            "0.05",
+            "--pads",
+            "2",
+            "--emulated-seconds",
+            "4",
+            *more,
+        ],
+        capture_output=True,
+        text=True,
+    )
 
 
 class Validation(unittest.TestCase):
@@ -106,8 +128,20 @@ class Validation(unittest.TestCase):
         self.assertFalse((self.folder / "validation_work").exists())
 
     def test_a_missing_build_is_said(self):
-        done = subprocess.run([sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", str(self.folder), "--boards", "none", "-o",
-                               str(self.folder / "none")], capture_output=True, text=True)
+        done = subprocess.run(
+            [
+                sys.executable,
+                str(ROOT / "host_tools/report/validation/validation.py"),
+                "--build",
+                str(self.folder),
+                "--boards",
+                "none",
+                "-o",
+                str(self.folder / "none"),
+            ],
+            capture_output=True,
+            text=True,
+        )
         self.assertEqual(done.returncode, 1)
         self.assertIn("cmake --build", done.stderr)
 

@@ -3,6 +3,7 @@ judges against the tool.
 
 usage: test_web_wasm.py --build DIR --node PROGRAM
 """
+
 import argparse
 import csv
 import json
@@ -41,7 +42,17 @@ class WebWasm(unittest.TestCase):
 
     def scenario(self, kind, *more):
         path = self.folder / f"{kind}.csv"
-        must(self.build / "host_tools/simulation/twin/twin", "scenario", kind, "--cache", self.build / "contact_tables", "-o", path, "--overwrite", *more)
+        must(
+            self.build / "host_tools/simulation/twin/twin",
+            "scenario",
+            kind,
+            "--cache",
+            self.build / "contact_tables",
+            "-o",
+            path,
+            "--overwrite",
+            *more,
+        )
         return path
 
     def fingertip(self, *arguments):
@@ -49,8 +60,19 @@ class WebWasm(unittest.TestCase):
 
     def captured(self, scenario, *options):
         capture, recording = self.folder / "felt.ftr", self.folder / "felt.csv"
-        must(self.build / "host_tools/simulation/player/fingertip_player", "play", scenario, "-o", recording, "--raw-bytes", capture, "--overwrite",
-             "--quiet", "--raw", *options)
+        must(
+            self.build / "host_tools/simulation/player/fingertip_player",
+            "play",
+            scenario,
+            "-o",
+            recording,
+            "--raw-bytes",
+            capture,
+            "--overwrite",
+            "--quiet",
+            "--raw",
+            *options,
+        )
         return capture
 
     def judged(self, *arguments):
@@ -58,7 +80,12 @@ class WebWasm(unittest.TestCase):
 
     def commands(self, name, *texts):
         path = self.folder / name
-        path.write_bytes(b"".join(bytes.fromhex(must(self.build / "tests/support/command_frame", "--sequence", n, *text.split())) for n, text in enumerate(texts)))
+        path.write_bytes(
+            b"".join(
+                bytes.fromhex(must(self.build / "tests/support/command_frame", "--sequence", n, *text.split()))
+                for n, text in enumerate(texts)
+            )
+        )
         return path
 
     def recording_of(self, capture, used):
@@ -102,7 +129,9 @@ class Simulated(WebWasm):
         commands = cls().commands("commands", "osr 256", "rate max", "stream contact,raw,health", "info")
         cls().commands("commands.loader", "loader")
         cls.capture = cls.folder / "scene.ftr"
-        cls.seen = json.loads(must(OPTIONS.node, HERE / "scene.mjs", cls.web / "simulated.wasm", cls.web / "objects.bin", commands, cls.capture))
+        cls.seen = json.loads(
+            must(OPTIONS.node, HERE / "scene.mjs", cls.web / "simulated.wasm", cls.web / "objects.bin", commands, cls.capture)
+        )
         cls.truth = {truth["name"]: truth for truth in cls.seen["truths"]}
         cls.told = must(cls.build / "host_tools/tool/cli/fingertip", "convert", cls.capture, cls.folder / "scene.csv")
         cls.rows, cls.head = cls.recording(cls.folder / "scene.csv")
@@ -183,8 +212,17 @@ class Simulated(WebWasm):
 
 class Judges(WebWasm):
     def test_a_simulated_pad_is_calibrated(self):
-        found = json.loads(must(OPTIONS.node, HERE / "calibrate.mjs", self.web / "simulated.wasm", self.web / "objects.bin",
-                                self.web / "judges.wasm", self.commands("raw", "stream raw", "info"), 300))
+        found = json.loads(
+            must(
+                OPTIONS.node,
+                HERE / "calibrate.mjs",
+                self.web / "simulated.wasm",
+                self.web / "objects.bin",
+                self.web / "judges.wasm",
+                self.commands("raw", "stream raw", "info"),
+                300,
+            )
+        )
         self.assertIn("good", found["text"])
         # The twin draws the same pad.
         head = self.scenario("taps", "--seconds", "6", "--effects", "gain=10").read_text()
@@ -240,7 +278,7 @@ class Judges(WebWasm):
         first = next(i for i, line in enumerate(taps) if line.startswith("t_s,"))
         still = taps[first + 1].split(",")
         rows = [",".join([t, *("0" for _ in still[1:])]) + "\n" for t in ("0", "12")]
-        scenario.write_text("".join(taps[:first + 1] + rows))
+        scenario.write_text("".join(taps[: first + 1] + rows))
         capture = self.captured(scenario)
         found = self.judged("doctor", capture)
         self.assertGreater(found["seconds"], 10)
@@ -254,9 +292,9 @@ class Judges(WebWasm):
     def test_what_ends_an_examination_is_told(self):
         empty = self.folder / "empty.ftr"
         empty.write_bytes(b"")
-        found = self.judged("doctor", empty, "no_answer", "a \"port\": no answer")
+        found = self.judged("doctor", empty, "no_answer", 'a "port": no answer')
         self.assertEqual([(finding["verdict"], finding["check"]) for finding in found["findings"]], [("ok", "port"), ("bad", "protocol")])
-        self.assertEqual(found["findings"][1]["text"], "a \"port\": no answer")
+        self.assertEqual(found["findings"][1]["text"], 'a "port": no answer')
         self.assertTrue(found["findings"][1]["advice"])
 
 

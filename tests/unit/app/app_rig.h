@@ -46,9 +46,8 @@ static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t 
   double dy = (double)geometry.y_mm[sensor] - y_mm;
   const double sigma_mm = 5.7;
   double p0_Pa = press.force_N / (2.0 * PI * sigma_mm * sigma_mm * 1e-6);
-  double pressure_Pa = world_field_Pa
-                           ? world_field_Pa(dx, dy, t_us)
-                           : p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+  double pressure_Pa =
+      world_field_Pa ? world_field_Pa(dx, dy, t_us) : p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
   return AMBIENT_Pa + (world_gain ? world_gain(sensor) : 1.0) * pressure_Pa;
 }
 
@@ -107,8 +106,7 @@ static inline void send_packet(struct wire_packet *packet) {
   size_t length;
   packet->sequence = host_sequence++;
   packet->t_us = 123456789;
-  TEST_ASSERT_EQUAL(
-      FT_OK, wire_encode(wire_find_layout(wire_commands, packet->type), packet, frame, &length));
+  TEST_ASSERT_EQUAL(FT_OK, wire_encode(wire_find_layout(wire_commands, packet->type), packet, frame, &length));
   TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(frame, length));
 }
 
@@ -147,8 +145,8 @@ static inline struct wire_contact newest_contact(void) {
  */
 static inline uint8_t ask(struct wire_packet command) {
   struct wire_packet packet;
-  bool stores = (command.type >= WIRE_CMD_CALIBRATE && command.type <= WIRE_CMD_KEEP) ||
-                command.type == WIRE_CMD_PAD || command.type == WIRE_CMD_ERASE_PAD;
+  bool stores = (command.type >= WIRE_CMD_CALIBRATE && command.type <= WIRE_CMD_KEEP) || command.type == WIRE_CMD_PAD ||
+                command.type == WIRE_CMD_ERASE_PAD;
   send_packet(&command);
   run_for(stores ? 100 : 30);
   TEST_ASSERT_TRUE_MESSAGE(next_of_type(WIRE_ACK, &packet), "no acknowledgement");
@@ -159,8 +157,7 @@ static inline uint8_t ask(struct wire_packet command) {
 }
 
 static inline void start_streams(uint8_t streams) {
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_STREAM,
-                                                               .body.cmd_stream = {streams}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {streams}}));
 }
 
 static inline struct wire_info get_info(void) {

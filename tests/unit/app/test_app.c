@@ -34,8 +34,7 @@ static void a_press_is_located_and_weighed(void) {
   int held = 0;
   while (next_packet(&packet)) {
     if (packet.type == WIRE_RAW) {
-      TEST_ASSERT_EQUAL_HEX32(contact.flags & CONTACT_FLAG_HELD ? 0 : 0x7FFF,
-                              packet.body.raw.valid);
+      TEST_ASSERT_EQUAL_HEX32(contact.flags & CONTACT_FLAG_HELD ? 0 : 0x7FFF, packet.body.raw.valid);
       TEST_ASSERT_EQUAL_UINT32_MESSAGE(contact.frame, packet.body.raw.frame, "raw follows contact");
       continue;
     }
@@ -50,9 +49,8 @@ static void a_press_is_located_and_weighed(void) {
       TEST_ASSERT_EQUAL_FLOAT(last.x_mm, contact.x_mm);
       TEST_ASSERT_EQUAL_FLOAT(last.force_N, contact.force_N);
     }
-    TEST_ASSERT_EQUAL_UINT16(stages->total_us, stages->convert_us + stages->read_us +
-                                                   stages->queue_us + stages->condition_us +
-                                                   stages->fit_us + stages->contact_us);
+    TEST_ASSERT_EQUAL_UINT16(stages->total_us, stages->convert_us + stages->read_us + stages->queue_us +
+                                                   stages->condition_us + stages->fit_us + stages->contact_us);
     if (!(contact.flags & CONTACT_FLAG_CONTACT)) {
       TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force_N);
       TEST_ASSERT_TRUE(packet.t_us < press.from_us + 3000);
@@ -63,10 +61,8 @@ static void a_press_is_located_and_weighed(void) {
     }
     in_contact++;
     TEST_ASSERT_EQUAL_HEX32(
-        CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-            CONTACT_FLAG_TARED,
-        contact.flags &
-            ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_HELD));
+        CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED,
+        contact.flags & ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_HELD));
     TEST_ASSERT_EQUAL_HEX32(0x7FFF, contact.sensors_used);
     /* Noise, and the compensation's own rounding. The standard deviations are far larger: they are
      * those of a pad that was never calibrated, and these sensors happen to be alike. */
@@ -126,32 +122,26 @@ static void settings_are_checked_and_kept(void) {
   static const struct {
     uint32_t rate_mHz;
     uint8_t result;
-  } rates[] = {{0, 0},       {100, 0},  {2000000, 0}, {99, WIRE_RESULT_OUT_OF_RANGE},
-               {2000001, 2}, {20000, 0}};
+  } rates[] = {{0, 0}, {100, 0}, {2000000, 0}, {99, WIRE_RESULT_OUT_OF_RANGE}, {2000001, 2}, {20000, 0}};
   for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(
-        rates[i].result,
-        ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {rates[i].rate_mHz}}));
+    TEST_ASSERT_EQUAL_UINT8(rates[i].result,
+                            ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {rates[i].rate_mHz}}));
   }
   TEST_ASSERT_EQUAL_UINT32(20000, get_info().rate_mHz);
 
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
-                    ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {1000}}));
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {256}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {1000}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {256}}));
   TEST_ASSERT_EQUAL_UINT16(256, get_info().osr);
 
   static const struct {
     float threshold_mm;
     uint16_t window_ms;
     uint8_t result;
-  } slips[] = {{0.009f, 100, 2}, {51.0f, 100, 2}, {1.0f, 4, 2},
-               {1.0f, 1001, 2},  {-1.0f, 100, 2}, {0.5f, 200, 0}};
+  } slips[] = {{0.009f, 100, 2}, {51.0f, 100, 2}, {1.0f, 4, 2}, {1.0f, 1001, 2}, {-1.0f, 100, 2}, {0.5f, 200, 0}};
   for (size_t i = 0; i < sizeof slips / sizeof slips[0]; i++) {
     TEST_ASSERT_EQUAL_UINT8(
         slips[i].result,
-        ask((struct wire_packet){.type = WIRE_CMD_SLIP,
-                                 .body.cmd_slip = {slips[i].threshold_mm, slips[i].window_ms}}));
+        ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {slips[i].threshold_mm, slips[i].window_ms}}));
   }
   TEST_ASSERT_EQUAL_UINT16(200, get_info().slip_window_ms);
   TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().slip_threshold_mm);
@@ -171,16 +161,15 @@ static void priors_and_limits_are_checked(void) {
   for (size_t i = 0; i < sizeof priors / sizeof priors[0]; i++) {
     TEST_ASSERT_EQUAL_UINT8(
         priors[i].result,
-        ask((struct wire_packet){.type = WIRE_CMD_PRIOR,
-                                 .body.cmd_prior = {priors[i].sigma_mm, priors[i].width_mm}}));
+        ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {priors[i].sigma_mm, priors[i].width_mm}}));
   }
   TEST_ASSERT_EQUAL_FLOAT(3.1f, get_info().prior_sigma_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().prior_width_mm);
   static const float limits[] = {0.009f, 100.1f, -1.0f, 0.8f};
   for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(i < 3 ? WIRE_RESULT_OUT_OF_RANGE : WIRE_RESULT_DONE,
-                            ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT,
-                                                     .body.cmd_location_limit = {limits[i]}}));
+    TEST_ASSERT_EQUAL_UINT8(
+        i < 3 ? WIRE_RESULT_OUT_OF_RANGE : WIRE_RESULT_DONE,
+        ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {limits[i]}}));
   }
   TEST_ASSERT_EQUAL_FLOAT(0.8f, get_info().location_limit_mm);
 }

@@ -12,13 +12,11 @@ void tearDown(void) {
   rig_end();
 }
 
-static const uint32_t CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) |
-                                     (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
-                                     (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) |
-                                     (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) |
-                                     (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0);
-static const uint8_t STREAMS =
-    (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
+static const uint32_t CAPABILITIES =
+    (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) | (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
+    (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) | (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) |
+    (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0);
+static const uint8_t STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
 
 static void it_tells_its_capabilities_and_their_settings_only(void) {
   native_cdc_open();
@@ -37,29 +35,23 @@ static void it_refuses_streams_and_commands_that_it_lacks(void) {
   run_for(300);
   for (uint8_t streams = 0; streams <= 8; streams++) {
     bool known = (streams & ~(STREAMS | WIRE_STREAM_HEALTH)) == 0;
-    TEST_ASSERT_EQUAL_UINT8(
-        known ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE,
-        ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {streams}}));
+    TEST_ASSERT_EQUAL_UINT8(known ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE,
+                            ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {streams}}));
   }
   start_streams(0);
-  TEST_ASSERT_EQUAL_UINT8(
-      FT_WITH_SLIP ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-      ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}}));
-  TEST_ASSERT_EQUAL_UINT8(
-      FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-      ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.5f}}));
-  TEST_ASSERT_EQUAL_UINT8(
-      FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-      ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {1}}));
+  TEST_ASSERT_EQUAL_UINT8(FT_WITH_SLIP ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+                          ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}}));
+  TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+                          ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.5f}}));
+  TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+                          ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {1}}));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
                           ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
-  TEST_ASSERT_EQUAL_UINT8(
-      FT_WITH_SYNC ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-      ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_IN}}));
+  TEST_ASSERT_EQUAL_UINT8(FT_WITH_SYNC ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+                          ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_IN}}));
   uint8_t of_tangential = FT_WITH_TANGENTIAL ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND;
-  TEST_ASSERT_EQUAL_UINT8(
-      of_tangential,
-      ask((struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}}));
+  TEST_ASSERT_EQUAL_UINT8(of_tangential,
+                          ask((struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}}));
   TEST_ASSERT_EQUAL_UINT8(of_tangential, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
 }
 
@@ -81,8 +73,7 @@ static void it_streams_what_it_has(void) {
     const struct wire_contact *contact = &packet.body.contact;
     uint32_t flags = is_raw ? packet.body.raw.flags : contact->flags;
     uint32_t frame = is_raw ? packet.body.raw.frame : contact->frame;
-    TEST_ASSERT_EQUAL(
-        0, flags & (uint32_t)(FT_WITH_SLIP ? 0 : CONTACT_FLAG_SLIP | CONTACT_FLAG_SLIP_VALID));
+    TEST_ASSERT_EQUAL(0, flags & (uint32_t)(FT_WITH_SLIP ? 0 : CONTACT_FLAG_SLIP | CONTACT_FLAG_SLIP_VALID));
     TEST_ASSERT_EQUAL(0, flags & (uint32_t)(FT_WITH_FIT ? 0 : CONTACT_FLAG_FIT_VALID));
     TEST_ASSERT_TRUE(flags & CONTACT_FLAG_TARED);
     bool first_of_frame = frames == 0 || frame != before;
@@ -97,8 +88,7 @@ static void it_streams_what_it_has(void) {
     pressed += first_of_frame;
     TEST_ASSERT_TRUE(flags & CONTACT_FLAG_CONTACT);
     if (is_raw) {
-      int32_t above_Pa_q10 =
-          packet.body.raw.pressure_Pa_q10[7] - packet.body.raw.baseline_Pa_q10[7];
+      int32_t above_Pa_q10 = packet.body.raw.pressure_Pa_q10[7] - packet.body.raw.baseline_Pa_q10[7];
       TEST_ASSERT_GREATER_THAN_INT32(1000 * 1024, above_Pa_q10);
     } else {
       TEST_ASSERT_TRUE(flags & CONTACT_FLAG_FIT_VALID);
@@ -125,8 +115,7 @@ static void it_keeps_settings(void) {
   run_for(500);
   ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
   ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_SECOND}});
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
   rig_power_up();
   native_cdc_open();
   run_for(300);

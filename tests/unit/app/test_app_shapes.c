@@ -14,8 +14,8 @@ static unsigned object_count;
 static double load_qx_N;
 static uint64_t ends_us; /* 0: never */
 
-static const uint32_t SHAPES = CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS |
-                               CONTACT_FLAG_EDGE | CONTACT_FLAG_SHAPE_UNKNOWN;
+static const uint32_t SHAPES =
+    CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_EDGE | CONTACT_FLAG_SHAPE_UNKNOWN;
 
 /* By the definition in pad_profile.h, from the middle of the pad. */
 static double field_Pa(double x_mm, double y_mm, uint64_t t_us) {
@@ -34,8 +34,7 @@ static double field_Pa(double x_mm, double y_mm, uint64_t t_us) {
     }
     for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
       double v = (double)pad.tangential[j].sd_mm * (double)pad.tangential[j].sd_mm + 1.3 * t2;
-      sum += load_qx_N * dx * (double)pad.tangential[j].moment_mm / (2 * PI * v * v) *
-             exp(-r2 / (2 * v));
+      sum += load_qx_N * dx * (double)pad.tangential[j].moment_mm / (2 * PI * v * v) * exp(-r2 / (2 * v));
     }
   }
   return sum * 1e6;
@@ -68,13 +67,11 @@ static void run_until(uint64_t t_us, const struct pad_profile *profile) {
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(osr));
   const struct wire_packet pad = {.type = WIRE_CMD_PAD, .body.cmd_pad = {*profile}};
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(pad));
-  struct wire_packet calibrate = {
-      .type = WIRE_CMD_CALIBRATE,
-      .body.cmd_calibrate.sensor_count = geometry.sensor_count,
-      .body.cmd_calibrate.calibration = {.placements = 20, .force_scale = 1.25f}};
+  struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE,
+                                  .body.cmd_calibrate.sensor_count = geometry.sensor_count,
+                                  .body.cmd_calibrate.calibration = {.placements = 20, .force_scale = 1.25f}};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    calibrate.body.cmd_calibrate.calibration.sensors[k] =
-        (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
+    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
   }
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
   start_streams(WIRE_STREAM_CONTACT);
@@ -152,16 +149,14 @@ static void a_long_contact_doubts_its_place_by_what_its_line_has(void) {
   }
   const struct wire_contact contact = last_of_press();
   TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_UNCERTAIN,
-                   CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE | CONTACT_FLAG_UNCERTAIN,
-                   contact.flags);
+                   CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE | CONTACT_FLAG_UNCERTAIN, contact.flags);
   const float off_mm = hypotf(contact.x_mm - 5.0f, contact.y_mm + 13.0f);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.y_mm, contact.y_mm);
   TEST_ASSERT_FLOAT_WITHIN(0.4f, 5.0f, app.fit.x_mm + app.shapes.from_fit_x_mm);
   TEST_ASSERT_FLOAT_WITHIN(0.4f, -13.0f, app.fit.y_mm + app.shapes.from_fit_y_mm);
   TEST_ASSERT_TRUE(contact.location_sd_mm > 0.7f * off_mm);
-  TEST_ASSERT_TRUE(contact.location_sd_mm >
-                   hypotf(app.shapes.from_fit_x_mm, app.shapes.from_fit_y_mm));
+  TEST_ASSERT_TRUE(contact.location_sd_mm > hypotf(app.shapes.from_fit_x_mm, app.shapes.from_fit_y_mm));
 }
 
 /* Noise makes one pull of six look like a short line (two.json: round, Q/F 0.3). */
@@ -178,8 +173,7 @@ static void one_contact_is_one_with_a_load_or_without(void) {
     for (unsigned i = 0; i < count; i++) {
       valid += (contacts[i].flags & CONTACT_FLAG_SHAPE_VALID) != 0;
       lines += (contacts[i].flags & CONTACT_FLAG_EDGE) != 0;
-      TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_SHAPE_UNKNOWN,
-                           contacts[i].flags);
+      TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_SHAPE_UNKNOWN, contacts[i].flags);
       TEST_ASSERT_EQUAL_FLOAT(0.0f, contacts[i].force1_N);
     }
     TEST_ASSERT_GREATER_THAN(count / 3, valid);
@@ -191,8 +185,8 @@ static void one_contact_is_one_with_a_load_or_without(void) {
   app.frame.t_us += 3700;
   app_process_frame(&app, app.frame.t_read_us);
   TEST_ASSERT_TRUE(app.tangential_job.estimate.valid);
-  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID,
-                   CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS, app.contact.flags);
+  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS,
+                   app.contact.flags);
 }
 
 static void what_is_none_of_these_is_warned_of_all_the_time(void) {
@@ -208,8 +202,7 @@ static void what_is_none_of_these_is_warned_of_all_the_time(void) {
   }
   TEST_ASSERT_LESS_THAN(count / 2, first);
   for (unsigned i = first; i < count; i++) {
-    TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN,
-                     contacts[i].flags);
+    TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN, contacts[i].flags);
   }
 }
 
@@ -332,8 +325,7 @@ static void without_a_second_processor_that_answers_there_are_no_shapes(void) {
   run_until(PRESS_us + 150000, &profile);
   const unsigned count = take_contacts(contacts);
   for (unsigned i = 0; i < count; i++) {
-    TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE,
-                     contacts[i].flags);
+    TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, contacts[i].flags);
   }
 }
 

@@ -18,11 +18,10 @@ static struct wire_packet calibrate_command(void) {
   struct wire_packet command = {.type = WIRE_CMD_CALIBRATE};
   struct wire_cmd_calibrate *body = &command.body.cmd_calibrate;
   body->sensor_count = geometry.sensor_count;
-  body->calibration = (struct calibration){
-      .date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f};
+  body->calibration =
+      (struct calibration){.date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    body->calibration.sensors[k] =
-        (struct sensor_calibration){.gain = 0.8f + 0.02f * (float)k, .gain_sd = 0.01f};
+    body->calibration.sensors[k] = (struct sensor_calibration){.gain = 0.8f + 0.02f * (float)k, .gain_sd = 0.01f};
   }
   return command;
 }
@@ -66,11 +65,9 @@ static void a_calibration_acts_on_readings_and_force(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.05f, 0.125f * after.force_N, scaled.force_sd_N);
   struct wire_info info = get_info();
   TEST_ASSERT_TRUE(info.stored & WIRE_STORED_CALIBRATION);
-  TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_calibrate.calibration, &info.calibration,
-                           sizeof info.calibration);
+  TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_calibrate.calibration, &info.calibration, sizeof info.calibration);
 
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
   run_for(100);
   struct wire_contact erased = newest_contact();
   TEST_ASSERT_FALSE(erased.flags & CONTACT_FLAG_CALIBRATED);
@@ -123,12 +120,10 @@ static void a_calibration_tells_the_fit_the_pads_shape(void) {
   calibration->ambient_kPa = 81;
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
   run_for(1100);
-  TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.11f * calibration->force_scale,
-                           app.contact_settings.force_scale_sd);
+  TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.11f * calibration->force_scale, app.contact_settings.force_scale_sd);
   calibration->dip_share_q16 = 6554;
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.dip_share);
   TEST_ASSERT_NULL(app.fit_settings.own);
@@ -142,13 +137,11 @@ static void a_calibration_outlives_power(void) {
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, get_info().stored);
   struct wire_info info = info_after_restart();
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info.stored);
-  TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_calibrate.calibration, &info.calibration,
-                           sizeof info.calibration);
+  TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_calibrate.calibration, &info.calibration, sizeof info.calibration);
   start_streams(WIRE_STREAM_CONTACT);
   run_for(50);
   TEST_ASSERT_TRUE(newest_contact().flags & CONTACT_FLAG_CALIBRATED);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
   TEST_ASSERT_EQUAL_HEX32(0, info_after_restart().stored);
 }
 
@@ -161,8 +154,7 @@ static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
   ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
   ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
   ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
-  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz,
-                                   "it was not kept");
+  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz, "it was not kept");
 
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
   ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
@@ -211,9 +203,8 @@ static void after_a_tare_no_frame_says_tared_before_it_is(void) {
     TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
     TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
     held += (packet.body.contact.flags & CONTACT_FLAG_HELD) != 0;
-    TEST_ASSERT_EQUAL_HEX32(0,
-                            packet.body.contact.flags & (CONTACT_FLAG_TARED | CONTACT_FLAG_CONTACT |
-                                                         CONTACT_FLAG_FIT_VALID));
+    TEST_ASSERT_EQUAL_HEX32(0, packet.body.contact.flags &
+                                   (CONTACT_FLAG_TARED | CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID));
   }
   TEST_ASSERT_GREATER_THAN(0, held);
 }
@@ -238,8 +229,7 @@ static void storing_takes_its_time_and_keeps_nobody_waiting(void) {
       if (packet.type == WIRE_ACK) {
         done += packet.body.ack.result == WIRE_RESULT_DONE;
         refused += packet.body.ack.result == WIRE_RESULT_NOT_NOW;
-        TEST_ASSERT_EQUAL_UINT16(done ? host_sequence - 2 : host_sequence - 1,
-                                 packet.body.ack.sequence);
+        TEST_ASSERT_EQUAL_UINT16(done ? host_sequence - 2 : host_sequence - 1, packet.body.ack.sequence);
       } else if (packet.type == WIRE_CONTACT) {
         TEST_ASSERT_TRUE(frame == 0 || packet.body.contact.frame == frame + 1);
         frame = packet.body.contact.frame;
@@ -333,8 +323,7 @@ static void a_calibration_out_of_range_is_refused(void) {
   };
   for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
     struct wire_packet command = good;
-    memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad[i].offset, &bad[i].value,
-           sizeof bad[i].value);
+    memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad[i].offset, &bad[i].value, sizeof bad[i].value);
     TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
   }
   static const struct {
@@ -347,8 +336,8 @@ static void a_calibration_out_of_range_is_refused(void) {
   };
   for (size_t i = 0; i < sizeof bad_places / sizeof bad_places[0]; i++) {
     struct wire_packet command = good;
-    memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad_places[i].offset,
-           &bad_places[i].value, sizeof bad_places[i].value);
+    memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad_places[i].offset, &bad_places[i].value,
+           sizeof bad_places[i].value);
     TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
   }
   struct wire_packet other = good;

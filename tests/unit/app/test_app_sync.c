@@ -133,15 +133,13 @@ static void it_is_off_while_the_bus_sleeps(void) {
 
 static void it_is_kept_like_other_settings(void) {
   set(PORT_SYNC_FRAME);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
   rig_power_up();
   TEST_ASSERT_EQUAL(PORT_SYNC_FRAME, native_sync_mode());
   native_cdc_open();
   run_for(300);
   TEST_ASSERT_EQUAL_UINT8(PORT_SYNC_FRAME, get_info().sync);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {0}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {0}}));
   rig_power_up();
   TEST_ASSERT_EQUAL(PORT_SYNC_OFF, native_sync_mode());
 }

@@ -24,8 +24,8 @@ static double field_Pa(double dx_mm, double dy_mm, uint64_t t_us) {
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     double v = (double)pad.tangential[j].sd_mm * (double)pad.tangential[j].sd_mm + 1.3 * t2;
-    sum += (qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad.tangential[j].moment_mm /
-           (2 * PI * v * v) * exp(-r2 / (2 * v));
+    sum += (qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad.tangential[j].moment_mm / (2 * PI * v * v) *
+           exp(-r2 / (2 * v));
   }
   return sum * 1e6;
 }
@@ -56,8 +56,7 @@ static void store_pad(const struct wire_packet *command) {
 }
 
 /* The last contact packet of the time until t_us; its flags hold for all from from_us on. */
-static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_t high,
-                                        uint32_t low) {
+static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_t high, uint32_t low) {
   struct wire_packet packet;
   struct wire_contact last;
   memset(&last, 0, sizeof last);
@@ -70,8 +69,8 @@ static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_
       TEST_ASSERT_BITS_HIGH(high, last.flags);
       TEST_ASSERT_BITS_LOW(low, last.flags);
       const struct wire_stages *stages = &last.stages;
-      TEST_ASSERT_EQUAL_UINT16(stages->convert_us + stages->read_us + stages->queue_us +
-                                   stages->condition_us + stages->fit_us + stages->contact_us,
+      TEST_ASSERT_EQUAL_UINT16(stages->convert_us + stages->read_us + stages->queue_us + stages->condition_us +
+                                   stages->fit_us + stages->contact_us,
                                stages->total_us);
       count++;
     }
@@ -80,8 +79,7 @@ static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_
   return last;
 }
 
-static const uint32_t TANGENTIAL =
-    CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
+static const uint32_t TANGENTIAL = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
 
 /* The Gaussian fit is pulled along by the load; with the profile it is not, and the load is told.
  */
@@ -90,8 +88,8 @@ static void a_profile_tells_the_load_and_corrects_the_location(void) {
   load.qy_N = -0.9;
   struct wire_packet command = pad_command();
   store_pad(&command);
-  struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID,
-                                             CONTACT_FLAG_TANGENTIAL_FROM_TOUCH);
+  struct wire_contact contact =
+      last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_FROM_TOUCH);
   TEST_ASSERT_FLOAT_WITHIN(0.15f, 1.2f, contact.qx_N);
   TEST_ASSERT_FLOAT_WITHIN(0.15f, -0.9f, contact.qy_N);
   TEST_ASSERT_FLOAT_WITHIN(0.03f, 0.3f, contact.tangential_ratio);
@@ -127,9 +125,8 @@ static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
     rig_power_up();
     native_cdc_open();
     run_for(1300);
-    TEST_ASSERT_EQUAL(
-        WIRE_RESULT_DONE,
-        ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {slow ? 1024 : 256}}));
+    TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                      ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {slow ? 1024 : 256}}));
     start_streams(WIRE_STREAM_CONTACT);
     run_for(200);
     unsigned frames = 0;
@@ -372,8 +369,7 @@ static void feed_fast(double share) {
   app.frame.t_us += TANGENTIAL_BESIDE_us / 2;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const double zero = app.condition.zero_Pa_q10[k];
-    app.frame.pressure_Pa_q10[k] =
-        (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
+    app.frame.pressure_Pa_q10[k] = (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
   }
   app_process_frame(&app, app.frame.t_read_us);
 }
@@ -424,13 +420,11 @@ static void fast_frames_say_that_the_one_before_got_no_answer(void) {
   }
   native_set_worker(true, UINT64_MAX);
   feed_fast(1.0); /* asks, and has the answer of the frame before */
-  TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_VALID,
-                   app.contact.flags);
+  TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_VALID, app.contact.flags);
   const unsigned starts = native_worker_starts();
   for (int i = 0; i < 4; i++) {
     feed_fast(1.0);
-    TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE,
-                     app.contact.flags);
+    TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, app.contact.flags);
   }
   TEST_ASSERT_EQUAL(starts + 4, native_worker_starts());
 }

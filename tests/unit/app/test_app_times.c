@@ -87,8 +87,8 @@ static void run(struct told *told, const struct start *start) {
   count_on(start->count);
   native_cdc_open();
   run_for(300);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_PAD,
-                                                               .body.cmd_pad = {pad_of_12_mm()}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                    ask((struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}}));
   start_streams(WIRE_STREAM_ALL);
   for (unsigned ms = 0; ms < RUN_ms; ms += 20) {
     struct wire_packet packet;
@@ -117,8 +117,7 @@ static void check(uint64_t crossing_us, uint32_t count) {
   }
   /* All that has a memory of times took part. */
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TARED | CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_HELD |
-                            CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
-                            CONTACT_FLAG_SLIDING,
+                            CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SLIDING,
                         flags);
 }
 

@@ -105,9 +105,8 @@ static void the_loader_is_reached_by_command_and_by_touch(void) {
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
                     ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {0}}));
   TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(200));
-  TEST_ASSERT_EQUAL(
-      WIRE_RESULT_DONE,
-      ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                    ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}}));
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
 
   setUp();
@@ -211,16 +210,14 @@ static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
   }
   while (next_packet(&packet)) {
   }
-  array.fault = (struct sim_fault){
-      .kind = SIM_FAULT_FLIP, .transfer = array.transfers + 1 + 7, .mask = 0x80000};
+  array.fault = (struct sim_fault){.kind = SIM_FAULT_FLIP, .transfer = array.transfers + 1 + 7, .mask = 0x80000};
   run_for(80);
   int held = 0;
   int doubtful = 0;
   while (next_packet(&packet)) {
     if (packet.type == WIRE_CONTACT) {
       held += (packet.body.contact.flags & CONTACT_FLAG_HELD) != 0;
-      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_FIT_VALID,
-                            packet.body.contact.flags);
+      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_FIT_VALID, packet.body.contact.flags);
     } else {
       const bool holds = packet.body.raw.flags & CONTACT_FLAG_HELD;
       TEST_ASSERT_EQUAL_HEX32(holds ? 0 : 1 << 7, packet.body.raw.doubtful);
@@ -275,8 +272,7 @@ static void test_whether_the_watchdog_struck_is_told(void) {
 /* USB 2.0, 9.6.1: bcdDevice is 0xJJMN. */
 static void test_the_port_tells_the_version(void) {
   const uint8_t *version = build_info.version;
-  TEST_ASSERT_EQUAL_HEX16(version[0] * 256 + version[1] * 16 + version[2],
-                          native_cdc_identity()->device_version_bcd);
+  TEST_ASSERT_EQUAL_HEX16(version[0] * 256 + version[1] * 16 + version[2], native_cdc_identity()->device_version_bcd);
 }
 
 static void test_what_is_being_stored_is_told(void) {

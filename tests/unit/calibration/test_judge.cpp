@@ -14,10 +14,8 @@ using State = Judgement::State;
 namespace {
 
 /* Of thirty placements, each made by `press` on pad and placements of this seed. */
-Judgement judged(std::uint64_t seed,
-                 const std::function<KnownPad::Press(Random &random, int i)> &press,
-                 const std::function<void(Placement &placement, int i)> &change = {},
-                 std::size_t count = 30) {
+Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(Random &random, int i)> &press,
+                 const std::function<void(Placement &placement, int i)> &change = {}, std::size_t count = 30) {
   const KnownPad pad(seed);
   Random random(seed, 5, 0);
   std::vector<Placement> placements;
@@ -36,8 +34,7 @@ KnownPad::Press anywhere(Random &random, int = 0) {
 }
 
 double rms(const std::vector<double> &values) {
-  return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) /
-                   double(values.size()));
+  return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) / double(values.size()));
 }
 
 void expect_refused(const Judgement &judgement, Reason reason, const std::string &words) {
@@ -205,8 +202,7 @@ TEST(Judge, halves_that_disagree_are_refused) {
    */
   for (std::uint64_t seed = 74; seed < 78; seed++) {
     const Judgement judgement = judged(
-        seed, anywhere,
-        [](Placement &placement, int i) { placement.reading_Pa[7] *= i % 2 ? 0.95 : 1.05; }, 44);
+        seed, anywhere, [](Placement &placement, int i) { placement.reading_Pa[7] *= i % 2 ? 0.95 : 1.05; }, 44);
     expect_refused(judgement, Reason::halves, "every other placement");
   }
 }

@@ -1,5 +1,5 @@
-#include "tool/calibration/placements.hpp"
 #include "support/placements.hpp"
+#include "tool/calibration/placements.hpp"
 
 #include <cmath>
 #include <functional>
@@ -30,8 +30,8 @@ struct Feed {
       frame.valid = valid;
       for (std::size_t k = 0; k < 15; k++) {
         const double felt_Pa = force(t) * pad.gain[k] * pad.base_Pa({x, y}, k);
-        frame.pressure_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + drift_Pa_s * t_s +
-                                    felt_Pa + noise_Pa * random.normal());
+        frame.pressure_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + drift_Pa_s * t_s + felt_Pa +
+                                    noise_Pa * random.normal());
         frame.zero_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + zero_off_Pa);
       }
       if (auto placement = finder.take(frame)) {
@@ -53,8 +53,7 @@ struct Feed {
   double error(const Placement &placement, double force = 1.0) const {
     double worst = 0.0;
     for (std::size_t k = 0; k < 15; k++) {
-      worst = std::max(worst, std::abs(placement.reading_Pa[k] -
-                                       force * pad.gain[k] * pad.base_Pa({2.0, 3.0}, k)));
+      worst = std::max(worst, std::abs(placement.reading_Pa[k] - force * pad.gain[k] * pad.base_Pa({2.0, 3.0}, k)));
     }
     return worst / (force * KnownPad::PEAK_Pa);
   }
@@ -138,8 +137,7 @@ TEST(Placements, a_hand_is_none) {
       [](double t) {
         return std::pair{2.0 + 0.4 * std::sin(9.0 * t), 3.0 + 0.3 * std::sin(7.0 * t)};
       });
-  trembles.run(
-      8.0, [](double t) { return 1.0 + 0.03 * std::sin(20.0 * t) + 0.03 * std::sin(13.0 * t); });
+  trembles.run(8.0, [](double t) { return 1.0 + 0.03 * std::sin(20.0 * t) + 0.03 * std::sin(13.0 * t); });
   slides.run(
       8.0, [](double) { return 1.0; },
       [](double t) {

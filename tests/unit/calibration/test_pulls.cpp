@@ -22,8 +22,7 @@ public:
   bool good = true;
 
   /* The load goes from where it is to this, in so long; the object by so much. */
-  Bench &go(double seconds, double qx_N, double qy_N, double way_mm = 0.0,
-            double force_N = FORCE_N) {
+  Bench &go(double seconds, double qx_N, double qy_N, double way_mm = 0.0, double force_N = FORCE_N) {
     const int frames = static_cast<int>(std::lround(seconds * RATE_Hz));
     const double from_x_N = qx_N_, from_y_N = qy_N_, from_N = force_N_, from_mm = x_mm;
     for (int i = 1; i <= frames; i++) {
@@ -179,10 +178,8 @@ TEST(PullFinder, RefusesALoadThatTheFingertipHardlyKnows) {
 TEST(PullJudgement, IsGoodWithEnoughPullsThatAgree) {
   const auto reading = [](std::size_t i) { return i % 3 == 0 ? 0.88 : 0.91; };
   EXPECT_EQ(judge_pulls({}, KNOWN_N, false).state, PullJudgement::State::more);
-  EXPECT_EQ(judge_pulls(pulls_that_read(7, reading), KNOWN_N, false).state,
-            PullJudgement::State::more);
-  EXPECT_EQ(judge_pulls(pulls_that_read(7, reading), KNOWN_N, true).state,
-            PullJudgement::State::refused);
+  EXPECT_EQ(judge_pulls(pulls_that_read(7, reading), KNOWN_N, false).state, PullJudgement::State::more);
+  EXPECT_EQ(judge_pulls(pulls_that_read(7, reading), KNOWN_N, true).state, PullJudgement::State::refused);
   const PullJudgement good = judge_pulls(pulls_that_read(8, reading), KNOWN_N, false);
   EXPECT_EQ(good.state, PullJudgement::State::good) << good.text;
   EXPECT_EQ(good.kept, 8u);
@@ -192,8 +189,8 @@ TEST(PullJudgement, IsGoodWithEnoughPullsThatAgree) {
 }
 
 TEST(PullJudgement, LeavesAStrayPullOut) {
-  const PullJudgement judgement = judge_pulls(
-      pulls_that_read(10, [](std::size_t i) { return i == 3 ? 0.5 : 0.9; }), KNOWN_N, false);
+  const PullJudgement judgement =
+      judge_pulls(pulls_that_read(10, [](std::size_t i) { return i == 3 ? 0.5 : 0.9; }), KNOWN_N, false);
   EXPECT_EQ(judgement.state, PullJudgement::State::good) << judgement.text;
   EXPECT_EQ(judgement.kept, 9u);
   EXPECT_NEAR(judgement.reading, 0.9, 1e-9);
@@ -201,12 +198,11 @@ TEST(PullJudgement, LeavesAStrayPullOut) {
 
 TEST(PullJudgement, RefusesWhatDoesNotAgree) {
   const PullJudgement weights = judge_pulls(
-      pulls_that_read(12, [](std::size_t i) { return 0.6 + 0.06 * static_cast<double>(i); }),
-      KNOWN_N, false);
+      pulls_that_read(12, [](std::size_t i) { return 0.6 + 0.06 * static_cast<double>(i); }), KNOWN_N, false);
   EXPECT_EQ(weights.state, PullJudgement::State::refused);
   EXPECT_NE(weights.text.find("use one and the same weight"), std::string::npos) << weights.text;
-  const PullJudgement ways = judge_pulls(
-      pulls_that_read(12, [](std::size_t i) { return i % 2 ? 0.9 : 1.03; }), KNOWN_N, false);
+  const PullJudgement ways =
+      judge_pulls(pulls_that_read(12, [](std::size_t i) { return i % 2 ? 0.9 : 1.03; }), KNOWN_N, false);
   EXPECT_EQ(ways.state, PullJudgement::State::refused);
   EXPECT_NE(ways.text.find("directions disagree"), std::string::npos) << ways.text;
 }

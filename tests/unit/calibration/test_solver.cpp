@@ -75,8 +75,7 @@ TEST(Solver, finds_gains_places_and_the_profile) {
 TEST(Solver, finds_the_width_of_the_dip) {
   constexpr double DIP = 0.05, DIP_mm = 14.3;
   const KnownPad pad(6);
-  const Solution s =
-      solve_presses(pad, [](double r_mm) { return layer(r_mm, 5.8) - DIP * bell(r_mm, DIP_mm); });
+  const Solution s = solve_presses(pad, [](double r_mm) { return layer(r_mm, 5.8) - DIP * bell(r_mm, DIP_mm); });
   ASSERT_TRUE(s.solved);
   EXPECT_NEAR(s.dip_sd_mm / DIP_mm, 1.0, 0.05);
   EXPECT_NEAR(s.dip / DIP, 1.0, 0.1);
@@ -87,8 +86,7 @@ TEST(Solver, finds_the_width_of_the_dip) {
 TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
   constexpr double WIDE_mm = 5.9, DIP = 0.05, DIP_mm = 14.4;
   const KnownPad pad(6);
-  const Solution s = solve_presses(
-      pad, [](double r_mm) { return layer(r_mm, WIDE_mm) - DIP * bell(r_mm, DIP_mm); });
+  const Solution s = solve_presses(pad, [](double r_mm) { return layer(r_mm, WIDE_mm) - DIP * bell(r_mm, DIP_mm); });
   ASSERT_TRUE(s.solved);
   EXPECT_NEAR(s.dip_sd_mm / DIP_mm, 1.0, 0.07);
   /* What the Gaussian leaves of the layer, seen from contacts all over the array: sensors lie 6 and
@@ -116,8 +114,8 @@ TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
  * a wide dip, which together are none. */
 TEST(Solver, what_presses_far_away_makes_no_dip) {
   const KnownPad pad(6);
-  const Solution s = solve_presses(
-      pad, [](double r_mm) { return layer(r_mm, 5.9) + 0.005 * (1.0 - bell(r_mm, 20.0)); });
+  const Solution s =
+      solve_presses(pad, [](double r_mm) { return layer(r_mm, 5.9) + 0.005 * (1.0 - bell(r_mm, 20.0)); });
   ASSERT_TRUE(s.solved);
   EXPECT_GT(s.dip, 0.003);
   EXPECT_LT(s.dip_share, 0.001);
@@ -179,8 +177,8 @@ TEST(Solver, own_widths_are_found_and_pass_for_no_gains) {
         all += 1.0;
         along += s.own_width[k] * pad.own_width[k];
         square += pad.own_width[k] * pad.own_width[k];
-        const double reading_off = std::abs(std::log(s.gain[k] / pad.gain[k]) +
-                                            OWN_WIDTH_SQUARE * (s.own_width[k] - pad.own_width[k]));
+        const double reading_off =
+            std::abs(std::log(s.gain[k] / pad.gain[k]) + OWN_WIDTH_SQUARE * (s.own_width[k] - pad.own_width[k]));
         readings_within_one += reading_off < s.reading_sd[k];
       }
       if (spread > 0.0) {
@@ -259,8 +257,7 @@ TEST(Solver, sees_what_a_session_holds) {
 
   std::vector<Placement> oval;
   for (int i = 0; i < 30; i++) {
-    oval.push_back(pad.place({random.uniform(-9, 9), random.uniform(-18, 18), 1.0, 1.2, 0.0},
-                             4.0 * i, random));
+    oval.push_back(pad.place({random.uniform(-9, 9), random.uniform(-18, 18), 1.0, 1.2, 0.0}, 4.0 * i, random));
   }
   const Solution shape = solve(pad.array, oval);
   EXPECT_NEAR(2.0 * shape.ellipse_of_all[0], std::log(1.2), 0.03);
@@ -279,8 +276,7 @@ TEST(Solver, tells_memory_from_gain) {
   std::vector<Placement> felt = placements;
   for (Placement &placement : felt) {
     for (std::size_t k = 0; k < 15; k++) {
-      placement.reading_Pa[k] -=
-          std::min(memory[k] * placement.earlier_Pa[k], std::max(placement.reading_Pa[k], 0.0));
+      placement.reading_Pa[k] -= std::min(memory[k] * placement.earlier_Pa[k], std::max(placement.reading_Pa[k], 0.0));
     }
   }
   const Solution s = solve(pad.array, felt);
@@ -343,8 +339,7 @@ TEST(Solver, wants_the_place_that_tells_most) {
     auto asked = placements, elsewhere = placements;
     asked.push_back(pad.place({wanted.x_mm, wanted.y_mm}, 60.0, random));
     elsewhere.push_back(pad.place({0.0, -9.0 * bare}, 60.0, random));
-    EXPECT_LT(solve(pad.array, asked).worst_shape_sd(),
-              solve(pad.array, elsewhere).worst_shape_sd());
+    EXPECT_LT(solve(pad.array, asked).worst_shape_sd(), solve(pad.array, elsewhere).worst_shape_sd());
   }
   /* The first in the middle, and then away from it. */
   const Wanted first = next_place(pad.array, {}, Solution{});

@@ -68,8 +68,7 @@ TEST(Bundle, WindsUpAsStifflyAsAHalfSpace) {
   // 16 G a^3 / 3 where 8 G a / (2 - nu) is the stiffness along it, nu = 0.5.
   const double expected_Nmm = STIFFNESS_N_mm * RADIUS_mm * RADIUS_mm * TURN_rad;
   EXPECT_NEAR(-held.turn_Nmm, expected_Nmm, 0.06 * expected_Nmm);
-  EXPECT_NEAR(Bundle::TURN_STIFFNESS * lever_mm * lever_mm, RADIUS_mm * RADIUS_mm,
-              0.02 * RADIUS_mm * RADIUS_mm);
+  EXPECT_NEAR(Bundle::TURN_STIFFNESS * lever_mm * lever_mm, RADIUS_mm * RADIUS_mm, 0.02 * RADIUS_mm * RADIUS_mm);
 }
 
 TEST(Bundle, SharesFrictionBetweenSlidingAndSpinning) {
@@ -94,8 +93,7 @@ TEST(Bundle, NeverGivesEnergyAway) {
     const Motion motion{30.0 * random.normal(), 30.0 * random.normal(), 5.0 * random.normal()};
     for (int i = 0; i < 200; i++) {
       const Wrench held = bundle.step(STEP_s, FORCE_N, STIFFNESS_N_mm, RADIUS_mm, motion);
-      work_mJ -= STEP_s * (held.x_N * motion.x_mm_s + held.y_N * motion.y_mm_s +
-                           held.turn_Nmm * motion.turn_rad_s);
+      work_mJ -= STEP_s * (held.x_N * motion.x_mm_s + held.y_N * motion.y_mm_s + held.turn_Nmm * motion.turn_rad_s);
       ASSERT_GE(bundle.lost_mJ(), lost_mJ - 1e-12);
       lost_mJ = bundle.lost_mJ();
     }

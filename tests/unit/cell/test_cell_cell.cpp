@@ -42,8 +42,7 @@ Drive drive(const Object &what, double width_mm) {
   return made;
 }
 
-void run(Cell &cell, double seconds, const std::function<Drive(double)> &at,
-         double chunk_s = 1e-3) {
+void run(Cell &cell, double seconds, const std::function<Drive(double)> &at, double chunk_s = 1e-3) {
   for (long i = 0; i < std::lround(seconds / chunk_s); i++) {
     cell.run(chunk_s, at((static_cast<double>(i) + 0.5) * chunk_s));
   }
@@ -113,8 +112,7 @@ TEST(Cell, StandsOnTheTableUntilItIsLifted) {
   });
   EXPECT_EQ(cell.table_N(), 0.0);
   for (const std::size_t finger : {0U, 1U}) {
-    EXPECT_NEAR(std::hypot(cell.touch(finger).pull_x_N, cell.touch(finger).pull_y_N), 0.25 * 9.81,
-                0.02);
+    EXPECT_NEAR(std::hypot(cell.touch(finger).pull_x_N, cell.touch(finger).pull_y_N), 0.25 * 9.81, 0.02);
   }
   EXPECT_EQ(cell.slid_mm(), 0.0);
 }
@@ -168,10 +166,8 @@ TEST(Cell, AWeightBesideTheAxisWindsTheRubberUp) {
   run(cell, 6.0, [&](double) { return hangs; });
   const double radius_mm = face().radius_mm(FORCE_N);
   const double lever_mm = Bundle::LEVER * radius_mm;
-  const double stiffness_Nmm =
-      2.0 * Bundle::TURN_STIFFNESS * stiff().shear_N_mm2 * radius_mm * lever_mm * lever_mm;
-  EXPECT_NEAR(-cell.turned_rad(), 0.05 * 9.81 * 4.0 / stiffness_Nmm,
-              0.07 * std::abs(cell.turned_rad()));
+  const double stiffness_Nmm = 2.0 * Bundle::TURN_STIFFNESS * stiff().shear_N_mm2 * radius_mm * lever_mm * lever_mm;
+  EXPECT_NEAR(-cell.turned_rad(), 0.05 * 9.81 * 4.0 / stiffness_Nmm, 0.07 * std::abs(cell.turned_rad()));
 }
 
 TEST(Cell, ATorqueBeyondFrictionTurnsItUntilItHangs) {
@@ -214,8 +210,7 @@ TEST(Cell, EnergyBalances) {
   });
   const Cell::Energy after = cell.energy();
   most = std::max(most, after.work - before.work);
-  const double became =
-      after.kinetic + after.elastic + after.lost - (before.kinetic + before.elastic + before.lost);
+  const double became = after.kinetic + after.elastic + after.lost - (before.kinetic + before.elastic + before.lost);
   EXPECT_GT(cell.slid_mm(), 2.0);
   EXPECT_NEAR(after.work - before.work, became, 0.01 * most);
 }

@@ -19,8 +19,7 @@ using namespace fingertip::cell;
 TEST(Face, FeelsWhatTheTwinDoes) {
   for (const char *name : {"sphere6", "sphere15", "cube6"}) {
     const twin::Layer layer = twin::silicone(12.0);
-    const auto table =
-        twin::ContactTable::load_or_build(twin::indenter(name), layer, FINGERTIP_TEST_TABLES);
+    const auto table = twin::ContactTable::load_or_build(twin::indenter(name), layer, FINGERTIP_TEST_TABLES);
     const twin::TractionTable traction(table, layer);
     const Face face(name, 12.0, FINGERTIP_TEST_TABLES);
     Random random(3, 1, 1);
@@ -39,8 +38,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
       const Pressures felt_Pa = face.base_Pa(touch, share);
       const double peak_Pa = table.base_pressure_Pa(touch.force_N, 0.0, 0.0);
       const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
-      const twin::TractionTable::Load load{touch.force_N, touch.stuck_N,
-                                           c * touch.pull_x_N + s * touch.pull_y_N,
+      const twin::TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
                                            c * touch.pull_y_N - s * touch.pull_x_N};
       for (std::size_t k = 0; k < SENSORS; k++) {
         const double dx = static_cast<double>(geometry.x_mm[k]) - touch.x_mm;
@@ -87,8 +85,7 @@ TEST(Plate, IsAsStiffAsGentAndLindleysStrip) {
   constexpr double HALF_X_mm = 18.0, HALF_Y_mm = 5000.0;
   const Plate plate(layer, HALF_X_mm, HALF_Y_mm);
   const double area_mm2 = 4.0 * HALF_X_mm * HALF_Y_mm;
-  const double expected =
-      1e-6 * layer.youngs_modulus_Pa * area_mm2 / 12.0 * (1.0 + 36.0 * 36.0 / (3.0 * 144.0));
+  const double expected = 1e-6 * layer.youngs_modulus_Pa * area_mm2 / 12.0 * (1.0 + 36.0 * 36.0 / (3.0 * 144.0));
   EXPECT_NEAR(plate.stiffness_N_mm() / expected, 1.0, 0.02);
 }
 

@@ -56,9 +56,7 @@ Trial calm(double mass_kg, double friction) {
 class ClosesTo : public Controller {
 public:
   explicit ClosesTo(double width_mm) : width_mm_(width_mm) {}
-  void take_touch(std::size_t finger, const GripTouch &touch) override {
-    touches[finger].push_back(touch);
-  }
+  void take_touch(std::size_t finger, const GripTouch &touch) override { touches[finger].push_back(touch); }
   void take_status(const GripperStatus &status) override { told_mm.insert(status.width_mm); }
   GripReport step(double now_s, GripCommand &command) override {
     now_s_ = now_s;
@@ -82,8 +80,7 @@ private:
 };
 
 double width_mm(const Trial &trial, double force_N) {
-  return trial.scene.object.width_mm - 2.0 * face().indentation_mm(force_N) -
-         force_N / trial.scene.grasp.fingers_N_mm;
+  return trial.scene.object.width_mm - 2.0 * face().indentation_mm(force_N) - force_N / trial.scene.grasp.fingers_N_mm;
 }
 
 TEST(Trial, WhatDoesNothingDropsWhatPhysicsSays) {

@@ -37,8 +37,7 @@ static void test_crc_equals_bitwise_at_every_length_and_alignment(void) {
   }
   for (size_t length = 0; length <= 512; length++) {
     for (size_t at = 0; at < 8; at++) {
-      TEST_ASSERT_EQUAL_HEX32(crc32_bitwise(bytes + at, length),
-                              crc32_iso_hdlc(bytes + at, length));
+      TEST_ASSERT_EQUAL_HEX32(crc32_bitwise(bytes + at, length), crc32_iso_hdlc(bytes + at, length));
     }
   }
   for (int value = 0; value < 256; value++) {
@@ -95,9 +94,8 @@ static void test_bytes_are_little_endian(void) {
 }
 
 static void test_bytes_round_trip_at_every_alignment(void) {
-  static const uint64_t values[] = {0,          1,          0x7F,       0x80,      0xFF,
-                                    0x100,      0x7FFF,     0x8000,     0xFFFF,    0x10000,
-                                    0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, INT64_MAX, UINT64_MAX};
+  static const uint64_t values[] = {0,      1,       0x7F,       0x80,       0xFF,       0x100,     0x7FFF,    0x8000,
+                                    0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, INT64_MAX, UINT64_MAX};
   uint8_t bytes[16];
   for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
     for (size_t at = 0; at < 8; at++) {
@@ -183,8 +181,7 @@ static void test_calibrations_are_in_their_ranges(void) {
     calibration.dip_sd_um = shapes[i].dip_sd_um;
     TEST_ASSERT_EQUAL(shapes[i].valid, calibration_is_valid(&calibration, 15));
   }
-  calibration.sensors[15] =
-      (struct sensor_calibration){NAN, NAN, 2001, 2001, 9831}; /* of no sensor */
+  calibration.sensors[15] = (struct sensor_calibration){NAN, NAN, 2001, 2001, 9831}; /* of no sensor */
   TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
 }
 
@@ -238,8 +235,7 @@ static void test_pad_profiles_are_in_their_ranges(void) {
   for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
     const float was = *ranges[i].value;
     const float good[] = {ranges[i].least, ranges[i].greatest};
-    const float bad[] = {ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, -INFINITY, INFINITY,
-                         NAN};
+    const float bad[] = {ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, -INFINITY, INFINITY, NAN};
     for (size_t j = 0; j < sizeof good / sizeof good[0]; j++) {
       *ranges[i].value = good[j];
       TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));

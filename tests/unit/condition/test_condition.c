@@ -11,10 +11,8 @@ static void test_gate_has_a_hysteresis_in_pascals_and_sigmas(void) {
     const struct {
       int32_t above;
       bool contact;
-    } steps[] = {{open - 2 * Pa, false},  {open + 2 * Pa, true},
-                 {close + 2 * Pa, true},  {close - 2 * Pa, false},
-                 {close + 2 * Pa, false}, {open - 2 * Pa, false},
-                 {2 * open, true},        {0, false}};
+    } steps[] = {{open - 2 * Pa, false},  {open + 2 * Pa, true},  {close + 2 * Pa, true}, {close - 2 * Pa, false},
+                 {close + 2 * Pa, false}, {open - 2 * Pa, false}, {2 * open, true},       {0, false}};
     for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
       frame.pressure_Pa_q10[7] = condition.zero_Pa_q10[7] + steps[i].above;
       run(1);

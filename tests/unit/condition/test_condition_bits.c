@@ -39,9 +39,7 @@ static void change_load(void) {
   int32_t kind = draw_between(0, 4), centre = draw_between(0, SENSORS - 1);
   int32_t peak = draw_between(100, 60000) * Pa;
   for (int32_t k = 0; k < SENSORS; k++) {
-    load.slope[k] = kind == 2   ? draw_between(-40, 80)
-                    : kind == 3 ? (k == centre ? draw_between(0, 400) : 0)
-                                : 0;
+    load.slope[k] = kind == 2 ? draw_between(-40, 80) : kind == 3 ? (k == centre ? draw_between(0, 400) : 0) : 0;
     if (kind == 0) {
       load.pressure[k] = ONE_IN(3) ? draw_between(-50, 200) * Pa : 0;
     } else if (kind == 1 || kind == 4) {

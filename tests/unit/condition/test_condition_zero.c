@@ -125,8 +125,7 @@ static void test_a_ramp_from_the_start_is_a_contact(void) {
 
 /* A flipped bit must not become a false touch that lasts, nor be remembered as a pressure. */
 static void test_one_disturbed_reading_moves_no_zero(void) {
-  static const int32_t readings[] = {INT32_MIN, 0, AMBIENT - 300 * Pa, AMBIENT + 300 * Pa,
-                                     INT32_MAX};
+  static const int32_t readings[] = {INT32_MIN, 0, AMBIENT - 300 * Pa, AMBIENT + 300 * Pa, INT32_MAX};
   for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++) {
     for (int at = 0; at < 14; at++) { /* when the sensor is tracked, too */
       begin_calm(4854);

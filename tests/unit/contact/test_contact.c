@@ -6,8 +6,7 @@
 
 #define GOOD_FIT (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID)
 
-static const struct contact_settings settings = {.slip_threshold_mm = 0.75f,
-                                                 .slip_window_us = 100000};
+static const struct contact_settings settings = {.slip_threshold_mm = 0.75f, .slip_window_us = 100000};
 static struct slip_history history;
 static struct fit_result fit;
 static struct contact_input input;
@@ -50,8 +49,7 @@ static void test_nothing_fitted(void) {
   input.masked = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED, update());
   input.calibrated = true;
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_CALIBRATED,
-                          update());
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_CALIBRATED, update());
   input = (struct contact_input){.sensor_doubtful = true};
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SENSOR_DOUBTFUL, update());
   input = (struct contact_input){.zero_doubtful = true};
@@ -70,14 +68,12 @@ static void test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale
 }
 
 static void test_flags_of_the_fit_pass(void) {
-  static const uint32_t flags[] = {CONTACT_FLAG_LOW_SIGNAL,    CONTACT_FLAG_FLAT,
-                                   CONTACT_FLAG_UNCERTAIN,     CONTACT_FLAG_MODEL,
-                                   CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND};
+  static const uint32_t flags[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT,          CONTACT_FLAG_UNCERTAIN,
+                                   CONTACT_FLAG_MODEL,      CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND};
   for (size_t i = 0; i < sizeof flags / sizeof flags[0]; i++) {
     setUp();
     fit.flags = GOOD_FIT | flags[i];
-    TEST_ASSERT_EQUAL_HEX32(GOOD_FIT | flags[i] | CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED,
-                            update());
+    TEST_ASSERT_EQUAL_HEX32(GOOD_FIT | flags[i] | CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED, update());
   }
 }
 
@@ -152,9 +148,8 @@ static void test_a_location_that_noise_moves_ends_the_history(void) {
 }
 
 static void test_other_warnings_keep_the_history(void) {
-  static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL,
-                                      CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_UNCERTAIN,
-                                      CONTACT_FLAG_ELONGATED};
+  static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL, CONTACT_FLAG_SENSOR_MASKED,
+                                      CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_ELONGATED};
   for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) {
     setUp();
     fill_history();

@@ -101,10 +101,8 @@ static void draw_frame(int32_t period_us) {
   course.y = found.y_mm > 27.0f || found.y_mm < -27.0f ? found.y_mm * -0.01f : course.y;
   found.x_mm += course.x;
   found.y_mm += course.y;
-  course.qx =
-      found.qx_N > found.force_N || found.qx_N < -found.force_N ? found.qx_N * -0.1f : course.qx;
-  course.qy =
-      found.qy_N > found.force_N || found.qy_N < -found.force_N ? found.qy_N * -0.1f : course.qy;
+  course.qx = found.qx_N > found.force_N || found.qx_N < -found.force_N ? found.qx_N * -0.1f : course.qx;
+  course.qy = found.qy_N > found.force_N || found.qy_N < -found.force_N ? found.qy_N * -0.1f : course.qy;
   found.qx_N += course.qx;
   found.qy_N += course.qy;
   found.force_N += found.force_N < 0.2f ? 0.1f : found.force_N > 20.0f ? -0.1f : course.force;
@@ -124,10 +122,9 @@ static void draw_frame(int32_t period_us) {
   fit.location_noise_mm = ONE_IN(40) ? between(0.0f, 0.4f) : course.noise_mm;
   fit.used = ONE_IN(80) ? draw() & 0x7FFF : 0x7FFF;
   fit.flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
-  fit.flags |=
-      ONE_IN(40) ? draw() & (CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN |
-                             CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ELONGATED)
-                 : 0;
+  fit.flags |= ONE_IN(40) ? draw() & (CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN |
+                                      CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ELONGATED)
+                          : 0;
   fit.flags &= ONE_IN(100) ? 0u : UINT32_MAX;
 }
 

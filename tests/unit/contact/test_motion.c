@@ -19,15 +19,10 @@ static uint32_t interval_us;
 void setUp(void) {
   settings = (struct tangential_settings){.force_scale = 1.0f, .tangential_scale = 1.0f};
   memset(&history, 0, sizeof history);
-  found = (struct fit_tangential){.valid = true,
-                                  .x_mm = 2.5f,
-                                  .y_mm = -7.0f,
-                                  .location_sd_mm = 0.1f,
-                                  .location_noise_mm = 0.01f,
-                                  .force_N = 4.0f};
+  found = (struct fit_tangential){
+      .valid = true, .x_mm = 2.5f, .y_mm = -7.0f, .location_sd_mm = 0.1f, .location_noise_mm = 0.01f, .force_N = 4.0f};
   fit = (struct fit_result){.used = 0x7FFF};
-  input =
-      (struct contact_input){.t_us = 5000000, .contact = true, .fit = &fit, .tangential = &found};
+  input = (struct contact_input){.t_us = 5000000, .contact = true, .fit = &fit, .tangential = &found};
   interval_us = 2439;
 }
 
@@ -118,8 +113,7 @@ static void noise_alone_never_speaks(void) {
 static void creeping_along_with_a_load_is_no_slide(void) {
   rest(0.4f);
   /* 0.4 in 0.1 s, 5 mm for each unit; and back. */
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING,
-                          go(0.1f, 20.0f, 0, 4.0f));
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING, go(0.1f, 20.0f, 0, 4.0f));
   TEST_ASSERT_EQUAL_HEX32(0, go(0.5f, 0, 0, 0) & CONTACT_FLAG_SLIDING);
   TEST_ASSERT_EQUAL_HEX32(0, go(0.1f, -20.0f, 0, -4.0f) & CONTACT_FLAG_SLIDING);
 }

@@ -20,8 +20,7 @@ static void parts_and_the_load_take_no_longer_than_frames_are_apart(void) {
   for (uint64_t apart_us = 765; apart_us < 100000; apart_us += 5) {
     const uint8_t parts = shapes_parts(apart_us);
     const unsigned load_us = apart_us < 4500 ? 450 : 2250;
-    TEST_ASSERT_TRUE(parts == 1 ||
-                     (parts >= FIT_SHAPES_PARTS && parts * SHAPES_PART_us + load_us <= apart_us));
+    TEST_ASSERT_TRUE(parts == 1 || (parts >= FIT_SHAPES_PARTS && parts * SHAPES_PART_us + load_us <= apart_us));
   }
   TEST_ASSERT_EQUAL(1, shapes_parts(1499));
   TEST_ASSERT_EQUAL(FIT_SHAPES_PARTS, shapes_parts(1500));

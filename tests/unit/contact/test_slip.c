@@ -34,8 +34,7 @@ static void compare_with_eq7(uint64_t (*time_us)(struct random *, int), int n, u
     r[i][0] = (float)random_between(&random, -13.0, 13.0);
     r[i][1] = (float)random_between(&random, -22.0, 22.0);
     float distance_mm = -1.0f;
-    bool full = slip_update(&history, time_us(&random, i), (float)r[i][0], (float)r[i][1],
-                            window_us, &distance_mm);
+    bool full = slip_update(&history, time_us(&random, i), (float)r[i][0], (float)r[i][1], window_us, &distance_mm);
     TEST_ASSERT_EQUAL(i >= n, full);
     if (full) {
       TEST_ASSERT_FLOAT_WITHIN(ROUNDING_mm, (float)eq7((const double(*)[2])r, i, n), distance_mm);
@@ -106,8 +105,7 @@ static void test_window_beyond_the_capacity(void) {
   const float step_mm = 0.01f;
   float distance_mm = 0.0f;
   for (int i = 0; i < 1000; i++) {
-    bool full = slip_update(&history, interval_us * (uint64_t)i, step_mm * (float)i, 0.0f,
-                            WINDOW_us, &distance_mm);
+    bool full = slip_update(&history, interval_us * (uint64_t)i, step_mm * (float)i, 0.0f, WINDOW_us, &distance_mm);
     TEST_ASSERT_EQUAL(i >= SLIP_CAPACITY, full);
     if (full) {
       TEST_ASSERT_FLOAT_WITHIN(ROUNDING_mm, step_mm * (SLIP_CAPACITY + 1) / 2.0f, distance_mm);
@@ -138,8 +136,7 @@ static void test_pause(void) {
   TEST_ASSERT_TRUE(slip_update(&history, 10000000, 3.0f, 0.0f, WINDOW_us, &distance_mm));
   TEST_ASSERT_FLOAT_WITHIN(ROUNDING_mm, 2.0f, distance_mm);
   for (uint64_t i = 1; i < 20; i++) {
-    TEST_ASSERT_FALSE(
-        slip_update(&history, 10000000 + 5000 * i, 3.0f, 0.0f, WINDOW_us, &distance_mm));
+    TEST_ASSERT_FALSE(slip_update(&history, 10000000 + 5000 * i, 3.0f, 0.0f, WINDOW_us, &distance_mm));
   }
   TEST_ASSERT_TRUE(slip_update(&history, 10100000, 3.0f, 0.0f, WINDOW_us, &distance_mm));
   TEST_ASSERT_FLOAT_WITHIN(1e-9f, 0.0f, distance_mm);
@@ -173,8 +170,7 @@ static void test_farthest_positions(void) {
     slip_update(&history, 300 * i, 800.0f, -800.0f, WINDOW_us, &distance_mm);
   }
   TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.0f, distance_mm);
-  TEST_ASSERT_TRUE(
-      slip_update(&history, 300 * (SLIP_CAPACITY + 1), -800.0f, 800.0f, WINDOW_us, &distance_mm));
+  TEST_ASSERT_TRUE(slip_update(&history, 300 * (SLIP_CAPACITY + 1), -800.0f, 800.0f, WINDOW_us, &distance_mm));
   TEST_ASSERT_FLOAT_WITHIN(1e-2f, 2262.742f, distance_mm);
 }
 

@@ -15,8 +15,7 @@ static struct contact_result result;
 static struct tangential_load load;
 
 void setUp(void) {
-  settings = (struct tangential_settings){
-      .force_scale = 1.0f, .tangential_scale = 1.0f, .location_sd_limit_mm = 0.6f};
+  settings = (struct tangential_settings){.force_scale = 1.0f, .tangential_scale = 1.0f, .location_sd_limit_mm = 0.6f};
   tangential_reset(&history);
   found = (struct fit_tangential){.valid = true,
                                   .x_mm = 2.5f,
@@ -59,8 +58,7 @@ static void an_estimate_that_is_not_there_says_nothing(void) {
 }
 
 static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID,
-                          update(CONTACT_FLAG_CONTACT));
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_CONTACT));
   TEST_ASSERT_EQUAL_FLOAT(2.5f, load.x_mm);
   TEST_ASSERT_EQUAL_FLOAT(-7.0f, load.y_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.15f, load.location_sd_mm);
@@ -249,8 +247,7 @@ static void touch(void) {
 }
 
 static void assert_from_touch(float qx_N, float qy_N) {
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID |
-                              CONTACT_FLAG_TANGENTIAL_FROM_TOUCH,
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH,
                           update(CONTACT_FLAG_CONTACT));
   TEST_ASSERT_FLOAT_WITHIN(1e-4f, qx_N, load.qx_N);
   TEST_ASSERT_FLOAT_WITHIN(1e-4f, qy_N, load.qy_N);
@@ -327,8 +324,7 @@ static void fits_that_an_estimate_is_worthwhile_for(void) {
 enum { SENSORS = 15 };
 
 /* A contact of the pad's own, pressing there. */
-static struct fit_tangential frame(struct tangential_job *job, float x_mm, float y_mm,
-                                   uint64_t t_us, uint32_t flags) {
+static struct fit_tangential frame(struct tangential_job *job, float x_mm, float y_mm, uint64_t t_us, uint32_t flags) {
   const struct pad_profile profile = pad_of_12_mm();
   float at_x_mm[SENSORS], at_y_mm[SENSORS];
   int32_t readings[SENSORS];

@@ -1,6 +1,6 @@
-#include "tool/doctor/crash.hpp"
 #include "libfingertip/error.hpp"
 #include "support/host_packets.hpp"
+#include "tool/doctor/crash.hpp"
 
 #include <elf.h>
 #include <gtest/gtest.h>
@@ -111,11 +111,10 @@ TEST(Crash, InWords) {
   record.exception = 16 + 23;
   record.lr = 0xfffffff9;
   record.t_us = 500000;
-  EXPECT_EQ(
-      crash_text(with_places(record, symbols)),
-      "the watchdog struck: the scan of the sensors and USB stood still; the processor was at "
-      "fit_frame+0x0 (0x20001000), in interrupt 23 (I2C), the main loop fitting, 0.50 s after "
-      "its start");
+  EXPECT_EQ(crash_text(with_places(record, symbols)),
+            "the watchdog struck: the scan of the sensors and USB stood still; the processor was at "
+            "fit_frame+0x0 (0x20001000), in interrupt 23 (I2C), the main loop fitting, 0.50 s after "
+            "its start");
   record.stuck = CRASH_STUCK_INTERRUPTS;
   record.t_us = UINT64_C(86400000000) * 60;
   EXPECT_EQ(crash_text(with_places(record, symbols)),
@@ -132,8 +131,7 @@ TEST(Crash, InWords) {
 
 TEST(Crash, WhatALaterFirmwareTellsIsToldAsNumbers) {
   crash_record record = record_of(77);
-  EXPECT_EQ(crash_text(with_places(record, std::nullopt)),
-            "an end of kind 77, which this tool does not know");
+  EXPECT_EQ(crash_text(with_places(record, std::nullopt)), "an end of kind 77, which this tool does not know");
   record = record_of(CRASH_FAULT);
   record.activity = 200;
   record.event_codes[0] = 200;

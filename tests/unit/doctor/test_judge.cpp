@@ -1,6 +1,6 @@
-#include "tool/doctor/judge.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "support/host_packets.hpp"
+#include "tool/doctor/judge.hpp"
 
 #include <gtest/gtest.h>
 
@@ -107,8 +107,7 @@ TEST(Judge, EdgesOfASyncPinThatStampsThem) {
   EXPECT_TRUE(wrong(facts).empty());
   EXPECT_EQ(judge(facts).size(), judge(good()).size() + 1);
   facts.rest->edges_missing = 3;
-  EXPECT_EQ(only(facts, Verdict::warn, "sync").text,
-            "600 edges at the sync pin in 10.0 s, 3 missing");
+  EXPECT_EQ(only(facts, Verdict::warn, "sync").text, "600 edges at the sync pin in 10.0 s, 3 missing");
   facts.rest->edges = facts.rest->edges_missing = 0;
   const Finding silent = only(facts, Verdict::warn, "sync");
   EXPECT_EQ(silent.text, "0 edges at the sync pin in 10.0 s");
@@ -344,9 +343,8 @@ TEST(Judge, RatesAreThoseOfTheReleaseImages) {
     const char *board;
     std::uint16_t osr;
     double rate_Hz;
-  } measured[] = {{"pico_mux", 256, 314.8},       {"pico_mux", 1024, 206.2},
-                  {"pico_mux", 8192, 48.47},      {"pico_parallel", 256, 1308.9},
-                  {"pico_parallel", 1024, 410.8}, {"pico_parallel", 8192, 54.9}};
+  } measured[] = {{"pico_mux", 256, 314.8},       {"pico_mux", 1024, 206.2},      {"pico_mux", 8192, 48.47},
+                  {"pico_parallel", 256, 1308.9}, {"pico_parallel", 1024, 410.8}, {"pico_parallel", 8192, 54.9}};
   for (const auto &each : measured) {
     Facts facts = good(each.board);
     facts.info->osr = each.osr;
@@ -397,8 +395,8 @@ TEST(Judge, RestartsProcessorStackStored) {
   EXPECT_TRUE(contains(findings[0].text, "1 reset by the watchdog"));
   EXPECT_EQ(findings[1].check, "crash");
   EXPECT_EQ(findings[1].verdict, Verdict::bad);
-  for (const char *part : {"a hard fault at 0x20001000", "before that: command stream",
-                           "sp 0x20041f00", "other firmware"}) {
+  for (const char *part :
+       {"a hard fault at 0x20001000", "before that: command stream", "sp 0x20041f00", "other firmware"}) {
     EXPECT_TRUE(contains(findings[1].text, part)) << findings[1].text;
   }
   facts.crash->record.kind = CRASH_START;

@@ -1,5 +1,5 @@
-#include "tool/doctor/rest.hpp"
 #include "support/host_packets.hpp"
+#include "tool/doctor/rest.hpp"
 
 #include <cmath>
 #include <functional>
@@ -41,8 +41,7 @@ Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, double r
     raw.body.raw.saturated = 0;
     raw.body.raw.doubtful = i % 2 ? 1u << 3 : 0;
     for (unsigned k = 0; k < SENSORS; k++) {
-      double pressure_Pa =
-          101325 + 1000.0 * k + signal(k, t_s) + pad.noise_Pa[k] * gaussian(random);
+      double pressure_Pa = 101325 + 1000.0 * k + signal(k, t_s) + pad.noise_Pa[k] * gaussian(random);
       raw.body.raw.pressure_Pa_q10[k] = static_cast<std::int32_t>(pressure_Pa * 1024);
     }
     meter.add(raw);
@@ -83,8 +82,7 @@ TEST(Rest, NoiseOfEachSensorWhateverTheOthersDo) {
 }
 
 TEST(Rest, MovesOfTheAirAreNoNoiseAndNoDriftOfASensor) {
-  Rest rest =
-      measure(Pad(), [](unsigned, double t_s) { return 200 * std::sin(40 * t_s) + 30 * t_s; });
+  Rest rest = measure(Pad(), [](unsigned, double t_s) { return 200 * std::sin(40 * t_s) + 30 * t_s; });
   for (const auto &sensor : rest.sensors) {
     EXPECT_NEAR(*sensor.noise_Pa / NOISE_Pa, 1, 0.08);
     EXPECT_LT(std::abs(sensor.drift->Pa_per_s), 0.2);

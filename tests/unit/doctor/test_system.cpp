@@ -1,5 +1,5 @@
-#include "tool/doctor/system.hpp"
 #include "support/host_packets.hpp"
+#include "tool/doctor/system.hpp"
 
 #include <algorithm>
 #include <fcntl.h>
@@ -77,9 +77,8 @@ private:
 
 TEST_F(System, RuleIsFoundWhereUdevLooks) {
   EXPECT_EQ(rule(), "");
-  for (const char *path :
-       {"etc/udev/rules.d/60-fingertip.rules", "usr/lib/udev/rules.d/60-fingertip.rules",
-        "usr/local/lib/udev/rules.d/99-mine.rules"}) {
+  for (const char *path : {"etc/udev/rules.d/60-fingertip.rules", "usr/lib/udev/rules.d/60-fingertip.rules",
+                           "usr/local/lib/udev/rules.d/99-mine.rules"}) {
     write(path, TTY_RULE);
     EXPECT_EQ(rule(), folder_ / path);
     fs::remove(folder_ / path);

@@ -55,8 +55,7 @@ double force_of(const struct press *press) {
 struct press random_press(struct random *random, double reach_mm) {
   return (struct press){random_between(random, -9.0 - reach_mm, 9.0 + reach_mm),
                         random_between(random, -18.0 - reach_mm, 18.0 + reach_mm),
-                        exp(random_between(random, log(500.0), log(100000.0))),
-                        random_between(random, 4.0, 12.0)};
+                        exp(random_between(random, log(500.0), log(100000.0))), random_between(random, 4.0, 12.0)};
 }
 
 void assert_finite_and_defined(void) {
@@ -69,10 +68,9 @@ void assert_finite_and_defined(void) {
     TEST_ASSERT_TRUE(isfinite(values[i]));
     TEST_ASSERT_TRUE(valid || values[i] == 0.0f);
   }
-  const uint32_t known = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                         CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN |
-                         CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SENSOR_MASKED |
-                         CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
+  const uint32_t known = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_LOW_SIGNAL |
+                         CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND |
+                         CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
   TEST_ASSERT_EQUAL_HEX32(0, result.flags & ~known);
   TEST_ASSERT_EQUAL((result.flags & CONTACT_FLAG_WIDTHS_VALID) != 0, result.sigma_x_mm > 0.0f);
   TEST_ASSERT_EQUAL(result.sigma_x_mm > 0.0f, result.sigma_y_mm > 0.0f);
@@ -84,7 +82,6 @@ void assert_finite_and_defined(void) {
     TEST_ASSERT_TRUE(result.residual_rms_Pa >= 0.0f);
     TEST_ASSERT_TRUE(result.location_sd_mm >= 0.0f && result.force_sd_N >= 0.0f);
     TEST_ASSERT_TRUE(result.location_noise_mm >= 0.0f);
-    TEST_ASSERT_TRUE(!(result.flags & CONTACT_FLAG_UNCERTAIN) ==
-                     (result.location_sd_mm <= FIT_LOCATION_SD_LIMIT_mm));
+    TEST_ASSERT_TRUE(!(result.flags & CONTACT_FLAG_UNCERTAIN) == (result.location_sd_mm <= FIT_LOCATION_SD_LIMIT_mm));
   }
 }

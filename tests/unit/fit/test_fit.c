@@ -99,8 +99,7 @@ static void test_residual_is_that_of_the_readings(void) {
   struct press press = {2.0, -5.0, 5000.0, 6.0};
   read_press(&press, 50.0, &random);
   fit_gaussian(&array, readings, ALL, &patient, &result);
-  struct press fitted = {(double)result.x_mm, (double)result.y_mm, (double)result.p0_Pa,
-                         (double)result.sigma_mm};
+  struct press fitted = {(double)result.x_mm, (double)result.y_mm, (double)result.p0_Pa, (double)result.sigma_mm};
   double squares = 0.0;
   for (int k = 0; k < SENSORS; k++) {
     double residual = readings[k] / 1024.0 - gaussian(&fitted, (double)x_mm[k], (double)y_mm[k]);
@@ -158,8 +157,7 @@ static void test_predicted_scatter(void) {
   for (size_t i = 0; i < 4; i++) {
     enum { FITS = 20000 };
     struct random random = {90 + i};
-    const struct fit_settings settings = {.iterations = 7,
-                                          .noise_Pa_q10 = to_q10(cases[i].noise_Pa)};
+    const struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = to_q10(cases[i].noise_Pa)};
     double sum_x = 0, sum_y = 0, sum_f = 0, square_x = 0, square_y = 0, square_f = 0;
     double predicted = 0, predicted_f = 0;
     for (int fit = 0; fit < FITS; fit++) {
@@ -177,12 +175,10 @@ static void test_predicted_scatter(void) {
       predicted += (double)result.location_sd_mm / FITS;
       predicted_f += (double)result.force_sd_N / FITS;
     }
-    double radial = sqrt((square_x + square_y) / FITS -
-                         (sum_x * sum_x + sum_y * sum_y) / ((double)FITS * FITS));
+    double radial = sqrt((square_x + square_y) / FITS - (sum_x * sum_x + sum_y * sum_y) / ((double)FITS * FITS));
     double force = sqrt(square_f / FITS - sum_f * sum_f / ((double)FITS * FITS));
     char text[140];
-    snprintf(text, sizeof text,
-             "predicted over actual scatter: location %.3f, force %.3f (%.2g mm, %.2g N)",
+    snprintf(text, sizeof text, "predicted over actual scatter: location %.3f, force %.3f (%.2g mm, %.2g N)",
              predicted / radial, predicted_f / force, radial, force);
     TEST_MESSAGE(text);
     /* The larger of noise and residuals is taken, so a little above 1. */
@@ -222,8 +218,7 @@ static void test_n_largest(void) {
     bool enough = largest > 0 && __builtin_popcount(expected) >= 4;
     TEST_ASSERT_EQUAL_HEX32(enough ? expected : 0, result.used);
     TEST_ASSERT_EQUAL(usable != ALL, (result.flags & CONTACT_FLAG_SENSOR_MASKED) != 0);
-    masked.flags = result.flags =
-        (masked.flags ^ result.flags) & ~(uint32_t)CONTACT_FLAG_SENSOR_MASKED;
+    masked.flags = result.flags = (masked.flags ^ result.flags) & ~(uint32_t)CONTACT_FLAG_SENSOR_MASKED;
     TEST_ASSERT_EQUAL_MEMORY(&masked, &result, sizeof masked);
     TEST_ASSERT_EQUAL_HEX32(0, result.flags);
 
@@ -260,8 +255,7 @@ static void test_narrow_contacts_outside_are_not_held_back_by_p0(void) {
   double steepest = 0.0;
   int missed = 0, held_back = 0, unflagged = 0, count = 0;
   while (count < 20000) {
-    const struct press press = {random_between(&random, -15.0, 15.0),
-                                random_between(&random, -24.0, 24.0), 50000.0,
+    const struct press press = {random_between(&random, -15.0, 15.0), random_between(&random, -24.0, 24.0), 50000.0,
                                 random_between(&random, 2.7, 4.0)};
     if (fabs(press.x_mm) <= 9.0 && fabs(press.y_mm) <= 18.0) {
       continue;

@@ -35,16 +35,14 @@ struct touch {
 };
 
 static struct touch anywhere(double p0_Pa, double sigma_mm) {
-  return (struct touch){p0_Pa, sigma_mm, random_between(&random, -9.0, 9.0),
-                        random_between(&random, -18.0, 18.0)};
+  return (struct touch){p0_Pa, sigma_mm, random_between(&random, -9.0, 9.0), random_between(&random, -18.0, 18.0)};
 }
 
 static void feel(struct touch touch, int32_t *pressure_Pa_q10, struct fit_result *result) {
   for (int k = 0; k < SENSORS; k++) {
     const double dx = 9.0 * (k / 5 - 1) - touch.x_mm, dy = 9.0 * (k % 5 - 2) - touch.y_mm;
     const double bell = exp(-(dx * dx + dy * dy) / (2.0 * touch.sigma_mm * touch.sigma_mm));
-    pressure_Pa_q10[k] =
-        (int32_t)lround(1024.0 * (gain[k] * touch.p0_Pa * bell + 4.0 * random_normal(&random)));
+    pressure_Pa_q10[k] = (int32_t)lround(1024.0 * (gain[k] * touch.p0_Pa * bell + 4.0 * random_normal(&random)));
   }
   fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, result);
 }
@@ -187,8 +185,7 @@ static void test_a_strip_learns_nothing(void) {
   for (int look = 0; look < 2; look++) {
     for (int k = 0; k < SENSORS; k++) {
       const double bell = exp(-9.0 * 9.0 * (k - 7) * (k - 7) / (2.0 * 5.6 * 5.6));
-      pressure_Pa_q10[k] =
-          (int32_t)lround(1024.0 * (14000.0 * bell + 4.0 * random_normal(&random)));
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * (14000.0 * bell + 4.0 * random_normal(&random)));
     }
     fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &result);
     TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, result.flags);

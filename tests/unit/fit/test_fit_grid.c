@@ -1,7 +1,7 @@
 /* The fixed-point kernels against the float32 one, which other tests hold to the reference. Built
  * once for the 3 x 5 grid of the firmware and once for another size. */
-#include "fit_grid_bench.h"
 #include "fit/fit_tables.h"
+#include "fit_grid_bench.h"
 #include "support/random.h"
 
 #include <math.h>
@@ -10,8 +10,7 @@
 #include <string.h>
 #include <unity.h>
 
-static void press(double x, double y, double p0_Pa, double sigma_mm, double noise_Pa,
-                  struct random *random) {
+static void press(double x, double y, double p0_Pa, double sigma_mm, double noise_Pa, struct random *random) {
   for (int k = 0; k < SENSORS; k++) {
     double dx = (double)x_mm[k] - x;
     double dy = (double)y_mm[k] - y;
@@ -22,9 +21,8 @@ static void press(double x, double y, double p0_Pa, double sigma_mm, double nois
 
 static void random_press(struct random *random, double sigma_low_mm, double sigma_high_mm) {
   double half_x = 4.5 * (COLUMNS - 1), half_y = 4.5 * (ROWS - 1);
-  press(1.5 + random_between(random, -half_x, half_x),
-        -0.25 + random_between(random, -half_y, half_y), random_between(random, 2e3, 1e5),
-        random_between(random, sigma_low_mm, sigma_high_mm), 5.0, random);
+  press(1.5 + random_between(random, -half_x, half_x), -0.25 + random_between(random, -half_y, half_y),
+        random_between(random, 2e3, 1e5), random_between(random, sigma_low_mm, sigma_high_mm), 5.0, random);
 }
 
 static void a_rectangle_is_recognised_in_any_order(void) {
@@ -87,8 +85,7 @@ static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
     }
     fit_general(&array, readings, usable, &settled, &general);
     TEST_ASSERT_EQUAL_HEX32(usable, grid.used);
-    const uint32_t skipped =
-        CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_ELONGATED;
+    const uint32_t skipped = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_ELONGATED;
     if (((general.flags | grid.flags) & skipped) || general.location_sd_mm > 0.2f) {
       continue; /* what is hardly determined may differ, and one alone tells shapes */
     }
@@ -101,13 +98,11 @@ static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
     worst_force_sd = fmaxf(worst_force_sd, fabsf(grid.force_sd_N / general.force_sd_N - 1.0f));
     TEST_ASSERT_FLOAT_WITHIN(3e-4f * general.p0_Pa, general.p0_Pa, grid.p0_Pa);
     TEST_ASSERT_FLOAT_WITHIN(3e-4f * general.sigma_mm, general.sigma_mm, grid.sigma_mm);
-    TEST_ASSERT_FLOAT_WITHIN(0.02f * general.residual_rms_Pa, general.residual_rms_Pa,
-                             grid.residual_rms_Pa);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f * general.residual_rms_Pa, general.residual_rms_Pa, grid.residual_rms_Pa);
   }
   char text[120];
-  snprintf(text, sizeof text, "%d compared, worst: %.3f um, force %.1e, sd %.1e, force sd %.1e",
-           compared, (double)worst_um, (double)worst_force, (double)worst_sd,
-           (double)worst_force_sd);
+  snprintf(text, sizeof text, "%d compared, worst: %.3f um, force %.1e, sd %.1e, force sd %.1e", compared,
+           (double)worst_um, (double)worst_force, (double)worst_sd, (double)worst_force_sd);
   TEST_MESSAGE(text);
   TEST_ASSERT_GREATER_THAN_INT(presses / 3, compared);
   TEST_ASSERT_TRUE(worst_um < (masked > 0 ? 3.0f : 1.0f));
@@ -185,13 +180,13 @@ static void an_outlier_is_left_out(bool by_the_general_kernel) {
     TEST_ASSERT_EQUAL(masked, result.used != ALL);
     found += result.used == (ALL & ~(UINT32_C(1) << wrong)) && moved_mm < 0.2f;
     others += masked && result.used != (ALL & ~(UINT32_C(1) << wrong));
-    const uint32_t warnings = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND |
-                              CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL;
+    const uint32_t warnings = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT |
+                              CONTACT_FLAG_LOW_SIGNAL;
     unwarned += moved_mm > 1.0f && !(result.flags & warnings);
   }
   char text[100];
-  snprintf(text, sizeof text, "of %d outliers %d found, %d others left out, %d unwarned", presses,
-           found, others, unwarned);
+  snprintf(text, sizeof text, "of %d outliers %d found, %d others left out, %d unwarned", presses, found, others,
+           unwarned);
   TEST_MESSAGE(text);
   TEST_ASSERT_GREATER_THAN_INT(presses * 3 / 5, found);
   TEST_ASSERT_LESS_THAN_INT(presses / 20, others);
@@ -309,16 +304,14 @@ static void a_prior_leaves_what_is_uncertain_so(void) {
     if (i % 2) {
       fit_grid(&array, readings, &settings, &grid);
     } else {
-      fit_grid_masked(&array, readings, ALL & ~(UINT32_C(1) << random_below(&random, SENSORS)),
-                      &settings, &grid);
+      fit_grid_masked(&array, readings, ALL & ~(UINT32_C(1) << random_below(&random, SENSORS)), &settings, &grid);
     }
     if (!(grid.flags & CONTACT_FLAG_FIT_VALID)) {
       continue;
     }
     fit_general(&array, readings, grid.used, &settings, &general);
     if (!((grid.flags | general.flags) & CONTACT_FLAG_AT_BOUND)) {
-      TEST_ASSERT_TRUE(grid.flags & CONTACT_FLAG_UNCERTAIN ||
-                       grid.location_sd_mm > 0.3f * general.location_sd_mm);
+      TEST_ASSERT_TRUE(grid.flags & CONTACT_FLAG_UNCERTAIN || grid.location_sd_mm > 0.3f * general.location_sd_mm);
       compared++;
     }
   }
@@ -382,8 +375,7 @@ static void warnings_are_given(void) {
 
   press(1.5, -0.25, 20e3, 1.0, 0.0, &random); /* far narrower than the grid */
   fit_grid(&array, readings, &usual, &result);
-  TEST_ASSERT_TRUE(result.flags &
-                   (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL));
+  TEST_ASSERT_TRUE(result.flags & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL));
 
   memset(readings, 0, sizeof readings);
   fit_grid(&array, readings, &usual, &result);
@@ -436,9 +428,8 @@ static void any_bits_give_finite_results(void) {
       fit_grid(&array, readings, &settings, &result);
     }
     TEST_ASSERT_TRUE(isfinite(result.x_mm) && isfinite(result.y_mm) && isfinite(result.p0_Pa) &&
-                     isfinite(result.sigma_mm) && isfinite(result.force_N) &&
-                     isfinite(result.residual_rms_Pa) && isfinite(result.location_sd_mm) &&
-                     isfinite(result.force_sd_N));
+                     isfinite(result.sigma_mm) && isfinite(result.force_N) && isfinite(result.residual_rms_Pa) &&
+                     isfinite(result.location_sd_mm) && isfinite(result.force_sd_N));
     bool valid = result.flags & CONTACT_FLAG_FIT_VALID;
     TEST_ASSERT_TRUE(valid || masked || result.flags == CONTACT_FLAG_LOW_SIGNAL);
   }

@@ -10,8 +10,8 @@
 
 /* A contact of 30 kPa on rubber with a dip, felt with 2 Pa of noise by sensors that have this own.
  */
-static void press_cast(double x, double y, double sigma, double share, double sd,
-                       const struct fit_own *own, struct random *random) {
+static void press_cast(double x, double y, double sigma, double share, double sd, const struct fit_own *own,
+                       struct random *random) {
   for (int k = 0; k < SENSORS; k++) {
     double dx = (double)x_mm[k] + (double)PITCH_mm * own[k].off_x_q15 / 32768.0 - x;
     double dy = (double)y_mm[k] + (double)PITCH_mm * own[k].off_y_q15 / 32768.0 - y;
@@ -57,11 +57,8 @@ static void a_known_dip_is_added_back_alike_in_all(void) {
     double y = -0.25 + random_between(&random, -half_y, half_y);
     double sigma = random_between(&random, 3.4, 6.0), sd = sd_per_sigma * sigma;
     press_cast(x, y, sigma, share, sd, no_own, &random);
-    struct fit_settings settings = {.iterations = 8,
-                                    .noise_Pa_q10 = 2048,
-                                    .cut_noises = 4,
-                                    .prior_sigma_mm = (float)sigma,
-                                    .prior_width_mm = 0.1f};
+    struct fit_settings settings = {
+        .iterations = 8, .noise_Pa_q10 = 2048, .cut_noises = 4, .prior_sigma_mm = (float)sigma, .prior_width_mm = 0.1f};
     struct fit_result plain, grid, masked, general;
     fit_grid(&array, readings, &settings, &plain);
     settings.dip_share = (float)share;
@@ -77,8 +74,8 @@ static void a_known_dip_is_added_back_alike_in_all(void) {
     TEST_ASSERT_TRUE(grid.location_sd_mm <= plain.location_sd_mm);
   }
   char text[100];
-  snprintf(text, sizeof text, "%d: off %.3f mm, unknown %.3f, kernels apart %.3f", counted,
-           (double)worst, (double)unknown, (double)apart);
+  snprintf(text, sizeof text, "%d: off %.3f mm, unknown %.3f, kernels apart %.3f", counted, (double)worst,
+           (double)unknown, (double)apart);
   TEST_ASSERT_TRUE_MESSAGE(unknown > 0.3f, text);
   TEST_ASSERT_TRUE_MESSAGE(worst < 0.08f, text);
   TEST_ASSERT_TRUE_MESSAGE(apart < 0.02f, text);
@@ -108,8 +105,8 @@ static void beyond_the_sensors_the_dip_tells_the_place(void) {
     apart += off_mm(&general, (double)found.x_mm, (double)found.y_mm) > 0.05f;
   }
   char text[160];
-  snprintf(text, sizeof text, "of %d off by 0.5 mm: %d, wide kernel %d; beyond 2.5 sd %d; apart %d",
-           PRESSES, far, far_of_wide, unsure, apart);
+  snprintf(text, sizeof text, "of %d off by 0.5 mm: %d, wide kernel %d; beyond 2.5 sd %d; apart %d", PRESSES, far,
+           far_of_wide, unsure, apart);
   TEST_ASSERT_TRUE_MESSAGE(far_of_wide > PRESSES / 2, text);
   TEST_ASSERT_TRUE_MESSAGE(far <= PRESSES / 50, text);
   TEST_ASSERT_TRUE_MESSAGE(unsure <= PRESSES / 100, text);
@@ -160,8 +157,8 @@ static void what_is_the_sensors_own_is_taken_out_alike_in_all(void) {
     sooner += memcmp(early, without, sizeof early) != 0;
   }
   char text[120];
-  snprintf(text, sizeof text, "off %.3f mm, unknown %.3f, kernels apart %.3f; %d rough, %d sooner",
-           (double)worst, (double)unknown, (double)apart, rough, sooner);
+  snprintf(text, sizeof text, "off %.3f mm, unknown %.3f, kernels apart %.3f; %d rough, %d sooner", (double)worst,
+           (double)unknown, (double)apart, rough, sooner);
   TEST_ASSERT_TRUE_MESSAGE(unknown > 0.1f, text);
   TEST_ASSERT_TRUE_MESSAGE(worst < 0.08f, text);
   TEST_ASSERT_TRUE_MESSAGE(apart < 0.03f, text);

@@ -12,8 +12,7 @@ static void test_an_array_far_from_the_origin_is_none_for_the_grid(void) {
     for (int k = 0; k < SENSORS; k++) {
       y[k] = y_mm[k] + offsets_mm[i];
     }
-    TEST_ASSERT_EQUAL_INT(i == 0 ? FT_OK : FT_ERR_ARGUMENT,
-                          fit_array_init_grid(&far, SENSORS, x_mm, y, PITCH_mm));
+    TEST_ASSERT_EQUAL_INT(i == 0 ? FT_OK : FT_ERR_ARGUMENT, fit_array_init_grid(&far, SENSORS, x_mm, y, PITCH_mm));
     TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&far, SENSORS, x_mm, y, PITCH_mm));
     fit_gaussian(&far, readings, ALL, &usual, &result);
     TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_FIT_VALID);
@@ -50,8 +49,7 @@ static void test_order_and_rotation_of_the_sensors(void) {
       turned[k] = readings[order[k]];
     }
     struct fit_array turned_array;
-    TEST_ASSERT_EQUAL_INT(FT_OK,
-                          fit_array_init(&turned_array, SENSORS, turned_x, turned_y, PITCH_mm));
+    TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&turned_array, SENSORS, turned_x, turned_y, PITCH_mm));
     fit_gaussian(&turned_array, turned, ALL, &patient, &result);
     double back_x = cos(angle) * (double)result.x_mm + sin(angle) * (double)result.y_mm;
     double back_y = -sin(angle) * (double)result.x_mm + cos(angle) * (double)result.y_mm;
@@ -72,8 +70,8 @@ static void test_every_mask_of_up_to_three_sensors(void) {
     if (bits > 3) {
       continue;
     }
-    struct press press = {random_between(&random, -9.0, 9.0), random_between(&random, -18.0, 18.0),
-                          5000.0, random_between(&random, 5.0, 8.0)};
+    struct press press = {random_between(&random, -9.0, 9.0), random_between(&random, -18.0, 18.0), 5000.0,
+                          random_between(&random, 5.0, 8.0)};
     read_press(&press, 0.0, NULL);
     for (int k = 0; k < SENSORS; k++) {
       readings[k] = lost >> k & 1u ? (int32_t)random_u32(&random) : readings[k];
@@ -119,8 +117,7 @@ static void test_any_layout(void) {
       readings[k] = (int32_t)random_u32(&random) >> random_below(&random, 32);
     }
     struct fit_array layout;
-    TEST_ASSERT_EQUAL_INT(
-        FT_OK, fit_array_init(&layout, count, x, y, (float)random_between(&random, 1.0, 20.0)));
+    TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&layout, count, x, y, (float)random_between(&random, 1.0, 20.0)));
     fit_gaussian(&layout, readings, UINT32_MAX, &usual, &result);
     assert_finite_and_defined();
   }
@@ -174,8 +171,7 @@ static void test_sensors_on_a_line(void) {
       const struct press press = {origin_x + at * along_x, origin_y + at * along_y, 5000.0,
                                   random_between(&random, 3.0, 6.0)};
       for (int k = 0; k < COUNT; k++) {
-        readings[k] = to_q10(gaussian(&press, (double)x[k], (double)y[k]) +
-                             noise_Pa * random_normal(&random));
+        readings[k] = to_q10(gaussian(&press, (double)x[k], (double)y[k]) + noise_Pa * random_normal(&random));
       }
       const struct fit_settings settings = {.iterations = 12, .noise_Pa_q10 = NOISE_5_Pa};
       fit_gaussian(&line, readings, UINT32_MAX, &settings, &result);

@@ -76,8 +76,7 @@ static void test_a_load_is_part_of_the_error(void) {
     silent += error_mm > 1.0 && !(result.flags & CONTACT_FLAG_UNCERTAIN);
   }
   char text[80];
-  snprintf(text, sizeof text, "off %.2f mm, said %.2f mm, %d silent", errors_mm / 400.0,
-           said_mm / 400.0, silent);
+  snprintf(text, sizeof text, "off %.2f mm, said %.2f mm, %d silent", errors_mm / 400.0, said_mm / 400.0, silent);
   TEST_ASSERT_TRUE_MESSAGE(fabs(said_mm / errors_mm - 1.0) < 0.2, text);
   TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(4, silent, text);
 }
@@ -87,8 +86,7 @@ static void test_without_a_load_little_is_added(void) {
   int more = 0;
   for (int i = 0; i < 200; i++) {
     int32_t pressure_Pa_q10[SENSORS];
-    press(random_between(&noise, -9.0, 9.0), random_between(&noise, -18.0, 18.0), 0.0, 0.0,
-          pressure_Pa_q10);
+    press(random_between(&noise, -9.0, 9.0), random_between(&noise, -18.0, 18.0), 0.0, 0.0, pressure_Pa_q10);
     struct fit_result with, without;
     struct fit_load load = {0};
     fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &without);
@@ -166,16 +164,15 @@ static void test_a_dip_that_is_known_is_no_load(void) {
       press(x_mm, y_mm, load * cos(angle), load * sin(angle), pressure_Pa_q10);
       for (int k = 0; k < SENSORS; k++) {
         double dx = 9.0 * (k / 5 - 1) - x_mm, dy = 9.0 * (k % 5 - 2) - y_mm;
-        pressure_Pa_q10[k] -= (int32_t)(0.05 * 1024.0 * (double)result.p0_Pa *
-                                        exp(-(dx * dx + dy * dy) / (2.0 * 14.0 * 14.0)));
+        pressure_Pa_q10[k] -=
+            (int32_t)(0.05 * 1024.0 * (double)result.p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * 14.0 * 14.0)));
       }
       struct fit_load held = {0};
       hold(&held, pressure_Pa_q10, ALL, &settings, &result);
       warned[i % 2] += (result.flags & CONTACT_FLAG_UNCERTAIN) != 0;
     }
     char text[80];
-    snprintf(text, sizeof text, "told %.1f mm, of 200 warned: %d, loaded %d", (double)told_mm[c],
-             warned[0], warned[1]);
+    snprintf(text, sizeof text, "told %.1f mm, of 200 warned: %d, loaded %d", (double)told_mm[c], warned[0], warned[1]);
     TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(4, warned[0], text);
     TEST_ASSERT_GREATER_OR_EQUAL_INT_MESSAGE(180, warned[1], text);
   }
@@ -237,14 +234,12 @@ static void test_what_is_the_sensors_own_is_no_load(void) {
     int32_t pressure_Pa_q10[SENSORS];
     double x_mm = random_between(&noise, -9.0, 9.0), y_mm = random_between(&noise, -18.0, 18.0);
     for (int k = 0; k < SENSORS; k++) {
-      own[k] = (struct fit_own){(int32_t)random_between(&noise, -600, 600),
-                                (int32_t)random_between(&noise, -600, 600),
+      own[k] = (struct fit_own){(int32_t)random_between(&noise, -600, 600), (int32_t)random_between(&noise, -600, 600),
                                 (int32_t)random_between(&noise, -2000, 2000)};
       double sigma_mm = 6.0 * exp(own[k].wider_q15 / 32768.0);
       double dx = 9.0 * (k / 5 - 1 + own[k].off_x_q15 / 32768.0) - x_mm;
       double dy = 9.0 * (k % 5 - 2 + own[k].off_y_q15 / 32768.0) - y_mm;
-      pressure_Pa_q10[k] =
-          (int32_t)lround(1024.0 * 2e4 * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm)));
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * 2e4 * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm)));
     }
     for (int known = 0; known < 2; known++) {
       struct fit_settings settings = usual();

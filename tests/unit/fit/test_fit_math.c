@@ -15,9 +15,8 @@ static void say(const char *what, double value) {
 }
 
 static void test_mul_q30(void) {
-  static const int32_t corners[] = {0,          1,          -1,          65535,
-                                    65536,      -65535,     -65536,      1 << 30,
-                                    -(1 << 30), 1073741823, -1073741823, 1073676289};
+  static const int32_t corners[] = {0,      1,       -1,         65535,      65536,       -65535,
+                                    -65536, 1 << 30, -(1 << 30), 1073741823, -1073741823, 1073676289};
   double worst = 0.0;
   struct random random = {61};
   for (int i = 0; i < 2000000; i++) {
@@ -59,8 +58,7 @@ static void test_exp2_at_its_ends(void) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, fit_exp2_negative(INFINITY));
   for (int whole = 1; whole < 100; whole++) {
     TEST_ASSERT_EQUAL_FLOAT(ldexpf(1.0f, -whole), fit_exp2_negative((float)whole));
-    TEST_ASSERT_TRUE(fit_exp2_negative(nextafterf((float)whole, 0.0f)) >=
-                     fit_exp2_negative((float)whole));
+    TEST_ASSERT_TRUE(fit_exp2_negative(nextafterf((float)whole, 0.0f)) >= fit_exp2_negative((float)whole));
   }
 }
 

@@ -15,12 +15,10 @@
 #define ARRAYS 12
 #define SEED UINT64_C(0x66696E676572)
 
-static const uint32_t always = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID |
-                               CONTACT_FLAG_ELONGATED;
-static const uint32_t warnings = CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT |
-                                 CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL |
-                                 CONTACT_FLAG_AT_BOUND;
+static const uint32_t always = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED |
+                               CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
+static const uint32_t warnings =
+    CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND;
 
 struct input {
   const struct fit_array *array;
@@ -35,13 +33,11 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-static void make_array(struct fit_array *array, uint8_t count, const float *x_mm, const float *y_mm,
-                       float pitch_mm) {
+static void make_array(struct fit_array *array, uint8_t count, const float *x_mm, const float *y_mm, float pitch_mm) {
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(array, count, x_mm, y_mm, pitch_mm));
 }
 
-static void make_grid(struct fit_array *array, uint8_t columns, uint8_t rows, float pitch_mm,
-                      float x_mm, float y_mm) {
+static void make_grid(struct fit_array *array, uint8_t columns, uint8_t rows, float pitch_mm, float x_mm, float y_mm) {
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS];
   for (uint8_t k = 0; k < columns * rows; k++) {
     x[k] = x_mm + pitch_mm * (float)(k / rows);
@@ -50,8 +46,8 @@ static void make_grid(struct fit_array *array, uint8_t columns, uint8_t rows, fl
   make_array(array, (uint8_t)(columns * rows), x, y, pitch_mm);
 }
 
-static void make_scattered(struct random *random, struct fit_array *array, uint8_t count,
-                           float spread_mm, float pitch_mm) {
+static void make_scattered(struct random *random, struct fit_array *array, uint8_t count, float spread_mm,
+                           float pitch_mm) {
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS];
   for (uint8_t k = 0; k < count; k++) {
     x[k] = (float)random_between(random, (double)-spread_mm, (double)spread_mm);
@@ -234,8 +230,7 @@ static const char *complaint(const struct input *input, const struct fit_result 
   }
   const uint8_t n = input->settings.n_largest;
   const bool selected = n > 0 && n < array->sensor_count;
-  const bool outlier = (result->flags & CONTACT_FLAG_FIT_VALID) && !selected &&
-                       result->used != (input->usable & all);
+  const bool outlier = (result->flags & CONTACT_FLAG_FIT_VALID) && !selected && result->used != (input->usable & all);
   const bool masked = outlier || (input->usable & all) != all;
   if (!(result->flags & CONTACT_FLAG_SENSOR_MASKED) == masked) {
     return "SENSOR_MASKED";
@@ -267,8 +262,8 @@ static const char *complaint(const struct input *input, const struct fit_result 
   if (!saturated && !within(result->force_N, 0.999f * force, 1.001f * force)) {
     return "the force is not 2 pi p0 sigma^2";
   }
-  if (!within(result->residual_rms_Pa, 0.0f, 1e13f) ||
-      !within(result->location_sd_mm, 0.0f, huge) || !within(result->force_sd_N, 0.0f, huge)) {
+  if (!within(result->residual_rms_Pa, 0.0f, 1e13f) || !within(result->location_sd_mm, 0.0f, huge) ||
+      !within(result->force_sd_N, 0.0f, huge)) {
     return "residual or standard deviation";
   }
   if (!within(result->location_noise_mm, 0.0f, huge)) {
@@ -284,17 +279,14 @@ static const char *complaint(const struct input *input, const struct fit_result 
   return NULL;
 }
 
-static void judge(uint32_t number, const char *kernel, const struct input *input,
-                  const struct fit_result *result) {
+static void judge(uint32_t number, const char *kernel, const struct input *input, const struct fit_result *result) {
   const char *wrong = complaint(input, result);
   if (wrong) {
     char text[200];
-    snprintf(text, sizeof text,
-             "input %u, %s: %s; x %g y %g sigma %g p0 %g force %g rms %g sd %g %g flags %x",
-             (unsigned)number, kernel, wrong, (double)result->x_mm, (double)result->y_mm,
-             (double)result->sigma_mm, (double)result->p0_Pa, (double)result->force_N,
-             (double)result->residual_rms_Pa, (double)result->location_sd_mm,
-             (double)result->force_sd_N, (unsigned)result->flags);
+    snprintf(text, sizeof text, "input %u, %s: %s; x %g y %g sigma %g p0 %g force %g rms %g sd %g %g flags %x",
+             (unsigned)number, kernel, wrong, (double)result->x_mm, (double)result->y_mm, (double)result->sigma_mm,
+             (double)result->p0_Pa, (double)result->force_N, (double)result->residual_rms_Pa,
+             (double)result->location_sd_mm, (double)result->force_sd_N, (unsigned)result->flags);
     TEST_FAIL_MESSAGE(text);
   }
 }

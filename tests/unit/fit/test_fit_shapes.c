@@ -55,8 +55,7 @@ static void press(double x_mm, double y_mm, double force_N, double qx_N, double 
     sum = force_N * (sum - dip * peak * exp(-r2 / (2.0 * 14.0 * 14.0)));
     for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
       double v = (double)profile.tangential[j].sd_mm * (double)profile.tangential[j].sd_mm + 5.2;
-      sum += (qx_N * dx + qy_N * dy) * (double)profile.tangential[j].moment_mm / (v * v) *
-             exp(-r2 / (2.0 * v));
+      sum += (qx_N * dx + qy_N * dy) * (double)profile.tangential[j].moment_mm / (v * v) * exp(-r2 / (2.0 * v));
     }
     reading->Pa[k] += 1e6 / (2.0 * PI) * sum;
   }
@@ -67,8 +66,7 @@ static void line(double x_mm, double y_mm, double length_mm, double angle_rad, d
   const int parts = 60;
   for (int i = 0; i < parts; i++) {
     double at = length_mm * ((i + 0.5) / parts - 0.5);
-    press(x_mm + at * cos(angle_rad), y_mm + at * sin(angle_rad), force_N / parts, 0.0, 0.0, 0.0,
-          reading);
+    press(x_mm + at * cos(angle_rad), y_mm + at * sin(angle_rad), force_N / parts, 0.0, 0.0, 0.0, reading);
   }
 }
 
@@ -83,8 +81,7 @@ static struct fit_settings usual(double dip) {
 
 static float worst_line; /* chi^2 of that model, of all answers since it was 0 */
 
-static struct fit_shapes_result hold(const struct reading *reading, uint32_t usable, double dip,
-                                     int frames) {
+static struct fit_shapes_result hold(const struct reading *reading, uint32_t usable, double dip, int frames) {
   struct fit_settings settings = usual(dip);
   struct fit_shapes_state state;
   struct fit_shapes_result result;
@@ -93,8 +90,7 @@ static struct fit_shapes_result hold(const struct reading *reading, uint32_t usa
   for (int frame = 0; frame < frames; frame++) {
     int32_t pressure_Pa_q10[SENSORS];
     for (int k = 0; k < SENSORS; k++) {
-      pressure_Pa_q10[k] =
-          (int32_t)lround(1024.0 * (reading->Pa[k] + NOISE_Pa * random_between(&noise, -1.7, 1.7)));
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * (reading->Pa[k] + NOISE_Pa * random_between(&noise, -1.7, 1.7)));
     }
     struct fit_result fit;
     fit_gaussian(&array, pressure_Pa_q10, usable, &settings, &fit);
@@ -128,8 +124,7 @@ static void test_what_is_the_sensors_own_is_taken_out(void) {
   int round = 0, pairs = 0;
   for (int i = 0; i < 100; i++) {
     for (int k = 0; k < SENSORS; k++) {
-      own[k] = (struct fit_own){(int32_t)random_between(&noise, -600, 600),
-                                (int32_t)random_between(&noise, -600, 600),
+      own[k] = (struct fit_own){(int32_t)random_between(&noise, -600, 600), (int32_t)random_between(&noise, -600, 600),
                                 (int32_t)random_between(&noise, -2000, 2000)};
     }
     struct reading reading = {{0.0}};
@@ -154,8 +149,7 @@ static void test_a_pull_is_no_pair(void) {
   for (int i = 0; i < 60; i++) {
     struct reading reading = {{0.0}};
     double x = random_between(&noise, -6.0, 6.0), y = random_between(&noise, -15.0, 15.0);
-    double direction = random_between(&noise, 0.0, 2.0 * PI), qx = 1.8 * cos(direction),
-           qy = 1.8 * sin(direction);
+    double direction = random_between(&noise, 0.0, 2.0 * PI), qx = 1.8 * cos(direction), qy = 1.8 * sin(direction);
     press(x, y, 6.0, qx, qy, 0.0, &reading);
     struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
     TEST_ASSERT_TRUE(result.shape == FIT_SHAPE_PULLED || result.shape == FIT_SHAPE_ELONGATED);
@@ -166,8 +160,7 @@ static void test_a_pull_is_no_pair(void) {
   }
 }
 
-static struct fit_shapes_result hold_line(double x_mm, double y_mm, double length_mm,
-                                          double angle_rad) {
+static struct fit_shapes_result hold_line(double x_mm, double y_mm, double length_mm, double angle_rad) {
   struct reading reading = {{0.0}};
   line(x_mm, y_mm, length_mm, angle_rad, 8.0, &reading);
   struct fit_shapes_result result = hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES);
@@ -183,8 +176,7 @@ static void test_a_line_has_its_length_and_direction(void) {
     struct fit_shapes_result result = hold_line(x, y, length, angle);
     TEST_ASSERT_FLOAT_WITHIN(1.5f, (float)length, result.length_mm);
     TEST_ASSERT_TRUE(result.along_x >= 0.0f);
-    TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.0f,
-                             result.along_x * result.along_x + result.along_y * result.along_y);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.0f, result.along_x * result.along_x + result.along_y * result.along_y);
     double off = fabs((double)result.along_x * sin(angle) - (double)result.along_y * cos(angle));
     TEST_ASSERT_TRUE(off < 0.06);
     TEST_ASSERT_TRUE(off < 4.0 * (double)result.angle_sd_rad);
@@ -197,8 +189,7 @@ static void test_a_line_may_be_as_long_as_the_array(void) {
   for (int i = 0; i < 40; i++) {
     double length = random_between(&noise, 24.0, 32.0);
     double x = random_between(&noise, -4.0, 4.0), y = random_between(&noise, -2.0, 2.0);
-    struct fit_shapes_result result =
-        hold_line(x, y, length, random_between(&noise, 0.4 * PI, 0.6 * PI));
+    struct fit_shapes_result result = hold_line(x, y, length, random_between(&noise, 0.4 * PI, 0.6 * PI));
     TEST_ASSERT_FLOAT_WITHIN(2.0f, (float)length, result.length_mm);
   }
 }
@@ -209,8 +200,8 @@ static void test_models_stay_where_they_have_settled(void) {
   worst_line = 0.0f;
   for (int i = 0; i < 400; i++) {
     struct reading reading = {{0.0}};
-    line(random_between(&noise, -9.0, 9.0), (i % 2 ? 1 : -1) * random_between(&noise, 12.0, 18.0),
-         3.0, random_between(&noise, -0.5 * PI, 0.5 * PI), 4.0, &reading);
+    line(random_between(&noise, -9.0, 9.0), (i % 2 ? 1 : -1) * random_between(&noise, 12.0, 18.0), 3.0,
+         random_between(&noise, -0.5 * PI, 0.5 * PI), 4.0, &reading);
     for (int k = 0; k < SENSORS; k++) { /* gains */
       reading.Pa[k] *= 1.0 + 0.02 * random_between(&noise, -1.7, 1.7);
     }
@@ -340,8 +331,7 @@ static void test_an_answer_takes_its_frames_and_its_sensors(void) {
   TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, hold(&reading, ALL, 0.0, FIT_SHAPES_FRAMES - 1).shape);
   TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, hold(&reading, ALL & ~0x4001u, 0.0, FIT_SHAPES_FRAMES).shape);
   TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, hold(&reading, ALL & ~0x3u, 0.0, 1).shape);
-  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED,
-                    hold(&reading, ALL & ~0x4013u, 0.0, FIT_SHAPES_FRAMES).shape);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, hold(&reading, ALL & ~0x4013u, 0.0, FIT_SHAPES_FRAMES).shape);
 }
 
 static void test_what_hardly_presses_is_undecided(void) {
@@ -393,8 +383,7 @@ static int32_t limit_q8(int32_t unexplained_q8) {
 
 static void test_a_pair_must_explain_more_than_a_round_and_a_long_contact(void) {
   static const int32_t unexplained[] = {0, FREEDOM << 8, (4 * FREEDOM) << 8};
-  const struct fit_shapes_at apart[MODELS] = {
-      [TWO] = {{[SPAN_X] = ONE_Q20 / 2, [SPAN_Y] = ONE_Q20 / 2}}};
+  const struct fit_shapes_at apart[MODELS] = {[TWO] = {{[SPAN_X] = ONE_Q20 / 2, [SPAN_Y] = ONE_Q20 / 2}}};
   for (int i = 0; i < 3; i++) {
     const int32_t limit = limit_q8(unexplained[i]);
     for (int model = ROUND; model <= LONG; model++) { /* the better of the two counts */
@@ -415,13 +404,10 @@ static void test_a_pair_that_looks_too_long_may_explain_a_little_less(void) {
     const int32_t line = FREEDOM << 8, most = line + (line + (FIT_SHAPES_ERRORS << 8)) / 8;
     at[LONG] = (struct fit_shapes_at){{0}};
     at[LONG].value[axis] = half;
-    TEST_ASSERT_EQUAL(LONG,
-                      fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, line}, at));
+    TEST_ASSERT_EQUAL(LONG, fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, line}, at));
     at[LONG].value[axis] = -half - step;
-    TEST_ASSERT_EQUAL(TWO,
-                      fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, most - 1}, at));
-    TEST_ASSERT_EQUAL(LONG,
-                      fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, most}, at));
+    TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, most - 1}, at));
+    TEST_ASSERT_EQUAL(LONG, fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, line, most}, at));
     /* What a round contact explains is none. */
     TEST_ASSERT_EQUAL(ROUND, fit_shapes_best(&pad, (const int32_t[MODELS]){line, line, line}, at));
   }
@@ -433,10 +419,8 @@ static void test_a_pair_is_further_apart_than_half_a_pitch(void) {
   const int32_t near[][2] = {{quarter, 0}, {0, -quarter}, {quarter / 2, quarter / 2}};
   const int32_t far[][2] = {{quarter + step, 0}, {0, -quarter - step}, {quarter, quarter / 2}};
   for (int i = 0; i < 3; i++) {
-    const struct fit_shapes_at of_near[MODELS] = {
-        [TWO] = {{[SPAN_X] = near[i][0], [SPAN_Y] = near[i][1]}}};
-    const struct fit_shapes_at of_far[MODELS] = {
-        [TWO] = {{[SPAN_X] = far[i][0], [SPAN_Y] = far[i][1]}}};
+    const struct fit_shapes_at of_near[MODELS] = {[TWO] = {{[SPAN_X] = near[i][0], [SPAN_Y] = near[i][1]}}};
+    const struct fit_shapes_at of_far[MODELS] = {[TWO] = {{[SPAN_X] = far[i][0], [SPAN_Y] = far[i][1]}}};
     TEST_ASSERT_NOT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, of_near));
     TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, chi_square_q8, of_far));
   }
@@ -472,8 +456,7 @@ static void test_a_pair_of_no_spread_must_explain_more(void) {
   struct fit_shapes_at at[MODELS] = {[TWO] = {{[SPAN_X] = ONE_Q20 / 2}}};
   const int32_t pair = FREEDOM << 8, limit = limit_q8(pair), doubted = limit_q8(pair + (8 << 8));
   at[TWO].value[SPREAD] = pad.spread_least_q20 + 256;
-  TEST_ASSERT_EQUAL(TWO,
-                    fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, limit + 1, pair}, at));
+  TEST_ASSERT_EQUAL(TWO, fit_shapes_best(&pad, (const int32_t[MODELS]){1 << 20, limit + 1, pair}, at));
   at[TWO].value[SPREAD] = pad.spread_least_q20 + 255;
   for (int model = ROUND; model <= LONG; model++) {
     int32_t chi_square_q8[MODELS] = {doubted + 4096, doubted + 4096, pair};
@@ -493,10 +476,8 @@ static void test_what_no_model_explains_at_all_is_no_pair(void) {
 static void test_a_long_contact_must_explain_more_than_a_round_one(void) {
   const struct fit_shapes_at together[MODELS] = {{{0}}};
   const int32_t line = FREEDOM << 8, limit = limit_q8(line);
-  TEST_ASSERT_EQUAL(ROUND,
-                    fit_shapes_best(&pad, (const int32_t[MODELS]){limit, line, 0}, together));
-  TEST_ASSERT_EQUAL(LONG,
-                    fit_shapes_best(&pad, (const int32_t[MODELS]){limit + 1, line, 0}, together));
+  TEST_ASSERT_EQUAL(ROUND, fit_shapes_best(&pad, (const int32_t[MODELS]){limit, line, 0}, together));
+  TEST_ASSERT_EQUAL(LONG, fit_shapes_best(&pad, (const int32_t[MODELS]){limit + 1, line, 0}, together));
 }
 
 /* 256 Pa where the largest reading, of 1000 Pa, is 0.98 of a unit. */
@@ -510,8 +491,8 @@ static void test_a_sum_that_no_contact_has_begins_again(void) {
     for (int frame = 0; frame < 2; frame++) {
       int32_t pressure_Pa_q10[SENSORS] = {[7] = 1000 << 10};
       pressure_Pa_q10[0] = (sums_Pa[i][frame] - 1000) * 1024;
-      TEST_ASSERT_EQUAL(frame == 0 || i > 1, fit_shapes(&array, &pad, pressure_Pa_q10, &settings,
-                                                        &fit, &state, &result));
+      TEST_ASSERT_EQUAL(frame == 0 || i > 1,
+                        fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result));
     }
     TEST_ASSERT_EQUAL(i > 1 ? 1 : 2, state.frames);
   }
@@ -564,18 +545,15 @@ static void test_parts_add_up_to_a_frame(void) {
     press(-2.0, -6.0, 4.0, 0.0, 0.0, 0.015, &reading);
     int32_t pressure_Pa_q10[SENSORS];
     for (int k = 0; k < SENSORS; k++) {
-      pressure_Pa_q10[k] =
-          (int32_t)lround(1024.0 * (reading.Pa[k] + NOISE_Pa * random_between(&noise, -1.7, 1.7)));
+      pressure_Pa_q10[k] = (int32_t)lround(1024.0 * (reading.Pa[k] + NOISE_Pa * random_between(&noise, -1.7, 1.7)));
     }
     struct fit_result fit;
     fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
-    const bool answers =
-        fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &whole, &of_whole);
+    const bool answers = fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &whole, &of_whole);
     enum fit_shapes_progress progress;
     int count = 0;
     do {
-      progress =
-          fit_shapes_part(&array, &other, pressure_Pa_q10, &settings, &fit, &parts, &of_parts);
+      progress = fit_shapes_part(&array, &other, pressure_Pa_q10, &settings, &fit, &parts, &of_parts);
       count++;
     } while (progress == FIT_SHAPES_UNFINISHED);
     TEST_ASSERT_EQUAL(frame == 0 ? 2 : FIT_SHAPES_PARTS, count);
@@ -589,8 +567,7 @@ static void test_parts_add_up_to_a_frame(void) {
   /* Too few sensors: the contact is forgotten. */
   struct fit_result none = {.flags = 0};
   const int32_t zeros[SENSORS] = {0};
-  TEST_ASSERT_EQUAL(FIT_SHAPES_ANSWERED,
-                    fit_shapes_part(&array, &other, zeros, &settings, &none, &parts, &of_parts));
+  TEST_ASSERT_EQUAL(FIT_SHAPES_ANSWERED, fit_shapes_part(&array, &other, zeros, &settings, &none, &parts, &of_parts));
   TEST_ASSERT_EQUAL(FIT_SHAPE_UNDECIDED, of_parts.shape);
   TEST_ASSERT_EQUAL(0, parts.frames);
   TEST_ASSERT_EQUAL(0, parts.part);
@@ -606,16 +583,15 @@ static void test_garbage_leaves_finite_results(void) {
     for (int frame = 0; frame < FIT_SHAPES_FRAMES + 3; frame++) {
       int32_t pressure_Pa_q10[SENSORS];
       for (int k = 0; k < SENSORS; k++) {
-        pressure_Pa_q10[k] = (int32_t)random_between(&noise, -2147483647.0, 2147483647.0) >>
-                             (int)random_between(&noise, 0.0, i % 31);
+        pressure_Pa_q10[k] =
+            (int32_t)random_between(&noise, -2147483647.0, 2147483647.0) >> (int)random_between(&noise, 0.0, i % 31);
       }
       struct fit_result fit;
       fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fit);
       fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
-      const float all[] = {result.x_mm[0],   result.y_mm[0],           result.force_N[0],
-                           result.x_mm[1],   result.y_mm[1],           result.force_N[1],
-                           result.length_mm, result.along_x,           result.angle_sd_rad,
-                           result.qx_N,      result.location_sd_mm[0], result.force_sd_N[1]};
+      const float all[] = {result.x_mm[0],      result.y_mm[0],    result.force_N[0],        result.x_mm[1],
+                           result.y_mm[1],      result.force_N[1], result.length_mm,         result.along_x,
+                           result.angle_sd_rad, result.qx_N,       result.location_sd_mm[0], result.force_sd_N[1]};
       for (size_t m = 0; m < sizeof all / sizeof all[0]; m++) {
         TEST_ASSERT_TRUE(isfinite(all[m]));
       }

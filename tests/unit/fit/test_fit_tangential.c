@@ -71,13 +71,12 @@ static double pressure_Pa(const struct contact *contact, double x_mm, double y_m
   double dx = x_mm - contact->x_mm, dy = y_mm - contact->y_mm, sum = 0.0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
     double v = pow((double)profile.normal[j].sd_mm, 2) + contact->spread_mm2;
-    sum += contact->force_N * (double)profile.normal[j].share / v *
-           exp(-(dx * dx + dy * dy) / (2 * v));
+    sum += contact->force_N * (double)profile.normal[j].share / v * exp(-(dx * dx + dy * dy) / (2 * v));
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     double v = pow((double)profile.tangential[j].sd_mm, 2) + 1.3 * contact->spread_mm2;
-    sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)profile.tangential[j].moment_mm /
-           (v * v) * exp(-(dx * dx + dy * dy) / (2 * v));
+    sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)profile.tangential[j].moment_mm / (v * v) *
+           exp(-(dx * dx + dy * dy) / (2 * v));
   }
   double middle = 0.0, r2 = dx * dx + dy * dy;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
@@ -101,8 +100,7 @@ static void read_contact(const struct contact *contact, int32_t *readings) {
   }
 }
 
-static struct fit_tangential go_on(struct fit_tangential_state *state, const int32_t *readings,
-                                   uint32_t usable) {
+static struct fit_tangential go_on(struct fit_tangential_state *state, const int32_t *readings, uint32_t usable) {
   struct fit_result fit;
   fit_gaussian(&array, readings, usable, &settings, &fit);
   struct fit_tangential result;
@@ -141,8 +139,7 @@ static bool is_zero(const struct fit_tangential *result) {
 
 /* Of 300 contacts: the least number of valid ones, and of those the most that may be further off
  * than mm or share of the force and SDS standard deviations. */
-static void judge_pad(double thickness_mm, uint32_t usable, double mm, double share, int least,
-                      int most_off) {
+static void judge_pad(double thickness_mm, uint32_t usable, double mm, double share, int least, int most_off) {
   use_pad(thickness_mm);
   struct random random = {SEED};
   int valid = 0, outside = 0;
@@ -163,10 +160,8 @@ static void judge_pad(double thickness_mm, uint32_t usable, double mm, double sh
     /* What is told loosely is drawn towards the priors. */
     if (off_mm > mm + SDS * sd_mm || off > share * contact.force_N + SDS * sd_N) {
       outside++;
-      snprintf(text, sizeof text,
-               "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)",
-               thickness_mm, i, contact.x_mm, contact.y_mm, off_mm, sd_mm, off, contact.force_N,
-               sd_N);
+      snprintf(text, sizeof text, "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)",
+               thickness_mm, i, contact.x_mm, contact.y_mm, off_mm, sd_mm, off, contact.force_N, sd_N);
     }
   }
   TEST_ASSERT_TRUE_MESSAGE(outside <= most_off, text);
@@ -226,8 +221,7 @@ static void test_place_and_load_err_together_as_is_said(void) {
     }
     struct fit_tangential found = estimate(readings, ALL);
     TEST_ASSERT_TRUE(found.valid);
-    double q[2] = {(double)((found.qx_N - at.qx_N) / at.force_N),
-                   (double)((found.qy_N - at.qy_N) / at.force_N)};
+    double q[2] = {(double)((found.qx_N - at.qx_N) / at.force_N), (double)((found.qy_N - at.qy_N) / at.force_N)};
     double moved[2] = {(double)(found.x_mm - at.x_mm), (double)(found.y_mm - at.y_mm)};
     for (int i = 0; i < 2; i++) {
       square[i] += q[i] * q[i];
@@ -609,25 +603,22 @@ static void test_any_bits_give_finite_results(void) {
       settings.gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
     }
     uint32_t usable = random_below(&random, 2) ? ALL : random_u32(&random) | random_u32(&random);
-    struct fit_tangential found =
-        i % 2 ? go_on(&state, readings, usable) : estimate(readings, usable);
-    const float values[] = {
-        found.x_mm,    found.y_mm,       found.location_sd_mm, found.location_noise_mm,
-        found.force_N, found.force_sd_N, found.qx_N,           found.qy_N,
-        found.q_sd_N};
+    struct fit_tangential found = i % 2 ? go_on(&state, readings, usable) : estimate(readings, usable);
+    const float values[] = {found.x_mm,    found.y_mm,       found.location_sd_mm, found.location_noise_mm,
+                            found.force_N, found.force_sd_N, found.qx_N,           found.qy_N,
+                            found.q_sd_N};
     bool good = found.valid || is_zero(&found);
     for (size_t k = 0; k < sizeof values / sizeof *values; k++) {
       good = good && isfinite(values[k]);
     }
-    good = good && (!found.valid || (found.force_N > 0.0f && found.q_sd_N > 0.0f &&
-                                     found.force_sd_N > 0.0f && found.location_sd_mm > 0.0f &&
-                                     fabsf(found.x_mm) < 26.0f && fabsf(found.y_mm) < 35.0f));
+    good = good &&
+           (!found.valid || (found.force_N > 0.0f && found.q_sd_N > 0.0f && found.force_sd_N > 0.0f &&
+                             found.location_sd_mm > 0.0f && fabsf(found.x_mm) < 26.0f && fabsf(found.y_mm) < 35.0f));
     if (!good) {
       char text[200];
-      snprintf(text, sizeof text, "input %u: x %g y %g sd %g force %g sd %g q %g %g sd %g",
-               (unsigned)i, (double)found.x_mm, (double)found.y_mm, (double)found.location_sd_mm,
-               (double)found.force_N, (double)found.force_sd_N, (double)found.qx_N,
-               (double)found.qy_N, (double)found.q_sd_N);
+      snprintf(text, sizeof text, "input %u: x %g y %g sd %g force %g sd %g q %g %g sd %g", (unsigned)i,
+               (double)found.x_mm, (double)found.y_mm, (double)found.location_sd_mm, (double)found.force_N,
+               (double)found.force_sd_N, (double)found.qx_N, (double)found.qy_N, (double)found.q_sd_N);
       TEST_FAIL_MESSAGE(text);
     }
     valid += found.valid;

@@ -39,8 +39,7 @@ static void test_one_hot(void) {
     fit_gaussian(&array, readings, ALL, &usual, &result);
     assert_finite_and_defined();
     TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, result.flags);
-    TEST_ASSERT_NOT_EQUAL_UINT32(0,
-                                 result.flags & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND));
+    TEST_ASSERT_NOT_EQUAL_UINT32(0, result.flags & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND));
     if (!(result.flags & CONTACT_FLAG_AT_BOUND)) {
       TEST_ASSERT_FLOAT_WITHIN(PITCH_mm, x_mm[hot], result.x_mm);
       TEST_ASSERT_FLOAT_WITHIN(PITCH_mm, y_mm[hot], result.y_mm);
@@ -75,8 +74,7 @@ static void test_gains_spread_the_location_as_predicted(void) {
       for (int k = 0; k < SENSORS; k++) {
         double sd = k % 3 ? 0.02 : 0.0;
         settings.gain_sd_q16[k] = (uint16_t)(65536.0 * sd);
-        readings[k] = to_q10((1.0 + sd * random_normal(&random)) *
-                             gaussian(&press, (double)x_mm[k], (double)y_mm[k]));
+        readings[k] = to_q10((1.0 + sd * random_normal(&random)) * gaussian(&press, (double)x_mm[k], (double)y_mm[k]));
       }
       if (kernel == 2) {
         fit_general(&array, readings, used, &settings, &result);
@@ -118,8 +116,7 @@ static void test_widths_and_slant(void) {
     double xy = (longer * longer - shorter * shorter) * s * c;
     TEST_ASSERT_FLOAT_WITHIN(i % 2 ? 0.6f : 0.02f, (float)sqrt(xx), result.sigma_x_mm);
     TEST_ASSERT_FLOAT_WITHIN(i % 2 ? 0.6f : 0.02f, (float)sqrt(yy), result.sigma_y_mm);
-    TEST_ASSERT_FLOAT_WITHIN(i % 2 ? 0.1f : 0.005f, (float)(xy / sqrt(xx * yy)),
-                             result.width_correlation);
+    TEST_ASSERT_FLOAT_WITHIN(i % 2 ? 0.1f : 0.005f, (float)(xy / sqrt(xx * yy)), result.width_correlation);
   }
   /* Not told apart from gains that are off by so much. */
   for (int k = 0; k < SENSORS; k++) {
@@ -195,8 +192,8 @@ static void test_two_contacts_are_not_the_model(void) {
   struct press one = {0.0, -14.0, 5000.0, 5.0};
   struct press other = {0.0, 14.0, 5000.0, 5.0};
   for (int k = 0; k < SENSORS; k++) {
-    readings[k] = to_q10(gaussian(&one, (double)x_mm[k], (double)y_mm[k]) +
-                         gaussian(&other, (double)x_mm[k], (double)y_mm[k]));
+    readings[k] =
+        to_q10(gaussian(&one, (double)x_mm[k], (double)y_mm[k]) + gaussian(&other, (double)x_mm[k], (double)y_mm[k]));
   }
   fit_gaussian(&array, readings, ALL, &usual, &result);
   assert_finite_and_defined();
@@ -216,8 +213,7 @@ static void test_a_fit_that_still_moves_says_how_far(void) {
     for (settings.iterations = 2; settings.iterations <= 5; settings.iterations++) {
       struct fit_result before = result;
       fit_general(&array, readings, ALL, &settings, &result);
-      double moved_mm =
-          hypot((double)(result.x_mm - before.x_mm), (double)(result.y_mm - before.y_mm));
+      double moved_mm = hypot((double)(result.x_mm - before.x_mm), (double)(result.y_mm - before.y_mm));
       if (before.used != ALL || result.used != ALL) {
         continue; /* without a sensor it is another fit */
       }
@@ -229,8 +225,8 @@ static void test_a_fit_that_still_moves_says_how_far(void) {
 }
 
 /* Share of presses farther off than 1 mm that carry no warning, and of those with a warning. */
-static void shares(double sigma_low_mm, double sigma_high_mm, double outside_mm, bool corner,
-                   uint64_t seed, double *unflagged, double *warned) {
+static void shares(double sigma_low_mm, double sigma_high_mm, double outside_mm, bool corner, uint64_t seed,
+                   double *unflagged, double *warned) {
   struct fit_settings settings = usual;
   settings.model_sd_q16 = 426; /* 0.65 %, as the firmware */
   enum { PRESSES = 5000 };
@@ -250,9 +246,8 @@ static void shares(double sigma_low_mm, double sigma_high_mm, double outside_mm,
     read_press(&press, 5.0, &random);
     fit_gaussian(&array, readings, ALL, &settings, &result);
     assert_finite_and_defined();
-    bool doubtful =
-        result.flags & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL |
-                        CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT);
+    bool doubtful = result.flags & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL |
+                                    CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT);
     warnings += doubtful;
     bad += !doubtful && location_error_mm(&press) > 1.0;
   }
@@ -276,11 +271,11 @@ static void test_stiff_cases_are_flagged(void) {
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     double unflagged, warned;
-    shares(cases[i].sigma_low_mm, cases[i].sigma_high_mm, cases[i].outside_mm, cases[i].corner,
-           80 + i, &unflagged, &warned);
+    shares(cases[i].sigma_low_mm, cases[i].sigma_high_mm, cases[i].outside_mm, cases[i].corner, 80 + i, &unflagged,
+           &warned);
     char text[140];
-    snprintf(text, sizeof text, "%s: beyond 1 mm unflagged %.4f, with a warning %.3f",
-             cases[i].name, unflagged, warned);
+    snprintf(text, sizeof text, "%s: beyond 1 mm unflagged %.4f, with a warning %.3f", cases[i].name, unflagged,
+             warned);
     TEST_MESSAGE(text);
     TEST_ASSERT_TRUE_MESSAGE(unflagged <= cases[i].most_unflagged, cases[i].name);
     TEST_ASSERT_TRUE_MESSAGE(warned <= cases[i].most_warned, cases[i].name);

@@ -33,8 +33,7 @@ inline GripperTraits fine_gripper() {
 
 class GripWorld {
 public:
-  explicit GripWorld(const std::map<std::string, double> &wanted = {},
-                     const GripperTraits &gripper = fine_gripper())
+  explicit GripWorld(const std::map<std::string, double> &wanted = {}, const GripperTraits &gripper = fine_gripper())
       : traits(gripper), settings(settings_for(gripper, wanted)), grip(settings, gripper) {
     sent_before_.assign(64, width_mm);
   }
@@ -82,8 +81,8 @@ public:
   GripReport report;
   double t_s = 1.0, width_mm = 60.0, force_N = 0.0, load_N = 0.0, slide_mm_s = 0.0;
   double object_mm = 40.0, stiffness = 3.0, power = 1.6; // of a pad at 1 mm; 0 mm: nothing there
-  double off_mm = 0.0;   // the object presses fingertip 0 by so much more, fingertip 1 less
-  double delay_s = 0.0;  // of frames
+  double off_mm = 0.0;  // the object presses fingertip 0 by so much more, fingertip 1 less
+  double delay_s = 0.0; // of frames
   double frame_s = 1.0 / 410.0;
   std::array<double, 2> gain{1.0, 1.0};
   double sd_share = 0.05; // of a force, as reported

@@ -310,8 +310,8 @@ TEST(Grip, NothingWrongComesOfAnything) {
       }
       GripCommand command;
       const GripReport report = grip.step(t_s, command);
-      for (const double value : {command.width_mm, command.speed_mm_s, command.force_N,
-                                 report.wanted_N, report.load_N, report.margin, report.friction}) {
+      for (const double value : {command.width_mm, command.speed_mm_s, command.force_N, report.wanted_N, report.load_N,
+                                 report.margin, report.friction}) {
         ASSERT_TRUE(std::isfinite(value));
       }
       ASSERT_GE(command.width_mm, 0.0);

@@ -4,8 +4,8 @@
 #include <utility>
 
 using namespace fingertip;
-using test::fine_gripper;
 using test::expect_share;
+using test::fine_gripper;
 using test::GripWorld;
 
 TEST(Grip, FollowsTheLoadAndFallsToTheFloorThen) {

@@ -141,8 +141,8 @@ TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
           world.run(5.0);
           world.pull(world.report.state == GRIP_HOLDING ? 0.6 : 0.0, 0.3);
           world.run(0.5);
-          const auto about = std::to_string(stiffness) + " " + std::to_string(power) + " " +
-                             std::to_string(touch_mm) + " " + std::to_string(off_mm);
+          const auto about = std::to_string(stiffness) + " " + std::to_string(power) + " " + std::to_string(touch_mm) +
+                             " " + std::to_string(off_mm);
           EXPECT_LE(world.peak_N, 2.4) << about;
           if (off_mm == 0.0) { // one that does not give may leave no room for the other pad
             EXPECT_EQ(world.report.state, GRIP_HOLDING) << about;

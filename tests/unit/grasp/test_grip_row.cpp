@@ -48,8 +48,7 @@ std::string with_cell(const std::string &column, const std::string &cell) {
   const std::string value = "1530022.5," + grip_cells(row_with_everything());
   const auto names = split(header, ',');
   auto cells = split(value, ',');
-  cells[static_cast<std::size_t>(std::find(names.begin(), names.end(), column) - names.begin())] =
-      cell;
+  cells[static_cast<std::size_t>(std::find(names.begin(), names.end(), column) - names.begin())] = cell;
   std::string all;
   for (const std::string_view each : cells) {
     all += (all.empty() ? "" : ",") + std::string(each);
@@ -125,8 +124,7 @@ TEST(GripRow, EveryWrongCellIsNamed) {
 TEST_F(GripRowFile, RowsAreFoundBetweenOthersAndFromAnyPlace) {
   const std::string row = grip_cells(row_with_everything());
   write({"# fingertip-recording 2\n", "# grip: time_us," + grip_columns() + "\n", "0,1,2\n",
-         "# grip: 100.0," + row + "\n", "# grip_event: 1.0,hold\n",
-         "# grip: 200.0," + row + "\r\n"});
+         "# grip: 100.0," + row + "\n", "# grip_event: 1.0,hold\n", "# grip: 200.0," + row + "\r\n"});
   GripRowReader reader(path_, false);
   EXPECT_EQ(reader.next()->time_us, 100);
   const auto place = reader.place();
@@ -138,8 +136,8 @@ TEST_F(GripRowFile, RowsAreFoundBetweenOthersAndFromAnyPlace) {
 
 TEST_F(GripRowFile, DamageIsSaidWithItsLineOrSkipped) {
   const std::string row = grip_cells(row_with_everything());
-  write({"# grip: time_us," + grip_columns() + "\n", "# grip: 100.0,nonsense\n",
-         "# grip: 200.0," + row + "\n", "# grip: 300.0," + row});
+  write({"# grip: time_us," + grip_columns() + "\n", "# grip: 100.0,nonsense\n", "# grip: 200.0," + row + "\n",
+         "# grip: 300.0," + row});
   GripRowReader strict(path_, false);
   try {
     strict.next();
@@ -184,8 +182,7 @@ TEST_F(GripRowFile, AJointRecordingWithThemIsReadAsOneWithoutByWhoeverDoesNotKno
     RecordingReader reader(path_, false, serial);
     std::uint32_t frames = 0;
     while (auto item = reader.next()) {
-      frames +=
-          item->kind == RecordingReader::Item::Kind::packet && item->packet.type == WIRE_CONTACT;
+      frames += item->kind == RecordingReader::Item::Kind::packet && item->packet.type == WIRE_CONTACT;
     }
     EXPECT_EQ(frames, 10u);
     EXPECT_TRUE(reader.has_end());

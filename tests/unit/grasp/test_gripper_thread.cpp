@@ -51,8 +51,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
     pass();
   }
   EXPECT_TRUE(thread.is_done());
-  EXPECT_TRUE(
-      comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
+  EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
   for (int i = 0; i < 5; i++) {
     thread.command({{38.0, 50.0, 0.0}, GRIP_MOVE}); /* the same */
     EXPECT_TRUE(comes(thread, is_answer));
@@ -126,8 +125,7 @@ TEST_F(GripperThreadTest, ThatNobodySpokeToItIsToldAndNoFault) {
   state_->was_left_alone = true;
   GripperThread thread(open()(), open());
   EXPECT_TRUE(comes(thread, [](const auto &news) {
-    return news.status && news.status->fault == 0 &&
-           news.trouble == "no command for a second";
+    return news.status && news.status->fault == 0 && news.trouble == "no command for a second";
   }));
   state_->was_left_alone = false;
   EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.trouble.empty(); }));

@@ -18,8 +18,7 @@ double pad_N(double width_mm) {
 // A gripper that cannot limit its own force to the cap, between two fingertips.
 class Bench {
 public:
-  explicit Bench(double begins_mm = PRESSED_mm)
-      : reach(gripper_traits("2f85")), width_mm(begins_mm) {
+  explicit Bench(double begins_mm = PRESSED_mm) : reach(gripper_traits("2f85")), width_mm(begins_mm) {
     settings.cap_N = CAP_N;
     answer(width_mm, false, 0.3);
     reach.first_touch(t_s);

@@ -1,9 +1,9 @@
 #include "grasp/settings.hpp"
 #include "libfingertip/error.hpp"
 
-#include <gtest/gtest.h>
 #include <algorithm>
 #include <cstddef>
+#include <gtest/gtest.h>
 #include <set>
 
 using namespace fingertip;
@@ -67,12 +67,10 @@ TEST(GraspSettings, RangesHold) {
       const GripSettings settings = settings_for(any(), wanted);
       EXPECT_NEAR(value_of(setting, settings), wanted[name], 1e-9 + 1e-9 * value) << name;
     }
-    for (const double value :
-         {setting.low - 0.02 * setting.high - 0.01, setting.high * 1.01, 0.0 / 0.0}) {
+    for (const double value : {setting.low - 0.02 * setting.high - 0.01, setting.high * 1.01, 0.0 / 0.0}) {
       std::map<std::string, double> wanted = {{"cap", 100}};
       wanted[name] = value;
-      EXPECT_NE(error_of(wanted).find("--" + name), std::string::npos)
-          << name;
+      EXPECT_NE(error_of(wanted).find("--" + name), std::string::npos) << name;
     }
   }
 }
@@ -80,11 +78,9 @@ TEST(GraspSettings, RangesHold) {
 TEST(GraspSettings, DefaultsGiveWayButWishesDoNot) {
   EXPECT_EQ(settings_for(any(), {{"cap", 5}}).blind_N, 5.0);
   EXPECT_EQ(settings_for(any(), {{"cap", 3}}).start_N, 3.0);
-  EXPECT_NE(error_of({{"cap", 5}, {"blind", 6}}).find("--blind is not possible"),
-            std::string::npos);
+  EXPECT_NE(error_of({{"cap", 5}, {"blind", 6}}).find("--blind is not possible"), std::string::npos);
   EXPECT_NE(error_of({{"cap", 5}, {"fixed", 6}}).find("above --cap"), std::string::npos);
-  EXPECT_NE(error_of({{"start", 3}, {"blind", 2}}).find("between --start and --cap"),
-            std::string::npos);
+  EXPECT_NE(error_of({{"start", 3}, {"blind", 2}}).find("between --start and --cap"), std::string::npos);
   EXPECT_NE(error_of({{"open-width", 86}}).find("2f85 opens to 85.0 mm"), std::string::npos);
   EXPECT_EQ(settings_for(any(), {{"fixed", 4}}).mode, GRIP_MODE_FIXED);
   EXPECT_EQ(settings_for(any(), {{"fixed", 4}}).set_N, 4.0);
@@ -101,8 +97,7 @@ TEST(GraspSettings, PresetsStayWellBelowWhatBreaks) {
 }
 
 TEST(GraspSettings, AGripperWhoseStepExceedsTheCapIsRefused) {
-  EXPECT_NE(error_of(preset_values("crisp")).find("the least move of a 2f85, 0.75 mm"),
-            std::string::npos);
+  EXPECT_NE(error_of(preset_values("crisp")).find("the least move of a 2f85, 0.75 mm"), std::string::npos);
   EXPECT_EQ(error_of(preset_values("cup")), "");
   EXPECT_NO_THROW(settings_for(gripper_traits("sts3215"), preset_values("crisp")));
 }

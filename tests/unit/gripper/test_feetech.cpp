@@ -55,14 +55,12 @@ template <typename Act> ErrorCode code_of(Act act) {
  * 56 of it, writes position 2048, time 0 and speed 1000; the answer is a read's. */
 TEST(FeetechPacket, IsThatOfTheManual) {
   using feetech::Bytes;
-  EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::PING}),
-            (Bytes{0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB}));
+  EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::PING}), (Bytes{0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB}));
   EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::READ, .parameters = {0x38, 0x02}}),
             (Bytes{0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE}));
-  EXPECT_EQ(feetech::encoded({.id = 1,
-                              .code = feetech::WRITE,
-                              .parameters = {0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03}}),
-            (Bytes{0xFF, 0xFF, 0x01, 0x09, 0x03, 0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03, 0xD5}));
+  EXPECT_EQ(
+      feetech::encoded({.id = 1, .code = feetech::WRITE, .parameters = {0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03}}),
+      (Bytes{0xFF, 0xFF, 0x01, 0x09, 0x03, 0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03, 0xD5}));
   Bytes answer = {0xFF, 0xFF, 0x01, 0x04, 0x00, 0x18, 0x05, 0xDD};
   std::size_t skipped = 0;
   const auto packet = feetech::take_packet(&answer, &skipped);
@@ -73,8 +71,7 @@ TEST(FeetechPacket, IsThatOfTheManual) {
 }
 
 TEST(FeetechPacket, IsFoundInNoiseHoweverItComes) {
-  const feetech::Bytes packet =
-      feetech::encoded({.id = 6, .code = 0, .parameters = {0xFF, 0xFF, 1}});
+  const feetech::Bytes packet = feetech::encoded({.id = 6, .code = 0, .parameters = {0xFF, 0xFF, 1}});
   feetech::Bytes line = {0xFF, 0x00, 0xFF, 0xFF, 0x06, 0x02, 0x00, 0x12, 0xFF};
   const std::size_t noise = line.size();
   line.insert(line.end(), packet.begin(), packet.end());
@@ -98,8 +95,7 @@ TEST(Jaw, IsAChord) {
     for (double width_mm : {0.0, 1.0, 30.0, 100.0}) {
       const double count = jaw.count(width_mm);
       EXPECT_NEAR(jaw.width_mm(count), width_mm, 1e-9);
-      EXPECT_NEAR(std::abs(jaw.width_mm(count + 0.5) - jaw.width_mm(count - 0.5)),
-                  jaw.slope_mm(width_mm), 1e-4);
+      EXPECT_NEAR(std::abs(jaw.width_mm(count + 0.5) - jaw.width_mm(count - 0.5)), jaw.slope_mm(width_mm), 1e-4);
     }
   }
 }
@@ -116,8 +112,7 @@ TEST(Feetech, MovesItsJawOnceActivated) {
   EXPECT_TRUE(gripper->poll().active);
   EXPECT_NEAR(gripper->poll().width_mm, traits.stroke_mm, 0.1);
   for (double width_mm : {50.0, 10.0, 0.0, 90.0}) {
-    const GripperStatus status =
-        moved(simulated, *gripper, {.width_mm = width_mm, .speed_mm_s = 400});
+    const GripperStatus status = moved(simulated, *gripper, {.width_mm = width_mm, .speed_mm_s = 400});
     EXPECT_NEAR(status.width_mm, width_mm, traits.step_mm / 2 + 1e-6);
     EXPECT_EQ(status.object, false);
     EXPECT_EQ(status.fault, 0);
@@ -132,13 +127,10 @@ TEST(Feetech, KnowsAnObjectByWhereItStops) {
       return force_N > 0 && width_mm < 40 && (40 - width_mm) * 2 >= force_N;
     };
   });
-  const GripperStatus status =
-      moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 300, .force_N = 8});
+  const GripperStatus status = moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 300, .force_N = 8});
   EXPECT_EQ(status.object, true);
   EXPECT_GT(status.current_A, 0.5);
-  EXPECT_NEAR(
-      simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }), 36,
-      0.05);
+  EXPECT_NEAR(simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }), 36, 0.05);
 }
 
 TEST(Feetech, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
@@ -157,9 +149,7 @@ TEST(Feetech, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
       trouble.fault = one.fault;
       trouble.answers = 1;
       simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
-      EXPECT_EQ(code_of([&] {
-                  polls ? gripper->poll() : gripper->move({.width_mm = 50, .speed_mm_s = 100});
-                }),
+      EXPECT_EQ(code_of([&] { polls ? gripper->poll() : gripper->move({.width_mm = 50, .speed_mm_s = 100}); }),
                 one.code)
           << static_cast<int>(one.fault) << polls;
       EXPECT_TRUE(gripper->poll().active);
@@ -170,9 +160,7 @@ TEST(Feetech, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
 TEST(Feetech, FaultsAreBits) {
   Served simulated(options());
   std::unique_ptr<Gripper> gripper = activated(simulated.port());
-  simulated.with([](GripperServer &server, GripperMotion &) {
-    server.fail(feetech::OVERLOAD | feetech::TEMPERATURE);
-  });
+  simulated.with([](GripperServer &server, GripperMotion &) { server.fail(feetech::OVERLOAD | feetech::TEMPERATURE); });
   const GripperStatus status = gripper->poll();
   EXPECT_EQ(status.fault, feetech::OVERLOAD | feetech::TEMPERATURE);
   EXPECT_EQ(gripper->fault_text(status.fault), "too hot, overloaded");
@@ -222,10 +210,8 @@ Packet table() {
 
 Packet status(int position) {
   Bytes bytes(31);
-  bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE] =
-      static_cast<std::uint8_t>(position & 0xFF);
-  bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE + 1] =
-      static_cast<std::uint8_t>(position >> 8);
+  bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE] = static_cast<std::uint8_t>(position & 0xFF);
+  bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE + 1] = static_cast<std::uint8_t>(position >> 8);
   return {6, 0, bytes};
 }
 
@@ -236,8 +222,7 @@ TEST(FeetechFrames, TheirOwnEchoIsIgnored) {
   const auto exchange = [](const Packet &question, const Packet &answer) {
     return std::pair(text(question), text(question) + " " + text(answer));
   };
-  Tape tape({exchange(ASK_TABLE, table()), exchange(ASK_STATUS, status(2304)),
-             exchange(ASK_STATUS, status(2304))});
+  Tape tape({exchange(ASK_TABLE, table()), exchange(ASK_STATUS, status(2304)), exchange(ASK_STATUS, status(2304))});
   {
     std::unique_ptr<Gripper> gripper = opened(tape.port());
     EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 16), 1e-9);
@@ -268,8 +253,7 @@ TEST(Feetech, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   Served simulated(options());
   std::unique_ptr<Gripper> gripper = activated(simulated.port());
   const auto width_mm = [&] {
-    return simulated.with(
-        [](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
+    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
   };
   Random random(7, 0, 0);
   int answers = 0;

@@ -158,8 +158,7 @@ TEST(Robotiq, GripsAnObjectAndLosesIt) {
       return force_N > 0 && (40 - width_mm) * 10 >= force_N && width_mm < 40;
     };
   });
-  GripperStatus status =
-      moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 150, .force_N = 20});
+  GripperStatus status = moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 150, .force_N = 20});
   EXPECT_EQ(status.object, true);
   EXPECT_NEAR(status.width_mm, 38, 0.2);
   EXPECT_GT(status.current_A, 0.05);
@@ -176,12 +175,10 @@ TEST(Robotiq, WidthsOfAllModels) {
     const GripperTraits &traits = gripper->traits();
     EXPECT_EQ(gripper->poll().width_mm, traits.stroke_mm);
     for (double part : {0.5, 0.25, 0.0, 1.0}) {
-      const GripperStatus status =
-          moved(simulated, *gripper, {.width_mm = part * traits.stroke_mm, .speed_mm_s = 1e6});
+      const GripperStatus status = moved(simulated, *gripper, {.width_mm = part * traits.stroke_mm, .speed_mm_s = 1e6});
       EXPECT_NEAR(status.width_mm, part * traits.stroke_mm, traits.step_mm / 2 + 1e-9) << model;
-      EXPECT_NEAR(
-          simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }),
-          status.width_mm, 1e-9);
+      EXPECT_NEAR(simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }),
+                  status.width_mm, 1e-9);
     }
   }
 }
@@ -190,9 +187,7 @@ TEST(Robotiq, FindsTheFunctionsThatItAnswers) {
   const struct {
     std::vector<int> functions;
     const char *line;
-  } CASES[] = {{{3, 4, 16, 23}, "function 23"},
-               {{3, 16}, "function 16 and 3"},
-               {{4, 16}, "function 16 and 4"}};
+  } CASES[] = {{{3, 4, 16, 23}, "function 23"}, {{3, 16}, "function 16 and 3"}, {{4, 16}, "function 16 and 4"}};
   for (const auto &one : CASES) {
     Served simulated(served("2f85", one.functions));
     std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
@@ -234,8 +229,7 @@ TEST(Robotiq, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
 
 /* An answer that comes when the next question has been asked says what was, not what is. */
 TEST(RobotiqFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
-  const std::string stale = with_crc("09 04 06 F9 00 00 00 40 00"),
-                    fresh = with_crc("09 04 06 F9 00 00 00 80 00"),
+  const std::string stale = with_crc("09 04 06 F9 00 00 00 40 00"), fresh = with_crc("09 04 06 F9 00 00 00 80 00"),
                     one = with_crc("09 04 07 D0 00 01");
   Tape tape({{"09 04 07 D0 00 03 B1 CE", stale},
              {"09 04 07 D0 00 03 B1 CE", ""},
@@ -306,17 +300,14 @@ TEST(Robotiq, OnlyActivateClearsAFault) {
 /* What the manuals say of moves that come at the wrong time, and of automatic release. */
 TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
   Served simulated(served("2f85"));
-  const auto fault = [&] {
-    return asked(simulated.port(), "09 04 07 D0 00 03 B1 CE", 11).substr(6 * 3 - 3, 2);
-  };
+  const auto fault = [&] { return asked(simulated.port(), "09 04 07 D0 00 03 B1 CE", 11).substr(6 * 3 - 3, 2); };
   asked(simulated.port(), with_crc("09 10 03 E8 00 03 06 08 00 00 FF FF FF"), 8);
   EXPECT_EQ(fault(), "07");
   asked(simulated.port(), with_crc("09 10 03 E8 00 03 06 09 00 00 FF FF FF"), 8);
   EXPECT_EQ(fault(), "05");
   std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
   /* Then it goes where it was told to. */
-  EXPECT_EQ(wait_for(simulated, *gripper,
-                     [](const GripperStatus &status) { return status.active && !status.moving; })
+  EXPECT_EQ(wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.active && !status.moving; })
                 .width_mm,
             0.0);
   gripper.reset();
@@ -336,8 +327,7 @@ TEST(Robotiq, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   Served simulated(served("2f85"));
   std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
   const auto width_mm = [&] {
-    return simulated.with(
-        [](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
+    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
   };
   Random random(7, 0, 0);
   int answers = 0;
@@ -383,18 +373,12 @@ TEST(Robotiq, RefusesWhatCannotBe) {
   EXPECT_EQ(code_of([&] { opened("2f85", "/dev/null"); }), ErrorCode::not_a_port);
   EXPECT_EQ(code_of([&] { opened("2f85", simulated.port()); }), ErrorCode::port_in_use);
   gripper.reset();
-  EXPECT_EQ(code_of([&] {
-              open_gripper(
-                  {.model = "2f85", .port = simulated.port(), .slave = 10});
-            }),
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 10}); }),
             ErrorCode::gripper_silent);
-  EXPECT_EQ(
-      code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 300}); }),
-      ErrorCode::bad_value);
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 300}); }),
+            ErrorCode::bad_value);
   for (int closed : {3, 2, 256, -1}) {
-    EXPECT_EQ(code_of([&] {
-                open_gripper({.model = "2f85", .port = simulated.port(), .closed_count = closed});
-              }),
+    EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .closed_count = closed}); }),
               ErrorCode::bad_value);
   }
 }

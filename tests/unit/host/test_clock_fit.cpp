@@ -25,8 +25,7 @@ constexpr double HOST_us = 5e12; /* two months of uptime */
 
 /* Exchanges every 100 ms, after a burst, and the largest error of any frame after that, us; the
  * bound must hold at every exchange. */
-double worst_error_us(const Device &device, double seconds, std::uint64_t seed,
-                      double burst_us = 0) {
+double worst_error_us(const Device &device, double seconds, std::uint64_t seed, double burst_us = 0) {
   ClockFit fit;
   double worst = 0;
   double sent_us = HOST_us;
@@ -37,14 +36,12 @@ double worst_error_us(const Device &device, double seconds, std::uint64_t seed,
     double back_us = 60 + random.uniform(0, 1000) - 300 * std::log(random.uniform(1e-9, 1));
     back_us += random.uniform(0, 1) < 0.05 ? burst_us : 0;
     double received_us = sent_us + there_us + back_us;
-    fit.add({std::llround(std::floor(sent_us)), std::llround(std::ceil(received_us)),
-             device.at(sent_us + there_us)});
+    fit.add({std::llround(std::floor(sent_us)), std::llround(std::ceil(received_us)), device.at(sent_us + there_us)});
     const ClockEstimate &now = *fit.estimate();
     double error_us = now.host_at(device.at(sent_us + there_us)) - (sent_us + there_us);
     EXPECT_LE(std::abs(error_us), now.uncertainty_us + 2) << i;
     double step_us = i < 32 ? 6000 : 100000;
-    for (double later_us = received_us; i >= 32 && later_us < received_us + step_us;
-         later_us += 2500) {
+    for (double later_us = received_us; i >= 32 && later_us < received_us + step_us; later_us += 2500) {
       worst = std::max(worst, std::abs(now.host_at(device.at(later_us)) - later_us));
     }
     sent_us = received_us + step_us;
@@ -94,8 +91,7 @@ TEST(ClockFit, AJumpIsNoticedAndForgotten) {
   }
   EXPECT_GE(fit.jumps(), 1u);
   std::int64_t end_us = 1000000 + 199 * 250000 + 200;
-  EXPECT_NEAR(fit.estimate()->host_at(static_cast<std::uint64_t>(end_us) + 50000),
-              static_cast<double>(end_us), 100);
+  EXPECT_NEAR(fit.estimate()->host_at(static_cast<std::uint64_t>(end_us) + 50000), static_cast<double>(end_us), 100);
 }
 
 TEST(ClockFit, WhatCannotBeIsLeftOut) {

@@ -83,8 +83,7 @@ TEST(Command, CarriesItsValue) {
   EXPECT_EQ(decoded(command_erase_pad()).type, WIRE_CMD_ERASE_PAD);
   wire_packet calibrate = decoded(command_calibrate(test::make_calibration(), 15));
   EXPECT_EQ(calibrate.body.cmd_calibrate.sensor_count, 15);
-  EXPECT_EQ(calibrate.body.cmd_calibrate.calibration.sensors[14].gain,
-            test::make_calibration().sensors[14].gain);
+  EXPECT_EQ(calibrate.body.cmd_calibrate.calibration.sensors[14].gain, test::make_calibration().sensors[14].gain);
 }
 
 TEST(Command, BytesOnTheLine) {
@@ -112,11 +111,29 @@ TEST(Command, ACalibrationOutOfRangeIsNotSent) {
 }
 
 TEST(Command, SettingsAsTyped) {
-  for (const char *text :
-       {"rate=20.000", "rate=0.100", "rate=2000.000", "rate=max", "osr=256", "osr=512", "osr=1024",
-        "osr=2048", "osr=4096", "osr=8192", "slip_threshold=0.01", "slip_threshold=50",
-        "slip_window=5", "slip_window=1000", "prior=3.1:0.5", "prior=100:0.01", "prior=none",
-        "limit=0.6", "limit=100", "sync=in", "sync=frame", "sync=second", "sync=off"}) {
+  for (const char *text : {"rate=20.000",
+                           "rate=0.100",
+                           "rate=2000.000",
+                           "rate=max",
+                           "osr=256",
+                           "osr=512",
+                           "osr=1024",
+                           "osr=2048",
+                           "osr=4096",
+                           "osr=8192",
+                           "slip_threshold=0.01",
+                           "slip_threshold=50",
+                           "slip_window=5",
+                           "slip_window=1000",
+                           "prior=3.1:0.5",
+                           "prior=100:0.01",
+                           "prior=none",
+                           "limit=0.6",
+                           "limit=100",
+                           "sync=in",
+                           "sync=frame",
+                           "sync=second",
+                           "sync=off"}) {
     EXPECT_EQ(as_shown(text), text);
   }
   EXPECT_EQ(as_shown("prior=3.1"), "prior=3.1:0.5");
@@ -130,9 +147,7 @@ TEST(Command, SettingsOutOfRangeAreRefused) {
       {"osr", {"0", "128", "257", "1000", "16384", "65792", "-256", "1024.0", ""}},
       {"slip_threshold", {"0", "0.009", "50.1", "-1", "nan", "x", ""}},
       {"slip_window", {"0", "4", "1001", "65541", "-5", "99999999999999999999", "5.5"}},
-      {"prior",
-       {"", "x", "3.1:", ":0.5", "0", "0:0", "0.4", "101", "3:0", "3:101", "3:nan", "inf",
-        "3:0.5:1", "-3"}},
+      {"prior", {"", "x", "3.1:", ":0.5", "0", "0:0", "0.4", "101", "3:0", "3:101", "3:nan", "inf", "3:0.5:1", "-3"}},
       {"limit", {"", "0", "0.009", "101", "nan", "none"}},
       {"sync", {"", "out", "1", "0", "In", "in ", "infinity", "none"}},
   };
@@ -161,15 +176,13 @@ TEST(Command, WhatTravelsWithASettingStaysAsItIs) {
   wire_info now{};
   now.slip_threshold_mm = 0.75f;
   now.slip_window_ms = 100;
-  auto commands = setting_commands({setting_from_text("slip_window=250"),
-                                    setting_from_text("limit=1"), setting_from_text("limit=2")},
-                                   now);
+  auto commands = setting_commands(
+      {setting_from_text("slip_window=250"), setting_from_text("limit=1"), setting_from_text("limit=2")}, now);
   ASSERT_EQ(commands.size(), 2u);
   EXPECT_EQ(decoded(commands[0]).body.cmd_slip.threshold_mm, 0.75f);
   EXPECT_EQ(decoded(commands[0]).body.cmd_slip.window_ms, 250);
   EXPECT_EQ(decoded(commands[1]).body.cmd_location_limit.limit_mm, 2.0f) << "the last one counts";
-  commands = setting_commands(
-      {setting_from_text("slip_threshold=1"), setting_from_text("slip_window=9")}, now);
+  commands = setting_commands({setting_from_text("slip_threshold=1"), setting_from_text("slip_window=9")}, now);
   ASSERT_EQ(commands.size(), 1u);
   EXPECT_EQ(decoded(commands[0]).body.cmd_slip.threshold_mm, 1.0f);
   EXPECT_EQ(decoded(commands[0]).body.cmd_slip.window_ms, 9);
@@ -227,8 +240,7 @@ TEST(Names, StreamsBothWays) {
 TEST(Names, EveryFlagBitHasAName) {
   EXPECT_EQ(flags_text(0), "");
   EXPECT_EQ(flags_text(CONTACT_FLAG_CONTACT | CONTACT_FLAG_SLIP), "CONTACT SLIP");
-  EXPECT_EQ(flags_text(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_SLIDING),
-            "TANGENTIAL_VALID SLIDING");
+  EXPECT_EQ(flags_text(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_SLIDING), "TANGENTIAL_VALID SLIDING");
   EXPECT_EQ(flags_text(1u << 30 | 1u << 31), "bit30 bit31");
 }
 

@@ -75,8 +75,7 @@ Bytes frame_with_header_byte(std::uint16_t sequence, std::size_t index, std::uin
 }
 
 std::uint64_t errors(const LineStatistics &statistics) {
-  return statistics.crc_errors + statistics.format_errors + statistics.version_errors +
-         statistics.unknown_types;
+  return statistics.crc_errors + statistics.format_errors + statistics.version_errors + statistics.unknown_types;
 }
 
 } // namespace
@@ -95,8 +94,7 @@ TEST(Decoder, FindsPacketsHoweverTheBytesArePartitioned) {
 TEST(Decoder, JoiningAtAnyByteIsNoError) {
   Bytes first = frame(1);
   for (std::size_t torn = 1; torn < first.size(); torn++) {
-    Bytes bytes = joined({Bytes(first.begin() + static_cast<std::ptrdiff_t>(torn), first.end()),
-                          frame(2), frame(3)});
+    Bytes bytes = joined({Bytes(first.begin() + static_cast<std::ptrdiff_t>(torn), first.end()), frame(2), frame(3)});
     Result result = decode(bytes);
     EXPECT_EQ(result.sequences, (std::vector<std::uint16_t>{2, 3})) << torn;
     EXPECT_EQ(errors(result.statistics), 0u) << torn;
@@ -164,8 +162,7 @@ TEST(Decoder, CountsGapsAcrossTheWrapOfTheSequence) {
 
 TEST(Decoder, AnotherVersionAndUnknownTypesHaveCountersOfTheirOwn) {
   ASSERT_EQ(frame_with_header_byte(5, 0, WIRE_VERSION), frame(5));
-  Result other_version =
-      decode(joined({frame(4), frame_with_header_byte(5, 0, WIRE_VERSION + 1), frame(6)}));
+  Result other_version = decode(joined({frame(4), frame_with_header_byte(5, 0, WIRE_VERSION + 1), frame(6)}));
   EXPECT_EQ(other_version.statistics.version_errors, 1u);
   EXPECT_EQ(errors(other_version.statistics), 1u);
   Result new_type = decode(joined({frame(4), frame_with_header_byte(5, 1, 0x3F), frame(6)}));
@@ -193,9 +190,7 @@ TEST(Decoder, SurvivesNoiseAndFindsWhatFollows) {
 
 TEST(Decoder, AfterARestartAnySequenceIsFine) {
   Decoder decoder;
-  auto feed = [&](const Bytes &bytes) {
-    decoder.feed(bytes.data(), bytes.size(), [](const wire_packet &) {});
-  };
+  auto feed = [&](const Bytes &bytes) { decoder.feed(bytes.data(), bytes.size(), [](const wire_packet &) {}); };
   feed(frame(1000));
   Bytes torn = frame(1001);
   torn.resize(torn.size() / 2);

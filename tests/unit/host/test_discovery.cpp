@@ -40,8 +40,7 @@ protected:
       std::ofstream(root() + "/dev/" + tty) << "";
     }
     if (by_id) {
-      fs::create_symlink("../../" + tty,
-                         root() + "/dev/serial/by-id/usb-Fingertip_" + serial + "-if00");
+      fs::create_symlink("../../" + tty, root() + "/dev/serial/by-id/usb-Fingertip_" + serial + "-if00");
     }
   }
 

@@ -16,17 +16,14 @@ struct Device {
   double zero_us, drift_ppm;
 
   double at(double host_us) const { return (host_us - zero_us) * (1 + 1e-6 * drift_ppm); }
-  std::uint64_t stamp(double host_us) const {
-    return static_cast<std::uint64_t>(std::llround(at(host_us)));
-  }
+  std::uint64_t stamp(double host_us) const { return static_cast<std::uint64_t>(std::llround(at(host_us))); }
 };
 
 /* Devices on one wire, and what a recorder knows of their clocks: wrong by up to its bound, and
  * another estimate ten times a second. */
 class Bench {
 public:
-  explicit Bench(std::vector<Device> devices)
-      : devices_(std::move(devices)), alignment_(devices_.size()) {}
+  explicit Bench(std::vector<Device> devices) : devices_(std::move(devices)), alignment_(devices_.size()) {}
 
   /* Until so many seconds have passed; an edge each period on the wires of these. */
   void run(double seconds, double period_us, const std::vector<std::size_t> &wired) {
@@ -36,9 +33,8 @@ public:
         if (steps_ % 20 == i) {
           Random random(7, i, steps_);
           const std::uint64_t device_us = devices_[i].stamp(now_us_);
-          alignment_.clock(
-              i, {device_us, now_us_ + random.uniform(-UNCERTAINTY_us, UNCERTAINTY_us),
-                  devices_[i].drift_ppm + random.uniform(-0.3, 0.3), UNCERTAINTY_us});
+          alignment_.clock(i, {device_us, now_us_ + random.uniform(-UNCERTAINTY_us, UNCERTAINTY_us),
+                               devices_[i].drift_ppm + random.uniform(-0.3, 0.3), UNCERTAINTY_us});
         }
       }
       for (; next_edge_us < now_us_ + STEP_us; next_edge_us += period_us) {

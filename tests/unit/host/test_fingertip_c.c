@@ -69,8 +69,7 @@ static void every_packet_comes_back_as_its_numbers(void) {
   double values[1 + FINGERTIP_VALUES_MOST];
   size_t filled = 0;
   const uint8_t joined = 0;
-  TEST_ASSERT_EQUAL_size_t(1, fingertip_decoder_feed(decoder, &joined, 1, values,
-                                                     1 + FINGERTIP_VALUES_MOST, &filled));
+  TEST_ASSERT_EQUAL_size_t(1, fingertip_decoder_feed(decoder, &joined, 1, values, 1 + FINGERTIP_VALUES_MOST, &filled));
   for (const uint8_t *type = wire_types; type < wire_types + WIRE_TYPES; type++) {
     struct sampler sampler = {SAMPLE_RANDOM, {*type}};
     struct wire_packet packet;
@@ -84,13 +83,12 @@ static void every_packet_comes_back_as_its_numbers(void) {
     uint8_t frame[FINGERTIP_FRAME_MOST], again[FINGERTIP_FRAME_MOST];
     size_t length = 0, length_again = 0;
     TEST_ASSERT_EQUAL_INT(FT_OK, encode(&packet, frame, &length));
-    TEST_ASSERT_EQUAL_size_t(length, fingertip_decoder_feed(decoder, frame, length, values,
-                                                            1 + FINGERTIP_VALUES_MOST, &filled));
+    TEST_ASSERT_EQUAL_size_t(
+        length, fingertip_decoder_feed(decoder, frame, length, values, 1 + FINGERTIP_VALUES_MOST, &filled));
     TEST_ASSERT_EQUAL_size_t(1 + fingertip_value_count(*type), filled);
     TEST_ASSERT_TRUE(values[0] == *type);
     TEST_ASSERT_EQUAL_INT(FINGERTIP_OK,
-                          fingertip_encode(*type, values + 1, filled - 1, again,
-                                           FINGERTIP_FRAME_MOST, &length_again));
+                          fingertip_encode(*type, values + 1, filled - 1, again, FINGERTIP_FRAME_MOST, &length_again));
     TEST_ASSERT_EQUAL_size_t(length, length_again);
     TEST_ASSERT_EQUAL_MEMORY(frame, again, length);
   }
@@ -101,8 +99,7 @@ static void numbers_stand_under_their_names(void) {
   struct numbers contact = contact_of(70000, 123456789012.0);
   uint8_t frame[FINGERTIP_FRAME_MOST];
   size_t length = 0;
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_encode(CONTACT, contact.of,
-                                                       fingertip_value_count(CONTACT), frame,
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), frame,
                                                        sizeof frame, &length));
   struct wire_packet packet;
   TEST_ASSERT_EQUAL_INT(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &packet));
@@ -124,8 +121,7 @@ static void refuse(struct numbers numbers, uint8_t type, const char *name, doubl
   size_t length = 7;
   set(&numbers, type, name, value);
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE,
-                        fingertip_encode(type, numbers.of, fingertip_value_count(type), frame,
-                                         sizeof frame, &length));
+                        fingertip_encode(type, numbers.of, fingertip_value_count(type), frame, sizeof frame, &length));
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(fingertip_error(), name), fingertip_error());
   TEST_ASSERT_EQUAL_size_t(7, length);
 }
@@ -146,7 +142,8 @@ static void what_no_packet_may_hold_is_refused_by_its_name(void) {
   size_t length = 0;
   const size_t count = fingertip_value_count(INFO);
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE, fingertip_encode(INFO, info.of, count, frame, sizeof frame, &length));
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, info.of, count - 1, frame, sizeof frame, &length));
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT,
+                        fingertip_encode(INFO, info.of, count - 1, frame, sizeof frame, &length));
   info = info_of('A');
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, info.of, count, frame, 20, &length));
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, NULL, count, frame, sizeof frame, &length));
@@ -160,8 +157,7 @@ static void a_full_buffer_takes_no_more_bytes_than_it_has_packets_for(void) {
     struct numbers contact = contact_of(i, 1000 * i);
     contact.of[0] = i + (i > 20); /* one is lost */
     size_t bytes = 0;
-    fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), line + length,
-                     FINGERTIP_FRAME_MOST, &bytes);
+    fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), line + length, FINGERTIP_FRAME_MOST, &bytes);
     length += bytes;
   }
   line[length - 5] ^= 8;
@@ -169,8 +165,8 @@ static void a_full_buffer_takes_no_more_bytes_than_it_has_packets_for(void) {
   double values[1 + FINGERTIP_VALUES_MOST];
   while (taken < length) {
     size_t filled = 0;
-    const size_t step = fingertip_decoder_feed(decoder, line + taken, length - taken, values,
-                                               1 + FINGERTIP_VALUES_MOST, &filled);
+    const size_t step =
+        fingertip_decoder_feed(decoder, line + taken, length - taken, values, 1 + FINGERTIP_VALUES_MOST, &filled);
     TEST_ASSERT_TRUE(step > 0);
     taken += step;
     if (filled > 0) {
@@ -207,11 +203,9 @@ static void take(struct fingertip_writer *writer) {
   }
 }
 
-static void put(struct fingertip_writer *writer, size_t device, uint8_t type,
-                struct numbers numbers, double host_us) {
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK,
-                        fingertip_writer_packet(writer, device, type, numbers.of,
-                                                fingertip_value_count(type), host_us));
+static void put(struct fingertip_writer *writer, size_t device, uint8_t type, struct numbers numbers, double host_us) {
+  TEST_ASSERT_EQUAL_INT(
+      FINGERTIP_OK, fingertip_writer_packet(writer, device, type, numbers.of, fingertip_value_count(type), host_us));
   take(writer);
 }
 
@@ -229,7 +223,8 @@ static void write_one(enum fingertip_format format) {
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_writer_event(writer, 1, "gone"));
   struct numbers three = raw_of(100, 100000);
   set(&three, RAW, "sensor_count", 3);
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_SENSORS, fingertip_writer_packet(writer, 0, RAW, three.of, fingertip_value_count(RAW), 0));
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_SENSORS,
+                        fingertip_writer_packet(writer, 0, RAW, three.of, fingertip_value_count(RAW), 0));
   double counts[FINGERTIP_COUNTS] = {0};
   counts[FINGERTIP_COUNT_PACKETS] = 200;
   TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_writer_finish(writer, "stopped", counts));
@@ -254,7 +249,8 @@ static struct found found_in(size_t step, int salvage) {
     double values[FINGERTIP_VALUES_MOST];
     struct fingertip_item item;
     size_t count = 0;
-    while ((found.status = fingertip_reader_next(reader, &item, values, FINGERTIP_VALUES_MOST, &count)) == FINGERTIP_OK) {
+    while ((found.status = fingertip_reader_next(reader, &item, values, FINGERTIP_VALUES_MOST, &count)) ==
+           FINGERTIP_OK) {
       found.contacts += item.type == CONTACT;
       found.raws += item.type == RAW;
       found.of_device_1 += item.device == 1;
@@ -381,7 +377,8 @@ static void a_capture_of_the_line_is_read_too(void) {
     struct numbers contact = contact_of(i, 1000 * i);
     contact.of[0] = i;
     size_t length = 0;
-    fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), file.bytes + file.length, FINGERTIP_FRAME_MOST, &length);
+    fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), file.bytes + file.length,
+                     FINGERTIP_FRAME_MOST, &length);
     file.length += length;
   }
   file.bytes[5000] ^= 64;

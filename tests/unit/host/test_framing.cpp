@@ -14,9 +14,7 @@ Bytes body_of(std::size_t length, int pattern) {
   Bytes packet{WIRE_VERSION};
   packet.resize(WIRE_HEADER_BYTES + length);
   for (std::size_t i = 0; i < length; i++) {
-    packet[WIRE_HEADER_BYTES + i] = static_cast<std::uint8_t>(pattern == 0   ? 0
-                                                              : pattern == 1 ? 0xAA
-                                                                             : i % 7);
+    packet[WIRE_HEADER_BYTES + i] = static_cast<std::uint8_t>(pattern == 0 ? 0 : pattern == 1 ? 0xAA : i % 7);
   }
   return packet;
 }
@@ -25,8 +23,8 @@ Bytes body_of(std::size_t length, int pattern) {
 
 TEST(Framing, AgreesWithTheCodecOfTheFirmware) {
   for (wire_packet packet :
-       {test::make_contact(7, 1u << 20, 3), test::make_raw(300, 5, 9, FT_MAX_SENSORS),
-        test::make_info(1, 2), test::make_health(0xFFFF, 3), test::make_ack(0, 1, 0x80, 0, 2, 3)}) {
+       {test::make_contact(7, 1u << 20, 3), test::make_raw(300, 5, 9, FT_MAX_SENSORS), test::make_info(1, 2),
+        test::make_health(0xFFFF, 3), test::make_ack(0, 1, 0x80, 0, 2, 3)}) {
     Bytes frame = frame_bytes(packet);
     auto envelope = Envelope::opened(Bytes(frame.begin(), frame.end() - 1));
     ASSERT_TRUE(envelope);
@@ -80,13 +78,11 @@ TEST(Framing, CutsAtDelimitersHoweverTheBytesCome) {
     FrameCutter cutter;
     std::vector<std::pair<Bytes, bool>> frames;
     for (std::size_t at = 0; at < line.size(); at += step) {
-      cutter.feed(line.data() + at, std::min(step, line.size() - at),
-                  [&](const Bytes &frame, bool joining) {
-                    frames.push_back({frame, joining});
-                  });
+      cutter.feed(line.data() + at, std::min(step, line.size() - at), [&](const Bytes &frame, bool joining) {
+        frames.push_back({frame, joining});
+      });
     }
-    EXPECT_EQ(frames,
-              (std::vector<std::pair<Bytes, bool>>{{{9, 9}, true}, {{1, 2}, false}, {{3}, false}}));
+    EXPECT_EQ(frames, (std::vector<std::pair<Bytes, bool>>{{{9, 9}, true}, {{1, 2}, false}, {{3}, false}}));
   }
 }
 

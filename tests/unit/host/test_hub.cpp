@@ -96,8 +96,7 @@ protected:
     std::size_t length = 0;
     const std::uint8_t *bytes = hub.waiting(program.client, &length);
     length = std::min(length, most);
-    program.decoder.feed(bytes, length,
-                         [&](const wire_packet &packet) { program.heard.push_back(packet); });
+    program.decoder.feed(bytes, length, [&](const wire_packet &packet) { program.heard.push_back(packet); });
     hub.took(program.client, length);
   }
 

@@ -1,7 +1,7 @@
 /* What the monitor draws, and how much of it goes to the terminal. */
-#include "tool/cli/monitor.hpp"
 #include "support/host_packets.hpp"
 #include "support/pad.h"
+#include "tool/cli/monitor.hpp"
 #include "tool/cli/painter.hpp"
 
 #include <cmath>
@@ -14,9 +14,8 @@ using namespace fingertip;
 
 namespace {
 
-constexpr std::uint32_t GOOD = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
-                               CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SLIP_VALID |
-                               CONTACT_FLAG_TARED;
+constexpr std::uint32_t GOOD = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                               CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
 
 Model model_with_info() {
   Model model;
@@ -46,8 +45,8 @@ struct Pull {
 };
 
 /* A contact of 5.7 mm and 5 N, and what the sensors under it measure. */
-void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm,
-                float force_N, std::uint32_t flags, const Pull &pull = {}) {
+void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm, float force_N,
+                std::uint32_t flags, const Pull &pull = {}) {
   constexpr float sigma_mm = 5.7f, pi = 3.14159265f;
   float p0_Pa = force_N / (2 * pi * sigma_mm * sigma_mm * 1e-6f);
   wire_packet contact = test::make_contact(0, t_us, frame);
@@ -142,8 +141,7 @@ TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
   EXPECT_LE(pulled.changes, before / 10) << "an arrow that turns with it";
   report("{\n  \"monitor_200x60_10_s_bytes\": " + std::to_string(sent.changes) +
          ",\n  \"monitor_200x60_10_s_bytes_of_grasp\": " + std::to_string(pulled.changes) +
-         ",\n  \"monitor_200x60_10_s_bytes_of_full_pictures\": " + std::to_string(sent.all) +
-         "\n}\n");
+         ",\n  \"monitor_200x60_10_s_bytes_of_full_pictures\": " + std::to_string(sent.all) + "\n}\n");
 }
 
 TEST(Monitor, SendsNothingWhereNothingChanged) {
@@ -164,15 +162,13 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
   EXPECT_TRUE(shows(good, "5.00 N")) << text_of(good);
   EXPECT_TRUE(shows(good, "┼"));
   for (std::uint32_t flag :
-       {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT, CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_MODEL,
-        CONTACT_FLAG_SATURATED, CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED,
-        CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED, CONTACT_FLAG_ZERO_DOUBTFUL,
-        CONTACT_FLAG_SENSOR_DOUBTFUL}) {
+       {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT, CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_MODEL, CONTACT_FLAG_SATURATED,
+        CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED,
+        CONTACT_FLAG_ZERO_DOUBTFUL, CONTACT_FLAG_SENSOR_DOUBTFUL}) {
     take_frame(model, 2000000, 2, 4.5f, 4.5f, 5, GOOD | flag);
     Canvas doubtful = one(model);
     EXPECT_TRUE(shows(doubtful, "5.00?N")) << text_of(doubtful);
-    EXPECT_TRUE(shows(doubtful, "x   +4.50?") && shows(doubtful, "y   +4.50?"))
-        << text_of(doubtful);
+    EXPECT_TRUE(shows(doubtful, "x   +4.50?") && shows(doubtful, "y   +4.50?")) << text_of(doubtful);
     EXPECT_FALSE(shows(doubtful, "┼")) << text_of(doubtful);
     EXPECT_TRUE(shows(doubtful, "╌")) << text_of(doubtful);
   }
@@ -190,9 +186,8 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
 TEST(Monitor, EveryWarningAtOnceIsNamed) {
   Model model = model_with_info();
   take_frame(model, 1000000, 1, 1, 2, 5, 0x7FFFF);
-  for (const char *name :
-       {"LOW_SIGNAL", "FLAT", "UNCERTAIN", "MODEL", "SATURATED", "FORCE_LOWER_BOUND",
-        "SENSOR_MASKED", "AT_BOUND", "ELONGATED", "ZERO_DOUBTFUL", "SENSOR_DOUBTFUL"}) {
+  for (const char *name : {"LOW_SIGNAL", "FLAT", "UNCERTAIN", "MODEL", "SATURATED", "FORCE_LOWER_BOUND",
+                           "SENSOR_MASKED", "AT_BOUND", "ELONGATED", "ZERO_DOUBTFUL", "SENSOR_DOUBTFUL"}) {
     EXPECT_TRUE(shows(one(model), name)) << text_of(one(model));
   }
 }
@@ -216,8 +211,8 @@ TEST(Monitor, TracesHaveAxesAndSensorsNumbersAndBothPressures) {
     take_frame(model, 1000000 + 20000 * frame, frame, 0, 0, 5, GOOD);
   }
   Canvas canvas = one(model, 120, 40);
-  for (const char *text : {"force  5 N┤", "x    15 mm┤", "-15┤", "y    24 mm┤", "-24┤",
-                           "slip  1 mm┤", "0 s", "-5", "no., measured, fitted"}) {
+  for (const char *text : {"force  5 N┤", "x    15 mm┤", "-15┤", "y    24 mm┤", "-24┤", "slip  1 mm┤", "0 s", "-5",
+                           "no., measured, fitted"}) {
     EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
   }
   for (int k = 0; k < 15; k++) {
@@ -259,8 +254,8 @@ TEST(Monitor, WhatIsGoneHasNoRateAndNoNumbers) {
 TEST(Monitor, EachCounterIsColouredByItself) {
   Model model = model_with_info();
   wire_packet health = test::make_health(0, 0);
-  health.body.health.bus_timeouts = health.body.health.bus_recoveries =
-      health.body.health.fit_failures = health.body.health.packets_dropped = 0;
+  health.body.health.bus_timeouts = health.body.health.bus_recoveries = health.body.health.fit_failures =
+      health.body.health.packets_dropped = 0;
   health.body.health.bus_nacks = 1;
   model.take(health);
   take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
@@ -297,11 +292,10 @@ TEST(Monitor, EverySizeIsLaidOut) {
   for (int columns = 80; columns <= 200; columns += 3) {
     for (int rows = 24; rows <= 60; rows++) {
       Canvas canvas = one(model, columns, rows);
-      for (const char *text : {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s",
-                               "no fit", "NACKs", "convert", "force  ", "x    15 mm┤",
-                               "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}) {
-        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n"
-                                         << text_of(canvas);
+      for (const char *text :
+           {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s", "no fit", "NACKs", "convert", "force  ",
+            "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}) {
+        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n" << text_of(canvas);
       }
     }
   }
@@ -318,9 +312,8 @@ TEST(Monitor, APullIsAnArrowAndNumbersAndTraces) {
     take_frame(model, 1000000 + 20000 * frame, frame, -4.5f, -4.5f, 5, PULLED, {1.5f, 0, 0.05f});
   }
   Canvas canvas = one(model, 120, 40);
-  for (const char *text :
-       {"qx  +1.50", "qy  +0.00", "sd  0.050 N", "Q/F 0.300", "sd  0.010", "○ MOVING", "○ SLIDING",
-        "qx     2 N┤", "qy     2 N┤", "force  5 N┤", "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤"}) {
+  for (const char *text : {"qx  +1.50", "qy  +0.00", "sd  0.050 N", "Q/F 0.300", "sd  0.010", "○ MOVING", "○ SLIDING",
+                           "qx     2 N┤", "qy     2 N┤", "force  5 N┤", "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤"}) {
     EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
   }
   EXPECT_FALSE(shows(canvas, "since touch"));
@@ -328,9 +321,8 @@ TEST(Monitor, APullIsAnArrowAndNumbersAndTraces) {
   struct {
     float qx_N, qy_N;
     const char *head;
-  } cases[] = {{1.5f, 0, "→"},    {1.1f, 1.1f, "↗"},   {0, 1.5f, "↑"},  {-1.1f, 1.1f, "↖"},
-               {-1.5f, 0, "←"},   {-1.1f, -1.1f, "↙"}, {0, -1.5f, "↓"}, {1.1f, -1.1f, "↘"},
-               {1.5f, 0.5f, "→"}, {-1.5f, -0.5f, "←"}};
+  } cases[] = {{1.5f, 0, "→"},      {1.1f, 1.1f, "↗"}, {0, 1.5f, "↑"},     {-1.1f, 1.1f, "↖"}, {-1.5f, 0, "←"},
+               {-1.1f, -1.1f, "↙"}, {0, -1.5f, "↓"},   {1.1f, -1.1f, "↘"}, {1.5f, 0.5f, "→"},  {-1.5f, -0.5f, "←"}};
   for (const auto &[qx_N, qy_N, head] : cases) {
     take_frame(model, 4000000, 101, 4.5f, 4.5f, 5, PULLED, {qx_N, qy_N, 0.05f});
     EXPECT_TRUE(shows(one(model, 120, 40), head)) << head << "\n" << text_of(one(model, 120, 40));
@@ -413,8 +405,7 @@ TEST(Monitor, SlidingIsToldOnThePadAndByALamp) {
   Canvas moves = one(model);
   EXPECT_TRUE(shows(moves, "● MOVING") && shows(moves, "─ MOVING ─")) << text_of(moves);
   EXPECT_FALSE(shows(moves, "● SLIDING"));
-  take_frame(model, 1040000, 3, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING,
-             {1.5f, 0});
+  take_frame(model, 1040000, 3, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING, {1.5f, 0});
   take_frame(model, 1140000, 4, 4.5f, 4.5f, 5, PULLED, {1.5f, 0});
   Canvas slides = one(model);
   EXPECT_TRUE(shows(slides, "● SLIDING") && shows(slides, "─ SLIDING ─")) << text_of(slides);
@@ -442,8 +433,7 @@ TEST(Monitor, WithoutAPadItSaysWhatIsMissing) {
 
 TEST(Monitor, ALoadSinceTheTouchIsMarked) {
   Model model = model_of_grasp(true);
-  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH,
-             {1.5f, 0});
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH, {1.5f, 0});
   EXPECT_TRUE(shows(one(model), "since touch")) << text_of(one(model));
   EXPECT_TRUE(shows(draw_monitor({model, model}, {"keys", "note", ""}, 80, 24), "ΔQ/F"));
 }
@@ -456,17 +446,15 @@ TEST(Monitor, EverySizeOfAPullIsLaidOut) {
   for (int columns = 80; columns <= 200; columns += 3) {
     for (int rows = 24; rows <= 60; rows++) {
       Canvas canvas = one(model, columns, rows);
-      for (const char *text : {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING",
-                               "CONTACT", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s", "NACKs"}) {
-        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n"
-                                         << text_of(canvas);
+      for (const char *text : {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING", "CONTACT", "force  5 N┤",
+                               "2 N┤", "slip  1 mm┤", "0 s", "NACKs"}) {
+        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n" << text_of(canvas);
       }
     }
   }
   for (auto [columns, rows] : {std::pair{80, 24}, {80, 46}, {200, 60}}) {
     Canvas canvas = draw_monitor({model, model}, {"keys", "note", ""}, columns, rows);
-    for (const char *text :
-         {"-1.50", "+0.20", "Q/F ", "○ SLIDING", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s"}) {
+    for (const char *text : {"-1.50", "+0.20", "Q/F ", "○ SLIDING", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s"}) {
       EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
     }
   }
@@ -484,20 +472,15 @@ TEST(Monitor, SeveralStandSideBySide) {
     }
     models.push_back(model);
   }
-  auto serial = [](int i) {
-    return std::string(1, static_cast<char>('A' + i)) + "660583883265A2C";
-  };
-  for (auto [columns, rows, shown] :
-       {std::tuple{80, 24, 2}, {120, 24, 3}, {80, 46, 4}, {200, 60, 10}}) {
+  auto serial = [](int i) { return std::string(1, static_cast<char>('A' + i)) + "660583883265A2C"; };
+  for (auto [columns, rows, shown] : {std::tuple{80, 24, 2}, {120, 24, 3}, {80, 46, 4}, {200, 60, 10}}) {
     for (int count = 2; count <= 12; count++) {
-      Canvas canvas = draw_monitor({models.begin(), models.begin() + count}, {"keys", "note", ""},
-                                   columns, rows);
+      Canvas canvas = draw_monitor({models.begin(), models.begin() + count}, {"keys", "note", ""}, columns, rows);
       for (int i = 0; i < std::min(count, shown); i++) {
         ASSERT_TRUE(shows(canvas, serial(i))) << text_of(canvas);
         ASSERT_TRUE(shows(canvas, "+" + std::to_string(i) + ".00")) << text_of(canvas);
       }
-      EXPECT_TRUE(shows(canvas, "x   ") && shows(canvas, "slip ") && shows(canvas, "0 s"))
-          << text_of(canvas);
+      EXPECT_TRUE(shows(canvas, "x   ") && shows(canvas, "slip ") && shows(canvas, "0 s")) << text_of(canvas);
       EXPECT_EQ(shows(canvas, "a larger window shows more"), count > shown) << text_of(canvas);
     }
   }
@@ -516,8 +499,8 @@ TEST(Painter, WithoutColourTheLocationIsStillSeen) {
 }
 
 TEST(Monitor, TwoContactsAndEdgesAreShown) {
-  constexpr std::uint32_t flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
-                                  CONTACT_FLAG_TARED | CONTACT_FLAG_SHAPE_VALID;
+  constexpr std::uint32_t flags =
+      CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_SHAPE_VALID;
   for (int columns : {80, 120}) {
     Model model = model_of_grasp(true);
     wire_packet packet = test::make_contact(0, 1000, 1);

@@ -1,6 +1,6 @@
-#include "tool/cli/playback.hpp"
 #include "libfingertip/recording.hpp"
 #include "support/host_packets.hpp"
+#include "tool/cli/playback.hpp"
 
 #include <cstdio>
 #include <gtest/gtest.h>
@@ -18,8 +18,7 @@ protected:
   void SetUp() override {
     path_ = testing::TempDir() + "playback-" + std::to_string(getpid()) + ".csv";
     wire_packet info = test::make_info(0, 0);
-    RecordingWriter writer(path_, true, &info.body.info, 15, {}, true,
-                           OutputFile::Appears::at_once);
+    RecordingWriter writer(path_, true, &info.body.info, 15, {}, true, OutputFile::Appears::at_once);
     std::uint16_t sequence = 0;
     for (std::uint32_t frame = 0; frame < FRAMES; frame++) {
       std::uint64_t t_us = 5000 + std::uint64_t{20000} * (frame % (FRAMES / 2));
@@ -42,9 +41,7 @@ protected:
       playback.step(now_);
     }
   }
-  std::uint32_t frame_of(const Playback &playback) const {
-    return playback.models()[0].contact()->frame;
-  }
+  std::uint32_t frame_of(const Playback &playback) const { return playback.models()[0].contact()->frame; }
 
   std::string path_;
   HostTime now_{};

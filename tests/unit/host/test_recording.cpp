@@ -38,15 +38,12 @@ std::vector<std::vector<std::uint8_t>> frames_of(const std::vector<wire_packet> 
 }
 
 std::vector<wire_packet> all_kinds() {
-  return {test::make_info(0, 10),
-          test::make_ack(1, 20, WIRE_CMD_STREAM, WIRE_RESULT_OUT_OF_RANGE, 65535, ~0ull),
-          test::make_contact(2, 1000, 1),
-          test::make_raw(3, 1000, 1),
-          test::make_contact(4, 2000, 2), /* its raw packet was lost */
-          test::make_contact(6, 3000, 3),
-          test::make_raw(7, 3000, 3),
-          test::make_health(8, 3500),
-          test::make_raw(10, 4000, 4)}; /* its contact packet was lost */
+  return {
+      test::make_info(0, 10),         test::make_ack(1, 20, WIRE_CMD_STREAM, WIRE_RESULT_OUT_OF_RANGE, 65535, ~0ull),
+      test::make_contact(2, 1000, 1), test::make_raw(3, 1000, 1),
+      test::make_contact(4, 2000, 2), /* its raw packet was lost */
+      test::make_contact(6, 3000, 3), test::make_raw(7, 3000, 3),
+      test::make_health(8, 3500),     test::make_raw(10, 4000, 4)}; /* its contact packet was lost */
 }
 
 constexpr auto AT_ONCE = OutputFile::Appears::at_once;
@@ -62,8 +59,7 @@ void record(const std::string &path, const std::vector<wire_packet> &packets, bo
   }
 }
 
-std::vector<wire_packet> read_all(const std::string &path, bool salvage = false,
-                                  std::uint64_t *skipped = nullptr) {
+std::vector<wire_packet> read_all(const std::string &path, bool salvage = false, std::uint64_t *skipped = nullptr) {
   RecordingReader reader(path, salvage);
   std::vector<wire_packet> packets;
   while (auto item = reader.next()) {
@@ -258,8 +254,9 @@ TEST(Recording, EdgesAtTheSyncPinAreKeptAndCounted) {
   }
   record(folder / "r.csv", packets);
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
-  EXPECT_NE(contents(folder / "r.csv").find("\n# packet: sync sequence=11 t_us=1100 number=11 "
-                                            "level=1\n"),
+  EXPECT_NE(contents(folder / "r.csv")
+                .find("\n# packet: sync sequence=11 t_us=1100 number=11 "
+                      "level=1\n"),
             std::string::npos);
   EXPECT_NE(contents(folder / "r.csv").find(" edges=4 edges_missing=2 "), std::string::npos);
 }
@@ -276,8 +273,7 @@ TEST(Recording, ThePadIsKeptWithItsChanges) {
   record(folder / "r.csv", packets);
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
   EXPECT_EQ(read_all(folder / "r.csv")[3].body.info.pad.thickness_mm, 0);
-  EXPECT_NE(contents(folder / "r.csv").find("\n# pad_moment_sds_mm: 4.8537 7.9913 20.39\n"),
-            std::string::npos);
+  EXPECT_NE(contents(folder / "r.csv").find("\n# pad_moment_sds_mm: 4.8537 7.9913 20.39\n"), std::string::npos);
   std::string four = contents(folder / "r.csv");
   four.insert(four.find("\n# pad_moment_sds_mm: ") + 21, " 3.5");
   write(folder / "four.csv", four);
@@ -325,8 +321,7 @@ TEST(Recording, EarlierOnesAreRead) {
         contact.shape_age_ms = 0;
         contact.edge_angle_deg = contact.edge_angle_sd_deg = contact.edge_length_mm = 0;
         if (!tangential) {
-          contact.flags &= ~static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID |
-                                                       CONTACT_FLAG_VELOCITY_VALID);
+          contact.flags &= ~static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID);
           contact.qx_N = contact.qy_N = contact.q_sd_N = contact.tangential_ratio = 0;
           contact.vx_mm_s = contact.vy_mm_s = 0;
         }
@@ -350,8 +345,8 @@ TEST(Recording, AKilledRecorderLosesAtMostTheLastFrame) {
 TEST(Recording, EveryTornTailIsReportedWithItsLineOrSalvaged) {
   test::TemporaryFolder folder;
   record(folder / "r.csv",
-         {test::make_contact(1, 1000, 1), test::make_raw(2, 1000, 1),
-          test::make_contact(3, 2000, 2), test::make_raw(4, 2000, 2)},
+         {test::make_contact(1, 1000, 1), test::make_raw(2, 1000, 1), test::make_contact(3, 2000, 2),
+          test::make_raw(4, 2000, 2)},
          false);
   std::string whole = contents(folder / "r.csv");
   std::size_t last_line = whole.rfind('\n', whole.size() - 2) + 1;
@@ -359,8 +354,7 @@ TEST(Recording, EveryTornTailIsReportedWithItsLineOrSalvaged) {
   for (std::size_t length = last_line + 1; length < whole.size(); length++) {
     write(folder / "torn.csv", whole.substr(0, length));
     std::string error = error_of(folder / "torn.csv");
-    EXPECT_EQ(error.rfind(folder / "torn.csv" + ":" + std::to_string(line_number) + ": ", 0), 0u)
-        << error;
+    EXPECT_EQ(error.rfind(folder / "torn.csv" + ":" + std::to_string(line_number) + ": ", 0), 0u) << error;
     EXPECT_EQ(thrown_by(folder / "torn.csv").code(), ErrorCode::damaged_line);
     std::uint64_t skipped = 0;
     EXPECT_EQ(read_all(folder / "torn.csv", true, &skipped).size(), 2u);
@@ -375,11 +369,9 @@ TEST(Recording, DamagedCellsAreNamed) {
   std::size_t row = whole.find("\n1000,1,") + 1;
   struct {
     const char *from, *to, *named;
-  } cases[] = {{"1000,", "-1000,", "t_us"},      {"1000,", "nan,", "t_us"},
-               {"5.7000003", "nan", "sigma_mm"}, {"5.7000003", "inf", "sigma_mm"},
-               {"5.7000003", "", "sigma_mm"},    {"2501", "70000", "convert_us"},
-               {"2501", "2501x", "convert_us"},  {"2501", "2501,1", "columns"},
-               {"2501,", "", "columns"}};
+  } cases[] = {{"1000,", "-1000,", "t_us"},      {"1000,", "nan,", "t_us"},     {"5.7000003", "nan", "sigma_mm"},
+               {"5.7000003", "inf", "sigma_mm"}, {"5.7000003", "", "sigma_mm"}, {"2501", "70000", "convert_us"},
+               {"2501", "2501x", "convert_us"},  {"2501", "2501,1", "columns"}, {"2501,", "", "columns"}};
   for (const auto &damage : cases) {
     std::string text = whole;
     std::size_t at = text.find(damage.from, row);
@@ -463,8 +455,7 @@ TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
   record(folder / "r.csv", packets);
   std::string text = contents(folder / "r.csv");
   EXPECT_NE(text.find("\n1000,1,1,32,0,,,,,,,,,,,,,0,0,0,0,0,0,0,,,,,,,"), std::string::npos) << text;
-  EXPECT_NE(text.find("\n2000,2,2,340787367,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"),
-            std::string::npos)
+  EXPECT_NE(text.find("\n2000,2,2,340787367,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"), std::string::npos)
       << text;
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
   /* an empty cell under its flag is damage */
@@ -476,10 +467,8 @@ TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
 TEST(Recording, PressuresWithoutSensorsAreDamage) {
   test::TemporaryFolder folder;
   { RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false, AT_ONCE); }
-  std::ofstream(folder / "r.csv", std::ios::app)
-      << "1000,1" << std::string(42, ',') << ",7,0,0,0,0,20.00\n";
-  EXPECT_NE(error_of(folder / "r.csv").find("pressures in a recording without sensors"),
-            std::string::npos)
+  std::ofstream(folder / "r.csv", std::ios::app) << "1000,1" << std::string(42, ',') << ",7,0,0,0,0,20.00\n";
+  EXPECT_NE(error_of(folder / "r.csv").find("pressures in a recording without sensors"), std::string::npos)
       << error_of(folder / "r.csv");
 }
 
@@ -500,8 +489,7 @@ LineStatistics counts_of_joint(const std::vector<wire_packet> &packets, bool fin
     wire_packet one = test::make_info(0, 0), two = test::make_info(0, 0);
     one.body.info.serial[0] = 'A';
     two.body.info.serial[0] = 'B';
-    JointRecordingWriter writer(folder / "j.csv", false, {one.body.info, two.body.info}, {}, 0,
-                                true, AT_ONCE);
+    JointRecordingWriter writer(folder / "j.csv", false, {one.body.info, two.body.info}, {}, 0, true, AT_ONCE);
     for (const wire_packet &packet : packets) {
       writer.packet(0, packet, host_us(packet));
       writer.settle(host_us(packet) - 3000);
@@ -530,8 +518,7 @@ std::vector<wire_packet> everything_in_sequence() {
     if (frame % 5 == 0) {
       /* said after the frames of that time were measured, before they are sent */
       packets.push_back(test::make_health(sequence++, t_us + 3500));
-      packets.push_back(test::make_ack(sequence++, t_us + 200, WIRE_CMD_STREAM, WIRE_RESULT_DONE,
-                                       frame & 0xFFFF, 7));
+      packets.push_back(test::make_ack(sequence++, t_us + 200, WIRE_CMD_STREAM, WIRE_RESULT_DONE, frame & 0xFFFF, 7));
     }
   }
   return packets;
@@ -539,9 +526,8 @@ std::vector<wire_packet> everything_in_sequence() {
 
 TEST(Recording, AJointOneInventsNoLosses) {
   for (bool finish : {false, true}) {
-    LineStatistics counts =
-        counts_of_joint(everything_in_sequence(), finish,
-                        [](const wire_packet &packet) { return static_cast<double>(packet.t_us); });
+    LineStatistics counts = counts_of_joint(everything_in_sequence(), finish,
+                                            [](const wire_packet &packet) { return static_cast<double>(packet.t_us); });
     EXPECT_EQ(counts.dropped_packets, 0u) << finish;
     EXPECT_EQ(counts.out_of_order, 0u) << finish;
   }
@@ -551,9 +537,7 @@ TEST(Recording, AClockThatJumpsBackTurnsNoRowsAround) {
   std::vector<std::uint64_t> t_us;
   LineStatistics counts = counts_of_joint(
       everything_in_sequence(), false,
-      [](const wire_packet &packet) {
-        return static_cast<double>(packet.t_us) - (packet.t_us > 20000 ? 7500.0 : 0.0);
-      },
+      [](const wire_packet &packet) { return static_cast<double>(packet.t_us) - (packet.t_us > 20000 ? 7500.0 : 0.0); },
       &t_us);
   EXPECT_TRUE(std::is_sorted(t_us.begin(), t_us.end()));
   EXPECT_EQ(t_us.size(), 50u);

@@ -22,8 +22,7 @@ public:
       waiting_.push_back(byte);
     }
   }
-  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-              milliseconds) override {
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, milliseconds) override {
     *length = 0;
     while (*length < capacity && !waiting_.empty()) {
       bytes[(*length)++] = waiting_.front();
@@ -68,8 +67,7 @@ TEST(Session, RepeatsACommandUntilItIsAcknowledged) {
   int deaf = 2;
   line.on_command = [&](const wire_packet &command) {
     if (deaf-- <= 0) {
-      line.say(
-          test::make_ack(1, 5000, command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
+      line.say(test::make_ack(1, 5000, command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
     }
   };
   Session session(line);
@@ -96,8 +94,7 @@ TEST(Session, ARepeatThatIsRefusedWhileTheFirstIsObeyedIsNoRefusal) {
     FakeTransport line;
     line.on_command = [&](const wire_packet &command) {
       if (line.commands.size() > 1) {
-        line.say(test::make_ack(1, 5000, command.type, WIRE_RESULT_NOT_NOW, command.sequence,
-                                command.t_us));
+        line.say(test::make_ack(1, 5000, command.type, WIRE_RESULT_NOT_NOW, command.sequence, command.t_us));
       }
       if (line.commands.size() == 3 && first_is_obeyed) {
         const wire_packet &first = line.commands[0];
@@ -119,21 +116,17 @@ TEST(Session, AnswersToOthersDoNotCount) {
     line.say(test::make_ack(2, 2, WIRE_CMD_OSR, WIRE_RESULT_DONE, command.sequence, 1));
   };
   Session session(line);
-  EXPECT_NE(error_of([&] { session.command(command_tare(), QUICK); }).find("no answer to \"tare\""),
-            std::string::npos);
+  EXPECT_NE(error_of([&] { session.command(command_tare(), QUICK); }).find("no answer to \"tare\""), std::string::npos);
   EXPECT_EQ(line.commands.size(), 3u);
 }
 
 TEST(Session, ARefusalIsAnErrorAtOnce) {
   FakeTransport line;
   line.on_command = [&](const wire_packet &command) {
-    line.say(
-        test::make_ack(1, 1, command.type, WIRE_RESULT_NOT_NOW, command.sequence, command.t_us));
+    line.say(test::make_ack(1, 1, command.type, WIRE_RESULT_NOT_NOW, command.sequence, command.t_us));
   };
   Session session(line);
-  EXPECT_NE(error_of([&] {
-              session.command(command_tare(), QUICK);
-            }).find("refused \"tare\": not possible now"),
+  EXPECT_NE(error_of([&] { session.command(command_tare(), QUICK); }).find("refused \"tare\": not possible now"),
             std::string::npos);
   EXPECT_EQ(line.commands.size(), 1u);
 }
@@ -143,8 +136,7 @@ TEST(Session, NoPacketIsLostToWaiting) {
   std::uint16_t sequence = 0;
   line.on_command = [&](const wire_packet &command) {
     line.say(test::make_contact(sequence++, 1, 1));
-    line.say(test::make_ack(sequence++, 2, command.type, WIRE_RESULT_DONE, command.sequence,
-                            command.t_us));
+    line.say(test::make_ack(sequence++, 2, command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
     line.say(test::make_contact(sequence++, 3, 2));
     line.say(test::make_info(sequence++, 4));
     line.say(test::make_contact(sequence++, 5, 3));
@@ -155,8 +147,7 @@ TEST(Session, NoPacketIsLostToWaiting) {
   wire_packet info = session.info();
   EXPECT_EQ(info.sequence, 3);
   EXPECT_EQ(info.body.info.osr, 1024);
-  EXPECT_EQ(types,
-            (std::vector<int>{WIRE_CONTACT, WIRE_ACK, WIRE_CONTACT, WIRE_INFO, WIRE_CONTACT}));
+  EXPECT_EQ(types, (std::vector<int>{WIRE_CONTACT, WIRE_ACK, WIRE_CONTACT, WIRE_INFO, WIRE_CONTACT}));
   EXPECT_EQ(session.statistics().dropped_packets, 0u);
 }
 
@@ -164,15 +155,13 @@ TEST(Session, RelatesTheClocks) {
   FakeTransport line;
   line.on_command = [&](const wire_packet &command) {
     auto device_us = static_cast<std::uint64_t>(steady_now_us()) - 1000000u;
-    line.say(test::make_ack(1, device_us, command.type, WIRE_RESULT_DONE, command.sequence,
-                            command.t_us));
+    line.say(test::make_ack(1, device_us, command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
   };
   Session session(line);
   EXPECT_FALSE(session.clock());
   session.command(command_tare(), QUICK);
   ASSERT_TRUE(session.clock());
-  EXPECT_LE(std::abs(session.clock()->device_minus_host_us + 1000000),
-            session.clock()->uncertainty_us + 1);
+  EXPECT_LE(std::abs(session.clock()->device_minus_host_us + 1000000), session.clock()->uncertainty_us + 1);
 }
 
 /* What the sanitizers have to say of it: the difference of such times has no room for a sign. */
@@ -180,14 +169,13 @@ TEST(Session, RelatesWhateverTimeADeviceTells) {
   for (const std::uint64_t device_us : {std::uint64_t{1} << 63, std::uint64_t{UINT64_MAX}}) {
     FakeTransport line;
     line.on_command = [&](const wire_packet &command) {
-      line.say(test::make_ack(1, device_us, command.type, WIRE_RESULT_DONE, command.sequence,
-                              command.t_us));
+      line.say(test::make_ack(1, device_us, command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
     };
     Session session(line);
     session.command(command_tare(), QUICK);
     ASSERT_TRUE(session.clock());
-    const auto told_us = static_cast<std::uint64_t>(session.clock()->device_minus_host_us) +
-                         static_cast<std::uint64_t>(steady_now_us());
+    const auto told_us =
+        static_cast<std::uint64_t>(session.clock()->device_minus_host_us) + static_cast<std::uint64_t>(steady_now_us());
     EXPECT_LT(told_us - device_us, 10'000'000u);
   }
 }
@@ -208,9 +196,8 @@ TEST(Session, BytesAreTappedAsTheyCome) {
   line.say(contact);
   Session session(line);
   std::vector<std::uint8_t> tapped;
-  session.on_bytes([&](const std::uint8_t *bytes, std::size_t length) {
-    tapped.insert(tapped.end(), bytes, bytes + length);
-  });
+  session.on_bytes(
+      [&](const std::uint8_t *bytes, std::size_t length) { tapped.insert(tapped.end(), bytes, bytes + length); });
   session.poll(milliseconds(0));
   EXPECT_EQ(tapped, frame_bytes(contact));
 }

@@ -45,8 +45,7 @@ protected:
     std::uint8_t bytes[100];
     std::size_t length = 0;
     Result result;
-    while ((result = transport.read(bytes, sizeof bytes, &length, milliseconds(1))) ==
-           Result::data) {
+    while ((result = transport.read(bytes, sizeof bytes, &length, milliseconds(1))) == Result::data) {
       all.insert(all.end(), bytes, bytes + length);
     }
     EXPECT_EQ(static_cast<int>(result), static_cast<int>(last));
@@ -213,12 +212,10 @@ TEST_F(Usb, IsSharedAndSeenToGoAndComeBack) {
     }
     Decoder line;
     std::vector<wire_packet> commands;
-    line.feed(device.out.data(), device.out.size(),
-              [&](const wire_packet &packet) { commands.push_back(packet); });
+    line.feed(device.out.data(), device.out.size(), [&](const wire_packet &packet) { commands.push_back(packet); });
     ASSERT_FALSE(commands.empty());
     ASSERT_EQ(commands.back().type, WIRE_CMD_TARE);
-    device.in.push_back(
-        frame_bytes(test::make_ack(9, 1, WIRE_CMD_TARE, 0, commands.back().sequence, 0)));
+    device.in.push_back(frame_bytes(test::make_ack(9, 1, WIRE_CMD_TARE, 0, commands.back().sequence, 0)));
     device.out.clear();
     server.step(milliseconds(0));
     Decoder answers;

@@ -56,8 +56,7 @@ static void test_driver_and_simulated_sensor_agree(void) {
       struct ms58xx_thermal thermal;
       const int32_t q10 = pressure_Pa_q10(d1, d2, &thermal);
       branches[thermal.branch]++;
-      TEST_ASSERT_EQUAL_DOUBLE(sim_ms5840_temperature_degC(prom.word, d2),
-                               thermal.temperature_cC / 100.0);
+      TEST_ASSERT_EQUAL_DOUBLE(sim_ms5840_temperature_degC(prom.word, d2), thermal.temperature_cC / 100.0);
       const double simulated_Pa = sim_ms5840_pressure_Pa(prom.word, d1, d2);
       TEST_ASSERT_TRUE(q10 >= simulated_Pa * 1024 && q10 < (simulated_Pa + 10) * 1024);
       TEST_ASSERT_DOUBLE_WITHIN(1.1, Pa, q10 / 1024.0);

@@ -33,8 +33,7 @@ struct reference {
   int64_t pressure_Pa, pressure_Pa_q10;
 };
 
-static struct reference datasheet(const struct ms58xx_prom *prom, uint32_t d1, uint32_t d2,
-                                  enum ms58xx_branch branch) {
+static struct reference datasheet(const struct ms58xx_prom *prom, uint32_t d1, uint32_t d2, enum ms58xx_branch branch) {
   const uint16_t *c = prom->word;
   wide dT = (wide)d2 - (wide)c[5] * 256;
   wide temperature = 2000 + divide(dT * c[6], 8388608);
@@ -88,8 +87,7 @@ static uint32_t code_of_temperature(const struct ms58xx_prom *prom, int32_t temp
   return (uint32_t)(dT + (wide)prom->word[5] * 256);
 }
 
-static int32_t pressure_Pa_q10(const struct ms58xx_prom *prom, uint32_t d1, uint32_t d2,
-                               enum ms58xx_branch previous) {
+static int32_t pressure_Pa_q10(const struct ms58xx_prom *prom, uint32_t d1, uint32_t d2, enum ms58xx_branch previous) {
   struct ms58xx_thermal thermal;
   ms58xx_compensate_temperature(prom, d2, previous, &thermal);
   return ms58xx_compensate_pressure(&thermal, d1);
@@ -147,8 +145,7 @@ static void test_all_sixteen_crcs_occur_and_are_accepted(void) {
       prom.word[0] = (uint16_t)(nibble << 12 | (example.word[0] & 0x0FFF));
       const struct ms58xx_prom before = prom;
       TEST_ASSERT_EQUAL_HEX8(crc, ms58xx_prom_crc4(&prom));
-      TEST_ASSERT_EQUAL_INT(nibble == crc ? MS58XX_PROM_GOOD : MS58XX_PROM_CRC_DIFFERS,
-                            ms58xx_check_prom(&prom));
+      TEST_ASSERT_EQUAL_INT(nibble == crc ? MS58XX_PROM_GOOD : MS58XX_PROM_CRC_DIFFERS, ms58xx_check_prom(&prom));
       TEST_ASSERT_EQUAL_MEMORY(&before, &prom, sizeof prom);
     }
   }
@@ -205,13 +202,11 @@ static void test_reading_of_the_real_part(void) {
 /* One count is about 0.04 Pa and stays visible; the code clips only near 5 bar, far above the
  * extended range. */
 static void test_resolution_and_range(void) {
-  int32_t thousand_counts_Pa_q10 =
-      pressure_Pa_q10(&example, EXAMPLE_D1 + 1000, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN) -
-      pressure_Pa_q10(&example, EXAMPLE_D1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN);
+  int32_t thousand_counts_Pa_q10 = pressure_Pa_q10(&example, EXAMPLE_D1 + 1000, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN) -
+                                   pressure_Pa_q10(&example, EXAMPLE_D1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN);
   TEST_ASSERT_INT32_WITHIN(5 * 1024, 44 * 1024, thousand_counts_Pa_q10);
-  TEST_ASSERT_GREATER_THAN_INT32(
-      pressure_Pa_q10(&example, EXAMPLE_D1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN),
-      pressure_Pa_q10(&example, EXAMPLE_D1 + 1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN));
+  TEST_ASSERT_GREATER_THAN_INT32(pressure_Pa_q10(&example, EXAMPLE_D1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN),
+                                 pressure_Pa_q10(&example, EXAMPLE_D1 + 1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN));
   int32_t clipped = pressure_Pa_q10(&example, CODE_MAX, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN) >> 10;
   TEST_ASSERT_INT32_WITHIN(100000, 500000, clipped);
   TEST_ASSERT_GREATER_THAN_INT32(2 * MS58XX_MAX_PRESSURE_Pa, clipped);
@@ -221,11 +216,9 @@ static void test_both_sides_of_every_edge(void) {
   static const struct {
     int32_t temperature_cC;
     enum ms58xx_branch branch;
-  } edges[] = {{2001, MS58XX_BRANCH_WARM},     {2000, MS58XX_BRANCH_WARM},
-               {1999, MS58XX_BRANCH_COLD},     {1001, MS58XX_BRANCH_COLD},
-               {1000, MS58XX_BRANCH_COLD},     {999, MS58XX_BRANCH_VERY_COLD},
-               {500, MS58XX_BRANCH_VERY_COLD}, {-2000, MS58XX_BRANCH_VERY_COLD},
-               {8500, MS58XX_BRANCH_WARM}};
+  } edges[] = {{2001, MS58XX_BRANCH_WARM},     {2000, MS58XX_BRANCH_WARM},       {1999, MS58XX_BRANCH_COLD},
+               {1001, MS58XX_BRANCH_COLD},     {1000, MS58XX_BRANCH_COLD},       {999, MS58XX_BRANCH_VERY_COLD},
+               {500, MS58XX_BRANCH_VERY_COLD}, {-2000, MS58XX_BRANCH_VERY_COLD}, {8500, MS58XX_BRANCH_WARM}};
   const struct ms58xx_prom *proms[] = {&example, &real_part};
   for (size_t part = 0; part < 2; part++) {
     for (size_t i = 0; i < sizeof edges / sizeof edges[0]; i++) {
@@ -236,8 +229,7 @@ static void test_both_sides_of_every_edge(void) {
       TEST_ASSERT_EQUAL_INT(edges[i].branch, thermal.branch);
       struct reference plain = datasheet(proms[part], EXAMPLE_D1, d2, MS58XX_BRANCH_UNKNOWN);
       TEST_ASSERT_EQUAL_INT64(plain.temperature_cC, thermal.temperature_cC);
-      TEST_ASSERT_EQUAL_INT64(plain.pressure_Pa,
-                              ms58xx_compensate_pressure(&thermal, EXAMPLE_D1) >> 10);
+      TEST_ASSERT_EQUAL_INT64(plain.pressure_Pa, ms58xx_compensate_pressure(&thermal, EXAMPLE_D1) >> 10);
       for (int previous = MS58XX_BRANCH_UNKNOWN; previous <= MS58XX_BRANCH_VERY_COLD; previous++) {
         assert_equals_datasheet(proms[part], EXAMPLE_D1, d2, (enum ms58xx_branch)previous);
       }
@@ -260,14 +252,13 @@ static void test_branch_hysteresis(void) {
     int32_t temperature_cC;
     int next;
   } cases[] = {
-      {W, 2000, W}, {W, 1999, W}, {W, 1970, W}, {W, 1969, C}, {W, 1000, C}, {W, 999, V},
-      {C, 1999, C}, {C, 2000, C}, {C, 2029, C}, {C, 2030, W}, {C, 1000, C}, {C, 970, C},
-      {C, 969, V},  {V, 999, V},  {V, 1000, V}, {V, 1029, V}, {V, 1030, C}, {V, 1999, C},
-      {V, 2000, W}, {0, 2000, W}, {0, 1999, C}, {0, 1000, C}, {0, 999, V},
+      {W, 2000, W}, {W, 1999, W}, {W, 1970, W}, {W, 1969, C}, {W, 1000, C}, {W, 999, V},  {C, 1999, C}, {C, 2000, C},
+      {C, 2029, C}, {C, 2030, W}, {C, 1000, C}, {C, 970, C},  {C, 969, V},  {V, 999, V},  {V, 1000, V}, {V, 1029, V},
+      {V, 1030, C}, {V, 1999, C}, {V, 2000, W}, {0, 2000, W}, {0, 1999, C}, {0, 1000, C}, {0, 999, V},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-    TEST_ASSERT_EQUAL_INT(cases[i].next, ms58xx_branch_of((enum ms58xx_branch)cases[i].previous,
-                                                          cases[i].temperature_cC));
+    TEST_ASSERT_EQUAL_INT(cases[i].next,
+                          ms58xx_branch_of((enum ms58xx_branch)cases[i].previous, cases[i].temperature_cC));
   }
   /* A ramp down and up again changes the branch four times, each beyond its edge. */
   static const int32_t changes_cC[] = {1969, 969, 1030, 2030};
@@ -326,16 +317,14 @@ static void test_extremes_saturate(void) {
     }
     for (int codes_at = 0; codes_at < 25; codes_at++) {
       for (int previous = MS58XX_BRANCH_UNKNOWN; previous <= MS58XX_BRANCH_VERY_COLD; previous++) {
-        assert_equals_datasheet(&prom, codes[codes_at % 5], codes[codes_at / 5],
-                                (enum ms58xx_branch)previous);
+        assert_equals_datasheet(&prom, codes[codes_at % 5], codes[codes_at / 5], (enum ms58xx_branch)previous);
       }
     }
   }
   /* No offset and the greatest sensitivity with the greatest code read 4 MPa and more: beyond
    * an int32 of 1/1024 Pa. */
   const struct ms58xx_prom highest = {{0, UINT16_MAX, 0, UINT16_MAX, 0, 0, 0}};
-  TEST_ASSERT_EQUAL_INT32(INT32_MAX,
-                          pressure_Pa_q10(&highest, CODE_MAX, CODE_MAX, MS58XX_BRANCH_UNKNOWN));
+  TEST_ASSERT_EQUAL_INT32(INT32_MAX, pressure_Pa_q10(&highest, CODE_MAX, CODE_MAX, MS58XX_BRANCH_UNKNOWN));
   const struct ms58xx_prom lowest = {{0, 0, UINT16_MAX, UINT16_MAX, 0, UINT16_MAX, 0}};
   TEST_ASSERT_EQUAL_INT32(INT32_MIN, pressure_Pa_q10(&lowest, CODE_MAX, 0, MS58XX_BRANCH_UNKNOWN));
 }
@@ -347,12 +336,11 @@ static void test_q10_holds_the_datasheets_integer(void) {
     struct ms58xx_prom prom = example;
     for (int word = 1; word <= 6; word++) {
       /* Half of the parts near the example, half anything. */
-      prom.word[word] = i % 2 ? (uint16_t)random_u32(&random)
-                              : (uint16_t)(prom.word[word] - 2000 + random_below(&random, 4001));
+      prom.word[word] =
+          i % 2 ? (uint16_t)random_u32(&random) : (uint16_t)(prom.word[word] - 2000 + random_below(&random, 4001));
     }
     uint32_t d1 = random_below(&random, CODE_MAX + 1);
-    uint32_t d2 = i % 2 ? random_below(&random, CODE_MAX + 1)
-                        : EXAMPLE_D2 - 1000000 + random_below(&random, 2000001);
+    uint32_t d2 = i % 2 ? random_below(&random, CODE_MAX + 1) : EXAMPLE_D2 - 1000000 + random_below(&random, 2000001);
     struct reference is = datasheet(&prom, d1, d2, MS58XX_BRANCH_UNKNOWN);
     int32_t q10 = pressure_Pa_q10(&prom, d1, d2, MS58XX_BRANCH_UNKNOWN);
     TEST_ASSERT_EQUAL_INT32(saturated(is.pressure_Pa_q10), q10);

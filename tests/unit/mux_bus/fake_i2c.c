@@ -107,8 +107,7 @@ static uint32_t reachable(void) {
   uint32_t sensors = 0;
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     const unsigned m = k / BOARD_SENSORS_OF_STRIP;
-    if ((mux.open[m] >> k % BOARD_SENSORS_OF_STRIP & 1) != 0 && !fake.mux_missing[m] &&
-        !fake.sensor_missing[k]) {
+    if ((mux.open[m] >> k % BOARD_SENSORS_OF_STRIP & 1) != 0 && !fake.mux_missing[m] && !fake.sensor_missing[k]) {
       sensors |= UINT32_C(1) << k;
     }
   }
@@ -117,8 +116,7 @@ static uint32_t reachable(void) {
 
 static enum ft_status write_mux(unsigned m) {
   fake.selects++;
-  if (m >= BOARD_MUX_COUNT || fake.mux_missing[m] || mux.in_reset[m] ||
-      transaction.number == fake.nack_select_at) {
+  if (m >= BOARD_MUX_COUNT || fake.mux_missing[m] || mux.in_reset[m] || transaction.number == fake.nack_select_at) {
     return FT_ERR_NACK;
   }
   mux.open[m] = transaction.byte;

@@ -22,10 +22,9 @@ struct fake_i2c {
   unsigned arbitration_lost_at; /* the same, loses arbitration */
   unsigned nack_select_at;      /* the same, the addressed multiplexer misses its address */
   unsigned nack_read_at;        /* the same, the sensor that is read */
-  unsigned busy_polls; /* polls of each transaction that find the controller not yet idle */
+  unsigned busy_polls;          /* polls of each transaction that find the controller not yet idle */
   bool sda_held, scl_held;
-  uint32_t
-      tied_low; /* bitmap: sensors whose SDA is at ground, which the bus feels while it is on */
+  uint32_t tied_low;              /* bitmap: sensors whose SDA is at ground, which the bus feels while it is on */
   unsigned sda_free_after_clocks; /* 0: no number of clocks frees it */
   bool sda_free_by_mux_reset;
 

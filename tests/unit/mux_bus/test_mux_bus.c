@@ -253,8 +253,7 @@ static void test_a_selection_that_is_missed_once_is_repeated(void) {
     fake.nack_select_at = fake.transactions + at;
     const unsigned selects = fake.selects;
     expect_good_frame();
-    TEST_ASSERT_LESS_OR_EQUAL_UINT(selects + COMMAND_TRANSACTIONS - 1 + READ_TRANSACTIONS,
-                                   fake.selects);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(selects + COMMAND_TRANSACTIONS - 1 + READ_TRANSACTIONS, fake.selects);
     TEST_ASSERT_EQUAL_UINT(0, fake.collisions);
     expect_good_frame();
     TEST_ASSERT_EQUAL_UINT(0, fake.collisions);

@@ -79,18 +79,14 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void strike(enum sim_fault_kind kind, uint32_t at, uint32_t count, uint8_t sensor) {
-  array.fault = (struct sim_fault){.kind = kind,
-                                   .transfer = array.transfers + at,
-                                   .count = count,
-                                   .mask = 0x800001,
-                                   .sensor = sensor};
+  array.fault = (struct sim_fault){
+      .kind = kind, .transfer = array.transfers + at, .count = count, .mask = 0x800001, .sensor = sensor};
 }
 
 static void test_a_frame_and_its_bus_time(void) {
   const uint64_t start_us = now_us;
   expect_good_frame();
-  TEST_ASSERT_EQUAL_UINT64(
-      start_us + SIM_ARRAY_BROADCAST_us + CONVERT_us + SENSORS * SIM_ARRAY_READ_us, now_us);
+  TEST_ASSERT_EQUAL_UINT64(start_us + SIM_ARRAY_BROADCAST_us + CONVERT_us + SENSORS * SIM_ARRAY_READ_us, now_us);
   TEST_ASSERT_EQUAL_UINT32(1 + 1 + SENSORS, array.transfers);
   TEST_ASSERT_EQUAL_UINT32(0, array.early_reads);
 }
@@ -132,8 +128,7 @@ static void test_noise_is_the_datasheets(void) {
     TEST_ASSERT_EQUAL_INT(FT_OK, frame());
     for (unsigned k = 0; k < SENSORS; k++, readings++) {
       const uint16_t *prom = array.sensor[k].prom;
-      const double error_Pa =
-          sim_ms5840_pressure_Pa(prom, code(k), sim_ms5840_d2(prom, 25.0)) + 0.5 - 101325.0;
+      const double error_Pa = sim_ms5840_pressure_Pa(prom, code(k), sim_ms5840_d2(prom, 25.0)) + 0.5 - 101325.0;
       sum += error_Pa;
       squares += error_Pa * error_Pa;
     }
@@ -204,8 +199,7 @@ static void test_spoilt_bytes(void) {
   const struct {
     enum sim_fault_kind kind;
     uint32_t code;
-  } cases[] = {
-      {SIM_FAULT_FLIP, 1000006 ^ 0x800001}, {SIM_FAULT_ZERO, 0}, {SIM_FAULT_ONES, 0xFFFFFF}};
+  } cases[] = {{SIM_FAULT_FLIP, 1000006 ^ 0x800001}, {SIM_FAULT_ZERO, 0}, {SIM_FAULT_ONES, 0xFFFFFF}};
   for (unsigned i = 0; i < 3; i++) {
     strike(cases[i].kind, 1 + 7, 0, 0);
     TEST_ASSERT_EQUAL_INT(FT_OK, frame());

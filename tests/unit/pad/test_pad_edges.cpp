@@ -26,8 +26,8 @@ twin::BlockTable block(const wire_info &info) {
   for (int k = 0; k < info.sensor_count; k++) {
     sensors.push_back({double(info.x_mm[k]), double(info.y_mm[k])});
   }
-  return twin::BlockTable::load_or_build(
-      {twin::silicone(12.0), 9.0 + OVERHANG_mm, 18.0 + OVERHANG_mm}, sensors, FINGERTIP_TABLES_DIR);
+  return twin::BlockTable::load_or_build({twin::silicone(12.0), 9.0 + OVERHANG_mm, 18.0 + OVERHANG_mm}, sensors,
+                                         FINGERTIP_TABLES_DIR);
 }
 
 struct Told {
@@ -37,8 +37,7 @@ struct Told {
 
 /* What the firmware says of a contact 3 mm wide on the pad that ends. The layer's part is written
  * again here, from the formulas of pad_profile.h. */
-Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx,
-          double qy) {
+Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx, double qy) {
   const wire_info info = pad::own_sensors();
   constexpr double FORCE_N = 4.0, SPREAD_mm2 = 3.0;
   std::array<std::int32_t, FT_MAX_SENSORS> readings{};
@@ -51,8 +50,7 @@ Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, dou
     }
     for (const auto &term : pad.tangential) {
       const double v = std::pow(double(term.sd_mm), 2) + 1.3 * SPREAD_mm2;
-      Pa += (qx * dx + qy * dy) * double(term.moment_mm) / (v * v) *
-            std::exp(-(dx * dx + dy * dy) / (2 * v));
+      Pa += (qx * dx + qy * dy) * double(term.moment_mm) / (v * v) * std::exp(-(dx * dx + dy * dy) / (2 * v));
     }
     Pa *= 1e6 * FORCE_N / (2 * M_PI);
     Pa += ends.added_Pa(k, {FORCE_N, qx * FORCE_N, qy * FORCE_N, 3.0}, x_mm, y_mm);
@@ -67,8 +65,7 @@ Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, dou
   fitting.noise_Pa_q10 = 1024;
   fit_result fit;
   struct fit_tangential found;
-  fit_gaussian_grid(&array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count),
-                    &fitting, &fit);
+  fit_gaussian_grid(&array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &fitting, &fit);
   fit_tangential_state state{};
   for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
     fit_tangential_load(&array, &prepared, readings.data(), &fitting, &fit, &state, &found);

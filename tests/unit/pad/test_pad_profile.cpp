@@ -40,8 +40,7 @@ double normal_of(const pad_profile &pad, double H) {
 double tangential_of(const pad_profile &pad, double H) {
   double sum = 0;
   for (const auto &term : pad.tangential) {
-    sum += H * double(term.moment_mm) / h_mm *
-           std::exp(-0.5 * std::pow(H * double(term.sd_mm) / h_mm, 2));
+    sum += H * double(term.moment_mm) / h_mm * std::exp(-0.5 * std::pow(H * double(term.sd_mm) / h_mm, 2));
   }
   return sum;
 }
@@ -50,12 +49,10 @@ double tangential_of(const pad_profile &pad, double H) {
 pad::Misfit misfit_of(const pad_profile &pad) {
   auto T = [](double H) { return twin::base_transfer(H, 0.49); };
   auto Q = [](double H) { return twin::tangential_transfer(H, 0.49); };
-  return {
-      std::sqrt(over_waves([&](double H) { return H * std::pow(T(H) - normal_of(pad, H), 2); }) /
-                over_waves([&](double H) { return H * T(H) * T(H); })),
-      std::sqrt(
-          over_waves([&](double H) { return H * std::pow(Q(H) - tangential_of(pad, H), 2); }) /
-          over_waves([&](double H) { return H * Q(H) * Q(H); }))};
+  return {std::sqrt(over_waves([&](double H) { return H * std::pow(T(H) - normal_of(pad, H), 2); }) /
+                    over_waves([&](double H) { return H * T(H) * T(H); })),
+          std::sqrt(over_waves([&](double H) { return H * std::pow(Q(H) - tangential_of(pad, H), 2); }) /
+                    over_waves([&](double H) { return H * Q(H) * Q(H); }))};
 }
 
 } // namespace
@@ -99,19 +96,15 @@ TEST(PadProfile, GivesThePressureOfTheLayer) {
   const pad_profile pad = profile_of(h_mm);
   const double t2 = 0.04; /* in squared thicknesses: 4 mm^2 */
   auto pressure = [&](const std::function<double(double)> &transfer, int order, double r) {
-    return over_waves([&](double H) {
-             return H * transfer(H) * std::exp(-0.5 * H * H * t2) * jn(order, H * r);
-           }) /
+    return over_waves([&](double H) { return H * transfer(H) * std::exp(-0.5 * H * H * t2) * jn(order, H * r); }) /
            (2 * M_PI);
   };
   auto T = [](double H) { return twin::base_transfer(H, 0.49); };
   auto Q = [](double H) { return twin::tangential_transfer(H, 0.49); };
   const double p0 = pressure(T, 0, 0);
   for (double r = 0; r < 4; r += 0.25) {
-    EXPECT_NEAR(pressure([&](double H) { return normal_of(pad, H); }, 0, r), pressure(T, 0, r),
-                0.01 * p0);
-    EXPECT_NEAR(pressure([&](double H) { return tangential_of(pad, H); }, 1, r), pressure(Q, 1, r),
-                0.005 * p0);
+    EXPECT_NEAR(pressure([&](double H) { return normal_of(pad, H); }, 0, r), pressure(T, 0, r), 0.01 * p0);
+    EXPECT_NEAR(pressure([&](double H) { return tangential_of(pad, H); }, 1, r), pressure(Q, 1, r), 0.005 * p0);
   }
 }
 

@@ -23,8 +23,7 @@ pad::Thickness found_on(double layer_mm, const truth::PadOptions &options, std::
 }
 
 TEST(PadThickness, IsThatOfTheRubber) {
-  const truth::PadOptions kinds[] = {
-      {10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}, {20.0, 0.0, 0.1, 5.0, 3.5}};
+  const truth::PadOptions kinds[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}, {20.0, 0.0, 0.1, 5.0, 3.5}};
   for (const double layer_mm : {9.0, 12.0, 15.0}) {
     for (std::uint64_t seed = 0; seed < 6; seed++) {
       const pad::Thickness found = found_on(layer_mm, kinds[seed % 3], 7000 + seed);

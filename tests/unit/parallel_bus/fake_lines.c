@@ -7,8 +7,7 @@
 struct fake_lines fake;
 
 enum { MAX_CELLS = 64, RISE_ns = 426, FALL_ns = 180, HOLD_ns = 300 };
-static const int STEP_ns[WAVE_STEPS_PER_CELL] = {WAVE_STEP0_ns, WAVE_STEP1_ns, WAVE_STEP2_ns,
-                                                 WAVE_STEP3_ns};
+static const int STEP_ns[WAVE_STEPS_PER_CELL] = {WAVE_STEP0_ns, WAVE_STEP1_ns, WAVE_STEP2_ns, WAVE_STEP3_ns};
 
 static struct sensor {
   enum { IDLE, ADDRESS, RECEIVE, SEND, IGNORE } state;
@@ -97,8 +96,7 @@ static void on_scl_fall(struct sensor *sensor, unsigned k) {
       fake.received[k]++;
       sensor->index = 0;
     }
-    sensor->low =
-        sensor->state == ADDRESS || (sensor->state == RECEIVE && (fake.deaf >> k & 1) == 0);
+    sensor->low = sensor->state == ADDRESS || (sensor->state == RECEIVE && (fake.deaf >> k & 1) == 0);
     return;
   }
   sensor->low = false;
@@ -191,8 +189,7 @@ static void take_step(uint16_t step) {
   const uint16_t after = levels();
   const bool scl = after >> BOARD_PIN_SCL & 1;
   const bool scl_changed = ((before ^ after) >> BOARD_PIN_SCL & 1) != 0;
-  if ((pulled_before ^ step) >> BOARD_PIN_SCL != 0 &&
-      ((pulled_before ^ step) & BOARD_SDA_LINES) != 0) {
+  if ((pulled_before ^ step) >> BOARD_PIN_SCL != 0 && ((pulled_before ^ step) & BOARD_SDA_LINES) != 0) {
     misused("SCL and SDA at once");
   }
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
@@ -220,8 +217,8 @@ enum ft_status wave_player_open(void) {
 }
 
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
-  if (wave.active || cell_count == 0 || cell_count % 2 != 0 || cell_count > MAX_CELLS ||
-      (uintptr_t)steps % 4 != 0 || (uintptr_t)samples % 4 != 0) {
+  if (wave.active || cell_count == 0 || cell_count % 2 != 0 || cell_count > MAX_CELLS || (uintptr_t)steps % 4 != 0 ||
+      (uintptr_t)samples % 4 != 0) {
     misused("wave_player_start");
     return;
   }

@@ -162,7 +162,7 @@ static void test_a_chip_that_does_not_start(void) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, read_back(READ_ADC, 3));
-  TEST_ASSERT_EQUAL_UINT(before, fake.waves); /* nothing is played on blocks in reset ... */
+  TEST_ASSERT_EQUAL_UINT(before, fake.waves);   /* nothing is played on blocks in reset ... */
   TEST_ASSERT_EQUAL_UINT64(at_us, fake.now_us); /* ... or waited for */
   fake.opens = true;
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
@@ -282,8 +282,7 @@ static void test_a_disturbed_clock_at_every_place(void) {
       expect_bytes_of(ALL & ~(1u << 5), READ_ADC, 3);
       const bool acknowledged = (result.acknowledged >> 5 & 1) != 0;
       const uint8_t *bytes = result.bytes[5];
-      const bool high_bytes_right =
-          bytes[0] == fake_byte(5, READ_ADC, 0) && bytes[1] == fake_byte(5, READ_ADC, 1);
+      const bool high_bytes_right = bytes[0] == fake_byte(5, READ_ADC, 0) && bytes[1] == fake_byte(5, READ_ADC, 1);
       TEST_ASSERT_TRUE(!acknowledged || high_bytes_right || bytes[2] == 0xFF);
       TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
       TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));

@@ -15,8 +15,8 @@ static void misused(struct fake_bus *fake, const char *how) {
   fake->misuse = how;
 }
 
-static enum ft_status start(struct fake_bus *fake, enum fake_operation operation, uint8_t command,
-                            uint8_t byte_count, uint64_t now_us) {
+static enum ft_status start(struct fake_bus *fake, enum fake_operation operation, uint8_t command, uint8_t byte_count,
+                            uint64_t now_us) {
   if (fake->running && operation != FAKE_RECOVERY) {
     misused(fake, "two operations at once");
     return FT_ERR_BUSY;
@@ -37,8 +37,8 @@ static enum ft_status start(struct fake_bus *fake, enum fake_operation operation
       misused(fake, "something was sent before the PROM was loaded");
     }
   }
-  fake->log[fake->logged++] = (struct fake_entry){
-      operation, command, byte_count, now_us, now_us + duration_us[operation], FT_PENDING};
+  fake->log[fake->logged++] =
+      (struct fake_entry){operation, command, byte_count, now_us, now_us + duration_us[operation], FT_PENDING};
   fake->running = true;
   return FT_OK;
 }
@@ -47,8 +47,7 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
   return start(context, FAKE_COMMAND, command, 0, now_us);
 }
 
-static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
-                                 uint64_t now_us) {
+static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count, uint64_t now_us) {
   return start(context, FAKE_READ, command, byte_count, now_us);
 }
 
@@ -90,8 +89,7 @@ static void answer_adc(struct fake_bus *fake, struct array_bus_result *result) {
   fake->converted = 0;
 }
 
-static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result,
-                           uint64_t *wake_us) {
+static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us) {
   struct fake_bus *fake = context;
   if (!fake->running) {
     misused(fake, "polled without an operation");
@@ -151,8 +149,8 @@ void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_
   fake->fail_with = FT_ERR_TIMEOUT;
   fake->recovery_is = FT_OK;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    fake->prom[k] = (struct ms58xx_prom){{(uint16_t)(0x0040 + k), (uint16_t)(46372 + 31 * k), 43981,
-                                          29059, 27842, (uint16_t)(31553 + k), 28165}};
+    fake->prom[k] = (struct ms58xx_prom){
+        {(uint16_t)(0x0040 + k), (uint16_t)(46372 + 31 * k), 43981, 29059, 27842, (uint16_t)(31553 + k), 28165}};
     fake->prom[k].word[0] |= (uint16_t)(ms58xx_prom_crc4(&fake->prom[k]) << 12);
     fake->d1[k] = 6465444u + 1000u * k;
     fake->d2[k] = 8077636u + 150000u;

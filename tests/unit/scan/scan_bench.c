@@ -95,8 +95,7 @@ int count_entries(uint8_t command, enum fake_operation operation) {
 }
 
 int find_entry(int from, uint8_t command, enum fake_operation operation) {
-  while (from < fake.logged &&
-         !(fake.log[from].operation == operation && fake.log[from].command == command)) {
+  while (from < fake.logged && !(fake.log[from].operation == operation && fake.log[from].command == command)) {
     from++;
   }
   TEST_ASSERT_LESS_THAN_INT_MESSAGE(fake.logged, from, "the operation never came");
@@ -117,8 +116,7 @@ void assert_good_frame(uint32_t valid) {
 }
 
 void skip_to_temperature(void) {
-  for (int steps = 0; scan.state != SCAN_WAIT_CONVERSION || !scan.conversion->is_temperature;
-       steps++) {
+  for (int steps = 0; scan.state != SCAN_WAIT_CONVERSION || !scan.conversion->is_temperature; steps++) {
     TEST_ASSERT_LESS_THAN_INT_MESSAGE(20000, steps, "no temperature comes");
     step();
   }

@@ -30,8 +30,7 @@ void setUp(void) {
     d1[k] = D1 + (uint32_t)(20000 * k); /* moulding: up to 12 kPa apart */
     d2[k] = D2 + (uint32_t)(700 * k);
   }
-  temperature = (struct readings_temperature){
-      .prom = prom, .code = d2, .good = ALL, .returned = ALL, .admitted = ALL};
+  temperature = (struct readings_temperature){.prom = prom, .code = d2, .good = ALL, .returned = ALL, .admitted = ALL};
 }
 
 void tearDown(void) {}
@@ -312,9 +311,8 @@ static void test_a_temperature_step_needs_a_second_and_the_others(void) {
     double first_degC, second_degC;
     bool used, suspect;
   } cases[] = {
-      {2, 2.1, true, false},  {-4, -4, true, false},   {2, -3, false, false},
-      {2, 4.5, false, false}, {20, 20.1, false, true}, {-60, -60, false, true},
-      {20, 35, false, false},
+      {2, 2.1, true, false},   {-4, -4, true, false},   {2, -3, false, false},  {2, 4.5, false, false},
+      {20, 20.1, false, true}, {-60, -60, false, true}, {20, 35, false, false},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     next_case();
@@ -454,8 +452,7 @@ static void test_one_and_two_sensors_have_nobody_to_ask(void) {
     readings_take_temperature(&readings, count, &temperature);
     temperature.returned = 0;
     warm_by(0, 20);
-    TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN,
-                            readings_take_temperature(&readings, count, &temperature));
+    TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN, readings_take_temperature(&readings, count, &temperature));
     readings_take_temperature(&readings, count, &temperature);
     readings_take_pressures(&readings, d1, temperature.good, &frame);
     TEST_ASSERT_EQUAL_HEX32(temperature.good, frame.valid);

@@ -64,8 +64,7 @@ static void test_saturation_is_reported_at_the_end_of_the_range(void) {
   uint32_t high = 0xFFFFFF;
   while (high - low > 1) { /* the greatest code that passes */
     fake.d1[DISTURBED] = (low + high) / 2;
-    *(expected_Pa_q10(DISTURBED) > MS58XX_MAX_PRESSURE_Pa * 1024 ? &high : &low) =
-        fake.d1[DISTURBED];
+    *(expected_Pa_q10(DISTURBED) > MS58XX_MAX_PRESSURE_Pa * 1024 ? &high : &low) = fake.d1[DISTURBED];
   }
   fake.d1[DISTURBED] = low;
   skip_frames(2);
@@ -93,8 +92,7 @@ static void test_waits_at_every_osr(void) {
         uint32_t longest_us = fake_conversion_us(entry->command);
         TEST_ASSERT_EQUAL_HEX8(2 * i, entry->command & 0x0F);
         TEST_ASSERT_GREATER_OR_EQUAL_UINT64(longest_us, wait_us);
-        TEST_ASSERT_GREATER_OR_EQUAL_UINT64(longest_us + longest_us / 20 - FAKE_READ_LEAD_us,
-                                            wait_us);
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT64(longest_us + longest_us / 20 - FAKE_READ_LEAD_us, wait_us);
         TEST_ASSERT_LESS_OR_EQUAL_UINT64(longest_us + longest_us / 10, wait_us);
       } else if (entry->command == 0x1E) {
         TEST_ASSERT_GREATER_OR_EQUAL_UINT64(2800, wait_us);
@@ -249,8 +247,7 @@ static void test_a_temperature_waits_for_the_processor(void) {
   next_frame();
   TEST_ASSERT_FALSE(frame.held);
   TEST_ASSERT_GREATER_THAN_UINT32(number, frame.number);
-  TEST_ASSERT_EQUAL_UINT32(frame.number + 1 - frames_before - 2,
-                           value_of(&scan.counters.frames_skipped));
+  TEST_ASSERT_EQUAL_UINT32(frame.number + 1 - frames_before - 2, value_of(&scan.counters.frames_skipped));
   run_until(now_us + 2000000);
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
   assert_good_frame(ALL);

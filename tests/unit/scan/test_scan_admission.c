@@ -80,10 +80,8 @@ static void test_blank_prom_is_not_admitted_and_asked_ever_more_rarely(void) {
     int next = find_entry(at + 1, 0x1E, FAKE_COMMAND);
     assert_admission(next, 3);
     /* At the end of the frame during which the time came. */
-    TEST_ASSERT_UINT64_WITHIN(10000, intervals_s[i] * 1000000 + 5000,
-                              fake.log[next].start_us - fake.log[at].start_us);
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(intervals_s[i] * 1000000,
-                                        fake.log[next].start_us - fake.log[at].start_us);
+    TEST_ASSERT_UINT64_WITHIN(10000, intervals_s[i] * 1000000 + 5000, fake.log[next].start_us - fake.log[at].start_us);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(intervals_s[i] * 1000000, fake.log[next].start_us - fake.log[at].start_us);
     at = next;
   }
   /* Once all are admitted, the next loss is answered after a second again. */
@@ -107,8 +105,7 @@ static void test_nobody_answers(void) {
   TEST_ASSERT_EQUAL_HEX32(0, frame.valid);
   TEST_ASSERT_EQUAL_INT16(0, frame.temperature_cC);
   TEST_ASSERT_GREATER_THAN_UINT32(0, value_of(&scan.counters.bus_nacks));
-  TEST_ASSERT_EQUAL_UINT32(value_of(&scan.counters.frames),
-                           value_of(&scan.counters.frames_incomplete));
+  TEST_ASSERT_EQUAL_UINT32(value_of(&scan.counters.frames), value_of(&scan.counters.frames_incomplete));
   TEST_ASSERT_EQUAL_INT(6, count_entries(0x1E, FAKE_COMMAND)); /* at 0, 1, 3, 7, 15, 23 s */
   fake.answering = ALL;
   run_until(34000000);

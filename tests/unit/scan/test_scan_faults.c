@@ -187,8 +187,7 @@ static void test_single_nacks_cost_the_frames_they_touch(void) {
       fake.answering = ALL;
       skip_frames(4);
       assert_good_frame(ALL);
-      TEST_ASSERT_LESS_OR_EQUAL_UINT32(before + (single ? 1 : 2),
-                                       value_of(&scan.counters.frames_incomplete));
+      TEST_ASSERT_LESS_OR_EQUAL_UINT32(before + (single ? 1 : 2), value_of(&scan.counters.frames_incomplete));
     }
     TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
   }
@@ -231,8 +230,7 @@ static void test_timeout_leads_to_recovery_and_admission(void) {
     TEST_ASSERT_LESS_THAN_INT(fake.logged, ++at);
   }
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, fake.log[at - 1].status);
-  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(fake.log[at].end_us + fake_conversion_us(0x44),
-                                      fake.log[at + 1].start_us);
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(fake.log[at].end_us + fake_conversion_us(0x44), fake.log[at + 1].start_us);
   assert_entry(assert_admission(at + 1, 1), FAKE_COMMAND, 0x54);
   assert_good_frame(ALL);
   TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_timeouts));
@@ -398,8 +396,7 @@ static void test_random_faults_are_survived(void) {
         scan_set_rate_mHz(&scan, random_below(&random, 2000001));
         break;
       case 6:
-        TEST_ASSERT_EQUAL_INT(FT_OK,
-                              scan_set_osr(&scan, (uint16_t)(256u << random_below(&random, 6))));
+        TEST_ASSERT_EQUAL_INT(FT_OK, scan_set_osr(&scan, (uint16_t)(256u << random_below(&random, 6))));
         break;
       case 7:
         fake.misread_prom = random_u32(&random) & ALL;

@@ -240,8 +240,7 @@ static void test_temperature_fits_into_the_pauses(void) {
       TEST_ASSERT_LESS_THAN_UINT64(7000, fake.log[next + 2].start_us - fake.log[next].start_us);
       if (n > 4) {
         uint64_t interval_us = fake.log[next].start_us - fake.log[at - 1].start_us;
-        TEST_ASSERT_UINT64_WITHIN(period_us + 10000,
-                                  (LONGEST_INTERVAL_us + period_us - 1) / period_us * period_us,
+        TEST_ASSERT_UINT64_WITHIN(period_us + 10000, (LONGEST_INTERVAL_us + period_us - 1) / period_us * period_us,
                                   interval_us);
       }
       at = next + 1;

@@ -82,8 +82,7 @@ struct change {
 };
 
 static struct change some_change(void) {
-  static const int kinds[] = {CALIBRATE, CALIBRATE, CALIBRATE, ERASE_CALIBRATION,
-                              KEEP,      KEEP,      KEEP,      FORGET,
+  static const int kinds[] = {CALIBRATE, CALIBRATE, CALIBRATE, ERASE_CALIBRATION, KEEP, KEEP, KEEP, FORGET,
                               PAD,       PAD,       PAD,       ERASE_PAD};
   struct change change = {.kind = kinds[random_below(&random, sizeof kinds / sizeof kinds[0])]};
   change.calibration = some_calibration();
@@ -92,8 +91,7 @@ static struct change some_change(void) {
   return change;
 }
 
-static struct store_content changed(const struct store_content *before,
-                                    const struct change *change) {
+static struct store_content changed(const struct store_content *before, const struct change *change) {
   static const struct calibration no_calibration;
   static const struct store_settings no_settings;
   static const struct pad_profile no_profile;
@@ -119,10 +117,8 @@ static struct store_content changed(const struct store_content *before,
 
 static bool is(const struct store_content *expected) {
   return store.content.has_calibration == expected->has_calibration &&
-         store.content.has_settings == expected->has_settings &&
-         store.content.has_profile == expected->has_profile &&
-         memcmp(&store.content.calibration, &expected->calibration, sizeof expected->calibration) ==
-             0 &&
+         store.content.has_settings == expected->has_settings && store.content.has_profile == expected->has_profile &&
+         memcmp(&store.content.calibration, &expected->calibration, sizeof expected->calibration) == 0 &&
          memcmp(&store.content.settings, &expected->settings, sizeof expected->settings) == 0 &&
          memcmp(&store.content.profile, &expected->profile, PROFILE_BYTES) == 0;
 }
@@ -322,8 +318,7 @@ static void power_may_come_and_go(void) {
 }
 
 static struct store_content keep_something(void) {
-  struct store_content content = {
-      .has_calibration = true, .has_settings = true, .has_profile = true};
+  struct store_content content = {.has_calibration = true, .has_settings = true, .has_profile = true};
   content.calibration = some_calibration();
   content.settings = some_settings();
   content.profile = some_profile();
@@ -398,9 +393,8 @@ static void what_another_firmware_wrote_is_left_alone(void) {
   static const struct {
     uint32_t at;
     uint16_t value;
-  } others[] = {
-      {8, 1},   {8, 2},    {8, 3},    {8, 5},       {8, UINT16_MAX},      {20, 14 << 8 | 1},
-      {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}, {20 + LENGTH_3, 2001}};
+  } others[] = {{8, 1},   {8, 2},    {8, 3},    {8, 5},       {8, UINT16_MAX},      {20, 14 << 8 | 1},
+                {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}, {20 + LENGTH_3, 2001}};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     native_flash = ours;
     alter_record(others[i].at, others[i].value);
@@ -421,8 +415,7 @@ static void generations_go_round(void) {
     struct store_content kept = keep_something();
     alter_record(12, (uint16_t)generation);
     alter_record(14, (uint16_t)(generation >> 16));
-    memset(native_flash.bytes + STORE_SHORT_SLOT_BYTES, 0xFF,
-           NATIVE_FLASH_BYTES - STORE_SHORT_SLOT_BYTES);
+    memset(native_flash.bytes + STORE_SHORT_SLOT_BYTES, 0xFF, NATIVE_FLASH_BYTES - STORE_SHORT_SLOT_BYTES);
     for (int i = 0; i < 3 * STORE_SLOTS; i++) {
       restart();
       finish();
@@ -594,8 +587,7 @@ static void slots_that_do_not_hold_what_is_written_are_given_up(void) {
     keep_something();
     for (int slot = 0; slot < bad; slot++) {
       uint32_t at = store.sector * PORT_FLASH_SECTOR_BYTES;
-      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * store.slot_bytes + 100],
-             0, 4);
+      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * store.slot_bytes + 100], 0, 4);
     }
     struct store_content changed = store.content;
     changed.calibration = some_calibration();
@@ -625,8 +617,7 @@ static void a_flash_that_does_not_answer_is_not_waited_for(void) {
 /* A record of the most sensors takes three pages; the most that fit into a short slot, and one
  * more. */
 static void large_arrays_fit(void) {
-  static const uint8_t counts[] = {STORE_SENSORS_OF_SHORT_SLOT, STORE_SENSORS_OF_SHORT_SLOT + 1,
-                                   FT_MAX_SENSORS};
+  static const uint8_t counts[] = {STORE_SENSORS_OF_SHORT_SLOT, STORE_SENSORS_OF_SHORT_SLOT + 1, FT_MAX_SENSORS};
   for (size_t n = 0; n < sizeof counts; n++) {
     begin_with(counts[n]);
     struct calibration calibration = some_calibration();

@@ -17,14 +17,11 @@ inline const ContactTable &table_of(const std::string &name) {
   if (found != tables.end()) {
     return found->second;
   }
-  return tables
-      .emplace(name, ContactTable::load_or_build(indenter(name), silicone(LAYER_mm),
-                                                 FINGERTIP_TEST_TABLES))
+  return tables.emplace(name, ContactTable::load_or_build(indenter(name), silicone(LAYER_mm), FINGERTIP_TEST_TABLES))
       .first->second;
 }
 
-inline Scenario scenario_of(const std::string &kind,
-                            const std::function<void(ScenarioOptions &)> &change = {}) {
+inline Scenario scenario_of(const std::string &kind, const std::function<void(ScenarioOptions &)> &change = {}) {
   ScenarioOptions options;
   options.kind = kind;
   if (change) {

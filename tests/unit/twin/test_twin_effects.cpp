@@ -36,8 +36,7 @@ std::vector<double> along(Pad &pad, const std::vector<Corner> &corners, double s
     const long steps = std::lround((b.t_s - a.t_s) / step_s);
     for (long n = 1; n <= steps; n++) {
       const double u = static_cast<double>(n) / static_cast<double>(steps);
-      readings.push_back(
-          reported(pad, a.t_s + u * (b.t_s - a.t_s), a.base_Pa + u * (b.base_Pa - a.base_Pa))[0]);
+      readings.push_back(reported(pad, a.t_s + u * (b.t_s - a.t_s), a.base_Pa + u * (b.base_Pa - a.base_Pa))[0]);
     }
   }
   return readings;
@@ -99,9 +98,7 @@ TEST(Effects, RubberNeitherPullsNorGivesMore) {
     EXPECT_LE(reading, 50000.0);
     EXPECT_GE(reading, -200.0);
   }
-  const auto at = [&](double t_s) {
-    return readings[static_cast<std::size_t>(std::lround(t_s / 0.01))];
-  };
+  const auto at = [&](double t_s) { return readings[static_cast<std::size_t>(std::lround(t_s / 0.01))]; };
   EXPECT_GT(at(20.0), 0.5 * 50000.0);
   EXPECT_LT(at(20.0), 0.95 * 50000.0);
   EXPECT_EQ(at(20.5), 0.0);
@@ -113,8 +110,7 @@ TEST(Effects, HysteresisLoopHasItsShareOfTheWorkAtAnySpeedAndSize) {
     for (double peak_Pa : {2000.0, 80000.0}) {
       Pad pad = pad_with("hysteresis=4");
       const double t_s = 10.0 / speed;
-      const std::vector<double> readings =
-          along(pad, {{0, 0}, {t_s, peak_Pa}, {2 * t_s, 0}}, t_s / 5000);
+      const std::vector<double> readings = along(pad, {{0, 0}, {t_s, peak_Pa}, {2 * t_s, 0}}, t_s / 5000);
       const std::size_t half = readings.size() / 2;
       double loop = 0.0, work = 0.0;
       for (std::size_t i = 0; i <= half; i++) {
@@ -130,8 +126,8 @@ TEST(Effects, HysteresisLoopHasItsShareOfTheWorkAtAnySpeedAndSize) {
 
 TEST(Effects, HysteresisRemembersItsLargestPressureAndClosesInnerLoops) {
   Pad pad = pad_with("hysteresis=10");
-  const std::vector<double> readings = along(
-      pad, {{0, 0}, {1, 10000}, {2, 5000}, {3, 8000}, {4, 5000}, {5, 10000}, {6, 12000}}, 0.01);
+  const std::vector<double> readings =
+      along(pad, {{0, 0}, {1, 10000}, {2, 5000}, {3, 8000}, {4, 5000}, {5, 10000}, {6, 12000}}, 0.01);
   EXPECT_NEAR(readings[200], 5000.0 - 0.3 * 5000.0 * 0.5, 1e-6);
   EXPECT_LT(readings[300], 8000.0);
   EXPECT_GT(readings[300], 8000.0 - 0.3 * 2500.0);
@@ -227,8 +223,7 @@ TEST(Effects, AftereffectDoesNotDependOnTheStep) {
 TEST(Effects, AftereffectOfAPressThatIsSmallerAddsNothing) {
   Pad one = pad_with("aftereffect"), two = pad_with("aftereffect");
   const std::vector<double> a = along(one, {{0, 0}, {1, 50000}, {1.5, 0}, {3, 0}}, 0.1);
-  const std::vector<double> b =
-      along(two, {{0, 0}, {1, 50000}, {1.5, 0}, {1.7, 0}, {1.8, 50}, {1.9, 0}, {3, 0}}, 0.1);
+  const std::vector<double> b = along(two, {{0, 0}, {1, 50000}, {1.5, 0}, {1.7, 0}, {1.8, 50}, {1.9, 0}, {3, 0}}, 0.1);
   EXPECT_NEAR(a.back(), b.back(), 0.1 * std::abs(a.back()));
   EXPECT_NE(a.back(), 0.0);
 }
@@ -380,8 +375,7 @@ TEST(Effects, BranchStepsByWhatTheRuleStepsBy) {
       const double code = 0.5 * (low + high);
       (compensated_Pa(typical, code, dT, false) < AMBIENT_Pa + bases_Pa[i] ? low : high) = code;
     }
-    const double step_Pa =
-        compensated_Pa(typical, low, dT, false) - compensated_Pa(typical, low, dT, true);
+    const double step_Pa = compensated_Pa(typical, low, dT, false) - compensated_Pa(typical, low, dT, true);
     EXPECT_NEAR(sum_Pa[i], step_Pa, 0.6) << i;
     EXPECT_NEAR(step_Pa, i == 0 ? 51.1 : 90.9, 0.2);
   }
@@ -425,8 +419,7 @@ TEST(Effects, AreParsed) {
   EXPECT_EQ(parse_effects("all,clip=5").at("clip"), 5.0);
   EXPECT_EQ(parse_effects("clip=5, all").at("clip"), 5.0);
   EXPECT_EQ(parse_effects("gain").at("gain"), 10.0);
-  for (const char *wrong :
-       {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain", "all=1"}) {
+  for (const char *wrong : {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain", "all=1"}) {
     EXPECT_THROW(parse_effects(wrong), Error) << wrong;
   }
   try {

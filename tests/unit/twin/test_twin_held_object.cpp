@@ -24,8 +24,7 @@ double mindlin_mm(double load_share) {
 
 void play(
     HeldObject &held, double seconds, const std::function<double(double)> &load_N,
-    const std::function<double(double)> &force_N = [](double) { return FORCE_N; },
-    double step_s = HeldObject::STEP_s) {
+    const std::function<double(double)> &force_N = [](double) { return FORCE_N; }, double step_s = HeldObject::STEP_s) {
   const long steps = std::lround(seconds / step_s);
   for (long i = 0; i < steps; i++) {
     const double t_s = static_cast<double>(i) * step_s;
@@ -114,9 +113,7 @@ TEST(HeldObject, LosesNoEnergyAndMakesNone) {
   HeldObject held = object();
   // Shaken within what sticks, let fall, held again, all at one force.
   const auto load_N = [](double t_s) {
-    return t_s < 0.6   ? 0.7 * HOLDS_N * std::sin(60.0 * t_s)
-           : t_s < 0.7 ? 1.3 * HOLDS_N
-                       : 0.2 * HOLDS_N;
+    return t_s < 0.6 ? 0.7 * HOLDS_N * std::sin(60.0 * t_s) : t_s < 0.7 ? 1.3 * HOLDS_N : 0.2 * HOLDS_N;
   };
   double damped = 0.0, rubbed = 0.0;
   for (int i = 0; i < 24000; i++) {
@@ -141,9 +138,7 @@ TEST(HeldObject, StepsAreShortEnough) {
   const auto ends_mm = [](double step_s) {
     HeldObject held = object();
     const auto load_N = [](double t_s) { return 1.2 * HOLDS_N * std::min(t_s / 0.1, 1.0); };
-    const auto force_N = [](double t_s) {
-      return FORCE_N * (1.0 + std::clamp((t_s - 0.13) / 0.05, 0.0, 1.0));
-    };
+    const auto force_N = [](double t_s) { return FORCE_N * (1.0 + std::clamp((t_s - 0.13) / 0.05, 0.0, 1.0)); };
     play(held, 0.4, load_N, force_N, step_s);
     EXPECT_FALSE(held.slips());
     return held.way_mm();

@@ -26,8 +26,7 @@ double way_mm(const Touch &from, const Touch &to) {
 }
 
 const Phase &phase_of(const Act &act, const std::string &name) {
-  return *std::find_if(act.phases.begin(), act.phases.end(),
-                       [&](const Phase &one) { return one.name == name; });
+  return *std::find_if(act.phases.begin(), act.phases.end(), [&](const Phase &one) { return one.name == name; });
 }
 
 TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
@@ -42,8 +41,8 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
   std::set<double> frictions;
   for (const Act &act : scenario.acts) {
     const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
-    const Phase &load = phase_of(act, "load"), &carry = phase_of(act, "carry"),
-                &slip = phase_of(act, "slip"), &after = phase_of(act, "after");
+    const Phase &load = phase_of(act, "load"), &carry = phase_of(act, "carry"), &slip = phase_of(act, "slip"),
+                &after = phase_of(act, "after");
     EXPECT_GE(carry.end_s - carry.begin_s, 3.0 - 1e-9);
     const double force_N = at(load.begin_s).force_N, slides_N = act.friction * force_N;
     EXPECT_EQ(force_N, 3.0);
@@ -70,8 +69,7 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
       EXPECT_LE(std::abs(at(t_s).y_mm), 15.75 + 1e-9);
     }
     EXPECT_NEAR(pull_N(at(after.begin_s)), 0.0, 1e-9);
-    directions.insert(
-        {std::lround(slides.pull_x_N / slides_N), std::lround(slides.pull_y_N / slides_N)});
+    directions.insert({std::lround(slides.pull_x_N / slides_N), std::lround(slides.pull_y_N / slides_N)});
     EXPECT_NEAR((at(slip.end_s).x_mm - slides.x_mm) / 8.0, slides.pull_x_N / slides_N, 1e-6);
     EXPECT_NEAR((at(slip.end_s).y_mm - slides.y_mm) / 8.0, slides.pull_y_N / slides_N, 1e-6);
   }
@@ -82,8 +80,7 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
 }
 
 const Scenario &slides() {
-  static const Scenario scenario =
-      scenario_of("slide", [](ScenarioOptions &o) { o.seconds = 600; });
+  static const Scenario scenario = scenario_of("slide", [](ScenarioOptions &o) { o.seconds = 600; });
   return scenario;
 }
 
@@ -114,9 +111,8 @@ TEST(Slide, SlipsWhereTheLoadReachesFrictionAndNowhereElse) {
         began = true;
         // In the millisecond that ends in slip, a fast hand's load rises by a few percent.
         const double local_s = phase.begin_s - act.begin_s;
-        const double most =
-            std::max(pull_N(track.at(local_s)) / track.at(local_s).force_N,
-                     pull_N(track.at(local_s + MS_s)) / track.at(local_s + MS_s).force_N);
+        const double most = std::max(pull_N(track.at(local_s)) / track.at(local_s).force_N,
+                                     pull_N(track.at(local_s + MS_s)) / track.at(local_s + MS_s).force_N);
         EXPECT_GE(most, 0.97 * act.friction) << act.press;
       }
     }
@@ -141,8 +137,7 @@ TEST(Slide, MovesAsMassAndForcesSay) {
     for (double t_s = slip.begin_s + 0.01; t_s < slip.end_s - 0.012; t_s += 0.004) {
       const Track &track = act.tracks[0];
       const auto way = [&](double at_s) { return track.pusher_mm.at(at_s - act.begin_s); };
-      const double found_mm_s2 =
-          (way(t_s + SPAN_s) - 2.0 * way(t_s) + way(t_s - SPAN_s)) / (SPAN_s * SPAN_s);
+      const double found_mm_s2 = (way(t_s + SPAN_s) - 2.0 * way(t_s) + way(t_s - SPAN_s)) / (SPAN_s * SPAN_s);
       // The mean pull with the weights of that difference.
       double mean_N = 0.0;
       for (int i = -8; i <= 8; i++) {
@@ -224,19 +219,18 @@ TEST(Slide, SticksAndSlipsWhereKineticFrictionIsLow) {
   EXPECT_GE(most, 4);
 }
 
-std::array<double, 15> base_Pa(const Touch &touch, const ContactTable &table,
-                               const TractionTable &traction) {
+std::array<double, 15> base_Pa(const Touch &touch, const ContactTable &table, const TractionTable &traction) {
   const double cosine = std::cos(touch.angle_rad), sine = std::sin(touch.angle_rad);
   std::array<double, 15> pressures{};
   for (std::size_t k = 0; k < pressures.size(); k++) {
     const double dx = double(geometry.x_mm[k]) - touch.x_mm;
     const double dy = double(geometry.y_mm[k]) - touch.y_mm;
     const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
-    pressures[k] = table.base_pressure_Pa(touch.force_N, along_x, along_y) +
-                   traction.base_pressure_Pa({touch.force_N, touch.stuck_N,
-                                              cosine * touch.pull_x_N + sine * touch.pull_y_N,
-                                              cosine * touch.pull_y_N - sine * touch.pull_x_N},
-                                             along_x, along_y);
+    pressures[k] =
+        table.base_pressure_Pa(touch.force_N, along_x, along_y) +
+        traction.base_pressure_Pa({touch.force_N, touch.stuck_N, cosine * touch.pull_x_N + sine * touch.pull_y_N,
+                                   cosine * touch.pull_y_N - sine * touch.pull_x_N},
+                                  along_x, along_y);
   }
   return pressures;
 }
@@ -286,8 +280,8 @@ TEST(Screw, WindsUpUntilFrictionGivesWayToBothSides) {
       turns.push_back(angle(one.end_s) - angle(one.begin_s));
       EXPECT_FALSE(one.slip);
     }
-    ASSERT_EQ(names, (std::vector<std::string>{"touch", "hold", "wind", "spin", "wind", "spin",
-                                               "unwind", "after", "release"}));
+    ASSERT_EQ(names, (std::vector<std::string>{"touch", "hold", "wind", "spin", "wind", "spin", "unwind", "after",
+                                               "release"}));
     const double side = turns[2] > 0.0 ? 1.0 : -1.0;
     sides.insert(turns[2] > 0.0);
     EXPECT_NEAR(turns[2], side * limit_rad, 1e-4);

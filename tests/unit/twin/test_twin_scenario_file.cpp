@@ -31,9 +31,8 @@ struct File {
   std::string bytes;
 
   double at(const std::string &name, double t_s) const {
-    const auto after =
-        std::lower_bound(rows.begin(), rows.end(), t_s,
-                         [](const std::vector<double> &row, double t) { return row[0] < t; });
+    const auto after = std::lower_bound(rows.begin(), rows.end(), t_s,
+                                        [](const std::vector<double> &row, double t) { return row[0] < t; });
     const std::size_t c = column.at(name);
     if (after == rows.begin() || after == rows.end()) {
       return (after == rows.begin() ? rows.front() : rows.back())[c];
@@ -46,8 +45,8 @@ struct File {
 File written(const Scenario &scenario, const BlockTable *block = nullptr) {
   const std::string path = testing::TempDir() + "twin_scenario.csv";
   const std::string &first = scenario.options.indenter, &second = scenario.options.second_indenter;
-  write_scenario(scenario, silicone(LAYER_mm), table_of(first),
-                 table_of(second.empty() ? first : second), block, path, true);
+  write_scenario(scenario, silicone(LAYER_mm), table_of(first), table_of(second.empty() ? first : second), block, path,
+                 true);
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
   File file;
@@ -80,8 +79,8 @@ TEST(ScenarioFile, ADipIsLowerAroundTheContactAndBelowNothingFarFromIt) {
   const double middle_Pa = table.base_pressure_Pa(5.0, 0.0, 0.0);
   const double width_mm = std::sqrt(5e6 / (2.0 * M_PI * middle_Pa));
   EXPECT_NEAR(table.base_pressure_Pa(5.0, 0.0, 0.0, 0.05), 0.95 * middle_Pa, 1e-6 * middle_Pa);
-  const double off_Pa = table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0) -
-                        table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0, 0.05);
+  const double off_Pa =
+      table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0) - table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0, 0.05);
   EXPECT_NEAR(off_Pa, 0.05 * std::exp(-0.5) * middle_Pa, 1e-6 * middle_Pa);
   EXPECT_LT(table.base_pressure_Pa(5.0, 0.0, 4.0 * width_mm, 0.05), -0.005 * middle_Pa);
   EXPECT_EQ(table.base_pressure_Pa(0.0, 1.0, 1.0, 0.05), 0.0);
@@ -98,22 +97,18 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
     Random random(7, 7, 7);
     for (int i = 0; i < 3000; i++) {
       const double t_s = 1e-3 * std::round(random.uniform(0.0, 30000.0)); // where it was computed
-      const auto act =
-          std::find_if(scenario.acts.begin(), scenario.acts.end(),
-                       [&](const Act &one) { return t_s >= one.begin_s && t_s < one.end_s; });
+      const auto act = std::find_if(scenario.acts.begin(), scenario.acts.end(),
+                                    [&](const Act &one) { return t_s >= one.begin_s && t_s < one.end_s; });
       const bool touched = act != scenario.acts.end();
       const Touch touch = touched ? act->tracks[0].at(t_s - act->begin_s) : Touch{};
       double peak_Pa = 0.0, expected[15];
       for (int k = 0; k < 15; k++) {
-        expected[k] = table_of("sphere6").base_pressure_Pa(touch.force_N,
-                                                           double(geometry.x_mm[k]) - touch.x_mm,
-                                                           double(geometry.y_mm[k]) - touch.y_mm,
-                                                           dip_share);
+        expected[k] = table_of("sphere6").base_pressure_Pa(touch.force_N, double(geometry.x_mm[k]) - touch.x_mm,
+                                                           double(geometry.y_mm[k]) - touch.y_mm, dip_share);
         peak_Pa = std::max(peak_Pa, std::abs(expected[k]));
       }
       for (int k = 0; k < 15; k++) {
-        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected[k],
-                    0.25 + 1.1e-4 * peak_Pa)
+        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected[k], 0.25 + 1.1e-4 * peak_Pa)
             << kind << " " << t_s;
       }
       EXPECT_NEAR(file.at("force_N", t_s), touch.force_N, 2e-4 + 1.1e-4 * touch.force_N);
@@ -148,8 +143,8 @@ TEST(ScenarioFile, HasTheClosestGaussian) {
     double sum = 0.0;
     for (double x = -36.0; x <= 36.0; x += 1.5) {
       for (double y = -36.0; y <= 36.0; y += 1.5) {
-        const double rest = table_of("sphere6").base_pressure_Pa(10.0, x, y) -
-                            p0 * std::exp(-(x * x + y * y) / (2 * sigma * sigma));
+        const double rest =
+            table_of("sphere6").base_pressure_Pa(10.0, x, y) - p0 * std::exp(-(x * x + y * y) / (2 * sigma * sigma));
         sum += rest * rest;
       }
     }
@@ -183,8 +178,7 @@ TEST(ScenarioFile, AddsTwoContactsAndTurnsObjects) {
                 3.0);
   }
   EXPECT_NEAR(file.at("force_N", t_s), a.force_N + b.force_N, 1e-3);
-  EXPECT_NEAR(file.at("x_mm", t_s),
-              (a.force_N * a.x_mm + b.force_N * b.x_mm) / (a.force_N + b.force_N), 3e-3);
+  EXPECT_NEAR(file.at("x_mm", t_s), (a.force_N * a.x_mm + b.force_N * b.x_mm) / (a.force_N + b.force_N), 3e-3);
   EXPECT_EQ(file.at("p0_Pa", t_s), 0.0);
   EXPECT_EQ(file.metadata.at("second_indenter").substr(0, 5), "cube6");
 }
@@ -207,8 +201,7 @@ TEST(ScenarioFile, TurnsObjects) {
   for (int k = 0; k < 15; k++) {
     const std::string name = "s" + std::to_string(k) + "_Pa";
     EXPECT_NEAR(file.at(name, twist.begin_s), file.at(name, twist.end_s), 6.0) << k;
-    difference_Pa =
-        std::max(difference_Pa, std::abs(file.at(name, twist.begin_s) - file.at(name, middle_s)));
+    difference_Pa = std::max(difference_Pa, std::abs(file.at(name, twist.begin_s) - file.at(name, middle_s)));
     peak_Pa = std::max(peak_Pa, file.at(name, middle_s));
   }
   EXPECT_GT(difference_Pa, 1e-3 * peak_Pa);
@@ -247,20 +240,17 @@ TEST(ScenarioFile, HasTheTangentialPressureInIt) {
           for (std::size_t k = 0; k < 15; k++) {
             const double x = double(geometry.x_mm[k]) - touch.x_mm;
             const double y = double(geometry.y_mm[k]) - touch.y_mm;
-            const TractionTable::Load load{touch.force_N, touch.stuck_N,
-                                           c * touch.pull_x_N + s * touch.pull_y_N,
+            const TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
                                            c * touch.pull_y_N - s * touch.pull_x_N};
             const double sheared_Pa = traction.base_pressure_Pa(load, c * x + s * y, c * y - s * x);
             most_Pa = std::max(most_Pa, std::abs(sheared_Pa));
-            expected_Pa[k] +=
-                pressure.base_pressure_Pa(touch.force_N, c * x + s * y, c * y - s * x) + sheared_Pa;
+            expected_Pa[k] += pressure.base_pressure_Pa(touch.force_N, c * x + s * y, c * y - s * x) + sheared_Pa;
             peak_Pa = std::max(peak_Pa, std::abs(expected_Pa[k]));
           }
         }
       }
       for (std::size_t k = 0; k < 15; k++) {
-        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected_Pa[k],
-                    0.25 + 1.1e-4 * peak_Pa)
+        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected_Pa[k], 0.25 + 1.1e-4 * peak_Pa)
             << kind << " " << t_s;
       }
       EXPECT_NEAR(file.at("Qx_N", t_s), pull_x_N, 2e-4 + 1.1e-4 * force_N);
@@ -295,10 +285,10 @@ TEST(ScenarioFile, HasThePadsEdgesInIt) {
             continue;
           }
           for (std::size_t k = 0; k < 15; k++) {
-            added_Pa[k] += block.added_Pa(k,
-                                          {touch.force_N, touch.pull_x_N, touch.pull_y_N,
-                                           table_of("sphere6").contact_radius_mm(touch.force_N)},
-                                          touch.x_mm, touch.y_mm);
+            added_Pa[k] += block.added_Pa(
+                k,
+                {touch.force_N, touch.pull_x_N, touch.pull_y_N, table_of("sphere6").contact_radius_mm(touch.force_N)},
+                touch.x_mm, touch.y_mm);
             most_Pa = std::max(most_Pa, std::abs(added_Pa[k]));
           }
         }
@@ -318,8 +308,8 @@ TEST(ScenarioFile, HasThePadsEdgesInIt) {
 }
 
 TEST(ScenarioFile, ContactsLeaveThePadOnlyByRolling) {
-  const BlockTable block = BlockTable::load_or_build(block_around(silicone(LAYER_mm), 3.0),
-                                                     sensor_places(), FINGERTIP_TEST_TABLES);
+  const BlockTable block =
+      BlockTable::load_or_build(block_around(silicone(LAYER_mm), 3.0), sensor_places(), FINGERTIP_TEST_TABLES);
   ScenarioOptions options;
   options.overhang_mm = 3.0;
   options.seconds = 60;
@@ -328,8 +318,7 @@ TEST(ScenarioFile, ContactsLeaveThePadOnlyByRolling) {
     written(make_scenario(options, table_of("sphere6")), &block);
     ADD_FAILURE() << "a contact left the pad";
   } catch (const Error &error) {
-    EXPECT_NE(std::string(error.what()).find("leaves the pad, which ends at 12.0, 21.0 mm"),
-              std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("leaves the pad, which ends at 12.0, 21.0 mm"), std::string::npos)
         << error.what();
   }
   options.margin_mm = 2.25;
@@ -371,8 +360,8 @@ TEST(ScenarioFile, HasItsEffectsInIt) {
   for (double t_s : {0.0, 1.7, 15.2, 22.22, 39.9}) {
     for (std::size_t k = 0; k < 15; k++) {
       const std::string name = "s" + std::to_string(k) + "_Pa";
-      const double expected = plain.at(name, t_s) * (1 + 0.01 * to_double(gains[k]).value()) +
-                              to_double(drifts[k]).value() * t_s;
+      const double expected =
+          plain.at(name, t_s) * (1 + 0.01 * to_double(gains[k]).value()) + to_double(drifts[k]).value() * t_s;
       EXPECT_NEAR(file.at(name, t_s), expected, 0.5 + 2e-4 * std::abs(expected)) << t_s;
     }
   }

@@ -68,11 +68,9 @@ TEST(Scenarios, HaveQuietTimeAndNoJumps) {
           // what falls or winds up is a little faster.
           const bool slides = kind.name == "slide", turned = kind.name == "screw";
           EXPECT_LT(std::abs(now.force_N - before.force_N), slides ? 0.6 : 0.3) << kind.name << t_s;
-          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm),
-                    slides ? 0.27 : 0.202)
+          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm), slides ? 0.27 : 0.202)
               << kind.name << t_s;
-          EXPECT_LT(std::abs(now.angle_rad - before.angle_rad), turned ? 5e-3 : 3.2e-3)
-              << kind.name << t_s;
+          EXPECT_LT(std::abs(now.angle_rad - before.angle_rad), turned ? 5e-3 : 3.2e-3) << kind.name << t_s;
           before = now;
         }
       }
@@ -111,8 +109,7 @@ TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
   for (const Act &act : scenario.acts) {
     speeds.insert(act.speed_mm_s);
     const auto phase = [&](const std::string &name) {
-      return *std::find_if(act.phases.begin(), act.phases.end(),
-                           [&](const Phase &one) { return one.name == name; });
+      return *std::find_if(act.phases.begin(), act.phases.end(), [&](const Phase &one) { return one.name == name; });
     };
     const Phase dead = phase("dead_travel"), slip = phase("slip");
     const auto y = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).y_mm; };
@@ -120,8 +117,7 @@ TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
     EXPECT_NEAR(std::abs(y(slip.end_s) - y(dead.begin_s)), 24.0, 1e-6);
     EXPECT_NEAR(dead.end_s - dead.begin_s, 2.0 / act.speed_mm_s + 0.005, 1.2e-3);
     const double middle_s = 0.5 * (slip.begin_s + slip.end_s);
-    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, act.speed_mm_s,
-                0.006 * act.speed_mm_s);
+    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, act.speed_mm_s, 0.006 * act.speed_mm_s);
   }
   EXPECT_EQ(speeds, (std::set<double>{20, 50, 100, 150, 200}));
 }
@@ -143,8 +139,7 @@ TEST(Scenarios, GridIsThePapers) {
     // As many sensors are at the least distance.
     std::multiset<double> distances;
     for (int k = 0; k < geometry.sensor_count; k++) {
-      distances.insert(std::hypot(double(geometry.x_mm[k]) - place.first,
-                                  double(geometry.y_mm[k]) - place.second));
+      distances.insert(std::hypot(double(geometry.x_mm[k]) - place.first, double(geometry.y_mm[k]) - place.second));
     }
     EXPECT_EQ(static_cast<std::size_t>(n), distances.count(*distances.begin()));
     count[n]++;
@@ -184,8 +179,7 @@ TEST(Scenarios, TwoContactsAreApartAsTold) {
     EXPECT_LE(std::abs(a.y_mm), 18.0);
     EXPECT_LE(std::abs(b.x_mm), 10.0);
   }
-  EXPECT_EQ(distances,
-            (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000, 30000000}));
+  EXPECT_EQ(distances, (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000, 30000000}));
 }
 
 TEST(Scenarios, LiftsTakeAWeightOverWhileTheGripStays) {
@@ -219,11 +213,8 @@ TEST(Scenarios, LiftsTakeAWeightOverWhileTheGripStays) {
     EXPECT_NEAR(carried.stuck_N, 0.2 * held.force_N, 1e-9);
     const double moved = std::hypot(carried.x_mm - held.x_mm, carried.y_mm - held.y_mm);
     EXPECT_NEAR(moved, 1.5 * (1.0 - std::cbrt(0.04)), 1e-9);
-    EXPECT_NEAR((carried.x_mm - held.x_mm) * carried.pull_y_N,
-                (carried.y_mm - held.y_mm) * carried.pull_x_N, 1e-9);
-    EXPECT_GT((carried.x_mm - held.x_mm) * carried.pull_x_N +
-                  (carried.y_mm - held.y_mm) * carried.pull_y_N,
-              0.0);
+    EXPECT_NEAR((carried.x_mm - held.x_mm) * carried.pull_y_N, (carried.y_mm - held.y_mm) * carried.pull_x_N, 1e-9);
+    EXPECT_GT((carried.x_mm - held.x_mm) * carried.pull_x_N + (carried.y_mm - held.y_mm) * carried.pull_y_N, 0.0);
     EXPECT_NEAR(at(lower.end_s).x_mm, held.x_mm, 1e-9);
     quadrants.insert((carried.pull_x_N > 0.0) + 2 * (carried.pull_y_N > 0.0));
   }
@@ -269,8 +260,7 @@ TEST(Scenarios, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
 }
 
 TEST(Scenarios, WrongOptionsAreToldInOneLine) {
-  const auto message = [](const std::string &kind,
-                          const std::function<void(ScenarioOptions &)> &change) {
+  const auto message = [](const std::string &kind, const std::function<void(ScenarioOptions &)> &change) {
     try {
       scenario_of(kind, change);
     } catch (const Error &error) {
@@ -278,42 +268,41 @@ TEST(Scenarios, WrongOptionsAreToldInOneLine) {
     }
     return std::string();
   };
-  for (const std::string &text :
-       {message("glide", {}),
-        message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
-        message("taps", [](ScenarioOptions &o) { o.seconds = 1e9; }),
-        message("taps", [](ScenarioOptions &o) { o.seconds = NAN; }),
-        message("taps", [](ScenarioOptions &o) { o.forces = "0"; }),
-        message("taps", [](ScenarioOptions &o) { o.forces = "1..51"; }),
-        message("taps", [](ScenarioOptions &o) { o.forces = "9..2"; }),
-        message("taps", [](ScenarioOptions &o) { o.forces = "5,"; }),
-        message("taps", [](ScenarioOptions &o) { o.margin_mm = -1; }),
-        message("taps", [](ScenarioOptions &o) { o.speeds_mm_s = {20}; }),
-        message("slip", [](ScenarioOptions &o) { o.speeds_mm_s = {0}; }),
-        message("slip", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
-        message("taps", [](ScenarioOptions &o) { o.tangential = "0.51"; }),
-        message("taps", [](ScenarioOptions &o) { o.tangential = "-0.1"; }),
-        message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,"; }),
-        message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,0,0"; }),
-        message("lift", [](ScenarioOptions &o) { o.friction = "0.2"; }),
-        message("lift", [](ScenarioOptions &o) { o.friction = "nan"; }),
-        message("lift", [](ScenarioOptions &o) { o.tangential = "0.1..0.6"; }),
-        message("lift", [](ScenarioOptions &o) { o.tangential = "0.4..0.1"; }),
-        message("lift", [](ScenarioOptions &o) { o.tangential = "0.1.."; }),
-        message("lift",
-                [](ScenarioOptions &o) {
-                  o.friction = "0.3..0.5";
-                  o.tangential = "0.4";
-                }),
-        message("lift", [](ScenarioOptions &o) { o.mass_kg = "0.2"; }),
-        message("slide", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
-        message("slide", [](ScenarioOptions &o) { o.mass_kg = "5"; }),
-        message("slide", [](ScenarioOptions &o) { o.mass_kg = "0..1"; }),
-        message("slide", [](ScenarioOptions &o) { o.kinetic_share = 1.1; }),
-        message("slide", [](ScenarioOptions &o) { o.dead_travel_mm = 0; }),
-        message("slide", [](ScenarioOptions &o) { o.speeds_mm_s = {500}; }),
-        message("slip", [](ScenarioOptions &o) { o.second_indenter = "cube6"; }),
-        message("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 11; })}) {
+  for (const std::string &text : {message("glide", {}),
+                                  message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
+                                  message("taps", [](ScenarioOptions &o) { o.seconds = 1e9; }),
+                                  message("taps", [](ScenarioOptions &o) { o.seconds = NAN; }),
+                                  message("taps", [](ScenarioOptions &o) { o.forces = "0"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.forces = "1..51"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.forces = "9..2"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.forces = "5,"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.margin_mm = -1; }),
+                                  message("taps", [](ScenarioOptions &o) { o.speeds_mm_s = {20}; }),
+                                  message("slip", [](ScenarioOptions &o) { o.speeds_mm_s = {0}; }),
+                                  message("slip", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.tangential = "0.51"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.tangential = "-0.1"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,"; }),
+                                  message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,0,0"; }),
+                                  message("lift", [](ScenarioOptions &o) { o.friction = "0.2"; }),
+                                  message("lift", [](ScenarioOptions &o) { o.friction = "nan"; }),
+                                  message("lift", [](ScenarioOptions &o) { o.tangential = "0.1..0.6"; }),
+                                  message("lift", [](ScenarioOptions &o) { o.tangential = "0.4..0.1"; }),
+                                  message("lift", [](ScenarioOptions &o) { o.tangential = "0.1.."; }),
+                                  message("lift",
+                                          [](ScenarioOptions &o) {
+                                            o.friction = "0.3..0.5";
+                                            o.tangential = "0.4";
+                                          }),
+                                  message("lift", [](ScenarioOptions &o) { o.mass_kg = "0.2"; }),
+                                  message("slide", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
+                                  message("slide", [](ScenarioOptions &o) { o.mass_kg = "5"; }),
+                                  message("slide", [](ScenarioOptions &o) { o.mass_kg = "0..1"; }),
+                                  message("slide", [](ScenarioOptions &o) { o.kinetic_share = 1.1; }),
+                                  message("slide", [](ScenarioOptions &o) { o.dead_travel_mm = 0; }),
+                                  message("slide", [](ScenarioOptions &o) { o.speeds_mm_s = {500}; }),
+                                  message("slip", [](ScenarioOptions &o) { o.second_indenter = "cube6"; }),
+                                  message("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 11; })}) {
     EXPECT_NE(text.find("; "), std::string::npos) << text;
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
   }

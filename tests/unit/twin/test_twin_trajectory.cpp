@@ -85,8 +85,7 @@ TEST(WindUp, IsNearLubkinsIntegrals) {
     const double turn = 3.0 / (4.0 * M_PI) * (std::comp_ellint_1(k) - std::comp_ellint_2(k));
     torque += 4.0 / M_PI * k * rest * std::comp_ellint_2(k) / STEPS;
     if (!errors.empty() && torque >= errors.front().first * limit) {
-      EXPECT_NEAR(wind_up_rad(torque / limit, 1.0, 1.0, 1.0) / turn - 1.0, errors.front().second,
-                  0.001);
+      EXPECT_NEAR(wind_up_rad(torque / limit, 1.0, 1.0, 1.0) / turn - 1.0, errors.front().second, 0.001);
       errors.erase(errors.begin());
     }
   }

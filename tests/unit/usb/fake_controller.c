@@ -272,8 +272,7 @@ void host_setup(uint8_t type, uint8_t request, uint16_t value, uint16_t index, u
   leave_interrupt();
 }
 
-int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length,
-                    uint8_t *answer) {
+int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length, uint8_t *answer) {
   host_setup(type, request, value, index, length);
   int total = 0;
   for (;;) {
@@ -292,8 +291,8 @@ int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t inde
   return status < 0 ? status : total;
 }
 
-int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t index,
-                     const void *bytes, uint16_t length) {
+int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t index, const void *bytes,
+                     uint16_t length) {
   host_setup(type, request, value, index, length);
   for (uint16_t done = 0; done < length;) {
     size_t n = length - done < 64 ? (size_t)(length - done) : 64;

@@ -42,11 +42,9 @@ int host_out(uint8_t endpoint, const void *bytes, size_t length);
 void host_setup(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length);
 
 /* A whole control transfer, as in USB 2.0 section 8.5.3. Bytes of the answer, or HOST_. */
-int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length,
-                    uint8_t *answer);
+int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length, uint8_t *answer);
 /* 0, or HOST_. */
-int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t index,
-                     const void *bytes, uint16_t length);
+int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t index, const void *bytes, uint16_t length);
 
 /* The host sends to this address from now on. */
 void host_address(uint8_t address);

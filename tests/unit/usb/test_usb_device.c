@@ -36,8 +36,7 @@ static int get_descriptor(uint16_t type_and_index, uint16_t length) {
 }
 
 static void test_enumeration_as_linux_does(void) {
-  static const uint8_t device[18] = {18,   1, 0x00, 0x02, 0xef, 2, 1, 64, 0x09,
-                                     0x12, 1, 0,    0x23, 0x01, 1, 2, 3,  1};
+  static const uint8_t device[18] = {18, 1, 0x00, 0x02, 0xef, 2, 1, 64, 0x09, 0x12, 1, 0, 0x23, 0x01, 1, 2, 3, 1};
   TEST_ASSERT_EQUAL(18, get_descriptor(DEVICE, 64));
   TEST_ASSERT_EQUAL_HEX8_ARRAY(device, answer, sizeof device);
   host_bus_reset();
@@ -95,8 +94,7 @@ static void test_configuration_descriptor_is_well_formed(void) {
 
 /* Byte by byte: USB 2.0 tables 9-8 to 9-13, CDC 1.20 tables 15 and 16, PSTN 1.2 tables 3 and 4. */
 static void test_descriptors_are_these(void) {
-  static const uint8_t device[] = {18,   1,    0,    2,    0xEF, 2, 1, 64, 0x09,
-                                   0x12, 0x01, 0x00, 0x23, 0x01, 1, 2, 3,  1};
+  static const uint8_t device[] = {18, 1, 0, 2, 0xEF, 2, 1, 64, 0x09, 0x12, 0x01, 0x00, 0x23, 0x01, 1, 2, 3, 1};
   static const uint8_t configuration[] = {
       9, 2,    75,   0,    2,  1,  0,  0x80, 50, /* configuration, 100 mA from the bus */
       8, 0x0B, 0,    2,    2,  2,  0,  0,        /* association: abstract control model */
@@ -181,8 +179,8 @@ struct refused {
 static void assert_refused(const struct refused *r, size_t count) {
   for (size_t i = 0; i < count; i++) {
     char message[80];
-    snprintf(message, sizeof message, "%02x %02x %04x %04x %04x", r[i].type, r[i].request,
-             r[i].value, r[i].index, r[i].length);
+    snprintf(message, sizeof message, "%02x %02x %04x %04x %04x", r[i].type, r[i].request, r[i].value, r[i].index,
+             r[i].length);
     host_setup(r[i].type, r[i].request, r[i].value, r[i].index, r[i].length);
     TEST_ASSERT_EQUAL_MESSAGE(HOST_STALL, host_in(0x80, answer), message);
     TEST_ASSERT_EQUAL_MESSAGE(HOST_STALL, host_out(0, NULL, 0), message);
@@ -236,10 +234,9 @@ static void test_refused_in_any_state(void) {
 
 static void test_refused_before_configuration(void) {
   static const struct refused early[] = {
-      {0x81, GET_STATUS, 0, 0, 2},     {0x82, GET_STATUS, 0, 0x82, 2},
-      {0x81, GET_INTERFACE, 0, 0, 1},  {0x01, SET_INTERFACE, 0, 0, 0},
-      {0x02, SET_FEATURE, 0, 0x82, 0}, {0x02, CLEAR_FEATURE, 0, 0x82, 0},
-      {0x21, 0x22, 1, 0, 0},           {0xa1, 0x21, 0, 0, 7},
+      {0x81, GET_STATUS, 0, 0, 2},    {0x82, GET_STATUS, 0, 0x82, 2},  {0x81, GET_INTERFACE, 0, 0, 1},
+      {0x01, SET_INTERFACE, 0, 0, 0}, {0x02, SET_FEATURE, 0, 0x82, 0}, {0x02, CLEAR_FEATURE, 0, 0x82, 0},
+      {0x21, 0x22, 1, 0, 0},          {0xa1, 0x21, 0, 0, 7},
   };
   static const struct refused unaddressed[] = {{0x00, SET_CONFIGURATION, 1, 0, 0}};
   assert_refused(early, sizeof early / sizeof early[0]);
@@ -255,9 +252,8 @@ static void test_refused_before_configuration(void) {
 static void test_status_and_interface_questions(void) {
   enumerate();
   static const struct refused questions[] = {
-      {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},
-      {0x81, GET_STATUS, 0, 1, 2},    {0x82, GET_STATUS, 0, 0, 2},
-      {0x82, GET_STATUS, 0, 0x80, 2}, {0x82, GET_STATUS, 0, 0x81, 2},
+      {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 1, 2},
+      {0x82, GET_STATUS, 0, 0, 2},    {0x82, GET_STATUS, 0, 0x80, 2}, {0x82, GET_STATUS, 0, 0x81, 2},
       {0x82, GET_STATUS, 0, 0x02, 2}, {0x82, GET_STATUS, 0, 0x82, 2},
   };
   for (size_t i = 0; i < sizeof questions / sizeof questions[0]; i++) {
@@ -280,8 +276,7 @@ static void test_halted_endpoint_stalls_until_cleared_and_starts_at_data0(void) 
     TEST_ASSERT_EQUAL(0, host_control_out(0x02, SET_FEATURE, 0, all[i], NULL, 0));
     TEST_ASSERT_EQUAL(2, host_control_in(0x82, GET_STATUS, 0, all[i], 2, answer));
     TEST_ASSERT_EQUAL_HEX8_ARRAY("\1\0", answer, 2);
-    TEST_ASSERT_EQUAL(HOST_STALL,
-                      all[i] & 0x80 ? host_in(all[i], answer) : host_out(all[i], "x", 1));
+    TEST_ASSERT_EQUAL(HOST_STALL, all[i] & 0x80 ? host_in(all[i], answer) : host_out(all[i], "x", 1));
     TEST_ASSERT_EQUAL(0, host_control_out(0x02, CLEAR_FEATURE, 0, all[i], NULL, 0));
     host_reset_toggle(all[i]);
     TEST_ASSERT_EQUAL(2, host_control_in(0x82, GET_STATUS, 0, all[i], 2, answer));

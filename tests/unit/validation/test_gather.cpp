@@ -145,14 +145,12 @@ TEST(Walk, APullIsAskedForAlongEachWay) {
   Pad pad({100.0, 2.0});
   go_to_pulls(pad);
   for (const char *way : {"+x", "+y", "-x", "-y"}) {
-    EXPECT_EQ(pad.walk.advice(),
-              std::string("set the weight down in the middle, its thread slack towards ") + way);
+    EXPECT_EQ(pad.walk.advice(), std::string("set the weight down in the middle, its thread slack towards ") + way);
     pad.pressed_Pa = PRESS_Pa;
     pad.wait(1.0);
     EXPECT_EQ(pad.walk.advice(), std::string("let it stand, its thread slack towards ") + way);
     pad.wait(2.0);
-    EXPECT_EQ(pad.walk.advice(),
-              std::string("pull: hang the other weight on the thread towards ") + way);
+    EXPECT_EQ(pad.walk.advice(), std::string("pull: hang the other weight on the thread towards ") + way);
     pad.pulled = 0.2;
     pad.wait(0.5);
     EXPECT_EQ(pad.walk.advice(), "let it hang still");

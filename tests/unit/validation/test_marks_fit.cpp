@@ -56,8 +56,7 @@ Session session(const Pad &pad) {
         }
         press.placement.reading_Pa.push_back(pad.dead == k ? 0.0 : reading);
       }
-      std::swap(press.placement.reading_Pa[pad.swapped[0]],
-                press.placement.reading_Pa[pad.swapped[1]]);
+      std::swap(press.placement.reading_Pa[pad.swapped[0]], press.placement.reading_Pa[pad.swapped[1]]);
       made.measured.presses.push_back(press);
     }
   }

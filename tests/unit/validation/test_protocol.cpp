@@ -53,10 +53,8 @@ TEST(Protocol, EachMarkIsAnotherAndFarFromTheOneBefore) {
 
 TEST(Protocol, StepsAreTheSameFromTheirEvents) {
   const std::vector<Step> steps = steps_of(marks_of(validation_array()), 312.5, 11.0, {104.5, 1.5});
-  EXPECT_EQ(steps.size(),
-            steps_of(marks_of(validation_array()), 312.5, 11.0).size() + PULLS_TOWARD_deg.size());
-  EXPECT_EQ(std::count_if(steps.begin(), steps.end(),
-                          [](const Step &step) { return step.kind == Step::Kind::press; }),
+  EXPECT_EQ(steps.size(), steps_of(marks_of(validation_array()), 312.5, 11.0).size() + PULLS_TOWARD_deg.size());
+  EXPECT_EQ(std::count_if(steps.begin(), steps.end(), [](const Step &step) { return step.kind == Step::Kind::press; }),
             static_cast<std::ptrdiff_t>(MARKS * TURNS));
   for (const Step &step : steps) {
     const auto read = step_of(event_of(step));
@@ -74,11 +72,10 @@ TEST(Protocol, StepsAreTheSameFromTheirEvents) {
 }
 
 TEST(Protocol, OtherEventsAreNoSteps) {
-  for (const char *text :
-       {"gone 2026-01-01", "validate: dance", "validate: press mark=1 x_mm=3",
-        "validate: press mark=0 x_mm=1 y_mm=", "validate: begin", "validate:hold",
-        "validate: begin weight_g=0 skin_mm=12", "validate: pull toward_deg=0 height_mm=2",
-        "validate: pull toward_deg=0 weight_g=0 height_mm=2", ""}) {
+  for (const char *text : {"gone 2026-01-01", "validate: dance", "validate: press mark=1 x_mm=3",
+                           "validate: press mark=0 x_mm=1 y_mm=", "validate: begin", "validate:hold",
+                           "validate: begin weight_g=0 skin_mm=12", "validate: pull toward_deg=0 height_mm=2",
+                           "validate: pull toward_deg=0 weight_g=0 height_mm=2", ""}) {
     EXPECT_FALSE(step_of(text)) << text;
   }
 }

@@ -49,22 +49,20 @@ TEST(Objects, AreTheTwinsTables) {
   for (std::size_t i = 0; i < read.size(); i++) {
     SCOPED_TRACE(read[i].name);
     EXPECT_EQ(read[i].name, object_names()[i]);
-    const auto table = twin::ContactTable::load_or_build(twin::indenter(read[i].name), layer,
-                                                         FINGERTIP_TEST_TABLES);
+    const auto table = twin::ContactTable::load_or_build(twin::indenter(read[i].name), layer, FINGERTIP_TEST_TABLES);
     const twin::TractionTable traction(table, layer);
     for (const double force_N : {0.5, 3.0, 20.0}) {
       const double peak_Pa = table.base_pressure_Pa(force_N, 0.0, 0.0);
-      EXPECT_NEAR(twin::ForcePlanes::between_forces(read[i].radius_mm, force_N),
-                  table.contact_radius_mm(force_N), 1e-4);
+      EXPECT_NEAR(twin::ForcePlanes::between_forces(read[i].radius_mm, force_N), table.contact_radius_mm(force_N),
+                  1e-4);
       double worst_Pa = 0.0, worst_pulled_Pa = 0.0;
       for (double x_mm = -30.0; x_mm <= 30.0; x_mm += 0.7) {
         for (double y_mm = -40.0; y_mm <= 40.0; y_mm += 0.7) {
           const twin::TractionLoad load{force_N, 0.4 * force_N, 0.2 * force_N, -0.15 * force_N};
-          worst_Pa = std::max(worst_Pa, std::abs(read[i].normal.at(force_N, x_mm, y_mm) -
-                                                 table.base_pressure_Pa(force_N, x_mm, y_mm)));
+          worst_Pa = std::max(
+              worst_Pa, std::abs(read[i].normal.at(force_N, x_mm, y_mm) - table.base_pressure_Pa(force_N, x_mm, y_mm)));
           worst_pulled_Pa = std::max(
-              worst_pulled_Pa, std::abs(twin::traction_pressure_Pa(read[i].along_x, read[i].along_y,
-                                                                   load, x_mm, y_mm) -
+              worst_pulled_Pa, std::abs(twin::traction_pressure_Pa(read[i].along_x, read[i].along_y, load, x_mm, y_mm) -
                                         traction.base_pressure_Pa(load, x_mm, y_mm)));
         }
       }
@@ -78,8 +76,7 @@ TEST(Objects, CutAndForeignFilesAreRefused) {
   std::vector<std::uint8_t> cut = file();
   const ObjectsFile whole = read_objects(cut.data(), cut.size());
   EXPECT_FALSE(whole.pad_command.empty());
-  EXPECT_THROW(read_objects(cut.data(), cut.size() - whole.pad_command.size() - 1),
-               std::runtime_error);
+  EXPECT_THROW(read_objects(cut.data(), cut.size() - whole.pad_command.size() - 1), std::runtime_error);
   EXPECT_THROW(read_objects(cut.data(), 3), std::runtime_error);
   cut[0] ^= 1;
   EXPECT_THROW(read_objects(cut.data(), cut.size()), std::runtime_error);
@@ -99,12 +96,11 @@ TEST_F(WorldTest, APressIsTheTwins) {
   EXPECT_EQ(world.truth().x_mm, 2.0);
   EXPECT_EQ(world.truth().y_mm, -3.0);
   EXPECT_EQ(pull_N(), 0.0);
-  const auto table = twin::ContactTable::load_or_build(
-      twin::indenter(object_names()[0]), twin::silicone(PAD_mm), FINGERTIP_TEST_TABLES);
+  const auto table = twin::ContactTable::load_or_build(twin::indenter(object_names()[0]), twin::silicone(PAD_mm),
+                                                       FINGERTIP_TEST_TABLES);
   const double x_mm = static_cast<double>(geometry.x_mm[MIDDLE]) - 2.0;
   const double y_mm = static_cast<double>(geometry.y_mm[MIDDLE]) + 3.0;
-  EXPECT_NEAR(pressure_Pa, table.base_pressure_Pa(6.0, x_mm, y_mm),
-              0.004 * table.base_pressure_Pa(6.0, 0.0, 0.0));
+  EXPECT_NEAR(pressure_Pa, table.base_pressure_Pa(6.0, x_mm, y_mm), 0.004 * table.base_pressure_Pa(6.0, 0.0, 0.0));
   world.lift();
   EXPECT_EQ(run(0.01), 0.0);
 }
@@ -134,10 +130,9 @@ TEST_F(WorldTest, WhatIsDraggedSticksGivesThenSlips) {
   EXPECT_GT(most_N, 0.9 * FRICTION * 6.0);
   EXPECT_TRUE(world.truth().slips);
   // At a steady speed the law of friction (twin/held_object.hpp) is in balance.
-  const double speed_mm_s = 2.0, rested = 1.0 / (1.0 + twin::HeldObject::HEALS_s * speed_mm_s /
-                                                           twin::HeldObject::SETTLES_mm);
-  EXPECT_NEAR(world.truth().qy_N,
-              (World::KINETIC_SHARE + (1.0 - World::KINETIC_SHARE) * rested) * FRICTION * 6.0,
+  const double speed_mm_s = 2.0,
+               rested = 1.0 / (1.0 + twin::HeldObject::HEALS_s * speed_mm_s / twin::HeldObject::SETTLES_mm);
+  EXPECT_NEAR(world.truth().qy_N, (World::KINETIC_SHARE + (1.0 - World::KINETIC_SHARE) * rested) * FRICTION * 6.0,
               0.01 * FRICTION * 6.0);
 }
 

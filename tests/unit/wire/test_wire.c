@@ -11,23 +11,19 @@ static size_t body_length(const struct wire_packet *packet) {
   switch (packet->type) {
   case WIRE_CONTACT: {
     uint32_t flags = packet->body.contact.flags;
-    return 22u + (flags & CONTACT_FLAG_FIT_VALID ? 28 : 0) +
-           (flags & CONTACT_FLAG_UNCERTAINTY_VALID ? 8 : 0) +
-           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) +
-           (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0) +
-           (flags & CONTACT_FLAG_TANGENTIAL_VALID ? 16 : 0) +
-           (flags & CONTACT_FLAG_VELOCITY_VALID ? 8 : 0) +
-           (flags & CONTACT_FLAG_SHAPE_VALID ? 4 : 0) +
-           (flags & CONTACT_FLAG_TWO_CONTACTS ? 40 : 0) + (flags & CONTACT_FLAG_EDGE ? 12 : 0);
+    return 22u + (flags & CONTACT_FLAG_FIT_VALID ? 28 : 0) + (flags & CONTACT_FLAG_UNCERTAINTY_VALID ? 8 : 0) +
+           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) + (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0) +
+           (flags & CONTACT_FLAG_TANGENTIAL_VALID ? 16 : 0) + (flags & CONTACT_FLAG_VELOCITY_VALID ? 8 : 0) +
+           (flags & CONTACT_FLAG_SHAPE_VALID ? 4 : 0) + (flags & CONTACT_FLAG_TWO_CONTACTS ? 40 : 0) +
+           (flags & CONTACT_FLAG_EDGE ? 12 : 0);
   }
   case WIRE_RAW:
     return 23 + 8u * packet->body.raw.sensor_count;
   case WIRE_INFO: {
     const struct wire_info *info = &packet->body.info;
     return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
-           (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) +
-           (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) + 8u * info->sensor_count +
-           (info->stored & WIRE_STORED_CALIBRATION ? 23 + 14u * info->sensor_count : 0) +
+           (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) +
+           8u * info->sensor_count + (info->stored & WIRE_STORED_CALIBRATION ? 23 + 14u * info->sensor_count : 0) +
            (info->stored & WIRE_STORED_PAD ? 177 : 0);
   }
   case WIRE_HEALTH:
@@ -112,15 +108,9 @@ static void test_quantities_travel_under_their_flags(void) {
   static const struct {
     uint32_t flag;
     size_t length;
-  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},
-               {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
-               {CONTACT_FLAG_SLIP_VALID, 4},
-               {CONTACT_FLAG_WIDTHS_VALID, 12},
-               {CONTACT_FLAG_TANGENTIAL_VALID, 16},
-               {CONTACT_FLAG_VELOCITY_VALID, 8},
-               {CONTACT_FLAG_SHAPE_VALID, 4},
-               {CONTACT_FLAG_TWO_CONTACTS, 40},
-               {CONTACT_FLAG_EDGE, 12}};
+  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},    {CONTACT_FLAG_UNCERTAINTY_VALID, 8}, {CONTACT_FLAG_SLIP_VALID, 4},
+               {CONTACT_FLAG_WIDTHS_VALID, 12}, {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
+               {CONTACT_FLAG_SHAPE_VALID, 4},   {CONTACT_FLAG_TWO_CONTACTS, 40},     {CONTACT_FLAG_EDGE, 12}};
   enum { PARTS = sizeof parts / sizeof parts[0] };
   for (unsigned present = 0; present < 1u << PARTS; present++) {
     struct sampler sampler = {SAMPLE_GREATEST, {12}};
@@ -173,18 +163,16 @@ static void test_quantities_travel_under_their_flags(void) {
 
 /* What a device decodes: its commands, and nothing that itself sends. */
 static void test_sets_of_commands(void) {
-  static const struct wire_layout *const always[] = {WIRE_COMMANDS, NULL},
-                                         *const of_fit[] = {WIRE_COMMANDS_OF_FIT, NULL},
-                                         *const of_slip[] = {WIRE_COMMANDS_OF_SLIP, NULL},
-                                         *const of_tangential[] = {WIRE_COMMANDS_OF_TANGENTIAL,
-                                                                   NULL},
-                                         *const of_sync[] = {WIRE_COMMANDS_OF_SYNC, NULL};
+  static const struct wire_layout *const
+      always[] = {WIRE_COMMANDS, NULL},
+      *const of_fit[] = {WIRE_COMMANDS_OF_FIT, NULL}, *const of_slip[] = {WIRE_COMMANDS_OF_SLIP, NULL},
+      *const of_tangential[] = {WIRE_COMMANDS_OF_TANGENTIAL, NULL}, *const of_sync[] = {WIRE_COMMANDS_OF_SYNC, NULL};
   for (size_t i = 0; i < WIRE_TYPES; i++) {
     uint8_t type = wire_types[i];
     bool command = type >= 0x80;
     bool slip = type == WIRE_CMD_SLIP;
-    bool fit = type == WIRE_CMD_CALIBRATE || type == WIRE_CMD_ERASE_CALIBRATION ||
-               type == WIRE_CMD_PRIOR || type == WIRE_CMD_LOCATION_LIMIT;
+    bool fit = type == WIRE_CMD_CALIBRATE || type == WIRE_CMD_ERASE_CALIBRATION || type == WIRE_CMD_PRIOR ||
+               type == WIRE_CMD_LOCATION_LIMIT;
     bool tangential = type == WIRE_CMD_PAD || type == WIRE_CMD_ERASE_PAD;
     bool sync = type == WIRE_CMD_SYNC;
     TEST_ASSERT_NOT_NULL(wire_find_layout(wire_all_layouts, type));
@@ -193,8 +181,7 @@ static void test_sets_of_commands(void) {
     TEST_ASSERT_EQUAL(slip, wire_find_layout(of_slip, type) != NULL);
     TEST_ASSERT_EQUAL(tangential, wire_find_layout(of_tangential, type) != NULL);
     TEST_ASSERT_EQUAL(sync, wire_find_layout(of_sync, type) != NULL);
-    TEST_ASSERT_EQUAL(command && !fit && !slip && !tangential && !sync,
-                      wire_find_layout(always, type) != NULL);
+    TEST_ASSERT_EQUAL(command && !fit && !slip && !tangential && !sync, wire_find_layout(always, type) != NULL);
   }
   struct sampler sampler = {SAMPLE_RANDOM, {12}};
   struct wire_packet packet, decoded;
@@ -207,8 +194,7 @@ static void test_sets_of_commands(void) {
   TEST_ASSERT_EQUAL_UINT16(packet.sequence, decoded.sequence);
 }
 
-static void assert_float_guarded(uint8_t type, size_t body_offset, float *field,
-                                 struct wire_packet *packet) {
+static void assert_float_guarded(uint8_t type, size_t body_offset, float *field, struct wire_packet *packet) {
   static const uint32_t refused[] = {0x7F800000, 0xFF800000, 0x7FC00000, 0x7F800001, 0xFFFFFFFF};
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length = 0;
@@ -229,8 +215,7 @@ static void assert_float_guarded(uint8_t type, size_t body_offset, float *field,
 }
 
 /* of FT_MAX_SENSORS */
-static void assert_calibration_guarded(uint8_t type, size_t body_offset,
-                                       struct calibration *calibration,
+static void assert_calibration_guarded(uint8_t type, size_t body_offset, struct calibration *calibration,
                                        struct wire_packet *packet) {
   assert_float_guarded(type, body_offset + 6, &calibration->force_scale, packet);
   assert_float_guarded(type, body_offset + 10, &calibration->force_scale_sd, packet);
@@ -241,8 +226,7 @@ static void assert_calibration_guarded(uint8_t type, size_t body_offset,
   }
 }
 
-static void assert_pad_guarded(uint8_t type, size_t body_offset, struct pad_profile *pad,
-                               struct wire_packet *packet) {
+static void assert_pad_guarded(uint8_t type, size_t body_offset, struct pad_profile *pad, struct wire_packet *packet) {
   for (size_t i = 0; i < PAD_PROFILE_FLOATS; i++) {
     assert_float_guarded(type, body_offset + 4 * i, (float *)(void *)pad + i, packet);
   }
@@ -312,14 +296,12 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
   assert_calibration_guarded(WIRE_INFO, 369, &info->calibration, &packet);
   assert_pad_guarded(WIRE_INFO, 840, &info->pad, &packet);
   sample_packet(&sampler, WIRE_CMD_CALIBRATE, &packet);
-  assert_calibration_guarded(WIRE_CMD_CALIBRATE, 1, &packet.body.cmd_calibrate.calibration,
-                             &packet);
+  assert_calibration_guarded(WIRE_CMD_CALIBRATE, 1, &packet.body.cmd_calibrate.calibration, &packet);
   sample_packet(&sampler, WIRE_CMD_PRIOR, &packet);
   assert_float_guarded(WIRE_CMD_PRIOR, 0, &packet.body.cmd_prior.sigma_mm, &packet);
   assert_float_guarded(WIRE_CMD_PRIOR, 4, &packet.body.cmd_prior.width_mm, &packet);
   sample_packet(&sampler, WIRE_CMD_LOCATION_LIMIT, &packet);
-  assert_float_guarded(WIRE_CMD_LOCATION_LIMIT, 0, &packet.body.cmd_location_limit.limit_mm,
-                       &packet);
+  assert_float_guarded(WIRE_CMD_LOCATION_LIMIT, 0, &packet.body.cmd_location_limit.limit_mm, &packet);
   sample_packet(&sampler, WIRE_CMD_PAD, &packet);
   assert_pad_guarded(WIRE_CMD_PAD, 0, &packet.body.cmd_pad.profile, &packet);
   sample_packet(&sampler, WIRE_CMD_SLIP, &packet);
@@ -350,8 +332,7 @@ static void test_sensor_counts_outside_their_range_are_refused_both_ways(void) {
       if (count > 40) {
         *sensor_count = 32;
       }
-      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT,
-                            decode_sealed(bytes, 12 + body_length(&packet), &decoded));
+      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT, decode_sealed(bytes, 12 + body_length(&packet), &decoded));
     }
   }
 }
@@ -375,8 +356,7 @@ static void test_text_is_printable(void) {
       bytes[12 + 3] = 1;
       bytes[12 + offsets[text]] = (uint8_t)value;
       struct wire_packet decoded;
-      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT,
-                            decode_sealed(bytes, 12 + 93 + 8, &decoded));
+      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT, decode_sealed(bytes, 12 + 93 + 8, &decoded));
     }
   }
 }
@@ -396,8 +376,7 @@ static void test_wrong_lengths_are_refused(void) {
       uint8_t bytes[sizeof original];
       memcpy(bytes, original, sizeof bytes);
       struct wire_packet decoded;
-      TEST_ASSERT_EQUAL_INT(used == right ? FT_OK : FT_ERR_FORMAT,
-                            decode_sealed(bytes, used, &decoded));
+      TEST_ASSERT_EQUAL_INT(used == right ? FT_OK : FT_ERR_FORMAT, decode_sealed(bytes, used, &decoded));
     }
   }
 }
@@ -415,8 +394,7 @@ static void test_unknown_types_keep_their_header(void) {
       TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, encode(&packet, frame, &length));
     }
     for (size_t body = 0; body <= WIRE_MAX_BODY_BYTES; body += 50) {
-      uint8_t bytes[WIRE_MAX_PACKET_BYTES] = {
-          WIRE_VERSION, (uint8_t)type, 0x34, 0x12, 1, 2, 3, 4, 5, 6, 7, 8};
+      uint8_t bytes[WIRE_MAX_PACKET_BYTES] = {WIRE_VERSION, (uint8_t)type, 0x34, 0x12, 1, 2, 3, 4, 5, 6, 7, 8};
       for (size_t i = 0; i < body; i++) {
         bytes[12 + i] = (uint8_t)random_u32(&random);
       }
@@ -438,12 +416,10 @@ static void test_other_versions_are_told_from_damage(void) {
   for (int version = 0; version < 256; version++) {
     uint8_t bytes[32] = {(uint8_t)version, WIRE_CMD_INFO};
     struct wire_packet decoded;
-    TEST_ASSERT_EQUAL_INT(version == WIRE_VERSION ? FT_OK : FT_ERR_VERSION,
-                          decode_sealed(bytes, 12, &decoded));
+    TEST_ASSERT_EQUAL_INT(version == WIRE_VERSION ? FT_OK : FT_ERR_VERSION, decode_sealed(bytes, 12, &decoded));
     bytes[12] ^= 1; /* of the CRC that is there by now */
     uint8_t frame[40];
-    TEST_ASSERT_EQUAL_INT(FT_ERR_CRC, wire_decode(wire_all_layouts, frame,
-                                                  reference_cobs(bytes, 16, frame), &decoded));
+    TEST_ASSERT_EQUAL_INT(FT_ERR_CRC, wire_decode(wire_all_layouts, frame, reference_cobs(bytes, 16, frame), &decoded));
   }
 }
 

@@ -198,17 +198,15 @@ static void test_garbage_between_good_frames(void) {
     }
     feed(&tally, &delimiter, 1);
     TEST_ASSERT_EQUAL_UINT(0, tally.packets);
-    struct frame_bytes frame =
-        good_frame(wire_types[random_below(&random, WIRE_TYPES)], (uint16_t)repeat);
+    struct frame_bytes frame = good_frame(wire_types[random_below(&random, WIRE_TYPES)], (uint16_t)repeat);
     expect(&frame);
     expect(&frame);
   }
 }
 
 static void test_overlong_frames(void) {
-  static const size_t lengths[] = {WIRE_MAX_FRAME_BYTES - 1, WIRE_MAX_FRAME_BYTES,
-                                   WIRE_MAX_FRAME_BYTES + 1, WIRE_MAX_FRAME_BYTES + 2,
-                                   2 * WIRE_MAX_FRAME_BYTES, 100000};
+  static const size_t lengths[] = {WIRE_MAX_FRAME_BYTES - 1, WIRE_MAX_FRAME_BYTES,     WIRE_MAX_FRAME_BYTES + 1,
+                                   WIRE_MAX_FRAME_BYTES + 2, 2 * WIRE_MAX_FRAME_BYTES, 100000};
   struct frame_bytes next = good_frame(WIRE_CONTACT, 1);
   for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
     struct wire_packet packet;

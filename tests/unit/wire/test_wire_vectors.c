@@ -37,9 +37,8 @@ static struct vector read_vector(const char *name) {
         length = &vector.frame_length;
         capacity = sizeof vector.frame;
       } else {
-        TEST_ASSERT_TRUE_MESSAGE(strlen(word) == 2 && isxdigit((unsigned char)word[0]) &&
-                                     isxdigit((unsigned char)word[1]) && length,
-                                 path);
+        TEST_ASSERT_TRUE_MESSAGE(
+            strlen(word) == 2 && isxdigit((unsigned char)word[0]) && isxdigit((unsigned char)word[1]) && length, path);
         TEST_ASSERT_LESS_THAN_size_t(capacity, *length);
         unsigned value;
         TEST_ASSERT_EQUAL_INT(1, sscanf(word, "%x", &value));
@@ -58,15 +57,12 @@ static void check(const char *name, const struct wire_packet *expected) {
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length = 0;
   TEST_ASSERT_EQUAL_INT_MESSAGE(
-      FT_OK,
-      wire_encode(wire_find_layout(wire_all_layouts, expected->type), expected, frame, &length),
-      name);
+      FT_OK, wire_encode(wire_find_layout(wire_all_layouts, expected->type), expected, frame, &length), name);
   TEST_ASSERT_EQUAL_size_t_MESSAGE(vector.frame_length, length, name);
   TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(vector.frame, frame, length, name);
 
   struct wire_packet decoded;
-  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &decoded),
-                                name);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &decoded), name);
   TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, &decoded, sizeof decoded, name);
   /* wire_decode has left the packet itself in the buffer. */
   TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(vector.packet, frame, vector.packet_length, name);
@@ -114,10 +110,9 @@ static void test_contact(void) {
   packet.body.contact = (struct wire_contact){
       .frame = 70000,
       .flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-               CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_LOW_SIGNAL |
-               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED |
-               CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH |
-               CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING,
+               CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_SENSOR_MASKED |
+               CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_TANGENTIAL_VALID |
+               CONTACT_FLAG_TANGENTIAL_FROM_TOUCH | CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING,
       .sensors_used = 0x7FEF,
       .x_mm = -4.5f,
       .y_mm = 12.25f,
@@ -148,8 +143,7 @@ static void test_contact(void) {
   contact->vx_mm_s = contact->vy_mm_s = 0.0f;
   check("contact.txt", &packet);
 
-  contact->flags &=
-      ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED);
+  contact->flags &= ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED);
   contact->slip_mm = 0.0f;
   contact->sigma_x_mm = contact->sigma_y_mm = contact->width_correlation = 0.0f;
   check("contact_press.txt", &packet);
@@ -177,8 +171,7 @@ static void test_contact(void) {
   contact->edge_length_mm = 18.25f;
   check("contact_edge.txt", &packet);
 
-  *contact = (struct wire_contact){
-      .frame = contact->frame, .flags = CONTACT_FLAG_TARED, .stages = contact->stages};
+  *contact = (struct wire_contact){.frame = contact->frame, .flags = CONTACT_FLAG_TARED, .stages = contact->stages};
   check("contact_none.txt", &packet);
 }
 
@@ -186,8 +179,7 @@ static void test_raw(void) {
   struct wire_packet packet = blank(0x02, UINT16_MAX, UINT64_C(0x100000000));
   struct wire_raw *raw = &packet.body.raw;
   raw->frame = 256;
-  raw->flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED | CONTACT_FLAG_SATURATED |
-               CONTACT_FLAG_SENSOR_MASKED;
+  raw->flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED | CONTACT_FLAG_SATURATED | CONTACT_FLAG_SENSOR_MASKED;
   raw->valid = 5;
   raw->saturated = 4;
   raw->doubtful = 1;

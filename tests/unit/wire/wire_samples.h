@@ -11,15 +11,14 @@
 #include <float.h>
 #include <string.h>
 
-static const uint8_t wire_types[] = {
-    WIRE_CONTACT,    WIRE_RAW,           WIRE_INFO,
-    WIRE_HEALTH,     WIRE_ACK,           WIRE_CMD_STREAM,
-    WIRE_CMD_TARE,   WIRE_CMD_RATE,      WIRE_CMD_OSR,
-    WIRE_CMD_SLIP,   WIRE_CMD_INFO,      WIRE_CMD_HEALTH,
-    WIRE_CMD_LOADER, WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION,
-    WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT,
-    WIRE_CMD_PAD,    WIRE_CMD_ERASE_PAD, WIRE_CRASH,
-    WIRE_CMD_CRASH,  WIRE_SYNC,          WIRE_CMD_SYNC};
+static const uint8_t wire_types[] = {WIRE_CONTACT,    WIRE_RAW,           WIRE_INFO,
+                                     WIRE_HEALTH,     WIRE_ACK,           WIRE_CMD_STREAM,
+                                     WIRE_CMD_TARE,   WIRE_CMD_RATE,      WIRE_CMD_OSR,
+                                     WIRE_CMD_SLIP,   WIRE_CMD_INFO,      WIRE_CMD_HEALTH,
+                                     WIRE_CMD_LOADER, WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION,
+                                     WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT,
+                                     WIRE_CMD_PAD,    WIRE_CMD_ERASE_PAD, WIRE_CRASH,
+                                     WIRE_CMD_CRASH,  WIRE_SYNC,          WIRE_CMD_SYNC};
 enum { WIRE_TYPES = sizeof wire_types };
 
 enum sample_kind { SAMPLE_ZERO, SAMPLE_GREATEST, SAMPLE_LEAST, SAMPLE_RANDOM, SAMPLE_KINDS };
@@ -88,9 +87,7 @@ static inline void sample_text(struct sampler *sampler, char text[WIRE_TEXT_BYTE
                     : sampler->kind == SAMPLE_GREATEST ? WIRE_TEXT_BYTES
                                                        : 0;
   for (uint32_t i = 0; i < length; i++) {
-    text[i] = sampler->kind == SAMPLE_GREATEST
-                  ? '~'
-                  : (char)(' ' + (int)random_below(&sampler->random, '~' - ' ' + 1));
+    text[i] = sampler->kind == SAMPLE_GREATEST ? '~' : (char)(' ' + (int)random_below(&sampler->random, '~' - ' ' + 1));
   }
 }
 
@@ -178,8 +175,7 @@ static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
   }
 }
 
-static inline void sample_calibration(struct sampler *sampler, unsigned sensor_count,
-                                      struct calibration *calibration) {
+static inline void sample_calibration(struct sampler *sampler, unsigned sensor_count, struct calibration *calibration) {
   calibration->date_s = sample_u32(sampler);
   calibration->placements = (uint16_t)sample_u32(sampler);
   calibration->force_scale = sample_f32(sampler);
@@ -280,8 +276,7 @@ static inline void sample_health(struct sampler *sampler, struct wire_health *he
 }
 
 static inline void sample_crash(struct sampler *sampler, struct crash_record *crash) {
-  uint8_t *bytes[] = {&crash->kind, &crash->exception, &crash->vector, &crash->activity,
-                      &crash->stuck};
+  uint8_t *bytes[] = {&crash->kind, &crash->exception, &crash->vector, &crash->activity, &crash->stuck};
   for (size_t i = 0; i < sizeof bytes / sizeof bytes[0]; i++) {
     *bytes[i] = (uint8_t)sample_u32(sampler);
   }
@@ -299,8 +294,7 @@ static inline void sample_crash(struct sampler *sampler, struct crash_record *cr
 }
 
 /* Every byte of the packet is defined, so that two of them may be compared as memory. */
-static inline void sample_packet(struct sampler *sampler, uint8_t type,
-                                 struct wire_packet *packet) {
+static inline void sample_packet(struct sampler *sampler, uint8_t type, struct wire_packet *packet) {
   memset(packet, 0, sizeof *packet);
   packet->type = type;
   packet->sequence = (uint16_t)sample_u32(sampler);
@@ -352,8 +346,7 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
     break;
   case WIRE_CMD_CALIBRATE:
     packet->body.cmd_calibrate.sensor_count = sample_sensor_count(sampler);
-    sample_calibration(sampler, packet->body.cmd_calibrate.sensor_count,
-                       &packet->body.cmd_calibrate.calibration);
+    sample_calibration(sampler, packet->body.cmd_calibrate.sensor_count, &packet->body.cmd_calibrate.calibration);
     break;
   case WIRE_CMD_TARE:
     packet->body.cmd_tare.force = (uint8_t)sample_u32(sampler);
@@ -376,8 +369,7 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
   }
 }
 
-static inline enum ft_status encode(const struct wire_packet *packet, uint8_t *frame,
-                                    size_t *length) {
+static inline enum ft_status encode(const struct wire_packet *packet, uint8_t *frame, size_t *length) {
   return wire_encode(wire_find_layout(wire_all_layouts, packet->type), packet, frame, length);
 }
 

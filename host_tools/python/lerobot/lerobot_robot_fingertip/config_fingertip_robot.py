@@ -1,4 +1,5 @@
 """Its options; apart from the robot, as LeRobot's conventions have it."""
+
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,4 +1,5 @@
 """A robot that feels."""
+
 import contextlib
 from functools import cached_property
 from typing import Any

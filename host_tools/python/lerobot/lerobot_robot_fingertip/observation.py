@@ -1,4 +1,5 @@
 """What a frame is for a policy: floats, none of them NaN. Knows nothing of LeRobot."""
+
 import math
 
 from fingertip import Flag, Frame

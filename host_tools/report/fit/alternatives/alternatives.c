@@ -43,8 +43,8 @@ struct normal {
   real rhs[PARAMETERS];
 };
 
-static bool normalise(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                      uint32_t usable, struct samples *samples) {
+static bool normalise(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                      struct samples *samples) {
   int32_t largest = 0;
   samples->count = 0;
   for (int k = 0; k < array->sensor_count; k++) {
@@ -132,8 +132,7 @@ static void log_linear(const struct samples *samples, real theta[PARAMETERS]) {
   }
 }
 
-static void guess(const struct samples *samples, enum alternative_guess how,
-                  real theta[PARAMETERS]) {
+static void guess(const struct samples *samples, enum alternative_guess how, real theta[PARAMETERS]) {
   theta[P0] = R(1);
   theta[X] = samples->x[samples->peak];
   theta[Y] = samples->y[samples->peak];
@@ -154,8 +153,7 @@ static void guess(const struct samples *samples, enum alternative_guess how,
 }
 
 /* exponential[n] and half the sum of squared residuals. */
-static real evaluate(const struct samples *samples, const real theta[PARAMETERS],
-                     real exponential[FT_MAX_SENSORS]) {
+static real evaluate(const struct samples *samples, const real theta[PARAMETERS], real exponential[FT_MAX_SENSORS]) {
   real scale = R(-0.5) / (theta[SIGMA] * theta[SIGMA]);
   real cost = 0;
   for (int n = 0; n < samples->count; n++) {
@@ -176,15 +174,13 @@ static void linearise(const struct samples *samples, const real theta[PARAMETERS
     real x = samples->x[n] - theta[X], y = samples->y[n] - theta[Y];
     real model = theta[P0] * exponential[n];
     real slope = model * inverse_variance;
-    real row[PARAMETERS] = {exponential[n], slope * x, slope * y,
-                            slope * (x * x + y * y) * inverse_sigma};
+    real row[PARAMETERS] = {exponential[n], slope * x, slope * y, slope * (x * x + y * y) * inverse_sigma};
     add_row(normal, row, samples->p[n] - model);
   }
 }
 
 static struct NAMED(alternative_fit_)
-    in_units(const struct fit_array *array, const struct samples *samples,
-             const real theta[PARAMETERS]) {
+    in_units(const struct fit_array *array, const struct samples *samples, const real theta[PARAMETERS]) {
   real pitch_mm = (real)array->pitch_mm;
   struct NAMED(alternative_fit_) fit = {
       .x_mm = theta[X] * pitch_mm,
@@ -196,9 +192,8 @@ static struct NAMED(alternative_fit_)
   return fit;
 }
 
-struct NAMED(alternative_fit_)
-    NAMED(alternative_naive_)(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              uint32_t usable, const struct alternative_settings *settings) {
+struct NAMED(alternative_fit_) NAMED(alternative_naive_)(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                                                         uint32_t usable, const struct alternative_settings *settings) {
   struct samples samples;
   if (!normalise(array, pressure_Pa_q10, usable, &samples)) {
     return (struct NAMED(alternative_fit_)){0};
@@ -219,9 +214,8 @@ struct NAMED(alternative_fit_)
   return in_units(array, &samples, theta);
 }
 
-struct NAMED(alternative_fit_)
-    NAMED(alternative_lm_)(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                           uint32_t usable, const struct alternative_settings *settings) {
+struct NAMED(alternative_fit_) NAMED(alternative_lm_)(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                                                      uint32_t usable, const struct alternative_settings *settings) {
   struct samples samples;
   if (!normalise(array, pressure_Pa_q10, usable, &samples)) {
     return (struct NAMED(alternative_fit_)){0};

@@ -29,16 +29,15 @@ struct alternative_settings {
   enum alternative_guess guess;
 };
 
-#define ALTERNATIVES_OF(real)                                                                      \
-  struct alternative_fit_##real {                                                                  \
-    real x_mm, y_mm, p0_Pa, sigma_mm, force_N;                                                     \
-  };                                                                                               \
-  struct alternative_fit_##real alternative_naive_##real(                                          \
-      const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,              \
-      const struct alternative_settings *settings);                                                \
-  struct alternative_fit_##real alternative_lm_##real(                                             \
-      const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,              \
-      const struct alternative_settings *settings);
+#define ALTERNATIVES_OF(real)                                                                                          \
+  struct alternative_fit_##real {                                                                                      \
+    real x_mm, y_mm, p0_Pa, sigma_mm, force_N;                                                                         \
+  };                                                                                                                   \
+  struct alternative_fit_##real alternative_naive_##real(const struct fit_array *array,                                \
+                                                         const int32_t *pressure_Pa_q10, uint32_t usable,              \
+                                                         const struct alternative_settings *settings);                 \
+  struct alternative_fit_##real alternative_lm_##real(const struct fit_array *array, const int32_t *pressure_Pa_q10,   \
+                                                      uint32_t usable, const struct alternative_settings *settings);
 
 ALTERNATIVES_OF(float)
 ALTERNATIVES_OF(double)

@@ -39,7 +39,11 @@ function main(argv) {
   let options;
   try {
     const text = (other) => ({ type: 'string', default: other });
-    ({ values: options } = parseArgs({ args: argv, options: { image: text(), jobs: text(), out: text(), budget: text('25'), kernel: text(), help: { type: 'boolean' } }, strict: true }));
+    ({ values: options } = parseArgs({
+      args: argv,
+      options: { image: text(), jobs: text(), out: text(), budget: text('25'), kernel: text(), help: { type: 'boolean' } },
+      strict: true,
+    }));
   } catch (error) {
     throw new InputError(`${error.message.split('\n')[0]}; see --help`);
   }
@@ -60,9 +64,19 @@ function main(argv) {
   for (const variant of variants) {
     if (!KERNELS.includes(variant.kernel) || (options.kernel && variant.kernel !== options.kernel)) continue;
     const { cycles, error_um } = measure(bench, variant, presses[variant.mask], budget);
-    const row = [variant.kernel, variant.variant, cycles.length, Math.min(...cycles), median(cycles), Math.max(...cycles), median(error_um).toPrecision(3)];
+    const row = [
+      variant.kernel,
+      variant.variant,
+      cycles.length,
+      Math.min(...cycles),
+      median(cycles),
+      Math.max(...cycles),
+      median(error_um).toPrecision(3),
+    ];
     rows.push(row.join(','));
-    process.stdout.write(`${row[0].padEnd(13)} ${row[1].padEnd(18)} ${String(row[2]).padStart(4)} fits, cycles ${row[3]} ${row[4]} ${row[5]}, ${row[6]} um\n`);
+    process.stdout.write(
+      `${row[0].padEnd(13)} ${row[1].padEnd(18)} ${String(row[2]).padStart(4)} fits, cycles ${row[3]} ${row[4]} ${row[5]}, ${row[6]} um\n`,
+    );
   }
   try {
     writeFileSync(options.out, `${rows.join('\n')}\n`);

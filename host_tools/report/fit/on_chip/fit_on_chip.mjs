@@ -6,10 +6,44 @@ import { Report } from '../../../simulation/emulator/report.mjs';
 
 const rows = readFileSync(new URL('../../../../firmware/fit/kernels.h', import.meta.url), 'utf8').matchAll(/^ +ROW\((\w+),/gm);
 /** In the order of `kernels` in main.c. */
-export const KERNELS = ['nothing', 'fit', 'naive_float', 'naive_double', 'lm_float', 'lm_double', 'tangential', 'load_0', 'load_1', 'load_2', 'load_3', 'load_4', 'load_5', 'gains_of_touch', 'shapes_first_0', 'shapes_first_1', 'shapes_0', 'shapes_1', 'shapes_2', ...[...rows].map((row) => row[1])];
+export const KERNELS = [
+  'nothing',
+  'fit',
+  'naive_float',
+  'naive_double',
+  'lm_float',
+  'lm_double',
+  'tangential',
+  'load_0',
+  'load_1',
+  'load_2',
+  'load_3',
+  'load_4',
+  'load_5',
+  'gains_of_touch',
+  'shapes_first_0',
+  'shapes_first_1',
+  'shapes_0',
+  'shapes_1',
+  'shapes_2',
+  ...[...rows].map((row) => row[1]),
+];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */
-const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, guess: 3, noise_Pa_q10: 4, prior_sigma_mm: 5, prior_width_mm: 6, usable: 7, own: 8, readings: 9, x_mm: 41, y_mm: 42 };
+const FIELDS = {
+  kernel: 0,
+  iterations: 1,
+  n_largest: 2,
+  guess: 3,
+  noise_Pa_q10: 4,
+  prior_sigma_mm: 5,
+  prior_width_mm: 6,
+  usable: 7,
+  own: 8,
+  readings: 9,
+  x_mm: 41,
+  y_mm: 42,
+};
 const GUESSES = ['log_linear', 'maximum', 'centroid'];
 
 /** One chip that runs fit_cycles.bin. */
@@ -40,14 +74,26 @@ export class Bench {
       this.chip.runUntil(this.time.nanos + 60e9);
     } catch (error) {
       if (!(error instanceof Stopped)) throw error;
-      if (error.reason !== 'next job') throw new Error(`the image stopped: ${error.reason}; ${this.report.list.map((e) => Report.line(e)).join('; ')}`);
+      if (error.reason !== 'next job')
+        throw new Error(`the image stopped: ${error.reason}; ${this.report.list.map((e) => Report.line(e)).join('; ')}`);
       return;
     }
     throw new Error('a fit takes longer than a minute');
   }
 
   /** @returns {{cycles, x_mm, y_mm}} of one fit */
-  run({ kernel, iterations = 0, n_largest = 0, guess = 'log_linear', noise_Pa_q10 = 1, prior_sigma_mm = 0, prior_width_mm = 0, usable = 0, own = false, readings = [] }) {
+  run({
+    kernel,
+    iterations = 0,
+    n_largest = 0,
+    guess = 'log_linear',
+    noise_Pa_q10 = 1,
+    prior_sigma_mm = 0,
+    prior_width_mm = 0,
+    usable = 0,
+    own = false,
+    readings = [],
+  }) {
     const { chip } = this;
     const at = chip.core.registers[0] - 0x20000000;
     const view = new DataView(chip.sram.buffer, chip.sram.byteOffset + at);
@@ -63,6 +109,10 @@ export class Bench {
     put(FIELDS.own, own ? 1 : 0);
     readings.forEach((value, k) => put(FIELDS.readings + k, value));
     this.#untilNextJob();
-    return { cycles: this.cycles - (this.overhead ?? 0), x_mm: view.getFloat32(4 * FIELDS.x_mm, true), y_mm: view.getFloat32(4 * FIELDS.y_mm, true) };
+    return {
+      cycles: this.cycles - (this.overhead ?? 0),
+      x_mm: view.getFloat32(4 * FIELDS.x_mm, true),
+      y_mm: view.getFloat32(4 * FIELDS.y_mm, true),
+    };
   }
 }

@@ -27,10 +27,10 @@ static struct {
 
 enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
 
-#define CALL_DEBUGGER(number)                                                                      \
-  do {                                                                                             \
-    register void *argument __asm("r0") = &job;                                                    \
-    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                           \
+#define CALL_DEBUGGER(number)                                                                                          \
+  do {                                                                                                                 \
+    register void *argument __asm("r0") = &job;                                                                        \
+    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                                               \
   } while (0)
 
 static struct fit_array layout;
@@ -55,17 +55,17 @@ static void fit(void) {
 }
 
 /* One for each row of fit/kernels.h. */
-#define OF_THE_FIRMWARE(name, suits, fits)                                                         \
-  static void name(void) {                                                                         \
-    const struct fit_array *array = &layout;                                                       \
-    const struct fit_settings *settings = &chosen;                                                 \
-    struct fit_result *result = &contact;                                                            \
-    const int32_t *pressure_Pa_q10 = job.pressure_Pa_q10;                                          \
-    uint32_t usable = job.usable;                                                                  \
-    (void)usable;                                                                                  \
-    fits;                                                                                          \
-    job.x_mm = contact.x_mm;                                                                       \
-    job.y_mm = contact.y_mm;                                                                       \
+#define OF_THE_FIRMWARE(name, suits, fits)                                                                             \
+  static void name(void) {                                                                                             \
+    const struct fit_array *array = &layout;                                                                           \
+    const struct fit_settings *settings = &chosen;                                                                     \
+    struct fit_result *result = &contact;                                                                              \
+    const int32_t *pressure_Pa_q10 = job.pressure_Pa_q10;                                                              \
+    uint32_t usable = job.usable;                                                                                      \
+    (void)usable;                                                                                                      \
+    fits;                                                                                                              \
+    job.x_mm = contact.x_mm;                                                                                           \
+    job.y_mm = contact.y_mm;                                                                                           \
   }
 FIT_GRID_KERNELS(OF_THE_FIRMWARE)
 FIT_OTHER_KERNELS(OF_THE_FIRMWARE)
@@ -87,8 +87,7 @@ static void tangential(void) {
   struct fit_settings settings = chosen;
   settings.dip_share = 0.0125f;
   settings.dip_sd_mm = 14.0f;
-  fit_tangential_load(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state,
-                      &tangential_result);
+  fit_tangential_load(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state, &tangential_result);
   job.x_mm = tangential_result.x_mm;
   job.y_mm = tangential_result.y_mm;
 }
@@ -97,9 +96,9 @@ static void tangential(void) {
 static void follow_load(void) {
   fit_load_follow(&load, &layout, job.pressure_Pa_q10, &chosen, &contact);
 }
-#define LOAD_PART(part)                                                                            \
-  static void load_##part(void) {                                                                  \
-    follow_load();                                                                                 \
+#define LOAD_PART(part)                                                                                                \
+  static void load_##part(void) {                                                                                      \
+    follow_load();                                                                                                     \
   }
 LOAD_PART(0)
 LOAD_PART(1)
@@ -107,8 +106,7 @@ LOAD_PART(2)
 LOAD_PART(3)
 LOAD_PART(4)
 LOAD_PART(5)
-static void (*const load_parts[FIT_LOAD_PARTS])(void) = {load_0, load_1, load_2,
-                                                         load_3, load_4, load_5};
+static void (*const load_parts[FIT_LOAD_PARTS])(void) = {load_0, load_1, load_2, load_3, load_4, load_5};
 
 /* A touch that rests, after `fit` of the same readings. */
 static void gains_of_touch(void) {
@@ -121,34 +119,31 @@ static void shapes(void) {
   struct fit_settings settings = chosen;
   settings.dip_share = 0.0125f;
   settings.dip_sd_mm = 14.0f;
-  fit_shapes_part(&layout, &shapes_pad, job.pressure_Pa_q10, &settings, &contact, &shapes_state,
-                  &shapes_result);
+  fit_shapes_part(&layout, &shapes_pad, job.pressure_Pa_q10, &settings, &contact, &shapes_state, &shapes_result);
   job.x_mm = shapes_result.x_mm[0];
   job.y_mm = shapes_result.y_mm[0];
 }
 #define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS)
-#define SHAPES_PART(part)                                                                          \
-  static void shapes_##part(void) {                                                                \
-    shapes();                                                                                      \
+#define SHAPES_PART(part)                                                                                              \
+  static void shapes_##part(void) {                                                                                    \
+    shapes();                                                                                                          \
   }
 SHAPES_PART(0)
 SHAPES_PART(1)
 SHAPES_PART(2)
 SHAPES_PART(first_0)
 SHAPES_PART(first_1)
-static void (*const shapes_parts[])(void) = {shapes_first_0, shapes_first_1, shapes_0, shapes_1,
-                                             shapes_2};
+static void (*const shapes_parts[])(void) = {shapes_first_0, shapes_first_1, shapes_0, shapes_1, shapes_2};
 /* Parts before each. */
 static const int shapes_before[] = {0, 1, SHAPES_LATER, SHAPES_LATER + 1, SHAPES_LATER + 2};
 
-#define ALTERNATIVE(name, solver, real)                                                            \
-  static void name(void) {                                                                         \
-    const struct alternative_settings options = {(int)job.iterations,                              \
-                                                (enum alternative_guess)job.guess};                \
-    struct alternative_fit_##real answer =                                                          \
-        alternative_##solver##_##real(&layout, job.pressure_Pa_q10, job.usable, &options);          \
-    job.x_mm = (float)answer.x_mm;                                                                  \
-    job.y_mm = (float)answer.y_mm;                                                                  \
+#define ALTERNATIVE(name, solver, real)                                                                                \
+  static void name(void) {                                                                                             \
+    const struct alternative_settings options = {(int)job.iterations, (enum alternative_guess)job.guess};              \
+    struct alternative_fit_##real answer =                                                                             \
+        alternative_##solver##_##real(&layout, job.pressure_Pa_q10, job.usable, &options);                             \
+    job.x_mm = (float)answer.x_mm;                                                                                     \
+    job.y_mm = (float)answer.y_mm;                                                                                     \
   }
 ALTERNATIVE(naive_float, naive, float)
 ALTERNATIVE(naive_double, naive, double)
@@ -158,18 +153,14 @@ ALTERNATIVE(lm_double, lm, double)
 #define NAME(name, suits, fits) name,
 /* The order is that of KERNELS in fit_on_chip.mjs: the rows of fit/kernels.h are the last. */
 static void (*const kernels[])(void) = {
-    nothing,   fit,       naive_float,
-    naive_double, lm_float,  lm_double,
-    tangential, load_0,    load_1,
-    load_2,    load_3,    load_4,
-    load_5,    gains_of_touch, shapes_first_0, shapes_first_1, shapes_0,
-    shapes_1,  shapes_2,  FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+    nothing,        fit,        naive_float, naive_double,   lm_float,
+    lm_double,      tangential, load_0,      load_1,         load_2,
+    load_3,         load_4,     load_5,      gains_of_touch, shapes_first_0,
+    shapes_first_1, shapes_0,   shapes_1,    shapes_2,       FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
-  if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK ||
-      fit_pad_init(&pad, &layout, &profile) != FT_OK ||
-      fit_shapes_init(&shapes_pad, &layout, &profile) != FT_OK) {
+  if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK ||
+      fit_pad_init(&pad, &layout, &profile) != FT_OK || fit_shapes_init(&shapes_pad, &layout, &profile) != FT_OK) {
     port_panic();
   }
   for (int k = 0; k < FT_MAX_SENSORS; k++) { /* so little that it spoils no press */

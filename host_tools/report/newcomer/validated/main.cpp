@@ -59,8 +59,8 @@ public:
     }
     native_fingertip_start(&settings);
     native_cdc_open();
-    for (const wire_packet &command : setting_commands(
-             {setting_from_text("rate=" + std::to_string(int(validating::RATE_Hz)))}, {})) {
+    for (const wire_packet &command :
+         setting_commands({setting_from_text("rate=" + std::to_string(int(validating::RATE_Hz)))}, {})) {
       send(command);
     }
     if (options.calibrated) {
@@ -121,8 +121,7 @@ private:
     }
     send(command_calibrate(
         calibrating::calibration_of(
-            solution, calibrating::force_scale(array, placements, solution, truth::WEIGHT_N, shape),
-            DATE_s),
+            solution, calibrating::force_scale(array, placements, solution, truth::WEIGHT_N, shape), DATE_s),
         SENSORS));
   }
 
@@ -171,14 +170,11 @@ void keep_truth(const Options &options, const ValidatedPad &pad) {
                           {"presses", nlohmann::json::array()},
                           {"pulls", nlohmann::json::array()}};
   for (const ValidatedPad::Truth &press : pad.presses()) {
-    truth["presses"].push_back(
-        {{"x_mm", press.x_mm}, {"y_mm", press.y_mm}, {"force_N", press.force_N}});
+    truth["presses"].push_back({{"x_mm", press.x_mm}, {"y_mm", press.y_mm}, {"force_N", press.force_N}});
   }
   for (const ValidatedPad::TruePull &pull : pad.pulls()) {
-    truth["pulls"].push_back({{"toward_deg", pull.toward_deg},
-                              {"pull_N", pull.pull_N},
-                              {"force_N", pull.force_N},
-                              {"way_mm", pull.way_mm}});
+    truth["pulls"].push_back(
+        {{"toward_deg", pull.toward_deg}, {"pull_N", pull.pull_N}, {"force_N", pull.force_N}, {"way_mm", pull.way_mm}});
   }
   OutputFile file(options.truth, options.overwrite, OutputFile::Appears::when_finished);
   const std::string text = truth.dump(1) + "\n";
@@ -187,15 +183,12 @@ void keep_truth(const Options &options, const ValidatedPad &pad) {
 }
 
 int run(int argc, char **argv) {
-  CLI::App app(
-      "Simulates a validation of a fingertip, and records it as `fingertip validate` does.",
-      "newcomer_validated");
+  CLI::App app("Simulates a validation of a fingertip, and records it as `fingertip validate` does.",
+               "newcomer_validated");
   speak_plainly(app);
   Options options;
   options.pad.cache = twin::default_cache_directory();
-  app.add_option("-o,--output", options.recording, "The recording")
-      ->required()
-      ->type_name("FILE.csv");
+  app.add_option("-o,--output", options.recording, "The recording")->required()->type_name("FILE.csv");
   app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.json");
   app.add_option("--fault", options.fault, "What is wrong with the pad")
       ->check(CLI::IsMember(pad_fault_names()))
@@ -203,13 +196,10 @@ int run(int argc, char **argv) {
   app.add_option("--seed", options.pad.seed, "Of the pad, its fault and the hand")
       ->type_name("N")
       ->capture_default_str();
-  CLI::Option *calibrated =
-      app.add_flag("--calibrated", options.calibrated, "The fingertip was calibrated before");
-  app.add_flag("--known-pad", options.knows_pad,
-               "The calibration set the pad's profile, so that pulls are estimated")
+  CLI::Option *calibrated = app.add_flag("--calibrated", options.calibrated, "The fingertip was calibrated before");
+  app.add_flag("--known-pad", options.knows_pad, "The calibration set the pad's profile, so that pulls are estimated")
       ->needs(calibrated);
-  app.add_flag("--plain", options.plain,
-               "Rubber as its profile has it: sensors' gains differ, and nothing else");
+  app.add_flag("--plain", options.plain, "Rubber as its profile has it: sensors' gains differ, and nothing else");
   app.add_option("--pull", options.pad.pulling.weight_g, "Pulls in the end, by so much on a thread")
       ->check(CLI::Range(10.0, 1000.0))
       ->type_name("GRAMS");
@@ -233,8 +223,7 @@ int run(int argc, char **argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   const auto &names = pad_fault_names();
-  options.pad.fault =
-      static_cast<PadFault>(std::find(names.begin(), names.end(), options.fault) - names.begin());
+  options.pad.fault = static_cast<PadFault>(std::find(names.begin(), names.end(), options.fault) - names.begin());
   if (options.plain) {
     options.pad.effects = twin::parse_effects("gain");
   }

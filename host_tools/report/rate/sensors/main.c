@@ -23,10 +23,10 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
 enum { FRAME_us = 4854 };
 enum { AMBIENT_Pa_q10 = 101325 * 1024, NOISE_Pa_q10 = 11 * 1024 };
 
-#define CALL_DEBUGGER(number)                                                                      \
-  do {                                                                                             \
-    register void *argument __asm("r0") = &job;                                                    \
-    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                           \
+#define CALL_DEBUGGER(number)                                                                                          \
+  do {                                                                                                                 \
+    register void *argument __asm("r0") = &job;                                                                        \
+    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                                               \
   } while (0)
 
 static struct condition condition;
@@ -48,8 +48,7 @@ static void condition_one(void) {
 }
 
 static void fit(void) {
-  const struct fit_settings settings = {.iterations = FINGERTIP_FIT_ITERATIONS,
-                                        .noise_Pa_q10 = NOISE_Pa_q10};
+  const struct fit_settings settings = {.iterations = FINGERTIP_FIT_ITERATIONS, .noise_Pa_q10 = NOISE_Pa_q10};
   fit_gaussian(&array, conditioned.pressure_Pa_q10, conditioned.usable, &settings, &result);
 }
 

@@ -15,14 +15,25 @@ cycles of the slowest of the presses, and the largest distance of a location fro
 Exit: 0 done; 1 an image failed; 2 wrong usage or input.`;
 
 /** Rectangles by their image. */
-const GRIDS = [[3, 3], [3, 4], [3, 5], [4, 5], [5, 5], [5, 6]];
+const GRIDS = [
+  [3, 3],
+  [3, 4],
+  [3, 5],
+  [4, 5],
+  [5, 5],
+  [5, 6],
+];
 /** Free layouts, all with the image of the first rectangle: a rectangle that the kernel is not compiled for, or the five of a die. */
 const FREE = [null, [3, 4], [3, 5], [4, 5], [5, 5], [5, 6], [4, 8]];
 const PITCH_MM = 9;
 const SIGMA_MM = 5.7;
 const P0_PA = 25000;
 /** Places of the presses, in parts of the array. */
-const PLACES = [[0.1, -0.2], [-0.35, 0.3], [0.45, 0.45]];
+const PLACES = [
+  [0.1, -0.2],
+  [-0.35, 0.3],
+  [0.45, 0.45],
+];
 
 const STAGES = ['take', 'condition', 'fit'];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
@@ -78,7 +89,8 @@ class Bench {
       view.setInt32(4 * (AT.pressure + k), Math.round(1024 * P0_PA * Math.exp(-distance2 / (2 * SIGMA_MM ** 2))), true);
     });
     this.#untilNextJob();
-    const error_um = 1e3 * Math.hypot(view.getFloat32(4 * AT.fit_x_mm, true) - press.x_mm, view.getFloat32(4 * AT.fit_y_mm, true) - press.y_mm);
+    const error_um =
+      1e3 * Math.hypot(view.getFloat32(4 * AT.fit_x_mm, true) - press.x_mm, view.getFloat32(4 * AT.fit_y_mm, true) - press.y_mm);
     return { cycles: this.cycles, error_um };
   }
 }

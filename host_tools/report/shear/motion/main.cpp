@@ -20,12 +20,11 @@ using namespace fingertip;
 using namespace fingertip::shear;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] =
-    "usage: shear_motion [--seed S] [--pads N] [--usual] [--cache DIR]\n"
-    "  --seed S     of acts, pads and noise, 31000 by default\n"
-    "  --pads N     of each case, for as many lifts of each duration and slides; 200 by default\n"
-    "  --usual      the usual case alone\n"
-    "  --cache DIR  folder of the contact tables\n";
+constexpr char HELP[] = "usage: shear_motion [--seed S] [--pads N] [--usual] [--cache DIR]\n"
+                        "  --seed S     of acts, pads and noise, 31000 by default\n"
+                        "  --pads N     of each case, for as many lifts of each duration and slides; 200 by default\n"
+                        "  --usual      the usual case alone\n"
+                        "  --cache DIR  folder of the contact tables\n";
 
 struct Options {
   std::string cache = FINGERTIP_TABLES_DIR;
@@ -89,8 +88,8 @@ ordered_json rounded(double value) {
   return std::isnan(value) ? ordered_json(nullptr) : ordered_json(std::round(10.0 * value) / 10.0);
 }
 
-twin::Scenario scenario_of(const Case &c, const std::string &kind, const Object &object,
-                           std::uint64_t seed, std::size_t acts) {
+twin::Scenario scenario_of(const Case &c, const std::string &kind, const Object &object, std::uint64_t seed,
+                           std::size_t acts) {
   constexpr double LONGEST_LIFT_s = 6.5, LONGEST_SLIDE_s = 14.0;
   twin::ScenarioOptions options;
   options.kind = kind;
@@ -116,8 +115,8 @@ twin::Scenario scenario_of(const Case &c, const std::string &kind, const Object 
 }
 
 // What became of the acts of one kind on all objects of a case.
-std::vector<Judged> play(const Case &c, const std::string &kind, const Pads &pads,
-                         const Options &options, std::size_t acts) {
+std::vector<Judged> play(const Case &c, const std::string &kind, const Pads &pads, const Options &options,
+                         std::size_t acts) {
   std::vector<Judged> all;
   for (std::size_t o = 0; o < c.objects.size(); o++) {
     const std::size_t share = acts / c.objects.size() + (o < acts % c.objects.size() ? 1 : 0);
@@ -179,21 +178,18 @@ void judge_slides(const std::vector<Judged> &slides, ordered_json &out) {
       int gaps = 0;
       for (const Judged &act : slides) {
         for (const Judged::Found &found : act.slips) {
-          if (found.slip.way_mm < WAY_MIN_mm || (found.slip.speed_mm_s >= FAST_mm_s) != fast ||
-              !found.latency_s[d]) {
+          if (found.slip.way_mm < WAY_MIN_mm || (found.slip.speed_mm_s >= FAST_mm_s) != fast || !found.latency_s[d]) {
             continue;
           }
           latency_ms.push_back(1e3 * *found.latency_s[d]);
-          since_shown_ms.push_back(latency_ms.back() -
-                                   1e3 * (found.slip.shows_s - found.slip.begin_s));
+          since_shown_ms.push_back(latency_ms.back() - 1e3 * (found.slip.shows_s - found.slip.begin_s));
           lasts_ms.push_back(1e3 * found.lasts_s[d]);
           gaps += found.gaps[d];
         }
       }
       const std::string name = DETECTOR_NAMES[d] + std::string("_") + which;
       out[name + "found_percent"] = rounded(
-          slips > 0 ? 100.0 * static_cast<double>(latency_ms.size()) / static_cast<double>(slips)
-                    : std::nan(""));
+          slips > 0 ? 100.0 * static_cast<double>(latency_ms.size()) / static_cast<double>(slips) : std::nan(""));
       out[name + "latency_p50_ms"] = rounded(quantile(latency_ms, 0.5));
       out[name + "latency_p95_ms"] = rounded(quantile(latency_ms, 0.95));
       out[name + "since_shown_p95_ms"] = rounded(quantile(since_shown_ms, 0.95));
@@ -226,9 +222,7 @@ ordered_json series_of(const Case &c, const std::string &kind, std::size_t act, 
     if (!felt.tangential.valid) {
       return;
     }
-    const auto add = [&](const char *name, double value) {
-      series[name].push_back(std::round(1e4 * value) / 1e4);
-    };
+    const auto add = [&](const char *name, double value) { series[name].push_back(std::round(1e4 * value) / 1e4); };
     add("t_s", 1e-6 * static_cast<double>(felt.t_us));
     add("true_x_mm", felt.truth.x_mm);
     add("true_y_mm", felt.truth.y_mm);
@@ -269,8 +263,7 @@ ordered_json measure(const Options &options) {
     judge_slides(play(c, "slide", pads, options, options.pads), row);
     if (out.count("motion_cases") == 0) {
       for (const Duration &duration : DURATIONS) {
-        out[std::string("lift_false_slides_") + duration.name] =
-            row[std::string("sliding_false_") + duration.name];
+        out[std::string("lift_false_slides_") + duration.name] = row[std::string("sliding_false_") + duration.name];
       }
       out["slide_found_percent"] = row["sliding_found_percent"];
       out["slide_latency_p50_ms"] = row["sliding_latency_p50_ms"];

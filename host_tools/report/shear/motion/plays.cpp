@@ -41,15 +41,13 @@ fit_pad pad_under(double layer_mm, const fit_array &array) {
 
 Object::Object(const std::string &name, double thickness_mm, const std::filesystem::path &cache)
     : indenter(name), layer_mm(thickness_mm),
-      table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(thickness_mm),
-                                               cache)),
+      table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(thickness_mm), cache)),
       traction_(table_, twin::silicone(thickness_mm)) {}
 
 std::array<double, truth::SENSORS> Object::base_Pa(const twin::Touch &touch) const {
   std::array<double, truth::SENSORS> base_Pa{};
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
-  const twin::TractionTable::Load load{touch.force_N, touch.stuck_N,
-                                       c * touch.pull_x_N + s * touch.pull_y_N,
+  const twin::TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
                                        c * touch.pull_y_N - s * touch.pull_x_N};
   const bool pulls = touch.pull_x_N != 0.0 || touch.pull_y_N != 0.0;
   for (std::size_t k = 0; k < truth::SENSORS; k++) {
@@ -67,12 +65,10 @@ const std::vector<std::string> &Pads::kinds() {
   return all;
 }
 
-Pads::Pads(std::size_t calibrations, std::uint64_t seed, const std::filesystem::path &cache)
-    : seed_(seed) {
+Pads::Pads(std::size_t calibrations, std::uint64_t seed, const std::filesystem::path &cache) : seed_(seed) {
   const truth::Feet feet(12.0, cache);
   for (std::size_t i = 0; i < calibrations; i++) {
-    calibrated_.push_back(
-        truth::calibrated_pad(truth::calibrated_session(feet, CALIBRATED_PADS[0], seed + i)));
+    calibrated_.push_back(truth::calibrated_pad(truth::calibrated_session(feet, CALIBRATED_PADS[0], seed + i)));
   }
 }
 
@@ -93,8 +89,7 @@ truth::Pad Pads::pad(const std::string &kind, std::uint64_t n) const {
   return truth::perfect_pad();
 }
 
-Player::Player(const Object &object, const truth::Pad &pad, const Sensing &sensing,
-               std::uint64_t seed)
+Player::Player(const Object &object, const truth::Pad &pad, const Sensing &sensing, std::uint64_t seed)
     : object_(object), pad_(pad), sensing_(sensing), seed_(seed), array_(truth::firmware_array()) {
   const ms58xx_osr *osr = ms58xx_find_osr(sensing.osr);
   if (!osr) {
@@ -111,8 +106,7 @@ Player::Player(const Object &object, const truth::Pad &pad, const Sensing &sensi
 
 Player::~Player() = default;
 
-void Player::play(const twin::Act &act, std::uint64_t number,
-                  const std::function<void(const Felt &)> &frame) {
+void Player::play(const twin::Act &act, std::uint64_t number, const std::function<void(const Felt &)> &frame) {
   Random random(seed_, NOISE, number);
   job_->course = {};
   const double first_s = random.uniform(0.0, 1.0) / sensing_.rate_Hz;
@@ -137,8 +131,7 @@ void Player::play(const twin::Act &act, std::uint64_t number,
     }
     felt.contact = largest_Pa > GATE_NOISES * noise_Pa_;
     if (felt.contact) {
-      fit_gaussian_grid(&array_, readings, (1u << geometry.sensor_count) - 1u, &settings_,
-                        &felt.fit);
+      fit_gaussian_grid(&array_, readings, (1u << geometry.sensor_count) - 1u, &settings_, &felt.fit);
       job_->question = {false, 0, felt.t_us, readings, &settings_, &felt.fit};
       tangential_estimate(job_.get());
       felt.tangential = job_->estimate;

@@ -73,8 +73,7 @@ class Player {
 public:
   Player(const Object &object, const truth::Pad &pad, const Sensing &sensing, std::uint64_t seed);
   ~Player();
-  void play(const twin::Act &act, std::uint64_t number,
-            const std::function<void(const Felt &)> &frame);
+  void play(const twin::Act &act, std::uint64_t number, const std::function<void(const Felt &)> &frame);
 
 private:
   const Object &object_;

@@ -20,8 +20,8 @@ struct Watch::Histories {
 };
 
 Watch::Watch() : histories_(std::make_unique<Histories>()) {
-  histories_->contact = {DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u,
-                         DEFAULT_FORCE_SCALE, DEFAULT_FORCE_SCALE_SD};
+  histories_->contact = {DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, DEFAULT_FORCE_SCALE,
+                         DEFAULT_FORCE_SCALE_SD};
   histories_->tangential.force_scale = 1.0F;
   histories_->tangential.tangential_scale = 1.0F;
   histories_->tangential.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
@@ -70,8 +70,7 @@ std::vector<Slip> slips_of(const twin::Act &act) {
       const twin::Touch now = act.tracks[0].at(t_s);
       const double way_mm = std::hypot(now.x_mm - from.x_mm, now.y_mm - from.y_mm);
       slip.way_mm = std::max(slip.way_mm, way_mm);
-      slip.speed_mm_s = std::max(slip.speed_mm_s,
-                                 std::hypot(now.x_mm - last.x_mm, now.y_mm - last.y_mm) / STEP_s);
+      slip.speed_mm_s = std::max(slip.speed_mm_s, std::hypot(now.x_mm - last.x_mm, now.y_mm - last.y_mm) / STEP_s);
       if (way_mm >= Slip::SHOWS_mm) {
         slip.shows_s = std::min(slip.shows_s, t_s);
       }
@@ -100,8 +99,7 @@ Judged judge(Player &player, const twin::Act &act, std::uint64_t number) {
       bool excused = false;
       for (Judged::Found &found : judged.slips) {
         const bool within = t_s >= found.slip.begin_s && t_s <= found.slip.end_s;
-        excused =
-            excused || (t_s > found.slip.begin_s - EARLY_s && t_s < found.slip.end_s + LATE_s);
+        excused = excused || (t_s > found.slip.begin_s - EARLY_s && t_s < found.slip.end_s + LATE_s);
         if (said.flags[d] && t_s >= found.slip.begin_s && t_s < found.slip.end_s + Slip::JOINED_s) {
           if (!found.latency_s[d]) {
             found.latency_s[d] = felt.known_s - found.slip.begin_s;

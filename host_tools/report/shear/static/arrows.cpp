@@ -25,8 +25,8 @@ void draw_arrows(Bench &bench, ordered_json &out) {
       touch.pull_y_N = SHARE * FORCE_N * std::sin(direction);
       touch.stuck_N = twin::stuck_force_N(FORCE_N, SHARE * FORCE_N, FRICTION);
       Said said{};
-      fingertip.feel(base_Pa(fingertip.array(), object, touch, nullptr, pad.cast), pad,
-                     noise_Pa(1024), ALL_SENSORS, random, said);
+      fingertip.feel(base_Pa(fingertip.array(), object, touch, nullptr, pad.cast), pad, noise_Pa(1024), ALL_SENSORS,
+                     random, said);
       out["arrows"].push_back({{"x_mm", touch.x_mm},
                                {"y_mm", touch.y_mm},
                                {"qx", touch.pull_x_N / FORCE_N},

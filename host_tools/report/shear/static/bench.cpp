@@ -42,8 +42,7 @@ const char *place_of(const twin::Touch &touch) {
   return at_x && at_y ? "corner" : at_x || at_y ? "border" : "inner";
 }
 
-Bench::Bench(const Options &given)
-    : options(given), objects(given.cache), profile(profile_of(LAYER_mm)) {
+Bench::Bench(const Options &given) : options(given), objects(given.cache), profile(profile_of(LAYER_mm)) {
   if (options.pads == 0) {
     throw std::runtime_error("--pads needs at least one pad");
   }
@@ -85,8 +84,7 @@ PadOf Bench::calibrated_on(double layer_mm) {
 
 PadOf Bench::calibrated_as(const std::vector<truth::PadOptions> &kinds) {
   std::vector<KnownPad> pads;
-  for (const truth::Calibrated &session :
-       truth::calibrations_of(kinds, options.pads, options.seed, options.cache)) {
+  for (const truth::Calibrated &session : truth::calibrations_of(kinds, options.pads, options.seed, options.cache)) {
     pads.push_back({truth::calibrated_pad(session), {}, session.shape, cast_of(session)});
   }
   return weighed(std::move(pads), LAYER_mm, objects);
@@ -114,8 +112,7 @@ twin::Touch Bench::draw(const Case &c, const fit_array &array, Random &random) c
   const double direction = random.uniform(0.0, 2.0 * M_PI), load_N = share * touch.force_N;
   touch.pull_x_N = load_N * std::cos(direction);
   touch.pull_y_N = load_N * std::sin(direction);
-  touch.stuck_N =
-      c.history == History::held ? twin::stuck_force_N(touch.force_N, load_N, FRICTION) : 0.0;
+  touch.stuck_N = c.history == History::held ? twin::stuck_force_N(touch.force_N, load_N, FRICTION) : 0.0;
   return touch;
 }
 
@@ -130,8 +127,7 @@ Results Bench::run(const std::string &table, const Case &c, const pad_profile *t
       Judged &j = judged[unit * TOUCHES + t];
       j.truth = draw(c, fingertip.array(), random);
       j.object = random.next() % c.objects.size();
-      const Readings base =
-          base_Pa(fingertip.array(), *c.objects[j.object], j.truth, c.block, pad.cast);
+      const Readings base = base_Pa(fingertip.array(), *c.objects[j.object], j.truth, c.block, pad.cast);
       const std::uint32_t usable = truth::choose_sensors(c.sensors, errors);
       // Without a positive reading among the sensors in use there is nothing to judge.
       t += fingertip.feel(base, pad, noise_Pa(c.osr), usable, errors, j.said);

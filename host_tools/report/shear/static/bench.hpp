@@ -30,12 +30,9 @@ struct Load {
   double share; // Q/F
   History history;
 };
-constexpr Load LOADS[] = {{"0", 0.0, History::held},
-                          {"0.1", 0.1, History::held},
-                          {"0.3", SHARE, History::held},
-                          {"0.3, risen with the force", SHARE, History::together},
-                          {"0.45", 0.45, History::held},
-                          {"0.5, sliding", FRICTION, History::slides}};
+constexpr Load LOADS[] = {{"0", 0.0, History::held},     {"0.1", 0.1, History::held},
+                          {"0.3", SHARE, History::held}, {"0.3, risen with the force", SHARE, History::together},
+                          {"0.45", 0.45, History::held}, {"0.5, sliding", FRICTION, History::slides}};
 
 using PadOf = std::function<KnownPad(std::size_t)>;
 

@@ -21,13 +21,13 @@ double model_Pa(const pad_profile &profile, const Unknowns &u, double x_mm, doub
   double sum = 0.0;
   for (const auto &term : profile.normal) {
     const double sd = static_cast<double>(term.sd_mm), v = sd * sd + u[SPREAD];
-    sum += u[FORCE] * (1.0 + elongated / (v * v)) * static_cast<double>(term.share) /
-           (2.0 * M_PI * v) * std::exp(-0.5 * square / v);
+    sum += u[FORCE] * (1.0 + elongated / (v * v)) * static_cast<double>(term.share) / (2.0 * M_PI * v) *
+           std::exp(-0.5 * square / v);
   }
   for (const auto &term : profile.tangential) {
     const double sd = static_cast<double>(term.sd_mm), v = sd * sd + KAPPA * u[SPREAD];
-    sum += (u[PULL_X] * dx + u[PULL_Y] * dy) * static_cast<double>(term.moment_mm) /
-           (2.0 * M_PI * v * v) * std::exp(-0.5 * square / v);
+    sum += (u[PULL_X] * dx + u[PULL_Y] * dy) * static_cast<double>(term.moment_mm) / (2.0 * M_PI * v * v) *
+           std::exp(-0.5 * square / v);
   }
   return 1e6 * sum;
 }
@@ -39,19 +39,18 @@ Unknowns slope(const pad_profile &profile, const Unknowns &at, double x_mm, doub
     Unknowns up = at, down = at;
     up[i] += STEP;
     down[i] -= STEP;
-    slope[i] =
-        (model_Pa(profile, up, x_mm, y_mm) - model_Pa(profile, down, x_mm, y_mm)) / (2.0 * STEP);
+    slope[i] = (model_Pa(profile, up, x_mm, y_mm) - model_Pa(profile, down, x_mm, y_mm)) / (2.0 * STEP);
   }
   return slope;
 }
 
 } // namespace
 
-Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::Touch &touch,
-               const Errors &errors, Told told) {
+Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::Touch &touch, const Errors &errors,
+               Told told) {
   Unknowns at;
-  at << touch.force_N, touch.x_mm, touch.y_mm, static_cast<double>(profile.spread_mm2), 0.0, 0.0,
-      touch.pull_x_N, touch.pull_y_N;
+  at << touch.force_N, touch.x_mm, touch.y_mm, static_cast<double>(profile.spread_mm2), 0.0, 0.0, touch.pull_x_N,
+      touch.pull_y_N;
   Unknowns round = at;
   round[PULL_X] = round[PULL_Y] = 0.0;
   const double peak_Pa = model_Pa(profile, round, touch.x_mm, touch.y_mm);
@@ -60,8 +59,7 @@ Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::T
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double x_mm = pitch_mm * static_cast<double>(array.x[k]);
     const double y_mm = pitch_mm * static_cast<double>(array.y[k]);
-    const double gain_Pa =
-        errors.gain_sd ? (*errors.gain_sd)[k] * model_Pa(profile, at, x_mm, y_mm) : 0.0;
+    const double gain_Pa = errors.gain_sd ? (*errors.gain_sd)[k] * model_Pa(profile, at, x_mm, y_mm) : 0.0;
     const double model = errors.model_share * peak_Pa;
     const double variance = errors.noise_Pa * errors.noise_Pa + gain_Pa * gain_Pa + model * model;
     const Unknowns J = slope(profile, at, x_mm, y_mm);
@@ -79,8 +77,7 @@ Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::T
   // Scaled to a diagonal of ones: forces and squares of millimetres are far apart.
   const Unknowns scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Information scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  const Information covariance =
-      scale.asDiagonal() * scaled.ldlt().solve(Information::Identity()) * scale.asDiagonal();
+  const Information covariance = scale.asDiagonal() * scaled.ldlt().solve(Information::Identity()) * scale.asDiagonal();
   Eigen::Matrix<double, 2, UNKNOWNS> ratio = Eigen::Matrix<double, 2, UNKNOWNS>::Zero();
   ratio(0, PULL_X) = ratio(1, PULL_Y) = 1.0 / touch.force_N;
   ratio(0, FORCE) = -touch.pull_x_N / (touch.force_N * touch.force_N);

@@ -33,7 +33,7 @@ struct Bound {
   Eigen::Matrix2d place_mm2; // of x, y
 };
 
-Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::Touch &touch,
-               const Errors &errors, Told told);
+Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::Touch &touch, const Errors &errors,
+               Told told);
 
 } // namespace fingertip::shear

@@ -13,8 +13,7 @@ void judge_cast(Bench &bench, ordered_json &out) {
   };
   const Kind kinds[] = {{"10 %, calibrated", "", bench.calibrated},
                         {"10 % and a dip, calibrated", "dip_", bench.calibrated_as({truth::DIP})},
-                        {"like real ones, calibrated", "cast_",
-                         bench.calibrated_as({truth::LIKE_REAL})}};
+                        {"like real ones, calibrated", "cast_", bench.calibrated_as({truth::LIKE_REAL})}};
   for (const Kind &kind : kinds) {
     for (const Load &load : LOADS) {
       Case c = bench.usual();
@@ -29,9 +28,8 @@ void judge_cast(Bench &bench, ordered_json &out) {
       out["by_cast"].push_back(row);
       const std::string prefix = kind.prefix;
       if (!prefix.empty() && load.share == SHARE && load.history == History::held) {
-        for (const char *key :
-             {"valid_percent", "ratio_error_p50", "ratio_error_p95", "vector_error_p50",
-              "vector_error_p95", "direction_p90_deg", "q_cover_1sd", "q_cover_2sd"}) {
+        for (const char *key : {"valid_percent", "ratio_error_p50", "ratio_error_p95", "vector_error_p50",
+                                "vector_error_p95", "direction_p90_deg", "q_cover_1sd", "q_cover_2sd"}) {
           out[prefix + key] = row[key];
         }
         out[prefix + "location_loaded_median_mm"] = row["location_p50_mm"];

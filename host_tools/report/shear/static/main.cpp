@@ -44,8 +44,8 @@ ordered_json measure(const Options &options) {
     return out;
   }
   for (const auto judge :
-       {judge_pads, judge_objects, judge_elongated, judge_limits, judge_thickness, judge_learned,
-        judge_cast, judge_bounds, judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
+       {judge_pads, judge_objects, judge_elongated, judge_limits, judge_thickness, judge_learned, judge_cast,
+        judge_bounds, judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
     judge(bench, out);
   }
   return out;

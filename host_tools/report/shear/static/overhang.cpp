@@ -37,8 +37,8 @@ Ended touch_twice(const Bench &bench, const Case &c, const pad_profile &profile)
       first.force_N = first.stuck_N = random.uniform(FIRST_MIN_N, FIRST_MAX_N);
       const auto feel = [&](const twin::Touch &touch) {
         Judged j{touch, 0, {}};
-        fingertip.feel(base_Pa(fingertip.array(), object, touch, c.block, pad.cast), pad,
-                       noise_Pa(c.osr), ALL_SENSORS, random, j.said);
+        fingertip.feel(base_Pa(fingertip.array(), object, touch, c.block, pad.cast), pad, noise_Pa(c.osr), ALL_SENSORS,
+                       random, j.said);
         return j;
       };
       const Judged begun = feel(first);
@@ -61,9 +61,8 @@ Ended touch_twice(const Bench &bench, const Case &c, const pad_profile &profile)
 void judge_overhang(Bench &bench, ordered_json &out) {
   double worst_zero = 0.0;
   for (const double overhang_mm : {13.0, 9.0, 6.0, 4.5}) {
-    const twin::BlockTable block =
-        twin::BlockTable::load_or_build(twin::block_around(twin::silicone(LAYER_mm), overhang_mm),
-                                        twin::sensor_places(), bench.options.cache);
+    const twin::BlockTable block = twin::BlockTable::load_or_build(
+        twin::block_around(twin::silicone(LAYER_mm), overhang_mm), twin::sensor_places(), bench.options.cache);
     pad_profile told = bench.profile;
     told.overhang_mm = static_cast<float>(overhang_mm);
     told.edges = pad::edges_of(told, pad::own_sensors(), bench.options.cache);
@@ -83,22 +82,21 @@ void judge_overhang(Bench &bench, ordered_json &out) {
         const auto vector = [](const Judged &j) { return j.vector_error(); };
         const auto located = [](const Judged &j) { return j.location_error_mm(); };
         const auto gaussian = [](const Judged &j) { return j.gaussian_location_error_mm(); };
-        out["by_overhang"].push_back(
-            {{"overhang_mm", overhang_mm},
-             {"told", knows_ends ? "thickness and ends" : "thickness"},
-             {"place", place},
-             {"touches", zero.all().size()},
-             {"valid_percent", increment.valid_percent()},
-             {"zero_error_p50", zero.valid_at(vector, 0.5)},
-             {"zero_error_p95", zero.valid_at(vector, 0.95)},
-             {"loaded_error_p50", loaded.valid_at(vector, 0.5)},
-             {"loaded_error_p95", loaded.valid_at(vector, 0.95)},
-             {"increment_error_p50", increment.valid_at(vector, 0.5)},
-             {"increment_error_p95", increment.valid_at(vector, 0.95)},
-             {"location_p50_mm", zero.at(located, 0.5)},
-             {"location_without_p50_mm", zero.at(gaussian, 0.5)},
-             {"location_loaded_p50_mm", loaded.at(located, 0.5)},
-             {"location_loaded_without_p50_mm", loaded.at(gaussian, 0.5)}});
+        out["by_overhang"].push_back({{"overhang_mm", overhang_mm},
+                                      {"told", knows_ends ? "thickness and ends" : "thickness"},
+                                      {"place", place},
+                                      {"touches", zero.all().size()},
+                                      {"valid_percent", increment.valid_percent()},
+                                      {"zero_error_p50", zero.valid_at(vector, 0.5)},
+                                      {"zero_error_p95", zero.valid_at(vector, 0.95)},
+                                      {"loaded_error_p50", loaded.valid_at(vector, 0.5)},
+                                      {"loaded_error_p95", loaded.valid_at(vector, 0.95)},
+                                      {"increment_error_p50", increment.valid_at(vector, 0.5)},
+                                      {"increment_error_p95", increment.valid_at(vector, 0.95)},
+                                      {"location_p50_mm", zero.at(located, 0.5)},
+                                      {"location_without_p50_mm", zero.at(gaussian, 0.5)},
+                                      {"location_loaded_p50_mm", loaded.at(located, 0.5)},
+                                      {"location_loaded_without_p50_mm", loaded.at(gaussian, 0.5)}});
       }
       const ordered_json anywhere = out["by_overhang"][out["by_overhang"].size() - 4];
       const std::string told_ends = knows_ends ? "_own_tables" : "";

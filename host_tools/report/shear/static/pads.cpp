@@ -26,25 +26,23 @@ void judge_places(const Results &usual, ordered_json &out) {
       const Results some = usual.where([=](const Judged &j) { return here(j) && j.object == o; });
       ordered_json row = some.row(SEVEN[o] + ", " + place);
       const Results valid = some.where([](const Judged &j) { return j.said.valid; });
-      row["off_by_0_05_percent"] =
-          valid.share([](const Judged &j) { return j.vector_error() > 0.05; });
-      row["off_by_5_deg_percent"] =
-          valid.share([](const Judged &j) { return j.direction_error_deg() > 5.0; });
+      row["off_by_0_05_percent"] = valid.share([](const Judged &j) { return j.vector_error() > 0.05; });
+      row["off_by_5_deg_percent"] = valid.share([](const Judged &j) { return j.direction_error_deg() > 5.0; });
       out["where_misses_lie"].push_back(row);
     }
   }
-  const Results rounder = usual.where(
-      [](const Judged &j) { return SEVEN[j.object] != "lime" && place_of(j.truth) != "corner"s; });
+  const Results rounder =
+      usual.where([](const Judged &j) { return SEVEN[j.object] != "lime" && place_of(j.truth) != "corner"s; });
   const ordered_json row = rounder.row("without the lime and the corners");
   for (const char *key : {"ratio_error_p95", "vector_error_p95", "direction_p90_deg"}) {
     out["no_lime_no_corner_" + std::string(key)] = row[key];
   }
   for (double force_N = 1.0; force_N < 10.0; force_N *= 2.0) {
     const double to_N = force_N < 8.0 ? 2.0 * force_N : 10.0;
-    const Results some = usual.where(
-        [=](const Judged &j) { return j.truth.force_N >= force_N && j.truth.force_N < to_N; });
-    out["by_force"].push_back(some.row(std::to_string(static_cast<int>(force_N)) + " to " +
-                                       std::to_string(static_cast<int>(to_N)) + " N"));
+    const Results some =
+        usual.where([=](const Judged &j) { return j.truth.force_N >= force_N && j.truth.force_N < to_N; });
+    out["by_force"].push_back(
+        some.row(std::to_string(static_cast<int>(force_N)) + " to " + std::to_string(static_cast<int>(to_N)) + " N"));
   }
   for (double x_mm = -9.0; x_mm < 9.0; x_mm += CELL_mm) {
     for (double y_mm = -18.0; y_mm < 18.0; y_mm += CELL_mm) {
@@ -93,18 +91,16 @@ void judge_pads(Bench &bench, ordered_json &out) {
       const bool loaded = load.share == SHARE && load.history == History::held;
       if ((equal || calibrated) && loaded) {
         const std::string prefix = equal ? "equal_" : "";
-        for (const char *key : {"ratio_error_p50", "ratio_error_p95", "vector_error_p50",
-                                "vector_error_p95", "direction_p90_deg"}) {
+        for (const char *key :
+             {"ratio_error_p50", "ratio_error_p95", "vector_error_p50", "vector_error_p95", "direction_p90_deg"}) {
           out[prefix + key] = row[key];
         }
-        out[equal ? "equal_location_loaded_mm" : "location_loaded_median_mm"] =
-            row["location_p50_mm"];
+        out[equal ? "equal_location_loaded_mm" : "location_loaded_median_mm"] = row["location_p50_mm"];
         out[prefix + "location_loaded_without_mm"] = row["location_without_p50_mm"];
       }
       if (calibrated && loaded) {
-        for (const char *key :
-             {"valid_percent", "q_cover_1sd", "q_cover_2sd", "location_cover_1sd",
-              "location_cover_2sd", "force_p50_percent", "force_without_p50_percent"}) {
+        for (const char *key : {"valid_percent", "q_cover_1sd", "q_cover_2sd", "location_cover_1sd",
+                                "location_cover_2sd", "force_p50_percent", "force_without_p50_percent"}) {
           out[key] = row[key];
         }
         judge_places(results, out);
@@ -115,8 +111,7 @@ void judge_pads(Bench &bench, ordered_json &out) {
       if (calibrated && load.share == 0.0) {
         out["location_unloaded_mm"] = row["location_p50_mm"];
         out["location_unloaded_without_mm"] = row["location_without_p50_mm"];
-        out["location_price_mm"] =
-            row["location_p50_mm"].get<double>() - row["location_without_p50_mm"].get<double>();
+        out["location_price_mm"] = row["location_p50_mm"].get<double>() - row["location_without_p50_mm"].get<double>();
       }
       if (calibrated && (loaded || load.share == 0.0)) {
         ordered_json &curve = out["location_quantiles"];
@@ -136,14 +131,12 @@ void judge_pads(Bench &bench, ordered_json &out) {
 
 void judge_thickness(Bench &bench, ordered_json &out) {
   const std::vector<double> layers_mm =
-      bench.options.few ? std::vector<double>{LAYER_mm}
-                        : std::vector<double>{5.0, 6.0, 9.0, LAYER_mm, 15.0, 20.0};
+      bench.options.few ? std::vector<double>{LAYER_mm} : std::vector<double>{5.0, 6.0, 9.0, LAYER_mm, 15.0, 20.0};
   for (const double layer_mm : layers_mm) {
     const PadOf pads = bench.calibrated_on(layer_mm);
     for (const double told : {1.0, 1.1, 0.9}) {
       const double told_mm = told * layer_mm;
-      if (told_mm < static_cast<double>(PAD_THICKNESS_MIN_mm) ||
-          told_mm > static_cast<double>(PAD_THICKNESS_MAX_mm)) {
+      if (told_mm < static_cast<double>(PAD_THICKNESS_MIN_mm) || told_mm > static_cast<double>(PAD_THICKNESS_MAX_mm)) {
         continue;
       }
       const pad_profile profile = profile_of(told_mm);
@@ -155,8 +148,8 @@ void judge_thickness(Bench &bench, ordered_json &out) {
       std::snprintf(name, sizeof name, "%g mm, told %g mm", layer_mm, told_mm);
       for (const double share : {0.0, SHARE}) {
         c.share = share;
-        ordered_json row = bench.run("thickness", c, &profile)
-                               .row(std::string(name) + (share > 0.0 ? ", Q/F 0.3" : ", Q/F 0"));
+        ordered_json row =
+            bench.run("thickness", c, &profile).row(std::string(name) + (share > 0.0 ? ", Q/F 0.3" : ", Q/F 0"));
         row["layer_mm"] = layer_mm;
         row["told_mm"] = told_mm;
         row["load"] = share;
@@ -177,8 +170,7 @@ void judge_learned(Bench &bench, ordered_json &out) {
   double wrong_said = 0.0, right_said = 0.0;
   std::vector<double> off_percent;
   for (std::size_t i = 0; i < SESSIONS; i++) {
-    const std::uint64_t seed =
-        Random(bench.options.seed, truth::stream_of("learned thickness"), i).next();
+    const std::uint64_t seed = Random(bench.options.seed, truth::stream_of("learned thickness"), i).next();
     truth::SessionPad pad(kinds[i % std::size(kinds)], LAYER_mm, seed);
     truth::Session session(feet, truth::SessionKind::good, seed, 24);
     std::vector<calibrating::Placement> placements;

@@ -26,8 +26,8 @@ void judge_rubber(Bench &bench, ordered_json &out) {
                             {"1.7 s after the load", 3.0},
                             {"10 s after the load", 11.2},
                             {"0.2 s after the load has gone", 11.8}};
-  constexpr double PRESS_END_s = 0.3, LOAD_s = 1.0, LOAD_END_s = 1.3, UNLOAD_s = 11.3,
-                   UNLOAD_END_s = 11.6, STEP_s = 0.03;
+  constexpr double PRESS_END_s = 0.3, LOAD_s = 1.0, LOAD_END_s = 1.3, UNLOAD_s = 11.3, UNLOAD_END_s = 11.6,
+                   STEP_s = 0.03;
   const auto rises = [](double t_s, double from_s, double to_s) {
     return std::clamp((t_s - from_s) / (to_s - from_s), 0.0, 1.0);
   };
@@ -38,9 +38,8 @@ void judge_rubber(Bench &bench, ordered_json &out) {
   const Case c = bench.usual();
   const std::size_t touches = std::max<std::size_t>(20, bench.options.pads);
   for (const Rubber &kind :
-       {Rubber{"none", false}, Rubber{"relaxation", false}, Rubber{"relaxation", true},
-        Rubber{"hysteresis", false}, Rubber{"aftereffect", false},
-        Rubber{"relaxation,hysteresis,aftereffect", true}}) {
+       {Rubber{"none", false}, Rubber{"relaxation", false}, Rubber{"relaxation", true}, Rubber{"hysteresis", false},
+        Rubber{"aftereffect", false}, Rubber{"relaxation,hysteresis,aftereffect", true}}) {
     const twin::EffectValues values = twin::parse_effects(kind.effects);
     std::vector<std::array<Judged, std::size(moments)>> judged(touches);
     twin::in_parallel(touches, [&](std::size_t i) {
@@ -124,8 +123,8 @@ void judge_screws(Bench &bench, ordered_json &out) {
         }
         const twin::Touch now = act.tracks[0].at(0.5 * (phase.begin_s + phase.end_s) - act.begin_s);
         Said said{};
-        fingertip.feel(base_Pa(fingertip.array(), object, now, nullptr, pad.cast), pad,
-                       noise_Pa(1024), ALL_SENSORS, random, said);
+        fingertip.feel(base_Pa(fingertip.array(), object, now, nullptr, pad.cast), pad, noise_Pa(1024), ALL_SENSORS,
+                       random, said);
         if (phase.name == "hold") {
           before = said;
         } else if (said.valid && before.valid) {
@@ -158,9 +157,8 @@ void judge_taps(Bench &bench, ordered_json &out) {
     const char *name;
     const PadOf &pad;
   };
-  for (const Kind &kind :
-       {Kind{"equal gains", bench.equal}, Kind{"10 %, calibrated", bench.calibrated},
-        Kind{"10 %, not calibrated", bench.raw10}}) {
+  for (const Kind &kind : {Kind{"equal gains", bench.equal}, Kind{"10 %, calibrated", bench.calibrated},
+                           Kind{"10 %, not calibrated", bench.raw10}}) {
     for (const double share : {0.0, 0.1, 0.3}) {
       std::vector<std::vector<Judged>> found(std::size(names) * PADS);
       for (std::size_t i = 0; i < found.size(); i++) {
@@ -182,8 +180,8 @@ void judge_taps(Bench &bench, ordered_json &out) {
           for (double t_s = 0.0; t_s < act.end_s - act.begin_s; t_s += 1.0 / RATE_Hz) {
             Judged j{act.tracks[0].at(t_s), i / PADS, {}};
             if (j.truth.force_N >= LEAST_N &&
-                fingertip.feel(base_Pa(fingertip.array(), object, j.truth, nullptr, pad.cast), pad,
-                               noise_Pa(1024), ALL_SENSORS, random, j.said)) {
+                fingertip.feel(base_Pa(fingertip.array(), object, j.truth, nullptr, pad.cast), pad, noise_Pa(1024),
+                               ALL_SENSORS, random, j.said)) {
               found[i].push_back(j);
             }
           }
@@ -219,8 +217,7 @@ void judge_taps(Bench &bench, ordered_json &out) {
       row["pad"] = kind.name;
       row["load"] = share;
       scaled([](const Judged &j) { return j.said.force_N; }, "force_scaled_p50_percent", row);
-      scaled([](const Judged &j) { return j.said.gaussian_force_N; },
-             "force_scaled_without_p50_percent", row);
+      scaled([](const Judged &j) { return j.said.gaussian_force_N; }, "force_scaled_without_p50_percent", row);
       out["taps"].push_back(row);
     }
   }

@@ -24,8 +24,7 @@ const Object &Objects::on(double layer_mm, const std::string &name) {
   std::unique_ptr<Object> &object = objects_[{layer_mm, name}];
   if (!object) {
     const twin::Layer layer = twin::silicone(layer_mm);
-    twin::ContactTable pressure =
-        twin::ContactTable::load_or_build(truth::indenter_of(name), layer, cache_);
+    twin::ContactTable pressure = twin::ContactTable::load_or_build(truth::indenter_of(name), layer, cache_);
     twin::TractionTable traction(pressure, layer);
     object = std::make_unique<Object>(Object{name, std::move(pressure), std::move(traction)});
   }
@@ -42,14 +41,13 @@ Cast cast_of(const truth::Calibrated &session) {
   return cast;
 }
 
-Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
-                 const twin::BlockTable *block, const Cast &cast) {
+Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch, const twin::BlockTable *block,
+                 const Cast &cast) {
   Readings base{};
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
   const bool pulls = touch.pull_x_N != 0.0 || touch.pull_y_N != 0.0;
-  const twin::TractionTable::Load load{touch.force_N, touch.stuck_N,
-                                       c * touch.pull_x_N + s * touch.pull_y_N,
+  const twin::TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
                                        c * touch.pull_y_N - s * touch.pull_x_N};
   const twin::BlockTable::Load added{touch.force_N, touch.pull_x_N, touch.pull_y_N,
                                      object.pressure.contact_radius_mm(touch.force_N)};
@@ -70,15 +68,14 @@ Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch
   return base;
 }
 
-Fingertip::Fingertip(const pad_profile &profile)
-    : array_(truth::firmware_array()), profile_(profile) {
+Fingertip::Fingertip(const pad_profile &profile) : array_(truth::firmware_array()), profile_(profile) {
   if (fit_pad_init(&fit_pad_, &array_, &profile) != FT_OK) {
     throw std::runtime_error("the firmware refuses the pad's profile");
   }
 }
 
-bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa,
-                     std::uint32_t usable, Random &random, Said &said) {
+bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa, std::uint32_t usable,
+                     Random &random, Said &said) {
   const truth::Pad &pad = known.pad;
   fit_settings settings = truth::settings_for(pad, noise_Pa);
   settings.cut_noises = 0; // as where a profile acts
@@ -157,8 +154,7 @@ KnownPad Fingertip::weighed(KnownPad pad, const Object &sphere15) {
     Said said;
     // A noise of nothing is none that the fit takes.
     constexpr double QUIET_Pa = 0.1;
-    if (feel(base_Pa(array_, sphere15, touch, nullptr, pad.cast), pad, QUIET_Pa, ALL_SENSORS, none,
-             said)) {
+    if (feel(base_Pa(array_, sphere15, touch, nullptr, pad.cast), pad, QUIET_Pa, ALL_SENSORS, none, said)) {
       scales.push_back(touch.force_N / said.gaussian_force_N);
     }
   }

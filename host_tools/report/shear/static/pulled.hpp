@@ -90,8 +90,8 @@ public:
   const fit_array &array() const { return array_; }
   double pitch_mm() const { return static_cast<double>(array_.pitch_mm); }
   // base: pressures; gains act, noise is added. False: no fit.
-  bool feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa, std::uint32_t usable,
-            Random &random, Said &said);
+  bool feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa, std::uint32_t usable, Random &random,
+            Said &said);
   // With the scale that a known weight tells: a sphere of 15 mm under 3 N at nine places around the
   // middle, the median of them.
   KnownPad weighed(KnownPad pad, const Object &sphere15);

@@ -14,8 +14,7 @@ double Judged::true_ratio() const {
 }
 
 double Judged::vector_error() const {
-  return std::hypot(said.qx - truth.pull_x_N / truth.force_N,
-                    said.qy - truth.pull_y_N / truth.force_N);
+  return std::hypot(said.qx - truth.pull_x_N / truth.force_N, said.qy - truth.pull_y_N / truth.force_N);
 }
 
 double Judged::ratio_error() const {
@@ -110,9 +109,7 @@ ordered_json Results::row(const std::string &name) const {
   row["elongated_percent"] = share([](const Judged &j) { return j.said.elongated; });
   // Of none there is no figure.
   const Results valid = where([](const Judged &j) { return j.said.valid; });
-  const auto of_valid = [&](double value) {
-    return valid.all().empty() ? ordered_json() : ordered_json(value);
-  };
+  const auto of_valid = [&](double value) { return valid.all().empty() ? ordered_json() : ordered_json(value); };
   const auto vector = [](const Judged &j) { return j.vector_error(); };
   const auto ratio = [](const Judged &j) { return j.ratio_error(); };
   row["ratio_error_p50"] = of_valid(valid.at(ratio, 0.5));
@@ -120,8 +117,7 @@ ordered_json Results::row(const std::string &name) const {
   row["vector_error_p50"] = of_valid(valid.at(vector, 0.5));
   row["vector_error_p95"] = of_valid(valid.at(vector, 0.95));
   if (judged_.front().true_ratio() > 0.0) {
-    row["direction_p90_deg"] =
-        of_valid(valid.at([](const Judged &j) { return j.direction_error_deg(); }, 0.9));
+    row["direction_p90_deg"] = of_valid(valid.at([](const Judged &j) { return j.direction_error_deg(); }, 0.9));
   } else {
     row["claimed_percent"] = claimed_percent();
     row["claimed_surely_percent"] = claimed_surely_percent();
@@ -133,12 +129,8 @@ ordered_json Results::row(const std::string &name) const {
   row["location_p95_mm"] = at(located, 0.95);
   row["location_without_p50_mm"] = at(gaussian, 0.5);
   row["location_without_p95_mm"] = at(gaussian, 0.95);
-  const auto force = [](const Judged &j) {
-    return std::abs(j.said.force_N / j.truth.force_N - 1.0);
-  };
-  const auto without = [](const Judged &j) {
-    return std::abs(j.said.gaussian_force_N / j.truth.force_N - 1.0);
-  };
+  const auto force = [](const Judged &j) { return std::abs(j.said.force_N / j.truth.force_N - 1.0); };
+  const auto without = [](const Judged &j) { return std::abs(j.said.gaussian_force_N / j.truth.force_N - 1.0); };
   row["force_p50_percent"] = 100.0 * at(force, 0.5);
   row["force_p95_percent"] = 100.0 * at(force, 0.95);
   row["force_without_p50_percent"] = 100.0 * at(without, 0.5);

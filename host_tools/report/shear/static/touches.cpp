@@ -14,8 +14,7 @@ using nlohmann::ordered_json;
 namespace {
 
 // Every lying cylinder of the twin, a shorter one, and an edge.
-const std::vector<std::string> LONG{"cylinder6x12", "edge20",     "ball_bearing",
-                                    "cylinder12",   "cylinder18", "cylinder24"};
+const std::vector<std::string> LONG{"cylinder6x12", "edge20", "ball_bearing", "cylinder12", "cylinder18", "cylinder24"};
 
 } // namespace
 
@@ -32,8 +31,7 @@ void judge_objects(Bench &bench, ordered_json &out) {
       c.objects = bench.on(LAYER_mm, {name});
       c.share = share;
       c.fewer = 0.1;
-      ordered_json row =
-          bench.run("objects", c).row(name + (share > 0.0 ? ", Q/F 0.3" : ", Q/F 0"));
+      ordered_json row = bench.run("objects", c).row(name + (share > 0.0 ? ", Q/F 0.3" : ", Q/F 0"));
       row["object"] = name;
       row["load"] = share;
       out["by_object"].push_back(row);
@@ -65,8 +63,8 @@ void judge_elongated(Bench &bench, ordered_json &out) {
       return static_cast<int>(BINS * (half_turns - std::floor(half_turns))) == bin;
     });
     const int from = 180 / BINS * bin;
-    out["elongated"].push_back(some.row("any of them, " + std::to_string(from) + " to " +
-                                        std::to_string(from + 180 / BINS) + " degrees"));
+    out["elongated"].push_back(
+        some.row("any of them, " + std::to_string(from) + " to " + std::to_string(from + 180 / BINS) + " degrees"));
   }
   bench.progress("elongated objects");
 }
@@ -77,8 +75,8 @@ void judge_limits(Bench &bench, ordered_json &out) {
     const char *name;
     double least_N, most_N;
   };
-  for (const Light &light : {Light{"0.1 to 0.2 N", 0.1, 0.2}, Light{"0.2 to 0.5 N", 0.2, 0.5},
-                             Light{"0.5 to 1 N", 0.5, 1.0}}) {
+  for (const Light &light :
+       {Light{"0.1 to 0.2 N", 0.1, 0.2}, Light{"0.2 to 0.5 N", 0.2, 0.5}, Light{"0.5 to 1 N", 0.5, 1.0}}) {
     for (const double share : {0.0, SHARE}) {
       Case c = bench.usual();
       c.share = share;
@@ -86,8 +84,7 @@ void judge_limits(Bench &bench, ordered_json &out) {
       c.force_max_N = light.most_N;
       c.fewer = 0.2;
       out["light_touches"].push_back(
-          bench.run("light", c)
-              .row(std::string(light.name) + (share > 0.0 ? ", Q/F 0.3" : ", Q/F 0")));
+          bench.run("light", c).row(std::string(light.name) + (share > 0.0 ? ", Q/F 0.3" : ", Q/F 0")));
     }
   }
   for (std::uint16_t osr = 256; osr <= 8192; osr = static_cast<std::uint16_t>(2 * osr)) {
@@ -144,8 +141,7 @@ void judge_bounds(Bench &bench, ordered_json &out) {
       const KnownPad pad = c.pad(i);
       Judged &j = judged[i];
       j.truth = bench.draw(c, array, random);
-      const Errors errors{noise_Pa(c.osr), limit.gains ? &pad.pad.gain_sd : nullptr,
-                          limit.model_share};
+      const Errors errors{noise_Pa(c.osr), limit.gains ? &pad.pad.gain_sd : nullptr, limit.model_share};
       const Bound bound = bound_of(array, bench.profile, j.truth, errors, limit.told);
       const auto drawn = [&](const Eigen::Matrix2d &covariance) -> Eigen::Vector2d {
         const double first = random.normal(), second = random.normal();
@@ -161,9 +157,8 @@ void judge_bounds(Bench &bench, ordered_json &out) {
     });
     const ordered_json row = Results(std::move(judged)).row(limit.name);
     ordered_json bound;
-    for (const char *key :
-         {"case", "touches", "ratio_error_p50", "ratio_error_p95", "vector_error_p50",
-          "vector_error_p95", "direction_p90_deg", "location_p50_mm", "location_p95_mm"}) {
+    for (const char *key : {"case", "touches", "ratio_error_p50", "ratio_error_p95", "vector_error_p50",
+                            "vector_error_p95", "direction_p90_deg", "location_p50_mm", "location_p95_mm"}) {
       bound[key] = row[key];
     }
     out["bounds"].push_back(bound);

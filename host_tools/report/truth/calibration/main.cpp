@@ -93,8 +93,7 @@ public:
   Felt felt(const std::vector<double> &gain, const std::vector<double> &gain_sd,
             const calibrating::Shape &shape = {}) const {
     fit_array array;
-    fit_array_init_grid(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                        geometry.pitch_mm);
+    fit_array_init_grid(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm);
     fit_settings settings{};
     fit_set_errors(&settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
     settings.iterations = DEFAULT_FIT_ITERATIONS;
@@ -122,8 +121,8 @@ public:
         fit_load_follow(&load, &array, pressure, &settings, &result);
       }
       fit_load_widen(&load, &array, &settings, &result);
-      felt.location_mm.push_back(std::hypot(static_cast<double>(result.x_mm) - tap.x_mm,
-                                            static_cast<double>(result.y_mm) - tap.y_mm));
+      felt.location_mm.push_back(
+          std::hypot(static_cast<double>(result.x_mm) - tap.x_mm, static_cast<double>(result.y_mm) - tap.y_mm));
       felt.force.push_back(static_cast<double>(result.force_N) / tap.force_N);
       felt.warned += (result.flags & warning_flags()) != 0;
     }
@@ -159,8 +158,7 @@ private:
 };
 
 // work(i) for i below count; a bar tells how far it is.
-void with_bar(const std::string &what, std::size_t count,
-              const std::function<void(std::size_t)> &work) {
+void with_bar(const std::string &what, std::size_t count, const std::function<void(std::size_t)> &work) {
   ProgressBar bar(what, ProgressBar::Lines::tenths);
   std::mutex telling;
   std::size_t done = 0;
@@ -188,9 +186,7 @@ struct GainErrors {
     }
   }
   double within(double sds) const {
-    return 100.0 *
-           double(
-               std::count_if(over_sd.begin(), over_sd.end(), [&](double e) { return e <= sds; })) /
+    return 100.0 * double(std::count_if(over_sd.begin(), over_sd.end(), [&](double e) { return e <= sds; })) /
            double(over_sd.size());
   }
 };
@@ -256,22 +252,20 @@ Outcome lead(Session &session, SessionPad &pad) {
   std::optional<calibrating::Wanted> wanted;
   while (auto placement = session.next(pad, wanted)) {
     outcome.placements.push_back(*placement);
-    if (outcome.placements.size() >= calibrating::PLACEMENTS_WANTED &&
-        outcome.placements.size() % JUDGED_EVERY == 0) {
+    if (outcome.placements.size() >= calibrating::PLACEMENTS_WANTED && outcome.placements.size() % JUDGED_EVERY == 0) {
       outcome.judgement = calibrating::judge(session_array(), outcome.placements, false);
       if (outcome.judgement.state != Judgement::State::more) {
         return outcome;
       }
-      wanted =
-          calibrating::next_place(session_array(), outcome.placements, outcome.judgement.solution);
+      wanted = calibrating::next_place(session_array(), outcome.placements, outcome.judgement.solution);
     }
   }
   outcome.judgement = calibrating::judge(session_array(), outcome.placements, true);
   return outcome;
 }
 
-PadCase try_pads(const std::string &what, const Options &options, std::size_t pads,
-                 const Objects &objects, const PadOptions &pad_options, bool with_counts) {
+PadCase try_pads(const std::string &what, const Options &options, std::size_t pads, const Objects &objects,
+                 const PadOptions &pad_options, bool with_counts) {
   PadCase all;
   std::mutex adding;
   const double layer_mm = objects.feet.layer_mm;
@@ -285,8 +279,8 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
       placements.push_back(*session.next(pad));
     }
     const Solution solution = calibrating::solve(session_array(), placements);
-    const auto scale = calibrating::force_scale(session_array(), placements, solution, WEIGHT_N,
-                                                calibrating::shape_of(solution));
+    const auto scale =
+        calibrating::force_scale(session_array(), placements, solution, WEIGHT_N, calibrating::shape_of(solution));
     SessionPad fresh(pad_options, layer_mm, seed);
     const std::vector<double> truth = fresh.settled_gains();
     const Taps taps(fresh, objects.all(), seed);
@@ -312,8 +306,8 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     Session led(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
     const Outcome outcome = lead(led, led_pad);
     const bool accepted = outcome.judgement.state == Judgement::State::good;
-    const bool worse = accepted && median(taps.felt(outcome.judgement.solution).location_mm) >
-                                       median(before.location_mm);
+    const bool worse =
+        accepted && median(taps.felt(outcome.judgement.solution).location_mm) > median(before.location_mm);
 
     const std::lock_guard<std::mutex> lock(adding);
     all.before_mm.push_back(median(before.location_mm));
@@ -353,41 +347,41 @@ double warned_percent(const PadCase &c) {
 }
 
 json row_of(const char *name, const PadCase &c) {
-  return {{"case", name},
-          {"pads", c.pads},
-          {"before_median_mm", median(c.before_mm)},
-          {"after_median_mm", median(c.after_mm)},
-          {"by_gains_median_mm", median(c.by_gains_mm)},
-          {"true_gains_median_mm", median(c.true_mm)},
-          {"before_p95_mm", median(c.before_p95_mm)},
-          {"after_p95_mm", median(c.after_p95_mm)},
-          {"after_worst_pad_mm", quantile(c.after_mm, 1.0)},
-          {"after_warned_percent", warned_percent(c)},
-          {"force_mape_before_percent", 100.0 * mean(c.force_before)},
-          {"force_mape_after_percent", 100.0 * mean(c.force_after)},
-          {"force_scale_error_in_sds_rms", std::sqrt(mean([&] {
-             std::vector<double> squares;
-             for (double off : c.scale_off_sds) {
-               squares.push_back(off * off);
-             }
-             return squares;
-           }()))},
-          {"gain_error_rms_percent", 100.0 * std::sqrt(mean([&] {
-                                       std::vector<double> squares;
-                                       for (double e : c.gains.relative) {
-                                         squares.push_back(e * e);
-                                       }
-                                       return squares;
-                                     }()))},
-          {"gain_within_1sd_percent", c.gains.within(1.0)},
-          {"gain_within_2sd_percent", c.gains.within(2.0)},
-          {"accepted_percent", 100.0 * double(c.accepted) / double(c.pads)},
-          {"worse_after_accept", c.worse},
-          {"placements_needed_p10_p50_p90",
-           {quantile(c.placements_needed, 0.1), quantile(c.placements_needed, 0.5),
-            quantile(c.placements_needed, 0.9)}},
-          {"refusals", c.refusals},
-          {"evidence_p1_p50_p99", summary(c.evidence)}};
+  return {
+      {"case", name},
+      {"pads", c.pads},
+      {"before_median_mm", median(c.before_mm)},
+      {"after_median_mm", median(c.after_mm)},
+      {"by_gains_median_mm", median(c.by_gains_mm)},
+      {"true_gains_median_mm", median(c.true_mm)},
+      {"before_p95_mm", median(c.before_p95_mm)},
+      {"after_p95_mm", median(c.after_p95_mm)},
+      {"after_worst_pad_mm", quantile(c.after_mm, 1.0)},
+      {"after_warned_percent", warned_percent(c)},
+      {"force_mape_before_percent", 100.0 * mean(c.force_before)},
+      {"force_mape_after_percent", 100.0 * mean(c.force_after)},
+      {"force_scale_error_in_sds_rms", std::sqrt(mean([&] {
+         std::vector<double> squares;
+         for (double off : c.scale_off_sds) {
+           squares.push_back(off * off);
+         }
+         return squares;
+       }()))},
+      {"gain_error_rms_percent", 100.0 * std::sqrt(mean([&] {
+                                   std::vector<double> squares;
+                                   for (double e : c.gains.relative) {
+                                     squares.push_back(e * e);
+                                   }
+                                   return squares;
+                                 }()))},
+      {"gain_within_1sd_percent", c.gains.within(1.0)},
+      {"gain_within_2sd_percent", c.gains.within(2.0)},
+      {"accepted_percent", 100.0 * double(c.accepted) / double(c.pads)},
+      {"worse_after_accept", c.worse},
+      {"placements_needed_p10_p50_p90",
+       {quantile(c.placements_needed, 0.1), quantile(c.placements_needed, 0.5), quantile(c.placements_needed, 0.9)}},
+      {"refusals", c.refusals},
+      {"evidence_p1_p50_p99", summary(c.evidence)}};
 }
 
 // Sessions that should be refused, on every other pad like real ones: how many are, why, and pads
@@ -469,19 +463,17 @@ json measure(const Options &options) {
 
   // Rubber that ends so far beyond the outer sensors.
   const auto block_of = [&](double overhang_mm) {
-    return twin::BlockTable::load_or_build(
-        twin::block_around(twin::silicone(feet.layer_mm), overhang_mm), twin::sensor_places(),
-        options.cache);
+    return twin::BlockTable::load_or_build(twin::block_around(twin::silicone(feet.layer_mm), overhang_mm),
+                                           twin::sensor_places(), options.cache);
   };
   const twin::BlockTable near = block_of(6.0), far = block_of(9.0);
 
   std::size_t worse = 0, led = 0, accepted = 0;
   json rows = json::array();
   // On one of so many of the pads.
-  const auto judged = [&](const char *name, const Objects &on, const PadOptions &pad,
-                          std::size_t one_of, bool with_counts = false) {
-    PadCase all =
-        try_pads(name, options, (options.pads + one_of - 1) / one_of, on, pad, with_counts);
+  const auto judged = [&](const char *name, const Objects &on, const PadOptions &pad, std::size_t one_of,
+                          bool with_counts = false) {
+    PadCase all = try_pads(name, options, (options.pads + one_of - 1) / one_of, on, pad, with_counts);
     rows.push_back(row_of(name, all));
     if (&on == &objects) { // 6 mm worsens the median and mends the rest: its rows tell
       worse += all.worse;
@@ -545,26 +537,21 @@ json measure(const Options &options) {
        std::max({warned_percent(usual), warned_percent(cast), warned_percent(ends)})},
       {"calibrated_pads", rows},
       {"truth_calibration",
-       {{"pads", options.pads},
-        {"seed", options.seed},
-        {"bad_sessions", bad},
-        {"by_placements", by_count}}},
+       {{"pads", options.pads}, {"seed", options.seed}, {"bad_sessions", bad}, {"by_placements", by_count}}},
   };
 }
 
-constexpr char HELP[] =
-    "usage: truth_calibration [--seed N] [--pads N] [--cache DIR] [--presses]\n"
-    "  --presses   only the presses of so many pads, for the report on real rubber\n";
+constexpr char HELP[] = "usage: truth_calibration [--seed N] [--pads N] [--cache DIR] [--presses]\n"
+                        "  --presses   only the presses of so many pads, for the report on real rubber\n";
 
 } // namespace
 
 int main(int argc, char **argv) {
   Options options;
-  return reference::print_found(
-      "truth_calibration", argc, argv,
-      {{"--cache", &options.cache},
-       {"--seed", nullptr, &options.seed},
-       {"--pads", nullptr, &options.pads},
-       {"--presses", nullptr, nullptr, &options.presses}},
-      HELP, [&] { return options.presses ? presses(options) : measure(options); });
+  return reference::print_found("truth_calibration", argc, argv,
+                                {{"--cache", &options.cache},
+                                 {"--seed", nullptr, &options.seed},
+                                 {"--pads", nullptr, &options.pads},
+                                 {"--presses", nullptr, nullptr, &options.presses}},
+                                HELP, [&] { return options.presses ? presses(options) : measure(options); });
 }

@@ -45,8 +45,7 @@ double noise_of_one_Pa() {
 }
 
 const twin::Indenter &lying_cylinder() {
-  static const twin::Indenter cylinder{
-      "cylinder6x12", "", twin::Indenter::Shape::roller, 6, 12, 0, 0.4, 0};
+  static const twin::Indenter cylinder{"cylinder6x12", "", twin::Indenter::Shape::roller, 6, 12, 0, 0.4, 0};
   return cylinder;
 }
 
@@ -63,9 +62,8 @@ calibrating::Array session_array() {
 }
 
 SessionPad::SessionPad(const PadOptions &options, double layer_mm, std::uint64_t seed)
-    : base_Pa_(geometry.sensor_count), reported_Pa_(geometry.sensor_count), options_(options),
-      layer_mm_(layer_mm), seed_(seed),
-      pad_(effects_of(options), geometry.sensor_count, layer_mm, AMBIENT_Pa, seed),
+    : base_Pa_(geometry.sensor_count), reported_Pa_(geometry.sensor_count), options_(options), layer_mm_(layer_mm),
+      seed_(seed), pad_(effects_of(options), geometry.sensor_count, layer_mm, AMBIENT_Pa, seed),
       noise_(seed, NOISE, 0) {
   for (std::size_t k = 0; k < geometry.sensor_count; k++) {
     x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + pad_.seats()[k].dx_mm);
@@ -83,14 +81,12 @@ void SessionPad::report(double after_s, double share) {
   pad_.report(t_s_, base_Pa, reported_Pa_);
 }
 
-void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_mm, double y_mm,
-                     double angle_rad) {
+void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_mm, double y_mm, double angle_rad) {
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   for (std::size_t k = 0; k < x_mm_.size(); k++) {
     const double width = pad_.seats()[k].width;
     const double dx = (x_mm_[k] - x_mm) / width, dy = (y_mm_[k] - y_mm) / width;
-    base_Pa_[k] =
-        object.base_pressure_Pa(force_N, c * dx + s * dy, c * dy - s * dx, pad_.dip_share());
+    base_Pa_[k] = object.base_pressure_Pa(force_N, c * dx + s * dy, c * dy - s * dx, pad_.dip_share());
   }
   if (options_.block) {
     const twin::BlockTable::Load load{force_N, 0.0, 0.0, object.contact_radius_mm(force_N)};
@@ -100,16 +96,15 @@ void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_
   }
 }
 
-calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double force_N,
-                                         double x_mm, double y_mm, double angle_rad) {
+calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm,
+                                         double angle_rad) {
   aim(foot, force_N, x_mm, y_mm, angle_rad);
   report(PAUSE_s, 0.0);
   report(DOWN_s, 1.0);
   calibrating::Placement placement;
   placement.t_s = t_s_ + 0.5 * (SETTLED_BEGIN_s + SETTLED_END_s);
   placement.usable = (1u << x_mm_.size()) - 1u;
-  placement.noise_Pa =
-      noise_of_one_Pa() / std::sqrt(FRAMES_PER_s * (SETTLED_END_s - SETTLED_BEGIN_s));
+  placement.noise_Pa = noise_of_one_Pa() / std::sqrt(FRAMES_PER_s * (SETTLED_END_s - SETTLED_BEGIN_s));
   placement.reading_Pa.assign(x_mm_.size(), 0.0);
   double first_Pa = 0.0, last_Pa = 0.0;
   for (int i = 0; i < SETTLED_STEPS; i++) {
@@ -129,8 +124,7 @@ calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double 
   return placement;
 }
 
-std::vector<double> SessionPad::tap(const twin::ContactTable &object, double force_N, double x_mm,
-                                    double y_mm) {
+std::vector<double> SessionPad::tap(const twin::ContactTable &object, double force_N, double x_mm, double y_mm) {
   aim(object, force_N, x_mm, y_mm, 0.0);
   report(PAUSE_s, 0.0);
   report(TAP_DOWN_s, 1.0);
@@ -169,10 +163,8 @@ const char *name_of(SessionKind kind) {
 
 Feet::Feet(double layer_thickness_mm, const std::filesystem::path &cache)
     : layer_mm(layer_thickness_mm),
-      round(twin::ContactTable::load_or_build(twin::indenter("sphere15"),
-                                              twin::silicone(layer_thickness_mm), cache)),
-      lying(twin::ContactTable::load_or_build(lying_cylinder(), twin::silicone(layer_thickness_mm),
-                                              cache)) {}
+      round(twin::ContactTable::load_or_build(twin::indenter("sphere15"), twin::silicone(layer_thickness_mm), cache)),
+      lying(twin::ContactTable::load_or_build(lying_cylinder(), twin::silicone(layer_thickness_mm), cache)) {}
 
 Session::Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::size_t planned)
     : feet_(feet), kind_(kind), random_(seed, SESSION, static_cast<std::uint64_t>(kind)),
@@ -184,15 +176,12 @@ Session::Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::si
   Random errors(seed, ERRORS, static_cast<std::uint64_t>(kind));
   for (std::size_t k = 0; k < array.sensors(); k++) {
     const double sign = errors.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
-    zero_Pa_.push_back(kind != SessionKind::offsets ? 0.0
-                       : variant_                   ? OFFSET_Pa
-                                                    : sign * OFFSET_Pa);
+    zero_Pa_.push_back(kind != SessionKind::offsets ? 0.0 : variant_ ? OFFSET_Pa : sign * OFFSET_Pa);
     drift_Pa_.push_back(kind == SessionKind::drift ? sign * DRIFT_Pa : 0.0);
   }
 }
 
-std::optional<calibrating::Placement> Session::next(SessionPad &pad,
-                                                    std::optional<calibrating::Wanted> wanted) {
+std::optional<calibrating::Placement> Session::next(SessionPad &pad, std::optional<calibrating::Wanted> wanted) {
   if (made_ >= planned_) {
     return std::nullopt;
   }
@@ -239,14 +228,12 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
       if (placements.size() < PLACEMENTS) {
         continue;
       }
-      const calibrating::Judgement judgement =
-          calibrating::judge(session_array(), placements, false);
+      const calibrating::Judgement judgement = calibrating::judge(session_array(), placements, false);
       if (judgement.state == calibrating::Judgement::State::refused) {
         break;
       }
-      const auto scale =
-          calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N,
-                                   calibrating::shape_of(judgement.solution));
+      const auto scale = calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N,
+                                                  calibrating::shape_of(judgement.solution));
       if (judgement.state == calibrating::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
         Calibrated left{{},

@@ -24,8 +24,7 @@ struct PadOptions {
   double relaxation_percent = 0.0; // mean of what a sensor loses in a hold; 17.5: 9 to 26 %
   double misplaced_mm = 0.0;       // sd of a sensor's place, each way
   double dip_percent = 0.0, widths_percent = 0.0;
-  const twin::BlockTable *block =
-      nullptr; // of rubber that ends; of sensors that are in their places
+  const twin::BlockTable *block = nullptr; // of rubber that ends; of sensors that are in their places
 };
 
 // As real arrays are (host_tools/report/real); and each of gains and dip alone.
@@ -39,11 +38,10 @@ public:
 
   // A weight is set down by hand, stands two seconds and is lifted: the means of the readings from
   // 0.5 to 1 s after it was down.
-  calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm,
-                               double y_mm, double angle_rad);
+  calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm,
+                               double angle_rad);
   // A tap: the readings of one frame 0.15 s after it was down.
-  std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm,
-                          double y_mm);
+  std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm, double y_mm);
 
   // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors'
   // mean.
@@ -54,8 +52,7 @@ public:
 private:
   void report(double after_s, double share);
   std::vector<double> base_Pa_, reported_Pa_; // [sensor]
-  void aim(const twin::ContactTable &object, double force_N, double x_mm, double y_mm,
-           double angle_rad);
+  void aim(const twin::ContactTable &object, double force_N, double x_mm, double y_mm, double angle_rad);
 
   std::vector<double> x_mm_, y_mm_;
   PadOptions options_;
@@ -67,9 +64,9 @@ private:
 };
 
 enum class SessionKind { good, elongated, offsets, one_end, cluster, drift, too_few, weights };
-constexpr std::array<SessionKind, 7> BAD_SESSIONS{
-    SessionKind::elongated, SessionKind::offsets, SessionKind::one_end, SessionKind::cluster,
-    SessionKind::drift,     SessionKind::too_few, SessionKind::weights};
+constexpr std::array<SessionKind, 7> BAD_SESSIONS{SessionKind::elongated, SessionKind::offsets, SessionKind::one_end,
+                                                  SessionKind::cluster,   SessionKind::drift,   SessionKind::too_few,
+                                                  SessionKind::weights};
 const char *name_of(SessionKind kind);
 
 constexpr double WEIGHT_N = 3.0;
@@ -94,8 +91,7 @@ class Session {
 public:
   Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::size_t planned);
   // The next placement, of as many as the person is willing to make.
-  std::optional<calibrating::Placement> next(SessionPad &pad,
-                                             std::optional<calibrating::Wanted> wanted = {});
+  std::optional<calibrating::Placement> next(SessionPad &pad, std::optional<calibrating::Wanted> wanted = {});
 
 private:
   const Feet &feet_;

@@ -41,11 +41,10 @@ constexpr char HELP[] = "usage: truth_fit [--seed S] [--pads N] [--cache DIR]\n"
 constexpr int TOUCHES = 50; // of each pad
 constexpr int TAUGHT = 20;  // touches of a pad that was never calibrated, before those
 constexpr double BAD_mm = 1.0;
-constexpr std::uint32_t WARNINGS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT |
-                                   CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
+constexpr std::uint32_t WARNINGS =
+    CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
 // Rounded feet, a flat cylinder and a cube, and everyday objects; all of them round or nearly so.
-constexpr const char *OBJECTS[] = {"sphere6",   "sphere15",    "cylinder6", "cube6",
-                                   "ping_pong", "rubber_duck", "lime"};
+constexpr const char *OBJECTS[] = {"sphere6", "sphere15", "cylinder6", "cube6", "ping_pong", "rubber_duck", "lime"};
 
 struct Options {
   std::string cache = FINGERTIP_TABLES_DIR;
@@ -90,9 +89,7 @@ public:
   }
   // Share of the errors within so many predicted standard deviations.
   double covered(double sds) const {
-    return share([=](const Judged &j) {
-      return j.error_mm <= sds * static_cast<double>(j.fit.location_sd_mm);
-    });
+    return share([=](const Judged &j) { return j.error_mm <= sds * static_cast<double>(j.fit.location_sd_mm); });
   }
   // Of the force, once the scale that all touches have in common is taken out.
   double force_covered(double sds) const {
@@ -162,8 +159,7 @@ Felt draw(const Case &c, const fit_array &array, Random &random) {
     felt.contact = c.contacts[random.next() % c.contacts.size()];
   } else {
     const shear::Object &object = *c.pulled[random.next() % c.pulled.size()];
-    felt.contact =
-        pulled_by(object, felt.touch.force_N, random.uniform(c.load_least, c.load_most), random);
+    felt.contact = pulled_by(object, felt.touch.force_N, random.uniform(c.load_least, c.load_most), random);
   }
   felt.noise_Pa = draw_noise_Pa(random);
   return felt;
@@ -177,8 +173,7 @@ void teach(const Case &c, const fit_array &array, Pad &pad, Random random) {
     const Felt felt = draw(c, array, random);
     fit_gains_lift(&gains);
     for (int look = 0; look < 2; look++) {
-      const auto readings =
-          readings_of(array, felt.contact, felt.touch, pad, felt.noise_Pa, random);
+      const auto readings = readings_of(array, felt.contact, felt.touch, pad, felt.noise_Pa, random);
       const fit_settings settings = settings_for(pad, felt.noise_Pa);
       fit_result fit;
       fit_gaussian_grid(&array, readings.data(), (1u << SENSORS) - 1u, &settings, &fit);
@@ -219,8 +214,8 @@ Results run(const Case &c, const Options &options) {
       if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
         continue; // no positive reading among the sensors in use
       }
-      const double error_mm = std::hypot(static_cast<double>(fit.x_mm) - touch.x_mm,
-                                         static_cast<double>(fit.y_mm) - touch.y_mm);
+      const double error_mm =
+          std::hypot(static_cast<double>(fit.x_mm) - touch.x_mm, static_cast<double>(fit.y_mm) - touch.y_mm);
       judged[p * TOUCHES + static_cast<std::size_t>(t++)] = {error_mm, touch.force_N, fit};
     }
   });
@@ -255,9 +250,7 @@ auto spread(double sd) {
 
 // What the firmware believes at first of a pad that was never calibrated.
 auto never_calibrated(double sd) {
-  return [sd](Random &random, std::size_t) {
-    return raw_pad(sd, static_cast<double>(DEFAULT_GAIN_SD), random);
-  };
+  return [sd](Random &random, std::size_t) { return raw_pad(sd, static_cast<double>(DEFAULT_GAIN_SD), random); };
 }
 
 // Gains that rise over the pad in one direction, by so much rms: rubber that was cast aslant.
@@ -269,8 +262,7 @@ auto tilted(double rms) {
     Readings along{};
     double square = 0.0;
     for (std::size_t k = 0; k < SENSORS; k++) {
-      along[k] = std::cos(angle) * static_cast<double>(array.x[k]) +
-                 std::sin(angle) * static_cast<double>(array.y[k]);
+      along[k] = std::cos(angle) * static_cast<double>(array.x[k]) + std::sin(angle) * static_cast<double>(array.y[k]);
       square += along[k] * along[k] / static_cast<double>(SENSORS);
     }
     for (std::size_t k = 0; k < SENSORS; k++) {
@@ -284,9 +276,8 @@ auto one_of(const CalibratedPads &pads) {
   return [&pads](Random &, std::size_t pad) { return pads[pad % pads.size()]; };
 }
 
-void judge_coverage(const Options &options, const std::vector<Contact> &thick,
-                    const std::vector<Contact> &thin, const CalibratedPads &calibrated,
-                    ordered_json &out) {
+void judge_coverage(const Options &options, const std::vector<Contact> &thick, const std::vector<Contact> &thin,
+                    const CalibratedPads &calibrated, ordered_json &out) {
   struct Row {
     Case c;
     bool covers; // the standard deviations are to hold here
@@ -321,9 +312,8 @@ void judge_coverage(const Options &options, const std::vector<Contact> &thick,
     if (c.name == "12 mm, calibrated") {
       out["cal_warned_percent"] = results.flagged(WARNINGS);
       out["cal_bad_unflagged_percent"] = results.bad_without(WARNINGS);
-      out["round_elongated_percent"] = results.share([](const Judged &j) {
-        return j.error_mm <= BAD_mm && (j.fit.flags & CONTACT_FLAG_ELONGATED);
-      });
+      out["round_elongated_percent"] =
+          results.share([](const Judged &j) { return j.error_mm <= BAD_mm && (j.fit.flags & CONTACT_FLAG_ELONGATED); });
     } else if (c.name == "12 mm, gains 10 %") {
       out["raw_warned_percent"] = results.flagged(WARNINGS);
       out["raw_bad_unflagged_percent"] = results.bad_without(WARNINGS);
@@ -350,8 +340,7 @@ void judge_loaded(const Options &options, const CalibratedPads &calibrated, orde
                         {"12 mm, gains 10 %", 12.0, never_calibrated(0.10), TAUGHT},
                         {"6 mm, equal gains", 6.0, equal},
                         {"6 mm, gains 10 %", 6.0, never_calibrated(0.10), TAUGHT}};
-  const double loads[][2] = {{0.0, 0.0}, {0.1, 0.1}, {0.2, 0.2},
-                             {0.3, 0.3}, {0.5, 0.5}, {0.0, 0.5}};
+  const double loads[][2] = {{0.0, 0.0}, {0.1, 0.1}, {0.2, 0.2}, {0.3, 0.3}, {0.5, 0.5}, {0.0, 0.5}};
   for (const Kind &kind : kinds) {
     Case c{"loaded, " + std::string(kind.name), {}, kind.pad};
     c.taught = kind.taught;
@@ -402,9 +391,9 @@ void judge_elongated(const Options &options, const CalibratedPads &calibrated, o
   double worst = 0.0;
   for (const Shape &shape : shapes) {
     for (const Angle &angle : angles) {
-      const Results results = run({std::string(shape.name) + " at " + angle.name, shape.contacts,
-                                   one_of(calibrated), false, angle.angle_rad},
-                                  options);
+      const Results results = run(
+          {std::string(shape.name) + " at " + angle.name, shape.contacts, one_of(calibrated), false, angle.angle_rad},
+          options);
       const double unflagged = results.bad_without(WARNINGS | CONTACT_FLAG_ELONGATED);
       ordered_json row = results.row(std::string(shape.name) + ", " + angle.name);
       row["bad_and_neither_warned_nor_elongated"] = unflagged;
@@ -415,8 +404,8 @@ void judge_elongated(const Options &options, const CalibratedPads &calibrated, o
   out["elongated_bad_unflagged_percent"] = worst;
 }
 
-void judge_iterations(const Options &options, const std::vector<Contact> &thick,
-                      const std::vector<Contact> &thin, ordered_json &out) {
+void judge_iterations(const Options &options, const std::vector<Contact> &thick, const std::vector<Contact> &thin,
+                      ordered_json &out) {
   for (int iterations = 3; iterations <= 8; iterations++) {
     for (const bool is_thin : {false, true}) {
       for (const double sd : {0.0, 0.10}) {
@@ -435,9 +424,8 @@ void judge_iterations(const Options &options, const std::vector<Contact> &thick,
   }
 }
 
-void judge_few_sensors(const Options &options, const std::vector<Contact> &thick,
-                       const std::vector<Contact> &thin, const CalibratedPads &calibrated,
-                       ordered_json &out) {
+void judge_few_sensors(const Options &options, const std::vector<Contact> &thick, const std::vector<Contact> &thin,
+                       const CalibratedPads &calibrated, ordered_json &out) {
   for (const bool is_thin : {false, true}) {
     for (const std::size_t sensors : {4u, 5u, 6u, 8u, 14u}) {
       Case c{is_thin ? "6 mm" : "12 mm", is_thin ? thin : thick, one_of(calibrated)};
@@ -474,9 +462,8 @@ ordered_json judge(const Options &options) {
 
 int main(int argc, char **argv) {
   Options options;
-  return reference::print_found("truth_fit", argc, argv,
-                                {{"--cache", &options.cache},
-                                 {"--seed", nullptr, &options.seed},
-                                 {"--pads", nullptr, &options.pads}},
-                                HELP, [&] { return judge(options); });
+  return reference::print_found(
+      "truth_fit", argc, argv,
+      {{"--cache", &options.cache}, {"--seed", nullptr, &options.seed}, {"--pads", nullptr, &options.pads}}, HELP,
+      [&] { return judge(options); });
 }

@@ -45,15 +45,13 @@ const twin::Indenter &indenter_of(const std::string &name) {
       {"edge36", "", Shape::roller, 2, 36, 0, EDGE_mm, 0},
       {"cube15", "", Shape::flat_square, 15, 15, 0, EDGE_mm, 0},
   };
-  const auto found =
-      std::find_if(all.begin(), all.end(), [&](const auto &one) { return one.name == name; });
+  const auto found = std::find_if(all.begin(), all.end(), [&](const auto &one) { return one.name == name; });
   return found == all.end() ? twin::indenter(name) : *found;
 }
 
-Contact contact_of(const std::string &name, double layer_mm,
-                   const std::filesystem::path &cache_directory) {
-  const auto table = std::make_shared<twin::ContactTable>(twin::ContactTable::load_or_build(
-      indenter_of(name), twin::silicone(layer_mm), cache_directory));
+Contact contact_of(const std::string &name, double layer_mm, const std::filesystem::path &cache_directory) {
+  const auto table = std::make_shared<twin::ContactTable>(
+      twin::ContactTable::load_or_build(indenter_of(name), twin::silicone(layer_mm), cache_directory));
   return {name, [table](double force_N, double dx_mm, double dy_mm) {
             return table->base_pressure_Pa(force_N, dx_mm, dy_mm);
           }};
@@ -91,22 +89,18 @@ Pad calibrated_pad(const Calibrated &session) {
   return pad;
 }
 
-std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, std::size_t judged,
-                                        std::uint64_t seed,
+std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, std::size_t judged, std::uint64_t seed,
                                         const std::filesystem::path &cache_directory) {
   const Feet feet(CALIBRATED_LAYER_mm, cache_directory);
-  std::vector<Calibrated> sessions(
-      std::clamp<std::size_t>(judged / PADS_PER_SESSION, 1, SESSIONS_MAX));
+  std::vector<Calibrated> sessions(std::clamp<std::size_t>(judged / PADS_PER_SESSION, 1, SESSIONS_MAX));
   const std::uint64_t stream = stream_of("calibrated sessions");
   twin::in_parallel(sessions.size(), [&](std::size_t i) {
-    sessions[i] =
-        calibrated_session(feet, kinds[i % kinds.size()], Random(seed, stream, i).next());
+    sessions[i] = calibrated_session(feet, kinds[i % kinds.size()], Random(seed, stream, i).next());
   });
   return sessions;
 }
 
-CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
-                               const std::filesystem::path &cache_directory) {
+CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed, const std::filesystem::path &cache_directory) {
   CalibratedPads pads;
   for (const Calibrated &session : calibrations_of(USUAL_PADS, judged, seed, cache_directory)) {
     pads.push_back(calibrated_pad(session));
@@ -149,9 +143,8 @@ double draw_noise_Pa(Random &random) {
   return ms58xx_find_osr(osr)->noise_Pa_q10 / 1024.0;
 }
 
-std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact,
-                                              const Touch &touch, const Pad &pad, double noise_Pa,
-                                              Random &random) {
+std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact, const Touch &touch,
+                                              const Pad &pad, double noise_Pa, Random &random) {
   std::array<std::int32_t, SENSORS> readings{};
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
@@ -168,8 +161,7 @@ std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Cont
 fit_array firmware_array() {
   fit_array array;
   if (geometry.sensor_count != SENSORS ||
-      fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK) {
+      fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
     throw std::runtime_error("the firmware's geometry is not the grid of 15 that is judged here");
   }
   return array;

@@ -36,8 +36,7 @@ struct Contact {
 // so many millimetres; "cube15".
 const twin::Indenter &indenter_of(const std::string &name);
 // Its table is solved if the cache does not hold it.
-Contact contact_of(const std::string &name, double layer_mm,
-                   const std::filesystem::path &cache_directory);
+Contact contact_of(const std::string &name, double layer_mm, const std::filesystem::path &cache_directory);
 // Its width along the first axis is this times the other.
 Contact gaussian(double shorter_mm, double ratio);
 
@@ -58,8 +57,7 @@ Pad calibrated_pad(const Calibrated &session);
 
 // One for every ten pads that are judged, a hundred at most: a calibration each, which so many
 // pads have in turn. The kinds of pads take turns.
-std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, std::size_t judged,
-                                        std::uint64_t seed,
+std::vector<Calibrated> calibrations_of(const std::vector<PadOptions> &kinds, std::size_t judged, std::uint64_t seed,
                                         const std::filesystem::path &cache_directory);
 
 // As the twin's own, and as many whose sensors relax by 9 to 26 % and sit 0.1 mm (sd) off.
@@ -67,8 +65,7 @@ inline const std::vector<PadOptions> USUAL_PADS{{10.0}, {10.0, 17.5, 0.1}};
 
 using CalibratedPads = std::vector<Pad>;
 // What calibrations of USUAL_PADS left of the gains.
-CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
-                               const std::filesystem::path &cache_directory);
+CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed, const std::filesystem::path &cache_directory);
 
 // Of random numbers, for a name.
 std::uint64_t stream_of(const std::string &name);
@@ -87,9 +84,8 @@ Touch draw_touch(const fit_array &array, Random &random);
 double draw_noise_Pa(Random &random);
 
 // What condition hands to the fit: gains act, noise is added; 1/1024 Pa.
-std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact,
-                                              const Touch &touch, const Pad &pad, double noise_Pa,
-                                              Random &random);
+std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact, const Touch &touch,
+                                              const Pad &pad, double noise_Pa, Random &random);
 
 // The firmware's array. Throws std::runtime_error if its geometry is refused.
 fit_array firmware_array();

@@ -173,8 +173,14 @@ function main(argv) {
   let values;
   try {
     ({ values } = parseArgs({
-      args: argv, strict: true,
-      options: { image: { type: 'string' }, updates: { type: 'string', default: '10000' }, seed: { type: 'string', default: '1' }, help: { type: 'boolean' } },
+      args: argv,
+      strict: true,
+      options: {
+        image: { type: 'string' },
+        updates: { type: 'string', default: '10000' },
+        seed: { type: 'string', default: '1' },
+        help: { type: 'boolean' },
+      },
     }));
   } catch (error) {
     throw new InputError(`${error.message.split('\n')[0]}; see --help`);

@@ -13,6 +13,7 @@ Prints one JSON object, and what it is doing on standard error:
     flash                  the figures behind them: latencies with and without storing among them. A command that brings a calibration
                            takes the processor 0.1 ms, which a frame may have to wait once; the writing does not
 """
+
 import argparse
 import concurrent.futures
 import json
@@ -62,14 +63,35 @@ class Run:
 
     def __init__(self, tools, folder, name, path, commands, options=()):
         base = pathlib.Path(folder) / name
-        lines = ["0.45 dtr 1", f"0.452 {tools.encoded('info')}", f"0.455 {tools.encoded('osr', OSR)}",
-                 f"0.46 {tools.encoded('stream', 'contact,health')}", f"{CALIBRATED_s} {calibrate_frame(0)}"]
+        lines = [
+            "0.45 dtr 1",
+            f"0.452 {tools.encoded('info')}",
+            f"0.455 {tools.encoded('osr', OSR)}",
+            f"0.46 {tools.encoded('stream', 'contact,health')}",
+            f"{CALIBRATED_s} {calibrate_frame(0)}",
+        ]
         stores = [calibrate_frame(1 + i) if i % 3 else tools.encoded("keep") for i in range(commands)]
         lines += [f"{FROM_s + INTERVAL_s * i:.3f} {frame}" for i, frame in enumerate(stores)]
         base.with_suffix(".script").write_text("\n".join(lines) + "\n")
-        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", BOARD, "--image", tools.image(BOARD), "--scenario", path,
-            "--host-script", base.with_suffix(".script"), "--capture", f"{base}.ftr", "--usb-log", f"{base}.usb", "--report", f"{base}.json",
-            *options)
+        run(
+            "node",
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            BOARD,
+            "--image",
+            tools.image(BOARD),
+            "--scenario",
+            path,
+            "--host-script",
+            base.with_suffix(".script"),
+            "--capture",
+            f"{base}.ftr",
+            "--usb-log",
+            f"{base}.usb",
+            "--report",
+            f"{base}.json",
+            *options,
+        )
         run(tools.fingertip, "replay", f"{base}.ftr", "--to-csv", f"{base}.csv")
         emulated = json.loads(pathlib.Path(f"{base}.json").read_text())
         recording = read_recording(f"{base}.csv")
@@ -104,8 +126,18 @@ def power(image, updates, seed):
     halves = [updates - updates // 2, updates // 2]
 
     def half(i):
-        return json.loads(run("node", ROOT / "host_tools/report/truth/flash/store_power.mjs", "--image", image, "--updates", halves[i],
-                              "--seed", 2 * seed + i))
+        return json.loads(
+            run(
+                "node",
+                ROOT / "host_tools/report/truth/flash/store_power.mjs",
+                "--image",
+                image,
+                "--updates",
+                halves[i],
+                "--seed",
+                2 * seed + i,
+            )
+        )
 
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         found = list(pool.map(half, [i for i in range(2) if halves[i]]))
@@ -128,15 +160,29 @@ def main(argv):
     cut = power(image, options.updates, options.seed)
     say(f"{options.commands} commands that store while {BOARD} streams at OSR {OSR}, without them, and with the slowest flash")
     runs = stream(tools, options.commands)
-    print(json.dumps({
-        "flash_lost": cut["lost"],
-        "flash_frames_skipped": max(runs[name].skipped for name in ("storing", "storing_slowly")),
-        "flash": {
-            "power": cut,
-            **{name: {"frames": found.frames, "skipped": found.skipped, "stored": len(found.stored), "erases": found.erases,
-                      "programs": found.programs, "latency_us": found.latency_us} for name, found in runs.items()},
-        },
-    }, indent=2))
+    print(
+        json.dumps(
+            {
+                "flash_lost": cut["lost"],
+                "flash_frames_skipped": max(runs[name].skipped for name in ("storing", "storing_slowly")),
+                "flash": {
+                    "power": cut,
+                    **{
+                        name: {
+                            "frames": found.frames,
+                            "skipped": found.skipped,
+                            "stored": len(found.stored),
+                            "erases": found.erases,
+                            "programs": found.programs,
+                            "latency_us": found.latency_us,
+                        }
+                        for name, found in runs.items()
+                    },
+                },
+            },
+            indent=2,
+        )
+    )
     return 0
 
 

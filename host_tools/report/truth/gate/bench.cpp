@@ -49,8 +49,8 @@ std::vector<Mode> modes() {
   for (const Wiring &wiring : Wiring::all()) {
     for (unsigned osr = 256; osr <= 8192; osr *= 2) {
       const ms58xx_osr *row = ms58xx_find_osr(static_cast<std::uint16_t>(osr));
-      all.push_back({wiring.board, osr, 1e6 / (wiring.overhead_us + row->conversion_us),
-                     row->noise_Pa_q10 / 1024.0, row->noise_Pa_q10});
+      all.push_back({wiring.board, osr, 1e6 / (wiring.overhead_us + row->conversion_us), row->noise_Pa_q10 / 1024.0,
+                     row->noise_Pa_q10});
     }
   }
   return all;
@@ -65,21 +65,18 @@ void press(Pressures &pressures_Pa, double x_mm, double y_mm, double force_N) {
   }
 }
 
-Bench::Bench(const Mode &mode, std::uint64_t seed)
-    : mode_(mode), noise_at_(Random(seed, NOISE, 1).next()) {
-  if (fit_array_init_grid(&array_, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                          geometry.pitch_mm) != FT_OK) {
+Bench::Bench(const Mode &mode, std::uint64_t seed) : mode_(mode), noise_at_(Random(seed, NOISE, 1).next()) {
+  if (fit_array_init_grid(&array_, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
     throw std::runtime_error("fit_array_init refuses the geometry");
   }
   for (std::size_t k = 0; k < SENSORS; k++) {
     Random offset(seed, OFFSET, k), drift(seed, DRIFT, k), prom(seed, PROM, k);
     offset_Pa_[k] = AMBIENT_Pa + 500.0 * offset.normal();
-    drawn_drift_Pa_s_[k] = (drift.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) *
-                           drift.uniform(DRIFT_LEAST_Pa, DRIFT_MOST_Pa) / DRIFT_SPAN_s;
+    drawn_drift_Pa_s_[k] =
+        (drift.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * drift.uniform(DRIFT_LEAST_Pa, DRIFT_MOST_Pa) / DRIFT_SPAN_s;
     std::array<std::uint16_t, 6> c{};
     for (std::size_t i = 0; i < c.size(); i++) {
-      c[i] = static_cast<std::uint16_t>(COEFFICIENTS[i] *
-                                        (1.0 + prom.uniform(-PROM_SPREAD, PROM_SPREAD)));
+      c[i] = static_cast<std::uint16_t>(COEFFICIENTS[i] * (1.0 + prom.uniform(-PROM_SPREAD, PROM_SPREAD)));
     }
     sim_ms5840 part;
     sim_ms5840_init(&part, c.data());
@@ -124,8 +121,8 @@ void Bench::run(double seconds, const Feels &feels, const Sees &sees) {
       thermal_at_s_ = t_s_;
       for (std::size_t k = 0; k < SENSORS; k++) {
         const double degC = temperature_degC_(t_s_ - warm_since_s_);
-        ms58xx_compensate_temperature(&proms_[k], sim_ms5840_d2(proms_[k].word, degC),
-                                      thermal_[k].branch, &thermal_[k]);
+        ms58xx_compensate_temperature(&proms_[k], sim_ms5840_d2(proms_[k].word, degC), thermal_[k].branch,
+                                      &thermal_[k]);
       }
     }
     Pressures felt_Pa{};

@@ -28,13 +28,12 @@ using namespace fingertip;
 using namespace fingertip::truth;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] =
-    "usage: truth_gate [--seed S] [--pads N] [--recordings DIR]\n"
-    "  --seed S          of pads and places, 20230706 by default\n"
-    "  --pads N          pads of each case, 8 by default; with 1 only OSR 8192,\n"
-    "                    with 0 the recordings alone\n"
-    "  --recordings DIR  folder of the strips' recordings, *.csv; the environment's\n"
-    "                    FINGERTIP_RECORDINGS by default\n";
+constexpr char HELP[] = "usage: truth_gate [--seed S] [--pads N] [--recordings DIR]\n"
+                        "  --seed S          of pads and places, 20230706 by default\n"
+                        "  --pads N          pads of each case, 8 by default; with 1 only OSR 8192,\n"
+                        "                    with 0 the recordings alone\n"
+                        "  --recordings DIR  folder of the strips' recordings, *.csv; the environment's\n"
+                        "                    FINGERTIP_RECORDINGS by default\n";
 
 struct Options {
   std::string recordings;
@@ -51,9 +50,7 @@ constexpr double RETURN_TIMES_s[] = {0.5, 1.0, 2.0, 5.0, 10.0};
 constexpr double STAND_OFFS[] = {-0.15, -0.09, -0.03, 0.004, 0.03, 0.08};
 constexpr double STAND_OFF_HOLDS_s[] = {1.0, 10.0};
 constexpr double LEFT_SHARES[] = {0.02, 0.05, 0.1, 0.2};
-constexpr struct {
-  double frames_per_s, noise_Pa;
-} STRIP_RATES[] = {{57.0, 2.0}, {315.0, 4.0}, {1308.0, 11.0}};
+constexpr struct { double frames_per_s, noise_Pa; } STRIP_RATES[] = {{57.0, 2.0}, {315.0, 4.0}, {1308.0, 11.0}};
 
 struct Place {
   double x_mm, y_mm;
@@ -71,8 +68,7 @@ Place place_of(std::uint64_t seed, std::size_t pad) {
 
 // Of the cases of one kind, on two threads, in order of their number.
 template <typename Result>
-std::vector<Result> each(const char *what, std::size_t count,
-                         const std::function<Result(std::size_t)> &work) {
+std::vector<Result> each(const char *what, std::size_t count, const std::function<Result(std::size_t)> &work) {
   std::fprintf(stderr, "truth_gate: %s\n", what);
   std::vector<Result> results(count);
   std::atomic<std::size_t> next{0};
@@ -95,9 +91,7 @@ struct Judge {
   std::vector<Mode> all;
   ordered_json out;
 
-  std::uint64_t seed_of(std::size_t mode, std::size_t pad) const {
-    return options.seed + 1000 * mode + pad;
-  }
+  std::uint64_t seed_of(std::size_t mode, std::size_t pad) const { return options.seed + 1000 * mode + pad; }
 
   ordered_json row(const Mode &mode) const {
     return {{"board", mode.board}, {"osr", mode.osr}, {"frames_per_s", mode.frames_per_s}};
@@ -119,8 +113,7 @@ struct Judge {
     const Place at = place_of(options.seed, pad);
     Bench bench(all[mode], seed_of(mode, pad));
     bench.run(CALM_s);
-    bench.run(FORCE_N / N_s,
-              [&](double t_s, Pressures &felt) { press(felt, at.x_mm, at.y_mm, N_s * t_s); });
+    bench.run(FORCE_N / N_s, [&](double t_s, Pressures &felt) { press(felt, at.x_mm, at.y_mm, N_s * t_s); });
     return force_error_percent(bench, at);
   }
 
@@ -143,8 +136,7 @@ struct Judge {
     double worst = 0;
     for (std::size_t v = 0; v < values.size(); v++) {
       for (std::size_t m = 0; m < all.size(); m++) {
-        const auto first =
-            errors.begin() + static_cast<std::ptrdiff_t>((v * all.size() + m) * pads);
+        const auto first = errors.begin() + static_cast<std::ptrdiff_t>((v * all.size() + m) * pads);
         ordered_json one = row(all[m]);
         one[key] = values[v];
         one["worst_percent"] = *std::max_element(first, first + static_cast<std::ptrdiff_t>(pads));
@@ -156,12 +148,12 @@ struct Judge {
   }
 
   void judge_slow_forces() {
-    const double ramps = judge_forces(
-        "ramps", "N_s", {std::begin(RAMPS_N_s), std::end(RAMPS_N_s)},
-        [&](std::size_t mode, std::size_t pad, double N_s) { return ramp(mode, pad, N_s); });
-    const double holds = judge_forces(
-        "hour_holds", "calm_s", {CALM_s},
-        [&](std::size_t mode, std::size_t pad, double calm_s) { return hold(mode, pad, calm_s); });
+    const double ramps =
+        judge_forces("ramps", "N_s", {std::begin(RAMPS_N_s), std::end(RAMPS_N_s)},
+                     [&](std::size_t mode, std::size_t pad, double N_s) { return ramp(mode, pad, N_s); });
+    const double holds =
+        judge_forces("hour_holds", "calm_s", {CALM_s},
+                     [&](std::size_t mode, std::size_t pad, double calm_s) { return hold(mode, pad, calm_s); });
     out["slow_force_error_percent"] = std::max(ramps, holds);
   }
 
@@ -211,9 +203,8 @@ struct Judge {
       Bench bench(all[i / pads], seed_of(i / pads, i % pads));
       bench.drift();
       bench.run(i % 2 == 0 ? 5.0 : CALM_s);
-      bench.run(TEN_MINUTES_s, [&](double, Pressures &felt) {
-        press(felt, at.x_mm, at.y_mm, i % 4 < 2 ? FORCE_N : 0.1 * FORCE_N);
-      });
+      bench.run(TEN_MINUTES_s,
+                [&](double, Pressures &felt) { press(felt, at.x_mm, at.y_mm, i % 4 < 2 ? FORCE_N : 0.1 * FORCE_N); });
       double wrong_s = 0;
       bench.run(RECOVERY_WATCHED_s, nullptr, [&](double t_s, const Said &) {
         wrong_s = bench.worst_zero_error_Pa() > RECOVERED_Pa ? t_s : wrong_s;
@@ -245,9 +236,8 @@ struct Judge {
     for (std::size_t k = 0; k < SENSORS; k++) {
       off[k] *= share * Random(options.seed, 313, k).uniform(0.5, 1.0);
     }
-    bench.run(hold_s, [&](double t_s, Pressures &felt) {
-      press(felt, at.x_mm, at.y_mm, FORCE_N * std::min(1.0, t_s / 0.2));
-    });
+    bench.run(hold_s,
+              [&](double t_s, Pressures &felt) { press(felt, at.x_mm, at.y_mm, FORCE_N * std::min(1.0, t_s / 0.2)); });
     StandOff found;
     double since_s = 0;
     bench.run(
@@ -263,9 +253,8 @@ struct Judge {
           found.longest_s = std::max(found.longest_s, t_s - since_s);
           found.contact_s += said.contact && t_s > 0.3 ? 1.0 / bench.mode().frames_per_s : 0.0;
         });
-    bench.run(0.5, [&](double t_s, Pressures &felt) {
-      press(felt, at.x_mm, at.y_mm, FORCE_N * std::min(1.0, t_s / 0.2));
-    });
+    bench.run(0.5,
+              [&](double t_s, Pressures &felt) { press(felt, at.x_mm, at.y_mm, FORCE_N * std::min(1.0, t_s / 0.2)); });
     found.next_error_percent = force_error_percent(bench, at);
     return found;
   }
@@ -339,9 +328,9 @@ struct Judge {
   }
 
   void judge_strips() {
-    for (const char *key : {"real_phantom_percent_worst", "real_phantom_longest_s",
-                            "real_held_missed", "real_held_doubted_percent_worst",
-                            "real_median_mm_worst_test", "real_median_mm_worst_other"}) {
+    for (const char *key :
+         {"real_phantom_percent_worst", "real_phantom_longest_s", "real_held_missed", "real_held_doubted_percent_worst",
+          "real_median_mm_worst_test", "real_median_mm_worst_other"}) {
       out[key] = nullptr;
     }
     if (options.recordings.empty()) {
@@ -360,20 +349,18 @@ struct Judge {
     for (std::size_t i = 0; i < touches.size(); i++) {
       const Touches &one = touches[i];
       const Strip &strip = strips[i / RATES];
-      out["strips"].push_back(
-          {{"name", strip.name},
-           {"frames_per_s", STRIP_RATES[i % RATES].frames_per_s},
-           {"free_rows", std::count(strip.is_free.begin(), strip.is_free.end(), true)},
-           {"holds", strip.holds.size()},
-           {"phantom_percent", one.phantom_percent},
-           {"phantom_longest_s", one.longest_s},
-           {"doubted_percent", one.doubted_percent},
-           {"held_doubted_percent", one.doubted_in_hold_percent},
-           {"held_missed", one.holds_missed}});
+      out["strips"].push_back({{"name", strip.name},
+                               {"frames_per_s", STRIP_RATES[i % RATES].frames_per_s},
+                               {"free_rows", std::count(strip.is_free.begin(), strip.is_free.end(), true)},
+                               {"holds", strip.holds.size()},
+                               {"phantom_percent", one.phantom_percent},
+                               {"phantom_longest_s", one.longest_s},
+                               {"doubted_percent", one.doubted_percent},
+                               {"held_doubted_percent", one.doubted_in_hold_percent},
+                               {"held_missed", one.holds_missed}});
       worst.phantom_percent = std::max(worst.phantom_percent, one.phantom_percent);
       worst.longest_s = std::max(worst.longest_s, one.longest_s);
-      worst.doubted_in_hold_percent =
-          std::max(worst.doubted_in_hold_percent, one.doubted_in_hold_percent);
+      worst.doubted_in_hold_percent = std::max(worst.doubted_in_hold_percent, one.doubted_in_hold_percent);
       worst.holds_missed += one.holds_missed;
     }
     out["real_phantom_percent_worst"] = worst.phantom_percent;
@@ -391,8 +378,7 @@ struct Judge {
         located["median_by_others_mm"] = one.median_by_others_mm;
         located["median_without_prior_mm"] = one.median_without_prior_mm;
         const char *key = one.is_test ? "real_median_mm_worst_test" : "real_median_mm_worst_other";
-        out[key] =
-            out[key].is_null() ? one.median_mm : std::max(out[key].get<double>(), one.median_mm);
+        out[key] = out[key].is_null() ? one.median_mm : std::max(out[key].get<double>(), one.median_mm);
       }
       out["locations"].push_back(located);
     }
@@ -418,8 +404,7 @@ ordered_json measure(const Options &options) {
   Judge judge{options, modes(), {}};
   if (options.pads == 1) { // a quick look
     const auto is_left_out = [](const Mode &mode) { return mode.osr != 8192; };
-    judge.all.erase(std::remove_if(judge.all.begin(), judge.all.end(), is_left_out),
-                    judge.all.end());
+    judge.all.erase(std::remove_if(judge.all.begin(), judge.all.end(), is_left_out), judge.all.end());
   }
   judge.out["seed"] = options.seed;
   judge.out["pads"] = options.pads;
@@ -433,9 +418,8 @@ int main(int argc, char **argv) {
   if (const char *folder = std::getenv("FINGERTIP_RECORDINGS")) {
     options.recordings = folder;
   }
-  return reference::print_found("truth_gate", argc, argv,
-                                {{"--recordings", &options.recordings},
-                                 {"--seed", nullptr, &options.seed},
-                                 {"--pads", nullptr, &options.pads}},
-                                HELP, [&] { return measure(options); });
+  return reference::print_found(
+      "truth_gate", argc, argv,
+      {{"--recordings", &options.recordings}, {"--seed", nullptr, &options.seed}, {"--pads", nullptr, &options.pads}},
+      HELP, [&] { return measure(options); });
 }

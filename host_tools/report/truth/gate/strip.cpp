@@ -74,8 +74,7 @@ double deepest_of(const std::vector<StripRow> &rows) {
 }
 
 // Rows of one depth near the deepest, for long enough.
-std::vector<std::pair<std::size_t, std::size_t>> plateaus(const std::vector<StripRow> &rows,
-                                                          double deepest) {
+std::vector<std::pair<std::size_t, std::size_t>> plateaus(const std::vector<StripRow> &rows, double deepest) {
   std::vector<std::pair<std::size_t, std::size_t>> found;
   for (std::size_t first = 0; first < rows.size(); first++) {
     const double depth = rows[first].depth_steps;
@@ -237,8 +236,7 @@ std::optional<Response> response_of(const std::vector<Press> &presses, std::size
     }
   }
   const auto determinant = [](const std::array<double, 9> &a) {
-    return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) +
-           a[2] * (a[3] * a[7] - a[4] * a[6]);
+    return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) + a[2] * (a[3] * a[7] - a[4] * a[6]);
   };
   const double whole = determinant({m[0], m[1], m[2], m[1], m[2], m[3], m[2], m[3], m[4]});
   const double c1 = determinant({m[0], v[0], m[2], m[1], v[1], m[3], m[2], v[2], m[4]}) / whole;
@@ -308,8 +306,7 @@ Presses presses_of(const Strip &strip) {
     conditioned readings;
     condition_frame(&state, &taken, nullptr, &readings);
     condition_follow(&state, &taken, &readings);
-    if (readings.contact && !readings.zero_doubtful &&
-        readings.peak_Pa_q10 >= 1024 * LOCATED_LEAST_Pa) {
+    if (readings.contact && !readings.zero_doubtful && readings.peak_Pa_q10 >= 1024 * LOCATED_LEAST_Pa) {
       Press press{{}, readings.usable, row.x_mm, row.depth_steps >= DEEPEST * deepest};
       std::copy_n(readings.pressure_Pa_q10, STRIP_SENSORS, press.pressure_Pa_q10.begin());
       found.all.push_back(press);
@@ -347,8 +344,7 @@ Prior own_prior(const Presses &presses, double width_mm) {
 double median_error_mm(const Presses &presses, const Prior &prior) {
   std::vector<double> errors_mm;
   for (const Press &press : presses.all) {
-    const fit_result result =
-        fit(press, is_odd(press) ? prior.of_odd_mm : prior.of_even_mm, prior.width_mm);
+    const fit_result result = fit(press, is_odd(press) ? prior.of_odd_mm : prior.of_even_mm, prior.width_mm);
     if (result.flags & CONTACT_FLAG_FIT_VALID) {
       errors_mm.push_back(static_cast<double>(result.x_mm) - press.x_mm);
     }
@@ -441,9 +437,8 @@ Touches gate_on(const Strip &strip, double frames_per_s, double noise_Pa) {
       const double share = gap_s > 0.0 ? std::clamp((t_s - before.t_s) / gap_s, 0.0, 1.0) : 0.0;
       std::array<double, STRIP_SENSORS> pressure_Pa;
       for (std::size_t k = 0; k < STRIP_SENSORS; k++) {
-        pressure_Pa[k] = before.pressure_Pa[k] +
-                         share * (after.pressure_Pa[k] - before.pressure_Pa[k]) +
-                         noise_Pa * random.normal();
+        pressure_Pa[k] =
+            before.pressure_Pa[k] + share * (after.pressure_Pa[k] - before.pressure_Pa[k]) + noise_Pa * random.normal();
       }
       const frame taken = frame_of(pressure_Pa, t_s - begin_s, noise_Pa);
       condition_frame(&state, &taken, nullptr, &readings);
@@ -494,8 +489,8 @@ std::vector<Located> locate(const std::vector<Strip> &strips) {
       one.prior_width_mm = width_for_others(presses, i);
       one.median_mm = median_error_mm(presses[i], own_prior(presses[i], one.prior_width_mm));
       one.others_sigma_mm = sigma_of_others(presses, i);
-      one.median_by_others_mm = median_error_mm(
-          presses[i], {one.others_sigma_mm, one.others_sigma_mm, one.prior_width_mm});
+      one.median_by_others_mm =
+          median_error_mm(presses[i], {one.others_sigma_mm, one.others_sigma_mm, one.prior_width_mm});
       one.median_without_prior_mm = median_error_mm(presses[i], {0.0, 0.0, 0.0});
     }
     found.push_back(one);

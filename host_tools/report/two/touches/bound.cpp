@@ -21,8 +21,7 @@ double y_mm(const fit_array &array, std::size_t k) {
 void add_ball(const Rubber &rubber, double x, double y, double force_N, Column &Pa) {
   for (std::size_t k = 0; k < truth::SENSORS; k++) {
     Pa[Eigen::Index(k)] += rubber.object.pressure.base_pressure_Pa(
-        std::max(force_N, FORCE_LEAST_N), x_mm(rubber.array, k) - x, y_mm(rubber.array, k) - y,
-        rubber.dip_share);
+        std::max(force_N, FORCE_LEAST_N), x_mm(rubber.array, k) - x, y_mm(rubber.array, k) - y, rubber.dip_share);
   }
 }
 
@@ -32,8 +31,7 @@ template <int N> Slopes<N> slopes_of(const Rubber &rubber, const Unknowns<N> &at
   for (int i = 0; i < N; i++) {
     const Unknowns<N> step = STEP * Unknowns<N>::Unit(i);
     slopes.col(i) =
-        (rubber.readings_Pa(Unknowns<N>(at + step)) - rubber.readings_Pa(Unknowns<N>(at - step))) /
-        (2.0 * STEP);
+        (rubber.readings_Pa(Unknowns<N>(at + step)) - rubber.readings_Pa(Unknowns<N>(at - step))) / (2.0 * STEP);
   }
   return slopes;
 }
@@ -63,8 +61,8 @@ double normal_quantile(double share) {
 }
 
 // Share of estimates with this covariance that are right.
-double share_right(const Unknowns<PAIR> &truth, const Eigen::Matrix<double, PAIR, PAIR> &covariance,
-                   const Right &right, Random &random) {
+double share_right(const Unknowns<PAIR> &truth, const Eigen::Matrix<double, PAIR, PAIR> &covariance, const Right &right,
+                   Random &random) {
   constexpr int DRAWS = 400;
   const Eigen::Matrix<double, PAIR, PAIR> root = covariance.llt().matrixL();
   int found = 0;
@@ -99,8 +97,8 @@ Column Rubber::readings_Pa(const Unknowns<LINE> &line) const {
     const double dx = x_mm(array, k) - line[0], dy = y_mm(array, k) - line[1];
     for (const auto &term : profile.tangential) {
       const double v = std::pow(double(term.sd_mm), 2);
-      Pa[Eigen::Index(k)] += 1e6 * (line[5] * dx + line[6] * dy) * double(term.moment_mm) /
-                             (2.0 * M_PI * v * v) * std::exp(-0.5 * (dx * dx + dy * dy) / v);
+      Pa[Eigen::Index(k)] += 1e6 * (line[5] * dx + line[6] * dy) * double(term.moment_mm) / (2.0 * M_PI * v * v) *
+                             std::exp(-0.5 * (dx * dx + dy * dy) / v);
     }
   }
   return Pa;
@@ -110,8 +108,7 @@ Column per_sd(const Column &readings_Pa, const ReadingErrors &errors) {
   const double of_model = errors.model_share * readings_Pa.maxCoeff();
   Column weights;
   for (Eigen::Index k = 0; k < weights.size(); k++) {
-    weights[k] = 1.0 / std::hypot(errors.noise_Pa, errors.gain_sd[std::size_t(k)] * readings_Pa[k],
-                                  of_model);
+    weights[k] = 1.0 / std::hypot(errors.noise_Pa, errors.gain_sd[std::size_t(k)] * readings_Pa[k], of_model);
   }
   return weights;
 }
@@ -123,8 +120,7 @@ bool is_right(const Right &right, const Unknowns<PAIR> &truth, const Unknowns<PA
 }
 
 template <int N>
-Fitted<N> fitted(const Rubber &rubber, const Column &readings_Pa, const Column &per_sd,
-                 const Unknowns<N> &start) {
+Fitted<N> fitted(const Rubber &rubber, const Column &readings_Pa, const Column &per_sd, const Unknowns<N> &start) {
   const auto off = [&](const Unknowns<N> &u) {
     return Column(per_sd.cwiseProduct(readings_Pa - rubber.readings_Pa(u)));
   };
@@ -149,10 +145,8 @@ Fitted<N> fitted(const Rubber &rubber, const Column &readings_Pa, const Column &
   }
   return best;
 }
-template Fitted<PAIR> fitted(const Rubber &, const Column &, const Column &,
-                             const Unknowns<PAIR> &);
-template Fitted<LINE> fitted(const Rubber &, const Column &, const Column &,
-                             const Unknowns<LINE> &);
+template Fitted<PAIR> fitted(const Rubber &, const Column &, const Column &, const Unknowns<PAIR> &);
+template Fitted<LINE> fitted(const Rubber &, const Column &, const Column &, const Unknowns<LINE> &);
 
 Unknowns<LINE> line_like(const Unknowns<PAIR> &pair) {
   const double force_N = pair[2] + pair[5], share = pair[2] / force_N;
@@ -165,16 +159,16 @@ Unknowns<LINE> line_like(const Unknowns<PAIR> &pair) {
   return line;
 }
 
-PairBound bound_of(const Rubber &rubber, const Unknowns<PAIR> &pair, const ReadingErrors &errors,
-                   const Right &right, Random &random) {
+PairBound bound_of(const Rubber &rubber, const Unknowns<PAIR> &pair, const ReadingErrors &errors, const Right &right,
+                   Random &random) {
   const Column readings = rubber.readings_Pa(pair), weights = per_sd(readings, errors);
   const Slopes<PAIR> J = weights.asDiagonal() * slopes_of<PAIR>(rubber, pair);
   const Eigen::Matrix<double, PAIR, PAIR> covariance =
       (J.transpose() * J).ldlt().solve(Eigen::Matrix<double, PAIR, PAIR>::Identity());
   const Unknowns<LINE> line = fitted<LINE>(rubber, readings, weights, line_like(pair)).at;
   const double distance = weights.cwiseProduct(readings - rubber.readings_Pa(line)).norm();
-  return {share_right(pair, covariance, right, random),
-          normal_below(distance - normal_quantile(1.0 - right.false_two)), line};
+  return {share_right(pair, covariance, right, random), normal_below(distance - normal_quantile(1.0 - right.false_two)),
+          line};
 }
 
 } // namespace fingertip::two

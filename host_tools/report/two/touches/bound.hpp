@@ -56,8 +56,7 @@ template <int N> struct Fitted {
   double left;
 };
 template <int N>
-Fitted<N> fitted(const Rubber &rubber, const Column &readings_Pa, const Column &per_sd,
-                 const Unknowns<N> &start);
+Fitted<N> fitted(const Rubber &rubber, const Column &readings_Pa, const Column &per_sd, const Unknowns<N> &start);
 // With the pair's middle and second moment: where the search for the nearest line begins.
 Unknowns<LINE> line_like(const Unknowns<PAIR> &pair);
 
@@ -65,7 +64,7 @@ struct PairBound {
   double placed, told;
   Unknowns<LINE> line; // the long contact that told is about
 };
-PairBound bound_of(const Rubber &rubber, const Unknowns<PAIR> &pair, const ReadingErrors &errors,
-                   const Right &right, Random &random);
+PairBound bound_of(const Rubber &rubber, const Unknowns<PAIR> &pair, const ReadingErrors &errors, const Right &right,
+                   Random &random);
 
 } // namespace fingertip::two

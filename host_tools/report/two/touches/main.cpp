@@ -46,7 +46,7 @@ constexpr double NEAR_mm = 1.5, FORCE_SHARE = 0.1; // a pair is right within the
 constexpr double BAD_mm = 1.0;
 constexpr int HELD_FRAMES = 40;                          // after the first answer
 constexpr two::Right RIGHT{NEAR_mm, FORCE_SHARE, 0.002}; // and as often a long contact called two
-constexpr std::size_t BOUNDED = 1; // touches of each pad whose bounds are computed
+constexpr std::size_t BOUNDED = 1;                       // touches of each pad whose bounds are computed
 // What a judge's model is off by, of the largest reading: as the firmware states of its own, half
 // and a quarter of it, and nothing.
 struct JudgeOf {
@@ -101,13 +101,11 @@ double distance(const Touch &touch, float x_mm, float y_mm) {
 
 // Between undirected lines.
 double angle_deg(const fit_shapes_result &said, double angle_rad) {
-  const double off =
-      std::atan2(static_cast<double>(said.along_y), static_cast<double>(said.along_x)) - angle_rad;
+  const double off = std::atan2(static_cast<double>(said.along_y), static_cast<double>(said.along_x)) - angle_rad;
   return DEGREES * std::abs(std::remainder(off, M_PI));
 }
 
-Judged judge_touch(const fit_shapes_result &said, const shapes_place &shown,
-                   const std::vector<Touch> &touches) {
+Judged judge_touch(const fit_shapes_result &said, const shapes_place &shown, const std::vector<Touch> &touches) {
   Judged judged{};
   judged.said = said;
   judged.pair = touches.size() == 2;
@@ -130,8 +128,7 @@ Judged judge_touch(const fit_shapes_result &said, const shapes_place &shown,
     const double crossed = std::max(off_mm[0][1], off_mm[1][0]);
     const bool is_straight = straight <= crossed;
     judged.off_mm = std::min(straight, crossed);
-    const int worse = is_straight ? (off_mm[0][0] >= off_mm[1][1] ? 0 : 1)
-                                  : (off_mm[0][1] >= off_mm[1][0] ? 0 : 1);
+    const int worse = is_straight ? (off_mm[0][0] >= off_mm[1][1] ? 0 : 1) : (off_mm[0][1] >= off_mm[1][0] ? 0 : 1);
     judged.off_sd_mm = sd_mm(worse);
   } else if (told) {
     Touch middle{};
@@ -142,24 +139,21 @@ Judged judge_touch(const fit_shapes_result &said, const shapes_place &shown,
     judged.off_mm = distance(middle, shown.x_mm, shown.y_mm);
     judged.off_sd_mm = static_cast<double>(shown.location_sd_mm);
     if (said.shape == FIT_SHAPE_TWO) { // of one contact: the nearer place
-      judged.off_mm = std::min(distance(middle, said.x_mm[0], said.y_mm[0]),
-                               distance(middle, said.x_mm[1], said.y_mm[1]));
+      judged.off_mm =
+          std::min(distance(middle, said.x_mm[0], said.y_mm[0]), distance(middle, said.x_mm[1], said.y_mm[1]));
       judged.off_sd_mm = std::max(sd_mm(0), sd_mm(1));
     }
   }
   if (said.shape == FIT_SHAPE_ELONGATED) {
     judged.angle_deg =
-        judged.pair ? angle_deg(said, std::atan2(touches[1].y_mm - touches[0].y_mm,
-                                                 touches[1].x_mm - touches[0].x_mm))
+        judged.pair ? angle_deg(said, std::atan2(touches[1].y_mm - touches[0].y_mm, touches[1].x_mm - touches[0].x_mm))
                     : angle_deg(said, touches[0].angle_rad + 0.5 * M_PI); // a roller lies along y
   }
   // One place for two contacts is wrong whatever its error, unless it is called long.
-  const bool is_far =
-      judged.off_mm > BAD_mm ||
-      (judged.pair && (said.shape == FIT_SHAPE_ROUND || said.shape == FIT_SHAPE_PULLED)) ||
-      (!judged.pair && said.shape == FIT_SHAPE_TWO);
-  judged.silent =
-      told && is_far && judged.off_sd_mm <= static_cast<double>(FIT_LOCATION_SD_LIMIT_mm);
+  const bool is_far = judged.off_mm > BAD_mm ||
+                      (judged.pair && (said.shape == FIT_SHAPE_ROUND || said.shape == FIT_SHAPE_PULLED)) ||
+                      (!judged.pair && said.shape == FIT_SHAPE_TWO);
+  judged.silent = told && is_far && judged.off_sd_mm <= static_cast<double>(FIT_LOCATION_SD_LIMIT_mm);
   return judged;
 }
 
@@ -177,8 +171,8 @@ template <fit_shape SHAPE> bool is(const Judged &j) {
 }
 
 template <typename Value>
-double quantile_where(const std::vector<Judged> &judged, double at,
-                      bool (*predicate)(const Judged &), const Value &value) {
+double quantile_where(const std::vector<Judged> &judged, double at, bool (*predicate)(const Judged &),
+                      const Value &value) {
   std::vector<double> values;
   for (const Judged &j : judged) {
     if (predicate(j)) {
@@ -197,9 +191,8 @@ bool is_warned(const Judged &j) {
 }
 
 double chi_square_median(const std::vector<Judged> &judged, int model) {
-  return quantile_where(judged, 0.5, has_place, [model](const Judged &j) {
-    return static_cast<double>(j.said.chi_square[model]);
-  });
+  return quantile_where(judged, 0.5, has_place,
+                        [model](const Judged &j) { return static_cast<double>(j.said.chi_square[model]); });
 }
 
 // What no judge of these pairs does better than: of each the smaller of its two limits, in percent.
@@ -230,27 +223,26 @@ ordered_json row_of(const std::string &name, const Answers &answers) {
   const auto angle = [](const Judged &j) { return j.angle_deg; };
   std::vector<Judged> placed;
   std::copy_if(judged.begin(), judged.end(), std::back_inserter(placed), has_place);
-  ordered_json row{
-      {"case", name},
-      {"touches", judged.size()},
-      {"one", share(judged, is<FIT_SHAPE_ROUND>)},
-      {"pulled", share(judged, is<FIT_SHAPE_PULLED>)},
-      {"long", share(judged, is<FIT_SHAPE_ELONGATED>)},
-      {"two", share(judged, is<FIT_SHAPE_TWO>)},
-      {"none", share(judged, is<FIT_SHAPE_NONE>)},
-      {"undecided", share(judged, is<FIT_SHAPE_UNDECIDED>)},
-      {"two_and_right", share(judged, is_right)},
-      {"silent", share(judged, [](const Judged &j) { return j.silent; })},
-      {"warned", share(judged, is_warned)},
-      {"off_p50_mm", quantile_where(judged, 0.5, has_place, off)},
-      {"off_p95_mm", quantile_where(judged, 0.95, has_place, off)},
-      {"within_1sd", share(placed, [](const Judged &j) { return j.off_mm <= j.off_sd_mm; })},
-      {"within_2sd", share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
-      {"angle_p50_deg", quantile_where(judged, 0.5, is<FIT_SHAPE_ELONGATED>, angle)},
-      {"angle_p90_deg", quantile_where(judged, 0.9, is<FIT_SHAPE_ELONGATED>, angle)},
-      {"chi_square_one", chi_square_median(judged, 0)},
-      {"chi_square_long", chi_square_median(judged, 1)},
-      {"chi_square_two", chi_square_median(judged, 2)}};
+  ordered_json row{{"case", name},
+                   {"touches", judged.size()},
+                   {"one", share(judged, is<FIT_SHAPE_ROUND>)},
+                   {"pulled", share(judged, is<FIT_SHAPE_PULLED>)},
+                   {"long", share(judged, is<FIT_SHAPE_ELONGATED>)},
+                   {"two", share(judged, is<FIT_SHAPE_TWO>)},
+                   {"none", share(judged, is<FIT_SHAPE_NONE>)},
+                   {"undecided", share(judged, is<FIT_SHAPE_UNDECIDED>)},
+                   {"two_and_right", share(judged, is_right)},
+                   {"silent", share(judged, [](const Judged &j) { return j.silent; })},
+                   {"warned", share(judged, is_warned)},
+                   {"off_p50_mm", quantile_where(judged, 0.5, has_place, off)},
+                   {"off_p95_mm", quantile_where(judged, 0.95, has_place, off)},
+                   {"within_1sd", share(placed, [](const Judged &j) { return j.off_mm <= j.off_sd_mm; })},
+                   {"within_2sd", share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
+                   {"angle_p50_deg", quantile_where(judged, 0.5, is<FIT_SHAPE_ELONGATED>, angle)},
+                   {"angle_p90_deg", quantile_where(judged, 0.9, is<FIT_SHAPE_ELONGATED>, angle)},
+                   {"chi_square_one", chi_square_median(judged, 0)},
+                   {"chi_square_long", chi_square_median(judged, 1)},
+                   {"chi_square_two", chi_square_median(judged, 2)}};
   row["two_first"] = share(answers.first, is<FIT_SHAPE_TWO>);
   row["two_and_right_first"] = share(answers.first, is_right);
   row["silent_first"] = share(answers.first, [](const Judged &j) { return j.silent; });
@@ -300,18 +292,17 @@ std::vector<Touch> draw_touches(const fit_array &array, const Case &c, Random &r
   }
 }
 
-Readings base_of(const fit_array &array, const shear::Object &object,
-                 const std::vector<Touch> &touches, double load, const shear::Cast &cast,
-                 Random &random) {
+Readings base_of(const fit_array &array, const shear::Object &object, const std::vector<Touch> &touches, double load,
+                 const shear::Cast &cast, Random &random) {
   Readings base{};
   const double direction = random.uniform(0.0, 2.0 * M_PI);
   for (const Touch &touch : touches) {
     const double load_N = load * touch.force_N;
-    const Readings felt = shear::base_Pa(
-        array, object,
-        {touch.force_N, touch.x_mm, touch.y_mm, touch.angle_rad, load_N * std::cos(direction),
-         load_N * std::sin(direction), twin::stuck_force_N(touch.force_N, load_N, FRICTION)},
-        nullptr, cast);
+    const Readings felt =
+        shear::base_Pa(array, object,
+                       {touch.force_N, touch.x_mm, touch.y_mm, touch.angle_rad, load_N * std::cos(direction),
+                        load_N * std::sin(direction), twin::stuck_force_N(touch.force_N, load_N, FRICTION)},
+                       nullptr, cast);
     for (std::size_t k = 0; k < SENSORS; k++) {
       base[k] += felt[k];
     }
@@ -319,11 +310,10 @@ Readings base_of(const fit_array &array, const shear::Object &object,
   return base;
 }
 
-Judged::Bounds bounds_of(const two::Rubber &rubber, const std::vector<Touch> &touches,
-                         two::ReadingErrors errors, const Random &random) {
+Judged::Bounds bounds_of(const two::Rubber &rubber, const std::vector<Touch> &touches, two::ReadingErrors errors,
+                         const Random &random) {
   two::Unknowns<two::PAIR> pair;
-  pair << touches[0].x_mm, touches[0].y_mm, touches[0].force_N, touches[1].x_mm, touches[1].y_mm,
-      touches[1].force_N;
+  pair << touches[0].x_mm, touches[0].y_mm, touches[0].force_N, touches[1].x_mm, touches[1].y_mm, touches[1].force_N;
   Judged::Bounds bounds;
   for (std::size_t judge = 0; judge < std::size(JUDGES); judge++) {
     errors.model_share = JUDGES[judge].model_share;
@@ -336,8 +326,7 @@ Judged::Bounds bounds_of(const two::Rubber &rubber, const std::vector<Touch> &to
 Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &options) {
   const fit_array array = firmware_array();
   const pad_profile profile = shear::profile_of(LAYER_mm);
-  Answers answers{std::vector<Judged>(pads.size() * TOUCHES),
-                  std::vector<Judged>(pads.size() * TOUCHES)};
+  Answers answers{std::vector<Judged>(pads.size() * TOUCHES), std::vector<Judged>(pads.size() * TOUCHES)};
   twin::in_parallel(pads.size(), [&](std::size_t p) {
     Random random(options.seed, stream_of(c.name), p);
     shapes_job shapes{};
@@ -373,8 +362,7 @@ Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &op
       fit_load doubt{};
       shear::Said loaded{};
       const bool has_load =
-          load_estimate.feel(base, known, noise_Pa, shear::ALL_SENSORS, of_load, loaded) &&
-          loaded.valid;
+          load_estimate.feel(base, known, noise_Pa, shear::ALL_SENSORS, of_load, loaded) && loaded.valid;
       for (int frame = 0; frame < FIT_SHAPES_FRAMES + HELD_FRAMES; frame++) {
         question.begins = frame == 0;
         auto &readings = question.pressure_Pa_q10;
@@ -388,20 +376,17 @@ Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &op
         const bool first = frame == FIT_SHAPES_FRAMES - 1;
         if (first || frame == FIT_SHAPES_FRAMES + HELD_FRAMES - 1) {
           fit_load_widen(&doubt, &array, &settings, &fit);
-          const shapes_place shown =
-              shapes_locate(&shapes.report, &fit, has_load ? &loaded.load : nullptr);
+          const shapes_place shown = shapes_locate(&shapes.report, &fit, has_load ? &loaded.load : nullptr);
           fit_shapes_result said = shapes.result;
           said.shape = shapes.report.shape; // which stays, while what is none of these begins again
-          (first ? answers.first : answers.held)[p * TOUCHES + t] =
-              judge_touch(said, shown, touches);
+          (first ? answers.first : answers.held)[p * TOUCHES + t] = judge_touch(said, shown, touches);
         }
       }
       Judged &found = answers.held[p * TOUCHES + t];
       if (found.pair && t < BOUNDED) {
         const Random draws(options.seed, stream_of("bounds, " + c.name), p * TOUCHES + t);
-        found.bounds =
-            bounds_of({array, profile, object, cast.dip_share}, touches,
-                      {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0}, draws);
+        found.bounds = bounds_of({array, profile, object, cast.dip_share}, touches,
+                                 {noise_Pa / std::sqrt(double(FIT_SHAPES_FRAMES)), pad.gain_sd, 0.0}, draws);
       }
     }
   });
@@ -442,16 +427,14 @@ ordered_json judge(const Options &options) {
   }
   const auto cube = named({"cube6"}); // of all, it reaches furthest for its spread
   for (const double ratio : {1.0, 3.0}) {
-    cases.push_back({std::string("two, 8 mm, ") + (ratio > 1.0 ? "3:1" : "1:1") + ", cubes", cube,
-                     8.0, ratio, 0.0, false, Towards::any, true});
+    cases.push_back({std::string("two, 8 mm, ") + (ratio > 1.0 ? "3:1" : "1:1") + ", cubes", cube, 8.0, ratio, 0.0,
+                     false, Towards::any, true});
   }
   for (const int apart_mm : {8, 10, 12}) {
     const std::string name = "two, " + std::to_string(apart_mm) + " mm, 1:1, ";
     cases.push_back({name + "exact gains", ball, double(apart_mm), 1.0, 0.0, true});
-    cases.push_back(
-        {name + "along the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::along});
-    cases.push_back(
-        {name + "across the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::across});
+    cases.push_back({name + "along the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::along});
+    cases.push_back({name + "across the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::across});
   }
   const std::vector<DippedPad> pads = dipped_pads(options);
   std::fprintf(stderr, "two_touches: %zu calibrations\n", pads.size());
@@ -487,8 +470,7 @@ ordered_json judge(const Options &options) {
     right("two_right_percent_10mm_3to1", "two, 10 mm, 3:1");
     for (const JudgeOf &judge : JUDGES) {
       const auto of = [&](const char *apart, const char *of_case) {
-        key((std::string("two_") + judge.possible + "_percent_" + apart).c_str(), of_case,
-            judge.possible);
+        key((std::string("two_") + judge.possible + "_percent_" + apart).c_str(), of_case, judge.possible);
       };
       of("8mm", "two, 8 mm, 1:1");
       of("12mm", "two, 12 mm, 1:1");
@@ -506,9 +488,8 @@ ordered_json judge(const Options &options) {
 
 int main(int argc, char **argv) {
   Options options;
-  return reference::print_found("two_touches", argc, argv,
-                                {{"--cache", &options.cache},
-                                 {"--seed", nullptr, &options.seed},
-                                 {"--pads", nullptr, &options.pads}},
-                                HELP, [&] { return judge(options); });
+  return reference::print_found(
+      "two_touches", argc, argv,
+      {{"--cache", &options.cache}, {"--seed", nullptr, &options.seed}, {"--pads", nullptr, &options.pads}}, HELP,
+      [&] { return judge(options); });
 }

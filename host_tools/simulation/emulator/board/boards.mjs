@@ -11,7 +11,9 @@ const MODELS = { multiplexed: MultiplexedBoard, parallel: ParallelBoard };
 const FOLDER = new URL('../../../../boards/', import.meta.url);
 const descriptorOf = (name) => new URL(`${name}/board.json`, FOLDER);
 
-export const BOARDS = readdirSync(FOLDER).filter((name) => existsSync(descriptorOf(name))).sort();
+export const BOARDS = readdirSync(FOLDER)
+  .filter((name) => existsSync(descriptorOf(name)))
+  .sort();
 
 export function findBoard(name) {
   if (!BOARDS.includes(name)) throw new InputError(`unknown board "${name}"; known: ${BOARDS.join(', ')}`);

@@ -127,7 +127,11 @@ export class I2cBus {
       byte &= answer.byte ?? answer;
       drivers += answer.drivers ?? 1;
     }
-    if (drivers > 1) this.report.warn('i2c', `${drivers} sensors answered one read of 0x${this.current.address.toString(16)} at once; their data was ANDed`);
+    if (drivers > 1)
+      this.report.warn(
+        'i2c',
+        `${drivers} sensors answered one read of 0x${this.current.address.toString(16)} at once; their data was ANDed`,
+      );
     for (const t of this.targets) t.readAcknowledged(acknowledge);
     this.waveform?.byte((byte << 1) | (acknowledge ? 0 : 1), this.timing, this.now_ns());
     this.current.bytes.push(byte);

@@ -7,7 +7,17 @@
  */
 
 /** UM10204 table 10, fast mode, ns. tVD;DAT may be longer by what SCL stays low beyond tLOW. */
-const FAST_MODE = { tHD_STA: 600, tLOW: 1300, tHIGH: 600, tSU_STA: 600, tSU_DAT: 100, tSU_STO: 600, tBUF: 1300, tVD_DAT: 900, period: 2500 };
+const FAST_MODE = {
+  tHD_STA: 600,
+  tLOW: 1300,
+  tHIGH: 600,
+  tSU_STA: 600,
+  tSU_DAT: 100,
+  tSU_STO: 600,
+  tBUF: 1300,
+  tVD_DAT: 900,
+  period: 2500,
+};
 const NAMES = Object.keys(FAST_MODE);
 const LIMITS_NS = Float64Array.from(Object.values(FAST_MODE));
 /** By number, since they are judged at every clock of every line. */
@@ -45,7 +55,8 @@ export class TimingCheck {
   }
 
   #warn(what, value_ns, bound) {
-    if (!this.messages.has(what)) this.messages.set(what, `${this.name}: ${NAMES[what]} is ${value_ns.toFixed(0)} ns; fast mode allows ${bound} ${LIMITS_NS[what]} ns`);
+    if (!this.messages.has(what))
+      this.messages.set(what, `${this.name}: ${NAMES[what]} is ${value_ns.toFixed(0)} ns; fast mode allows ${bound} ${LIMITS_NS[what]} ns`);
     this.report.warn('i2c', this.messages.get(what));
   }
 }
@@ -156,7 +167,8 @@ export class I2cLine {
     this.byte = (this.byte << 1) | (this.sdaHigh ? 1 : 0);
     this.bits += 1;
     const targets = this.phase === 'acknowledge' || (this.phase === 'transmit' && this.answer !== null);
-    if (targets && controllerPulls && !this.check.excused) this.report.warn('i2c', `${this.name}: the controller pulls SDA in a bit that is the sensor's`);
+    if (targets && controllerPulls && !this.check.excused)
+      this.report.warn('i2c', `${this.name}: the controller pulls SDA in a bit that is the sensor's`);
   }
 
   sdaFell(t_ns, controllerPulls) {
@@ -193,7 +205,8 @@ export class I2cLine {
 
   #mustBeBetweenBytes(what) {
     const between = (this.phase === 'receive' || this.phase === 'transmit') && this.bits === 1;
-    if (!between && !this.check.excused) this.report.warn('i2c', `${this.name}: ${what} in the middle of a byte (SDA changed while SCL was high)`);
+    if (!between && !this.check.excused)
+      this.report.warn('i2c', `${this.name}: ${what} in the middle of a byte (SDA changed while SCL was high)`);
   }
 
   #finish(t_ns) {

@@ -53,17 +53,29 @@ const MS5840 = {
   /** Product type and factory bits of the same dump. */
   word0: 0x8a1,
   /** Powers of 2 with C1..C4 and in the pressure; what one count of that is. */
-  sens: [16, 7], off: [17, 6], divisor: 15, count_Pa: 1,
+  sens: [16, 7],
+  off: [17, 6],
+  divisor: 15,
+  count_Pa: 1,
   secondOrder: secondOrderOfMs5840,
 };
 
 /** The datasheet's pages 7 and 9 of 10/2015; noise below OSR 8192 recalled; times as of the MS5611, the same converter. */
 const MS5837_30BA = {
-  osr: [[256, 0.6, 157, 0.012], [512, 1.17, 84, 0.009], [1024, 2.28, 54, 0.006], [2048, 4.54, 38, 0.004], [4096, 9.04, 28, 0.003], [8192, 18.08, 20, 0.002]]
-    .map(([name, max_ms, noise_Pa, noise_degC]) => ({ name, max_ns: max_ms * 1e6, noise_Pa, noise_degC })),
+  osr: [
+    [256, 0.6, 157, 0.012],
+    [512, 1.17, 84, 0.009],
+    [1024, 2.28, 54, 0.006],
+    [2048, 4.54, 38, 0.004],
+    [4096, 9.04, 28, 0.003],
+    [8192, 18.08, 20, 0.002],
+  ].map(([name, max_ms, noise_Pa, noise_degC]) => ({ name, max_ns: max_ms * 1e6, noise_Pa, noise_degC })),
   typical: [34982, 36352, 20328, 22354, 26646, 26146],
   word0: 0x1a << 5,
-  sens: [15, 8], off: [16, 7], divisor: 13, count_Pa: 10,
+  sens: [15, 8],
+  off: [16, 7],
+  divisor: 13,
+  count_Pa: 10,
   secondOrder: secondOrderOfMs5837,
 };
 
@@ -123,7 +135,10 @@ function temperatureOf(words, dT, { secondOrder }) {
 export function compensate(words, d1, d2, kind = MS5840) {
   const dT = d2 - words[5] * 2 ** 8;
   const { off, sens } = lineOf(words, dT, kind);
-  return { pressure_Pa: (((d1 * sens) / 2 ** 21 - off) / 2 ** kind.divisor) * kind.count_Pa, temperature_cdegC: temperatureOf(words, dT, kind) };
+  return {
+    pressure_Pa: (((d1 * sens) / 2 ** 21 - off) / 2 ** kind.divisor) * kind.count_Pa,
+    temperature_cdegC: temperatureOf(words, dT, kind),
+  };
 }
 
 /** Codes (real numbers) that a part with this PROM gives for a pressure and temperature. */
@@ -269,11 +284,19 @@ export class Ms5840 extends I2cTarget {
 
   #convert(now, isPressure, osr) {
     // A sensor that came back hears what is meant for the others.
-    if (!this.wasReset && !this.returned) this.report.warn('ms5840', `sensor ${this.index}: conversion before the reset command that loads its PROM`);
+    if (!this.wasReset && !this.returned)
+      this.report.warn('ms5840', `sensor ${this.index}: conversion before the reset command that loads its PROM`);
     const interrupted = this.conversion !== null && now < this.conversion.end_ns;
     const duration_ns = osr.max_ns * this.timeFactor;
     const corrupt = !isPressure && this.faults(this.index).d2Corrupt;
-    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted, wrong: corrupt ? 1 << this.#otherBit() : 0 };
+    this.conversion = {
+      isPressure,
+      osr,
+      start_ns: now,
+      end_ns: now + duration_ns,
+      spoiled: interrupted,
+      wrong: corrupt ? 1 << this.#otherBit() : 0,
+    };
   }
 
   /** Of a corrupt temperature: never the same twice running, or two would agree. */

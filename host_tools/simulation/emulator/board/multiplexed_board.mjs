@@ -14,8 +14,13 @@ const FUNCTION_I2C = 3;
 export class MultiplexedBoard {
   static facts({ wiring }) {
     return {
-      sensors: wiring.sensor_count, muxes: wiring.sensor_count / wiring.sensors_of_strip, lines: false,
-      probes: [['SDA', WAVEFORM_SDA], ['SCL', WAVEFORM_SCL]],
+      sensors: wiring.sensor_count,
+      muxes: wiring.sensor_count / wiring.sensors_of_strip,
+      lines: false,
+      probes: [
+        ['SDA', WAVEFORM_SDA],
+        ['SCL', WAVEFORM_SCL],
+      ],
     };
   }
 
@@ -82,13 +87,19 @@ export class MultiplexedBoard {
   }
 
   attachChip(chip) {
-    const { bus, wiring: { pin_sda, pin_scl, pin_mux_reset_0 } } = this;
+    const {
+      bus,
+      wiring: { pin_sda, pin_scl, pin_mux_reset_0 },
+    } = this;
     chip.i2c[0].bus = bus;
     const [sda, scl] = [chip.gpio[pin_sda], chip.gpio[pin_scl]];
     bus.gpio = { sda: false, scl: false };
     bus.onReleased = null;
     bus.problem = () => {
-      for (const [pin, name] of [[sda, `GPIO${pin_sda} (SDA)`], [scl, `GPIO${pin_scl} (SCL)`]]) {
+      for (const [pin, name] of [
+        [sda, `GPIO${pin_sda} (SDA)`],
+        [scl, `GPIO${pin_scl} (SCL)`],
+      ]) {
         if (pin.functionSelect !== FUNCTION_I2C) return `${name} has function ${pin.functionSelect}, not I2C (3)`;
         if (!pin.inputEnable) return `${name} has its input disabled`;
         if (pin.outputDisable) return `${name} has its output disabled`;
@@ -103,7 +114,8 @@ export class MultiplexedBoard {
     };
     const onPin = () => {
       for (const pin of [sda, scl]) {
-        if (pin.value === GPIOPinState.High) chip.fail('i2c', `GPIO${pin.index} drives the bus high; a bus line may only be pulled low or released`);
+        if (pin.value === GPIOPinState.High)
+          chip.fail('i2c', `GPIO${pin.index} drives the bus high; a bus line may only be pulled low or released`);
       }
       bus.drive(sda.value === GPIOPinState.Low, scl.value === GPIOPinState.Low);
     };

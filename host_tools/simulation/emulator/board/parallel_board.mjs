@@ -23,7 +23,9 @@ const GLITCH_AT_NS = 200;
 export class ParallelBoard {
   static facts({ wiring }) {
     return {
-      sensors: wiring.sensor_count, muxes: 0, lines: true,
+      sensors: wiring.sensor_count,
+      muxes: 0,
+      lines: true,
       probes: [...Array.from({ length: wiring.sensor_count }, (_, k) => [`SDA${k}`, 1 << k]), ['SCL', 1 << wiring.pin_scl]],
     };
   }
@@ -33,7 +35,10 @@ export class ParallelBoard {
    * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of every line;
    *   onLevels(levels, t_ns): lines changed, bits as in `probes`
    */
-  constructor({ wiring, rise_ns: usual }, { scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, sensor, rise_ns: rise }) {
+  constructor(
+    { wiring, rise_ns: usual },
+    { scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, sensor, rise_ns: rise },
+  ) {
     const rise_ns = rise === undefined ? usual : { sda: rise, scl: rise };
     /** Bitmaps of lines. */
     this.scl = 1 << wiring.pin_scl;
@@ -43,11 +48,22 @@ export class ParallelBoard {
     this.onLevels = onLevels;
     this.statistics = { transactions: 0, nacks: 0 };
     this.sclCheck = new TimingCheck(report, 'SCL');
-    this.sensors = Array.from({ length: wiring.sensor_count }, (_, index) => new Ms5840({
-      index, prng: new Prng(Math.imul(seed, 1000003) + index), now_ns: () => scope.nanos, report, stimulus, sensor,
-      faults: (i) => faults().sensor(i),
-    }));
-    this.lines = this.sensors.map((target, k) => new I2cLine({ name: `SDA${k}`, target, rise_ns, report, statistics: this.statistics, onTransfer }));
+    this.sensors = Array.from(
+      { length: wiring.sensor_count },
+      (_, index) =>
+        new Ms5840({
+          index,
+          prng: new Prng(Math.imul(seed, 1000003) + index),
+          now_ns: () => scope.nanos,
+          report,
+          stimulus,
+          sensor,
+          faults: (i) => faults().sensor(i),
+        }),
+    );
+    this.lines = this.sensors.map(
+      (target, k) => new I2cLine({ name: `SDA${k}`, target, rise_ns, report, statistics: this.statistics, onTransfer }),
+    );
     this.absent = new I2cTarget(-1);
     this.rise_ns = rise_ns;
     /** Who pulls down; what a fault ties to VDD wins. */
@@ -57,7 +73,10 @@ export class ParallelBoard {
     /** Released lines that are not high yet, and since when. */
     this.rising = 0;
     this.released_ns = new Float64Array(32);
-    this.riseAlarms = [[this.sda, rise_ns.sda], [this.scl, rise_ns.scl]].map(([mask, rise]) => this.#riser(mask, rise * RELEASE_TO_HIGH));
+    this.riseAlarms = [
+      [this.sda, rise_ns.sda],
+      [this.scl, rise_ns.scl],
+    ].map(([mask, rise]) => this.#riser(mask, rise * RELEASE_TO_HIGH));
     this.sensorsAlarm = scope.createAlarm(() => this.#sensorsPull());
     this.glitches = 0;
     this.glitchAlarm = scope.createAlarm(() => this.#glitch());
@@ -124,7 +143,8 @@ export class ParallelBoard {
   attachChip(chip) {
     const drive = (low, high) => {
       const pins = high & this.all;
-      if (pins) chip.fail('i2c', `GPIO${31 - Math.clz32(pins & -pins)} drives a bus line high; a bus line may only be pulled low or released`);
+      if (pins)
+        chip.fail('i2c', `GPIO${31 - Math.clz32(pins & -pins)} drives a bus line high; a bus line may only be pulled low or released`);
       this.low.chip = low & this.all;
       this.#resolve();
     };

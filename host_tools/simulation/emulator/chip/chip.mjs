@@ -43,7 +43,17 @@ const PSM_PROC1 = 1 << 16;
 const ISER = 0x100;
 const FIFO_IRQ_OF_CORE_1 = 16;
 /** Interrupt to what wakes by it in deep sleep: the bits of SLEEP_EN0 and SLEEP_EN1. */
-const WAKES = new Map([[0, [0, 1 << 5]], [1, [0, 1 << 5]], [2, [0, 1 << 5]], [3, [0, 1 << 5]], [5, [0, 3 << 10]], [11, [1 << 5, 0]], [12, [1 << 5, 0]], [23, [1 << 6, 0]], [24, [1 << 7, 0]]]);
+const WAKES = new Map([
+  [0, [0, 1 << 5]],
+  [1, [0, 1 << 5]],
+  [2, [0, 1 << 5]],
+  [3, [0, 1 << 5]],
+  [5, [0, 3 << 10]],
+  [11, [1 << 5, 0]],
+  [12, [1 << 5, 0]],
+  [23, [1 << 6, 0]],
+  [24, [1 << 7, 0]],
+]);
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
 /** So many cycles of the ring oscillator the boot ROM tries to load the second stage, 128 times (pico-bootrom, bootrom_main.c), which waits for a flash that is still erasing: 255 ms at 12 MHz. */
@@ -54,10 +64,31 @@ const HUNG_AFTER_NS = 2e9;
 /** Page (address >> 14) to bit in RESETS. */
 const RESET_BIT_OF_PAGE = new Map(
   Object.entries({
-    0x40004000: 18, 0x40000000: 19, 0x40014000: 5, 0x40018000: 6, 0x4001c000: 8, 0x40020000: 9, 0x40028000: 12,
-    0x4002c000: 13, 0x40030000: 1, 0x40034000: 22, 0x40038000: 23, 0x4003c000: 16, 0x40040000: 17, 0x40044000: 3,
-    0x40048000: 4, 0x4004c000: 0, 0x40050000: 14, 0x40054000: 21, 0x4005c000: 15, 0x4006c000: 20, 0x50000000: 2,
-    0x50100000: 24, 0x50110000: 24, 0x50200000: 10, 0x50300000: 11,
+    0x40004000: 18,
+    0x40000000: 19,
+    0x40014000: 5,
+    0x40018000: 6,
+    0x4001c000: 8,
+    0x40020000: 9,
+    0x40028000: 12,
+    0x4002c000: 13,
+    0x40030000: 1,
+    0x40034000: 22,
+    0x40038000: 23,
+    0x4003c000: 16,
+    0x40040000: 17,
+    0x40044000: 3,
+    0x40048000: 4,
+    0x4004c000: 0,
+    0x40050000: 14,
+    0x40054000: 21,
+    0x4005c000: 15,
+    0x4006c000: 20,
+    0x50000000: 2,
+    0x50100000: 24,
+    0x50110000: 24,
+    0x50200000: 10,
+    0x50300000: 11,
   }).map(([address, bit]) => [Number(address) >>> 14, bit]),
 );
 
@@ -103,7 +134,21 @@ export class Chip extends RP2040 {
    *   in the chip; kept: { sram, usbDPRAM, watchdog }
    *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, rosc_hz = ROSC_HZ, uptime_us = 0, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
+  constructor(
+    time,
+    report,
+    {
+      serial,
+      seed = 1,
+      clock_ppm = 0,
+      revision = 2,
+      rosc_hz = ROSC_HZ,
+      uptime_us = 0,
+      memory = new FlashMemory({ time, serial, seed }),
+      trouble = new Trouble(),
+      kept = null,
+    },
+  ) {
     super(time.scope());
     this.memory = memory;
     memory.fail = (source, message) => this.fail(source, message);
@@ -149,7 +194,16 @@ export class Chip extends RP2040 {
     this.dma = new Dma(this);
     this.pio = [new Pio(this, 0), new Pio(this, 1)];
     this.pins = new Pins(this);
-    const ioQspi = new RegisterFile(this, 'IO_QSPI', Object.fromEntries([0, 1, 2, 3, 4, 5].flatMap((i) => [[8 * i, [0, 0]], [8 * i + 4, [0x1f, 0x3003331f]]])));
+    const ioQspi = new RegisterFile(
+      this,
+      'IO_QSPI',
+      Object.fromEntries(
+        [0, 1, 2, 3, 4, 5].flatMap((i) => [
+          [8 * i, [0, 0]],
+          [8 * i + 4, [0x1f, 0x3003331f]],
+        ]),
+      ),
+    );
     const writeIoQspi = ioQspi.writeUint32.bind(ioQspi);
     ioQspi.writeUint32 = (offset, value) => {
       writeIoQspi(offset, value);
@@ -178,7 +232,10 @@ export class Chip extends RP2040 {
     });
     for (const pin of this.qspi) pin.padValue = 0x56;
     const noise = new Prng(seed ^ 0x5eed);
-    for (const [memory, before] of [[this.sram, kept?.sram], [this.usbDPRAM, kept?.usbDPRAM]]) {
+    for (const [memory, before] of [
+      [this.sram, kept?.sram],
+      [this.usbDPRAM, kept?.usbDPRAM],
+    ]) {
       const words = new Uint32Array(memory.buffer);
       if (before) memory.set(before);
       else for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
@@ -241,7 +298,10 @@ export class Chip extends RP2040 {
     core.registers[15] = BOOT2_RAM;
     this.time.setCycleSource(core, 1e9 / this.trueHz(this.clkSys));
     if (stored !== computed) {
-      this.fail('boot ROM', `second stage CRC is 0x${stored.toString(16)}, computed 0x${computed.toString(16)}: the chip would not start this image`);
+      this.fail(
+        'boot ROM',
+        `second stage CRC is 0x${stored.toString(16)}, computed 0x${computed.toString(16)}: the chip would not start this image`,
+      );
     }
     const magic = this.watchdog.scratch[4];
     if (this.watchdog.reason && magic === 0xb007c0d3) {
@@ -318,7 +378,8 @@ export class Chip extends RP2040 {
   }
 
   #followPower({ frceOn, frceOff }) {
-    if (frceOn || frceOff & ~PSM_PROC1) this.fail('PSM', `FRCE_ON 0x${frceOn.toString(16)}, FRCE_OFF 0x${frceOff.toString(16)}: only the reset of core 1 is modelled`);
+    if (frceOn || frceOff & ~PSM_PROC1)
+      this.fail('PSM', `FRCE_ON 0x${frceOn.toString(16)}, FRCE_OFF 0x${frceOff.toString(16)}: only the reset of core 1 is modelled`);
     if (frceOff && this.core.id === 1) this.fail('PSM', 'core 1 resets itself');
     if (frceOff) this.second.powerDown();
     else if (this.second.state === 'off') this.second.powerUp();
@@ -331,7 +392,10 @@ export class Chip extends RP2040 {
   watchdogFired(reason) {
     const wdsel = this.peripherals[0x40010].wdsel;
     if ((wdsel & 0x1fffc) !== 0x1fffc) {
-      this.fail('WATCHDOG', `fired with PSM_WDSEL 0x${wdsel.toString(16)}; select everything but the oscillators (0x1fffc), or the reboot is partial`);
+      this.fail(
+        'WATCHDOG',
+        `fired with PSM_WDSEL 0x${wdsel.toString(16)}; select everything but the oscillators (0x1fffc), or the reboot is partial`,
+      );
     }
     this.watchdog.reason = reason;
     this.onWatchdog?.(reason);
@@ -362,7 +426,8 @@ export class Chip extends RP2040 {
       value = this.sio.readUint32(word - 0xd0000000);
     } else if (address >>> 12 === 0xe000e) {
       const offset = word & 0xfff;
-      value = offset === SCR ? this.core.scr : offset >= 0xd90 && offset <= 0xda0 ? this.core.mpu.read(offset) : this.ppb.readUint32(offset);
+      value =
+        offset === SCR ? this.core.scr : offset >= 0xd90 && offset <= 0xda0 ? this.core.mpu.read(offset) : this.ppb.readUint32(offset);
     } else if (address >>> 12 === DPRAM_BASE >>> 12) {
       this.#checkPage(address, 'read of');
       value = this.usbDPRAMView.getUint32(word - DPRAM_BASE, true);
@@ -413,7 +478,8 @@ export class Chip extends RP2040 {
   #checkPrivate(offset, value) {
     if (this.core.id === 0) return;
     if (offset >= 0x10 && offset < 0x20) this.fail('core 1', 'its SysTick is not modelled');
-    if (offset === ISER && value & ~(1 << FIFO_IRQ_OF_CORE_1)) this.fail('core 1', `interrupts 0x${value.toString(16)}: only that of its FIFO is modelled`);
+    if (offset === ISER && value & ~(1 << FIFO_IRQ_OF_CORE_1))
+      this.fail('core 1', `interrupts 0x${value.toString(16)}: only that of its FIFO is modelled`);
   }
 
   #writeScr(value) {
@@ -426,7 +492,8 @@ export class Chip extends RP2040 {
     const pending = core.pendingInterrupts & core.enabledInterrupts;
     const [en0, en1] = [clocks.readUint32(0xa8), clocks.readUint32(0xac)];
     for (const [irq, [in0, in1]] of WAKES) {
-      if ((pending >>> irq) & 1 && (in0 & ~en0 || in1 & ~en1)) this.fail('CLOCKS', `woken from deep sleep by interrupt ${irq}, but SLEEP_EN leaves its block without a clock`);
+      if ((pending >>> irq) & 1 && (in0 & ~en0 || in1 & ~en1))
+        this.fail('CLOCKS', `woken from deep sleep by interrupt ${irq}, but SLEEP_EN leaves its block without a clock`);
     }
   }
 

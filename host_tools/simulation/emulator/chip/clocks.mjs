@@ -21,9 +21,31 @@ const TIMER = 21;
 const RELEASED_BY_BOOT_ROM = (1 << 6) | (1 << 9) | (1 << 21);
 
 export const RESET_NAMES = [
-  'ADC', 'BUSCTRL', 'DMA', 'I2C0', 'I2C1', 'IO_BANK0', 'IO_QSPI', 'JTAG', 'PADS_BANK0', 'PADS_QSPI', 'PIO0',
-  'PIO1', 'PLL_SYS', 'PLL_USB', 'PWM', 'RTC', 'SPI0', 'SPI1', 'SYSCFG', 'SYSINFO', 'TBMAN', 'TIMER', 'UART0',
-  'UART1', 'USBCTRL',
+  'ADC',
+  'BUSCTRL',
+  'DMA',
+  'I2C0',
+  'I2C1',
+  'IO_BANK0',
+  'IO_QSPI',
+  'JTAG',
+  'PADS_BANK0',
+  'PADS_QSPI',
+  'PIO0',
+  'PIO1',
+  'PLL_SYS',
+  'PLL_USB',
+  'PWM',
+  'RTC',
+  'SPI0',
+  'SPI1',
+  'SYSCFG',
+  'SYSINFO',
+  'TBMAN',
+  'TIMER',
+  'UART0',
+  'UART1',
+  'USBCTRL',
 ];
 
 export class Resets extends BasePeripheral {
@@ -54,7 +76,7 @@ export class Resets extends BasePeripheral {
       for (let bit = 0; entered >>> bit; bit++) {
         if ((entered >>> bit) & 1) this.rp2040.resetBlock(bit);
       }
-      if (left >>> TIMER & 1) this.rp2040.timer.tickChanged(this.rp2040.watchdog.tickHz);
+      if ((left >>> TIMER) & 1) this.rp2040.timer.tickChanged(this.rp2040.watchdog.tickHz);
     } else super.writeUint32(offset, value);
   }
 }
@@ -71,7 +93,7 @@ export class Xosc extends BasePeripheral {
   }
 
   get enabled() {
-    return (this.ctrl >>> 12) === 0xfab;
+    return this.ctrl >>> 12 === 0xfab;
   }
 
   /** The cycles of the crystal are counted up to STARTUP, if there are any. */
@@ -236,8 +258,17 @@ export class Clocks extends BasePeripheral {
   get refHz() {
     const source = this.ref.ctrl & 3;
     const auxiliary = (this.ref.ctrl >>> 5) & 3;
-    const hz = source === 0 ? this.rp2040.roscHz : source === 2 ? (this.rp2040.xosc.stable ? XOSC_HZ : 0) : source === 1 && auxiliary === 0 ? this.rp2040.pllUsb.outputHz : 0;
-    return hz / (((this.ref.div >>> 8) & 3) || 4);
+    const hz =
+      source === 0
+        ? this.rp2040.roscHz
+        : source === 2
+          ? this.rp2040.xosc.stable
+            ? XOSC_HZ
+            : 0
+          : source === 1 && auxiliary === 0
+            ? this.rp2040.pllUsb.outputHz
+            : 0;
+    return hz / ((this.ref.div >>> 8) & 3 || 4);
   }
 
   /** clk_ref or clk_sys comes from the crystal. */
@@ -251,23 +282,40 @@ export class Clocks extends BasePeripheral {
 
   get sysHz() {
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    const hz = this.sys.ctrl & 1
-      ? this.#auxiliaryHz(this.sys, [() => pllSys.outputHz, () => pllUsb.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)])
-      : this.refHz;
+    const hz =
+      this.sys.ctrl & 1
+        ? this.#auxiliaryHz(this.sys, [
+            () => pllSys.outputHz,
+            () => pllUsb.outputHz,
+            () => this.rp2040.roscHz,
+            () => (xosc.stable ? XOSC_HZ : 0),
+          ])
+        : this.refHz;
     return hz / (this.sys.div / 256 || 65536);
   }
 
   get usbHz() {
     if (!(this.usb.ctrl & CTRL_ENABLE)) return 0;
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    const hz = this.#auxiliaryHz(this.usb, [() => pllUsb.outputHz, () => pllSys.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)]);
-    return hz / (((this.usb.div >>> 8) & 3) || 4);
+    const hz = this.#auxiliaryHz(this.usb, [
+      () => pllUsb.outputHz,
+      () => pllSys.outputHz,
+      () => this.rp2040.roscHz,
+      () => (xosc.stable ? XOSC_HZ : 0),
+    ]);
+    return hz / ((this.usb.div >>> 8) & 3 || 4);
   }
 
   get periHz() {
     if (!(this.peri.ctrl & CTRL_ENABLE)) return 0;
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    return this.#auxiliaryHz(this.peri, [() => this.sysHz, () => pllSys.outputHz, () => pllUsb.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)]);
+    return this.#auxiliaryHz(this.peri, [
+      () => this.sysHz,
+      () => pllSys.outputHz,
+      () => pllUsb.outputHz,
+      () => this.rp2040.roscHz,
+      () => (xosc.stable ? XOSC_HZ : 0),
+    ]);
   }
 
   readUint32(offset) {

@@ -205,14 +205,16 @@ export class StrictCore extends CortexM0Core {
     const pc = r[15];
     let cycles = 1;
     switch (op >>> 11) {
-      case 9: { // LDR literal
+      case 9: {
+        // LDR literal
         const address = ((pc + 4) & ~3) + ((op & 0xff) << 2);
         cycles += this.accessCycles(address, false);
         r[(op >>> 8) & 7] = this.readUint32(address);
         break;
       }
       case 10:
-      case 11: { // register offset
+      case 11: {
+        // register offset
         const address = (r[(op >>> 3) & 7] + r[(op >>> 6) & 7]) >>> 0;
         const t = op & 7;
         const kind = (op >>> 9) & 7;
@@ -295,7 +297,8 @@ export class StrictCore extends CortexM0Core {
       case 22:
       case 23: {
         const kind = (op >>> 8) & 15;
-        if (kind === 4 || kind === 5) { // PUSH
+        if (kind === 4 || kind === 5) {
+          // PUSH
           const count = bitCount(op & 0x1ff);
           let address = r[13] - 4 * count;
           const top = address;
@@ -307,7 +310,8 @@ export class StrictCore extends CortexM0Core {
           if (op & 0x100) this.writeUint32(address, r[14]);
           r[13] = top;
           cycles += count;
-        } else if (kind === 12) { // POP without pc
+        } else if (kind === 12) {
+          // POP without pc
           let address = r[13];
           for (let i = 0; i < 8; i++) {
             if (!((op >>> i) & 1)) continue;
@@ -322,7 +326,8 @@ export class StrictCore extends CortexM0Core {
         }
         break;
       }
-      case 24: { // STMIA
+      case 24: {
+        // STMIA
         const n = (op >>> 8) & 7;
         let address = r[n];
         for (let i = 0; i < 8; i++) {
@@ -334,7 +339,8 @@ export class StrictCore extends CortexM0Core {
         r[n] = address;
         break;
       }
-      case 25: { // LDMIA
+      case 25: {
+        // LDMIA
         const n = (op >>> 8) & 7;
         let address = r[n];
         for (let i = 0; i < 8; i++) {

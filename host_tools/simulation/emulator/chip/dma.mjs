@@ -35,8 +35,22 @@ const TRANS_COUNT = 2;
 const CTRL = 3;
 /** What each word of a channel's four aliases is; the last of each triggers. */
 const ALIASES = [
-  READ_ADDR, WRITE_ADDR, TRANS_COUNT, CTRL, CTRL, READ_ADDR, WRITE_ADDR, TRANS_COUNT,
-  CTRL, TRANS_COUNT, READ_ADDR, WRITE_ADDR, CTRL, WRITE_ADDR, TRANS_COUNT, READ_ADDR,
+  READ_ADDR,
+  WRITE_ADDR,
+  TRANS_COUNT,
+  CTRL,
+  CTRL,
+  READ_ADDR,
+  WRITE_ADDR,
+  TRANS_COUNT,
+  CTRL,
+  TRANS_COUNT,
+  READ_ADDR,
+  WRITE_ADDR,
+  CTRL,
+  WRITE_ADDR,
+  TRANS_COUNT,
+  READ_ADDR,
 ];
 
 const ACCESS_CYCLES = 2;
@@ -45,8 +59,17 @@ const accessCycles = (address) => (address >>> 28 === 4 ? ACCESS_CYCLES + APB_EX
 
 function makeChannel(index) {
   return {
-    index, readAddress: 0, writeAddress: 0, reload: 0, ctrl: index << 11, bytes: 1, treq: 0,
-    busy: false, toIssue: 0, remaining: 0, aborted: false,
+    index,
+    readAddress: 0,
+    writeAddress: 0,
+    reload: 0,
+    ctrl: index << 11,
+    bytes: 1,
+    treq: 0,
+    busy: false,
+    toIssue: 0,
+    remaining: 0,
+    aborted: false,
     /** Issued, but not yet through at the side that paces. */
     credit: 0,
     /** Issued, but not yet written. */
@@ -104,11 +127,15 @@ export class Dma extends BasePeripheral {
     const { treq } = channel;
     if (treq !== PERMANENT) {
       if (treq >= PIO_REQUESTS) this.#fail(channel, `request ${treq} is not modelled; 0 to 15 (PIO) and 63 (unpaced) are`);
-      if (this.paced[treq]) this.#fail(channel, `paced by request ${treq}, as busy channel ${this.paced[treq].index} is; the credits would be counted twice`);
+      if (this.paced[treq])
+        this.#fail(channel, `paced by request ${treq}, as busy channel ${this.paced[treq].index} is; the credits would be counted twice`);
       this.paced[treq] = channel;
     }
     if ((channel.readAddress | channel.writeAddress) & (channel.bytes - 1)) {
-      this.#fail(channel, `addresses 0x${channel.readAddress.toString(16)}, 0x${channel.writeAddress.toString(16)} are not aligned to ${channel.bytes} bytes`);
+      this.#fail(
+        channel,
+        `addresses 0x${channel.readAddress.toString(16)}, 0x${channel.writeAddress.toString(16)} are not aligned to ${channel.bytes} bytes`,
+      );
     }
     channel.busy = true;
     channel.aborted = false;
@@ -268,7 +295,10 @@ export class Dma extends BasePeripheral {
     if (offset >= 0x800 && offset < 0xb00) {
       const channel = this.channels[(offset - 0x800) >>> 6];
       if ((offset & 0x3f) === 4) return channel.reload >>> 0;
-      if ((offset & 0x3f) === 0) return channel.treq < PIO_REQUESTS ? Math.max(0, this.rp2040.pio[channel.treq >>> 3].requests(channel.treq & 7) - channel.credit) : 0;
+      if ((offset & 0x3f) === 0)
+        return channel.treq < PIO_REQUESTS
+          ? Math.max(0, this.rp2040.pio[channel.treq >>> 3].requests(channel.treq & 7) - channel.credit)
+          : 0;
     }
     switch (offset) {
       case 0x400:
@@ -329,7 +359,8 @@ export class Dma extends BasePeripheral {
     const what = ALIASES[word];
     if (what === CTRL) {
       if (((value >>> 2) & 3) === 3) this.#fail(channel, 'DATA_SIZE 3 is reserved');
-      if (channel.busy && (value ^ channel.ctrl) & CTRL_WRITABLE & ~CTRL_EN) this.#fail(channel, 'CTRL changed while the channel is busy; only EN may');
+      if (channel.busy && (value ^ channel.ctrl) & CTRL_WRITABLE & ~CTRL_EN)
+        this.#fail(channel, 'CTRL changed while the channel is busy; only EN may');
       channel.ctrl = value & CTRL_WRITABLE;
       channel.bytes = 1 << ((value >>> 2) & 3);
       channel.treq = (value >>> 15) & 63;

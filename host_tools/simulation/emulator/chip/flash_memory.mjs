@@ -17,7 +17,18 @@ export const FLASH_BYTES = 2 * 1024 * 1024;
 const PAGE_BYTES = 256;
 const SECTOR_BYTES = 4096;
 
-const OP = { writeStatus: 0x01, program: 0x02, read: 0x03, status: 0x05, writeEnable: 0x06, erase: 0x20, status2: 0x35, uniqueId: 0x4b, jedecId: 0x9f, exit: 0xff };
+const OP = {
+  writeStatus: 0x01,
+  program: 0x02,
+  read: 0x03,
+  status: 0x05,
+  writeEnable: 0x06,
+  erase: 0x20,
+  status2: 0x35,
+  uniqueId: 0x4b,
+  jedecId: 0x9f,
+  exit: 0xff,
+};
 const KNOWN = new Set(Object.values(OP));
 
 /** Datasheet 9.6, typical and maximum: page program, sector erase. The typical page is that of older revisions, 0.7 ms. */
@@ -77,13 +88,17 @@ export class FlashMemory {
       this.status2 = command[2] ?? this.status2;
       this.writeEnabled = false;
     } else if (op === OP.uniqueId && command.length < 13) {
-      this.fail('flash', `chip select rose after ${command.length} of the 13 bytes of a unique-id read; keep the FIFO fed or force chip select`);
+      this.fail(
+        'flash',
+        `chip select rose after ${command.length} of the 13 bytes of a unique-id read; keep the FIFO fed or force chip select`,
+      );
     } else if (op === OP.program) {
       this.#needsWriteEnable('page programmed');
       const at = this.#address(command);
       const data = Uint8Array.from(command.slice(4));
       if (command.length < 5) this.fail('flash', 'page program without data');
-      if ((at % PAGE_BYTES) + data.length > PAGE_BYTES) this.fail('flash', `page program of ${data.length} bytes at 0x${at.toString(16)} passes the end of the page`);
+      if ((at % PAGE_BYTES) + data.length > PAGE_BYTES)
+        this.fail('flash', `page program of ${data.length} bytes at 0x${at.toString(16)} passes the end of the page`);
       this.#begin({ kind: 'program', at, data });
     } else if (op === OP.erase) {
       this.#needsWriteEnable('sector erased');
@@ -108,7 +123,8 @@ export class FlashMemory {
     const op = command[0];
     if (index === 0) {
       if (!KNOWN.has(op)) this.fail('flash', `command 0x${op.toString(16)} is not modelled`);
-      if (this.isBusy && op !== OP.status && op !== OP.status2) this.fail('flash', `command 0x${op.toString(16)} while the flash is busy; it would be passed over`);
+      if (this.isBusy && op !== OP.status && op !== OP.status2)
+        this.fail('flash', `command 0x${op.toString(16)} while the flash is busy; it would be passed over`);
       return 0xff;
     }
     switch (op) {

@@ -41,7 +41,21 @@ const ABRT_USER = 1 << 16;
 /** The only register whose reading ends the flushed state of the transmit FIFO after an abort (4.3.17). */
 const CLR_TX_ABRT = 0x54;
 /** Reading one of these offsets clears the bits. */
-const CLEARS = new Map(Object.entries({ 0x44: RX_UNDER, 0x48: RX_OVER, 0x4c: TX_OVER, 0x50: 32, 0x54: TX_ABRT, 0x58: 128, 0x5c: ACTIVITY, 0x60: STOP_DET, 0x64: START_DET, 0x68: 2048, 0xa8: 4096 }).map(([k, v]) => [Number(k), v]));
+const CLEARS = new Map(
+  Object.entries({
+    0x44: RX_UNDER,
+    0x48: RX_OVER,
+    0x4c: TX_OVER,
+    0x50: 32,
+    0x54: TX_ABRT,
+    0x58: 128,
+    0x5c: ACTIVITY,
+    0x60: STOP_DET,
+    0x64: START_DET,
+    0x68: 2048,
+    0xa8: 4096,
+  }).map(([k, v]) => [Number(k), v]),
+);
 
 /** Minimum SCL low and high times of the I2C specification (UM10204, table 10), ns. */
 const MINIMUM_NS = { 1: { low: 4700, high: 4000, name: 'standard' }, 2: { low: 1300, high: 600, name: 'fast' } };
@@ -153,7 +167,13 @@ export class I2cBlock extends BasePeripheral {
       case 0x6c:
         return this.enable;
       case 0x70:
-        return (this.#active ? 0x21 : 0) | (this.tx.length < FIFO_DEPTH ? 2 : 0) | (this.tx.length ? 0 : 4) | (this.rx.length ? 8 : 0) | (this.rx.length >= FIFO_DEPTH ? 16 : 0);
+        return (
+          (this.#active ? 0x21 : 0) |
+          (this.tx.length < FIFO_DEPTH ? 2 : 0) |
+          (this.tx.length ? 0 : 4) |
+          (this.rx.length ? 8 : 0) |
+          (this.rx.length >= FIFO_DEPTH ? 16 : 0)
+        );
       case 0x74:
         return this.tx.length;
       case 0x78:
@@ -199,7 +219,8 @@ export class I2cBlock extends BasePeripheral {
   }
 
   #whileDisabled(what) {
-    if (this.enabled || this.#active) this.rp2040.fail(this.name, `${what} written while the block is enabled; clear IC_ENABLE and wait for IC_ENABLE_STATUS first`);
+    if (this.enabled || this.#active)
+      this.rp2040.fail(this.name, `${what} written while the block is enabled; clear IC_ENABLE and wait for IC_ENABLE_STATUS first`);
   }
 
   writeUint32(offset, value) {
@@ -208,7 +229,10 @@ export class I2cBlock extends BasePeripheral {
         this.#whileDisabled('IC_CON');
         this.con = value & 0x3ff;
         if (!(this.con & 1) || !(this.con & CON_SLAVE_DISABLE) || this.con & CON_10BIT) {
-          this.rp2040.fail(this.name, `IC_CON 0x${value.toString(16)}: only a 7-bit controller (MASTER_MODE and IC_SLAVE_DISABLE set) is modelled`);
+          this.rp2040.fail(
+            this.name,
+            `IC_CON 0x${value.toString(16)}: only a 7-bit controller (MASTER_MODE and IC_SLAVE_DISABLE set) is modelled`,
+          );
         }
         return;
       case 0x04:
@@ -299,7 +323,10 @@ export class I2cBlock extends BasePeripheral {
     }
     if ((this.sdaHold & 0xffff) > low - 2) chip.fail(this.name, 'IC_SDA_HOLD longer than the SCL low time allows');
     if (this.low_ns < limits.low || this.high_ns < limits.high) {
-      chip.fail(this.name, `SCL low ${this.low_ns.toFixed(0)} ns, high ${this.high_ns.toFixed(0)} ns; ${limits.name} mode needs ${limits.low} and ${limits.high} ns`);
+      chip.fail(
+        this.name,
+        `SCL low ${this.low_ns.toFixed(0)} ns, high ${this.high_ns.toFixed(0)} ns; ${limits.name} mode needs ${limits.low} and ${limits.high} ns`,
+      );
     }
   }
 
@@ -337,7 +364,11 @@ export class I2cBlock extends BasePeripheral {
 
   #startCondition() {
     this.state = 'start';
-    this.bus.timing = { low_ns: this.low_ns, high_ns: this.high_ns, hold_ns: ((this.sdaHold & 0xffff) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys) };
+    this.bus.timing = {
+      low_ns: this.low_ns,
+      high_ns: this.high_ns,
+      hold_ns: ((this.sdaHold & 0xffff) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys),
+    };
     this.bus.start();
     this.latched |= START_DET;
     this.reading = (this.tx[0] & CMD_READ) !== 0;
@@ -445,7 +476,10 @@ export class I2cBlock extends BasePeripheral {
     }
     this.state = 'data';
     const following = this.tx[0];
-    const last = (this.command & CMD_STOP) !== 0 || (following !== undefined && (!(following & CMD_READ) || (following & CMD_RESTART) !== 0)) || !this.enabled;
+    const last =
+      (this.command & CMD_STOP) !== 0 ||
+      (following !== undefined && (!(following & CMD_READ) || (following & CMD_RESTART) !== 0)) ||
+      !this.enabled;
     const byte = this.bus.readByte(!last);
     if (this.enabled) this.rx.push(byte | (this.firstByte ? FIRST_DATA_BYTE : 0));
     this.firstByte = false;

@@ -45,7 +45,8 @@ export function execute(core, stop, time) {
         op = core.fetch(pc);
       }
       switch (op >>> 11) {
-        case 0: { // LSLS immediate
+        case 0: {
+          // LSLS immediate
           const shift = (op >>> 6) & 31;
           const value = r[(op >>> 3) & 7];
           if (shift) carry = (value >>> (32 - shift)) & 1;
@@ -54,7 +55,8 @@ export function execute(core, stop, time) {
           r[op & 7] = negative;
           break;
         }
-        case 1: { // LSRS immediate
+        case 1: {
+          // LSRS immediate
           const shift = (op >>> 6) & 31;
           const value = r[(op >>> 3) & 7];
           carry = (value >>> (shift ? shift - 1 : 31)) & 1;
@@ -63,7 +65,8 @@ export function execute(core, stop, time) {
           r[op & 7] = negative;
           break;
         }
-        case 2: { // ASRS immediate
+        case 2: {
+          // ASRS immediate
           const shift = (op >>> 6) & 31;
           const value = r[(op >>> 3) & 7];
           carry = (value >>> (shift ? shift - 1 : 31)) & 1;
@@ -72,7 +75,8 @@ export function execute(core, stop, time) {
           r[op & 7] = negative;
           break;
         }
-        case 3: { // ADDS, SUBS register or 3-bit immediate
+        case 3: {
+          // ADDS, SUBS register or 3-bit immediate
           const operand = (op >>> 6) & 7;
           const a = r[(op >>> 3) & 7];
           const given = op & 0x400 ? operand : r[operand];
@@ -90,7 +94,8 @@ export function execute(core, stop, time) {
           zero = negative;
           r[(op >>> 8) & 7] = negative;
           break;
-        case 5: { // CMP
+        case 5: {
+          // CMP
           const a = r[(op >>> 8) & 7];
           const b = ~(op & 0xff);
           const result = (a + b + 1) | 0;
@@ -101,7 +106,8 @@ export function execute(core, stop, time) {
           break;
         }
         case 6:
-        case 7: { // ADDS, SUBS 8-bit immediate
+        case 7: {
+          // ADDS, SUBS 8-bit immediate
           const d = (op >>> 8) & 7;
           const a = r[d];
           const b = op & 0x800 ? ~(op & 0xff) : op & 0xff;
@@ -118,7 +124,8 @@ export function execute(core, stop, time) {
             const kind = (op >>> 8) & 3;
             const s = (op >>> 3) & 15;
             const value = s === 15 ? pc + 4 : r[s];
-            if (kind === 3) { // BX; an exception return and BLX are others'
+            if (kind === 3) {
+              // BX; an exception return and BLX are others'
               if (op & 0x87 || !(value & 1) || value >>> 28 === 15) {
                 isOthers = true;
                 break;
@@ -162,28 +169,32 @@ export function execute(core, stop, time) {
               negative = a ^ m;
               r[d] = negative;
               break;
-            case 2: { // LSLS register
+            case 2: {
+              // LSLS register
               const shift = m & 0xff;
               if (shift) carry = shift > 32 ? 0 : (shift === 32 ? a : a >>> (32 - shift)) & 1;
               negative = shift > 31 ? 0 : a << shift;
               r[d] = negative;
               break;
             }
-            case 3: { // LSRS register
+            case 3: {
+              // LSRS register
               const shift = m & 0xff;
               if (shift) carry = shift > 32 ? 0 : (a >>> (shift - 1)) & 1;
               negative = shift > 31 ? 0 : (a >>> shift) | 0;
               r[d] = negative;
               break;
             }
-            case 4: { // ASRS register
+            case 4: {
+              // ASRS register
               const shift = m & 0xff;
               if (shift) carry = (a >>> (shift > 32 ? 31 : shift - 1)) & 1;
               negative = a >> (shift > 31 ? 31 : shift);
               r[d] = negative;
               break;
             }
-            case 7: { // RORS
+            case 7: {
+              // RORS
               const shift = m & 0xff;
               const turn = shift & 31;
               negative = turn ? (a >>> turn) | (a << (32 - turn)) : a;
@@ -195,7 +206,8 @@ export function execute(core, stop, time) {
             case 6:
             case 9:
             case 10:
-            case 11: { // ADCS, SBCS, RSBS, CMP, CMN
+            case 11: {
+              // ADCS, SBCS, RSBS, CMP, CMN
               const kind = (op >>> 6) & 15;
               const first = kind === 9 ? 0 : a;
               const second = kind === 5 || kind === 11 ? m : ~m;
@@ -228,7 +240,8 @@ export function execute(core, stop, time) {
           zero = negative;
           break;
         }
-        case 9: { // LDR literal
+        case 9: {
+          // LDR literal
           const at = ((pc + 4) & ~3) + ((op & 0xff) << 2) - RAM_BASE;
           if (at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes) {
             isOthers = true;
@@ -239,7 +252,8 @@ export function execute(core, stop, time) {
           break;
         }
         case 10:
-        case 11: { // register offset
+        case 11: {
+          // register offset
           const at = (r[(op >>> 3) & 7] + r[(op >>> 6) & 7] - RAM_BASE) >>> 0;
           const t = op & 7;
           const kind = (op >>> 9) & 7;
@@ -374,7 +388,8 @@ export function execute(core, stop, time) {
             const value = r[(op >>> 3) & 7];
             const which = (op >>> 6) & 3;
             r[op & 7] = which === 0 ? (value << 16) >> 16 : which === 1 ? (value << 24) >> 24 : which === 2 ? value & 0xffff : value & 0xff;
-          } else if (kind === 4 || kind === 5) { // PUSH
+          } else if (kind === 4 || kind === 5) {
+            // PUSH
             const count = bitCount(op & 0x1ff);
             const top = (r[13] - 4 * count) | 0;
             const at = (top - RAM_BASE) | 0;
@@ -388,7 +403,8 @@ export function execute(core, stop, time) {
             if (op & 0x100) ram32[word] = r[14];
             r[13] = top;
             cycles += count;
-          } else if (kind === 12 || kind === 13) { // POP
+          } else if (kind === 12 || kind === 13) {
+            // POP
             const at = (r[13] - RAM_BASE) | 0;
             const count = bitCount(op & 0x1ff);
             if (at & 3 || at < 0 || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes)) {
@@ -398,7 +414,8 @@ export function execute(core, stop, time) {
             let word = at >>> 2;
             if (op & 0x100) {
               const target = ram32[word + count - 1];
-              if (!(target & 1) || target >>> 28 === 15) { // an exception return
+              if (!(target & 1) || target >>> 28 === 15) {
+                // an exception return
                 isOthers = true;
                 break;
               }
@@ -414,7 +431,8 @@ export function execute(core, stop, time) {
           } else isOthers = true;
           break;
         }
-        case 24: { // STMIA
+        case 24: {
+          // STMIA
           const n = (op >>> 8) & 7;
           const count = bitCount(op & 0xff);
           const at = (r[n] - RAM_BASE) | 0;
@@ -428,7 +446,8 @@ export function execute(core, stop, time) {
           cycles += count;
           break;
         }
-        case 25: { // LDMIA
+        case 25: {
+          // LDMIA
           const n = (op >>> 8) & 7;
           const count = bitCount(op & 0xff);
           const at = (r[n] - RAM_BASE) | 0;
@@ -443,7 +462,8 @@ export function execute(core, stop, time) {
           break;
         }
         case 26:
-        case 27: { // B conditional
+        case 27: {
+          // B conditional
           let isTaken;
           switch ((op >>> 8) & 15) {
             case 0:
@@ -503,7 +523,8 @@ export function execute(core, stop, time) {
           pc += 4 + ((op << 21) >> 20);
           cycles += 2;
           continue;
-        case 30: { // BL
+        case 30: {
+          // BL
           let low;
           if (offset + 2 < codeBytes) low = ram16[(offset + 2) >>> 1];
           else {

@@ -47,7 +47,8 @@ export class Mpu {
   #readOnly(regions) {
     let end = RAM_BASE;
     for (const [first, bytes] of regions.flatMap((r) => this.#parts(r)).sort((a, b) => a[0] - b[0])) {
-      if (first !== end) this.chip.fail('MPU', `read-only memory at 0x${first.toString(16)}: only one range from the start of SRAM on is modelled`);
+      if (first !== end)
+        this.chip.fail('MPU', `read-only memory at 0x${first.toString(16)}: only one range from the start of SRAM on is modelled`);
       end += bytes;
     }
     return end - RAM_BASE;
@@ -61,16 +62,23 @@ export class Mpu {
   write(offset, value) {
     if (offset === 0xd94) {
       this.ctrl = value & 7;
-      if (this.ctrl & CTRL_ENABLE && (!(this.ctrl & CTRL_PRIVDEFENA) || this.ctrl & CTRL_HFNMIENA)) this.chip.fail('MPU', `CTRL 0x${value.toString(16)}: only PRIVDEFENA without HFNMIENA is modelled`);
+      if (this.ctrl & CTRL_ENABLE && (!(this.ctrl & CTRL_PRIVDEFENA) || this.ctrl & CTRL_HFNMIENA))
+        this.chip.fail('MPU', `CTRL 0x${value.toString(16)}: only PRIVDEFENA without HFNMIENA is modelled`);
     } else if (offset === 0xd98) this.number = value & 7;
     else if (offset === 0xd9c) {
       if (value & 16) this.number = value & 7;
       this.regions[this.number].base = (value & ~0xff) >>> 0;
     } else if (offset === 0xda0) {
       const size = sizeOf(value);
-      const isModelled = !(value & OTHERS) && size >= 256 && ((value & ACCESS) === READ_ONLY ? !(value & XN) : value & XN && !(value & (ACCESS | 0xff00)));
-      if (value & 1 && !isModelled) this.chip.fail('MPU', `RASR 0x${(value >>> 0).toString(16)}: only regions of 256 bytes or more are modelled, whole without any access, or read-only with execution`);
-      if (value & 1 && !(value & XN) && !(value & CACHEABLE)) this.chip.fail('MPU', `RASR 0x${(value >>> 0).toString(16)}: nothing executes from strongly ordered memory`);
+      const isModelled =
+        !(value & OTHERS) && size >= 256 && ((value & ACCESS) === READ_ONLY ? !(value & XN) : value & XN && !(value & (ACCESS | 0xff00)));
+      if (value & 1 && !isModelled)
+        this.chip.fail(
+          'MPU',
+          `RASR 0x${(value >>> 0).toString(16)}: only regions of 256 bytes or more are modelled, whole without any access, or read-only with execution`,
+        );
+      if (value & 1 && !(value & XN) && !(value & CACHEABLE))
+        this.chip.fail('MPU', `RASR 0x${(value >>> 0).toString(16)}: nothing executes from strongly ordered memory`);
       if (value & 1 && this.regions[this.number].base % size) this.chip.fail('MPU', 'the base of a region is not aligned to its size');
       this.regions[this.number].attributes = value >>> 0;
     }

@@ -163,7 +163,8 @@ export class Pins {
 
   before(t_ns) {
     let inputs = this.inputs;
-    for (let i = 0, at = this.newest; i < HISTORY && this.changed_ns[at] >= t_ns; i++, at = (at + HISTORY - 1) % HISTORY) inputs = this.inputsBefore[at];
+    for (let i = 0, at = this.newest; i < HISTORY && this.changed_ns[at] >= t_ns; i++, at = (at + HISTORY - 1) % HISTORY)
+      inputs = this.inputsBefore[at];
     return inputs;
   }
 }

@@ -62,7 +62,10 @@ export class Pio extends BasePeripheral {
     this.bypass = 0;
     this.watchedPins = 0;
     this.pending = [true, true];
-    this.interrupts = [{ enable: 0, force: 0 }, { enable: 0, force: 0 }];
+    this.interrupts = [
+      { enable: 0, force: 0 },
+      { enable: 0, force: 0 },
+    ];
     this.inputsEdge = -1;
     this.memory.fill(0);
     if (this.machines.length) for (const m of this.machines) m.reset();
@@ -209,7 +212,14 @@ export class Pio extends BasePeripheral {
       case CTRL:
         return each((m) => (m.enabled ? 1 << m.index : 0));
       case FSTAT:
-        return each((m) => ((m.tx.length ? 0 : 1 << 24) | (m.tx.length >= m.txDepth ? 1 << 16 : 0) | (m.rx.length ? 0 : 1 << 8) | (m.rx.length >= m.rxDepth ? 1 : 0)) << m.index);
+        return each(
+          (m) =>
+            ((m.tx.length ? 0 : 1 << 24) |
+              (m.tx.length >= m.txDepth ? 1 << 16 : 0) |
+              (m.rx.length ? 0 : 1 << 8) |
+              (m.rx.length >= m.rxDepth ? 1 : 0)) <<
+            m.index,
+        );
       case FDEBUG:
         return this.fdebug >>> 0;
       case FLEVEL:

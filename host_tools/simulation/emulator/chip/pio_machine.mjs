@@ -138,7 +138,8 @@ export class StateMachine {
   // --- configuration -------------------------------------------------------------------------------------------
 
   writeExecctrl(value) {
-    if (value & (3 << 17)) this.pio.fail(`SM${this.index}_EXECCTRL 0x${(value >>> 0).toString(16)}: OUT_STICKY and INLINE_OUT_EN are not modelled`);
+    if (value & (3 << 17))
+      this.pio.fail(`SM${this.index}_EXECCTRL 0x${(value >>> 0).toString(16)}: OUT_STICKY and INLINE_OUT_EN are not modelled`);
     this.execctrl = (value & 0x7fffff9f) >>> 0;
     this.sideEnable = (value >>> 30) & 1;
     this.sideToDirections = ((value >>> 29) & 1) === 1;

@@ -27,7 +27,13 @@ export class StrictSio extends RPSIO {
   constructor(chip) {
     super(chip);
     const Interpolator = this.interp0.constructor;
-    this.own = [0, 1].map(() => ({ divider: new Divider(), interpolators: [new Interpolator(0), new Interpolator(1)], words: [], overflowed: false, underflowed: false }));
+    this.own = [0, 1].map(() => ({
+      divider: new Divider(),
+      interpolators: [new Interpolator(0), new Interpolator(1)],
+      words: [],
+      overflowed: false,
+      underflowed: false,
+    }));
     this.use(0);
   }
 

@@ -122,7 +122,13 @@ export class Ssi extends BasePeripheral {
         return this.rx.length;
       case 0x28: {
         const busy = this.shifting !== null;
-        return (busy ? 1 : 0) | (this.tx.length < FIFO_DEPTH ? 2 : 0) | (this.tx.length === 0 ? 4 : 0) | (this.rx.length ? 8 : 0) | (this.rx.length >= FIFO_DEPTH ? 16 : 0);
+        return (
+          (busy ? 1 : 0) |
+          (this.tx.length < FIFO_DEPTH ? 2 : 0) |
+          (this.tx.length === 0 ? 4 : 0) |
+          (this.rx.length ? 8 : 0) |
+          (this.rx.length >= FIFO_DEPTH ? 16 : 0)
+        );
       }
       case 0x48:
         return 0;
@@ -207,7 +213,8 @@ export class Ssi extends BasePeripheral {
       this.entering.push(value >>> 0);
       if (this.entering.length === 2) {
         const modeBits = this.entering[1] & 0xff;
-        if (![0xeb, 0xbb].includes(this.entering[0])) this.rp2040.fail('SSI', `dummy read with command 0x${this.entering[0].toString(16)} is not modelled`);
+        if (![0xeb, 0xbb].includes(this.entering[0]))
+          this.rp2040.fail('SSI', `dummy read with command 0x${this.entering[0].toString(16)} is not modelled`);
         this.flash.continuousRead = (modeBits & 0xf0) === 0xa0;
         this.rx.push(0);
       }

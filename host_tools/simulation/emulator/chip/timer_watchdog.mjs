@@ -44,7 +44,8 @@ export class Timer extends BasePeripheral {
       this.#tickStopped();
       return;
     }
-    if (Math.abs(hz - 1e6) > 1) rp2040.fail('WATCHDOG', `tick of ${(hz / 1e6).toFixed(4)} MHz; clk_ref / CYCLES must be 1 MHz for the timer`);
+    if (Math.abs(hz - 1e6) > 1)
+      rp2040.fail('WATCHDOG', `tick of ${(hz / 1e6).toFixed(4)} MHz; clk_ref / CYCLES must be 1 MHz for the timer`);
     this.#tickStarted();
   }
 
@@ -147,7 +148,7 @@ export class Timer extends BasePeripheral {
   /** The alarm matches when the low word becomes equal to the target: a target equal to now waits a whole turn. */
   #schedule(a) {
     const now_us = this.count_us;
-    const delta_us = ((a.target - (now_us >>> 0)) >>> 0) || 2 ** 32;
+    const delta_us = (a.target - (now_us >>> 0)) >>> 0 || 2 ** 32;
     a.alarm.scheduleAt(this.zero_ns + (now_us + delta_us) * this.tick_ns);
   }
 

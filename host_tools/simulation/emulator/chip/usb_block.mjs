@@ -108,7 +108,13 @@ export class UsbBlock extends BasePeripheral {
   /** The controller sees D+ high on GPIO15 instead of the bus, on which the pull-up stays. */
   get feigned() {
     const { ctrl } = this.rp2040.gpio[15];
-    return this.muxing === MUX_TO_PADS && (ctrl & 0x1f) === 8 && ((ctrl >>> 16) & 3) === 3 && ((this.phy.get(0x7c) ?? 0) & 2) !== 0 && ((this.phy.get(0x80) ?? 0) & 4) !== 0;
+    return (
+      this.muxing === MUX_TO_PADS &&
+      (ctrl & 0x1f) === 8 &&
+      ((ctrl >>> 16) & 3) === 3 &&
+      ((this.phy.get(0x7c) ?? 0) & 2) !== 0 &&
+      ((this.phy.get(0x80) ?? 0) & 4) !== 0
+    );
   }
 
   get vbusDetected() {
@@ -133,10 +139,18 @@ export class UsbBlock extends BasePeripheral {
   get raw() {
     const s = this.sieStatus;
     return (
-      (this.stallNak ? 1 << 19 : 0) | (this.epAbortDone ? 1 << 18 : 0) | (this.sofPending ? 1 << 17 : 0) |
-      (s & ST_SETUP_REC ? 1 << 16 : 0) | (s & ST_RESUME ? 1 << 15 : 0) | (this.suspendChanged ? 1 << 14 : 0) |
-      (this.connected ? 1 << 13 : 0) | (s & ST_BUS_RESET ? 1 << 12 : 0) | (this.vbusDetected ? 1 << 11 : 0) |
-      (s & ST_STALL_REC ? 1 << 10 : 0) | (this.buffStatus ? 1 << 4 : 0) | (s & ST_TRANS_COMPLETE ? 1 << 3 : 0)
+      (this.stallNak ? 1 << 19 : 0) |
+      (this.epAbortDone ? 1 << 18 : 0) |
+      (this.sofPending ? 1 << 17 : 0) |
+      (s & ST_SETUP_REC ? 1 << 16 : 0) |
+      (s & ST_RESUME ? 1 << 15 : 0) |
+      (this.suspendChanged ? 1 << 14 : 0) |
+      (this.connected ? 1 << 13 : 0) |
+      (s & ST_BUS_RESET ? 1 << 12 : 0) |
+      (this.vbusDetected ? 1 << 11 : 0) |
+      (s & ST_STALL_REC ? 1 << 10 : 0) |
+      (this.buffStatus ? 1 << 4 : 0) |
+      (s & ST_TRANS_COMPLETE ? 1 << 3 : 0)
     );
   }
 
@@ -158,7 +172,13 @@ export class UsbBlock extends BasePeripheral {
       case 0x4c:
         return this.sieCtrl >>> 0;
       case 0x50:
-        return (this.sieStatus | (this.vbusDetected ? 1 : 0) | (this.inReset && !this.feigned ? 0 : ST_LINE_J) | (this.connected ? ST_CONNECTED : 0)) >>> 0;
+        return (
+          (this.sieStatus |
+            (this.vbusDetected ? 1 : 0) |
+            (this.inReset && !this.feigned ? 0 : ST_LINE_J) |
+            (this.connected ? ST_CONNECTED : 0)) >>>
+          0
+        );
       case 0x58:
         return this.buffStatus >>> 0;
       case 0x5c:
@@ -274,7 +294,7 @@ export class UsbBlock extends BasePeripheral {
     if (word < 0x80) this.#checkEndpointControl(word, next);
     else this.#checkBufferControl(word, old, next);
     view.setUint32(word, next, true);
-    if (word >= 0x80 && (next & ~old) & (BC_AVAILABLE | BC_STALL | (BC_AVAILABLE << 16))) {
+    if (word >= 0x80 && next & ~old & (BC_AVAILABLE | BC_STALL | (BC_AVAILABLE << 16))) {
       this.onArmed((word - 0x80) >> 3, (word & 4) === 0);
     }
   }
@@ -310,7 +330,10 @@ export class UsbBlock extends BasePeripheral {
         if (fieldsChanged) chip.fail('USB', `${name}: AVAILABLE set in the same write as the other fields; write those first`);
         const gap_ns = now - this.fieldsWritten_ns[time];
         if (gap_ns < 1e9 / this.rp2040.trueHz(CLK_USB_HZ)) {
-          chip.fail('USB', `${name}: AVAILABLE set ${gap_ns.toFixed(0)} ns after the other fields; wait at least one cycle of clk_usb (21 ns)`);
+          chip.fail(
+            'USB',
+            `${name}: AVAILABLE set ${gap_ns.toFixed(0)} ns after the other fields; wait at least one cycle of clk_usb (21 ns)`,
+          );
         }
         if ((is & BC_LENGTH) > 64) chip.fail('USB', `${name}: length ${is & BC_LENGTH} exceeds the 64-byte packet`);
         if (!isOut && !(is & BC_FULL)) chip.fail('USB', `${name}: an IN buffer was made available without FULL`);
@@ -372,7 +395,8 @@ export class UsbBlock extends BasePeripheral {
 
   /** The controller moves data on clk_sys too; what it does on a slower one than clk_usb nobody has written down. */
   #checkClock() {
-    if (this.attached && this.rp2040.clkSys < CLK_USB_HZ) this.rp2040.fail('USB', `traffic while clk_sys is ${this.rp2040.clkSys / 1e6} MHz`);
+    if (this.attached && this.rp2040.clkSys < CLK_USB_HZ)
+      this.rp2040.fail('USB', `traffic while clk_sys is ${this.rp2040.clkSys / 1e6} MHz`);
   }
 
   #hears(address) {

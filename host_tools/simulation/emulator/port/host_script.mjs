@@ -40,10 +40,12 @@ export function readHostScript(file) {
 
 export function scheduleHostScript(steps, scope, cdc) {
   for (const step of steps) {
-    scope.createAlarm(() => {
-      if (step.bytes) cdc.write(step.bytes);
-      else if (step.baud) cdc.setBaud(step.baud);
-      else cdc.setDtr(step.dtr);
-    }).scheduleAt(step.t_s * 1e9);
+    scope
+      .createAlarm(() => {
+        if (step.bytes) cdc.write(step.bytes);
+        else if (step.baud) cdc.setBaud(step.baud);
+        else cdc.setDtr(step.dtr);
+      })
+      .scheduleAt(step.t_s * 1e9);
   }
 }

@@ -36,7 +36,10 @@ export class PtyPort {
     this.early = [];
     this.baud = null;
     this.errors = '';
-    this.child = spawn(PYTHON, [fileURLToPath(new URL('./pty_port.py', import.meta.url)), link], { stdio: ['pipe', 'pipe', 'pipe'], detached: true });
+    this.child = spawn(PYTHON, [fileURLToPath(new URL('./pty_port.py', import.meta.url)), link], {
+      stdio: ['pipe', 'pipe', 'pipe'],
+      detached: true,
+    });
     this.child.on('error', (error) => this.#lost(`cannot start ${PYTHON} (${inWords(error)})`));
     this.child.stderr.on('data', (text) => {
       this.errors += text;

@@ -5,6 +5,7 @@ Ends when its stdin closes. Opening and closing by a client shows as the absence
 master side; the line is put into raw mode before the first client and after the last one, baud rate changes are
 polled while a client has it open.
 """
+
 import os
 import pty
 import select
@@ -21,7 +22,7 @@ BAUD = {getattr(termios, n): int(n[1:]) for n in dir(termios) if n.startswith("B
 def frame(kind, payload=b""):
     data = kind + struct.pack("<I", len(payload)) + payload
     while data:
-        data = data[os.write(1, data):]
+        data = data[os.write(1, data) :]
 
 
 def make_link(link, target):
@@ -82,10 +83,10 @@ def main():
                 if len(incoming) < 5 + length:
                     break
                 if is_open:
-                    outgoing += incoming[5:5 + length]
+                    outgoing += incoming[5 : 5 + length]
                 else:  # a client that comes later must not get what an earlier one left
                     frame(b"A", struct.pack("<I", length))
-                incoming = incoming[5 + length:]
+                incoming = incoming[5 + length :]
             if is_open:
                 speed = BAUD.get(termios.tcgetattr(master)[5], 0)
                 if speed and speed != baud:

@@ -77,7 +77,7 @@ export class SteppedPort {
   answer(now_ns, hasEnded) {
     const data = Buffer.concat([...this.sent, this.#frame('T', now_ns, [hasEnded ? 1 : 0])]);
     this.sent = [];
-    for (let at = 0; at < data.length;) at += writeSync(1, data, at);
+    for (let at = 0; at < data.length; ) at += writeSync(1, data, at);
   }
 
   #frame(type, at_ns, bytes) {

@@ -32,7 +32,7 @@ export class CdcClient {
   #bind(device) {
     const communication = device.interfaces.find((i) => i.class === 2 && i.subclass === 2);
     const data = device.interfaces.find((i) => i.class === 10);
-    const endpoint = (type, isIn) => device.endpoints.find((e) => e.type === type && (e.address & 0x80) !== 0 === isIn);
+    const endpoint = (type, isIn) => device.endpoints.find((e) => e.type === type && ((e.address & 0x80) !== 0) === isIn);
     const [bulkIn, bulkOut, notification] = [endpoint(2, true), endpoint(2, false), endpoint(3, true)];
     if (!communication || !data || !bulkIn || !bulkOut || !notification) {
       this.host.block.rp2040.fail('usb host', 'the device is no CDC ACM device: an interface or endpoint is missing');

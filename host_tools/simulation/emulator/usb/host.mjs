@@ -82,7 +82,17 @@ export class UsbHost {
     this.offered_ns = new Map();
     this.onConfigured = () => {};
     this.onDisconnected = () => {};
-    this.statistics = { in_bytes: 0, out_bytes: 0, in_packets: 0, out_packets: 0, naks: 0, stalls: 0, resets: 0, enumerations: 0, detaches: 0 };
+    this.statistics = {
+      in_bytes: 0,
+      out_bytes: 0,
+      in_packets: 0,
+      out_packets: 0,
+      naks: 0,
+      stalls: 0,
+      resets: 0,
+      enumerations: 0,
+      detaches: 0,
+    };
     this.block = null;
     this.plugged = true;
     this.frame = 0;
@@ -194,7 +204,10 @@ export class UsbHost {
 
   /** A bulk IN packet lies ready and no transfer asks for it. */
   get hasUnasked() {
-    return this.state === 'active' && [...this.pipes.values()].some((p) => p.isIn && !p.queue.length && this.isBulkIn(p.endpoint) && this.block.offers(p.endpoint));
+    return (
+      this.state === 'active' &&
+      [...this.pipes.values()].some((p) => p.isIn && !p.queue.length && this.isBulkIn(p.endpoint) && this.block.offers(p.endpoint))
+    );
   }
 
   get configured() {
@@ -241,7 +254,8 @@ export class UsbHost {
 
   #checkPullup() {
     const { block } = this;
-    if (block && block.sieCtrl & (1 << 16) && !block.attached) this.#fail(`the firmware enabled the pull-up but ${block.attachProblem ?? 'holds USBCTRL in reset'}`);
+    if (block && block.sieCtrl & (1 << 16) && !block.attached)
+      this.#fail(`the firmware enabled the pull-up but ${block.attachProblem ?? 'holds USBCTRL in reset'}`);
   }
 
   #enumeration = null;
@@ -298,7 +312,8 @@ export class UsbHost {
   *#request(name, packet, { expectStall = false, data = null } = {}) {
     this.control(packet, data, (status, answer) => this.portStep({ status, answer }));
     const { status, answer } = yield null;
-    if (expectStall ? status !== 'stall' : status !== 'ok') this.#fail(`${name}: ${status}, expected ${expectStall ? 'a stall' : 'an answer'}`);
+    if (expectStall ? status !== 'stall' : status !== 'ok')
+      this.#fail(`${name}: ${status}, expected ${expectStall ? 'a stall' : 'an answer'}`);
     return answer;
   }
 
@@ -328,7 +343,11 @@ export class UsbHost {
     const languages = yield* this.#request('STRING 0', get(3, 0, 255));
     const language = languages[2] | (languages[3] << 8);
     const strings = {};
-    for (const [key, at] of [['product', 15], ['manufacturer', 14], ['serial', 16]]) {
+    for (const [key, at] of [
+      ['product', 15],
+      ['manufacturer', 14],
+      ['serial', 16],
+    ]) {
       const index = device[at];
       if (!index) continue;
       const text = yield* this.#request(`STRING ${index}`, get(3, index, 255, language));
@@ -336,7 +355,14 @@ export class UsbHost {
       strings[key] = new TextDecoder('utf-16le').decode(text.subarray(2));
     }
     yield* this.#request('SET_CONFIGURATION', setupPacket(0, 9, configuration[5], 0, 0));
-    const described = { device, configuration, strings, vendor: device[8] | (device[9] << 8), product: device[10] | (device[11] << 8), ...this.#parse(configuration) };
+    const described = {
+      device,
+      configuration,
+      strings,
+      vendor: device[8] | (device[9] << 8),
+      product: device[10] | (device[11] << 8),
+      ...this.#parse(configuration),
+    };
     this.statistics.enumerations += 1;
     this.device = described;
     this.onConfigured(described);
@@ -351,7 +377,13 @@ export class UsbHost {
       const d = configuration.subarray(at, at + length);
       if (d[1] === 4) interfaces.push({ number: d[2], class: d[5], subclass: d[6], protocol: d[7] });
       else if (d[1] === 5) {
-        const endpoint = { address: d[2], type: d[3] & 3, maxPacket: d[4] | (d[5] << 8), interval: d[6], interface: interfaces.at(-1)?.number };
+        const endpoint = {
+          address: d[2],
+          type: d[3] & 3,
+          maxPacket: d[4] | (d[5] << 8),
+          interval: d[6],
+          interface: interfaces.at(-1)?.number,
+        };
         endpoints.push(endpoint);
         this.pipes.set(d[2], new Pipe(d[2] & 15, (d[2] & 0x80) !== 0, endpoint.maxPacket));
       }
@@ -363,7 +395,18 @@ export class UsbHost {
 
   control(packet, data, done) {
     const length = packet[6] | (packet[7] << 8);
-    const transfer = { pipe: this.controlPipe, packet, stage: 'setup', isIn: (packet[0] & 0x80) !== 0, length, data: data ?? new Uint8Array(0), at: 0, got: [], done, started_ns: null };
+    const transfer = {
+      pipe: this.controlPipe,
+      packet,
+      stage: 'setup',
+      isIn: (packet[0] & 0x80) !== 0,
+      length,
+      data: data ?? new Uint8Array(0),
+      at: 0,
+      got: [],
+      done,
+      started_ns: null,
+    };
     return this.#submit(transfer);
   }
 
@@ -443,7 +486,9 @@ export class UsbHost {
 
   #candidates() {
     const pipes = [this.controlPipe, ...this.pipes.values()];
-    return [...pipes.slice(this.turn % pipes.length), ...pipes.slice(0, this.turn % pipes.length)].filter((p) => p.queue.length && p.parked_ns === null && !p.paused);
+    return [...pipes.slice(this.turn % pipes.length), ...pipes.slice(0, this.turn % pipes.length)].filter(
+      (p) => p.queue.length && p.parked_ns === null && !p.paused,
+    );
   }
 
   #schedule() {
@@ -568,7 +613,14 @@ export class UsbHost {
     pipe.toggle ^= 1;
     this.statistics.in_packets += 1;
     if (pipe.endpoint) this.statistics.in_bytes += data.length;
-    this.onPacket({ t_ns: this.scope.nanos, endpoint: pipe.endpoint, isIn: true, setup: false, data, offered_ns: this.offered_ns.get(pipe.endpoint) });
+    this.onPacket({
+      t_ns: this.scope.nanos,
+      endpoint: pipe.endpoint,
+      isIn: true,
+      setup: false,
+      data,
+      offered_ns: this.offered_ns.get(pipe.endpoint),
+    });
     if (interrupt) {
       interrupt.onData(data);
       return;

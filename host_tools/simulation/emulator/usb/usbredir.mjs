@@ -18,10 +18,28 @@ import { InputError, inWords } from '../errors.mjs';
 import { setupPacket } from './host.mjs';
 
 const TYPE = {
-  hello: 0, device_connect: 1, device_disconnect: 2, reset: 3, interface_info: 4, ep_info: 5, set_configuration: 6,
-  get_configuration: 7, configuration_status: 8, set_alt_setting: 9, get_alt_setting: 10, alt_setting_status: 11,
-  start_interrupt: 15, stop_interrupt: 16, interrupt_status: 17, cancel: 21, filter_reject: 22, filter_filter: 23,
-  device_disconnect_ack: 24, control: 100, bulk: 101, interrupt: 103,
+  hello: 0,
+  device_connect: 1,
+  device_disconnect: 2,
+  reset: 3,
+  interface_info: 4,
+  ep_info: 5,
+  set_configuration: 6,
+  get_configuration: 7,
+  configuration_status: 8,
+  set_alt_setting: 9,
+  get_alt_setting: 10,
+  alt_setting_status: 11,
+  start_interrupt: 15,
+  stop_interrupt: 16,
+  interrupt_status: 17,
+  cancel: 21,
+  filter_reject: 22,
+  filter_filter: 23,
+  device_disconnect_ack: 24,
+  control: 100,
+  bulk: 101,
+  interrupt: 103,
 };
 const CAP_CONNECT_DEVICE_VERSION = 1 << 1;
 const CAP_FILTER = 1 << 2;
@@ -45,8 +63,15 @@ const endpointIndex = (address) => ((address & 0x80) >> 3) | (address & 15);
 class ProtocolError extends Error {}
 
 // Of what a message of a type holds before its data.
-const LEAST_BYTES = new Map([[TYPE.control, 10], [TYPE.bulk, 10], [TYPE.set_configuration, 1], [TYPE.set_alt_setting, 2],
-  [TYPE.get_alt_setting, 1], [TYPE.start_interrupt, 1], [TYPE.stop_interrupt, 1]]);
+const LEAST_BYTES = new Map([
+  [TYPE.control, 10],
+  [TYPE.bulk, 10],
+  [TYPE.set_configuration, 1],
+  [TYPE.set_alt_setting, 2],
+  [TYPE.get_alt_setting, 1],
+  [TYPE.start_interrupt, 1],
+  [TYPE.stop_interrupt, 1],
+]);
 
 /** A message with the short header of a hello or the long one of everything after. */
 export function encodeMessage(type, id, payload = Buffer.alloc(0)) {
@@ -117,7 +142,8 @@ export class MessageReader {
       if (this.bytes.length < head) return;
       const type = this.bytes.readUInt32LE(0);
       const length = this.bytes.readUInt32LE(4);
-      if (length > LARGEST_MESSAGE || this.first !== (type === TYPE.hello)) throw new ProtocolError(`message of type ${type} and ${length} bytes`);
+      if (length > LARGEST_MESSAGE || this.first !== (type === TYPE.hello))
+        throw new ProtocolError(`message of type ${type} and ${length} bytes`);
       if (this.bytes.length < head + length) return;
       const id = this.first ? 0n : this.bytes.readBigUInt64LE(8);
       const payload = this.bytes.subarray(head, head + length);
@@ -299,7 +325,8 @@ export class UsbRedirServer {
   #receive(type, id, payload) {
     if (type === TYPE.hello) {
       const capabilities = payload.length >= VERSION_BYTES + 4 ? payload.readUInt32LE(VERSION_BYTES) : 0;
-      if ((capabilities & CAPABILITIES) !== CAPABILITIES) throw new ProtocolError(`its capabilities 0x${capabilities.toString(16)} lack some of 0x${CAPABILITIES.toString(16)}`);
+      if ((capabilities & CAPABILITIES) !== CAPABILITIES)
+        throw new ProtocolError(`its capabilities 0x${capabilities.toString(16)} lack some of 0x${CAPABILITIES.toString(16)}`);
       this.greeted = true;
       this.#updatePlug();
       return;
@@ -422,15 +449,20 @@ export class UsbRedirServer {
     const index = payload.readUInt16LE(6);
     const length = payload.readUInt16LE(8);
     const isIn = (requestType & 0x80) !== 0;
-    this.#queueTransfer(id, setupPacket(requestType, request, value, index, length), isIn ? null : Buffer.from(payload.subarray(10)), (code, got = Buffer.alloc(0)) => {
-      const clearsHalt = requestType === 0x02 && request === STANDARD.clear_feature && value === 0;
-      if (code === STATUS.ok && clearsHalt && this.#endpoint(index)) this.host.restartToggles([index]);
-      const answer = Buffer.from(payload.subarray(0, 10));
-      const data = isIn && code === STATUS.ok ? got : Buffer.alloc(0);
-      answer[3] = code;
-      answer.writeUInt16LE(isIn ? data.length : code === STATUS.ok ? length : 0, 8);
-      this.#send(TYPE.control, id, Buffer.concat([answer, data]));
-    });
+    this.#queueTransfer(
+      id,
+      setupPacket(requestType, request, value, index, length),
+      isIn ? null : Buffer.from(payload.subarray(10)),
+      (code, got = Buffer.alloc(0)) => {
+        const clearsHalt = requestType === 0x02 && request === STANDARD.clear_feature && value === 0;
+        if (code === STATUS.ok && clearsHalt && this.#endpoint(index)) this.host.restartToggles([index]);
+        const answer = Buffer.from(payload.subarray(0, 10));
+        const data = isIn && code === STATUS.ok ? got : Buffer.alloc(0);
+        answer[3] = code;
+        answer.writeUInt16LE(isIn ? data.length : code === STATUS.ok ? length : 0, 8);
+        this.#send(TYPE.control, id, Buffer.concat([answer, data]));
+      },
+    );
   }
 
   // Side by side
@@ -453,7 +485,9 @@ export class UsbRedirServer {
     const entry = {};
     this.transfers.set(id, entry);
     if (isIn) {
-      entry.transfer = this.host.bulkIn(address, length, (status, data) => this.#finish(id, status, (code) => answer(code, data.length, data)));
+      entry.transfer = this.host.bulkIn(address, length, (status, data) =>
+        this.#finish(id, status, (code) => answer(code, data.length, data)),
+      );
     } else {
       const data = Buffer.from(payload.subarray(10));
       entry.transfer = this.host.bulkOut(address, data, (status) => this.#finish(id, status, (code) => answer(code, entry.transfer.at)));

@@ -14,8 +14,7 @@ double weight_N_from_text(const std::string &option, const std::string &text, do
   constexpr double LIGHTEST_N = 0.1, HEAVIEST_N = 50;
   auto weight = to_double(text);
   if (!weight || *weight * unit_N < LIGHTEST_N || *weight * unit_N > HEAVIEST_N) {
-    wrong_value(option, text,
-                fixed(LIGHTEST_N / unit_N, 1) + " to " + fixed(HEAVIEST_N / unit_N, 0));
+    wrong_value(option, text, fixed(LIGHTEST_N / unit_N, 1) + " to " + fixed(HEAVIEST_N / unit_N, 0));
   }
   return *weight * unit_N;
 }
@@ -24,9 +23,8 @@ double weight_N_from_text(const std::string &option, const std::string &text, do
 
 void add_calibrate(CommandLine &line) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App *command = line.add(
-      "calibrate", "Find the sensors' gains by setting down one weight at some twenty places",
-      [options] {
+  CLI::App *command =
+      line.add("calibrate", "Find the sensors' gains by setting down one weight at some twenty places", [options] {
         if (options->dry_run && options->from.empty()) {
           throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
         }
@@ -41,28 +39,23 @@ void add_calibrate(CommandLine &line) {
                             ->add_option_function<std::string>(
                                 "--weight",
                                 [options](const std::string &text) {
-                                  options->force_N = weight_N_from_text(
-                                      "--weight", text, calibrating::GRAVITY_N_PER_g);
+                                  options->force_N = weight_N_from_text("--weight", text, calibrating::GRAVITY_N_PER_g);
                                 },
                                 "Mass of the weight: then forces are calibrated too")
                             ->type_name("GRAMS");
-  CLI::Option *force = command
-                           ->add_option_function<std::string>(
-                               "--force",
-                               [options](const std::string &text) {
-                                 options->force_N = weight_N_from_text("--force", text, 1.0);
-                               },
-                               "The same in newtons")
-                           ->excludes(weight)
-                           ->type_name("N");
-  CLI::Option *drag =
-      command->add_flag("--drag", options->drag,
-                        "Find the tangential force's scale: the weight hangs on a string that "
-                        "pulls an object level along the pad, several times in each direction");
-  CLI::Option *from =
+  CLI::Option *force =
       command
-          ->add_option("--from", options->from,
-                       "Use the placements of a recording with pressures, not live ones")
+          ->add_option_function<std::string>(
+              "--force",
+              [options](const std::string &text) { options->force_N = weight_N_from_text("--force", text, 1.0); },
+              "The same in newtons")
+          ->excludes(weight)
+          ->type_name("N");
+  CLI::Option *drag = command->add_flag("--drag", options->drag,
+                                        "Find the tangential force's scale: the weight hangs on a string that "
+                                        "pulls an object level along the pad, several times in each direction");
+  CLI::Option *from =
+      command->add_option("--from", options->from, "Use the placements of a recording with pressures, not live ones")
           ->type_name("FILE.csv");
   CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");

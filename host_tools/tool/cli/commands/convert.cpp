@@ -26,8 +26,7 @@ bool is_recording(const std::string &path) {
 int convert(const Conversion &conversion) {
   bool to_capture = ends_with(conversion.to, ".ftr");
   if (!to_capture && !ends_with(conversion.to, ".csv") && !is_mcap_name(conversion.to)) {
-    throw WrongUsage("\"" + printable(conversion.to) +
-                     "\" must end with .csv, .mcap or .ftr, which says what to make");
+    throw WrongUsage("\"" + printable(conversion.to) + "\" must end with .csv, .mcap or .ftr, which says what to make");
   }
   if (to_capture) {
     convert_to_capture(conversion);
@@ -43,8 +42,8 @@ int convert(const Conversion &conversion) {
 
 void add_convert(CommandLine &line) {
   auto options = std::make_shared<Conversion>();
-  CLI::App *command = line.add("convert", "Turn a recording or a capture into another kind",
-                               [options] { return convert(*options); });
+  CLI::App *command =
+      line.add("convert", "Turn a recording or a capture into another kind", [options] { return convert(*options); });
   command->add_option("from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")
       ->required()
       ->type_name("FILE");
@@ -55,8 +54,7 @@ void add_convert(CommandLine &line) {
       ->add_option("--device", options->device,
                    "Serial number of one of several fingertips in the recording; only this one")
       ->type_name("SERIAL");
-  command->add_flag("--salvage", options->salvage,
-                    "Read what is readable of a damaged file, and report the rest");
+  command->add_flag("--salvage", options->salvage, "Read what is readable of a damaged file, and report the rest");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
 }
 

@@ -101,18 +101,16 @@ Json crash_json(const Crash &crash) {
                        {"pc", record.pc}, {"xpsr", record.xpsr}, {"sp", record.sp}};
   json["events"] = Json::array();
   for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
-    json["events"].push_back({{"code", record.event_codes[i]},
-                              {"detail", record.event_details[i]},
-                              {"age_s", event_age_s(record, i)}});
+    json["events"].push_back(
+        {{"code", record.event_codes[i]}, {"detail", record.event_details[i]}, {"age_s", event_age_s(record, i)}});
   }
   return json;
 }
 
 Json to_json(const Facts &facts, const std::vector<Finding> &findings) {
   std::optional<Wiring> wiring;
-  Json json = {{"tool_version", FINGERTIP_VERSION},
-               {"verdict", verdict_text(worst_of(findings))},
-               {"port", facts.port}};
+  Json json = {
+      {"tool_version", FINGERTIP_VERSION}, {"verdict", verdict_text(worst_of(findings))}, {"port", facts.port}};
   if (facts.info) {
     std::string board = text_field(facts.info->board);
     wiring = Wiring::of_board(board);
@@ -157,9 +155,7 @@ int doctor(const DoctorOptions &options) {
   facts.tool_version = tool_version();
   std::vector<Finding> findings = judge(facts);
   if (options.json) {
-    std::printf(
-        "%s\n",
-        to_json(facts, findings).dump(2, ' ', false, Json::error_handler_t::replace).c_str());
+    std::printf("%s\n", to_json(facts, findings).dump(2, ' ', false, Json::error_handler_t::replace).c_str());
   } else {
     print(findings);
   }
@@ -170,11 +166,10 @@ int doctor(const DoctorOptions &options) {
 
 void add_doctor(CommandLine &line) {
   auto options = std::make_shared<DoctorOptions>();
-  CLI::App *command =
-      line.add("doctor",
-               "Find what is wrong with a fingertip, its sensors and its port; nothing may touch "
-               "the pad meanwhile. Exit status 1 if anything is bad",
-               [options] { return doctor(*options); });
+  CLI::App *command = line.add("doctor",
+                               "Find what is wrong with a fingertip, its sensors and its port; nothing may touch "
+                               "the pad meanwhile. Exit status 1 if anything is bad",
+                               [options] { return doctor(*options); });
   with_port(command, options->examination.choice);
   command
       ->add_option_function<std::string>(

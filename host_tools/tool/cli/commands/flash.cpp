@@ -48,8 +48,7 @@ constexpr Session::Policy QUICK = {milliseconds(400), 3};
 constexpr const char *INFO_FILE = "INFO_UF2.TXT";
 constexpr const char *BY_LABEL = "/dev/disk/by-label/RPI-RP2";
 constexpr const char *NO_VOLUME = ": no RP2040 boot volume (no INFO_UF2.TXT); ";
-constexpr const char *PRESS =
-    "unplug the Pico, hold its BOOTSEL button while plugging it in, and run this again";
+constexpr const char *PRESS = "unplug the Pico, hold its BOOTSEL button while plugging it in, and run this again";
 
 void sleep_or_stop() {
   if (stop_requested()) {
@@ -84,8 +83,7 @@ std::vector<std::string> mounted_volumes() {
     for (std::size_t i = 0; words.size() > 4 && i < words[4].size(); i++) {
       /* blanks and the like are octal */
       if (words[4][i] == '\\' && i + 3 < words[4].size()) {
-        folder += static_cast<char>(
-            std::strtol(std::string(words[4].substr(i + 1, 3)).c_str(), nullptr, 8));
+        folder += static_cast<char>(std::strtol(std::string(words[4].substr(i + 1, 3)).c_str(), nullptr, 8));
         i += 3;
       } else {
         folder += words[4][i];
@@ -106,15 +104,14 @@ public:
     if (!given.empty()) {
       auto board = loader_board(given);
       if (board && *board != "RPI-RP2") {
-        throw Error(given + ": the loader of another chip (" + *board +
-                    "); give that of an RP2040");
+        throw Error(given + ": the loader of another chip (" + *board + "); give that of an RP2040");
       }
       return board ? std::unique_ptr<Volume>(new Volume(given, false)) : nullptr;
     }
     auto mounted = mounted_volumes();
     if (mounted.size() > 1) {
-      throw Error("several Picos wait for firmware; unplug all but one, or choose with --volume: " +
-                  mounted[0] + " " + mounted[1]);
+      throw Error("several Picos wait for firmware; unplug all but one, or choose with --volume: " + mounted[0] + " " +
+                  mounted[1]);
     }
     if (mounted.size() == 1) {
       return std::unique_ptr<Volume>(new Volume(mounted[0], false));
@@ -153,14 +150,12 @@ public:
   }
 
 private:
-  Volume(std::string folder, bool mounted_here)
-      : folder_(std::move(folder)), mounted_here_(mounted_here) {}
+  Volume(std::string folder, bool mounted_here) : folder_(std::move(folder)), mounted_here_(mounted_here) {}
 
   static std::unique_ptr<Volume> mount_it() {
     if (geteuid() == 0) {
       char folder[] = "/run/fingertip-XXXXXX";
-      if (!mkdtemp(folder) ||
-          mount(BY_LABEL, folder, "vfat", MS_NOSUID | MS_NODEV | MS_NOEXEC, nullptr) != 0) {
+      if (!mkdtemp(folder) || mount(BY_LABEL, folder, "vfat", MS_NOSUID | MS_NODEV | MS_NOEXEC, nullptr) != 0) {
         throw Error(std::string(BY_LABEL) + ": cannot mount it (" + std::strerror(errno) +
                     "); mount it, and give its folder as --volume");
       }
@@ -176,8 +171,8 @@ private:
     }
     int status = 0;
     if (child < 0 || waitpid(child, &status, 0) != child || status != 0) {
-      throw Error("the drive RPI-RP2 is not mounted; sudo mount -o umask=0 " +
-                  std::string(BY_LABEL) + " /mnt, then give --volume /mnt");
+      throw Error("the drive RPI-RP2 is not mounted; sudo mount -o umask=0 " + std::string(BY_LABEL) +
+                  " /mnt, then give --volume /mnt");
     }
     auto mounted = mounted_volumes();
     return mounted.empty() ? nullptr : std::unique_ptr<Volume>(new Volume(mounted[0], false));
@@ -188,17 +183,15 @@ private:
 };
 
 /* Asks the fingertip into its loader; its serial number if it reported one. */
-std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &image,
-                            const Way &way) {
+std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &image, const Way &way) {
   auto transport = open_way(way);
   Session session(*transport, stop_requested);
   std::string serial = way.serial;
   try {
     wire_info info = session.info(QUICK).body.info;
     if (text_field(info.board) != image.board) {
-      throw Error(options.file + ": for board " + image.board + ", but fingertip " +
-                  text_field(info.serial) + " is a " + text_field(info.board) +
-                  "; give fingertip-" + text_field(info.board) + ".uf2");
+      throw Error(options.file + ": for board " + image.board + ", but fingertip " + text_field(info.serial) +
+                  " is a " + text_field(info.board) + "; give fingertip-" + text_field(info.board) + ".uf2");
     }
     serial = text_field(info.serial);
     session.command(command_loader(), QUICK);
@@ -243,8 +236,7 @@ std::optional<wire_info> wait_for_return(const Choice &choice) {
     if (last.code() != ErrorCode::permission_denied) {
       not_refused = host_now();
     } else if (host_now() - not_refused > PERMITTED_WITHIN) {
-      std::fprintf(stderr, "written, and it came back; its version was not read: %s\n",
-                   told(last).c_str());
+      std::fprintf(stderr, "written, and it came back; its version was not read: %s\n", told(last).c_str());
       return std::nullopt;
     }
   }
@@ -257,10 +249,9 @@ int flash(const FlashOptions &options) {
   std::unique_ptr<Volume> volume;
   /* What has other things in it will not become a mount point. */
   std::error_code unreadable;
-  if (!options.volume.empty() && fs::exists(options.volume, unreadable) &&
-      !fs::is_empty(options.volume, unreadable) && !loader_board(options.volume)) {
-    throw Error(options.volume + NO_VOLUME +
-                "leave out --volume, or give that of the drive RPI-RP2");
+  if (!options.volume.empty() && fs::exists(options.volume, unreadable) && !fs::is_empty(options.volume, unreadable) &&
+      !loader_board(options.volume)) {
+    throw Error(options.volume + NO_VOLUME + "leave out --volume, or give that of the drive RPI-RP2");
   }
   if (choice.device.empty() && choice.port.empty()) {
     volume = Volume::find(options.volume, true);
@@ -278,8 +269,7 @@ int flash(const FlashOptions &options) {
     }
     volume = wait_for_volume(options.volume);
   }
-  std::fprintf(stderr, "writing %s %s for %s\n", image.version.c_str(), image.git_hash.c_str(),
-               image.board.c_str());
+  std::fprintf(stderr, "writing %s %s for %s\n", image.version.c_str(), image.git_hash.c_str(), image.board.c_str());
   volume->write(image);
   volume.reset();
   std::optional<wire_info> back = wait_for_return(choice);
@@ -292,15 +282,12 @@ int flash(const FlashOptions &options) {
   for (const auto &[key, value] : pairs) {
     version += key == "firmware" ? value : "";
   }
-  if (version != image.version ||
-      text_field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
+  if (version != image.version || text_field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
       text_field(info.board) != image.board) {
-    throw Error("written, but fingertip " + text_field(info.serial) + " came back with firmware " +
-                version + " " + text_field(info.git_hash) + " instead of " + image.version + " " +
-                image.git_hash + "; " + PRESS);
+    throw Error("written, but fingertip " + text_field(info.serial) + " came back with firmware " + version + " " +
+                text_field(info.git_hash) + " instead of " + image.version + " " + image.git_hash + "; " + PRESS);
   }
-  std::printf("fingertip %s: firmware %s %s, board %s\n",
-              printable(text_field(info.serial)).c_str(), version.c_str(),
+  std::printf("fingertip %s: firmware %s %s, board %s\n", printable(text_field(info.serial)).c_str(), version.c_str(),
               text_field(info.git_hash).c_str(), text_field(info.board).c_str());
   return 0;
 }
@@ -309,8 +296,7 @@ int flash(const FlashOptions &options) {
 
 void add_flash(CommandLine &line) {
   auto options = std::make_shared<FlashOptions>();
-  CLI::App *command = line.add("flash", "Install firmware and see it come back",
-                               [options] { return flash(*options); });
+  CLI::App *command = line.add("flash", "Install firmware and see it come back", [options] { return flash(*options); });
   with_port(command, options->choice);
   command->add_option("image", options->file, "The firmware, build/BOARD/fingertip-BOARD.uf2")
       ->required()

@@ -25,8 +25,7 @@ std::string range_of(const GraspSetting &setting) {
 }
 
 /* Of the usual gripper, and of a servo if it has another. */
-std::string default_of(const GraspSetting &setting, const GripSettings &usual,
-                       const GripSettings &servo) {
+std::string default_of(const GraspSetting &setting, const GripSettings &usual, const GripSettings &servo) {
   if (setting.name == std::string("fixed")) {
     return "";
   }
@@ -38,14 +37,10 @@ std::string default_of(const GraspSetting &setting, const GripSettings &usual,
 void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
   std::string names;
   for (const GraspPreset &preset : grasp_presets()) {
-    names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" +
-             number(preset.breaks_N) + " N)";
+    names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" + number(preset.breaks_N) + " N)";
   }
   auto *preset = command->add_option_function<std::string>(
-      "--preset",
-      [&breaking](const std::string &name) {
-        breaking = typed([&] { return preset_values(name); });
-      },
+      "--preset", [&breaking](const std::string &name) { breaking = typed([&] { return preset_values(name); }); },
       "Cap, start, floor and approach for what breaks: " + names);
   preset->type_name("NAME")->group("Limits");
   command
@@ -98,10 +93,8 @@ void add_grasp(CommandLine &line) {
       ->add_option("--gripper-port", options->gripper.port,
                    "Its serial line; default: the only one on USB that is no fingertip")
       ->type_name("PATH");
-  command->add_option("--left", options->left, "Fingertip; default: the first of two")
-      ->type_name("SERIAL|PORT");
-  command->add_option("--right", options->right, "Fingertip; default: the other")
-      ->type_name("SERIAL|PORT");
+  command->add_option("--left", options->left, "Fingertip; default: the first of two")->type_name("SERIAL|PORT");
+  command->add_option("--right", options->right, "Fingertip; default: the other")->type_name("SERIAL|PORT");
   command->add_flag("--activate", options->activate,
                     "Activate a gripper that is not: it moves, and drops what it holds");
   with_seconds(command, options->seconds, "End after this long, the gripper holding");

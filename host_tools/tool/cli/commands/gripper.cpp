@@ -68,18 +68,17 @@ void advise_about_timer(const std::string &path) {
 int list_grippers() {
   std::printf("model\tstroke_mm\tstep_mm\tspeed_mm_s\tforce_N\n");
   for (const GripperTraits &traits : gripper_models()) {
-    std::printf("%s\t%s\t%s\t%s-%s\t%s-%s\n", traits.model.c_str(),
-                fixed(traits.stroke_mm, 0).c_str(), fixed(traits.step_mm, 3).c_str(),
-                fixed(traits.speed_min_mm_s, 0).c_str(), fixed(traits.speed_max_mm_s, 0).c_str(),
-                fixed(traits.force_min_N, 0).c_str(), fixed(traits.force_max_N, 0).c_str());
+    std::printf("%s\t%s\t%s\t%s-%s\t%s-%s\n", traits.model.c_str(), fixed(traits.stroke_mm, 0).c_str(),
+                fixed(traits.step_mm, 3).c_str(), fixed(traits.speed_min_mm_s, 0).c_str(),
+                fixed(traits.speed_max_mm_s, 0).c_str(), fixed(traits.force_min_N, 0).c_str(),
+                fixed(traits.force_max_N, 0).c_str());
   }
   const std::vector<GripperPort> ports = find_gripper_ports();
   std::printf(ports.empty() ? "\nno serial port on USB that may be a gripper's\n"
                             : "\nports that may be a gripper's:\n");
   for (const GripperPort &port : ports) {
     std::printf("%s\t%s\t%s\n", printable(port.path).c_str(),
-                port.adapter.empty() ? "-" : printable(port.adapter).c_str(),
-                timer_text(port).c_str());
+                port.adapter.empty() ? "-" : printable(port.adapter).c_str(), timer_text(port).c_str());
   }
   for (const GripperPort &port : ports) {
     advise_about_timer(port.path);
@@ -93,8 +92,7 @@ GripperStatus polled(Gripper &gripper) {
     try {
       return gripper.poll();
     } catch (const Error &error) {
-      const bool may_pass =
-          error.code() == ErrorCode::gripper_silent || error.code() == ErrorCode::gripper_garbled;
+      const bool may_pass = error.code() == ErrorCode::gripper_silent || error.code() == ErrorCode::gripper_garbled;
       if (!may_pass || missed >= MISSED_MOST) {
         throw;
       }
@@ -108,11 +106,10 @@ std::string fault_of(const Gripper &gripper, const GripperStatus &status) {
 
 // Until it is done; what lasts too long, or faults, ends in an Error.
 GripperStatus wait_for_end(Gripper &gripper, const char *what, double longest_s,
-                       const std::function<bool(const GripperStatus &)> &done,
-                       const std::function<double(const GripperStatus &)> &share) {
+                           const std::function<bool(const GripperStatus &)> &done,
+                           const std::function<double(const GripperStatus &)> &share) {
   ProgressBar bar(what, ProgressBar::Lines::none);
-  const auto end = host_now() +
-                   std::chrono::milliseconds(static_cast<long>(longest_s * 1000));
+  const auto end = host_now() + std::chrono::milliseconds(static_cast<long>(longest_s * 1000));
   for (;;) {
     const GripperStatus status = polled(gripper);
     if (done(status)) {
@@ -139,8 +136,7 @@ void activate(Gripper &gripper) {
   const GripperStatus status = wait_for_end(
       gripper, "activating", ACTIVATION_MOST_s, [](const GripperStatus &now) { return now.active; },
       [&](const GripperStatus &) {
-        return std::chrono::duration<double>(host_now() - begin).count() /
-               ACTIVATION_MOST_s;
+        return std::chrono::duration<double>(host_now() - begin).count() / ACTIVATION_MOST_s;
       });
   std::printf("activated at %s\n", mm(status.width_mm).c_str());
 }
@@ -163,8 +159,8 @@ int info(Gripper &gripper, const std::string &port) {
 
 void check_range(const char *name, double value, double least, double most, const char *unit) {
   if (!(value >= least && value <= most)) {
-    throw WrongUsage(std::string(name) + " goes from " + fixed(least, 0) + " to " + fixed(most, 0) +
-                     " " + unit + " with this gripper");
+    throw WrongUsage(std::string(name) + " goes from " + fixed(least, 0) + " to " + fixed(most, 0) + " " + unit +
+                     " with this gripper");
   }
 }
 
@@ -173,8 +169,8 @@ int move(Gripper &gripper, const GripperOptions &options) {
   const double width_mm = options.action == "open"    ? traits.stroke_mm
                           : options.action == "close" ? 0.0
                                                       : *options.width_mm;
-  const double speed_mm_s = options.speed_mm_s.value_or(
-      std::clamp(SPEED_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s));
+  const double speed_mm_s =
+      options.speed_mm_s.value_or(std::clamp(SPEED_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s));
   check_range("WIDTH", width_mm, 0.0, traits.stroke_mm, "mm");
   check_range("--speed", speed_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s, "mm/s");
   if (options.force_N != 0) {
@@ -185,8 +181,7 @@ int move(Gripper &gripper, const GripperOptions &options) {
   }
   const GripperStatus begin = polled(gripper);
   if (!begin.active) {
-    throw Error("the gripper is not active" +
-                (begin.fault ? ", fault " + fault_of(gripper, begin) : std::string()) +
+    throw Error("the gripper is not active" + (begin.fault ? ", fault " + fault_of(gripper, begin) : std::string()) +
                 "; --activate does it, and a Robotiq opens and closes then: whatever it holds "
                 "falls");
   }
@@ -195,17 +190,13 @@ int move(Gripper &gripper, const GripperOptions &options) {
   const GripperStatus end = wait_for_end(
       gripper, width_mm < begin.width_mm ? "closing" : "opening", way_mm / speed_mm_s + REST_MOST_s,
       [](const GripperStatus &now) { return !now.moving; },
-      [&](const GripperStatus &now) {
-        return way_mm > 0 ? std::abs(now.width_mm - begin.width_mm) / way_mm : 1.0;
-      });
+      [&](const GripperStatus &now) { return way_mm > 0 ? std::abs(now.width_mm - begin.width_mm) / way_mm : 1.0; });
   if (!end.active || end.fault) {
-    throw Error("the gripper stopped at " + mm(end.width_mm) + ", " +
-                (end.active ? "active" : "not active") +
+    throw Error("the gripper stopped at " + mm(end.width_mm) + ", " + (end.active ? "active" : "not active") +
                 (end.fault ? ", fault " + fault_of(gripper, end) : ""));
   }
   if (end.object.value_or(false)) {
-    std::printf("holds an object at %s, asked for %s\n", mm(end.width_mm).c_str(),
-                mm(width_mm).c_str());
+    std::printf("holds an object at %s, asked for %s\n", mm(end.width_mm).c_str(), mm(width_mm).c_str());
   } else {
     std::printf("stands at %s, without an object\n", mm(end.width_mm).c_str());
   }
@@ -220,8 +211,7 @@ int gripper_command(GripperOptions options) {
     throw WrongUsage("--model is missing; fingertip gripper list has them");
   }
   if ((options.action == "move") != options.width_mm.has_value()) {
-    throw WrongUsage(options.width_mm ? "only move takes a WIDTH"
-                                      : "WIDTH is missing: fingertip gripper move MM");
+    throw WrongUsage(options.width_mm ? "only move takes a WIDTH" : "WIDTH is missing: fingertip gripper move MM");
   }
   typed([&] { return gripper_traits(options.way.model); });
   try {
@@ -244,11 +234,10 @@ int gripper_command(GripperOptions options) {
 
 void add_gripper(CommandLine &line) {
   auto options = std::make_shared<GripperOptions>();
-  CLI::App *command =
-      line.add("gripper",
-               "Try a gripper by hand: list models, show its state, open it, close it, move "
-               "it to a width; waits and prints how it ended",
-               [options] { return gripper_command(*options); });
+  CLI::App *command = line.add("gripper",
+                               "Try a gripper by hand: list models, show its state, open it, close it, move "
+                               "it to a width; waits and prints how it ended",
+                               [options] { return gripper_command(*options); });
   command->add_option("ACTION", options->action, "list, info, move WIDTH, open or close")
       ->required()
       ->check([](const std::string &text) {
@@ -260,25 +249,18 @@ void add_gripper(CommandLine &line) {
         return "there is no \"" + text + "\"; give list, info, move WIDTH, open or close";
       })
       ->type_name("ACTION");
-  command->add_option("WIDTH", options->width_mm, "For move: width between the pads, in mm")
-      ->type_name("MM");
-  command
-      ->add_option("--model", options->way.model,
-                   "Model of the gripper: " + gripper_model_names())
+  command->add_option("WIDTH", options->width_mm, "For move: width between the pads, in mm")->type_name("MM");
+  command->add_option("--model", options->way.model, "Model of the gripper: " + gripper_model_names())
       ->type_name("MODEL");
-  command
-      ->add_option("--port", options->way.port,
-                   "Its serial line; default: the only one on USB that is no fingertip")
+  command->add_option("--port", options->way.port, "Its serial line; default: the only one on USB that is no fingertip")
       ->type_name("PATH");
   command
-      ->add_option("--speed", options->speed_mm_s,
-                   "Speed of the width; default: 50 mm/s, or the nearest that it can")
+      ->add_option("--speed", options->speed_mm_s, "Speed of the width; default: 50 mm/s, or the nearest that it can")
       ->type_name("MM/S");
   command
-      ->add_option(
-          "--force", options->force_N,
-          "Force at which it stops, by its maker's scale, which is not newtons; default: its "
-          "least")
+      ->add_option("--force", options->force_N,
+                   "Force at which it stops, by its maker's scale, which is not newtons; default: its "
+                   "least")
       ->type_name("N");
   command->add_flag("--activate", options->activate,
                     "Activate it first, which clears its faults; a Robotiq opens and closes fully, "

@@ -25,10 +25,9 @@ void print_pairs(const Metadata &pairs) {
 void leave_out_missing(Metadata &pairs, std::uint32_t capabilities) {
   auto is_missing = [&](const std::pair<std::string, std::string> &pair) {
     bool of_slip = pair.first.rfind("slip_", 0) == 0;
-    bool of_fit = pair.first.rfind("fit_", 0) == 0 || pair.first.rfind("prior_", 0) == 0 ||
-                  pair.first.rfind("location_", 0) == 0;
-    return (of_slip && !(capabilities & WIRE_CAPABILITY_SLIP)) ||
-           (of_fit && !(capabilities & WIRE_CAPABILITY_FIT));
+    bool of_fit =
+        pair.first.rfind("fit_", 0) == 0 || pair.first.rfind("prior_", 0) == 0 || pair.first.rfind("location_", 0) == 0;
+    return (of_slip && !(capabilities & WIRE_CAPABILITY_SLIP)) || (of_fit && !(capabilities & WIRE_CAPABILITY_FIT));
   };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_missing), pairs.end());
 }
@@ -40,8 +39,7 @@ int info(const Choice &choice) {
   Metadata pairs = info_metadata(info);
   /* print_gains has them. */
   auto is_of_sensors = [](const std::pair<std::string, std::string> &pair) {
-    static constexpr std::string_view names[] = {"gains", "gain_sds", "off_x_um", "off_y_um",
-                                                 "wider_q15"};
+    static constexpr std::string_view names[] = {"gains", "gain_sds", "off_x_um", "off_y_um", "wider_q15"};
     return std::find(std::begin(names), std::end(names), pair.first) != std::end(names);
   };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_of_sensors), pairs.end());
@@ -74,8 +72,8 @@ int info(const Choice &choice) {
   }
   leave_out_missing(counters, info.capabilities);
   print_pairs(counters);
-  const auto [key, firmware] = *std::find_if(
-      pairs.begin(), pairs.end(), [](const auto &pair) { return pair.first == "firmware"; });
+  const auto [key, firmware] =
+      *std::find_if(pairs.begin(), pairs.end(), [](const auto &pair) { return pair.first == "firmware"; });
   if (firmware != FINGERTIP_VERSION) {
     std::printf("\nits firmware is of version %s, this tool of version " FINGERTIP_VERSION
                 "; install this tool's with `fingertip flash`, or use the other's tool\n",
@@ -85,8 +83,7 @@ int info(const Choice &choice) {
     print_gains(info.calibration, info.sensor_count);
   }
   if (info.stored & WIRE_STORED_DAMAGED) {
-    std::printf(
-        "\nwhat it had stored cannot be read and is not used; calibrate again, or set --keep\n");
+    std::printf("\nwhat it had stored cannot be read and is not used; calibrate again, or set --keep\n");
   }
   return 0;
 }
@@ -95,9 +92,7 @@ int info(const Choice &choice) {
 
 void add_info(CommandLine &line) {
   auto choice = std::make_shared<Choice>();
-  with_port(
-      line.add("info", "Show identity, settings and health", [choice] { return info(*choice); }),
-      *choice);
+  with_port(line.add("info", "Show identity, settings and health", [choice] { return info(*choice); }), *choice);
 }
 
 } // namespace fingertip

@@ -20,9 +20,9 @@ int loader(const Choice &choice) {
 
 void add_loader(CommandLine &line) {
   auto choice = std::make_shared<Choice>();
-  with_port(line.add("loader", "Restart into the USB loader, to install firmware",
-                     [choice] { return loader(*choice); }),
-            *choice);
+  with_port(
+      line.add("loader", "Restart into the USB loader, to install firmware", [choice] { return loader(*choice); }),
+      *choice);
 }
 
 } // namespace fingertip

@@ -30,12 +30,10 @@ int monitor(const MonitorOptions &options) {
 
 void add_monitor(CommandLine &line) {
   auto options = std::make_shared<MonitorOptions>();
-  CLI::App *command = line.add("monitor", "Show live what fingertips feel",
-                               [options] { return monitor(*options); });
+  CLI::App *command = line.add("monitor", "Show live what fingertips feel", [options] { return monitor(*options); });
   with_several(command, options->several);
   with_recording(command, options->live);
-  command->add_option("--record", options->live.recording, "Record at the same time")
-      ->type_name("FILE.csv|FILE.mcap");
+  command->add_option("--record", options->live.recording, "Record at the same time")->type_name("FILE.csv|FILE.mcap");
   with_colour(command, options->live.colour);
 }
 

@@ -70,25 +70,20 @@ int pad_command(const PadOptions &options) {
   }
   const pad::Shape shape{thickness_mm(options, info), options.overhang_mm, options.from_touch};
   pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
-  const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm &&
-                    shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
+  const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm && shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
   if (ends) {
     ProgressBar bar("the pad's ends", ProgressBar::Lines::none);
     profile.edges = typed([&] {
-      return pad::edges_of(profile, info, twin::default_cache_directory(),
-                           [&](double share) { bar.show(share); });
+      return pad::edges_of(profile, info, twin::default_cache_directory(), [&](double share) { bar.show(share); });
     });
   }
   session.command(command_pad(profile));
-  std::printf("thickness=%s overhang=%s%s%s force_ratio=%s kept\n",
-              shortest(profile.thickness_mm).c_str(),
-              profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?",
-              ends ? " ends" : "", profile.from_touch ? " from_touch" : "",
-              fixed(static_cast<double>(profile.force_ratio), 3).c_str());
+  std::printf("thickness=%s overhang=%s%s%s force_ratio=%s kept\n", shortest(profile.thickness_mm).c_str(),
+              profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?", ends ? " ends" : "",
+              profile.from_touch ? " from_touch" : "", fixed(static_cast<double>(profile.force_ratio), 3).c_str());
   if (shape.overhang_mm == 0) {
-    std::fprintf(stderr,
-                 "fingertip: a pad without end, as there is no --overhang: where the rubber "
-                 "ends, location and tangential load are off\n");
+    std::fprintf(stderr, "fingertip: a pad without end, as there is no --overhang: where the rubber "
+                         "ends, location and tangential load are off\n");
   }
   if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
     std::fprintf(stderr,
@@ -104,28 +99,25 @@ int pad_command(const PadOptions &options) {
 
 void add_pad(CommandLine &line) {
   auto options = std::make_shared<PadOptions>();
-  CLI::App *command = line.add(
-      "pad",
-      "Set the pad's profile, for the tangential load (the fingertip keeps it without power)",
-      [options] { return pad_command(*options); });
+  CLI::App *command =
+      line.add("pad", "Set the pad's profile, for the tangential load (the fingertip keeps it without power)",
+               [options] { return pad_command(*options); });
   with_port(command, options->choice);
   CLI::Option *thickness = command
                                ->add_option("--thickness", options->thickness_mm,
                                             "Thickness of the rubber above the sensors, 9 to 20 mm."
                                             " Default: as the calibration found it")
                                ->type_name("MM");
-  CLI::Option *overhang =
-      command
-          ->add_option("--overhang", options->overhang_mm,
-                       "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 "
-                       "to 20 mm the effect of the ends is computed and subtracted. Default: a pad "
-                       "without end")
-          ->type_name("MM");
+  CLI::Option *overhang = command
+                              ->add_option("--overhang", options->overhang_mm,
+                                           "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 "
+                                           "to 20 mm the effect of the ends is computed and subtracted. Default: a pad "
+                                           "without end")
+                              ->type_name("MM");
   CLI::Option *from_touch =
-      command
-          ->add_flag("--from-touch", options->from_touch,
-                     "Report the change since the first 100 ms of each contact: for pads whose "
-                     "rubber ends within half its thickness of the outer sensors");
+      command->add_flag("--from-touch", options->from_touch,
+                        "Report the change since the first 100 ms of each contact: for pads whose "
+                        "rubber ends within half its thickness of the outer sensors");
   command->add_flag("--erase", options->erase, "Erase the pad's profile: no tangential load")
       ->excludes(thickness)
       ->excludes(overhang)

@@ -36,10 +36,9 @@ void add_record(CommandLine &line) {
                                [options] { return record(*options); });
   with_several(command, options->several);
   command
-      ->add_option(
-          "file", options->live.recording,
-          "The recording to write, CSV or MCAP by its name; -: standard output, each row as "
-          "it comes")
+      ->add_option("file", options->live.recording,
+                   "The recording to write, CSV or MCAP by its name; -: standard output, each row as "
+                   "it comes")
       ->required()
       ->type_name("FILE.csv|FILE.mcap|-");
   with_recording(command, options->live);

@@ -15,7 +15,6 @@ namespace fingertip {
 
 namespace {
 
-
 struct ReplayOptions {
   std::string file;
   double speed = 1; /* 0: as fast as possible */
@@ -40,8 +39,8 @@ double speed_from_text(const std::string &text) {
 int show(const ReplayOptions &options) {
   Playback playback(options.file, options.salvage, options.device, options.speed);
   std::string name = printable(options.file);
-  std::unique_ptr<View> view = playback.grip() ? make_grasp_view(options.colour, *playback.grip())
-                                               : make_monitor_view(options.colour);
+  std::unique_ptr<View> view =
+      playback.grip() ? make_grasp_view(options.colour, *playback.grip()) : make_monitor_view(options.colour);
   while (!playback.is_over() && !stop_requested()) {
     playback.step(host_now());
     view->update(playback.models(), playback.caption(name));
@@ -56,8 +55,7 @@ int show(const ReplayOptions &options) {
     const Track &track = playback.tracks()[i];
     const Model &model = playback.models()[i];
     if (model.frames() == 0 && track.is_ended()) {
-      throw Error(options.file +
-                  ": no frames in it; give a recording or capture of a streaming fingertip");
+      throw Error(options.file + ": no frames in it; give a recording or capture of a streaming fingertip");
     }
     report_losses(options.file, track.file());
     bool several = playback.tracks().size() > 1;
@@ -76,8 +74,7 @@ void add_replay(CommandLine &line) {
     if (options->to_csv.empty()) {
       return show(*options);
     }
-    convert_packets(
-        {options->file, options->to_csv, options->device, options->salvage, options->overwrite});
+    convert_packets({options->file, options->to_csv, options->device, options->salvage, options->overwrite});
     return 0;
   });
   command->add_option("file", options->file, "Recording (.csv, .mcap) or bytes of the line (.ftr)")
@@ -93,8 +90,7 @@ void add_replay(CommandLine &line) {
                    "Serial number of one of several fingertips in the recording; default: show all")
       ->type_name("SERIAL");
   command->add_flag("--salvage", options->salvage, "Skip damaged lines and count them");
-  command->add_option("--to-csv", options->to_csv, "Write a recording instead of showing it")
-      ->type_name("OUT.csv");
+  command->add_option("--to-csv", options->to_csv, "Write a recording instead of showing it")->type_name("OUT.csv");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT.csv if it exists");
   with_colour(command, options->colour);
 }

@@ -99,9 +99,8 @@ int serve(const ServeOptions &options) {
 
 void add_serve(CommandLine &line) {
   auto options = std::make_shared<ServeOptions>();
-  CLI::App *command =
-      line.add("serve", "Share fingertips with every program that uses them, until Ctrl-C",
-               [options] { return serve(*options); });
+  CLI::App *command = line.add("serve", "Share fingertips with every program that uses them, until Ctrl-C",
+                               [options] { return serve(*options); });
   command
       ->add_option("--device", options->devices,
                    "Serial number of a fingertip to share; default: all, also those plugged in "

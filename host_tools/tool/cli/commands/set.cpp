@@ -38,8 +38,7 @@ int set(const SetOptions &options) {
     session.command(command_keep(options.keep));
   }
   wire_info info = session.info().body.info;
-  std::printf("%s%s\n", settings_text(info).c_str(),
-              info.stored & WIRE_STORED_SETTINGS ? " kept" : "");
+  std::printf("%s%s\n", settings_text(info).c_str(), info.stored & WIRE_STORED_SETTINGS ? " kept" : "");
   return 0;
 }
 
@@ -47,17 +46,13 @@ int set(const SetOptions &options) {
 
 void add_set(CommandLine &line) {
   auto options = std::make_shared<SetOptions>();
-  CLI::App *command =
-      line.add("set", "Change settings until the next power-on, or for good with --keep",
-               [options] { return set(*options); });
+  CLI::App *command = line.add("set", "Change settings until the next power-on, or for good with --keep",
+                               [options] { return set(*options); });
   with_port(command, options->choice);
   command->add_option("settings", options->settings, settings_help())->type_name("KEY=VALUE");
-  CLI::Option *keep =
-      command->add_flag("--keep", options->keep,
-                        "Keep all present settings: the fingertip starts with them from now on");
-  command
-      ->add_flag("--forget", options->forget,
-                 "Keep none: from its next start on it has the firmware's defaults")
+  CLI::Option *keep = command->add_flag("--keep", options->keep,
+                                        "Keep all present settings: the fingertip starts with them from now on");
+  command->add_flag("--forget", options->forget, "Keep none: from its next start on it has the firmware's defaults")
       ->excludes(keep);
 }
 

@@ -84,8 +84,7 @@ int tare(const TareOptions &options) {
   Device device(options.choice);
   wire_info info = device.session.info().body.info;
   Tare taring(device);
-  device.session.command(
-      command_stream(possible_streams(info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)));
+  device.session.command(command_stream(possible_streams(info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)));
   taring.run(options.force);
   device.session.command(command_stream(0));
   std::printf("tared\n");
@@ -96,9 +95,8 @@ int tare(const TareOptions &options) {
 
 void add_tare(CommandLine &line) {
   auto options = std::make_shared<TareOptions>();
-  CLI::App *tare_command =
-      line.add("tare", "Measure the zero of every sensor; nothing may touch the pad",
-               [options] { return tare(*options); });
+  CLI::App *tare_command = line.add("tare", "Measure the zero of every sensor; nothing may touch the pad",
+                                    [options] { return tare(*options); });
   with_port(tare_command, options->choice);
   tare_command->add_flag("--force", options->force,
                          "Tare even if a contact is reported, though nothing touches the pad");

@@ -126,21 +126,10 @@ export interface Finding {
 }
 
 /** As in libfingertip/error.hpp. */
-export type FailureCode =
-  | 'no_port'
-  | 'port_in_use'
-  | 'cannot_open'
-  | 'not_a_fingertip'
-  | 'gone'
-  | 'no_answer'
-  | 'other_version'
-  | 'other';
+export type FailureCode = 'no_port' | 'port_in_use' | 'cannot_open' | 'not_a_fingertip' | 'gone' | 'no_answer' | 'other_version' | 'other';
 
 /** What the line counted during the measurement. */
-export type MeasuredCounts = Pick<
-  LineCounts,
-  'bytes' | 'packets' | 'dropped_packets' | 'out_of_order' | 'crc_errors' | 'format_errors'
->;
+export type MeasuredCounts = Pick<LineCounts, 'bytes' | 'packets' | 'dropped_packets' | 'out_of_order' | 'crc_errors' | 'format_errors'>;
 
 /**
  * As `fingertip doctor` does it: info, health, crash, then contact and raw packets for ten seconds

@@ -7,10 +7,7 @@ export interface Line {
    * arrival; closed: once, if it ends without close(), a sentence that says why and what to do.
    * Rejects with an Error whose message says what to do.
    */
-  open(
-    receive: (bytes: Uint8Array, at_ms: number) => void,
-    closed: (why: string) => void,
-  ): Promise<void>;
+  open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void>;
   send(bytes: Uint8Array): Promise<void>;
   close(): Promise<void>;
 }

@@ -24,9 +24,7 @@ export function whyNoWebSerial(): string {
 function nameOf(port: SerialPort): string {
   const { usbVendorId, usbProductId } = port.getInfo();
   const hex = (id: number): string => id.toString(16).padStart(4, '0');
-  return usbVendorId === undefined
-    ? 'serial port'
-    : `USB port ${hex(usbVendorId)}:${hex(usbProductId ?? 0)}`;
+  return usbVendorId === undefined ? 'serial port' : `USB port ${hex(usbVendorId)}:${hex(usbProductId ?? 0)}`;
 }
 
 export class SerialLine implements Line {
@@ -38,10 +36,7 @@ export class SerialLine implements Line {
     this.label = nameOf(port);
   }
 
-  async open(
-    receive: (bytes: Uint8Array, at_ms: number) => void,
-    closed: (why: string) => void,
-  ): Promise<void> {
+  async open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
     this.closing = false;
     try {
       await this.port.open({ baudRate: 115200, bufferSize: BUFFER_bytes });
@@ -74,10 +69,7 @@ export class SerialLine implements Line {
     await this.port.close().catch(() => undefined);
   }
 
-  private async read(
-    receive: (bytes: Uint8Array, at_ms: number) => void,
-    closed: (why: string) => void,
-  ): Promise<void> {
+  private async read(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
     let why = 'the port was closed; press "Connect"';
     // An overrun or a line error ends a stream, and the port has another; a lost device has none.
     while (this.port.readable && !this.closing) {
@@ -149,8 +141,6 @@ export async function rememberedPorts(): Promise<SerialPort[]> {
   const ports = hasWebSerial() ? await navigator.serial.getPorts().catch(() => []) : [];
   return ports.filter((port) => {
     const { usbVendorId, usbProductId } = port.getInfo();
-    return FINGERTIP_PORTS.some(
-      (each) => each.usbVendorId === usbVendorId && each.usbProductId === usbProductId,
-    );
+    return FINGERTIP_PORTS.some((each) => each.usbVendorId === usbVendorId && each.usbProductId === usbProductId);
   });
 }

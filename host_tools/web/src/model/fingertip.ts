@@ -161,11 +161,7 @@ export class Fingertip {
       await this.stream(Stream.CONTACT | Stream.RAW | Stream.HEALTH);
     } catch (error) {
       const why =
-        error instanceof OtherFingertip
-          ? 'it is not there: plug it in again'
-          : error instanceof Error
-            ? error.message
-            : String(error);
+        error instanceof OtherFingertip ? 'it is not there: plug it in again' : error instanceof Error ? error.message : String(error);
       if ((this.state as FingertipState) !== 'closed') {
         await line.close().catch(() => undefined);
         this.gone(why);
@@ -197,10 +193,7 @@ export class Fingertip {
     }
     const ack = await this.exchange(command, tries);
     if (ack.result !== Result.DONE) {
-      throw new CommandError(
-        `${core.commandName(command.type)}: ${core.resultText(ack.result)}`,
-        ack.result,
-      );
+      throw new CommandError(`${core.commandName(command.type)}: ${core.resultText(ack.result)}`, ack.result);
     }
     return ack;
   }
@@ -209,9 +202,7 @@ export class Fingertip {
   async stream(streams: number): Promise<void> {
     const capabilities = this.info?.capabilities ?? 0;
     const possible =
-      (capabilities & Capability.FIT ? Stream.CONTACT : 0) |
-      (capabilities & Capability.RAW_STREAM ? Stream.RAW : 0) |
-      Stream.HEALTH;
+      (capabilities & Capability.FIT ? Stream.CONTACT : 0) | (capabilities & Capability.RAW_STREAM ? Stream.RAW : 0) | Stream.HEALTH;
     await this.command({ type: PacketType.CMD_STREAM, streams: streams & possible });
   }
 
@@ -291,7 +282,7 @@ export class Fingertip {
       throw new Error(
         this.counts.bytes === 0
           ? 'nothing answers on this port: it may be something else than a fingertip; choose another, ' +
-            'or unplug the fingertip and plug it in again'
+              'or unplug the fingertip and plug it in again'
           : 'what answers on this port is no fingertip: choose another port',
       );
     }
@@ -305,11 +296,7 @@ export class Fingertip {
       }
     }
     const until_ms = performance.now() + PATIENCE.version_ms;
-    while (
-      this.decoder.other_version === 0 &&
-      (this.state as FingertipState) !== 'closed' &&
-      performance.now() < until_ms
-    ) {
+    while (this.decoder.other_version === 0 && (this.state as FingertipState) !== 'closed' && performance.now() < until_ms) {
       await new Promise((done) => setTimeout(done, 20));
     }
     return this.decoder.other_version;
@@ -413,8 +400,7 @@ export class Fingertip {
           this.history = new History(packet.sensor_count);
         }
         this.info = packet;
-        this.history.gain =
-          packet.stored & Stored.CALIBRATION ? packet.gain : [];
+        this.history.gain = packet.stored & Stored.CALIBRATION ? packet.gain : [];
         break;
       case PacketType.HEALTH:
         this.health = packet;
@@ -436,9 +422,7 @@ export class Fingertip {
   };
 
   private acknowledge(ack: Ack): void {
-    const waiting = this.waiting.find(
-      (each) => each.command === ack.command && each.sequence === ack.command_sequence,
-    );
+    const waiting = this.waiting.find((each) => each.command === ack.command && each.sequence === ack.command_sequence);
     if (waiting && waiting.sent_us === ack.host_time_us) {
       this.clock.add({
         sent_us: waiting.sent_us,

@@ -71,9 +71,7 @@ export class History {
       flag: flagOf(field),
       column: new Float32Array(capacity),
     }));
-    this.columns = Object.fromEntries(
-      this.fields.map(({ field, column }) => [field, column]),
-    ) as Record<ContactField, Float32Array>;
+    this.columns = Object.fromEntries(this.fields.map(({ field, column }) => [field, column])) as Record<ContactField, Float32Array>;
   }
 
   /** The oldest row that is kept. */
@@ -108,10 +106,7 @@ export class History {
   /** A view of a row's readings, overwritten with it; null where no raw packet came. */
   readingsAt(row: number): Readings | null {
     const slot = row % this.capacity;
-    const pressure_Pa = this.pressure_Pa.subarray(
-      slot * this.sensor_count,
-      (slot + 1) * this.sensor_count,
-    );
+    const pressure_Pa = this.pressure_Pa.subarray(slot * this.sensor_count, (slot + 1) * this.sensor_count);
     return row < this.oldest || row >= this.next || pressure_Pa.every(Number.isNaN)
       ? null
       : {
@@ -145,8 +140,7 @@ export class History {
     const measured = raw.flags & Flag.HELD ? ~0 : raw.valid;
     for (let k = 0; k < count; k++) {
       const above_Pa = (raw.pressure_Pa_q10[k] - raw.baseline_Pa_q10[k]) / 1024;
-      this.pressure_Pa[at + k] =
-        (measured >>> k) & 1 ? above_Pa / (k < this.gain.length ? this.gain[k] : 1) : NaN;
+      this.pressure_Pa[at + k] = (measured >>> k) & 1 ? above_Pa / (k < this.gain.length ? this.gain[k] : 1) : NaN;
     }
   }
 

@@ -90,8 +90,6 @@ export async function chooseOutput(name: string, media_type: string): Promise<Ou
     if (error instanceof DOMException && error.name === 'AbortError') {
       return null;
     }
-    throw new Error(
-      `the browser does not let this page write there (${String(error)}): choose another folder`,
-    );
+    throw new Error(`the browser does not let this page write there (${String(error)}): choose another folder`);
   }
 }

@@ -81,9 +81,7 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
 /** Of a file that was read to its end; empty: none. */
 function problemOf(reader: Reader, packets: number): string {
   if (!reader.is_capture) {
-    return reader.has_end
-      ? ''
-      : 'has no end line: it was cut short, its recorder killed or its disk full. What there is, is shown';
+    return reader.has_end ? '' : 'has no end line: it was cut short, its recorder killed or its disk full. What there is, is shown';
   }
   const { crc_errors, format_errors, version_errors } = reader.counts;
   if (packets === 0) {
@@ -117,10 +115,7 @@ class ReplayLine implements Line {
     return holdsSeveral && this.serial ? `${file.name}: fingertip ${this.serial.slice(-4)}` : file.name;
   }
 
-  open(
-    receive: (bytes: Uint8Array, at_ms: number) => void,
-    closed: (why: string) => void,
-  ): Promise<void> {
+  open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
     this.receive = receive;
     this.closed = closed;
     return Promise.resolve();
@@ -235,9 +230,7 @@ export class Replay {
         this.next = null;
       }
     } catch (error) {
-      this.end(
-        error instanceof ReadError ? error.message : `${this.file.name} cannot be read (${String(error)})`,
-      );
+      this.end(error instanceof ReadError ? error.message : `${this.file.name} cannot be read (${String(error)})`);
     }
   }
 

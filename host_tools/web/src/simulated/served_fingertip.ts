@@ -42,9 +42,7 @@ export class ServedFingertip implements Line {
   /** A ball of 15 mm, on rubber of 12 mm: where it is, and how hard; null lifts. */
   readonly press: ((hand: { x_mm: number; y_mm: number; force_N: number } | null) => void) | undefined;
 
-  private readonly client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) =>
-    byte.toString(16).padStart(2, '0'),
-  ).join('');
+  private readonly client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join('');
   private readonly aborter = new AbortController();
   private timer: ReturnType<typeof setInterval> | null = null;
   private asking = false;
@@ -54,18 +52,13 @@ export class ServedFingertip implements Line {
     this.label = `simulated ${served.serial.slice(-4)}`;
     this.press = served.hand
       ? (hand) => {
-          this.command = hand
-            ? ['press', ...[hand.x_mm, hand.y_mm, hand.force_N].map((value) => value.toFixed(3))].join(' ')
-            : 'lift';
+          this.command = hand ? ['press', ...[hand.x_mm, hand.y_mm, hand.force_N].map((value) => value.toFixed(3))].join(' ') : 'lift';
           void this.ask();
         }
       : undefined;
   }
 
-  async open(
-    receive: (bytes: Uint8Array, at_ms: number) => void,
-    closed: (why: string) => void,
-  ): Promise<void> {
+  async open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
     const query = { serial: this.served.serial, client: this.client };
     const answer = await fetch(at('simulated/line', query), { signal: this.aborter.signal });
     if (!answer.ok || !answer.body) {

@@ -79,12 +79,8 @@ export class SimulatedFingertip implements Line {
     const { files = 'wasm/', errors = 'gain=10', ...others } = options;
     const folder = new URL(files, document.baseURI);
     this.worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
-    this.worker.addEventListener('message', (event: MessageEvent<FromWorker>) =>
-      this.take(event.data),
-    );
-    this.worker.addEventListener('error', (event) =>
-      this.take({ kind: 'failed', why: event.message || 'its worker did not start' }),
-    );
+    this.worker.addEventListener('message', (event: MessageEvent<FromWorker>) => this.take(event.data));
+    this.worker.addEventListener('error', (event) => this.take({ kind: 'failed', why: event.message || 'its worker did not start' }));
     this.post({
       kind: 'start',
       wasm: new URL('simulated.wasm', folder).href,
@@ -97,10 +93,7 @@ export class SimulatedFingertip implements Line {
     return this.newest;
   }
 
-  open(
-    receive: (bytes: Uint8Array, at_ms: number) => void,
-    closed: (why: string) => void,
-  ): Promise<void> {
+  open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
     this.receive = receive;
     this.closed = closed;
     return new Promise((done, failed) => {
@@ -174,10 +167,7 @@ export class SimulatedFingertip implements Line {
     this.worker.postMessage(message);
   }
 
-  private act(
-    name: (ToWorker & { kind: 'act' })['name'],
-    ...values: unknown[]
-  ): void {
+  private act(name: (ToWorker & { kind: 'act' })['name'], ...values: unknown[]): void {
     this.post({ kind: 'act', name, values });
   }
 
@@ -188,9 +178,7 @@ export class SimulatedFingertip implements Line {
         this.opening = null;
         break;
       case 'failed':
-        this.opening?.failed(
-          new Error(`the simulated fingertip cannot start (${message.why}); load the page again`),
-        );
+        this.opening?.failed(new Error(`the simulated fingertip cannot start (${message.why}); load the page again`));
         this.opening = null;
         break;
       case 'bytes':

@@ -1,12 +1,6 @@
 /** What the page does with fingertips: finds them, has them come back, records, replays. */
 import type { Line } from '../line/line';
-import {
-  SerialLine,
-  hasWebSerial,
-  rememberedPorts,
-  requestPort,
-  whyNoWebSerial,
-} from '../line/serial_line';
+import { SerialLine, hasWebSerial, rememberedPorts, requestPort, whyNoWebSerial } from '../line/serial_line';
 import { Bench } from '../model/bench';
 import { Fingertip, OtherFingertip } from '../model/fingertip';
 import type { Recorder, RecordingKind } from '../recording/recorder';
@@ -203,9 +197,7 @@ export class App {
   /** As the fingertip that it was before, if it was; else as a new one. */
   private async take(port: SerialPort): Promise<void> {
     const known = this.ports.get(port);
-    const others = this.bench.fingertips.filter(
-      (each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine,
-    );
+    const others = this.bench.fingertips.filter((each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine);
     for (const fingertip of [...(known ? [known] : []), ...others]) {
       try {
         await fingertip.open(new SerialLine(port));
@@ -222,9 +214,7 @@ export class App {
     const fingertip = new Fingertip(new SerialLine(port));
     this.ports.set(port, fingertip);
     this.bench.add(fingertip);
-    await fingertip
-      .open()
-      .catch((error: unknown) => this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad'));
+    await fingertip.open().catch((error: unknown) => this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad'));
   }
 
   private async lookForServed(): Promise<void> {

@@ -39,13 +39,9 @@ function frameOfInfo(fingertip: Fingertip): Promise<Uint8Array> {
 
 async function checkSensors(fingertip: Fingertip): Promise<void> {
   const { sensors_present } = await fingertip.askHealth();
-  const missing = Array.from({ length: fingertip.info?.sensor_count ?? 0 }, (_, k) => k).filter(
-    (k) => !((sensors_present >>> k) & 1),
-  );
+  const missing = Array.from({ length: fingertip.info?.sensor_count ?? 0 }, (_, k) => k).filter((k) => !((sensors_present >>> k) & 1));
   if (missing.length > 0) {
-    throw new Error(
-      `sensors do not answer: ${missing.join(' ')}; mend their wiring first, a calibration is of all of them`,
-    );
+    throw new Error(`sensors do not answer: ${missing.join(' ')}; mend their wiring first, a calibration is of all of them`);
   }
 }
 
@@ -133,13 +129,7 @@ export function calibrate(fingertip: Fingertip): void {
     });
   dialog.choose([
     makeButton('Begin', () => start((judges, force_N) => gains(dialog, fingertip, judges, force_N)), true),
-    ...(knows_pad
-      ? [
-          makeButton('Tangential load', () =>
-            start((judges, force_N) => pulls(dialog, fingertip, judges, force_N)),
-          ),
-        ]
-      : []),
+    ...(knows_pad ? [makeButton('Tangential load', () => start((judges, force_N) => pulls(dialog, fingertip, judges, force_N)))] : []),
     ...(calibrated
       ? [
           makeButton(
@@ -156,12 +146,7 @@ export function calibrate(fingertip: Fingertip): void {
   ]);
 }
 
-async function gains(
-  dialog: Dialog,
-  fingertip: Fingertip,
-  judges: Judges,
-  force_N: number | null,
-): Promise<void> {
+async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force_N: number | null): Promise<void> {
   const session = judges.gains(await frameOfInfo(fingertip));
   const progress = make('p', {});
   const text = make('p', {});
@@ -218,12 +203,7 @@ function finderWords(finder: string): string {
   return finder === 'settling' ? 'Hold still. ' : finder === 'taken' ? 'Taken: lift it off. ' : '';
 }
 
-function confirmGains(
-  dialog: Dialog,
-  fingertip: Fingertip,
-  session: GainSession,
-  force_N: number | null,
-): void {
+function confirmGains(dialog: Dialog, fingertip: Fingertip, session: GainSession, force_N: number | null): void {
   const date_s = Math.floor(Date.now() / 1000);
   const { calibration, before, after } = session.result(force_N, date_s);
   const { text } = session.status();
@@ -239,9 +219,7 @@ function confirmGains(
       {},
       make('caption', {}, 'Of the placements, in the median'),
       make('tr', {}, make('td'), make('th', { scope: 'col' }, 'before'), make('th', { scope: 'col' }, 'after')),
-      ...rows.map(([name, old, now]) =>
-        make('tr', {}, make('th', { scope: 'row' }, name), make('td', {}, old), make('td', {}, now)),
-      ),
+      ...rows.map(([name, old, now]) => make('tr', {}, make('th', { scope: 'row' }, name), make('td', {}, old), make('td', {}, now))),
     ),
     make(
       'p',
@@ -296,8 +274,7 @@ function confirmGains(
 
 /** A row for each sensor. */
 function sensorTable(calibration: GainResult['calibration']): HTMLElement {
-  const signed = (value: number, digits: number) =>
-    `${value < 0 ? '\u2212' : '+'}${Math.abs(value).toFixed(digits)}`;
+  const signed = (value: number, digits: number) => `${value < 0 ? '\u2212' : '+'}${Math.abs(value).toFixed(digits)}`;
   const heads = ['sensor', 'gain', 'sd, %', 'off by x, mm', 'y, mm', 'wider by, %'];
   return make(
     'table',
@@ -321,12 +298,7 @@ function sensorTable(calibration: GainResult['calibration']): HTMLElement {
   );
 }
 
-async function pulls(
-  dialog: Dialog,
-  fingertip: Fingertip,
-  judges: Judges,
-  force_N: number | null,
-): Promise<void> {
+async function pulls(dialog: Dialog, fingertip: Fingertip, judges: Judges, force_N: number | null): Promise<void> {
   if (force_N === null) {
     throw new Error('give the weight that hangs on the string');
   }
@@ -374,11 +346,7 @@ async function pulls(
   }
 }
 
-function confirmPulls(
-  dialog: Dialog,
-  fingertip: Fingertip,
-  result: { tangential_scale: number; tangential_scale_sd: number },
-): void {
+function confirmPulls(dialog: Dialog, fingertip: Fingertip, result: { tangential_scale: number; tangential_scale_sd: number }): void {
   const info = fingertip.info as Info;
   dialog.content.replaceChildren(
     make(
@@ -399,7 +367,7 @@ function confirmPulls(
           await fingertip.command({ ...info, type: PacketType.CMD_PAD, pad_tangential_scale, pad_tangential_scale_sd });
           const now = await fingertip.askInfo();
           if (now.pad_tangential_scale !== pad_tangential_scale) {
-            throw new Error("it did not keep the pad's profile; see \"Doctor\"");
+            throw new Error('it did not keep the pad\'s profile; see "Doctor"');
           }
           dialog.say('Stored: it acts from now on, and without power.');
           dialog.choose([], 'Close');

@@ -68,9 +68,7 @@ export class Dialog {
 
   /** The buttons, before the one that closes. */
   choose(buttons: HTMLButtonElement[] = [], close = 'Cancel'): void {
-    this.choices.replaceChildren(
-      ...[...buttons, makeButton(close, () => this.close())].map((button) => make('li', {}, button)),
-    );
+    this.choices.replaceChildren(...[...buttons, makeButton(close, () => this.close())].map((button) => make('li', {}, button)));
   }
 
   say(text: string): void {

@@ -51,11 +51,7 @@ function item(finding: Finding): HTMLElement {
   );
 }
 
-async function findingsOf(
-  fingertip: Fingertip,
-  progress: (seconds: number) => void,
-  stopped: () => boolean,
-): Promise<Finding[]> {
+async function findingsOf(fingertip: Fingertip, progress: (seconds: number) => void, stopped: () => boolean): Promise<Finding[]> {
   const judges = await loadJudges();
   const tool_version = PAGE_VERSION.split('.').map(Number) as [number, number, number];
   const examination = judges.examination({ port: fingertip.line.label, tool_version });

@@ -21,9 +21,7 @@ async function imageOf(file: File): Promise<Image> {
   try {
     return { name: file.name, bytes, ...core.firmwareOf(file.name, bytes) };
   } catch (error) {
-    throw error instanceof CoreError
-      ? new Error(`${error.message}: choose fingertip-BOARD.uf2 of the build`)
-      : error;
+    throw error instanceof CoreError ? new Error(`${error.message}: choose fingertip-BOARD.uf2 of the build`) : error;
   }
 }
 
@@ -43,9 +41,7 @@ export function flash(app: App, fingertip: Fingertip): void {
   dialog.content.append(make('ol', { class: 'steps' }, ...items), field('Image', input));
   let image: Image | null = null;
   const at = (step: number): void =>
-    items.forEach((item, i) =>
-      i === step ? item.setAttribute('aria-current', 'step') : item.removeAttribute('aria-current'),
-    );
+    items.forEach((item, i) => (i === step ? item.setAttribute('aria-current', 'step') : item.removeAttribute('aria-current')));
   const reboot = makeButton('Reboot to the loader', () => void dialog.run(toLoader), true);
   const save = makeButton('Save onto the drive', () => void dialog.run(toDrive), true);
   const show = (step: number): void => {
@@ -65,9 +61,7 @@ export function flash(app: App, fingertip: Fingertip): void {
         image = await imageOf(file);
         const board = fingertip.info?.board;
         if (board && board !== image.board) {
-          throw new Error(
-            `${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`,
-          );
+          throw new Error(`${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`);
         }
         dialog.say(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
         show(1);
@@ -81,9 +75,7 @@ export function flash(app: App, fingertip: Fingertip): void {
     } else if (port) {
       // What speaks another version understands this.
       await port.open({ baudRate: LOADER_BAUD }).catch((error: unknown) => {
-        throw new Error(
-          `its port cannot be opened (${String(error)}): hold BOOTSEL while plugging it in, then go on`,
-        );
+        throw new Error(`its port cannot be opened (${String(error)}): hold BOOTSEL while plugging it in, then go on`);
       });
       await port.close().catch(() => undefined);
     }
@@ -104,9 +96,7 @@ export function flash(app: App, fingertip: Fingertip): void {
         if (error instanceof DOMException && error.name === 'AbortError') {
           return;
         }
-        throw new Error(
-          `the browser does not let this page write there (${String(error)}): copy ${name} onto the drive by hand`,
-        );
+        throw new Error(`the browser does not let this page write there (${String(error)}): copy ${name} onto the drive by hand`);
       }
       const file = await handle.createWritable();
       await file.write(bytes);

@@ -109,9 +109,7 @@ export function settings(fingertip: Fingertip): void {
       }
     }
     kept.textContent =
-      now.stored & Stored.SETTINGS
-        ? 'It starts with settings that are kept.'
-        : "It starts with the firmware's own settings.";
+      now.stored & Stored.SETTINGS ? 'It starts with settings that are kept.' : "It starts with the firmware's own settings.";
   };
   show(info);
   dialog.content.append(form, kept);
@@ -124,8 +122,7 @@ export function settings(fingertip: Fingertip): void {
       show(await fingertip.askInfo());
       dialog.say(said);
     });
-  const typed = (): Partial<Record<Name, string>> =>
-    Object.fromEntries([...inputs].map(([name, input]) => [name, input.value]));
+  const typed = (): Partial<Record<Name, string>> => Object.fromEntries([...inputs].map(([name, input]) => [name, input.value]));
   const apply = (keep: boolean): Promise<void> =>
     dialog.run(async () => {
       const commands = commandsFor(fingertip.info ?? info, typed());
@@ -144,11 +141,7 @@ export function settings(fingertip: Fingertip): void {
       makeButton('Apply and keep', () => void apply(true)),
       makeButton(
         'Forget what is kept',
-        () =>
-          void send(
-            [{ type: PacketType.CMD_KEEP, keep: 0 }],
-            "Forgotten: from the next start on it has the firmware's own settings.",
-          ),
+        () => void send([{ type: PacketType.CMD_KEEP, keep: 0 }], "Forgotten: from the next start on it has the firmware's own settings."),
       ),
     ],
     'Close',

@@ -42,8 +42,7 @@ function tared(fingertip: Fingertip): Promise<void> {
 function explain(app: App, fingertip: Fingertip): void {
   const { contact, contacts, info } = fingertip;
   const touched = contacts > 0 && contact.flags & Flag.CONTACT;
-  const force =
-    touched && contact.flags & Flag.FIT_VALID ? ` of ${contact.force_N.toFixed(2)} N` : '';
+  const force = touched && contact.flags & Flag.FIT_VALID ? ` of ${contact.force_N.toFixed(2)} N` : '';
   const dialog = new Dialog('Not tared');
   dialog.content.append(
     make(
@@ -57,16 +56,11 @@ function explain(app: App, fingertip: Fingertip): void {
     ),
   );
   if (touched) {
-    dialog.content.append(
-      make('p', {}, 'Where nothing touches the pad and the contact is none, tare anyway.'),
-    );
+    dialog.content.append(make('p', {}, 'Where nothing touches the pad and the contact is none, tare anyway.'));
   }
   const again = (force_it: boolean): void => {
     dialog.close();
     void tare(app, fingertip, force_it);
   };
-  dialog.choose([
-    makeButton('Try again', () => again(false), true),
-    ...(touched ? [makeButton('Tare anyway', () => again(true))] : []),
-  ]);
+  dialog.choose([makeButton('Try again', () => again(false), true), ...(touched ? [makeButton('Tare anyway', () => again(true))] : [])]);
 }

@@ -80,12 +80,7 @@ export class Buckets {
 
   /** Reads what is new of from_s..to_s; returns the intervals that cover it: first to last. At most
    * size of them. */
-  read(
-    history: History,
-    width_s: number,
-    from_s: number,
-    to_s: number,
-  ): { first: number; last: number } {
+  read(history: History, width_s: number, from_s: number, to_s: number): { first: number; last: number } {
     const last = Math.floor(to_s / width_s);
     const first = Math.max(Math.floor(from_s / width_s), last - this.size + 1);
     const moved = width_s !== this.width_s || first < this.from || this.next < history.begin;

@@ -38,16 +38,8 @@ export function cameraOf(look: Look, aspect: number, box: Box): Camera {
   const turn = radians(look.turn_deg);
   const tilt = radians(look.tilt_deg);
   const right: Point = [Math.cos(turn), Math.sin(turn), 0];
-  const up: Point = [
-    -Math.sin(turn) * Math.sin(tilt),
-    Math.cos(turn) * Math.sin(tilt),
-    Math.cos(tilt),
-  ];
-  const back: Point = [
-    Math.sin(turn) * Math.cos(tilt),
-    -Math.cos(turn) * Math.cos(tilt),
-    Math.sin(tilt),
-  ];
+  const up: Point = [-Math.sin(turn) * Math.sin(tilt), Math.cos(turn) * Math.sin(tilt), Math.cos(tilt)];
+  const back: Point = [Math.sin(turn) * Math.cos(tilt), -Math.cos(turn) * Math.cos(tilt), Math.sin(tilt)];
   const high = Math.tan(HALF_VIEW_rad) * RIM;
   const wide = high * aspect;
   const middle_mm = (box.low_mm + box.high_mm) / 2;
@@ -57,19 +49,11 @@ export function cameraOf(look: Look, aspect: number, box: Box): Camera {
       for (const z of [box.low_mm - middle_mm, box.high_mm - middle_mm]) {
         const corner: Point = [x, y, z];
         const ahead = dot(corner, back);
-        distance_mm = Math.max(
-          distance_mm,
-          ahead + Math.abs(dot(corner, right)) / wide,
-          ahead + Math.abs(dot(corner, up)) / high,
-        );
+        distance_mm = Math.max(distance_mm, ahead + Math.abs(dot(corner, right)) / wide, ahead + Math.abs(dot(corner, up)) / high);
       }
     }
   }
-  const eye: Point = [
-    back[0] * distance_mm,
-    back[1] * distance_mm,
-    back[2] * distance_mm + middle_mm,
-  ];
+  const eye: Point = [back[0] * distance_mm, back[1] * distance_mm, back[2] * distance_mm + middle_mm];
   const near = 0.2 * distance_mm;
   const far = 3 * distance_mm;
   const scale = 1 / Math.tan(HALF_VIEW_rad);
@@ -80,10 +64,22 @@ export function cameraOf(look: Look, aspect: number, box: Box): Camera {
   project[11] = -1;
   project[14] = (2 * far * near) / (near - far);
   const view = new Float32Array([
-    right[0], up[0], back[0], 0,
-    right[1], up[1], back[1], 0,
-    right[2], up[2], back[2], 0,
-    -dot(right, eye), -dot(up, eye), -dot(back, eye), 1,
+    right[0],
+    up[0],
+    back[0],
+    0,
+    right[1],
+    up[1],
+    back[1],
+    0,
+    right[2],
+    up[2],
+    back[2],
+    0,
+    -dot(right, eye),
+    -dot(up, eye),
+    -dot(back, eye),
+    1,
   ]);
   return { matrix: product(project, view), eye, right, up, back, aspect };
 }
@@ -91,29 +87,17 @@ export function cameraOf(look: Look, aspect: number, box: Box): Camera {
 /** Where a point is seen: -1 to 1, to the right and up. */
 export function seen(camera: Camera, point: Point): { right: number; up: number } {
   const m = camera.matrix;
-  const row = (i: number) =>
-    (m[i] ?? 0) * point[0] +
-    (m[i + 4] ?? 0) * point[1] +
-    (m[i + 8] ?? 0) * point[2] +
-    (m[i + 12] ?? 0);
+  const row = (i: number) => (m[i] ?? 0) * point[0] + (m[i + 4] ?? 0) * point[1] + (m[i + 8] ?? 0) * point[2] + (m[i + 12] ?? 0);
   const w = row(3);
   return { right: row(0) / w, up: row(1) / w };
 }
 
 /** The point of the rubber's surface, or of a plane at another height, that is seen there; null
  * where none is: at the horizon and above. */
-export function picked(
-  camera: Camera,
-  right: number,
-  up: number,
-  height_mm = 0,
-): { x_mm: number; y_mm: number } | null {
+export function picked(camera: Camera, right: number, up: number, height_mm = 0): { x_mm: number; y_mm: number } | null {
   const high = Math.tan(HALF_VIEW_rad);
   const ray = [0, 1, 2].map(
-    (i) =>
-      (camera.right[i] ?? 0) * right * high * camera.aspect +
-      (camera.up[i] ?? 0) * up * high -
-      (camera.back[i] ?? 0),
+    (i) => (camera.right[i] ?? 0) * right * high * camera.aspect + (camera.up[i] ?? 0) * up * high - (camera.back[i] ?? 0),
   );
   const [dx = 0, dy = 0, dz = 0] = ray;
   const along = (height_mm - camera.eye[2]) / dz;

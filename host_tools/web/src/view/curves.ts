@@ -19,13 +19,7 @@ export interface Chart {
 }
 
 /** Broken where frames were lost and where for longer than break_s no frame came. */
-export function chartOf(
-  buckets: Buckets,
-  columns: readonly ColumnName[],
-  first: number,
-  last: number,
-  break_s: number,
-): Chart {
+export function chartOf(buckets: Buckets, columns: readonly ColumnName[], first: number, last: number, break_s: number): Chart {
   const width_s = buckets.width_s;
   const slots: number[] = [];
   const breaks: boolean[] = [];
@@ -36,8 +30,7 @@ export function chartOf(
     if (slot < 0) {
       continue;
     }
-    const broken =
-      before >= 0 && ((buckets.lost[slot] ?? 0) > 0 || (b - before) * width_s > break_s + width_s);
+    const broken = before >= 0 && ((buckets.lost[slot] ?? 0) > 0 || (b - before) * width_s > break_s + width_s);
     if (broken) {
       t_s.push(b * width_s);
       slots.push(-1);
@@ -108,13 +101,7 @@ export interface Span {
 }
 
 /** lost: 'lost' instead of a flag's bit gives where frames are missing. */
-export function spansOf(
-  buckets: Buckets,
-  bit: number | 'lost',
-  first: number,
-  last: number,
-  break_s: number,
-): Span[] {
+export function spansOf(buckets: Buckets, bit: number | 'lost', first: number, last: number, break_s: number): Span[] {
   const spans: Span[] = [];
   const width_s = buckets.width_s;
   for (let b = first; b <= last; b++) {

@@ -41,11 +41,7 @@ export class HandPanel implements Touch {
       'section',
       { class: 'hand', 'aria-label': 'Simulated hand' },
       element('h3', {}, 'Your hand'),
-      element(
-        'p',
-        { class: 'hint' },
-        'Press on the pad and drag: longer presses harder, the wheel too. All of it is simulated.',
-      ),
+      element('p', { class: 'hint' }, 'Press on the pad and drag: longer presses harder, the wheel too. All of it is simulated.'),
       ...this.objects(),
       this.force.element,
       element('div', { class: 'choices' }, this.pressButton, ...this.dropping(), lift),
@@ -93,10 +89,7 @@ export class HandPanel implements Touch {
     const y_mm = this.y.value;
     const most_N = this.force.value;
     const held_s = (now_ms - this.since_ms) / 1000;
-    const force_N =
-      this.doing === 'pointer'
-        ? most_N + (FIRST_N - most_N) * Math.exp(-held_s / RISE_s)
-        : most_N;
+    const force_N = this.doing === 'pointer' ? most_N + (FIRST_N - most_N) * Math.exp(-held_s / RISE_s) : most_N;
     const rounded_N = Math.round(100 * force_N) / 100;
     const grip = { load_N: this.load.value, angle_deg: this.angle.value };
     const doing = JSON.stringify([this.doing, x_mm, y_mm, rounded_N, grip]);
@@ -116,11 +109,7 @@ export class HandPanel implements Touch {
     if (!hand.objects) {
       return [];
     }
-    const object = element(
-      'select',
-      { id: 'object' },
-      ...hand.objects.map(({ name, title }) => element('option', { value: name }, title)),
-    );
+    const object = element('select', { id: 'object' }, ...hand.objects.map(({ name, title }) => element('option', { value: name }, title)));
     object.addEventListener('change', () => {
       this.end();
       hand.choose?.(object.value);
@@ -142,12 +131,7 @@ export class HandPanel implements Touch {
     if (!hand.hold) {
       return [];
     }
-    const friction = slider(
-      'Friction',
-      '',
-      { least: 0.1, most: 1.5, step: 0.05, value: 0.5 },
-      (value) => hand.setFriction?.(value),
-    );
+    const friction = slider('Friction', '', { least: 0.1, most: 1.5, step: 0.05, value: 0.5 }, (value) => hand.setFriction?.(value));
     return [
       friction.element,
       element('p', { class: 'hint' }, 'A grip presses while a load pulls; more than friction holds slips.'),

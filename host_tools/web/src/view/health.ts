@@ -14,9 +14,7 @@ export class HealthPanel {
 
   show(groups: readonly FactGroup[]): void {
     const facts = groups.flatMap((group) => group.facts);
-    const shape = groups
-      .map((group) => `${group.title}:${group.facts.map((fact) => fact.name).join()}`)
-      .join(';');
+    const shape = groups.map((group) => `${group.title}:${group.facts.map((fact) => fact.name).join()}`).join(';');
     if (shape !== this.shape) {
       this.shape = shape;
       this.values = [];

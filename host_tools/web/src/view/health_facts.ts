@@ -14,15 +14,7 @@ export interface FactGroup {
   readonly facts: readonly Fact[];
 }
 
-const ENDS = [
-  'none',
-  'hard fault',
-  'panic',
-  'watchdog',
-  'an exception without a handler',
-  'stack overflow',
-  'start-up gave up',
-];
+const ENDS = ['none', 'hard fault', 'panic', 'watchdog', 'an exception without a handler', 'stack overflow', 'start-up gave up'];
 /** A processor without a rest drops frames soon. */
 const BUSY_permille = 950;
 const LITTLE_STACK_bytes = 512;
@@ -170,9 +162,7 @@ export function duration(seconds: number): string {
     [Math.floor(seconds) % 60, 's'],
   ];
   const from = parts.findIndex(([count]) => count > 0);
-  return (from < 0 ? parts.slice(3) : parts.slice(from, from + 2))
-    .map(([count, unit]) => `${count} ${unit}`)
-    .join(' ');
+  return (from < 0 ? parts.slice(3) : parts.slice(from, from + 2)).map(([count, unit]) => `${count} ${unit}`).join(' ');
 }
 
 function bytesText(bytes: number): string {

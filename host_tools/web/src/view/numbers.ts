@@ -28,8 +28,7 @@ const NUMBERS: readonly Number_[] = [
     title: 'Force',
     unit: 'N',
     valid: Flag.FIT_VALID,
-    value: (contact) =>
-      `${contact.flags & Flag.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`,
+    value: (contact) => `${contact.flags & Flag.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`,
     sd: sdOf((contact) => contact.force_sd_N, 2),
     truth: (truth) => fixed(truth.force_N, 2),
   },
@@ -63,8 +62,7 @@ const NUMBERS: readonly Number_[] = [
     valid: Flag.TANGENTIAL_VALID,
     value: (contact) => `${fixed(contact.qx_N, 2)}, ${fixed(contact.qy_N, 2)}`,
     sd: (contact) => `± ${fixed(contact.q_sd_N, 2)}`,
-    truth: ({ qx_N, qy_N }) =>
-      qx_N === undefined || qy_N === undefined ? undefined : `${fixed(qx_N, 2)}, ${fixed(qy_N, 2)}`,
+    truth: ({ qx_N, qy_N }) => (qx_N === undefined || qy_N === undefined ? undefined : `${fixed(qx_N, 2)}, ${fixed(qy_N, 2)}`),
     tangential: true,
   },
   {
@@ -153,8 +151,7 @@ export class Numbers {
       const isTrue = truth?.contact ? number.truth?.(truth) : undefined;
       write(row.truth, isTrue === undefined ? '' : `true ${isTrue}`);
       row.row.classList.toggle('doubtful', there && doubtful);
-      row.row.hidden =
-        number.seldom === true ? !there : number.tangential === true && !tangential;
+      row.row.hidden = number.seldom === true ? !there : number.tangential === true && !tangential;
     }
     for (const { bit, name, lamp } of this.lamps) {
       const on = (flags & bit) !== 0;
@@ -169,9 +166,7 @@ export class Numbers {
       contact && !(flags & Flag.TARED)
         ? ['no zero yet: taring']
         : warningsOf(flags).map(({ bit, meaning }) =>
-            bit === Flag.UNCERTAIN && limit_mm > 0
-              ? `the place may be off by more than ${limit_mm.toFixed(2)} mm`
-              : meaning,
+            bit === Flag.UNCERTAIN && limit_mm > 0 ? `the place may be off by more than ${limit_mm.toFixed(2)} mm` : meaning,
           );
     if (words.join() !== this.warned) {
       this.warned = words.join();

@@ -31,14 +31,7 @@ export class PadCard {
     select: () => void,
   ) {
     const dot = element('span', { class: 'dot', 'aria-hidden': 'true' });
-    this.nameButton = element(
-      'button',
-      { type: 'button', class: 'pad-name' },
-      dot,
-      this.name,
-      this.state,
-      this.force,
-    );
+    this.nameButton = element('button', { type: 'button', class: 'pad-name' }, dot, this.name, this.state, this.force);
     this.nameButton.addEventListener('click', select);
     this.above = button('From above', () => this.view?.setFromAbove(!this.view.fromAbove), {
       class: 'above small',
@@ -64,12 +57,7 @@ export class PadCard {
   }
 
   /** behind_s: before end_s, of a pause; null: live. True if something was drawn. */
-  draw(
-    end_s: number,
-    behind_s: number | null,
-    now_ms: number,
-    palette: Palette,
-  ): boolean {
+  draw(end_s: number, behind_s: number | null, now_ms: number, palette: Palette): boolean {
     const { shown } = this;
     this.prepare();
     this.hand?.apply(now_ms);
@@ -82,9 +70,7 @@ export class PadCard {
     if (seen !== this.seen && shown.layout && this.view) {
       this.seen = seen;
       const live = behind_s === null;
-      const row = live
-        ? history.end - 1
-        : Math.min(history.rowAt(end_s - behind_s), history.end - 1);
+      const row = live ? history.end - 1 : Math.min(history.rowAt(end_s - behind_s), history.end - 1);
       const kept = row >= history.begin;
       this.contact = live ? shown.contact : kept ? contactAt(history, row) : null;
       const readings = live ? shown.readings : kept ? shown.readingsAt(row) : null;
@@ -122,7 +108,9 @@ export class PadCard {
     }
     this.layoutSeen = layout;
     this.view?.dispose();
-    const keys = hand ? 'Arrow keys turn it, Home looks from above. Press on it with the pointer.' : 'Arrow keys turn it, Home looks from above.';
+    const keys = hand
+      ? 'Arrow keys turn it, Home looks from above. Press on it with the pointer.'
+      : 'Arrow keys turn it, Home looks from above.';
     const view = new PadView(layout, `Pad of ${this.shown.name}. ${keys}`);
     this.view = view;
     this.hand = hand ? new HandPanel(hand) : null;

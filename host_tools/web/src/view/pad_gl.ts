@@ -194,10 +194,7 @@ export class PadGl {
   readonly software: boolean;
 
   /** Throws where there is no WebGL 2. */
-  constructor(
-    canvas: HTMLCanvasElement,
-    size: { x_mm: number; y_mm: number },
-  ) {
+  constructor(canvas: HTMLCanvasElement, size: { x_mm: number; y_mm: number }) {
     const probe = canvas.getContext('webgl2', {
       antialias: !/SwiftShader|llvmpipe|Software/i.test(rendererOf()),
       alpha: true,
@@ -308,10 +305,7 @@ export class PadGl {
       const pressure_Pa = scene.saturated[k] ? Infinity : scene.pressure_Pa[k];
       if (pressure_Pa !== null && pressure_Pa !== undefined) {
         const height = Math.max(0.12, heatPart(pressure_Pa) * HEIGHT_mm);
-        put(this.bars, [
-          x, y, 0, 0, 0, height, BAR_HALF_mm, 1,
-          ...rubber, scene.doubtful[k] ? DOUBTFUL : 1,
-        ], true);
+        put(this.bars, [x, y, 0, 0, 0, height, BAR_HALF_mm, 1, ...rubber, scene.doubtful[k] ? DOUBTFUL : 1], true);
       }
     }
     scene.trail.forEach((past, i) => {
@@ -386,7 +380,12 @@ export class PadGl {
     flat(
       this.over,
       [x_mm + arrow.along_x * arrow.length_mm, y_mm + arrow.along_y * arrow.length_mm, 0.1],
-      Math.max(arrow.sd_mm, 0.5), 0, 0.2, 0.5, pull, UNSURE * part,
+      Math.max(arrow.sd_mm, 0.5),
+      0,
+      0.2,
+      0.5,
+      pull,
+      UNSURE * part,
     );
   }
 
@@ -544,10 +543,7 @@ function flat(
   angle = 0,
   dashed = false,
 ): void {
-  mesh.values.push(
-    ...at, half_mm, kind, line_mm, disc,
-    ...colour, alpha, Math.cos(angle), Math.sin(angle), dashed ? 1 : 0,
-  );
+  mesh.values.push(...at, half_mm, kind, line_mm, disc, ...colour, alpha, Math.cos(angle), Math.sin(angle), dashed ? 1 : 0);
 }
 
 /** Triangles with a normal each, from lists of corners of convex faces. */
@@ -557,11 +553,7 @@ function faces(list: readonly (readonly (readonly number[])[])[]): Float32Array 
     const [a, b, c] = corners as readonly [number[], number[], number[]];
     const u = b.map((value, i) => value - (a[i] ?? 0)) as [number, number, number];
     const v = c.map((value, i) => value - (a[i] ?? 0)) as [number, number, number];
-    const normal = [
-      u[1] * v[2] - u[2] * v[1],
-      u[2] * v[0] - u[0] * v[2],
-      u[0] * v[1] - u[1] * v[0],
-    ];
+    const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     const size = Math.hypot(...normal) || 1;
     for (let i = 1; i + 1 < corners.length; i++) {
       for (const corner of [corners[0], corners[i], corners[i + 1]]) {
@@ -574,13 +566,23 @@ function faces(list: readonly (readonly (readonly number[])[])[]): Float32Array 
 
 /** -1 to 1 across, 0 to 1 along. */
 function boxMesh(): Float32Array {
-  return prism([[-1, -1], [1, -1], [1, 1], [-1, 1]]);
+  return prism([
+    [-1, -1],
+    [1, -1],
+    [1, 1],
+    [-1, 1],
+  ]);
 }
 
 function prism(ring: readonly (readonly [number, number])[]): Float32Array {
   const sides = ring.map((at, i) => {
     const next = ring[(i + 1) % ring.length] ?? at;
-    return [[...at, 0], [...next, 0], [...next, 1], [...at, 1]];
+    return [
+      [...at, 0],
+      [...next, 0],
+      [...next, 1],
+      [...at, 1],
+    ];
   });
   return faces([...sides, ring.map((at) => [...at, 1])]);
 }
@@ -611,10 +613,7 @@ function slabMesh(x_mm: number, y_mm: number): Float32Array {
     const up = corner < 2 ? 1 : -1;
     for (let i = 0; i <= 6; i++) {
       const angle = ((corner + i / 6) * Math.PI) / 2;
-      ring.push([
-        right * (x_mm - round_mm) + round_mm * Math.cos(angle),
-        up * (y_mm - round_mm) + round_mm * Math.sin(angle),
-      ]);
+      ring.push([right * (x_mm - round_mm) + round_mm * Math.cos(angle), up * (y_mm - round_mm) + round_mm * Math.sin(angle)]);
     }
   }
   return prism(ring);

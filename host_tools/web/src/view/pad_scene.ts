@@ -84,17 +84,14 @@ export function sceneOf(
   return {
     layout,
     count,
-    pressure_Pa: sensors.map((k) =>
-      known && tared && has(known.valid, k) ? (known.pressure_Pa[k] ?? null) : null,
-    ),
+    pressure_Pa: sensors.map((k) => (known && tared && has(known.valid, k) ? (known.pressure_Pa[k] ?? null) : null)),
     broken: sensors.map((k) => known !== null && !has(known.valid, k) && !has(known.saturated, k)),
     saturated: sensors.map((k) => has(known?.saturated, k)),
     doubtful: sensors.map((k) => has(known?.doubtful, k)),
     fit: contact && flags & Flag.FIT_VALID ? fitOf(contact) : null,
     trail,
     truth,
-    alarm:
-      flags & Flag.SLIDING ? 'slides' : flags & Flag.SLIP ? 'slips' : flags & Flag.MOVING ? 'moves' : null,
+    alarm: flags & Flag.SLIDING ? 'slides' : flags & Flag.SLIP ? 'slips' : flags & Flag.MOVING ? 'moves' : null,
   };
 }
 
@@ -144,7 +141,6 @@ export function forceLength(force_N: number): number {
 }
 
 export function padSize(layout: ShownLayout): { x_mm: number; y_mm: number } {
-  const reach = (values: ArrayLike<number>) =>
-    RIM_mm + Math.max(...Array.from(values, (value) => Math.abs(value)));
+  const reach = (values: ArrayLike<number>) => RIM_mm + Math.max(...Array.from(values, (value) => Math.abs(value)));
   return { x_mm: reach(layout.x_mm), y_mm: reach(layout.y_mm) };
 }

@@ -246,8 +246,7 @@ export class PadView {
         return;
       }
       const at = place(event);
-      const onPad =
-        at && Math.abs(at.x_mm) <= this.size.x_mm && Math.abs(at.y_mm) <= this.size.y_mm;
+      const onPad = at && Math.abs(at.x_mm) <= this.size.x_mm && Math.abs(at.y_mm) <= this.size.y_mm;
       if (this.touch && onPad) {
         this.touching = event.pointerId;
         this.touch.down(at.x_mm, at.y_mm);
@@ -372,11 +371,7 @@ export class PadView {
   }
 
   /** Millimetres on the edges of the surface that are nearest to who looks. */
-  private axes(
-    pen: CanvasRenderingContext2D,
-    palette: Palette,
-    at: (x_mm: number, y_mm: number, z_mm: number) => [number, number],
-  ): void {
+  private axes(pen: CanvasRenderingContext2D, palette: Palette, at: (x_mm: number, y_mm: number, z_mm: number) => [number, number]): void {
     const { x_mm, y_mm } = this.size;
     const turn = (this.look.turn_deg * Math.PI) / 180;
     const front = Math.cos(turn) >= 0 ? -1 : 1;
@@ -419,4 +414,3 @@ export class PadView {
     pen.fillText('kPa', x, bottom - long - 14);
   }
 }
-

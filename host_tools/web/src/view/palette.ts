@@ -47,11 +47,7 @@ export function heatCss(palette: Palette, pressure_Pa: number): string {
 }
 
 export function mix(a: Colour, b: Colour, part: number): Colour {
-  return [
-    a[0] + (b[0] - a[0]) * part,
-    a[1] + (b[1] - a[1]) * part,
-    a[2] + (b[2] - a[2]) * part,
-  ];
+  return [a[0] + (b[0] - a[0]) * part, a[1] + (b[1] - a[1]) * part, a[2] + (b[2] - a[2]) * part];
 }
 
 export function cssOf(colour: Colour): string {
@@ -70,7 +66,6 @@ export function contrast(a: Colour, b: Colour): number {
 }
 
 function luminance(colour: Colour): number {
-  const linear = (part: number) =>
-    part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4;
+  const linear = (part: number) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
   return 0.2126 * linear(colour[0]) + 0.7152 * linear(colour[1]) + 0.0722 * linear(colour[2]);
 }

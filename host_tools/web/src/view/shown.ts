@@ -42,9 +42,7 @@ export interface Hand {
   press(hand: { x_mm: number; y_mm: number; force_N: number } | null): void;
   choose?(name: string): void;
   drop?(x_mm: number, y_mm: number): void;
-  hold?(
-    grip: { x_mm: number; y_mm: number; force_N: number; load_N: number; angle_deg: number } | null,
-  ): void;
+  hold?(grip: { x_mm: number; y_mm: number; force_N: number; load_N: number; angle_deg: number } | null): void;
   setFriction?(friction: number): void;
 }
 

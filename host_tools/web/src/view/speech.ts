@@ -38,8 +38,7 @@ export class Speech {
     if (is.state !== was.state) {
       parts.push(is.state);
     }
-    const forceNoted =
-      Math.abs(is.force_N - was.force_N) > NOTED_PART * Math.max(is.force_N, was.force_N, 0.2);
+    const forceNoted = Math.abs(is.force_N - was.force_N) > NOTED_PART * Math.max(is.force_N, was.force_N, 0.2);
     if (is.contact && (!was.contact || forceNoted) && contact && flags & Flag.FIT_VALID) {
       parts.push(
         `${was.contact ? '' : 'contact, '}${is.force_N.toFixed(1)} newtons at ` +

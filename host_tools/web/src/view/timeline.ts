@@ -52,11 +52,7 @@ export class Timeline {
       'select',
       { 'aria-label': 'Time shown', class: 'window' },
       ...WINDOWS_s.map((seconds) =>
-        element(
-          'option',
-          { value: seconds, selected: seconds === this.window_s },
-          seconds < 60 ? `${seconds} s` : `${seconds / 60} min`,
-        ),
+        element('option', { value: seconds, selected: seconds === this.window_s }, seconds < 60 ? `${seconds} s` : `${seconds / 60} min`),
       ),
     );
     choice.addEventListener('change', () => {

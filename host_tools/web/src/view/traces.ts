@@ -105,10 +105,7 @@ export class Traces {
       return;
     }
     const least_s = fingertip.frames_per_s > 0 ? 1.5 / fingertip.frames_per_s : 0;
-    const width_s = Math.max(
-      intervalOf(span.to_s - span.from_s, Math.min(inner / 1.5, MOST_INTERVALS)),
-      intervalOf(least_s, 1),
-    );
+    const width_s = Math.max(intervalOf(span.to_s - span.from_s, Math.min(inner / 1.5, MOST_INTERVALS)), intervalOf(least_s, 1));
     const { first, last } = this.buckets.read(history, width_s, span.from_s, span.to_s);
     const break_s = Math.max(BREAK_s, 3 * width_s);
     const columns = this.drawn.flatMap(({ plot }) => plot.columns);
@@ -132,20 +129,11 @@ export class Traces {
   private scale(drawn: Drawn, chart: Chart, fingertip: Shown): void {
     const { plot } = drawn;
     const reaches = plot.columns.map((name) => chart.reach.get(name) ?? null);
-    const most = Math.max(
-      0,
-      ...reaches.map((reach) => (reach ? Math.max(Math.abs(reach.low), Math.abs(reach.high)) : 0)),
-    );
+    const most = Math.max(0, ...reaches.map((reach) => (reach ? Math.max(Math.abs(reach.low), Math.abs(reach.high)) : 0)));
     drawn.threshold = null;
     if (plot.columns[0] === 'x_mm') {
       const layout = fingertip.layout;
-      const reach =
-        6 +
-        Math.max(
-          0,
-          ...Array.from(layout?.x_mm ?? [], Math.abs),
-          ...Array.from(layout?.y_mm ?? [], Math.abs),
-        );
+      const reach = 6 + Math.max(0, ...Array.from(layout?.x_mm ?? [], Math.abs), ...Array.from(layout?.y_mm ?? [], Math.abs));
       drawn.low = -reach;
       drawn.high = reach;
       return;
@@ -198,7 +186,11 @@ export class Traces {
         low: 0,
         high: 1,
         threshold: null,
-        chart: new uPlot(this.options(plot, palette, () => drawn), [[]], box),
+        chart: new uPlot(
+          this.options(plot, palette, () => drawn),
+          [[]],
+          box,
+        ),
       };
       this.drawn.push(drawn);
     }
@@ -222,7 +214,9 @@ export class Traces {
     const last = plot === PLOTS[PLOTS.length - 1];
     const colours = plot.columns.map((_, i) => palette.css(`finger-${this.colour(i)}`));
     const see = (css: string, part: number) =>
-      `${css}${Math.round(255 * part).toString(16).padStart(2, '0')}`;
+      `${css}${Math.round(255 * part)
+        .toString(16)
+        .padStart(2, '0')}`;
     return {
       width: 300,
       height: 100,
@@ -342,9 +336,7 @@ export class Traces {
     pen.clearRect(0, 0, this.width, height);
     const inner = this.width - AXIS_px - RIGHT_px;
     const x = (t_s: number) =>
-      AXIS_px +
-      (inner * Math.min(Math.max(t_s - span.from_s, 0), span.to_s - span.from_s)) /
-        (span.to_s - span.from_s);
+      AXIS_px + (inner * Math.min(Math.max(t_s - span.from_s, 0), span.to_s - span.from_s)) / (span.to_s - span.from_s);
     pen.font = '11px system-ui, sans-serif';
     pen.textBaseline = 'middle';
     rows.forEach((row, i) => {

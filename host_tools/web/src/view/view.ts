@@ -176,12 +176,7 @@ export class View {
       'header',
       { class: 'top' },
       element('h1', {}, 'Fingertip'),
-      element(
-        'div',
-        { class: 'top-actions' },
-        this.controls.page,
-        themes,
-      ),
+      element('div', { class: 'top-actions' }, this.controls.page, themes),
     );
   }
 
@@ -222,8 +217,7 @@ export class View {
   private key(event: KeyboardEvent): void {
     const target = event.target as HTMLElement;
     const busy =
-      target.closest('input, select, textarea, button, summary, dialog, a') !== null ||
-      event.ctrlKey || event.metaKey || event.altKey;
+      target.closest('input, select, textarea, button, summary, dialog, a') !== null || event.ctrlKey || event.metaKey || event.altKey;
     if (busy || this.shown.size === 0) {
       return;
     }
@@ -259,12 +253,7 @@ export class View {
     }
   }
 
-  private drawChosen(
-    shown: Shown,
-    card: PadCard,
-    behind_s: number | null,
-    now_ms: number,
-  ): boolean {
+  private drawChosen(shown: Shown, card: PadCard, behind_s: number | null, now_ms: number): boolean {
     const { fingertip, history } = shown;
     const end_s = this.ends.get(fingertip) ?? newest_s(history);
     const fresh = behind_s === null && history !== null && history.end !== this.tracedEnd;
@@ -316,7 +305,5 @@ export class View {
 }
 
 function newest_s(history: History | null): number {
-  return history && history.end > history.begin
-    ? (history.t_s[history.slot(history.end - 1)] ?? 0)
-    : 0;
+  return history && history.end > history.begin ? (history.t_s[history.slot(history.end - 1)] ?? 0) : 0;
 }

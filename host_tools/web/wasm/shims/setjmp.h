@@ -8,7 +8,6 @@ typedef char jmp_buf[1];
 #define setjmp(out) ((void)(out), 0)
 #define longjmp(out, value) fingertip_leave(value)
 
-__attribute__((import_module("fingertip"), import_name("leave"))) _Noreturn void
-fingertip_leave(int value);
+__attribute__((import_module("fingertip"), import_name("leave"))) _Noreturn void fingertip_leave(int value);
 
 #endif

@@ -11,7 +11,8 @@ void main(void);
 
 void *memset(void *to, int value, unsigned n);
 void *memset(void *to, int value, unsigned n) {
-  for (unsigned i = 0; i < n; i++) ((volatile uint8_t *)to)[i] = (uint8_t)value;
+  for (unsigned i = 0; i < n; i++)
+    ((volatile uint8_t *)to)[i] = (uint8_t)value;
   return to;
 }
 
@@ -49,7 +50,9 @@ static inline void start_clocks(void) {
   REG(0x4005802c) = 0x200 | 12;
 }
 
-static inline uint32_t now_us(void) { return REG(0x40054028); }
+static inline uint32_t now_us(void) {
+  return REG(0x40054028);
+}
 
 static inline void wait_us(uint32_t us) {
   const uint32_t start = now_us();
@@ -78,8 +81,10 @@ static inline uint32_t i2c_run(uint32_t address, const uint8_t *out, int n, uint
   }
   REG(0x40044004) = address;
   REG(0x4004406c) = 1;
-  for (int i = 0; i < n; i++) REG(0x40044010) = out[i] | (i == n - 1 ? 0x200 : 0);
-  for (int i = 0; i < m; i++) REG(0x40044010) = 0x100 | (i == m - 1 ? 0x200 : 0);
+  for (int i = 0; i < n; i++)
+    REG(0x40044010) = out[i] | (i == n - 1 ? 0x200 : 0);
+  for (int i = 0; i < m; i++)
+    REG(0x40044010) = 0x100 | (i == m - 1 ? 0x200 : 0);
   int stops = (n > 0) + (m > 0);
   int got = 0;
   while (stops) {
@@ -97,7 +102,8 @@ static inline uint32_t i2c_run(uint32_t address, const uint8_t *out, int n, uint
     }
     while (REG(0x40044078)) {
       const uint8_t byte = (uint8_t)REG(0x40044010);
-      if (got < m) in[got] = byte;
+      if (got < m)
+        in[got] = byte;
       got++;
     }
   }
@@ -107,7 +113,9 @@ static inline uint32_t i2c_run(uint32_t address, const uint8_t *out, int n, uint
 /* Results for the test: RAM words from 0x20030000 on. */
 #define RESULT(i) REG(0x20030000 + 4 * (i))
 /* The end: the test catches this breakpoint as "entered the USB boot loader". */
-static inline void done(void) { __asm volatile("bkpt 0x42"); }
+static inline void done(void) {
+  __asm volatile("bkpt 0x42");
+}
 
 void reset_entry(void);
 void reset_entry(void) {
@@ -118,12 +126,50 @@ void reset_entry(void) {
 /* An image with interrupts defines HAS_ISR and isr(). */
 void isr(void);
 #ifndef HAS_ISR
-void isr(void) { __asm volatile("bkpt 1"); }
+void isr(void) {
+  __asm volatile("bkpt 1");
+}
 #endif
-__attribute__((section(".vectors"), used)) const void *const vectors[48] = {
-    (void *)0x20010000, (void *)reset_entry, (void *)isr, (void *)isr, 0, 0, 0, 0, 0, 0, 0, (void *)isr, 0, 0,
-    (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr,
-    (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr,
-    (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr,
-    (void *)isr, (void *)isr, (void *)isr, (void *)isr};
+__attribute__((section(".vectors"), used)) const void *const vectors[48] = {(void *)0x20010000,
+                                                                            (void *)reset_entry,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            0,
+                                                                            0,
+                                                                            0,
+                                                                            0,
+                                                                            0,
+                                                                            0,
+                                                                            0,
+                                                                            (void *)isr,
+                                                                            0,
+                                                                            0,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr,
+                                                                            (void *)isr};
 #endif

@@ -61,10 +61,8 @@ static void answer(void) {
   const struct store_settings settings = settings_of(content->settings.rate_mHz);
   job.calibration = content->has_calibration ? content->calibration.date_s : 0;
   job.settings = content->has_settings ? content->settings.rate_mHz : 0;
-  job.mixed =
-      (content->has_calibration &&
-       memcmp(&calibration, &content->calibration, sizeof calibration) != 0) ||
-      (content->has_settings && memcmp(&settings, &content->settings, sizeof settings) != 0);
+  job.mixed = (content->has_calibration && memcmp(&calibration, &content->calibration, sizeof calibration) != 0) ||
+              (content->has_settings && memcmp(&settings, &content->settings, sizeof settings) != 0);
   job.damaged = store.damaged;
   job.writing = store_is_writing(&store);
 }

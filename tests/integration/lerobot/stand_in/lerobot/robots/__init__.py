@@ -1,4 +1,5 @@
 """So much of LeRobot 0.6's robots as a plugin meets: the registry, and how a robot is found by its options' name."""
+
 import dataclasses
 import importlib
 
@@ -18,6 +19,7 @@ class RobotConfig:
         def register(subclass):
             cls.known[name] = subclass
             return subclass
+
         return register
 
     @classmethod
