@@ -1,0 +1,48 @@
+#include "report/measure/entry.hpp"
+
+namespace fingertip::measure {
+namespace {
+
+thread_local std::string last_failure;
+
+std::vector<Record> &records() {
+  static std::vector<Record> all;
+  return all;
+}
+
+} // namespace
+
+bool list_record(Record record) {
+  records().push_back(std::move(record));
+  return true;
+}
+
+void failed(const char *entry, const char *what) {
+  last_failure = entry + std::string(": ") + what;
+}
+
+} // namespace fingertip::measure
+
+extern "C" {
+
+__attribute__((visibility("default"))) const char *measure_failure() {
+  return fingertip::measure::last_failure.c_str();
+}
+
+// A line for each: name, bytes, and name:offset:kind:bytes:count of each field.
+__attribute__((visibility("default"))) const char *measure_records() {
+  static const std::string text = [] {
+    std::string all;
+    for (const auto &record : fingertip::measure::records()) {
+      all += record.name + " " + std::to_string(record.bytes);
+      for (const auto &field : record.fields) {
+        all += " " + field.name + ":" + std::to_string(field.offset) + ":" + field.kind + ":" +
+               std::to_string(field.item_bytes) + ":" + std::to_string(field.count);
+      }
+      all += "\n";
+    }
+    return all;
+  }();
+  return text.c_str();
+}
+}

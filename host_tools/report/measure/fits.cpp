@@ -1,0 +1,105 @@
+// The firmware's fit on many presses, for the rectangle that this file is compiled for.
+#include "libfingertip/in_parallel.hpp"
+#include "report/measure/fit_arguments.hpp"
+
+extern "C" {
+#include "config/defaults.h"
+#include "config/geometry.h"
+#include "fit/fit.h"
+#include "fit/fit_load.h"
+#include "fit/kernels.h"
+}
+
+using namespace fingertip::measure;
+using fingertip::twin::in_parallel;
+
+MEASURE_RECORD(fit_array, FIELD(sensor_count), FIELD(pitch_mm), FIELD(x), FIELD(y))
+MEASURE_RECORD(fit_own, FIELD(off_x_q15), FIELD(off_y_q15), FIELD(wider_q15))
+MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(n_largest), FIELD(prior_sigma_mm),
+               FIELD(prior_width_mm), FIELD(cut_noises), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16),
+               FIELD(model_sd_q16), FIELD(location_sd_limit_mm))
+MEASURE_RECORD(fit_result, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N),
+               FIELD(residual_rms_Pa), FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_sd_N),
+               FIELD(sigma_x_mm), FIELD(sigma_y_mm), FIELD(width_correlation), FIELD(used), FIELD(flags))
+
+// The layout that the firmware is built for.
+static void own_layout(Batch<float, 1> x_mm, Batch<float, 1> y_mm, Batch<float, 1> pitch_mm) {
+  require(x_mm.size() == geometry.sensor_count && y_mm.size() == geometry.sensor_count, "another number of sensors");
+  std::copy(geometry.x_mm, geometry.x_mm + geometry.sensor_count, x_mm.data);
+  std::copy(geometry.y_mm, geometry.y_mm + geometry.sensor_count, y_mm.data);
+  pitch_mm[0] = geometry.pitch_mm;
+}
+MEASURE_ENTRY(own_layout)
+
+static void array_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm,
+                     Batch<fit_array, 1> array) {
+  same_length(x_mm, y_mm);
+  require(fit_array_init(array.data, static_cast<std::uint8_t>(x_mm.size()), x_mm.data, y_mm.data,
+                         static_cast<float>(pitch_mm)) == FT_OK,
+          "the fit takes no such layout");
+}
+MEASURE_ENTRY(array_of)
+
+// The settings of a firmware that has only its defaults.
+static void default_settings(Batch<fit_settings, 1> settings) {
+  for (std::size_t i = 0; i < settings.size(); i++) {
+    settings[i] = {};
+    settings[i].iterations = DEFAULT_FIT_ITERATIONS;
+    settings[i].cut_noises = DEFAULT_CUT_NOISES;
+    fit_set_errors(&settings[i], DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
+  }
+}
+MEASURE_ENTRY(default_settings)
+
+using Kernel = void (*)(const fit_array *, const std::int32_t *, std::uint32_t, const fit_settings *, fit_result *);
+
+static Kernel kernel_named(const std::string &name) {
+  if (name == "fit") {
+    return fit_gaussian;
+  }
+  if (name == "fit_grid") {
+    return fit_gaussian_grid;
+  }
+#define ROW_OF(row, suits, fits)                                                                                       \
+  if (name == #row) {                                                                                                  \
+    return []([[maybe_unused]] const fit_array *array, const std::int32_t *pressure_Pa_q10,                            \
+              [[maybe_unused]] std::uint32_t usable, const fit_settings *settings, fit_result *result) { fits; };      \
+  }
+  FIT_GRID_KERNELS(ROW_OF)
+  FIT_OTHER_KERNELS(ROW_OF)
+  throw std::invalid_argument("no kernel has the name " + name);
+}
+
+// kernel: a row of fit/kernels.h, "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid).
+static void fit(std::string kernel, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
+                Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10,
+                Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
+  same_length(results, pressure_Pa_q10, usable);
+  length_or_one(results, all_settings);
+  const Kernel run = kernel_named(kernel);
+  in_parallel(results.size(), [&](std::size_t press) {
+    const fit_settings settings = settings_of(all_settings, own, press);
+    run(array, pressure_Pa_q10.row(press), usable[press], &settings, results.row(press));
+  });
+}
+MEASURE_ENTRY(fit)
+
+// Of presses that are held for this number of frames: adds to the results what a tangential force that is
+// not estimated does to the location.
+static void widen_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
+                       Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, std::int64_t frames,
+                       Batch<fit_result, 1> results) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
+  same_length(results, pressure_Pa_q10);
+  length_or_one(results, all_settings);
+  in_parallel(results.size(), [&](std::size_t press) {
+    const fit_settings settings = settings_of(all_settings, own, press);
+    fit_load load{};
+    for (std::int64_t frame = 0; frame < frames; frame++) {
+      fit_load_follow(&load, array, pressure_Pa_q10.row(press), &settings, results.row(press));
+    }
+    fit_load_widen(&load, array, &settings, results.row(press));
+  });
+}
+MEASURE_ENTRY(widen_held)

@@ -1,0 +1,145 @@
+"""The batch entry points of host_tools/report/measure: the same bits as a direct call, and what they refuse.
+
+usage: test_measure.py BUILD
+"""
+
+import ctypes
+import pathlib
+import sys
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools/report/measure"))
+from measure import Measure, MeasureError, q10, stream_of, usable_of  # noqa: E402
+
+MEASURE = Measure(sys.argv.pop())
+X_mm, Y_mm, PITCH_mm = MEASURE.layout()
+ARRAY = MEASURE.array()
+ALL = np.uint32((1 << 15) - 1)
+
+
+def presses(count, seed=1, noise_Pa=5.0):
+    """(x_mm, y_mm [press], readings [press, sensor] Pa) of Gaussians on the array."""
+    random = MEASURE.random(seed, stream_of("test"), np.arange(count))
+    x_mm, y_mm, sigma_mm, p0_Pa = random.uniform(-9, 9), random.uniform(-18, 18), random.log_uniform(4, 10), random.log_uniform(3e3, 5e4)
+    square = (X_mm - x_mm[:, None]) ** 2 + (Y_mm - y_mm[:, None]) ** 2
+    return x_mm, y_mm, p0_Pa[:, None] * np.exp(-square / (2 * sigma_mm[:, None] ** 2)) + noise_Pa * random.normal(15)
+
+
+class Fit(unittest.TestCase):
+    def test_a_batch_has_the_bits_of_direct_calls(self):
+        _, _, readings_Pa = presses(200)
+        readings = q10(readings_Pa)
+        settings = MEASURE.settings(200, noise_Pa=np.linspace(2, 20, 200))
+        for usable in (None, np.full(200, ALL & ~np.uint32(1 << 7), np.uint32)):
+            batch = MEASURE.fit(ARRAY, settings, readings, usable)
+            direct = MEASURE.made("fit_result", 200)
+            for i in range(200):
+                pointers = [ctypes.c_void_p(one.ctypes.data) for one in (ARRAY, readings[i], settings[i : i + 1], direct[i : i + 1])]
+                MEASURE.library.fit_gaussian(*pointers[:2], ctypes.c_uint32(ALL if usable is None else usable[i]), *pointers[2:])
+            self.assertEqual(batch.tobytes(), direct.tobytes())
+
+    def test_presses_are_found_where_they_are(self):
+        x_mm, y_mm, readings_Pa = presses(300)
+        for kernel in ("fit", "fit_grid", "grid", "masked", "general"):
+            found = MEASURE.fit(ARRAY, MEASURE.settings(noise_Pa=5.0, iterations=7), q10(readings_Pa), kernel=kernel)
+            self.assertLess(np.quantile(np.hypot(found["x_mm"] - x_mm, found["y_mm"] - y_mm), 0.9), 0.05, kernel)
+
+    def test_the_other_rectangle_has_the_same_fit(self):
+        other = Measure(MEASURE.build, "measure_2x4")
+        x_mm, y_mm = np.tile([-4.5, 4.5], 4), np.repeat([-13.5, -4.5, 4.5, 13.5], 2)
+        readings = q10(2e4 * np.exp(-((x_mm - 1) ** 2 + (y_mm - 2) ** 2) / 72)[None])
+        found = other.fit(other.array(x_mm, y_mm, 9.0), other.settings(noise_Pa=5.0), readings, kernel="fit_grid")
+        self.assertLess(np.hypot(found["x_mm"] - 1, found["y_mm"] - 2)[0], 0.01)
+
+    def test_what_is_wrong_is_refused_before_it_runs(self):
+        readings, settings = q10(presses(4)[2]), MEASURE.settings()
+        for values, words in (
+            (dict(pressure_Pa_q10=readings.astype(float)), "argument 5: an array of another type of item"),
+            (dict(pressure_Pa_q10=readings[0]), "another number of dimensions"),
+            (dict(pressure_Pa_q10=readings[:, :14].copy()), "another number of sensors"),
+            (dict(pressure_Pa_q10=readings[:, ::-1]), "neither a number, a text nor an array in C order"),
+            (dict(usable=np.zeros(3, np.uint32)), "arrays of different lengths"),
+            (dict(settings=MEASURE.settings(3)), "neither one row nor one for each"),
+            (dict(kernel="none"), "no kernel has the name none"),
+        ):
+            with self.assertRaisesRegex(MeasureError, words):
+                MEASURE.fit(
+                    **({"array": ARRAY, "settings": settings, "pressure_Pa_q10": readings, "usable": np.full(4, ALL, np.uint32)} | values)
+                )
+        fixed = MEASURE.made("fit_result", 4)
+        fixed.flags.writeable = False
+        with self.assertRaisesRegex(MeasureError, "argument 7: an array that is written"):
+            MEASURE.call("fit", "fit", ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint32), fixed)
+        with self.assertRaisesRegex(MeasureError, "fit: another number of arguments"):
+            MEASURE.call("fit", "fit")
+        with self.assertRaisesRegex(MeasureError, "no such entry point"):
+            MEASURE.call("none")
+        with self.assertRaisesRegex(MeasureError, "build it"):
+            Measure(MEASURE.build, "none")
+
+
+class Frames(unittest.TestCase):
+    def test_a_press_is_a_contact_with_the_fit_of_its_readings(self):
+        _, _, readings_Pa = presses(20)
+        frames = MEASURE.made("frame", 20, 20)
+        frames["t_us"], frames["sensor_count"], frames["noise_Pa_q10"], frames["valid"] = 10000 * np.arange(1, 21), 15, 5 * 1024, ALL
+        frames["pressure_Pa_q10"][..., :15] = q10(101325.0 + np.zeros(15))
+        frames["pressure_Pa_q10"][:, 16:, :15] += q10(readings_Pa)[:, None]
+        conditioned, fits, results = MEASURE.chain(ARRAY, MEASURE.settings(), frames)
+        self.assertFalse(conditioned["contact"][:, :16].any())
+        self.assertTrue(conditioned["contact"][:, 16:].all())
+        again = MEASURE.fit(
+            ARRAY,
+            MEASURE.settings(noise_Pa=5.0),
+            np.ascontiguousarray(conditioned["pressure_Pa_q10"][:, 16, :15]),
+            conditioned["usable"][:, 16].copy(),
+        )
+        np.testing.assert_array_equal(again, fits[:, 16])
+        self.assertTrue(((results["flags"][:, 16] & fits["flags"][:, 16]) == fits["flags"][:, 16]).all())
+
+    def test_a_tangential_force_of_the_twin_is_estimated(self):
+        touches = MEASURE.made("twin_touch", 8)
+        touches["force_N"], touches["pull_x_N"] = 6.0, np.linspace(0, 1.4, 8)
+        base_Pa = MEASURE.base_pressure("sphere15", 12.0, touches)
+        readings = np.ascontiguousarray(np.repeat(q10(base_Pa)[:, None], 6, axis=1))
+        _, loads = MEASURE.tangential(ARRAY, MEASURE.profile(12.0), MEASURE.settings(noise_Pa=2.0, cut_noises=0), readings)
+        self.assertTrue(loads["valid"][:, -1].all())
+        self.assertLess(abs(loads["qx_N"][:, -1] - touches["pull_x_N"]).max(), 0.2)
+        shapes = MEASURE.shapes(
+            ARRAY,
+            MEASURE.profile(12.0),
+            MEASURE.settings(noise_Pa=2.0, cut_noises=0),
+            np.ascontiguousarray(np.repeat(readings[:1], 5, axis=1)),
+        )
+        self.assertEqual(int(shapes["shape"][0]), 1)  # FIT_SHAPE_ROUND
+
+
+class Calibration(unittest.TestCase):
+    def test_gains_are_found_from_placements(self):
+        gain = 1.0 + 0.15 * MEASURE.random(3, 1, np.arange(15)).normal()
+        random = MEASURE.random(5, 2, np.arange(24))
+        touches = MEASURE.made("twin_touch", 24)
+        touches["force_N"], touches["x_mm"], touches["y_mm"] = 3.0, random.uniform(-8, 8), random.uniform(-16, 16)
+        readings_Pa = gain * MEASURE.base_pressure("sphere15", 12.0, touches) + 0.5 * random.normal(15)
+        readings_Pa[0, 3] = np.nan
+        self.assertEqual(usable_of(readings_Pa)[0], ALL & ~np.uint32(8))
+        found, sensors, own = MEASURE.calibrate(X_mm, Y_mm, PITCH_mm, 8.0 * np.arange(24.0)[None], readings_Pa[None], 0.5)
+        self.assertEqual((int(found["state"][0]), found["reason"][0]), (1, b"none"))
+        self.assertLess(abs(sensors["gain"][0] - gain / gain.mean()).max(), 0.06)
+        self.assertEqual(own.shape, (1, 15))
+
+
+class RandomNumbers(unittest.TestCase):
+    def test_each_state_is_its_own(self):
+        whole, part = (MEASURE.random(7, 2**63 + 5, np.arange(first, 10)) for first in (0, 4))
+        np.testing.assert_array_equal(whole.uniform(-1, 1)[4:], part.uniform(-1, 1))
+        drawn = whole.normal(3, of=np.arange(10) < 5)
+        self.assertTrue((drawn[:5] != 0).all() and (drawn[5:] == 0).all())
+        np.testing.assert_array_equal(whole.below(1000)[5:], part.below(1000)[1:])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
