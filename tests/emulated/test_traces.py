@@ -11,7 +11,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-COMMAND = [sys.executable, ROOT / "host_tools/report/bringup/traces.py"]
+COMMAND = [sys.executable, ROOT / "boards/drawing/traces.py"]
 BOARDS = sys.argv.pop()
 sys.argv.remove("--boards")
 # UM10204 table 10, fast mode; SCL low and period with the rise of the emulator's lines

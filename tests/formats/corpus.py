@@ -12,7 +12,7 @@ import sys
 import zlib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host_tools/report/ecosystem"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT / "host_tools/python")]
 
 import bags  # noqa: E402
 import mcap.writer  # noqa: E402

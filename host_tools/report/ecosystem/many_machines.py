@@ -57,7 +57,7 @@ def measure(build, steps):
 
     def run(what, seconds):
         done = subprocess.run(
-            [python, ROOT / "host_tools/report/ecosystem/hosts.py", fake_device, what, str(seconds)],
+            [python, ROOT / "tests/nightly/hosts.py", fake_device, what, str(seconds)],
             capture_output=True,
             text=True,
             timeout=PATIENCE_s,
@@ -85,7 +85,7 @@ def text(found):
         lines += [
             f"{found['zenoh_fingertips']} simulated fingertips of {found['zenoh_rate_Hz']} frames a second at {found['zenoh_hosts']} hosts (network "
             "namespaces on one computer) are recorded by one `fingertip-recorder` over a Zenoh router, while the router is killed "
-            "for 3 s, a host is cut off for 5 s and another one for 15 s, longer than Zenoh's lease, a bridge is killed for 2 s, and a fingertip unplugged for 1.5 s ([hosts.py](hosts.py)). The truth is what "
+            "for 3 s, a host is cut off for 5 s and another one for 15 s, longer than Zenoh's lease, a bridge is killed for 2 s, and a fingertip unplugged for 1.5 s ([hosts.py](../../../tests/nightly/hosts.py)). The truth is what "
             f"each fingertip sent, read on a second terminal: {found['zenoh_sent']} packets since the recording began. "
             f"{found['zenoh_recorded']} are in the file, {found['zenoh_asked_again']} of them were asked for again. {found['zenoh_lost_counted']} are counted as lost, "
             f"{found['zenoh_lost_by_killed_bridge']} of them at the host whose bridge was killed with what it kept, the answers "

@@ -29,7 +29,7 @@ def measure(build, steps):
         if not path.exists():
             raise InputError(f"{path} is not there; {how}")
     done = subprocess.run(
-        [python, ROOT / "host_tools/report/ecosystem/bags.py", tool, fake_device, str(SECONDS), str(TRUNCATIONS)],
+        [python, ROOT / "tests/support/bags.py", tool, fake_device, str(SECONDS), str(TRUNCATIONS)],
         capture_output=True,
         text=True,
         timeout=PATIENCE_s,
@@ -49,7 +49,7 @@ def text(found):
         f"A recording of a simulated fingertip by the tool ({found['mcap_seconds']} s, 400 frames a second, packets lost on purpose), and one of random "
         "packets by the Python package with all flags, restarts and missing packets. Each as the tool writes it and as the package does, which must "
         f"be equal; {found['mcap_messages']} messages in all, read by PyPI's mcap with mcap-ros2-support, by mcap without the index, and by rosbags, "
-        "and compared with one another and with the cells of the CSV file ([bags.py](bags.py)). Round trips, byte by byte: CSV, MCAP, CSV; MCAP, CSV, "
+        "and compared with one another and with the cells of the CSV file ([bags.py](../../../tests/support/bags.py)). Round trips, byte by byte: CSV, MCAP, CSV; MCAP, CSV, "
         "MCAP; bytes of the line, MCAP, bytes of the line. None was opened in ROS 2 or Foxglove themselves.",
         "",
         f"Cut at {found['mcap_truncations']} random bytes: at most {found['mcap_chunks_lost']} chunk is lost, the one that was cut, and the tool, the "

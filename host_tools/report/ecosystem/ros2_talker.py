@@ -14,7 +14,8 @@ import sys
 import tempfile
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import Fingertip  # noqa: E402
 from fingertip.ros2 import Publisher  # noqa: E402
 from ros2_judges import KINDS, LOCAL, Ears, Rosbags, fake_device  # noqa: E402

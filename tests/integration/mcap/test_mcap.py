@@ -19,7 +19,7 @@ import numpy as np
 
 FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "host_tools/report/ecosystem"))
+sys.path.insert(0, str(ROOT / "tests/support"))
 import bags  # noqa: E402  finds the package too
 from fingertip import InputError, JointRecordingWriter, RecordingWriter, files, read_recording  # noqa: E402
 from mcap.opcode import Opcode  # noqa: E402

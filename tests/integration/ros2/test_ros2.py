@@ -20,7 +20,7 @@ from unittest import mock
 FAKE_DEVICE, LISTENER = (os.path.abspath(path) for path in sys.argv[1:3])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
-sys.path[:0] = [str(PACKAGE), str(ROOT / "host_tools/report/ecosystem")]
+sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
 from fingertip import Fingertip, Flag, WARNINGS, ros2  # noqa: E402
 from fingertip.errors import BadValueError  # noqa: E402
 from fingertip.mcap_recording import TYPES, contact_of  # noqa: E402

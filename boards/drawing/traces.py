@@ -15,7 +15,7 @@ import pathlib
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from boards import BOARDS, DESCRIPTORS, TO_BUILD, image_of  # noqa: E402
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save  # noqa: E402

@@ -5,6 +5,7 @@
 What a bag must say is worked out here from the cells of its CSV file alone.
 """
 
+# real time: a simulated fingertip on a pseudo-terminal
 import collections
 import csv
 import dataclasses
@@ -22,7 +23,7 @@ import time
 import numpy as np
 import zstandard
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
 from fingertip import RecordingWriter, wire  # noqa: E402
 from fingertip.errors import InputError  # noqa: E402
@@ -32,10 +33,19 @@ from mcap.reader import make_reader  # noqa: E402
 from mcap.records import Message  # noqa: E402
 from mcap.stream_reader import StreamReader  # noqa: E402
 from mcap_ros2.decoder import DecoderFactory  # noqa: E402
-from python_package import wait_for  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
 PATIENCE_s = 60
+
+
+def wait_for(port):
+    end_s = time.monotonic() + PATIENCE_s
+    while not port.is_symlink():
+        if time.monotonic() > end_s:
+            raise InputError(f"no simulated fingertip within {PATIENCE_s} s")
+        time.sleep(0.02)
+
+
 RATE_Hz = 1300
 TRUSTED, WARNINGS, CONTACT, TARED = 2, 0x7FF00, 1, 32
 TANGENTIAL, FROM_TOUCH = 1 << 20, 1 << 21

@@ -8,6 +8,7 @@
 The truth of cuts is a second terminal of each fingertip (fake_device's mirror), which gets the same bytes a moment before the first.
 """
 
+# real time: processes on a network
 import contextlib
 import json
 import os
@@ -21,7 +22,7 @@ import threading
 import time
 import tty
 
-PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "python"
+PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "host_tools/python"
 sys.path.insert(0, str(PACKAGE))
 from fingertip import wire  # noqa: E402
 from fingertip.mcap_recording import McapLineReader  # noqa: E402

@@ -1,5 +1,6 @@
 """Who judges the topics of ROS 2: Fast DDS, which ROS 2 has as its default, and rosbags. Needs rosbags (tests/requirements.txt)."""
 
+# real time: discovery and delivery by DDS on a network
 import contextlib
 import os
 import struct
