@@ -23,9 +23,9 @@ usage() {
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  test quick    build what the quick tests need and run them: about half a minute once built" >&2
-  echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser or linux" >&2
+  echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser, linux, or nightly, which takes hours" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
-  echo "  report all    the same with every pad and grasp, and what fuzzers, storms of faults and mutation find; some hours" >&2
+  echo "  report all    the same with every pad and grasp; some hours" >&2
   echo "  report PART [FOLDER]  build everything and measure one part whole: $(echo $(parts)); real needs the FOLDER of its recordings" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
   echo "  soak    build everything and let faults storm on the firmware for so many hours, natively and emulated; findings in build/soak/findings" >&2
@@ -34,7 +34,7 @@ usage() {
 case $# in
   1) case $1 in demo | web | test | report) ;; *) usage ;; esac ;;
   2) case "$1 $2" in
-       "test quick" | "test host" | "test emulated" | "test accuracy" | "test realtime" | "test browser" | "test linux") ;;
+       "test quick" | "test host" | "test emulated" | "test accuracy" | "test realtime" | "test browser" | "test linux" | "test nightly") ;;
        "report all" | fuzz\ * | soak\ *) ;;
        report\ *) part_runs "$2" without || usage ;;
        *) usage ;;
@@ -241,8 +241,12 @@ case $1 in
     exec sh host_tools/demo/demo.sh $stay
     ;;
   web) exec build/host/host_tools/tool/cli/fingertip web ;;
-  # One more than there are processors: tests in real time wait most of theirs.
-  test) exec ctest --preset host -j "$(($(nproc) + 1))" ${2:+-L "^$2\$"} ;;
+  test)
+    # The preset leaves the nightly ones out.
+    [ "${2:-}" != nightly ] || exec ctest --test-dir build/host --output-on-failure -L '^nightly$'
+    # One more than there are processors: tests in real time wait most of theirs.
+    exec ctest --preset host -j "$(($(nproc) + 1))" ${2:+-L "^$2\$"}
+    ;;
   soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
   report) exec /usr/bin/python3 host_tools/report/shared/parts.py "${2:-report}" ${folder:+"$folder"} ;;
 esac

@@ -1,5 +1,6 @@
 # ft_test(LABEL NAME name COMMAND ...): as add_test, with one of the labels that tests/README.md explains.
-set(FT_TEST_LABELS quick host emulated accuracy realtime browser linux)
+# nightly is not part of a plain run: CMakePresets.json leaves it out.
+set(FT_TEST_LABELS quick host emulated accuracy realtime browser linux nightly)
 
 function(ft_test label)
   if(NOT label IN_LIST FT_TEST_LABELS)
@@ -11,6 +12,8 @@ function(ft_test label)
   # Tests in real time run one at a time. Each measures how late the machine was.
   if(label STREQUAL "realtime")
     set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK real_time)
+  elseif(label STREQUAL "nightly")
+    set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK nightly TIMEOUT 14400)
   endif()
   # What the quick tests need built: the programs that they name.
   if(label STREQUAL "quick")

@@ -8,15 +8,8 @@ import tempfile
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-sys.path[:0] = [
-    str(HERE),
-    str(ROOT / "host_tools/report/reliability"),
-    str(ROOT / "host_tools/report/shared"),
-    str(ROOT / "host_tools/python"),
-]
+sys.path.insert(0, str(HERE))
 import fuzz  # noqa: E402
-import fuzzing  # noqa: E402
 
 PROGRAM = """#!/usr/bin/python3
 import os, pathlib, struct, sys
@@ -138,10 +131,6 @@ class FuzzTest(unittest.TestCase):
         ]
         self.assertEqual(sorted(times, key=float), times)
         self.assertEqual(fuzz.bulk_seed("uf2", [b"ab", b"c"], 8), b"abcabcab")
-
-    def test_the_report_shows_each_target(self):
-        lines = fuzzing.text({"fuzz_targets": [{"target": "usb", "edges": 42}, {"target": "wire", "edges": 43}]})
-        self.assertIn("| usb | 42 |", lines)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ part.json has
                      in_report, in_all: the arguments to add there; without them that report leaves it out.
                      folder: what lies in the folder that it needs, if it needs one
     page             title, about, origin of the figures; origins: [pattern, origin], the first that matches goes before origin;
-                     text: its file if that is not NAME.md; pictures, tables: [file, what it shows]; by: the command, if none runs it
+                     text: its file if that is not NAME.md; pictures, tables: [file, what it shows]
 """
 
 import dataclasses
@@ -45,7 +45,6 @@ class Page:
     text: str = None
     pictures: list = ()
     tables: list = ()
-    by: str = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Part:
 
     @property
     def command(self):
-        return self.page.by if self.page.by else " ".join(["sh cmake/bootstrap.sh report", self.name] + ["FOLDER"] * bool(self.run.folder))
+        return " ".join(["sh cmake/bootstrap.sh report", self.name] + ["FOLDER"] * bool(self.run.folder))
 
 
 def read(path):

@@ -12,7 +12,7 @@ import time
 
 import page
 from fingertip.files import InputError, check_output, write_text
-from goals import goal_table_md, judge, missed, print_goals
+from goals import judge, missed, print_goals
 
 
 def option_parser(description):
@@ -145,17 +145,3 @@ def report_of_programs(options, name, parts, chosen, goals, measure, derive, pag
     pages.write(found, out / f"{name}.md")
     pages.draw(found, out / f"{name}.png")
     return finish(found, options, tuple(f"{name}.{kind}" for kind in ("json", "md", "png")))
-
-
-def report_of_parts(argv, description, name, parts):
-    """A report of parts, each a module: GOALS, measure(build, steps) -> figures by name, text(figures) -> lines of Markdown. Writes
-    name.json and name.md. Exit status."""
-    options = option_parser(description).parse_args(argv)
-    out, steps, found = output_folder(options), Steps(), {}
-    for part in parts:
-        found.update(part.measure(pathlib.Path(options.build).resolve(), steps))
-    found = judge(found, tuple(goal for part in parts for goal in part.GOALS))
-    write_json(out / f"{name}.json", found)
-    lines = [f"# {name.capitalize()}", "", "Written by `sh cmake/bootstrap.sh report`.", "", *goal_table_md(found), ""]
-    write_text(out / f"{name}.md", "\n".join(lines + [line for part in parts for line in part.text(found)]))
-    return finish(found, options, (f"{name}.json", f"{name}.md"))

@@ -22,9 +22,9 @@ import numpy as np
 FINGERTIP, FAKE_DEVICE, FINGERTIP_SIMULATE = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
-sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support"), str(ROOT / "host_tools/report/newcomer")]
+sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
 import fingertip  # noqa: E402
-import simulated as newcomer  # noqa: E402
+import readme_example  # noqa: E402
 from fingertip import Fingertip, Fingertips, Flag, wire  # noqa: E402
 from real_time import RealTime  # noqa: E402
 
@@ -115,20 +115,22 @@ class Simulated(DeviceTest):
     """Against what `fingertip simulate` simulates, found as any program finds it."""
 
     def test_the_example_of_the_readme_runs_as_printed(self):
-        environment = newcomer.environment_of(self.folder)
-        with newcomer.simulated(FINGERTIP, environment):
-            lines, err = newcomer.run_example(environment)
+        environment = readme_example.environment_of(self.folder)
+        with readme_example.simulated(FINGERTIP, environment):
+            lines, err = readme_example.run_example(environment)
         self.assertEqual(err, "")
-        self.assertTrue(newcomer.runs(lines), lines)
+        self.assertTrue(readme_example.runs(lines), lines)
         self.assertFalse(
-            newcomer.runs(lines[:-1]) or newcomer.runs([*lines[:-1], "nan nan nan"]) or newcomer.runs([*lines[:-1], "0 0 nothing"])
+            readme_example.runs(lines[:-1])
+            or readme_example.runs([*lines[:-1], "nan nan nan"])
+            or readme_example.runs([*lines[:-1], "0 0 nothing"])
         )
 
     def test_names(self):
         self.assertRaisesRegex(
             fingertip.NoFingertipError, "sim:: nothing is simulated there; start `fingertip simulate`", Fingertip, "sim:"
         )
-        with newcomer.simulated(FINGERTIP, newcomer.environment_of(self.folder), "--fingertips", "2"):
+        with readme_example.simulated(FINGERTIP, readme_example.environment_of(self.folder), "--fingertips", "2"):
             serials = []
             for name in ("sim:", "sim:left", "sim:right"):
                 with Fingertip(name, timeout_s=PATIENCE_s) as tip:

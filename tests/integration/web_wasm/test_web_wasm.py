@@ -10,25 +10,18 @@ import json
 import math
 import pathlib
 import re
-import subprocess
 import sys
 import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("python", "report/shared", "report/web")]
-import parity  # noqa: E402
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
+import wasm_parity  # noqa: E402
+from wasm_parity import run as must  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 STORED_PAD = 1 << 4  # wire_stored
-
-
-def must(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}: {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 class WebWasm(unittest.TestCase):
@@ -97,10 +90,10 @@ class WebWasm(unittest.TestCase):
 
 
 class Parity(WebWasm):
-    """All scenes are in the report (host_tools/report/web/parity.py)."""
+    """All scenes are a nightly test (web.parity)."""
 
     def same(self, scenario, *options, pad=False, least_Hz=100):
-        packets, different, told = parity.play(self.build, scenario, self.folder, *options, pad=pad)
+        packets, different, told = wasm_parity.play(self.build, scenario, self.folder, *options, pad=pad)
         self.assertEqual(different, 0, "build web_wasm and fingertip_player again first: their info packets name their commit")
         self.assertGreater(packets, least_Hz * told["seconds"])
 
@@ -117,9 +110,9 @@ class Parity(WebWasm):
         whole = bytes(range(1, 200)) + b"\0" + bytes(range(1, 100)) + b"\0"
         changed = bytearray(whole)
         changed[150] ^= 1
-        self.assertEqual(parity.compared(whole, whole), (2, 0))
-        self.assertEqual(parity.compared(whole, bytes(changed)), (2, 1))
-        self.assertEqual(parity.compared(whole, whole[:200]), (2, 1))
+        self.assertEqual(wasm_parity.compared(whole, whole), (2, 0))
+        self.assertEqual(wasm_parity.compared(whole, bytes(changed)), (2, 1))
+        self.assertEqual(wasm_parity.compared(whole, whole[:200]), (2, 1))
 
 
 class Simulated(WebWasm):

@@ -1,0 +1,63 @@
+"""What the Python package costs a program that takes every frame at the highest rate, and what it loses."""
+
+# real time: processor time of a program at its pace
+import json
+import subprocess
+import sys
+import time
+
+from nightly import PATIENCE_s, Programs, job
+
+from fingertip import Fingertip
+from fingertip.files import InputError
+
+RATE_Hz, SECONDS = 1310, 60
+
+
+def read_here(port, seconds):
+    taken = missing = 0
+    with Fingertip(port) as fingertip:
+        frames = iter(fingertip)
+        last = next(frames).frame
+        begun_s, cpu_s = time.perf_counter(), time.process_time()
+        for frame in frames:
+            taken += 1
+            missing += frame.frame - last - 1
+            last = frame.frame
+            if taken % 100 == 0 and time.perf_counter() - begun_s >= seconds:
+                break
+        wall_s, cpu_s = time.perf_counter() - begun_s, time.process_time() - cpu_s
+        line = fingertip.statistics
+        return {
+            "frames": taken,
+            "fps": taken / wall_s,
+            "core_percent": 100 * cpu_s / wall_s,
+            "us_per_packet": 1e6 * cpu_s / (2 * taken),
+            "lost": missing
+            + line.dropped_packets
+            + line.crc_errors
+            + line.format_errors
+            + line.out_of_order
+            + fingertip.overrun_frames,
+            "clock_us": fingertip.clock.uncertainty_us,
+        }
+
+
+def read(port, seconds):
+    """By a process of its own."""
+    words = [sys.executable, __file__, str(port), str(seconds)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=seconds + PATIENCE_s, check=False)
+    if done.returncode != 0:
+        raise InputError(f"the Python reader failed: {done.stderr.strip()[-500:]}")
+    return json.loads(done.stdout)
+
+
+@job("ecosystem", ("python_core_percent", "<=", 6), ("python_lost", "<=", 0), ("python_fps", ">=", 1308))
+def python(build):
+    with Programs(build) as programs:
+        found = read(programs.fake_device("AAAA", f"rate={RATE_Hz}"), SECONDS)
+    return {"python_seconds": SECONDS} | {f"python_{name}": round(value, 2) for name, value in found.items()}
+
+
+if __name__ == "__main__":
+    print(json.dumps(read_here(sys.argv[1], float(sys.argv[2]))))
