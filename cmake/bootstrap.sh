@@ -18,9 +18,10 @@ part_runs() {
 }
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|PART [FOLDER]]|fuzz HOURS|soak HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|docs|report [all|PART [FOLDER]]|fuzz HOURS|soak HOURS" >&2
   echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
+  echo "  docs    build the documents as a site with search, into build/docs/site, and check their links" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  test quick    build what the quick tests need and run them: about half a minute once built" >&2
   echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser, linux, or nightly, which takes hours" >&2
@@ -32,7 +33,7 @@ usage() {
   exit 2
 }
 case $# in
-  1) case $1 in demo | web | test | report) ;; *) usage ;; esac ;;
+  1) case $1 in demo | web | docs | test | report) ;; *) usage ;; esac ;;
   2) case "$1 $2" in
        "test quick" | "test host" | "test emulated" | "test accuracy" | "test realtime" | "test browser" | "test linux" | "test nightly") ;;
        "report all" | fuzz\ * | soak\ *) ;;
@@ -51,6 +52,14 @@ say() { printf '%s\n' "== $*"; }
 
 # command or file that shows a package is there, then the package
 needed() {
+  if [ "$1" = docs ]; then
+    cat << 'LIST'
+git git
+python3 python3
+/usr/share/doc/python3-venv python3-venv
+LIST
+    return
+  fi
   cat << 'LIST'
 cmake cmake
 ninja ninja-build
@@ -130,7 +139,7 @@ is_there() {
 PATH=$root/build/node/bin:$PATH
 export PATH
 own_node=
-if [ -e build/node ] || ! { is_there node && is_there npm; }; then own_node=yes; fi
+if [ "$job" = docs ]; then :; elif [ -e build/node ] || ! { is_there node && is_there npm; }; then own_node=yes; fi
 
 missing=$(needed "$job" | sort -u | while read -r probe package; do is_there "$probe" || echo "$package"; done)
 if [ -n "$missing" ]; then
@@ -150,6 +159,20 @@ if [ -n "$missing" ]; then
   say "installing them"
   $as_root apt-get -qq update
   $as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y install --no-install-recommends $missing
+fi
+
+if [ "$job" = docs ]; then
+  if ! cmp -s cmake/docs.txt build/docs/venv/.installed-requirements; then
+    say "fetching mkdocs-material with pip into build/docs"
+    mkdir -p build/docs
+    /usr/bin/python3 -m venv --clear build/docs/venv
+    build/docs/venv/bin/pip --quiet --disable-pip-version-check install -r cmake/docs.txt
+    cp cmake/docs.txt build/docs/venv/.installed-requirements
+  fi
+  /usr/bin/python3 cmake/docs.py
+  NO_MKDOCS_2_WARNING=1 build/docs/venv/bin/mkdocs build --quiet
+  say "open build/docs/site/index.html"
+  exit 0
 fi
 
 # NAME VERSION LEAST: ends if VERSION is older
