@@ -1,5 +1,5 @@
 #include "library/pad/thickness.hpp"
-#include "truth/calibration/sessions.hpp"
+#include "report/measure/sessions.hpp"
 
 #include <cmath>
 #include <gtest/gtest.h>

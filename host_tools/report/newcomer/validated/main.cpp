@@ -7,6 +7,7 @@
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
 #include "library/pad/thickness.hpp"
+#include "report/measure/sessions.hpp"
 #include "simulation/cell/place.hpp"
 #include "simulation/cell/validated.hpp"
 #include "simulation/player/native_fingertip.h"
@@ -14,7 +15,6 @@
 #include "tool/calibration/gain_session.hpp"
 #include "tool/plain_help.hpp"
 #include "tool/validation/protocol.hpp"
-#include "truth/calibration/sessions.hpp"
 
 extern "C" {
 #include "native/native_cdc.h"

@@ -4,9 +4,9 @@
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/progress_bar.hpp"
+#include "report/measure/sessions.hpp"
 #include "report/reference/options.hpp"
 #include "simulation/twin/scenarios.hpp"
-#include "truth/calibration/sessions.hpp"
 
 extern "C" {
 #include "config/defaults.h"

@@ -6,8 +6,8 @@
 #pragma once
 
 #include "libfingertip/random.hpp"
+#include "report/measure/sessions.hpp"
 #include "simulation/twin/contact_table.hpp"
-#include "truth/calibration/sessions.hpp"
 
 extern "C" {
 #include "fit/fit.h"

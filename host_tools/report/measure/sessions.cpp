@@ -1,4 +1,4 @@
-#include "truth/calibration/sessions.hpp"
+#include "report/measure/sessions.hpp"
 
 extern "C" {
 #include "config/geometry.h"
