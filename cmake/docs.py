@@ -4,7 +4,8 @@
 usage: docs.py [ROOT]
 
 The pages keep their folders in build/docs/pages, so that links between them hold. A file that a page links to is copied. A link to a folder
-leads to its README.md, and becomes plain text where there is none. A link to what is not in the tree is an error.
+leads to its README.md, and becomes plain text where there is none. A link to what is not in the tree is an error, and so is a document that
+mkdocs.yml does not list.
 """
 
 import pathlib
@@ -25,10 +26,11 @@ def targets(text):
 def gather(root):
     """Copies documents and what they link to; returns links that lead nowhere, as (document, link)."""
     listed = subprocess.run(["git", "ls-files", "*.md"], cwd=root, capture_output=True, text=True, check=True).stdout.split()
+    listed = [name for name in listed if not name.startswith(".github/")]
     pages = root / PAGES
     shutil.rmtree(pages, ignore_errors=True)
     missing = []
-    for name in [name for name in listed if not name.startswith(".github/")]:
+    for name in listed:
         text = (root / name).read_text(encoding="utf-8")
         for link in targets(text):
             path = (root / name).parent / link
@@ -46,6 +48,10 @@ def gather(root):
         page = pages / name
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(text, encoding="utf-8")
+    config = root / "mkdocs.yml"
+    navigation = re.findall(r"[\w/]+\.md", config.read_text(encoding="utf-8").split("\nnav:")[1])
+    missing += [("mkdocs.yml", name) for name in navigation if not (pages / name).is_file()]
+    missing += [(name, "a page of mkdocs.yml") for name in listed if name not in navigation]
     return missing
 
 
@@ -53,7 +59,7 @@ def main():
     root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()
     missing = gather(root)
     for name, link in missing:
-        print(f"docs.py: {name} links to {link}, which is not there", file=sys.stderr)
+        print(f"docs.py: {name} leads to {link}, which is not there", file=sys.stderr)
     return 1 if missing else 0
 
 

@@ -14,7 +14,7 @@ class Docs(unittest.TestCase):
     def gather(self, files):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
-            for name, text in files.items():
+            for name, text in {"mkdocs.yml": "site_name: x\nnav:\n  - README.md\n", **files}.items():
                 (root / name).parent.mkdir(parents=True, exist_ok=True)
                 (root / name).write_text(text, encoding="utf-8")
             subprocess.run(["git", "init", "--quiet"], cwd=root, check=True)
@@ -24,11 +24,27 @@ class Docs(unittest.TestCase):
             return missing, {str(path.relative_to(pages)): path.read_text(encoding="utf-8") for path in pages.rglob("*") if path.is_file()}
 
     def test_a_link_that_leads_nowhere_is_found(self):
-        missing, _ = self.gather({"README.md": "[a](a.md#b) [c](c/d.png) [out](https://example.org)", "a.md": ""})
+        missing, _ = self.gather({"README.md": "[a](LICENSE#b) [c](c/d.png) [out](https://example.org)", "LICENSE": ""})
         self.assertEqual(missing, [("README.md", "c/d.png")])
 
+    def test_pages_and_the_navigation_are_the_same(self):
+        missing, _ = self.gather({"README.md": "", "more.md": ""})
+        self.assertEqual(missing, [("more.md", "a page of mkdocs.yml")])
+        missing, _ = self.gather({"mkdocs.yml": "\nnav:\n", "LICENSE": ""})
+        self.assertEqual(missing, [])
+        missing, _ = self.gather({"LICENSE": ""})
+        self.assertEqual(missing, [("mkdocs.yml", "README.md")])
+
     def test_linked_files_are_copied_and_folders_lead_to_their_readme(self):
-        missing, pages = self.gather({"README.md": "[x](f/x.h) [f](f) [g](g)", "f/x.h": "int x;", "f/README.md": "", "g/y.c": ""})
+        missing, pages = self.gather(
+            {
+                "README.md": "[x](f/x.h) [f](f) [g](g)",
+                "f/x.h": "int x;",
+                "f/README.md": "",
+                "g/y.c": "",
+                "mkdocs.yml": "\nnav: README.md f/README.md",
+            }
+        )
         self.assertEqual(missing, [])
         self.assertEqual(pages, {"README.md": "[x](f/x.h) [f](f/README.md) g", "f/x.h": "int x;", "f/README.md": ""})
 
