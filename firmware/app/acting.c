@@ -77,7 +77,7 @@ void app_use_calibration(struct app *app, const struct calibration *calibration)
     app->gains.inverse_q16[k] = (uint32_t)(65536.0f / gain + 0.5f);
     app->fit_settings.gain_sd_q16[k] = (uint16_t)(gain_sd * 65536.0f + 0.5f);
   }
-#if FT_WITH_LOAD_DOUBT
+#if FT_WITH_TANGENTIAL_DOUBT
   fit_gains_begin(&app->learnt_gains, DEFAULT_GAIN_SD);
 #endif
   app_use_shape(app);

@@ -19,7 +19,7 @@
 #define FRAME_WAIT_us 100000u
 /* A zero that is not followed may be off by 30 Pa after so long: condition.h. */
 #define ZERO_LASTS_us 60000000u
-/* Frames so far apart leave time for all parts of fit_load.h, and for fit_gains.h. */
+/* Frames so far apart leave time for all parts of fit_doubt.h, and for fit_gains.h. */
 #define LOOK_AT_ONCE_us 4500u
 /* Frames so far apart have time for a search for an outlier in each. */
 #define WATCH_APART_us 2000u
@@ -133,7 +133,7 @@ static void fit_frame(struct app *app) {
 }
 #endif
 
-#if FT_WITH_LOAD_DOUBT
+#if FT_WITH_TANGENTIAL_DOUBT
 static bool is_load_estimated(const struct app *app) {
 #if FT_WITH_TANGENTIAL
   return app->tangential && app->tangential->valid;
@@ -145,7 +145,7 @@ static bool is_load_estimated(const struct app *app) {
 
 static void doubt_load(struct app *app) {
   if (app->conditioned.contact && !is_load_estimated(app)) {
-    fit_load_widen(&app->load_doubt, &app->fit_array, &app->fit_settings, &app->fit);
+    fit_doubt_widen(&app->load_doubt, &app->fit_array, &app->fit_settings, &app->fit);
   }
 }
 
@@ -165,18 +165,18 @@ static void look_for_load(struct app *app) {
   const bool slow = t_us - app->load_frame_us >= LOOK_AT_ONCE_us;
   app->load_frame_us = t_us;
   if (!app->conditioned.contact || is_load_estimated(app)) {
-    fit_load_begin(&app->load_doubt);
+    fit_doubt_begin(&app->load_doubt);
     fit_gains_lift(&app->learnt_gains);
     app->gains_due = false;
   } else {
-    for (int parts = slow ? FIT_LOAD_PARTS + 1 : 1; parts > 0; parts--) {
+    for (int parts = slow ? FIT_DOUBT_PARTS + 1 : 1; parts > 0; parts--) {
       if (app->gains_due) {
         learn_gains(app);
         app->gains_due = false;
         continue;
       }
-      fit_load_follow(&app->load_doubt, &app->fit_array, app->conditioned.pressure_Pa_q10, &app->fit_settings,
-                      &app->fit);
+      fit_doubt_follow(&app->load_doubt, &app->fit_array, app->conditioned.pressure_Pa_q10, &app->fit_settings,
+                       &app->fit);
       app->gains_due = app->load_doubt.part == 0 && !app->calibration;
     }
   }
@@ -271,7 +271,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     judge_fit(app);
     working_wait(app);
 #endif
-#if FT_WITH_LOAD_DOUBT
+#if FT_WITH_TANGENTIAL_DOUBT
     doubt_load(app);
 #endif
   }
@@ -322,7 +322,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     }
 #endif
     watch_below(app);
-#if FT_WITH_LOAD_DOUBT
+#if FT_WITH_TANGENTIAL_DOUBT
     look_for_load(app);
 #endif
   }

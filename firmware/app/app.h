@@ -16,8 +16,8 @@
 #include "contact/shapes.h"
 #include "contact/tangential.h"
 #include "fit/fit.h"
+#include "fit/fit_doubt.h"
 #include "fit/fit_gains.h"
-#include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 #include "port/sync.h"
 #include "scan/scan.h"
@@ -71,8 +71,8 @@ struct app {
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif
-#if FT_WITH_LOAD_DOUBT
-  struct fit_load load_doubt;
+#if FT_WITH_TANGENTIAL_DOUBT
+  struct fit_doubt load_doubt;
   struct fit_gains learnt_gains; /* while no calibration acts */
   bool gains_due;                /* of this contact, between two looks */
   uint32_t load_frame_us;        /* the last frame's time */

@@ -24,13 +24,13 @@
 #define FT_WITH_TANGENTIAL FINGERTIP_TANGENTIAL
 #endif
 
-/* What a tangential load that is not estimated does to the location: fit_load.h. The paper's scene
+/* What a tangential load that is not estimated does to the location: fit_doubt.h. The paper's scene
  * keeps the paper's fit. */
-#ifndef FT_WITH_LOAD_DOUBT
+#ifndef FT_WITH_TANGENTIAL_DOUBT
 #ifdef FINGERTIP_SCENE_PAPER
-#define FT_WITH_LOAD_DOUBT 0
+#define FT_WITH_TANGENTIAL_DOUBT 0
 #else
-#define FT_WITH_LOAD_DOUBT FT_WITH_FIT
+#define FT_WITH_TANGENTIAL_DOUBT FT_WITH_FIT
 #endif
 #endif
 

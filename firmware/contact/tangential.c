@@ -47,8 +47,8 @@ void tangential_estimate(void *job) {
   int steps = slow ? FIT_TANGENTIAL_FRAMES : 1;
   course->t_us = question->t_us;
   do {
-    fit_tangential_load(own->array, &own->pad, question->pressure_Pa_q10, question->settings, question->fit,
-                        &course->state, &own->estimate);
+    fit_tangential_estimate(own->array, &own->pad, question->pressure_Pa_q10, question->settings, question->fit,
+                            &course->state, &own->estimate);
   } while (!own->estimate.valid && --steps > 0);
 }
 

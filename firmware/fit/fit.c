@@ -1,156 +1,21 @@
 #include "fit/fit.h"
 
-#include "common/bytes.h"
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
-#include "fit/kernels.h"
 
-#include <math.h>
 #include <stdbool.h>
 
-#define POSITION_MAX_mm 10000.0f
-#define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
-#define ON_NODE 1e-4f /* pitches; the same off a line */
-/* Of a location, with a pitch of 2^23 to 2^24: the array and its margin beside it fit into 2^30. */
-#define ORIGIN_MAX 1073741824.0f
-
-/* value > 0 as mantissa * 2^exponent with a mantissa of 2^29 .. 2^30. */
-static int32_t split(float value, int32_t *exponent) {
-  uint32_t bits = bytes_from_f32(value);
-  *exponent = (int32_t)(bits >> 23) - 127 - 29;
-  return (int32_t)((bits & 0x7FFFFFu) | 0x800000u) << 6;
+static uint32_t all_sensors(const struct fit_array *array) {
+  return UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
 }
 
-/* Number of the node at this coordinate, or -1 off the grid. */
-static int node_at(float position, float first) {
-  float steps = position - first; /* not negative but for rounding */
-  int nearest = (int)(steps + 0.5f);
-  bool on_node = fabsf(steps - (float)nearest) <= ON_NODE && nearest < FIT_GRID_MAX_NODES;
-  return on_node ? nearest : -1;
-}
-
-/* Fills made->grid if the sensors occupy every node of a rectangle. */
-static void find_grid(struct fit_array *made, const float *x_mm, const float *y_mm) {
-  struct fit_grid_shape *grid = &made->grid;
-  float x_first = made->x_min + MARGIN, y_first = made->y_min + MARGIN;
-  int columns = node_at(made->x_max - MARGIN, x_first) + 1;
-  int rows = node_at(made->y_max - MARGIN, y_first) + 1;
-  if (columns < 2 || rows < 2 || columns * rows != made->sensor_count) {
-    return;
+/* The faster kernel, or that for missing sensors. Returns whether the residuals suggest an outlier. */
+static bool fit_rectangle(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                          const struct fit_settings *settings, struct fit_result *result) {
+  if (usable == all_sensors(array) && !fit_steps_want_dip(array, settings)) {
+    return fit_grid(array, pressure_Pa_q10, settings, result);
   }
-  uint32_t seen = 0;
-  for (uint8_t k = 0; k < made->sensor_count; k++) {
-    int column = node_at(made->x[k], x_first);
-    int row = node_at(made->y[k], y_first);
-    if (column < 0 || row < 0) {
-      return;
-    }
-    grid->sensor[column * rows + row] = k;
-    seen |= UINT32_C(1) << (column * rows + row);
-  }
-  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
-  if (seen != UINT32_MAX >> (FT_MAX_SENSORS - made->sensor_count)) {
-    return;
-  }
-  const int32_t half_q26 = 1 << 25;
-  grid->x_min = -(2 * (columns / 2) + 3) * half_q26;
-  grid->x_max = (2 * (columns - 1 - columns / 2) + 3) * half_q26;
-  grid->y_min = -(2 * (rows / 2) + 3) * half_q26;
-  grid->y_max = (2 * (rows - 1 - rows / 2) + 3) * half_q26;
-  int32_t exponent;
-  grid->pitch = split(made->pitch_mm, &exponent);
-  grid->pitch_exponent = exponent + 6;
-  uint8_t origin = grid->sensor[(columns / 2) * rows + rows / 2];
-  float unit = bytes_to_f32((uint32_t)(127 - grid->pitch_exponent) << 23); /* a power of 2 */
-  float x_origin = x_mm[origin] * unit, y_origin = y_mm[origin] * unit;
-  if (fabsf(x_origin) > ORIGIN_MAX || fabsf(y_origin) > ORIGIN_MAX) {
-    return;
-  }
-  grid->x_origin = (int32_t)x_origin;
-  grid->y_origin = (int32_t)y_origin;
-  grid->force_scale = split(6.28318531e-6f * made->pitch_mm * made->pitch_mm, &grid->force_exponent);
-  float settled = FIT_SETTLED_mm / made->pitch_mm * 4194304.0f;
-  settled = settled * settled * 0.5f;
-  grid->settled_square = settled < 5e8f ? (int32_t)settled : 500000000;
-  grid->columns = (uint8_t)columns;
-  grid->rows = (uint8_t)rows;
-}
-
-/* Fills the line that the sensors lie on, if they do and not all in one place. */
-static void find_line(struct fit_array *made) {
-  float along_x = 0.0f, along_y = 0.0f, longest = 0.0f;
-  for (uint8_t k = 1; k < made->sensor_count; k++) {
-    float x = made->x[k] - made->x[0], y = made->y[k] - made->y[0];
-    float length = sqrtf(x * x + y * y);
-    if (length > longest) {
-      longest = length;
-      along_x = x;
-      along_y = y;
-    }
-  }
-  if (longest <= ON_NODE) {
-    return;
-  }
-  made->line_x = -along_y / longest;
-  made->line_y = along_x / longest;
-  made->line_offset = made->x[0] * made->line_x + made->y[0] * made->line_y;
-  made->is_line = true;
-  for (uint8_t k = 1; k < made->sensor_count; k++) {
-    float x = made->x[k] - made->x[0], y = made->y[k] - made->y[0];
-    float across = x * made->line_x + y * made->line_y;
-    made->is_line = made->is_line && fabsf(across) <= ON_NODE;
-  }
-}
-
-/* Everything but the line. */
-static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
-                                 float pitch_mm) {
-  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS || !(pitch_mm >= 0.01f && pitch_mm <= POSITION_MAX_mm)) {
-    return FT_ERR_ARGUMENT;
-  }
-  struct fit_array made = {.sensor_count = sensor_count, .pitch_mm = pitch_mm};
-  for (uint8_t k = 0; k < sensor_count; k++) {
-    if (!(fabsf(x_mm[k]) <= POSITION_MAX_mm && fabsf(y_mm[k]) <= POSITION_MAX_mm)) {
-      return FT_ERR_ARGUMENT;
-    }
-    float x = x_mm[k] / pitch_mm;
-    float y = y_mm[k] / pitch_mm;
-    made.x[k] = x;
-    made.y[k] = y;
-    made.x_min = k == 0 || x - MARGIN < made.x_min ? x - MARGIN : made.x_min;
-    made.x_max = k == 0 || x + MARGIN > made.x_max ? x + MARGIN : made.x_max;
-    made.y_min = k == 0 || y - MARGIN < made.y_min ? y - MARGIN : made.y_min;
-    made.y_max = k == 0 || y + MARGIN > made.y_max ? y + MARGIN : made.y_max;
-  }
-  find_grid(&made, x_mm, y_mm);
-  *array = made;
-  return FT_OK;
-}
-
-static bool is_grid(const struct fit_array *array) {
-  return array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
-}
-
-enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
-                              float pitch_mm) {
-  enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
-  if (status == FT_OK) {
-    find_line(array);
-  }
-  return status;
-}
-
-enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
-                                   float pitch_mm) {
-  enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
-  return status == FT_OK && !is_grid(array) ? FT_ERR_ARGUMENT : status;
-}
-
-void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd) {
-  for (int k = 0; k < FT_MAX_SENSORS; k++) {
-    settings->gain_sd_q16[k] = (uint16_t)(gain_sd * 65536.0f);
-  }
-  settings->model_sd_q16 = (uint16_t)(model_sd * 65536.0f);
+  return fit_grid_masked(array, pressure_Pa_q10, usable, settings, result);
 }
 
 /* Fits once more without the outlier, if there is one. */
@@ -168,20 +33,6 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
   }
 }
 
-#define TAKE_GRID_IF_IT_SUITS(name, suits, fits)                                                                       \
-  if (suits) {                                                                                                         \
-    rough = fits;                                                                                                      \
-  } else
-
-/* Whether the residuals look like an outlier. */
-static bool fit_grid_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                          const struct fit_settings *settings, struct fit_result *result) {
-  const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-  bool rough = false;
-  FIT_GRID_KERNELS(TAKE_GRID_IF_IT_SUITS) {}
-  return rough;
-}
-
 static bool has_grown(const struct fit_watch *watch, const struct fit_result *result) {
   return watch->frames < FIT_WATCH_FRAMES - FIT_WATCH_LEAST &&
          2.0f * result->residual_rms_Pa * watch->force_N > 3.0f * watch->residual_rms_Pa * result->force_N;
@@ -193,19 +44,19 @@ void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pres
     *result = (struct fit_result){0};
     return;
   }
-  usable &= UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  usable &= all_sensors(array);
   if (watch->usable != usable) {
     watch->usable = usable;
     watch->frames = 0;
   }
   const uint32_t left_out = watch->frames > 0 ? watch->left_out : 0;
-  const bool rough = fit_grid_once(array, pressure_Pa_q10, usable & ~left_out, settings, result);
+  const bool rough = fit_rectangle(array, pressure_Pa_q10, usable & ~left_out, settings, result);
   if (watch->frames > 0) {
     watch->frames--;
     if (!rough || !has_grown(watch, result)) {
       return;
     }
-    if (left_out) { /* the next frame looks at all sensors */
+    if (left_out) { /* the next frame takes all sensors */
       watch->frames = 0;
       return;
     }
@@ -226,21 +77,14 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
   fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, &none, result);
 }
 
-#define TAKE_IF_IT_SUITS(name, suits, fits)                                                                            \
-  if (suits) {                                                                                                         \
-    fits;                                                                                                              \
-  } else
-
 void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                          const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result) {
-  bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if ((is_grid(array) && !some) || settings->noise_Pa_q10 < 1) {
+  const bool selects = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
+  if ((fit_is_rectangle(array) && !selects) || settings->noise_Pa_q10 < 1) {
     fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, watch, result);
-    return;
+  } else {
+    fit_general(array, pressure_Pa_q10, usable & all_sensors(array), settings, result);
   }
-  uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-  usable &= all;
-  FIT_OTHER_KERNELS(TAKE_IF_IT_SUITS) {}
 }
 
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

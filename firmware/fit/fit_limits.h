@@ -122,6 +122,11 @@ static inline bool fit_steps_want_dip(const struct fit_array *array, const struc
          settings->prior_sigma_mm < FIT_SHAPE_LEAST * array->pitch_mm;
 }
 
+/* Whether the sensors are the rectangle of the build. */
+static inline bool fit_is_rectangle(const struct fit_array *array) {
+  return array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
+}
+
 /* What a reading below zero counts as. */
 static inline int32_t fit_reading(const struct fit_settings *settings, int32_t pressure_Pa_q10) {
   if (settings->cut_noises == 0 || pressure_Pa_q10 >= 0) {

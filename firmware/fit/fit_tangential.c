@@ -393,9 +393,9 @@ static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
   return base_q26 / 2 >= sd_q26 ? 2 * ONE_Q26 : fixed_div_q26(base_q26, sd_q26) | 1;
 }
 
-void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
-                         const struct fit_settings *settings, const struct fit_result *fit,
-                         struct fit_tangential_state *state, struct fit_tangential *result) {
+void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
+                             const struct fit_settings *settings, const struct fit_result *fit,
+                             struct fit_tangential_state *state, struct fit_tangential *result) {
   *result = (struct fit_tangential){0};
   struct problem problem;
   problem.pad = pad;

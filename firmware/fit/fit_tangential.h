@@ -114,8 +114,8 @@ struct fit_tangential {
  * the pad ends near), and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
-void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
-                         const struct fit_settings *settings, const struct fit_result *fit,
-                         struct fit_tangential_state *state, struct fit_tangential *result);
+void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
+                             const struct fit_settings *settings, const struct fit_result *fit,
+                             struct fit_tangential_state *state, struct fit_tangential *result);
 
 #endif

@@ -89,12 +89,12 @@ int main(int argc, char **argv) {
     struct fit_tangential found;
     fit_tangential_state state{};
     for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
-      fit_tangential_load(&array, &pad, readings.data(), &settings, &start, &state, &found);
+      fit_tangential_estimate(&array, &pad, readings.data(), &settings, &start, &state, &found);
     }
     const reference::TangentialFit best =
-        reference::fit_tangential_load(profile, samples, noise_Pa,
-                                       {static_cast<double>(start.x_mm), static_cast<double>(start.y_mm),
-                                        static_cast<double>(start.sigma_mm), static_cast<double>(start.force_N)});
+        reference::fit_tangential_estimate(profile, samples, noise_Pa,
+                                           {static_cast<double>(start.x_mm), static_cast<double>(start.y_mm),
+                                            static_cast<double>(start.sigma_mm), static_cast<double>(start.force_N)});
     if (best.q_sd_N > OBSERVABLE * best.force_N || best.at_bound || start.used != all) {
       not_observable++;
       continue;

@@ -21,7 +21,7 @@ const SEARCH_CYCLES_MAX = 44800;
 const OUTLIER_CYCLES_MAX = 94000;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
 const TANGENTIAL_CYCLES_MAX = 41000;
-/** A part of the look for a load that is not estimated, which follows the frame's packet (fit_load.h), and all of them. */
+/** A part of the look for a load that is not estimated, which follows the frame's packet (fit_doubt.h), and all of them. */
 const LOAD_PART_CYCLES_MAX = 5800;
 const LOAD_CYCLES_MAX = 25000;
 const LOAD_PARTS = 6;
@@ -125,7 +125,7 @@ test(`no part of the look for a load takes more than ${LOAD_PART_CYCLES_MAX} cyc
     let dearest = 0;
     for (const [name, list] of Object.entries({ inside, presses, garbage })) {
       const cycles = list
-        .map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `load_${part}`, true))
+        .map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `doubt_${part}`, true))
         .sort((a, b) => a - b);
       t.diagnostic(
         `part ${part}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`,

@@ -88,7 +88,7 @@ public:
     fit_gaussian_grid(&prepared_.array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count),
                       &settings_, &fit);
     for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
-      fit_tangential_load(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit, &state, &found);
+      fit_tangential_estimate(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit, &state, &found);
     }
     if (!found.valid) {
       return false;

@@ -7,7 +7,7 @@ extern "C" {
 #include "alternatives/alternatives.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "fit/kernels.h"
+#include "fit/fit.h"
 }
 #include "common/contact_flags.h"
 
@@ -67,28 +67,33 @@ KernelResult fit(const fit_array &array, const std::int32_t *pressure_Pa_q10, st
   return widened(result);
 }
 
-// Of a row of fit/kernels.h.
-#define SUITS(suits)                                                                                                   \
-  []([[maybe_unused]] const fit_array *array, [[maybe_unused]] const fit_settings *settings,                           \
-     [[maybe_unused]] std::uint32_t usable, [[maybe_unused]] std::uint32_t all) { return suits; }
-template <class SUITS> unsigned takes_a_subset(SUITS suits) {
-  const fit_array array{};
-  const fit_settings settings{};
-  return suits(&array, &settings, 1, 3) ? unsigned{ANY_SUBSET} : 0u;
+// One of the kernels behind fit_gaussian.
+template <class FIT> KernelResult of_the_firmware(const KernelSettings &settings, FIT fit) {
+  const fit_settings chip = chip_settings(settings);
+  fit_result result;
+  fit(&chip, &result);
+  return widened(result);
 }
 
-// One for each row.
-#define OF_THE_FIRMWARE(name, suits, fits)                                                                             \
-  KernelResult name(const fit_array &of, const std::int32_t *pressure_Pa_q10, [[maybe_unused]] std::uint32_t usable,   \
-                    const KernelSettings &chosen) {                                                                    \
-    const fit_array *array = &of;                                                                                      \
-    const fit_settings chip = chip_settings(chosen), *settings = &chip;                                                \
-    fit_result found, *result = &found;                                                                                \
-    fits;                                                                                                              \
-    return widened(found);                                                                                             \
-  }
-FIT_GRID_KERNELS(OF_THE_FIRMWARE)
-FIT_OTHER_KERNELS(OF_THE_FIRMWARE)
+KernelResult grid(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t /*usable*/,
+                  const KernelSettings &settings) {
+  return of_the_firmware(
+      settings, [&](const fit_settings *chip, fit_result *result) { fit_grid(&array, pressure_Pa_q10, chip, result); });
+}
+
+KernelResult masked(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                    const KernelSettings &settings) {
+  return of_the_firmware(settings, [&](const fit_settings *chip, fit_result *result) {
+    fit_grid_masked(&array, pressure_Pa_q10, usable, chip, result);
+  });
+}
+
+KernelResult general(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                     const KernelSettings &settings) {
+  return of_the_firmware(settings, [&](const fit_settings *chip, fit_result *result) {
+    fit_general(&array, pressure_Pa_q10, usable, chip, result);
+  });
+}
 
 KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
                        const KernelSettings &settings) {
@@ -124,10 +129,10 @@ const char *name_of(Guess guess) {
 const std::vector<Kernel> &all_kernels() {
   static const std::vector<Kernel> kernels{
       {"fit", ANY_SUBSET | PRIOR, fit},
-#define GRID_ROW(name, suits, fits) {#name, takes_a_subset(SUITS(suits)) | PRIOR, name},
-      FIT_GRID_KERNELS(GRID_ROW)
-#define OTHER_ROW(name, suits, fits) {#name, ANY_SUBSET | N_LARGEST | PRIOR, name},
-          FIT_OTHER_KERNELS(OTHER_ROW){"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
+      {"grid", PRIOR, grid},
+      {"masked", ANY_SUBSET | PRIOR, masked},
+      {"general", ANY_SUBSET | N_LARGEST | PRIOR, general},
+      {"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
       {"separable", 0, separable},
       {"naive_float", ANY_SUBSET | GUESSES, alternative<alternative_naive_float>},
       {"naive_double", ANY_SUBSET | GUESSES, alternative<alternative_naive_double>},

@@ -20,7 +20,7 @@
 
 extern "C" {
 #include "config/defaults.h"
-#include "fit/fit_load.h"
+#include "fit/fit_doubt.h"
 }
 
 #include <algorithm>
@@ -112,11 +112,11 @@ json fit(const Array &layout, const json &job) {
   std::vector<std::uint32_t> flags;
   for (std::size_t press = 0; press < prepared.usable.size(); press++) {
     fit_result result = fit_press(prepared, press);
-    fit_load load{};
-    for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) { // of a press that is held
-      fit_load_follow(&load, &prepared.array, prepared.pressure_Pa_q10[press].data(), &prepared.settings, &result);
+    fit_doubt load{};
+    for (int frame = 0; frame < FIT_DOUBT_PARTS; frame++) { // of a press that is held
+      fit_doubt_follow(&load, &prepared.array, prepared.pressure_Pa_q10[press].data(), &prepared.settings, &result);
     }
-    fit_load_widen(&load, &prepared.array, &prepared.settings, &result);
+    fit_doubt_widen(&load, &prepared.array, &prepared.settings, &result);
     x_mm.push_back(result.x_mm);
     y_mm.push_back(result.y_mm);
     sigma_mm.push_back(result.sigma_mm);

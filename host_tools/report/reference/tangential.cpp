@@ -60,8 +60,8 @@ struct Prior {
 
 } // namespace
 
-TangentialFit fit_tangential_load(const pad_profile &profile, const std::vector<TangentialSample> &samples,
-                                  double noise_Pa, const TangentialStart &start) {
+TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vector<TangentialSample> &samples,
+                                      double noise_Pa, const TangentialStart &start) {
   double largest_Pa = 0.0;
   for (const TangentialSample &sample : samples) {
     largest_Pa = std::max(largest_Pa, sample.pressure_Pa);

@@ -25,7 +25,7 @@ struct TangentialFit {
   bool at_bound;
 };
 
-TangentialFit fit_tangential_load(const pad_profile &profile, const std::vector<TangentialSample> &samples,
-                                  double noise_Pa, const TangentialStart &start);
+TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vector<TangentialSample> &samples,
+                                      double noise_Pa, const TangentialStart &start);
 
 } // namespace fingertip::reference

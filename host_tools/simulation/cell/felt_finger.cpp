@@ -93,7 +93,7 @@ GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed, const st
     fit_gaussian_grid(&array, readings, (1U << SENSORS) - 1U, &fit, &fitted);
   }
   if (pressed && tangential_is_worthwhile(&fitted, 0)) {
-    fit_tangential_load(&array, &pad, readings, &fit, &fitted, &state, &estimate);
+    fit_tangential_estimate(&array, &pad, readings, &fit, &fitted, &state, &estimate);
   } else {
     state = {};
   }

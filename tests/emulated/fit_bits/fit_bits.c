@@ -4,7 +4,7 @@
 #include "config/geometry.h"
 #include "draw.h"
 #include "fit/fit.h"
-#include "fit/fit_load.h"
+#include "fit/fit_doubt.h"
 #include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
 
@@ -141,7 +141,7 @@ uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();
-  bool other = (kernel == FIT_BITS_GENERAL && press % 2) || (kernel == FIT_BITS_LOAD && press % 16 == 1);
+  bool other = (kernel == FIT_BITS_GENERAL && press % 2) || (kernel == FIT_BITS_DOUBT && press % 16 == 1);
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 
   const bool on_a_pad = kernel == FIT_BITS_TANGENTIAL || kernel == FIT_BITS_SHAPES;
@@ -206,7 +206,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   }
 
   uint32_t usable = UINT32_MAX;
-  const bool pulls = on_a_pad || kernel == FIT_BITS_LOAD;
+  const bool pulls = on_a_pad || kernel == FIT_BITS_DOUBT;
   if (pulls && press % 16 != 15) {
     pull(array, pressure_Pa_q10);
   }
@@ -229,14 +229,14 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
   } else if (kernel == FIT_BITS_GENERAL) {
     fit_general(array, pressure_Pa_q10, usable, &settings, &result);
-  } else if (kernel == FIT_BITS_LOAD) {
-    struct fit_load load;
+  } else if (kernel == FIT_BITS_DOUBT) {
+    struct fit_doubt load;
     memset(&load, 0, sizeof load);
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-    for (int part = 0; part < FIT_LOAD_PARTS; part++) {
-      fit_load_follow(&load, array, pressure_Pa_q10, &settings, &result);
+    for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
+      fit_doubt_follow(&load, array, pressure_Pa_q10, &settings, &result);
     }
-    fit_load_widen(&load, array, &settings, &result);
+    fit_doubt_widen(&load, array, &settings, &result);
   }
   if (kernel == FIT_BITS_TANGENTIAL) {
     struct fit_tangential found[FRAMES];
@@ -245,8 +245,8 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     memset(&tangential_state, 0, sizeof tangential_state);
     for (int frame = 0; frame < FRAMES; frame++) {
       fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-      fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &tangential_state,
-                          &found[frame]);
+      fit_tangential_estimate(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &tangential_state,
+                              &found[frame]);
       for (uint8_t k = 0; k < array->sensor_count; k++) {
         pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 64 * draw_between(0, 1);
       }

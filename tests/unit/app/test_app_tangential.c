@@ -99,7 +99,7 @@ static void a_profile_tells_the_load_and_corrects_the_location(void) {
   TEST_ASSERT_TRUE(app.fit.x_mm > 1.5f + 0.5f);
   TEST_ASSERT_TRUE(app.fit.y_mm < -4.0f - 0.4f);
   TEST_ASSERT_TRUE(contact.q_sd_N > 0.0f && contact.location_sd_mm > 0.0f);
-  TEST_ASSERT_TRUE(app.fit.location_sd_mm < FIT_LOAD_USUAL * 0.38f * 9.0f);
+  TEST_ASSERT_TRUE(app.fit.location_sd_mm < FIT_DOUBT_USUAL * 0.38f * 9.0f);
   TEST_ASSERT_FALSE(app.load_doubt.known);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.p0_Pa, contact.p0_Pa);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.sigma_mm, contact.sigma_mm);
@@ -137,8 +137,8 @@ static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
       }
       frames++;
       const bool uncertain = (contact->flags & CONTACT_FLAG_UNCERTAIN) != 0;
-      if (frames <= (slow ? 1 : FIT_LOAD_PARTS)) {
-        TEST_ASSERT_TRUE(contact->location_sd_mm > FIT_LOAD_USUAL * 0.38f * 9.0f && uncertain);
+      if (frames <= (slow ? 1 : FIT_DOUBT_PARTS)) {
+        TEST_ASSERT_TRUE(contact->location_sd_mm > FIT_DOUBT_USUAL * 0.38f * 9.0f && uncertain);
       } else if (loaded) {
         TEST_ASSERT_FLOAT_WITHIN(0.4f, contact->x_mm - 1.5f, contact->location_sd_mm);
         TEST_ASSERT_TRUE(contact->x_mm > 2.2f && uncertain);
@@ -146,7 +146,7 @@ static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
         TEST_ASSERT_TRUE(contact->location_sd_mm < 0.6f && !uncertain);
       }
     }
-    TEST_ASSERT_GREATER_THAN(FIT_LOAD_PARTS + 2, frames);
+    TEST_ASSERT_GREATER_THAN(FIT_DOUBT_PARTS + 2, frames);
   }
 }
 

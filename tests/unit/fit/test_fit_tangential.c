@@ -105,7 +105,7 @@ static struct fit_tangential go_on(struct fit_tangential_state *state, const int
   fit_gaussian(&array, readings, usable, &settings, &fit);
   struct fit_tangential result;
   memset(&result, 0xFF, sizeof result);
-  fit_tangential_load(&array, &pad, readings, &settings, &fit, state, &result);
+  fit_tangential_estimate(&array, &pad, readings, &settings, &fit, state, &result);
   return result;
 }
 
@@ -261,7 +261,7 @@ static void test_no_fit_gives_nothing(void) {
   struct fit_tangential_state state = {0};
   struct fit_tangential found;
   memset(&found, 0xFF, sizeof found);
-  fit_tangential_load(&array, &pad, readings, &settings, &start, &state, &found);
+  fit_tangential_estimate(&array, &pad, readings, &settings, &start, &state, &found);
   TEST_ASSERT_TRUE(is_zero(&found));
 }
 

@@ -68,7 +68,7 @@ Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, dou
   fit_gaussian_grid(&array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &fitting, &fit);
   fit_tangential_state state{};
   for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
-    fit_tangential_load(&array, &prepared, readings.data(), &fitting, &fit, &state, &found);
+    fit_tangential_estimate(&array, &prepared, readings.data(), &fitting, &fit, &state, &found);
   }
   contact_settings weighing{};
   tangential_settings settings{};

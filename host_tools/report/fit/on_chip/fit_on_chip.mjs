@@ -1,32 +1,32 @@
 /** Runs fits on the emulated chip one at a time and counts their cycles: the other half of main.c. */
-import { readFileSync } from 'node:fs';
 import { Chip, Stopped } from '../../../simulation/emulator/chip/chip.mjs';
 import { SimulatedTime } from '../../../simulation/emulator/clock.mjs';
 import { Report } from '../../../simulation/emulator/report.mjs';
 
-const rows = readFileSync(new URL('../../../../firmware/fit/kernels.h', import.meta.url), 'utf8').matchAll(/^ +ROW\((\w+),/gm);
 /** In the order of `kernels` in main.c. */
 export const KERNELS = [
   'nothing',
   'fit',
+  'grid',
+  'masked',
+  'general',
   'naive_float',
   'naive_double',
   'lm_float',
   'lm_double',
   'tangential',
-  'load_0',
-  'load_1',
-  'load_2',
-  'load_3',
-  'load_4',
-  'load_5',
+  'doubt_0',
+  'doubt_1',
+  'doubt_2',
+  'doubt_3',
+  'doubt_4',
+  'doubt_5',
   'gains_of_touch',
   'shapes_first_0',
   'shapes_first_1',
   'shapes_0',
   'shapes_1',
   'shapes_2',
-  ...[...rows].map((row) => row[1]),
 ];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */

@@ -4,11 +4,10 @@
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
+#include "fit/fit_doubt.h"
 #include "fit/fit_gains.h"
-#include "fit/fit_load.h"
 #include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
-#include "fit/kernels.h"
 #include "port/port.h"
 
 #include <stddef.h>
@@ -40,7 +39,7 @@ static struct fit_result contact;
 static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
-static struct fit_load load;
+static struct fit_doubt doubt;
 static struct fit_gains gains;
 static struct fit_shapes_pad shapes_pad;
 static struct fit_shapes_state shapes_state;
@@ -54,21 +53,24 @@ static void fit(void) {
   job.y_mm = contact.y_mm;
 }
 
-/* One for each row of fit/kernels.h. */
-#define OF_THE_FIRMWARE(name, suits, fits)                                                                             \
-  static void name(void) {                                                                                             \
-    const struct fit_array *array = &layout;                                                                           \
-    const struct fit_settings *settings = &chosen;                                                                     \
-    struct fit_result *result = &contact;                                                                              \
-    const int32_t *pressure_Pa_q10 = job.pressure_Pa_q10;                                                              \
-    uint32_t usable = job.usable;                                                                                      \
-    (void)usable;                                                                                                      \
-    fits;                                                                                                              \
-    job.x_mm = contact.x_mm;                                                                                           \
-    job.y_mm = contact.y_mm;                                                                                           \
-  }
-FIT_GRID_KERNELS(OF_THE_FIRMWARE)
-FIT_OTHER_KERNELS(OF_THE_FIRMWARE)
+/* The kernels behind it, one by one. */
+static void grid(void) {
+  fit_grid(&layout, job.pressure_Pa_q10, &chosen, &contact);
+  job.x_mm = contact.x_mm;
+  job.y_mm = contact.y_mm;
+}
+
+static void masked(void) {
+  fit_grid_masked(&layout, job.pressure_Pa_q10, job.usable, &chosen, &contact);
+  job.x_mm = contact.x_mm;
+  job.y_mm = contact.y_mm;
+}
+
+static void general(void) {
+  fit_general(&layout, job.pressure_Pa_q10, job.usable, &chosen, &contact);
+  job.x_mm = contact.x_mm;
+  job.y_mm = contact.y_mm;
+}
 
 /* Of 12 mm of rubber. */
 static const struct pad_profile profile = {
@@ -87,26 +89,28 @@ static void tangential(void) {
   struct fit_settings settings = chosen;
   settings.dip_share = 0.0125f;
   settings.dip_sd_mm = 14.0f;
-  fit_tangential_load(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state, &tangential_result);
+  fit_tangential_estimate(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state,
+                          &tangential_result);
   job.x_mm = tangential_result.x_mm;
   job.y_mm = tangential_result.y_mm;
 }
 
-/* One part of a look, after `fit` of the same readings and the parts before, which are not counted. */
-static void follow_load(void) {
-  fit_load_follow(&load, &layout, job.pressure_Pa_q10, &chosen, &contact);
+/* One part of a search for a tangential force, after `fit` of the same readings and the parts before,
+ * which are not counted. */
+static void follow_doubt(void) {
+  fit_doubt_follow(&doubt, &layout, job.pressure_Pa_q10, &chosen, &contact);
 }
-#define LOAD_PART(part)                                                                                                \
-  static void load_##part(void) {                                                                                      \
-    follow_load();                                                                                                     \
+#define DOUBT_PART(part)                                                                                               \
+  static void doubt_##part(void) {                                                                                     \
+    follow_doubt();                                                                                                    \
   }
-LOAD_PART(0)
-LOAD_PART(1)
-LOAD_PART(2)
-LOAD_PART(3)
-LOAD_PART(4)
-LOAD_PART(5)
-static void (*const load_parts[FIT_LOAD_PARTS])(void) = {load_0, load_1, load_2, load_3, load_4, load_5};
+DOUBT_PART(0)
+DOUBT_PART(1)
+DOUBT_PART(2)
+DOUBT_PART(3)
+DOUBT_PART(4)
+DOUBT_PART(5)
+static void (*const doubt_parts[FIT_DOUBT_PARTS])(void) = {doubt_0, doubt_1, doubt_2, doubt_3, doubt_4, doubt_5};
 
 /* A touch that rests, after `fit` of the same readings. */
 static void gains_of_touch(void) {
@@ -150,13 +154,11 @@ ALTERNATIVE(naive_double, naive, double)
 ALTERNATIVE(lm_float, lm, float)
 ALTERNATIVE(lm_double, lm, double)
 
-#define NAME(name, suits, fits) name,
-/* The order is that of KERNELS in fit_on_chip.mjs: the rows of fit/kernels.h are the last. */
-static void (*const kernels[])(void) = {
-    nothing,        fit,        naive_float, naive_double,   lm_float,
-    lm_double,      tangential, load_0,      load_1,         load_2,
-    load_3,         load_4,     load_5,      gains_of_touch, shapes_first_0,
-    shapes_first_1, shapes_0,   shapes_1,    shapes_2,       FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+/* The order is that of KERNELS in fit_on_chip.mjs. */
+static void (*const kernels[])(void) = {nothing,        fit,      grid,      masked,     general,        naive_float,
+                                        naive_double,   lm_float, lm_double, tangential, doubt_0,        doubt_1,
+                                        doubt_2,        doubt_3,  doubt_4,   doubt_5,    gains_of_touch, shapes_first_0,
+                                        shapes_first_1, shapes_0, shapes_1,  shapes_2};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK ||
@@ -195,12 +197,12 @@ int main(void) {
         }
       }
     }
-    for (int part = 0; part < FIT_LOAD_PARTS; part++) {
-      if (kernel == load_parts[part]) {
+    for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
+      if (kernel == doubt_parts[part]) {
         fit();
-        fit_load_begin(&load);
+        fit_doubt_begin(&doubt);
         for (int before = 0; before < part; before++) {
-          follow_load();
+          follow_doubt();
         }
       }
     }

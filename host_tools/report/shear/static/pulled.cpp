@@ -100,7 +100,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
     }
     found = {};
     if (tangential_is_worthwhile(&fit, saturated)) {
-      fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &state, &found);
+      fit_tangential_estimate(&array_, &fit_pad_, readings.data(), &settings, &fit, &state, &found);
     } else {
       state = {};
     }

@@ -11,7 +11,7 @@
 extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "fit/fit_load.h"
+#include "fit/fit_doubt.h"
 }
 
 #include <algorithm>
@@ -116,11 +116,11 @@ public:
       }
       fit_result result;
       fit_gaussian_grid(&array, pressure, (1u << geometry.sensor_count) - 1u, &settings, &result);
-      fit_load load{};
-      for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) { // held until it has looked
-        fit_load_follow(&load, &array, pressure, &settings, &result);
+      fit_doubt load{};
+      for (int frame = 0; frame < FIT_DOUBT_PARTS; frame++) { // held until it has looked
+        fit_doubt_follow(&load, &array, pressure, &settings, &result);
       }
-      fit_load_widen(&load, &array, &settings, &result);
+      fit_doubt_widen(&load, &array, &settings, &result);
       felt.location_mm.push_back(
           std::hypot(static_cast<double>(result.x_mm) - tap.x_mm, static_cast<double>(result.y_mm) - tap.y_mm));
       felt.force.push_back(static_cast<double>(result.force_N) / tap.force_N);

@@ -2,7 +2,7 @@
 //
 // Touches of the twin's objects on pads (touches.hpp) go through the firmware's fit_gaussian_grid
 // with the settings that the firmware starts with; those that pull along the rubber also through
-// its look for a load that is not estimated (fit_load.h). One JSON object on the standard output:
+// its look for a load that is not estimated (fit_doubt.h). One JSON object on the standard output:
 // the keys that are judged, and under "cases", "loaded", "elongated", "iterations" and
 // "few_sensors" the tables behind them. The constants of fit_limits.h and defaults.h were chosen
 // with --seed 1.
@@ -15,8 +15,8 @@
 extern "C" {
 #include "common/contact_flags.h"
 #include "config/defaults.h"
+#include "fit/fit_doubt.h"
 #include "fit/fit_gains.h"
-#include "fit/fit_load.h"
 }
 
 #include <algorithm>
@@ -203,13 +203,13 @@ Results run(const Case &c, const Options &options) {
       fit_result fit;
       fit_gaussian_grid(&array, readings.data(), usable, &settings, &fit);
       if (!c.pulled.empty()) { // held until the firmware has looked for the load
-        fit_load load{};
-        for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) {
-          fit_load_follow(&load, &array, readings.data(), &settings, &fit);
+        fit_doubt load{};
+        for (int frame = 0; frame < FIT_DOUBT_PARTS; frame++) {
+          fit_doubt_follow(&load, &array, readings.data(), &settings, &fit);
           readings = readings_of(array, contact, touch, pad, noise_Pa, random);
           fit_gaussian_grid(&array, readings.data(), usable, &settings, &fit);
         }
-        fit_load_widen(&load, &array, &settings, &fit);
+        fit_doubt_widen(&load, &array, &settings, &fit);
       }
       if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
         continue; // no positive reading among the sensors in use

@@ -15,7 +15,7 @@
 extern "C" {
 #include "common/contact_flags.h"
 #include "contact/shapes.h"
-#include "fit/fit_load.h"
+#include "fit/fit_doubt.h"
 }
 
 #include <algorithm>
@@ -359,7 +359,7 @@ Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &op
       question.parts = FIT_SHAPES_PARTS;
       question.settings = settings;
       fit_result &fit = question.fit;
-      fit_load doubt{};
+      fit_doubt doubt{};
       shear::Said loaded{};
       const bool has_load =
           load_estimate.feel(base, known, noise_Pa, shear::ALL_SENSORS, of_load, loaded) && loaded.valid;
@@ -372,10 +372,10 @@ Answers run(const Case &c, const std::vector<DippedPad> &pads, const Options &op
         }
         fit_gaussian_grid(&array, readings, shear::ALL_SENSORS, &settings, &fit);
         shapes_estimate(&shapes);
-        fit_load_follow(&doubt, &array, readings, &settings, &fit);
+        fit_doubt_follow(&doubt, &array, readings, &settings, &fit);
         const bool first = frame == FIT_SHAPES_FRAMES - 1;
         if (first || frame == FIT_SHAPES_FRAMES + HELD_FRAMES - 1) {
-          fit_load_widen(&doubt, &array, &settings, &fit);
+          fit_doubt_widen(&doubt, &array, &settings, &fit);
           const shapes_place shown = shapes_locate(&shapes.report, &fit, has_load ? &loaded.load : nullptr);
           fit_shapes_result said = shapes.result;
           said.shape = shapes.report.shape; // which stays, while what is none of these begins again

@@ -1,6 +1,6 @@
 /* A load that is not estimated: its trace in the residual, and what that makes of the error. */
 #include "common/contact_flags.h"
-#include "fit/fit_load.h"
+#include "fit/fit_doubt.h"
 #include "support/grid.h"
 #include "support/random.h"
 #include "unity.h"
@@ -48,13 +48,13 @@ static struct fit_settings usual(void) {
 }
 
 /* A press that is held until the look has ended. */
-static void hold(struct fit_load *load, const int32_t *pressure_Pa_q10, uint32_t usable,
+static void hold(struct fit_doubt *load, const int32_t *pressure_Pa_q10, uint32_t usable,
                  const struct fit_settings *settings, struct fit_result *result) {
   fit_gaussian(&array, pressure_Pa_q10, usable, settings, result);
-  for (int part = 0; part < FIT_LOAD_PARTS; part++) {
-    fit_load_follow(load, &array, pressure_Pa_q10, settings, result);
+  for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
+    fit_doubt_follow(load, &array, pressure_Pa_q10, settings, result);
   }
-  fit_load_widen(load, &array, settings, result);
+  fit_doubt_widen(load, &array, settings, result);
 }
 
 static void test_a_load_is_part_of_the_error(void) {
@@ -67,7 +67,7 @@ static void test_a_load_is_part_of_the_error(void) {
     int32_t pressure_Pa_q10[SENSORS];
     press(x_mm, y_mm, ratio * cos(angle), ratio * sin(angle), pressure_Pa_q10);
     struct fit_result result;
-    struct fit_load load = {0};
+    struct fit_doubt load = {0};
     hold(&load, pressure_Pa_q10, ALL, &settings, &result);
     double error_mm = hypot((double)result.x_mm - x_mm, (double)result.y_mm - y_mm);
     TEST_ASSERT_TRUE(error_mm > 0.6);
@@ -88,7 +88,7 @@ static void test_without_a_load_little_is_added(void) {
     int32_t pressure_Pa_q10[SENSORS];
     press(random_between(&noise, -9.0, 9.0), random_between(&noise, -18.0, 18.0), 0.0, 0.0, pressure_Pa_q10);
     struct fit_result with, without;
-    struct fit_load load = {0};
+    struct fit_doubt load = {0};
     fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &without);
     hold(&load, pressure_Pa_q10, ALL, &settings, &with);
     TEST_ASSERT_TRUE(with.location_sd_mm >= without.location_sd_mm * 0.999f);
@@ -104,20 +104,20 @@ static void test_before_the_first_look_a_load_is_assumed(void) {
   press(2.0, 3.0, 0.0, 0.0, pressure_Pa_q10);
   struct fit_result fitted;
   fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fitted);
-  struct fit_load load = {0};
+  struct fit_doubt load = {0};
   for (int contact = 0; contact < 2; contact++) {
-    for (int part = 0; part < FIT_LOAD_PARTS; part++) {
+    for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
       struct fit_result result = fitted;
-      fit_load_widen(&load, &array, &settings, &result);
-      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_LOAD_USUAL * 0.38f * 9.0f),
+      fit_doubt_widen(&load, &array, &settings, &result);
+      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_DOUBT_USUAL * 0.38f * 9.0f),
                                result.location_sd_mm);
       TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_UNCERTAIN);
-      fit_load_follow(&load, &array, pressure_Pa_q10, &settings, &result);
+      fit_doubt_follow(&load, &array, pressure_Pa_q10, &settings, &result);
     }
     struct fit_result result = fitted;
-    fit_load_widen(&load, &array, &settings, &result);
+    fit_doubt_widen(&load, &array, &settings, &result);
     TEST_ASSERT_TRUE(result.location_sd_mm < fitted.location_sd_mm + 0.1f);
-    fit_load_begin(&load);
+    fit_doubt_begin(&load);
   }
 }
 
@@ -128,14 +128,14 @@ static void test_a_look_does_not_mix_frames(void) {
   press(2.0, 3.0, 0.4, 0.1, loaded_Pa_q10);
   press(-5.0, 8.0, 0.0, 0.0, other_Pa_q10);
   struct fit_result loaded, other;
-  struct fit_load held = {0}, moved = {0};
+  struct fit_doubt held = {0}, moved = {0};
   hold(&held, loaded_Pa_q10, ALL, &settings, &loaded);
   fit_gaussian(&array, loaded_Pa_q10, ALL, &settings, &loaded);
   fit_gaussian(&array, other_Pa_q10, ALL, &settings, &other);
-  fit_load_follow(&moved, &array, loaded_Pa_q10, &settings, &loaded);
-  for (int part = 1; part < FIT_LOAD_PARTS; part++) {
+  fit_doubt_follow(&moved, &array, loaded_Pa_q10, &settings, &loaded);
+  for (int part = 1; part < FIT_DOUBT_PARTS; part++) {
     TEST_ASSERT_FALSE(moved.known);
-    fit_load_follow(&moved, &array, other_Pa_q10, &settings, &other);
+    fit_doubt_follow(&moved, &array, other_Pa_q10, &settings, &other);
   }
   TEST_ASSERT_TRUE(moved.known);
   TEST_ASSERT_TRUE(held.ratio > 0.2f);
@@ -167,7 +167,7 @@ static void test_a_dip_that_is_known_is_no_load(void) {
         pressure_Pa_q10[k] -=
             (int32_t)(0.05 * 1024.0 * (double)result.p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * 14.0 * 14.0)));
       }
-      struct fit_load held = {0};
+      struct fit_doubt held = {0};
       hold(&held, pressure_Pa_q10, ALL, &settings, &result);
       warned[i % 2] += (result.flags & CONTACT_FLAG_UNCERTAIN) != 0;
     }
@@ -184,7 +184,7 @@ static void test_sensors_may_be_missing(void) {
   press(2.0, 3.0, 0.4, 0.1, pressure_Pa_q10);
   for (int k = 0; k < SENSORS; k++) {
     struct fit_result result;
-    struct fit_load load = {0};
+    struct fit_doubt load = {0};
     hold(&load, pressure_Pa_q10, ALL & ~(UINT32_C(1) << k), &settings, &result);
     TEST_ASSERT_TRUE(load.known);
     TEST_ASSERT_TRUE_MESSAGE(result.flags & CONTACT_FLAG_UNCERTAIN, "one is enough to hide it");
@@ -197,10 +197,10 @@ static void test_few_sensors_see_no_load(void) {
   int32_t pressure_Pa_q10[SENSORS];
   press(2.0, 3.0, 0.0, 0.0, pressure_Pa_q10);
   struct fit_result result;
-  struct fit_load load = {0};
-  hold(&load, pressure_Pa_q10, (UINT32_C(1) << (FIT_LOAD_SENSORS - 1)) - 1, &settings, &result);
+  struct fit_doubt load = {0};
+  hold(&load, pressure_Pa_q10, (UINT32_C(1) << (FIT_DOUBT_SENSORS - 1)) - 1, &settings, &result);
   TEST_ASSERT_FALSE(load.known);
-  TEST_ASSERT_TRUE(result.location_sd_mm > FIT_LOAD_USUAL * 0.38f * 9.0f);
+  TEST_ASSERT_TRUE(result.location_sd_mm > FIT_DOUBT_USUAL * 0.38f * 9.0f);
 }
 
 static void test_what_is_no_fit_stays_as_it_is(void) {
@@ -215,10 +215,10 @@ static void test_what_is_no_fit_stays_as_it_is(void) {
     struct fit_result result = fitted;
     result.flags = flags[i];
     result.location_sd_mm = 0.1f;
-    struct fit_load load = {0};
-    for (int frame = 0; frame < 2 * FIT_LOAD_PARTS; frame++) {
-      fit_load_widen(&load, &array, &settings, &result);
-      fit_load_follow(&load, &array, pressure_Pa_q10, &settings, &result);
+    struct fit_doubt load = {0};
+    for (int frame = 0; frame < 2 * FIT_DOUBT_PARTS; frame++) {
+      fit_doubt_widen(&load, &array, &settings, &result);
+      fit_doubt_follow(&load, &array, pressure_Pa_q10, &settings, &result);
     }
     TEST_ASSERT_FALSE(load.known);
     TEST_ASSERT_EQUAL_FLOAT(0.1f, result.location_sd_mm);
@@ -245,7 +245,7 @@ static void test_what_is_the_sensors_own_is_no_load(void) {
       struct fit_settings settings = usual();
       fit_set_errors(&settings, 0.002f, 0.0065f);
       settings.own = known ? own : NULL;
-      struct fit_load load = {0};
+      struct fit_doubt load = {0};
       struct fit_result result;
       hold(&load, pressure_Pa_q10, ALL, &settings, &result);
       loads[known] += load.known && load.ratio > 0.1f;

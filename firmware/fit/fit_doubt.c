@@ -1,4 +1,4 @@
-#include "fit/fit_load.h"
+#include "fit/fit_doubt.h"
 
 #include "common/contact_flags.h"
 #include "fit/fit_grid_parts.h"
@@ -17,7 +17,7 @@
  * are such steps.
  */
 enum { HEIGHT, ALONG_X, ALONG_Y, WIDTH, FAR, PULL_X, PULL_Y, UNKNOWNS };
-_Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
+_Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 
 #define FAR_Q16 10486  /* 1 / 6.25: the variance of the dip that the recordings of real pads show */
 #define PULL_SHIFT 2   /* 1 / 4: the layer's wide terms under the contacts of the twin */
@@ -49,7 +49,8 @@ _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
 #define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
 #define OWN_MAX_Q12 ((int32_t)(FIT_OWN_SHARE_MAX * 4096.0f))
 
-static void set_dip(const struct fit_settings *settings, const struct fit_result *result, struct fit_load_look *look) {
+static void set_dip(const struct fit_settings *settings, const struct fit_result *result,
+                    struct fit_doubt_search *look) {
   look->dip_q18 = look->dip_per_q26 = 0;
   if (fit_has_dip(settings)) {
     struct scaled ratio = scaled_div(fit_grid_scaled(result->sigma_mm), fit_grid_scaled(settings->dip_sd_mm));
@@ -59,7 +60,8 @@ static void set_dip(const struct fit_settings *settings, const struct fit_result
 }
 
 /* 2^shift: the readings' unit, 1/1024 Pa. */
-static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift, struct fit_load_look *look) {
+static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift,
+                     struct fit_doubt_search *look) {
   int32_t noise_q4 = fixed_clamp(shifted(settings->noise_Pa_q10, 4 - shift), 1, ERROR_MAX_Q4);
   int32_t model_q4 = (int32_t)((settings->model_sd_q16 * (uint32_t)shifted(largest, -shift)) >> 12);
   look->base_q4 = fixed_clamp(fixed_longer_leg(noise_q4, model_q4 >> MODEL_SHARE_SHIFT), 1, ERROR_MAX_Q4);
@@ -78,7 +80,7 @@ enum { AT_X_Q12, AT_Y_Q12, READING_Q18, GAIN_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q15
 /* False: there is nothing to be seen in so few or such readings. */
 static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                           const struct fit_settings *settings, const struct fit_result *result,
-                          struct fit_load_look *look) {
+                          struct fit_doubt_search *look) {
   int32_t largest = 0;
   int count = 0;
   for (int k = 0; k < array->sensor_count; k++) {
@@ -87,7 +89,7 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
       count++;
     }
   }
-  if (count < FIT_LOAD_SENSORS || count > FIT_LOAD_SENSORS_MAX || largest <= 0) {
+  if (count < FIT_DOUBT_SENSORS || count > FIT_DOUBT_SENSORS_MAX || largest <= 0) {
     return false;
   }
   look->count = count;
@@ -124,7 +126,7 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
   return true;
 }
 
-static NOINLINE void set_row(struct fit_load_look *look, int32_t *row) {
+static NOINLINE void set_row(struct fit_doubt_search *look, int32_t *row) {
   int32_t x = row[AT_X_Q12], y = row[AT_Y_Q12], reading_q18 = row[READING_Q18];
   int32_t square_q20 = (int32_t)(((uint32_t)(x * x) + (uint32_t)(y * y)) >> 4);
   uint32_t z = (uint32_t)fixed_mul_q30(square_q20 * 4, 774541002); /* log2(e) / 2, Q22 */
@@ -155,14 +157,14 @@ static NOINLINE void set_row(struct fit_load_look *look, int32_t *row) {
   }
 }
 
-static void set_rows(struct fit_load_look *look, int from, int to) {
+static void set_rows(struct fit_doubt_search *look, int from, int to) {
   for (int k = from; k < to; k++) {
     set_row(look, look->row[k]);
   }
 }
 
 /* Brings a column to 13 bits, or so many that the sums hold, and returns the sum of its squares. */
-static NOINLINE int32_t normalise(struct fit_load_look *look, int u, int32_t prior_q30) {
+static NOINLINE int32_t normalise(struct fit_doubt_search *look, int u, int32_t prior_q30) {
   int32_t shift = fixed_bits(look->size[u] | fixed_size(prior_q30)) - (look->count > 16 ? 12 : 13);
   shift = shift < 1 ? 1 : shift;
   look->q[u] = (int8_t)(30 - shift);
@@ -178,7 +180,7 @@ static NOINLINE int32_t normalise(struct fit_load_look *look, int u, int32_t pri
   return own;
 }
 
-static NOINLINE void put_products(int a, const int32_t *sums, struct fit_load_look *look) {
+static NOINLINE void put_products(int a, const int32_t *sums, struct fit_doubt_search *look) {
   const int8_t *up = look->up;
   for (int k = 0, b = a; k < 3; k++) {
     b = b == UNKNOWNS - 1 ? 0 : b + 1;
@@ -189,7 +191,7 @@ static NOINLINE void put_products(int a, const int32_t *sums, struct fit_load_lo
 
 _Static_assert(UNKNOWNS == 7, "every pair is in one of these");
 #define TAKE_PRODUCTS(a)                                                                                               \
-  static NOINLINE void take_products_##a(struct fit_load_look *look) {                                                 \
+  static NOINLINE void take_products_##a(struct fit_doubt_search *look) {                                              \
     int32_t sums[4];                                                                                                   \
     const int32_t *row = look->row[0];                                                                                 \
     fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7); \
@@ -204,7 +206,7 @@ TAKE_PRODUCTS(5)
 TAKE_PRODUCTS(6)
 
 /* Columns in the room that the sums have, and the diagonal 2^28 .. 2^30. */
-static void scale_columns(struct fit_load_look *look) {
+static void scale_columns(struct fit_doubt_search *look) {
   int32_t prior_q30 = fit_scaled_to_fixed(scaled_mul(look->base, fit_scaled_from(FAR_PER_SD, 0)), 30);
   for (int u = 0; u < UNKNOWNS; u++) {
     int32_t own = normalise(look, u, u == FAR ? prior_q30 : 0);
@@ -216,7 +218,7 @@ static void scale_columns(struct fit_load_look *look) {
   look->residual_square = normalise(look, RESIDUAL, 0);
 }
 
-static void take_products(struct fit_load_look *look) {
+static void take_products(struct fit_doubt_search *look) {
   take_products_0(look);
   take_products_1(look);
   take_products_2(look);
@@ -227,14 +229,14 @@ static void take_products(struct fit_load_look *look) {
 }
 
 /* What the unknown explains of the square of the residual. */
-static NOINLINE int32_t eliminate(struct fit_load_look *look, int j) {
+static NOINLINE int32_t eliminate(struct fit_doubt_search *look, int j) {
   int32_t over[UNKNOWNS];
   struct fixed_pivot pivot = fixed_eliminate(look->matrix[0], UNKNOWNS, UNKNOWNS, j, look->right, over);
   return pivot.own * pivot.over * 2;
 }
 
 /* The square of the trace's coefficients beyond what they are by chance, 0 where there is none. */
-static NOINLINE struct scaled trace_of(struct fit_load_look *look) {
+static NOINLINE struct scaled trace_of(struct fit_doubt_search *look) {
   const struct scaled none = {0, 0};
   int32_t left = look->residual_square;
   for (int j = 0; j < UNKNOWNS; j++) {
@@ -274,28 +276,28 @@ static bool is_located(const struct fit_result *result) {
   return (result->flags & CONTACT_FLAG_FIT_VALID) && !(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT));
 }
 
-void fit_load_begin(struct fit_load *load) {
+void fit_doubt_begin(struct fit_doubt *load) {
   load->known = false;
   load->part = 0;
 }
 
-void fit_load_widen(const struct fit_load *load, const struct fit_array *array, const struct fit_settings *settings,
-                    struct fit_result *result) {
+void fit_doubt_widen(const struct fit_doubt *load, const struct fit_array *array, const struct fit_settings *settings,
+                     struct fit_result *result) {
   if (!is_located(result) || (load->known && load->ratio == 0.0f)) {
     return;
   }
   float by_pitch = SHIFT_PER_PITCH * array->pitch_mm;
   float by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
-  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, load->known ? load->ratio : FIT_LOAD_USUAL,
+  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, load->known ? load->ratio : FIT_DOUBT_USUAL,
                                           by_pitch > by_sigma ? by_pitch : by_sigma);
   if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }
 }
 
-void fit_load_follow(struct fit_load *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                     const struct fit_settings *settings, const struct fit_result *result) {
-  struct fit_load_look *look = &load->look;
+void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                      const struct fit_settings *settings, const struct fit_result *result) {
+  struct fit_doubt_search *look = &load->look;
   switch (load->part) {
   case 0:
     if (!is_located(result) || !take_readings(array, pressure_Pa_q10, settings, result, look)) {
@@ -321,5 +323,5 @@ void fit_load_follow(struct fit_load *load, const struct fit_array *array, const
     load->known = true;
   }
   }
-  load->part = (uint8_t)((load->part + 1) % FIT_LOAD_PARTS);
+  load->part = (uint8_t)((load->part + 1) % FIT_DOUBT_PARTS);
 }

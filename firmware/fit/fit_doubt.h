@@ -1,0 +1,71 @@
+/* What a tangential load that is not estimated does to the location.
+ *
+ * A load that pulls along the rubber moves the Gaussian by some 0.38 pitch for each unit of Q / F,
+ * though nothing has moved. It leaves a trace in the residual: its pressure is broader than the
+ * difference of two places of a contact. The look here finds how large that trace is, beyond what
+ * noise, gains and model leave by chance. So much of a load is part of the location's error. A
+ * press without a load has no such trace, so it is not doubted for what it might carry.
+ *
+ * A look is one least squares in fixed point, of the residual of a fit that is done: for every
+ * kernel, any layout, any sensors missing. A load changes slowly. So a look is in parts, one a
+ * frame, for the time after the frame's packet, and the frames that follow use what it finds. Until
+ * a contact's first look has ended, and where there is none, the load is taken to be
+ * FIT_DOUBT_USUAL. NUMERICS.md has the derivation and the price. */
+#ifndef FIT_FIT_DOUBT_H
+#define FIT_FIT_DOUBT_H
+
+#include "fit/fit.h"
+#include "fit/fit_fixed.h"
+
+/* With fewer sensors the residual shows nothing. With more than 24 there is no look, unless the
+ * build is for a larger rectangle. */
+#define FIT_DOUBT_SENSORS 8
+#define FIT_DOUBT_SENSORS_MAX (FIT_GRID_COLUMNS * FIT_GRID_ROWS > 24 ? FT_MAX_SENSORS : 24)
+
+/* Q / F that is usual in a gripper. */
+#define FIT_DOUBT_USUAL 0.2f
+
+/* Parts of a look: with fifteen sensors none takes more than 5800 cycles on a Cortex-M0+, nor all
+ * more than 25 000 (test emulated.fit_cycles). */
+#define FIT_DOUBT_PARTS 6
+
+#define FIT_DOUBT_UNKNOWNS 7
+
+/* A look under way. Errors of readings are in sixteenths of the unit that the readings have. */
+struct fit_doubt_search {
+  int count;                                                  /* of its sensors */
+  int32_t row[FIT_DOUBT_SENSORS_MAX][FIT_DOUBT_UNKNOWNS + 1]; /* weighted; the last: the residual */
+  uint32_t size[FIT_DOUBT_UNKNOWNS + 1];                      /* the highest bit: a column's largest */
+  int8_t q[FIT_DOUBT_UNKNOWNS + 1];                           /* value = integer 2^-q */
+  int8_t up[FIT_DOUBT_UNKNOWNS];                              /* of q, what the equations have more */
+  int32_t base_q4;                                            /* error of a reading of weight 1 */
+  struct scaled base;                                         /* the same, of p0 */
+  int32_t dip_q18;                                            /* of p0 */
+  int32_t dip_per_q26;                                        /* sigma^2 over the dip's sd^2 */
+  int32_t matrix[FIT_DOUBT_UNKNOWNS][FIT_DOUBT_UNKNOWNS];     /* lower half of the normal matrix */
+  int32_t right[FIT_DOUBT_UNKNOWNS];
+  int32_t residual_square;
+};
+
+/* Of one contact, from frame to frame. All zeros are as fit_doubt_begin leaves it. */
+struct fit_doubt {
+  bool known;
+  uint8_t part; /* of the look: which is next */
+  float ratio;  /* Q / F, if known */
+  struct fit_doubt_search look;
+};
+
+/* At each frame without a contact, or whose load is estimated otherwise. */
+void fit_doubt_begin(struct fit_doubt *load);
+
+/* Adds to location_sd_mm what the load does, as far as it is known, and sets UNCERTAIN if that
+ * exceeds the limit. Leaves a result alone that is no fit, stopped at a limit, or is FLAT. */
+void fit_doubt_widen(const struct fit_doubt *load, const struct fit_array *array, const struct fit_settings *settings,
+                     struct fit_result *result);
+
+/* The next part of a look. A look begins with these readings, which are those of the result; its
+ * later parts do not see them. A result that fit_doubt_widen leaves alone begins none. */
+void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                      const struct fit_settings *settings, const struct fit_result *result);
+
+#endif
