@@ -6,8 +6,7 @@ extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
-#include "fit/fit_load.h"
-#include "fit/kernels.h"
+#include "fit/fit_doubt.h"
 }
 
 using namespace fingertip::measure;
@@ -60,17 +59,22 @@ static Kernel kernel_named(const std::string &name) {
   if (name == "fit_grid") {
     return fit_gaussian_grid;
   }
-#define ROW_OF(row, suits, fits)                                                                                       \
-  if (name == #row) {                                                                                                  \
-    return []([[maybe_unused]] const fit_array *array, const std::int32_t *pressure_Pa_q10,                            \
-              [[maybe_unused]] std::uint32_t usable, const fit_settings *settings, fit_result *result) { fits; };      \
+  if (name == "grid") {
+    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, std::uint32_t, const fit_settings *settings,
+              fit_result *result) { fit_grid(array, pressure_Pa_q10, settings, result); };
   }
-  FIT_GRID_KERNELS(ROW_OF)
-  FIT_OTHER_KERNELS(ROW_OF)
+  if (name == "masked") {
+    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+              const fit_settings *settings,
+              fit_result *result) { fit_grid_masked(array, pressure_Pa_q10, usable, settings, result); };
+  }
+  if (name == "general") {
+    return fit_general;
+  }
   throw std::invalid_argument("no kernel has the name " + name);
 }
 
-// kernel: a row of fit/kernels.h, "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid).
+// kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid).
 static void fit(std::string kernel, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
                 Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10,
                 Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
@@ -95,11 +99,11 @@ static void widen_held(Batch<const fit_array, 1> arrays, Batch<const fit_setting
   length_or_one(results, all_settings);
   in_parallel(results.size(), [&](std::size_t press) {
     const fit_settings settings = settings_of(all_settings, own, press);
-    fit_load load{};
+    fit_doubt doubt{};
     for (std::int64_t frame = 0; frame < frames; frame++) {
-      fit_load_follow(&load, array, pressure_Pa_q10.row(press), &settings, results.row(press));
+      fit_doubt_follow(&doubt, array, pressure_Pa_q10.row(press), &settings, results.row(press));
     }
-    fit_load_widen(&load, array, &settings, results.row(press));
+    fit_doubt_widen(&doubt, array, &settings, results.row(press));
   });
 }
 MEASURE_ENTRY(widen_held)

@@ -130,7 +130,7 @@ static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1>
       result = {};
       fit_gaussian_grid(array, pressure, usable.row(contact)[i] & ~left_out, &settings, &fit);
       if (tangential_is_worthwhile(&fit, left_out)) {
-        fit_tangential_load(array, pad.get(), pressure, &settings, &fit, &state, &result);
+        fit_tangential_estimate(array, pad.get(), pressure, &settings, &fit, &state, &result);
       } else {
         state = {};
       }
