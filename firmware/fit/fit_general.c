@@ -417,6 +417,171 @@ static void take_own_out(const struct fit_own *own, const struct parameters *at,
   }
 }
 
+/* One fit: what it starts from, and where its last iteration has led. */
+struct problem {
+  const struct fit_array *array;
+  const struct fit_settings *settings;
+  struct samples samples;
+  int32_t largest;   /* reading, 1/1024 Pa */
+  float scale;       /* 1 / largest */
+  float sum_squares; /* of the readings, in units of the largest */
+  int peak;          /* sample of the largest reading */
+  int unknowns;
+  struct prior prior;
+  struct dip dip;
+};
+struct solution {
+  struct parameters theta, before; /* after the last step, and where it was linearised */
+  struct normal_equations normal;  /* factorised */
+  float squares;                   /* sum of the squared residuals */
+  float moved;                     /* length of the last step, pitches */
+  bool deficient;                  /* the readings do not determine a direction */
+};
+
+static void take_samples(const int32_t *pressure_Pa_q10, uint32_t usable, struct problem *problem) {
+  const struct fit_array *array = problem->array;
+  const struct fit_settings *settings = problem->settings;
+  const float scale = problem->scale;
+  float guess_share = GUESS_NOISES * (float)settings->noise_Pa_q10 * scale;
+  guess_share = clamp(guess_share, GUESS_SHARE, 0.99f); /* the largest reading enters */
+  const bool has_dip = fit_has_dip(settings);
+  struct samples *samples = &problem->samples;
+  samples->count = 0;
+  problem->peak = 0;
+  problem->sum_squares = 0.0f;
+  for (uint8_t k = 0; k < array->sensor_count; k++) {
+    if (!(usable & UINT32_C(1) << k)) {
+      continue;
+    }
+    int n = samples->count++;
+    int32_t raw = pressure_Pa_q10[k], reading = fit_reading(settings, raw);
+    if (reading == problem->largest) {
+      problem->peak = n;
+    }
+    samples->sensor[n] = k;
+    samples->x[n] = array->x[k];
+    samples->y[n] = array->y[k];
+    samples->p[n] = clamp((float)(has_dip ? raw : reading) * scale, -1.0f, 1.0f);
+    samples->log2_q24[n] = samples->p[n] >= guess_share ? fit_log2_q24((uint32_t)reading) : INT32_MIN;
+    problem->sum_squares += samples->p[n] * samples->p[n];
+  }
+}
+
+/* The prior and the dip that are known of the pad. */
+static void set_known(struct problem *problem) {
+  const struct fit_settings *settings = problem->settings;
+  const float pitch_mm = problem->array->pitch_mm;
+  problem->prior = (struct prior){0.0f, 0.0f};
+  if (fit_has_prior(settings)) {
+    problem->prior.sigma = settings->prior_sigma_mm / pitch_mm;
+    problem->prior.weight = FIT_PRIOR_WEIGHT * pitch_mm / settings->prior_width_mm;
+  }
+  problem->dip = (struct dip){0.0f, 0.0f, 0.0f};
+  if (fit_has_dip(settings)) {
+    float sd = clamp(settings->dip_sd_mm / pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
+    problem->dip.share = settings->dip_share;
+    problem->dip.narrowness = 1.0f / (sd * sd);
+    problem->dip.log2_scale = 0.5f * LOG2_E * problem->dip.narrowness;
+  }
+}
+
+static void iterate(struct problem *problem, struct solution *solution) {
+  const struct fit_array *array = problem->array;
+  const struct fit_settings *settings = problem->settings;
+  struct parameters *theta = &solution->theta;
+  *theta = guess(&problem->samples, problem->peak);
+  int left = settings->iterations;
+  do {
+    if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
+      take_own_out(settings->own, theta, &problem->samples);
+    }
+    solution->squares = linearise(array, &problem->samples, problem->prior, &problem->dip, theta, &solution->normal);
+    solution->before = *theta;
+    solution->deficient = factorise(&solution->normal);
+    solution->moved = step(array, &solution->normal, theta);
+    if (left == 0) { /* the guess is asked for: the step only shows how good it is */
+      *theta = solution->before;
+    }
+    left--;
+  } while (left > 0);
+  theta->x = clamp(theta->x, array->x_min, array->x_max);
+  theta->y = clamp(theta->y, array->y_min, array->y_max);
+}
+
+static void set_values(const struct problem *problem, const struct solution *solution, struct fit_result *result) {
+  const struct parameters *theta = &solution->theta;
+  const float pitch = problem->array->pitch_mm;
+  float unit_Pa = (float)problem->largest * (1.0f / 1024.0f);
+  float sigma_mm = theta->sigma * pitch;
+  result->x_mm = theta->x * pitch;
+  result->y_mm = theta->y * pitch;
+  result->p0_Pa = theta->p0 * unit_Pa;
+  result->sigma_mm = sigma_mm;
+  result->force_N = TWO_PI * result->p0_Pa * sigma_mm * sigma_mm * 1e-6f;
+  result->residual_rms_Pa = unit_Pa * sqrtf(solution->squares / (float)problem->samples.count);
+}
+
+/* The flags that need no variance. */
+static uint32_t flags_of(const struct problem *problem, const struct solution *solution) {
+  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+  if (problem->settings->noise_Pa_q10 > problem->largest / FIT_LOW_SIGNAL_SIGMA) {
+    flags |= CONTACT_FLAG_LOW_SIGNAL;
+  }
+  if (solution->theta.sigma >= FIT_FLAT_SIGMA) {
+    flags |= CONTACT_FLAG_FLAT;
+  }
+  if (solution->squares > FIT_MODEL_RESIDUAL * FIT_MODEL_RESIDUAL * problem->sum_squares) {
+    flags |= CONTACT_FLAG_MODEL;
+  }
+  if (at_bound(problem->array, &solution->theta)) {
+    flags |= CONTACT_FLAG_AT_BOUND;
+  }
+  return flags;
+}
+
+/* Sets the standard deviations, from the last linearisation: a variance of the readings that is the same for all
+ * of them, and what their own errors make of the result; that of the prior is its own. Returns whether noise,
+ * gains and model do not explain the residuals. */
+static bool set_errors(const struct problem *problem, const struct solution *solution, uint32_t flags,
+                       struct fit_result *result) {
+  const struct fit_settings *settings = problem->settings;
+  const struct parameters *before = &solution->before;
+  const int count = problem->samples.count;
+  const float pitch = problem->array->pitch_mm;
+  struct influence influence;
+  set_influence(problem->array, before, &solution->normal, &influence);
+  struct own_errors own;
+  add_own_errors(&problem->samples, settings, &problem->dip, before, &influence, &own);
+  int freedom = count > problem->unknowns ? count - problem->unknowns : 1;
+  float noise = (float)settings->noise_Pa_q10 * problem->scale;
+  float model = (float)settings->model_sd_q16 * (1.0f / 65536.0f);
+  float variance = noise * noise + model * model;
+  float expected = variance + own.gains / (float)count;
+  float found = solution->squares / (float)freedom;
+  if (found > expected) {
+    float times = clamp(found / expected * (1.0f / FIT_MISFIT_BEGIN), 1.0f, FIT_MISFIT_MOST);
+    variance += times * (found - expected);
+  }
+  float location_variance = variance * influence.location_form + own.location;
+  float force_variance = variance * influence.force_form + own.force;
+  float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
+  if (problem->prior.weight > 0.0f && prior_excess > 0.0f) {
+    float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, problem->prior.weight * before->sigma * influence.gain};
+    float x = product(row, influence.x), y = product(row, influence.y);
+    float force = product(row, influence.force);
+    location_variance += prior_excess * (x * x + y * y);
+    force_variance += prior_excess * force * force;
+  }
+  location_variance += solution->moved * solution->moved;
+  if (solution->deficient || (flags & CONTACT_FLAG_AT_BOUND)) {
+    location_variance = FIT_BOUND_SD * FIT_BOUND_SD;
+  }
+  result->location_noise_mm = at_most(pitch * noise * sqrtf(influence.location_form), FIT_HUGE);
+  result->location_sd_mm = at_most(pitch * sqrtf(location_variance), FIT_HUGE);
+  result->force_sd_N = at_most(result->force_N * sqrtf(force_variance), FIT_HUGE);
+  return found > (float)(FIT_MISFIT * FIT_MISFIT) * expected;
+}
+
 /* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
  * sensor that does not belong to the others, or -1. */
 static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
@@ -428,149 +593,42 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   if (usable != all) {
     result->flags |= CONTACT_FLAG_SENSOR_MASKED;
   }
-  int32_t largest = largest_reading(array, pressure_Pa_q10, usable);
-  if (largest <= 0) {
+  struct problem problem;
+  problem.array = array;
+  problem.settings = settings;
+  problem.largest = largest_reading(array, pressure_Pa_q10, usable);
+  if (problem.largest <= 0) {
     result->flags |= CONTACT_FLAG_LOW_SIGNAL;
     return false;
   }
   if (settings->n_largest > 0) {
     usable = n_largest_of(array, pressure_Pa_q10, usable, settings->n_largest);
   }
-  float scale = 1.0f / (float)largest;
-  float guess_share = GUESS_NOISES * (float)settings->noise_Pa_q10 * scale;
-  guess_share = clamp(guess_share, GUESS_SHARE, 0.99f); /* the largest reading enters */
-  const bool has_dip = fit_has_dip(settings);
-  struct samples samples;
-  samples.count = 0;
-  int peak = 0;
-  float sum_squares = 0.0f;
-  for (uint8_t k = 0; k < array->sensor_count; k++) {
-    if (!(usable & UINT32_C(1) << k)) {
-      continue;
-    }
-    int n = samples.count++;
-    int32_t raw = pressure_Pa_q10[k], reading = fit_reading(settings, raw);
-    if (reading == largest) {
-      peak = n;
-    }
-    samples.sensor[n] = k;
-    samples.x[n] = array->x[k];
-    samples.y[n] = array->y[k];
-    samples.p[n] = clamp((float)(has_dip ? raw : reading) * scale, -1.0f, 1.0f);
-    samples.log2_q24[n] = samples.p[n] >= guess_share ? fit_log2_q24((uint32_t)reading) : INT32_MIN;
-    sum_squares += samples.p[n] * samples.p[n];
-  }
-  const int unknowns = array->is_line ? PARAMETERS - 1 : PARAMETERS;
-  if (samples.count < unknowns) {
+  problem.scale = 1.0f / (float)problem.largest;
+  problem.unknowns = array->is_line ? PARAMETERS - 1 : PARAMETERS;
+  take_samples(pressure_Pa_q10, usable, &problem);
+  if (problem.samples.count < problem.unknowns) {
     return false;
   }
-
-  struct parameters theta = guess(&samples, peak);
-  struct prior prior = {0.0f, 0.0f};
-  if (fit_has_prior(settings)) {
-    prior.sigma = settings->prior_sigma_mm / array->pitch_mm;
-    prior.weight = FIT_PRIOR_WEIGHT * array->pitch_mm / settings->prior_width_mm;
-  }
-  struct normal_equations normal;
-  struct parameters before;
-  float squares;
-  float moved;
-  bool deficient;
-  struct dip dip = {0.0f, 0.0f, 0.0f};
-  if (has_dip) {
-    float sd = clamp(settings->dip_sd_mm / array->pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
-    dip.share = settings->dip_share;
-    dip.narrowness = 1.0f / (sd * sd);
-    dip.log2_scale = 0.5f * LOG2_E * dip.narrowness;
-  }
-  int left = settings->iterations;
-  do {
-    if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
-      take_own_out(settings->own, &theta, &samples);
-    }
-    squares = linearise(array, &samples, prior, &dip, &theta, &normal);
-    before = theta;
-    deficient = factorise(&normal);
-    moved = step(array, &normal, &theta);
-    if (left == 0) { /* the guess is asked for: the step only tells how good it is */
-      theta = before;
-    }
-    left--;
-  } while (left > 0);
-  theta.x = clamp(theta.x, array->x_min, array->x_max);
-  theta.y = clamp(theta.y, array->y_min, array->y_max);
-
-  float pitch = array->pitch_mm;
-  float unit_Pa = (float)largest * (1.0f / 1024.0f);
-  float sigma_mm = theta.sigma * pitch;
+  set_known(&problem);
+  struct solution solution;
+  iterate(&problem, &solution);
   result->used = usable;
-  result->x_mm = theta.x * pitch;
-  result->y_mm = theta.y * pitch;
-  result->p0_Pa = theta.p0 * unit_Pa;
-  result->sigma_mm = sigma_mm;
-  result->force_N = TWO_PI * result->p0_Pa * sigma_mm * sigma_mm * 1e-6f;
-  result->residual_rms_Pa = unit_Pa * sqrtf(squares / (float)samples.count);
-
-  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
-  if (settings->noise_Pa_q10 > largest / FIT_LOW_SIGNAL_SIGMA) {
-    flags |= CONTACT_FLAG_LOW_SIGNAL;
-  }
-  if (theta.sigma >= FIT_FLAT_SIGMA) {
-    flags |= CONTACT_FLAG_FLAT;
-  }
-  bool rough = squares > FIT_ROUGH_RESIDUAL * FIT_ROUGH_RESIDUAL * sum_squares;
-  if (squares > FIT_MODEL_RESIDUAL * FIT_MODEL_RESIDUAL * sum_squares) {
-    flags |= CONTACT_FLAG_MODEL;
-  }
-  if (at_bound(array, &theta)) {
-    flags |= CONTACT_FLAG_AT_BOUND;
-  }
-
-  /* At the last linearisation. A variance of the readings that is the same for all of them, and
-   * what their own errors make of the result; that of the prior is its own. */
-  struct influence influence;
-  set_influence(array, &before, &normal, &influence);
-  struct own_errors own;
-  add_own_errors(&samples, settings, &dip, &before, &influence, &own);
-  int freedom = samples.count > unknowns ? samples.count - unknowns : 1;
-  float noise = (float)settings->noise_Pa_q10 * scale;
-  float model = (float)settings->model_sd_q16 * (1.0f / 65536.0f);
-  float variance = noise * noise + model * model;
-  float expected = variance + own.gains / (float)samples.count;
-  float found = squares / (float)freedom;
-  bool misfit = found > (float)(FIT_MISFIT * FIT_MISFIT) * expected;
-  if (found > expected) {
-    float times = clamp(found / expected * (1.0f / FIT_MISFIT_BEGIN), 1.0f, FIT_MISFIT_MOST);
-    variance += times * (found - expected);
-  }
-  float location_variance = variance * influence.location_form + own.location;
-  float force_variance = variance * influence.force_form + own.force;
-  float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
-  if (prior.weight > 0.0f && prior_excess > 0.0f) {
-    float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * before.sigma * influence.gain};
-    float x = product(row, influence.x), y = product(row, influence.y);
-    float force = product(row, influence.force);
-    location_variance += prior_excess * (x * x + y * y);
-    force_variance += prior_excess * force * force;
-  }
-  location_variance += moved * moved;
-  if (deficient || (flags & CONTACT_FLAG_AT_BOUND)) {
-    location_variance = FIT_BOUND_SD * FIT_BOUND_SD;
-  }
-  result->location_noise_mm = at_most(pitch * noise * sqrtf(influence.location_form), FIT_HUGE);
-  result->location_sd_mm = at_most(pitch * sqrtf(location_variance), FIT_HUGE);
-  result->force_sd_N = at_most(result->force_N * sqrtf(force_variance), FIT_HUGE);
+  set_values(&problem, &solution, result);
+  uint32_t flags = flags_of(&problem, &solution);
+  bool misfit = set_errors(&problem, &solution, flags, result);
   if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
   result->flags |= flags;
-  bool settled = moved * pitch <= FIT_SETTLED_mm;
-  if (!misfit || !rough || !settled) {
+  bool rough = solution.squares > FIT_ROUGH_RESIDUAL * FIT_ROUGH_RESIDUAL * problem.sum_squares;
+  if (!misfit || !rough || !(solution.moved * array->pitch_mm <= FIT_SETTLED_mm)) {
     return false;
   }
   bool selected = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if (samples.count > unknowns + 1 && !selected) {
-    *outlier = outlier_of(&samples, &dip, &before, &normal, squares, unknowns);
+  if (problem.samples.count > problem.unknowns + 1 && !selected) {
+    *outlier = outlier_of(&problem.samples, &problem.dip, &solution.before, &solution.normal, solution.squares,
+                          problem.unknowns);
   }
   return true;
 }

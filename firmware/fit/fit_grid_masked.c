@@ -310,8 +310,8 @@ static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, in
   return to_poly(share_q12, 15 - q, LIFT_LIMIT);
 }
 
-/* Columns, norms and factors from the model at the nodes. */
-static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge, struct columns *c) {
+/* The columns and their norms, from the polynomials of the iteration before. */
+static NOINLINE void fill_columns(const struct readings *readings, const struct ridge *ridge, struct columns *c) {
   set_mean(readings, c);
   struct dips dips;
   const struct polynomial *dip1 = NULL, *dip2 = NULL, *dip3 = NULL;
@@ -350,7 +350,11 @@ static NOINLINE void orthogonalise(const struct readings *readings, const struct
     c->lift2 = project_out(c, &c->node[0].p2, c->q2, &c->norm2);
     c->lift3 = project_out(c, &c->node[0].p3, c->q3, &c->norm3);
   }
+}
 
+/* Columns, norms and factors from the model at the nodes, and the polynomials of the next iteration. */
+static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge, struct columns *c) {
+  fill_columns(readings, ridge, c);
   int32_t g21 = 0, g31 = 0, g32 = 0;
   const struct node *node = c->node;
   UNROLL
@@ -368,12 +372,14 @@ static NOINLINE void orthogonalise(const struct readings *readings, const struct
   c->f32 = factor(g32, c->norm2);
   c->norm3 = remaining(c->norm3, times_factor(g31, c->f31) + times_factor(g32, c->f32));
 
-  cross = cross * (1 << COEFFICIENT_SHIFT) + to_poly(c->f21, c->q1 - c->q2, CROSS_LIMIT);
+  /* The coefficients with the precision that they are used with. */
+  const int32_t used = -(1 << COEFFICIENT_SHIFT);
+  int32_t cross = (c->cross & used) + to_poly(c->f21, c->q1 - c->q2, CROSS_LIMIT);
   int32_t tilt_x = to_poly(c->f31, c->q1 - c->q3, SKEW_LIMIT);
   int32_t tilt_y = to_poly(c->f32, c->q2 - c->q3, SKEW_LIMIT);
   c->cross = fixed_clamp(cross, -CROSS_LIMIT, CROSS_LIMIT);
-  tilt_x += skew_x * (1 << COEFFICIENT_SHIFT) - fixed_mul_q26(tilt_y, c->cross * LINEAR_TO_Q26);
-  tilt_y += skew_y * (1 << COEFFICIENT_SHIFT);
+  tilt_x += (c->skew_x & used) - fixed_mul_q26(tilt_y, c->cross * LINEAR_TO_Q26);
+  tilt_y += c->skew_y & used;
   c->skew_x = fixed_clamp(tilt_x, -SKEW_LIMIT, SKEW_LIMIT);
   c->skew_y = fixed_clamp(tilt_y, -SKEW_LIMIT, SKEW_LIMIT);
 }

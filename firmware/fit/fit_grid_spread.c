@@ -46,53 +46,75 @@ static void set_down(int32_t *down, int nodes, int origin, int32_t centre, int32
   }
 }
 
-NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings, const struct fit_system *system,
-                                    const struct fit_columns_q *columns, struct fit_spread *spread) {
+/* How far one unit of each column moves a coefficient of the step: the softness over its norm. */
+struct units {
+  struct scaled of1, of2, of3;
+};
+
+FIXED_INLINE void set_units(const struct fit_columns_q *columns, const struct fit_spread *spread, struct units *units) {
+  units->of1 = scaled_mul(spread->softness, spread->inverse1);
+  units->of2 = scaled_mul(spread->softness, spread->inverse2);
+  units->of3 = scaled_mul(spread->softness, spread->inverse3);
+  units->of1.exponent -= columns->q1;
+  units->of2.exponent -= columns->q2;
+  units->of3.exponent -= columns->q3;
+}
+
+FIXED_INLINE void set_location_moves(const struct fit_system *system, const struct units *units,
+                                     struct fit_spread *spread) {
   const struct state *at = &system->at;
-  spread->inverse_mass = fit_grid_reciprocal(fit_scaled_from(system->mass_q20, -20));
-  spread->inverse1 = fit_grid_reciprocal(system->d1);
-  spread->inverse2 = fit_grid_reciprocal(system->d2);
-  spread->inverse3 = fit_grid_reciprocal(system->d3);
-  spread->amplitude = fit_scaled_from(system->amplitude_q28, -28);
-  struct scaled softness = spread->softness = fit_grid_reciprocal(system->stiffness);
-  struct scaled unit1 = scaled_mul(softness, spread->inverse1);
-  struct scaled unit2 = scaled_mul(softness, spread->inverse2);
-  struct scaled unit3 = scaled_mul(softness, spread->inverse3);
-  unit1.exponent -= columns->q1;
-  unit2.exponent -= columns->q2;
-  unit3.exponent -= columns->q3;
   struct scaled values[5];
   int32_t aligned[5];
-  values[0] = unit1;
+  values[0] = units->of1;
   values[1] = (struct scaled){0, 0};
   if (system->cross != 0) {
-    values[1] = scaled_mul(unit2, fit_scaled_from(-system->cross, -26));
+    values[1] = scaled_mul(units->of2, fit_scaled_from(-system->cross, -26));
   }
-  values[2] = scaled_mul(unit3, fit_scaled_from(2 * at->x - system->slope_x, -26));
-  values[3] = unit2;
-  values[4] = scaled_mul(unit3, fit_scaled_from(2 * at->y - system->slope_y, -26));
+  values[2] = scaled_mul(units->of3, fit_scaled_from(2 * at->x - system->slope_x, -26));
+  values[3] = units->of2;
+  values[4] = scaled_mul(units->of3, fit_scaled_from(2 * at->y - system->slope_y, -26));
   spread->location_exponent = fit_grid_align(values, 5, aligned) + 15;
   spread->x1 = aligned[0];
   spread->x2 = aligned[1];
   spread->x3 = aligned[2];
   spread->y2 = aligned[3];
   spread->y3 = aligned[4];
+}
 
-  /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis. */
+/* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis. */
+FIXED_INLINE void set_force_moves(const struct fit_system *system, const struct units *units,
+                                  struct fit_spread *spread) {
+  const struct state *at = &system->at;
+  struct scaled values[4];
+  int32_t aligned[4];
   spread->off_x = at->x - system->mean_x;
   spread->off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, spread->off_x);
   /* 2 sigma^2 = log2(e) / height */
   spread->lift_q24 = system->bend_q24 + port_divide(LOG2E_Q30, at->height >> 14) * (1 << 6);
-  values[0] = scaled_mul(spread->inverse_mass, softness);
+  values[0] = scaled_mul(spread->inverse_mass, spread->softness);
   values[0].exponent -= 15;
-  values[1] = scaled_mul(unit1, fit_scaled_from(spread->off_x, -26));
-  values[2] = scaled_mul(unit2, fit_scaled_from(spread->off_y, -26));
-  values[3] = scaled_mul(unit3, fit_scaled_from(spread->lift_q24, -24));
+  values[1] = scaled_mul(units->of1, fit_scaled_from(spread->off_x, -26));
+  values[2] = scaled_mul(units->of2, fit_scaled_from(spread->off_y, -26));
+  values[3] = scaled_mul(units->of3, fit_scaled_from(spread->lift_q24, -24));
   spread->force_exponent = fit_grid_align(values, 4, aligned) + 15;
   spread->f0 = aligned[0];
   spread->f1 = aligned[1];
   spread->f2 = aligned[2];
   spread->f3 = aligned[3];
+}
+
+NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings, const struct fit_system *system,
+                                    const struct fit_columns_q *columns, struct fit_spread *spread) {
+  spread->inverse_mass = fit_grid_reciprocal(fit_scaled_from(system->mass_q20, -20));
+  spread->inverse1 = fit_grid_reciprocal(system->d1);
+  spread->inverse2 = fit_grid_reciprocal(system->d2);
+  spread->inverse3 = fit_grid_reciprocal(system->d3);
+  spread->amplitude = fit_scaled_from(system->amplitude_q28, -28);
+  spread->softness = fit_grid_reciprocal(system->stiffness);
+  struct units units;
+  set_units(columns, spread, &units);
+  set_location_moves(system, &units, spread);
+  set_force_moves(system, &units, spread);
 
   int32_t rise_q10 = fixed_clamp(system->rise_q22 >> 12, 0, DOWN_MAX_Q10);
   int32_t most_q21 = (rise_q10 * rise_q10) * 2;
