@@ -61,8 +61,13 @@ static bool stamps(enum port_sync mode) {
   return mode == PORT_SYNC_IN || mode == PORT_SYNC_SECOND;
 }
 
+/* Once armed, one of the two is always busy: an edge makes the first chain to the second, and back at once. Both could
+ * be read idle if an edge came between the two reads, so the first is read again: the next edge is some time off. */
 static bool is_armed(void) {
-  return ((DMA_CTRL_TRIG(CHANNEL_NUMBERS) | DMA_CTRL_TRIG(CHANNEL_TIMES)) & DMA_CTRL_BUSY) != 0;
+  uint32_t busy = DMA_CTRL_TRIG(CHANNEL_NUMBERS);
+  busy |= DMA_CTRL_TRIG(CHANNEL_TIMES);
+  busy |= DMA_CTRL_TRIG(CHANNEL_NUMBERS);
+  return (busy & DMA_CTRL_BUSY) != 0;
 }
 
 /* Nothing has come since the edge that was taken last. */
