@@ -30,7 +30,7 @@ _Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 #define SURE 2
 
 /* How far the location moves for each unit of Q / F, the longer of two, and the trace's coefficient
- * that it makes: medians over truth_fit's objects on 6 to 15 mm of rubber, seed 1. */
+ * that it makes: medians over the objects of report truth on 6 to 15 mm of rubber, seed 1. */
 #define SHIFT_PER_PITCH 0.38f
 #define SHIFT_PER_SIGMA 0.58f
 #define RATIO_PER_TRACE 14.7f

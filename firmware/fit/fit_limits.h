@@ -49,7 +49,7 @@
  * belongs to the force scale. Where the pad's dip is known the shape's part counts by
  * FIT_SHAPE_KNOWN. The last step counts as an error of the location. Where the fit
  * stopped at a limit, FIT_BOUND_SD replaces all, since a linear estimate there means nothing.
- * Values from truth_fit --seed 1; NUMERICS.md has their coverage on others. */
+ * Values from truth.py --parts fit --seed 1; NUMERICS.md has their coverage on others. */
 #define FIT_MISFIT_BEGIN 8
 #define FIT_MISFIT_MOST 8
 #define FIT_SHAPE_PER_MODEL 1.1f

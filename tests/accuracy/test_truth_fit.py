@@ -1,13 +1,20 @@
-"""truth_fit on few pads: its keys are there, repeatable, and as good as the fit is meant to be.
+"""The part fit of the report truth on few pads: its keys are there, repeatable, and as good as the fit is meant to be.
 
-usage: test_truth_fit.py TRUTH_FIT [unittest arguments]
+usage: test_truth_fit.py BUILD
 """
 
-import json
-import subprocess
+import argparse
+import pathlib
 import sys
 import unittest
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools" / folder) for folder in ("report/truth", "report/measure", "report/shared", "python")]
+import one_press  # noqa: E402
+from fingertip.files import InputError  # noqa: E402
+from measure import Measure  # noqa: E402
+
+FIRMWARE = Measure(sys.argv.pop())
 # (key, least, most): what a full run is held to, with room for a tenth of its pads.
 GOALS = (
     ("cover_1sd_min", 54, 100),
@@ -26,16 +33,14 @@ GOALS = (
 )
 
 
-def run(*options):
-    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+def run(pads, seed):
+    return one_press.figures(FIRMWARE, argparse.Namespace(pads=pads, seed=seed))
 
 
 class TruthFit(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.options = ("--pads", "150", "--seed", "3")
-        cls.text = run(*cls.options).stdout
-        cls.found = json.loads(cls.text)
+        cls.found = run(150, 3)
 
     def test_goals(self):
         for key, least, most in GOALS:
@@ -57,18 +62,15 @@ class TruthFit(unittest.TestCase):
         self.assertLess(rows["12 mm, calibrated"]["error_p50_mm"], 0.5 * rows["12 mm, gains 10 %"]["error_p50_mm"])
         self.assertLess(rows["noise only"]["error_p50_mm"], 0.01)
 
-    def test_the_same_seed_gives_the_same(self):
-        self.assertEqual(run("--pads", "15", "--seed", "3").stdout, run("--pads", "15", "--seed", "3").stdout)
+    def test_a_seed_decides_what_is_drawn(self):
+        once = run(15, 3)
+        self.assertEqual(run(15, 3), once)
+        self.assertNotEqual(run(15, 4), once)
 
-    def test_another_seed_gives_another(self):
-        self.assertNotEqual(run("--pads", "15", "--seed", "4").stdout, run("--pads", "15", "--seed", "3").stdout)
-
-    def test_wrong_usage_is_one_line(self):
-        for options in (("--pads", "0"), ("--pads", "x"), ("--what", "1")):
-            done = run(*options)
-            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1))
+    def test_no_pads_are_refused(self):
+        with self.assertRaises(InputError):
+            run(0, 3)
 
 
 if __name__ == "__main__":
-    PROGRAM = sys.argv.pop(1)
     unittest.main()

@@ -1,17 +1,21 @@
-"""truth_gate on few pads and on made-up recordings: its keys are there, meet their goals, and tell a press from what follows it.
+"""The part gate of the report truth on few pads and on made-up recordings: its keys are there, meet their goals, and distinguish a press from what follows it.
 
-usage: test_truth_gate.py TRUTH_GATE [unittest arguments]
+usage: test_truth_gate.py BUILD
 """
 
-import json
+import argparse
 import math
-import os
 import pathlib
 import random
-import subprocess
 import sys
 import tempfile
 import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools" / folder) for folder in ("report/truth", "report/measure", "report/shared", "python")]
+import zero_and_gate  # noqa: E402
+from fingertip.files import InputError  # noqa: E402
+from measure import Measure  # noqa: E402
 
 GOALS = {"slow_force_error_percent": 2, "false_contacts": 0, "zero_recovery_s": 5, "phantom_force_longest_s": 1}
 REAL = (
@@ -36,9 +40,9 @@ def write_recording(path, sigma_mm, stays_Pa=0, seed=1):
 
     def row(x_mm, depth, touches, stays):
         nonlocal t_s
-        felt = [12000 * touches * math.exp(-0.5 * ((place - x_mm) / sigma_mm) ** 2) for place in PLACES_mm]
-        felt[-1] += stays
-        cells = [f"{AMBIENT_Pa + pressure + draw.gauss(0, 5):.2f}" for pressure in felt]
+        sensed = [12000 * touches * math.exp(-0.5 * ((place - x_mm) / sigma_mm) ** 2) for place in PLACES_mm]
+        sensed[-1] += stays
+        cells = [f"{AMBIENT_Pa + pressure + draw.gauss(0, 5):.2f}" for pressure in sensed]
         rows.append(",".join([*cells, f"{1000 * x_mm:.0f}", f"{depth:.0f}", f"{t_s:.4f}"]))
         t_s += 1 / ROWS_PER_S
 
@@ -53,12 +57,8 @@ def write_recording(path, sigma_mm, stays_Pa=0, seed=1):
     path.write_text("Sensor_0,Sensor_1,Sensor_2,Sensor_3,x,z,time\n" + "\n".join(rows) + "\n")
 
 
-def judged(pads, *more):
-    environment = {name: value for name, value in os.environ.items() if name != "FINGERTIP_RECORDINGS"}
-    done = subprocess.run([PROGRAM, "--pads", pads, *map(str, more)], capture_output=True, text=True, env=environment)
-    if done.returncode != 0:
-        raise AssertionError(done.stderr)
-    return json.loads(done.stdout)
+def judged(pads, recordings):
+    return zero_and_gate.figures(Measure(BUILD), argparse.Namespace(pads=pads, seed=None, recordings=recordings))
 
 
 class TruthGate(unittest.TestCase):
@@ -70,7 +70,7 @@ class TruthGate(unittest.TestCase):
         write_recording(folder / "test_good.csv", 2.4)
         write_recording(folder / "other.csv", 2.1, seed=2)
         write_recording(folder / "stays.csv", 2.2, stays_Pa=3000, seed=3)
-        cls.found = judged("1", "--recordings", folder)
+        cls.found = judged(1, folder)
         cls.strips = {}
         for strip in cls.found["strips"]:
             cls.strips.setdefault(strip["name"], []).append(strip)
@@ -101,7 +101,7 @@ class TruthGate(unittest.TestCase):
         self.assertEqual(self.found["real_phantom_percent_worst"], worst)
         self.assertGreater(self.found["real_phantom_longest_s"], 20)
 
-    def test_places_are_found_where_sensors_feel(self):
+    def test_locations_are_found_where_sensors_respond(self):
         for located in self.found["locations"]:
             if located["name"] != "stays.csv":
                 self.assertGreater(located["fits"], 11 * 2 * ROWS_PER_S)
@@ -109,20 +109,16 @@ class TruthGate(unittest.TestCase):
                 self.assertLess(located["median_mm"], 0.06)
         self.assertLess(self.found["real_median_mm_worst_test"], 0.06)
 
-    def test_nothing_is_said_of_recordings_that_are_not_there(self):
+    def test_recordings_that_are_not_there_have_no_figures(self):
         with tempfile.TemporaryDirectory() as folder:
-            found = judged("0", "--recordings", folder)
+            found = judged(0, folder)
         for name in REAL:
             self.assertIsNone(found[name], name)
         self.assertFalse(GOALS.keys() & found.keys())
-
-    def test_wrong_words_are_named(self):
-        for words, what in ((("--pads", "x"), "--pads"), (("--recordings", "/nowhere"), "/nowhere"), (("--other", "1"), "--other")):
-            done = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
-            self.assertEqual(done.returncode, 1)
-            self.assertIn(what, done.stderr)
+        with self.assertRaises(InputError):
+            judged(0, "/nowhere")
 
 
 if __name__ == "__main__":
-    PROGRAM = sys.argv.pop(1)
+    BUILD = sys.argv.pop()
     unittest.main()

@@ -1,7 +1,8 @@
 // The tool's calibration, on many sessions.
+#include "report/measure/calibrations.hpp"
+
 #include "libfingertip/in_parallel.hpp"
 #include "report/measure/entry.hpp"
-#include "tool/calibration/judge.hpp"
 
 extern "C" {
 #include "fit/fit.h"
@@ -13,26 +14,13 @@ extern "C" {
 using namespace fingertip::calibrating;
 using namespace fingertip::measure;
 
-// What a session ends with, and what the tool would keep of it.
-struct calibration {
-  std::int32_t state; // 0: more, 1: good, 2: refused
-  char reason[16];
-  bool solved, helps;
-  bool has_own; // the tool would keep `own`
-  double width_mm, residual_share;
-  double prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm; // as fit_settings has them
-  double worst_shape_sd, gauge_sd, force_share, ellipse, offset_share, drift_share, kept_share;
-};
 MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(helps), FIELD(has_own), FIELD(width_mm),
-               FIELD(residual_share), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm),
-               FIELD(worst_shape_sd), FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share),
-               FIELD(drift_share), FIELD(kept_share))
+               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(memory), FIELD(position_mm),
+               FIELD(halves_shape), FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd),
+               FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd),
+               FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share),
+               FIELD(kept_share))
 
-// What it found of one sensor.
-struct calibrated_sensor {
-  double gain, gain_sd, reading_sd; // reading_sd: what the firmware gets as the gain's
-  double off_x_mm, off_y_mm, wider;
-};
 MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm),
                FIELD(wider))
 
@@ -56,16 +44,48 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.offset_share = judgement.offset_share;
   found.drift_share = judgement.drift_share;
   found.kept_share = judgement.kept_share;
+  found.sigma_sd_mm = solution.sigma_sd_mm;
+  found.dip = solution.dip;
+  found.dip_sd = solution.dip_sd;
+  found.memory = solution.spread.memory;
+  found.position_mm = solution.spread.position_mm;
+  found.halves_shape = judgement.halves_shape;
+  found.halves_gauge = judgement.halves_gauge;
   return found;
 }
 
+void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements,
+                                  const Judgement &judgement, double force_N, calibration &found,
+                                  calibrated_sensor *sensors, fit_own *own) {
+  const Solution &solution = judgement.solution;
+  const Shape shape = shape_of(solution);
+  found = found_by(judgement, shape);
+  if (const auto scale = force_scale(layout, placements, solution, force_N, shape); solution.solved && scale) {
+    found.force_scale = scale->scale;
+    found.force_scale_sd = scale->sd;
+  }
+  const std::vector<fit_own> kept = own_of(layout, shape);
+  found.has_own = !kept.empty();
+  std::fill_n(own, layout.sensors(), fit_own{});
+  std::copy(kept.begin(), kept.end(), own);
+  for (std::size_t k = 0; k < layout.sensors(); k++) {
+    const auto at = [&](const std::vector<double> &values) { return k < values.size() ? values[k] : 0.0; };
+    const Own sensor = k < shape.own.size() ? shape.own[k] : Own{};
+    sensors[k] = {at(solution.gain), at(solution.gain_sd), at(solution.reading_sd),
+                  sensor.off_x_mm,   sensor.off_y_mm,      sensor.wider};
+  }
+}
+
 // Sessions [session][placement][sensor]; a sensor whose reading is not a number has none. No placement follows.
-// own [session][sensor]: zeros unless the session found it.
+// force_N: of each placement. fading: share of the readings that each loses in half a second, or none. own
+// [session][sensor]: zeros unless the session found it.
 static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double noise_Pa,
-                      Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa, Batch<calibration, 1> found,
-                      Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own) {
+                      double force_N, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa,
+                      Batch<const double, 2> fading, Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors,
+                      Batch<fit_own, 2> own) {
   same_length(x_mm, y_mm);
   same_length(found, t_s, reading_Pa, sensors, own);
+  require(fading.size() == 0 || (fading.size() == found.size() && fading.size(1) == t_s.size(1)), "other fadings");
   const std::size_t count = x_mm.size(), placements_of_each = reading_Pa.size(1);
   require(reading_Pa.size(2) == count && sensors.size(1) == count && own.size(1) == count &&
               t_s.size(1) == placements_of_each,
@@ -80,6 +100,7 @@ static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, 
       Placement &placement = placements[i];
       placement.t_s = t_s.row(session)[i];
       placement.noise_Pa = noise_Pa;
+      placement.fading = fading.size() ? fading.row(session)[i] : 0.0;
       const double *const readings = reading_Pa.row(session) + i * count;
       for (std::size_t k = 0; k < count; k++) {
         const bool there = readings[k] == readings[k];
@@ -87,20 +108,8 @@ static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, 
         placement.reading_Pa.push_back(there ? readings[k] : 0.0);
       }
     }
-    const Judgement judgement = judge(layout, placements, true);
-    const Solution &solution = judgement.solution;
-    const Shape shape = shape_of(solution);
-    found[session] = found_by(judgement, shape);
-    const std::vector<fit_own> kept = own_of(layout, shape);
-    found[session].has_own = !kept.empty();
-    std::fill_n(own.row(session), count, fit_own{});
-    std::copy(kept.begin(), kept.end(), own.row(session));
-    for (std::size_t k = 0; k < count; k++) {
-      const auto at = [&](const std::vector<double> &values) { return k < values.size() ? values[k] : 0.0; };
-      const Own sensor = k < shape.own.size() ? shape.own[k] : Own{};
-      sensors.row(session)[k] = {at(solution.gain), at(solution.gain_sd), at(solution.reading_sd),
-                                 sensor.off_x_mm,   sensor.off_y_mm,      sensor.wider};
-    }
+    describe(layout, placements, judge(layout, placements, true), force_N, found[session], sensors.row(session),
+             own.row(session));
   });
 }
 MEASURE_ENTRY(calibrate)

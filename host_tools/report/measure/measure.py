@@ -215,16 +215,33 @@ class Measure(Library):
         self.call("shapes", array, pad, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found)
         return found
 
-    def calibrate(self, x_mm, y_mm, pitch_mm, t_s, reading_Pa, noise_Pa):
+    def osr(self, osr):
+        """(conversion_us, noise_Pa_q10) of a reading at this oversampling; the noise is rms."""
+        found = np.zeros(1, np.int32), np.zeros(1, np.int32)
+        self.call("sensor_osr", osr, *found)
+        return tuple(int(one[0]) for one in found)
+
+    def calibrate(self, x_mm, y_mm, pitch_mm, t_s, reading_Pa, noise_Pa, *, force_N=1.0, fading=None):
         """(calibration [session], calibrated_sensor [session, sensor], fit_own [session, sensor]) of sessions of placements: t_s [session, placement],
-        reading_Pa [session, placement, sensor], NaN where a sensor has none."""
+        reading_Pa [session, placement, sensor], NaN where a sensor has none. force_N: of each; fading: share of the readings
+        that each loses in half a second."""
         sessions, _, sensors = reading_Pa.shape
         found = (
             self.made("calibration", sessions),
             self.made("calibrated_sensor", sessions, sensors),
             self.made("fit_own", sessions, sensors),
         )
-        self.call("calibrate", *(np.asarray(one, float) for one in (x_mm, y_mm)), float(pitch_mm), float(noise_Pa), t_s, reading_Pa, *found)
+        self.call(
+            "calibrate",
+            *(np.asarray(one, float) for one in (x_mm, y_mm)),
+            float(pitch_mm),
+            float(noise_Pa),
+            float(force_N),
+            t_s,
+            reading_Pa,
+            np.zeros((0, 0)) if fading is None else fading,
+            *found,
+        )
         return found
 
     def random(self, seed, stream, index):
@@ -276,6 +293,10 @@ class Random:
 
     def normal(self, count=None, of=None):
         return self.drawn("random_normal", count=count, of=of)
+
+    def bits(self, count=None, of=None):
+        """Seeds."""
+        return self.drawn("random_bits", count=count, of=of, kind=np.int64)
 
     def below(self, end, count=None, of=None):
         return self.drawn("random_below", int(end), count=count, of=of, kind=np.int64)

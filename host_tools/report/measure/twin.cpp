@@ -55,6 +55,15 @@ static void random_normal(Batch<Random, 1> states, Batch<double, 2> values) {
 }
 MEASURE_ENTRY(random_normal)
 
+// All 64 bits: seeds of other numbers.
+static void random_bits(Batch<Random, 1> states, Batch<std::int64_t, 2> values) {
+  same_length(states, values);
+  for (std::size_t i = 0; i < states.size(); i++) {
+    std::generate_n(values.row(i), values.size(1), [&] { return static_cast<std::int64_t>(states[i].next()); });
+  }
+}
+MEASURE_ENTRY(random_bits)
+
 // Whole numbers below `end`.
 static void random_below(Batch<Random, 1> states, std::int64_t end, Batch<std::int64_t, 2> values) {
   same_length(states, values);

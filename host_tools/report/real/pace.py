@@ -4,17 +4,16 @@ On presses of real arrays, and of simulated pads with their dip, gains and width
 times are of this host, all ways in turns, over that of the published fit with four iterations.
 """
 
-import json
-import subprocess
 from types import SimpleNamespace
 
 import grids
 import numpy as np
-from fingertip.files import InputError
+import sessions
 
 ITERATIONS = range(1, 11)
 PUBLISHED_ITERATIONS = 4
 PASSES = 31
+PLACEMENTS, PRESSES = 30, 600
 SEED = 40000  # no constant was chosen on it
 WAYS = (("published", "as published"), ("shipped", "as shipped, not calibrated"), ("calibrated", "calibrated"))
 
@@ -54,22 +53,20 @@ def rows(presses, measured):
     ]
 
 
-def twin_rows(programs, pads):
-    """Of so many simulated pads."""
-    source = programs.parent / "truth/calibration/truth_calibration"
-    done = subprocess.run([source, "--presses", "--pads", str(pads), "--seed", str(SEED)], stdout=subprocess.PIPE, text=True)
-    if done.returncode:
-        raise InputError(f"{source} failed, exit status {done.returncode}; see above")
-    made = json.loads(done.stdout)
-    array = SimpleNamespace(layout=np.column_stack([made["x_mm"], made["y_mm"]]), pitch_mm=made["pitch_mm"])
+def twin_rows(programs, firmware, pads):
+    """Of this number of simulated pads, cast as real ones."""
+    x_mm, y_mm, pitch_mm = firmware.layout()
+    array = SimpleNamespace(layout=np.column_stack([x_mm, y_mm]), pitch_mm=pitch_mm)
+    kind, seeds = sessions.kinds(firmware, sessions.LIKE_REAL), SEED + np.arange(pads)
+    made = sessions.placements(firmware, "good", kind, seeds, sessions.LAYER_mm, PLACEMENTS)
+    tap_x_mm, tap_y_mm, _, tap_Pa = sessions.taps(firmware, kind, seeds, sessions.LAYER_mm, PRESSES)
     program = programs / "twin_fit"
-    calibrations = (
-        grids.ask(program, array, [grids.calibration_job(np.array(pad["placements"]), pad["every_s"])])[0] for pad in made["pads"]
-    )
+    every_s = np.diff(made.t_s[0]).mean()
+    calibrations = [grids.ask(program, array, [grids.calibration_job(readings, every_s)])[0] for readings in made.reading_Pa]
     return rows(
         "twin",
         [
-            (program, array, np.array(pad["presses"]), np.array(pad["xy_mm"]), calibration["stored"])
-            for pad, calibration in zip(made["pads"], calibrations)
+            (program, array, readings, np.column_stack(xy_mm), calibration["stored"])
+            for readings, *xy_mm, calibration in zip(tap_Pa, tap_x_mm, tap_y_mm, calibrations)
         ],
     )

@@ -18,20 +18,20 @@ calibrations, the others are judged.
 import hashlib
 import json
 import pathlib
-import subprocess
 import sys
-import tempfile
 
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / "host_tools" / folder) for folder in ("report/shared", "report/measure", "report/truth", "python")]
 
 import grids  # noqa: E402
 import pace  # noqa: E402
 import real_report  # noqa: E402
+import strips  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
+from measure import Measure  # noqa: E402
 from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
 
 GOALS = (
@@ -191,29 +191,22 @@ def judge_grids(program, source, here):
     return {**figures, "grids": found}, shown
 
 
-def judge_strips(program, source, here):
+def judge_strips(firmware, source, here):
     wanted = [one for one in source["files"] if one["name"] in here]
     names = ("phantom_percent_1308", "phantom_percent_57", "doubted_percent", "holds_missed")
     if not wanted:
         return {**dict.fromkeys(names), "strips": []}
     print(f"        {len(wanted)} recordings of strips", flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        for one in wanted:
-            (pathlib.Path(folder) / one["name"]).symlink_to(here[one["name"]].resolve())
-        done = subprocess.run([str(program), folder], capture_output=True, text=True)
-    if done.returncode:
-        raise InputError(f"real_strips failed: {done.stderr.strip()}")
-    parts = {one["name"]: one["part"] for one in wanted}
-    strips = [{**said, "part": parts[said["name"]]} for said in json.loads(done.stdout)["strips"]]
-    rows = [strip for strip in strips if strip["part"] == "judges"]
-    by_rate = {rate["frames_per_s"]: [strip["rates"][k] for strip in rows] for k, rate in enumerate(rows[0]["rates"])} if rows else {}
-    fast, slow = by_rate.get(1308.0, []), by_rate.get(57.0, [])
+    read = {one["name"]: (one["part"], strips.Strip(here[one["name"]])) for one in wanted}
+    rates = {name: [strip.gate(firmware, *rate) for rate in strips.RATES] for name, (_, strip) in read.items()}
+    judged = [one for name, (part, _) in read.items() if part == "judges" for one in rates[name]]
+    fast, slow = ([one for one in judged if one["frames_per_s"] == rate] for rate in (1308.0, 57.0))
     return {
         "phantom_percent_1308": mean_of(fast, "phantom_percent"),
         "phantom_percent_57": mean_of(slow, "phantom_percent"),
         "doubted_percent": mean_of(fast, "doubted_percent"),
-        "holds_missed": sum(rate["holds_missed"] for rates in by_rate.values() for rate in rates) if rows else None,
-        "strips": strips,
+        "holds_missed": sum(one["held_missed"] for one in judged) if judged else None,
+        "strips": [{"name": name, "part": part, "holds": len(strip.holds), "rates": rates[name]} for name, (part, strip) in read.items()],
     }
 
 
@@ -226,16 +219,19 @@ def main(argv):
     parser.add_argument("--pads", type=int, default=30, help="simulated ones for the run times (default: %(default)s)")
     options = parser.parse_args(argv)
     out, programs = output_folder(options), pathlib.Path(options.build) / "host_tools/report/real"
-    for program in ("real_fit", "twin_fit", "real_strips"):
+    for program in ("real_fit", "twin_fit"):
         if not (programs / program).is_file():
             raise InputError(f"{programs / program} is not there; build it: cmake --build --preset host")
+    firmware = Measure(options.build)
     sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
     here = found_below(options.folder, sources)
     found, shown = judge_grids(programs / "real_fit", sources["grids"], here)
     print("        run times", flush=True)
     judges = [row["recording"] for row in found["grids"] if row["part"] == "judges"]
-    found["pace"] = pace.twin_rows(programs, options.pads) + pace.rows("real", [pad for key in judges for pad in shown[key]["to_pace"]])
-    found |= judge_strips(programs / "real_strips", sources["strips"], here)
+    found["pace"] = pace.twin_rows(programs, firmware, options.pads) + pace.rows(
+        "real", [pad for key in judges for pad in shown[key]["to_pace"]]
+    )
+    found |= judge_strips(firmware, sources["strips"], here)
     found["missing"] = sorted(one["name"] for source in sources.values() for one in source["files"] if one["name"] not in here)
     found["sources"] = {name: {key: source[key] for key in ("repository", "commit", "terms", "what")} for name, source in sources.items()}
     found = judge(found, GOALS)

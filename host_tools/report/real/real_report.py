@@ -134,7 +134,7 @@ def write(found, path):
                     *(
                         text_of(rate[key], 3)
                         for rate in strip["rates"]
-                        for key in ("phantom_percent", "doubted_percent", "longest_s", "holds_missed")
+                        for key in ("phantom_percent", "doubted_percent", "phantom_longest_s", "held_missed")
                     ),
                 ]
                 for strip in found["strips"]

@@ -1,4 +1,17 @@
-"""Tables of Markdown, as every report writes them."""
+"""Tables of Markdown, as every report writes them, and what is in them."""
+
+import numpy as np
+
+
+def quantile(values, share):
+    """Of none, 0."""
+    at = int(share * (len(values) - 1))
+    return float(np.partition(values, at)[at]) if len(values) else 0.0
+
+
+def percent(chosen):
+    """Share of the true ones; of none, 0."""
+    return 100.0 * float(np.count_nonzero(chosen)) / len(chosen) if len(chosen) else 0.0
 
 
 def text_of(value, digits=4):

@@ -18,13 +18,16 @@ import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/report/measure"), str(ROOT / "host_tools/python")]
 
+import calibrations  # noqa: E402
+import one_press  # noqa: E402
 import truth_report  # noqa: E402
+import zero_and_gate  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
+from measure import Measure, MeasureError  # noqa: E402
 from reporting import chosen_parts, figures_kept, figures_printed, option_parser, report_of_programs  # noqa: E402
 
-# part: what it does, its program below the build folder
 PARTS = {
     "fit": "one press: coverage of the standard deviations, warnings, contacts that are not round",
     "calibration": "gains by placements of one weight",
@@ -70,30 +73,18 @@ GOALS = (
 OF_FIT_REPORT = ("cold_cycles", "masked_cycles")  # of another report in the same folder
 
 
-def command_of(part, options):
+# part: figures(firmware, options)
+FIGURES = {"fit": one_press.figures, "calibration": calibrations.figures, "gate": zero_and_gate.figures}
+
+
+def measured(part, options):
     if part == "flash":
-        command = [
-            sys.executable,
-            str(ROOT / "host_tools/report/truth/flash/truth_flash.py"),
-            "--build",
-            str(options.build),
-            "--boards",
-            str(options.boards),
-        ]
-    else:
-        program = pathlib.Path(options.build) / "host_tools/report/truth" / part / f"truth_{part}"
-        if not program.is_file():
-            raise InputError(f"{program} is not there; build it: cmake --build --preset host")
-        command = [str(program)]
-    if options.seed is not None and part != "flash":
-        command += ["--seed", str(options.seed)]
-    if options.pads is not None and part != "flash":
-        command += ["--pads", str(options.pads)]
-    if part in ("fit", "calibration"):
-        command += ["--cache", str(pathlib.Path(options.output) / "contact_tables")]
-    if part == "gate" and options.recordings:
-        command += ["--recordings", options.recordings]
-    return command
+        program = ROOT / "host_tools/report/truth/flash/truth_flash.py"
+        return figures_printed("truth_flash", [sys.executable, program, "--build", options.build, "--boards", options.boards])
+    try:
+        return FIGURES[part](Measure(options.build), options)
+    except MeasureError as error:
+        raise InputError(str(error)) from None
 
 
 def main(argv):
@@ -111,7 +102,7 @@ def main(argv):
         PARTS,
         parts,
         GOALS,
-        lambda part: figures_printed(f"truth_{part}", command_of(part, options)),
+        lambda part: measured(part, options),
         lambda _, out: figures_kept(out / "fit.json", OF_FIT_REPORT),
         truth_report,
     )

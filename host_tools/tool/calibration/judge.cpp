@@ -16,10 +16,10 @@ constexpr double CLUSTER_PITCHES = 0.6;
 /* An array none of whose placements lie in an end third of it lacks that end. */
 constexpr double END_SHARE = 1.0 / 3.0;
 /* What one scale leaves between round and flat objects, 1 to 15 N, and of the firmware's fit
- * (truth_calibration, table "force"). */
+ * (report truth, part calibration, table "force"). */
 constexpr double FORCE_MODEL_SD = 0.01;
 /* How far the force of a tap is off, over what the readings lose from 0.5 to 1 s, on the twin's
- * pads that relax by 9 to 26 % in 8 s (truth_calibration --seed 500, "relaxing"). */
+ * pads that relax by 9 to 26 % in 8 s (truth.py --parts calibration --seed 500, "relaxing"). */
 constexpr double FADED_BEFORE = 2.7;
 /* Contacts add to sigma^2, each its own spread; sd of that, about the calibration's foot. */
 constexpr double CONTACTS_SD_mm2 = 0.6;

@@ -6,7 +6,7 @@
  * Refused: what speaks against it does not go away with more placements. More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm,
- * alike and as uneven as real ones (program truth_calibration, tables evidence_p1_p50_p99; chosen
+ * alike and as uneven as real ones (report truth, part calibration, tables evidence_p1_p50_p99; chosen
  * on seeds 5000 to 5011, judged from 20000 on), and the real pad that chooses
  * (host_tools/report/real).
  */
@@ -33,7 +33,7 @@ constexpr double HALVES_GAUGE_MAX = 0.04;     /* and within */
 constexpr double FORCE_SPREAD_MAX = 0.065;    /* rms of e within the array: one weight */
 constexpr double ELLIPSE_MAX = 0.05;          /* rms of q1, q2 beyond their sds: a round foot. Lying
                                                  cylinders of 6 by 12 mm have 0.053 and more, balls
-                                                 0.031 at most (truth_calibration, seed 20000) */
+                                                 0.031 at most (report truth, part calibration, seed 20000) */
 constexpr double OFFSET_MAX = 0.012;          /* rms over the sensors, of the peak: zeros */
 constexpr double DRIFT_MAX = 0.006;           /* the same, from first to last placement */
 constexpr double POSITION_MAX_mm = 0.5;       /* rms: sensors where the layout says */

@@ -83,7 +83,7 @@ struct Assumptions {
   double offset_share = 0.0075;         /* of the peak: zeros that were off, and how far they move from
                                            first to last placement. A wide dip and such zeros look alike:
                                            with more, gains of real pads suffer; with less, sessions of the
-                                           twin pass whose zeros were off (truth_calibration, seed 20000) */
+                                           twin pass whose zeros were off (report truth, part calibration, seed 20000) */
   double force = 0.025;                 /* of the force between placements of one weight */
   double width = 0.01;                  /* of the width between places: a pad cast a little aslant */
   double ellipse = 0.007;               /* of q1 and q2 from placement to placement; axes differ by 2 q */
@@ -183,7 +183,7 @@ std::vector<double> outside_gauge(const Array &array, const std::vector<double> 
 
 /* How far inside the outer sensors a place is asked for. Right above them a foot stands where the
  * rubber may end, which no profile of one thickness explains. Pads that end 6 mm beyond got worse
- * by calibrations with such places, 4 of 60, and none does with these (truth_calibration, seed
+ * by calibrations with such places, 4 of 60, and none does with these (report truth, part calibration, seed
  * 31000). Wide pads of 12 mm are located as well. The price is on 6 mm of rubber, where a sensor
  * feels only what is near: 8 % more location error. */
 constexpr double INSET_PITCHES = 0.5;

@@ -1,0 +1,37 @@
+// What a calibration found, as the entry points hand it out.
+#pragma once
+
+#include "tool/calibration/judge.hpp"
+
+#include <cstdint>
+#include <vector>
+
+extern "C" {
+#include "fit/fit.h"
+}
+
+// What a session ends with, and what the tool would keep of it.
+struct calibration {
+  std::int32_t state; // 0: more, 1: good, 2: refused
+  char reason[16];
+  bool solved, helps;
+  bool has_own; // the tool would keep `own`
+  double width_mm, residual_share;
+  double prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm; // as fit_settings has them
+  double sigma_sd_mm, dip, dip_sd, memory, position_mm, halves_shape, halves_gauge;
+  double force_scale, force_scale_sd; // 0: there is none
+  double worst_shape_sd, gauge_sd, force_share, ellipse, offset_share, drift_share, kept_share;
+};
+// What it found of one sensor.
+struct calibrated_sensor {
+  double gain, gain_sd, reading_sd; // reading_sd: what the firmware gets as the gain's
+  double off_x_mm, off_y_mm, wider;
+};
+namespace fingertip::measure {
+
+// sensors, own: [sensor]; own is zeros unless has_own. force_N: of each placement.
+void describe(const calibrating::Array &layout, const std::vector<calibrating::Placement> &placements,
+              const calibrating::Judgement &judgement, double force_N, calibration &found, calibrated_sensor *sensors,
+              fit_own *own);
+
+} // namespace fingertip::measure

@@ -1,0 +1,73 @@
+// Presses that are held or repeated: what the firmware's searches beside the fit find of them.
+#include "libfingertip/in_parallel.hpp"
+#include "report/measure/fit_arguments.hpp"
+
+extern "C" {
+#include "fit/fit_gains.h"
+#include "fit/fit_doubt.h"
+#include "ms58xx/ms58xx.h"
+}
+
+using namespace fingertip::measure;
+using fingertip::twin::in_parallel;
+
+// Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that is
+// not estimated has found in the frames before. A single frame is not searched.
+static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
+                     Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10,
+                     Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
+  same_length(results, pressure_Pa_q10, usable);
+  length_or_one(results, all_settings);
+  in_parallel(results.size(), [&](std::size_t press) {
+    const fit_settings settings = settings_of(all_settings, own, press);
+    const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
+    const std::int32_t *pressure = pressure_Pa_q10.row(press);
+    fit_gaussian_grid(array, pressure, usable[press], &settings, &results[press]);
+    fit_doubt doubt{};
+    for (std::size_t i = 1; i < frames; i++, pressure += sensors) {
+      fit_doubt_follow(&doubt, array, pressure, &settings, &results[press]);
+      fit_gaussian_grid(array, pressure + sensors, usable[press], &settings, &results[press]);
+    }
+    if (frames > 1) {
+      fit_doubt_widen(&doubt, array, &settings, &results[press]);
+    }
+  });
+}
+MEASURE_ENTRY(fit_held)
+
+MEASURE_RECORD(fit_gains)
+
+static void gains_begin(Batch<const double, 1> gain_sd, Batch<fit_gains, 1> gains) {
+  same_length(gain_sd, gains);
+  for (std::size_t i = 0; i < gains.size(); i++) {
+    fit_gains_begin(&gains[i], static_cast<float>(gain_sd[i]));
+  }
+}
+MEASURE_ENTRY(gains_begin)
+
+// One frame of each pad: what it has learnt of how far its gains are apart. gain_sd keeps its value where nothing was.
+static void gains_learn(Batch<const fit_array, 1> array, Batch<const fit_settings, 1> settings,
+                        Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const fit_result, 1> fits,
+                        std::int64_t is_first_of_touch, Batch<fit_gains, 1> gains, Batch<double, 1> gain_sd) {
+  checked(array, pressure_Pa_q10.size(1), {});
+  same_length(gains, settings, pressure_Pa_q10, fits, gain_sd);
+  for (std::size_t i = 0; i < gains.size(); i++) {
+    if (is_first_of_touch) {
+      fit_gains_lift(&gains[i]);
+    }
+    if (fit_gains_learn(&gains[i], array.data, pressure_Pa_q10.row(i), &settings[i], &fits[i])) {
+      gain_sd[i] = static_cast<double>(fit_gains_sd(&gains[i]));
+    }
+  }
+}
+MEASURE_ENTRY(gains_learn)
+
+// Conversion time and rms noise of one reading at an oversampling.
+static void sensor_osr(std::int64_t osr, Batch<std::int32_t, 1> conversion_us, Batch<std::int32_t, 1> noise_Pa_q10) {
+  const ms58xx_osr *const row = ms58xx_find_osr(static_cast<std::uint16_t>(osr));
+  require(row != nullptr, "no sensor has this oversampling");
+  conversion_us[0] = row->conversion_us;
+  noise_Pa_q10[0] = row->noise_Pa_q10;
+}
+MEASURE_ENTRY(sensor_osr)

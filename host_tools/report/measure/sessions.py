@@ -1,0 +1,125 @@
+"""Pads of the twin on which somebody calibrates and taps (measure/pads.cpp), one row for each."""
+
+import dataclasses
+
+import numpy as np
+from measure import stream_of
+
+TEN_PERCENT = {"gain_percent": 10.0}
+GAINS_20 = {"gain_percent": 20.0}
+DIP = TEN_PERCENT | {"dip_percent": 5.0}
+# As real arrays are (host_tools/report/real).
+LIKE_REAL = {"gain_percent": 20.0, "misplaced_mm": 0.1, "dip_percent": 5.0, "widths_percent": 3.5}
+# As the twin's own, and as many whose sensors relax by 9 to 26 % and sit 0.1 mm (sd) off.
+USUAL = (TEN_PERCENT, TEN_PERCENT | {"relaxation_percent": 17.5, "misplaced_mm": 0.1})
+LAYER_mm, WEIGHT_N = 12.0, 3.0
+PADS_PER_SESSION, SESSIONS_MAX = 10, 100
+
+
+SENSORS = 15
+# Contact shapes that the twin has no name for: kind, size_x_mm, size_y_mm, and the edge of the twin's cylinders.
+FLAT_SQUARE, ROLLER, EDGE_mm = 2, 4, 0.4
+SHAPES = {"cylinder6x12": (ROLLER, 6, 12)} | {f"edge{mm}": (ROLLER, 2, mm) for mm in (10, 14, 20, 24, 30, 36)} | {"cube15": (FLAT_SQUARE, 15, 15)}
+
+
+def shape(firmware, name):
+    """The contact shape of a name that the twin does not know, or None."""
+    if name not in SHAPES:
+        return None
+    made = firmware.made("contact_shape", 1)
+    kind, x_mm, y_mm = SHAPES[name]
+    for field, value in (("kind", kind), ("size_x_mm", x_mm), ("size_y_mm", y_mm), ("edge_mm", EDGE_mm)):
+        made[field] = value
+    return made
+
+
+def kinds(firmware, *each):
+    made = firmware.made("pad_kind", len(each))
+    for row, kind in zip(made, each):
+        for name, value in kind.items():
+            row[name] = value
+    return made
+
+
+def calibrated(firmware, of, judged, seed, layer_mm=LAYER_mm):
+    """calibrated_pad: what accepted calibrations left of pads of these kinds in turn, one for every ten pads that are judged, a hundred at most."""
+    count = min(max(judged // PADS_PER_SESSION, 1), SESSIONS_MAX)
+    seeds = firmware.random(seed, stream_of("calibrated sessions"), np.arange(count)).bits()
+    return calibrated_by(firmware, kinds(firmware, *of)[np.arange(count) % len(of)], seeds, layer_mm)[0]
+
+
+def calibrated_by(firmware, of, seeds, layer_mm=LAYER_mm):
+    """calibrated_pad [pad], fit_own and twin_seat [pad, sensor] of pads of their own for each seed."""
+    count = len(seeds)
+    found = firmware.made("calibrated_pad", count), firmware.made("fit_own", count, SENSORS), firmware.made("twin_seat", count, SENSORS)
+    firmware.call("pad_calibrated", of, layer_mm, firmware.contact_tables, seeds, *found)
+    return found
+
+
+def fit_held(firmware, array, settings, pressure_Pa_q10, usable=None, own=None):
+    """fit_result of presses [press, frame, sensor] that are held: of the last frame, with what the firmware's search for a tangential force has found in
+    the frames before. One frame alone is not searched."""
+    found = firmware.made("fit_result", len(pressure_Pa_q10))
+    usable = np.full(len(found), (1 << SENSORS) - 1, np.uint32) if usable is None else usable
+    firmware.call("fit_held", array, settings, firmware.no_own if own is None else own, pressure_Pa_q10, usable, found)
+    return found
+
+
+@dataclasses.dataclass
+class Session:
+    """What calibrations found: calibration [pad], calibrated_sensor and fit_own [pad, sensor]."""
+
+    found: np.ndarray
+    sensors: np.ndarray
+    own: np.ndarray
+
+    @classmethod
+    def of(cls, firmware, count):
+        return cls(firmware.made("calibration", count), firmware.made("calibrated_sensor", count, SENSORS), firmware.made("fit_own", count, SENSORS))
+
+    def where(self, chosen):
+        return Session(self.found[chosen], self.sensors[chosen], self.own[chosen])
+
+
+@dataclasses.dataclass
+class Placements:
+    """[pad, placement, sensor], their times, and the share of the readings that fades in half a second."""
+
+    firmware: object
+    t_s: np.ndarray
+    reading_Pa: np.ndarray
+    fading: np.ndarray
+
+    def first(self, count):
+        return Placements(self.firmware, *(np.ascontiguousarray(each[:, :count]) for each in (self.t_s, self.reading_Pa, self.fading)))
+
+    def calibrated(self):
+        noise_Pa = self.firmware.osr(1024)[1] / 1024.0 / 10.0  # of a mean over a hundred frames
+        return Session(*self.firmware.calibrate(*self.firmware.layout(), self.t_s, self.reading_Pa, noise_Pa, fading=self.fading, force_N=WEIGHT_N))
+
+
+def placements(firmware, session, of, seeds, layer_mm, count):
+    shape = (len(seeds), count)
+    made = Placements(firmware, np.zeros(shape), np.zeros((*shape, SENSORS)), np.zeros(shape))
+    firmware.call("pad_placements", session, of, layer_mm, firmware.contact_tables, seeds, made.t_s, made.reading_Pa, made.fading)
+    return made
+
+
+def led(firmware, session, of, seeds, layer_mm, planned):
+    """Sessions as the tool leads them, and how many placements each needed."""
+    made, needed = Session.of(firmware, len(seeds)), np.zeros(len(seeds), np.int64)
+    firmware.call("pad_lead", session, of, layer_mm, firmware.contact_tables, seeds, planned, made.found, made.sensors, made.own, needed)
+    return made, needed
+
+
+def taps(firmware, of, seeds, layer_mm, count):
+    """x_mm, y_mm, force_N [pad, tap], reading_Pa [pad, tap, sensor]."""
+    made = *(np.zeros((len(seeds), count)) for _ in range(3)), np.zeros((len(seeds), count, SENSORS))
+    firmware.call("pad_taps", of, layer_mm, firmware.contact_tables, seeds, *made)
+    return made
+
+
+def settled_gains(firmware, of, seeds, layer_mm):
+    gain = np.zeros((len(seeds), SENSORS))
+    firmware.call("pad_gains", of, layer_mm, firmware.contact_tables, seeds, gain)
+    return gain
