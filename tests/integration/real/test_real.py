@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/report/real"), str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / "host_tools" / folder) for folder in ("report/real", "report/measure", "report/shared", "python")]
 BUILD = pathlib.Path(sys.argv.pop())
 
 import grids  # noqa: E402
