@@ -1,42 +1,42 @@
 #include "app/sync.h"
 
-#include "app/packets.h"
+#define SAMPLE_us 1000u
 
-#if FT_WITH_SYNC
-
-#define LOOK_us 1000u
-
-static void apply(struct app *app) {
-  const enum port_sync mode = app->sync.paused ? PORT_SYNC_OFF : (enum port_sync)app->sync.mode;
-  atomic_store_explicit(&app->sync.shows_frames, 0, memory_order_relaxed);
+static void apply(struct sync *sync) {
+  const enum port_sync mode = sync->paused ? PORT_SYNC_OFF : (enum port_sync)sync->mode;
+  atomic_store_explicit(&sync->shows_frames, 0, memory_order_relaxed);
   port_sync_set(mode);
-  atomic_store_explicit(&app->sync.shows_frames, mode == PORT_SYNC_FRAME, memory_order_relaxed);
+  atomic_store_explicit(&sync->shows_frames, mode == PORT_SYNC_FRAME, memory_order_relaxed);
 }
 
-bool sync_set(struct app *app, uint8_t mode) {
+enum ft_status sync_set(struct sync *sync, uint8_t mode) {
   if (mode > PORT_SYNC_SECOND) {
-    return false;
+    return FT_ERR_ARGUMENT;
   }
-  app->sync.mode = mode;
-  apply(app);
-  return true;
+  sync->mode = mode;
+  apply(sync);
+  return FT_OK;
 }
 
-void sync_pause(struct app *app, bool paused) {
-  app->sync.paused = paused;
-  apply(app);
+void sync_pause(struct sync *sync, bool paused) {
+  sync->paused = paused;
+  apply(sync);
 }
 
-void sync_follow(struct app *app, uint64_t now_us) {
-  if (!sync_is_stamping(app) || now_us - app->sync.looked_us < LOOK_us) {
+static void send_edge(struct line *line, const struct port_sync_edge *edge) {
+  line->packet.body.sync = (struct wire_sync){.number = edge->number, .level = edge->number & 1u};
+  line_send(line, &wire_sync_layout, edge->t_us);
+}
+
+void sync_follow(struct sync *sync, uint64_t now_us, bool streams, struct line *line) {
+  if (!sync_is_stamping(sync) || now_us - sync->sampled_us < SAMPLE_us) {
     return;
   }
-  app->sync.looked_us = now_us;
+  sync->sampled_us = now_us;
   struct port_sync_edge edge;
   for (unsigned i = 0; i < SYNC_EDGES_PER_ms && port_sync_take(&edge); i++) {
-    if (app->streams != 0) {
-      packets_send_sync(app, &edge);
+    if (streams) {
+      send_edge(line, &edge);
     }
   }
 }
-#endif

@@ -1,25 +1,55 @@
-/* From absolute readings to pressure on the pad. Everything here works in seconds and pascals, at
- * any rate from 0.1 Hz to 1400 Hz and at any oversampling. It has four parts, each with one state
- * for each sensor; ZERO.md has the picture:
+/* From absolute readings to pressure on the pad. Everything here works in seconds and pascals, at any rate from 0.1 Hz
+ * to 1400 Hz and at any oversampling. ZERO.md has the picture, constants.h the figures.
  *
- * - zero.h: what a sensor reads when nothing touches
- * - after_effect.h: what rubber keeps of a press
- * - gate.h: whether anything touches the pad
- * - doubt.h: whether a force and a zero that has moved look alike
+ * A frame's pressures are its readings less the zero of each sensor. From them the gate (gate.h) decides whether
+ * anything touches. Every UPDATE_ms each sensor is updated (update.h): one pass over all that is remembered of it. Its
+ * zero has two parts.
  *
- * The zero of a sensor is the level of the first and the remainder of the second. It stands while
- * the gate is open, and while the temperature of its sensor is unsettled. It is taken again if it
- * was taken in the five seconds before its sensor was reset (the sensor had lost its state), or
- * before the temperature turned out to be another. No single sensor is tared in a contact that
- * others feel. It waits for eight seconds at most, since wrong zeros may make that contact. Such a
- * zero is in doubt until the contact ends. Then it is taken again. */
+ * Level: what the sensor reads when nothing touches.
+ * - Taken: the mean of ZERO_TARE_FRAMES readings without the smallest and the largest; at rates below 16 Hz of three
+ * and more.
+ * - Settled: rubber and sensors warm up. A level that was just taken may be off by its spread, ZERO_COLD_Pa for a
+ * sensor that was off or is another, ZERO_WARM_Pa for one that was calm before. While there is a spread the level takes
+ * over all readings within it, and the gate is higher by it: a weaker touch is not seen. The spread fades by evidence,
+ * to three times what the reading moves in a second. A calm sensor has none after two seconds, one that creeps after
+ * fifteen.
+ * - Followed: then the level moves at 0.5 Pa/s. A force that rises faster is no drift. In a contact it does not move,
+ * except for the drift of the calm before it (calm.h), for an hour.
+ * - Taken again: a reading below what a release explains means that the level was taken under a press. The sensor is
+ * tared again after ZERO_BELOW_s, or after half a second if it is far below.
+ *
+ * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
+ * - Each sensor remembers its strongest press; the memory fades in 20 s. Half of the strongest memory of the pad counts
+ * for all. An eighth of the memory is the band: so much may remain above the level, and twice as much below. A contact
+ * closes within it.
+ * - After a contact the remainder follows the reading within the band. It rises only for two seconds, and never as fast
+ * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
+ * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
+ *
+ * The zero of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
+ * is taken again if it was taken in the five seconds before its sensor was reset (the sensor had lost its state), or
+ * before the temperature turned out to be another. No single sensor is tared in a contact that others measure. It waits
+ * for eight seconds at most, since wrong zeros may make that contact. Such a zero is a guess until the contact ends.
+ * Then it is taken again.
+ *
+ * Doubt: a zero that has moved and a force may look alike. A zero may be off by what it took: wander is what the level
+ * moved, taken is what level and remainder moved since the zero was proven. A press without doubt proves it: what the
+ * zero comes back to after that press is the zero. Without evidence both fade in minutes. Doubtful is
+ * - a contact in which no sensor measures more than its zero wandered, half as much again; or no more than barometers
+ * drift in such a time; or while a zero is a guess. This one is unsure: the zero follows it slowly, as if nothing
+ * touched
+ * - a contact whose sensors have crept up, by less than 24 Pa/s all the time, 0.005 N/s on 12 mm of rubber, and to less
+ * than 3.9 kPa
+ * - a contact less than three times what its zeros had taken when it left the band, or six times what they had taken of
+ * it
+ * - a contact below an eighth of the strongest press in it: what may remain of that one
+ * - no contact, but a zero that has taken more than opens the gate, or has not settled to that */
 #ifndef CONDITION_CONDITION_H
 #define CONDITION_CONDITION_H
 
-#include "condition/after_effect.h"
-#include "condition/doubt.h"
+#include "condition/calm.h"
+#include "condition/constants.h"
 #include "condition/gate.h"
-#include "condition/zero.h"
 #include "frame/frame.h"
 
 #include <stdbool.h>
@@ -27,38 +57,59 @@
 
 /* All that is remembered of one sensor. */
 struct condition_sensor {
-  struct zero zero;
-  struct after_effect after;
-  struct doubt doubt;
-  int32_t before_Pa_q10; /* reading when last looked at */
-  int32_t slow_Pa_q10;   /* readings, through a low pass of a second */
-  uint32_t looked_ms;
+  int32_t level_Pa_q10;
+  int32_t spread_Pa_q10;  /* 0: settled */
+  int32_t memory_Pa_q10;  /* strongest press, fading */
+  int32_t reached_Pa_q10; /* the same of this contact alone */
+  int32_t wander_Pa_q10;
+  int32_t taken_Pa_q10;
+  int32_t crept_Pa_q10;   /* risen slowly */
+  int32_t before_Pa_q10;  /* reading of the last update */
+  int32_t slow_Pa_q10;    /* readings, through a low pass of a second */
+  uint32_t updated_ms;    /* time of the last update */
+  uint16_t below_ms;      /* time for which readings have been too far below */
+  uint8_t tare_left;      /* while taring: readings still to be averaged, */
+  uint32_t tare_begun_ms; /* time of the first, */
+  int32_t tare_min;       /* the smallest and the largest, */
+  int32_t tare_max;
+  int64_t tare_sum; /* and their sum */
+  struct drift drift;
 };
 
 struct condition {
-  /* These come first, where a load's offset reaches. */
   uint32_t now_ms;
-  uint32_t tared_ms; /* since a tare */
-  int32_t due_ms;    /* looks that are due, over all sensors */
+  uint32_t tared_ms; /* age of the newest tare */
+  int32_t due_ms;    /* updates that are due, over all sensors */
+  uint8_t next;      /* sensor to update */
+  bool touched;      /* conditioned.contact of the last frame */
+  bool unsure;       /* a contact that the zero follows */
+  bool sure;         /* a contact without doubt */
+
+  uint32_t taring;     /* bitmap: tare_left is not 0 */
+  uint32_t guessed;    /* bitmap: tared in a contact that others measure */
+  uint32_t restless;   /* bitmap: the level does not keep up, no calm */
+  uint32_t below;      /* bitmap: too far below zero */
+  uint32_t firm;       /* bitmap: stronger than what the zero has wandered */
+  uint32_t sudden;     /* bitmap: stronger than what may have crept up */
+  uint32_t zero_risen; /* bitmap: the zero has taken more than opens the gate */
+
+  /* Of the whole pad. */
+  int32_t memory_Pa_q10, reached_Pa_q10; /* as of a sensor, the strongest */
+  int32_t drifted_Pa_q10;                /* by which any zero may have drifted in a contact; fades after it */
+  int32_t taken_before_Pa_q10;           /* taken when the contact came, in doubt or not */
+  int32_t strong_Pa_q10;                 /* a contact above it stands out from what its zeros may be off by */
+  int32_t strongest_Pa_q10;              /* of this contact */
   struct gate gate;
-  struct after_effect_pad after;
-  struct doubt_pad doubt;
-  uint32_t taring;   /* bitmap: tare_left is not 0 */
-  uint32_t guessed;  /* bitmap: tared in a contact that others feel */
-  uint32_t restless; /* bitmap: the level does not keep up, no calm */
-  uint32_t below;    /* bitmap: too far below zero */
-  uint8_t next;      /* sensor to look at */
-  bool touched;      /* as .contact of the last frame */
+  struct calm calm;
 
   int32_t zero_Pa_q10[FT_MAX_SENSORS];   /* [sensor] 1/1024 Pa, as all here: level + remainder */
-  int32_t margin_Pa_q10[FT_MAX_SENSORS]; /* by so much the gate is higher */
-  int32_t sum_Pa_q10[FT_MAX_SENSORS];    /* above the zero, since last looked at */
+  int32_t margin_Pa_q10[FT_MAX_SENSORS]; /* by which the gate is higher */
+  int32_t sum_Pa_q10[FT_MAX_SENSORS];    /* of readings above the zero, since the last update */
   uint8_t summed[FT_MAX_SENSORS];        /* readings in the sum */
   struct condition_sensor sensor[FT_MAX_SENSORS];
-  struct zero_calm calm;
 };
 
-/* What a calibration says of the sensors. */
+/* What a calibration has of the sensors. */
 struct condition_gains {
   uint32_t inverse_q16[FT_MAX_SENSORS]; /* [sensor] 1 / gain, 65536: 1; 0.25..4 */
 };
@@ -79,15 +130,14 @@ void condition_start(struct condition *condition);
 /* Asks for a tare of all sensors over the next frames. A sensor whose zero had settled is warm. */
 void condition_tare(struct condition *condition);
 
-/* Processes one frame, later than the one before by frame->t_us. Do not pass held frames. gains:
- * NULL for sensors that are all alike. Call condition_follow() between two frames. Cost: about 105
- * Cortex-M0+ cycles a sensor in contact, 190 without. */
+/* Processes one frame, later than the one before by frame->t_us. Do not pass held frames. gains: NULL for sensors that
+ * are all alike. Call condition_follow() between two frames. Cost: about 105 Cortex-M0+ cycles a sensor in contact, 190
+ * without. */
 void condition_frame(struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
                      struct conditioned *conditioned);
 
-/* Follows zeros and remembers presses with the frame just processed. In a contact only the frames
- * to come need it, so its answer can be sent before. A second call does nothing. Cost: about 420
- * cycles a sensor, once in 64 ms. */
+/* Updates the sensors that are due with the frame just processed. In a contact only the frames to come need it, so its
+ * answer can be sent before. A second call does nothing. Cost: about 420 cycles a sensor, once in UPDATE_ms. */
 void condition_follow(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned);
 
 #endif

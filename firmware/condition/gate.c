@@ -11,7 +11,7 @@ void gate_age(struct gate *gate, int32_t ms, int32_t noise_Pa_q10) {
   gate->close_Pa_q10 = Pa_q10(GATE_CLOSE_Pa) + GATE_CLOSE_SIGMA * noise_Pa_q10;
 }
 
-/* Of the strongest, mostly. */
+/* The strongest decides, except where its own margin is larger than that of others. */
 static bool is_over(const struct gate_view *view, int32_t limit) {
   if (view->saturated || view->peak_Pa_q10 > limit + view->margin_Pa_q10[view->strongest]) {
     return true;
@@ -27,7 +27,7 @@ static bool is_over(const struct gate_view *view, int32_t limit) {
   return false;
 }
 
-bool gate_look(struct gate *gate, const struct gate_view *view) {
+bool gate_update(struct gate *gate, const struct gate_view *view) {
   bool over = is_over(view, gate->pressed ? gate->close_Pa_q10 : gate->open_Pa_q10);
   if (over == gate->pressed) {
     return false;

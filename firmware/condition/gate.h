@@ -5,20 +5,15 @@
 #ifndef CONDITION_GATE_H
 #define CONDITION_GATE_H
 
-#include "condition/steps.h"
+#include "condition/constants.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define GATE_OPEN_Pa 132
-#define GATE_OPEN_SIGMA 6
-#define GATE_CLOSE_Pa 90
-#define GATE_CLOSE_SIGMA 4
-
 struct gate {
   bool pressed;                      /* a contact that is no remainder */
   uint32_t pressed_ms, released_ms;  /* since it began, and since it ended; at most a day */
-  int32_t open_Pa_q10, close_Pa_q10; /* but for the margins */
+  int32_t open_Pa_q10, close_Pa_q10; /* without the margins */
 };
 
 /* The readings of a frame: where usable, above the zero; and the strongest, 0 when none. */
@@ -32,6 +27,6 @@ struct gate_view {
 void gate_age(struct gate *gate, int32_t ms, int32_t noise_Pa_q10);
 
 /* Returns whether a contact begins or ends with this frame. */
-bool gate_look(struct gate *gate, const struct gate_view *view);
+bool gate_update(struct gate *gate, const struct gate_view *view);
 
 #endif

@@ -6,7 +6,7 @@
  * in:
  *
  *   MAX_PRESSURE_Pa   readings above are flagged: beyond the range, or near it
- *   APART_Pa          more than two sound parts differ by in the same air (condition/rest.h)
+ *   APART_Pa          more than two sound parts differ by in the same air (condition/plausibility.h)
  *   STEP_Pa           no press moves one sensor alone by so much (scan/readings.h)
  *   SENS_T1, TCS      SENS = C1 * 2^SENS_T1 + C3 * dT / 2^TCS
  *   OFF_T1, TCO       OFF = C2 * 2^OFF_T1 + C4 * dT / 2^TCO

@@ -109,7 +109,7 @@ enum readings_news {
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
                                    const struct readings_temperature *taken);
 
-/* These stand apart from the others at rest (condition/rest.h), and are doubtful until a call says
+/* These stand apart from the others at rest (condition/plausibility.h), and are doubtful until a call says
  * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
 void readings_doubt(struct readings *readings, uint32_t apart);
 

@@ -54,6 +54,11 @@ struct scan_settings {
 #define SCAN_TEMPERATURE_INTERVAL_ms 500u
 #define SCAN_TEMPERATURE_INTERVAL_MAX_ms 2000u
 
+/* A counter or bitmap that the event context writes. */
+static inline uint32_t scan_read(const _Atomic uint32_t *value) {
+  return atomic_load_explicit(value, memory_order_relaxed);
+}
+
 /* Since start, modulo 2^32. Readable from any context. */
 struct scan_counters {
   _Atomic uint32_t frames;

@@ -88,30 +88,29 @@ enum store_step {
 };
 
 struct store {
-  struct store_content content;
-  /* What the flash holds is damaged, or of a later firmware: .content is empty. */
-  bool damaged;
-
-  uint8_t sensor_count;
-  uint16_t slot_bytes;
   uint8_t step;     /* enum store_step */
   uint8_t attempts; /* that have failed */
+  uint8_t sensor_count;
+  uint16_t slot_bytes;
 
   /* The log. The current sector holds the newest record, if there is any. */
   uint8_t sector;
   uint8_t next_slot;   /* of the current sector; none that there is: it is full */
-  uint32_t generation; /* of the current sector; 0: there is no record */
   uint8_t sure_slot;   /* of the current sector: a sealed record; STORE_SLOTS: none */
-  uint16_t sure_slot_bytes;
   bool other_is_quiet; /* the other sector holds nothing that may turn into a newer record */
   bool must_settle;    /* what was decided at start-up has to be written once more */
+  uint16_t sure_slot_bytes;
+  uint32_t generation; /* of the current sector; 0: there is no record */
 
   /* The write under way. */
   uint8_t to_sector, to_slot;
-  uint32_t to_generation;
   uint16_t at; /* byte of the record */
   uint16_t record_length;
+  uint32_t to_generation;
   uint64_t step_ends_us;
+
+  bool damaged; /* what the flash holds is damaged, or of a later firmware: .content is empty */
+  struct store_content content;
   uint8_t record[STORE_RECORD_BYTES];
 };
 

@@ -16,7 +16,10 @@ from elf import Elf, fail
 
 # Objects below firmware/CMakeFiles, and names of other symbols.
 OWNED = {
-    "FIT": (["ft_fit.dir/fit/*.obj"], r"wire_contact_\w+|contact_weigh|app_use_calibration|cmd_(calibrate|prior|location_limit)_\w+"),
+    "FIT": (
+        ["ft_fit.dir/fit/*.obj", "ft_app.dir/app/location_stage.c.obj", "ft_app.dir/app/doubt_stage.c.obj"],
+        r"wire_contact_\w+|contact_weigh|cmd_(calibrate|prior|location_limit)_\w+",
+    ),
     "SLIP": (["ft_contact.dir/contact/slip.c.obj"], r"contact_update|cmd_slip_\w+"),
     "TANGENTIAL": (
         [
@@ -24,12 +27,14 @@ OWNED = {
             "ft_fit.dir/fit/fit_shapes*.obj",
             "ft_contact.dir/contact/tangential.c.obj",
             "ft_contact.dir/contact/shapes.c.obj",
-            "ft_app.dir/app/working.c.obj",
+            "ft_app.dir/app/jobs.c.obj",
+            "ft_app.dir/app/tangential_stage.c.obj",
+            "ft_app.dir/app/shapes_stage.c.obj",
         ],
-        r"store_put_profile|app_use_pad|cmd_(pad|erase_pad)_\w+",
+        r"store_put_profile|cmd_(pad|erase_pad)_\w+",
     ),
     "RAW_STREAM": ([], r"wire_raw_\w+"),
-    "SYNC": (["ft_app.dir/app/sync.c.obj"], r"sync|sync_pin|numbers|times_us|port_sync_\w+|packets_send_sync|(wire|cmd)_sync_\w+"),
+    "SYNC": (["ft_app.dir/app/sync.c.obj"], r"sync|sync_pin|numbers|times_us|port_sync_\w+|(wire|cmd)_sync_\w+"),
 }
 
 

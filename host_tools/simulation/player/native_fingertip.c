@@ -1,6 +1,5 @@
 #include "simulation/player/native_fingertip.h"
 
-#include "app/acting.h"
 #include "app/app.h"
 #include "config/geometry.h"
 #include "native/native_cdc.h"
@@ -46,12 +45,12 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   port_set_event_handler(on_event, &app);
   app_start(&app, sim_array_bus(&array));
   if (settings->prior_width_mm > 0.0f) {
-    app.fit_settings.prior_sigma_mm = settings->prior_sigma_mm;
-    app.fit_settings.prior_width_mm = settings->prior_width_mm;
+    app.stages.location.settings.prior_sigma_mm = settings->prior_sigma_mm;
+    app.stages.location.settings.prior_width_mm = settings->prior_width_mm;
   }
 #if FT_WITH_TANGENTIAL
   if (settings->pad) {
-    app_use_pad(&app, settings->pad);
+    stages_use_profile(&app.stages, settings->pad);
   }
   return true;
 #else

@@ -295,9 +295,9 @@ static void test_wrong_bits_in_a_prom(void) {
       array.sensor[7].prom[word] ^= (uint16_t)(1u << bit);
       seen.expected = ALL & ~(1u << 7);
       run_until(3000000);
-      const uint32_t used = app.frame.valid >> 7 & 1u;
-      const double error_Pa = fabs(app.frame.pressure_Pa_q10[7] / 1024.0 - 101000.0);
-      TEST_ASSERT_EQUAL_UINT32(used, app.frame.doubtful >> 7 & 1u);
+      const uint32_t used = app.found.frame.valid >> 7 & 1u;
+      const double error_Pa = fabs(app.found.frame.pressure_Pa_q10[7] / 1024.0 - 101000.0);
+      TEST_ASSERT_EQUAL_UINT32(used, app.found.frame.doubtful >> 7 & 1u);
       TEST_ASSERT_TRUE(!used || error_Pa < 21000.0);
     }
   }

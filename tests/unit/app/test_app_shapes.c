@@ -1,6 +1,5 @@
 /* What presses, from sensors to packets: one contact, a pulled one, a long one, two, and what is
  * none of these, on the pad that the profile describes. */
-#include "app/acting.h"
 #include "app_rig.h"
 #include "common/contact_flags.h"
 #include "config/defaults.h"
@@ -120,7 +119,7 @@ static void two_contacts_have_their_places_and_forces(void) {
   TEST_ASSERT_TRUE(contact.location2_sd_mm > contact.location1_sd_mm);
   TEST_ASSERT_TRUE(contact.force1_sd_N > 0.0f && contact.force2_sd_N > 0.0f);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.edge_length_mm);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contact.x_mm);
 }
 
 static void a_long_contact_has_its_direction(void) {
@@ -151,12 +150,13 @@ static void a_long_contact_doubts_its_place_by_what_its_line_has(void) {
   TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_UNCERTAIN,
                    CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE | CONTACT_FLAG_UNCERTAIN, contact.flags);
   const float off_mm = hypotf(contact.x_mm - 5.0f, contact.y_mm + 13.0f);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.y_mm, contact.y_mm);
-  TEST_ASSERT_FLOAT_WITHIN(0.4f, 5.0f, app.fit.x_mm + app.shapes.from_fit_x_mm);
-  TEST_ASSERT_FLOAT_WITHIN(0.4f, -13.0f, app.fit.y_mm + app.shapes.from_fit_y_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contact.x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.y_mm, contact.y_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, 5.0f, app.found.fit.x_mm + app.stages.shapes.report.from_fit_x_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.4f, -13.0f, app.found.fit.y_mm + app.stages.shapes.report.from_fit_y_mm);
   TEST_ASSERT_TRUE(contact.location_sd_mm > 0.7f * off_mm);
-  TEST_ASSERT_TRUE(contact.location_sd_mm > hypotf(app.shapes.from_fit_x_mm, app.shapes.from_fit_y_mm));
+  TEST_ASSERT_TRUE(contact.location_sd_mm >
+                   hypotf(app.stages.shapes.report.from_fit_x_mm, app.stages.shapes.report.from_fit_y_mm));
 }
 
 /* Noise makes one pull of six look like a short line (two.json: round, Q/F 0.3). */
@@ -181,12 +181,12 @@ static void one_contact_is_one_with_a_load_or_without(void) {
     TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, contacts[count - 1].flags);
   }
   /* A load that is estimated all the same is none of two contacts. */
-  app.shapes_job.report.shape = FIT_SHAPE_TWO;
-  app.frame.t_us += 3700;
-  app_process_frame(&app, app.frame.t_read_us);
-  TEST_ASSERT_TRUE(app.tangential_job.estimate.valid);
+  app.stages.shapes.job.report.shape = FIT_SHAPE_TWO;
+  app.found.frame.t_us += 3700;
+  app_process_frame(&app, app.found.frame.t_read_us);
+  TEST_ASSERT_TRUE(app.stages.tangential.job.estimate.valid);
   TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS,
-                   app.contact.flags);
+                   app.found.contact.flags);
 }
 
 static void what_is_none_of_these_is_warned_of_all_the_time(void) {
@@ -211,20 +211,20 @@ static void what_is_none_of_these_is_warned_of_all_the_time(void) {
 static void a_search_for_an_outlier_is_of_fast_frames(void) {
   put(1.5, -4.0, 5.0);
   last_of_press();
-  app.fit_watch = (struct fit_watch){.usable = app.conditioned.usable,
-                                     .left_out = 1,
-                                     .frames = 9,
-                                     .residual_rms_Pa = app.fit.residual_rms_Pa,
-                                     .force_N = app.fit.force_N};
-  app.frame.t_us += 765;
-  app_process_frame(&app, app.frame.t_read_us);
-  TEST_ASSERT_EQUAL(8, app.fit_watch.frames);
-  TEST_ASSERT_EQUAL_HEX32(app.conditioned.usable & ~UINT32_C(1), app.fit.used);
-  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_MASKED, app.contact.flags);
-  app.frame.t_us += 3700;
-  app_process_frame(&app, app.frame.t_read_us);
-  TEST_ASSERT_EQUAL_HEX32(app.conditioned.usable, app.fit.used);
-  TEST_ASSERT_EQUAL(0, app.fit_watch.left_out);
+  app.stages.location.watch = (struct fit_watch){.usable = app.found.conditioned.usable,
+                                                 .left_out = 1,
+                                                 .frames = 9,
+                                                 .residual_rms_Pa = app.found.fit.residual_rms_Pa,
+                                                 .force_N = app.found.fit.force_N};
+  app.found.frame.t_us += 765;
+  app_process_frame(&app, app.found.frame.t_read_us);
+  TEST_ASSERT_EQUAL(8, app.stages.location.watch.frames);
+  TEST_ASSERT_EQUAL_HEX32(app.found.conditioned.usable & ~UINT32_C(1), app.found.fit.used);
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_MASKED, app.found.contact.flags);
+  app.found.frame.t_us += 3700;
+  app_process_frame(&app, app.found.frame.t_read_us);
+  TEST_ASSERT_EQUAL_HEX32(app.found.conditioned.usable, app.found.fit.used);
+  TEST_ASSERT_EQUAL(0, app.stages.location.watch.left_out);
 }
 
 /* Here each frame has time for several frames' worth of parts. */
@@ -262,7 +262,7 @@ static void a_contact_that_ends_is_forgotten(void) {
   const struct pad_profile profile = pad_of_12_mm();
   run_until(ends_us + 20000, &profile);
   take_contacts(contacts);
-  TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, app.shapes_job.report.shape);
+  TEST_ASSERT_EQUAL(FIT_SHAPE_TWO, app.stages.shapes.job.report.shape);
   object_count = 0;
   put(1.0, 2.0, 5.0);
   run_for(230);
@@ -306,7 +306,7 @@ static void a_second_processor_gives_the_same_answers(void) {
     run_until(PRESS_us + 250000, &profile);
     counts[processors - 1] = take_contacts(processors == 1 ? contacts : two);
   }
-  TEST_ASSERT_TRUE(app.has_worker);
+  TEST_ASSERT_TRUE(app.stages.jobs.has_processor);
   TEST_ASSERT_EQUAL(counts[0], counts[1]);
   for (unsigned i = 0; i < counts[0]; i++) {
     two[i].stages = contacts[i].stages;

@@ -99,34 +99,34 @@ static void a_calibration_tells_the_fit_the_pads_shape(void) {
   calibration->force_scale_sd = 0.01f;
   calibration->ambient_kPa = 101;
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
-  TEST_ASSERT_EQUAL_FLOAT(5.552f, app.fit_settings.prior_sigma_mm);
-  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
-  TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.fit_settings.dip_share);
-  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
-  TEST_ASSERT_INT_WITHIN(1, 328, app.fit_settings.own[3].off_x_q15);
-  TEST_ASSERT_INT_WITHIN(1, -655, app.fit_settings.own[3].off_y_q15);
-  TEST_ASSERT_EQUAL_INT(-1311, app.fit_settings.own[14].wider_q15);
-  TEST_ASSERT_EQUAL_INT(0, app.fit_settings.own[14].off_x_q15);
+  TEST_ASSERT_EQUAL_FLOAT(5.552f, app.stages.location.settings.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.stages.location.settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.stages.location.settings.dip_share);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
+  TEST_ASSERT_INT_WITHIN(1, 328, app.stages.location.settings.own[3].off_x_q15);
+  TEST_ASSERT_INT_WITHIN(1, -655, app.stages.location.settings.own[3].off_y_q15);
+  TEST_ASSERT_EQUAL_INT(-1311, app.stages.location.settings.own[14].wider_q15);
+  TEST_ASSERT_EQUAL_INT(0, app.stages.location.settings.own[14].off_x_q15);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, get_info().prior_width_mm);
   run_for(1100);
-  TEST_ASSERT_FLOAT_WITHIN(0.003f, 0.01f, app.contact_settings.force_scale_sd);
+  TEST_ASSERT_FLOAT_WITHIN(0.003f, 0.01f, app.stages.contact_settings.force_scale_sd);
   ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
-  TEST_ASSERT_EQUAL_FLOAT(3.1f, app.fit_settings.prior_sigma_mm);
-  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
+  TEST_ASSERT_EQUAL_FLOAT(3.1f, app.stages.location.settings.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
   ask((struct wire_packet){.type = WIRE_CMD_PRIOR});
-  TEST_ASSERT_EQUAL_FLOAT(5.552f, app.fit_settings.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(5.552f, app.stages.location.settings.prior_sigma_mm);
 
   /* A force scale that was found 20 kPa away is doubted by 11 %. */
   calibration->ambient_kPa = 81;
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
   run_for(1100);
-  TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.11f * calibration->force_scale, app.contact_settings.force_scale_sd);
+  TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.11f * calibration->force_scale, app.stages.contact_settings.force_scale_sd);
   calibration->dip_share_q16 = 6554;
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
-  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
-  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.dip_share);
-  TEST_ASSERT_NULL(app.fit_settings.own);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.dip_share);
+  TEST_ASSERT_NULL(app.stages.location.settings.own);
 }
 
 static void a_calibration_outlives_power(void) {
@@ -239,7 +239,7 @@ static void storing_takes_its_time_and_keeps_nobody_waiting(void) {
         calibrated_from = calibrated && !calibrated_from ? frames : calibrated_from;
       }
     }
-    TEST_ASSERT_EQUAL(done == 1, app.calibration != NULL);
+    TEST_ASSERT_EQUAL(done == 1, app.stages.location.calibration != NULL);
   }
   TEST_ASSERT_EQUAL(1, done);
   TEST_ASSERT_EQUAL(1, refused);
@@ -271,11 +271,11 @@ static void the_loader_waits_for_what_is_being_stored(void) {
   struct wire_packet calibrate = calibrate_command();
   struct wire_packet loader = {.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}};
   send_packet(&loader);
-  while (app.loader_at_us == 0 || port_now_us() + 2000 < app.loader_at_us) {
+  while (app.commands.loader_at_us == 0 || port_now_us() + 2000 < app.commands.loader_at_us) {
     run_for(1);
   }
   send_packet(&calibrate);
-  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, native_run_until(app.loader_at_us + 3000, main_round, &app));
+  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, native_run_until(app.commands.loader_at_us + 3000, main_round, &app));
   TEST_ASSERT_TRUE(store_is_writing(&app.store));
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
   TEST_ASSERT_TRUE(info_after_restart().stored & WIRE_STORED_CALIBRATION);

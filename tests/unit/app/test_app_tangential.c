@@ -1,5 +1,4 @@
 /* Tangential load, from sensors to packets: on the pad that the profile describes. */
-#include "app/acting.h"
 #include "app_rig.h"
 #include "common/contact_flags.h"
 #include "config/defaults.h"
@@ -96,13 +95,13 @@ static void a_profile_tells_the_load_and_corrects_the_location(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 5.0f, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f, contact.x_mm);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, -4.0f, contact.y_mm);
-  TEST_ASSERT_TRUE(app.fit.x_mm > 1.5f + 0.5f);
-  TEST_ASSERT_TRUE(app.fit.y_mm < -4.0f - 0.4f);
+  TEST_ASSERT_TRUE(app.found.fit.x_mm > 1.5f + 0.5f);
+  TEST_ASSERT_TRUE(app.found.fit.y_mm < -4.0f - 0.4f);
   TEST_ASSERT_TRUE(contact.q_sd_N > 0.0f && contact.location_sd_mm > 0.0f);
-  TEST_ASSERT_TRUE(app.fit.location_sd_mm < FIT_DOUBT_USUAL * 0.38f * 9.0f);
-  TEST_ASSERT_FALSE(app.load_doubt.known);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.p0_Pa, contact.p0_Pa);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.sigma_mm, contact.sigma_mm);
+  TEST_ASSERT_TRUE(app.found.fit.location_sd_mm < FIT_DOUBT_USUAL * 0.38f * 9.0f);
+  TEST_ASSERT_FALSE(app.stages.doubt.force.known);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.p0_Pa, contact.p0_Pa);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.sigma_mm, contact.sigma_mm);
 }
 
 static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
@@ -111,8 +110,8 @@ static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
   run_for(300);
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
   struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_FIT_VALID, TANGENTIAL);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.force_N, contact.force_N);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contact.x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.force_N, contact.force_N);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.qx_N);
 }
 
@@ -155,15 +154,15 @@ static void touches_tell_the_gains_of_a_pad_without_a_calibration(void) {
   const uint16_t assumed_q16 = (uint16_t)(65536.0f * DEFAULT_GAIN_SD + 0.5f);
   native_cdc_open();
   run_for(1400);
-  TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.fit_settings.gain_sd_q16[14]);
+  TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.stages.location.settings.gain_sd_q16[14]);
   run_for(400);
-  const uint16_t learnt_q16 = app.fit_settings.gain_sd_q16[14];
-  TEST_ASSERT_EQUAL_UINT16(learnt_q16, app.fit_settings.gain_sd_q16[0]);
+  const uint16_t learnt_q16 = app.stages.location.settings.gain_sd_q16[14];
+  TEST_ASSERT_EQUAL_UINT16(learnt_q16, app.stages.location.settings.gain_sd_q16[0]);
   TEST_ASSERT_TRUE(learnt_q16 < 0.95f * assumed_q16 && learnt_q16 > 0.8f * assumed_q16);
   run_for(400);
-  TEST_ASSERT_EQUAL_UINT16(learnt_q16, app.fit_settings.gain_sd_q16[14]);
-  app_use_calibration(&app, NULL); /* as after its erasure */
-  TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.fit_settings.gain_sd_q16[14]);
+  TEST_ASSERT_EQUAL_UINT16(learnt_q16, app.stages.location.settings.gain_sd_q16[14]);
+  stages_use_calibration(&app.stages, &app.found, NULL); /* as after its erasure */
+  TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.stages.location.settings.gain_sd_q16[14]);
 }
 
 static void a_profile_outlives_power_until_it_is_erased(void) {
@@ -173,19 +172,19 @@ static void a_profile_outlives_power_until_it_is_erased(void) {
     struct wire_info info = get_info();
     TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_PAD, info.stored);
     TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_pad.profile, &info.pad, 4 * PAD_PROFILE_FLOATS + 1);
-    TEST_ASSERT_NOT_NULL(app.pad);
-    TEST_ASSERT_EQUAL_UINT8(0, app.fit_settings.cut_noises);
+    TEST_ASSERT_NOT_NULL(app.stages.tangential.profile);
+    TEST_ASSERT_EQUAL_UINT8(0, app.stages.location.settings.cut_noises);
     rig_power_up();
     native_cdc_open();
     run_for(300);
   }
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
-  TEST_ASSERT_NULL(app.pad);
-  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.fit_settings.cut_noises);
+  TEST_ASSERT_NULL(app.stages.tangential.profile);
+  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.stages.location.settings.cut_noises);
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
   rig_power_up();
-  TEST_ASSERT_NULL(app.pad);
-  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.fit_settings.cut_noises);
+  TEST_ASSERT_NULL(app.stages.tangential.profile);
+  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.stages.location.settings.cut_noises);
 }
 
 /* The Gaussian is where the estimate begins, and what is left where there is none. */
@@ -207,9 +206,9 @@ static void beside_a_profile_the_fit_has_the_dip_and_assumes_no_width(void) {
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
   struct wire_packet command = pad_command();
   store_pad(&command);
-  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
-  TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.fit_settings.dip_share);
-  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.stages.location.settings.dip_share);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
 }
 
 static void a_profile_out_of_range_is_refused(void) {
@@ -222,7 +221,7 @@ static void a_profile_out_of_range_is_refused(void) {
   command.body.cmd_pad.profile.from_touch = 2;
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
-  TEST_ASSERT_NULL(app.pad);
+  TEST_ASSERT_NULL(app.stages.tangential.profile);
 }
 
 /* Of a firmware that knew other ranges. */
@@ -235,7 +234,7 @@ static void a_stored_profile_out_of_range_does_not_act(void) {
   run_for(300);
   for (int restart = 0; restart < 2; restart++) {
     TEST_ASSERT_TRUE(app.store.content.has_profile);
-    TEST_ASSERT_NULL(app.pad);
+    TEST_ASSERT_NULL(app.stages.tangential.profile);
     TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
     rig_power_up();
     native_cdc_open();
@@ -261,10 +260,10 @@ static void a_calibration_and_the_scale_of_the_profile_act(void) {
   const float scale = 1.25f * command.body.cmd_pad.profile.force_ratio;
   TEST_ASSERT_FLOAT_WITHIN(0.2f, scale * 5.0f, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
-  TEST_ASSERT_EQUAL_FLOAT(scale * app.tangential->force_N, contact.force_N);
-  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.tangential->qx_N, contact.qx_N);
-  TEST_ASSERT_EQUAL_FLOAT(app.load.location_sd_mm, contact.location_sd_mm);
-  TEST_ASSERT_TRUE(app.load.location_sd_mm != app.fit.location_sd_mm);
+  TEST_ASSERT_EQUAL_FLOAT(scale * app.found.tangential->force_N, contact.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.found.tangential->qx_N, contact.qx_N);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.load.location_sd_mm, contact.location_sd_mm);
+  TEST_ASSERT_TRUE(app.found.load.location_sd_mm != app.found.fit.location_sd_mm);
 }
 
 static void from_touch_tells_what_changed(void) {
@@ -329,10 +328,10 @@ static unsigned take_contacts(struct wire_contact contacts[CONTACTS]) {
 static void a_second_processor_gives_the_same_estimates(void) {
   static struct wire_contact alone[CONTACTS], two[CONTACTS];
   const unsigned count = take_contacts(alone);
-  TEST_ASSERT_FALSE(app.has_worker);
+  TEST_ASSERT_FALSE(app.stages.jobs.has_processor);
   native_set_worker(true, TANGENTIAL_LATE_us / 2);
   TEST_ASSERT_EQUAL(count, take_contacts(two));
-  TEST_ASSERT_TRUE(app.has_worker);
+  TEST_ASSERT_TRUE(app.stages.jobs.has_processor);
   TEST_ASSERT_EQUAL(1, native_worker_starts());
   for (unsigned i = 0; i < count; i++) {
     TEST_ASSERT_GREATER_OR_EQUAL(TANGENTIAL_LATE_us / 2, two[i].stages.fit_us);
@@ -351,7 +350,7 @@ static void without_an_answer_frames_go_out_with_the_fit_and_say_so(void) {
     TEST_ASSERT_BITS_LOW(TANGENTIAL, contacts[i].flags);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, contacts[i].qx_N);
   }
-  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contacts[count - 1].x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contacts[count - 1].x_mm);
   uint8_t detail;
   TEST_ASSERT_EQUAL(CRASH_EVENT_WORKER, native_last_event(&detail));
   TEST_ASSERT_GREATER_THAN(count, native_worker_starts());
@@ -362,16 +361,16 @@ static void without_an_answer_frames_go_out_with_the_fit_and_say_so(void) {
 static void feed_fast(double share) {
   static struct frame first;
   if (share == 0.0) {
-    first = app.frame;
+    first = app.found.frame;
     return;
   }
-  app.frame.number++;
-  app.frame.t_us += TANGENTIAL_BESIDE_us / 2;
+  app.found.frame.number++;
+  app.found.frame.t_us += TANGENTIAL_BESIDE_us / 2;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    const double zero = app.condition.zero_Pa_q10[k];
-    app.frame.pressure_Pa_q10[k] = (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
+    const double zero = app.stages.condition.condition.zero_Pa_q10[k];
+    app.found.frame.pressure_Pa_q10[k] = (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));
   }
-  app_process_frame(&app, app.frame.t_read_us);
+  app_process_frame(&app, app.found.frame.t_read_us);
 }
 
 static void fast_frames_take_the_load_of_the_frame_before(void) {
@@ -386,24 +385,24 @@ static void fast_frames_take_the_load_of_the_frame_before(void) {
     feed_fast(0.0);
     for (int i = 0; i < 10; i++) {
       feed_fast(1.0);
-      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, app.contact.flags);
+      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, app.found.contact.flags);
     }
     run_for(1); /* of the question of this frame: its processor answers */
-    const struct fit_tangential before = app.tangential_job.estimate;
+    const struct fit_tangential before = app.stages.tangential.job.estimate;
     TEST_ASSERT_TRUE(before.valid);
-    const float force_N = app.fit.force_N;
+    const float force_N = app.found.fit.force_N;
     feed_fast(1.25);
-    const float share = app.fit.force_N / force_N;
+    const float share = app.found.fit.force_N / force_N;
     TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.25f, share);
-    TEST_ASSERT_EQUAL_FLOAT(before.force_N * share, app.estimate.force_N);
-    TEST_ASSERT_EQUAL_FLOAT(before.qx_N * share, app.estimate.qx_N);
-    TEST_ASSERT_EQUAL_FLOAT(before.q_sd_N * share, app.estimate.q_sd_N);
-    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.5f, app.load.x_mm);
+    TEST_ASSERT_EQUAL_FLOAT(before.force_N * share, app.stages.tangential.estimate.force_N);
+    TEST_ASSERT_EQUAL_FLOAT(before.qx_N * share, app.stages.tangential.estimate.qx_N);
+    TEST_ASSERT_EQUAL_FLOAT(before.q_sd_N * share, app.stages.tangential.estimate.q_sd_N);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.5f, app.found.load.x_mm);
     feed_fast(1.25);
-    TEST_ASSERT_FLOAT_WITHIN(0.2f, 6.25f, app.load.force_N);
+    TEST_ASSERT_FLOAT_WITHIN(0.2f, 6.25f, app.found.load.force_N);
     feed_fast(3.0); /* another contact's */
-    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_VALID, app.contact.flags);
-    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_LATE, app.contact.flags);
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_VALID, app.found.contact.flags);
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_LATE, app.found.contact.flags);
   }
 }
 
@@ -420,11 +419,11 @@ static void fast_frames_say_that_the_one_before_got_no_answer(void) {
   }
   native_set_worker(true, UINT64_MAX);
   feed_fast(1.0); /* asks, and has the answer of the frame before */
-  TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_VALID, app.contact.flags);
+  TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_VALID, app.found.contact.flags);
   const unsigned starts = native_worker_starts();
   for (int i = 0; i < 4; i++) {
     feed_fast(1.0);
-    TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, app.contact.flags);
+    TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, app.found.contact.flags);
   }
   TEST_ASSERT_EQUAL(starts + 4, native_worker_starts());
 }

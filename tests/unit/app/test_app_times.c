@@ -41,13 +41,13 @@ struct start {
 
 static void count_on(uint32_t count) {
   app.scan.frame_number = count;
-  app.sequence = (uint16_t)count;
-  app.packets_sent = count;
-  app.commands_done = count;
-  app.uptime_s = count;
+  app.line.sequence = (uint16_t)count;
+  app.line.sent = count;
+  app.commands.done = count;
+  app.second.uptime_s = count;
   atomic_store(&app.scan.counters.frames, count);
   atomic_store(&app.scan.counters.bus_nacks, count);
-  app.frames_at_second = count;
+  app.second.frames = count;
 }
 
 /* As if all had begun at 0. */

@@ -1,5 +1,4 @@
 /* The app of scene slip: commands and hosts that fail, health, crashes and what is told of them. */
-#include "app/packets.h"
 #include "app_rig.h"
 #include "common/bytes.h"
 #include "common/contact_flags.h"
@@ -183,18 +182,18 @@ static void test_sensors_that_lost_their_state_are_reset_before_their_zeros_give
     native_run_until(port_now_us() + 50, main_round, &app);
   }
   run_for(50);
-  const int32_t zero_Pa_q10 = app.condition.zero_Pa_q10[7];
+  const int32_t zero_Pa_q10 = app.stages.condition.condition.zero_Pa_q10[7];
   sim_ms5840_brown_out(&array.sensor[7]);
   sim_ms5840_brown_out(&array.sensor[9]);
   run_for(100);
-  TEST_ASSERT_FALSE(app.conditioned.tared);
+  TEST_ASSERT_FALSE(app.found.conditioned.tared);
   TEST_ASSERT_TRUE(array.sensor[7].untrimmed);
   run_for(400);
   TEST_ASSERT_FALSE(array.sensor[7].untrimmed);
   run_for(200);
-  TEST_ASSERT_TRUE(app.conditioned.tared);
-  TEST_ASSERT_INT32_WITHIN(20 * 1024, zero_Pa_q10, app.condition.zero_Pa_q10[7]);
-  TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.frame.valid);
+  TEST_ASSERT_TRUE(app.found.conditioned.tared);
+  TEST_ASSERT_INT32_WITHIN(20 * 1024, zero_Pa_q10, app.stages.condition.condition.zero_Pa_q10[7]);
+  TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.found.frame.valid);
 }
 
 static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
@@ -237,11 +236,13 @@ static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
 }
 
 static void test_stages_end_at_what_fits(void) {
-  TEST_ASSERT_EQUAL_UINT16(0, saturate_u16(0));
-  TEST_ASSERT_EQUAL_UINT16(65534, saturate_u16(65534));
-  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(65535));
-  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(65536));
-  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(UINT64_MAX));
+  static const uint32_t spent_us[] = {0, 65534, 65535, 65536, UINT32_MAX};
+  for (unsigned i = 0; i < 5; i++) {
+    struct wire_contact contact;
+    app.found.spent_us[CRASH_AT_FIT] = spent_us[i];
+    contact_stage_put(&app.found, &contact);
+    TEST_ASSERT_EQUAL_UINT16(i < 2 ? spent_us[i] : 65535, contact.stages.fit_us);
+  }
 }
 
 static void test_uptime_keeps_the_rest_of_each_second(void) {

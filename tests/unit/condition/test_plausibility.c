@@ -1,13 +1,13 @@
 /* A sensor that reads apart from the others at rest is known from the first frame on, and no press
  * changes that. */
-#include "condition/rest.h"
+#include "condition/plausibility.h"
 #include "unity.h"
 
 #include <string.h>
 
 enum { SENSORS = 15, ALL = (1 << SENSORS) - 1, ODD = 4 };
 
-static struct rest rest;
+static struct plausibility plausibility;
 static struct frame frame;
 static struct conditioned conditioned;
 
@@ -19,11 +19,11 @@ static void read_all(int32_t pressure_Pa) {
 
 static void next_frame(uint64_t later_us) {
   frame.t_us += later_us;
-  rest_follow(&rest, &frame, &conditioned);
+  plausibility_follow(&plausibility, &frame, &conditioned);
 }
 
 void setUp(void) {
-  rest = (struct rest){.apart_Pa = 1000};
+  plausibility = (struct plausibility){.apart_Pa = 1000};
   memset(&conditioned, 0, sizeof conditioned);
   frame = (struct frame){.t_us = 1000, .sensor_count = SENSORS, .valid = ALL};
   conditioned.usable = ALL;
@@ -34,16 +34,16 @@ void tearDown(void) {}
 
 static void test_sensors_that_agree_are_not_apart(void) {
   next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(0, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
 }
 
 static void test_one_apart_is_known_from_the_first_frame_on(void) {
   frame.pressure_Pa_q10[ODD] += 1200 * 1024;
   next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
   frame.pressure_Pa_q10[ODD] -= 2400 * 1024;
   next_frame(2000000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
 static void test_moulded_sensors_that_differ_by_kilopascals_are_not_apart(void) {
@@ -52,10 +52,10 @@ static void test_moulded_sensors_that_differ_by_kilopascals_are_not_apart(void) 
   }
   frame.pressure_Pa_q10[ODD] += 10700 * 1024;
   next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(0, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
   frame.pressure_Pa_q10[ODD] += 10000 * 1024;
   next_frame(2000000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
 static void test_a_press_changes_nothing(void) {
@@ -67,7 +67,7 @@ static void test_a_press_changes_nothing(void) {
   frame.saturated = 1;
   conditioned.usable = ALL & ~1;
   next_frame(3000000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
 static void test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press(void) {
@@ -76,24 +76,24 @@ static void test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press(void)
   frame.saturated = 1;
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
   next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
 static void test_comparisons_are_rare_unless_others_are_used(void) {
   next_frame(0);
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
   next_frame(1000);
-  TEST_ASSERT_EQUAL_HEX32(0, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
   conditioned.usable = ALL & ~1;
   next_frame(1000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
 static void test_few_sensors_cannot_tell(void) {
   conditioned.usable = 7 << ODD;
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
   next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(0, rest.apart);
+  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
 }
 
 int main(void) {

@@ -1,4 +1,4 @@
-#include "condition/steps.h"
+#include "condition/fixed.h"
 
 #include "port/divide.h"
 
@@ -18,10 +18,6 @@ int32_t part_of(int32_t value, int32_t share_q16) {
 
 int32_t share_in(int32_t ms, int32_t time_constant_ms) {
   return port_divide(ms << 16, time_constant_ms + ms);
-}
-
-int32_t faded(int32_t value, int32_t ms, int32_t time_constant_ms) {
-  return value - part_of(value, share_in(ms, time_constant_ms));
 }
 
 int32_t in_step(int32_t each_second, int32_t ms) {

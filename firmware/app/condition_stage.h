@@ -1,0 +1,30 @@
+/* Stage: pressure above the zero, and whether anything touches (condition/condition.h).
+ * Reads findings.frame. Writes findings.conditioned. Asks the scan for a temperature where one may explain a reading.
+ */
+#ifndef APP_CONDITION_STAGE_H
+#define APP_CONDITION_STAGE_H
+
+#include "app/findings.h"
+#include "common/calibration.h"
+#include "scan/scan.h"
+#include "wire/packet.h"
+
+struct condition_stage {
+  struct condition condition;
+  struct condition_gains gains; /* of the calibration in use */
+  bool has_gains;
+  bool below; /* in the last frame a sensor was below its zero */
+};
+
+void condition_stage_process(struct condition_stage *own, struct findings *found);
+
+/* After the frame's packets. */
+void condition_stage_follow(struct condition_stage *own, const struct findings *found, struct scan *scan);
+
+/* Fills in a raw packet. */
+void condition_stage_put(const struct condition_stage *own, const struct findings *found, struct wire_raw *packet);
+
+/* The gains of this calibration are in use from the next frame on; NULL: all sensors are alike. */
+void condition_stage_use_calibration(struct condition_stage *own, const struct calibration *calibration);
+
+#endif

@@ -1,0 +1,21 @@
+#include "condition/plausibility.h"
+
+#include "common/apart.h"
+
+#define INTERVAL_us 2000000u /* between two comparisons */
+
+bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame,
+                          const struct conditioned *conditioned) {
+  const uint32_t usable = conditioned->usable;
+  if (usable == plausibility->compared && frame->t_us < plausibility->next_us) {
+    return false;
+  }
+  int32_t pressure_Pa[FT_MAX_SENSORS];
+  for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    pressure_Pa[k] = frame->pressure_Pa_q10[k] / 1024;
+  }
+  plausibility->apart = apart_find(pressure_Pa, usable, frame->sensor_count, plausibility->apart_Pa);
+  plausibility->compared = usable;
+  plausibility->next_us = frame->t_us + INTERVAL_us;
+  return true;
+}
