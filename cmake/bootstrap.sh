@@ -18,7 +18,7 @@ part_runs() {
 }
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|docs|report [all|PART [FOLDER]]|fuzz HOURS|soak HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|docs|report [all|PART [FOLDER]]|fuzz HOURS" >&2
   echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  docs    build the documents as a site with search, into build/docs/site, and check their links" >&2
@@ -29,14 +29,13 @@ usage() {
   echo "  report all    the same with every pad and grasp; some hours" >&2
   echo "  report PART [FOLDER]  build everything and measure one part whole: $(echo $(parts)); real needs the FOLDER of its recordings" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
-  echo "  soak    build everything and let faults storm on the firmware for so many hours, natively and emulated; findings in build/soak/findings" >&2
   exit 2
 }
 case $# in
   1) case $1 in demo | web | docs | test | report) ;; *) usage ;; esac ;;
   2) case "$1 $2" in
        "test quick" | "test host" | "test emulated" | "test accuracy" | "test realtime" | "test browser" | "test linux" | "test nightly") ;;
-       "report all" | fuzz\ * | soak\ *) ;;
+       "report all" | fuzz\ *) ;;
        report\ *) part_runs "$2" without || usage ;;
        *) usage ;;
      esac ;;
@@ -82,7 +81,7 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/serial/__init__.py python3-serial
 LIST
-  case $1 in quick | test | report | fuzz | soak) cat << 'LIST' ;; esac
+  case $1 in quick | test | report | fuzz) cat << 'LIST' ;; esac
 xz xz-utils
 qemu-system-arm qemu-system-arm
 qemu-system-x86_64 qemu-system-x86
@@ -243,10 +242,6 @@ case $job in
     configure host -DBUILD_TESTING=ON
     cmake --build --preset host --target quick_tests
     ;;
-  soak)
-    configure host -DBUILD_TESTING=ON
-    cmake --build --preset host
-    ;;
   *)
     configure host -DBUILD_TESTING=ON -DFINGERTIP_FUZZ=ON -DFINGERTIP_WEB=ON
     cmake --build --preset host
@@ -270,6 +265,5 @@ case $1 in
     # One more than there are processors: tests in real time wait most of theirs.
     exec ctest --preset host -j "$(($(nproc) + 1))" ${2:+-L "^$2\$"}
     ;;
-  soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
   report) exec /usr/bin/python3 host_tools/report/shared/parts.py "${2:-report}" ${folder:+"$folder"} ;;
 esac

@@ -155,7 +155,6 @@ class Bootstrap(Folder):
             (("test", "quick"), False),
             (("report",), True),
             (("fuzz", "1"), True),
-            (("soak", "1"), False),
         ):
             with self.subTest(job):
                 done = self.up_to_npm(job=job, path=path)

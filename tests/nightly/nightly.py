@@ -22,7 +22,9 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / folder) for folder in ("host_tools/report/shared", "host_tools/python", "tests/support", "tests/web", "tests/checks")]
+sys.path[:0] = [
+    str(ROOT / folder) for folder in ("host_tools/report/shared", "host_tools/python", "tests/support", "tests/web", "tests/checks")
+]
 from fingertip.files import InputError  # noqa: E402
 from goals import judge, print_goals  # noqa: E402
 
@@ -80,7 +82,9 @@ class Programs(contextlib.ExitStack):
         super().__init__()
         self.build = build
         self.folder = pathlib.Path(self.enter_context(tempfile.TemporaryDirectory(prefix="fingertip-")))
-        self.environment = {name: value for name, value in os.environ.items() if name != "FINGERTIP_PORT"} | {"XDG_RUNTIME_DIR": str(self.folder)}
+        self.environment = {name: value for name, value in os.environ.items() if name != "FINGERTIP_PORT"} | {
+            "XDG_RUNTIME_DIR": str(self.folder)
+        }
         self.enter_context(contextlib.ExitStack()).callback(os.environ.pop, "XDG_RUNTIME_DIR", None)
         os.environ["XDG_RUNTIME_DIR"] = str(self.folder)  # for the package in this process
 

@@ -33,12 +33,7 @@ def read_here(port, seconds):
             "fps": taken / wall_s,
             "core_percent": 100 * cpu_s / wall_s,
             "us_per_packet": 1e6 * cpu_s / (2 * taken),
-            "lost": missing
-            + line.dropped_packets
-            + line.crc_errors
-            + line.format_errors
-            + line.out_of_order
-            + fingertip.overrun_frames,
+            "lost": missing + line.dropped_packets + line.crc_errors + line.format_errors + line.out_of_order + fingertip.overrun_frames,
             "clock_us": fingertip.clock.uncertainty_us,
         }
 

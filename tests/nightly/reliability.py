@@ -117,8 +117,7 @@ def power_cuts(build):
     """The release images, their power cut every STEP_us of each kind of flash write and of each kind of start."""
 
     def one(board, kind):
-        words = ("--image", image_of(build.parent, board), "--board", board, "--step-us", STEP_us, "--kinds", kind)
-        return json.loads(run("node", EMULATED / "power_cuts.mjs", *words, *tools_of(build)))[kind]
+        return json.loads(run("node", EMULATED / "test_power_cuts.mjs", build.parent, *tools_of(build), board, kind, STEP_us))
 
     found = in_parallel({(board, kind): functools.partial(one, board, kind) for board in BOARDS for kind in CUTS})
     rows = [{"board": board, "cut": kind, **row} for (board, kind), row in found.items()]

@@ -5,19 +5,19 @@
 #include <cstdarg>
 #include <cstdio>
 
-namespace soak {
+namespace storm {
 namespace {
 
 constexpr std::uint32_t WARNINGS = 0x7FF00;
-// More are counted, but not told.
-constexpr std::size_t TOLD = 10;
+// More are not kept.
+constexpr std::size_t KEPT = 10;
 // The line and its queue take less, where the host reads.
 constexpr std::uint64_t ANSWER_LIMIT_us = 2500000;
 // A weaker touch is little more than noise. One of less than such a part of what was pressed in the
 // last minute the gate may take for a zero that has moved, and say that nothing touches
 // (condition.h).
-constexpr double FELT_Pa = 600, FELT_SHARE = 0.25;
-constexpr std::uint64_t FELT_FOR_us = 100000, MEMORY_us = 60000000;
+constexpr double SENSED_Pa = 600, SENSED_SHARE = 0.25;
+constexpr std::uint64_t SENSED_FOR_us = 100000, MEMORY_us = 60000000;
 // A contact may close that late.
 constexpr std::uint64_t RELEASED_FOR_us = 300000;
 constexpr double UPTIME_LAG_s = 2.5;
@@ -35,10 +35,6 @@ template <typename T> unsigned long long number(T value) {
   return static_cast<unsigned long long>(value);
 }
 
-double seconds(std::uint64_t t_us) {
-  return 1e-6 * static_cast<double>(t_us);
-}
-
 bool is_frame(const wire_packet &packet) {
   return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
 }
@@ -46,24 +42,8 @@ bool is_frame(const wire_packet &packet) {
 } // namespace
 
 void Judge::find(const std::string &kind, std::uint64_t t_us, const std::string &what) {
-  std::uint64_t *count = kind == "time"      ? &figures_.time
-                         : kind == "loss"    ? &figures_.loss
-                         : kind == "damaged" ? &figures_.damaged
-                         : kind == "answer"  ? &figures_.answer
-                         : kind == "wrong"   ? &figures_.wrong
-                                             : nullptr;
-  if (count) {
-    ++*count;
-  }
-  if (findings_.size() < TOLD) {
+  if (findings_.size() < KEPT) {
     findings_.push_back({kind, t_us, what + "; " + scene_});
-  }
-}
-
-void Judge::set_scene(const std::string &scene) {
-  scene_ = scene;
-  if (show_to_us_ > 0) {
-    std::fprintf(stderr, "%s\n", scene.c_str());
   }
 }
 
@@ -141,7 +121,6 @@ void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t 
 
 void Judge::count_sequence(std::uint64_t t_us, const wire_packet &packet) {
   const std::uint16_t gap = sequence_ ? static_cast<std::uint16_t>(packet.sequence - *sequence_ - 1) : 0;
-  figures_.wraps += sequence_ && packet.sequence < *sequence_ && gap < 0x8000;
   sequence_ = packet.sequence;
   session_missing_ += gap;
   figures_.missing += gap;
@@ -201,14 +180,14 @@ void Judge::packet(std::uint64_t t_us, const wire_packet &packet) {
 
 bool Judge::is_firm(std::uint64_t t_us) const {
   const double peak_Pa = world_.at(t_us).peak_Pa;
-  if (peak_Pa < FELT_Pa) {
+  if (peak_Pa < SENSED_Pa) {
     return false;
   }
   double strongest_Pa = 0;
   for (std::uint64_t back_us = 0; back_us <= std::min(t_us, MEMORY_us); back_us += 50000) {
     strongest_Pa = std::max(strongest_Pa, world_.at(t_us - back_us).peak_Pa);
   }
-  return peak_Pa > FELT_SHARE * strongest_Pa;
+  return peak_Pa > SENSED_SHARE * strongest_Pa;
 }
 
 void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
@@ -240,22 +219,13 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     find("answer", t_us, text("stages of frame %u add up to %u us, not %u", contact.frame, sum, s.total_us));
   }
   const std::uint32_t flags = contact.flags;
-  figures_.loads += (flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
   figures_.late += (flags & CONTACT_FLAG_TANGENTIAL_LATE) != 0;
   if (flags & CONTACT_FLAG_HELD) {
     return; // it repeats the frame before
   }
 
-  const std::uint64_t felt_us = bench_us(packet.t_us);
-  const Row truth = world_.at(felt_us);
-  if (shows(t_us)) {
-    std::fprintf(stderr,
-                 "%.4f s contact %u of %.4f s, %05x: %.2f %.2f mm %.3f N, sd %.2f mm; truth %.2f "
-                 "%.2f mm %.3f N, %.0f Pa\n",
-                 seconds(t_us), contact.frame, seconds(felt_us), flags, static_cast<double>(contact.x_mm),
-                 static_cast<double>(contact.y_mm), static_cast<double>(contact.force_N),
-                 static_cast<double>(contact.location_sd_mm), truth.x_mm, truth.y_mm, truth.force_N(), truth.peak_Pa);
-  }
+  const std::uint64_t measured_us = bench_us(packet.t_us);
+  const Row truth = world_.at(measured_us);
   const bool good =
       (flags & CONTACT_FLAG_TARED) && !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
   if (good && good_in_a_row_++ == 0) {
@@ -274,25 +244,22 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     const double error_N = std::fabs(static_cast<double>(contact.force_N) - force_N);
     const double share = std::max(0.0, error_N - FORCE_BOUND_N) / std::max(force_N, 1e-9);
     const bool touched =
-        truth.peak_Pa > 0 || felt_us < RELEASED_FOR_us || world_.at(felt_us - RELEASED_FOR_us).peak_Pa > 0;
+        truth.peak_Pa > 0 || measured_us < RELEASED_FOR_us || world_.at(measured_us - RELEASED_FOR_us).peak_Pa > 0;
     if (!touched) {
       wrong(t_us,
             text("frame %u says %.2f N where nothing touches", contact.frame, static_cast<double>(contact.force_N)));
-    } else if (truth.peak_Pa >= FELT_Pa) {
+    } else if (truth.peak_Pa >= SENSED_Pa) {
       const double allowed_mm = allowed_sds_ * static_cast<double>(contact.location_sd_mm);
       if (error_mm > std::max(LOCATION_BOUND_mm, allowed_mm) || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
                          "mm, sensors %04x, sd %.2f mm",
                          contact.frame, flags, error_mm, static_cast<double>(contact.force_N), force_N, truth.x_mm,
                          truth.y_mm, contact.sensors_used, static_cast<double>(contact.location_sd_mm)));
-      } else {
-        figures_.worst_mm = std::max(figures_.worst_mm, error_mm);
-        figures_.worst_force = std::max(figures_.worst_force, share);
       }
     }
   } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
     figures_.at_rest++;
-    if (felt_us >= FELT_FOR_us && is_firm(felt_us - FELT_FOR_us) && is_firm(felt_us)) {
+    if (measured_us >= SENSED_FOR_us && is_firm(measured_us - SENSED_FOR_us) && is_firm(measured_us)) {
       wrong(t_us, text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa", contact.frame,
                        flags, truth.peak_Pa));
     }
@@ -306,16 +273,7 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
   }
   raw_frame_ = raw.frame;
   raw_us_ = packet.t_us;
-  const std::uint64_t felt_us = bench_us(packet.t_us);
-  if (shows(t_us)) {
-    std::fprintf(stderr, "%.4f s raw %u of %.4f s, valid %04x doubtful %04x, Pa off / zero off:", seconds(t_us),
-                 raw.frame, seconds(felt_us), raw.valid, raw.doubtful);
-    for (unsigned k = 0; k < SENSORS; k++) {
-      std::fprintf(stderr, " %.0f/%.0f", raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us),
-                   raw.baseline_Pa_q10[k] / 1024.0 - world_.ambient_Pa(k));
-    }
-    std::fputc('\n', stderr);
-  }
+  const std::uint64_t measured_us = bench_us(packet.t_us);
   const bool warned = (raw.flags & WARNINGS) || !(raw.flags & CONTACT_FLAG_TARED);
   const std::uint32_t trusted = warned ? 0 : raw.valid & ~raw.saturated & ~raw.doubtful;
   for (unsigned k = 0; k < SENSORS; k++) {
@@ -323,13 +281,11 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
       continue;
     }
     figures_.readings++;
-    const double off_Pa = std::fabs(raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us));
+    const double off_Pa = std::fabs(raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, measured_us));
     if (off_Pa > READING_BOUND_Pa && t_us < readings_excused_until_us_) {
       figures_.excused++;
     } else if (off_Pa > READING_BOUND_Pa) {
       wrong(t_us, text("frame %u: sensor %u is off by %.0f Pa, flags %05x", raw.frame, k, off_Pa, raw.flags));
-    } else {
-      figures_.worst_Pa = std::max(figures_.worst_Pa, off_Pa);
     }
   }
 }
@@ -405,7 +361,6 @@ void Judge::judge_ack(std::uint64_t t_us, const wire_packet &packet) {
     return;
   }
   asked_.erase(question);
-  figures_.answered++;
 }
 
-} // namespace soak
+} // namespace storm

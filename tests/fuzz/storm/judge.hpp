@@ -29,7 +29,7 @@
 #include <string>
 #include <vector>
 
-namespace soak {
+namespace storm {
 
 constexpr double LOCATION_BOUND_mm = 1.2;
 constexpr double FORCE_BOUND_N = 0.1, FORCE_BOUND_SHARE = 0.15;
@@ -46,17 +46,12 @@ struct Finding {
 struct Figures {
   std::uint64_t frames = 0;   // contact packets
   std::uint64_t unwarned = 0; // of them, with a fit and without a warning
-  std::uint64_t at_rest = 0;  // and those that say without a warning that nothing touches
+  std::uint64_t at_rest = 0;  // and those that state without a warning that nothing touches
   std::uint64_t readings = 0; // valid and not doubtful, of tared frames without a warning
   std::uint64_t missing = 0;  // packets
   std::uint64_t skipped = 0;  // frames
-  std::uint64_t loads = 0;    // frames with a tangential load
-  std::uint64_t late = 0;     // and those that say that theirs was late
-  std::uint64_t wraps = 0;    // of the sequence numbers
-  std::uint64_t answered = 0; // commands
-  std::uint64_t excused = 0;  // wrong frames and readings after what nothing can tell
-  std::uint64_t time = 0, loss = 0, damaged = 0, answer = 0, wrong = 0; // findings
-  double worst_mm = 0, worst_force = 0, worst_Pa = 0;                   // of the unwarned; force: share beyond the N
+  std::uint64_t late = 0;     // frames that state that their tangential force was late
+  std::uint64_t excused = 0;  // wrong frames and readings after what nothing can detect
 };
 
 class Judge {
@@ -89,14 +84,8 @@ public:
   std::uint64_t good_since_us() const { return good_since_us_; }
   std::uint64_t last_frame_us() const { return last_frame_heard_us_; }
 
-  // What happens: told with what is found.
-  void set_scene(const std::string &scene);
-  // Prints what comes within these times on standard error, with the truth.
-  void show(std::uint64_t from_us, std::uint64_t to_us) {
-    show_from_us_ = from_us;
-    show_to_us_ = to_us;
-  }
-
+  // What happens meanwhile: part of each finding.
+  void set_scene(const std::string &scene) { scene_ = scene; }
   void find(const std::string &kind, std::uint64_t t_us, const std::string &text);
   const std::vector<Finding> &findings() const { return findings_; }
   const Figures &figures() const { return figures_; }
@@ -123,7 +112,6 @@ private:
   void judge_raw(std::uint64_t t_us, const wire_packet &packet);
   void judge_health(std::uint64_t t_us, const wire_packet &packet);
   void judge_ack(std::uint64_t t_us, const wire_packet &packet);
-  bool shows(std::uint64_t t_us) const { return t_us >= show_from_us_ && t_us < show_to_us_; }
   void wrong(std::uint64_t t_us, const std::string &text);
   std::uint64_t bench_us(std::uint64_t device_us) const;
 
@@ -148,11 +136,10 @@ private:
   std::optional<Counted> counted_;
   std::map<std::uint16_t, Question> asked_;
 
-  std::uint64_t show_from_us_ = 0, show_to_us_ = 0;
   double allowed_sds_ = 0;
   std::uint64_t excused_until_us_ = 0, readings_excused_until_us_ = 0;
   unsigned good_in_a_row_ = 0;
   std::uint64_t good_since_us_ = 0, last_frame_heard_us_ = 0;
 };
 
-} // namespace soak
+} // namespace storm

@@ -21,22 +21,22 @@ static uint64_t bus_next_us(const void *context) {
   return sim_array_next_event_us(context);
 }
 
-struct sim_array *soak_firmware_array(void) {
+struct sim_array *storm_firmware_array(void) {
   return &array;
 }
 
-void soak_firmware_power_sensors(uint64_t seed) {
+void storm_firmware_power_sensors(uint64_t seed) {
   sim_array_init(&array, geometry.sensor_count, seed);
   sim_array_vary_parts(&array, 0.03);
 }
 
-void soak_firmware_cut_sensors(void) {
+void storm_firmware_cut_sensors(void) {
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     sim_ms5840_power_cycle(&array.sensor[k]);
   }
 }
 
-void soak_firmware_start(uint64_t elapsed_us, uint64_t clock_us) {
+void storm_firmware_start(uint64_t elapsed_us, uint64_t clock_us) {
   sim_array_restart_bus(&array, elapsed_us);
   while (port_flash_poll()) { /* a flash goes on while the chip is in reset */
   }
@@ -48,6 +48,6 @@ void soak_firmware_start(uint64_t elapsed_us, uint64_t clock_us) {
   app_start(&app, sim_array_bus(&array));
 }
 
-enum native_end soak_firmware_run_until(uint64_t t_us) {
+enum native_end storm_firmware_run_until(uint64_t t_us) {
   return native_run_until(t_us, main_round, &app);
 }

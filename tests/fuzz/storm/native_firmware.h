@@ -1,6 +1,6 @@
 /* The firmware on boards/native, for C++, which its headers are not written for. */
-#ifndef SOAK_NATIVE_FIRMWARE_H
-#define SOAK_NATIVE_FIRMWARE_H
+#ifndef STORM_NATIVE_FIRMWARE_H
+#define STORM_NATIVE_FIRMWARE_H
 
 #include "native/native_port.h"
 #include "native/sim_array.h"
@@ -11,20 +11,20 @@
 extern "C" {
 #endif
 
-struct sim_array *soak_firmware_array(void);
+struct sim_array *storm_firmware_array(void);
 
 /* New sensors, each with a calibration of its own. */
-void soak_firmware_power_sensors(uint64_t seed);
+void storm_firmware_power_sensors(uint64_t seed);
 
 /* Their supply fails and comes back. */
-void soak_firmware_cut_sensors(void);
+void storm_firmware_cut_sensors(void);
 
 /* The chip starts, its clock at clock_us, so long after its last start; flash and sensors are as
  * they are. */
-void soak_firmware_start(uint64_t elapsed_us, uint64_t clock_us);
+void storm_firmware_start(uint64_t elapsed_us, uint64_t clock_us);
 
 /* Device time. */
-enum native_end soak_firmware_run_until(uint64_t t_us);
+enum native_end storm_firmware_run_until(uint64_t t_us);
 
 #ifdef __cplusplus
 }

@@ -11,30 +11,30 @@ extern "C" {
 
 #include <algorithm>
 
-namespace soak {
+namespace storm {
 namespace {
 
 // What waits for the device goes on in pieces of its queue.
 constexpr std::uint64_t PIECE_us = 1000;
 
 const std::vector<Target> FAULTS = {
-    {"sensor_nack", SENSORS, 0, 0},
-    {"nacks", 0, 100000, 3000000},
-    {"sensor_dead", SENSORS, 20000, 3000000},
-    {"sensor_missing", SENSORS, 20000, 3000000},
-    {"bus_timeout", 0, 0, 0},
-    {"sda_stuck", 0, 0, 0},
-    {"adc_zero", 0, 0, 0},
-    {"adc_ones", 0, 0, 0},
-    {"inverted_bits", 0, 0, 0},
-    {"sensor_power_cycle", SENSORS, 0, 0},
-    {"sensor_brown_out", SENSORS, 0, 0},
-    {"d2_corrupt", 0, 500000, 4000000},
-    {"host_stall", 0, 20000, 4000000},
-    {"port_closed", 0, 20000, 1000000},
-    {"suspend", 0, 10000, 3000000},
-    {"power_cut", 0, 3000, 500000},
-    {"chip_reset", 0, 3000, 100000},
+    {"sensor_nack", 0, 0},
+    {"nacks", 100000, 3000000},
+    {"sensor_dead", 20000, 3000000},
+    {"sensor_missing", 20000, 3000000},
+    {"bus_timeout", 0, 0},
+    {"sda_stuck", 0, 0},
+    {"adc_zero", 0, 0},
+    {"adc_ones", 0, 0},
+    {"inverted_bits", 0, 0},
+    {"sensor_power_cycle", 0, 0},
+    {"sensor_brown_out", 0, 0},
+    {"d2_corrupt", 500000, 4000000},
+    {"host_stall", 20000, 4000000},
+    {"port_closed", 20000, 1000000},
+    {"suspend", 10000, 3000000},
+    {"power_cut", 3000, 500000},
+    {"chip_reset", 3000, 100000},
 };
 
 struct Bench {
@@ -55,8 +55,8 @@ double temperature_degC(void *, unsigned, std::uint64_t t_us) {
 NativePlant::NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us, bool has_line_each)
     : world_(world), random_{seed * 2 + 0xB0A2D} {
   native_flash_reset(seed);
-  soak_firmware_power_sensors(seed);
-  struct sim_array *array = soak_firmware_array();
+  storm_firmware_power_sensors(seed);
+  struct sim_array *array = storm_firmware_array();
   array->noise = 1;
   array->parallel = has_line_each;
   array->world = {nullptr, pressure_Pa, temperature_degC};
@@ -67,7 +67,7 @@ NativePlant::~NativePlant() {
   native_cdc_reset();
 }
 
-const std::vector<Target> &NativePlant::faults() const {
+const std::vector<Target> &NativePlant::faults() {
   return FAULTS;
 }
 
@@ -76,7 +76,7 @@ void NativePlant::start(std::uint64_t t_us, std::uint64_t clock_us, Judge *judge
   zero_us_ = t_us - clock_us;
   bench = {&world_, zero_us_};
   has_power_ = true;
-  soak_firmware_start(elapsed_us, clock_us);
+  storm_firmware_start(elapsed_us, clock_us);
   if (judge) {
     judge->begin_life(t_us);
   }
@@ -98,7 +98,7 @@ void NativePlant::write(const std::vector<std::uint8_t> &bytes) {
   to_send_.insert(to_send_.end(), bytes.begin(), bytes.end());
 }
 
-void NativePlant::look_at_port(std::uint64_t t_us, Judge &judge) {
+void NativePlant::update_port(std::uint64_t t_us, Judge &judge) {
   const bool open = has_power_ && closed_ == 0 && asleep_ == 0;
   if (open == open_) {
     return;
@@ -117,8 +117,8 @@ void NativePlant::look_at_port(std::uint64_t t_us, Judge &judge) {
 
 void NativePlant::act(const Change &change, Judge &judge) {
   const std::string &kind = change.fault.kind;
-  const auto sensor = static_cast<unsigned>(std::max(change.fault.target, 0));
-  struct sim_array *array = soak_firmware_array();
+  const unsigned sensor = change.fault.sensor;
+  struct sim_array *array = storm_firmware_array();
   const auto strike = [&](enum sim_fault_kind what, std::uint32_t count = 1, std::uint32_t mask = 0) {
     array->fault = {what, array->transfers + 1 + random_below(&random_, 2 * SENSORS), count, mask,
                     static_cast<std::uint8_t>(sensor)};
@@ -159,10 +159,10 @@ void NativePlant::act(const Change &change, Judge &judge) {
   } else if (kind == "power_cut" || kind == "chip_reset") {
     if (change.begins) {
       has_power_ = false;
-      look_at_port(change.t_us, judge);
+      update_port(change.t_us, judge);
       if (kind == "power_cut") {
         native_flash_power_up(); // what was under way is cut short
-        soak_firmware_cut_sensors();
+        storm_firmware_cut_sensors();
       }
     } else {
       start(change.t_us, 0, &judge);
@@ -170,7 +170,7 @@ void NativePlant::act(const Change &change, Judge &judge) {
       native_cdc_stall(stalled_ > 0);
     }
   }
-  look_at_port(change.t_us, judge);
+  update_port(change.t_us, judge);
 }
 
 void NativePlant::listen(std::uint64_t t_us, Judge &judge) {
@@ -184,7 +184,7 @@ void NativePlant::run_firmware(std::uint64_t t_us) {
   if (!has_power_ || t_us <= now_us_) {
     return;
   }
-  switch (soak_firmware_run_until(t_us - zero_us_)) {
+  switch (storm_firmware_run_until(t_us - zero_us_)) {
   case NATIVE_PANIC:
     ended_ = "panic";
     break;
@@ -199,7 +199,7 @@ void NativePlant::run_firmware(std::uint64_t t_us) {
 }
 
 void NativePlant::run_to(std::uint64_t t_us, Judge &judge) {
-  look_at_port(now_us_, judge);
+  update_port(now_us_, judge);
   while (now_us_ < t_us && ended_.empty()) {
     while (open_ && !to_send_.empty()) {
       const std::size_t count = std::min<std::size_t>(to_send_.size(), 64);
@@ -223,4 +223,4 @@ void NativePlant::run_to(std::uint64_t t_us, Judge &judge) {
   }
 }
 
-} // namespace soak
+} // namespace storm

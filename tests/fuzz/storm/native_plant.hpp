@@ -1,33 +1,52 @@
-// The firmware on boards/native, in this process: one at a time.
+// The firmware on boards/native, in this process: one at a time. Times are of the bench, us.
 //
 // Nothing takes time there but bus and conversions. Its faults: those of sim_array.h, and
 //   sensor_dead, sensor_missing   acknowledges nothing for a while; the other one without power
 //   nacks                         one read in fifty is not acknowledged
 //   d2_corrupt                    one temperature in five has a wrong bit
-//   inverted_bits                 bits of a transfer are inverted; what a conversion found has no
-//                                 check, so a wrong frame that follows is excused, and counted
+//   inverted_bits                 bits of a transfer are inverted; the result of a conversion has
+//                                 no check, so a wrong frame that follows is excused, and counted
 #pragma once
 
-#include "plant.hpp"
+#include "judge.hpp"
+#include "world.hpp"
 
-namespace soak {
+#include <cstdint>
+#include <string>
+#include <vector>
 
-class NativePlant : public Plant {
+namespace storm {
+
+struct Fault {
+  std::string kind;
+  unsigned sensor = 0;
+  std::uint64_t from_us = 0, to_us = 0;
+};
+
+struct Target {
+  const char *kind;
+  std::uint64_t least_us, most_us; // its duration; most_us 0: it is over at once
+};
+
+class NativePlant {
 public:
   // The chip's clock shows clock_us at the first start, and 0 at later ones. has_line_each: a data
   // line for each sensor, as pico_parallel has, instead of multiplexers.
   NativePlant(const World &world, std::uint64_t seed, std::uint64_t clock_us = 0, bool has_line_each = false);
-  ~NativePlant() override;
+  ~NativePlant();
   NativePlant(const NativePlant &) = delete;
   NativePlant &operator=(const NativePlant &) = delete;
 
-  const std::vector<Target> &faults() const override;
-  void schedule(const Fault &fault) override;
-  void run_to(std::uint64_t t_us, Judge &judge) override;
-  bool port_is_open() const override { return open_; }
-  void write(const std::vector<std::uint8_t> &bytes) override;
-  std::uint64_t unasked_starts() const override { return 0; }
-  std::string ended() const override { return ended_; }
+  static const std::vector<Target> &faults();
+  // From now on or later.
+  void schedule(const Fault &fault);
+  // Runs the bench, whose world must extend further than that, and passes to the judge what comes.
+  void run_to(std::uint64_t t_us, Judge &judge);
+  bool port_is_open() const { return open_; }
+  // Only while the port is open.
+  void write(const std::vector<std::uint8_t> &bytes);
+  // Why it runs no more, if so.
+  const std::string &ended() const { return ended_; }
 
 private:
   struct Change {
@@ -39,7 +58,7 @@ private:
   void run_firmware(std::uint64_t t_us);
   void act(const Change &change, Judge &judge);
   void listen(std::uint64_t t_us, Judge &judge);
-  void look_at_port(std::uint64_t t_us, Judge &judge);
+  void update_port(std::uint64_t t_us, Judge &judge);
 
   const World &world_;
   struct random random_;
@@ -51,4 +70,4 @@ private:
   std::string ended_;
 };
 
-} // namespace soak
+} // namespace storm

@@ -1,58 +1,57 @@
 #include "storm.hpp"
 
 #include "libfingertip/command.hpp"
-#include "pad/profile.hpp"
+#include "support/pad.h"
 
 #include <algorithm>
 #include <cstdio>
 
-namespace soak {
+namespace storm {
 namespace {
 
-// A fault begins after what is told of the world, so that a hand can be off the pad in time.
+// A fault begins after the part of the world that is fixed already, so that a hand can be off the pad in time.
 constexpr std::uint64_t LEAD_us = AHEAD_us + 2 * STEP_us;
 // The zero is taken at the start: nothing may touch then.
 constexpr std::uint64_t STARTS_WITHIN_us = 3000000;
-// A host that hears nothing asks again.
+// A host that receives nothing asks again.
 constexpr std::uint64_t ASK_AGAIN_us = 200000;
 constexpr std::uint64_t FIRST_ASK_us = 10000;
-// Of a steady one. The first frames come after the tare.
-constexpr double PAD_mm = 12;
+// Of a steady run. The first frames come after the tare.
 constexpr std::uint64_t FRAMES_FROM_us = 2000000, FRAME_WITHIN_us = 100000;
 
-// So long a wrong frame may follow inverted bits: until the next temperature but one.
+// A wrong frame may follow inverted bits until the next temperature but one.
 constexpr std::uint64_t EXCUSED_us = 5000000;
+// At a time.
+constexpr unsigned MOST_FAULTS = 5;
 
 bool inverts_bits(const std::string &kind) {
-  return kind == "inverted_bits" || kind == "d2_corrupt" || kind == "sensor_d2_corrupt";
+  return kind == "inverted_bits" || kind == "d2_corrupt";
 }
 
 bool takes_power(const std::string &kind) {
-  return kind == "power_cut" || kind == "chip_reset" || kind.rfind("start_", 0) == 0;
+  return kind == "power_cut" || kind == "chip_reset";
 }
 
-// What is done to the line; every bench has it.
+// What is done to the line.
 constexpr Target ON_THE_LINE[] = {
-    {"command_flood", 0, 100000, 1500000},
-    {"garbage", 0, 50000, 800000},
-    {"store_writes", 0, 100000, 1500000},
+    {"command_flood", 100000, 1500000},
+    {"garbage", 50000, 800000},
+    {"store_writes", 100000, 1500000},
 };
-constexpr const char *STORE_CUT = "store_cut";
 
 } // namespace
 
-Storm::Storm(Plant &plant, World &world, Judge &judge, std::uint64_t seed)
-    : plant_(plant), world_(world), judge_(judge), random_{seed * 2 + 0x5EED} {
+Storm::Storm(NativePlant &plant, World &world, Judge &judge, std::uint64_t seed, fuzz_input input)
+    : plant_(plant), world_(world), judge_(judge), input_(input), random_{seed * 2 + 0x5EED} {
   for (int i = 0; i < 8; i++) {
     random_u64(&random_);
   }
-  kind_ = "start";
-  judge_.set_scene(kind_);
+  judge_.set_scene("start");
 }
 
-void Storm::hang(const std::string &why) {
-  hangs_++;
+bool Storm::find(const std::string &why) {
   judge_.find("hang", now_us_, why);
+  return false;
 }
 
 void Storm::write(wire_packet packet) {
@@ -117,7 +116,7 @@ void Storm::write_some_command() {
     return write(packet);
   default:
     if (!loses_power_ && world_.resting_since_us() != UINT64_MAX && now_us_ > world_.resting_since_us() + 1000000) {
-      world_.keep_off(world_.told_us() + STEP_us, std::max(world_.told_us(), ends_us_) + STARTS_WITHIN_us);
+      world_.keep_off(world_.fixed_us() + STEP_us, std::max(world_.fixed_us(), ends_us_) + STARTS_WITHIN_us);
       write(fingertip::command_tare());
     }
   }
@@ -147,20 +146,17 @@ void Storm::write_something_to_store() {
 void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   Fault fault;
   fault.kind = target.kind;
-  fault.target =
-      target.targets ? static_cast<int>(random_below(&random_, static_cast<std::uint32_t>(target.targets))) : -1;
+  fault.sensor = fuzz_u8(&input_) % SENSORS;
   fault.from_us = from_us;
   fault.to_us = from_us;
   if (target.most_us > 0) {
-    fault.to_us +=
-        target.least_us + random_below(&random_, static_cast<std::uint32_t>(target.most_us - target.least_us) + 1);
+    fault.to_us += target.least_us + (target.most_us - target.least_us) * fuzz_u8(&input_) / 255;
   }
   ends_us_ = std::max(ends_us_, fault.to_us);
-  char told[120];
-  std::snprintf(told, sizeof told, "%s%s%s %.3f to %.3f s", scene_.empty() ? "" : ", ", fault.kind.c_str(),
-                fault.target < 0 ? "" : (" " + std::to_string(fault.target)).c_str(),
-                1e-6 * static_cast<double>(fault.from_us), 1e-6 * static_cast<double>(fault.to_us));
-  scene_ += told;
+  char text[120];
+  std::snprintf(text, sizeof text, "%s%s %u %.3f to %.3f s", scene_.empty() ? "" : ", ", fault.kind.c_str(),
+                fault.sensor, 1e-6 * static_cast<double>(fault.from_us), 1e-6 * static_cast<double>(fault.to_us));
+  scene_ += text;
   if (fault.kind == "command_flood") {
     commands_until_us_ = fault.to_us;
   } else if (fault.kind == "garbage") {
@@ -182,41 +178,25 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   }
 }
 
+// Of the input: how many faults, their kinds, and when each begins.
 void Storm::begin_bout() {
-  struct random *r = &random_;
-  const std::vector<Target> &own = plant_.faults();
-  const std::uint32_t kinds = static_cast<std::uint32_t>(own.size() + std::size(ON_THE_LINE)) + 1; // and STORE_CUT
-  bouts_++;
+  const std::vector<Target> &own = NativePlant::faults();
+  const std::size_t kinds = own.size() + std::size(ON_THE_LINE);
   in_bout_ = true;
   loses_power_ = false;
   ends_us_ = now_us_;
   scene_.clear();
-  const std::uint64_t from_us = std::max(now_us_, world_.told_us()) + LEAD_us + random_below(r, 20000);
-  begins_us_ = from_us;
-  const bool several = random_below(r, 3) == 0;
-  const unsigned count = several ? 2 + random_below(r, 4) : 1;
-  for (unsigned i = 0; i < count; i++) {
-    const std::uint32_t kind = random_below(r, kinds);
-    const std::uint64_t later_us = several ? from_us + random_below(r, 300000) : from_us;
-    if (kind == kinds - 1) { // power is cut at some moment of the writing, or of its erase
-      kind_ = STORE_CUT;
-      if (!loses_power_) {
-        store_until_us_ = from_us + 200000;
-        add_fault({"power_cut", 0, 3000, 50000}, from_us + random_below(r, 150000));
-      }
-      continue;
-    }
+  begins_us_ = std::max(now_us_, world_.fixed_us()) + LEAD_us;
+  for (unsigned left = 1 + fuzz_u8(&input_) % MOST_FAULTS; left > 0 && fuzz_left(&input_) > 0; left--) {
+    const std::size_t kind = fuzz_u8(&input_) % kinds;
     const Target &target = kind < own.size() ? own[kind] : ON_THE_LINE[kind - own.size()];
-    if (takes_power(target.kind) && loses_power_) {
-      continue;
+    if (!takes_power(target.kind) || !loses_power_) {
+      add_fault(target, begins_us_ + 1200u * fuzz_u8(&input_));
     }
-    kind_ = target.kind;
-    add_fault(target, later_us);
   }
   if (loses_power_) { // a start may be held up by whatever else goes wrong, as by a suspend
     world_.keep_off(power_lost_us_, ends_us_ + STARTS_WITHIN_us);
   }
-  kind_ = several ? "several" : kind_;
   judge_.set_scene(scene_);
 }
 
@@ -224,10 +204,10 @@ void Storm::set_for_most_frames() {
   streams_ = WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
   write(fingertip::command_osr(256));
   write(fingertip::command_rate_mHz(0));
-  write(fingertip::command_pad(fingertip::pad::profile_over_own_sensors({PAD_mm})));
+  write(fingertip::command_pad(pad_of_12_mm()));
 }
 
-// What the host says.
+// What the host sends.
 void Storm::talk() {
   const bool open = plant_.port_is_open();
   if (open && !was_open_) {
@@ -264,53 +244,51 @@ void Storm::talk() {
   }
 }
 
-bool Storm::over() {
-  if (!plant_.ended().empty()) {
-    hang("it ended: " + plant_.ended());
-    return true;
-  }
-  if (plant_.unasked_starts() > unasked_starts_) {
-    unasked_starts_ = plant_.unasked_starts();
-    hang("it restarted by itself, in or after " + kind_);
-  }
-  if (steady_ && now_us_ > FRAMES_FROM_us && now_us_ > judge_.last_frame_us() + FRAME_WITHIN_us) {
-    hang("no frame for 0.1 s");
-    return true;
-  }
-  return false;
+// False: nothing comes any more.
+bool Storm::step() {
+  world_.extend_to(now_us_ + STEP_us);
+  talk();
+  plant_.run_to(now_us_ + STEP_us, judge_);
+  now_us_ += STEP_us;
+  return plant_.ended().empty() || find("it ended: " + plant_.ended());
 }
 
-void Storm::run_to(std::uint64_t end_us) {
-  while (now_us_ < end_us) {
-    world_.extend_to(now_us_ + STEP_us);
-    talk();
-    plant_.run_to(now_us_ + STEP_us, judge_);
-    now_us_ += STEP_us;
-    if (over()) {
+void Storm::run() {
+  constexpr std::uint64_t QUIET_us = 1000000;
+  while (now_us_ < FRAMES_FROM_us) {
+    if (!step()) {
       return;
     }
-    if (in_bout_) {
-      if (now_us_ >= ends_us_) {
-        in_bout_ = false;
-        recovers_ = true;
-        judge_.expect_recovery();
-      }
-    } else if (recovers_) {
-      if (judge_.has_recovered()) {
-        Recovery &recovery = recovery_[kind_];
-        const std::uint64_t since_us = std::max(judge_.good_since_us(), ends_us_);
-        recovery.bouts++;
-        recovery.worst_s = std::max(recovery.worst_s, 1e-6 * static_cast<double>(since_us - ends_us_));
-        recovers_ = false;
-        next_us_ = now_us_ + random_below(&random_, 1500000);
-      } else if (now_us_ > ends_us_ + RECOVERY_LIMIT_us) {
-        hang("no good frames within 20 s of " + kind_);
+  }
+  while (fuzz_left(&input_) > 0) {
+    begin_bout();
+    for (; in_bout_; in_bout_ = now_us_ < ends_us_) {
+      if (!step()) {
         return;
       }
-    } else if (!steady_ && now_us_ >= next_us_) {
-      begin_bout();
+    }
+    judge_.expect_recovery();
+    while (!judge_.has_recovered()) {
+      if (!step() || (now_us_ > ends_us_ + RECOVERY_LIMIT_us && !find("no good frames within 20 s"))) {
+        return;
+      }
+    }
+    for (const std::uint64_t end_us = now_us_ + QUIET_us; now_us_ < end_us;) {
+      if (!step()) {
+        return;
+      }
     }
   }
 }
 
-} // namespace soak
+void Storm::run_steady(std::uint64_t end_us) {
+  steady_ = true;
+  while (now_us_ < end_us && step()) {
+    if (now_us_ > FRAMES_FROM_us && now_us_ > judge_.last_frame_us() + FRAME_WITHIN_us) {
+      find("no frame for 0.1 s");
+      return;
+    }
+  }
+}
+
+} // namespace storm

@@ -8,7 +8,7 @@ extern "C" {
 #include <cmath>
 #include <stdexcept>
 
-namespace soak {
+namespace storm {
 namespace {
 
 constexpr double PI = 3.14159265358979;
@@ -93,18 +93,18 @@ void World::add_row(std::uint64_t t_us) {
 }
 
 void World::extend_to(std::uint64_t t_us) {
-  while (told_us() < t_us + AHEAD_us) {
-    add_row(told_us() + STEP_us);
+  while (fixed_us() < t_us + AHEAD_us) {
+    add_row(fixed_us() + STEP_us);
   }
-  while (told_us() - first_us_ > KEPT_us) {
+  while (fixed_us() - first_us_ > KEPT_us) {
     rows_.pop_front();
     first_us_ += STEP_us;
   }
 }
 
 void World::keep_off(std::uint64_t from_us, std::uint64_t to_us) {
-  if (from_us <= told_us()) {
-    throw std::logic_error("what is told stays");
+  if (from_us <= fixed_us()) {
+    throw std::logic_error("what is fixed stays");
   }
   off_from_us_ = from_us;
   off_to_us_ = to_us;
@@ -128,7 +128,7 @@ Row World::at(std::uint64_t t_us) const {
     return row;
   }
   const Row &next = rows_[p.row + 1];
-  if (row.p0_Pa == 0 || next.p0_Pa == 0) { // one of the two has no place: the other's holds
+  if (row.p0_Pa == 0 || next.p0_Pa == 0) { // one of the two has no location: the other's holds
     const Row &there = row.p0_Pa == 0 ? next : row;
     row.x_mm = there.x_mm;
     row.y_mm = there.y_mm;
@@ -158,4 +158,4 @@ double World::temperature_degC(std::uint64_t t_us) const {
   return p.share == 0 ? here : mix(here, rows_[p.row + 1].temperature_degC, p.share);
 }
 
-} // namespace soak
+} // namespace storm

@@ -1,8 +1,8 @@
-// What a soaked fingertip feels, and so the truth: touches with rests between, each a Gaussian of
-// pressure, which is what the firmware's fit takes a contact for. So an error of what it says comes
+// What the fingertip senses, and so the truth: touches with rests between, each a Gaussian of
+// pressure, which is what the firmware's fit takes a contact for. So an error of what it reports comes
 // from a fault, or from the noise.
 //
-// Times are of the bench, us since it began. Rows of one step each, linear between; told ahead,
+// Times are of the bench, us since it began. Rows of one step each, linear between; fixed ahead,
 // since a simulated conversion asks for its middle when it begins.
 #pragma once
 
@@ -14,7 +14,7 @@ extern "C" {
 #include <cstdint>
 #include <deque>
 
-namespace soak {
+namespace storm {
 
 constexpr unsigned SENSORS = 15;
 constexpr std::uint64_t STEP_us = 10000;
@@ -26,7 +26,7 @@ struct Row {
   std::array<double, SENSORS> pressure_Pa; // absolute
 
   double force_N() const;
-  double peak_Pa; // on the sensor that feels most, above ambient
+  double peak_Pa; // on the sensor with the most, above ambient
 };
 
 class World {
@@ -35,12 +35,12 @@ public:
 
   // Adds rows up to t_us + AHEAD_us.
   void extend_to(std::uint64_t t_us);
-  // Nothing touches from one time to the other; both later than what has been told.
+  // Nothing touches from one time to the other; both later than what is fixed.
   void keep_off(std::uint64_t from_us, std::uint64_t to_us);
 
-  std::uint64_t told_us() const { return first_us_ + (rows_.size() - 1) * STEP_us; }
+  std::uint64_t fixed_us() const { return first_us_ + (rows_.size() - 1) * STEP_us; }
   const Row &last() const { return rows_.back(); }
-  // Since when nothing has touched, of what is told; UINT64_MAX: something does.
+  // Since when nothing has touched, of what is fixed; UINT64_MAX: something does.
   std::uint64_t resting_since_us() const { return resting_since_us_; }
   Row at(std::uint64_t t_us) const; // of the last two minutes
   double pressure_Pa(unsigned sensor, std::uint64_t t_us) const;
@@ -69,4 +69,4 @@ private:
   } touch_{};
 };
 
-} // namespace soak
+} // namespace storm
