@@ -11,7 +11,7 @@ import unittest
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools/report/measure"))
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
 from measure import Measure, MeasureError, q10, stream_of, usable_of  # noqa: E402
 
 MEASURE = Measure(sys.argv.pop())
@@ -57,7 +57,7 @@ class Fit(unittest.TestCase):
     def test_what_is_wrong_is_refused_before_it_runs(self):
         readings, settings = q10(presses(4)[2]), MEASURE.settings()
         for values, words in (
-            (dict(pressure_Pa_q10=readings.astype(float)), "argument 5: an array of another type of item"),
+            (dict(pressure_Pa_q10=readings.astype(float)), "argument 6: an array of another type of item"),
             (dict(pressure_Pa_q10=readings[0]), "another number of dimensions"),
             (dict(pressure_Pa_q10=readings[:, :14].copy()), "another number of sensors"),
             (dict(pressure_Pa_q10=readings[:, ::-1]), "neither a number, a text nor an array in C order"),
@@ -71,8 +71,8 @@ class Fit(unittest.TestCase):
                 )
         fixed = MEASURE.made("fit_result", 4)
         fixed.flags.writeable = False
-        with self.assertRaisesRegex(MeasureError, "argument 7: an array that is written"):
-            MEASURE.call("fit", "fit", ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint32), fixed)
+        with self.assertRaisesRegex(MeasureError, "argument 8: an array that is written"):
+            MEASURE.call("fit", "fit", 2, ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint32), fixed, np.zeros(1))
         with self.assertRaisesRegex(MeasureError, "fit: another number of arguments"):
             MEASURE.call("fit", "fit")
         with self.assertRaisesRegex(MeasureError, "no such entry point"):

@@ -34,7 +34,7 @@ constexpr double P0_MIN = 0.05;
 constexpr double P0_MAX = 1e6;
 constexpr double SIGMA_MIN = 0.158;
 constexpr double SIGMA_MAX = 5.0;
-constexpr double PIVOT_FLOOR = 1e-15; // double tells no less
+constexpr double PIVOT_FLOOR = 1e-15; // the resolution of double
 
 double limited(double value, double low, double high) {
   return value > low ? std::min(value, high) : low;

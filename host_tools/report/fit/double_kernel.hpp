@@ -2,7 +2,7 @@
 // not judge itself: no flag but FIT_VALID.
 #pragma once
 
-#include "report/fit/kernels.hpp"
+#include "report/fit/compared.hpp"
 
 #include <array>
 

@@ -3,11 +3,11 @@
 
     fit.py --build build/host --boards build -o build/report
 
-Runs fit_report (error against the reference), on_chip/bench.mjs (cycles on the emulated chip), fit_bench (time on this
-host, paired), and fit_stiff, and merges what they find:
+Measures the error against the reference (errors.py), cycles on the emulated chip (on_chip/bench.mjs), time on this computer, paired, and presses
+that are hard, extreme, or none (stiff.py), and merges the results:
 
     fit.json        the figures by which the fit is judged, with their goals
-    fit_table.csv   every kernel and variant: cycles, milliseconds at 125 MHz, error; fit_table.md says the same
+    fit_table.csv   every kernel and variant: cycles, milliseconds at 125 MHz, error; fit_table.md has the same
     fit_report.png  the Pareto front
 
 Errors are distances of the location from the reference optimum over the observable presses of the sets A to D.
@@ -17,86 +17,56 @@ import csv
 import json
 import math
 import pathlib
-import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
-sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "python")]
+import errors  # noqa: E402
+import stiff  # noqa: E402
 from boards import TO_BUILD, fit_cycles_of  # noqa: E402
 from drawing import BLUE, FAINT, GOAL, INK, plt, save  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
-from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
+from measure import Measure  # noqa: E402
+from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 from tables import table_md  # noqa: E402
 
 CLOCK_Hz = 125e6
-SETS = ("A", "B", "C", "D")
+SETS = errors.SETS
 ALL_SETS = "".join(SETS)
-USUAL = "iterations=7"
-BUILT = "iterations=4"  # FINGERTIP_FIT_ITERATIONS
-MASKS = ("mask=random", "mask=peak", "mask=random2", "mask=random3")
+USUAL, BUILT = f"iterations={errors.USUAL_ITERATIONS}", f"iterations={errors.BUILT_ITERATIONS}"
+MASKS = tuple(f"mask={mask}" for mask in errors.MASKS[1:])
 BUILT_MASKS = tuple(f"{mask} {BUILT}" for mask in MASKS[:2])
 
 
 def measure(options, out):
     steps = Steps()
-    tools = pathlib.Path(options.build) / "host_tools/report/fit"
-
-    def logged(name, what, *command):
-        """Output goes to NAME.log beside the results; progress of the reference to the terminal."""
-        steps.say(what)
-        log = out / f"{name}.log"
-        with open(log, "w", encoding="utf-8") as file:
-            done = subprocess.run([str(part) for part in command], stdout=file)
-        if done.returncode != 0:
-            raise InputError(f"{what} failed, exit status {done.returncode}; see above and {log}")
-
-    for tool in ("fit_report", "fit_bench", "fit_stiff"):
-        if not (tools / tool).exists():
-            raise InputError(f"{tools / tool} is not there; build it: cmake --build --preset host")
     image = fit_cycles_of(options.boards)
     if not image.exists():
         raise InputError(f"{image} is not there; {TO_BUILD}")
-    common = ("--limit", options.limit, "--seed", options.seed, "--out", out, "--cache", out / "cache")
-    logged(
-        "fit_error",
-        "error against the reference (the first run solves the reference, about eight minutes on two cores)",
-        tools / "fit_report",
-        *common,
-    )
-    jobs = out / "fit_jobs.json"
-    logged("fit_jobs", "presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
-    logged(
-        "fit_cycles",
-        "cycles on the emulated chip",
+    measure = Measure(options.build)
+    bench = errors.Bench(measure, options.seed, options.limit, out / "cache")
+    steps.say("error against the reference (the first run solves the reference, about eight minutes on two cores)")
+    write_json(out / "fit_error.json", {"seed": options.seed, "presses": options.limit, "rows": errors.rows(bench)})
+    steps.say("cycles on the emulated chip")
+    write_json(out / "fit_jobs.json", errors.jobs(bench))
+    run(
         "node",
         HERE / "on_chip/bench.mjs",
         "--image",
         image,
         "--jobs",
-        jobs,
+        out / "fit_jobs.json",
         "--out",
         out / "fit_cycles.csv",
         "--budget",
         options.budget,
     )
-    logged(
-        "fit_bench",
-        "time on this host",
-        tools / "fit_bench",
-        "--limit",
-        max(1200, options.limit // 10),
-        "--passes",
-        options.passes,
-        "--seed",
-        options.seed,
-        "--out",
-        out,
-        "--cache",
-        out / "cache",
-    )
-    logged("stiff", "what is hard, extreme, or no press", tools / "fit_stiff", "--out", out, "--limit", max(200, options.limit // 15))
+    steps.say("time on this computer")
+    write_json(out / "fit_bench.json", errors.timed(bench, max(1200, options.limit // 10), options.passes))
+    steps.say("presses that are hard, extreme, or none")
+    write_json(out / "stiff.json", stiff.measure_cases(measure, max(200, options.limit // 15)))
     steps.say("table and picture")
 
 
@@ -118,7 +88,7 @@ class Results:
         self.stiff = read_json(out / "stiff.json")
 
     def error(self, kernel, variant, set_, key):
-        """null stands for infinite: too many presses without a fit."""
+        """null is infinite: too many presses without a fit."""
         row = self.rows.get((kernel, variant, set_, True))
         if row is None:
             return None
@@ -169,7 +139,7 @@ def figures(results):
     """fit.json. Shipped: with the iterations that the firmware makes; else with those that reach the optimum. Masked: one random sensor, or
     the peak sensor, is unusable for the reference too."""
     r = results
-    ours = r.bench["rows"][0]["kernel"]  # what fit_bench compares the others with
+    ours = errors.HOST_KERNEL
     libraries = ("ceres_reused", "tiny_solver", "cminpack")
     speed = {name: r.host[name]["ratio"] for name in libraries}
     found = {
@@ -278,8 +248,8 @@ def write_table_md(path, rows, found):
         f"more than 100 um away. At most {max(found['shipped_bad_unflagged_percent_per_set'].values()):.2g} % of a set's presses are then "
         "more than 1 mm from the truth without a warning.",
         "",
-        "The presses have no dip and the fit is not told of one: these figures say how near the arithmetic comes to the optimum of its own model. What a",
-        "dip and the fit that knows it do to the distance from the truth is in the parts `truth`, `validation` and, on real rubber, `real`.",
+        "The presses have no dip, and the fit has none set: these figures are the distance of the arithmetic from the optimum of its own model. The parts",
+        "`truth`, `validation` and, on real rubber, `real` have the effect of a dip, and of a fit that knows it, on the distance from the truth.",
         "",
         *goal_table_md(found),
     ]
@@ -349,7 +319,7 @@ def plot(path, results, found):
         "lm_float": "Levenberg-Marquardt, float",
         "lm_double": "Levenberg-Marquardt, double",
     }
-    # on the host: name, whether it stands left or right of the bar or else above the point, lifted by so many points
+    # on the host: name, its side of the bar or else above the point, lifted by points
     host_labels = {
         "fit": ("firmware, fixed point", "left", 0),
         "general": ("firmware, float32", "left", 0),

@@ -10,6 +10,7 @@
 #include <cminpack.h>
 #include <gsl/gsl_multifit_nlinear.h>
 #include <limits>
+#include <map>
 #include <memory>
 
 namespace fingertip::fitting {
@@ -41,9 +42,9 @@ void evaluate(const Samples &samples, const double *theta, double *residual, dou
   }
 }
 
-using Solve = void (*)(const Samples &samples, double theta[4]);
+using Minimise = void (*)(const Samples &samples, double theta[4]);
 
-template <Solve SOLVE>
+template <Minimise MINIMISE>
 KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
                   const KernelSettings &settings) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
@@ -53,7 +54,7 @@ KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, s
   }
   const Gaussian guess = first_guess(samples, settings.noise_Pa);
   double theta[4] = {guess.p0, guess.x, guess.y, guess.sigma};
-  SOLVE(samples, theta);
+  MINIMISE(samples, theta);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
   result.x_mm = theta[1] * pitch_mm;
   result.y_mm = theta[2] * pitch_mm;
@@ -217,14 +218,15 @@ void gsl(const Samples &samples, double theta[4]) {
 
 } // namespace
 
-const std::vector<Kernel> &library_kernels() {
-  static const std::vector<Kernel> kernels{
-      {"tiny_solver", 0, with<tiny_solver>},   {"tiny_tight", 0, with<tiny_tight>},
-      {"cminpack", 0, with<cminpack>},         {"gsl", 0, with<gsl>},
-      {"ceres_reused", 0, with<ceres_reused>}, {"ceres_new", 0, with<ceres_new>},
-      {"ceres_tight", 0, with<ceres_tight>},
+Solve library_named(const std::string &name) {
+  static const std::map<std::string, Solve> libraries{
+      {"tiny_solver", with<tiny_solver>}, {"tiny_tight", with<tiny_tight>},
+      {"cminpack", with<cminpack>},       {"gsl", with<gsl>},
+      {"ceres_new", with<ceres_new>},     {"ceres_reused", with<ceres_reused>},
+      {"ceres_tight", with<ceres_tight>},
   };
-  return kernels;
+  const auto found = libraries.find(name);
+  return found == libraries.end() ? nullptr : found->second;
 }
 
 } // namespace fingertip::fitting

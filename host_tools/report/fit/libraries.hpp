@@ -13,11 +13,13 @@
 // The fits use every sensor of a fully usable array and report no flags but FIT_VALID.
 #pragma once
 
-#include "report/fit/kernels.hpp"
+#include "report/fit/compared.hpp"
+
+#include <string>
 
 namespace fingertip::fitting {
 
-// Not for several threads at once: some keep their workspace.
-const std::vector<Kernel> &library_kernels();
+// By its name, or nullptr. Not for several threads at once: some keep their workspace.
+Solve library_named(const std::string &name);
 
 } // namespace fingertip::fitting

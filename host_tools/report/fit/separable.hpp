@@ -8,7 +8,7 @@
 // general kernel. It stops when it has settled: settings.iterations is the most it takes.
 #pragma once
 
-#include "report/fit/kernels.hpp"
+#include "report/fit/compared.hpp"
 
 namespace fingertip::fitting {
 

@@ -1,6 +1,7 @@
 // The firmware's fit on many presses, for the rectangle that this file is compiled for.
 #include "libfingertip/in_parallel.hpp"
 #include "report/measure/fit_arguments.hpp"
+#include "report/measure/stopwatch.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -74,18 +75,25 @@ static Kernel kernel_named(const std::string &name) {
   throw std::invalid_argument("no kernel has the name " + name);
 }
 
-// kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid).
-static void fit(std::string kernel, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10,
-                Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
+// kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid). us: of one fit, if a
+// single thread runs them.
+static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> arrays,
+                Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
+                Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
+                Batch<fit_result, 1> results, Batch<double, 1> us) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);
   const Kernel run = kernel_named(kernel);
-  in_parallel(results.size(), [&](std::size_t press) {
-    const fit_settings settings = settings_of(all_settings, own, press);
-    run(array, pressure_Pa_q10.row(press), usable[press], &settings, results.row(press));
-  });
+  const Stopwatch watch;
+  in_parallel(
+      results.size(),
+      [&](std::size_t press) {
+        const fit_settings settings = settings_of(all_settings, own, press);
+        run(array, pressure_Pa_q10.row(press), usable[press], &settings, results.row(press));
+      },
+      static_cast<std::size_t>(threads));
+  us[0] = watch.us() / static_cast<double>(results.size());
 }
 MEASURE_ENTRY(fit)
 

@@ -10,6 +10,7 @@ extern "C" {
 #include "contact/contact.h"
 #include "contact/tangential.h"
 #include "fit/fit_shapes.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <memory>
@@ -26,6 +27,20 @@ MEASURE_RECORD(condition_gains, FIELD(inverse_q16))
 MEASURE_RECORD(contact_settings, FIELD(slip_threshold_mm), FIELD(slip_window_us), FIELD(force_scale),
                FIELD(force_scale_sd))
 MEASURE_RECORD(contact_result, FIELD(flags), FIELD(slip_mm))
+
+// Of this build, as the headers of these names have them.
+struct firmware_constants {
+  double sensor_max_pressure_Pa, default_gain_sd, default_model_sd;
+  std::int32_t zero_tare_frames, default_fit_iterations;
+};
+MEASURE_RECORD(firmware_constants, FIELD(sensor_max_pressure_Pa), FIELD(default_gain_sd), FIELD(default_model_sd),
+               FIELD(zero_tare_frames), FIELD(default_fit_iterations))
+
+static void constants_of_build(Batch<firmware_constants, 1> constants) {
+  constants[0] = {static_cast<double>(MS58XX_MAX_PRESSURE_Pa), static_cast<double>(DEFAULT_GAIN_SD),
+                  static_cast<double>(DEFAULT_MODEL_SD), ZERO_TARE_FRAMES, DEFAULT_FIT_ITERATIONS};
+}
+MEASURE_ENTRY(constants_of_build)
 
 static void default_contact_settings(Batch<contact_settings, 1> settings) {
   for (std::size_t i = 0; i < settings.size(); i++) {

@@ -137,7 +137,8 @@ static void gate_run(Batch<gate_pad, 1> pads, std::int64_t frames, Batch<const d
                      Batch<const double, 1> share, Batch<const double, 1> remains_Pa, double decay_s,
                      Batch<std::uint8_t, 1> flags, Batch<float, 1> worst_zero_Pa,
                      Batch<std::int32_t, 2> pressure_Pa_q10) {
-  require(contact_Pa.size() == SENSORS && remains_Pa.size() == SENSORS && share.size() == 3, "another number of sensors");
+  require(contact_Pa.size() == SENSORS && remains_Pa.size() == SENSORS && share.size() == 3,
+          "another number of sensors");
   const auto fits = [&](const auto &array) { return array.size() == 0 || std::int64_t(array.size()) == frames; };
   require(fits(flags) && fits(worst_zero_Pa) && fits(pressure_Pa_q10), "another number of frames");
   gate_pad &pad = pads[0];

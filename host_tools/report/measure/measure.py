@@ -13,11 +13,12 @@ import ctypes
 import pathlib
 
 import numpy as np
+from fingertip.errors import InputError
 
 ARRAY_OF_SHAPE = 4  # dimensions at most
 
 
-class MeasureError(Exception):
+class MeasureError(InputError):
     pass
 
 
@@ -120,7 +121,14 @@ class Measure(Library):
     def __init__(self, build, name="measure"):
         self.build = pathlib.Path(build).resolve()
         super().__init__(self.build / f"measure/lib{name}.so")
-        self.no_own = np.zeros((0, 0), self.records["fit_own"])
+        self.no_own = np.zeros((0, 0), self.records.get("fit_own", "V12"))
+
+    @property
+    def constants(self):
+        """firmware_constants of this build."""
+        constants = self.made("firmware_constants", 1)
+        self.call("constants_of_build", constants)
+        return constants[0]
 
     @property
     def contact_tables(self):
@@ -157,11 +165,15 @@ class Measure(Library):
 
     def fit(self, array, settings, pressure_Pa_q10, usable=None, *, own=None, kernel="fit"):
         """fit_result [press] of readings [press, sensor] in 1/1024 Pa. usable: bitmap [press] of the sensors to use."""
-        found = self.made("fit_result", len(pressure_Pa_q10))
+        return self.timed_fit(array, settings, pressure_Pa_q10, usable, own=own, kernel=kernel, threads=2)[0]
+
+    def timed_fit(self, array, settings, pressure_Pa_q10, usable=None, *, own=None, kernel="fit", threads=1):
+        """(fit_result [press], microseconds of processor time for each)."""
+        found, us = self.made("fit_result", len(pressure_Pa_q10)), np.zeros(1)
         if usable is None:
             usable = np.full(len(found), (1 << pressure_Pa_q10.shape[1]) - 1, np.uint32)
-        self.call("fit", kernel, array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found)
-        return found
+        self.call("fit", kernel, threads, array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found, us)
+        return found, float(us[0])
 
     def widen_held(self, array, settings, pressure_Pa_q10, fits, *, own=None, frames=6):
         """Adds to the fits of presses that are held what a tangential force that is not estimated does to the location."""
@@ -245,7 +257,7 @@ class Measure(Library):
         return found
 
     def random(self, seed, stream, index):
-        """Random numbers of the twin's generator, a state for each index: what C++ draws with Random(seed, stream, index)."""
+        """Random numbers of the twin's generator, a state for each index: what C++ draws with Random(seed, stream, index). seed: one, or one for each."""
         return Random(self, seed, stream, index)
 
     def base_pressure(self, contact_shape, layer_mm, touches, *, dip_share=0.0, seats=None, shape=None):
@@ -271,8 +283,9 @@ class Random:
 
     def __init__(self, measure, seed, stream, index):
         index = np.ascontiguousarray(index, np.int64)
+        seeds = seed if isinstance(seed, np.ndarray) else np.array([signed(seed)])
         self.measure, self.states = measure, np.zeros(len(index), "V8")
-        measure.call("random_begin", int(seed), signed(stream), index, self.states)
+        measure.call("random_begin", seeds, signed(stream), index, self.states)
 
     def drawn(self, entry, *arguments, count, of, kind=float):
         """of: which states draw, all by default; the others keep theirs and have 0."""
@@ -299,6 +312,7 @@ class Random:
         return self.drawn("random_bits", count=count, of=of, kind=np.int64)
 
     def below(self, end, count=None, of=None):
+        """Whole numbers."""
         return self.drawn("random_below", int(end), count=count, of=of, kind=np.int64)
 
 

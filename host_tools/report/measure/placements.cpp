@@ -16,7 +16,8 @@ using namespace fingertip::truth;
 using calibrating::Judgement;
 using calibrating::Placement;
 
-// Percents and sds as effects.hpp has them. overhang_mm: how far the rubber extends beyond the outer sensors; 0: without end.
+// Percents and sds as effects.hpp has them. overhang_mm: how far the rubber extends beyond the outer sensors; 0:
+// without end.
 struct pad_kind {
   double gain_percent, relaxation_percent, misplaced_mm, dip_percent, widths_percent, overhang_mm;
 };
@@ -71,12 +72,9 @@ struct Pads {
 
   PadOptions options(std::size_t i) const {
     const pad_kind &kind = *kinds.row_or_all(i);
-    return {kind.gain_percent,
-            kind.relaxation_percent,
-            kind.misplaced_mm,
-            kind.dip_percent,
-            kind.widths_percent,
-            kind.overhang_mm > 0.0 ? block_of(kind.overhang_mm, layer_mm, cache) : nullptr};
+    return {kind.gain_percent,   kind.relaxation_percent,
+            kind.misplaced_mm,   kind.dip_percent,
+            kind.widths_percent, kind.overhang_mm > 0.0 ? block_of(kind.overhang_mm, layer_mm, cache) : nullptr};
   }
   std::uint64_t seed(std::size_t i) const { return static_cast<std::uint64_t>(seeds[i]); }
   SessionPad pad(std::size_t i) const { return {options(i), layer_mm, seed(i)}; }
@@ -115,9 +113,9 @@ Judgement lead(Session &session, SessionPad &pad, std::vector<Placement> &placem
 } // namespace
 
 // The placements of sessions without a calibration [pad][placement][sensor], with their times and fadings.
-static void pad_placements(std::string session_kind, Batch<const pad_kind, 1> kinds, double layer_mm,
-                           std::string cache, Batch<const std::int64_t, 1> seeds, Batch<double, 2> t_s,
-                           Batch<double, 3> reading_Pa, Batch<double, 2> fading) {
+static void pad_placements(std::string session_kind, Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
+                           Batch<const std::int64_t, 1> seeds, Batch<double, 2> t_s, Batch<double, 3> reading_Pa,
+                           Batch<double, 2> fading) {
   same_length(seeds, t_s, reading_Pa, fading);
   require(t_s.size(1) == reading_Pa.size(1) && t_s.size(1) == fading.size(1), "other numbers of placements");
   const Pads pads{kinds, layer_mm, cache, seeds};
@@ -129,8 +127,7 @@ static void pad_placements(std::string session_kind, Batch<const pad_kind, 1> ki
       const Placement placement = *session.next(pad);
       t_s.row(i)[p] = placement.t_s;
       fading.row(i)[p] = placement.fading;
-      std::copy(placement.reading_Pa.begin(), placement.reading_Pa.end(),
-                reading_Pa.row(i) + p * reading_Pa.size(2));
+      std::copy(placement.reading_Pa.begin(), placement.reading_Pa.end(), reading_Pa.row(i) + p * reading_Pa.size(2));
     }
   });
 }

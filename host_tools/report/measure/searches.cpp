@@ -3,16 +3,16 @@
 #include "report/measure/fit_arguments.hpp"
 
 extern "C" {
-#include "fit/fit_gains.h"
 #include "fit/fit_doubt.h"
+#include "fit/fit_gains.h"
 #include "ms58xx/ms58xx.h"
 }
 
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
 
-// Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that is
-// not estimated has found in the frames before. A single frame is not searched.
+// Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
+// is not estimated has found in the frames before. A single frame is not searched.
 static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
                      Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10,
                      Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {

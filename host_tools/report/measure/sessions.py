@@ -19,7 +19,11 @@ PADS_PER_SESSION, SESSIONS_MAX = 10, 100
 SENSORS = 15
 # Contact shapes that the twin has no name for: kind, size_x_mm, size_y_mm, and the edge of the twin's cylinders.
 FLAT_SQUARE, ROLLER, EDGE_mm = 2, 4, 0.4
-SHAPES = {"cylinder6x12": (ROLLER, 6, 12)} | {f"edge{mm}": (ROLLER, 2, mm) for mm in (10, 14, 20, 24, 30, 36)} | {"cube15": (FLAT_SQUARE, 15, 15)}
+SHAPES = (
+    {"cylinder6x12": (ROLLER, 6, 12)}
+    | {f"edge{mm}": (ROLLER, 2, mm) for mm in (10, 14, 20, 24, 30, 36)}
+    | {"cube15": (FLAT_SQUARE, 15, 15)}
+)
 
 
 def shape(firmware, name):
@@ -75,7 +79,11 @@ class Session:
 
     @classmethod
     def of(cls, firmware, count):
-        return cls(firmware.made("calibration", count), firmware.made("calibrated_sensor", count, SENSORS), firmware.made("fit_own", count, SENSORS))
+        return cls(
+            firmware.made("calibration", count),
+            firmware.made("calibrated_sensor", count, SENSORS),
+            firmware.made("fit_own", count, SENSORS),
+        )
 
     def where(self, chosen):
         return Session(self.found[chosen], self.sensors[chosen], self.own[chosen])
@@ -95,7 +103,9 @@ class Placements:
 
     def calibrated(self):
         noise_Pa = self.firmware.osr(1024)[1] / 1024.0 / 10.0  # of a mean over a hundred frames
-        return Session(*self.firmware.calibrate(*self.firmware.layout(), self.t_s, self.reading_Pa, noise_Pa, fading=self.fading, force_N=WEIGHT_N))
+        return Session(
+            *self.firmware.calibrate(*self.firmware.layout(), self.t_s, self.reading_Pa, noise_Pa, fading=self.fading, force_N=WEIGHT_N)
+        )
 
 
 def placements(firmware, session, of, seeds, layer_mm, count):

@@ -186,7 +186,9 @@ class Presses:
 def locations(firmware, strips):
     """Where the sigma is that of other strips the location is worse (median_by_others_mm). The other recordings choose how wide the prior is."""
     presses = [Presses(firmware, strip) for strip in strips]
-    by_width = np.array([[one.median_error_mm(one.own_prior_mm, width) if len(one.x_mm) else np.nan for width in WIDTHS_mm] for one in presses])
+    by_width = np.array(
+        [[one.median_error_mm(one.own_prior_mm, width) if len(one.x_mm) else np.nan for width in WIDTHS_mm] for one in presses]
+    )
     sigmas_mm = np.array([one.sigma_mm for one in presses])
     for i, (strip, one) in enumerate(zip(strips, presses)):
         row = {"name": strip.name, "fits": len(one.x_mm)}

@@ -72,7 +72,15 @@ class Pad:
         coefficients = (np.array(COEFFICIENTS) * (1.0 + spread)).astype(np.uint16)
         self.pad = firmware.made("gate_pad", 1)
         firmware.call(
-            "gate_begin", seed, self.frames_per_s, self.noise_Pa_q10, offset_Pa, drift_Pa_s * drifts, np.array(temperature, float), coefficients, self.pad
+            "gate_begin",
+            seed,
+            self.frames_per_s,
+            self.noise_Pa_q10,
+            offset_Pa,
+            drift_Pa_s * drifts,
+            np.array(temperature, float),
+            coefficients,
+            self.pad,
         )
 
     def run(self, seconds, contact_Pa=None, share=(1.0, 1.0, 1.0), remains_Pa=None, decay_s=1.0, watch=""):
@@ -189,7 +197,9 @@ class Judge:
             pad.run(0.5, contact_Pa, (0.0, 1.0, 0.2))
             return longest_s, contact_s, pad.force_error_percent(contact_Pa)
 
-        cases = [({"share": share}, [(share, decay_s, hold_s) for decay_s in RETURN_TIMES_s for hold_s in REMAINS_AFTER_s]) for share in REMAINS]
+        cases = [
+            ({"share": share}, [(share, decay_s, hold_s) for decay_s in RETURN_TIMES_s for hold_s in REMAINS_AFTER_s]) for share in REMAINS
+        ]
         columns = ["phantom_longest_s", "contact_s", "next_force_error_percent"]
         self.out["phantom_force_longest_s"] = self.judge("after_press", cases, of_press, columns)
 

@@ -145,16 +145,6 @@ class Report(unittest.TestCase):
         self.assertEqual(report(self.folder, "--only-merge").returncode, 0)
         self.assertEqual((self.folder / "fit.json").read_bytes(), before)
 
-    def test_wrong_options_of_the_programs_are_one_line(self):
-        for name in ("fit_report", "fit_bench", "fit_stiff"):
-            program = str(pathlib.Path(OPTIONS.build) / "host_tools/report/fit" / name)
-            for options in (("--limt", "3"), ("--seed", "x"), ("--seed",), ("--seed", "-1"), ("--limit", "1.5"), ("more",)):
-                done = subprocess.run([program, *options], capture_output=True, text=True, timeout=60)
-                self.assertEqual(done.returncode, 1, options)
-                self.assertEqual((done.stdout, done.stderr.count("\n")), ("", 1), done.stderr)
-                self.assertRegex(done.stderr, rf"^{name}: .*{options[0].lstrip('-')}.*; see --help\n$")
-            self.assertIn(f"usage: {name}", subprocess.run([program, "--help"], capture_output=True, text=True, check=True).stdout)
-
     def test_a_missing_image_is_one_line(self):
         done = subprocess.run(
             [

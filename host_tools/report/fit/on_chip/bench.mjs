@@ -7,7 +7,7 @@ import { Bench, KERNELS } from './fit_on_chip.mjs';
 
 const USAGE = `usage: bench.mjs --image fit_cycles.bin --jobs fit_jobs.json --out fit_cycles.csv [options]
 
-Fits the presses of fit_jobs.json (written by fit_report --jobs) on the emulated chip with every kernel and variant
+Fits the presses of fit_jobs.json (written by fit.py) on the emulated chip with every kernel and variant
 that the image knows and counts processor cycles, from the call to its return, corrected as the emulator's core
 describes. No interrupt runs meanwhile.
 
@@ -55,7 +55,7 @@ function main(argv) {
     try {
       return readFileSync(file, how);
     } catch (error) {
-      throw new InputError(`${file}: cannot read (${error.code}); build the image, and run fit_report --jobs first`);
+      throw new InputError(`${file}: cannot read (${error.code}); build the image, and run fit.py first`);
     }
   };
   const { variants, presses } = JSON.parse(read(options.jobs, 'utf8'));

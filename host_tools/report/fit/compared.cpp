@@ -1,0 +1,132 @@
+// The fits that the firmware's kernels are compared with, and the reference optimum, on many presses.
+#include "common/contact_flags.h"
+#include "libfingertip/in_parallel.hpp"
+#include "report/fit/double_kernel.hpp"
+#include "report/fit/libraries.hpp"
+#include "report/fit/separable.hpp"
+#include "report/measure/entry.hpp"
+#include "report/measure/stopwatch.hpp"
+#include "report/reference/reference.hpp"
+
+extern "C" {
+#include "alternatives/alternatives.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+using namespace fingertip::measure;
+namespace fitting = fingertip::fitting;
+namespace reference = fingertip::reference;
+
+using compared_fit = fitting::KernelResult;
+MEASURE_RECORD(compared_fit, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N), FIELD(used),
+               FIELD(flags))
+using compared_settings = fitting::KernelSettings;
+MEASURE_RECORD(compared_settings, FIELD(iterations), FIELD(noise_Pa), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
+               FIELD(guess))
+
+namespace {
+
+// It does not judge itself, so the only flag is whether it came to anything.
+template <auto SOLVE>
+compared_fit alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                         const compared_settings &settings) {
+  const alternative_settings chosen{settings.iterations, static_cast<alternative_guess>(settings.guess)};
+  const auto found = SOLVE(&array, pressure_Pa_q10, usable, &chosen);
+  compared_fit result{};
+  result.x_mm = static_cast<double>(found.x_mm);
+  result.y_mm = static_cast<double>(found.y_mm);
+  result.p0_Pa = static_cast<double>(found.p0_Pa);
+  result.sigma_mm = static_cast<double>(found.sigma_mm);
+  result.force_N = static_cast<double>(found.force_N);
+  const bool finite = std::isfinite(result.x_mm) && std::isfinite(result.y_mm);
+  result.flags = finite && result.sigma_mm != 0.0 ? std::uint32_t{CONTACT_FLAG_FIT_VALID} : 0;
+  result.used = usable;
+  return result;
+}
+
+struct Named {
+  const char *name;
+  fitting::Solve solve;
+};
+constexpr Named OWN[] = {
+    {"double", fitting::double_kernel},
+    {"separable", fitting::separable},
+    {"naive_float", alternative<alternative_naive_float>},
+    {"naive_double", alternative<alternative_naive_double>},
+    {"lm_float", alternative<alternative_lm_float>},
+    {"lm_double", alternative<alternative_lm_double>},
+};
+
+} // namespace
+
+// kernel: of those above, or of libraries.hpp, which one thread at a time may call. us: of one fit, if a single thread
+// runs them.
+static void compare(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> array,
+                    Batch<const compared_settings, 1> settings, Batch<const std::int32_t, 2> pressure_Pa_q10,
+                    Batch<const std::uint32_t, 1> usable, Batch<compared_fit, 1> results, Batch<double, 1> us) {
+  same_length(results, pressure_Pa_q10, usable);
+  length_or_one(results, settings);
+  require(array[0].sensor_count == pressure_Pa_q10.size(1), "readings of another number of sensors");
+  fitting::Solve solve = fitting::library_named(kernel);
+  require(!solve || threads == 1, "a library takes one thread");
+  for (const Named &own : OWN) {
+    solve = kernel == own.name ? own.solve : solve;
+  }
+  require(solve != nullptr, "no kernel has this name");
+  const Stopwatch watch;
+  fingertip::twin::in_parallel(
+      results.size(),
+      [&](std::size_t press) {
+        results[press] = solve(array[0], pressure_Pa_q10.row(press), usable[press], *settings.row_or_all(press));
+      },
+      static_cast<std::size_t>(threads));
+  us[0] = watch.us() / static_cast<double>(results.size());
+}
+MEASURE_ENTRY(compare)
+
+struct reference_fit {
+  double p0_Pa, x_mm, y_mm, sigma_mm, cost, force_N, location_sd_mm, condition_number;
+  bool at_bound;
+  bool observable; // the readings determine the location, away from the limits
+};
+MEASURE_RECORD(reference_fit, FIELD(p0_Pa), FIELD(x_mm), FIELD(y_mm), FIELD(sigma_mm), FIELD(cost), FIELD(force_N),
+               FIELD(location_sd_mm), FIELD(condition_number), FIELD(at_bound), FIELD(observable))
+
+// The optimum of presses [press][sensor]. starts [press or 0]: a further first guess. all_starts: Ceres from every
+// start. Without a positive usable reading there is none, and its location's sd is infinite.
+static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm,
+                    Batch<const double, 2> pressure_Pa, Batch<const std::uint32_t, 1> usable,
+                    Batch<const double, 1> noise_Pa, Batch<const reference_fit, 1> starts, std::int64_t all_starts,
+                    Batch<reference_fit, 1> results) {
+  same_length(results, pressure_Pa, usable, noise_Pa);
+  require(starts.size() == 0 || starts.size() == results.size(), "another number of starts");
+  require(x_mm.size() == y_mm.size() && x_mm.size() == pressure_Pa.size(1), "another number of sensors");
+  const reference::Array array{pitch_mm, {x_mm.data, x_mm.data + x_mm.size()}, {y_mm.data, y_mm.data + y_mm.size()}};
+  fingertip::twin::in_parallel(results.size(), [&](std::size_t i) {
+    const std::vector<double> readings(pressure_Pa.row(i), pressure_Pa.row(i + 1));
+    bool positive = false;
+    for (std::size_t k = 0; k < readings.size(); k++) {
+      positive = positive || ((usable[i] >> k & 1u) && readings[k] > 0.0);
+    }
+    if (!positive) {
+      constexpr double INFINITE = std::numeric_limits<double>::infinity();
+      results[i] = {0, 0, 0, 0, 0, 0, INFINITE, INFINITE, false, false};
+      return;
+    }
+    std::vector<reference::Parameters> guesses;
+    if (starts.size()) {
+      guesses.push_back({starts[i].p0_Pa, starts[i].x_mm, starts[i].y_mm, starts[i].sigma_mm});
+    }
+    const reference::Fit best = reference::fit(array, readings, usable[i], noise_Pa[i], guesses,
+                                               all_starts ? reference::Starts::all : reference::Starts::rationed);
+    results[i] = {best.theta.p0_Pa,    best.theta.x_mm,
+                  best.theta.y_mm,     best.theta.sigma_mm,
+                  best.cost,           best.force_N,
+                  best.location_sd_mm, best.condition_number,
+                  best.at_bound,       reference::observable(best) && !best.at_bound};
+  });
+}
+MEASURE_ENTRY(optimum)

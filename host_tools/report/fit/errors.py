@@ -1,0 +1,258 @@
+"""How far fits are from the reference optimum, what their flags state, and how long they take on this computer.
+
+A row for each kernel, variant, set (ABCD: all together) and observability; variants that a kernel does not have are left out:
+
+    presses       of the set that are (not) observable (presses.py)
+    p50_um ..     distance of the location from the reference optimum of the presses as received at 1/1024 Pa, with the sensors that the variant leaves
+                  usable; infinite where there is no fit
+    above_10um    presses farther than that from the reference
+    without_fit   presses that gave no fit
+    outlier       presses of which the fit left out a sensor by itself
+    truth_p50_mm  distance from where the contact truly is, of those with a fit
+    bad_unflagged share more than 1 mm wrong without a warning: against the reference in A and B, the truth in C and D
+    good_flagged  share within 1 mm with a warning
+"""
+
+import dataclasses
+
+import numpy as np
+import presses
+from fingertip.line import Flag
+from measure import q10, round_half_away
+from presses import MASKS, SETS, load
+
+USUAL_ITERATIONS, BUILT_ITERATIONS = 7, 4  # BUILT: FINGERTIP_FIT_ITERATIONS
+BAD_mm = 1.0
+WARNINGS = np.uint32(Flag.UNCERTAIN | Flag.MODEL | Flag.FLAT | Flag.AT_BOUND | Flag.LOW_SIGNAL)
+VALID = np.uint32(Flag.FIT_VALID)
+GUESSES = ("log_linear", "maximum", "centroid", "firmware")
+
+# What a kernel can do beside fitting every sensor: fit without every sensor, fit the n largest readings, assume a width, start from another guess, start
+# where the firmware's starts, end early.
+SUBSET, LARGEST, PRIOR, GUESS, FIRMWARE_GUESS, ENDS = "subset", "n_largest", "prior", "guess", "firmware guess", "ends early"
+FIRMWARE = {"fit": {SUBSET, PRIOR}, "grid": {PRIOR}, "masked": {SUBSET, PRIOR}, "general": {SUBSET, LARGEST, PRIOR}}
+KERNELS = FIRMWARE | {
+    "double": {SUBSET, LARGEST, PRIOR, GUESS, FIRMWARE_GUESS},  # the general kernel's steps in double
+    "separable": set(),  # the grid kernel's iteration in double, for the host
+    "naive_float": {SUBSET, GUESS},
+    "naive_double": {SUBSET, GUESS},
+    "lm_float": {SUBSET, GUESS, ENDS},
+    "lm_double": {SUBSET, GUESS, ENDS},
+}
+LIBRARIES = ("tiny_solver", "tiny_tight", "cminpack", "gsl", "ceres_reused", "ceres_new", "ceres_tight")
+HOST_KERNEL, HOST_ITERATIONS = "separable", 12  # made for the host, which the others are compared with
+BLOCK = 400
+
+
+@dataclasses.dataclass
+class Variant:
+    name: str
+    iterations: int = USUAL_ITERATIONS
+    n_largest: int = 0
+    lsb_Pa: float = 1 / 1024
+    mask: str = "none"
+    prior: tuple = (0.0, 0.0)  # sigma and its standard deviation, mm
+    guess: str = "log_linear"
+    needs: frozenset = frozenset()
+    on_chip: bool = True  # its cycles are counted
+
+
+VARIANTS = (
+    *(Variant(f"iterations={k}", k) for k in range(11)),
+    *(Variant(f"iterations={k}", k, needs={ENDS}) for k in (20, 50)),
+    *(Variant(f"n_largest={n}", n_largest=n, needs={LARGEST}) for n in range(4, 16)),
+    *(Variant(f"lsb_Pa=1/{n}", lsb_Pa=1 / n, on_chip=False) for n in (1, 16, 100, 1024)),
+    # The width that set D's layer gives a contact, one that is 20 % off, and set C's.
+    *(Variant(f"prior_mm={sigma_mm}", prior=(sigma_mm, 0.5), needs={PRIOR}) for sigma_mm in (3.2, 3.8, 5.7)),
+    *(Variant(f"guess={guess}", guess=guess, needs={FIRMWARE_GUESS if guess == "firmware" else GUESS}) for guess in GUESSES[1:]),
+    *(Variant(f"mask={mask}", mask=mask, needs={SUBSET}) for mask in MASKS[1:]),
+    *(Variant(f"mask={mask} iterations={BUILT_ITERATIONS}", BUILT_ITERATIONS, mask=mask, needs={SUBSET}) for mask in MASKS[1:3]),
+    *(Variant(f"mask={mask} guess=firmware", mask=mask, guess="firmware", needs={SUBSET, FIRMWARE_GUESS}) for mask in MASKS[1:3]),
+)
+
+
+class Bench:
+    """Presses and fits of them; `cache` keeps the reference."""
+
+    def __init__(self, measure, seed, limit, cache):
+        self.measure, self.compared, self.array = measure, presses.Compared(measure), measure.array()
+        self.seed, self.limit, self.cache, self.loaded = seed, limit, cache, {}
+
+    def presses(self, set_, mask="none", limit=None):
+        """limit: in all sets. A and B are a third each, C and D a sixth; with one sensor masked half of that, with two and three a tenth."""
+        share = {"none": 1, "random": 2, "peak": 2}.get(mask, 10)
+        count = (limit or self.limit) // (3 if set_ in "AB" else 6) // share
+        if (set_, mask, count) not in self.loaded:
+            self.loaded[set_, mask, count] = load(self.measure, self.compared, set_, mask, self.seed, count, self.cache)
+        return self.loaded[set_, mask, count]
+
+    def fit(self, kernel, variant, readings, usable, noise_Pa, threads=2):
+        """(results with x_mm, y_mm, used, flags, microseconds for each)"""
+        if kernel in FIRMWARE:
+            settings = self.measure.settings(
+                len(readings), gain_sd=0.0, cut_noises=0, iterations=variant.iterations, n_largest=variant.n_largest
+            )
+            settings["noise_Pa_q10"], (settings["prior_sigma_mm"], settings["prior_width_mm"]) = (
+                (1024 * noise_Pa).astype(np.int32),
+                variant.prior,
+            )
+            return self.measure.timed_fit(self.array, settings, readings, usable, kernel=kernel, threads=threads)
+        if variant.n_largest:
+            usable = largest_readings(readings, usable, variant.n_largest)
+        guess = GUESSES.index(variant.guess)
+        return self.compared.compare(kernel, variant.iterations, noise_Pa, readings, usable, variant.prior, guess, threads)
+
+
+def largest_readings(readings, usable, n):
+    """Bitmap [press] of the n largest usable ones, of equal ones those of lower number."""
+    bits = np.uint32(1) << np.arange(readings.shape[1], dtype=np.uint32)
+    order = np.argsort(np.where(usable[:, None] & bits, -readings.astype(np.int64), np.iinfo(np.int64).max), axis=1, kind="stable")
+    return usable & bits[order[:, :n]].sum(axis=1, dtype=np.uint32)
+
+
+def quantile(values, share):
+    """Of sorted values, without interpolation."""
+    return float(values[int(share * (len(values) - 1))]) if len(values) else None
+
+
+def distance_um(found, best):
+    um = 1e3 * np.hypot(found["x_mm"].astype(float) - best["x_mm"], found["y_mm"].astype(float) - best["y_mm"])
+    return np.where(np.isfinite(um) & (found["flags"] & VALID != 0), um, np.inf)
+
+
+def outcomes(bench, kernel, variant):
+    """Of the presses of each set: (observable, um from the reference, mm from the truth, mm wrong, flags, outlier), each [press]."""
+    for set_ in SETS:
+        these = bench.presses(set_, variant.mask)
+        readings = these.readings if variant.lsb_Pa == 1 / 1024 else quantised(these.pressure_Pa, variant.lsb_Pa)
+        found, _ = bench.fit(kernel, variant, readings, these.usable, these.noise_Pa)
+        truth_mm = np.hypot(found["x_mm"].astype(float) - these.x_mm, found["y_mm"].astype(float) - these.y_mm)
+        outlier = (found["used"] != these.usable) & (variant.n_largest == 0)
+        um = distance_um(found, these.best)
+        yield these.observable, um, truth_mm, um * 1e-3 if set_ in "AB" else truth_mm, found["flags"], outlier
+
+
+def quantised(pressure_Pa, lsb_Pa):
+    return q10(lsb_Pa * round_half_away(pressure_Pa / lsb_Pa))
+
+
+def row_of(kernel, variant, name, observable, of_sets):
+    """of_sets: as outcomes() has them."""
+    um, truth_mm, wrong_mm, flags, outlier = (np.concatenate([one[i][one[0] == observable] for one in of_sets]) for i in range(1, 6))
+    valid, warned = flags & VALID != 0, flags & WARNINGS != 0
+    errors, truths, count = np.sort(um), np.sort(truth_mm[valid]), max(len(um), 1)
+    return {
+        "kernel": kernel,
+        "variant": variant,
+        "set": name,
+        "observable": observable,
+        "presses": len(um),
+        "without_fit": int((~valid).sum()),
+        "outlier": int((valid & outlier).sum()),
+        "above_10um": int((um > 10).sum()),
+        "above_100um": int((um > 100).sum()),
+        **{f"{key}_um": quantile(errors, share) for key, share in (("p50", 0.5), ("p99", 0.99), ("p999", 0.999), ("worst", 1.0))},
+        **{f"truth_{key}_mm": quantile(truths, share) for key, share in (("p50", 0.5), ("p99", 0.99))},
+        "bad_unflagged": float((valid & (wrong_mm > BAD_mm) & ~warned).sum() / count),
+        "good_flagged": float((valid & (wrong_mm <= BAD_mm) & warned).sum() / count),
+    }
+
+
+def rows(bench):
+    found = []
+    for kernel, abilities in KERNELS.items():
+        for variant in VARIANTS:
+            if variant.needs <= abilities:
+                of_sets = list(outcomes(bench, kernel, variant))
+                for name, some in (*zip(SETS, ([one] for one in of_sets)), ("".join(SETS), of_sets)):
+                    found += [row_of(kernel, variant.name, name, observable, some) for observable in (True, False)]
+    return [row for row in found if row["presses"]]
+
+
+def jobs(bench):
+    """For on_chip/bench.mjs: the variants, and of each mask a thousandth of the presses."""
+    return {
+        "variants": [
+            {
+                "kernel": kernel,
+                "variant": variant.name,
+                "iterations": variant.iterations,
+                "n_largest": variant.n_largest,
+                "guess": variant.guess,
+                "mask": variant.mask,
+                "prior_sigma_mm": variant.prior[0],
+                "prior_width_mm": variant.prior[1],
+            }
+            for kernel, abilities in KERNELS.items()
+            for variant in VARIANTS
+            if variant.needs <= abilities and variant.on_chip
+        ],
+        "presses": {mask: [job for set_ in SETS for job in jobs_of(bench, set_, mask)] for mask in MASKS},
+    }
+
+
+def jobs_of(bench, set_, mask):
+    these = bench.presses(set_, mask)
+    for i in range(max(1, len(bench.presses(set_).readings) // 1000)):
+        yield {
+            "set": set_,
+            "observable": bool(these.observable[i]),
+            "usable": int(these.usable[i]),
+            "noise_Pa_q10": int(these.noise_Pa[i] * 1024),
+            "best_x_mm": float(these.best["x_mm"][i]),
+            "best_y_mm": float(these.best["y_mm"][i]),
+            "readings": these.readings[i].tolist(),
+        }
+
+
+def mixed(bench, limit):
+    """The observable ones of the first presses, A B C A B D and again, so that each set keeps its share in every block: (readings, usable, noise_Pa, best)."""
+    of_sets = {set_: bench.presses(set_, limit=limit) for set_ in SETS}
+    at = dict.fromkeys(SETS, 0)
+    chosen = []
+    for set_ in "ABCABD" * (limit // 6):
+        these = of_sets[set_]
+        if at[set_] < len(these.readings) and these.observable[at[set_]]:
+            chosen.append((these.readings[at[set_]], these.usable[at[set_]], these.noise_Pa[at[set_]], these.best[at[set_]]))
+        at[set_] += 1
+    chosen = chosen[: len(chosen) // BLOCK * BLOCK]
+    return tuple(np.array(column) for column in zip(*chosen))
+
+
+def timed(bench, limit, passes):
+    """Time and error of one fit on this computer, our kernels and libraries on the same presses, block after block in an order that rotates. Kernels that
+    run a number of iterations run seven; separable goes on until it has settled, twelve at the most. us: median over blocks and passes; ratio: the same
+    block's time over that of separable."""
+    readings, usable, noise_Pa, best = mixed(bench, limit)
+    kernels = [HOST_KERNEL, *(kernel for kernel in KERNELS if kernel != HOST_KERNEL), *LIBRARIES]
+    us, um = {kernel: [] for kernel in kernels}, {kernel: np.zeros(len(readings)) for kernel in kernels}
+    blocks = [slice(start, start + BLOCK) for start in range(0, len(readings), BLOCK)]
+    for turn, block in enumerate(blocks * passes):
+        for kernel in kernels[turn % len(kernels) :] + kernels[: turn % len(kernels)]:
+            variant = Variant("", HOST_ITERATIONS if kernel == HOST_KERNEL else USUAL_ITERATIONS)
+            found, one_us = bench.fit(kernel, variant, readings[block], usable[block], noise_Pa[block], threads=1)
+            us[kernel].append(one_us)
+            um[kernel][block] = distance_um(found, best[block])
+    found = []
+    for kernel in kernels:
+        times, ratios, errors = np.sort(us[kernel]), np.sort(np.divide(us[kernel], us[HOST_KERNEL])), np.sort(um[kernel])
+        spread = {
+            f"{name}{key}": quantile(of, share)
+            for name, of in (("us", times), ("ratio", ratios))
+            for key, share in (("", 0.5), ("_p10", 0.1), ("_p90", 0.9))
+        }
+        found.append(
+            {
+                "kernel": kernel,
+                **spread,
+                "p50_um": quantile(errors, 0.5),
+                "p999_um": quantile(errors, 0.999),
+                "above_100um": int((errors > 100).sum()),
+            }
+        )
+    return {"processor": processor(), "presses": len(readings), "passes": passes, "seed": bench.seed, "rows": found}
+
+
+def processor():
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        return next((line.split(": ", 1)[1].strip() for line in file if line.startswith("model name")), "unknown")

@@ -1,0 +1,291 @@
+"""The reference of the fit: its optimum, the presses it is solved for, the kernels that reach it, and reference.py.
+
+usage: test_reference.py BUILD
+"""
+
+import csv
+import io
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/fit", "report/measure", "python")]
+import errors  # noqa: E402
+import presses  # noqa: E402
+from measure import Measure  # noqa: E402
+
+BUILD = sys.argv.pop()
+MEASURE = Measure(BUILD)
+COMPARED = presses.Compared(MEASURE)
+SEED = 11
+X_mm, Y_mm, _ = MEASURE.layout()
+PRESS = {"x_mm": 2.5, "y_mm": -4.0, "p0_Pa": 20000.0, "sigma_mm": 6.0}
+AIR_Pa = 101325.0
+
+
+def run(*options, text=""):
+    return subprocess.run(
+        [sys.executable, ROOT / "host_tools/report/fit/reference.py", "--build", BUILD, *options],
+        input=text,
+        capture_output=True,
+        text=True,
+    )
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def pressure_Pa(k):
+    distance2 = (X_mm[k] - PRESS["x_mm"]) ** 2 + (Y_mm[k] - PRESS["y_mm"]) ** 2
+    return PRESS["p0_Pa"] * math.exp(-distance2 / (2 * PRESS["sigma_mm"] ** 2))
+
+
+def table(readings, tare=None, before="", **cells):
+    """A file of one row; readings: [sensor], None is an empty cell."""
+    columns = {"t_us": 7, **cells, **{f"s{k}_Pa": "" if value is None else f"{value:.6f}" for k, value in enumerate(readings)}}
+    if tare is not None:
+        columns |= {f"tare{k}_Pa": tare for k in range(15)}
+    return f"{before}{','.join(columns)}\n{','.join(str(cell) for cell in columns.values())}\n"
+
+
+def cost_at(these, best, dx_mm=0.0, dy_mm=0.0):
+    """[press], of the usable sensors"""
+    square = (X_mm - best["x_mm"][:, None] - dx_mm) ** 2 + (Y_mm - best["y_mm"][:, None] - dy_mm) ** 2
+    left_Pa = best["p0_Pa"][:, None] * np.exp(-0.5 * square / best["sigma_mm"][:, None] ** 2) - these.readings / 1024
+    return 0.5 * (np.square(left_Pa) * (these.usable[:, None] >> np.arange(15) & 1)).sum(axis=1)
+
+
+class Optimum(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.cache = pathlib.Path(folder.name)
+
+    def load(self, set_, mask, count):
+        return presses.load(MEASURE, COMPARED, set_, mask, SEED, count, self.cache)
+
+    def test_rationed_starts_miss_no_minimum(self):
+        observable = 0
+        for set_ in presses.SETS:
+            for mask in ("none", "peak"):
+                these = self.load(set_, mask, 60)
+                full = COMPARED.optimum(these.readings, these.usable, these.noise_Pa, all_starts=True)[these.observable]
+                best = these.best[these.observable]
+                self.assertTrue((best["cost"] <= full["cost"] * (1 + 1e-9)).all())
+                self.assertLess(np.hypot(best["x_mm"] - full["x_mm"], best["y_mm"] - full["y_mm"]).max(), 1e-6)
+                observable += len(best)
+        self.assertGreater(observable, 250)
+
+    def test_no_neighbour_is_better(self):
+        these = self.load("D", "none", 100)
+        cost = cost_at(these, these.best)
+        np.testing.assert_allclose(cost[these.observable], these.best["cost"][these.observable], rtol=1e-9)
+        for dx_mm, dy_mm in ((1e-3, 0), (-1e-3, 0), (0, 1e-3), (0, -1e-3)):
+            self.assertTrue((cost_at(these, these.best, dx_mm, dy_mm) > cost)[these.observable].all())
+
+    def test_the_cache_repeats_grows_and_survives_damage(self):
+        fresh = self.load("B", "random", 200).best
+        file = self.cache / f"reference_{SEED}_B_random.npz"
+        written = file.stat().st_mtime_ns
+        np.testing.assert_array_equal(self.load("B", "random", 200).best, fresh)
+        np.testing.assert_array_equal(self.load("B", "random", 50).best, fresh[:50])
+        self.assertEqual(file.stat().st_mtime_ns, written)
+        np.testing.assert_array_equal(self.load("B", "random", 260).best[:200], fresh)
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 0x5A
+        for damaged in (bytes(content), bytes(content[: len(content) // 2]), b""):
+            file.write_bytes(damaged)
+            np.testing.assert_array_equal(self.load("B", "random", 200).best, fresh)
+
+    def test_every_kernel_reaches_the_optimum_of_an_easy_press(self):
+        bench = errors.Bench(MEASURE, SEED, 600, self.cache)
+        for mask in ("none", "random"):
+            these = bench.presses("C", mask)
+            for kernel in (*errors.KERNELS, *(errors.LIBRARIES if mask == "none" else ())):
+                if mask == "none" or errors.SUBSET in errors.KERNELS[kernel]:
+                    threads = 1 if kernel in errors.LIBRARIES else 2
+                    found, _ = bench.fit(kernel, errors.Variant("", 20), these.readings, these.usable, these.noise_Pa, threads)
+                    found, best = found[these.observable], these.best[these.observable]
+                    self.assertTrue((found["flags"] & errors.VALID).all(), kernel)
+                    loose = 20 if kernel in errors.LIBRARIES else 2  # their own tolerances end them
+                    self.assertLess(errors.distance_um(found, best).max(), loose, kernel)
+                    for name in ("p0_Pa", "sigma_mm", "force_N"):
+                        np.testing.assert_allclose(found[name], best[name], rtol=3e-4 * loose, err_msg=kernel)
+
+    def test_double_and_separable_reach_every_observable_optimum(self):
+        bench = errors.Bench(MEASURE, SEED, 1200, self.cache)
+        for set_ in presses.SETS:
+            these = bench.presses(set_)
+            for kernel in ("double", "separable"):
+                found, _ = bench.fit(kernel, errors.Variant("", 10), these.readings, these.usable, these.noise_Pa)
+                self.assertLess(errors.distance_um(found, these.best)[these.observable].max(), 0.1, kernel)
+                np.testing.assert_allclose(found["sigma_mm"][these.observable], these.best["sigma_mm"][these.observable], rtol=1e-5)
+
+    def test_guesses_differ_and_the_log_linear_one_is_best(self):
+        bench = errors.Bench(MEASURE, SEED, 1200, self.cache)
+        these = bench.presses("A")
+        of_guess = [
+            errors.distance_um(
+                bench.fit("double", errors.Variant("", 0, guess=guess), these.readings, these.usable, these.noise_Pa)[0], these.best
+            )[these.observable].sum()
+            for guess in errors.GUESSES[:3]
+        ]
+        self.assertLess(2 * of_guess[0], min(of_guess[1:]))
+        self.assertNotEqual(*of_guess[1:])
+
+    def test_nothing_positive_is_no_fit(self):
+        bench = errors.Bench(MEASURE, SEED, 600, self.cache)
+        readings, usable = np.full((1, 15), -1024, np.int32), np.full(1, presses.ALL)
+        for kernel in errors.KERNELS:
+            found, _ = bench.fit(kernel, errors.Variant(""), readings, usable, np.array([5.0]))
+            self.assertFalse(found["flags"][0] & errors.VALID, kernel)
+        self.assertEqual(COMPARED.optimum(readings, usable, [5.0])["location_sd_mm"][0], np.inf)
+
+
+class Presses(unittest.TestCase):
+    def test_the_base_carries_the_whole_force(self):
+        for layer_mm in (6.0, 12.0):
+            r_mm = np.linspace(0, 24 * layer_mm, 20001)
+            around = 2 * np.pi * r_mm * presses.point_load_Pa(MEASURE, layer_mm, r_mm)
+            self.assertAlmostEqual(np.trapz(around, r_mm) * 1e-6, 1.0, delta=1e-5)
+
+    def test_the_table_is_interpolated_precisely(self):
+        """Against the Hankel integral by Simpson's rule, between the nodes of the table."""
+        layer_mm, r_mm, steps = 7.3, np.array([0.0, 0.013, 1.7, 3.21, 9.003, 25.37, 70.1]), 40000
+        u = np.linspace(0, 40, steps + 1)
+        weight = np.where(np.arange(steps + 1) % 2, 4.0, 2.0) * 40 / steps / 3
+        weight[[0, -1]] /= 2
+        transfer, waves = np.zeros_like(u), np.zeros((len(r_mm), len(u)))
+        MEASURE.call("base_transfer", u, 0.49, transfer)
+        MEASURE.call("bessel_j0", np.outer(r_mm / layer_mm, u), waves)
+        direct_Pa = waves @ (weight * u * transfer) * 1e6 / (2 * np.pi * layer_mm**2)
+        self.assertLess(abs(presses.point_load_Pa(MEASURE, layer_mm, r_mm) - direct_Pa).max(), 1e-7 * direct_Pa.max())
+
+    def test_the_best_gaussian_under_a_point_load(self):
+        """Least squares over the whole base: sigma = 0.447 h, and it holds 0.899 of the force."""
+        r_mm, sigma_mm = np.arange(0, 150, 0.1), np.arange(4, 7, 0.002)[:, None]
+        gaussian = np.exp(-0.5 * r_mm**2 / sigma_mm**2)
+        overlap, square = gaussian @ (r_mm * presses.point_load_Pa(MEASURE, 12.0, r_mm)), (gaussian**2) @ r_mm
+        best = (overlap**2 / square).argmax()  # by which the cost falls
+        self.assertAlmostEqual(sigma_mm[best, 0] / 12, 0.447, delta=0.002)
+        self.assertAlmostEqual(2e-6 * np.pi * overlap[best] / square[best] * sigma_mm[best, 0] ** 2, 0.899, delta=0.003)
+
+    def test_a_contact_pressure_conserves_its_force_and_its_peak_is_that_of_a_contact_solution(self):
+        for layer_mm, low_kPa, high_kPa in ((6.0, 11.4, 18.0), (12.0, 4.3, 5.0)):
+            for shape in presses.SHAPES:
+                x_mm, y_mm, share = presses.contact_pressure(shape, np.array([1.0, 5.0, 25.0]), layer_mm)
+                self.assertGreater(share.min(), 0)
+                np.testing.assert_allclose([share.sum(axis=1) - 1, (share * x_mm).sum(axis=1), (share * y_mm).sum(axis=1)], 0, atol=1e-13)
+                self.assertLessEqual(np.hypot(x_mm, y_mm).max(), min(7.5, layer_mm) if shape == "sphere15" else 3 * math.sqrt(2))
+                kPa = 1e-3 * (share * presses.point_load_Pa(MEASURE, layer_mm, np.hypot(x_mm, y_mm))).sum(axis=1)[1]
+                self.assertTrue(low_kPa < kPa < high_kPa, (shape, kPa))
+
+    def test_presses_repeat_and_pass_the_gate(self):
+        for set_ in presses.SETS:
+            made, again, other = (presses.draw(MEASURE, set_, seed, 300) for seed in (7, 7, 8))
+            np.testing.assert_array_equal(made.pressure_Pa, again.pressure_Pa)
+            np.testing.assert_array_equal(made.pressure_Pa[:40], presses.draw(MEASURE, set_, 7, 40).pressure_Pa)
+            self.assertFalse((made.pressure_Pa == other.pressure_Pa).any())
+            self.assertTrue(((2 <= made.noise_Pa) & (made.noise_Pa <= 20)).all())
+            self.assertTrue((made.pressure_Pa.max(axis=1) >= 20 * made.noise_Pa).all())
+            inside = (np.abs(made.x_mm) <= 9) & (np.abs(made.y_mm) <= 18)
+            self.assertTrue((inside == (set_ != "B")).all())
+            self.assertTrue(((np.abs(made.x_mm) <= 15) & (np.abs(made.y_mm) <= 24)).all())
+
+    def test_quantisation(self):
+        for pressure_Pa, lsb_Pa, found in ((1.0004, 1 / 1024, 1024), (-0.0007, 1 / 1024, -1), (1.6, 1.0, 2048), (0.2, 1 / 16, 64 * 3)):
+            self.assertEqual(errors.quantised(np.array([pressure_Pa]), lsb_Pa)[0], found)
+
+
+class Program(unittest.TestCase):
+    def fitted(self, text, *options):
+        done = run("fit", *options, text=text)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return rows_of(done.stdout)[0]
+
+    def assert_is_press(self, row, scale=1.0):
+        self.assertEqual((row["observable"], row["at_bound"]), ("1", "0"))
+        for name, value in PRESS.items():
+            self.assertAlmostEqual(float(row[f"best_{name}"]), value * (scale if name == "p0_Pa" else 1), delta=1e-4 * abs(value), msg=name)
+        self.assertAlmostEqual(float(row["best_force_N"]), scale * 2e-6 * math.pi * 20000 * 36, delta=1e-3)
+
+    def test_a_gaussian_is_found(self):
+        row = self.fitted(table([pressure_Pa(k) for k in range(15)], x_mm=2.5, y_mm=-1.0))
+        self.assertEqual(row["t_us"], "7")
+        self.assert_is_press(row)
+        self.assertAlmostEqual(float(row["distance_mm"]), 3.0, delta=1e-4)
+
+    def test_an_empty_cell_is_a_sensor_left_out(self):
+        self.assert_is_press(self.fitted(table([None if k == 6 else pressure_Pa(k) for k in range(15)])))
+        row = self.fitted(table([None] * 12 + [5000.0] * 3))
+        self.assertEqual((row["t_us"], row["best_x_mm"], row["observable"]), ("7", "", ""))
+
+    def test_of_a_recording_the_zero_is_subtracted_and_gains_are_divided_out(self):
+        absolute = [AIR_Pa + pressure_Pa(k) for k in range(15)]
+        self.assert_is_press(self.fitted(table(absolute, tare=AIR_Pa)))
+        gains = [0.9 + 0.02 * k for k in range(15)]
+        absolute = [AIR_Pa + gain * pressure_Pa(k) for k, gain in enumerate(gains)]
+        text = table(absolute, tare=AIR_Pa, before=f"# fingertip-recording 1\n# gains: {' '.join(map(str, gains))}\n")
+        self.assert_is_press(self.fitted(text))
+
+    def test_before_the_zero_there_is_nothing_to_fit(self):
+        self.assertEqual(self.fitted(table([AIR_Pa] * 15, tare=0))["best_x_mm"], "")
+
+    def test_noise_decides_what_is_observable(self):
+        weak = [0.005 * pressure_Pa(k) for k in range(15)]
+        self.assertEqual(self.fitted(table(weak), "--noise", "1")["observable"], "1")
+        row = self.fitted(table(weak, x_mm=1, y_mm=1), "--noise", "20")
+        self.assertEqual((row["observable"], row["distance_mm"]), ("0", ""))
+        self.assertEqual(self.fitted(table(weak, noise_Pa=20), "--noise", "1")["observable"], "0")
+
+    def test_presses_are_the_same_again_and_are_found(self):
+        for letter in "ABCD":
+            printed = run("presses", "--set", letter, "--count", "40", "--seed", "3").stdout
+            self.assertEqual(printed, run("presses", "--set", letter, "--count", "40", "--seed", "3").stdout)
+            self.assertNotEqual(printed, run("presses", "--set", letter, "--count", "40", "--seed", "4").stdout)
+            drawn, found = rows_of(printed), rows_of(run("fit", text=printed).stdout)
+            self.assertEqual([row["press"] for row in found], [row["press"] for row in drawn])
+            distances_mm = sorted(float(row["distance_mm"]) for row in found if row["observable"] == "1")
+            self.assertGreater(len(distances_mm), 20)
+            # Of a Gaussian noise alone is left; of rubber its tails, too.
+            self.assertLess(distances_mm[len(distances_mm) // 2], 0.05 if letter in "AB" else 0.5, letter)
+
+    def test_what_is_wrong_is_one_line(self):
+        good = [pressure_Pa(k) for k in range(15)]
+        for options, text, words in (
+            (("fit", "none.csv"), "", "none.csv: cannot read it"),
+            (("fit",), "", "no header"),
+            (("fit",), table(good[:14]), "has no column s14_Pa"),
+            (("fit",), table(good, device=0), "several fingertips"),
+            (("fit",), table([AIR_Pa] * 15), "absolute pressures"),
+            (("fit",), table(good).replace("\n7", "\n7,7"), "standard input:2: has 17 cells"),
+            (("fit",), table(good, noise_Pa="loud"), "'loud' is not a number"),
+            (("fit",), table(good, before="# gains: 1 1\n"), "2 gains for 15"),
+            (("fit",), table(good, before=f"# gains:{' 0' * 15}\n"), "'0' is no gain"),
+        ):
+            done = run(*options, text=text)
+            self.assertEqual(done.returncode, 1, words)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            self.assertIn(words, done.stderr)
+        for options in (
+            ("fit", "--noise", "0"),
+            ("presses", "--set", "E"),
+            ("presses", "--count", "0"),
+            ("presses", "--count", "-1"),
+            ("presses", "--seed", "-1"),
+            (),
+        ):
+            done = run(*options)
+            self.assertEqual(done.returncode, 2, options)
+            self.assertIn("error: ", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
