@@ -5,6 +5,7 @@
 #include "port/port.h"
 #include "rp2040/flash.h"
 #include "rp2040/nvic.h"
+#include "rp2040/progress.h"
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
 #include "rp2040/watchdog_regs.h"
@@ -76,7 +77,7 @@ static uint8_t stuck_parts(uint32_t now_us) {
   static const uint8_t bits[] = {[PORT_PART_SCAN] = CRASH_STUCK_SCAN, [PORT_PART_USB] = CRASH_STUCK_USB};
   uint8_t stuck = 0;
   for (unsigned part = 0; part < PORT_PARTS; part++) {
-    if (trace.watched[part] && now_us - trace.alive_us[part] > PORT_PART_LIMIT_us)
+    if (trace.watched[part] && is_overdue(now_us, trace.alive_us[part], PORT_PART_LIMIT_us))
       stuck |= bits[part];
   }
   return stuck;
@@ -85,7 +86,7 @@ static uint8_t stuck_parts(uint32_t now_us) {
 /* A main loop that rests waits for the scan, which wakes it from time to time. */
 static uint8_t all_stuck(uint32_t now_us) {
   uint8_t stuck = stuck_parts(now_us);
-  if (now_us - trace.main_us > PORT_PART_LIMIT_us && trace.activity != CRASH_AT_REST)
+  if (is_overdue(now_us, trace.main_us, PORT_PART_LIMIT_us) && trace.activity != CRASH_AT_REST)
     stuck |= CRASH_STUCK_MAIN;
   return stuck ? stuck : CRASH_STUCK_MAIN;
 }
