@@ -36,8 +36,7 @@ void location_stage_start(struct location_stage *own) {
   own->settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-void location_stage_process(struct location_stage *own, const struct contact_settings *contact,
-                            struct findings *found) {
+void location_stage_process(struct location_stage *own, struct findings *found) {
   const uint32_t t_us = (uint32_t)found->frame.t_us;
   if (!found->conditioned.contact || t_us - own->frame_us >= OUTLIER_EACH_FRAME_us) {
     memset(&own->watch, 0, sizeof own->watch);
@@ -51,6 +50,9 @@ void location_stage_process(struct location_stage *own, const struct contact_set
   } else {
     memset(&found->fit, 0, sizeof found->fit);
   }
+}
+
+void location_stage_weigh(const struct contact_settings *contact, struct findings *found) {
   found->force = contact_weigh(contact, &found->fit);
 }
 

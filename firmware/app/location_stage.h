@@ -22,8 +22,10 @@ struct location_stage {
 
 void location_stage_start(struct location_stage *own);
 
-/* contact: the force scale in use. */
-void location_stage_process(struct location_stage *own, const struct contact_settings *contact, struct findings *found);
+void location_stage_process(struct location_stage *own, struct findings *found);
+
+/* Scales the force. */
+void location_stage_weigh(const struct contact_settings *contact, struct findings *found);
 
 /* Fills in what this stage knows of a contact packet. */
 void location_stage_put(const struct findings *found, struct wire_contact *packet);

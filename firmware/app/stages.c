@@ -35,20 +35,25 @@ static void begin(struct findings *found, enum crash_activity activity) {
   port_at(activity);
 }
 
-/* The list of stages. */
-static void process_readings(struct stages *stages, struct findings *found) {
+/* The list of stages, up to what the second processor is asked. */
+static void fit_readings(struct stages *stages, struct findings *found) {
   condition_stage_process(&stages->condition, found);
 #if FT_WITH_FIT
   begin(found, CRASH_AT_FIT);
-  location_stage_process(&stages->location, &stages->contact_settings, found);
+  location_stage_process(&stages->location, found);
 #endif
 #if FT_WITH_TANGENTIAL
   jobs_begin_frame(&stages->jobs, found->frame.t_us);
   tangential_stage_ask(&stages->tangential, &stages->location, &stages->jobs, found);
   shapes_stage_ask(&stages->shapes, &stages->location, &stages->tangential.settings, &stages->jobs, found);
 #endif
+}
+
+/* The list of stages from there on. Not part of the other, whose stack lies below that of the fit. */
+static __attribute__((noinline)) void judge_fit(struct stages *stages, struct findings *found) {
   begin(found, CRASH_AT_CONTACT);
 #if FT_WITH_FIT
+  location_stage_weigh(&stages->contact_settings, found);
   contact_stage_gather(found, stages->location.calibration != NULL);
 #else
   contact_stage_gather(found, false);
@@ -86,7 +91,8 @@ void stages_process(struct stages *stages, struct findings *found, uint32_t take
     begin(found, CRASH_AT_CONTACT);
     contact_stage_hold(found);
   } else {
-    process_readings(stages, found);
+    fit_readings(stages, found);
+    judge_fit(stages, found);
   }
   begin(found, CRASH_AT_PACKET);
 }
