@@ -909,7 +909,17 @@ def protocol_md(line, text):
             raise SystemExit(f"line.py: PROTOCOL.md has {text.count(mark)} marks of {name}, it needs one")
         before, _, after = text.partition(mark)
         text = before + mark + "\n".join(rows) + "\n\n" + after.partition("\n\n")[2]
-    return re.sub(r"longer than \d+ bytes is damage", f"longer than {line.longest_frame()} bytes is damage", text)
+    numbers = {
+        r"# Wire protocol, version {}\n": line.version,
+        r"\| 0 \| u8 \| version, {} \|": line.version,
+        r"longer than {} bytes is damage": line.longest_frame(),
+    }
+    for form, number in numbers.items():
+        before, after = form.split("{}")
+        text, count = re.subn(rf"({before})\d+({after})", rf"\g<1>{number}\g<2>", text)
+        if count != 1:
+            raise SystemExit(f'line.py: PROTOCOL.md has {count} times "{form}", it needs one')
+    return text
 
 
 FILES = {

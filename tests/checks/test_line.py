@@ -147,6 +147,19 @@ class Generator(unittest.TestCase):
         with self.assertRaisesRegex(SystemExit, "flags \\[23\\] is there twice"):
             self.run_it()
 
+    def test_each_number_of_the_page_is_checked(self):
+        for before, after in (
+            ("protocol, version 9", "protocol, version 8"),
+            ("| version, 9 |", "| version, 8 |"),
+            ("longer than 1039 bytes", "longer than 1038 bytes"),
+        ):
+            self.run_it()
+            self.change(PAGE, before, after)
+            self.assertEqual(self.run_it("--check")[0], 1, before)
+        self.change(PAGE, "| version, 9 |", "| version |")
+        with self.assertRaisesRegex(SystemExit, "0 times"):
+            self.run_it()
+
     def test_a_page_without_its_mark_is_refused(self):
         self.change(PAGE, "<!-- line.toml: raw -->", "")
         with self.assertRaisesRegex(SystemExit, "0 marks of raw"):
