@@ -208,6 +208,7 @@ def main():
     parser.add_argument("--indirect", default=str(pathlib.Path(__file__).with_name("indirect_calls.txt")))
     parser.add_argument("--of", nargs="+", metavar="FUNCTION", help="of these functions alone")
     parser.add_argument("--limit", type=int, help="fail above this many bytes")
+    parser.add_argument("--reserved", type=int, help="fail unless the image reserves this many")
     parser.add_argument("--json", help="write the result to this file")
     args = parser.parse_args()
 
@@ -251,6 +252,8 @@ def main():
         with open(args.json, "w") as file:
             json.dump(result, file, indent=2)
             file.write("\n")
+    if args.reserved is not None and reserved != args.reserved:
+        fail(f"the image reserves {reserved} bytes of stack, not the {args.reserved} of firmware/common/limits.h")
     limit = reserved if args.limit is None else min(args.limit, reserved)
     if total > limit:
         fail(f"the stack may need {total} bytes, more than the {limit} allowed; see the chain above")

@@ -32,6 +32,8 @@ from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
+# What the checks of the images allow each scene.
+LIMITS = json.loads((ROOT / "tests/checks/scene_limits.json").read_text(encoding="utf-8"))
 GOALS = (
     ("parallel_fps_osr256", ">=", 1250),
     ("parallel_fps_osr1024", ">=", 410),
@@ -40,9 +42,9 @@ GOALS = (
     ("latency_parallel_us", "<=", 700),
     ("idle_sleep_percent", ">=", 80),
     ("contact_sleep_percent", ">=", 40),
-    ("flash_bytes", "<=", 64 * 1024),
+    ("flash_bytes", "<=", LIMITS["slip"]["flash_bytes"]),
     ("ram_bytes", "<=", 32 * 1024),
-    ("stack_bytes", "<=", 2048),
+    ("stack_bytes", "<=", LIMITS["slip"]["stack_bytes"]),
     ("raw_flash_bytes", "<=", "half_flash_bytes"),
     ("dropped", "<=", 0),
     ("unfitted", "<=", 0),

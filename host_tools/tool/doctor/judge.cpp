@@ -6,6 +6,7 @@
 #include "tool/doctor/wiring.hpp"
 
 extern "C" {
+#include "common/limits.h"
 #include "ms58xx/ms58xx.h"
 #include "ms58xx/sensors.h"
 }
@@ -50,8 +51,7 @@ constexpr double AIR_MIN_Pa = 30000, AIR_MAX_Pa = 115000;
 /* The formulas of the family differ by powers of two and by what a count is (sensors.h): those of
  * one sensor make so many times the pressure from another's codes, or that part of it. */
 constexpr double OF_ANOTHER_TYPE = 20;
-/* The stack's bank has 4 KiB, and its worst case by the call graph is below 2 (tests/checks). */
-constexpr unsigned STACK_FREE_MIN_bytes = 2048;
+constexpr unsigned STACK_FREE_MIN_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes;
 constexpr unsigned BUSY_MAX_permille = 950;
 
 std::string list(const std::vector<unsigned> &sensors) {

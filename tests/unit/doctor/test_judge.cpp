@@ -29,7 +29,7 @@ Facts good(const char *board = "pico_mux") {
   health.uptime_s = 60;
   health.sensors_present = 0x7FFF;
   health.cpu_busy_permille = 40;
-  health.stack_free_bytes = 2700;
+  health.stack_free_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes;
   facts.before = health;
   health.uptime_s = 70;
   facts.after = health;
@@ -411,7 +411,7 @@ TEST(Judge, RestartsProcessorStackStored) {
   facts.after->frames_skipped = 4;
   only(facts, Verdict::warn, "processor");
   facts = good();
-  facts.after->stack_free_bytes = 2000;
+  facts.after->stack_free_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes - 1;
   only(facts, Verdict::warn, "stack");
   facts.after->stack_free_bytes = 0;
   only(facts, Verdict::bad, "stack");
