@@ -139,7 +139,7 @@ class Store(unittest.TestCase):
         found = json.loads(
             run(
                 "/usr/bin/python3",
-                ROOT / "host_tools/report/truth/flash/truth_flash.py",
+                ROOT / "tests/emulated/storing/storing.py",
                 "--build",
                 OPTIONS.build,
                 "--boards",

@@ -79,7 +79,7 @@ FIGURES = {"fit": one_press.figures, "calibration": calibrations.figures, "gate"
 
 def measured(part, options):
     if part == "flash":
-        program = ROOT / "host_tools/report/truth/flash/truth_flash.py"
+        program = ROOT / "tests/emulated/storing/storing.py"
         return figures_printed("truth_flash", [sys.executable, program, "--build", options.build, "--boards", options.boards])
     try:
         return FIGURES[part](Measure(options.build), options)

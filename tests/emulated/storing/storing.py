@@ -23,7 +23,7 @@ import sys
 import tempfile
 import zlib
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "shared"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/report/shared"))
 import numpy as np  # noqa: E402
 
 from boards import PARALLEL as BOARD  # noqa: E402
@@ -129,7 +129,7 @@ def power(image, updates, seed):
         return json.loads(
             run(
                 "node",
-                ROOT / "host_tools/report/truth/flash/store_power.mjs",
+                ROOT / "tests/emulated/storing/store_power.mjs",
                 "--image",
                 image,
                 "--updates",

@@ -2,12 +2,12 @@
 /** Cuts the power of the emulated chip while it stores: see USAGE. */
 import { readFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
-import { Chip, Stopped } from '../../../simulation/emulator/chip/chip.mjs';
-import { FlashMemory } from '../../../simulation/emulator/chip/flash_memory.mjs';
-import { SimulatedTime } from '../../../simulation/emulator/clock.mjs';
-import { InputError, inWords } from '../../../simulation/emulator/errors.mjs';
-import { Prng } from '../../../simulation/emulator/prng.mjs';
-import { Report } from '../../../simulation/emulator/report.mjs';
+import { Chip, Stopped } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
+import { FlashMemory } from '../../../host_tools/simulation/emulator/chip/flash_memory.mjs';
+import { SimulatedTime } from '../../../host_tools/simulation/emulator/clock.mjs';
+import { InputError, inWords } from '../../../host_tools/simulation/emulator/errors.mjs';
+import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
+import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
 
 const USAGE = `usage: store_power.mjs --image FILE.bin [--updates N] [--seed S]
 
