@@ -1,4 +1,4 @@
-"""What the release image keeps in its flash: over restarts, new firmware and power cuts; and the report's own measurement of it in short.
+"""What the release image keeps in its flash: over restarts, new firmware and power cuts; and the nightly measurement of it in short.
 
 usage: test_store.py --build BUILD --boards BOARDS --node NODE
 """
@@ -12,8 +12,9 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+sys.path[:0] = [str(ROOT / folder) for folder in ("host_tools/python", "host_tools/report/shared", "tests/emulated/storing")]
 from fingertip import files  # noqa: E402
+from storing import storing  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 CALIBRATION, SETTINGS, WRITING, DAMAGED = 1, 2, 4, 8
@@ -87,7 +88,7 @@ class Store(unittest.TestCase):
     def tool(self):
         return f"{OPTIONS.build}/host_tools/tool/cli/fingertip"
 
-    LOOK = ((0.9, "info"), (0.91, "stream contact"))
+    STATE = ((0.9, "info"), (0.91, "stream contact"))
 
     def test_settings_are_kept_until_they_are_forgotten(self):
         for slow in ((), ("--slow-flash",)):
@@ -104,19 +105,19 @@ class Store(unittest.TestCase):
                     options=slow,
                 )
                 self.assertEqual((results, info["stored"]), ([0], str(SETTINGS)))
-                info, _ = self.life(*self.LOOK)
+                info, _ = self.life(*self.STATE)
                 self.assertEqual(
                     (info["osr"], info["prior_sigma_mm"], info["prior_width_mm"], info["location_limit_mm"], info["stored"]),
                     ("512", "3.1", "0.4", "0.8", str(SETTINGS)),
                 )
-                info, results = self.life((0.5, "forget"), *self.LOOK)
+                info, results = self.life((0.5, "forget"), *self.STATE)
                 self.assertEqual((results, info["osr"], info["stored"]), ([0], "512", "0"))
-                self.assertEqual(self.life(*self.LOOK)[0]["osr"], "1024")
+                self.assertEqual(self.life(*self.STATE)[0]["osr"], "1024")
 
     def test_power_lost_while_storing(self):
         """At many moments of one update; both answers occur."""
         found = set()
-        self.life((0.5, "osr 512"), (0.53, "keep"), *self.LOOK)
+        self.life((0.5, "osr 512"), (0.53, "keep"), *self.STATE)
         kept = self.flash.read_bytes()
         for cut_ms in (0.5, 3, 20, 46, 48, 60, 90, 150):
             self.flash.write_bytes(kept)
@@ -128,28 +129,15 @@ class Store(unittest.TestCase):
                 seconds=1.3,
                 faults=[{"type": "power_cut", "from_s": at_s, "to_s": at_s + 0.01}],
             )
-            info, _ = self.life(*self.LOOK)
+            info, _ = self.life(*self.STATE)
             self.assertIn(info["osr"], ("256", "512"), cut_ms)
             self.assertEqual(info["stored"], str(SETTINGS))
             found.add(info["osr"])
         self.assertEqual(found, {"256", "512"})
 
     def test_the_power_is_cut_at_each_step(self):
-        """The report's measurement, in short."""
-        found = json.loads(
-            run(
-                "/usr/bin/python3",
-                ROOT / "tests/emulated/storing/storing.py",
-                "--build",
-                OPTIONS.build,
-                "--boards",
-                OPTIONS.boards,
-                "--updates",
-                80,
-                "--commands",
-                3,
-            )
-        )
+        """The nightly measurement, in short."""
+        found = storing(OPTIONS.build, OPTIONS.boards, updates=80, commands=3)
         self.assertEqual((found["flash_lost"], found["flash_frames_skipped"]), (0, 0))
         power = found["flash"]["power"]
         self.assertEqual(power["updates"], 80)

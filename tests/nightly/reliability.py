@@ -1,10 +1,12 @@
 """The firmware, its protocol and the tools under damaged input, faults, power cuts and analysis."""
 
 import functools
+import importlib
 import json
 import os
 import re
 import subprocess
+import sys
 
 from boards import BOARDS, PARALLEL, image_of
 from nightly import ROOT, figures_of, job, run
@@ -130,6 +132,13 @@ def power_cuts(build):
         "power_cut_kinds": rows,
         "power_cut_findings": findings,
     }
+
+
+@job("reliability", ("flash_lost", "<=", 0), ("flash_frames_skipped", "<=", 0))
+def storing(build):
+    """The power cut while the emulated chip stores, and frames while it stores."""
+    sys.path.insert(0, str(EMULATED / "storing"))
+    return importlib.import_module("storing").storing(build, build.parent)
 
 
 @job("reliability", ("analyzer_findings", "<=", 0))

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""How far the fingertip's number is from the truth of the contact: gains, shapes, time, and what is kept in flash.
+"""How far the fingertip's number is from the truth of the contact: gains, shapes and time.
 
     truth.py --build build/host -o build/report
 
@@ -10,7 +10,7 @@
 Pads, presses and sensors are the twin's, the code that judges them is the firmware's own, compiled for the host; recordings of
 real strips are used where they are at hand (--recordings, or the environment's FINGERTIP_RECORDINGS) and their figures are null
 elsewhere. Constants were chosen with other seeds and other pads than those that judge here. Cycles are those of the fit report in
-the same folder.
+the same folder, and what is kept without power is that of the nightly test reliability.storing.
 """
 
 import os
@@ -26,13 +26,12 @@ import truth_report  # noqa: E402
 import zero_and_gate  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from measure import Measure, MeasureError  # noqa: E402
-from reporting import chosen_parts, figures_kept, figures_printed, option_parser, report_of_programs  # noqa: E402
+from reporting import chosen_parts, figures_kept, option_parser, report_of_programs  # noqa: E402
 
 PARTS = {
     "fit": "one press: coverage of the standard deviations, warnings, contacts that are not round",
     "calibration": "gains by placements of one weight",
     "gate": "zero and gate over time, on simulated and recorded rubber",
-    "flash": "what is kept, when power goes",
 }
 GOALS = (
     ("cal_median_mm", "<=", 0.15),
@@ -70,7 +69,8 @@ GOALS = (
     ("cold_cycles", "<=", 31000),
     ("masked_cycles", "<=", 62000),
 )
-OF_FIT_REPORT = ("cold_cycles", "masked_cycles")  # of another report in the same folder
+# Of other reports in the same folder: the fit, and the nightly test reliability.storing.
+KEPT = {"fit.json": ("cold_cycles", "masked_cycles"), "reliability.json": ("flash_lost", "flash_frames_skipped")}
 
 
 # part: figures(firmware, options)
@@ -78,9 +78,6 @@ FIGURES = {"fit": one_press.figures, "calibration": calibrations.figures, "gate"
 
 
 def measured(part, options):
-    if part == "flash":
-        program = ROOT / "tests/emulated/storing/storing.py"
-        return figures_printed("truth_flash", [sys.executable, program, "--build", options.build, "--boards", options.boards])
     try:
         return FIGURES[part](Measure(options.build), options)
     except MeasureError as error:
@@ -89,7 +86,6 @@ def measured(part, options):
 
 def main(argv):
     parser = option_parser(__doc__)
-    parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
     parser.add_argument("--recordings", default=os.environ.get("FINGERTIP_RECORDINGS"), metavar="DIR", help="of real strips")
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--pads", type=int, metavar="N", help="where pads differ; default 200 or more")
@@ -103,7 +99,7 @@ def main(argv):
         parts,
         GOALS,
         lambda part: measured(part, options),
-        lambda _, out: figures_kept(out / "fit.json", OF_FIT_REPORT),
+        lambda _, out: {name: value for file, names in KEPT.items() for name, value in figures_kept(out / file, names).items()},
         truth_report,
     )
 

@@ -1,28 +1,23 @@
 #!/usr/bin/env node
-/** Cuts the power of the emulated chip while it stores: see USAGE. */
+/**
+ * Cuts the power of the emulated chip while it stores.
+ *
+ *     store_power.mjs STORE_POWER.bin UPDATES SEED
+ *
+ * The image keeps one thing after another in its flash, with the firmware's store and driver. The power is cut once in each
+ * update, at each of its steps in turn: while bytes go to the flash, and early, late and in the middle of each erase and page
+ * program. In every fourth update it is cut once more while start-up mends what the first cut has left. After each start the
+ * flash must hold what it held before the update or what the update was to bring, and what it holds when start-up has ended
+ * must stay.
+ *
+ * Prints one JSON object: updates, cuts, cuts_in_mending, restarts, brought (updates that the cut did not keep), lost.
+ */
 import { readFileSync } from 'node:fs';
-import { parseArgs } from 'node:util';
 import { Chip, Stopped } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
 import { FlashMemory } from '../../../host_tools/simulation/emulator/chip/flash_memory.mjs';
 import { SimulatedTime } from '../../../host_tools/simulation/emulator/clock.mjs';
-import { InputError, inWords } from '../../../host_tools/simulation/emulator/errors.mjs';
 import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
 import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
-
-const USAGE = `usage: store_power.mjs --image FILE.bin [--updates N] [--seed S]
-
-Has the image store_power keep one thing after another in its flash, with the firmware's store and driver on the emulated
-chip, and cuts the power once in each update, at each of its steps in turn: while bytes go to the flash, and early, late
-and in the middle of each erase and page program; and in every fourth update once more while start-up mends what the first cut has
-left. After each start the flash must hold what it held before the update or what the update was to bring, and what it
-holds when start-up has ended must stay.
-
-Prints one JSON object: updates, cuts, cuts_in_mending, restarts, brought (updates that the cut did not keep), lost.
-
-  --updates N   default 10000
-  --seed S      of what is stored, and of what a cut leaves in the flash; default 1
-
-Exit: 0 done, whatever was found; 1 the image failed; 2 wrong usage or input.`;
 
 const RAM = 0x20000000;
 const NEXT_JOB = 1;
@@ -92,7 +87,7 @@ class Device {
     return new Uint32Array(this.chip.sram.buffer, this.chip.sram.byteOffset + this.chip.core.registers[0] - RAM, 8);
   }
 
-  /** What the fingertip says of itself. */
+  /** What the image reports. */
   get state() {
     const [, , calibration, settings, mixed, damaged, writing, failures] = this.#words;
     if (failures) throw new Error('the flash does not keep what is written');
@@ -169,40 +164,5 @@ function run(image, updates, seed) {
   return { ...found, erases: device.memory.erases, programs: device.memory.programs, device_s: device.time.nanos / 1e9 };
 }
 
-function main(argv) {
-  let values;
-  try {
-    ({ values } = parseArgs({
-      args: argv,
-      strict: true,
-      options: {
-        image: { type: 'string' },
-        updates: { type: 'string', default: '10000' },
-        seed: { type: 'string', default: '1' },
-        help: { type: 'boolean' },
-      },
-    }));
-  } catch (error) {
-    throw new InputError(`${error.message.split('\n')[0]}; see --help`);
-  }
-  if (values.help) return void process.stdout.write(`${USAGE}\n`);
-  if (!values.image) throw new InputError('--image is missing; see --help');
-  const [updates, seed] = ['updates', 'seed'].map((name) => {
-    if (!/^[1-9][0-9]{0,8}$/.test(values[name])) throw new InputError(`--${name} "${values[name]}" is not a whole number from 1 on`);
-    return Number(values[name]);
-  });
-  let image;
-  try {
-    image = readFileSync(values.image);
-  } catch (error) {
-    throw new InputError(`${values.image}: cannot read (${inWords(error)}); build the image first`);
-  }
-  process.stdout.write(`${JSON.stringify(run(image, updates, seed))}\n`);
-}
-
-try {
-  main(process.argv.slice(2));
-} catch (error) {
-  process.stderr.write(`store_power: ${error.message}\n`);
-  process.exitCode = error instanceof InputError ? 2 : 1;
-}
+const [image, updates, seed] = process.argv.slice(2);
+process.stdout.write(`${JSON.stringify(run(readFileSync(image), Number(updates), Number(seed)))}\n`);

@@ -1,35 +1,17 @@
-#!/usr/bin/python3
-"""What the fingertip keeps without power, in the emulator with the firmware's own flash driver.
+"""What the fingertip keeps without power, in the emulator with the firmware's own flash driver."""
 
-    truth_flash.py --build build/host --boards build
-
-Prints one JSON object, and what it is doing on standard error:
-
-    flash_lost             updates after which neither the old nor the new was there, or it did not stay, of --updates with the
-                           power cut at each step in turn (store_power.mjs); the unit test of the store cuts it at every step
-                           of ten thousand
-    flash_frames_skipped   frames that the release image skipped or did not send while it stored calibrations and settings, at
-                           OSR 256 and full rate, in contact on every frame
-    flash                  the figures behind them: latencies with and without storing among them. A command that brings a calibration
-                           takes the processor 0.1 ms, which a frame may have to wait once; the writing does not
-"""
-
-import argparse
 import concurrent.futures
 import json
 import pathlib
 import struct
-import sys
 import tempfile
 import zlib
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/report/shared"))
-import numpy as np  # noqa: E402
-
-from boards import PARALLEL as BOARD  # noqa: E402
-from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, scenario  # noqa: E402
-from fingertip.files import InputError, read_recording, run_tool  # noqa: E402
-from reporting import run  # noqa: E402
+import numpy as np
+from boards import PARALLEL as BOARD
+from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, scenario
+from fingertip.files import InputError, read_recording
+from reporting import run
 
 OSR = 256
 WIRE_VERSION, CALIBRATE, SENSORS = 9, 0x88, 15
@@ -40,17 +22,13 @@ CALIBRATED_s = 0.5
 FROM_s = 1.1
 
 
-def say(what):
-    print(f"truth_flash: {what}", file=sys.stderr, flush=True)
-
-
 def stuffed(packet):
     """COBS and the delimiter, firmware/wire/PROTOCOL.md; no run of a command is 254 bytes long."""
     return b"".join(bytes([len(run) + 1]) + run for run in packet.split(b"\0")) + b"\0"
 
 
 def calibrate_frame(number):
-    """A calibration that differs from the others, and hardly from the scenario's sensors: a fit that finds an outlier takes longer than a frame has."""
+    """A calibration that differs from the others, and hardly from the scenario's sensors: a fit that finds an outlier takes longer than a frame."""
     body = struct.pack("<BIHffHHHHB", SENSORS, 1785931200 + number, 30, 1 + 0.001 * number, 0.02, 5700, 60, 0, 0, 101)
     body += b"".join(struct.pack("<ff", 1 + 0.0001 * ((k + number) % 20), 0.01) for k in range(SENSORS))
     body += b"".join(struct.pack("<hhh", k, -((k + number) % 20), 10 * k) for k in range(SENSORS))
@@ -59,7 +37,7 @@ def calibrate_frame(number):
 
 
 class Run:
-    """The release image, calibrated, in contact, while it obeys so many commands that store."""
+    """The release image, calibrated, in contact, while it obeys a number of commands that store."""
 
     def __init__(self, tools, folder, name, path, commands, options=()):
         base = pathlib.Path(folder) / name
@@ -123,68 +101,41 @@ def stream(tools, commands):
 
 def power(image, updates, seed):
     """Two processes with half of the updates each."""
-    halves = [updates - updates // 2, updates // 2]
-
-    def half(i):
-        return json.loads(
-            run(
-                "node",
-                ROOT / "tests/emulated/storing/store_power.mjs",
-                "--image",
-                image,
-                "--updates",
-                halves[i],
-                "--seed",
-                2 * seed + i,
-            )
-        )
-
+    halves = (updates - updates // 2, updates // 2)
+    program = pathlib.Path(__file__).with_name("store_power.mjs")
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(half, [i for i in range(2) if halves[i]]))
+        found = list(pool.map(lambda i: json.loads(run("node", program, image, halves[i], 2 * seed + i)), range(2)))
     return {name: sum(part[name] for part in found) for name in found[0]}
 
 
-def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
-    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
-    parser.add_argument("--updates", type=int, default=10000, help="with a power cut (default: %(default)s)")
-    parser.add_argument("--commands", type=int, default=20, help="that store, while frames stream (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(argv)
-    if options.updates < 1 or options.commands < 1 or options.seed < 1:
-        raise InputError("--updates, --commands and --seed count from 1")
-    tools = Tools(options.build, options.boards)
-    image = tools.boards / BOARD / "store_power.bin"
-    say(f"{options.updates} updates with the power cut")
-    cut = power(image, options.updates, options.seed)
-    say(f"{options.commands} commands that store while {BOARD} streams at OSR {OSR}, without them, and with the slowest flash")
-    runs = stream(tools, options.commands)
-    print(
-        json.dumps(
-            {
-                "flash_lost": cut["lost"],
-                "flash_frames_skipped": max(runs[name].skipped for name in ("storing", "storing_slowly")),
-                "flash": {
-                    "power": cut,
-                    **{
-                        name: {
-                            "frames": found.frames,
-                            "skipped": found.skipped,
-                            "stored": len(found.stored),
-                            "erases": found.erases,
-                            "programs": found.programs,
-                            "latency_us": found.latency_us,
-                        }
-                        for name, found in runs.items()
-                    },
-                },
+def storing(build, boards, updates=10000, commands=20, seed=1):
+    """Figures:
+
+    flash_lost            updates after which neither the old nor the new was there, or it did not stay, with the power cut at each step in turn
+                          (store_power.mjs); the unit test of the store cuts it at every step of ten thousand
+    flash_frames_skipped  frames that the release image skipped or did not send while it stored calibrations and settings, at OSR 256 and full rate,
+                          in contact on every frame
+    flash                 what is behind them: latencies with and without storing among them. A command that brings a calibration takes the processor
+                          0.1 ms, for which a frame may have to wait once; the writing does not
+    """
+    tools = Tools(build, boards)
+    cut = power(tools.boards / BOARD / "store_power.bin", updates, seed)
+    runs = stream(tools, commands)
+    return {
+        "flash_lost": cut["lost"],
+        "flash_frames_skipped": max(runs[name].skipped for name in ("storing", "storing_slowly")),
+        "flash": {
+            "power": cut,
+            **{
+                name: {
+                    "frames": found.frames,
+                    "skipped": found.skipped,
+                    "stored": len(found.stored),
+                    "erases": found.erases,
+                    "programs": found.programs,
+                    "latency_us": found.latency_us,
+                }
+                for name, found in runs.items()
             },
-            indent=2,
-        )
-    )
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(run_tool("truth_flash.py", main))
+        },
+    }
