@@ -1,7 +1,6 @@
 #include "report/reference/options.hpp"
 
-#include "report/reference/whole_number.hpp"
-
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -11,6 +10,18 @@
 #include <stdexcept>
 
 namespace fingertip::reference {
+namespace {
+
+// CLI11 alone lets a negative number wrap.
+CLI::Validator whole_number() {
+  const auto complaint = [](const std::string &text) {
+    const bool whole = !text.empty() && text.size() <= 18 && text.find_first_not_of("0123456789") == std::string::npos;
+    return whole ? std::string() : "needs a whole number, not '" + text + "'";
+  };
+  return CLI::Validator(complaint, "N");
+}
+
+} // namespace
 
 void parse_options(int argc, char **argv, const std::vector<Option> &options, const std::string &usage) {
   CLI::App app;
