@@ -85,14 +85,14 @@ def reading(build, times=8):
     }
 
 
-sys.path.append(str(ROOT / "host_tools/report/newcomer"))
-import validated  # noqa: E402
+sys.path.append(str(ROOT / "host_tools/report/validation"))
+import cards  # noqa: E402
 
 
-@job("newcomer", *validated.GOALS)
+@job("newcomer", *cards.GOALS)
 def validate(build):
     """`fingertip validate` on simulated pads whose faults are known."""
-    return validated.measure(build, Steps())
+    return cards.measure(build, Steps())
 
 
 @job("newcomer", ("release_differs", "<=", 0))

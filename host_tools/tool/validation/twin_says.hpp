@@ -1,7 +1,7 @@
 /* What healthy pads of the twin score in the same validation: 12 mm of rubber over the firmware's
  * own sensors, with the errors of real pads (host_tools/simulation/cell/validated.cpp), pressed by
  * a hand that misses the marks by 0.3 mm each way. Written by
- * host_tools/report/newcomer/validated.py. */
+ * host_tools/report/validation/cards.py. */
 #pragma once
 
 #include <optional>

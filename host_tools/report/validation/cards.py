@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / "host_tools/python")]
 from fingertip.files import InputError, run_tool  # noqa: E402
 
 TOOL = "host_tools/tool/cli/fingertip"
-PAD = "host_tools/report/newcomer/validated/newcomer_validated"
+PAD = "host_tools/report/validation/simulated_pad/newcomer_validated"
 TABLES = "host_tools/simulation/cell/tables"
 TABLE = ROOT / "host_tools/tool/validation/twin_says.inc"
 FAULTS = ("dead_sensor", "loose_sensor", "tilted_skin", "thin_skin", "drift", "wrong_weight", "swapped_wires")
@@ -185,7 +185,7 @@ def table(build):
             cuts = statistics.quantiles(values, n=20, method="inclusive")
             low, middle, high = (f"{value:.3f}" for value in (cuts[0], statistics.median(values), cuts[-1]))
             rows.append(f'{{"{key}", {str(calibrated).lower()}, {low}, {middle}, {high}}},\n')
-    return f"// Written by host_tools/report/newcomer/validated.py, of {len(TABLE_SEEDS)} pads of each kind. Do not edit.\n" + "".join(rows)
+    return f"// Written by host_tools/report/validation/cards.py, of {len(TABLE_SEEDS)} pads of each kind. Do not edit.\n" + "".join(rows)
 
 
 def main(argv):
@@ -197,7 +197,7 @@ def main(argv):
     if not options.check:
         TABLE.write_text(made, encoding="utf-8")
     elif TABLE.read_text(encoding="utf-8") != made:
-        print(f"{TABLE.relative_to(ROOT)} is not what the twin's pads score; run host_tools/report/newcomer/validated.py", file=sys.stderr)
+        print(f"{TABLE.relative_to(ROOT)} is not what the twin's pads score; run host_tools/report/validation/cards.py", file=sys.stderr)
         return 1
     return 0
 
