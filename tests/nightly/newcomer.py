@@ -11,7 +11,6 @@ import numpy as np
 from nightly import ROOT, Programs, job, run
 from package import read
 from readme_example import environment_of, run_example, runs, simulated
-from reporting import Steps
 
 from fingertip import files
 from fingertip.files import InputError
@@ -83,16 +82,6 @@ def reading(build, times=8):
         "reader_us_per_row": round(1e6 * read_s / len(rows), 1),
         "reader_times_loadtxt": round(read_s / loadtxt_s, 2),
     }
-
-
-sys.path.append(str(ROOT / "host_tools/report/validation"))
-import cards  # noqa: E402
-
-
-@job("newcomer", *cards.GOALS)
-def validate(build):
-    """`fingertip validate` on simulated pads whose faults are known."""
-    return cards.measure(build, Steps())
 
 
 @job("newcomer", ("release_differs", "<=", 0))

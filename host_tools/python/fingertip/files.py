@@ -239,7 +239,7 @@ def write_scenario(path: Path, metadata: Mapping[str, Any], columns: Mapping[str
 
 class Recording:
     """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid says which are
-    measurements), events, end; packets, those that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file;
+    measurements), events and event_lines, their numbers in the file, end; packets, those that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file;
     time_us[n] on the recorder's clock, None in a recording of one."""
 
     def __init__(
@@ -251,6 +251,7 @@ class Recording:
         line_numbers: Any,
         sensors: int,
         events: list[str],
+        event_lines: list[int],
         packets: list[tuple[str, dict[str, str]]],
         end: dict[str, str],
         skipped_lines: int,
@@ -267,6 +268,7 @@ class Recording:
         self.sensors_Pa = table[:, first : first + sensors]
         self.tare_Pa = table[:, first + sensors : first + 2 * sensors]
         self.events = events
+        self.event_lines = event_lines
         self.packets = packets
         self.end = end
         self.skipped_lines = skipped_lines
@@ -408,6 +410,7 @@ class _Reading:
         self.rows: Rows | None = None  # once there is a header
         self.metadata: dict[str, str] = {}
         self.events: list[str] = []
+        self.event_lines: list[int] = []
         self.packets: list[tuple[str, dict[str, str]]] = []
         self.end: dict[str, str] = {}
         self.own_end: dict[str, str] = {}
@@ -421,7 +424,7 @@ class _Reading:
         if not text.strip(" \t\r"):
             return
         if text.startswith("#"):
-            self._comment(text)
+            self._comment(number, text)
         elif self.rows is None:
             self._header(text)
         elif not self.is_joint:
@@ -471,7 +474,7 @@ class _Reading:
             self.times_us.extend(times_us[at : at + len(found)])
             at += len(found)
 
-    def _comment(self, text: str) -> None:
+    def _comment(self, line: int, text: str) -> None:
         key, separator, value = text[1:].partition(": ")
         if not separator:
             raise ValueError('neither a comment "# key: value" nor a row')
@@ -490,6 +493,7 @@ class _Reading:
             self.end = {**counts, **self.own_end}
         elif key == "event":
             self.events.append(value)
+            self.event_lines.append(line)
         elif key == "packet":
             self._packet(value)
         else:
@@ -575,6 +579,7 @@ def read_recording(
         reading.line_numbers,
         reading.sensors,
         reading.events,
+        reading.event_lines,
         reading.packets,
         reading.end,
         skipped,

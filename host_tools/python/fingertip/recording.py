@@ -113,10 +113,11 @@ def _header(sensors: int) -> str:
     )
 
 
-def _own_keys(extra: Mapping[str, str] | None) -> dict[str, str]:
+def _own_keys(extra: Mapping[str, str | None] | None) -> dict[str, str]:
+    """None takes a key out."""
     started = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
-    keys = {"recorded_by": "fingertip-tactile", "started_utc": started, **(extra or {})}
-    return {key: "".join(c if c.isprintable() else "?" for c in value) for key, value in keys.items()}
+    keys: dict[str, str | None] = {"recorded_by": "fingertip-tactile", "started_utc": started, **(extra or {})}
+    return {key: "".join(c if c.isprintable() else "?" for c in value) for key, value in keys.items() if value is not None}
 
 
 class _PacketLines:
@@ -306,7 +307,7 @@ class RecordingWriter(_Writer):
         *,
         replace: bool = False,
         raw_expected: bool = True,
-        extra: Mapping[str, str] | None = None,
+        extra: Mapping[str, str | None] | None = None,
         count: Callable[[], LineStatistics] = LineStatistics,
     ) -> None:
         super().__init__(path, replace)

@@ -1,14 +1,15 @@
 #!/usr/bin/python3
-"""What `fingertip validate` says of simulated pads, held against what is true of them.
+"""The cards of `fingertip validate` of simulated pads, against what is true of them. For validation.py, and by itself:
 
-validated.py --build build/host            writes host_tools/tool/validation/twin_says.inc: what healthy pads of the twin score
-validated.py --build build/host --check    says whether that file is what would be written
+cards.py --build build/host            writes expected.json of the package: the figures of healthy simulated pads
+cards.py --build build/host --check    exit status 1 if that file is not what would be written
 """
 
 import argparse
 import concurrent.futures
 import json
 import math
+import os
 import pathlib
 import statistics
 import subprocess
@@ -19,12 +20,13 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python")]
 from fingertip.files import InputError, run_tool  # noqa: E402
 
+PACKAGE = ROOT / "host_tools/python"
 TOOL = "host_tools/tool/cli/fingertip"
-PAD = "host_tools/report/validation/simulated_pad/newcomer_validated"
+PAD = "host_tools/report/validation/simulated_pad/simulated_pad"
 TABLES = "host_tools/simulation/cell/tables"
-TABLE = ROOT / "host_tools/tool/validation/twin_says.inc"
+TABLE = PACKAGE / "fingertip/validation/expected.json"
 FAULTS = ("dead_sensor", "loose_sensor", "tilted_skin", "thin_skin", "drift", "wrong_weight", "swapped_wires")
-# The bounds of tool/validation were chosen on seeds 1 to 12, 101 to 124, 201 to 206 and 501 to 512. Other seeds showed what was wrong with
+# The bounds of the card were chosen on seeds 1 to 12, 101 to 124, 201 to 206 and 501 to 512. Other seeds showed what was wrong with
 # earlier ones: 403, 815, 852, 853, 874, 890, 945 and 953.
 HEALTHY_SEEDS, FAULTY_SEEDS, TABLE_SEEDS, PULL_SEEDS = range(701, 721), range(961, 966), range(301, 321), range(721, 731)
 PULL = ("--pull", "100")  # of 300 g
@@ -42,16 +44,17 @@ GOALS = (
 
 
 def session(build, cache, folder, fault, seed, calibrated, options=()):
-    """(what the card says, what is true) of one pad."""
+    """(the card, what is true) of one pad."""
     name = "".join((f"{fault}-{seed}-{calibrated}", *options))
     recording, figures, truth = (pathlib.Path(folder) / f"{name}{kind}" for kind in (".csv", ".card.json", ".truth.json"))
     for command in (
         [build / PAD, "-o", recording, "--truth", truth, "--fault", fault, "--seed", str(seed), "--cache", cache]
         + ["--calibrated"] * calibrated
         + list(options),
-        [build / TOOL, "validate", "--from", recording, "--figures", figures],
+        [sys.executable, PACKAGE, "validate", "--from", recording, "--figures", figures],
     ):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        environment = os.environ | {"FINGERTIP_TOOL": str(build / TOOL), "OMP_NUM_THREADS": "1"}
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
         if done.returncode != 0:
             raise InputError(f"{pathlib.Path(command[0]).name} failed on {name}: {done.stderr.strip()}")
     recording.unlink()
@@ -69,7 +72,7 @@ def sessions(build, jobs):
         for table in (build / TABLES).glob("*.table"):
             (cache / table.name).symlink_to(table)
         solved = {}
-        for job in jobs:  # one of each fault first: it solves the tables that the others share
+        for job in jobs:  # one of each fault first: it solves the tables that the others need too
             if job[0] == "thin_skin" and not solved:
                 solved[job] = session(build, cache, folder, *job)
         return list(zip(jobs, pool.map(lambda job: solved.get(job) or session(build, cache, folder, *job), jobs)))
@@ -78,9 +81,9 @@ def sessions(build, jobs):
 def location_off(card, truth):
     """The card's error of the location over the true one, less 1."""
     true_mm = statistics.median(
-        math.hypot(said["x_mm"] - press["x_mm"], said["y_mm"] - press["y_mm"])
-        for said, press in zip(card["presses"], truth["presses"])
-        if said["frames"]
+        math.hypot(found["x_mm"] - press["x_mm"], found["y_mm"] - press["y_mm"])
+        for found, press in zip(card["presses"], truth["presses"])
+        if found["frames"]
     )
     return card["figures"]["location_error_mm"] / true_mm - 1
 
@@ -95,10 +98,10 @@ def is_found(fault, card, truth):
     return any(finding["finding"] == fault and set(truth["faulty"]) <= set(finding["sensors"]) for finding in card["findings"])
 
 
-def pulls(build, steps):
+def pulls(build, steps, pads):
     """Figures of the pulls, by pads of which the fingertip knows the profile."""
-    plain = sessions(build, [("none", seed, True, PLAIN) for seed in PULL_SEEDS])
-    real = sessions(build, [("none", seed, True, LIKE_REAL) for seed in PULL_SEEDS])
+    plain = sessions(build, [("none", seed, True, PLAIN) for seed in PULL_SEEDS[:pads]])
+    real = sessions(build, [("none", seed, True, LIKE_REAL) for seed in PULL_SEEDS[:pads]])
     steps.say(f"{len(plain) + len(real)} pads pulled")
     off = [one["figures"]["pull_over_thread"] - 1 for _, (one, _) in plain]
     moved = [one["figures"]["pull_moves_mm"] - truth["pulls"][0]["way_mm"] for _, (one, truth) in plain]
@@ -114,10 +117,13 @@ def pulls(build, steps):
     }
 
 
-def measure(build, steps):
-    healthy = sessions(build, [("none", seed, calibrated) for calibrated in (False, True) for seed in HEALTHY_SEEDS])
+def measure(build, steps, pads):
+    """pads: the most of each kind."""
+    healthy = sessions(build, [("none", seed, calibrated) for calibrated in (False, True) for seed in HEALTHY_SEEDS[:pads]])
     steps.say(f"{len(healthy)} healthy pads validated")
-    faulty = sessions(build, [(fault, seed, calibrated) for fault in FAULTS for calibrated in (False, True) for seed in FAULTY_SEEDS])
+    faulty = sessions(
+        build, [(fault, seed, calibrated) for fault in FAULTS for calibrated in (False, True) for seed in FAULTY_SEEDS[:pads]]
+    )
     steps.say(f"{len(faulty)} faulty pads validated")
     off = {
         kind: [100 * abs(location_off(card, truth)) for job, (card, truth) in healthy if job[2] in kind]
@@ -144,48 +150,53 @@ def measure(build, steps):
         "validate_finds": sum(count == 0 for count in missed.values()),
         "validate_missed": sum(missed.values()),
         "validate_false_findings": sum(false),
-        **pulls(build, steps),
+        **pulls(build, steps, pads),
     }
 
 
 def text(found):
-    return [
-        "## A report card",
-        "",
+    """Paragraphs of the report."""
+    return (
+        "## The report card",
         f"`fingertip validate` makes the card of {found['validate_healthy_pads']} healthy and {found['validate_faulty_pads']} faulty simulated pads, half of "
-        f"them calibrated before. Sensors' gains, places, widths, relaxation, after-effects, drift and dip are as recordings of real pads have them. The hand "
-        f"misses the marks by 0.3 mm each way, and the print lies shifted and turned. The bounds of the findings were chosen on other seeds.",
-        "",
+        "them calibrated before. Sensors' gains, places, widths, relaxation, after-effects, drift and dip are as recordings of real pads have them. The hand "
+        "misses the marks by 0.3 mm each way, and the print is shifted and turned on the pad. The bounds of the findings were chosen on other seeds.",
         "`validate_location_error_percent_off`: how far the card's error of the location is from the true one, median over the healthy pads. "
         f"`validate_gain_sd_honest`: {WITHIN_1[0]} to {WITHIN_1[1]} % of the gains' errors are within one standard deviation, and {WITHIN_2[0]} % or more "
         "within two. `validate_finds`: of the seven faults, those that the card finds on every pad that has them, with the right sensors. "
         "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.",
-        "",
         f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ only in their gains, and of as many with all the errors of real pads. Each is "
-        "calibrated and knows its profile. On the first, `validate_pull_off_percent` says how far the pull that the card finds differs from the thread's. "
-        "`validate_pull_location_off_mm` says how far the movement of the location differs from that of the ball, which is `validate_pull_way_mm`. Both are "
-        "medians. On the second, the firmware does not estimate every pull, but `validate_pull_like_real_estimated_percent` of them. The pulley has no "
-        "friction here.",
-        "",
-    ]
+        "calibrated and knows its profile. On the first, `validate_pull_off_percent` is how far the tangential force that the card finds differs from the "
+        "thread's. `validate_pull_location_off_mm` is how far the movement of the location differs from that of the ball, which is `validate_pull_way_mm`. "
+        "Both are medians. On the second, the firmware estimates the tangential force of `validate_pull_like_real_estimated_percent` of the pulls. The "
+        "pulley has no friction here.",
+    )
 
 
 def table(build):
-    rows = []
-    for calibrated in (False, True):
+    """(low, middle, high) of each figure of healthy pads, as the card compares them."""
+    made = {}
+    for calibrated, name in ((False, "never_calibrated"), (True, "calibrated")):
         found = {}
-        for _, (card, _) in sessions(build, [("none", seed, calibrated, PULL) for seed in TABLE_SEEDS]):
-            for key, value in card["figures"].items():
-                found.setdefault(key, []).append(value)
-        for _, (card, _) in sessions(build, [("none", seed, True, PLAIN) for seed in TABLE_SEEDS] if calibrated else []):
-            for key, value in card["figures"].items():
-                if key.startswith("pull_"):
-                    found.setdefault(key, []).append(value)
+        plain = sessions(build, [("none", seed, True, PLAIN) for seed in TABLE_SEEDS] if calibrated else [])
+        for cards, begin in ((sessions(build, [("none", seed, calibrated, PULL) for seed in TABLE_SEEDS]), ""), (plain, "pull_")):
+            for _, (card, _) in cards:
+                for key, value in card["figures"].items():
+                    if key.startswith(begin):
+                        found.setdefault(key, []).append(value)
+        made[name] = {}
         for key, values in sorted(found.items()):
             cuts = statistics.quantiles(values, n=20, method="inclusive")
-            low, middle, high = (f"{value:.3f}" for value in (cuts[0], statistics.median(values), cuts[-1]))
-            rows.append(f'{{"{key}", {str(calibrated).lower()}, {low}, {middle}, {high}}},\n')
-    return f"// Written by host_tools/report/validation/cards.py, of {len(TABLE_SEEDS)} pads of each kind. Do not edit.\n" + "".join(rows)
+            made[name][key] = [round(value, 3) for value in (cuts[0], statistics.median(values), cuts[-1])]
+    return made
+
+
+def table_text(build):
+    head = {
+        "written_by": "host_tools/report/validation/cards.py",
+        "pads": {"of_each_kind": len(TABLE_SEEDS), "sensors": 15, "pitch_mm": 9.0, "skin_mm": 12.0, "pull_share": round(100 / 300, 3)},
+    }
+    return json.dumps(head | table(build), indent=1) + "\n"
 
 
 def main(argv):
@@ -193,14 +204,14 @@ def main(argv):
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/host", metavar="FOLDER", help="of the programs")
     parser.add_argument("--check", action="store_true", help="write nothing")
     options = parser.parse_args(argv)
-    made = table(options.build.resolve())
+    made = table_text(options.build.resolve())
     if not options.check:
         TABLE.write_text(made, encoding="utf-8")
     elif TABLE.read_text(encoding="utf-8") != made:
-        print(f"{TABLE.relative_to(ROOT)} is not what the twin's pads score; run host_tools/report/validation/cards.py", file=sys.stderr)
+        print(f"{TABLE.relative_to(ROOT)} is not what simulated pads have; run host_tools/report/validation/cards.py", file=sys.stderr)
         return 1
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(run_tool("validated.py", main))
+    sys.exit(run_tool("cards.py", main))

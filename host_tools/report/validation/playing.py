@@ -72,27 +72,27 @@ def session_of(scenario):
 
 
 class Played:
-    """Arrays over the frames of one scenario: time_s, truth and what was said; phases: rows of the truth file."""
+    """Arrays over the frames of one scenario: time_s, truth and estimates; phases: rows of the truth file."""
 
     def __init__(self, scenario, recording, truth):
         # The truth columns only: t_s, contact, x_mm, y_mm, force_N, (p0, sigma), slip
         table = np.loadtxt(scenario, delimiter=",", comments=["#", "t_s"], usecols=(0, 1, 2, 3, 4, 7), ndmin=2)
-        said = read_recording(recording)
-        rows = said.has_contact
-        self.time_s = said["t_us"][rows] * 1e-6
-        self.flags = said["flags"][rows].astype(np.int64)
+        read = read_recording(recording)
+        rows = read.has_contact
+        self.time_s = read["t_us"][rows] * 1e-6
+        self.flags = read["flags"][rows].astype(np.int64)
         at = [np.interp(self.time_s, table[:, 0], table[:, i]) for i in range(1, 6)]
         self.touched = at[0] > 1 - 1e-9
         self.x_mm, self.y_mm, self.force_N = at[1:4]
         self.slips = at[4] > 0.5
-        self.said = {name: said[name][rows] for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")}
-        if said.sensors_Pa.shape[1]:
-            self.above_Pa = (said.sensors_Pa - said.tare_Pa)[rows]
+        self.estimated = {name: read[name][rows] for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")}
+        if read.sensors_Pa.shape[1]:
+            self.above_Pa = (read.sensors_Pa - read.tare_Pa)[rows]
         with open(truth, newline="", encoding="utf-8") as file:
             self.phases = list(csv.DictReader(line for line in file if not line.startswith("#")))
         self.sample = self.touched & ((self.flags & FIT_VALID) != 0)
         self.located = self.sample & (self.force_N >= FORCE_MIN_N)
-        self.error_mm = np.hypot(self.said["x_mm"] - self.x_mm, self.said["y_mm"] - self.y_mm)
+        self.error_mm = np.hypot(self.estimated["x_mm"] - self.x_mm, self.estimated["y_mm"] - self.y_mm)
 
 
 class Workshop:
@@ -140,13 +140,13 @@ class Workshop:
             if done.returncode != 0:
                 raise InputError("twin tables failed; see above")
         for indenter, layer_mm in pairs:
-            said = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)
+            text = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)
             self.gaussians.append({"indenter": indenter, "layer_mm": layer_mm} | {
-                name: float(value) for name, value in (word.split("=") for word in said.split())})
+                name: float(value) for name, value in (word.split("=") for word in text.split())})
 
     @property
     def prior_sigma_mm(self):
-        """Of the stiff layer: the mean over what presses there, for a prior does not know which it will be."""
+        """Of the stiff layer: the mean over the indenters there, for a prior does not know which it will be."""
         return float(np.mean([g["sigma_mm"] for g in self.gaussians if g["layer_mm"] == STIFF_LAYER_mm]))
 
     def calibrate(self, layer_mm, effects, pad):
@@ -157,11 +157,11 @@ class Workshop:
             run(self.twin, "scenario", "placements", "--layer", layer_mm, "--effects", effects or "none", "--seed", seed + OTHER_PLACES * refused,
                 "--pad", seed, "--force", WEIGHT_N, "--seconds", SESSION_s, "--cache", self.tables, "-o", path, "--overwrite")
             run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", SESSION_RATE_Hz, "--raw", "--seed", seed)
-            said = subprocess.run([str(self.player), "calibrate", recording, "--force", str(WEIGHT_N), "-o", commands], capture_output=True, text=True)
-            if said.returncode == 0:
+            judged = subprocess.run([str(self.player), "calibrate", recording, "--force", str(WEIGHT_N), "-o", commands], capture_output=True, text=True)
+            if judged.returncode == 0:
                 return commands, refused
-            if "not calibrated: " not in said.stderr:
-                raise InputError(said.stderr.strip())
+            if "not calibrated: " not in judged.stderr:
+                raise InputError(judged.stderr.strip())
         return None, SESSIONS_MAX
 
     def play_one(self, scenario):
@@ -196,7 +196,7 @@ class Workshop:
         return time.monotonic() - progress.start_s
 
     def emulate(self, effects, seconds):
-        """The image on the emulated chip plays a scenario; its contact packets computed here from its pressures."""
+        """Runs a scenario on the image of the emulated chip, and computes its contact packets here from its pressures."""
         if not self.image.exists():
             raise InputError(f"{self.image} is not there; {TO_BUILD}")
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"

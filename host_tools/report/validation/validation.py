@@ -3,9 +3,9 @@
 
     validation.py --build build/host --boards build -o build/report
 
-Writes scenarios with twin, plays them with fingertip_player through the firmware's own code, and compares what it says with
+Writes scenarios with twin, runs them with fingertip_player through the firmware's own code, and compares its estimates with
 the truth, beside the figures of De Clercq et al., RA-L 2022 ("the paper"). Theirs are of hardware, these are of a
-simulation: they tell how far the method and this code carry on a pad that is as the model says, and what each error of a
+simulation: they show how far the method and this code carry on a pad that is as the model, and what each error of a
 pad costs, not how good a fingertip is.
 
     validation.json   all that was measured; "goals": the figures by which this is judged
@@ -22,11 +22,12 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import cards  # noqa: E402
 from fingertip.files import SLIP, InputError, run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
 from goals import judge  # noqa: E402
 from playing import PAPER_RATE_Hz, PRIOR_WIDTH_mm, STIFF_LAYER_mm, Workshop  # noqa: E402
-from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
+from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402
 
 # A saturated or missing sensor is left out: that alone makes no location worse.
@@ -86,6 +87,7 @@ GOALS = (
     ("h6_bad_unflagged_percent", "<=", 0.5),
     ("saturated_median_mm", "<=", 0.1),
     ("emulated_frames_different", "<=", 0),
+    *cards.GOALS,
 )
 
 
@@ -147,12 +149,12 @@ class Samples:
             return np.concatenate([member(played)[played.located] for played in scenarios])
 
         self.error_mm, self.flags = gathered(lambda p: p.error_mm), gathered(lambda p: p.flags)
-        self.force_N, self.said_N = gathered(lambda p: p.force_N), gathered(lambda p: p.said["force_N"])
+        self.force_N, self.estimated_N = gathered(lambda p: p.force_N), gathered(lambda p: p.estimated["force_N"])
 
     @property
     def scale(self):
-        """The one factor that a user finds with one known weight: median of true over said."""
-        return float(np.median(self.force_N / self.said_N))
+        """The one factor that a user finds with one known weight: median of true over estimated."""
+        return float(np.median(self.force_N / self.estimated_N))
 
     @property
     def warned(self):
@@ -176,11 +178,11 @@ class Samples:
 
     def force(self, scale=1.0):
         """RMSE, MAPE (median of the absolute errors), correlation."""
-        said_N = scale * self.said_N
+        scaled_N = scale * self.estimated_N
         return {
-            "rmse_N": float(np.sqrt(np.mean((said_N - self.force_N) ** 2))),
-            "mape_percent": float(100 * np.median(np.abs(said_N - self.force_N) / self.force_N)),
-            "r": float(np.corrcoef(self.force_N, self.said_N)[0, 1]),
+            "rmse_N": float(np.sqrt(np.mean((scaled_N - self.force_N) ** 2))),
+            "mape_percent": float(100 * np.median(np.abs(scaled_N - self.force_N) / self.force_N)),
+            "r": float(np.corrcoef(self.force_N, self.estimated_N)[0, 1]),
         }
 
 
@@ -190,7 +192,7 @@ def pads_of(shop, what, **wanted):
 
 def scaled_force(pads):
     """Each pad has a factor of its own."""
-    off = [pad.scale * pad.said_N - pad.force_N for pad in pads]
+    off = [pad.scale * pad.estimated_N - pad.force_N for pad in pads]
     relative = np.abs(np.concatenate([o / pad.force_N for o, pad in zip(off, pads)]))
     return {
         "scale": float(np.median([pad.scale for pad in pads])),
@@ -204,31 +206,36 @@ def slip_steps(scenarios):
     """Of each act of slip scenarios: speed, steps judged, steps right, seconds from the pusher's start to the first SLIP (NaN: none)."""
     rows = []
     for played in scenarios:
-        said = (played.flags & SLIP) != 0
-        acts = {}
+        reported = (played.flags & SLIP) != 0
+        contacts = {}
         for phase in played.phases:
-            acts.setdefault(phase["act"], []).append(phase)
-        for phases in acts.values():
+            contacts.setdefault(phase["act"], []).append(phase)
+        for phases in contacts.values():
             moving = [p for p in phases if p["phase"] in ("dead_travel", "slip")]
             if not moving:
                 continue
             begin, end = float(moving[0]["t_begin_s"]), float(moving[-1]["t_end_s"])
             near = (played.time_s >= begin - SLIP_MARGIN_s) & (played.time_s <= end + SLIP_MARGIN_s) & played.touched
-            found = played.time_s[said & (played.time_s >= begin) & (played.time_s <= end + 0.1)]
+            found = played.time_s[reported & (played.time_s >= begin) & (played.time_s <= end + 0.1)]
             rows.append(
-                (float(moving[0]["speed_mm_s"]), near.sum(), (said == played.slips)[near].sum(), found[0] - begin if len(found) else np.nan)
+                (
+                    float(moving[0]["speed_mm_s"]),
+                    near.sum(),
+                    (reported == played.slips)[near].sum(),
+                    found[0] - begin if len(found) else np.nan,
+                )
             )
     return np.array(rows).reshape(-1, 4)
 
 
-def slip_success(acts):
-    found_s = acts[np.isfinite(acts[:, 3]), 3]
-    steps = int(acts[:, 1].sum())
+def slip_success(contacts):
+    found_s = contacts[np.isfinite(contacts[:, 3]), 3]
+    steps = int(contacts[:, 1].sum())
     return {
         "steps": steps,
-        "success_percent": float(100 * acts[:, 2].sum() / steps) if steps else None,
-        "acts": len(acts),
-        "acts_not_found": len(acts) - len(found_s),
+        "success_percent": float(100 * contacts[:, 2].sum() / steps) if steps else None,
+        "contacts": len(contacts),
+        "contacts_not_found": len(contacts) - len(found_s),
         "latency_median_ms": float(1e3 * np.median(found_s)) if len(found_s) else None,
         "latency_p95_ms": float(1e3 * np.quantile(found_s, 0.95)) if len(found_s) else None,
     }
@@ -305,7 +312,7 @@ def measure_slip(shop):
             "speed_mm_s": speed,
             "paper_rate": slip_success(steady[steady[:, 0] == speed]),
             "every_frame": slip_success(fast[fast[:, 0] == speed]),
-            **{case: slip_success(acts[acts[:, 0] == speed]) for case, acts in dips.items()},
+            **{case: slip_success(contacts[contacts[:, 0] == speed]) for case, contacts in dips.items()},
         }
         for speed in sorted(set(steady[:, 0]))
     ]
@@ -317,7 +324,7 @@ def measure_slip(shop):
     every = slip_success(steady)
     return {
         "slip_success_percent": every["success_percent"],
-        **{f"slip_success_{key_of(case)}_percent": slip_success(acts)["success_percent"] for case, acts in dips.items()},
+        **{f"slip_success_{key_of(case)}_percent": slip_success(contacts)["success_percent"] for case, contacts in dips.items()},
         "slip_steps": every["steps"],
         "slip_by_object": rows,
         "slip_by_speed": speeds,
@@ -391,14 +398,14 @@ def measure(shop, seconds, emulated):
     found |= measure_location(shop) | measure_force(shop, scales) | measure_stiff(shop) | measure_slip(shop)
     found |= measure_budget(shop)
     found["emulated_frames"], found["emulated_frames_different"] = emulated["frames"], emulated["frames"] - emulated["equal"]
-    return judge(found, GOALS)
+    return found
 
 
 def curves(shop):
     """What the pictures show, by picture; a part that was not played is not there."""
 
     def force_of(played, shown):
-        return {"time_s": played.time_s[shown], "true_N": played.force_N[shown], "said_N": played.said["force_N"][shown]}
+        return {"time_s": played.time_s[shown], "true_N": played.force_N[shown], "estimated_N": played.estimated["force_N"][shown]}
 
     force = {}
     for name, what, indenter in (("taps", "taps", "sphere6"), ("object", "pokes", "ping_pong")):
@@ -427,7 +434,7 @@ def curves(shop):
                 "time_s": played.time_s[moving],
                 "true_x_mm": played.x_mm[moving],
                 "true_y_mm": played.y_mm[moving],
-                **{name: values[moving] for name, values in played.said.items()},
+                **{name: values[moving] for name, values in played.estimated.items()},
             }
     return {"force": force, "signals": signals, "slip": slip}
 
@@ -441,6 +448,9 @@ def main(argv):
     parser.add_argument("--pads", type=int, default=8, metavar="N", help="with unequal sensors; default 8")
     parser.add_argument("--indenters", metavar="NAME,...", help="only scenarios with these; sphere6 must be among them")
     parser.add_argument("--emulated-seconds", type=float, default=12, metavar="S", help="of the image on the emulated chip; default 12")
+    parser.add_argument(
+        "--cards", type=int, default=20, metavar="N", help="report cards of this many simulated pads of each kind at most; 0: none"
+    )
     options = parser.parse_args(argv)
     if not 1 <= options.pads <= 100:
         raise InputError(f"--pads {options.pads} is out of range; give 1 to 100")
@@ -456,7 +466,11 @@ def main(argv):
     for file in shop.work.iterdir():
         file.unlink()
     shop.work.rmdir()
-    found = measure(shop, seconds, emulated)
+    found = {figure: None for figure, _, _ in cards.GOALS}
+    if options.cards:
+        print("        report cards of simulated pads", flush=True)
+        found = cards.measure(pathlib.Path(options.build).resolve(), Steps(), options.cards)
+    found = judge(measure(shop, seconds, emulated) | found, GOALS)
     write_json(out / "validation.json", found)
     pictures = draw(curves(shop), out)
     write_report(found, out / "validation.md")

@@ -3,6 +3,7 @@
 write_report takes the dict that is in validation.json, draw the arrays of validation.curves; neither measures anything.
 """
 
+import cards
 import numpy as np
 from drawing import BLUE, FAINT, INK, ORANGE, plt, save
 from fingertip.files import SENSOR_X_mm, SENSOR_Y_mm, write_text
@@ -92,11 +93,11 @@ def write_report(found, path):
         "# The published experiments on the simulated fingertip",
         "Columns headed *paper* are measured on hardware (De Clercq et al., RA-L 2022). Columns headed *simulated* come from the twin: an "
         "elastic layer under the paper's indenters, the firmware's own code on simulated sensors. The two do not compare as better and worse: "
-        "a simulated pad is as straight, as bonded and as quiet as its settings say.",
+        "a simulated pad is as straight, as bonded and as quiet as its settings.",
         f"{found['samples']} samples (frames in contact with a fit) out of {found['frames']} frames, at {found['rate_Hz']} Hz where nothing else is "
-        f"said, OSR 1024, in {found['seconds']:.0f} s. The image on the emulated chip played {found['emulated_frames']} frames of such taps: "
+        f"named, OSR 1024, in {found['seconds']:.0f} s. The image on the emulated chip played {found['emulated_frames']} frames of such taps: "
         f"{found['emulated_frames'] - found['emulated_frames_different']} of its contact packets are what the same code gives here, byte for "
-        f"byte. Layers: rubber of Shore 15 A, 12 mm unless said otherwise. Unequal sensors are drawn for {found['pads']} pads.",
+        f"byte. Layers: rubber of Shore 15 A, 12 mm unless another thickness is named. Unequal sensors are drawn for {found['pads']} pads.",
     )
     write_dip(found, r)
     r.text("## Figures and goals")
@@ -112,10 +113,12 @@ def write_report(found, path):
         )
     write_slip(found, r)
     write_budget(found, r)
+    if found["validate_finds"] is not None:
+        r.text(*cards.text(found))
     r.text(
         "## What is not the paper",
         "The pad has no edges, no friction and no large strain; at high forces a ball of 6 mm would be pressed in deeper than the layer "
-        "allows. The objects are stand-ins whose shape is ours. Relaxation and hysteresis act on the readings at a given force. The paper's layer "
+        "allows. The objects are substitutes whose shape is ours. Relaxation and hysteresis act on the readings at a given force. The paper's layer "
         "thickness and gains are not known.",
     )
     r.text(
@@ -130,7 +133,7 @@ def write_dip(found, r):
     r.text(
         "## Pads with a dip",
         "On recordings of real pads a sensor three to five widths away from a press reads 1 to 2 % of the peak below its zero. The paper's model has no "
-        "such dip. So each figure stands beside the same one on pads whose rubber has the twin's dip of 5 %, which leaves that much "
+        "such dip. So each figure is beside the same one on pads whose rubber has the twin's dip of 5 %, which leaves that much "
         "([twin](../../host_tools/simulation/twin/README.md)). The columns with a dip and without have the same sensors and the same presses. "
         "*Calibrated*: a weight of 3 N on a ball was set down before, as `fingertip calibrate` asks for it; the firmware has what it found. On 12 mm that "
         "is the pad's profile too, as scene `grasp` takes it. "
@@ -274,15 +277,15 @@ def write_stiff(found, r):
             for row in found["stiff"]
         ],
     )
-    said = []
+    parts = []
     for margin_mm, area in areas.items():
         without, given = (pick(found["stiff"], margin_mm=margin_mm, case="gain0", prior=prior) for prior in (False, True))
         helps = given["p99_mm"] < 0.5 * without["p99_mm"]
-        said.append(
+        parts.append(
             f"{area}: {'it decides' if helps else 'it is not needed'}, 99 % are within {given['p99_mm']:.2f} mm with it and within "
             f"{without['p99_mm']:.2f} mm without"
         )
-    r.text("What the prior is worth with equal sensors, by where the presses are: " + "; ".join(said) + ".")
+    r.text("What the prior is worth with equal sensors, by where the presses are: " + "; ".join(parts) + ".")
     outer = {(row["case"], row["prior"]): row for row in found["stiff"] if row["margin_mm"] == 4.5}
     r.text(
         "On rubber as thin as this the dip decides. Up to the outer sensors the median without a calibration is "
@@ -296,7 +299,7 @@ def latency(success):
     """Median / 95 % in ms, and how many were never found."""
     if success["latency_median_ms"] is None:
         return "none found"
-    missed = f", {success['acts_not_found']} of {success['acts']} not found" if success["acts_not_found"] else ""
+    missed = f", {success['contacts_not_found']} of {success['contacts']} not found" if success["contacts_not_found"] else ""
     return f"{success['latency_median_ms']:.0f} / {success['latency_p95_ms']:.0f}{missed}"
 
 
@@ -309,7 +312,7 @@ def write_slip(found, r):
         "## Slip, step by step",
         "Success per step of 50 ms: SLIP against whether the pusher moves, from half a second before it starts to half a second after it "
         "stops; eq. (7), n = 2, threshold 0.75 mm, 20 Hz; speeds 20, 50, 100, 150 and 200 mm/s over 24 mm; elastic dead travel of 1 mm, which "
-        "counts as slip as in the paper. The contact moves as the kinematics of `twin scenario slip` say: in the paper friction decides.",
+        "counts as slip as in the paper. The contact moves by the kinematics of `twin scenario slip`: in the paper friction decides.",
     )
     rows = []
     for row in found["slip_by_object"]:
@@ -339,7 +342,7 @@ def write_slip(found, r):
             "the past two places lags. That the objects hardly differ is the model's doing: it has no friction that would."
         )
     r.text(
-        "By speed, over all objects; beside it the sphere of 18 mm with every frame that the sensors give, where eq. (7) looks back over the "
+        "By speed, over all objects; beside it the sphere of 18 mm with every frame that the sensors give, where eq. (7) covers the "
         "same 0.1 s:"
     )
     r.table(
@@ -421,17 +424,17 @@ def draw(curves, folder):
             axis.set_axis_off()
             continue
         axis.plot(shown[name]["time_s"], shown[name]["true_N"], color=ORANGE, label="true")
-        axis.plot(shown[name]["time_s"], shown[name]["said_N"], ".-", color=BLUE, ms=3, lw=0.8, label="estimated")
+        axis.plot(shown[name]["time_s"], shown[name]["estimated_N"], ".-", color=BLUE, ms=3, lw=0.8, label="estimated")
         axis.set(title=title, xlabel="time, s", ylabel="force, N")
         axis.legend()
     for name, colour, label in (("dip", ORANGE, "never calibrated"), ("dip calibrated", BLUE, "calibrated")):
-        axes[1, 0].plot(shown[name]["true_N"], shown[name]["said_N"], ",", color=colour, rasterized=True)
+        axes[1, 0].plot(shown[name]["true_N"], shown[name]["estimated_N"], ",", color=colour, rasterized=True)
         axes[1, 0].plot([], [], "o", ms=4, color=colour, label=label)
     axes[1, 0].plot((0, 50), (0, 50), color=FAINT, lw=0.8)
     axes[1, 0].legend()
     axes[1, 0].set(title="(c) all samples, gain spread 10 %, dip", xlabel="true force, N", ylabel="estimated force, N")
     if "cycle" in shown:
-        axes[1, 1].plot(shown["cycle"]["true_N"], shown["cycle"]["said_N"], color=BLUE)
+        axes[1, 1].plot(shown["cycle"]["true_N"], shown["cycle"]["estimated_N"], color=BLUE)
         axes[1, 1].plot((0, 20), (0, 20), color=FAINT, lw=0.8)
         axes[1, 1].set(title="(d) slow load cycle, relaxation and hysteresis", xlabel="true force, N", ylabel="estimated force, N")
     figure.suptitle("Simulated fingertip, as the paper's Fig. 7")

@@ -5,7 +5,6 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
 #include "simulation/cell/hand_server.hpp"
-#include "simulation/cell/validated.hpp"
 #include "simulation/twin/effects.hpp"
 
 #include <algorithm>
@@ -242,7 +241,7 @@ void validate(const ValidateHandOptions &options, const Place &place) {
       for (std::size_t k = 0; k < SENSORS; k++) {
         pressures[k] = pad->pressure_Pa(k, time_s);
       }
-      if (time_s >= pad->plan().back().first) {
+      if (time_s >= pad->end_s()) {
         began_us.reset();
         rates_set = fingers.rates_set(0);
       }

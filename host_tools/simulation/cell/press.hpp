@@ -7,7 +7,7 @@
 #pragma once
 
 #include "simulation/cell/place.hpp"
-#include "tool/validation/protocol.hpp"
+#include "simulation/cell/validated.hpp"
 
 namespace fingertip::cell {
 
@@ -29,7 +29,7 @@ struct ValidateHandOptions {
   std::string cache;
   std::uint64_t seed = 1;
   double weight_g = 300.0;
-  validating::Pulling pulling = {};
+  Pulling pulling = {};
   std::optional<double> seconds;
 };
 void validate(const ValidateHandOptions &options, const Place &place);

@@ -1,8 +1,10 @@
 #include "simulation/cell/validated.hpp"
 
 #include "libfingertip/random.hpp"
+#include "libfingertip/text.hpp"
 #include "simulation/cell/place.hpp"
 #include "simulation/cell/press.hpp"
+#include "tool/calibration/solver.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -14,15 +16,13 @@ extern "C" {
 namespace fingertip::cell {
 namespace {
 
-using validating::Step;
-
 enum Stream : std::uint64_t { FAULT = 871, HAND = 872, SHEET = 873 };
 
 constexpr double AIR_Pa = 101325.0;
 constexpr double THIN_mm = 8.0, TILT_SHARE = 0.09, LOOSE_SD = 0.2;
 constexpr double DRIFT_MIN_Pa_min = 60.0, DRIFT_MAX_Pa_min = 180.0;
 constexpr std::size_t DRIFTING = 3;
-constexpr double BEGIN_s = 2.0, RESTS_s = 3.0, MOVES_s = 0.15, STANDS_s = 2.0;
+constexpr double BEGIN_s = 2.0, RESTS_s = 3.0, MOVES_s = 0.15, PRESSES_s = 2.0;
 constexpr double PULLS_AFTER_s = 3.0, PULLS_s = 0.5, PULLED_s = 3.0;
 constexpr double FRICTION = 0.8;   // of the ball on rubber
 constexpr double AIM_SD_deg = 2.0; // of the thread
@@ -30,6 +30,34 @@ constexpr double SPARE_s = 1.0;    // beyond what a step asks for
 // The print lies on the pad so far off, sd each way.
 constexpr double SHEET_SD_mm = 0.7, SHEET_SD_rad = 0.02;
 constexpr double SETTLED_Pa = 10000.0, SETTLED_s = 0.75;
+
+// As the template has them, in their order: protocol.py.
+constexpr double EMPTY_s = 60.0, HOLD_s = 30.0, REST_s = 30.0;
+constexpr std::size_t TURNS = 2, STRIDE = 7;
+
+struct Mark {
+  double x_mm, y_mm;
+};
+
+// Each sensor, and the middle of each cell of four: columns half a pitch apart, that of sensors and
+// that of cells in turn.
+std::vector<Mark> template_marks() {
+  const double pitch_mm = static_cast<double>(geometry.pitch_mm);
+  std::vector<Mark> sorted, marks;
+  for (int column = -2; column <= 2; column++) {
+    for (int row = column % 2 ? 3 : 4; row >= -4; row -= 2) {
+      sorted.push_back({0.5 * pitch_mm * column, 0.5 * pitch_mm * row});
+    }
+  }
+  for (std::size_t i = 0; i < sorted.size(); i++) {
+    marks.push_back(sorted[i * STRIDE % sorted.size()]);
+  }
+  return marks;
+}
+
+std::string text_of(double value) {
+  return shortest(static_cast<float>(value));
+}
 
 double smooth(double share) {
   return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
@@ -170,69 +198,60 @@ std::vector<double> ValidatedPad::pulled_Pa(double x_mm, double y_mm, const True
 }
 
 void ValidatedPad::draw_plan() {
-  calibrating::Array array;
-  array.pitch_mm = static_cast<double>(geometry.pitch_mm);
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    array.x_mm.push_back(static_cast<double>(geometry.x_mm[k]));
-    array.y_mm.push_back(static_cast<double>(geometry.y_mm[k]));
-  }
   Random sheet(options_.seed, SHEET, 0), hand(options_.seed, HAND, 0);
   const double shift_x = SHEET_SD_mm * sheet.normal(), shift_y = SHEET_SD_mm * sheet.normal();
   const double turn = SHEET_SD_rad * sheet.normal();
   double t_s = BEGIN_s;
-  const auto touch = [&](double x_mm, double y_mm, double stands_s) {
+  const auto begin = [&](const std::string &step) { plan_.emplace_back(t_s, "validate: " + step); };
+  const auto touch = [&](double x_mm, double y_mm, double rests_s) {
     t_s += RESTS_s;
-    Touch made{t_s, stands_s, base_Pa(x_mm, y_mm), std::vector<double>(SENSORS, 1.0)};
+    Touch made{t_s, rests_s, base_Pa(x_mm, y_mm), std::vector<double>(SENSORS, 1.0)};
     if (options_.fault == PadFault::loose_sensor) {
       made.share[faulty_[0]] = std::max(1.0 + LOOSE_SD * hand.normal(), 0.1);
     }
     touches_.push_back(std::move(made));
-    t_s += MOVES_s + stands_s;
+    t_s += MOVES_s + rests_s;
   };
-  for (const Step &step :
-       validating::steps_of(validating::marks_of(array), options_.weight_g, LAYER_mm, options_.pulling)) {
-    plan_.emplace_back(t_s, step);
-    switch (step.kind) {
-    case Step::Kind::empty:
-      t_s += validating::EMPTY_s + SPARE_s;
-      break;
-    case Step::Kind::press: {
-      const double x = step.at.x_mm + options_.hand_sd_mm * hand.normal();
-      const double y = step.at.y_mm + options_.hand_sd_mm * hand.normal();
-      truth_.push_back({std::cos(turn) * x - std::sin(turn) * y + shift_x,
-                        std::sin(turn) * x + std::cos(turn) * y + shift_y, weight_N_});
-      touch(truth_.back().x_mm, truth_.back().y_mm, STANDS_s);
-      t_s += MOVES_s;
-      break;
-    }
-    case Step::Kind::hold:
-      touch(options_.hand_sd_mm * hand.normal(), options_.hand_sd_mm * hand.normal(), validating::HOLD_s + SPARE_s);
-      break; // the rest begins with the lift
-    case Step::Kind::pull: {
-      const double pull_N = calibrating::GRAVITY_N_PER_g * options_.pulling.weight_g;
-      true_pulls_.push_back({step.toward_deg + AIM_SD_deg * hand.normal(), pull_N, weight_N_, way_mm(pull_N)});
-      const double x_mm = options_.hand_sd_mm * hand.normal();
-      const double y_mm = options_.hand_sd_mm * hand.normal();
-      touch(x_mm, y_mm, PULLS_AFTER_s + PULLS_s + PULLED_s);
-      touches_.back().pulled_Pa = pulled_Pa(x_mm, y_mm, true_pulls_.back());
-      t_s += MOVES_s;
-      break;
-    }
-    case Step::Kind::rest:
-      t_s += MOVES_s + validating::REST_s + SPARE_s;
-      break;
-    case Step::Kind::begin:
-    case Step::Kind::take_back:
-    case Step::Kind::end:
-      break;
-    }
+  begin("begin weight_g=" + text_of(options_.weight_g) + " skin_mm=" + text_of(LAYER_mm));
+  begin("empty");
+  t_s += EMPTY_s + SPARE_s;
+  const std::vector<Mark> marks = template_marks();
+  for (std::size_t i = 0; i < TURNS * marks.size(); i++) {
+    const Mark &mark = marks[i % marks.size()];
+    begin("press mark=" + std::to_string(i % marks.size() + 1) + " x_mm=" + text_of(mark.x_mm) +
+          " y_mm=" + text_of(mark.y_mm));
+    const double x = mark.x_mm + options_.hand_sd_mm * hand.normal();
+    const double y = mark.y_mm + options_.hand_sd_mm * hand.normal();
+    truth_.push_back({std::cos(turn) * x - std::sin(turn) * y + shift_x,
+                      std::sin(turn) * x + std::cos(turn) * y + shift_y, weight_N_});
+    touch(truth_.back().x_mm, truth_.back().y_mm, PRESSES_s);
+    t_s += MOVES_s;
   }
+  begin("hold");
+  touch(options_.hand_sd_mm * hand.normal(), options_.hand_sd_mm * hand.normal(), HOLD_s + SPARE_s);
+  begin("rest"); // with the lift
+  t_s += MOVES_s + REST_s + SPARE_s;
+  const double pull_N = calibrating::GRAVITY_N_PER_g * options_.pulling.weight_g;
+  for (double toward_deg : {0.0, 90.0, 180.0, 270.0}) {
+    if (!(pull_N > 0.0)) {
+      break;
+    }
+    begin("pull toward_deg=" + text_of(toward_deg) + " weight_g=" + text_of(options_.pulling.weight_g) +
+          " height_mm=" + text_of(options_.pulling.height_mm));
+    true_pulls_.push_back({toward_deg + AIM_SD_deg * hand.normal(), pull_N, weight_N_, way_mm(pull_N)});
+    const double x_mm = options_.hand_sd_mm * hand.normal();
+    const double y_mm = options_.hand_sd_mm * hand.normal();
+    touch(x_mm, y_mm, PULLS_AFTER_s + PULLS_s + PULLED_s);
+    touches_.back().pulled_Pa = pulled_Pa(x_mm, y_mm, true_pulls_.back());
+    t_s += MOVES_s;
+  }
+  begin("end");
 }
 
 void ValidatedPad::step() {
   before_Pa_ = after_Pa_;
   const double t_s = STEP_s * double(++steps_);
-  const auto end_s = [&](const Touch &touch) { return touch.begin_s + 2.0 * MOVES_s + touch.stands_s; };
+  const auto end_s = [&](const Touch &touch) { return touch.begin_s + 2.0 * MOVES_s + touch.rests_s; };
   while (touch_ < touches_.size() && t_s > end_s(touches_[touch_])) {
     touch_++;
   }
@@ -240,7 +259,7 @@ void ValidatedPad::step() {
   if (touch_ < touches_.size() && t_s > touches_[touch_].begin_s) {
     const Touch &touch = touches_[touch_];
     const double since_s = t_s - touch.begin_s;
-    const double share = smooth(since_s / MOVES_s) - smooth((since_s - MOVES_s - touch.stands_s) / MOVES_s);
+    const double share = smooth(since_s / MOVES_s) - smooth((since_s - MOVES_s - touch.rests_s) / MOVES_s);
     const double pulled = touch.pulled_Pa.empty() ? 0.0 : smooth((since_s - MOVES_s - PULLS_AFTER_s) / PULLS_s);
     for (std::size_t k = 0; k < SENSORS; k++) {
       const double base_Pa = touch.base_Pa[k] + (pulled > 0.0 ? pulled * (touch.pulled_Pa[k] - touch.base_Pa[k]) : 0.0);

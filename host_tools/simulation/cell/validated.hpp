@@ -1,4 +1,4 @@
-// A hand that leads the steps of `fingertip validate` on a simulated pad: an empty minute, a weight
+// A hand that follows the steps of `fingertip validate` on a simulated pad: an empty minute, a weight
 // on a ball at the marks of the template, a hold, a rest, and pulls where they are wanted. With the
 // errors of real pads, and with one fault of those that the card is to find.
 #pragma once
@@ -6,7 +6,6 @@
 #include "simulation/cell/face.hpp"
 #include "simulation/twin/effects.hpp"
 #include "simulation/twin/traction_table.hpp"
-#include "tool/validation/protocol.hpp"
 
 #include <filesystem>
 #include <optional>
@@ -17,8 +16,8 @@ namespace fingertip::cell {
 
 enum class PadFault {
   none,
-  dead_sensor,   // one feels nothing, or (odd seeds) answers nothing
-  loose_sensor,  // one feels each press by another share, sd 20 %
+  dead_sensor,   // one measures nothing, or (odd seeds) answers nothing
+  loose_sensor,  // one measures another share of each press, sd 20 %
   tilted_skin,   // 9 % thicker at one end than in the middle, along x or y, and as much thinner
   thin_skin,     // 8 mm of rubber where 12 are stated
   drift,         // three zeros move by 60 to 180 Pa in a minute
@@ -30,11 +29,16 @@ const std::vector<std::string> &pad_fault_names(); // in this order
 // As the recordings of real strips and grids have them (twin/README.md, effects).
 twin::EffectValues usual_effects();
 
+struct Pulling {
+  double weight_g = 0.0;  // on the thread; 0: no pulls
+  double height_mm = 2.0; // of the thread above the rubber
+};
+
 struct ValidatedOptions {
   PadFault fault = PadFault::none;
   double weight_g = 300.0; // as stated
   double hand_sd_mm = 0.3; // from the marks, each way
-  validating::Pulling pulling = {};
+  Pulling pulling = {};
   twin::EffectValues effects = usual_effects();
   std::uint64_t seed = 1;
   std::filesystem::path cache;
@@ -44,8 +48,10 @@ class ValidatedPad {
 public:
   explicit ValidatedPad(const ValidatedOptions &options);
 
-  // When each step begins, s; the last is the end. All touches are in between.
-  const std::vector<std::pair<double, validating::Step>> &plan() const { return plan_; }
+  // When each step begins, s, and its event (host_tools/python/fingertip/validation/protocol.py); the
+  // last is the end. All touches are in between.
+  const std::vector<std::pair<double, std::string>> &plan() const { return plan_; }
+  double end_s() const { return plan_.back().first; }
   // Above ambient, what the sensor with this number reads; times may not fall by more than STEP_s.
   double pressure_Pa(std::size_t sensor, double t_s);
 
@@ -55,7 +61,7 @@ public:
   };
   const std::vector<Truth> &presses() const { return truth_; } // as in the plan; the hold is not there
   // A pull that the rubber shears under: the ball moves by way_mm along it. The thread's moment
-  // moves what presses, and not what pulls, by the thread's height times the pull over the weight.
+  // moves the pressure, and not the tangential force, by the thread's height times the pull over the weight.
   struct TruePull {
     double toward_deg, pull_N, force_N, way_mm;
   };
@@ -67,9 +73,9 @@ public:
 
 private:
   struct Touch {
-    double begin_s, stands_s;
+    double begin_s, rests_s;
     std::vector<double> base_Pa;        // [sensor], under the whole weight
-    std::vector<double> share;          // [sensor] of it that a loose one feels
+    std::vector<double> share;          // [sensor] of it that a loose one measures
     std::vector<double> pulled_Pa = {}; // [sensor] the same when it is pulled; empty: it is not
   };
   void choose_fault();
@@ -92,7 +98,7 @@ private:
   std::vector<std::size_t> faulty_, wire_; // wire_: [sensor] whose pressure it reads
   std::vector<double> deaf_, drift_Pa_s_, gains_;
   std::vector<bool> absent_;
-  std::vector<std::pair<double, validating::Step>> plan_;
+  std::vector<std::pair<double, std::string>> plan_;
   std::vector<Touch> touches_;
   std::vector<Truth> truth_;
   std::vector<TruePull> true_pulls_;

@@ -1,14 +1,24 @@
-/* Files that are installed with this program. */
+/* Files that are installed with this program, and other programs. */
 #pragma once
 
 #include <filesystem>
 #include <initializer_list>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace fingertip {
 
 /* The first of these that exists, as seen from this program's folder: where it is installed, or in
  * the tree that it is built in. */
 std::optional<std::filesystem::path> beside(std::initializer_list<const char *> places);
+
+/* This program's own path. */
+std::filesystem::path this_program();
+
+/* Another program, a path or one of PATH, takes this one's place. Throws Error; missing: its text
+ * where there is no such program, else what the system reports. */
+[[noreturn]] void become(const std::string &program, const std::vector<std::string> &arguments,
+                         const std::string &missing = "");
 
 } // namespace fingertip

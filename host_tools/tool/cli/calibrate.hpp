@@ -19,6 +19,7 @@ struct CalibrateOptions {
   bool dry_run = false;          /* of a recording, write nothing */
   bool yes = false;              /* ask nothing */
   bool show = false, erase = false;
+  bool placements = false; /* of another program (calibrate_placements.hpp) */
   ColourMode colour = ColourMode::automatic;
 };
 

@@ -119,8 +119,14 @@ class Install(RealPort, CliTest):
             self.assertIn("share/fingertip/web/index.html", page)
         tables = {path for path in installed if re.fullmatch(r"share/fingertip/tables/sphere(15|18)-.*\.table", path)}
         self.assertEqual(len(tables), 2)
+        package = {path for path in installed if path.startswith("share/fingertip/python/")}
+        sources = [path for path in (ROOT / "host_tools/python/fingertip").rglob("*.*") if path.suffix in (".py", ".json", ".msg")]
+        self.assertEqual(len(package), len(sources) + 1)
+        sheet = os.path.join(self.folder, "sheet.pdf")
+        subprocess.run([os.path.join(self.folder, "bin/fingertip"), "validate", "--template", sheet], check=True, capture_output=True)
+        self.assertTrue(os.path.exists(sheet))
         self.assertEqual(
-            installed - page - tables,
+            installed - page - tables - package,
             {
                 "bin/fingertip",
                 "libexec/fingertip/fingertip-simulate",

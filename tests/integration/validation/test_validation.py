@@ -36,6 +36,8 @@ def validate(folder, *more):
             "2",
             "--emulated-seconds",
             "4",
+            "--cards",
+            "0",
             *more,
         ],
         capture_output=True,

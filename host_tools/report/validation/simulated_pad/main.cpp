@@ -14,7 +14,6 @@
 #include "tool/advice.hpp"
 #include "tool/calibration/gain_session.hpp"
 #include "tool/plain_help.hpp"
-#include "tool/validation/protocol.hpp"
 
 extern "C" {
 #include "native/native_cdc.h"
@@ -59,8 +58,7 @@ public:
     }
     native_fingertip_start(&settings);
     native_cdc_open();
-    for (const wire_packet &command :
-         setting_commands({setting_from_text("rate=" + std::to_string(int(validating::RATE_Hz)))}, {})) {
+    for (const wire_packet &command : setting_commands({setting_from_text("rate=50")}, {})) {
       send(command);
     }
     if (options.calibrated) {
@@ -73,12 +71,12 @@ public:
   void run() {
     std::size_t next = 0;
     const auto &plan = pad_.plan();
-    const double end_s = plan.back().first;
+    const double end_s = pad_.end_s();
     for (std::uint64_t t_us = SLICE_us;; t_us += SLICE_us) {
       run_to(t_us);
       const double t_s = 1e-6 * static_cast<double>(t_us);
       while (next < plan.size() && plan[next].first <= t_s && writer_) {
-        writer_->event(validating::event_of(plan[next++].second));
+        writer_->event(plan[next++].second);
       }
       if (t_s >= end_s && next == plan.size()) {
         break;
@@ -144,7 +142,7 @@ private:
     }
     if (!writer_ && packet.type == WIRE_INFO) {
       writer_.emplace(options_.recording, options_.overwrite, &packet.body.info, SENSORS,
-                      Metadata{{"recorded_by", "newcomer_validated"},
+                      Metadata{{"recorded_by", "simulated_pad"},
                                {"simulated", "the firmware's code on simulated rubber"},
                                {"fault", options_.fault},
                                {"seed", std::to_string(options_.pad.seed)}},
@@ -183,8 +181,7 @@ void keep_truth(const Options &options, const ValidatedPad &pad) {
 }
 
 int run(int argc, char **argv) {
-  CLI::App app("Simulates a validation of a fingertip, and records it as `fingertip validate` does.",
-               "newcomer_validated");
+  CLI::App app("Simulates a validation of a fingertip, and records it as `fingertip validate` does.", "simulated_pad");
   speak_plainly(app);
   Options options;
   options.pad.cache = twin::default_cache_directory();
@@ -200,14 +197,14 @@ int run(int argc, char **argv) {
   app.add_flag("--known-pad", options.knows_pad, "The calibration set the pad's profile, so that pulls are estimated")
       ->needs(calibrated);
   app.add_flag("--plain", options.plain, "Rubber as its profile has it: sensors' gains differ, and nothing else");
-  app.add_option("--pull", options.pad.pulling.weight_g, "Pulls in the end, by so much on a thread")
+  app.add_option("--pull", options.pad.pulling.weight_g, "Mass on a thread that pulls at the end")
       ->check(CLI::Range(10.0, 1000.0))
       ->type_name("GRAMS");
   app.add_option("--thread-height", options.pad.pulling.height_mm, "Of the thread above the rubber")
       ->check(CLI::Range(0.0, 10.0))
       ->type_name("MM")
       ->capture_default_str();
-  app.add_option("--hand", options.pad.hand_sd_mm, "The hand misses the marks by so much, each way")
+  app.add_option("--hand", options.pad.hand_sd_mm, "How far the hand misses the marks, sd each way")
       ->check(CLI::Range(0.0, 3.0))
       ->type_name("MM")
       ->capture_default_str();
@@ -243,9 +240,9 @@ int main(int argc, char **argv) {
   try {
     return fingertip::cell::run(argc, argv);
   } catch (const fingertip::Error &error) {
-    fingertip::tell("newcomer_validated", error);
+    fingertip::tell("simulated_pad", error);
   } catch (const std::exception &error) {
-    fingertip::tell("newcomer_validated", fingertip::Error(error.what()));
+    fingertip::tell("simulated_pad", fingertip::Error(error.what()));
   }
   return 1;
 }

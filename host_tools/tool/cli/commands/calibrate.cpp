@@ -1,6 +1,7 @@
 #include "tool/cli/calibrate.hpp"
 
 #include "libfingertip/text.hpp"
+#include "tool/cli/calibrate_placements.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/usage.hpp"
 
@@ -27,6 +28,9 @@ void add_calibrate(CommandLine &line) {
       line.add("calibrate", "Find the sensors' gains by setting down one weight at some twenty places", [options] {
         if (options->dry_run && options->from.empty()) {
           throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
+        }
+        if (options->placements) {
+          return calibrate_placements();
         }
         if (options->drag && !options->force_N) {
           throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or "
@@ -63,6 +67,11 @@ void add_calibrate(CommandLine &line) {
                           ->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Erase its calibration, after a question")
       ->excludes(weight, force, drag, from, dry_run, show);
+  command
+      ->add_flag(
+          "--placements", options->placements,
+          "For programs: only solve the placements that standard input has, and print the solution, both as JSON")
+      ->excludes(weight, force, drag, from, dry_run, yes, show);
   with_colour(command, options->colour);
 }
 

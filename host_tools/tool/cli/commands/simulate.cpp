@@ -2,10 +2,6 @@
 #include "tool/cli/beside.hpp"
 #include "tool/cli/commands/commands.hpp"
 
-#include <cerrno>
-#include <cstring>
-#include <unistd.h>
-
 namespace fingertip {
 
 namespace {
@@ -18,13 +14,7 @@ int simulate(const std::vector<std::string> &options) {
     throw Error("the program that simulates is not installed; install all of the tool, or build "
                 "the target fingertip in the project's tree");
   }
-  std::vector<char *> arguments = {const_cast<char *>(program->c_str())};
-  for (const std::string &option : options) {
-    arguments.push_back(const_cast<char *>(option.c_str()));
-  }
-  arguments.push_back(nullptr);
-  execv(program->c_str(), arguments.data());
-  throw Error(ErrorCode::cannot_read, program->string() + ": " + std::strerror(errno));
+  become(program->string(), options);
 }
 
 } // namespace
