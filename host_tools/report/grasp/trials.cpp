@@ -5,6 +5,7 @@
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/table_file.hpp"
+#include "report/measure/sessions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +22,7 @@ constexpr double FORCE_GAIN_SD = 0.05; // of a calibrated fingertip's force scal
 constexpr double LAYER_mm = 12.0;
 constexpr std::size_t CALIBRATIONS = 40;
 constexpr double FAST_Hz = 600.0;
-enum Stream : std::uint64_t { PADS = 831, NOISE, SET };
+enum Stream : std::uint64_t { PADS = 831, NOISE, SET, CALIBRATED = 6619936917925592332u };
 
 } // namespace
 
@@ -48,36 +49,35 @@ std::map<std::string, double> settings_of(const std::string &changes) {
 
 namespace {
 
-// A calibration takes half a second, so they are kept; the first of them is gone through anyway,
-// and tells whether the others still are what they would be.
-truth::CalibratedPads pads_of(std::uint64_t seed, const std::string &cache) {
-  constexpr std::size_t PER_CALIBRATION = 10; // truth::calibrated_pads
-  constexpr std::size_t VALUES = 2 * truth::SENSORS;
-  const auto values_of = [](const truth::CalibratedPads &pads) {
-    std::vector<float> values;
-    for (const truth::Pad &pad : pads) {
-      for (const truth::Readings *part : {&pad.gain, &pad.gain_sd}) {
-        for (const double value : *part) {
-          values.push_back(static_cast<float>(value));
-        }
-      }
-    }
+// Pads with what their calibrations left of the gains. A calibration takes half a second, so they are kept. The first
+// is repeated anyway, and shows whether the others still are what they would be.
+std::vector<Rubber> pads_of(std::uint64_t seed, const std::string &cache) {
+  const truth::Feet feet(LAYER_mm, cache);
+  const auto pad_of = [&](std::size_t i) {
+    const truth::PadOptions relaxing{10.0, 17.5,
+                                     0.1}; // every other pad: its sensors relax by 9 to 26 % and sit 0.1 mm off
+    const auto session =
+        truth::calibrated_session(feet, i % 2 ? relaxing : truth::PadOptions{}, Random(seed, CALIBRATED, i).next());
+    std::vector<float> values(session.remaining_gain.begin(), session.remaining_gain.end());
+    values.insert(values.end(), session.gain_sd.begin(), session.gain_sd.end());
     return values;
   };
-  const std::string key = "calibrated-pads seed " + std::to_string(seed);
-  const twin::TableFile file(cache, "calibrated-pads", key);
-  std::vector<float> values(CALIBRATIONS * VALUES);
-  const std::vector<float> first = values_of(truth::calibrated_pads(PER_CALIBRATION, seed, cache));
+  const std::size_t sensors = truth::session_array().sensors();
+  const std::vector<float> first = pad_of(0);
+  std::vector<float> values(CALIBRATIONS * 2 * sensors);
+  const twin::TableFile file(cache, "calibrated-pads", "calibrated-pads seed " + std::to_string(seed));
   if (!file.read(values) || !std::equal(first.begin(), first.end(), values.begin())) {
-    values = values_of(truth::calibrated_pads(PER_CALIBRATION * CALIBRATIONS, seed, cache));
+    twin::in_parallel(CALIBRATIONS, [&](std::size_t i) {
+      const std::vector<float> pad = pad_of(i);
+      std::copy(pad.begin(), pad.end(), values.begin() + std::ptrdiff_t(i * 2 * sensors));
+    });
     file.write(values);
   }
-  truth::CalibratedPads pads(CALIBRATIONS);
+  std::vector<Rubber> pads(CALIBRATIONS);
   for (std::size_t i = 0; i < CALIBRATIONS; i++) {
-    for (std::size_t k = 0; k < truth::SENSORS; k++) {
-      pads[i].gain[k] = static_cast<double>(values[i * VALUES + k]);
-      pads[i].gain_sd[k] = static_cast<double>(values[i * VALUES + truth::SENSORS + k]);
-    }
+    const auto begin = values.begin() + std::ptrdiff_t(i * 2 * sensors), middle = begin + std::ptrdiff_t(sensors);
+    std::copy(begin, middle, pads[i].gain.begin());
+    std::copy(middle, middle + std::ptrdiff_t(sensors), pads[i].gain_sd.begin());
   }
   return pads;
 }
@@ -121,8 +121,7 @@ Trial Set::trial(std::uint64_t n) const {
   trial.seed = Random(options_.seed, NOISE, n).next();
   Random random(options_.seed, PADS, n);
   for (Rubber &rubber : trial.rubber) {
-    const truth::Pad &pad = pads_[random.next() % pads_.size()];
-    rubber = {pad.gain, pad.gain_sd};
+    rubber = pads_[random.next() % pads_.size()];
     const double scale = 1.0 + FORCE_GAIN_SD * std::clamp(random.normal(), -3.0, 3.0);
     for (double &gain : rubber.gain) {
       gain *= scale;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "simulation/cell/trial.hpp"
-#include "truth/fit/touches.hpp"
 
 #include <cstdint>
 #include <map>
@@ -46,7 +45,7 @@ private:
   std::vector<std::string> faces_;
   std::map<std::string, cell::Face> all_;
   GripperMechanics gripper_;
-  truth::CalibratedPads pads_;
+  std::vector<cell::Rubber> pads_;
   cell::Sensing sensing_;
 };
 
