@@ -1,4 +1,4 @@
-// Pads of the twin on which somebody calibrates and taps (sessions.hpp), many at once.
+// Pads of the twin on which a person calibrates and taps (sessions.hpp), many at once.
 #include "libfingertip/in_parallel.hpp"
 #include "report/measure/calibrations.hpp"
 #include "report/measure/entry.hpp"

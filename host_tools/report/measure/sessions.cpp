@@ -15,7 +15,7 @@ constexpr double AMBIENT_Pa = 101325.0;
 constexpr std::uint16_t OSR = 1024;
 constexpr double FRAMES_PER_s = 200.0;           // of the slower board at this OSR
 constexpr double DOWN_s = 0.3, TAP_DOWN_s = 0.1; // from first touch to the full force
-constexpr double SETTLED_BEGIN_s = 0.5, SETTLED_END_s = 1.0, STANDS_s = 2.0, PAUSE_s = 1.5;
+constexpr double SETTLED_BEGIN_s = 0.5, SETTLED_END_s = 1.0, WEIGHT_DOWN_s = 2.0, PAUSE_s = 1.5;
 constexpr int SETTLED_STEPS = 5;
 constexpr double TAP_READ_s = 0.15;
 
@@ -119,7 +119,7 @@ calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double 
   for (double &reading : placement.reading_Pa) {
     reading += placement.noise_Pa * noise_.normal();
   }
-  report(STANDS_s - SETTLED_END_s, 1.0);
+  report(WEIGHT_DOWN_s - SETTLED_END_s, 1.0);
   report(DOWN_s, 0.0);
   return placement;
 }

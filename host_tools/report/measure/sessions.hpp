@@ -1,5 +1,5 @@
-// Calibrations that never were: pads of the twin on which somebody sets down a weight, as it should
-// be done and as it should not.
+// Simulated calibrations: pads of the twin on which a person sets down a weight, as it should be done and as it should
+// not.
 #pragma once
 
 #include "libfingertip/random.hpp"
@@ -36,8 +36,8 @@ class SessionPad {
 public:
   SessionPad(const PadOptions &options, double layer_mm, std::uint64_t seed);
 
-  // A weight is set down by hand, stands two seconds and is lifted: the means of the readings from
-  // 0.5 to 1 s after it was down.
+  // A weight is set down by hand and lifted after two seconds. The result has the means of the readings from 0.5 to 1 s
+  // after it was down.
   calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm,
                                double angle_rad);
   // A tap: the readings of one frame 0.15 s after it was down.
@@ -78,12 +78,12 @@ struct Feet {
   twin::ContactTable round, lying;
 };
 
-// Somebody at work. Places are anywhere on the array; in a good session, where the tool asks for
-// one, within 3 mm (sd) of it.
+// A person who calibrates. Locations are anywhere on the array. In a good session, where the tool asks for a location,
+// they are within 3 mm (sd) of it.
 //   elongated  lying cylinder, half of the sessions always at one angle
 //   offsets    zeros off by 500 Pa: up in every other session, else up or down by the sensor
 //   one_end    all in the upper third of the array
-//   cluster    all within 7 mm of one place
+//   cluster    all within 7 mm of one location
 //   drift      zeros move by 200 Pa from first to last, up or down by the sensor
 //   too_few    six placements
 //   weights    in turn 3 and 4 N, or anything from 1.5 to 4.5 N
@@ -103,8 +103,8 @@ private:
   std::vector<double> zero_Pa_, drift_Pa_;
 };
 
-// What a calibration left: true over estimated gains, what the solver says of their sds, and the
-// response that it found. And how the pad is.
+// What a calibration left: true over estimated gains, their sds by the solver, and the response that it found; and how
+// the pad is.
 struct Calibrated {
   std::vector<double> remaining_gain, gain_sd; // [sensor]
   double force_scale, force_scale_sd;

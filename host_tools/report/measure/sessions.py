@@ -1,4 +1,4 @@
-"""Pads of the twin on which somebody calibrates and taps (measure/pads.cpp), one row for each."""
+"""Pads of the twin on which a person calibrates and taps (placements.cpp), one row for each."""
 
 import dataclasses
 

@@ -1,6 +1,6 @@
 /* An image that stores one thing after another with the firmware's own store and flash driver:
- * store_power.mjs plays the debugger that its breakpoint calls, says what to store, cuts the power,
- * and judges what is left.
+ * store_power.mjs is the debugger that its breakpoint calls. It commands what to store, cuts the
+ * power, and judges what is left.
  *
  * All of a calibration, and all of a set of settings, follows from one number; so a mixture shows.
  */
@@ -51,7 +51,7 @@ static struct store_settings settings_of(uint32_t number) {
   }
   memcpy(bytes, &number, sizeof number);
   memcpy(&settings, bytes, sizeof settings);
-  settings.sync &= UINT8_MAX; /* so much is stored */
+  settings.sync &= UINT8_MAX; /* the store keeps 8 bits */
   return settings;
 }
 
