@@ -22,9 +22,9 @@ usage() {
   echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  docs    build the documents as a site with search, into build/docs/site, and check their links" >&2
-  echo "  test    build everything and run the whole test suite" >&2
+  echo "  test    build everything and run the test suite: the labels quick, host, emulated, accuracy and realtime" >&2
   echo "  test quick    build what the quick tests need and run them: about half a minute once built" >&2
-  echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser, linux, or nightly, which takes hours" >&2
+  echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser, linux, or nightly, which has the last two and takes hours" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp; some hours" >&2
   echo "  report PART [FOLDER]  build everything and measure one part whole: $(echo $(parts)); real needs the FOLDER of its recordings" >&2
@@ -43,9 +43,12 @@ case $# in
   *) usage ;;
 esac
 
-# What is built and installed for it.
+# What is built and installed for it. Some labels need a browser, virtual machines or the fuzz targets, which a plain run leaves out.
 job=$1
-[ "$1 ${2:-}" = "test quick" ] && job=quick
+case "$1 ${2:-}" in
+  "test quick") job=quick ;;
+  "test browser" | "test linux" | "test nightly") job=nightly ;;
+esac
 
 say() { printf '%s\n' "== $*"; }
 
@@ -81,12 +84,9 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/serial/__init__.py python3-serial
 LIST
-  case $1 in quick | test | report | fuzz) cat << 'LIST' ;; esac
+  case $1 in quick | test | nightly | report | fuzz) cat << 'LIST' ;; esac
 xz xz-utils
 qemu-system-arm qemu-system-arm
-qemu-system-x86_64 qemu-system-x86
-/bin/busybox busybox-static
-lsusb usbutils
 sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
 /usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
@@ -96,13 +96,18 @@ sigrok-cli sigrok-cli
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
 LIST
-  case $1 in test | report | fuzz) cat << 'LIST' ;; esac
+  case $1 in nightly | fuzz) cat << 'LIST' ;; esac
 clang-14 clang-14
 /usr/share/doc/libclang-rt-14-dev libclang-rt-14-dev
+LIST
+  case $1 in nightly) cat << 'LIST' ;; esac
+qemu-system-x86_64 qemu-system-x86
+/bin/busybox busybox-static
+lsusb usbutils
 lintian lintian
 /usr/sbin/piuparts piuparts
 LIST
-  case $1 in web | test | report) cat << 'LIST' ;; esac
+  case $1 in web | test | nightly | report) cat << 'LIST' ;; esac
 clang-14 clang-14
 wasm-ld-14 lld-14
 llvm-ar-14 llvm-14
@@ -111,10 +116,10 @@ llvm-ar-14 llvm-14
 /usr/lib/wasm32-wasi/libc++.a libc++-14-dev-wasm32
 /usr/lib/wasm32-wasi/libc++abi.a libc++abi-14-dev-wasm32
 LIST
-  case $1 in quick | test | report) cat << 'LIST' ;; esac
+  case $1 in quick | test | nightly | report) cat << 'LIST' ;; esac
 /usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
 LIST
-  case $1 in test | report) cat << 'LIST' ;; esac
+  case $1 in test | nightly | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
 clang-format-14 clang-format-14
 cppcheck cppcheck
@@ -123,7 +128,7 @@ openssl openssl
 LIST
   [ -z "$own_node" ] || echo /usr/share/doc/python3-venv python3-venv
   # Ubuntu has no package of it; without it the page's tests say why they do not run.
-  case $1.$(sed -n 's/^ID=//p' /etc/os-release) in test.debian | report.debian) echo chromium chromium ;; esac
+  case $1.$(sed -n 's/^ID=//p' /etc/os-release) in nightly.debian) echo chromium chromium ;; esac
 }
 
 is_there() {
@@ -209,7 +214,7 @@ fi
 
 mkdir -p build
 judges=
-if { [ "$job" = test ] || [ "$job" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
+if { [ "$job" = test ] || [ "$job" = nightly ] || [ "$job" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
   say "fetching the judges with pip, while the rest is built"
   {
     /usr/bin/python3 -m venv --clear build/venv &&
@@ -242,8 +247,12 @@ case $job in
     configure host -DBUILD_TESTING=ON
     cmake --build --preset host --target quick_tests
     ;;
+  nightly)
+    configure host -DBUILD_TESTING=ON -DFINGERTIP_WEB=ON -DFINGERTIP_FUZZ=ON
+    cmake --build --preset host
+    ;;
   *)
-    configure host -DBUILD_TESTING=ON -DFINGERTIP_FUZZ=ON -DFINGERTIP_WEB=ON
+    configure host -DBUILD_TESTING=ON -DFINGERTIP_WEB=ON -DFINGERTIP_FUZZ=OFF
     cmake --build --preset host
     ;;
 esac
@@ -260,10 +269,13 @@ case $1 in
     ;;
   web) exec build/host/host_tools/tool/cli/fingertip web ;;
   test)
-    # The preset leaves the nightly ones out.
-    [ "${2:-}" != nightly ] || exec ctest --test-dir build/host --output-on-failure -L '^nightly$'
+    case ${2:-} in
+      browser | linux) set -- --test-dir build/host --output-on-failure -L "^$2\$" ;;
+      nightly) set -- --test-dir build/host --output-on-failure -L '^(nightly|browser|linux)$' ;;
+      *) set -- --preset host ${2:+-L "^$2\$"} ;;
+    esac
     # One more than there are processors: tests in real time wait most of theirs.
-    exec ctest --preset host -j "$(($(nproc) + 1))" ${2:+-L "^$2\$"}
+    exec ctest -j "$(($(nproc) + 1))" "$@"
     ;;
   report) exec /usr/bin/python3 host_tools/report/shared/parts.py "${2:-report}" ${folder:+"$folder"} ;;
 esac

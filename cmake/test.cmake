@@ -1,5 +1,5 @@
 # ft_test(LABEL NAME name COMMAND ...): as add_test, with one of the labels that tests/README.md explains.
-# nightly is not part of a plain run: CMakePresets.json leaves it out.
+# browser, linux and nightly are no part of a plain run: CMakePresets.json leaves them out.
 set(FT_TEST_LABELS quick host emulated accuracy realtime browser linux nightly)
 
 function(ft_test label)

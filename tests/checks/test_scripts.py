@@ -155,6 +155,7 @@ class Bootstrap(Folder):
             (("test", "quick"), False),
             (("report",), True),
             (("fuzz", "1"), True),
+            (("test", "nightly"), True),
         ):
             with self.subTest(job):
                 done = self.up_to_npm(job=job, path=path)

@@ -1,4 +1,5 @@
-// Faults, one after another or several at a time, on the whole firmware while it is used: what must hold of its packets (storm/judge.hpp).
+// Faults, one after another or several at a time, on the whole firmware while it is used: what must hold of its packets
+// (storm/judge.hpp).
 #include "fuzz.h"
 #include "storm/storm.hpp"
 

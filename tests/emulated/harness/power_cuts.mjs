@@ -36,7 +36,8 @@ export function stateOf(bytes) {
 
 /** 'not_started', 'wrong_values', 'brought' (the new settings) or 'kept' (the old ones), by the states of two lives. */
 export function verdict(now, later) {
-  if ([now, later].some(({ present, prom_bad, complete }) => present !== ALL_SENSORS || prom_bad !== 0 || complete < 1)) return 'not_started';
+  if ([now, later].some(({ present, prom_bad, complete }) => present !== ALL_SENSORS || prom_bad !== 0 || complete < 1))
+    return 'not_started';
   if (![OLD, NEW].includes(now.osr) || later.osr !== now.osr || now.stored !== SETTINGS || (later.stored & ~WRITING) !== SETTINGS)
     return 'wrong_values';
   return now.osr === NEW ? 'brought' : 'kept';
@@ -128,7 +129,8 @@ function torn(bench, kept) {
       begun += what === 'begins' ? 1 : 0;
     };
     life.write(NEW);
-    for (const end_ms = life.now_ms + START_LIMIT_MS; begun < 4; life.run(0.1)) if (life.now_ms > end_ms) throw new Error('nothing is written');
+    for (const end_ms = life.now_ms + START_LIMIT_MS; begun < 4; life.run(0.1))
+      if (life.now_ms > end_ms) throw new Error('nothing is written');
     life.run(0.3);
     life.memory.cutPower();
     const next = new Life(bench, life.keep(), seed);
@@ -189,7 +191,8 @@ export function powerCuts(bench, kinds, step_us) {
       const { outcome, what, start_ms = 0 } = cut(bench, kept[kind], 1 + i, at_ns, kind === 'reset' ? 'chip_reset' : 'power_cut', writes);
       found[outcome] += 1;
       found.slowest_ms = Math.max(found.slowest_ms, Math.round(start_ms));
-      if (outcome === 'not_started' || outcome === 'wrong_values') found.what.push(`${kind} cut at ${(at_ns / 1e6).toFixed(3)} ms: ${what}`);
+      if (outcome === 'not_started' || outcome === 'wrong_values')
+        found.what.push(`${kind} cut at ${(at_ns / 1e6).toFixed(3)} ms: ${what}`);
     });
     all[kind] = found;
   }
