@@ -47,8 +47,8 @@ class Distribution(unittest.TestCase):
         with zipfile.ZipFile(self.wheel) as wheel:
             names = set(wheel.namelist())
             (metadata,) = (wheel.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
-        modules = {f"fingertip/{path.name}" for path in (PACKAGE / "fingertip").iterdir() if path.is_file()}
-        modules |= {str(path.relative_to(PACKAGE)) for path in (PACKAGE / "fingertip/msg").rglob("*.msg")}
+        files = [path for path in (PACKAGE / "fingertip").rglob("*.*") if path.suffix in (".py", ".json", ".msg", ".typed")]
+        modules = {str(path.relative_to(PACKAGE)) for path in files}
         self.assertEqual({name for name in names if ".dist-info/" not in name}, modules)
         self.assertIn("fingertip/py.typed", names)
         for line in (r"Name: fingertip[-_]tactile", r"Requires-Dist: numpy", r"Requires-Dist: pyserial", r"Requires-Python: >=3.10"):
