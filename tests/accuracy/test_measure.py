@@ -12,6 +12,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
+import sessions  # noqa: E402
 from measure import Measure, MeasureError, q10, stream_of, usable_of  # noqa: E402
 
 MEASURE = Measure(sys.argv.pop())
@@ -81,7 +82,41 @@ class Fit(unittest.TestCase):
             Measure(MEASURE.build, "none")
 
 
+class Held(unittest.TestCase):
+    def test_a_press_that_is_held_is_the_fit_and_what_the_search_adds(self):
+        settings, readings = MEASURE.settings(noise_Pa=5.0), q10(presses(50)[2])
+        alone = MEASURE.fit(ARRAY, settings, readings, kernel="fit_grid")
+        np.testing.assert_array_equal(sessions.fit_held(MEASURE, ARRAY, settings, readings[:, None]), alone)
+        MEASURE.widen_held(ARRAY, settings, readings, alone)
+        held = np.ascontiguousarray(np.repeat(readings[:, None], 7, axis=1))
+        np.testing.assert_array_equal(sessions.fit_held(MEASURE, ARRAY, settings, held), alone)
+
+    def test_gains_that_are_apart_are_learnt(self):
+        gains, sd = MEASURE.made("fit_gains", 1), np.array([0.1])
+        MEASURE.call("gains_begin", sd, gains)
+        for _, _, readings_Pa in (presses(1, seed) for seed in range(40)):
+            readings = q10(readings_Pa * (1.0 + 0.3 * (-1.0) ** np.arange(15)))
+            for is_first in (1, 0):
+                fits = MEASURE.fit(ARRAY, MEASURE.settings(noise_Pa=5.0), readings, kernel="fit_grid")
+                MEASURE.call("gains_learn", ARRAY, MEASURE.settings(noise_Pa=5.0), readings, fits, is_first, gains, sd)
+        self.assertGreater(sd[0], 0.2)
+
+
 class Frames(unittest.TestCase):
+    def test_a_series_has_the_zeros_and_contacts_of_the_chain(self):
+        frames = MEASURE.made("frame", 1, 400)
+        frames["t_us"], frames["sensor_count"], frames["noise_Pa_q10"], frames["valid"] = 10000 * np.arange(1, 401), 15, 5 * 1024, ALL
+        pressed_Pa = np.where(np.arange(400) % 100 > 60, 1.0, 0.0)[:, None] * presses(1)[2]
+        frames["pressure_Pa_q10"][0, :, :15] = q10(101325.0 + pressed_Pa)
+        chained, *_ = MEASURE.chain(ARRAY, MEASURE.settings(), frames)
+        flags, usable, above = np.zeros(400, np.uint8), np.zeros(400, np.uint32), np.zeros((400, 15), np.int32)
+        readings = np.ascontiguousarray(frames["pressure_Pa_q10"][0, :, :15])
+        MEASURE.call("gate_series", 5.0, frames["t_us"][0].copy(), readings, flags, usable, above)
+        np.testing.assert_array_equal(flags & 1, chained["contact"][0])
+        np.testing.assert_array_equal(flags >> 1, chained["zero_doubtful"][0])
+        np.testing.assert_array_equal(usable, chained["usable"][0])
+        np.testing.assert_array_equal(above, chained["pressure_Pa_q10"][0, :, :15])
+
     def test_a_press_is_a_contact_with_the_fit_of_its_readings(self):
         _, _, readings_Pa = presses(20)
         frames = MEASURE.made("frame", 20, 20)
