@@ -7,7 +7,6 @@ triangles of pressure: their tops, found in the recording, show the same without
 """
 
 import argparse
-import json
 import pathlib
 import sys
 import tempfile
@@ -17,6 +16,7 @@ import numpy as np
 
 from two_clocks import CLOCKS_ppm, RATE_Hz, Emulator, record_all, recordings_in, worst_us, write_scenario
 from world import World
+import figures
 
 TOOLS = argparse.Namespace()
 RECORDED_s = 20  # in which the drift is found to 0.2 ppm
@@ -116,15 +116,9 @@ class TwoFingertips(unittest.TestCase):
 
 
 def report(**numbers):
-    """Into a file that other tests write to too; what this run did not measure is in it no more."""
-    path = pathlib.Path(TOOLS.report)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    others = {name: value for name, value in whole.items() if name not in REPORTED}
+    """What this run did not measure is no longer in the file."""
     MEASURED.update(numbers)
-    fresh = path.with_suffix(".new")
-    fresh.write_text(json.dumps({**others, **MEASURED}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
-    fresh.replace(path)
+    figures.add(TOOLS.report, MEASURED, stale=REPORTED)
 
 
 if __name__ == "__main__":

@@ -31,8 +31,9 @@ import zlib
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
-sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
+import figures  # noqa: E402
 import guest as virtual  # noqa: E402
 
 TOOLS = argparse.Namespace()
@@ -693,16 +694,6 @@ class Report(unittest.TextTestRunner):
         return result
 
 
-def write_report(path):
-    """Into a file that other tests write to too; what this run did not measure is in it no more."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    whole = json.loads(path.read_text()) if path.exists() else {}
-    others = {key: value for key, value in whole.items() if key not in REPORTED}
-    fresh = path.with_suffix(".new")
-    fresh.write_text(json.dumps({**others, **REPORT}, indent=2, sort_keys=True) + "\n")
-    fresh.replace(path)
-
-
 def main():
     parser = argparse.ArgumentParser()
     for name in ("image", "parallel", "cpack", "build", "node", "cache", "report"):
@@ -719,7 +710,7 @@ def main():
         return SKIPPED
     options = parser.parse_known_args()[1]
     program = unittest.main(argv=[sys.argv[0], *options], testRunner=Report(verbosity=2), exit=False)
-    write_report(pathlib.Path(TOOLS.report))
+    figures.add(TOOLS.report, REPORT, stale=REPORTED)
     return 0 if program.result.wasSuccessful() else 1
 
 

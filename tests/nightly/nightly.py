@@ -25,6 +25,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [
     str(ROOT / folder) for folder in ("host_tools/report/shared", "host_tools/python", "tests/support", "tests/web", "tests/checks")
 ]
+import figures  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from goals import judge, print_goals  # noqa: E402
 
@@ -116,12 +117,8 @@ def keep(name, found, goals):
     found = json.loads(json.dumps(found))
     judged = judge({**{goal: None for goal, _, _ in goals}, **found}, goals)
     path = REPORT / f"{name}.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
     whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    merged = {**whole, **judged, "goals": {**whole.get("goals", {}), **judged["goals"]}}
-    fresh = path.with_suffix(".new")
-    fresh.write_text(json.dumps(merged, indent=1) + "\n", encoding="utf-8")
-    fresh.replace(path)
+    figures.add(path, {**judged, "goals": {**whole.get("goals", {}), **judged["goals"]}})
     if goals:
         print_goals(judged)
     return [goal for goal, verdict in judged["goals"].items() if verdict["met"] is False and not OF_TIME.search(goal)]

@@ -1,6 +1,5 @@
 """The fingertip command against a fake device: usage test_cli.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 
-import json
 import os
 import pathlib
 import re
@@ -13,16 +12,7 @@ import numpy as np
 
 from cli_case import CliTest, PYTHON_TOOLS
 from fingertip import files
-
-
-def report(**numbers):
-    """Adds to the JSON file that FINGERTIP_REPORT names."""
-    path = os.environ.get("FINGERTIP_REPORT")
-    if path:
-        os.makedirs(os.path.dirname(path), exist_ok=True)
-        old = json.loads(pathlib.Path(path).read_text(encoding="utf-8")) if os.path.exists(path) else {}
-        pathlib.Path(path + ".new").write_text(json.dumps({**old, **numbers}, indent=2) + "\n", encoding="utf-8")
-        os.replace(path + ".new", path)
+import figures
 
 
 class Usage(CliTest):
@@ -258,7 +248,10 @@ class Several(CliTest):
         span_us = one["t_us"][-1] - one["t_us"][0]
         self.assertGreater(span_us, 1e6)
         self.assertGreater(len(errors[0]), 100e-6 * span_us)
-        report(alignment_fake_devices_us=round(alignment_us, 1), alignment_fake_devices_seconds=self.ALIGNMENT_SECONDS)
+        if path := os.environ.get("FINGERTIP_REPORT"):
+            figures.add(
+                path, {"alignment_fake_devices_us": round(alignment_us, 1), "alignment_fake_devices_seconds": self.ALIGNMENT_SECONDS}
+            )
         self.assert_in_order()
         # replay and conversion take one of them
         self.assertIn(
