@@ -2,7 +2,7 @@
 """Draws all pictures and tables of the boards that follow from the boards' descriptors and the sensors' geometry.
 
 draw.py            writes them
-draw.py --check    says which of them are not what would be written
+draw.py --check    lists those that differ from what would be written
 
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
@@ -51,7 +51,7 @@ def parts_table(board, parts):
 
 
 def drawings(root):
-    """{path: what is to stand in it}."""
+    """{path: its content}."""
     boards = root / "boards"
     parts = json.loads((boards / "parts.json").read_text(encoding="utf-8"))
     found = {}

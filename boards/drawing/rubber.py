@@ -2,7 +2,7 @@
 """The table in boards/BUILD.md of what hardness and thickness of the rubber do, computed by the twin.
 
 rubber.py TWIN            writes it; TWIN: build/host/host_tools/simulation/twin/twin
-rubber.py TWIN --check    says whether it is what would be written
+rubber.py TWIN --check    fails if it differs from what would be written
 """
 
 import math

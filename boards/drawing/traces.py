@@ -79,7 +79,7 @@ class Trace:
             self.transactions.append((int(row["start_ns"]), int(row["end_ns"]), what, row))
 
     def commands(self, kind):
-        """Those that tell the sensors to do so."""
+        """Those that command the sensors to do so."""
         return [at for at in self.transactions if at[2] == kind and at[3]["rw"] == "w"]
 
     def frame(self):
@@ -153,8 +153,8 @@ def draw_byte(axes, trace):
         "high": min(f - r for f, r in zip(falls[1:], rises)),
         "period": min(b - a for a, b in zip(falls, falls[1:])),
     }
-    told = ", ".join(f"{name} {found[name] / 1e3:.2f} us (at least {least / 1e3:.1f})" for name, least in BYTE_TIMES)
-    axes.set_title(f"Its first byte. SCL, with the rise: {told}", pad=8)
+    times = ", ".join(f"{name} {found[name] / 1e3:.2f} us (at least {least / 1e3:.1f})" for name, least in BYTE_TIMES)
+    axes.set_title(f"Its first byte. SCL, with the rise: {times}", pad=8)
     return found
 
 

@@ -39,7 +39,7 @@ static uint8_t random_bits(void) {
   return (uint8_t)(random_u64() >> 56);
 }
 
-/* Of eight bits each one set with a chance of so many of 256. */
+/* Eight bits, each set with a chance of n in 256. */
 static uint8_t bits_with_chance(unsigned chance) {
   uint8_t bits = 0;
   for (int i = 0; i < 8; i++) {

@@ -23,7 +23,7 @@ extern struct native_flash native_flash;
 /* Erased and with power. The seed is that of every random choice. */
 void native_flash_reset(uint64_t seed);
 
-/* Power is lost when so many steps more have been taken: 0 at the next one. */
+/* Steps until power is lost: 0 at the next one. */
 void native_flash_cut_after(uint64_t steps);
 
 /* Whether it has been lost. Reads then give ones, operations never end. */

@@ -86,7 +86,7 @@ static void pass_time_to(uint64_t t_us) {
 
 static void count_at_once(void) {
   if (++native.at_once > MAX_AT_ONCE) {
-    stop("no time passes: the alarm, the bus or the main loop goes round without end");
+    stop("no time passes: the alarm, the bus or the main loop runs without end");
   }
 }
 

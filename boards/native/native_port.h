@@ -29,10 +29,10 @@ void native_set_last_crash(const struct crash_record *crash);
 /* The last argument of port_event(). */
 enum crash_event native_last_event(uint8_t *detail);
 
-/* next_us tells when the source has its next event, UINT64_MAX for never. */
+/* next_us returns when the source has its next event, UINT64_MAX for never. */
 void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context);
 
-/* Whether there is a second processor, which needs so long for what it is woken for; UINT64_MAX:
+/* Whether there is a second processor, which needs this time for what it is woken for; UINT64_MAX:
  * for ever. Kept over starts. At first there is none. */
 void native_set_worker(bool exists, uint64_t takes_us);
 

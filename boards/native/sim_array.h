@@ -1,6 +1,6 @@
 /* A simulated array of MS5840 behind array_bus, with bus times like those of multiplexers and a
  * fault on request at any transfer. Time is the caller's: nothing happens but at poll(), and each
- * transfer then acts at the time at which it ended on the bus.
+ * transfer is then applied at the time at which it ended on the bus.
  *
  * Transfers are counted from 1: each broadcast of a command is one, each read of one sensor is one.
  * After start_* advance time to the earlier of *wake_us and sim_array_next_event_us(), and poll.
@@ -95,7 +95,7 @@ void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed
  * part's. The sensors are as after power-up. */
 void sim_array_vary_parts(struct sim_array *array, double share);
 
-/* The bus driver starts again, and its time at 0, so long after its last start: what was under
+/* The bus driver starts again, and its time at 0; the argument is the time since its last start: what was under
  * way on the bus is no more, what the sensors do goes on. */
 void sim_array_restart_bus(struct sim_array *array, uint64_t elapsed_us);
 

@@ -1,4 +1,4 @@
-/* One simulated MS5840-02BA, or MS5837-30BA where FINGERTIP_SENSOR says so, as seen from its two wires: what it
+/* One simulated MS5840-02BA, or MS5837-30BA by FINGERTIP_SENSOR, as seen from its two wires: what it
  * acknowledges, answers and forgets, and when. Written from the datasheet, apart from the driver in firmware/ms58xx, so
  * that the two can be tested against each other.
  *
@@ -6,7 +6,7 @@
  * sensor acknowledges nothing. A conversion takes the datasheet's maximum. Its result can be read
  * once; without one the sensor answers 0. Reading during a conversion answers 0 and spoils the
  * result, and so does a second conversion command: the spoiled result is 1/8 too small, so that it
- * looks like a measurement. Word 7 of the PROM is not acknowledged.
+ * resembles a measurement. Word 7 of the PROM is not acknowledged.
  */
 #ifndef NATIVE_SIM_MS5840_H
 #define NATIVE_SIM_MS5840_H

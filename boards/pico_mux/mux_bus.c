@@ -18,9 +18,9 @@ enum {
 #define COMMAND_us 44u
 #define RECOVERY_HALF_PERIOD_us 5u /* 100 kHz, for whatever is on the bus */
 
-/* Interrupts lead from one transaction to the next; a poll only looks whether they move on.
+/* Interrupts lead from one transaction to the next; a poll only checks that they move on.
  * A transaction takes 110 us. */
-#define STANDSTILL_us 1000u
+#define STALL_us 1000u
 #define SHUT_MIN_us 1000000u
 #define SHUT_MAX_us 16000000u
 
@@ -223,7 +223,7 @@ static enum ft_status look(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_
   }
   if (bus->moves != bus->moves_seen) {
     bus->moves_seen = bus->moves;
-    bus->deadline_us = now_us + STANDSTILL_us;
+    bus->deadline_us = now_us + STALL_us;
   } else if (now_us >= bus->deadline_us) {
     return FT_ERR_TIMEOUT;
   }
@@ -231,7 +231,7 @@ static enum ft_status look(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_
   return FT_PENDING;
 }
 
-/* Twice in a row the bus stood still as soon as this multiplexer had opened: a line behind it is
+/* Twice in a row the bus stalled as soon as this multiplexer had opened: a line behind it is
  * held, and opening it loses the others too. */
 static void judge_failure(struct mux_bus *bus, uint64_t now_us) {
   if (bus->just_opened == NO_MUX) {
@@ -314,7 +314,7 @@ static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operatio
   bus->absent = bus->shut;
   bus->result.acknowledged = 0;
   bus->moves_seen = bus->moves;
-  bus->deadline_us = now_us + STANDSTILL_us;
+  bus->deadline_us = now_us + STALL_us;
   if (!bus->failed) {
     bus->ended = !start_next(bus);
   }

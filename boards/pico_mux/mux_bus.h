@@ -14,7 +14,7 @@
  *
  * A multiplexer that still does not acknowledge is held in reset, which closes its channels
  * whatever state it is in, until the next operation asks it again; its sensors do not acknowledge
- * and the others are not disturbed. So is one whose opening makes the bus stand still, twice in a
+ * and the others are not disturbed. So is one whose opening stalls the bus, twice in a
  * row, for a line behind it is then held; it is opened again after 1 s, and after twice as long
  * each time, up to 16 s, that it still does.
  */
@@ -44,7 +44,7 @@ struct mux_bus {
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */
   uint8_t absent;                /* bitmap of multiplexers: shut, or did not acknowledge in this operation */
   uint8_t just_opened;           /* multiplexer, if the last transaction that ended selected its channels */
-  uint8_t suspect;               /* the one just opened when the bus last stood still, until all goes well */
+  uint8_t suspect;               /* the one just opened when the bus last stalled, until all goes well */
   uint8_t shut;                  /* bitmap: held in reset until shut_until_us */
   uint64_t shut_until_us;
   uint32_t shut_us; /* how long the next one is */

@@ -1,5 +1,5 @@
 /* Bit-parallel I2C in tables: the waves of the transactions that the array needs, and what their
- * samples say. SCL is common, so every sensor gets the same byte at the same moment and answers on
+ * samples show. SCL is common, so every sensor gets the same byte at the same moment and answers on
  * its own line: a sample holds one bit of each.
  *
  * Cells, steps and samples are those of rp2040/wave_player.h. A bit, a START and a STOP take a cell
@@ -51,7 +51,7 @@ void i2c_wave_set_command(uint16_t steps[], uint8_t command);
 
 /* UM10204 3.1.16: nine clocks, in which a sensor that was left in the middle of a byte lets go, and
  * a STOP on these lines (bitmap). The other lines stay released: sensors take no notice of clocks
- * without a START. The last cell is idle, so its sample tells which lines are held low. */
+ * without a START. The last cell is idle, so its sample shows which lines are held low. */
 void i2c_wave_recovery(uint16_t steps[I2C_WAVE_RECOVERY_STEPS], uint16_t stop_lines);
 
 /* Cells after which the samples of this byte of a read (0 is the first) are complete. */
@@ -64,10 +64,10 @@ uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index, uint8_t bytes[][
 struct i2c_reply {
   uint16_t acknowledged; /* bitmap: acknowledged every byte, and let go of the line where it should */
   uint16_t held;         /* bitmap of lines that were low without a reason */
-  bool scl_follows;      /* SCL was high in every sample that was looked at */
+  bool scl_follows;      /* SCL was high in every sample that was checked */
 };
 
-/* What all the other samples say, with the AND of what i2c_wave_byte() returned for byte_count
+/* What all the other samples show, with the AND of what i2c_wave_byte() returned for byte_count
  * bytes; 0 and UINT16_MAX for a command. The bytes count for those that acknowledged. */
 struct i2c_reply i2c_wave_reply(const uint16_t *samples, uint8_t byte_count, uint16_t in_bytes);
 

@@ -29,7 +29,7 @@ struct parallel_bus {
   bool freeing; /* the wave under way is the one for the stuck lines, before the command's own */
   bool failed;  /* until a recovery succeeds, every operation ends with FT_ERR_TIMEOUT */
   uint64_t deadline_us;
-  uint64_t look_us;    /* what a read has so far is looked at then */
+  uint64_t look_us;    /* when to check what a read has so far */
   uint8_t bytes_taken; /* of a read */
   uint16_t in_bytes;   /* AND of what i2c_wave_byte() returned */
 

@@ -39,7 +39,7 @@ struct event {
   uint8_t code, detail;
 };
 
-/* Of this life; the next one may find it. A part that tells it is alive interrupts the others. */
+/* Of this life; the next one may find it. A part that reports progress interrupts the others. */
 static NOINIT struct {
   volatile uint32_t alive_us[PORT_PARTS]; /* the timer's low word */
   volatile bool watched[PORT_PARTS];
@@ -63,7 +63,7 @@ static uint32_t kept_crc(void) {
   return crc32_iso_hdlc((const uint8_t *)&kept.record, sizeof kept.record);
 }
 
-static void tell_events(struct crash_record *record) {
+static void put_events(struct crash_record *record) {
   for (uint32_t i = 0; i < CRASH_EVENTS && i < trace.event_count; i++) {
     const struct event *event = &trace.events[(trace.event_count - 1 - i) % CRASH_EVENTS];
     const uint64_t age_us = record->t_us > event->t_us ? record->t_us - event->t_us : 0;
@@ -116,7 +116,7 @@ _Noreturn void rp2040_take_crash(void) {
   record->t_us = timer_runs() ? port_now_us() : 0;
   if (record->kind == CRASH_WATCHDOG)
     record->stuck = all_stuck((uint32_t)record->t_us);
-  tell_events(record);
+  put_events(record);
   kept.crc = kept_crc();
   kept.magic = RECORD_MAGIC;
   __asm volatile("dsb" ::: "memory");
@@ -139,7 +139,7 @@ static void reconstruct(bool had_run) {
     last.activity = trace.activity;
     last.stuck = CRASH_STUCK_INTERRUPTS;
     last.t_us = trace.fed_us + PORT_WATCHDOG_PERIOD_us;
-    tell_events(&last);
+    put_events(&last);
   } else {
     last.kind = CRASH_START;
   }
@@ -159,8 +159,8 @@ void crash_start(void) {
   WATCHDOG_SCRATCH2 = 0;
   memset(&trace, 0, sizeof trace);
   /* A Cortex-M3 runs the handler of a fault though it could not stack the registers (ARM DDI 0337E
-   * 5.12.1); should this core do so too, what is read in their place is to say nothing. */
-  // cppcheck-suppress comparePointers ; the linker script says that they are of one array
+   * 5.12.1); should this core do so too, what is read in their place must have no meaning. */
+  // cppcheck-suppress comparePointers ; by the linker script they are of one array
   for (uint32_t *word = __stack_guard; word < __stack_limit; word++)
     *word = 0;
   trace.events[0].code = CRASH_EVENT_START;

@@ -166,7 +166,7 @@ bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) {
   return gpio_read(pin_of(pins, line));
 }
 
-/* The interrupts are levels, cleared by the next transaction: masked until i2c_poll has looked. */
+/* The interrupts are levels, cleared by the next transaction: masked until i2c_poll has read them. */
 void i2c0_irq_handler(void) {
   IC_INTR_MASK = 0;
   owner.on_event(owner.context);

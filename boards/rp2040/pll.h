@@ -1,5 +1,5 @@
 /* Starting a PLL, in the order of pico-sdk's pll_init() (RP2040 datasheet 2.18). Its block comes
- * out of a reset: the status of a PLL that ran before may still say that it is locked. */
+ * out of a reset: the status of a PLL that ran before may still report a lock. */
 #ifndef RP2040_PLL_H
 #define RP2040_PLL_H
 

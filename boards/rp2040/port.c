@@ -114,7 +114,7 @@ size_t port_stack_free_bytes(void) {
   extern const uint32_t __stack_limit[], __stack_top[];
   const uint32_t paint = UINT32_C(0x5aa5c33c); /* start.S */
   const uint32_t *word = __stack_limit;
-  // cppcheck-suppress comparePointers ; the linker script says that they are of one array
+  // cppcheck-suppress comparePointers ; by the linker script they are of one array
   while (word < __stack_top && *word == paint)
     word++;
   return (size_t)(word - __stack_limit) * sizeof *word;

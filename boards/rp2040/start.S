@@ -71,7 +71,7 @@ boot_reset:
   ldr r0, =boot_main
   bx r0
 
-  /* Before the SRAM copy stands, a fault can only start over. */
+  /* Before the SRAM copy is complete, a fault can only start over. */
   .thumb_func
   .type boot_fault, %function
 boot_fault:

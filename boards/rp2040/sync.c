@@ -45,7 +45,7 @@ static const uint16_t program[] = {
 enum { PROGRAM_LENGTH = sizeof program / sizeof program[0] };
 
 /* Written by DMA; a slot of both belongs to one edge. The number is one less than it is called. DMA
- * goes round within aligned addresses only, and the sections that are cleared are not aligned so. */
+ * wraps within aligned addresses only, and the sections that are cleared are not aligned so. */
 #define RING __attribute__((section(".noinit.rings"), aligned(4 * SLOTS)))
 static volatile uint32_t numbers[SLOTS] RING;
 static volatile uint32_t times_us[SLOTS] RING;

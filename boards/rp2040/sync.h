@@ -7,7 +7,7 @@
  * microseconds are the edge's time, rounded. Other DMA and the processor may delay the two transfers
  * by a few cycles each.
  *
- * The two channels write rings that go round by themselves. A reader that is late finds by the
+ * The two channels write rings that wrap by themselves. A reader that is late finds by the
  * numbers what it has missed.
  */
 #ifndef RP2040_SYNC_H

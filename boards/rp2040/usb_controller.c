@@ -1,19 +1,19 @@
 /* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is
- * in its buffer control word, and software tells from BUFF_STATUS what has happened (RP2040
+ * in its buffer control word, and software reads from BUFF_STATUS what has happened (RP2040
  * datasheet 4.1.2). Every endpoint is single-buffered.
  *
  * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus
  * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and against E5 the
  * bus is made to look idle after a reset, if the board can spare GPIO15 for it: else the device may
  * not enumerate there behind a hub with traffic (pico-sdk, rp2040_usb_device_enumeration.c). E15
- * (some bus errors in an IN transfer hang the device) stands in all revisions: no bulk IN packet is
+ * (some bus errors in an IN transfer hang the device) is in all revisions: no bulk IN packet is
  * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
  * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
  * a bus reset. So the block is reset, and the device attached again, when the bus is silent and not
  * suspended, or when frames but no request follow a reset of the bus. A hung controller that goes
  * on seeing frames, under a host that resets nothing, is not noticed.
  *
- * How many resets come before the request says nothing. An EHCI controller sends no frame after its
+ * The number of resets before the request shows nothing. An EHCI controller sends no frame after its
  * own reset of a full-speed device; its companion then resets the device again (Linux, ehci-hub.c
  * check_reset_complete()). And the erratum strikes a controller that answers, so one that has not
  * yet heard a request since its block was reset waits for as long as the host takes.
@@ -45,7 +45,7 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 #define PACKET_us 60u
 #define ABORT_LIMIT_us 200u
 
-/* How often the bus is looked at, and how long it may be silent: each millisecond a frame begins.
+/* How often the bus is checked, and how long it may be silent: each millisecond a frame begins.
  */
 #define WATCH_us 250000u
 #define SILENCE_us 1000000u
@@ -80,10 +80,10 @@ static enum { WATCH, ATTACH, AWAIT_END_OF_RESET, FEIGN_IDLE } next;
 static uint32_t feigned_ms;
 static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
 static uint32_t patience = 1;
-/* What the host still owes: a first request to a block just reset, nothing, a frame or a request
+/* What is awaited of the host: a first request to a block just reset, nothing, a frame or a request
  * after a reset of the bus. */
-static enum { OWES_FIRST_REQUEST, OWES_NOTHING, OWES_FRAME, OWES_REQUEST } host_owes;
-static uint32_t asking_us; /* the first frame after the reset: OWES_REQUEST */
+static enum { AWAIT_SETUP_AFTER_ATTACH, AWAIT_NOTHING, AWAIT_FRAME, AWAIT_SETUP } awaited;
+static uint32_t asking_us; /* the first frame after the reset: AWAIT_SETUP */
 
 /* The controller reads the control word in its own clock domain, so AVAILABLE is written once the
  * other fields are certain to have arrived there: datasheet 4.1.2.5.1. */
@@ -107,8 +107,8 @@ static bool in_frame_tail(void) {
 static void start_frame(void) {
   frame_began = false;
   alive_us = frame_start_us;
-  if (host_owes == OWES_FRAME) {
-    host_owes = OWES_REQUEST;
+  if (awaited == AWAIT_FRAME) {
+    awaited = AWAIT_SETUP;
     asking_us = frame_start_us;
   }
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
@@ -296,13 +296,13 @@ static void start_over(void) {
   data1 = 0;
   suspended = false;
   frame_began = false;
-  host_owes = OWES_FIRST_REQUEST;
+  awaited = AWAIT_SETUP_AFTER_ATTACH;
   next = ATTACH;
   usb_device_on_bus_reset();
   look_in(DETACHED_us);
 }
 
-/* It sleeps, or the host holds a reset for longer than it needs: low at two looks in a row. */
+/* It sleeps, or the host holds a reset for longer than it needs: low at two checks in a row. */
 static bool bus_may_be_silent(void) {
   static bool was_low;
   uint32_t status = REG32(USB_SIE_STATUS);
@@ -313,7 +313,7 @@ static bool bus_may_be_silent(void) {
 }
 
 static bool is_deaf(void) {
-  return host_owes == OWES_REQUEST && TIMER_TIMERAWL - asking_us >= UNASKED_us;
+  return awaited == AWAIT_SETUP && TIMER_TIMERAWL - asking_us >= UNASKED_us;
 }
 
 void timer1_irq_handler(void) {
@@ -363,8 +363,8 @@ static void on_bus_reset(void) {
   usb_controller_withdraw(USB_ENDPOINT_IN);
   usb_controller_withdraw(0);
   suspended = false;
-  if (host_owes == OWES_NOTHING)
-    host_owes = OWES_FRAME;
+  if (awaited == AWAIT_NOTHING)
+    awaited = AWAIT_FRAME;
   usb_device_on_bus_reset();
   if (is_old && usb_controller_has_gpio15) {
     next = AWAIT_END_OF_RESET;
@@ -374,7 +374,7 @@ static void on_bus_reset(void) {
 
 static void on_setup(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SETUP_REC;
-  host_owes = OWES_NOTHING;
+  awaited = AWAIT_NOTHING;
   patience = 1;
   uint8_t packet[USB_SETUP_BYTES];
   for (unsigned i = 0; i < sizeof packet; i++)

@@ -47,7 +47,7 @@
 #define USB_SIE_STATUS_SETUP_REC (1u << 17)
 #define USB_SIE_STATUS_CONNECTED (1u << 16)
 #define USB_SIE_STATUS_RESUME (1u << 11)
-/* Reads whether the bus is suspended; writing a 1 clears INTS.DEV_SUSPEND, which says that this has
+/* Reads whether the bus is suspended; writing a 1 clears INTS.DEV_SUSPEND, which reports that this has
  * changed (pico-sdk, hardware/regs/usb.h). */
 #define USB_SIE_STATUS_SUSPENDED (1u << 4)
 #define USB_SIE_STATUS_LINES (3u << 2) /* 0: both are low */

@@ -62,7 +62,7 @@ __vectors:
   interrupt usb_service_irq_handler, SECOND /* 26 */
   unexpected 5
 
-  /* The assembler resolves a weak name that stands for one of another file there and then. */
+  /* The assembler resolves a weak alias of a name of another file at once. */
   .section .text.unexpected_exception, "ax"
   .thumb_func
   .type unexpected_exception, %function

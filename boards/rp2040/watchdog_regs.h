@@ -13,7 +13,7 @@
 #define WATCHDOG_LOAD REG32(WATCHDOG_BASE + 0x04u)
 #define WATCHDOG_REASON REG32(WATCHDOG_BASE + 0x08u) /* 0: this start was no watchdog's */
 #define WATCHDOG_REASON_TIMER (1u << 0)              /* not fed; else triggered */
-/* Survive the watchdog's reset, and nothing else. The boot ROM reads 4 to 7, of which 4 tells it to
+/* Survive the watchdog's reset, and nothing else. The boot ROM reads 4 to 7, of which 4 makes it
  * start from elsewhere, and writes 0 and 1 on its way into the USB loader (pico-bootrom-rp2040,
  * bootrom_rt0.S "Check watchdog scratch" and bootrom_main.c reset_usb_boot(); the SDK uses 4 in
  * watchdog_enable()). */

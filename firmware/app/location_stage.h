@@ -38,7 +38,7 @@ enum ft_status location_stage_set_limit(struct location_stage *own, float limit_
 void location_stage_use_calibration(struct location_stage *own, const struct calibration *calibration);
 
 /* Whether a pad's profile is in use. With one the prior and the dip limit of the calibration are left out: the
- * tangential estimate was judged without them, and tells a wide contact from a tangential force. */
+ * tangential estimate was judged without them, and it distinguishes a wide contact from a tangential force. */
 void location_stage_use_profile(struct location_stage *own, bool has_profile);
 
 /* Sets the force scale of the calibration in use. Its standard deviation grows with the difference between the air

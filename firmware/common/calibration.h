@@ -12,7 +12,7 @@
 struct sensor_calibration {
   float gain;    /* sensitivity relative to the pad's mean: pressure = reading / gain */
   float gain_sd; /* relative standard deviation */
-  /* Of the sensor from its place in the layout, and the log of the width in which it feels a
+  /* Offset of the sensor from its place in the layout, and the log of the width in which it measures a
    * contact over that of the others, 1/32768; positive: wider. Zeros: not known, none. */
   int16_t off_x_um, off_y_um;
   int16_t wider_q15;
@@ -23,7 +23,7 @@ struct calibration {
   uint16_t placements;  /* of the weight that entered */
   float force_scale;    /* force is this times 2 pi p0 sigma^2 */
   float force_scale_sd; /* standard deviation of force_scale */
-  /* The pad's response to a usual contact, as the fit is told it (fit.h): a prior on sigma, and the
+  /* The pad's response to a usual contact, as the fit is given it (fit.h): a prior on sigma, and the
    * dip around a contact. Zeros: not known, none. */
   uint16_t sigma_um, sigma_sd_um;
   uint16_t dip_share_q16, dip_sd_um;

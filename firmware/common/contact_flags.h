@@ -34,26 +34,26 @@ enum contact_flag {
   /* warning: the pressure may be a force or a zero that has moved */
   CONTACT_FLAG_ZERO_DOUBTFUL = 1 << 17,
   CONTACT_FLAG_SENSOR_DOUBTFUL = 1 << 18, /* warning: a sensor in use gives reason to doubt it */
-  CONTACT_FLAG_CALIBRATED = 1 << 19, /* gains and force scale of a calibration act */
-  /* the tangential load has values; location and force are corrected for it */
+  CONTACT_FLAG_CALIBRATED = 1 << 19, /* gains and force scale of a calibration are applied */
+  /* the tangential force has values; location and force are corrected for it */
   CONTACT_FLAG_TANGENTIAL_VALID = 1 << 20,
-  /* the tangential load is the change since the first touch */
+  /* the tangential force is the change since the first touch */
   CONTACT_FLAG_TANGENTIAL_FROM_TOUCH = 1 << 21,
   CONTACT_FLAG_VELOCITY_VALID = 1 << 22, /* the velocity of the contact has values */
   CONTACT_FLAG_MOVING = 1 << 23, /* the speed of the contact is above the threshold */
   /* the contact moves beyond what the load explains, however slowly */
   CONTACT_FLAG_SLIDING = 1 << 24,
-  /* warning: the second processor did not estimate the tangential load in time: location and
+  /* warning: the second processor did not estimate the tangential force in time: location and
    * force are not corrected for it */
   CONTACT_FLAG_TANGENTIAL_LATE = 1 << 25,
-  /* what presses is known: one contact, unless one of the three below says otherwise */
+  /* the contact shape is known: one contact, unless one of the three below is set */
   CONTACT_FLAG_SHAPE_VALID = 1 << 26,
   /* warning: two contacts press, and each has a place and a force: x_mm and y_mm are the place
    * of neither */
   CONTACT_FLAG_TWO_CONTACTS = 1 << 27,
   /* one long contact presses, and its direction and length have values */
   CONTACT_FLAG_EDGE = 1 << 28,
-  /* warning: what presses is neither one contact nor a long one nor two */
+  /* warning: the contact shape is neither one contact nor a long one nor two */
   CONTACT_FLAG_SHAPE_UNKNOWN = 1 << 29,
 };
 

@@ -9,7 +9,7 @@ enum crash_kind {
   CRASH_NONE,
   CRASH_FAULT,     /* a hard fault: pc is the instruction */
   CRASH_PANIC,     /* port_panic(): pc is the call */
-  CRASH_WATCHDOG,  /* a part of the firmware stood still; see stuck. pc is what was interrupted */
+  CRASH_WATCHDOG,  /* a part of the firmware made no progress; see stuck. pc is what was interrupted */
   CRASH_EXCEPTION, /* one without a handler; see vector */
   CRASH_OVERFLOW,  /* a hard fault whose registers were to be stacked below the stack: all 0 where
                       they could not be */
@@ -48,8 +48,8 @@ enum crash_event {
   CRASH_EVENT_AWAKE,
   CRASH_EVENT_STORED,  /* detail: 1 if the flash failed */
   CRASH_EVENT_SENSORS, /* others answer than before */
-  CRASH_EVENT_BUS,     /* timeouts of the sensor bus; detail: so many in a second */
-  CRASH_EVENT_SKIPPED, /* frames that were not taken; detail: so many in a second */
+  CRASH_EVENT_BUS,     /* timeouts of the sensor bus; detail: number in a second */
+  CRASH_EVENT_SKIPPED, /* frames that were not taken; detail: number in a second */
   CRASH_EVENT_WORKER,  /* the second processor did not answer, and was started again */
 };
 

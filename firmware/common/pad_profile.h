@@ -20,7 +20,7 @@ enum { PAD_NORMAL_TERMS = 2, PAD_TANGENTIAL_TERMS = 3, PAD_EDGE_TERMS = 3 };
  * place (x, y). With u = x / PAD_EDGE_UNIT_mm and v = y / PAD_EDGE_UNIT_mm
  *   even(c) = c[0] + c[1] u^2 + c[2] v^2
  *   odd(c)  = u even(c) for values along x, v even(c) for values along y
- * An estimate of ratios q = Q / F, place and F then stands for
+ * An estimate of ratios q = Q / F, place and F then means
  *   q' = (q - odd(ratio)) / (1 + even(gain))
  *   place' = place - odd(place) - q' even(pull)
  *   F' = F / (1 + even(force))

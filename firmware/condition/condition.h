@@ -20,7 +20,7 @@
  *
  * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
  * - Each sensor remembers its strongest press; the memory fades in 20 s. Half of the strongest memory of the pad counts
- * for all. An eighth of the memory is the band: so much may remain above the level, and twice as much below. A contact
+ * for all. An eighth of the memory is the band: this may remain above the level, and twice as much below. A contact
  * closes within it.
  * - After a contact the remainder follows the reading within the band. It rises only for two seconds, and never as fast
  * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
@@ -97,7 +97,7 @@ struct condition {
   int32_t memory_Pa_q10, reached_Pa_q10; /* as of a sensor, the strongest */
   int32_t drifted_Pa_q10;                /* by which any zero may have drifted in a contact; fades after it */
   int32_t taken_before_Pa_q10;           /* taken when the contact came, in doubt or not */
-  int32_t strong_Pa_q10;                 /* a contact above it stands out from what its zeros may be off by */
+  int32_t strong_Pa_q10;                 /* a contact above it is more than its zeros may be off by */
   int32_t strongest_Pa_q10;              /* of this contact */
   struct gate gate;
   struct calm calm;

@@ -17,7 +17,7 @@
 #define LEVEL_MAX (INT32_C(1) << 30)    /* 1/1024 Pa, 1 MPa: the part ends near 0.5 MPa */
 #define SUM_RANGE (INT32_C(1) << 23)    /* 1/1024 Pa, 8 kPa: a reading in a mean, so that 255 of them fit */
 
-/* Gate: opens above OPEN, closes below CLOSE, both with so many standard deviations of the noise. */
+/* Gate: opens above OPEN, closes below CLOSE, each plus SIGMA standard deviations of the noise. */
 #define GATE_OPEN_Pa 132   /* temperature: 60 Pa of compensation step, 24 to 48 Pa of lag (data sheet) */
 #define GATE_OPEN_SIGMA 6  /* choice */
 #define GATE_CLOSE_Pa 90   /* below OPEN, so that it does not flicker */
@@ -43,7 +43,7 @@
 #define FOLLOW_ms SECONDS(2) /* time constant of the level; choice */
 #define KEEP_DOWN_SHIFT 2    /* a quarter of a remainder downward: what dipped comes back */
 #define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600)) /* the drift before a contact holds in it for an hour; choice */
-#define STILL_SIGMA 3                              /* a rise of so many sigma between two updates is no remainder's */
+#define STILL_SIGMA 3                              /* a rise of 3 sigma between two updates is no remainder's */
 #define FALL_SHIFT 2                               /* nor a fall by a quarter of the pressure */
 
 /* Below the zero: the level was taken under a press. */

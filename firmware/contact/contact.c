@@ -10,10 +10,10 @@ static bool fewer_bits_than(uint32_t bitmap, int limit) {
   return bits < limit;
 }
 
-/* An uncertain location tells motion as well as any: what gains and model add to it moves with the
+/* An uncertain location shows motion as well as any: what gains and model add to it moves with the
  * contact. What the noise adds does not, and beside a doubtful zero a falling force alone moves it.
  */
-static bool tells_motion(const struct contact_input *input, uint32_t flags) {
+static bool shows_motion(const struct contact_input *input, uint32_t flags) {
   return (flags & CONTACT_FLAG_FIT_VALID) && (flags & CONTACT_FLAG_UNCERTAINTY_VALID) &&
          !(flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ZERO_DOUBTFUL)) &&
          input->fit->location_noise_mm <= CONTACT_JITTER_MAX_mm;
@@ -53,7 +53,7 @@ void contact_update(struct slip_history *history, const struct contact_settings 
                     const struct contact_input *input, struct contact_result *result) {
   contact_judge(input, result);
   uint32_t flags = result->flags;
-  if (!input->fit || !tells_motion(input, flags)) {
+  if (!input->fit || !shows_motion(input, flags)) {
     slip_reset(history);
   } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us,
                          &result->slip_mm)) {

@@ -9,7 +9,7 @@
 #define TICK_SHIFT 6 /* 64 us */
 
 /* Ages of the frames that make a pair, and by how much what the load explains may be wrong over it.
- * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it feels
+ * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it includes
  * the lift that came before, for as long as it reaches back. The brisk one does not. Of 312 lifts
  * with a dead travel of 2 mm (seed 211) half of what BRIEF leaves unexplained, or two thirds of
  * FLOOR_um, let one to two pass for slides.
@@ -31,10 +31,10 @@ static const struct pair_spans SLOW_LATEST = {40000u, 40000u, 80000u, 0};
 #define CROSSTALK_PER_SD2_q8 100
 /* The slow pair is overruled where the brief one's way is below 1 / 22 of its own, a quarter of
  * what steady motion gives, or its latest span's share below 1 / 8, a half of it. */
-#define STANDS_SHIFT 9
+#define CREEP_SHIFT 9
 #define GOES_ON 8
 
-/* Squares and products of so much fit 32 bits. */
+/* Squares and products of this fit 32 bits. */
 #define CHANGE_MAX_um 20000
 
 void motion_reset(struct motion_history *history) {
@@ -47,7 +47,7 @@ void motion_reset(struct motion_history *history) {
   history->slow_slides = false;
 }
 
-/* Place of what was entered so many entries before the newest. */
+/* Place of the entry with this age, counted from the newest. */
 static uint32_t place_of(const struct motion_ring *ring, uint32_t back) {
   return (ring->newest - back) % MOTION_ENTRIES;
 }
@@ -164,7 +164,7 @@ static bool slides_slowly(const struct motion_history *history, const struct cha
   }
   struct change slow = change_of(history, &history->slow, &SLOW);
   if (!slides(&slow, &SLOW, history->crosstalk_q8, history->sliding) ||
-      squared_way(&slow) >> STANDS_SHIFT > squared_way(brief) + squared_doubt(brief, false)) {
+      squared_way(&slow) >> CREEP_SHIFT > squared_way(brief) + squared_doubt(brief, false)) {
     return false;
   }
   struct change latest = change_of(history, &history->slow, &SLOW_LATEST);
@@ -240,7 +240,7 @@ static bool find_velocity(struct motion_history *history) {
   /* The slope's variance is that of one location times n / spread: um^2 to the quotient's square.
    */
   const uint32_t per_um2 = 4398047u * MOTION_NOISE_SDS * MOTION_NOISE_SDS;
-  int32_t least = QUOTIENTS_PER_mm_s * (history->moving ? MOTION_STANDS_mm_s : MOTION_MOVING_mm_s);
+  int32_t least = QUOTIENTS_PER_mm_s * (history->moving ? MOTION_MOVING_ENDS_mm_s : MOTION_MOVING_mm_s);
   uint32_t v2 = (uint32_t)(vx_q10 * vx_q10) + (uint32_t)(vy_q10 * vy_q10);
   history->moving = v2 > (uint32_t)(least * least) &&
                     (uint64_t)v2 * (uint32_t)spread > (uint64_t)(now->variance - from->variance) * per_um2;
@@ -311,12 +311,12 @@ static void judge(struct motion_history *history, uint64_t t_us) {
   }
 }
 
-static bool starts_anew(const struct motion_history *history, const struct contact_input *input) {
+static bool starts_again(const struct motion_history *history, const struct contact_input *input) {
   return history->brief.count > 0 && (input->fit->used != history->used || input->t_us <= history->newest_us ||
                                       input->t_us - history->newest_us > MOTION_PAUSE_us);
 }
 
-static void tell(const struct motion_history *history, struct contact_result *result, struct motion *motion) {
+static void report(const struct motion_history *history, struct contact_result *result, struct motion *motion) {
   if (history->velocity_valid) {
     *motion = history->motion;
     result->flags |= CONTACT_FLAG_VELOCITY_VALID;
@@ -337,7 +337,7 @@ void motion_update(struct motion_history *history, const struct tangential_setti
   if (force_N_q12 <= 0 || noise_um(found) > MOTION_NOISE_MAX_um) {
     return;
   }
-  if (starts_anew(history, input)) {
+  if (starts_again(history, input)) {
     motion_reset(history);
   }
   history->used = input->fit->used;
@@ -345,5 +345,5 @@ void motion_update(struct motion_history *history, const struct tangential_setti
   if (history->brief.count == 1 || input->t_us - history->judged_us >= MOTION_JUDGED_us) {
     judge(history, input->t_us);
   }
-  tell(history, result, motion);
+  report(history, result, motion);
 }

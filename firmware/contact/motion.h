@@ -33,14 +33,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Least squares over at least so long and so many frames: at 410 frames a second, 0.3 mm/s of noise
+/* Shortest span of the least squares, and fewest frames: at 410 frames a second, 0.3 mm/s of noise
  * where one location has 0.01 mm. */
 #define MOTION_VELOCITY_us 30000u
 #define MOTION_VELOCITY_FRAMES 3u
 /* MOVING begins and ends. */
 #define MOTION_MOVING_mm_s 8
-#define MOTION_STANDS_mm_s 6
-/* So many standard deviations count as motion. One frame of a weak contact in a million exceeds
+#define MOTION_MOVING_ENDS_mm_s 6
+/* Standard deviations that count as motion. One frame of a weak contact in a million exceeds
  * them by noise, all of which may lie along one line. The fixed limits protect other contacts
  * better. */
 #define MOTION_NOISE_SDS 5
@@ -51,13 +51,13 @@
  * of the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 gave the same.
  */
 #define MOTION_PER_LOAD_mm 8
-/* SLIDING ends after so long without a slide: a caught object rings. */
+/* SLIDING ends after this time without a slide: a caught object rings. */
 #define MOTION_SLIDING_ENDS_us 15000u
 
 /* 64 frames span the brief pair at 1280 frames a second; with more the spans get shorter. */
 #define MOTION_ENTRIES 64u
 #define MOTION_SLOW_STEP_us 5000u
-/* Frames nearer to the last that was judged enter, and say what it did: most of the cost is the
+/* Frames nearer to the last that was judged enter, and report what it did: most of the cost is the
  * judging's. */
 #define MOTION_JUDGED_us 2000u
 /* After a longer interval between two locations the history is dropped. */

@@ -84,7 +84,7 @@ void shapes_estimate(void *job) {
      */
     goes_on = own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
   } while (goes_on);
-  /* What is none of these is looked at from its beginning again, and stays so until it is known. */
+  /* A shape that is none of these is fitted from the beginning again, and stays so until it is known. */
   const bool again = own->result.shape == FIT_SHAPE_UNDECIDED && !question->begins &&
                      own->report.shape == FIT_SHAPE_NONE && own->state.frames > 0;
   if (own->progress == FIT_SHAPES_ANSWERED && !again) {

@@ -1,5 +1,5 @@
-/* What the fingertip reports about what presses: one contact, a long one, or two, as fit_shapes.h
- * tells them apart, in the scales of the pad. */
+/* What the fingertip reports about the contact shape: one contact, a long one, or two, as fit_shapes.h
+ * distinguishes them, in the scales of the pad. */
 #ifndef CONTACT_SHAPES_H
 #define CONTACT_SHAPES_H
 
@@ -24,7 +24,7 @@ struct shapes_report {
                                          the same frame */
 };
 
-/* The fit of what presses: a job of worker/worker.h. It holds all that the fit reads, so that the
+/* The fit of the contact shape: a job of worker/worker.h. It holds all that the fit reads, so that the
  * frames that follow leave it alone. */
 struct shapes_job {
   const struct fit_array *array;
@@ -44,7 +44,7 @@ struct shapes_job {
   struct fit_shapes_result result;
 };
 
-/* A part takes a Cortex-M0+ at 125 MHz so long at most (test emulated.fit_cycles). Where one is
+/* A part takes a Cortex-M0+ at 125 MHz this time at most (test emulated.fit_cycles). Where one is
  * under way, the worker's other job may wait for it. */
 #define SHAPES_PART_us 350u
 

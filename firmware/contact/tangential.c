@@ -104,8 +104,8 @@ static int32_t per_force_q26(float value_N, int32_t force_N_q24) {
 
 /* Q / F along one axis without what the pad's ends add, all of which is odd. */
 static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_q20, int32_t gain_q20) {
-  int32_t told_q26 = per_force_q26(tangential_N, force_N_q24);
-  int32_t own_q26 = told_q26 - fixed_clamp(added_q20, -FACTOR_MAX_Q20 / 4, FACTOR_MAX_Q20 / 4) * 64;
+  int32_t found_q26 = per_force_q26(tangential_N, force_N_q24);
+  int32_t own_q26 = found_q26 - fixed_clamp(added_q20, -FACTOR_MAX_Q20 / 4, FACTOR_MAX_Q20 / 4) * 64;
   return fixed_div_q26(fixed_clamp(own_q26, -RATIO_MAX_Q26, RATIO_MAX_Q26), gain_q20 * 64);
 }
 
@@ -223,7 +223,7 @@ static void weigh_load(struct fit_tangential *found) {
   found->location_sd_mm = fit_float(root.mantissa, root.exponent);
 }
 
-/* Of the first touch; whether it stands. */
+/* The zero of the first touch. Returns whether it is settled. */
 static bool settle_zero(struct tangential_history *history, uint64_t t_us, float x, float y) {
   if (history->count == 0) {
     history->first_us = t_us;

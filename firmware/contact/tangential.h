@@ -25,7 +25,7 @@ struct tangential_settings {
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
                     const struct contact_settings *settings, bool calibrated);
 
-/* The load at the beginning of a contact counts as zero: the mean of Q / F over so long after its
+/* The load at the beginning of a contact counts as zero: the mean of Q / F over this time after its
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */
 #define TANGENTIAL_ZERO_us 100000u
 
@@ -33,7 +33,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
 struct tangential_history {
   uint64_t first_us; /* of its first estimate */
   uint32_t count;    /* of estimates in the sums; 0: none yet */
-  bool settled;      /* the zero stands */
+  bool settled;      /* the zero is complete */
   float x_sum, y_sum;
   float zero_x, zero_y; /* Q / F */
 };
@@ -76,7 +76,7 @@ struct tangential_job {
   struct tangential_course course;
 };
 
-/* A frame so long after the last has time for more than one step, and the contact has moved
+/* A frame this time after the last has time for more than one step, and the contact has moved
  * further. So it takes up to FIT_TANGENTIAL_FRAMES steps until an estimate can be reported. */
 #define TANGENTIAL_SLOW_us 4500u
 
@@ -99,7 +99,7 @@ void tangential_reset(struct tangential_history *history);
 /* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and
  * TANGENTIAL_FROM_TOUCH to result->flags. With the former, UNCERTAIN is about the corrected
  * location, and ELONGATED about the estimate, which a load does not make look long. Where the pad's
- * edges hide so much of a load that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
+ * edges hide a load such that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
  * none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,

@@ -7,7 +7,7 @@
  *
  *   MAX_PRESSURE_Pa   readings above are flagged: beyond the range, or near it
  *   APART_Pa          more than two sound parts differ by in the same air (condition/plausibility.h)
- *   STEP_Pa           no press moves one sensor alone by so much (scan/readings.h)
+ *   STEP_Pa           no press moves one sensor alone by this (scan/readings.h)
  *   SENS_T1, TCS      SENS = C1 * 2^SENS_T1 + C3 * dT / 2^TCS
  *   OFF_T1, TCO       OFF = C2 * 2^OFF_T1 + C4 * dT / 2^TCO
  *   Q10_TIMES, _SHIFT pressure in 1/1024 Pa = (D1 * SENS / 2^21 - OFF) * Q10_TIMES / 2^Q10_SHIFT

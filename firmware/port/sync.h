@@ -1,5 +1,5 @@
 /* The pin by which a fingertip shares its clock with cameras and other fingertips. Provided by the
- * board at link time, in images with capability sync. Main context, unless a function says more.
+ * board at link time, in images with capability sync. Main context, unless stated otherwise.
  */
 #ifndef PORT_SYNC_H
 #define PORT_SYNC_H

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* After an admission of all sensors the next one waits so many times as long as it took. */
+/* Factor of the time that an admission of all sensors took, for which the next one waits. */
 #define REST 20u
 /* After one that left a sensor out, or that was for a suspect; then doubled. */
 #define INTERVAL_MIN_us 1000000u

@@ -29,7 +29,7 @@ static int32_t difference(int32_t a, int32_t b) {
   return (int32_t)((uint32_t)a - (uint32_t)b);
 }
 
-/* The sensor whose reading has stepped while all others of these stood still, as a bitmap. */
+/* The sensor whose reading has stepped while all others of these did not move, as a bitmap. */
 static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[]) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
@@ -111,7 +111,7 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
   return left_out;
 }
 
-/* Tells most frames, of which nothing else need be asked, from the others. */
+/* Whether nothing else needs to be checked, as in most frames. */
 struct glance {
   uint32_t sum;
   uint32_t signs; /* the highest bit: a reading is outside the sensor's range */

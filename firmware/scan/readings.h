@@ -23,7 +23,7 @@
  * measured shortly before (condition.h). The same holds for a sensor whose pressure has stepped
  * alone, for example when it was reset for another's sake, or when it returns.
  *
- * A sensor whose temperature stands apart from the others' (common/apart.h) since it came is
+ * A sensor whose temperature is apart from the others' (common/apart.h) since it came is
  * doubtful until it has read like them twice in a row: its PROM may be wrong in spite of its CRC.
  *
  * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
@@ -45,7 +45,7 @@
 #define READINGS_TEMPERATURE_APART_cC 50
 /* Of one sensor, from one reading to the next. */
 #define READINGS_STEP_Pa_q10 (MS58XX_STEP_Pa * 1024)
-/* All others have moved by less: so many times the noise of a reading (two of them differ by 1.4 of
+/* All others have moved by less: this factor times the noise of a reading (two of them differ by 1.4 of
  * it rms), or such a part of the step. Of 785 steps beyond 8 kPa that taps of a sphere of 6 mm make
  * from one frame to the next at 20 and 57 frames/s in a simulated pad of 6 mm with a pitch of 9 mm,
  * up to 6 mm outside the array, the loneliest moves a neighbour by 64 Pa and 1/160; on 12 mm by
@@ -53,7 +53,7 @@
 #define READINGS_STILL_NOISES 6
 #define READINGS_ALONE 256
 /* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A
- * sensitivity that is off by 1 % moves the reading at 1 bar by 2.9 kPa: what stands apart by less
+ * sensitivity that is off by 1 % moves the reading at 1 bar by 2.9 kPa: what is apart by less
  * than this is no worse than the gains of a pad may be. */
 #define READINGS_APART_Pa_q10 (20000 * 1024)
 
@@ -109,7 +109,7 @@ enum readings_news {
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
                                    const struct readings_temperature *taken);
 
-/* These stand apart from the others at rest (condition/plausibility.h), and are doubtful until a call says
+/* These are apart from the others at rest (condition/plausibility.h), and are doubtful until a call states
  * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
 void readings_doubt(struct readings *readings, uint32_t apart);
 

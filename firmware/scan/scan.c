@@ -8,7 +8,7 @@
 #define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
-/* How soon a temperature that was not taken is looked at again. */
+/* How soon a temperature that was not taken is tried again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
 #define RATE_POLL_us 10000u
@@ -254,7 +254,7 @@ static bool temperature_waits(const struct scan *scan) {
   return get(&scan->temperature_state) != SCAN_SLOT_EMPTY;
 }
 
-static void heed_wish(struct scan *scan, uint64_t now_us) {
+static void obey_wish(struct scan *scan, uint64_t now_us) {
   uint32_t within_us = get(&scan->temperature_within_us);
   if (temperature_waits(scan) || within_us == 0) {
     return;
@@ -300,7 +300,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
     begin_bring_up(scan, now_us);
     return;
   }
-  heed_wish(scan, now_us);
+  obey_wish(scan, now_us);
   uint32_t period_us = get(&scan->period_us);
   if (period_us != 0) {
     if (scan->next_frame_us > now_us + period_us) {
@@ -511,7 +511,7 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
   return now_us;
 }
 
-/* Says when the next reading is wanted, if not as planned. */
+/* Sets when the next reading is wanted, if not as planned. */
 static void adapt_interval(struct scan *scan, uint32_t news) {
   uint32_t interval_us = get(&scan->temperature_interval_us);
   if (news != 0) {

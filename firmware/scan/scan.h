@@ -2,9 +2,9 @@
  * failures, and hands over frames.
  *
  * Two contexts meet here. scan_step runs in the event context (interrupt) and only moves bytes. The
- * next conversion begins as soon as the last one was read, before its codes are looked at. So
+ * next conversion begins as soon as the last one was read, before its codes are evaluated. So
  * sensors, bus and processor work at the same time, and the frame clock depends on none of the
- * others. scan_take runs in the main context and does the arithmetic. Between them stands one slot
+ * others. scan_take runs in the main context and does the arithmetic. Between them is one slot
  * that holds the newest frame. A processor that falls behind takes the frames it can. Overwritten
  * frames are counted.
  *
@@ -22,7 +22,7 @@
  * commands as one. It is half as much where each sensor answers for itself, and none where the bus
  * asks again.
  *
- * Temperatures are converted twice a second, less often while they stand still. Where the requested
+ * Temperatures are converted twice a second, less often while they are constant. Where the requested
  * rate leaves a pause, that is done in the pause before a frame. Otherwise it takes the place of a
  * frame, at most one in 600 at OSR 256 and one in 25 at OSR 8192. That frame goes out at its time
  * too, with the pressures of the one before, and marked as held. All ones are no reading. A
@@ -45,10 +45,10 @@ struct scan_settings {
   uint8_t sensor_count;    /* 1..FT_MAX_SENSORS */
   uint16_t osr;            /* see ms58xx_find_osr */
   uint32_t rate_mHz;       /* 0 = as fast as the sensors allow */
-  bool presses_are_shared; /* sensors stand so close that no press moves one alone */
+  bool presses_are_shared; /* sensors are so close that no press moves one alone */
 };
 
-/* The interval while the temperature changes. While it stands still the interval doubles up to the
+/* The interval while the temperature changes. While it is constant the interval doubles up to the
  * maximum. At 0.1 degC/s, as in a hand, the pressures stay within some 24 Pa, and within 48 Pa
  * until such a change is noticed. The error is much the same for all sensors. */
 #define SCAN_TEMPERATURE_INTERVAL_ms 500u

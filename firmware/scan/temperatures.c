@@ -20,7 +20,7 @@ static int16_t clamped_i16(int32_t value) {
   return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
 }
 
-/* What the temperatures of the array say about one of them. */
+/* What the temperatures of the array show about one of them. */
 struct company {
   int32_t step_cC;   /* that the sensors made together */
   int32_t middle_cC; /* of them now */
@@ -62,7 +62,7 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
   bool near = possible && (!company->votes || within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
   bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
   bool use;
-  bool insists; /* says it again, and it cannot be */
+  bool insists; /* reports it again, and it cannot be */
   if (!(readings->has_thermal & bit)) {
     use = near || (agrees && possible && (readings->pardoned & bit));
     insists = agrees && !use;
@@ -122,7 +122,7 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
   readings->was_near = near;
 }
 
-/* Returns the bitmap of those apart that have not read like the others yet. Later they may stand
+/* Returns the bitmap of those apart that have not read like the others yet. Later they may be
  * apart, as something warm may touch some. */
 static uint32_t compare(struct readings *readings, uint8_t sensor_count) {
   if ((readings->has_thermal & ~readings->alike) == 0) {

@@ -222,7 +222,7 @@ static void make_record(struct store *store, const struct parts *parts) {
   store->record_length = (uint16_t)(PAYLOAD_AT + length);
 }
 
-/* Of the record in the buffer, as its length says. */
+/* Of the record in the buffer, by its length. */
 static uint32_t record_crc(const struct store *store) {
   uint32_t crc = CRC32_BEGIN;
   for (unsigned i = MAGIC_AT; i < store->record_length; i++) {
@@ -313,7 +313,7 @@ static bool load_record(struct store *store, unsigned sector, unsigned slot) {
   return bytes_get_u32(record + CRC_AT) == record_crc(store);
 }
 
-/* Generations go round, past 0, which is none: no flash lives that long, but what else has written
+/* Generations wrap, past 0, which is none: no flash lives that long, but what else has written
  * to it may have left any. */
 static bool is_older(uint32_t generation, uint32_t than) {
   return than != 0 && (generation == 0 || generation - than > UINT32_MAX / 2);
@@ -329,7 +329,7 @@ struct sector {
   uint8_t used;        /* slots, counted to the last one that is */
   uint8_t sure_slot;   /* the last that is good and sealed; STORE_SLOTS: none */
   bool is_final;       /* and marked so, and no slot is used behind it */
-  bool lost;           /* behind the newest good record stands one that was sealed */
+  bool lost;           /* behind the newest good record is one that was sealed */
   bool first_is_bad;   /* the first slot is used and not good */
   bool is_earlier;     /* it holds good records of a version before this one */
 };

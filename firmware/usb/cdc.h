@@ -5,7 +5,7 @@
  * port/usb_controller.h. Exactly one exists per image.
  *
  * Interrupt context serves the controller; the functions below are for the main context. Between
- * the two stand single-producer single-consumer rings, so nothing here locks or waits.
+ * the two are single-producer single-consumer rings, so nothing here locks or waits.
  */
 #ifndef USB_CDC_H
 #define USB_CDC_H

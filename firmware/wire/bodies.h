@@ -58,7 +58,7 @@ enum wire_capability {
   WIRE_CAPABILITY_FIT = 1 << 0, /* contact packets: location and force; and calibrations */
   WIRE_CAPABILITY_SLIP = 1 << 1, /* slip, and the command that sets it */
   WIRE_CAPABILITY_RAW_STREAM = 1 << 2, /* raw packets */
-  WIRE_CAPABILITY_TANGENTIAL = 1 << 3, /* tangential load, where the pad's profile is stored */
+  WIRE_CAPABILITY_TANGENTIAL = 1 << 3, /* tangential force, where the pad's profile is stored */
   WIRE_CAPABILITY_SYNC = 1 << 4, /* sync packets, and the command that sets the sync pin */
 };
 
@@ -74,12 +74,14 @@ enum wire_result {
 
 /* Bits of the word that says what the fingertip keeps without power. */
 enum wire_stored {
-  WIRE_STORED_CALIBRATION = 1 << 0, /* a calibration, and it acts; never without capability fit */
+  /* a calibration, and it is applied; never without capability fit */
+  WIRE_STORED_CALIBRATION = 1 << 0,
   WIRE_STORED_SETTINGS = 1 << 1, /* settings; it started with them */
   WIRE_STORED_WRITING = 1 << 2, /* a change is on its way into the flash */
   /* the content is damaged, or of a later firmware, and not used; storing again repairs it */
   WIRE_STORED_DAMAGED = 1 << 3,
-  WIRE_STORED_PAD = 1 << 4, /* a pad's profile, and it acts; never without capability tangential */
+  /* a pad's profile, and it is applied; never without capability tangential */
+  WIRE_STORED_PAD = 1 << 4,
 };
 
 /* Ranges of the settings that commands carry; the device answers OUT_OF_RANGE beyond them. */
@@ -149,15 +151,15 @@ struct wire_contact {
   float sigma_y_mm; /* standard deviation of that along y */
   float width_correlation; /* of that Gaussian, -1 to 1; 0 unless it lies aslant */
   /* TANGENTIAL_VALID */
-  float qx_N; /* tangential load of the object on the rubber, along x */
-  float qy_N; /* tangential load along y */
+  float qx_N; /* tangential force of the object on the rubber, along x */
+  float qy_N; /* tangential force along y */
   float q_sd_N; /* predicted standard deviation of either, with those of the scales */
-  float tangential_ratio; /* size of the tangential load over force_N */
+  float tangential_ratio; /* size of the tangential force over force_N */
   /* VELOCITY_VALID */
   float vx_mm_s; /* velocity of the contact along x */
   float vy_mm_s; /* velocity of the contact along y */
   /* SHAPE_VALID */
-  float shape_age_ms; /* what follows is of the frame that came so long before this one */
+  float shape_age_ms; /* age of the frame that the following values are of */
   /* TWO_CONTACTS */
   float x1_mm; /* location of the stronger of two contacts, as x_mm */
   float y1_mm; /* as y_mm */
@@ -225,7 +227,7 @@ struct wire_info {
   float y_mm[FT_MAX_SENSORS];
   /* with WIRE_CAPABILITY_FIT, else 0 */
   float prior_sigma_mm; /* prior on sigma that is set */
-  /* its standard deviation; 0: none is set, and the sigma of a calibration acts */
+  /* its standard deviation; 0: none is set, and the sigma of a calibration is applied */
   float prior_width_mm;
   float location_limit_mm; /* UNCERTAIN is set where location_sd_mm is above it */
   /* with WIRE_CAPABILITY_SYNC, else 0 */
@@ -326,7 +328,7 @@ struct wire_cmd_loader {
 
 /* Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, sensors up to 2000
  * um from their places and wider or narrower by up to 9830/32768, scale 0.1 to 10, its standard
- * deviation 0 to 1. It acts from the first frame after the acknowledgement. */
+ * deviation 0 to 1. It is applied from the first frame after the acknowledgement. */
 struct wire_cmd_calibrate {
   uint8_t sensor_count; /* that of the fingertip */
   struct calibration calibration; /* as in info */
@@ -340,7 +342,7 @@ struct wire_cmd_keep {
 };
 
 /* Set the width to expect of a contact, and its standard deviation; 0 and 0: none, and the sigma
- * of a calibration acts. */
+ * of a calibration is applied. */
 struct wire_cmd_prior {
   float sigma_mm; /* width */
   float width_mm; /* its standard deviation */
@@ -351,13 +353,13 @@ struct wire_cmd_location_limit {
   float limit_mm; /* limit */
 };
 
-/* Store a pad's profile, each value in its range and the terms in order of width. It acts from
- * the first frame after the acknowledgement. */
+/* Store a pad's profile, each value in its range and the terms in order of width. It is applied
+ * from the first frame after the acknowledgement. */
 struct wire_cmd_pad {
   struct pad_profile profile; /* as in info */
 };
 
-/* Set the sync pin, as packet sync says; 0: off. */
+/* Set the sync pin, as in packet sync; 0: off. */
 struct wire_cmd_sync {
   uint8_t mode; /* 1 in, 2 frame, 3 second */
 };

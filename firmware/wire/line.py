@@ -9,16 +9,16 @@ Needs nothing but Python 3.11.
 
 import argparse
 import pathlib
-import re
 import sys
 import textwrap
 import tomllib
 
+import line_protocol
 import line_settings
 import line_values
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-SAYS = "written by firmware/wire/line.py from line.toml; change it there"
+MADE_BY = "written by firmware/wire/line.py from line.toml; change it there"
 BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "n": 1}
 C_TYPES = {
     "u8": "uint8_t",
@@ -92,19 +92,19 @@ class Body:
 class Line:
     def __init__(self, path):
         with open(path, "rb") as file:
-            said = tomllib.load(file)
+            content = tomllib.load(file)
         self.version, self.sensors_max, self.text_bytes, self.loader_magic = (
-            said[key] for key in ("version", "sensors_max", "text_bytes", "loader_magic")
+            content[key] for key in ("version", "sensors_max", "text_bytes", "loader_magic")
         )
         self.flags, self.streams, self.capabilities, self.stored, self.results = (
-            said[key] for key in ("flags", "streams", "capabilities", "stored", "results")
+            content[key] for key in ("flags", "streams", "capabilities", "stored", "results")
         )
-        self.ranges = said["ranges"]
-        wanted = said["struct"].keys()
-        self.structs = {name: Body(name, table, wanted) for name, table in said["struct"].items()}
-        self.packets = {name: Body(name, table, wanted) for name, table in said["packet"].items()}
-        self.commands = {name: Body(name, table, wanted) for name, table in said["command"].items()}
-        self.settings = [line_settings.Setting(each, self) for each in said["settings"]]
+        self.ranges = content["ranges"]
+        wanted = content["struct"].keys()
+        self.structs = {name: Body(name, table, wanted) for name, table in content["struct"].items()}
+        self.packets = {name: Body(name, table, wanted) for name, table in content["packet"].items()}
+        self.commands = {name: Body(name, table, wanted) for name, table in content["command"].items()}
+        self.settings = [line_settings.Setting(each, self) for each in content["settings"]]
         numbers = [body.type for body in (*self.packets.values(), *self.commands.values())]
         for what, values in (("type", numbers), *((key, [each["bit"] for each in getattr(self, key)]) for key in SETS)):
             twice = {value for value in values if values.count(value) > 1}
@@ -188,7 +188,7 @@ def c_bits(title, prefix, entries):
 
 def contact_flags_h(line):
     lines = [
-        f"/* {SAYS}.",
+        f"/* {MADE_BY}.",
         " *",
         " * What a contact result says about itself. The bits travel unchanged in the contact packet.",
         " *",
@@ -259,7 +259,7 @@ def one(key):
 
 def bodies_h(line):
     lines = [
-        f"/* {SAYS}.",
+        f"/* {MADE_BY}.",
         " *",
         " * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.",
         " */",
@@ -359,7 +359,7 @@ def runs_of(body, line, when=None, prefix=""):
 
 def layouts_inc(line):
     lines = [
-        f"/* {SAYS}.",
+        f"/* {MADE_BY}.",
         " *",
         " * The layouts of all bodies, for packet.c alone. */",
         "",
@@ -398,7 +398,7 @@ def layouts_inc(line):
 def line_fields_hpp(line):
     contact, raw, info, health, ack, sync = (line.packets[name] for name in ("contact", "raw", "info", "health", "ack", "sync"))
     lines = [
-        f"/* {SAYS}.",
+        f"/* {MADE_BY}.",
         " *",
         " * Walks over the fields of packets in the order of columns and comments of recordings, and the words",
         " * for what packets number; no interface of the library. */",
@@ -567,7 +567,7 @@ def py_wire(field, line):
     base = {"f32": "float", "text": "str"}.get(field.kind, "int")
     if field.times > 1 or field.per_sensor:
         base = f"tuple[{base}, ...]"
-    said = (
+    wire = (
         f'"{code}"'
         + (f", {field.times}" if field.times > 1 else "")
         + (f", {field.per_sensor}, each_sensor=True" if field.per_sensor else "")
@@ -575,8 +575,8 @@ def py_wire(field, line):
     if field.when:
         absent = "math.nan" if field.kind == "f32" else "0" if field.when[0] == "flags" else None
         base += "" if absent else " | None"
-        said += f", when={py_when(field)}" + (f", absent={absent}" if absent else "")
-    return f"Annotated[{base}, Wire({said})]"
+        wire += f", when={py_when(field)}" + (f", absent={absent}" if absent else "")
+    return f"Annotated[{base}, Wire({wire})]"
 
 
 def py_when(field):
@@ -610,7 +610,7 @@ def py_class(body, line):
 
 def line_py(line):
     lines = [
-        f'"""{SAYS}.',
+        f'"""{MADE_BY}.',
         "",
         "The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a",
         "body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.",
@@ -755,42 +755,44 @@ ROS_TYPES = {"u16": "uint16", "u32": "uint32", "f32": "float32"}
 def contact_msg(line):
     contact, raw = line.packets["contact"], line.packets["raw"]
 
-    def said(code, text):
+    def described(code, text):
         return f"{code:<27} # {text}" if text else code
 
     def of(field):
-        return said(f"{ROS_TYPES[field.kind]} {field.key.lower()}", field.text)
+        return described(f"{ROS_TYPES[field.kind]} {field.key.lower()}", field.text)
 
     lines = [
-        f"# {SAYS}.",
+        f"# {MADE_BY}.",
         "#",
         "# A frame of a fingertip: its contact packet, its raw packet, or both, unchanged. NaN is what there is not: a quantity whose flag is off.",
         "# Use a number only if its flag is on, and no warning: flags & (FIT_VALID | WARNINGS) == FIT_VALID.",
         "",
-        said("std_msgs/Header header", "as log time: begin of the recording, and what the clocks tell since then"),
-        said("uint64 line", "of the recording, from 1, 0 outside of one; counts those of fingertip_msgs/Line and of other fingertips too"),
-        said("uint32 device", "number of the fingertip in a recording of several"),
-        said("float64 time_us", "on the recorder's clock, since the recording's host_zero_us; NaN in a recording of one"),
-        said("uint64 t_us", "on the fingertip's clock: the middle of the sensors' conversion"),
-        said("uint32 frame", "number, from the fingertip's start"),
+        described("std_msgs/Header header", "as log time: begin of the recording, and what the clocks show since then"),
+        described(
+            "uint64 line", "of the recording, from 1, 0 outside of one; counts those of fingertip_msgs/Line and of other fingertips too"
+        ),
+        described("uint32 device", "number of the fingertip in a recording of several"),
+        described("float64 time_us", "on the recorder's clock, since the recording's host_zero_us; NaN in a recording of one"),
+        described("uint64 t_us", "on the fingertip's clock: the middle of the sensors' conversion"),
+        described("uint32 frame", "number, from the fingertip's start"),
         "",
-        said("bool has_contact", "without: all below, until raw_sequence, is 0 and NaN"),
-        said("uint16 sequence", "of the packet"),
+        described("bool has_contact", "without: all below, until raw_sequence, is 0 and NaN"),
+        described("uint16 sequence", "of the packet"),
         "uint32 flags",
     ]
     for flag in line.flags:
-        lines.append(said(f"uint32 {flag['name']}={1 << flag['bit']}", "warning: " * bool(flag.get("warning")) + flag["text"]))
-    lines.append(said(f"uint32 WARNINGS={line.warnings()}", "all of them"))
+        lines.append(described(f"uint32 {flag['name']}={1 << flag['bit']}", "warning: " * bool(flag.get("warning")) + flag["text"]))
+    lines.append(described(f"uint32 WARNINGS={line.warnings()}", "all of them"))
     lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [
         of(field) for fields in line.later().values() for field in fields
     ]
-    lines += ["", said("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
+    lines += ["", described("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
     lines += [of(field) for field in raw.fields if field.kind == "u32" and field.name != "frame"]
     return [
         *lines,
-        said("float64 temperature_degc", "mean of the sensors; 0 until measured"),
-        said("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"),
-        said("float64[] tare_pa", "the zero of each sensor"),
+        described("float64 temperature_degc", "mean of the sensors; 0 until measured"),
+        described("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"),
+        described("float64[] tare_pa", "the zero of each sensor"),
     ]
 
 
@@ -799,7 +801,7 @@ def contact_msg(line):
 
 def line_facts_ts(line):
     lines = [
-        f"/** {SAYS}. */",
+        f"/** {MADE_BY}. */",
         "",
         f"export const WIRE_VERSION = {line.version};",
         f"export const LOADER_MAGIC = 0x{line.loader_magic:08x};",
@@ -852,83 +854,13 @@ def ts_text(text):
     return f'"{text}"' if "'" in text else f"'{text}'"
 
 
-# ---- PROTOCOL.md
-
-WHEN_TEXTS = {"flags": "", "capabilities": "capability ", "stored": "stored "}
-
-
-def protocol_parts(line):
-    """name -> lines, for between its marks."""
-
-    def table(fields, always=True):
-        conditions = any(field.when for field in fields)
-        rows = ["| type | field | what |" + (" there if |" if conditions else ""), "|---|---|---|" + ("---|" if conditions else "")]
-        for field in fields:
-            when = f" {WHEN_TEXTS[field.when[0]]}{field.when[1]} |" if field.when else " always |"
-            rows.append(f"| {field.type_text} | {field.names_text} | {field.text} |" + (when if conditions else ""))
-        return rows
-
-    parts = {name: table(body.fields) for name, body in (*line.packets.items(), *line.structs.items())}
-    parts["flags"] = ["| bit | name | meaning |", "|---|---|---|"] + [
-        f"| {flag['bit']} | {flag['name']} | {flag['text']}{'; ' + flag['more'] if 'more' in flag else ''} |" for flag in line.flags
-    ]
-    for name in ("streams", "capabilities", "stored"):
-        parts[name] = ["| bit | name | meaning |", "|---|---|---|"] + [
-            f"| {each['bit']} | {each['word']} | {each['text']} |" for each in getattr(line, name)
-        ]
-    parts["results"] = ["| number | meaning |", "|---|---|"] + [f"| {each['number']} | {each['text']} |" for each in line.results]
-
-    def range_text(field):
-        if not field.range:
-            return ""
-        each = line.ranges[field.range]
-        if "words" in each:
-            return f" ({', '.join(f'{number} {word}' for number, word in zip(each['choices'], each['words'], strict=True))})"
-        return (
-            f" ({', '.join(map(str, each['choices']))})"
-            if "choices" in each
-            else f" ({each['min']:.12g} to {each['max']:.12g} {each['unit']})"
-        )
-
-    parts["commands"] = ["| type | command | body | known with | what it does |", "|---|---|---|---|---|"]
-    for body in sorted(line.commands.values(), key=lambda body: body.type):
-        fields = ", ".join(
-            f"{field.type_text} {field.names_text}{range_text(field)}{': ' + field.text if field.text and not field.range else ''}"
-            for field in body.fields
-        )
-        known = next((each["word"] for each in line.capabilities if each["name"] == body.capability), "always")
-        parts["commands"].append(f"| 0x{body.type:02X} | {body.word} | {fields or '-'} | {known} | {body.text} |")
-    return parts
-
-
-def protocol_md(line, text):
-    """The page with its tables replaced. Each stands behind a mark "<!-- line.toml: NAME -->" and ends with an empty line."""
-    for name, rows in protocol_parts(line).items():
-        mark = f"<!-- line.toml: {name} -->\n"
-        if text.count(mark) != 1:
-            raise SystemExit(f"line.py: PROTOCOL.md has {text.count(mark)} marks of {name}, it needs one")
-        before, _, after = text.partition(mark)
-        text = before + mark + "\n".join(rows) + "\n\n" + after.partition("\n\n")[2]
-    numbers = {
-        r"# Wire protocol, version {}\n": line.version,
-        r"\| 0 \| u8 \| version, {} \|": line.version,
-        r"longer than {} bytes is damage": line.longest_frame(),
-    }
-    for form, number in numbers.items():
-        before, after = form.split("{}")
-        text, count = re.subn(rf"({before})\d+({after})", rf"\g<1>{number}\g<2>", text)
-        if count != 1:
-            raise SystemExit(f'line.py: PROTOCOL.md has {count} times "{form}", it needs one')
-    return text
-
-
 FILES = {
     "firmware/common/contact_flags.h": contact_flags_h,
     "firmware/wire/bodies.h": bodies_h,
     "firmware/wire/layouts.inc": layouts_inc,
     "host_tools/library/libfingertip/line_fields.hpp": line_fields_hpp,
-    "host_tools/library/libfingertip/line_settings.hpp": lambda line: line_settings.line_settings_hpp(line, SAYS),
-    "host_tools/library/libfingertip/line_values.hpp": lambda line: line_values.line_values_hpp(line, SAYS),
+    "host_tools/library/libfingertip/line_settings.hpp": lambda line: line_settings.line_settings_hpp(line, MADE_BY),
+    "host_tools/library/libfingertip/line_values.hpp": lambda line: line_values.line_values_hpp(line, MADE_BY),
     "host_tools/python/fingertip/line.py": line_py,
     "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": contact_msg,
     "host_tools/web/src/line/line_facts.ts": line_facts_ts,
@@ -940,7 +872,7 @@ def written(root):
     line = Line(root / "firmware/wire/line.toml")
     texts = {name: "\n".join(write(line)).rstrip("\n") + "\n" for name, write in FILES.items()}
     page = "firmware/wire/PROTOCOL.md"
-    texts[page] = protocol_md(line, (root / page).read_text(encoding="utf-8"))
+    texts[page] = line_protocol.protocol_md(line, (root / page).read_text(encoding="utf-8"))
     return texts
 
 

@@ -4,11 +4,11 @@
 class Value:
     """One field of a command that people set."""
 
-    def __init__(self, said, command, ranges):
-        self.field = command.field(said["field"])
-        self.info = said["info"]
-        self.python = said.get("python", self.info)
-        self.per = said.get("per", 1)
+    def __init__(self, entry, command, ranges):
+        self.field = command.field(entry["field"])
+        self.info = entry["info"]
+        self.python = entry.get("python", self.info)
+        self.per = entry.get("per", 1)
         self.whole = self.field.kind != "f32"
         self.range_name = self.field.range
         self.range = ranges[self.range_name]
@@ -16,22 +16,22 @@ class Value:
         self.words = self.range.get("words")
         self.typed = self.words or self.choices
         self.default = self.range.get("default")
-        self.say = said["say"]
-        self.give = said["give"].format(self.span("one of " + ", ".join(map(str, self.typed or ()))))
-        self.text = said["text"].format(self.span("one of " + ", ".join(map(str, self.typed or ()))), default=self.default)
+        self.title = entry["title"]
+        self.give = entry["give"].format(self.span("one of " + ", ".join(map(str, self.typed or ()))))
+        self.text = entry["text"].format(self.span("one of " + ", ".join(map(str, self.typed or ()))), default=self.default)
 
     def span(self, choices):
         return choices if self.choices else f"{self.range['min'] / self.per:.12g} to {self.range['max'] / self.per:.12g}"
 
 
 class Setting:
-    def __init__(self, said, line):
-        self.name, self.typed, self.label = said["name"], said["typed"], said["label"]
-        self.zeros = said.get("zeros")
-        self.command = line.commands[said["command"]]
+    def __init__(self, entry, line):
+        self.name, self.typed, self.label = entry["name"], entry["typed"], entry["label"]
+        self.zeros = entry.get("zeros")
+        self.command = line.commands[entry["command"]]
         self.capability = self.command.capability
         self.capability_word = next((each["word"] for each in line.capabilities if each["name"] == self.capability), "")
-        self.values = [Value(value, self.command, line.ranges) for value in said["values"]]
+        self.values = [Value(value, self.command, line.ranges) for value in entry["values"]]
         self.typed_choices = self.values[0].typed
 
         def filled(text, listed=""):
@@ -41,10 +41,10 @@ class Setting:
         self.help = (
             f"{self.name}={'|'.join(choices + [self.zeros] * bool(self.zeros))}"
             if choices
-            else f"{self.name}={self.typed} ({filled(said['help'])})"
+            else f"{self.name}={self.typed} ({filled(entry['help'])})"
         )
-        self.give = filled(said["give"], ", ".join(choices) if self.zeros else ", ".join(choices[:-1]) + " or " + "".join(choices[-1:]))
-        self.hint = filled(said["hint"])
+        self.give = filled(entry["give"], ", ".join(choices) if self.zeros else ", ".join(choices[:-1]) + " or " + "".join(choices[-1:]))
+        self.hint = filled(entry["hint"])
 
 
 # ---- C++
@@ -213,7 +213,7 @@ def page_settings(line, text_of):
         for value in setting.values:
             span = "null" if value.choices else f"[{value.range['min'] / value.per:.12g}, {value.range['max'] / value.per:.12g}]"
             lines += [
-                f"      {{ field: '{value.field.name}', info: '{value.info}', say: {text_of(value.say)}, per: {value.per}, whole: {'true' if value.whole else 'false'}, "
+                f"      {{ field: '{value.field.name}', info: '{value.info}', say: {text_of(value.title)}, per: {value.per}, whole: {'true' if value.whole else 'false'}, "
                 f"span: {span}, choices: {value.choices or 'null'}, words: {value.words or 'null'}, unlessGiven: {'null' if value.default is None else value.default} }},"
             ]
         lines += ["    ],", "  },"]

@@ -1,4 +1,4 @@
-"""The generator of what the languages know of the line: a field is added by its one line, and what differs is told."""
+"""The generator of what the languages know of the line: a field is added by its one line, and what differs is reported."""
 
 import io
 import pathlib
@@ -24,7 +24,7 @@ help = "{0}"
 give = "{0} ms"
 label = "Hold, ms"
 hint = "{0}"
-values = [{ field = "hold_ms", info = "hold_ms", say = "Hold", give = "{0} ms", text = "{0}" }]
+values = [{ field = "hold_ms", info = "hold_ms", title = "Hold", give = "{0} ms", text = "{0}" }]
 
 """
 FIRST_COMMAND = "[command.stream]\n"
@@ -50,8 +50,8 @@ class Generator(unittest.TestCase):
             shutil.copy(ROOT / name, self.root / name)
 
     def run_it(self, *words):
-        with redirect_stdout(io.StringIO()) as said, mock.patch.object(sys, "argv", ["line.py", "--root", str(self.root), *words]):
-            return line.main(), said.getvalue()
+        with redirect_stdout(io.StringIO()) as output, mock.patch.object(sys, "argv", ["line.py", "--root", str(self.root), *words]):
+            return line.main(), output.getvalue()
 
     def change(self, name, before, after):
         path = self.root / name
@@ -69,16 +69,16 @@ class Generator(unittest.TestCase):
             ("host_tools/web/src/line/line_facts.ts", "  bus_nacks: number;", "  bus_timeouts: number;"),
         ):
             self.change(name, before, after)
-            status, said = self.run_it("--check")
-            self.assertEqual((status, said.split(":")[0]), (1, name))
+            status, output = self.run_it("--check")
+            self.assertEqual((status, output.split(":")[0]), (1, name))
             self.assertEqual(self.run_it(), (0, f"{name}: written\n"))
             self.assertEqual(self.run_it("--check"), (0, ""))
 
     def test_a_field_is_one_line(self):
         self.change("firmware/wire/line.toml", LAST_FIELD, NEW_FIELD + LAST_FIELD)
-        status, said = self.run_it()
+        status, output = self.run_it()
         self.assertEqual(status, 0)
-        changed = {each.split(":")[0] for each in said.splitlines()}
+        changed = {each.split(":")[0] for each in output.splitlines()}
         self.assertEqual(
             changed,
             {
@@ -121,15 +121,15 @@ class Generator(unittest.TestCase):
         self.assertIn('{"hold", "MS", "hold=MS (7 to 70)", "7 to 70 ms", nullptr, WIRE_CMD_HOLD, 0, 1,', tool)
         self.assertIn("WIRE_HOLD_MIN_ms, WIRE_HOLD_MAX_ms", tool)
         self.assertIn("command.body.cmd_hold.hold_ms = static_cast<std::uint16_t>(value);", tool)
-        said = {}
-        exec(texts["host_tools/python/fingertip/line.py"], said)
-        setting = said["SETTINGS"][0]
+        output = {}
+        exec(texts["host_tools/python/fingertip/line.py"], output)
+        setting = output["SETTINGS"][0]
         self.assertEqual(
-            (setting.argument, setting.command, setting.least, setting.most, setting.whole), ("hold_ms", said["SetHold"], 7, 70, True)
+            (setting.argument, setting.command, setting.least, setting.most, setting.whole), ("hold_ms", output["SetHold"], 7, 70, True)
         )
         self.assertIn("hold_ms: int | None", texts["host_tools/python/fingertip/line.py"])
-        self.assertIn("hold_ms", said["INFO_KEYS"])
-        self.assertIn("        hold_ms: 7 to 70.\n", said["Settable"].set.__doc__)
+        self.assertIn("hold_ms", output["INFO_KEYS"])
+        self.assertIn("        hold_ms: 7 to 70.\n", output["Settable"].set.__doc__)
         self.assertIn(
             "field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]",
             texts["host_tools/web/src/line/line_facts.ts"],

@@ -91,7 +91,7 @@ STAGE_TIMES = slice(8, 22)
 PRESSED_s = 1.2
 STEADY_FROM_FRAME = 300
 # The zero follows by the clock, and while the bus rests the sensors do, so that it is of other moments: 2 to 15 Pa apart, that of one sensor
-# most. ZERO_WARM_Pa of condition/zero.h is what the firmware takes the zero of a warm sensor to be off by. What some pascals do to a fit of
+# most. ZERO_WARM_Pa of condition/constants.h is what the firmware takes the zero of a warm sensor to be off by. What some pascals do to a fit of
 # 20 kPa stands below.
 RAW_HEAD, CONTACT_HEAD = 23, 12  # bytes before the pairs of pressure and zero, and before the floats
 ZERO_q10 = 60 << 10  # ZERO_WARM_Pa

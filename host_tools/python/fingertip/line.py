@@ -49,17 +49,17 @@ class Flag(enum.IntFlag):
     ELONGATED = 1 << 16  #: warning: the contact is not round
     ZERO_DOUBTFUL = 1 << 17  #: warning: the pressure may be a force or a zero that has moved
     SENSOR_DOUBTFUL = 1 << 18  #: warning: a sensor in use gives reason to doubt it
-    CALIBRATED = 1 << 19  #: gains and force scale of a calibration act
-    TANGENTIAL_VALID = 1 << 20  #: the tangential load has values; location and force are corrected for it
-    TANGENTIAL_FROM_TOUCH = 1 << 21  #: the tangential load is the change since the first touch
+    CALIBRATED = 1 << 19  #: gains and force scale of a calibration are applied
+    TANGENTIAL_VALID = 1 << 20  #: the tangential force has values; location and force are corrected for it
+    TANGENTIAL_FROM_TOUCH = 1 << 21  #: the tangential force is the change since the first touch
     VELOCITY_VALID = 1 << 22  #: the velocity of the contact has values
     MOVING = 1 << 23  #: the speed of the contact is above the threshold
     SLIDING = 1 << 24  #: the contact moves beyond what the load explains, however slowly
-    TANGENTIAL_LATE = 1 << 25  #: warning: the second processor did not estimate the tangential load in time: location and force are not corrected for it
-    SHAPE_VALID = 1 << 26  #: what presses is known: one contact, unless one of the three below says otherwise
+    TANGENTIAL_LATE = 1 << 25  #: warning: the second processor did not estimate the tangential force in time: location and force are not corrected for it
+    SHAPE_VALID = 1 << 26  #: the contact shape is known: one contact, unless one of the three below is set
     TWO_CONTACTS = 1 << 27  #: warning: two contacts press, and each has a place and a force: x_mm and y_mm are the place of neither
     EDGE = 1 << 28  #: one long contact presses, and its direction and length have values
-    SHAPE_UNKNOWN = 1 << 29  #: warning: what presses is neither one contact nor a long one nor two
+    SHAPE_UNKNOWN = 1 << 29  #: warning: the contact shape is neither one contact nor a long one nor two
 
 
 WARNINGS = Flag(0x2A07FF00)
@@ -82,18 +82,18 @@ class Capability(enum.IntFlag):
     FIT = 1 << 0  #: contact packets: location and force; and calibrations
     SLIP = 1 << 1  #: slip, and the command that sets it
     RAW_STREAM = 1 << 2  #: raw packets
-    TANGENTIAL = 1 << 3  #: tangential load, where the pad's profile is stored
+    TANGENTIAL = 1 << 3  #: tangential force, where the pad's profile is stored
     SYNC = 1 << 4  #: sync packets, and the command that sets the sync pin
 
 
 class Stored(enum.IntFlag):
     """What a fingertip keeps without power."""
 
-    CALIBRATION = 1 << 0  #: a calibration, and it acts; never without capability fit
+    CALIBRATION = 1 << 0  #: a calibration, and it is applied; never without capability fit
     SETTINGS = 1 << 1  #: settings; it started with them
     WRITING = 1 << 2  #: a change is on its way into the flash
     DAMAGED = 1 << 3  #: the content is damaged, or of a later firmware, and not used; storing again repairs it
-    PAD = 1 << 4  #: a pad's profile, and it acts; never without capability tangential
+    PAD = 1 << 4  #: a pad's profile, and it is applied; never without capability tangential
 
 
 class Result(enum.IntEnum):
@@ -129,8 +129,8 @@ class Calibration(NamedTuple):
     gains_and_sds: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
     """of each sensor: gain, and its relative standard deviation"""
     places_and_widths: Annotated[tuple[int, ...], Wire("h", 3, each_sensor=True)]
-    """of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of
-    the others, 1/32768; zeros: not known
+    """of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it measures a contact over that
+    of the others, 1/32768; zeros: not known
     """
 
     @property
@@ -252,19 +252,19 @@ class Contact(NamedTuple):
     width_correlation: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
     """of that Gaussian, -1 to 1; 0 unless it lies aslant"""
     qx_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
-    """tangential load of the object on the rubber, along x"""
+    """tangential force of the object on the rubber, along x"""
     qy_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
-    """tangential load along y"""
+    """tangential force along y"""
     q_sd_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
     """predicted standard deviation of either, with those of the scales"""
     tangential_ratio: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
-    """size of the tangential load over force_N"""
+    """size of the tangential force over force_N"""
     vx_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
     """velocity of the contact along x"""
     vy_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
     """velocity of the contact along y"""
     shape_age_ms: Annotated[float, Wire("f", when=("flags", Flag.SHAPE_VALID), absent=math.nan)]
-    """what follows is of the frame that came so long before this one"""
+    """age of the frame that the following values are of"""
     x1_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
     """location of the stronger of two contacts, as x_mm"""
     y1_mm: Annotated[float, Wire("f", when=("flags", Flag.TWO_CONTACTS), absent=math.nan)]
@@ -358,7 +358,7 @@ class Info(NamedTuple):
     prior_sigma_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
     """prior on sigma that is set"""
     prior_width_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
-    """its standard deviation; 0: none is set, and the sigma of a calibration acts"""
+    """its standard deviation; 0: none is set, and the sigma of a calibration is applied"""
     location_limit_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
     """UNCERTAIN is set where location_sd_mm is above it"""
     sync: Annotated[int | None, Wire("B", when=("capabilities", Capability.SYNC))]
@@ -546,7 +546,8 @@ class Loader(NamedTuple):
 
 class StoreCalibration(NamedTuple):
     """Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, sensors up to 2000 um from their places and wider or
-    narrower by up to 9830/32768, scale 0.1 to 10, its standard deviation 0 to 1. It acts from the first frame after the acknowledgement.
+    narrower by up to 9830/32768, scale 0.1 to 10, its standard deviation 0 to 1. It is applied from the first frame after the
+    acknowledgement.
     """
 
     sensors: Annotated[int, Wire("n")]
@@ -567,7 +568,7 @@ class Keep(NamedTuple):
 
 
 class SetPrior(NamedTuple):
-    """Set the width to expect of a contact, and its standard deviation; 0 and 0: none, and the sigma of a calibration acts."""
+    """Set the width to expect of a contact, and its standard deviation; 0 and 0: none, and the sigma of a calibration is applied."""
 
     sigma_mm: Annotated[float, Wire("f")]
     """width"""
@@ -583,7 +584,7 @@ class SetLocationLimit(NamedTuple):
 
 
 class StorePad(NamedTuple):
-    """Store a pad's profile, each value in its range and the terms in order of width. It acts from the first frame after the
+    """Store a pad's profile, each value in its range and the terms in order of width. It is applied from the first frame after the
     acknowledgement.
     """
 
@@ -592,11 +593,11 @@ class StorePad(NamedTuple):
 
 
 class ErasePad(NamedTuple):
-    """Erase the pad profile: there is no tangential load from now on."""
+    """Erase the pad profile: there is no tangential force from now on."""
 
 
 class SetSync(NamedTuple):
-    """Set the sync pin, as packet sync says; 0: off."""
+    """Set the sync pin, as in packet sync; 0: off."""
 
     mode: Annotated[int, Wire("B")]
     """1 in, 2 frame, 3 second"""
@@ -789,12 +790,12 @@ class ContactQuantities:
 
     @property
     def qx_N(self) -> float:
-        """Tangential load of the object on the rubber, along x."""
+        """Tangential force of the object on the rubber, along x."""
         return self.contact.qx_N
 
     @property
     def qy_N(self) -> float:
-        """Tangential load along y."""
+        """Tangential force along y."""
         return self.contact.qy_N
 
     @property
@@ -804,7 +805,7 @@ class ContactQuantities:
 
     @property
     def tangential_ratio(self) -> float:
-        """Size of the tangential load over force_N."""
+        """Size of the tangential force over force_N."""
         return self.contact.tangential_ratio
 
     @property
@@ -819,7 +820,7 @@ class ContactQuantities:
 
     @property
     def shape_age_ms(self) -> float:
-        """What follows is of the frame that came so long before this one."""
+        """Age of the frame that the following values are of."""
         return self.contact.shape_age_ms
 
     @property

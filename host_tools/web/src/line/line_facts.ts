@@ -103,13 +103,13 @@ export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: bo
   { bit: Flag.TARED, name: 'TARED', warning: false, meaning: 'readings are relative to a measured zero' },
   { bit: Flag.HELD, name: 'HELD', warning: false, meaning: 'all values are those of the frame before: the sensors measured their temperature' },
   { bit: Flag.WIDTHS_VALID, name: 'WIDTHS_VALID', warning: false, meaning: 'the widths along the axes have values' },
-  { bit: Flag.CALIBRATED, name: 'CALIBRATED', warning: false, meaning: 'gains and force scale of a calibration act' },
+  { bit: Flag.CALIBRATED, name: 'CALIBRATED', warning: false, meaning: 'gains and force scale of a calibration are applied' },
   { bit: Flag.TANGENTIAL_VALID, name: 'TANGENTIAL_VALID', warning: false, meaning: 'the force along the rubber has values' },
-  { bit: Flag.TANGENTIAL_FROM_TOUCH, name: 'TANGENTIAL_FROM_TOUCH', warning: false, meaning: 'the tangential load is the change since the first touch' },
+  { bit: Flag.TANGENTIAL_FROM_TOUCH, name: 'TANGENTIAL_FROM_TOUCH', warning: false, meaning: 'the tangential force is the change since the first touch' },
   { bit: Flag.VELOCITY_VALID, name: 'VELOCITY_VALID', warning: false, meaning: 'the velocity of the contact has values' },
   { bit: Flag.MOVING, name: 'MOVING', warning: false, meaning: 'the contact moves' },
   { bit: Flag.SLIDING, name: 'SLIDING', warning: false, meaning: 'the contact slides, however slowly' },
-  { bit: Flag.SHAPE_VALID, name: 'SHAPE_VALID', warning: false, meaning: 'what presses is known' },
+  { bit: Flag.SHAPE_VALID, name: 'SHAPE_VALID', warning: false, meaning: 'the contact shape is known' },
   { bit: Flag.EDGE, name: 'EDGE', warning: false, meaning: 'one long contact presses' },
   { bit: Flag.LOW_SIGNAL, name: 'LOW_SIGNAL', warning: true, meaning: 'the press is so light that noise matters' },
   { bit: Flag.FLAT, name: 'FLAT', warning: true, meaning: 'pressure without a peak: there is no place' },
@@ -124,7 +124,7 @@ export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: bo
   { bit: Flag.SENSOR_DOUBTFUL, name: 'SENSOR_DOUBTFUL', warning: true, meaning: 'a sensor in use gives reason to doubt it' },
   { bit: Flag.TANGENTIAL_LATE, name: 'TANGENTIAL_LATE', warning: true, meaning: 'the force along the rubber was not computed in time' },
   { bit: Flag.TWO_CONTACTS, name: 'TWO_CONTACTS', warning: true, meaning: 'two contacts press' },
-  { bit: Flag.SHAPE_UNKNOWN, name: 'SHAPE_UNKNOWN', warning: true, meaning: 'what presses is neither one contact nor a long one nor two' },
+  { bit: Flag.SHAPE_UNKNOWN, name: 'SHAPE_UNKNOWN', warning: true, meaning: 'the contact shape is neither one contact nor a long one nor two' },
 ];
 
 /** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */
@@ -217,19 +217,19 @@ export interface Contact extends Header {
   sigma_y_mm: number;
   /** of that Gaussian, -1 to 1; 0 unless it lies aslant */
   width_correlation: number;
-  /** tangential load of the object on the rubber, along x */
+  /** tangential force of the object on the rubber, along x */
   qx_N: number;
-  /** tangential load along y */
+  /** tangential force along y */
   qy_N: number;
   /** predicted standard deviation of either, with those of the scales */
   q_sd_N: number;
-  /** size of the tangential load over force_N */
+  /** size of the tangential force over force_N */
   tangential_ratio: number;
   /** velocity of the contact along x */
   vx_mm_s: number;
   /** velocity of the contact along y */
   vy_mm_s: number;
-  /** what follows is of the frame that came so long before this one */
+  /** age of the frame that the following values are of */
   shape_age_ms: number;
   /** location of the stronger of two contacts, as x_mm */
   x1_mm: number;
@@ -321,7 +321,7 @@ export interface Info extends Header {
   y_mm: Float64Array;
   /** prior on sigma that is set */
   prior_sigma_mm: number;
-  /** its standard deviation; 0: none is set, and the sigma of a calibration acts */
+  /** its standard deviation; 0: none is set, and the sigma of a calibration is applied */
   prior_width_mm: number;
   /** UNCERTAIN is set where location_sd_mm is above it */
   location_limit_mm: number;
@@ -351,11 +351,11 @@ export interface Info extends Header {
   gain: Float64Array;
   /** of each sensor: gain, and its relative standard deviation */
   gain_sd: Float64Array;
-  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of the others, 1/32768; zeros: not known */
+  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it measures a contact over that of the others, 1/32768; zeros: not known */
   off_x_um: Float64Array;
-  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of the others, 1/32768; zeros: not known */
+  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it measures a contact over that of the others, 1/32768; zeros: not known */
   off_y_um: Float64Array;
-  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it feels a contact over that of the others, 1/32768; zeros: not known */
+  /** of each sensor: how far it lies from its place in the layout, um, and the log of the width in which it measures a contact over that of the others, 1/32768; zeros: not known */
   wider_q15: Float64Array;
   /** of the rubber */
   pad_thickness_mm: number;
