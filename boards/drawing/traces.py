@@ -18,7 +18,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from boards import BOARDS, DESCRIPTORS, TO_BUILD, image_of  # noqa: E402
-from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save  # noqa: E402
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save  # noqa: E402
 from emulated import scenario  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from reporting import run  # noqa: E402

@@ -27,7 +27,7 @@ sys.path[:0] = [
 ]
 import figures  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
-from goals import judge, print_goals  # noqa: E402
+from presentation import judge, print_goals  # noqa: E402
 
 REPORT = ROOT / "build/report"
 PATIENCE_s = 120
@@ -35,7 +35,7 @@ OF_TIME = re.compile(r"_(us|ms|s|fps|percent|seconds|minutes|per_s|per_minute|fr
 
 
 def job(name, *goals):
-    """A function of the build folder that returns figures for NAME.json; goals as goals.py has them."""
+    """A function of the build folder that returns figures for NAME.json; goals as presentation.py has them."""
 
     def mark(function):
         function.name, function.goals = name, goals

@@ -25,12 +25,10 @@ sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "r
 import errors  # noqa: E402
 import stiff  # noqa: E402
 from boards import TO_BUILD, fit_cycles_of  # noqa: E402
-from drawing import BLUE, FAINT, GOAL, INK, plt, save  # noqa: E402
+from presentation import BLUE, FAINT, GOAL, INK, goal_table_md, judge, plt, save, table_md  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
-from goals import goal_table_md, judge  # noqa: E402
 from measure import Measure  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
-from tables import table_md  # noqa: E402
 
 CLOCK_Hz = 125e6
 SETS = errors.SETS

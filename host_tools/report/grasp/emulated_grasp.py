@@ -9,7 +9,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 from boards import PARALLEL as BOARD, image_of  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from reporting import run  # noqa: E402
-from tables import table_md, text_of  # noqa: E402
+from presentation import table_md, text_of  # noqa: E402
 
 CLOCKS_ppm = "25,-25"
 # Of the slip: what is called how.

@@ -5,7 +5,7 @@ import pathlib
 
 from fingertip.files import InputError
 from reporting import run
-from tables import table_md
+from presentation import table_md
 
 GOALS = (("faults_opened", "<=", 0), ("faults_beyond_cap", "<=", 0), ("faults_unsaid", "<=", 0), ("cups_crushed", "<=", 0))
 ABOUT = """Each fault begins in each state of a grasp of each object (a paper cup that 5 N crush, a lime, a ball; caps of 4, 8 and 10 N), on a 2F-85 and

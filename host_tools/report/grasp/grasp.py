@@ -25,7 +25,7 @@ import grasp_report  # noqa: E402
 import kinds  # noqa: E402
 from kinds import GRIPPERS  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from goals import judge  # noqa: E402
+from presentation import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
 SEED = 27001  # seen by no choice of a constant

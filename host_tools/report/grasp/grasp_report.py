@@ -5,11 +5,9 @@ import bisect
 import emulated_grasp
 import faults
 import kinds
-from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_md, text_of
 from fingertip.files import write_text
-from goals import goal_table_md
 from kinds import GRIPPERS
-from tables import table_md, text_of
 
 # key: what its column is called
 COLUMNS = {

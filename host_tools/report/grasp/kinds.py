@@ -3,10 +3,9 @@
 import json
 import pathlib
 
-from drawing import BLUE, GOAL, ORANGE
+from presentation import BLUE, GOAL, ORANGE, table_md, text_of
 from fingertip.files import InputError
 from reporting import run
-from tables import table_md, text_of
 
 # model: what the figures call it, its colour
 GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}

@@ -29,7 +29,7 @@ import scenes  # noqa: E402
 from boards import BOARDS, DESCRIPTORS, PARALLEL, short  # noqa: E402
 from emulated import CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
-from goals import judge  # noqa: E402
+from presentation import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
 # What the checks of the images allow each scene.

@@ -5,10 +5,8 @@ import itertools
 import matplotlib
 import scenes
 from boards import BOARDS, DESCRIPTORS, PARALLEL, short
-from drawing import BLUE, FAINT, GOAL, ORANGE, plt, save
+from presentation import BLUE, FAINT, GOAL, ORANGE, goal_table_md, plt, save, table_md
 from emulated import CONVERSION_us
-from goals import goal_table_md
-from tables import table_md
 
 # Twenty-six pins on a Pico's edge, one for SCL.
 DATA_PINS = 25

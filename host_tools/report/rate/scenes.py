@@ -20,7 +20,7 @@ from boards import BOARDS  # noqa: E402
 from emulated import CLOCK_Hz, CONVERSION_us, Tools, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from reporting import Steps, run, write_json  # noqa: E402
-from tables import table_md  # noqa: E402
+from presentation import table_md  # noqa: E402
 
 SCENES = ("raw", "press", "slip", "grasp", "paper")
 STREAM = {"raw": "raw", "press": "contact", "slip": "contact", "grasp": "contact", "paper": "contact"}

@@ -30,7 +30,7 @@ import pace  # noqa: E402
 import real_report  # noqa: E402
 import strips  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from goals import judge  # noqa: E402
+from presentation import judge  # noqa: E402
 from measure import Measure  # noqa: E402
 from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
 

@@ -1,12 +1,10 @@
 """Tables and picture of real.py."""
 
 import numpy as np
-from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_md, text_of
 from fingertip.files import write_text
-from goals import goal_table_md
 from pace import PUBLISHED_ITERATIONS
 from pace import WAYS as PACE_WAYS
-from tables import table_md, text_of
 
 COLUMNS = (
     "inside_p50_mm",

@@ -24,9 +24,8 @@ import markdown
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
-from goals import HEADER, goal_rows  # noqa: E402
+from presentation import HEADER, goal_rows, text_of  # noqa: E402
 from parts import PARTS  # noqa: E402
-from tables import text_of  # noqa: E402
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #22252e; --faint: #5c6270; --paper: #fff; --line: #d5d9e2; --band: #f4f6fa;

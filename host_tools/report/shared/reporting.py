@@ -12,7 +12,7 @@ import time
 
 import page
 from fingertip.files import InputError, check_output, write_text
-from goals import judge, missed, print_goals
+from presentation import judge, missed, print_goals
 
 
 def option_parser(description):

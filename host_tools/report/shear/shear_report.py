@@ -1,10 +1,8 @@
 """What shear.py measured as text and as a picture."""
 
 import numpy as np
-from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_md, table_of_dicts_md, text_of
 from fingertip.files import write_text
-from goals import goal_table_md
-from tables import table_md, table_of_dicts_md, text_of
 
 SEVEN = "spheres of 6 and 15 mm, flat ends of a cylinder and a cube of 6 mm, ping-pong ball, rubber duck, lime"
 USUAL = (

@@ -7,7 +7,7 @@ import sessions
 from fingertip.files import InputError
 from fingertip.line import WARNINGS
 from measure import q10
-from tables import quantile
+from presentation import quantile
 
 PLACEMENTS, PLACEMENTS_MAX = 30, 60
 TAPS = 600  # on each pad: of 120 a median is 10 % off by chance

@@ -14,7 +14,7 @@ from emulated import CONVERSION_us
 from fingertip.files import InputError
 from fingertip.line import Flag
 from measure import q10, stream_of
-from tables import percent, quantile
+from presentation import percent, quantile
 
 TOUCHES = 50  # of each pad
 LEARNT_FROM = 20  # touches of a pad that was never calibrated, before those

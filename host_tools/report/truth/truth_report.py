@@ -1,9 +1,7 @@
 """What truth.py measured as text and as a picture."""
 
-from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, tidy
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_of_dicts_md, tidy
 from fingertip.files import write_text
-from goals import goal_table_md
-from tables import table_of_dicts_md
 
 # Share of truths within one and two radial standard deviations of a normal distribution in the plane.
 IDEAL_PERCENT = (63.2, 98.2)

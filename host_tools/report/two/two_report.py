@@ -1,9 +1,7 @@
 """What two.py measured as text and as a picture."""
 
-from drawing import BLUE, FAINT, INK, ORANGE, plt, save, tidy
+from presentation import BLUE, FAINT, INK, ORANGE, goal_table_md, plt, save, table_md, table_of_dicts_md, text_of, tidy
 from fingertip.files import write_text
-from goals import goal_table_md
-from tables import table_md, table_of_dicts_md, text_of
 
 CALLED = (("one", BLUE), ("pulled", "#8fb4d9"), ("long", ORANGE), ("two", "#4a9a5b"), ("none", FAINT), ("undecided", "#dddddd"))
 DISTANCES_mm = (6, 8, 10, 12, 15, 20)

@@ -25,7 +25,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import cards  # noqa: E402
 from fingertip.files import SLIP, InputError, run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
-from goals import judge  # noqa: E402
+from presentation import judge  # noqa: E402
 from playing import PAPER_RATE_Hz, PRIOR_WIDTH_mm, STIFF_LAYER_mm, Workshop  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402

@@ -5,10 +5,8 @@ write_report takes the dict that is in validation.json, draw the arrays of valid
 
 import cards
 import numpy as np
-from drawing import BLUE, FAINT, INK, ORANGE, plt, save
+from presentation import BLUE, FAINT, INK, ORANGE, goal_table_md, plt, save, table_md
 from fingertip.files import SENSOR_X_mm, SENSOR_Y_mm, write_text
-from goals import goal_table_md
-from tables import table_md
 
 NAMES = {
     "sphere6": "Small spherical indenter",

@@ -20,7 +20,7 @@ import shear  # noqa: E402
 import grasp  # noqa: E402
 import truth  # noqa: E402
 import validation  # noqa: E402
-from goals import goal_table_md, judge  # noqa: E402
+from presentation import goal_table_md, judge  # noqa: E402
 
 GOALS = {
     "fit": fit.GOALS,
