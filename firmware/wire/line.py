@@ -11,11 +11,11 @@ import argparse
 import pathlib
 import sys
 import textwrap
-import tomllib
 
 import line_protocol
 import line_settings
 import line_values
+import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MADE_BY = "written by firmware/wire/line.py from line.toml; change it there"
