@@ -8,7 +8,7 @@
 
 #define TICK_SHIFT 6 /* 64 us */
 
-/* Ages of the frames that make a pair, and by how much what the load explains may be wrong over it.
+/* Ages of the frames that make a pair, and by how much what the tangential force explains may be wrong over it.
  * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it includes
  * the lift that came before, for as long as it reaches back. The brisk one does not. Of 312 lifts
  * with a dead travel of 2 mm (seed 211) half of what BRIEF leaves unexplained, or two thirds of
@@ -24,7 +24,7 @@ static const struct pair_spans SLOW = {40000u, 120000u, 300000u, 200};
 static const struct pair_spans SLOW_LATEST = {40000u, 40000u, 80000u, 0};
 
 #define FLOOR_um 30 /* less is no motion */
-/* Squares, in 1/256, of mm for each 8 mm that the load explains: a load moves the estimated
+/* Squares, in 1/256, of mm for each 8 mm that the tangential force explains: a tangential force moves the estimated
  * location by up to 0.3 mm for each unit of Q / F on calibrated pads. 1.5 mm is not believed, nor 5
  * times the location's standard deviation, which pads that were never calibrated need. */
 #define CROSSTALK_q8 9
@@ -106,7 +106,7 @@ static int32_t um_from_q11(int32_t mm_q11) {
  * F of any size. */
 #define RATIO_CHANGE_MAX_q12 500000
 
-/* What the load explains. */
+/* What the tangential force explains. */
 static int32_t um_from_ratio(int32_t ratio_q12, int32_t scale_q8) {
   ratio_q12 = clamped(ratio_q12, RATIO_CHANGE_MAX_q12);
   return clamped(ratio_q12 * (MOTION_PER_LOAD_mm * 125) / 512 * scale_q8 / 256, CHANGE_MAX_um);
@@ -249,7 +249,7 @@ static bool find_velocity(struct motion_history *history) {
 
 #define LOAD_MAX_q24 (32 << 24)
 
-/* Enters a load: what it has changed by, over the force of now. The normal force's own scale is in
+/* Enters a tangential force: what it has changed by, over the force of now. The normal force's own scale is in
  * both. Exact over any number of frames of one force. */
 static void follow_load(struct motion_load *load, int32_t tangential_N_q24, int32_t force_N_q12, bool first) {
   if (first) {

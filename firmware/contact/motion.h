@@ -1,22 +1,22 @@
 /* How the contact moves, and whether it slides. Both come from the location that is corrected for
- * the tangential load, and from that load.
+ * the tangential force, and from that force.
  *
- * Motion alone does not show a slide. Rubber that takes over a load gives way, and the contact
+ * Motion alone does not show a slide. Rubber that takes over a tangential force gives way, and the contact
  * creeps along: by 1 to 5 mm for each unit of Q / F, tangential over normal force, as Mindlin's
  * contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949). It always
- * creeps with the load, never against it. If all of the contact slides, it goes on while Q / F
+ * creeps with the tangential force, never against it. If all of the contact slides, it goes on while Q / F
  * stays or comes down, as friction falls once it has given way. So the measure is how far the
- * contact has moved beyond what the change of its load explains:
+ * contact has moved beyond what the change of its tangential force explains:
  *   |d| - MOTION_PER_LOAD_mm dq . d / |d|,    d: displacement, dq: change of Q / F, both vectors
- * from an earlier span of time to the latest. Location and load are means over the same frames, so
- * that no course of a load makes an elastic contact slide.
+ * from an earlier span of time to the latest. Location and tangential force are means over the same frames, so
+ * that no course of a tangential force makes an elastic contact slide.
  *
  * There are three pairs of spans. The brief one shows a slide of 7 mm/s or more. The brisk one
- * shows one of 15 mm/s or more sooner, and within a lift: it does not reach back to where the load
+ * shows one of 15 mm/s or more sooner, and within a lift: it does not reach back to where the tangential force
  * still rose. The slow one is for a creep of 1 mm/s or more. It counts only as long as the contact
  * still moves.
  *
- * Limits: a contact that rolls moves without a load as a sliding one does. So does one carried
+ * Limits: a contact that rolls moves without a tangential force as a sliding one does. So does one carried
  * along by an object that is held elsewhere too. Friction that rises with a slide by more than 1 /
  * MOTION_PER_LOAD_mm for each mm hides it. A location that jumps because another set of sensors is
  * in use is no motion: then the history is dropped.
@@ -72,7 +72,7 @@ struct motion_sums {
   uint32_t variance;       /* of the location's noise, um^2 */
 };
 
-/* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the load
+/* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the tangential force
  * grows leaves Q / F as it is, though the rubber gives way. */
 struct motion_load {
   uint32_t ratio_q12;            /* modulo 2^32 */
@@ -104,7 +104,7 @@ struct motion_history {
   uint64_t newest_us;
   uint64_t judged_us, slid_us; /* when last; when a slide showed last */
   struct motion motion;        /* as judged */
-  int32_t scale_q8;            /* of the load, newest frame */
+  int32_t scale_q8;            /* of the tangential force, newest frame */
   int32_t crosstalk_q8;        /* the same: see motion.c */
   uint32_t used;               /* bitmap: sensors in use */
   bool velocity_valid, moving, sliding;

@@ -48,7 +48,7 @@ struct shapes_job {
  * under way, the worker's other job may wait for it. */
 #define SHAPES_PART_us 350u
 
-/* Parts for frames so far apart: one, or as many as there is time for beside the load's job, from a
+/* Parts for frames so far apart: one, or as many as there is time for beside the tangential job, from a
  * whole frame to all that the first answer takes. */
 uint8_t shapes_parts(uint64_t apart_us);
 
@@ -60,9 +60,9 @@ struct shapes_place {
   float x_mm, y_mm, location_sd_mm;
 };
 
-/* Where the contact is, of which the report and the fit are: the load's estimate has the place, and
+/* Where the contact is, of which the report and the fit are: the tangential estimate has the location, and
  * where there is none (load NULL), the Gaussian. But neither knows a length, nor the Gaussian a
- * load. So of a long contact, and of a pulled one without an estimate, what lies between that place
+ * tangential force. So of a long contact, and of a pulled one without an estimate, what lies between that location
  * and the middle that the shape has is part of the standard deviation. It is not the place: rubber
  * that relaxes makes a round object look long or pulled, with its middle further off. The standard
  * deviation of a round contact grows where its shape leaves residuals. */

@@ -86,7 +86,7 @@ static int32_t even(const struct tangential_settings *settings, enum edge edge, 
   return terms[0] + fixed_mul_q26(terms[1], at->uu_q26) + fixed_mul_q26(terms[2], at->vv_q26);
 }
 
-/* 1 + even. The result shows a load that hides too much of itself. */
+/* 1 + even. The result shows a tangential force that hides too much of itself. */
 static int32_t factor(const struct tangential_settings *settings, enum edge edge, const struct from_middle *at) {
   return fixed_clamp((1 << 20) + even(settings, edge, at), 0, FACTOR_MAX_Q20);
 }
@@ -109,7 +109,7 @@ static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_
   return fixed_div_q26(fixed_clamp(own_q26, -RATIO_MAX_Q26, RATIO_MAX_Q26), gain_q20 * 64);
 }
 
-/* pad_profile.h has the formulas. False: the load shows too little of itself, or there is hardly a
+/* pad_profile.h has the formulas. False: the tangential force shows too little of itself, or there is hardly a
  * force. */
 static bool without_edges(const struct tangential_settings *settings, const struct fit_tangential *found,
                           struct fit_tangential *mended) {
@@ -264,7 +264,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
   }
   const float size_N = fit_quadrature(fabsf(qx_N), 1.0f, fabsf(qy_N), 1.0f);
   const float scale = settings->force_scale * settings->tangential_scale;
-  /* Both scales' share of the standard deviation, along the load, where it is the whole. */
+  /* Both scales' share of the standard deviation, along the tangential force, where it is the whole. */
   const float scale_sd = fit_quadrature(settings->force_scale, settings->tangential_scale_sd,
                                         settings->tangential_scale, settings->force_scale_sd);
   load->x_mm = found->x_mm;

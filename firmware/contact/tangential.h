@@ -1,4 +1,4 @@
-/* What the fingertip reports about the tangential load of one frame: the estimate of
+/* What the fingertip reports about the tangential force of one frame: the estimate of
  * fit_tangential.h in the scales of the pad. Where the pad's edges spoil the zero, it reports only
  * the change since the first touch. */
 #ifndef CONTACT_TANGENTIAL_H
@@ -13,7 +13,7 @@
 struct tangential_settings {
   float force_scale; /* force is this times the estimate's */
   float force_scale_sd;
-  float tangential_scale; /* tangential load is this and force_scale times the estimate's */
+  float tangential_scale; /* tangential force is this and force_scale times the estimate's */
   float tangential_scale_sd;
   bool from_touch;
   int32_t edges_q20[PAD_EDGE_KINDS][PAD_EDGE_TERMS]; /* of the profile, in the order there */
@@ -25,7 +25,7 @@ struct tangential_settings {
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
                     const struct contact_settings *settings, bool calibrated);
 
-/* The load at the beginning of a contact counts as zero: the mean of Q / F over this time after its
+/* The tangential force at the beginning of a contact counts as zero: the mean of Q / F over this time after its
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */
 #define TANGENTIAL_ZERO_us 100000u
 
@@ -39,7 +39,7 @@ struct tangential_history {
 };
 
 /* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as
- * estimated and of one that nothing pulls, each by how likely it is: a small load may be none, and
+ * estimated and of one that nothing pulls, each by how likely it is: a small tangential force may be none, and
  * chance loads would move it. location_sd_mm has what lies between the two. */
 struct tangential_load {
   float x_mm, y_mm, location_sd_mm;
@@ -81,7 +81,7 @@ struct tangential_job {
 #define TANGENTIAL_SLOW_us 4500u
 
 /* Frames nearer to each other than this leave no time to wait for an answer. The one of the frame
- * before is taken, whose load has changed little since. */
+ * before is taken, whose tangential force has changed little since. */
 #define TANGENTIAL_BESIDE_us 1500u
 
 /* A Cortex-M0+ at 125 MHz answers within 330 us, and within 1.6 ms after a slow frame
@@ -98,8 +98,8 @@ void tangential_reset(struct tangential_history *history);
 
 /* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and
  * TANGENTIAL_FROM_TOUCH to result->flags. With the former, UNCERTAIN is about the corrected
- * location, and ELONGATED about the estimate, which a load does not make look long. Where the pad's
- * edges hide a load such that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
+ * location, and ELONGATED about the estimate, which a tangential force does not make look long. Where the pad's
+ * edges hide a tangential force such that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
  * none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
