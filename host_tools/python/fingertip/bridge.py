@@ -1,6 +1,6 @@
-"""Publishes every fingertip of this computer on Zenoh, until it is ended: contact, raw, health and info packets as they stood on the
+"""Publishes every fingertip of this computer on Zenoh, until it is ended: contact, raw, health and info packets as they were on the
 line, with this computer's clock. Keys: fingertip/network.py. A fingertip that is plugged in later is found, one that is unplugged is
-waited for. Nothing is encrypted and everybody in reach may tare and set, unless --config says otherwise.
+waited for. Nothing is encrypted and everybody in reach may tare and set, unless --config has it otherwise.
 
 In Python, because the package reconnects, finds and shares fingertips already, and Debian has no Zenoh for C++.
 """
@@ -36,7 +36,7 @@ def _offset_ns():
 
 
 def _boot():
-    """What only processes of the same computer say: they have one clock."""
+    """Only processes of the same computer have this in common: they have one clock."""
     try:
         return pathlib.Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     except OSError:
@@ -75,7 +75,7 @@ class _Published:
                 ("tare", self._tare),
                 ("set", self._set),
                 ("info", self._info),
-                ("status", self._tell_status),
+                ("status", self._answer_status),
                 ("again", self._again),
             )
         ]
@@ -204,7 +204,7 @@ class _Published:
     def _info(self, query):
         self._reply_info(query, "info", self.tip.info if self.tip.is_returning else self.tip.read_info())
 
-    def _tell_status(self, query):
+    def _answer_status(self, query):
         query.reply(f"{self._root}/status", self._status(1))
 
     def _again(self, query):
@@ -230,12 +230,12 @@ class _Published:
 class Bridge:
     """ports: these alone; none: all that discovery finds, again and again."""
 
-    def __init__(self, session, ports, keep, latency_ms, say):
+    def __init__(self, session, ports, keep, latency_ms, report):
         self._session = session
         self._ports = ports
         self._keep = keep
         self._latency_ms = latency_ms
-        self._say = say
+        self._report = report
         self._published = {}
         self._complaints = {}
         self.clock = host_clock()
@@ -250,7 +250,7 @@ class Bridge:
             try:
                 one.tip.take_one()
             except FingertipError as error:  # for good: another one has its port
-                self._say(str(error))
+                self._report(str(error))
                 del self._published[way]
                 one.close()
         found = [discovery.Found("", port) for port in self._ports] or discovery.find()
@@ -274,13 +274,13 @@ class Bridge:
         except FingertipError as error:
             if self._complaints.get(way) != str(error):
                 self._complaints[way] = str(error)
-                self._say(str(error))
+                self._report(str(error))
             return
         if any(one.tip.serial == tip.serial for one in self._published.values()):  # it is waited for already, and has another name now
             tip.close()
             return
         self._published[way] = _Published(self._session, tip, self._keep, lambda: self.clock)
-        self._say(f"{tip.serial} at {tip.description}")
+        self._report(f"{tip.serial} at {tip.description}")
 
     def close(self):
         for one in self._published.values():
@@ -314,12 +314,12 @@ def main(argv):
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
 
-    def say(text):
+    def report(text):
         print(f"fingertip-bridge: {printable(text)}", file=sys.stderr, flush=True)
 
     with open_session(options, options.router) as session:
-        bridge = Bridge(session, options.port, options.keep, options.latency_ms, say)
-        say(bridge.clock.text)
+        bridge = Bridge(session, options.port, options.keep, options.latency_ms, report)
+        report(bridge.clock.text)
         try:
             while not ended.is_set():
                 bridge.look()

@@ -106,8 +106,8 @@ class Topic:
         return len(self._writer.get_matched_subscriptions())
 
     def close(self, patience_s: float) -> None:
-        """Once all is acknowledged, or so much later."""
+        """Once all is acknowledged, or after that time."""
         if self._writer:
-            with contextlib.suppress(AttributeError):  # by which cyclonedds 11.0.1 says that the time is over
+            with contextlib.suppress(AttributeError):  # which cyclonedds 11.0.1 raises when the time is over
                 self._writer.wait_for_acks(round(patience_s * 1e9))
             self._writer = None

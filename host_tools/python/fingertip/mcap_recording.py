@@ -16,31 +16,36 @@ from typing import Any
 
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, WARNINGS, Flag
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
 from .lines import LineFile, shortest
+from .messages import (
+    CONTACT_TYPE,
+    DIAGNOSTICS_TYPE,
+    LINE_TYPE,
+    PLACE_TYPE,
+    PRESSURES_TYPE,
+    TYPES,
+    WRENCH_TYPE,
+    FrameMessages,
+    diagnostics,
+    health_status,
+    name_in_ros,
+    stamp,
+)
 from .ros_messages import decode, encode, schema_of
 
-CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (
-    "fingertip_msgs/Contact",
-    "fingertip_msgs/Line",
-    "geometry_msgs/WrenchStamped",
-    "geometry_msgs/PointStamped",
-    "sensor_msgs/PointCloud2",
-    "diagnostic_msgs/DiagnosticArray",
-)
-TYPES = (CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE)
-LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can say
+LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
 CHUNK_MOST_bytes = 1 << 26  # of one that is read
 
-_JUDGED = int(Flag.FIT_VALID | WARNINGS)
-_TANGENTIAL = int(Flag.TANGENTIAL_VALID | Flag.TANGENTIAL_FROM_TOUCH)
-_NOTHING = int(Flag.CONTACT | Flag.TARED | WARNINGS)
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
 _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *LATER_COLUMNS) if name not in _COUNTS]
 _FIRST_RAW = 2 + len(CONTACT_COLUMNS) + len(LATER_COLUMNS)
 _FIRST_SENSOR = _FIRST_RAW + len(RAW_COLUMNS)
+_CELLS = [(name, at) for at, name in enumerate((*CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS), 2)]
+_NUMBER_CELLS = [(name.lower(), at) for name, at in _CELLS if name in (*_QUANTITIES, "temperature_degC")]
+_WHOLE_CELLS = [(name.lower(), at) for name, at in _CELLS if name not in (*_QUANTITIES, "temperature_degC")]
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(?:\.(\d{3}))?Z")
 
 
@@ -57,118 +62,12 @@ def _mcap() -> types.ModuleType:
     return mcap
 
 
-def name_in_ros(serial: str) -> str:
-    """As a part of topics and coordinate frames."""
-    name = re.sub("[^A-Za-z0-9_]", "_", serial) or "unknown"
-    return "s" + name if name[0].isdigit() else name
-
-
-def stamp(time_ns: int) -> dict[str, int]:
-    return {"sec": time_ns // 10**9, "nanosec": time_ns % 10**9}
-
-
-def wrench(flags: int, x_mm: float, y_mm: float, force_N: float, qx_N: float, qy_N: float) -> dict[str, dict[str, float]]:
-    """geometry_msgs/Wrench of a contact packet; its definition says what it is."""
-    if flags & _NOTHING == Flag.TARED:
-        return {"force": {"x": 0.0, "y": 0.0, "z": 0.0}, "torque": {"x": 0.0, "y": 0.0, "z": 0.0}}
-    trusted = flags & _JUDGED == Flag.FIT_VALID
-    sure = trusted and flags & _TANGENTIAL == Flag.TANGENTIAL_VALID
-    x_m, y_m, z_N = x_mm / 1000, y_mm / 1000, -force_N if trusted else math.nan
-    x_N, y_N = (qx_N, qy_N) if sure else (math.nan, math.nan)
-    return {
-        "force": {"x": x_N, "y": y_N, "z": z_N},
-        "torque": {
-            "x": y_m * z_N if trusted else math.nan,
-            "y": -x_m * z_N if trusted else math.nan,
-            "z": x_m * y_N - y_m * x_N if sure else math.nan,
-        },
-    }
-
-
-def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
-    """geometry_msgs/Point of a contact packet."""
-    trusted = flags & _JUDGED == Flag.FIT_VALID
-    return {"x": x_mm / 1000, "y": y_mm / 1000, "z": 0.0} if trusted else {"x": math.nan, "y": math.nan, "z": math.nan}
-
-
-def pressure_cloud(x_mm: list[float], y_mm: list[float], valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> dict[str, Any]:
-    """sensor_msgs/PointCloud2 of a raw packet, without its header."""
-    count = len(pressures_Pa)
-    data = b"".join(
-        struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
-        for k in range(count)
-    )
-    fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
-    return {
-        "height": 1,
-        "width": count,
-        "fields": fields,
-        "is_bigendian": False,
-        "point_step": 16,
-        "row_step": 16 * count,
-        "data": data,
-        "is_dense": False,
-    }
-
-
-class _Cloud:
-    """sensor_msgs/PointCloud2 of raw packets, all of whose bytes but stamp and pressures are the same each time."""
-
-    def __init__(self, frame_id: str, x_mm: list[float], y_mm: list[float], sensors: int) -> None:
-        zeros = [0.0] * sensors
-        cloud = {"header": {"stamp": stamp(0), "frame_id": frame_id}, **pressure_cloud(x_mm, y_mm, 0, zeros, zeros)}
-        self._bytes = bytearray(encode(PRESSURES_TYPE, cloud))
-        end = len(self._bytes) - 1  # behind the data is_dense
-        self._places = range(end - 16 * sensors + 12, end, 16)
-
-    def message(self, time_ns: int, valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> bytes:
-        struct.pack_into("<iI", self._bytes, 4, *stamp(time_ns).values())
-        for k, place in enumerate(self._places):
-            struct.pack_into("<f", self._bytes, place, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
-        return bytes(self._bytes)
-
-
-def health_status(serial: str, sensors: int, fields: dict[str, str]) -> dict[str, Any]:
-    """diagnostic_msgs/DiagnosticStatus of a health packet."""
-    present, bad = (int(fields.get(name, "0")) for name in ("sensors_present", "sensors_prom_bad"))
-    missing = " ".join(str(k) for k in range(sensors) if not present >> k & 1)
-    doubtful = " ".join(str(k) for k in range(sensors) if bad >> k & 1)
-    said = [
-        text for text in (f"sensors missing: {missing}" * bool(missing), f"damaged PROM of sensors: {doubtful}" * bool(doubtful)) if text
-    ]
-    return {
-        "level": 1 if said else 0,
-        "name": f"fingertip {serial}",
-        "message": "; ".join(said) or "all sensors are there",
-        "hardware_id": serial,
-        "values": [{"key": key, "value": value} for key, value in fields.items()],
-    }
-
-
-def warning_status(serial: str, warnings: int) -> dict[str, Any]:
-    """diagnostic_msgs/DiagnosticStatus of a contact packet's warnings."""
-    names = " ".join(flag.name or "" for flag in Flag if flag & WARNINGS & warnings)
-    return {
-        "level": 1 if names else 0,
-        "name": f"fingertip {serial} contact",
-        "message": names or "no warning",
-        "hardware_id": serial,
-        "values": [],
-    }
-
-
 def _utc_ns(text: str) -> int | None:
     """Of the last word."""
     match = _UTC.fullmatch(text.rpartition(" ")[2])
     if not match:
         return None
     return calendar.timegm(tuple(int(match[i]) for i in range(1, 7))) * 10**9 + int(match[7] or 0) * 10**6
-
-
-def _as_binary32(*values: float) -> tuple[float, ...]:
-    """As the fingertip sent them."""
-    form = f"<{len(values)}f"
-    return struct.unpack(form, struct.pack(form, *values))
 
 
 def _clamp_ns(time_ns: int) -> int:
@@ -209,27 +108,20 @@ class _Device:
         self.number = number
         self.keys: dict[str, str] = {}
         self.serial = serial
-        self.frame_id = "fingertip_" + name_in_ros(serial)
+        self.messages = FrameMessages(serial)
         self.channels: dict[str, int] = {}
-        self.warnings: int | None = None
         self.x_mm: list[float] = []
         self.y_mm: list[float] = []
         self.sensors = 0
-        self._cloud: _Cloud | None = None
-
-    def cloud(self, sensors: int) -> _Cloud | None:
-        """Of rows with so many sensors; nothing where their places are unknown."""
-        if self._cloud is None and min(len(self.x_mm), len(self.y_mm)) >= sensors:
-            self._cloud = _Cloud(self.frame_id, self.x_mm, self.y_mm, sensors)
-        return self._cloud
 
     def key(self, key: str, value: str) -> None:
         self.keys[key] = value
-        self._cloud = None
         if key in ("x_mm", "y_mm"):
             setattr(self, key, [float(word) for word in value.split()])
         elif key == "sensors":
             self.sensors = int(value)
+        if key in ("x_mm", "y_mm", "sensors"):
+            self.messages.place_sensors(self.x_mm, self.y_mm, self.sensors)
 
     def calibration(self) -> str:
         """What there is of gains, force scale and pad, as JSON; nothing without."""
@@ -324,7 +216,7 @@ class McapLines:
         }
         for device in self._devices:
             root = f"/fingertip/{name_in_ros(device.serial)}/"
-            device.channels = {
+            device.channels = self._channels | {
                 name: self._channel(root + topic, name)
                 for name, topic in (
                     (CONTACT_TYPE, "contact"),
@@ -361,12 +253,10 @@ class McapLines:
             self._clock.event(value)
         elif device and own == "packet" and value.startswith("health "):
             fields = dict(pair.partition("=")[::2] for pair in value.split()[1:] if not pair.startswith(("sequence=", "t_us=")))
-            self._diagnose(health_status(device.serial, device.sensors, fields))
+            status = health_status(device.serial, device.sensors, fields)
+            self._add(self._channels[DIAGNOSTICS_TYPE], diagnostics(self._clock.last_ns, status))
         elif device and own in ("x_mm", "y_mm", "sensors"):
             device.key(own, value)
-
-    def _message(self, channel: int, name: str, frame_id: str, message: dict[str, Any]) -> None:
-        self._add(channel, encode(name, {"header": {"stamp": stamp(self._clock.last_ns), "frame_id": frame_id}, **message}))
 
     def _add(self, channel: int, data: bytes) -> None:
         now_ns = self._clock.last_ns
@@ -378,10 +268,8 @@ class McapLines:
 
     def _put_line(self, text: str) -> None:
         self._number += 1
-        self._message(self._channels[LINE_TYPE], LINE_TYPE, "", {"line": self._number, "text": text, "torn": False})
-
-    def _diagnose(self, status: dict[str, Any]) -> None:
-        self._message(self._channels[DIAGNOSTICS_TYPE], DIAGNOSTICS_TYPE, "", {"status": [status]})
+        header = {"stamp": stamp(self._clock.last_ns), "frame_id": ""}
+        self._add(self._channels[LINE_TYPE], encode(LINE_TYPE, {"header": header, "line": self._number, "text": text, "torn": False}))
 
     def _put_row(self, text: str) -> None:
         self._number += 1
@@ -390,33 +278,17 @@ class McapLines:
         if self._joint:
             device, time_us = self._devices[int(cells[0])], float(cells[1])
             del cells[:2]
-        row = contact_of(cells)
+        row = contact_of(cells) | {"line": self._number, "device": device.number, "time_us": time_us}
         self._clock.row(row["t_us"], time_us)
-
-        def put(name: str, message: dict[str, Any]) -> None:
-            self._message(device.channels[name], name, device.frame_id, message)
-
-        put(CONTACT_TYPE, {**row, "line": self._number, "device": device.number, "time_us": time_us})
-        if row["has_contact"]:
-            flags = row["flags"]
-            x_mm, y_mm, *forces_N = _as_binary32(row["x_mm"], row["y_mm"], row["force_n"], row["qx_n"], row["qy_n"])
-            put(WRENCH_TYPE, {"wrench": wrench(flags, x_mm, y_mm, *forces_N)})
-            put(PLACE_TYPE, {"point": place(flags, x_mm, y_mm)})
-        cloud = device.cloud(len(row["pressure_pa"])) if row["has_raw"] else None
-        if cloud:
-            self._add(device.channels[PRESSURES_TYPE], cloud.message(self._clock.last_ns, row["valid"], row["pressure_pa"], row["tare_pa"]))
-        if row["has_contact"] and device.warnings != row["flags"] & WARNINGS:
-            device.warnings = row["flags"] & WARNINGS
-            self._diagnose(warning_status(device.serial, device.warnings))
+        for kind, data in device.messages.of(self._clock.last_ns, row):
+            self._add(device.channels[kind], data)
 
 
 def contact_of(cells: list[str]) -> dict[str, Any]:
     """Cells of a row from t_us on, with all its columns, as the fields of fingertip_msgs/Contact that they hold."""
     row: dict[str, Any] = {"t_us": int(cells[0]), "frame": int(cells[1]), "has_contact": cells[2] != "", "has_raw": cells[_FIRST_RAW] != ""}
-    for name, cell in zip((*CONTACT_COLUMNS, *LATER_COLUMNS), cells[2:]):
-        row[name.lower()] = int(cell or "0") if name in _COUNTS else float(cell) if cell else math.nan
-    for name, cell in zip(RAW_COLUMNS, cells[_FIRST_RAW:]):
-        row[name.lower()] = (float(cell) if cell else math.nan) if name == "temperature_degC" else int(cell or "0")
+    row |= {name: int(cells[at] or 0) for name, at in _WHOLE_CELLS}
+    row |= {name: float(cells[at] or "nan") for name, at in _NUMBER_CELLS}
     pressures = [round(float(cell) * Q10) / Q10 for cell in cells[_FIRST_SENSOR:]] if row["has_raw"] else []
     row["pressure_pa"], row["tare_pa"] = pressures[: len(pressures) // 2], pressures[len(pressures) // 2 :]
     return row
@@ -485,7 +357,7 @@ class McapLineReader:
         return (each for each in self.lines() if not isinstance(each, Damaged))
 
     def lines(self) -> Iterator[Line | Damaged]:
-        """What is damaged is among them, where it stands."""
+        """What is damaged is among them, at its place."""
         has_line = False
         for each in self._messages():
             if isinstance(each, Damaged):
@@ -521,7 +393,7 @@ class McapLineReader:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
     def _records(self, stream: Any, size: int) -> Iterator[tuple[int, int, bytes]]:
-        """(place, opcode, content). Each ends where its length says, whatever is in it. Raises EOFError where the last one is torn."""
+        """(place, opcode, content). Each ends by its length, whatever is in it. Raises EOFError where the last one is torn."""
         while stream.count < size:  # a killed writer leaves whole chunks
             at = stream.count
             if size - at < 9:

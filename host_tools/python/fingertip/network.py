@@ -1,6 +1,6 @@
-"""What fingertip-bridge and fingertip-recorder say to each other on Zenoh (zenoh.io), and how they open a session.
+"""What fingertip-bridge and fingertip-recorder exchange on Zenoh (zenoh.io), and how they open a session.
 
-    fingertip/SERIAL/contact, raw, health, info   the packet's frame as it stood on the line, without its closing zero: wire.decode
+    fingertip/SERIAL/contact, raw, health, info   the packet's frame as it was on the line, without its closing zero: wire.decode
                                                   reads it; firmware/wire/PROTOCOL.md is its format. The attachment is a Stamp.
     fingertip/SERIAL/other                        the other packets: acknowledgements, crashes
     fingertip/SERIAL/status                       JSON, twice a second, and asked: host, its clock by its own time daemon, lines with the number of
@@ -44,7 +44,7 @@ class Stamp(NamedTuple):
 
     line: u64, begins again when the bridge or the fingertip does, and only grows. number: u64, counts from 1 the packets that the fingertip sent
     on this line, with those that the line lost. taken_ns: i64, the host's clock, ns since 1970, when it was read. measured_ns: i64, the same
-    when the fingertip's clock stood at the packet's t_us, good to uncertainty_us, f32; drift_ppm: f32, of the fingertip's clock against the
+    when the fingertip's clock was at the packet's t_us, good to uncertainty_us, f32; drift_ppm: f32, of the fingertip's clock against the
     host's. shared: u32, 1 where it came through `fingertip serve`, whose sequence numbers are not the fingertip's.
     """
 
@@ -76,13 +76,13 @@ class HostClock(NamedTuple):
 
 
 def judge_tracking(text: str) -> HostClock:
-    """What `chronyc -c tracking` said: chrony bounds the error by the correction under way, root dispersion and half the root delay
+    """By the text of `chronyc -c tracking`: chrony bounds the error by the correction under way, root dispersion and half the root delay
     (chrony.conf(5), maxclockerror; chronyc(1), tracking)."""
     cells = text.strip().split(",")
     try:
         offset_s, delay_s, dispersion_s, leap = float(cells[4]), float(cells[10]), float(cells[11]), cells[13]
     except (IndexError, ValueError):
-        return HostClock(False, float("inf"), "clock not disciplined: chronyc said something else than expected")
+        return HostClock(False, float("inf"), "clock not disciplined: chronyc printed something else than expected")
     if leap == "Not synchronised" or int(cells[2]) == 0:
         return HostClock(False, float("inf"), "clock not disciplined: chrony is not synchronised")
     bound_us = 1e6 * (abs(offset_s) + dispersion_s + delay_s / 2)
@@ -141,7 +141,7 @@ def open_session(options: argparse.Namespace, router: bool = False) -> Any:
         if not options.config:  # started before the router, it waits
             config.insert_json5("connect/timeout_ms", "-1")
             config.insert_json5("connect/exit_on_failure", "false")
-            # a full queue is waited for so long, by a thread that may, before a live packet is dropped
+            # the wait for a full queue in us, by a thread that may, before a live packet is dropped
             config.insert_json5("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "50000")
         return zenoh.open(config)
     except zenoh.ZError as error:

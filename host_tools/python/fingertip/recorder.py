@@ -22,7 +22,7 @@ from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session,
 from .line import Capability
 from .recording import JointRecordingWriter
 
-GAP_s = 0.2  # a packet that is missing so long is asked for
+GAP_s = 0.2  # a packet that is missing for this time is asked for
 ASK_s = 0.3
 ASK_TIMEOUT_s = 5.0
 PINGS = 8
@@ -47,12 +47,12 @@ class Line:
 
 
 class Account:
-    """What one fingertip said, put in order, and what is missing of it.
+    """The packets of one fingertip in order, and what is missing of them.
 
-    offer: a packet that came, in any order, any number of times. heard: what its bridge says to have given out, [line, number]s, the
+    offer: a packet that came, in any order, any number of times. heard: what its bridge reports to have given out, [line, number]s, the
     present line last; what is missing of a line that is not among them is lost. take: the packets whose turn it is, each with how many
     were lost right before it and why. ask: the range to ask for again. sent == recorded + lost, always, after take. Lines follow one another
-    as their bridge says or as they came, whatever their numbers: a computer's clock may have been set back. unread_frames: between two lines
+    as their bridge reports or as they came, whatever their numbers: a computer's clock may have been set back. unread_frames: between two lines
     of a fingertip that went on; firmware sends nothing while no program has its port, and sequence numbers wrap.
     """
 
@@ -93,11 +93,11 @@ class Account:
         is_stuck = line.high >= line.next and line.next not in line.early
         line.stuck_s = (now_s if line.stuck_s is None else line.stuck_s) if is_stuck else None
 
-    def heard(self, told, now_s):
-        if not self.lines or not told or told[-1][0] in self._finished:
+    def heard(self, reported, now_s):
+        if not self.lines or not reported or reported[-1][0] in self._finished:
             return
-        place = len(self.lines)  # of the line told before, from the end
-        for number, last in reversed(told):
+        place = len(self.lines)  # of the line reported before, from the end
+        for number, last in reversed(reported):
             at = next((at for at, line in enumerate(self.lines) if line.number == number), None)
             if at is None:
                 if not last or number in self._finished or (place == 0 and self._last):
@@ -107,8 +107,8 @@ class Account:
             line, place = self.lines[at], at
             line.high = max(line.high, last)
             self._look(line, now_s)
-        known = dict(told)
-        present = next((at for at, line in enumerate(self.lines) if line.number == told[-1][0]), len(self.lines))
+        known = dict(reported)
+        present = next((at for at, line in enumerate(self.lines) if line.number == reported[-1][0]), len(self.lines))
         for line in self.lines[:present]:
             line.is_over = True
             if line.number not in known:
@@ -224,19 +224,19 @@ class _Source:
 class Recording:
     """session: of Zenoh. Everything but what asks runs in the thread that calls run."""
 
-    def __init__(self, session, path, infos, replace, extra, say):
+    def __init__(self, session, path, infos, replace, extra, report):
         self._zenoh = zenoh_module()
         self._session = session
-        self._say = say
+        self._report = report
         self._zero_us = (host_time.wall_ns() - host_time.now_ns()) / 1000
         self.sources = {info.serial: _Source(info.serial, number, info) for number, info in enumerate(infos)}
         self._arrived = queue.SimpleQueue()
         self._ending = False
         self._ended = host_time.event()
         self.damaged = 0
-        self.behind = self._said_behind = False  # too much for this computer
+        self.behind = self._reported_behind = False  # too much for this computer
         self.unrecorded = set()  # came later
-        self.unheard = []  # did not say at the end what they had sent
+        self.unheard = []  # did not report at the end what they had sent
         self._writer = JointRecordingWriter(
             path,
             infos,
@@ -293,7 +293,7 @@ class Recording:
     # The main thread
 
     def run(self, seconds, ended, patience_s):
-        """Until it is to end, or for so long, and then until everything that was sent is there or patience is over."""
+        """Until it is to end, or for this time, and then until everything that was sent is there or patience is over."""
         end_s = host_time.now_s() + seconds
         while not ended.is_set() and host_time.now_s() < end_s:
             self._work(0.1)
@@ -327,16 +327,16 @@ class Recording:
             if source is None:
                 if name in RECORDED and serial not in self.unrecorded:
                     self.unrecorded.add(serial)
-                    self._say(f"{serial} came after the recording had begun, and is not recorded")
+                    self._report(f"{serial} came after the recording had begun, and is not recorded")
             elif name in ("status", "answer"):
                 self._take_status(source, data, name == "answer")
                 touched.add(source)
             elif name in RECORDED or name == "again":
                 self._take(source, name, data, attachment)
                 touched.add(source)
-        if self.behind and not self._said_behind:
-            self._said_behind = True
-            self._say(
+        if self.behind and not self._reported_behind:
+            self._reported_behind = True
+            self._report(
                 "more comes than this computer writes: what does not fit is asked for again, and lost once no bridge keeps it; record fewer, or slower"
             )
         now_s = host_time.now_s()
@@ -358,8 +358,8 @@ class Recording:
     def _take(self, source, name, data, attachment):
         try:
             if not attachment:
-                told = json.loads(data)
-                source.account.answered(int(told["line"]), min(int(told["last"]), int(told["first"]) + AGAIN_MOST - 1))
+                reported = json.loads(data)
+                source.account.answered(int(reported["line"]), min(int(reported["last"]), int(reported["first"]) + AGAIN_MOST - 1))
                 return
             stamp = Stamp.of(attachment)
             packet = wire.decode_stream_packet(data) or wire.decode(data)
@@ -376,7 +376,7 @@ class Recording:
     def _write(self, source):
         for stamp, packet, lost, restarted in source.account.take(host_time.now_s()):
             if restarted:
-                self._event(source, "restarted: what it said in between is not known")
+                self._event(source, "restarted: what it sent in between is not known")
             if lost:
                 self._event(source, f"lost {lost} packets")
             if source.account.unread_frames > source.unread_frames:
@@ -454,7 +454,7 @@ def find(session, serials, expect, wait_s):
 
 
 class _HostClock(NamedTuple):
-    """Of a fingertip's host: where it was measured to stand against this computer's, within half of the way there and back."""
+    """Of a fingertip's host: how far it was measured to be from this computer's, within half of the way there and back."""
 
     host: str
     boot: str
@@ -474,7 +474,7 @@ def _clock_of(session, serial):
     for _ in range(PINGS):
         answer = ask(session, f"{ROOT}/{serial}/status").get(serial)
         if answer is None:
-            raise InputError(f"{serial}: its bridge does not say how its clock is kept")
+            raise InputError(f"{serial}: its bridge does not report how its clock is kept")
         try:
             status = json.loads(answer[0])
             best = min(best, ((answer[2] - answer[1]) / 2000, (status["now_ns"] - (answer[1] + answer[2]) / 2) / 1000))
@@ -489,7 +489,7 @@ def _clock_of(session, serial):
                 best[0],
             )
         except (ValueError, KeyError, TypeError):
-            raise InputError(f"{serial}: its bridge says its clock in a way that is not known here; it is of another version") from None
+            raise InputError(f"{serial}: its bridge reports its clock in a way that is not known here; it is of another version") from None
     return found
 
 
@@ -524,7 +524,7 @@ def main(argv):
     parser.add_argument(
         "--serial", action="append", default=[], metavar="SERIAL", help="this fingertip; several times for several; without, all"
     )
-    parser.add_argument("--expect", type=int, default=1, metavar="N", help="wait until so many are there")
+    parser.add_argument("--expect", type=int, default=1, metavar="N", help="wait until this number is there")
     parser.add_argument("--wait", type=float, default=10.0, metavar="S", help="for fingertips, at most; default 10")
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S")
     parser.add_argument("--patience", type=float, default=30.0, metavar="S", help="at the end, for hosts that are cut off; default 30")
@@ -554,21 +554,21 @@ def main(argv):
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
 
-    def say(text):
+    def report(text):
         print(f"fingertip-recorder: {printable(text)}", file=sys.stderr, flush=True)
 
     with open_session(options) as session:
         infos = find(session, options.serial, options.expect, options.wait)
         notes = judge_clocks(session, list(infos), options.clock_bound_us, options.undisciplined)
         extra = {f"{number}/host_clock": notes[serial] for number, serial in enumerate(infos)}
-        recording = Recording(session, options.file, list(infos.values()), options.replace, extra, say)
-        say(f"{options.file}: {', '.join(infos)}")
+        recording = Recording(session, options.file, list(infos.values()), options.replace, extra, report)
+        report(f"{options.file}: {', '.join(infos)}")
         recording.run(options.seconds, ended, options.patience)
     figures = recording.figures()
     for serial, each in figures.items():
-        say(f"{serial}: " + " ".join(f"{name}={value}" for name, value in each.items()))
+        report(f"{serial}: " + " ".join(f"{name}={value}" for name, value in each.items()))
     if recording.damaged:
-        say(f"{recording.damaged} messages were damaged, and count as lost")
+        report(f"{recording.damaged} messages were damaged, and count as lost")
     if options.json:
         print(json.dumps({"fingertips": figures, "damaged": recording.damaged, "unrecorded": sorted(recording.unrecorded)}))
     return 3 if any(each["lost"] or each["restarts"] or each["unread_frames"] or each["unheard"] for each in figures.values()) else 0

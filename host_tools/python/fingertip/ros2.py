@@ -1,4 +1,4 @@
-"""Fingertips as topics of ROS 2, from a computer without ROS: DDS by cyclonedds, the messages of MCAP recordings (mcap_recording.py).
+"""Fingertips as topics of ROS 2, from a computer without ROS: DDS by cyclonedds, the messages of MCAP recordings (messages.py).
 
     from fingertip import Fingertip
     from fingertip.ros2 import Publisher
@@ -31,22 +31,17 @@ from .errors import BadValueError, FingertipError, InputError
 from .files import run_tool
 from .frames import Q10, Frame
 from .group import Fingertips
-from .mcap_recording import (
+from .messages import (
     CONTACT_TYPE,
     DIAGNOSTICS_TYPE,
     PLACE_TYPE,
     PRESSURES_TYPE,
     WRENCH_TYPE,
+    FrameMessages,
+    diagnostics,
     health_status,
     name_in_ros,
-    place,
-    pressure_cloud,
-    stamp,
-    warning_status,
-    wrench,
 )
-from .line import WARNINGS
-from .ros_messages import encode
 from .wire import Contact, Health
 
 if TYPE_CHECKING:
@@ -91,12 +86,12 @@ def contact_of_frame(frame: Frame) -> dict[str, Any]:
 
 
 def _system_minus_host_ns() -> int:
-    """Of three looks at both clocks the one in which least time passed: in between another program may have had its turn."""
-    looks = []
+    """Of three samples of both clocks the one in which least time passed: another program may run in between."""
+    samples = []
     for _ in range(3):
         before_ns, now_ns, after_ns = host_time.now_ns(), host_time.wall_ns(), host_time.now_ns()
-        looks.append((after_ns - before_ns, now_ns - before_ns))
-    return min(looks)[1]
+        samples.append((after_ns - before_ns, now_ns - before_ns))
+    return min(samples)[1]
 
 
 def utc_ns(frame: Frame) -> int:
@@ -110,19 +105,15 @@ class _Device:
 
     def __init__(self, participant: "Participant", fingertip: Fingertip) -> None:
         self.fingertip = fingertip
-        name = name_in_ros(fingertip.serial)
-        self.frame_id = "fingertip_" + name
+        name, info = name_in_ros(fingertip.serial), fingertip.info
+        self.messages = FrameMessages(fingertip.serial)
+        self.messages.place_sensors(info.x_mm, info.y_mm, info.sensors)
         self.topics: "dict[str, Topic]" = {
             kind: participant.topic(f"/fingertip/{name}/{topic}", kind) for topic, kind in FRAME_TOPICS.items()
         }
         self.frames = 0
-        self.warnings: int | None = None
         self.health: Health | None = None
         self.is_gone = False
-
-    def send(self, kind: str, time_ns: int, message: dict[str, Any]) -> None:
-        header = {"stamp": stamp(time_ns), "frame_id": self.frame_id}
-        self.topics[kind].send(encode(kind, {"header": header, **message}), time_ns)
 
 
 class Publisher:
@@ -130,7 +121,7 @@ class Publisher:
     fingertip. Raises BadValueError, InputError."""
 
     def __init__(self, domain: int | None = None) -> None:
-        from . import dds  # says what to install
+        from . import dds  # whose error names what to install
 
         loopback_only = (
             os.environ.get("ROS_LOCALHOST_ONLY", "") == "1" or os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
@@ -157,55 +148,38 @@ class Publisher:
         self._devices[fingertip.serial] = _Device(self._participant, fingertip)
 
     def frame(self, frame: Frame) -> None:
-        """Says it on the topics of its fingertip."""
+        """Sends it on the topics of its fingertip."""
         device = self._devices[frame.serial]
         time_ns = utc_ns(frame)
         device.frames += 1
-        device.send(CONTACT_TYPE, time_ns, contact_of_frame(frame))
-        contact, raw = frame.contact, frame.raw
-        if frame.has_contact:
-            device.send(
-                WRENCH_TYPE,
-                time_ns,
-                {"wrench": wrench(contact.flags, contact.x_mm, contact.y_mm, contact.force_N, contact.qx_N, contact.qy_N)},
-            )
-            device.send(PLACE_TYPE, time_ns, {"point": place(contact.flags, contact.x_mm, contact.y_mm)})
-            if device.warnings != contact.flags & WARNINGS:
-                device.warnings = contact.flags & WARNINGS
-                self._diagnose(warning_status(frame.serial, device.warnings), time_ns)
-        info = device.fingertip.info
-        if frame.has_raw and min(len(info.x_mm), len(info.y_mm)) >= raw.sensors:
-            pressures, tares = ([value / Q10 for value in raw.readings[first::2]] for first in (0, 1))
-            device.send(PRESSURES_TYPE, time_ns, pressure_cloud(list(info.x_mm), list(info.y_mm), raw.valid, pressures, tares))
+        for kind, data in device.messages.of(time_ns, contact_of_frame(frame)):
+            if kind == DIAGNOSTICS_TYPE:
+                self._diagnose(data, time_ns)
+            else:
+                device.topics[kind].send(data, time_ns)
 
     def state(self) -> None:
-        """Says on /diagnostics what fingertips said of their health since the last time, and which have gone or are there again."""
+        """Sends on /diagnostics the health that fingertips reported since the last time, and which have gone or are there again."""
         for serial, device in self._devices.items():
             tip = device.fingertip
             if tip.is_returning != device.is_gone:
                 device.is_gone = tip.is_returning
-                said = "gone; it is waited for" if device.is_gone else "there again"
-                self._diagnose(
-                    {
-                        "level": 2 if device.is_gone else 0,
-                        "name": f"fingertip {serial} line",
-                        "message": said,
-                        "hardware_id": serial,
-                        "values": [],
-                    },
-                    host_time.wall_ns(),
-                )
+                message = "gone; it is waited for" if device.is_gone else "there again"
+                status = {"level": 2 * device.is_gone, "name": f"fingertip {serial} line", "message": message, "hardware_id": serial}
+                self._state(status | {"values": []})
             health = tip.health
             if health is not None and health is not device.health:
                 device.health = health
                 fields = {name: str(0 if value is None else value) for name, value in health._asdict().items()}
-                self._diagnose(health_status(serial, tip.info.sensors, fields), host_time.wall_ns())
+                self._state(health_status(serial, tip.info.sensors, fields))
 
-    def _diagnose(self, status: dict[str, Any], time_ns: int) -> None:
+    def _state(self, status: dict[str, Any]) -> None:
+        time_ns = host_time.wall_ns()
+        self._diagnose(diagnostics(time_ns, status), time_ns)
+
+    def _diagnose(self, data: bytes, time_ns: int) -> None:
         with self._lock:
-            self._diagnostics.send(
-                encode(DIAGNOSTICS_TYPE, {"header": {"stamp": stamp(time_ns), "frame_id": ""}, "status": [status]}), time_ns
-            )
+            self._diagnostics.send(data, time_ns)
 
     @property
     def frames(self) -> dict[str, int]:
@@ -261,7 +235,7 @@ def publish(publisher: Publisher, fingertips: Fingertips, is_over: Callable[[], 
 
 
 def main(argv: list[str]) -> int:
-    description = "Says what fingertips feel on topics of ROS 2, without ROS. Not run against ROS 2."
+    description = "Publishes what fingertips measure on topics of ROS 2, without ROS. Not run against ROS 2."
     parser = argparse.ArgumentParser(prog="fingertip-ros2", description=description)
     parser.add_argument("--device", action="append", metavar="SERIAL", help="a fingertip; all that are there, if none is named")
     parser.add_argument("--port", action="append", metavar="PORT", help="the same, by its serial port")

@@ -6,8 +6,8 @@ import re
 import struct
 from typing import Any
 
-_CDR_LITTLE_ENDIAN = b"\0\1\0\0"
-_PRIMITIVES = {
+CDR_LITTLE_ENDIAN = b"\0\1\0\0"
+PRIMITIVES = {
     "bool": "?",
     "byte": "B",
     "char": "B",
@@ -48,7 +48,7 @@ def schema_of(name: str) -> str:
 
 
 @functools.lru_cache(4096)
-def _packer(codes: tuple[str, ...]) -> struct.Struct:
+def packer_of(codes: tuple[str, ...]) -> struct.Struct:
     """Of struct's codes in this order, each where CDR aligns it."""
     form, at = "<", 0
     for code in codes:
@@ -68,8 +68,8 @@ def _flatten(name: str, message: dict[str, Any], codes: list[str], flat: list[An
             if isinstance(value, bytes):
                 codes.append(f"{len(value)}s")
                 flat.append(value)
-            elif kind in _PRIMITIVES:
-                codes.append(f"{len(value)}{_PRIMITIVES[kind]}")
+            elif kind in PRIMITIVES:
+                codes.append(f"{len(value)}{PRIMITIVES[kind]}")
                 flat += value
             else:
                 for each in value:
@@ -78,8 +78,8 @@ def _flatten(name: str, message: dict[str, Any], codes: list[str], flat: list[An
             text = value.encode("utf-8") + b"\0"
             codes += ("I", f"{len(text)}s")
             flat += (len(text), text)
-        elif kind in _PRIMITIVES:
-            codes.append(_PRIMITIVES[kind])
+        elif kind in PRIMITIVES:
+            codes.append(PRIMITIVES[kind])
             flat.append(value)
         else:
             _flatten(kind, value, codes, flat)
@@ -90,7 +90,7 @@ def encode(name: str, message: dict[str, Any]) -> bytes:
     codes: list[str] = []
     flat: list[Any] = []
     _flatten(name, message, codes, flat)
-    return _CDR_LITTLE_ENDIAN + _packer(tuple(codes)).pack(*flat)
+    return CDR_LITTLE_ENDIAN + packer_of(tuple(codes)).pack(*flat)
 
 
 class _Reader:
@@ -113,14 +113,14 @@ class _Reader:
             if not text:
                 raise ValueError("a text without its end")
             return text[:-1].decode("utf-8", "surrogateescape")
-        if kind in _PRIMITIVES:
-            return self.take(_PRIMITIVES[kind])[0]
+        if kind in PRIMITIVES:
+            return self.take(PRIMITIVES[kind])[0]
         return self.message(kind)
 
     def sequence(self, kind: str) -> Any:
         (count,) = self.take("I")
-        if kind in _PRIMITIVES:
-            return self.take(_PRIMITIVES[kind], count) if count else ()
+        if kind in PRIMITIVES:
+            return self.take(PRIMITIVES[kind], count) if count else ()
         return tuple(self.value(kind) for _ in range(min(count, len(self.data))))
 
     def message(self, name: str) -> dict[str, Any]:
@@ -129,6 +129,6 @@ class _Reader:
 
 def decode(name: str, data: bytes) -> dict[str, Any]:
     """Back, as dictionaries. Raises ValueError for bytes that are no such message."""
-    if data[:4] != _CDR_LITTLE_ENDIAN:
+    if data[:4] != CDR_LITTLE_ENDIAN:
         raise ValueError("no CDR of a known kind")
     return _Reader(data[4:]).message(name)
