@@ -1,26 +1,26 @@
 """Presses on real two-dimensional arrays: what others recorded, and how far the firmware's fit of each press is off.
 
-The sensors stand in two columns of four; the board's drawing gives the pitch. The gantry's frame is laid on that layout by one rotation and one
+The sensors are in two columns of four; the board's drawing gives the pitch. The gantry's frame is laid on that layout by one rotation and one
 shift. Every second row of presses aligns the layout and gives placements for calibrations; the figures are of the other rows.
 """
 
 import csv
-import json
-import subprocess
+import dataclasses
 
 import numpy as np
 from fingertip.files import InputError
 from fingertip.line import WARNINGS, Flag
+from measure import q10, round_half_away, usable_of
 
 PA_PER_PSI = 6894.757
 NOISE_PA = 10.0  # of a mean of ten samples, whose steps are 20 Pa
 RESPONSE_MM = 6.0  # a sensor's response is fitted to presses so near it
 OUTSIDE_MM = 3.0  # presses so far beyond the outer sensors are judged apart
-RAW_GAIN_SD = 0.105  # of a pad that was never calibrated: DEFAULT_GAIN_SD
-PRIOR_WIDTH_MM = 0.5  # of the prior on sigma that a user types: PRIOR_WIDTH in line.toml
+PRIOR_WIDTH_MM = 0.5  # of the prior on sigma that a user sets: PRIOR_WIDTH in line.toml
 DIP_PITCHES = 2.3  # standard deviation of the dip: DIP_PITCHES of calibration/solver.hpp
 DIP_FROM_WIDTHS = 3.0
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
+PASSES = 31
 PLACEMENT_PEAK_PA = 1500.0  # a calibration refuses lighter ones
 
 
@@ -95,48 +95,59 @@ def fit_gaussian(xy, reading_Pa, start, width_mm):
     return at
 
 
-def ask(program, array, jobs):
-    """The answers of real_fit, one for each job. array: has layout [sensor, 2] and pitch_mm, as a Grid."""
-    asked = {"x_mm": array.layout[:, 0].tolist(), "y_mm": array.layout[:, 1].tolist(), "pitch_mm": array.pitch_mm, "jobs": jobs}
-    done = subprocess.run([str(program)], input=json.dumps(asked), capture_output=True, text=True)
-    if done.returncode:
-        raise InputError(f"{program.name} failed: {done.stderr.strip()}")
-    return json.loads(done.stdout)["results"]
+class Fingertip:
+    """The firmware's fit and the tool's calibration for one layout [sensor, 2], and a shared object that is compiled for it."""
+
+    def __init__(self, measure, layout, pitch_mm):
+        self.measure, self.layout_mm, self.pitch_mm = measure, tuple(np.ascontiguousarray(layout.T)), pitch_mm
+        self.array = measure.array(*self.layout_mm, pitch_mm)
+
+    def calibrate(self, reading_Pa, every_s=EVERY_S):
+        """A Calibration for each session of placements [session, placement, sensor]."""
+        t_s = np.tile(every_s * np.arange(reading_Pa.shape[1]), (len(reading_Pa), 1))
+        found = self.measure.calibrate(*self.layout_mm, self.pitch_mm, t_s, np.ascontiguousarray(reading_Pa), NOISE_PA)
+        return [Calibration(*one) for one in zip(*found)]
+
+    def inputs(self, reading_Pa, calibration=None, prior=(0.0, 0.0), **fields):
+        """What the fit gets of readings [press, sensor], NaN where a sensor is missing: settings, readings in 1/1024 Pa, bitmap of usable sensors, own."""
+        settings = self.measure.settings(noise_Pa=NOISE_PA, prior_sigma_mm=prior[0], prior_width_mm=prior[1], **fields)
+        gain, own = 1.0, None
+        if calibration:
+            gain, own = calibration.sensors["gain"], calibration.own[None] if calibration.found["has_own"] else None
+            settings["gain_sd_q16"][0, : len(gain)] = round_half_away(65536 * calibration.sensors["reading_sd"])
+            for name in ("prior_sigma_mm", "prior_width_mm", "dip_share", "dip_sd_mm"):
+                settings[name] = calibration.found[name]
+        return settings, q10(reading_Pa / gain), usable_of(reading_Pa), own
+
+    def fit(self, *arguments, **named):
+        """fit_result [press] of the inputs of these arguments, as of presses that are held."""
+        settings, readings, usable, own = self.inputs(*arguments, **named)
+        found = self.measure.fit(self.array, settings, readings, usable, own=own)
+        self.measure.widen_held(self.array, settings, readings, found, own=own)
+        return found
+
+    def us(self, several):
+        """Microseconds of one fit of each of several inputs, in the quickest of PASSES passes in which they take turns."""
+        return np.min([[self.measure.timed_fit(self.array, *one[:3], own=one[3])[1] for one in several] for _ in range(PASSES)], axis=0)
 
 
-def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0), own=(), **settings):
-    """prior: sigma, its standard deviation, mm; dip: its share, its sd, mm; NaN in readings: that sensor is missing. settings: others of real_fit."""
-    sensors = readings.shape[1]
-    return {
-        "kind": "fit",
-        "presses": [[None if np.isnan(one) else one for one in press] for press in readings.tolist()],
-        "noise_Pa": NOISE_PA,
-        "gain": [1.0] * sensors if gain is None else gain,
-        "gain_sd": [RAW_GAIN_SD] * sensors if gain_sd is None else gain_sd,
-        "prior_sigma_mm": prior[0],
-        "prior_width_mm": prior[1],
-        "dip_share": dip[0],
-        "dip_sd_mm": dip[1],
-        "own": list(own),
-        **settings,
-    }
+@dataclasses.dataclass
+class Calibration:
+    """One session: calibration, calibrated_sensor and fit_own [sensor]."""
 
+    found: np.void
+    sensors: np.ndarray
+    own: np.ndarray
 
-def stored_job(readings, stored, **settings):
-    """With what a calibration leaves in the fingertip."""
-    return fit_job(
-        readings,
-        stored["gain"],
-        stored["gain_sd"],
-        (stored["prior_sigma_mm"], stored["prior_width_mm"]),
-        (stored["dip_share"], stored["dip_sd_mm"]),
-        stored["own"],
-        **settings,
-    )
+    @property
+    def good(self):
+        return self.found["state"] == 1
 
-
-def calibration_job(readings, every_s=EVERY_S):
-    return {"kind": "calibrate", "presses": readings.tolist(), "noise_Pa": NOISE_PA, "every_s": every_s}
+    def by_gains(self):
+        """Without the sensors' own locations and widths."""
+        found = self.found.copy()
+        found["has_own"] = False
+        return Calibration(found, self.sensors, self.own)
 
 
 def dip_share(grid):
@@ -148,17 +159,16 @@ def dip_share(grid):
     return float((below * dip).sum() / (dip**2).sum())
 
 
-class Felt:
-    """What the fit said of presses beside where they were. All arrays [press]; without a fit the error is infinite."""
+class Errors:
+    """Fits beside where the presses were. All arrays [press]; without a fit the error is infinite."""
 
-    def __init__(self, answer, xy):
-        flags = np.array(answer["flags"])
-        valid = flags & int(Flag.FIT_VALID) != 0
-        apart = np.hypot(np.array(answer["x_mm"]) - xy[:, 0], np.array(answer["y_mm"]) - xy[:, 1])
+    def __init__(self, fits, xy):
+        valid = fits["flags"] & np.uint32(Flag.FIT_VALID) != 0
+        apart = np.hypot(fits["x_mm"].astype(float) - xy[:, 0], fits["y_mm"].astype(float) - xy[:, 1])
         self.error_mm = np.where(valid, apart, np.inf)
-        self.sd_mm = np.array(answer["location_sd_mm"])
-        self.warned = ~valid | (flags & int(WARNINGS) != 0)
-        self.force_N = np.where(valid, answer["force_N"], np.nan)
+        self.sd_mm = fits["location_sd_mm"].astype(float)
+        self.warned = ~valid | (fits["flags"] & np.uint32(WARNINGS) != 0)
+        self.force_N = np.where(valid, fits["force_N"].astype(float), np.nan)
 
     @classmethod
     def joined(cls, several):

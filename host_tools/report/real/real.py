@@ -78,76 +78,53 @@ def one_missing(readings):
     return copies
 
 
-def judge_grid(program, one, path):
-    """What the firmware says of one recording without a calibration, and after each of its sessions."""
+def judge_grid(measure, one, path):
+    """The firmware's figures of one recording without a calibration, and after each of its sessions."""
     grid = grids.Grid(path, one["pitch_mm"])
+    fingertip = grids.Fingertip(measure, grid.layout, grid.pitch_mm)
     readings, xy = grid.reading_Pa[grid.judged], grid.xy[grid.judged]
     inside, outside = grid.inside[grid.judged], grid.outside[grid.judged]
-    typed = (float(np.median(grid.width_mm)), grids.PRIOR_WIDTH_MM)
-    sessions = grid.sessions(SEED)
-    shipped, raw, *calibrations = grids.ask(
-        program,
-        grid,
-        [
-            grids.fit_job(readings),
-            grids.fit_job(readings, prior=typed),
-            *(grids.calibration_job(grid.reading_Pa[these]) for these in sessions),
-        ],
-    )
-    accepted = [one for one in calibrations if one["state"] == "good"]
-    solved = [one for one in calibrations if one["solved"]]
+    set_by_hand = (float(np.median(grid.width_mm)), grids.PRIOR_WIDTH_MM)
+    calibrations = fingertip.calibrate(np.array([grid.reading_Pa[these] for these in grid.sessions(SEED)]))
+    solved = [one for one in calibrations if one.found["solved"]]
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
-    fits = grids.ask(
-        program,
-        grid,
-        [
-            job
-            for one in solved
-            for job in (
-                grids.stored_job(readings, one["stored"]),
-                grids.stored_job(torn, one["stored"]),
-                grids.stored_job(readings, {**one["stored"], "own": []}),
-            )
-        ],
-    )
-    felt = [grids.Felt(answer, xy) for answer in fits[0::3]]
-    missing = [grids.Felt(answer, torn_xy) for answer in fits[1::3]]
-    by_gains = [grids.Felt(answer, xy) for answer in fits[2::3]]
-    raw_felt, shipped_felt = grids.Felt(raw, xy), grids.Felt(shipped, xy)
-    all_inside, all_outside = np.tile(inside, len(felt)), np.tile(outside, len(felt))
-    before = float(np.median(raw_felt.error_mm[inside]))
+    calibrated = [grids.Errors(fingertip.fit(readings, one), xy) for one in solved]
+    missing = [grids.Errors(fingertip.fit(torn, one), torn_xy) for one in solved]
+    by_gains = [grids.Errors(fingertip.fit(readings, one.by_gains()), xy) for one in solved]
+    shipped, raw = (grids.Errors(fingertip.fit(readings, **more), xy) for more in ({}, {"prior": set_by_hand}))
+    accepted = [one for one in calibrations if one.good]
+    all_inside, all_outside = np.tile(inside, len(calibrated)), np.tile(outside, len(calibrated))
+    before = float(np.median(raw.error_mm[inside]))
     found = {
         "recording": one["key"],
         "part": one["part"],
-        "width_mm": typed[0],
+        "width_mm": set_by_hand[0],
         "dip_percent": 100 * grids.dip_share(grid),
         "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
         "places_off_mm": float(np.median(grid.places_off_mm)),
         "centroid_p50_mm": grids.quantile(np.hypot(*(grids.centroid(readings, grid.layout) - xy)[inside].T), 0.5),
-        "shipped": shipped_felt.figures(inside, outside),
-        "raw": raw_felt.figures(inside, outside),
+        "shipped": shipped.figures(inside, outside),
+        "raw": raw.figures(inside, outside),
         "sessions": len(calibrations),
         "accepted": len(accepted),
-        "reasons": sorted({one["reason"] for one in calibrations} - {"none"}),
-        "width_found_mm": grids.quantile([one["width_mm"] for one in solved], 0.5),
-        "worse_after_accept": sum(
-            float(np.median(each.error_mm[inside])) > before for each, one in zip(felt, solved) if one["state"] == "good"
-        ),
+        "reasons": sorted({one.found["reason"].decode() for one in calibrations} - {"none"}),
+        "width_found_mm": grids.quantile([one.found["width_mm"] for one in solved], 0.5),
+        "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(calibrated, solved) if one.good),
     }
-    if felt:
-        found["calibrated"] = grids.Felt.joined(felt).figures(all_inside, all_outside)
+    if calibrated:
+        found["calibrated"] = grids.Errors.joined(calibrated).figures(all_inside, all_outside)
         found["calibrated"]["force_scatter_percent"] = float(
-            np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt])
+            np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in calibrated])
         )
         found["by_gains_inside_p50_mm"] = grids.quantile(np.concatenate([each.error_mm[inside] for each in by_gains]), 0.5)
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
     shown = {
         "grid": grid,
         "inside": inside,
-        "shipped": shipped_felt,
-        "raw": raw_felt,
-        "calibrated": felt[0] if felt else None,
-        "to_pace": [(program, grid, readings[inside], xy[inside], one["stored"]) for one in accepted],
+        "shipped": shipped,
+        "raw": raw,
+        "calibrated": calibrated[0] if calibrated else None,
+        "to_pace": [(fingertip, readings[inside], xy[inside], one) for one in accepted],
     }
     return found, shown
 
@@ -161,12 +138,12 @@ def mean_of(rows, *keys):
     return None if not values or None in values else float(np.mean(values))
 
 
-def judge_grids(program, source, here):
+def judge_grids(measure, source, here):
     found, shown = [], {}
     for one in source["files"]:
         if one["name"] in here:
             print(f"        {one['key']}", flush=True)
-            row, shown[one["key"]] = judge_grid(program, one, here[one["name"]])
+            row, shown[one["key"]] = judge_grid(measure, one, here[one["name"]])
             found.append(row)
     rows = [row for row in found if row["part"] == "judges"]
     figures = {f"raw_{name}": mean_of(rows, "raw", name) for name in ("inside_p50_mm", "over_2mm_percent")}
@@ -218,19 +195,13 @@ def main(argv):
     )
     parser.add_argument("--pads", type=int, default=30, help="simulated ones for the run times (default: %(default)s)")
     options = parser.parse_args(argv)
-    out, programs = output_folder(options), pathlib.Path(options.build) / "host_tools/report/real"
-    for program in ("real_fit", "twin_fit"):
-        if not (programs / program).is_file():
-            raise InputError(f"{programs / program} is not there; build it: cmake --build --preset host")
-    firmware = Measure(options.build)
+    out, firmware = output_folder(options), Measure(options.build)
     sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
     here = found_below(options.folder, sources)
-    found, shown = judge_grids(programs / "real_fit", sources["grids"], here)
+    found, shown = judge_grids(Measure(options.build, "measure_2x4"), sources["grids"], here)
     print("        run times", flush=True)
     judges = [row["recording"] for row in found["grids"] if row["part"] == "judges"]
-    found["pace"] = pace.twin_rows(programs, firmware, options.pads) + pace.rows(
-        "real", [pad for key in judges for pad in shown[key]["to_pace"]]
-    )
+    found["pace"] = pace.twin_rows(firmware, options.pads) + pace.rows("real", [pad for key in judges for pad in shown[key]["to_pace"]])
     found |= judge_strips(firmware, sources["strips"], here)
     found["missing"] = sorted(one["name"] for source in sources.values() for one in source["files"] if one["name"] not in here)
     found["sources"] = {name: {key: source[key] for key in ("repository", "commit", "terms", "what")} for name, source in sources.items()}

@@ -18,7 +18,7 @@ COLUMNS = (
     "force_scatter_percent",
     "outside_p50_mm",
 )
-WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"))
+WAYS = (("shipped", "as shipped"), ("raw", "width set"), ("calibrated", "calibrated"))
 PROFILE_TO = 6.0  # widths
 
 
@@ -52,7 +52,7 @@ def write(found, path):
             "",
             "## Presses on arrays",
             "",
-            'Inside the outer sensors, of rows that neither align nor calibrate. "width typed": a prior of the pad\'s own width, 0.5 mm.',
+            'Inside the outer sensors, of rows that neither align nor calibrate. "width set": a prior of the pad\'s own width, 0.5 mm.',
             '"calibrated": with the gains, width and dip of each session of twenty placements, whether the tool accepts it or not.',
             "silent: beyond 1 mm and no warning.",
             "",
@@ -175,7 +175,7 @@ def draw_map(axes, each, way, title):
 
 
 def draw_coverage(axes, shown, part):
-    for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE)):
+    for way, name, colour in (("raw", "width set", ORANGE), ("calibrated", "calibrated, one session", BLUE)):
         ratios = [
             each[way].error_mm[each["inside"]] / np.maximum(each[way].sd_mm[each["inside"]], 1e-6)
             for key, each in shown.items()

@@ -29,7 +29,7 @@ def write_grid(path, gains=(1.0,) * 8):
         for column in range(16):
             at = (column - 7.5, row - 14.0)
             stage = (math.cos(TURN) * at[0] - math.sin(TURN) * at[1] + 14.0, math.sin(TURN) * at[0] + math.cos(TURN) * at[1] + 16.0)
-            stage = (round(stage[0], 6), float(row))  # rows are told apart by the stage's y
+            stage = (round(stage[0], 6), float(row))  # rows differ by the stage's y
             at = (
                 math.cos(TURN) * (stage[0] - 14.0) + math.sin(TURN) * (stage[1] - 16.0),
                 -math.sin(TURN) * (stage[0] - 14.0) + math.cos(TURN) * (stage[1] - 16.0),
