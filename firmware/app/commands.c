@@ -50,9 +50,12 @@ static enum ft_status keep_settings(struct app *app, uint8_t keep) {
     return FT_ERR_ARGUMENT;
   }
   struct store_settings settings = app->store.content.settings;
+  if (!app->store.content.has_settings) {
+    settings.prior_width_mm = -1.0f; /* not set, where no stage sets it: 0 would be the wish to have none */
+  }
   settings.rate_mHz = app->commands.rate_mHz;
   settings.osr = app->commands.osr;
-  stages_keep_settings(&app->stages, app->store.content.has_settings, &settings);
+  stages_keep_settings(&app->stages, &settings);
   return store_put_settings(&app->store, keep ? &settings : NULL);
 }
 

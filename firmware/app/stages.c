@@ -252,7 +252,7 @@ void stages_use_settings(struct stages *stages, const struct store_settings *set
 #endif
 }
 
-void stages_keep_settings(const struct stages *stages, bool were_kept, struct store_settings *settings) {
+void stages_keep_settings(const struct stages *stages, struct store_settings *settings) {
 #if FT_WITH_SLIP
   settings->slip_threshold_mm = stages->contact_settings.slip_threshold_mm;
   settings->slip_window_ms = (uint16_t)(stages->contact_settings.slip_window_us / 1000u);
@@ -261,10 +261,6 @@ void stages_keep_settings(const struct stages *stages, bool were_kept, struct st
   settings->prior_sigma_mm = stages->location.prior_sigma_mm;
   settings->prior_width_mm = stages->location.prior_sd_mm;
   settings->location_limit_mm = stages->location.settings.location_sd_limit_mm;
-#else
-  if (!were_kept) {
-    settings->prior_width_mm = -1.0f; /* no other firmware shall take it for the wish to have none */
-  }
 #endif
 #if FT_WITH_SYNC
   settings->sync = stages->sync.mode;

@@ -87,7 +87,7 @@ void stages_use_stored_pad(struct stages *stages, const struct findings *found, 
 
 /* Settings that are stored, and those that are to be. What this firmware refuses stays as it is. */
 void stages_use_settings(struct stages *stages, const struct store_settings *settings);
-void stages_keep_settings(const struct stages *stages, bool were_kept, struct store_settings *settings);
+void stages_keep_settings(const struct stages *stages, struct store_settings *settings);
 
 /* The set of commands that this scene knows, and the result of one of the stages: FT_OK; FT_PENDING: it is being
  * stored; FT_ERR_ARGUMENT: out of range; FT_ERR_BUSY; FT_ERR_TYPE: no command of the stages. */
