@@ -1,6 +1,7 @@
 #include "tool/cli/calibrate.hpp"
 
 #include "libfingertip/text.hpp"
+#include "tool/calibration/solver.hpp"
 #include "tool/cli/calibrate_placements.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/usage.hpp"
