@@ -45,9 +45,9 @@ def measure(options, out):
         raise InputError(f"{image} is not there; {TO_BUILD}")
     measure = Measure(options.build)
     bench = errors.Bench(measure, options.seed, options.limit, out / "cache")
-    steps.say("error against the reference (the first run solves the reference, about eight minutes on two cores)")
+    steps.report("error against the reference (the first run solves the reference, about eight minutes on two cores)")
     write_json(out / "fit_error.json", {"seed": options.seed, "presses": options.limit, "rows": errors.rows(bench)})
-    steps.say("cycles on the emulated chip")
+    steps.report("cycles on the emulated chip")
     write_json(out / "fit_jobs.json", errors.jobs(bench))
     run(
         "node",
@@ -61,11 +61,11 @@ def measure(options, out):
         "--budget",
         options.budget,
     )
-    steps.say("time on this computer")
+    steps.report("time on this computer")
     write_json(out / "fit_bench.json", errors.timed(bench, max(1200, options.limit // 10), options.passes))
-    steps.say("presses that are hard, extreme, or none")
+    steps.report("presses that are hard, extreme, or none")
     write_json(out / "stiff.json", stiff.measure_cases(measure, max(200, options.limit // 15)))
-    steps.say("table and picture")
+    steps.report("table and picture")
 
 
 def read_json(path):

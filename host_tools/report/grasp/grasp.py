@@ -129,7 +129,7 @@ def measure(options):
                 continue
             row, all_of_it = row_of(name, gripper, options)
             found["rows"].append(row)
-            steps.say(f"{gripper}, {about}: {row['grasps']} grasps")
+            steps.report(f"{gripper}, {about}: {row['grasps']} grasps")
             if name in ("minute", "still_fixed"):
                 found["limit_cycles"] = found.get("limit_cycles", 0) + row["limit_cycles"]
             if name in ("still", "still_oracle"):
@@ -160,10 +160,10 @@ def measure(options):
                     found["caught"] = {"gripper": gripper, "begin_s": begin_s, **trials(options, gripper, ("--trace", number))}
     found |= kinds.measure(options, steps)
     found |= faults.measure(options.build, pathlib.Path(options.output) / "contact_tables")
-    steps.say(f"faults: {found['faults_grasps']} grasps")
+    steps.report(f"faults: {found['faults_grasps']} grasps")
     if not options.no_emulated:
         found |= emulated_grasp.measure(options.build, options.boards, pathlib.Path(options.output) / "contact_tables")
-        steps.say("two emulated fingertips: one grasp")
+        steps.report("two emulated fingertips: one grasp")
     return found
 
 

@@ -133,7 +133,7 @@ def measure(options, steps):
             for controller in CONTROLLERS if is_judged else ("ours",):
                 count = judged if name == "usual and rough" or controller == "ours" and is_judged else more
                 rows.append(row_of(program, name, gripper, controller, count, options.seed))
-            steps.say(f"{gripper}, {name}: {rows[-1]['grasps']} grasps")
+            steps.report(f"{gripper}, {name}: {rows[-1]['grasps']} grasps")
     return {"kinds": rows, **figures(rows)}
 
 

@@ -65,9 +65,7 @@ def found_below(folder, sources):
         if path.name in wanted and hashlib.sha256(path.read_bytes()).hexdigest() == wanted[path.name]:
             here.setdefault(path.name, path)
     if not here:
-        raise InputError(
-            f"{folder}: none of the recordings of sources.json is there; host_tools/report/real/README.md says where they come from"
-        )
+        raise InputError(f"{folder}: none of the recordings of sources.json is there; host_tools/report/real/README.md has their sources")
     return here
 
 

@@ -1,4 +1,4 @@
-"""The boards, by their descriptors (boards/README.md). As a program: says their names, the fastest first."""
+"""The boards, by their descriptors (boards/README.md). As a program: prints their names, the fastest first."""
 
 import json
 import pathlib

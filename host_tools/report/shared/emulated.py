@@ -20,7 +20,7 @@ HEADER_BYTES, CRC_BYTES = 12, 4
 CLOCK_Hz = 125e6
 # Longest conversion by OSR, us: MS5840-02BA datasheet.
 CONVERSION_us = {256: 560, 512: 1100, 1024: 2170, 2048: 4320, 4096: 8610, 8192: 17200}
-# By then the contact stands, the tare is over, and the settings have been obeyed.
+# By then the contact is there, the tare is over, and the settings have been obeyed.
 FROM_s = 1.0
 # The firmware waits for a conversion by this much longer than the datasheet's maximum.
 MARGIN = 1.05

@@ -105,8 +105,8 @@ def text_html(path):
         in_goals = line.startswith("|") and (in_goals or line == f"| {' | '.join(HEADER)} |")
         if not in_goals and not line.startswith("# "):
             lines.append(re.sub(r"^#", "##", re.sub(r"!\[[^]]*]\([^)]*\)", "", line)))
-    said = markdown.markdown("\n".join(lines), extensions=["tables", "sane_lists"], output_format="html")
-    return said.replace("<table>", '<div class="scroll"><table>').replace("</table>", "</table></div>")
+    text = markdown.markdown("\n".join(lines), extensions=["tables", "sane_lists"], output_format="html")
+    return text.replace("<table>", '<div class="scroll"><table>').replace("</table>", "</table></div>")
 
 
 def picture_html(path, caption):
@@ -145,13 +145,13 @@ def in_short(found):
     by_verdict = {True: [], False: [], None: []}
     for name, goal in found.get("goals", {}).items():
         by_verdict[goal["met"]].append(name)
-    said = [f"{len(by_verdict[True])} met"] if by_verdict[True] else []
-    said += [
+    parts = [f"{len(by_verdict[True])} met"] if by_verdict[True] else []
+    parts += [
         f"{len(names)} {what} ({html.escape(', '.join(names))})"
         for names, what in ((by_verdict[False], "missed"), (by_verdict[None], "not measured"))
         if names
     ]
-    return ", ".join(said) or "no goals"
+    return ", ".join(parts) or "no goals"
 
 
 def section(part, folder):
@@ -172,7 +172,7 @@ def section(part, folder):
             f'<p class="faint">Written {written}.</p>',
             goals_html(part, found) if "goals" in found else "",
             *(picture_html(folder / name, caption) for name, caption in part.page.pictures),
-            folded(f"Tables and what they say ({text.name})", text_html(text), "open") if text.is_file() else "",
+            folded(f"Tables in words ({text.name})", text_html(text), "open") if text.is_file() else "",
             *(further_table_html(folder / name, caption) for name, caption in part.page.tables),
             figures_html(part, found),
         ]

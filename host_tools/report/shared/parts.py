@@ -8,7 +8,7 @@
 part.json has
 
     order            its place in the run and on the page
-    run              says: what is shown while it runs. program, arguments: with paths from the top of the project.
+    run              step: what is shown while it runs. program, arguments: with paths from the top of the project.
                      in_report, in_all: the arguments to add there; without them that report leaves it out.
                      folder: what lies in the folder that it needs, if it needs one
     page             title, about, origin of the figures; origins: [pattern, origin], the first that matches goes before origin;
@@ -28,7 +28,7 @@ from fingertip.files import InputError, run_tool  # noqa: E402
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    says: str
+    step: str
     program: str
     arguments: list
     in_report: list = None
@@ -72,7 +72,7 @@ PARTS = tuple(sorted((read(path) for path in ROOT.glob("host_tools/report/*/part
 
 
 def steps(what, folder=None):
-    """[(says, command)] of report, all, or one part."""
+    """[(step, command)] of report, all, or one part."""
     running = [part for part in PARTS if part.run]
     if what in ("report", "all"):
         if folder:
@@ -88,7 +88,7 @@ def steps(what, folder=None):
             raise InputError(f"{what} needs the folder {needed}" if needed else f"{what} takes no folder")
     return [
         (
-            part.run.says,
+            part.run.step,
             [
                 "/usr/bin/python3",
                 f"host_tools/report/{part.name}/{part.run.program}",
@@ -107,8 +107,8 @@ def main(argv):
         return 0
     if not 1 <= len(argv) <= 2:
         raise InputError("usage: parts.py --list | report | all | NAME [FOLDER]")
-    for says, command in steps(*argv):
-        print(f"== {says}", flush=True)
+    for step, command in steps(*argv):
+        print(f"== {step}", flush=True)
         done = subprocess.run(command, cwd=ROOT)
         if done.returncode:
             return done.returncode

@@ -47,13 +47,13 @@ def run(*call):
 
 
 class Steps:
-    """Runs what is to be done, some at a time, and says what is done and when."""
+    """Runs what is to be done, some at a time, and reports what is done and when."""
 
     def __init__(self):
         self.start_s = time.monotonic()
         self.lock = threading.Lock()
 
-    def say(self, what):
+    def report(self, what):
         with self.lock:
             print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
 
@@ -62,7 +62,7 @@ class Steps:
 
         def one(what, function):
             result = function()
-            self.say(what)
+            self.report(what)
             return result
 
         with concurrent.futures.ThreadPoolExecutor(workers) as pool:
@@ -88,7 +88,7 @@ def write_json(path, found):
 
 
 def finish(found, options, files):
-    """Says what came out and makes the page again. files: in the output folder, all that was written; the first picture goes to
+    """Prints the figures and makes the page again. files: in the output folder, all that was written; the first picture goes to
     --picture, too. Exit status."""
     out = pathlib.Path(options.output)
     if options.picture:

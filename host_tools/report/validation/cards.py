@@ -102,7 +102,7 @@ def pulls(build, steps, pads):
     """Figures of the pulls, by pads of which the fingertip knows the profile."""
     plain = sessions(build, [("none", seed, True, PLAIN) for seed in PULL_SEEDS[:pads]])
     real = sessions(build, [("none", seed, True, LIKE_REAL) for seed in PULL_SEEDS[:pads]])
-    steps.say(f"{len(plain) + len(real)} pads pulled")
+    steps.report(f"{len(plain) + len(real)} pads pulled")
     off = [one["figures"]["pull_over_thread"] - 1 for _, (one, _) in plain]
     moved = [one["figures"]["pull_moves_mm"] - truth["pulls"][0]["way_mm"] for _, (one, truth) in plain]
     found = [sum(pull["frames"] > 0 for pull in one["pulls"]) for _, (one, _) in real]
@@ -120,11 +120,11 @@ def pulls(build, steps, pads):
 def measure(build, steps, pads):
     """pads: the most of each kind."""
     healthy = sessions(build, [("none", seed, calibrated) for calibrated in (False, True) for seed in HEALTHY_SEEDS[:pads]])
-    steps.say(f"{len(healthy)} healthy pads validated")
+    steps.report(f"{len(healthy)} healthy pads validated")
     faulty = sessions(
         build, [(fault, seed, calibrated) for fault in FAULTS for calibrated in (False, True) for seed in FAULTY_SEEDS[:pads]]
     )
-    steps.say(f"{len(faulty)} faulty pads validated")
+    steps.report(f"{len(faulty)} faulty pads validated")
     off = {
         kind: [100 * abs(location_off(card, truth)) for job, (card, truth) in healthy if job[2] in kind]
         for kind in ((False, True), (False,), (True,))
