@@ -40,11 +40,11 @@ class AsyncFingertip:
         loop = asyncio.get_running_loop()
         self._sync = await asyncio.to_thread(self._open)
 
-        def tell() -> None:
+        def notify() -> None:
             with contextlib.suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(self._news.set)
 
-        self._sync.on_frames(tell)
+        self._sync.on_frames(notify)
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:

@@ -1,6 +1,6 @@
 """A fingertip's clock in terms of the host's, from commands and their acknowledgements.
 
-An exchange tells that the host's clock stood between sent and received when the fingertip's stood at device_us. A straight line,
+By an exchange the host's clock was between sent and received when the fingertip's was at device_us. A straight line,
 offset and drift, must pass between all of these of the last half minute; how far the lines that do are apart at one time bounds the
 error, whatever the delays were. The line in the middle, as far from the nearest limits on both sides as it can be, is the estimate.
 If no line passes, the clock has jumped, and the older half of the exchanges goes. The same as host_tools/library/libfingertip/clock_fit.hpp.
@@ -19,7 +19,7 @@ WINDOW_us = 30e6
 EXCHANGES = 512
 # Crystals are good to 100 ppm with all their errors, at both ends.
 SLOPE_LIMIT = 200e-6
-# What drift is worth in gap: while the exchanges span less time than this, they do not tell it.
+# What drift is worth in gap: while the exchanges span less time than this, they do not show it.
 DRIFT_COST_us = 1.5e6
 # (2/3)^40 of SLOPE_LIMIT, over WINDOW_us: nanoseconds.
 STEPS = 40

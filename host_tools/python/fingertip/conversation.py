@@ -1,4 +1,4 @@
-"""What a program and a fingertip say to each other on one line, from its opening to its end."""
+"""The packets that a program and a fingertip exchange on one line, from its opening to its end."""
 
 import threading
 
@@ -31,7 +31,7 @@ REFUSALS: dict[int, tuple[type[RefusedError], str]] = {
 
 
 class Conversation:
-    """Commands, repeated until they are acknowledged, and the relation of the two clocks, which each acknowledgement tells.
+    """Commands, repeated until they are acknowledged, and the relation of the two clocks, by each acknowledgement.
 
     One thread reads and passes on each packet that is no frame (heard); any thread may ask (exchange). changed is notified, by who reads,
     after anything came, and guards what is read below it.
@@ -46,7 +46,7 @@ class Conversation:
         """Why it has ended."""
         self.is_closed = False
         self.is_interrupted = False
-        """The port has gone, and is looked for."""
+        """The port has gone, and is searched for."""
         self._clock_fit = ClockFit()
         self._sending = threading.Lock()
         self._one_command = threading.Lock()
@@ -102,7 +102,7 @@ class Conversation:
             self._answer = body
 
     def relate(self, t_us: int, ack: Acknowledgement) -> None:
-        """The clocks, as this acknowledgement tells."""
+        """The clocks, by this acknowledgement."""
         now_us = host_now_us()
         if 0 < ack.host_time_us <= now_us:
             self._clock_fit.add(ClockExchange(ack.host_time_us, now_us, t_us))

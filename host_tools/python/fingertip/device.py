@@ -20,7 +20,7 @@ from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStati
 
 EXCHANGE_INTERVAL_us = 500_000  # the two clocks are compared so often
 FIRST_EXCHANGES = 8
-RETURN_INTERVAL_s = 0.25  # a port that has gone is looked for so often
+RETURN_INTERVAL_s = 0.25  # a port that has gone is searched for at this interval
 FRAMES_MAX = 1 << 20
 EDGES_KEPT = 65536
 
@@ -160,7 +160,7 @@ class Fingertip(Settable):
                 self._line.send(wire.SetStreams(0))
         self._stop()
         self._finish_recording("closed")
-        self._tell()
+        self._notify()
 
     # What it is
 
@@ -186,7 +186,7 @@ class Fingertip(Settable):
 
     @property
     def sync_edges(self) -> list[Edge]:
-        """Those at the sync pin since it was opened, the last 65536 at most, while set(sync="in") or "second" acts. A gap in their numbers is
+        """Those at the sync pin since it was opened, the last 65536 at most, while set(sync="in") or "second" is set. A gap in their numbers is
         edges that came too fast."""
         return list(self._edges)
 
@@ -282,7 +282,7 @@ class Fingertip(Settable):
         return latest
 
     def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
-        """The next frames as arrays: so many (1 to 1048576), or those of so many seconds of device time (above 0). Fewer if it is closed."""
+        """The next frames as arrays: their number (1 to 1048576), or those of this time by the device (above 0). Fewer if it is closed."""
         if (frames is None) == (seconds is None):
             raise BadValueError("give frames or seconds")
         if frames is not None:
@@ -300,7 +300,7 @@ class Fingertip(Settable):
         return Block(taken)
 
     def blocks(self, frames: int) -> Iterator[Block]:
-        """Arrays of so many frames each, without end; the last one may be shorter."""
+        """Arrays of this number of frames each, without end; the last one may be shorter."""
         while True:
             block = self.read_block(frames)
             if len(block):
@@ -323,7 +323,7 @@ class Fingertip(Settable):
     def tare(self, force: bool = False) -> None:
         """Measures the zero again over the next 16 frames, in which no contact is reported; nothing may touch the pad.
 
-        While a contact is reported it is refused (NotNowError): what presses would become the zero. force: tares all the same.
+        While a contact is reported it is refused (NotNowError): the contact would become the zero. force: tares all the same.
         """
         self._line.exchange(wire.Tare(int(force)))
 
@@ -369,7 +369,7 @@ class Fingertip(Settable):
     # Recording
 
     def record(self, path: "str | os.PathLike[str]", replace: bool = False) -> RecordingWriter:
-        """Writes everything that it says from now on, as `fingertip record` does, until the writer is closed:
+        """Writes all its packets from now on, as `fingertip record` does, until the writer is closed:
 
             with fingertip.record("press.csv"):
                 ...
@@ -414,7 +414,7 @@ class Fingertip(Settable):
 
     # The reading thread
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         with self._line.changed:
             self._line.changed.notify_all()
         for listener in self._listeners:
@@ -437,7 +437,7 @@ class Fingertip(Settable):
                 else:
                     self._return()
                 self._finish_pending()
-                self._tell()
+                self._notify()
                 if self._line.error:
                     self._finish_recording("gone")
                     return
@@ -448,12 +448,12 @@ class Fingertip(Settable):
         self._keep(frames)
 
     def _return(self) -> None:
-        """Looks for the port until it is back or this is closed."""
+        """Searches for the port until it is back or this is closed."""
         self._line.is_interrupted = True
         self._finish_pending()
         self._latest = None
         self._note("gone")
-        self._tell()
+        self._notify()
         self._line.transport.close()
         while not self._line.is_closed:
             host_time.sleep(RETURN_INTERVAL_s)
@@ -550,7 +550,7 @@ class Fingertip(Settable):
                 self._line.heard(t_us, body)
         self._keep(frames)
         if frames or news:
-            self._tell()
+            self._notify()
 
     def _flush(self, frames: list[Frame]) -> None:
         """A contact whose raw packet did not come."""

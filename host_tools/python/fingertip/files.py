@@ -7,7 +7,7 @@ Scenario (CSV, UTF-8): what the sensors feel.
 One row each millisecond, t_s strictly increasing from 0 = power-on; linear between rows. s<k>_Pa is the pressure
 above ambient on sensor k. contact .. slip are the truth, and so is the tangential force Qx_N, Qy_N; without, there is none.
 
-Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; one row per frame.
+Recording (CSV, UTF-8): the packets of a fingertip, written by `fingertip record`; one row per frame.
     # fingertip-recording 1
     # key: value              serial, board, scene, firmware, git, rate_mHz, osr, slip_window_ms, x_mm, ...; of a calibrated
                               fingertip (stored, bit 0) gains, force_scale, ...: the pressures are as measured all the same
@@ -23,7 +23,7 @@ Of a grasp also the gripper's and the controller's rows, "# grip: ..." between t
 
 Run report (JSON): what the emulator measured; used are device_time_zero_s and warnings.
 
-Every error is an InputError whose text is one line that names file and line and says what to do.
+Every error is an InputError whose text is one line that names file and line and what to do.
 """
 
 import array
@@ -155,7 +155,7 @@ def _metadata(line: str) -> tuple[str, str]:
 
 
 class Scenario:
-    """t_s[n], the TRUTH_COLUMNS and the tangential force as arrays[n], has_pull: the file says it, sensors_Pa[n][sensor], metadata."""
+    """t_s[n], the TRUTH_COLUMNS and the tangential force as arrays[n], has_pull: the file has it, sensors_Pa[n][sensor], metadata."""
 
     def __init__(self, metadata: dict[str, str], header: list[str], table: Array, sensors: int) -> None:
         self.metadata = metadata
@@ -238,7 +238,7 @@ def write_scenario(path: Path, metadata: Mapping[str, Any], columns: Mapping[str
 
 
 class Recording:
-    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid says which are
+    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid has those that are
     measurements), events and event_lines, their numbers in the file, end; packets, those that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file;
     time_us[n] on the recorder's clock, None in a recording of one."""
 
@@ -357,12 +357,12 @@ class _RecordingLines:
                     yield from McapLineReader(self.path, self.progress).lines()
                     return
                 file.seek(0)
-                size, read, told, number = os.fstat(file.fileno()).st_size, 0, 0, 1
+                size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
                 while lines := file.readlines(BLOCK_bytes):
                     block = b"".join(lines)
                     read += len(block)
-                    if self.progress and size > WORTH_WAITING_bytes and read - told > size // 100:
-                        told = read
+                    if self.progress and size > WORTH_WAITING_bytes and read - shown > size // 100:
+                        shown = read
                         self.progress(read / size)
                     torn = not block.endswith(b"\n")
                     texts = block.decode("utf-8", "surrogateescape").removesuffix("\n").split("\n")
@@ -547,7 +547,7 @@ def read_recording(
     for each in lines.stretches():
         if isinstance(each, Damaged):
             reading.take_rows(wrong)
-            damaged(each, 0)  # the next one's number tells how many lines are lost
+            damaged(each, 0)  # the next one's number shows how many lines are lost
         elif isinstance(each, Stretch):
             numbers, texts = range(each.number, each.number + len(each.texts)), each.texts
             if reading.rows is None or reading.is_joint:

@@ -93,7 +93,7 @@ class Fingertips:
         self._stack.close()
 
     def record(self, path: "str | os.PathLike[str]", replace: bool = False) -> JointRecordingWriter:
-        """Writes everything that they say from now on, on one clock, as `fingertip record --all` does, until the writer is closed.
+        """Writes all their packets from now on, on one clock, as `fingertip record --all` does, until the writer is closed.
         Raises InputError."""
         fingertips = list(self._opened.values())
         sides: list[_Side] = []

@@ -18,7 +18,7 @@ from .lines import LineFile, shortest
 from .mcap_recording import McapLines
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge
 
-LATE_us = 250_000  # rows wait so long for those of others
+LATE_us = 250_000  # rows wait for this time for those of others
 CLOCK_LINES_us = 1e6
 _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *LATER_COLUMNS) if name not in ("sequence", "flags")]
 
@@ -93,7 +93,7 @@ def info_metadata(info: Info) -> dict[str, str]:
 
 
 def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | McapLines:
-    """What becomes of the lines of a recording; the name says it. Raises InputError."""
+    """The file that the lines of a recording go to, by its name. Raises InputError."""
     if os.fspath(path).lower().endswith(".mcap"):
         return McapLines(path, replace)
     return LineFile(path, replace)
@@ -239,7 +239,7 @@ class _PacketLines:
 
 
 class Recorder(Protocol):
-    """What a Fingertip tells what it says, from its reading thread."""
+    """Gets the packets of a Fingertip, from its reading thread."""
 
     def packet(self, packet: Packet) -> None: ...
 
@@ -435,7 +435,7 @@ class JointRecordingWriter(_Writer):
         return f"{host_us - self._host_zero_us:.1f}"
 
     def _wait(self, member: _Member, host_us: float, text: str) -> None:
-        """What one fingertip said stays in the order in which it said it."""
+        """The lines of one fingertip keep their order."""
         member.last_line_us = max(member.last_line_us, host_us)
         self._order += 1
         heapq.heappush(self._waiting, (member.last_line_us, self._order, text))
