@@ -9,6 +9,10 @@ function(ft_test label)
   cmake_parse_arguments(arg "" "NAME" "COMMAND" ${ARGN})
   add_test(${ARGN})
   set_tests_properties(${arg_NAME} PROPERTIES LABELS ${label} ENVIRONMENT_MODIFICATION PYTHONDONTWRITEBYTECODE=set:1)
+  # Python that loads shared objects under the sanitizers (host_tools/report/measure) needs their runtime before its own start.
+  if(FINGERTIP_SANITIZE AND NOT FINGERTIP_LIBFUZZER AND label STREQUAL "accuracy" AND "Python3::Interpreter" IN_LIST arg_COMMAND)
+    ft_loads_sanitized(${arg_NAME})
+  endif()
   # Tests in real time run one at a time. Each measures how late the machine was.
   if(label STREQUAL "realtime")
     set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK real_time)
@@ -24,6 +28,13 @@ function(ft_test label)
       endif()
     endforeach()
   endif()
+endfunction()
+
+function(ft_loads_sanitized)
+  execute_process(COMMAND ${CMAKE_C_COMPILER} -print-file-name=libasan.so OUTPUT_VARIABLE runtime OUTPUT_STRIP_TRAILING_WHITESPACE)
+  foreach(name IN LISTS ARGV)
+    set_property(TEST ${name} APPEND PROPERTY ENVIRONMENT_MODIFICATION LD_PRELOAD=set:${runtime} ASAN_OPTIONS=set:detect_leaks=0)
+  endforeach()
 endfunction()
 
 # After all tests: `cmake --build build/host --target quick_tests` builds what the quick ones run.
