@@ -23,15 +23,12 @@ constexpr double BRANCH_degC = 10.0, BRANCH_STEP_Pa = -60.0;
 enum Stream : std::uint64_t { NOISE = 304 };
 
 // Normal numbers are drawn once, because hours of frames take billions.
-const std::vector<float> &normals() {
-  static const std::vector<float> drawn = [] {
-    std::vector<float> all(1 << 16);
-    Random random(1, NOISE, 0);
-    std::generate(all.begin(), all.end(), [&] { return static_cast<float>(random.normal()); });
-    return all;
-  }();
-  return drawn;
-}
+const std::vector<float> NORMALS = [] {
+  std::vector<float> all(1 << 16);
+  Random random(1, NOISE, 0);
+  std::generate(all.begin(), all.end(), [&] { return static_cast<float>(random.normal()); });
+  return all;
+}();
 
 enum Flag : std::uint8_t { CONTACT = 1, DOUBTFUL = 2 };
 
@@ -57,7 +54,7 @@ struct gate_pad {
 
   double noise() {
     noise_at = noise_at * 6364136223846793005u + 1442695040888963407u;
-    return static_cast<double>(normals()[noise_at >> 48]) * noise_Pa;
+    return static_cast<double>(NORMALS[noise_at >> 48]) * noise_Pa;
   }
   double degC() const {
     const double since_s = t_s - 1.0;
