@@ -18,8 +18,8 @@
  * pull beyond two standard deviations, as should be (shear.json: raw_beyond_2sd_percent).
  * A pull takes chi^2 over its degrees of freedom, fifteen readings less some seven unknowns. A
  * place takes half of that: with all of it more than the 98 % that should be lie within two
- * standard deviations on rubber with a dip (seed 888 of shear_static --only cast), and 7 % of the
- * round touches were warned of instead of 3 (seed 50000 of two_touches). */
+ * standard deviations on rubber with a dip (seed 888 of the report shear, by_cast), and 7 % of the
+ * round touches were warned of instead of 3 (seed 50000 of the report two). */
 #define GAINS_SHIFT 1
 #define MISFIT_SHIFT_PULL 3  /* 1 / 8 */
 #define MISFIT_SHIFT_PLACE 4 /* 1 / 16 */
@@ -39,7 +39,7 @@
 #define NEAR_ENDS 0.75f
 
 /* A contact is elongated if its elongation exceeds this share of the widest term's variance with t,
- * and so many standard deviations. shear_static tells how many do, by object and load.
+ * and ELONGATED_SURE standard deviations. The report shear counts them by object and tangential force.
  */
 #define ELONGATED_LEAST 0.05f
 #define ELONGATED_SURE 2.5f

@@ -1,24 +1,26 @@
-"""shear_motion on few acts: a lift is no slide, a slide is found soon, and what looks at motion alone cannot tell them apart.
+"""The report's lifts and slides on few runs: a lift is no slide, a slide is found soon, and motion alone cannot distinguish them.
 
-usage: test_shear_motion.py SHEAR_MOTION [unittest arguments]
+usage: test_shear_motion.py BUILD [unittest arguments]
 """
 
-import json
-import subprocess
+import pathlib
 import sys
 import unittest
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "report/shear", "python")]
+import motion  # noqa: E402
+from contacts import Contacts  # noqa: E402
 
-def run(*options):
-    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+
+def figures(seed, pads):
+    return motion.figures(Contacts(BUILD), seed, pads, motion.CASES[:1])
 
 
 class ShearMotion(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.options = ("--usual", "--pads", "60", "--seed", "5")
-        cls.text = run(*cls.options).stdout
-        cls.found = json.loads(cls.text)
+        cls.found = figures(seed=5, pads=60)
         (cls.case,) = cls.found["motion_cases"]
 
     def test_no_lift_is_a_slide(self):
@@ -44,26 +46,12 @@ class ShearMotion(unittest.TestCase):
         self.assertEqual(self.case["sliding_slow_found_percent"], 100)
         self.assertEqual(self.case["moving_slow_found_percent"], 0)
 
-    def test_series_have_a_value_for_each_frame(self):
-        for name in ("lift", "slide"):
-            series = self.found["motion_series"][name]
-            lengths = {len(values) for key, values in series.items() if key != "slips_s"}
-            self.assertEqual(len(lengths), 1)
-            self.assertGreater(lengths.pop(), 400)
-        self.assertNotIn("slips_s", self.found["motion_series"]["lift"])
-        self.assertEqual(max(self.found["motion_series"]["slide"]["sliding"]), 1)
-        self.assertEqual(max(self.found["motion_series"]["lift"]["sliding"]), 0)
-
     def test_the_same_seed_gives_the_same_and_another_another(self):
-        self.assertEqual(run("--usual", "--pads", "4", "--seed", "6").stdout, run("--usual", "--pads", "4", "--seed", "6").stdout)
-        self.assertNotEqual(run("--usual", "--pads", "4", "--seed", "7").stdout, run("--usual", "--pads", "4", "--seed", "6").stdout)
-
-    def test_wrong_usage_is_one_line(self):
-        for options in (("--pads", "0"), ("--pads", "x"), ("--what", "1")):
-            done = run(*options)
-            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1))
+        once, again, other = (figures(seed, pads=4)["motion_cases"] for seed in (6, 6, 7))
+        self.assertEqual(once, again)
+        self.assertNotEqual(once, other)
 
 
 if __name__ == "__main__":
-    PROGRAM = sys.argv.pop(1)
+    BUILD = sys.argv.pop(1)
     unittest.main()

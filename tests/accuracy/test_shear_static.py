@@ -1,6 +1,6 @@
-"""shear_static on few pads: its keys are there, repeatable, near what a full run is held to, and all of it can be written and drawn.
+"""The static tables of the report shear on few pads: near what a full run is held to, repeatable, and all of it is written and drawn.
 
-usage: test_shear_static.py SHEAR_STATIC SHEAR.PY [unittest arguments]
+usage: test_shear_static.py BUILD [unittest arguments]
 """
 
 import json
@@ -9,6 +9,13 @@ import subprocess
 import sys
 import tempfile
 import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "report/shear", "python")]
+import static  # noqa: E402
+from contacts import Contacts  # noqa: E402
+
+SHEAR = ROOT / "host_tools/report/shear/shear.py"
 
 # (key, least, most): what a full run finds, with room for a fortieth of its pads.
 LIMITS = (
@@ -46,19 +53,20 @@ LIMITS = (
     ("told_wrong_said_percent", 90, 100),
     ("told_right_said_percent", 0, 5),
 )
-PADS = ("--pads", "40", "--few")  # the objects on each other thickness take seconds to solve
 
 
 def run(*options):
-    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+    command = [sys.executable, str(SHEAR), "--build", BUILD, "--parts", "static", *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 class ShearStatic(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.options = (*PADS, "--seed", "3")
-        cls.text = run(*cls.options).stdout
-        cls.found = json.loads(cls.text)
+        cls.out = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
+        # The objects on each other thickness take seconds to solve.
+        cls.done = run("--pads", "40", "--few", "--seed", "3", "-o", str(cls.out))
+        cls.found = json.loads((cls.out / "shear.json").read_text())
 
     def rows(self, table, key):
         return {row[key]: row for row in self.found[table]}
@@ -82,7 +90,7 @@ class ShearStatic(unittest.TestCase):
                 self.assertLess(row["noise"], row["noise, gains"])
                 self.assertLess(row["noise, model 0.1 %"], 0.5 * row["noise, model 0.3 %"])
                 self.assertLess(row["noise, model 1 %; priors"], row["noise, model 1 %"])
-                self.assertLess(row["noise, gains, model 0.1 %; told round"], row["noise, gains, model 0.1 %; priors"])
+                self.assertLess(row["noise, gains, model 0.1 %; known round"], row["noise, gains, model 0.1 %; priors"])
         # Nothing that was found is below what noise and gains allow.
         self.assertLess(bounds["noise, gains; priors"]["vector_error_p50"], self.found["vector_error_p50"])
         self.assertLess(bounds["noise; priors"]["location_p50_mm"], self.found["equal_location_loaded_mm"])
@@ -99,11 +107,11 @@ class ShearStatic(unittest.TestCase):
         zero = {
             row["overhang_mm"]: row["zero_error_p50"]
             for row in self.found["by_overhang"]
-            if (row["told"], row["place"]) == ("thickness", "anywhere")
+            if (row["profile"], row["place"]) == ("thickness", "anywhere")
         }
         self.assertEqual([zero[mm] for mm in sorted(zero, reverse=True)], sorted(zero.values()))
-        told = self.rows("by_thickness", "case")
-        self.assertLess(told["12 mm, told 12 mm, Q/F 0"]["vector_error_p50"], 0.6 * told["12 mm, told 13.2 mm, Q/F 0"]["vector_error_p50"])
+        row = self.rows("by_thickness", "case")
+        self.assertLess(row["12 mm, set 12 mm, Q/F 0"]["vector_error_p50"], 0.6 * row["12 mm, set 13.2 mm, Q/F 0"]["vector_error_p50"])
         rubber = self.rows("by_rubber", "case")
         at = "{}, 10 s after the load"
         self.assertLess(
@@ -114,40 +122,32 @@ class ShearStatic(unittest.TestCase):
         )
 
     def test_the_same_seed_gives_the_same_and_another_another(self):
-        texts = [run("--pads", "4", "--few", "--seed", seed).stdout for seed in ("3", "3", "4")]
-        self.assertEqual(texts[0], texts[1])
-        self.assertNotEqual(texts[0], texts[2])
+        contacts = Contacts(BUILD)
+        once, again, other = (static.figures(contacts, seed=seed, pads=4, tables=("objects", "rubber", "taps")) for seed in (3, 3, 4))
+        self.assertEqual(once, again)
+        self.assertNotEqual(once["by_object"], other["by_object"])
 
-    def test_wrong_usage_is_one_line(self):
+    def test_wrong_usage_is_an_error(self):
         for options in (("--pads", "0"), ("--pads", "x"), ("--what", "1")):
-            done = run(*options)
-            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1))
+            done = run("-o", str(self.out / "wrong"), *options)
+            self.assertNotEqual(done.returncode, 0)
+            self.assertEqual(done.stdout, "")
 
     def test_all_of_it_is_written_and_drawn(self):
-        """What was found, by a program that only says it again."""
-        with tempfile.TemporaryDirectory() as folder:
-            program = pathlib.Path(folder) / "host_tools/report/shear/static/shear_static"
-            program.parent.mkdir(parents=True)
-            program.write_text(f"#!{sys.executable}\nprint({self.text!r})\n")
-            program.chmod(0o755)
-            done = subprocess.run(
-                [sys.executable, REPORT, "--build", folder, "--boards", folder, "-o", f"{folder}/out"], capture_output=True, text=True
-            )
-            self.assertEqual((done.returncode, done.stderr), (0, ""))
-            out = pathlib.Path(folder) / "out"
-            text = (out / "shear.md").read_text()
-            for title in (
-                "By pad and load",
-                "Where the misses lie",
-                "What is physics and what is ours",
-                "Pads that end",
-                "Creep and relaxation",
-                "Screws",
-            ):
-                self.assertIn(f"## {title}\n", text)
-            self.assertGreater(len((out / "shear.png").read_bytes()), 50000)
+        self.assertEqual(self.done.returncode, 0, self.done.stderr)
+        text = (self.out / "shear.md").read_text()
+        for title in (
+            "By pad and tangential force",
+            "Where the misses lie",
+            "What is physics and what is ours",
+            "Pads that end",
+            "Creep and relaxation",
+            "Screws",
+        ):
+            self.assertIn(f"## {title}\n", text)
+        self.assertGreater(len((self.out / "shear.png").read_bytes()), 50000)
 
 
 if __name__ == "__main__":
-    PROGRAM, REPORT = sys.argv.pop(1), sys.argv.pop(1)
+    BUILD = sys.argv.pop(1)
     unittest.main()

@@ -121,6 +121,29 @@ def figures_kept(path, names):
     return {name: found.get(name) for name in names}
 
 
+def positive(text):
+    """The type of an option that is a number of things."""
+    if (value := int(text)) < 1:
+        raise argparse.ArgumentTypeError("must be 1 or more")
+    return value
+
+
+def given(options, *names):
+    """Those of these options that the user has set."""
+    return {name: value for name in names if (value := getattr(options, name)) is not None}
+
+
+def contacts_of(options):
+    """The firmware, the twin and their contacts (measure/contacts.py) of the build folder."""
+    from contacts import Contacts
+    from measure import MeasureError
+
+    try:
+        return Contacts(options.build)
+    except MeasureError as error:
+        raise InputError(str(error)) from None
+
+
 def chosen_parts(options, parts, usual):
     """Those of --parts, or the usual ones."""
     chosen = options.parts.split(",") if options.parts else list(usual)

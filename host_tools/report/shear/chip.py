@@ -1,4 +1,4 @@
-"""What the tangential load costs on the chip: the images of scene grasp in the emulator, a pad of 12 mm in their profile, and the cycles of
+"""What the tangential force costs on the chip: the images of scene grasp in the emulator, a pad of 12 mm in their profile, and the cycles of
 the estimate alone."""
 
 import pathlib
@@ -19,7 +19,7 @@ OSRS = (256, 1024)
 SECONDS = 6.0
 
 
-def measure(build, boards, say):
+def measure(build, boards, progress):
     tools = Tools(build, boards)
     sizes = scenes.sizes(image_of(boards, BOARD).parent, BOARD)
     found = {"chip_flash_bytes": sizes["flash_bytes"], "chip_ram_bytes": sizes["ram_bytes"], "chip_stack_bytes": sizes["stack_bytes"]}
@@ -27,8 +27,8 @@ def measure(build, boards, say):
         path = scenario(folder, "wander", FROM_s + SECONDS + 1)
         for osr in OSRS:
             measured = Measurement(tools, folder, BOARD, osr, path, SECONDS, commands=[tools.encoded("pad", *PAD)])
-            told = read_recording(f"{measured.name}.csv")
-            flags = told["flags"][told.has_contact & (told["t_us"] > told["t_us"][-1] - 1e6 * SECONDS)].astype(np.int64)
+            read = read_recording(f"{measured.name}.csv")
+            flags = read["flags"][read.has_contact & (read["t_us"] > read["t_us"][-1] - 1e6 * SECONDS)].astype(np.int64)
             found |= {
                 f"chip_fps_osr{osr}": measured.fitted_per_s,
                 f"chip_frames_per_s_osr{osr}": measured.frames_per_s,
@@ -39,6 +39,6 @@ def measure(build, boards, say):
                 f"chip_told_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()),
                 f"chip_sleep_percent_osr{osr}": measured.sleep_percent,
             }
-            say(f"grasp on {BOARD}, OSR {osr}: {measured.fitted_per_s:.0f} frames/s")
+            progress(f"grasp on {BOARD}, OSR {osr}: {measured.fitted_per_s:.0f} frames/s")
     cycles = run("node", pathlib.Path(__file__).with_name("cycles.mjs"), fit_cycles_of(boards)).split()
     return {**found, "fit_cycles_median": int(cycles[0]), "shear_cycles_median": int(cycles[1]), "shear_cycles": int(cycles[2])}

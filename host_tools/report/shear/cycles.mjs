@@ -1,5 +1,5 @@
 #!/usr/bin/env node
-/** usage: cycles.mjs fit_cycles.bin: cycles of the fit, and of the estimate of tangential load after it: median, median and most of 100 presses. */
+/** usage: cycles.mjs fit_cycles.bin: cycles of the fit, and of the tangential estimate after it: median, median and most of 100 presses. */
 import { readFileSync } from 'node:fs';
 import { Prng } from '../../simulation/emulator/prng.mjs';
 import { Bench } from '../fit/on_chip/fit_on_chip.mjs';

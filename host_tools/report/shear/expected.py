@@ -1,22 +1,22 @@
 #!/usr/bin/python3
 """What to expect of a pad, never calibrated, calibrated and pulled side by side: the tables of README.md and host_tools/README.md.
 
-    expected.py --build build/host            writes them, from shear_static on 200 pads
-    expected.py --build build/host --check    says whether they are what would be written
+    expected.py --build build/host            writes them, from the table of pads, of 200 of each case
+    expected.py --build build/host --check    fails if they are not what would be written
 
 Medians over touches anywhere on the array, 1 to 10 N, of seven objects, on 12 mm of simulated rubber without end whose sensors' gains differ by
 10 %. Calibrated: with twenty placements of a known weight. Pulled: along the rubber by 0.3 of the force. Rubber does not relax here.
 """
 
 import argparse
-import json
 import pathlib
-import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "host_tools/python"))
+sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
+import static  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
+from reporting import contacts_of  # noqa: E402
 
 PADS = 200
 RAW, CALIBRATED = "10 %, not calibrated", "10 %, calibrated"
@@ -24,12 +24,10 @@ STRAIGHT, PULLED = "Q/F 0", "Q/F 0.3"
 BEGIN, END = "<!--expected-->", "<!--/expected-->"
 
 
-def rows_of(program):
+def rows_of(options):
     """{(pad, load): row}"""
-    done = subprocess.run([program, "--only", "pads", "--pads", str(PADS)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    if done.returncode:
-        raise InputError(f"{program} failed: {done.stderr.strip()[-300:]}")
-    rows = {row["case"]: row for row in json.loads(done.stdout)["by_pad_and_load"]}
+    found = static.figures(contacts_of(options), pads=PADS, tables=("pads",))
+    rows = {row["case"]: row for row in found["by_pad_and_load"]}
     return {(pad, load): rows[f"{pad}, {load}"] for pad in (RAW, CALIBRATED) for load in (STRAIGHT, PULLED)}
 
 
@@ -100,10 +98,7 @@ def main(argv):
     parser.add_argument("--build", required=True, type=pathlib.Path, metavar="DIR")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args(argv)
-    program = options.build / "host_tools/report/shear/static/shear_static"
-    if not program.is_file():
-        raise InputError(f"{program} is not there; build it: cmake --build --preset host --target shear_static")
-    rows = rows_of(program)
+    rows = rows_of(options)
     wrong = []
     for path, text in ((ROOT / "README.md", short_table(rows)), (ROOT / "host_tools/README.md", long_table(rows))):
         page = filled(path, text)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Tangential load from the normal pressures: how near to the truth, on which pads, and what it does to every other figure.
+"""The tangential force from the normal pressures: how near to the truth, on which pads, and what it does to every other figure.
 
     shear.py --build build/host -o build/report
 
@@ -17,17 +17,16 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
 
-import chip  # noqa: E402
 import shear_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from reporting import chosen_parts, figures_kept, figures_printed, option_parser, output_folder, report_of_programs  # noqa: E402
+from reporting import chosen_parts, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_programs  # noqa: E402
 
-# part: what it does, its program below the build folder
+# part: what it measures
 PARTS = {
-    "static": "one touch: size, direction, place and force by pad, load, object and place; bounds; pads that end",
+    "static": "one touch: size, direction, location and force by pad, tangential force, object and location; bounds; pads that end",
     "motion": "objects that are lifted, carried and slip: sliding distinguished from loading",
     "chip": "cycles, frames a second and latency of the images of scene grasp in the emulator",
 }
@@ -71,28 +70,31 @@ OPTIMUM_TEST = "tests/accuracy/test_tangential_against_reference"
 OPTIMUM_FILE, OPTIMUM = "shear_optimum.json", ("optimum_p99_um", "optimum_p99_ratio")
 
 
-def program_of(part, options):
-    """Or, of the chip, an image without which there are no others."""
-    if part == "chip":
-        return fit_cycles_of(options.boards)
-    return pathlib.Path(options.build) / "host_tools/report/shear" / part / f"shear_{part}"
+def measure_static(options):
+    import static
+
+    return static.figures(contacts_of(options), **given(options, "seed", "pads"), few=options.few)
 
 
-def measure(part, options):
-    program = program_of(part, options)
-    if not program.is_file():
-        raise InputError(f"{program} is not there; build it: cmake --build --preset host")
-    if part == "chip":
-        return chip.measure(options.build, options.boards, lambda what: print(f"        {what}", flush=True))
-    command = [program, "--cache", pathlib.Path(options.output) / "contact_tables"]
-    for name in ("seed", "pads") if part == "static" else ("seed",):
-        if (value := getattr(options, name)) is not None:
-            command += [f"--{name}", value]
-    return figures_printed(f"shear_{part}", command)
+def measure_motion(options):
+    import motion
+
+    return motion.figures(contacts_of(options), **given(options, "seed"), cases=motion.CASES[: 1 if options.few else None])
+
+
+def measure_chip(options):
+    import chip
+
+    if not (image := fit_cycles_of(options.boards)).is_file():
+        raise InputError(f"{image} is not there; build it: cmake --build --preset host")
+    return chip.measure(options.build, options.boards, lambda what: print(f"        {what}", flush=True))
+
+
+MEASURE = {"static": measure_static, "motion": measure_motion, "chip": measure_chip}
 
 
 def lifts(found):
-    """Of all rates of lifting together."""
+    """Of lifts of any duration."""
     false = [value for name, value in found.items() if name.startswith("lift_false_slides_") and value is not None]
     return {"lift_false_slides": sum(false)} if false else {}
 
@@ -101,13 +103,16 @@ def main(argv):
     parser = option_parser(__doc__)
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="folder of the boards' images; default %(default)s")
-    parser.add_argument("--pads", type=int, metavar="N", help="of each case; default 1500")
+    parser.add_argument("--pads", type=positive, metavar="N", help="of each case of one touch; default 1500")
+    parser.add_argument(
+        "--few", action="store_true", help="no rubber of other thicknesses than 12 mm, no other cases of motion than the usual"
+    )
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's shear.json")
     options = parser.parse_args(argv)
-    built = [part for part in PARTS if program_of(part, options).is_file()]
-    parts = chosen_parts(options, PARTS, built or PARTS)
+    usual = [part for part in PARTS if part != "chip" or fit_cycles_of(options.boards).is_file()]
+    parts = chosen_parts(options, PARTS, usual)
     if not options.parts and len(parts) < len(PARTS):
-        print(f"        not built, so not measured: {', '.join(part for part in PARTS if part not in parts)}", flush=True)
+        print("        not built, so not measured: chip", flush=True)
     if not options.parts and (test := pathlib.Path(options.build) / OPTIMUM_TEST).is_file():
         subprocess.run([str(test), str(output_folder(options) / OPTIMUM_FILE)], stdout=subprocess.DEVNULL)
     return report_of_programs(
@@ -116,7 +121,7 @@ def main(argv):
         PARTS,
         parts,
         GOALS,
-        lambda part: measure(part, options),
+        lambda part: MEASURE[part](options),
         lambda found, out: {**lifts(found), **figures_kept(out / OPTIMUM_FILE, OPTIMUM)},
         shear_report,
     )

@@ -1,67 +1,56 @@
-"""What shear.py measured as text and as a picture."""
+"""What shear.py measured, as text and as a picture."""
 
 import numpy as np
 from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_md, table_of_dicts_md, text_of
 from fingertip.files import write_text
 
-SEVEN = "spheres of 6 and 15 mm, flat ends of a cylinder and a cube of 6 mm, ping-pong ball, rubber duck, lime"
 USUAL = (
-    f"pads of 10 % gain spread after a calibration, 12 mm of rubber without end, noise of OSR 1024, 1 to 10 N, seven objects at any angle ({SEVEN}), "
-    "anywhere on the array (|x| <= 9 mm, |y| <= 18 mm), Q risen in any direction while F stayed, at a friction of 0.5"
+    "pads of 10 % gain spread after a calibration, 12 mm of rubber without end, noise of OSR 1024, 1 to 10 N, seven objects at any angle (spheres of "
+    "6 and 15 mm, flat ends of a cylinder and a cube of 6 mm, ping-pong ball, rubber duck, lime), anywhere on the array (|x| <= 9 mm, |y| <= 18 mm), "
+    "the tangential force Q in any direction, risen while the normal force F stayed, at a friction of 0.5"
 )
-# figure (or the beginning of its name): what it is over, beside or instead of what is usual
+# figure, or the beginning of its name: what differs from the usual case
 OVER = (
     ("ratio_error_*", "Q/F = 0.3: error of the size of Q / F, the ratio that is published"),
     ("vector_error_*", "Q/F = 0.3: error of Q / F as a vector"),
     ("direction_p90_deg", "Q/F = 0.3"),
-    ("no_lime_no_corner_*", "the same without the lime, and without places within half a pitch of both outer rows"),
+    ("no_lime_no_corner_*", "the same without the lime, and without locations within half a pitch of both outer rows"),
     ("location_loaded_*", "Q/F = 0.3, all touches: where the estimate is not valid, the Gaussian's; `without`: the Gaussian's"),
     ("location_price_mm, location_unloaded_*", "Q = 0: median with the estimate less the median without"),
-    ("equal_*", "the same on pads of equal gains"),
+    ("equal_*", "pads of equal gains"),
     ("force_*", "Q/F = 0.3; a known weight has calibrated each pad's scale"),
-    (
-        "q_cover_*, location_cover_*",
-        "Q/F = 0.3: share of true values within 1 and 2 of the standard deviations that the estimate gives; ideal 63 and 98 %",
-    ),
+    ("q_cover_*, location_cover_*", "Q/F = 0.3: share of true values within 1 and 2 estimated standard deviations; ideal 63 and 98 %"),
     (
         "elongated_false_percent",
         "Q = 0 at every angle: five lying cylinders (6 by 12, 12 by 12, 18 by 18, 24 by 24, 22 by 7 mm) and an edge of 20 mm, equally; "
-        "valid and claiming more than 0.05 and more than two standard deviations",
+        "valid, and claims more than 0.05 and more than two standard deviations",
     ),
     (
         "elongated_false_surely_percent",
-        "those that claim more than 2.8 standard deviations, which 98 % of a normal distribution in the plane stay below",
-    ),
-    ("learned_ratio_error_p50, _p95", "the usual touches with the profile of the thickness that each of 20 calibrations found"),
-    (
-        "dip_*",
-        "Q/F = 0.3 on pads of 10 % gain spread whose rubber has the twin's dip of 5 %, calibrated as they are; a pull has no dip of its own",
-    ),
-    ("cast_*", "the same on pads like real arrays: gains of 20 %, dip of 5 %, sensors 0.1 mm off their places and 3.5 % apart in width"),
-    (
-        "told_wrong_said_percent",
-        "calibrations that say so where 15 % less or more than the true thickness is set; told_right_said_percent: where the true one is",
-    ),
-    (
-        "raw_beyond_2sd_percent",
-        "Q = 0 on pads of 10 % that were never calibrated: the share with an estimate that reads a pull beyond two of its q_sd_N",
+        "claims more than 2.8 standard deviations, below which 98 % of a normal distribution in the plane are",
     ),
     ("elongated_false_unflagged_percent", "those of `elongated_false_percent` that the Gaussian fit does not flag as elongated"),
+    ("learned_ratio_error_p50, _p95", "the profile of the thickness that each of 20 calibrations found"),
+    ("dip_*", "Q/F = 0.3; rubber with the twin's dip of 5 %, calibrated as it is; a tangential force has no dip of its own"),
+    ("cast_*", "the same on pads like real arrays: gains of 20 %, dip of 5 %, sensors 0.1 mm off their locations and 3.5 % apart in width"),
+    ("told_wrong_said_percent", "calibrations that warn where the set thickness is 15 % less or more than the true one"),
+    ("told_right_said_percent", "calibrations that warn where the set thickness is the true one"),
+    ("raw_beyond_2sd_percent", "Q = 0, pads of 10 % that were never calibrated: share with a valid estimate beyond two of its q_sd_N"),
     (
         "screw_ratio, screw_change_p95",
-        "the twin's screws of a sphere of 15 mm, 6 N: what is read while it spins (median), and by how much that differs from before",
+        "a screw by a sphere of 15 mm, 6 N: the estimate while it spins (median), and how much it differs from before",
     ),
     (
         "zero_error_p50_*mm, increment_error_p50_*mm",
-        "a block with so much rubber beyond the outer sensors, the profile with its thickness alone: what is read at "
-        "Q = 0; at Q/F = 0.3 less what the same touch read at its beginning, at 0.5 to 2 N. As vectors",
+        "a block with this much rubber beyond the outer sensors, the profile with its thickness alone: the estimate at Q = 0; that at Q/F = 0.3 less "
+        "that at the beginning of the same touch, at 0.5 to 2 N. As vectors",
     ),
     ("*_own_tables_*mm", "the same, the profile with the effect of the pad's ends as well"),
     ("zero_error_p50_own_tables", "the worse of 9 and 13 mm"),
-    ("lift_*, slide_*", "lifts and slides of the twin; their own tables say which"),
+    ("lift_*, slide_*", "lifts and slides of the twin, as in the first row of their table"),
     ("optimum_*", "the estimate on the chip against an independent one in double precision, on readings of the model itself"),
     ("shear_cycles", "of the estimate alone on the emulated chip, most of 100 presses"),
-    ("chip_*", "an image of scene grasp on the emulated board with a data line for each sensor; `fps`: frames that tell the load"),
+    ("chip_*", "an image of scene grasp on the emulated board with a data line for each sensor; `fps`: frames with an estimate"),
 )
 COLUMNS = {
     "case": "case",
@@ -70,55 +59,68 @@ COLUMNS = {
     "ratio_error_p50": "ratio p50",
     "ratio_error_p95": "p95",
     "vector_error_p50": "vector p50",
-    "vector_error_p95": "p95 ",
+    "vector_error_p95": "p95",
     "direction_p90_deg": "direction p90, deg",
     "elongated_percent": "flagged elongated %",
-    "claimed_percent": "claims a load %",
+    "claimed_percent": "claims a force %",
     "claimed_surely_percent": "surely %",
     "claimed_unflagged_percent": "claims, not flagged %",
     "location_p50_mm": "location p50, mm",
-    "location_p95_mm": "p95  ",
+    "location_p95_mm": "p95",
     "location_without_p50_mm": "without: p50",
-    "location_without_p95_mm": "p95   ",
+    "location_without_p95_mm": "p95",
     "force_p50_percent": "force p50, %",
     "force_without_p50_percent": "without",
     "q_cover_1sd": "Q within 1 sd, %",
     "q_cover_2sd": "2 sd",
-    "location_cover_1sd": "place within 1 sd, %",
-    "location_cover_2sd": "2 sd ",
+    "location_cover_1sd": "location within 1 sd, %",
+    "location_cover_2sd": "2 sd",
 }
-# table: title, what it says
+TAPS = {
+    "location_without_p50_mm": "location before, mm: p50",
+    "location_without_p95_mm": "p95",
+    "location_p50_mm": "after: p50",
+    "location_p95_mm": "p95",
+    "force_without_p50_percent": "force before: p50, %",
+    "force_p50_percent": "after",
+    "force_scaled_without_p50_percent": "force scaled before: p50, %",
+    "force_scaled_p50_percent": "after",
+    "elongated_percent": "flagged elongated, %",
+}
+# table: title, what is in it
 TABLES = {
-    "by_pad_and_load": ("By pad and load", "`sliding`: Q = 0.5 F and all of the contact slides; `risen with the force`: nothing slides."),
+    "by_pad_and_load": (
+        "By pad and tangential force",
+        "`sliding`: Q = 0.5 F and all of the contact slides; `risen with the force`: nothing slides.",
+    ),
     "by_place": (
-        "By place",
+        "By location",
         "Q/F = 0.3. Inner: half a pitch inside the outer sensors (|x| <= 4.5 mm, |y| <= 13.5 mm); border: within half a pitch of one "
         "outer row of them; corner: of two.",
     ),
-    "where_misses_lie": ("Where the misses lie", "Q/F = 0.3, by object and place."),
+    "where_misses_lie": ("Where the misses lie", "Q/F = 0.3, by object and location."),
     "by_cast": (
         "Pads with a dip",
-        "By what is cast: pads without a dip, with one of 5 %, and like real arrays (gains of 20 %, dip of 5 %, sensors 0.1 mm off their "
-        "places and 3.5 % apart in width). Each calibrated as it is; the same touches. The estimate has the dip that the calibration found. It has neither the "
-        "sensors' places nor their widths, which the calibration finds and the fingertip does not keep: they are what pads like real ones lose by.",
+        "Pads without a dip, with one of 5 %, and like real arrays (gains of 20 %, dip of 5 %, sensors 0.1 mm off their locations and 3.5 % apart in "
+        "width). Each is calibrated as it is; the touches are the same. The estimate knows the dip that the calibration found. It knows neither the "
+        "sensors' own locations nor their widths, which the fingertip does not keep: pads like real ones lose by these.",
     ),
     "by_object": ("By object", ""),
-    "elongated": ("Elongated objects without a load", ""),
+    "elongated": ("Elongated objects without a tangential force", ""),
     "by_force": ("By force", "Q/F = 0.3."),
     "light_touches": ("Light touches", ""),
     "by_osr": ("By oversampling", "Q/F = 0.3."),
     "by_sensors": ("Sensors missing", "Q/F = 0.3; which are missing is drawn for each touch."),
     "by_thickness": (
         "By thickness",
-        "Spheres of 6 and 15 mm, flat cylinder of 6 mm; the true thickness and the set one. Sensors "
-        "beyond their range are left out, as the firmware does.",
+        "Spheres of 6 and 15 mm, flat cylinder of 6 mm; the true thickness and the set one. Sensors beyond their range are left out.",
     ),
     "by_rubber": (
         "Creep and relaxation",
-        "Gains are equal, or calibrated to what placements read 0.75 s after. Press of 0.3 s; the load comes after 1 s, within "
+        "Gains are equal, or calibrated to what placements read 0.75 s after. Press of 0.3 s; the tangential force comes after 1 s, within "
         "0.3 s, and goes after 11.3 s.",
     ),
-    "screws": ("Screws", "Objects on which a torque acts and no load."),
+    "screws": ("Screws", "Objects under a torque, without a tangential force."),
     "by_overhang": ("Pads that end", "Finite block, edges free; by the profile: the thickness alone, or the effect of the ends as well."),
 }
 
@@ -129,9 +131,7 @@ def rows_md(rows):
         return table_of_dicts_md(rows)
     columns = [name for name in COLUMNS if any(name in row for row in rows)]
     columns += [name for name in dict.fromkeys(key for row in rows for key in row) if name.startswith("off_by_")]
-    return table_md(
-        [COLUMNS.get(name, name).strip() for name in columns], [[text_of(row.get(name), 3) for name in columns] for row in rows]
-    )
+    return table_md([COLUMNS.get(name, name) for name in columns], [[text_of(row.get(name), 3) for name in columns] for row in rows])
 
 
 def bounds_md(found):
@@ -144,47 +144,24 @@ def bounds_md(found):
 
 
 def taps_md(rows):
-    """The paper's table II under load, before and after."""
-    header = (
-        "pad",
-        "Q/F",
-        "location before, mm: p50",
-        "p95",
-        "after: p50",
-        "p95",
-        "force before: p50, %",
-        "after",
-        "force scaled before: p50, %",
-        "after",
-        "flagged elongated, %",
-    )
-    names = (
-        "location_without_p50_mm",
-        "location_without_p95_mm",
-        "location_p50_mm",
-        "location_p95_mm",
-        "force_without_p50_percent",
-        "force_p50_percent",
-        "force_scaled_without_p50_percent",
-        "force_scaled_p50_percent",
-        "elongated_percent",
-    )
-    return table_md(header, [[row["pad"], text_of(row["load"]), *(text_of(row[name], 3) for name in names)] for row in rows])
+    """The paper's table II under a tangential force, before and after."""
+    cells = [[row["pad"], text_of(row["load"]), *(text_of(row[name], 3) for name in TAPS)] for row in rows]
+    return table_md(("pad", "Q/F", *TAPS.values()), cells)
 
 
 def missed_md(found):
-    """In words, what of the usual case is off, by object and place."""
+    """In words, what of the usual case is off, by object and location."""
     worst = sorted(found.get("where_misses_lie", ()), key=lambda row: -(row["off_by_0_05_percent"] or 0) * row["touches"])
     total = sum(row["off_by_0_05_percent"] * row["touches"] for row in worst)
     if not total:
         return []
-    said = ", ".join(f"{row['case']} ({100 * row['off_by_0_05_percent'] * row['touches'] / total:.0f} %)" for row in worst[:4])
-    return ["", f"Of all touches whose Q / F is off by more than 0.05, most are of: {said}."]
+    named = ", ".join(f"{row['case']} ({100 * row['off_by_0_05_percent'] * row['touches'] / total:.0f} %)" for row in worst[:4])
+    return ["", f"Of all touches whose Q / F is off by more than 0.05, most are of: {named}."]
 
 
 def write(found, path):
     lines = [
-        "# Tangential load",
+        "# Tangential force",
         "",
         "Written by `sh cmake/bootstrap.sh report`. Simulated pads and touches, the firmware's own code. No measurement on a real",
         "pad confirms the size or the accuracy of what is read; the shift of the centroid of one thickness for each unit of Q / F follows from the",
@@ -194,9 +171,9 @@ def write(found, path):
         "",
         *goal_table_md(found),
         "",
-        f"If nothing else is said: {USUAL}.",
+        f"The usual case: {USUAL}.",
         "",
-        *table_md(("figure", "is over"), OVER),
+        *table_md(("figure", "what differs from the usual case"), OVER),
         *missed_md(found),
         "",
     ]
@@ -204,7 +181,7 @@ def write(found, path):
         lines += [
             "## What is physics and what is ours",
             "",
-            "Cramer-Rao bounds of the eight unknowns (force, place, spread, two elongations, Q): what errors of the "
+            "Cramer-Rao bounds of the eight unknowns (force, location, spread, two elongations, Q): what errors of the "
             "readings alone cost any unbiased estimate. A model floor is an error of each reading of its own, as a share of the peak. Gains are "
             "those after a calibration. Priors: spread and elongation as the firmware expects them; assumed round: no elongation.",
             "",
@@ -213,11 +190,11 @@ def write(found, path):
         ]
     if "taps" in found:
         lines += [
-            "## What tangential load does to every figure published so far",
+            "## What a tangential force does to every figure published so far",
             "",
             "The taps of the paper's table II (|x| <= 4.5 mm, |y| <= 13.5 mm, 1 to 15 N, "
-            "four indenters, readings at 20 Hz of 1 N or more, relative to the true zero), each pulling along the rubber by the same share of its force. Before: "
-            "the Gaussian, as published so far. Scaled: with each pad's own factor. Nothing here is elongated: a load makes the Gaussian fit flag it so.",
+            "four indenters, readings at 20 Hz of 1 N or more, relative to the true zero), each under a tangential force of the same share of its normal one. Before: "
+            "the Gaussian, as published so far. Scaled: with each pad's own factor. Nothing here is elongated: the Gaussian fit flags it so because of the tangential force.",
             "",
             *taps_md(found["taps"]),
             "",
@@ -256,7 +233,7 @@ def draw_arrows(axes, arrows):
     for arrow in arrows:
         for x, y, qx, qy, colour, width in (
             (arrow["x_mm"], arrow["y_mm"], arrow["qx"], arrow["qy"], GOAL, 3),
-            (arrow["said_x_mm"], arrow["said_y_mm"], arrow["said_qx"], arrow["said_qy"], BLUE, 1.2),
+            (arrow["estimated_x_mm"], arrow["estimated_y_mm"], arrow["estimated_qx"], arrow["estimated_qy"], BLUE, 1.2),
         ):
             axes.annotate(
                 "",
@@ -265,7 +242,7 @@ def draw_arrows(axes, arrows):
                 arrowprops={"arrowstyle": "->", "color": colour, "lw": width, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 8},
             )
         axes.plot(arrow["without_x_mm"], arrow["without_y_mm"], "x", color=ORANGE, ms=5)
-    for colour, style, label in ((GOAL, "-", "true"), (BLUE, "-", "said"), (ORANGE, "x", "place without the correction")):
+    for colour, style, label in ((GOAL, "-", "true"), (BLUE, "-", "estimated"), (ORANGE, "x", "location without the correction")):
         axes.plot([], [], style, color=colour, label=label)
     axes.plot(*zip(*((9 * i, 9 * k) for i in (-1, 0, 1) for k in range(-2, 3))), ".", color=FAINT, ms=3)
     axes.set_xlim(-15, 15)
@@ -333,8 +310,8 @@ def draw_overhang(axes, rows):
         ("thickness and ends", "zero_error_p50", ORANGE, "zero, ends set"),
         ("thickness and ends", "increment_error_p50", BLUE, "increment"),
     )
-    for place, (told, key, colour, label) in enumerate(bars):
-        heights = [next(row[key] for row in rows if (row["told"], row["overhang_mm"]) == (told, overhang)) for overhang in overhangs]
+    for place, (profile, key, colour, label) in enumerate(bars):
+        heights = [next(row[key] for row in rows if (row["profile"], row["overhang_mm"]) == (profile, overhang)) for overhang in overhangs]
         axes.bar([x + 0.2 * (place - 1.5) for x in range(len(overhangs))], heights, 0.19, color=colour, label=label)
     axes.set_xticks(range(len(overhangs)), [f"{overhang:g} mm" for overhang in overhangs])
     axes.axhline(0.05, color=GOAL, lw=1, ls="--")
@@ -360,5 +337,5 @@ def draw(found, path):
             panel(axes)
         else:
             axes.set_axis_off()
-    figure.suptitle("Tangential load: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
+    figure.suptitle("Tangential force: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
     save(figure, path)

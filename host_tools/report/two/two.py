@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What presses: one contact, a long one, one that pulls, or two; how often the firmware's answer is right.
+"""Contact shapes: one contact, a long one, one under a tangential force, or two; how often the firmware's answer is right.
 
     two.py --build build/host -o build/report
 
@@ -16,12 +16,12 @@ import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
 
 import two_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from reporting import chosen_parts, figures_printed, option_parser, report_of_programs  # noqa: E402
+from reporting import chosen_parts, contacts_of, figures_printed, given, option_parser, positive, report_of_programs  # noqa: E402
 
 # part: what it does
 PARTS = {
@@ -40,29 +40,26 @@ GOALS = (
 )
 
 
-def command_of(part, options):
-    program = (
-        pathlib.Path(options.build) / "host_tools/report/two/touches/two_touches" if part == "touches" else fit_cycles_of(options.boards)
-    )
-    if not program.is_file():
-        raise InputError(
-            f"{program} is not there; build it: {'cmake --build --preset host' if part == 'touches' else 'sh cmake/bootstrap.sh'}"
-        )
-    if part == "cycles":
-        return ["node", pathlib.Path(__file__).with_name("cycles.mjs"), program]
-    command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
-    if options.seed is not None:
-        command += ["--seed", str(options.seed)]
-    if options.pads is not None:
-        command += ["--pads", str(options.pads)]
-    return command
+def measure_touches(options):
+    import shapes
+
+    return shapes.figures(contacts_of(options), **given(options, "seed", "pads"))
+
+
+def measure_cycles(options):
+    if not (image := fit_cycles_of(options.boards)).is_file():
+        raise InputError(f"{image} is not there; build it: sh cmake/bootstrap.sh")
+    return figures_printed("cycles.mjs", ["node", pathlib.Path(__file__).with_name("cycles.mjs"), image])
+
+
+MEASURE = {"touches": measure_touches, "cycles": measure_cycles}
 
 
 def main(argv):
     parser = option_parser(__doc__)
     parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
     parser.add_argument("--seed", type=int, metavar="N")
-    parser.add_argument("--pads", type=int, metavar="N", help="calibrated pads; default 200")
+    parser.add_argument("--pads", type=positive, metavar="N", help="calibrated pads; default 200")
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's two.json")
     options = parser.parse_args(argv)
     parts = chosen_parts(options, PARTS, PARTS)
@@ -72,7 +69,7 @@ def main(argv):
         PARTS,
         parts,
         GOALS,
-        lambda part: figures_printed(f"two_{part}", command_of(part, options)),
+        lambda part: MEASURE[part](options),
         lambda found, out: {},
         two_report,
     )

@@ -26,7 +26,7 @@ def possible_rows(found):
 
 def write(found, path):
     lines = [
-        "# What presses",
+        "# Contact shapes",
         "",
         "Written by `sh cmake/bootstrap.sh report two`. Simulated pads of 12 mm with a dip, calibrated; the firmware's own code,",
         "as scene grasp runs it. No public recording has two contacts and their truth.",
@@ -43,13 +43,13 @@ def write(found, path):
             ),
             "",
             "`possible`: what no judge does better than on such pads, be it with the rubber's response known exactly, or with a model that is off by",
-            "so much of the largest reading at each sensor: 0.002, as the firmware states of its own, half or a quarter of it. Noise and the gains'",
-            "errors are in all. It is the smaller of two limits, touch by touch: the Cramer-Rao bound of places and forces, and the likelihood ratio",
-            "of the pair to the nearest long contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (bound.hpp).",
+            "this share of the largest reading at each sensor: 0.002, as the firmware states of its own, half or a quarter of it. Noise and the gains'",
+            "errors are in all. It is the smaller of two limits, touch by touch: the Cramer-Rao bound of locations and forces, and the likelihood ratio",
+            "of the pair to the nearest long contact, of at most 20 mm and Q/F 0.3, of which at most 0.2 % may be called two (pair_bound.py).",
             "",
-            "Shares in percent. `two_and_right`: both places within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
+            "Shares in percent. `two_and_right`: both locations within 1.5 mm and the sum of the forces within 10 %. `off`: of a pair that is called one",
             "or long, from the middle of the forces. `silent`: what the packet shows is off by more than 1 mm, or is one for two, or",
-            "two for one, with a standard deviation below 0.6 mm and no shape that says so. `warned`: the standard deviation is above that. `exact gains`:",
+            "two for one, with a standard deviation below 0.6 mm and no shape that shows it. `warned`: the standard deviation is above that. `exact gains`:",
             "a pad whose gains are known without error. `along` and `across`: the pad's longer and shorter side, within 45 degrees. `first`: in the first answer;",
             "all else when the touch has been held for a while. The worse of the two is judged. Edges of 24 mm and more and pairs of cubes are not.",
             "",
@@ -110,7 +110,7 @@ def draw(found, path):
         for axes in places:
             axes.set_axis_off()
     figure.suptitle(
-        "What presses: simulated pads, calibrated, with a dip; the firmware's own code; no real pad",
+        "Contact shapes: simulated pads, calibrated, with a dip; the firmware's own code; no real pad",
         x=0.01,
         ha="left",
         size=12,

@@ -1,11 +1,18 @@
-"""shear.py with programs in the place of its parts: what it merges, judges, writes and refuses."""
+"""shear.py with figures in the place of its parts: what it merges, judges, writes and refuses."""
 
+import contextlib
+import io
+import json
 import pathlib
 import sys
+import tempfile
 import unittest
+from unittest import mock
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
-from report_of_programs import ReportOfPrograms  # noqa: E402
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "host_tools/report/shear"))
+import shear  # noqa: E402
+from fingertip.files import InputError  # noqa: E402
 
 ROW = {
     "case": "10 %, calibrated, Q/F 0.3",
@@ -56,12 +63,22 @@ FOUND = {
 }
 
 
-class Shear(ReportOfPrograms):
-    NAME, FOUND = "shear", FOUND
+class Shear(unittest.TestCase):
+    def setUp(self):
+        self.out = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) / "out"
+        self.enterContext(mock.patch.dict(shear.MEASURE, {part: lambda options, found=found: found for part, found in FOUND.items()}))
+
+    def run_tool(self, *options):
+        self.printed = io.StringIO()
+        with contextlib.redirect_stdout(self.printed):
+            return shear.main(["--build", "nowhere", "--boards", "nowhere", "-o", str(self.out), *options])
+
+    def found(self):
+        return json.loads((self.out / "shear.json").read_text())
 
     def test_parts_are_merged_and_judged(self):
-        done = self.run_tool()
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.run_tool(), 0)
+        self.assertIn("not built, so not measured: chip", self.printed.getvalue())
         found = self.found()
         verdicts = {name: goal["met"] for name, goal in found["goals"].items()}
         self.assertTrue(verdicts["ratio_error_p50"] and verdicts["slide_found_percent"] and verdicts["screw_ratio"])
@@ -70,7 +87,7 @@ class Shear(ReportOfPrograms):
         self.assertEqual(found["lift_false_slides"], 2)
         self.assertIsNone(verdicts["optimum_p99_um"])
         self.assertEqual((self.out / "shear.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
-        self.assertEqual(self.run_tool("--parts", "static", "--check").returncode, 1)
+        self.assertEqual(self.run_tool("--parts", "static", "--check"), 1)
 
     def test_what_is_written_to_read(self):
         self.run_tool()
@@ -88,14 +105,14 @@ class Shear(ReportOfPrograms):
     def test_the_page_has_its_part(self):
         self.run_tool()
         page = (self.out / "index.html").read_text()
-        for words in ('<h2 id="shear">Tangential load</h2>', "elongated_false_percent", "Where the misses lie"):
+        for words in ('<h2 id="shear">Tangential force</h2>', "elongated_false_percent", "Where the misses lie"):
             self.assertIn(words, page)
         self.assertNotIn("(shear.png): <strong>not drawn", page)
 
     def test_a_part_alone_keeps_what_the_others_found(self):
-        self.assertEqual(self.run_tool("--parts", "motion").returncode, 0)
+        self.assertEqual(self.run_tool("--parts", "motion"), 0)
         self.assertIsNone(self.found()["ratio_error_p50"])
-        self.assertEqual(self.run_tool("--parts", "static").returncode, 0)
+        self.assertEqual(self.run_tool("--parts", "static"), 0)
         self.assertEqual((self.found()["slide_found_percent"], self.found()["ratio_error_p50"]), (98.5, 0.011))
 
     def test_the_optimum_is_read_where_it_was_left(self):
@@ -105,24 +122,10 @@ class Shear(ReportOfPrograms):
         goals = self.found()["goals"]
         self.assertEqual((goals["optimum_p99_um"]["met"], goals["optimum_p99_ratio"]["met"]), (True, False))
 
-    def test_options_reach_the_parts(self):
-        for part, pads in (("static", ["--pads", "2"]), ("motion", [])):  # motion draws none
-            self.program(part, "import json; print(json.dumps({'said': sys.argv[1:]}))")
-            self.assertEqual(self.run_tool("--parts", part, "--seed", "3", "--pads", "2").returncode, 0)
-            self.assertEqual(self.found()["said"], ["--cache", str(self.out / "contact_tables"), "--seed", "3", *pads])
-
-    def test_what_goes_wrong_is_one_line(self):
-        self.program("static", "sys.exit(3)")
-        self.program("motion", "print('no figures')")
-        self.fails_in_one_line((("static", "ended with status 3"), ("motion", "wrote no JSON"), ("thumb", "thumb is none of")))
-
-    def test_a_part_that_was_not_built(self):
-        program = self.folder / "host_tools/report/shear/motion/shear_motion"
-        program.unlink()
-        self.assertIn("not built, so not measured: motion", self.run_tool().stdout)
-        self.assertIsNone(self.found()["goals"]["slide_found_percent"]["met"])
-        done = self.run_tool("--parts", "motion")
-        self.assertEqual((done.returncode, done.stderr), (1, f"shear.py: {program} is not there; build it: cmake --build --preset host\n"))
+    def test_what_goes_wrong_is_an_error(self):
+        for part, words in (("chip", "is not there; build it"), ("thumb", "thumb is none of")):
+            with self.assertRaisesRegex(InputError, words):
+                self.run_tool("--parts", part)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,18 @@
-"""two.py with a program in the place of its touches: what it judges, writes and refuses."""
+"""two.py with figures in the place of its parts: what it judges, writes and refuses."""
 
+import contextlib
+import io
+import json
 import pathlib
 import sys
+import tempfile
 import unittest
+from unittest import mock
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
-from report_of_programs import ReportOfPrograms  # noqa: E402
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "host_tools/report/two"))
+import two  # noqa: E402
+from fingertip.files import InputError  # noqa: E402
 
 CALLED = {"one": 0.0, "pulled": 0.0, "long": 40.0, "two": 60.0, "none": 0.0, "undecided": 0.0}
 ROWS = [
@@ -23,27 +30,31 @@ ROWS = [
 ]
 
 
-class Two(ReportOfPrograms):
-    NAME, FOUND = (
-        "two",
-        {
-            "touches": {
-                "two_right_percent_8mm": 59.0,
-                "one_called_two_percent": 0.1,
-                "touches": ROWS,
-                **{
-                    f"two_possible_{kind}_{pair}": 61.25
-                    for kind in ("percent", "model_halved_percent", "model_quartered_percent", "rubber_known_percent")
-                    for pair in ("8mm", "12mm", "10mm_3to1")
-                },
-            }
-        },
-    )
+FOUND = {
+    "two_right_percent_8mm": 59.0,
+    "one_called_two_percent": 0.1,
+    "touches": ROWS,
+    **{
+        f"two_possible_{kind}_{pair}": 61.25
+        for kind in ("percent", "model_halved_percent", "model_quartered_percent", "rubber_known_percent")
+        for pair in ("8mm", "12mm", "10mm_3to1")
+    },
+}
+
+
+class Two(unittest.TestCase):
+    def setUp(self):
+        self.out = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.enterContext(mock.patch.dict(two.MEASURE, {"touches": lambda options: FOUND}))
+
+    def run_parts(self, *options):
+        with contextlib.redirect_stdout(io.StringIO()):
+            return two.main(["--build", "nowhere", "--boards", "nowhere", "-o", str(self.out), "--parts", *options])
 
     def test_figures_are_judged_and_written(self):
-        done = self.run_tool("--parts", "touches")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        verdicts = {name: goal["met"] for name, goal in self.found()["goals"].items()}
+        self.assertEqual(self.run_parts("touches"), 0)
+        found = json.loads((self.out / "two.json").read_text())
+        verdicts = {name: goal["met"] for name, goal in found["goals"].items()}
         self.assertTrue(verdicts["one_called_two_percent"])
         self.assertFalse(verdicts["two_right_percent_8mm"])
         self.assertIsNone(verdicts["cycles_core1_max"])
@@ -52,16 +63,13 @@ class Two(ReportOfPrograms):
         self.assertIn("| 8 mm, 1:1 | >= 90 | 61.2 | 61.2 | 61.2 | 61.2 | 59 |", text)
         self.assertIn("| two, 12 mm, 3:1 |", text)
         self.assertEqual((self.out / "two.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
-        self.assertEqual(self.run_tool("--parts", "touches", "--check").returncode, 1)
+        self.assertEqual(self.run_parts("touches", "--check"), 1)
 
-    def test_options_reach_the_program(self):
-        self.program("touches", "import json; print(json.dumps({'said': sys.argv[1:]}))")
-        self.assertEqual(self.run_tool("--parts", "touches", "--seed", "3", "--pads", "2").returncode, 0)
-        self.assertEqual(self.found()["said"], ["--cache", str(self.out / "contact_tables"), "--seed", "3", "--pads", "2"])
-
-    def test_what_goes_wrong_is_one_line(self):
-        self.program("touches", "sys.exit(3)")
-        self.fails_in_one_line((("touches", "ended with status 3"), ("cycles", "is not there; build it"), ("thumb", "thumb is none of")))
+    def test_what_is_wrong_is_an_error_and_writes_nothing(self):
+        for part, words in (("cycles", "is not there; build it"), ("thumb", "thumb is none of")):
+            with self.assertRaisesRegex(InputError, words):
+                self.run_parts(part)
+            self.assertFalse((self.out / "two.json").exists())
 
 
 if __name__ == "__main__":

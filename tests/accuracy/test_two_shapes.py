@@ -1,12 +1,16 @@
-"""two_touches on few pads: its keys are there, repeatable, and as good as the shapes are meant to be.
+"""The report's contact shapes on few pads: the figures are there, repeatable, and as good as the shapes are meant to be.
 
-usage: test_two_touches.py TWO_TOUCHES [unittest arguments]
+usage: test_two_shapes.py BUILD [unittest arguments]
 """
 
-import json
-import subprocess
+import pathlib
 import sys
 import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "report/two", "python")]
+import shapes  # noqa: E402
+from contacts import Contacts  # noqa: E402
 
 # (key, least, most): what a full run finds on seed 40000, with room for a tenth of its pads.
 FOUND = (
@@ -20,16 +24,10 @@ FOUND = (
 )
 
 
-def run(*options):
-    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
-
-
-class TwoTouches(unittest.TestCase):
+class TwoShapes(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.options = ("--pads", "20", "--seed", "3")
-        cls.text = run(*cls.options).stdout
-        cls.found = json.loads(cls.text)
+        cls.found = shapes.figures(Contacts(BUILD), seed=3, pads=20)
 
     def test_figures(self):
         for key, least, most in FOUND:
@@ -76,17 +74,12 @@ class TwoTouches(unittest.TestCase):
         self.assertGreater(rows["two, 8 mm, 1:1"]["long"] + rows["two, 8 mm, 1:1"]["two"], 98)
 
     def test_repeatable_and_seeded(self):
-        self.assertEqual(run(*self.options).stdout, self.text)
-        self.assertNotEqual(
-            json.loads(run("--pads", "1", "--seed", "4").stdout)["touches"], json.loads(run("--pads", "1", "--seed", "3").stdout)["touches"]
-        )
-
-    def test_no_pads_is_an_error(self):
-        done = run("--pads", "0")
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("--pads needs at least one pad", done.stderr)
+        contacts, case = Contacts(BUILD), shapes.Case("round", ("sphere6",))
+        rows = [shapes.row_of(contacts, case, shapes.dipped_pads(contacts, 2, seed), seed) for seed in (3, 3, 4)]
+        self.assertEqual(rows[0], rows[1])
+        self.assertNotEqual(rows[0], rows[2])
 
 
 if __name__ == "__main__":
-    PROGRAM = sys.argv.pop(1)
+    BUILD = sys.argv.pop(1)
     unittest.main(verbosity=2)

@@ -1,0 +1,214 @@
+"""Contacts on pads of the twin, and what the firmware estimates of them: what the reports shear and two have in common.
+
+Touches are the records twin_touch, pads those of Contacts.pad. Arrays have a row for each touch: `pads` its pad, `which` its contact shape of a list,
+`normals` its noise in standard deviations. Readings are relative to the true zero: what condition does to them is left out.
+"""
+
+import functools
+
+import numpy as np
+import sessions
+from fingertip.files import FIT_VALID
+from measure import Measure, q10
+from sessions import SENSORS
+
+FORCE_N = ("pull_x_N", "pull_y_N")  # the tangential force of a twin_touch
+AMBIENT_Pa, FRICTION = 101325.0, 0.5  # of the twin; of the contacts
+WAITED = 1.05  # of the longest conversion: what the firmware waits
+
+
+def terms_of(field):
+    """[(share or moment_mm, sd_mm)]: a sum of Gaussians of a pad_profile."""
+    return field.view(np.float32).reshape(-1, 2).astype(float)
+
+
+class Contacts(Measure):
+    def __init__(self, build):
+        super().__init__(build)
+        self.own_array = self.array()
+        self.x_mm, self.y_mm, _ = self.layout()
+        constants = self.made("firmware_constants", 1)
+        self.call("constants", constants)
+        self.tangential_frames, self.shapes_frames, self.gain_sd, self.location_sd_limit_mm, self.max_pressure_Pa = constants[0].tolist()
+        self.pad = np.dtype(
+            [
+                # Factors of readings: what is left after the calibration of a calibrated pad; the standard deviation is the firmware's.
+                ("gain", float, SENSORS),
+                ("gain_sd", float, SENSORS),
+                ("force_scale", float),  # force over 2 pi p0 sigma^2; 0: not calibrated
+                # What the calibration found.
+                ("dip_share", float),
+                ("dip_sd_mm", float),
+                ("own", self.records["fit_own"], SENSORS),
+                # How the pad is cast.
+                ("cast_dip_share", float),
+                ("seat", self.records["twin_seat"], SENSORS),
+            ]
+        )
+
+    def noise_Pa(self, ratio):
+        return self.osr(ratio)[1] / 1024.0
+
+    def conversion_s(self, ratio):
+        """The longest."""
+        return 1e-6 * round(self.osr(ratio)[0] / WAITED)
+
+    @functools.cache
+    def pad_profile(self, thickness_mm, overhang_mm=0.0):
+        """With an overhang, with the effect of the pad's ends as well."""
+        profile = self.profile(thickness_mm)
+        if overhang_mm:
+            self.call("add_ends", overhang_mm, self.contact_tables, profile)
+        return profile
+
+    # Pads.
+
+    def perfect_pads(self, count):
+        pads = np.zeros(count, self.pad)
+        pads["gain"] = pads["seat"]["width"] = 1.0
+        return pads
+
+    def raw_pads(self, spread, known_sd, random):
+        """Gains as cast, normal about 1 within three standard deviations, and no calibration; a pad of each generator."""
+        pads = self.perfect_pads(len(random.states))
+        for k in range(SENSORS):
+            outside = np.ones(len(pads), bool)
+            while outside.any():
+                sigmas = random.normal(of=outside)
+                pads["gain"][outside, k] = 1.0 + spread * sigmas[outside]
+                outside &= np.abs(sigmas) > 3.0
+        pads["gain_sd"] = known_sd
+        return pads
+
+    def calibrated_pads(self, kinds, seeds):
+        """Each as a good session of placements calibrates it, without a force scale; the kinds (sessions.py) take turns."""
+        kinds = sessions.kinds(self, *kinds)[np.arange(len(seeds)) % len(kinds)]
+        found, own, seats = sessions.calibrated_by(self, kinds, seeds)
+        pads = self.perfect_pads(len(seeds))
+        for name in ("gain", "gain_sd", "dip_share", "dip_sd_mm"):
+            pads[name] = found[name]
+        pads["own"], pads["seat"], pads["cast_dip_share"] = own, seats, found["true_dip_share"]
+        return pads
+
+    def learned_thickness(self, kinds, seeds):
+        """mm, standard deviation, and rounded as the tool shows it: what the width of the response shows in sessions of 24 placements."""
+        kinds = sessions.kinds(self, *kinds)[np.arange(len(seeds)) % len(kinds)]
+        found = sessions.placements(self, "good", kinds, seeds, sessions.LAYER_mm, 24).calibrated().found
+        figures = np.zeros((len(seeds), 3))
+        self.call("thickness", *(np.ascontiguousarray(found[name]) for name in ("width_mm", "sigma_sd_mm")), figures)
+        return figures.T
+
+    def gains_only(self, pads):
+        """What calibrations have left of the gains, on any layer."""
+        found = self.perfect_pads(len(pads))
+        for name in ("gain", "gain_sd"):
+            found[name] = pads[name]
+        return found
+
+    # Contacts.
+
+    def base_Pa(self, layer_mm, shapes, which, touches, pads=None, overhang_mm=None):
+        """Pressures on the base [touch, sensor]. pads: [touch], or perfect ones; overhang_mm: of rubber that ends."""
+        base_Pa = np.empty((len(touches), SENSORS))
+        for k, name in enumerate(shapes):
+            some = which == k
+            cast, own_touches = {}, touches[some]
+            if pads is not None:
+                cast = {"dip_share": pads["cast_dip_share"][some], "seats": pads["seat"][some]}
+            base = self.base_pressure(name, layer_mm, own_touches, shape=sessions.shape(self, name), **cast)
+            if overhang_mm is not None:
+                self.call("add_block", name, layer_mm, overhang_mm, self.contact_tables, own_touches, base)
+            base_Pa[some] = base
+        return base_Pa
+
+    def settings_of(self, pads, noise_Pa):
+        """As the firmware has them where a profile is set, for each pad."""
+        return self.settings(
+            len(pads), noise_Pa=noise_Pa, gain_sd=pads["gain_sd"], cut_noises=0, dip_share=pads["dip_share"], dip_sd_mm=pads["dip_sd_mm"]
+        )
+
+    def own_of(self, pads):
+        """None where no calibration has found any."""
+        own = np.ascontiguousarray(pads["own"])
+        return own if np.any(own.view(np.int32)) else None
+
+    def readings_Pa(self, base_Pa, pads, noise_Pa, normals):
+        """[touch, frame, sensor] of pads [touch]."""
+        frames = normals.reshape(len(base_Pa), -1, SENSORS)
+        return (pads["gain"] * base_Pa)[:, None] + np.reshape(noise_Pa, (-1, 1, 1)) * frames
+
+    def estimated(self, base_Pa, pads, noise_Pa, normals, profile, usable=None):
+        """(published, found) of touches that hold still, on pads [touch]. A reading above the sensor's range is left out of the fit. found: every
+        frame has a fit."""
+        readings_Pa = self.readings_Pa(base_Pa, pads, noise_Pa, normals)
+        saturated = ((readings_Pa > self.max_pressure_Pa - AMBIENT_Pa) << np.arange(SENSORS)).sum(axis=2).astype(np.uint32)
+        if usable is not None:
+            usable = np.repeat(usable[:, None], saturated.shape[1], axis=1).astype(np.uint32)
+        settings, own = self.settings_of(pads, noise_Pa), self.own_of(pads)
+        fits, estimates = self.tangential(self.own_array, profile, settings, q10(readings_Pa), usable, saturated, own=own)
+        published = self.made("published", len(base_Pa))
+        self.call(
+            "publish",
+            profile,
+            np.ascontiguousarray(pads["force_scale"]),
+            *(np.ascontiguousarray(each[:, -1]) for each in (fits, estimates)),
+            published,
+        )
+        found = (fits["flags"] & FIT_VALID > 0).all(axis=1)
+        published[~found] = 0
+        return published, found
+
+    def held_shapes(self, base_Pa, pads, noise_Pa, normals, published, profile):
+        """(fit_shapes_result, shapes_place), each [touch, first or last], of contacts that hold still."""
+        pad = self.made("fit_shapes_pad", 1)
+        self.call("shapes_pad", self.own_array, profile, pad)
+        own = self.own_of(pads)
+        readings = q10(self.readings_Pa(base_Pa, pads, noise_Pa, normals))
+        found = self.made("fit_shapes_result", len(base_Pa), 2), self.made("shapes_place", len(base_Pa), 2)
+        settings = self.settings_of(pads, noise_Pa)
+        self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, readings, published, *found)
+        return found
+
+    def motion_flags(self, ends, t_us, readings_Pa, pads, noise_Pa, pressed, profile):
+        """Flags of the frames of runs, each of which ends before one of `ends`, on pads [run]."""
+        pad, flags = self.made("fit_pad", 1), np.zeros(len(t_us), np.uint32)
+        self.call("tangential_pad", self.own_array, profile, pad)
+        self.call("motion_flags", self.own_array, pad, self.settings_of(pads, noise_Pa), ends, t_us, q10(readings_Pa), pressed, flags)
+        return flags
+
+    def rubber(self, effects, layer_mm, seeds, t_s, base_Pa):
+        """What pads with these effects of the twin report [pad, time, sensor] of pressures on their bases."""
+        reported_Pa = np.empty(base_Pa.shape)
+        self.call("rubber", effects, layer_mm, seeds, t_s, base_Pa, reported_Pa)
+        return reported_Pa
+
+
+class Scenario:
+    """A scenario of the twin. phases: scenario_phase, times from the beginning of the act; last_s: how long each act takes."""
+
+    def __init__(
+        self, contacts, kind, contact_shape, layer_mm, seed, seconds, kinetic_share=0.8, dead_travel_mm=1.0, margin_mm=-1.0, **texts
+    ):
+        self.contacts, self.contact_shape = contacts, contact_shape
+        options = contacts.made("scenario_options", 1)
+        given = {"kind": kind, "contact_shape": contact_shape, "layer_mm": layer_mm, "seed": seed, "seconds": seconds, **texts}
+        given |= {"kinetic_share": kinetic_share, "dead_travel_mm": dead_travel_mm, "margin_mm": margin_mm}
+        for name, value in given.items():
+            options[name] = value
+        facts = np.zeros(3, np.int64)
+        contacts.call("scenario_begin", options, contacts.contact_tables, facts)
+        self.number, act_count, phase_count = map(int, facts)
+        self.last_s, self.phases = np.zeros(act_count), contacts.made("scenario_phase", phase_count)
+        contacts.call("scenario_phases", self.number, self.last_s, self.phases)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.contacts.call("scenario_end", self.number)
+
+    def touches(self, act, t_s):
+        """The first contact of each act at the time from its beginning."""
+        touches = self.contacts.made("twin_touch", len(t_s))
+        self.contacts.call("scenario_touches", self.number, np.ascontiguousarray(act, np.int64), np.ascontiguousarray(t_s, float), touches)
+        return touches

@@ -1,0 +1,194 @@
+// What the firmware publishes of contacts over frames: the tangential force, shapes of contacts that are held, and
+// motion.
+#include "libfingertip/in_parallel.hpp"
+#include "report/measure/fit_arguments.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+#include "config/defaults.h"
+#include "contact/motion.h"
+#include "contact/shapes.h"
+#include "fit/fit_doubt.h"
+#include "ms58xx/ms58xx.h"
+}
+
+#include <algorithm>
+#include <memory>
+
+using namespace fingertip::measure;
+using fingertip::twin::in_parallel;
+
+struct firmware_constants {
+  std::int32_t tangential_frames, shapes_frames; // until the first answer
+  double gain_sd, location_sd_limit_mm, max_pressure_Pa;
+};
+MEASURE_RECORD(firmware_constants, FIELD(tangential_frames), FIELD(shapes_frames), FIELD(gain_sd),
+               FIELD(location_sd_limit_mm), FIELD(max_pressure_Pa))
+
+static void constants(Batch<firmware_constants, 1> found) {
+  found[0] = {FIT_TANGENTIAL_FRAMES, FIT_SHAPES_FRAMES, static_cast<double>(DEFAULT_GAIN_SD),
+              static_cast<double>(FIT_LOCATION_SD_LIMIT_mm), MS58XX_MAX_PRESSURE_Pa};
+}
+MEASURE_ENTRY(constants)
+
+// In the scales of a calibration: the corrected location and force where the estimate is valid, otherwise the
+// Gaussian's.
+struct published {
+  bool valid, elongated; // the latter as the Gaussian fit flags it
+  double x_mm, y_mm, location_sd_mm, force_N;
+  double qx, qy, q_sd; // per normal force
+  double gaussian_x_mm, gaussian_y_mm, gaussian_force_N;
+};
+MEASURE_RECORD(published, FIELD(valid), FIELD(elongated), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm),
+               FIELD(force_N), FIELD(qx), FIELD(qy), FIELD(q_sd), FIELD(gaussian_x_mm), FIELD(gaussian_y_mm),
+               FIELD(gaussian_force_N))
+
+// force_scale: 0 of a pad that is not calibrated. Scales are exact.
+static published published_of(const pad_profile &profile, double force_scale, const fit_result &fit,
+                              const fit_tangential &estimate) {
+  contact_settings scales{};
+  const double scale = force_scale > 0.0 ? force_scale : 1.0;
+  scales.force_scale = static_cast<float>(scale);
+  tangential_settings settings{};
+  tangential_use(&settings, &profile, &scales, force_scale > 0.0);
+  settings.tangential_scale_sd = 0.0F;
+  contact_input input{};
+  input.contact = true;
+  input.fit = &fit;
+  input.tangential = &estimate;
+  tangential_history history{};
+  contact_result result{};
+  tangential_load load;
+  tangential_update(&history, &settings, &input, &result, &load);
+  const auto number = [](float value) { return static_cast<double>(value); };
+  published found{};
+  found.valid = (result.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+  found.elongated = (fit.flags & CONTACT_FLAG_ELONGATED) != 0;
+  found.gaussian_x_mm = number(fit.x_mm);
+  found.gaussian_y_mm = number(fit.y_mm);
+  found.gaussian_force_N = scale * number(fit.force_N);
+  if (found.valid) {
+    found.x_mm = number(load.x_mm);
+    found.y_mm = number(load.y_mm);
+    found.location_sd_mm = number(load.location_sd_mm);
+    found.force_N = number(load.force_N);
+    found.qx = number(load.qx_N) / found.force_N;
+    found.qy = number(load.qy_N) / found.force_N;
+    found.q_sd = number(load.q_sd_N) / found.force_N;
+  } else {
+    found.x_mm = found.gaussian_x_mm;
+    found.y_mm = found.gaussian_y_mm;
+    found.location_sd_mm = number(fit.location_sd_mm);
+    found.force_N = found.gaussian_force_N;
+  }
+  return found;
+}
+
+// All zeros where there is no fit.
+static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> force_scale,
+                    Batch<const fit_result, 1> fits, Batch<const fit_tangential, 1> estimates,
+                    Batch<published, 1> found) {
+  same_length(found, force_scale, fits, estimates);
+  for (std::size_t i = 0; i < found.size(); i++) {
+    const bool has_fit = (fits[i].flags & CONTACT_FLAG_FIT_VALID) != 0;
+    found[i] = has_fit ? published_of(profile[0], force_scale[i], fits[i], estimates[i]) : published{};
+  }
+}
+MEASURE_ENTRY(publish)
+
+MEASURE_RECORD(shapes_place, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
+
+// The shapes, as scene grasp has them, of contacts [contact][frame][sensor] that are held: after FIT_SHAPES_FRAMES
+// frames the first answer, and the last. Where the tangential force is estimated, its location is used.
+static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad,
+                        Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
+                        Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const published, 1> estimates,
+                        Batch<fit_shapes_result, 2> results, Batch<shapes_place, 2> places) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
+  const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
+  same_length(results, places, pressure_Pa_q10, estimates);
+  require(results.size(1) == 2 && places.size(1) == 2 && frames > FIT_SHAPES_FRAMES, "too few frames or answers");
+  in_parallel(results.size(), [&](std::size_t contact) {
+    const auto job = std::make_unique<shapes_job>();
+    job->array = array;
+    job->pad = pad[0];
+    auto &question = job->question;
+    question.parts = FIT_SHAPES_PARTS;
+    question.settings = settings_of(all_settings, own, contact);
+    const published &estimate = estimates[contact];
+    tangential_load load{};
+    load.x_mm = static_cast<float>(estimate.x_mm);
+    load.y_mm = static_cast<float>(estimate.y_mm);
+    load.location_sd_mm = static_cast<float>(estimate.location_sd_mm);
+    fit_doubt doubt{};
+    for (std::size_t i = 0; i < frames; i++) {
+      std::copy_n(pressure_Pa_q10.row(contact) + i * sensors, sensors, question.pressure_Pa_q10);
+      question.begins = i == 0;
+      fit_gaussian_grid(array, question.pressure_Pa_q10, (1u << sensors) - 1u, &question.settings, &question.fit);
+      shapes_estimate(job.get());
+      fit_doubt_follow(&doubt, array, question.pressure_Pa_q10, &question.settings, &question.fit);
+      const bool last = i == frames - 1;
+      if (last || i == FIT_SHAPES_FRAMES - 1) {
+        fit_doubt_widen(&doubt, array, &question.settings, &question.fit);
+        fit_shapes_result &result = results.row(contact)[last ? 1 : 0];
+        result = job->result;
+        result.shape = job->report.shape; // which stays, while what is none of these begins again
+        places.row(contact)[last ? 1 : 0] =
+            shapes_locate(&job->report, &question.fit, estimate.valid ? &load : nullptr);
+      }
+    }
+  });
+}
+MEASURE_ENTRY(held_shapes)
+
+// Flags of the frames of contacts that come and go, with the firmware's detectors of motion. Run i has the frames
+// before end[i]; pressed: the gate is open.
+static void motion_flags(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pad,
+                         Batch<const fit_settings, 1> all_settings, Batch<const std::int64_t, 1> end,
+                         Batch<const std::int64_t, 1> t_us, Batch<const std::int32_t, 2> pressure_Pa_q10,
+                         Batch<const bool, 1> pressed, Batch<std::uint32_t, 1> flags) {
+  same_length(flags, t_us, pressure_Pa_q10, pressed);
+  length_or_one(end, all_settings);
+  require(end.size() == 0 || end[end.size() - 1] == pressure_Pa_q10.shape[0], "runs of another number of frames");
+  const std::uint32_t usable = (1u << pressure_Pa_q10.size(1)) - 1u;
+  const contact_settings contact{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, DEFAULT_FORCE_SCALE,
+                                 DEFAULT_FORCE_SCALE_SD};
+  tangential_settings published{};
+  published.force_scale = published.tangential_scale = 1.0F;
+  published.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
+  in_parallel(end.size(), [&](std::size_t run) {
+    const fit_settings settings = *all_settings.row_or_all(run);
+    const auto job = std::make_unique<tangential_job>();
+    job->array = arrays.data;
+    job->pad = pad[0];
+    slip_history slip{};
+    tangential_history history{};
+    motion_history moved{};
+    for (auto i = static_cast<std::size_t>(run == 0 ? 0 : end[run - 1]); i < static_cast<std::size_t>(end[run]); i++) {
+      fit_result fit{};
+      fit_tangential estimate{};
+      const auto now_us = static_cast<std::uint64_t>(t_us[i]);
+      if (pressed[i]) {
+        fit_gaussian_grid(arrays.data, pressure_Pa_q10.row(i), usable, &settings, &fit);
+        job->question = {false, 0, now_us, pressure_Pa_q10.row(i), &settings, &fit};
+        tangential_estimate(job.get());
+        estimate = job->estimate;
+      } else {
+        job->course = {};
+      }
+      contact_input input{};
+      input.t_us = now_us;
+      input.contact = pressed[i];
+      input.fit = pressed[i] ? &fit : nullptr;
+      input.tangential = &estimate;
+      contact_result result;
+      tangential_load load;
+      motion motion;
+      contact_update(&slip, &contact, &input, &result);
+      tangential_update(&history, &published, &input, &result, &load);
+      motion_update(&moved, &published, &input, &result, &motion);
+      flags[i] = result.flags;
+    }
+  });
+}
+MEASURE_ENTRY(motion_flags)
