@@ -144,8 +144,8 @@ bool port_flash_poll(void) {
   uint8_t write_enable = COMMAND_WRITE_ENABLE;
   switch (operation.phase) {
   case PHASE_ENABLE:
-    run_command(&write_enable, 1);
-    operation.phase = PHASE_SEND;
+    if (run_command(&write_enable, 1) == FT_OK) /* the flash ignores what is sent without it */
+      operation.phase = PHASE_SEND;
     break;
   case PHASE_SEND:
     if (operation.sent == 0)
