@@ -352,9 +352,8 @@ static NOINLINE void fill_columns(const struct readings *readings, const struct 
   }
 }
 
-/* Columns, norms and factors from the model at the nodes, and the polynomials of the next iteration. */
-static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge, struct columns *c) {
-  fill_columns(readings, ridge, c);
+/* After fill_columns: the factors, and the polynomials of the next iteration. */
+static NOINLINE void orthogonalise(struct columns *c) {
   int32_t g21 = 0, g31 = 0, g32 = 0;
   const struct node *node = c->node;
   UNROLL
@@ -430,7 +429,8 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   }
   c->cross = c->skew_x = c->skew_y = 0;
   c->dip = false;
-  orthogonalise(readings, &guess_ridge, c);
+  fill_columns(readings, &guess_ridge, c);
+  orthogonalise(c);
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   const struct node *node = c->node;
   for (int k = 0; k < NODES; k++) {
@@ -624,7 +624,8 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
                               struct fit_system *system) {
   system->rise_q22 = set_model(&system->at, readings->residual, c);
   set_dip(readings, system, c);
-  orthogonalise(readings, &rounding_ridge, c);
+  fill_columns(readings, &rounding_ridge, c);
+  orthogonalise(c);
   system->amplitude_q28 = fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   struct node *node = c->node;
