@@ -19,12 +19,14 @@ if(NOT FINGERTIP_SENSOR IN_LIST FINGERTIP_SENSORS)
 endif()
 
 # A scene is a named set of capabilities and defaults for one use of the fingertip.
-#   raw    every frame the sensors can give; pressures and tare only
-#   press  every frame; location and force, no slip, no raw packets and no sync pin
-#   slip   every frame; location, force, slip, raw packets, sync pin: the least latency
-#   grasp  every frame; all there is: tangential load and what presses besides
-#   paper  as slip, in the published setting: 20 Hz, slip by eq. (7) with n = 2
-set(FINGERTIP_SCENES raw press slip grasp paper)
+#   raw     pressures and tare only
+#   press   location and force, in the least flash
+#   slip    location, force, slip, raw packets, sync pin: the least latency
+#   grasp   as slip, with tangential force, a search for outliers, and honest doubt where none is estimated
+#   shapes  as grasp, with contact shapes: two contacts, edges
+#   paper   as slip, in the published setting: 20 Hz, slip by eq. (7) with n = 2
+# host_tools/README.md has the table of what each computes, leaves out and costs.
+set(FINGERTIP_SCENES raw press slip grasp shapes paper)
 set(FINGERTIP_DEFAULT_SCENE grasp)
 set(FINGERTIP_SCENE ${FINGERTIP_DEFAULT_SCENE} CACHE STRING "Scene: one of ${FINGERTIP_SCENES}")
 set_property(CACHE FINGERTIP_SCENE PROPERTY STRINGS ${FINGERTIP_SCENES})
@@ -33,12 +35,13 @@ if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
 endif()
 
 # Capabilities: what is off is not compiled (firmware/config/capabilities.h).
-set(FINGERTIP_CAPABILITIES FIT SLIP TANGENTIAL RAW_STREAM SYNC)
+set(FINGERTIP_CAPABILITIES FIT FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL SHAPES RAW_STREAM SYNC)
 set(capabilities_of_raw RAW_STREAM)
 set(capabilities_of_press FIT)
-set(capabilities_of_slip FIT SLIP RAW_STREAM SYNC)
-set(capabilities_of_grasp FIT SLIP TANGENTIAL RAW_STREAM SYNC)
-set(capabilities_of_paper FIT SLIP RAW_STREAM SYNC)
+set(capabilities_of_slip FIT FULL_GRID SLIP RAW_STREAM SYNC)
+set(capabilities_of_grasp FIT FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL RAW_STREAM SYNC)
+set(capabilities_of_shapes ${capabilities_of_grasp} SHAPES)
+set(capabilities_of_paper FIT FULL_GRID OUTLIERS SLIP RAW_STREAM SYNC)
 foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
   set(option FINGERTIP_${capability})
   set(${option} SCENE CACHE STRING "ON, OFF, or SCENE: as the scene has it")
@@ -56,11 +59,16 @@ foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
   set(FT_WITH_${capability} $<BOOL:${wanted}>) # 0 or 1
   set(has_${capability} ${wanted})
 endforeach()
-if(has_SLIP AND NOT has_FIT)
-  message(FATAL_ERROR "FINGERTIP_SLIP needs FINGERTIP_FIT: slip is found from fits")
+foreach(capability FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL)
+  if(has_${capability} AND NOT has_FIT)
+    message(FATAL_ERROR "FINGERTIP_${capability} needs FINGERTIP_FIT: it is found from fits")
+  endif()
+endforeach()
+if(has_OUTLIERS AND NOT has_FULL_GRID)
+  message(FATAL_ERROR "FINGERTIP_OUTLIERS needs FINGERTIP_FULL_GRID: a search takes the time that the faster kernel saves")
 endif()
-if(has_TANGENTIAL AND NOT has_FIT)
-  message(FATAL_ERROR "FINGERTIP_TANGENTIAL needs FINGERTIP_FIT: tangential load is found from fits")
+if(has_SHAPES AND NOT has_TANGENTIAL)
+  message(FATAL_ERROR "FINGERTIP_SHAPES needs FINGERTIP_TANGENTIAL: both need the pad's profile")
 endif()
 if(NOT has_FIT AND NOT has_RAW_STREAM)
   message(FATAL_ERROR "with FINGERTIP_FIT and FINGERTIP_RAW_STREAM off nothing would be streamed; switch one on")

@@ -18,11 +18,19 @@
 #if FT_WITH_FIT_GENERAL
 #define INIT_ARRAY fit_array_init
 #define FIT fit_gaussian_follow
-#else
+#elif FT_WITH_OUTLIERS
 #define INIT_ARRAY fit_array_init_grid
 #define FIT fit_gaussian_grid_follow
-_Static_assert(DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERAL");
+#elif FT_WITH_FULL_GRID
+#define INIT_ARRAY fit_array_init_grid
+#define FIT(array, pressure, usable, settings, watch, result)                                                          \
+  fit_gaussian_grid_plain(array, pressure, usable, settings, result)
+#else
+#define INIT_ARRAY fit_array_init_grid
+#define FIT(array, pressure, usable, settings, watch, result)                                                          \
+  fit_gaussian_grid_small(array, pressure, usable, settings, result)
 #endif
+_Static_assert(FT_WITH_FIT_GENERAL || DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERAL");
 
 void location_stage_start(struct location_stage *own) {
   if (INIT_ARRAY(&own->array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {

@@ -17,7 +17,9 @@ void stages_start(struct stages *stages) {
 #endif
 #if FT_WITH_TANGENTIAL
   tangential_stage_start(&stages->tangential, &stages->location.array, &stages->jobs);
+#if FT_WITH_SHAPES
   shapes_stage_start(&stages->shapes, &stages->location.array, &stages->jobs);
+#endif
   jobs_start(&stages->jobs);
 #endif
 #if FT_WITH_SLIP
@@ -45,6 +47,8 @@ static void fit_readings(struct stages *stages, struct findings *found) {
 #if FT_WITH_TANGENTIAL
   jobs_begin_frame(&stages->jobs, found->frame.t_us);
   tangential_stage_ask(&stages->tangential, &stages->location, &stages->jobs, found);
+#endif
+#if FT_WITH_SHAPES
   shapes_stage_ask(&stages->shapes, &stages->location, &stages->tangential.settings, &stages->jobs, found);
 #endif
 }
@@ -66,6 +70,8 @@ static __attribute__((noinline)) void judge_fit(struct stages *stages, struct fi
 #if FT_WITH_TANGENTIAL
   begin(found, CRASH_AT_FIT);
   tangential_stage_wait(&stages->tangential, &stages->jobs, found);
+#endif
+#if FT_WITH_SHAPES
   shapes_stage_judge_tangential(&stages->shapes, found);
 #endif
 #if FT_WITH_TANGENTIAL_DOUBT
@@ -75,6 +81,8 @@ static __attribute__((noinline)) void judge_fit(struct stages *stages, struct fi
   begin(found, CRASH_AT_CONTACT);
   tangential_stage_scale(&stages->tangential, &stages->location, found);
   motion_update(&stages->motion, &stages->tangential.settings, &found->contact_input, &found->contact, &found->motion);
+#endif
+#if FT_WITH_SHAPES
   shapes_stage_locate(&stages->shapes, &stages->location, found);
 #endif
 }
@@ -104,6 +112,8 @@ static void send_contact(const struct stages *stages, const struct findings *fou
   location_stage_put(found, packet);
 #if FT_WITH_TANGENTIAL
   tangential_stage_put(found, packet);
+#endif
+#if FT_WITH_SHAPES
   shapes_stage_put(&stages->shapes, found, packet);
 #endif
   line_send(line, &wire_contact_layout, found->frame.t_us);
@@ -135,6 +145,8 @@ void stages_follow(struct stages *stages, const struct findings *found, struct s
 #if FT_WITH_TANGENTIAL
   port_at(CRASH_AT_FIT);
   jobs_serve_alone(&stages->jobs, JOB_TANGENTIAL);
+#endif
+#if FT_WITH_SHAPES
   jobs_serve_alone(&stages->jobs, JOB_SHAPES);
 #endif
   port_at(CRASH_AT_CONDITION);
@@ -193,6 +205,8 @@ static void forget_jobs(struct stages *stages) {
 #if FT_WITH_TANGENTIAL
   jobs_cancel(&stages->jobs);
   tangential_stage_forget(&stages->tangential);
+#endif
+#if FT_WITH_SHAPES
   shapes_stage_forget(&stages->shapes);
 #endif
 }
@@ -214,7 +228,9 @@ void stages_use_profile(struct stages *stages, const struct pad_profile *profile
   forget_jobs(stages);
 #if FT_WITH_TANGENTIAL
   tangential_stage_use_profile(&stages->tangential, profile);
+#if FT_WITH_SHAPES
   shapes_stage_use_profile(&stages->shapes, stages->tangential.profile);
+#endif
   location_stage_use_profile(&stages->location, stages->tangential.profile != NULL);
   tangential_stage_use_scale(&stages->tangential, &stages->location, &stages->contact_settings);
   motion_reset(&stages->motion);

@@ -37,8 +37,10 @@ struct stages {
 #if FT_WITH_TANGENTIAL
   struct jobs jobs;
   struct tangential_stage tangential;
-  struct shapes_stage shapes;
   struct motion_history motion;
+#endif
+#if FT_WITH_SHAPES
+  struct shapes_stage shapes;
 #endif
 #if FT_WITH_SLIP
   struct slip_history slip;

@@ -19,19 +19,32 @@
 #define FT_WITH_SLIP FINGERTIP_SLIP
 #endif
 
-/* Tangential load, and the commands that bring and erase the pad's profile. */
+/* The kernel for full rectangles: faster, and with separate widths and ELONGATED (fit.h). Without
+ * it, that for missing sensors fits all frames. */
+#ifndef FT_WITH_FULL_GRID
+#define FT_WITH_FULL_GRID FINGERTIP_FULL_GRID
+#endif
+
+/* The search for a sensor whose reading does not belong to the others'. Builds with
+ * FT_WITH_FIT_GENERAL have it always. */
+#ifndef FT_WITH_OUTLIERS
+#define FT_WITH_OUTLIERS FINGERTIP_OUTLIERS
+#endif
+
+/* Tangential force, and the commands that bring and erase the pad's profile. */
 #ifndef FT_WITH_TANGENTIAL
 #define FT_WITH_TANGENTIAL FINGERTIP_TANGENTIAL
 #endif
 
-/* What a tangential load that is not estimated does to the location: fit_doubt.h. The paper's scene
- * keeps the paper's fit. */
+/* What a tangential force that is not estimated does to the standard deviation of the location
+ * (fit_doubt.h), and learning from touches how far gains are apart (fit_gains.h). */
 #ifndef FT_WITH_TANGENTIAL_DOUBT
-#ifdef FINGERTIP_SCENE_PAPER
-#define FT_WITH_TANGENTIAL_DOUBT 0
-#else
-#define FT_WITH_TANGENTIAL_DOUBT FT_WITH_FIT
+#define FT_WITH_TANGENTIAL_DOUBT FINGERTIP_TANGENTIAL_DOUBT
 #endif
+
+/* Contact shapes: two contacts, edges (fit_shapes.h). */
+#ifndef FT_WITH_SHAPES
+#define FT_WITH_SHAPES FINGERTIP_SHAPES
 #endif
 
 /* The raw packets. */
@@ -48,7 +61,13 @@
 #error "slip is found from fits: switch FINGERTIP_FIT on too"
 #endif
 #if FT_WITH_TANGENTIAL && !FT_WITH_FIT
-#error "tangential load is found from fits: switch FINGERTIP_FIT on too"
+#error "tangential force is found from fits: switch FINGERTIP_FIT on too"
+#endif
+#if (FT_WITH_FULL_GRID || FT_WITH_OUTLIERS || FT_WITH_TANGENTIAL_DOUBT) && !FT_WITH_FIT
+#error "these are parts of the fit: switch FINGERTIP_FIT on too"
+#endif
+#if FT_WITH_SHAPES && !FT_WITH_TANGENTIAL
+#error "contact shapes need the pad's profile: switch FINGERTIP_TANGENTIAL on too"
 #endif
 #if !FT_WITH_FIT && !FT_WITH_RAW_STREAM
 #error "nothing would be streamed: switch FINGERTIP_FIT or FINGERTIP_RAW_STREAM on"

@@ -10,8 +10,8 @@ static uint32_t all_sensors(const struct fit_array *array) {
 }
 
 /* The faster kernel, or that for missing sensors. Returns whether the residuals suggest an outlier. */
-static bool fit_rectangle(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                          const struct fit_settings *settings, struct fit_result *result) {
+FIXED_INLINE bool fit_rectangle(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                                const struct fit_settings *settings, struct fit_result *result) {
   if (usable == all_sensors(array) && !fit_steps_want_dip(array, settings)) {
     return fit_grid(array, pressure_Pa_q10, settings, result);
   }
@@ -68,6 +68,24 @@ void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pres
     watch->residual_rms_Pa = result->residual_rms_Pa;
     watch->force_N = result->force_N;
   }
+}
+
+void fit_gaussian_grid_plain(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                             const struct fit_settings *settings, struct fit_result *result) {
+  if (settings->noise_Pa_q10 < 1) {
+    *result = (struct fit_result){0};
+    return;
+  }
+  fit_rectangle(array, pressure_Pa_q10, usable & all_sensors(array), settings, result);
+}
+
+void fit_gaussian_grid_small(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                             const struct fit_settings *settings, struct fit_result *result) {
+  if (settings->noise_Pa_q10 < 1) {
+    *result = (struct fit_result){0};
+    return;
+  }
+  fit_grid_masked(array, pressure_Pa_q10, usable & all_sensors(array), settings, result);
 }
 
 void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

@@ -17,19 +17,26 @@ from elf import Elf, fail
 # Objects below firmware/CMakeFiles, and names of other symbols.
 OWNED = {
     "FIT": (
-        ["ft_fit.dir/fit/*.obj", "ft_app.dir/app/location_stage.c.obj", "ft_app.dir/app/doubt_stage.c.obj"],
+        ["ft_fit.dir/fit/*.obj", "ft_app.dir/app/location_stage.c.obj"],
         r"wire_contact_\w+|contact_weigh|cmd_(calibrate|prior|location_limit)_\w+",
     ),
     "SLIP": (["ft_contact.dir/contact/slip.c.obj"], r"contact_update|cmd_slip_\w+"),
+    "FULL_GRID": (["ft_fit.dir/fit/fit_grid.c.obj"], r"fit_grid"),
+    "OUTLIERS": ([], r"fit_grid_outlier|leave_outlier_out|fit_gaussian_grid_follow"),
+    "TANGENTIAL_DOUBT": (
+        ["ft_fit.dir/fit/fit_doubt.c.obj", "ft_fit.dir/fit/fit_gains.c.obj", "ft_app.dir/app/doubt_stage.c.obj"],
+        r"fit_(doubt|gains)_\w+",
+    ),
+    "SHAPES": (
+        ["ft_fit.dir/fit/fit_shapes*.obj", "ft_contact.dir/contact/shapes.c.obj", "ft_app.dir/app/shapes_stage.c.obj"],
+        r"fit_shapes\w*",
+    ),
     "TANGENTIAL": (
         [
             "ft_fit.dir/fit/fit_tangential*.obj",
-            "ft_fit.dir/fit/fit_shapes*.obj",
             "ft_contact.dir/contact/tangential.c.obj",
-            "ft_contact.dir/contact/shapes.c.obj",
             "ft_app.dir/app/jobs.c.obj",
             "ft_app.dir/app/tangential_stage.c.obj",
-            "ft_app.dir/app/shapes_stage.c.obj",
         ],
         r"store_put_profile|cmd_(pad|erase_pad)_\w+",
     ),

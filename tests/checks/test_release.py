@@ -87,7 +87,7 @@ class Release(Folder):
 
     def test_every_board_in_every_scene(self):
         self.assertLessEqual({"pico_mux", "pico_parallel"}, set(release.boards(ROOT)))
-        self.assertEqual(release.scenes(ROOT), ["raw", "press", "slip", "grasp", "paper"])
+        self.assertEqual(release.scenes(ROOT), ["raw", "press", "slip", "grasp", "shapes", "paper"])
 
     def test_what_it_refuses(self):
         tree = self.folder / "tree"

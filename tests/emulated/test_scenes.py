@@ -1,5 +1,6 @@
-"""The images of the scenes raw, press and slip in the emulator: a packet has no field of what is off, and no command brings it back; the
-board's own, of scene grasp, tells the tangential load in every frame. It keeps up, and so does slip.
+"""The images of the scenes raw, press, slip and shapes in the emulator, and the board's own, of scene grasp: a packet has no field of what
+is off, and no command brings it back. Scenes grasp and shapes report the tangential force in every frame, and shapes the contact shape too.
+Slip, grasp and shapes keep up with the fastest sensors.
 
 usage: test_scenes.py --scenes FOLDER --image FILE.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
@@ -114,7 +115,7 @@ class Scenes(unittest.TestCase):
         """With a pad's profile, if it takes one: the recording, and which of its rows are of the last 0.9 s."""
         extra = [(0.455, encoded("--sequence", "6", "osr", "256")), (0.5, encoded("--sequence", "7", "pad", "12", "0"))]
         run = Run(self.folder.name, scene, "contact", extra)
-        self.assertEqual({name: run.acks[name] for name in ("6", "7")}, {"6": "0", "7": "0" if scene == "grasp" else UNKNOWN_COMMAND})
+        self.assertEqual({name: run.acks[name] for name in ("6", "7")}, {"6": "0", "7": UNKNOWN_COMMAND if scene == "slip" else "0"})
         recording = run.recording
         self.assertEqual(recording.metadata["scene"], scene)
         late = recording["t_us"] > recording["t_us"][-1] - 900e3
@@ -125,15 +126,20 @@ class Scenes(unittest.TestCase):
         self.assertEqual(recording.health()[-1]["frames_skipped"], 0)
         return recording, late
 
-    def test_slip_keeps_up_without_a_load(self):
+    def test_slip_keeps_up_without_a_tangential_force(self):
         recording, late = self.at_the_fastest("slip")
         self.assertTrue(recording.flag(files.FIT_VALID)[late].all())
         self.assertFalse(recording.flag(files.TANGENTIAL_VALID | int(Flag.SHAPE_VALID)).any())
 
-    def test_grasp_tells_the_tangential_load_in_every_frame(self):
+    def test_grasp_reports_the_tangential_force_in_every_frame(self):
         recording, late = self.at_the_fastest("grasp")
         self.assertTrue(recording.flag(files.TANGENTIAL_VALID)[late].all())
-        # What presses is known by then, and of a frame not long before.
+        self.assertFalse(recording.flag(int(Flag.SHAPE_VALID)).any())
+
+    def test_shapes_reports_the_contact_shape_too(self):
+        recording, late = self.at_the_fastest("shapes")
+        self.assertTrue(recording.flag(files.TANGENTIAL_VALID)[late].all())
+        # The shape is known by then, and of a frame shortly before.
         self.assertTrue(recording.flag(int(Flag.SHAPE_VALID))[late].all())
         self.assertLess(recording["shape_age_ms"][late].max(), 10)
 

@@ -1,4 +1,4 @@
-"""The release images, of scene grasp, with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two, on calibrated rubber with a dip, where the fit costs most, and with a sensor that reads double."""
+"""The release images, of scene grasp (with two contacts of scene shapes), with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two, on calibrated rubber with a dip, where the fit costs most, and with a sensor that reads double."""
 
 import math
 import pathlib
@@ -9,6 +9,7 @@ from emulated import FROM_s, Measurement, Tools, distribution, scenario
 from fingertip.files import TANGENTIAL_VALID, read_recording
 from fingertip.line import Flag
 from reporting import run
+from scenes import SceneTools
 
 PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
 CALIBRATED = ("5.5", "5.8")  # width of a contact, mm, and its dip, %: as a calibration finds them on the twin's rubber with a dip
@@ -96,7 +97,8 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
     )
 
     def one(board, path, *commands):
-        return Measurement(tools, folder, board, 256, path, seconds, commands=[*commands, tools.encoded("pad", *PAD)])
+        of_scene = SceneTools(build, boards, "shapes") if path is two else tools
+        return Measurement(of_scene, folder, board, 256, path, seconds, commands=[*commands, tools.encoded("pad", *PAD)])
 
     cases = [(short(board), board, wander, ()) for board in on] + [("two", PARALLEL, two, ())]
     cases.append(("calibrated", PARALLEL, dipped, (tools.encoded("calibrate", *CALIBRATED),)))
@@ -112,7 +114,7 @@ def figures(runs):
     parallel, two = runs[short(PARALLEL)], runs["two"]
     latency_us, of_two_us = distribution(parallel.offered_us), distribution(two.offered_us)
     calibrated_us = distribution(runs["calibrated"].offered_us)
-    recording = read_recording(f"{parallel.name}.csv")
+    recording, of_two = read_recording(f"{parallel.name}.csv"), read_recording(f"{two.name}.csv")
     return {
         **{f"grasp_{name}_fps_osr256": one.fitted_per_s for name, one in runs.items() if name in map(short, BOARDS)},
         **{f"grasp_{name}_latency_median_us": distribution(one.offered_us)["median"] for name, one in runs.items() if name != "two"},
@@ -126,6 +128,6 @@ def figures(runs):
         "grasp_two_latency_p99_us": of_two_us["p99"],
         "grasp_sleep_percent": parallel.sleep_percent,
         "grasp_load_percent": share_of(recording, TANGENTIAL_VALID, parallel.seconds),
-        "grasp_shape_percent": share_of(recording, Flag.SHAPE_VALID, parallel.seconds),
-        "grasp_shape_age_ms": float(np.nanmean(recording["shape_age_ms"])),
+        "grasp_shape_percent": share_of(of_two, Flag.SHAPE_VALID, two.seconds),
+        "grasp_shape_age_ms": float(np.nanmean(of_two["shape_age_ms"])),
     }

@@ -120,7 +120,7 @@ def text(found, how):
         f"core asleep {found['grasp_sleep_percent']:.1f} %. A packet is offered {found['grasp_parallel_latency_median_us']:.0f} us after the conversion in the median, p99",
         f"{found['grasp_latency_p99_us']:.0f}, with two contacts {found['grasp_two_latency_p99_us']:.0f}, with a sensor that reads double {found['grasp_broken_latency_p99_us']:.0f}",
         f"(at {found['grasp_broken_fps_osr256']:.1f} frames/s). {found['grasp_load_percent']:.1f} % of the frames have a load, which is that of the",
-        f"frame before, and {found['grasp_shape_percent']:.1f} % say what presses, on average {found['grasp_shape_age_ms']:.1f} ms after it.",
+        f"frame before, and {found['grasp_shape_percent']:.1f} % of scene shapes have a contact shape, on average {found['grasp_shape_age_ms']:.1f} ms old.",
     ]
     return "\n".join([*lines, "", "## By scene", "", *scenes.text(found["scenes"])]) + "\n"
 

@@ -22,8 +22,8 @@ from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from reporting import Steps, run, write_json  # noqa: E402
 from presentation import table_md  # noqa: E402
 
-SCENES = ("raw", "press", "slip", "grasp", "paper")
-STREAM = {"raw": "raw", "press": "contact", "slip": "contact", "grasp": "contact", "paper": "contact"}
+SCENES = ("raw", "press", "slip", "grasp", "shapes", "paper")
+STREAM = dict.fromkeys(SCENES, "contact") | {"raw": "raw"}
 # The contact of the scenario "wander" stands from 0.65 s on; windows of whole temperature intervals.
 REST_s = (0.5, 0.58)
 CONTACT_FROM_s, WINDOW_s, SETTLE_s = 1.0, 1.0, 0.1

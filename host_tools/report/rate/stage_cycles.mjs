@@ -27,6 +27,8 @@ const STAGES = {
   condition_follow: 'condition',
   fit_gaussian_follow: 'fit',
   fit_gaussian_grid_follow: 'fit',
+  fit_gaussian_grid_plain: 'fit',
+  fit_gaussian_grid_small: 'fit',
   contact_update: 'contact',
   contact_judge: 'contact',
   wire_encode: 'encode',

@@ -1,6 +1,6 @@
 """What the firmware makes of one contact, a long one, one under a tangential force, and two.
 
-The twin's objects press on calibrated pads of 12 mm with a dip, and hold still while the firmware's fit_shapes answers, as scene grasp runs
+The twin's objects press on calibrated pads of 12 mm with a dip, and hold still while the firmware's fit_shapes answers, as scene shapes runs
 it. Judged are the first answer and that HELD_FRAMES later. Two contacts are the sum of their pressures. The constants of fit_shapes were
 chosen with the seeds 20000 and 30000, the rules of shapes_locate were tried with 50000 and 60000.
 """

@@ -29,7 +29,7 @@ def write(found, path):
         "# Contact shapes",
         "",
         "Written by `sh cmake/bootstrap.sh report two`. Simulated pads of 12 mm with a dip, calibrated; the firmware's own code,",
-        "as scene grasp runs it. No public recording has two contacts and their truth.",
+        "as scene shapes runs it. No public recording has two contacts and their truth.",
         "",
         "![Pairs by distance, what touches are called](two.png)",
         "",
