@@ -36,7 +36,7 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
                                    float pitch_mm);
 
 /* A second fit leaves out a sensor whose reading does not belong to the others' (fit_limits.h).
- * SENSOR_MASKED and `used` show it. The fit looks for one only where residuals are rough, and more
+ * SENSOR_MASKED and `used` show it. The fit searches for one only where residuals are rough, and more
  * than noise, gains and model explain.
  *
  * Widths and ELONGATED need every sensor of the grid.

@@ -25,7 +25,7 @@ _Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 /* Of the model's own error, MODEL_SHARE_SHIFT: a half of model_sd is independent from sensor to
  * sensor. The other unknowns take the rest. */
 #define MODEL_SHARE_SHIFT 1
-/* A trace is one whose square is beyond so many times the sum of its two variances, which chance
+/* A trace is one whose square exceeds SURE times the sum of its two variances, which chance
  * makes in one press of seven. */
 #define SURE 2
 
@@ -163,7 +163,7 @@ static void set_rows(struct fit_doubt_search *look, int from, int to) {
   }
 }
 
-/* Brings a column to 13 bits, or so many that the sums hold, and returns the sum of its squares. */
+/* Brings a column to 13 bits, or to 12 so that the sums hold, and returns the sum of its squares. */
 static NOINLINE int32_t normalise(struct fit_doubt_search *look, int u, int32_t prior_q30) {
   int32_t shift = fixed_bits(look->size[u] | fixed_size(prior_q30)) - (look->count > 16 ? 12 : 13);
   shift = shift < 1 ? 1 : shift;

@@ -3,7 +3,7 @@
  * A load that pulls along the rubber moves the Gaussian by some 0.38 pitch for each unit of Q / F,
  * though nothing has moved. It leaves a trace in the residual: its pressure is broader than the
  * difference of two places of a contact. The look here finds how large that trace is, beyond what
- * noise, gains and model leave by chance. So much of a load is part of the location's error. A
+ * noise, gains and model leave by chance. That much of a load is part of the location's error. A
  * press without a load has no such trace, so it is not doubted for what it might carry.
  *
  * A look is one least squares in fixed point, of the residual of a fit that is done: for every

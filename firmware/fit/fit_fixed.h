@@ -102,10 +102,10 @@ FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int
 }
 
 /* What is left of unknown j of a least squares once those before have been taken from it; of no
- * use below FIXED_PIVOT_LEAST, where it is not told from them. */
+ * use below FIXED_PIVOT_LEAST, where the readings do not separate it from them. */
 struct fixed_pivot {
   int32_t half;        /* the element on the diagonal is 2^28 to 2^30 over 2^(2 half) */
-  int32_t inverse_q14; /* of that element, 2^28 to 1; 0: not told */
+  int32_t inverse_q14; /* of that element, 2^28 to 1; 0: not determined */
   int32_t own, over;   /* right-hand side, Q15, and over the element, Q14 */
 };
 #define FIXED_PIVOT_LEAST (1 << 18) /* 2^-12 */

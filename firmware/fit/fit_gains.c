@@ -8,11 +8,11 @@
 #define SHARE_PER_CUBE 0.58f
 #define WIDTH_LEAST 0.55f /* pitches */
 #define WIDTH_MOST 1.0f
-#define WIDTH_USUAL 0.6f  /* of the touches that what was assumed stands for */
+#define WIDTH_USUAL 0.6f  /* of the touches that the assumed value counts for */
 #define REST_SHARE 0.02f  /* of p0 */
 #define NOISE_SHARE 0.05f /* of what remains, at most */
 #define VARIANCE_USUAL 0.01f
-#define TIMES_MOST 8.0f /* of these or what is learnt: one odd touch says little */
+#define TIMES_MOST 8.0f /* of these or what is learnt: one odd touch shows little */
 #define SD_LEAST 0.08f
 #define SD_MOST 0.5f
 #define PARAMETERS 4

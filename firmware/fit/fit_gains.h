@@ -7,7 +7,7 @@
  * R and M the squares of the touch's residual, less those of the model's error, and of the fitted
  * Gaussian. The denominator is the share of independent relative errors that the fit leaves, the
  * mean over all places: within 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to
- * 1 pitch. Narrower contacts leave too little to tell.
+ * 1 pitch. Narrower contacts leave too little.
  *
  * Gains that lie on a tilt or a bowl over the pad move and widen the fit and leave nothing in the
  * residual. So it is never below 0.08, however well the readings fit.
@@ -20,7 +20,7 @@
 #include "fit/fit.h"
 
 #define FIT_GAINS_TOUCHES 4
-/* So many touches at most are remembered, so that another pad is learnt. */
+/* At most this number of touches is remembered, so that another pad is learnt. */
 #define FIT_GAINS_TOUCHES_MOST 64
 
 struct fit_gains {

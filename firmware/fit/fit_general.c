@@ -30,7 +30,7 @@
 #define P0_MIN 0.05f         /* of the largest reading */
 #define P0_MAX 1e6f          /* reached 30 mm outside the array */
 #define LEAST_FREE 0.015625f /* 1 - leverage, in a studentised residual */
-#define PIVOT_FLOOR 2e-7f    /* of the diagonal entry: float32 tells no less */
+#define PIVOT_FLOOR 2e-7f    /* of the diagonal entry: float32 resolves no less */
 
 /* Symmetric 4 x 4 and right-hand side. matrix[i][j] for j <= i. */
 struct normal_equations {
@@ -225,7 +225,7 @@ static float linearise(const struct fit_array *array, const struct samples *samp
     add_row(normal, of_prior, prior.weight * (prior.sigma - theta->sigma));
   }
   if (array->is_line) {
-    /* Nothing else tells the coordinate across the line: this row alone brings it there. */
+    /* Nothing else determines the coordinate across the line: this row alone brings it there. */
     float across = theta->x * array->line_x + theta->y * array->line_y;
     float of_line[PARAMETERS] = {0.0f, array->line_x, array->line_y, 0.0f};
     float gain = theta->sigma * theta->sigma / theta->p0;
@@ -354,7 +354,7 @@ static void set_influence(const struct fit_array *array, const struct parameters
   influence->force_form = influence_along(normal, along_force, 1.0f / at->p0, influence->force);
   float along_x[PARAMETERS] = {0.0f, 1.0f, 0.0f, 0.0f};
   float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
-  if (array->is_line) { /* x stands for the coordinate along it, nothing for that across */
+  if (array->is_line) { /* x is the coordinate along it, nothing for that across */
     along_x[1] = -array->line_y;
     along_x[2] = array->line_x;
     along_y[2] = 0.0f;

@@ -3,7 +3,7 @@
  *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
  * with p and q the polynomials of degree 1 and 2 that are orthogonal over the nodes under gx^2 and
  * gy^2. These four are orthogonal to each other: the normal matrix is diagonal, and where the data
- * hardly tell a direction apart, a small diagonal element says so with its full relative precision
+ * hardly determine a direction, a small diagonal element shows it with its full relative precision
  * instead of as a difference of large ones. That is what lets 16-bit factors do.
  *
  * The amplitude is no unknown: each evaluation takes the best one for the shape (variable
@@ -151,7 +151,7 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
     moment += (i - origin) * square;
   }
   f->linear_norm = norm;
-  /* The mean under linear^2. Where that is too small to tell, any value serves. */
+  /* The mean under linear^2. Where that is too small to matter, any value serves. */
   int32_t skew = norm < 1 << 13 ? f->mean : fixed_div_q26(moment, norm);
 
   f->slope = skew + f->mean;
@@ -658,7 +658,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
     system.at = state;
     evaluate(&readings, left > coarse && left > FINE_ITERATIONS, &m, &system);
     fit_grid_step(grid, &system, &state);
-    if (left == 0) { /* the guess is asked for: the step only tells how good it is */
+    if (left == 0) { /* the guess is asked for: the step only shows how good it is */
       state = system.at;
     }
     left--;

@@ -98,7 +98,7 @@ enum { STEP = sizeof(struct node) / sizeof(int32_t) };
 /* A column that the dip adds to may double when it is made orthogonal to the model. */
 #define COLUMN_BITS(has_dip) ((has_dip) ? 14 : 15)
 
-/* Brings a column in Qraw_q to so many bits; returns its norm with the ridge. What is smaller stays
+/* Brings a column in Qraw_q to this number of bits; returns its norm with the ridge. What is smaller stays
  * as it is, since there is nothing below its last bit. */
 FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q, const struct ridge *ridge,
                                int32_t *q) {
@@ -119,7 +119,7 @@ FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int
   return norm;
 }
 
-/* A polynomial as it acts on the model or on the dip: a part along x plus one along y. */
+/* A polynomial as it applies to the model or on the dip: a part along x plus one along y. */
 struct polynomial {
   int32_t x[COLUMNS], y[ROWS];
 };
@@ -264,7 +264,7 @@ static NOINLINE void set_mass(const struct readings *readings, struct columns *c
 struct dips {
   struct polynomial p1, p2, p3;
 };
-/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further apart tell no more. */
+/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further apart show no more. */
 #define PART_MAX (32 << SQUARE_Q)
 static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
   const int32_t off_x = c->centre_x - c->mean_x, off_y = c->centre_y - c->mean_y;
@@ -720,7 +720,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
     system.at.height = state.height;
     evaluate(&readings, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &system);
     fit_grid_step(grid, &system, &state);
-    if (left == 0) { /* the guess is asked for: the step only tells how good it is */
+    if (left == 0) { /* the guess is asked for: the step only shows how good it is */
       state = system.at;
     }
     left--;

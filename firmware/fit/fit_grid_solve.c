@@ -220,7 +220,7 @@ static NOINLINE struct scaled location_form(const struct fit_system *system, con
 }
 
 /* Variance of one reading that is the same for all of them, in units of Q28, and what the residuals
- * say besides. */
+ * show besides. */
 struct scatter {
   struct scaled noise; /* the noise's alone */
   struct scaled all;   /* and the model's, and what the residuals are above these and the gains' */

@@ -1,5 +1,5 @@
 /* Inside the fixed-point kernels alone: the normal equations of one iteration, the step they ask
- * for, and what the last of them say about the result. How a kernel comes by them is its own
+ * for, and what the last of them imply for the result. How a kernel comes by them is its own
  * affair.
  */
 #ifndef FIT_FIT_GRID_SOLVE_H

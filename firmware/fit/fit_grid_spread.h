@@ -1,7 +1,7 @@
 /* Inside the fixed-point kernels alone: how an error of each reading moves the result. Errors that
  * are the same for every sensor, as the noise, need no more than the norms of the columns
  * (fit_grid_conclude); those of the gains are each sensor's own, and the model's own error has a
- * shape. So the kernel hands over the sensors one by one. fit_limits.h says which errors there are.
+ * shape. So the kernel hands over the sensors one by one. fit_limits.h lists the errors.
  */
 #ifndef FIT_FIT_GRID_SPREAD_H
 #define FIT_FIT_GRID_SPREAD_H
@@ -23,7 +23,7 @@ struct fit_spread {
   struct scaled amplitude, softness;                        /* the latter 1 / stiffness */
   /* dF / F is that of e, p1, p2 and p3 times 1, off_x, off_y (Q26) and lift_q24. */
   int32_t off_x, off_y, lift_q24;
-  int32_t gain_shift;  /* gains Q16 are used with so many bits more */
+  int32_t gain_shift;  /* gains Q16 are used with this number of bits more */
   int32_t shape_shift; /* the model error's shape in Q(21 - shape_shift) */
   /* Sums over the sensors. */
   uint32_t gains;    /* of the squared errors of the readings */

@@ -18,18 +18,18 @@
 #define FIT_NARROW_SIGMA 0.4f   /* pitches: an outlier may look like it */
 #define FIT_FLAT_SIGMA 4.9f     /* pitches */
 #define FIT_LOW_SIGNAL_SIGMA 20 /* noise standard deviations in the largest reading */
-#define FIT_HUGE 1e9f           /* stands for: nothing is known */
+#define FIT_HUGE 1e9f           /* means: nothing is known */
 
-/* The sensors' own (struct fit_own) is taken from the readings before so many of the last
+/* The sensors' own (struct fit_own) is taken from the readings before this number of the last
  * iterations, and the dip not later: by then the contact is known well enough, and the last step
- * tells whether the fit has settled. The own is of first order, so it changes no reading by more
+ * shows whether the fit has settled. The own is of first order, so it changes no reading by more
  * than this share of the model. */
 #define FIT_OWN_ITERATIONS 2
 #define FIT_OWN_SHARE_MAX 0.5f
 
 /* A sensor is an outlier if its studentised residual, in standard deviations of the others',
  * exceeds FIT_OUTLIER, and leaving it out brings the residuals below the share FIT_OUTLIER_GAIN.
- * The fit looks for one only after it has settled with residuals that are rough and no noise. */
+ * The fit searches for one only after it has settled with residuals that are rough and no noise. */
 #define FIT_OUTLIER 15
 #define FIT_OUTLIER_GAIN 0.5f
 
@@ -62,10 +62,10 @@
  * FIT_STRETCH_SURE standard deviations of the part from noise and gains, added in quadrature. The
  * cubes and spheres of a layer stay below FIT_STRETCH_LEAST. The fit reports the widths up to a
  * standard deviation of FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX). Below
- * FIT_SHAPE_LEAST pitches of sigma the layer's own profile looks elongated between the sensors.
+ * FIT_SHAPE_LEAST pitches of sigma the layer's own profile appears elongated between the sensors.
  * Where the pad's dip is known, a tail that is off by FIT_TAIL_ERROR of the peak, as wide as the
  * dip, counts as one standard deviation more: without it a third of the round touches of simulated
- * pads looked elongated, with a dip and without (chosen on twin seed 20000). If
+ * pads appeared elongated, with a dip and without (chosen on twin seed 20000). If
  * the contact is elongated, the location's standard deviation contains the shift by separate
  * widths. Beyond a stretch of FIT_STRETCH_LINEAR that shift is many times the error, so only its
  * share counts that falls with the square of the stretch. */
@@ -84,7 +84,7 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
   return positive ? settings->location_sd_limit_mm : FIT_LOCATION_SD_LIMIT_mm;
 }
 
-/* The dip never takes more than this share of the largest reading, and is used with a sd of so many
+/* The dip never takes more than this share of the largest reading, and is used with a sd within these limits in
  * pitches. */
 #define FIT_DIP_DEPTH_MAX 0.25f
 /* What the dip may be off by at each sensor, of itself. It counts where the derivatives have the

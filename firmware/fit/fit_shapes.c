@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define MODEL_SD_Q16 131 /* 0.002 of the largest reading */
-/* Readings whose errors are more than 3 % of their unit tell no shapes. */
+/* Readings whose errors are more than 3 % of their unit determine no shape. */
 #define BASE_MAX_Q22 (1 << 17)
 #define LOG2E_HALF_FLOAT 0.72134752f
 /* Frames of a contact, counted from 1. The load joins its model once the line has settled: both at

@@ -1,4 +1,4 @@
-/* What presses on the pad: one contact, a long one, one that pulls, or two.
+/* The shape of a contact: one, a long one, one that pulls, or two.
  *
  * Three models explain the readings of each frame by the pad's profile (common/pad_profile.h) and
  * by the dip that its calibration found (struct fit_settings):
@@ -11,11 +11,11 @@
  * answer after FIT_SHAPES_FRAMES frames, and then in every other one, which does not step.
  *
  * The answer compares chi^2, in standard deviations that contain noise, gains and the model's own
- * error. How large these errors really are is unknown, and the residuals tell it. So a model with
+ * error. How large these errors really are is unknown, and the residuals show it. So a model with
  * more unknowns is chosen where it makes chi^2 + 14 less by a quarter. Two are two bodies: apart,
- * without overlap, on the array. A pair that looks like a long contact is called long, and a long
+ * without overlap, on the array. A pair that resembles a long contact is called long, and a long
  * one hardly ever a pair. Beyond 2.75 pitches, where pairs across the array look like lines, a pair
- * counts as the likelier; so some longer edges are called two. What the other models say of the
+ * counts as the likelier; so some longer edges are called two. What the other models make of the
  * place is part of location_sd_mm, by how likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
@@ -34,14 +34,14 @@
 /* With fewer sensors there are hardly more readings than unknowns. */
 #define FIT_SHAPES_SENSORS 12
 
-/* A frame is done in so many parts, a model each, for a processor that has other work between
+/* A frame is done in this number of parts, a model each, for a processor that has other work between
  * them. */
 #define FIT_SHAPES_PARTS 3
 
 #define FIT_SHAPES_FRAMES 23
 
 /* Errors are some times what is stated of them. How many times is not known; that it is once counts
- * as so many readings. With unknown errors the likelihood of a model falls as a power of
+ * as this number of readings. With unknown errors the likelihood of a model falls as a power of
  * chi^2 + FIT_SHAPES_ERRORS. Where chi^2 is above it, the model itself may be wrong. */
 #define FIT_SHAPES_ERRORS 14
 
@@ -129,7 +129,7 @@ struct fit_shapes_pad {
 enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
                                const struct pad_profile *profile);
 
-/* Whether the result is of this frame. Where it is not, the one before stands: every other frame
+/* Whether the result is of this frame. Where it is not, the one before remains: every other frame
  * only steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
  * settings: its dip is the pad's, and cut_noises 0. */
 bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad, const int32_t *pressure_Pa_q10,
@@ -140,7 +140,7 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad, const
  */
 enum fit_shapes_progress {
   FIT_SHAPES_UNFINISHED,
-  FIT_SHAPES_STEPPED,  /* the frame is done, and the result of one before stands */
+  FIT_SHAPES_STEPPED,  /* the frame is done, and the result of one before remains */
   FIT_SHAPES_ANSWERED, /* the frame is done, and the result is of it */
 };
 enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad,

@@ -1,4 +1,4 @@
-/* Which model it is, and what that says of places, forces and directions. */
+/* Which model it is, and what follows for places, forces and directions. */
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
@@ -169,6 +169,8 @@ static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32
     }
     float likely = fit_float(chi_square_q8[best] + (FIT_SHAPES_ERRORS << 8), 0) /
                    fit_float(chi_square_q8[m] + (FIT_SHAPES_ERRORS << 8), 0);
+    /* Where the scale of the errors is unknown, the likelihood of n readings falls as chi^2 to the power n / 2. For
+     * fifteen that is the eighth, nearly. */
     likely *= likely;
     likely *= likely;
     likely *= likely;

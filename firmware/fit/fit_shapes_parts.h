@@ -60,7 +60,7 @@ void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *square
 void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell);
 /* Where a step begins is rounded, which moves the step and not where it ends. */
 void fit_shapes_round_places(struct fit_shapes_at *at);
-/* The weighted rows of a model with so many unknowns, columns Q27 and residual Q28. */
+/* The weighted rows of a model with this number of unknowns, columns Q27 and residual Q28. */
 void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations);
 

@@ -6,9 +6,9 @@
 #define SPAN_MAX (3 << 20)
 #define BALANCE_MAX (15 << 16) /* 0.94 */
 #define MOVE_MAX (1 << 18)     /* a quarter of a pitch */
-/* Of the diagonal. What readings hardly tell moves slowly: with less, noise drives it far, where
+/* Of the diagonal. What readings hardly determine moves slowly: with less, noise drives it far, where
  * the readings are no longer linear in it. The matrix that answers has hardly any, since it would
- * hide how little they tell from the standard deviations. */
+ * hide how little they determine from the standard deviations. */
 #define STEP_DAMPING_SHIFT 6
 #define ANSWER_DAMPING_SHIFT 10
 
@@ -124,7 +124,7 @@ static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *prior
   }
 }
 
-/* L D L^T in place, below the diagonal L 2^-half in Q14. An unknown that is not told from those
+/* L D L^T in place, below the diagonal L 2^-half in Q14. An unknown that is not separable from those
  * before stays where it is. right: 2^-half times the elements of D^-1 L^-1 right, Q14. */
 static NOINLINE void eliminate(struct fit_shapes_equations *equations, int32_t *right) {
   for (int j = 0; j < equations->count; j++) {

@@ -11,26 +11,17 @@
 /* Prior of both elongations. */
 #define ELONGATION_SD_mm2 3.0f
 
-/* Variances are those of the errors as stated, times a share of chi^2. Independent model errors of
- * MODEL_SD are more than layers make of smooth contacts. So a small chi^2 takes from the variance
- * what is the model's and the noise's; of what is the gains' it leaves so much, for these are what
- * they are. With a half, 2 % of the straight touches of pads of 10 % without a calibration read a
- * pull beyond two standard deviations, as should be (shear.json: raw_beyond_2sd_percent).
- * A pull takes chi^2 over its degrees of freedom, fifteen readings less some seven unknowns. A
- * place takes half of that: with all of it more than the 98 % that should be lie within two
- * standard deviations on rubber with a dip (seed 888 of the report shear, by_cast), and 7 % of the
- * round touches were warned of instead of 3 (seed 50000 of the report two). */
-#define GAINS_SHIFT 1
-#define MISFIT_SHIFT_PULL 3  /* 1 / 8 */
-#define MISFIT_SHIFT_PLACE 4 /* 1 / 16 */
-#define MISFIT_LEAST_Q16 6554
+/* Factors of the stated variances by chi^2. NUMERICS.md has their reasons ("What the firmware does not report"). */
+#define GAINS_SHIFT 1         /* 1 / 2: share of the gains' part that a small chi^2 leaves */
+#define MISFIT_SHIFT_PULL 3   /* chi^2 / 8 of a tangential force: its degrees of freedom */
+#define MISFIT_SHIFT_PLACE 4  /* chi^2 / 16 of a location: by the coverage on rubber with a dip */
+#define MISFIT_LEAST_Q16 6554 /* 0.1 */
 
-/* A layer thinner than the pitch shows less of its shape than the residuals tell: standard
- * deviations grow as (pitch / thickness)^2. On 6 mm, where errors are 2.3 times what they would be
- * called, by 2.25; the widest term's sd is 0.478 of the thickness. */
+/* Thickness of a layer in units of length: the widest term's sd is 0.478 of the thickness. On layers thinner than
+ * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
 #define THICKNESS_PER_UNIT 1.0455f
 
-/* Beyond this share of it the contact is too long to tell a load from its shape: of lying cylinders
+/* Beyond this share of it the contact is too long to separate a tangential force from its shape: of lying cylinders
  * without load 15 % would claim one, 1 % do (report, elongated_false_percent). A pad that ends
  * nearer than three quarters of its thickness makes round contacts look long: there all are taken.
  */
@@ -54,18 +45,18 @@
 
 /* The first step leaves what a layer is not a Gaussian; after one longer than 0.2 of the longest
  * the estimate is off its optimum by some 0.1 mm, after a jump of the Gaussian too. */
-#define STEPS_TOLD 2
-#define LENGTH_TOLD_Q14 3277
+#define STEPS_REPORTED 2
+#define LENGTH_REPORTED_Q14 3277
 #define JUMP_Q26 (ONE_Q26 / 2)
 /* The Gaussian's place jitters more than the estimate's in the corners. */
 #define MOVED_NOISES 4
 /* Sum of the readings, scaled so that the largest is 0.5 to 1. A smaller sum cannot come from a
  * contact. */
 #define SUM_LEAST_Q20 (1 << 18)
-/* After so many frames in a row without a report it starts again: one more than a contact at rest
+/* After this number of frames in a row without a report it starts again: one more than a contact at rest
  * takes. Where another contact has come and gone it is found again within ten frames, without this
  * after hundreds. */
-#define UNTOLD_MOST 6
+#define UNREPORTED_MOST 6
 
 #define DIP_SD_LEAST_Q13 (1 << 11) /* the narrowest that a term may be */
 #define DIP_SD_MOST_Q13 (1 << 15)
@@ -181,7 +172,7 @@ NOINLINE static bool weigh(const struct fit_array *array, const struct fit_setti
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
 
-/* What the Gaussian says of the unknowns. */
+/* The unknowns by the Gaussian. */
 NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_result *fit, int32_t shift,
                                   struct fit_tangential_unknowns *at) {
   at->x_q26 = product(fit_fixed(fit->x_mm, 24) - pad->origin_x_q24_mm, pad->per_unit_q30, 28);
@@ -408,24 +399,24 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
     state->steps = 0;
     return;
   }
-  struct fit_tangential_unknowns said;
+  struct fit_tangential_unknowns of_fit;
   struct outcome outcome;
-  set_from_fit(pad, fit, problem.readings.shift, &said);
-  begin(pad, state, &said,
+  set_from_fit(pad, fit, problem.readings.shift, &of_fit);
+  begin(pad, state, &of_fit,
         product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30, 28),
         sum_of(&problem.readings));
-  int32_t long_sd_q26 = fixed_mul_q28(said.amplitude_q24 * 4, pad->long_sd_q26) * 4;
+  int32_t long_sd_q26 = fixed_mul_q28(of_fit.amplitude_q24 * 4, pad->long_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
   problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
   fit_tangential_improve(&problem, &state->at, &pad->room, &outcome);
-  if (state->steps < STEPS_TOLD) {
+  if (state->steps < STEPS_REPORTED) {
     state->steps++;
   }
-  if (state->steps == STEPS_TOLD && outcome.length_q14 <= LENGTH_TOLD_Q14) {
+  if (state->steps == STEPS_REPORTED && outcome.length_q14 <= LENGTH_REPORTED_Q14) {
     conclude(&problem, &state->at, &outcome, result);
   }
-  state->untold = result->valid ? 0 : state->untold + 1;
-  if (state->untold == UNTOLD_MOST) {
+  state->unreported = result->valid ? 0 : state->unreported + 1;
+  if (state->unreported == UNREPORTED_MOST) {
     *state = (struct fit_tangential_state){0};
   }
 }

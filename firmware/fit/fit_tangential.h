@@ -9,8 +9,8 @@
  * reported. After some frames without a report the estimate starts from the Gaussian again, so that
  * it cannot stay where another start finds better.
  *
- * The pad's profile (common/pad_profile.h) says how its rubber spreads a press and a pull.
- * Elongation is in the model because a long contact looks like a pulled one to a fit without it. A
+ * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull.
+ * Elongation is in the model because a long contact resembles a pulled one to a fit without it. A
  * prior holds it near round. Where a calibration has found the dip around a contact
  * (fit_settings), the model has it too: without, a dip of 5 % reads as a pull of 0.4 of the force.
  * An estimate that is clearly long, or leaves a residual that the model does not explain, is not
@@ -87,8 +87,8 @@ struct fit_tangential_state {
   struct fit_tangential_unknowns at; /* where the last step ended */
   int32_t fit_x_q26, fit_y_q26;      /* where the Gaussian was */
   int32_t sum_q20;                   /* of the readings, in the unit of amplitude */
-  uint8_t steps;                     /* since the beginning, 2 stands for more */
-  uint8_t untold;                    /* frames in a row without a report */
+  uint8_t steps;                     /* since the beginning, 2 means 2 or more */
+  uint8_t unreported;                /* frames in a row without a report */
 };
 
 /* Every member is finite. Where `valid` is off all are zero. */
@@ -104,7 +104,7 @@ struct fit_tangential {
   bool elongated;                          /* the contact is not round, whatever the Gaussian makes of its load */
 };
 
-/* A contact at rest is at its optimum after so many frames. */
+/* A contact at rest is at its optimum after this number of frames. */
 #define FIT_TANGENTIAL_FRAMES 5
 
 /* fit: of the same readings. `valid` stays off without FIT_VALID, with fewer than

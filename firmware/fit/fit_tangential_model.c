@@ -213,8 +213,8 @@ NOINLINE static void set_moving(const struct offset *x, const struct offset *y, 
   } while (++node != end);
 }
 
-/* Takes from the residuals what is the sensors' own. A sensor that is off by o and feels all wider
- * by b reads what the model has at d + o - b d, so that the columns of the place tell how much more
+/* Takes from the residuals what is the sensors' own. A sensor that is off by o and responds wider
+ * by b reads what the model has at d + o - b d, so that the columns of the place give how much more
  * it is. */
 NOINLINE static void take_own(const struct problem *problem, const struct offset *x, const struct offset *y,
                               struct fit_tangential_room *room) {

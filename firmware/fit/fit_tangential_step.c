@@ -207,7 +207,7 @@ NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *ri
   }
 }
 
-static int32_t clamp_told(int32_t value, int32_t low, int32_t high, bool *at_bound) {
+static int32_t clamp_noting(int32_t value, int32_t low, int32_t high, bool *at_bound) {
   *at_bound = *at_bound || value < low || value > high;
   return fixed_clamp(value, low, high);
 }
@@ -241,14 +241,14 @@ NOINLINE static int32_t take_step(const struct problem *problem, const struct ou
     }
   }
   *at_bound = false;
-  at->x_q26 = clamp_told(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
-  at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -reach(pad, ROWS), reach(pad, ROWS), at_bound);
-  at->amplitude_q24 = clamp_told(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
-  at->pull_x_q24 = clamp_told(at->pull_x_q24 + move[PULL_X], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
-  at->pull_y_q24 = clamp_told(at->pull_y_q24 + move[PULL_Y], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
+  at->x_q26 = clamp_noting(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
+  at->y_q26 = clamp_noting(at->y_q26 + move[PLACE_Y], -reach(pad, ROWS), reach(pad, ROWS), at_bound);
+  at->amplitude_q24 = clamp_noting(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
+  at->pull_x_q24 = clamp_noting(at->pull_x_q24 + move[PULL_X], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
+  at->pull_y_q24 = clamp_noting(at->pull_y_q24 + move[PULL_Y], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
   at->t_q26 = fixed_clamp(at->t_q26 + move[SPREAD], spread_least(pad), SPREAD_MOST_Q26);
-  at->e1_q26 = clamp_told(at->e1_q26 + move[STRETCH], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
-  at->e2_q26 = clamp_told(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
+  at->e1_q26 = clamp_noting(at->e1_q26 + move[STRETCH], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
+  at->e2_q26 = clamp_noting(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
   return most;
 }
 

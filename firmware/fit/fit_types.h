@@ -39,7 +39,7 @@ struct fit_array {
 };
 
 /* Of a sensor, beside its gain: how far it is from its place in the array, and how much wider than
- * the others it feels a contact. */
+ * the others it responds to a contact. */
 struct fit_own {
   int32_t off_x_q15, off_y_q15; /* pitches; within +-1, as the next */
   int32_t wider_q15;            /* log of its width over theirs */
@@ -56,7 +56,7 @@ struct fit_settings {
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
    * 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
-  /* A reading so many noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
+  /* A reading cut_noises noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
    * reading is changed, as a tangential load asks for. */
   uint8_t cut_noises;
   /* What the rubber takes from the readings around a contact, where that is known:
@@ -96,8 +96,8 @@ struct fit_result {
 
 /* What frames that follow each other keep of the search for an outlier. A sensor that is broken
  * stays broken, and a pad that the model fits roughly does so in each frame. So what the search
- * found stands for FIT_WATCH_FRAMES frames of the same sensors: an outlier is left out at once, and
- * where there was none, none is looked for. Before, only residuals that have grown by half of what
+ * found is kept for FIT_WATCH_FRAMES frames of the same sensors: an outlier is left out at once, and
+ * where there was none, none is searched for. Before, only residuals that have grown by half of what
  * they were, relative to the force, begin another search, and not in the first FIT_WATCH_LEAST
  * frames. So at most one frame in FIT_WATCH_LEAST + 1 takes as long as a search, and where the
  * contact is the same one in FIT_WATCH_FRAMES + 1 (NUMERICS.md has the cycles). All zeros: nothing
@@ -107,7 +107,7 @@ struct fit_result {
 struct fit_watch {
   uint32_t usable;   /* of these sensors */
   uint32_t left_out; /* bitmap of at most one */
-  uint16_t frames;   /* that it still stands for */
+  uint16_t frames;   /* that it is still kept for */
   float residual_rms_Pa, force_N;
   struct fit_result without; /* room of a search */
 };
