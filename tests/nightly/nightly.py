@@ -27,7 +27,6 @@ sys.path[:0] = [
 ]
 import figures  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
-from presentation import judge, print_goals  # noqa: E402
 
 REPORT = ROOT / "build/report"
 PATIENCE_s = 120
@@ -35,7 +34,7 @@ OF_TIME = re.compile(r"_(us|ms|s|fps|percent|seconds|minutes|per_s|per_minute|fr
 
 
 def job(name, *goals):
-    """A function of the build folder that returns figures for NAME.json; goals as presentation.py has them."""
+    """A function of the build folder that returns figures for NAME.json; goals: (figure, '>=' or '<=', limit)."""
 
     def mark(function):
         function.name, function.goals = name, goals
@@ -114,14 +113,16 @@ class Programs(contextlib.ExitStack):
 
 def keep(name, found, goals):
     """Into NAME.json, which other jobs write to as well. The names of counts that missed their goal."""
-    found = json.loads(json.dumps(found))
-    judged = judge({**{goal: None for goal, _, _ in goals}, **found}, goals)
+    verdicts = {}
+    for goal, sign, limit in goals:
+        value = found.get(goal)
+        met = None if value is None else bool(value <= limit if sign == "<=" else value >= limit)
+        verdicts[goal] = {"goal": f"{sign} {limit:g}", "met": met}
+        print(f"{ {True: 'met', False: 'MISSED', None: 'not measured'}[met]:12s} {goal:32s} {value}   goal {sign} {limit:g}")
     path = REPORT / f"{name}.json"
     whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    figures.add(path, {**judged, "goals": {**whole.get("goals", {}), **judged["goals"]}})
-    if goals:
-        print_goals(judged)
-    return [goal for goal, verdict in judged["goals"].items() if verdict["met"] is False and not OF_TIME.search(goal)]
+    figures.add(path, {**json.loads(json.dumps(found)), "goals": {**whole.get("goals", {}), **verdicts}})
+    return [goal for goal, verdict in verdicts.items() if verdict["met"] is False and not OF_TIME.search(goal)]
 
 
 def main(argv):
