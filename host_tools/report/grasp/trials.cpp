@@ -52,17 +52,17 @@ namespace {
 // Pads with what their calibrations left of the gains. A calibration takes half a second, so they are kept. The first
 // is repeated anyway, and shows whether the others still are what they would be.
 std::vector<Rubber> pads_of(std::uint64_t seed, const std::string &cache) {
-  const truth::Feet feet(LAYER_mm, cache);
+  const measure::Feet feet(LAYER_mm, cache);
   const auto pad_of = [&](std::size_t i) {
-    const truth::PadOptions relaxing{10.0, 17.5,
-                                     0.1}; // every other pad: its sensors relax by 9 to 26 % and sit 0.1 mm off
+    const measure::PadOptions relaxing{10.0, 17.5,
+                                       0.1}; // every other pad: its sensors relax by 9 to 26 % and sit 0.1 mm off
     const auto session =
-        truth::calibrated_session(feet, i % 2 ? relaxing : truth::PadOptions{}, Random(seed, CALIBRATED, i).next());
+        measure::calibrated_session(feet, i % 2 ? relaxing : measure::PadOptions{}, Random(seed, CALIBRATED, i).next());
     std::vector<float> values(session.remaining_gain.begin(), session.remaining_gain.end());
     values.insert(values.end(), session.gain_sd.begin(), session.gain_sd.end());
     return values;
   };
-  const std::size_t sensors = truth::session_array().sensors();
+  const std::size_t sensors = measure::session_array().sensors();
   const std::vector<float> first = pad_of(0);
   std::vector<float> values(CALIBRATIONS * 2 * sensors);
   const twin::TableFile file(cache, "calibrated-pads", "calibrated-pads seed " + std::to_string(seed));

@@ -12,7 +12,6 @@
 
 using namespace fingertip;
 using namespace fingertip::measure;
-using namespace fingertip::truth;
 using calibrating::Judgement;
 using calibrating::Placement;
 

@@ -8,7 +8,7 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 
-namespace fingertip::truth {
+namespace fingertip::measure {
 namespace {
 
 constexpr double AMBIENT_Pa = 101325.0;
@@ -252,4 +252,4 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
   }
 }
 
-} // namespace fingertip::truth
+} // namespace fingertip::measure

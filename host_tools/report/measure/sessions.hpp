@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace fingertip::truth {
+namespace fingertip::measure {
 
 // The firmware's.
 calibrating::Array session_array();
@@ -115,4 +115,4 @@ struct Calibrated {
 // Of a good session of thirty placements on a pad of its own, until one is accepted.
 Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::uint64_t seed);
 
-} // namespace fingertip::truth
+} // namespace fingertip::measure

@@ -13,21 +13,20 @@ import sessions
 from emulated import CONVERSION_us
 from fingertip.files import InputError
 from fingertip.line import Flag
+from contacts import Contacts
 from measure import q10, stream_of
+from sessions import SENSORS
 from presentation import percent, quantile
 
 TOUCHES = 50  # of each pad
 LEARNT_FROM = 20  # touches of a pad that was never calibrated, before those
-DEFAULT_GAIN_SD = 0.105  # DEFAULT_GAIN_SD of config/defaults.h
 BAD_mm, FRICTION = 1.0, 0.5  # friction: all of the contact slides at it
 # Rounded feet, a flat cylinder and a cube, and everyday objects; all of them round or nearly so.
 OBJECTS = ("sphere6", "sphere15", "cylinder6", "cube6", "ping_pong", "rubber_duck", "lime")
 FORCE_N = (1.0, 15.0)
 SEARCH_FRAMES = 6  # FIT_DOUBT_PARTS of fit_doubt.h
-GAIN_SIGMAS_MAX = 3.0  # as the twin's pads
 WARNINGS = Flag.UNCERTAIN | Flag.MODEL | Flag.FLAT | Flag.AT_BOUND | Flag.LOW_SIGNAL
 OSRS = tuple(CONVERSION_us)
-SENSORS = 15
 
 
 def gaussians(ratio):
@@ -35,50 +34,34 @@ def gaussians(ratio):
     return [(shorter_mm * ratio, shorter_mm) for shorter_mm in np.arange(5.25, 7.01, 0.25)]
 
 
-@dataclasses.dataclass
-class Pads:
-    """Gains of each sensor and their sds as the firmware has them, [pad][sensor]. Gains multiply readings."""
-
-    gain: np.ndarray
-    gain_sd: np.ndarray
+# Pads of a case: drawn from contacts and random numbers, one for each generator.
 
 
-def equal(random, count):
-    return Pads(np.ones((count, SENSORS)), np.zeros((count, SENSORS)))
+def equal(contacts, random):
+    return contacts.perfect_pads(len(random.states))
 
 
 def raw(sd, known_sd=None):
-    """Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware assumes known_sd, or its default."""
-
-    def draw(random, count):
-        gain = np.ones((count, SENSORS))
-        for k in range(SENSORS):
-            outside = np.ones(count, bool)
-            while outside.any():
-                sigmas = random.normal(of=outside)
-                gain[outside, k] = 1.0 + sd * sigmas[outside]
-                outside &= np.abs(sigmas) > GAIN_SIGMAS_MAX
-        return Pads(gain, np.full_like(gain, DEFAULT_GAIN_SD if known_sd is None else known_sd))
-
-    return draw
+    """Not calibrated: the firmware assumes known_sd, or its default."""
+    return lambda contacts, random: contacts.raw_pads(sd, contacts.gain_sd if known_sd is None else known_sd, random)
 
 
-def aslant(rms, x_mm, y_mm):
+def aslant(rms):
     """Gains that rise over the pad in one direction: rubber that was cast aslant."""
 
-    def draw(random, count):
-        drawn = raw(0.0)(random, count)
+    def draw(contacts, random):
+        pads = contacts.raw_pads(0.0, contacts.gain_sd, random)
         angle = random.uniform(0.0, 2.0 * np.pi)[:, None]
-        along = np.cos(angle) * x_mm + np.sin(angle) * y_mm
-        drawn.gain = 1.0 + rms * along / np.sqrt(np.mean(along**2, axis=1, keepdims=True))
-        return drawn
+        along = np.cos(angle) * contacts.x_mm + np.sin(angle) * contacts.y_mm
+        pads["gain"] = 1.0 + rms * along / np.sqrt(np.mean(along**2, axis=1, keepdims=True))
+        return pads
 
     return draw
 
 
-def calibrated(of):
-    """Pads with what calibrations left of the gains, in turn."""
-    return lambda random, count: Pads(*(of[name][np.arange(count) % len(of)] for name in ("gain", "gain_sd")))
+def calibrated(pads):
+    """What calibrations left of these pads, in turn."""
+    return lambda contacts, random: pads[np.arange(len(random.states)) % len(pads)]
 
 
 @dataclasses.dataclass
@@ -100,15 +83,14 @@ class Case:
 
 
 class Bench:
-    def __init__(self, firmware, seed, count):
-        self.firmware, self.seed, self.count = firmware, seed, count
-        self.x_mm, self.y_mm, _ = firmware.layout()
-        self.array = firmware.array()
-        self.noises_Pa = np.array([firmware.osr(osr)[1] / 1024.0 for osr in OSRS])
+    def __init__(self, contacts, seed, count):
+        self.contacts, self.seed, self.count = contacts, seed, count
+        self.array, self.x_mm, self.y_mm = contacts.own_array, contacts.x_mm, contacts.y_mm
+        self.noises_Pa = np.array([contacts.noise_Pa(osr) for osr in OSRS])
 
     def draw(self, case, random):
         """One touch of each pad: (touch, contact by its number, noise)."""
-        touch = self.firmware.made("twin_touch", self.count)
+        touch = self.contacts.made("twin_touch", self.count)
         touch["x_mm"] = random.uniform(self.x_mm.min(), self.x_mm.max())
         touch["y_mm"] = random.uniform(self.y_mm.min(), self.y_mm.max())
         touch["force_N"] = random.uniform(*FORCE_N)
@@ -125,11 +107,7 @@ class Bench:
     def base_Pa(self, case, touch, which):
         """[touch][sensor]"""
         if isinstance(case.contacts[0], str):
-            base_Pa = np.zeros((len(touch), SENSORS))
-            for number, name in enumerate(case.contacts):
-                chosen = which == number
-                base_Pa[chosen] = self.firmware.base_pressure(name, case.layer_mm, touch[chosen], shape=sessions.shape(self.firmware, name))
-            return base_Pa
+            return self.contacts.base_Pa(case.layer_mm, case.contacts, which, touch)
         sd_mm = np.array(case.contacts)[which]
         dx, dy = self.x_mm - touch["x_mm"][:, None], self.y_mm - touch["y_mm"][:, None]
         c, s = np.cos(touch["angle_rad"])[:, None], np.sin(touch["angle_rad"])[:, None]
@@ -139,25 +117,25 @@ class Bench:
 
     def learn(self, case, of, random):
         """The pads' sds as the firmware has them after these touches."""
-        gains, sd = self.firmware.made("fit_gains", self.count), of.gain_sd[:, 0].copy()
-        self.firmware.call("gains_begin", sd, gains)
+        gains, sd = self.contacts.made("fit_gains", self.count), of["gain_sd"][:, 0].copy()
+        self.contacts.call("gains_begin", sd, gains)
         for _ in range(LEARNT_FROM):
             touch, which, noise_Pa = self.draw(case, random)
-            base_Pa = of.gain * self.base_Pa(case, touch, which)
+            base_Pa = of["gain"] * self.base_Pa(case, touch, which)
             for is_first in (1, 0):
                 readings = q10(base_Pa + noise_Pa[:, None] * random.normal(SENSORS))
-                settings = self.firmware.settings(self.count, noise_Pa=noise_Pa, gain_sd=np.repeat(sd[:, None], SENSORS, axis=1))
-                found = self.firmware.fit(self.array, settings, readings, kernel="fit_grid")
-                self.firmware.call("gains_learn", self.array, settings, readings, found, is_first, gains, sd)
-        of.gain_sd[:] = sd[:, None]
+                settings = self.contacts.settings(self.count, noise_Pa=noise_Pa, gain_sd=np.repeat(sd[:, None], SENSORS, axis=1))
+                found = self.contacts.fit(self.array, settings, readings, kernel="fit_grid")
+                self.contacts.call("gains_learn", self.array, settings, readings, found, is_first, gains, sd)
+        of["gain_sd"][:] = sd[:, None]
 
     def run(self, case, iterations=(4,)):
         """What the fit finds, for each number of iterations."""
         pad = np.arange(self.count)
-        random = self.firmware.random(self.seed, case.stream, pad)
-        of = case.pads(random, self.count)
+        random = self.contacts.random(self.seed, case.stream, pad)
+        of = case.pads(self.contacts, random)
         if case.learns:
-            self.learn(case, of, self.firmware.random(self.seed, case.stream + 1, pad))
+            self.learn(case, of, self.contacts.random(self.seed, case.stream + 1, pad))
         frames = 1 + SEARCH_FRAMES * bool(case.tangential)  # held until the firmware has searched for a tangential force
         drawn = []
         for _ in range(TOUCHES):
@@ -165,16 +143,16 @@ class Bench:
             first = random.normal(SENSORS)
             usable = choose_sensors(case.sensors, random)
             normals = [first] + [random.normal(SENSORS) for _ in range(frames - 1)]
-            base_Pa = of.gain * self.base_Pa(case, touch, which)
+            base_Pa = of["gain"] * self.base_Pa(case, touch, which)
             readings = q10(base_Pa[:, None] + noise_Pa[:, None, None] * np.stack(normals, axis=1))
             drawn.append((touch, noise_Pa, usable, readings))
         touch, noise_Pa, usable, readings = (np.concatenate(each) for each in zip(*drawn))
-        settings = self.firmware.settings(len(touch), noise_Pa=noise_Pa, gain_sd=np.tile(of.gain_sd, (TOUCHES, 1)))
+        settings = self.contacts.settings(len(touch), noise_Pa=noise_Pa, gain_sd=np.tile(of["gain_sd"], (TOUCHES, 1)))
         if case.name == "noise only":  # the model has no error of its own
             settings["model_sd_q16"] = 0
         print(f"truth_fit: {case.name}", flush=True)
         for settings["iterations"] in iterations:
-            yield Results(touch, sessions.fit_held(self.firmware, self.array, settings, readings, usable))
+            yield Results(touch, sessions.fit_held(self.contacts, self.array, settings, readings, usable))
 
     def row(self, case):
         (results,) = self.run(case)
@@ -244,8 +222,8 @@ def coverage(bench, of, out):
         ("12 mm, gains 10 %", thick | {"pads": raw(0.10), "learns": True}, True),
         ("12 mm, gains 20 %" + first, thick | {"pads": raw(0.20)}, False),
         ("12 mm, gains 20 %", thick | {"pads": raw(0.20), "learns": True}, True),
-        ("12 mm, gains aslant by 10 %" + first, thick | {"pads": aslant(0.10, bench.x_mm, bench.y_mm)}, False),
-        ("12 mm, gains aslant by 10 %", thick | {"pads": aslant(0.10, bench.x_mm, bench.y_mm), "learns": True}, True),
+        ("12 mm, gains aslant by 10 %" + first, thick | {"pads": aslant(0.10)}, False),
+        ("12 mm, gains aslant by 10 %", thick | {"pads": aslant(0.10), "learns": True}, True),
         ("12 mm, calibrated", thick | {"pads": of}, True),
         ("6 mm, equal gains", thin | {"pads": equal}, True),
         ("6 mm, gains 10 %", thin | {"pads": raw(0.10), "learns": True}, False),
@@ -331,7 +309,7 @@ def figures(firmware, options):
     count = 1500 if options.pads is None else options.pads
     if count < 1:
         raise InputError("--pads needs at least one pad")
-    bench = Bench(firmware, 20221015 if options.seed is None else options.seed, count)
+    bench = Bench(Contacts(firmware.build), 20221015 if options.seed is None else options.seed, count)
     out = {}
     of = calibrated(sessions.calibrated(firmware, sessions.USUAL, count, bench.seed))
     for part in (coverage, tangential, elongated, iterations, few_sensors):

@@ -9,21 +9,21 @@ using namespace fingertip;
 namespace {
 
 /* Of a session of 24 placements on a pad of the twin. */
-pad::Thickness found_on(double layer_mm, const truth::PadOptions &options, std::uint64_t seed) {
-  const truth::Feet feet(layer_mm, FINGERTIP_TABLES_DIR);
-  truth::SessionPad pad(options, layer_mm, seed);
-  truth::Session session(feet, truth::SessionKind::good, seed, 24);
+pad::Thickness found_on(double layer_mm, const measure::PadOptions &options, std::uint64_t seed) {
+  const measure::Feet feet(layer_mm, FINGERTIP_TABLES_DIR);
+  measure::SessionPad pad(options, layer_mm, seed);
+  measure::Session session(feet, measure::SessionKind::good, seed, 24);
   std::vector<calibrating::Placement> placements;
   while (auto placement = session.next(pad)) {
     placements.push_back(*placement);
   }
-  const auto solution = calibrating::solve(truth::session_array(), placements);
+  const auto solution = calibrating::solve(measure::session_array(), placements);
   EXPECT_TRUE(solution.solved);
   return pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);
 }
 
 TEST(PadThickness, IsThatOfTheRubber) {
-  const truth::PadOptions kinds[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}, {20.0, 0.0, 0.1, 5.0, 3.5}};
+  const measure::PadOptions kinds[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}, {20.0, 0.0, 0.1, 5.0, 3.5}};
   for (const double layer_mm : {9.0, 12.0, 15.0}) {
     for (std::uint64_t seed = 0; seed < 6; seed++) {
       const pad::Thickness found = found_on(layer_mm, kinds[seed % 3], 7000 + seed);

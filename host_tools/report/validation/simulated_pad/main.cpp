@@ -32,7 +32,7 @@ constexpr std::uint32_t DATE_s = 1767225600;
 constexpr std::uint64_t SLICE_us = 5'000, COMMAND_us = 100'000;
 constexpr std::size_t PLACEMENTS = 20; // of a calibration
 // Of the pad that is validated: the same seed draws the same one.
-constexpr truth::PadOptions LIKE_REAL{10.0, 17.5, 0.1, 5.0, 3.5}, PLAIN{10.0};
+constexpr measure::PadOptions LIKE_REAL{10.0, 17.5, 0.1, 5.0, 3.5}, PLAIN{10.0};
 
 struct Options {
   ValidatedOptions pad;
@@ -97,10 +97,10 @@ private:
 
   // As `fingertip calibrate --weight` makes it of the healthy pad, some day before.
   void calibrate() {
-    const truth::Feet feet(LAYER_mm, options_.pad.cache);
-    truth::SessionPad pad(options_.plain ? PLAIN : LIKE_REAL, LAYER_mm, options_.pad.seed);
-    truth::Session session(feet, truth::SessionKind::good, options_.pad.seed, PLACEMENTS);
-    const calibrating::Array array = truth::session_array();
+    const measure::Feet feet(LAYER_mm, options_.pad.cache);
+    measure::SessionPad pad(options_.plain ? PLAIN : LIKE_REAL, LAYER_mm, options_.pad.seed);
+    measure::Session session(feet, measure::SessionKind::good, options_.pad.seed, PLACEMENTS);
+    const calibrating::Array array = measure::session_array();
     std::vector<calibrating::Placement> placements;
     std::optional<calibrating::Wanted> wanted;
     calibrating::Solution solution;
@@ -119,7 +119,7 @@ private:
     }
     send(command_calibrate(
         calibrating::calibration_of(
-            solution, calibrating::force_scale(array, placements, solution, truth::WEIGHT_N, shape), DATE_s),
+            solution, calibrating::force_scale(array, placements, solution, measure::WEIGHT_N, shape), DATE_s),
         SENSORS));
   }
 
