@@ -84,8 +84,8 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
   return positive ? settings->location_sd_limit_mm : FIT_LOCATION_SD_LIMIT_mm;
 }
 
-/* The dip never takes more than this share of the largest reading, and is used with a sd within these limits in
- * pitches. */
+/* The dip never takes more than this share of the largest reading, and its sd is at least FIT_DIP_SD_MIN and at most
+ * FIT_DIP_SD_MAX pitches. */
 #define FIT_DIP_DEPTH_MAX 0.25f
 /* What the dip may be off by at each sensor, of itself. It counts where the derivatives have the
  * dip. Chosen on the recording that chooses of host_tools/report/real. */

@@ -474,7 +474,7 @@ static void test_it_begins_anew_where_it_says_nothing(void) {
     struct fit_tangential found = held;
     for (int frame = 0; frame < 16; frame++) {
       found = go_on(&state, readings, ALL);
-      stuck.untold = 0;
+      stuck.unreported = 0;
       go_on(&stuck, readings, ALL);
     }
     TEST_ASSERT_EQUAL(held.valid, found.valid);
