@@ -5,7 +5,7 @@
 #include "grasp/fault_trials.hpp"
 #include "grasp/words.hpp"
 #include "libfingertip/in_parallel.hpp"
-#include "report/reference/options.hpp"
+#include "report/grasp/options.hpp"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

@@ -4,7 +4,7 @@
 // One JSON object on the standard output: what was asked for, and how the grasps went.
 #include "grasp/kind_rows.hpp"
 #include "libfingertip/text.hpp"
-#include "report/reference/options.hpp"
+#include "report/grasp/options.hpp"
 
 #include <cstdio>
 #include <exception>

@@ -4,7 +4,7 @@
 // and by object, friction and disturbance. All simulated.
 #include "grasp/summary.hpp"
 #include "libfingertip/text.hpp"
-#include "report/reference/options.hpp"
+#include "report/grasp/options.hpp"
 
 #include <chrono>
 #include <cstdio>

@@ -1,4 +1,4 @@
-#include "report/reference/options.hpp"
+#include "report/grasp/options.hpp"
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
