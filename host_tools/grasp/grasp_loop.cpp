@@ -168,9 +168,9 @@ void GraspLoop::take_gripper() {
     }
     if (news.trouble != gripper_trouble_) {
       gripper_trouble_ = news.trouble;
-      GraspNews told{Kind::gripper, steady_now_us()};
-      told.text = std::move(news.trouble);
-      put(std::move(told));
+      GraspNews change{Kind::gripper, steady_now_us()};
+      change.text = std::move(news.trouble);
+      put(std::move(change));
     }
   }
 }
@@ -199,20 +199,20 @@ void GraspLoop::step() {
   news.status = status_;
   put(std::move(news));
   if (has_failed) {
-    tell_fault(report_.trouble);
+    report_fault(report_.trouble);
   }
 }
 
-void GraspLoop::tell_fault(std::uint32_t trouble) {
-  GraspNews told{Kind::fault, steady_now_us()};
+void GraspLoop::report_fault(std::uint32_t trouble) {
+  GraspNews news{Kind::fault, steady_now_us()};
   if ((trouble & GRIP_GRIPPER_FAULT) != 0) {
-    told.text = fault_text_;
+    news.text = fault_text_;
   }
   if ((trouble & GRIP_GRIPPER_INACTIVE) != 0) {
-    told.text +=
-        (told.text.empty() ? "" : "; ") + std::string("it is not active any more: it lost its power, or was reset");
+    news.text +=
+        (news.text.empty() ? "" : "; ") + std::string("it is not active any more: it lost its power, or was reset");
   }
-  put(std::move(told));
+  put(std::move(news));
 }
 
 } // namespace fingertip

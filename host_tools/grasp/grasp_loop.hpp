@@ -45,7 +45,7 @@ struct GraspNews {
     step,    // of the core: its input and its output
     gripper, // text: what is wrong with it, its fault or why it does not answer; "": nothing now
     fault,   // text: why the core's state has become fault
-    dropped, // count: so many news of other kinds were not taken in time
+    dropped, // count: news of other kinds that were not taken in time
     ended,   // the last
   };
   Kind kind;
@@ -83,7 +83,7 @@ public:
   // As DeviceLoop has it, of both.
   double read_until_us() const;
 
-  // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop says
+  // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports
   // so.
   std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
 
@@ -104,7 +104,7 @@ private:
   void take_devices();
   void take_gripper();
   void step();
-  void tell_fault(std::uint32_t trouble);
+  void report_fault(std::uint32_t trouble);
   void obey_interrupts();
   void put(GraspNews news);
 

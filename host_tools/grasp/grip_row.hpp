@@ -41,7 +41,7 @@ struct GripRow {
 // Without time_us, which the writer of the recording puts before them.
 std::string grip_columns();
 std::string grip_cells(const GripRow &row);
-// Of a line's value, time_us first. Throws Error that says which cell is wrong.
+// Parses the cells of a line, time_us first. Throws Error that names the cell that is wrong.
 GripRow grip_row(std::string_view value);
 
 // The rows of a file; none in any other file.

@@ -100,11 +100,11 @@ void GripperThread::run() {
       }
       const GripperStatus status = exchange();
       put({status, trouble_of(*gripper_, status)});
-      told_.clear();
+      reported_.clear();
     } catch (const Error &error) {
-      if (told_ != error.what()) {
-        told_ = error.what();
-        put({std::nullopt, told_});
+      if (reported_ != error.what()) {
+        reported_ = error.what();
+        put({std::nullopt, reported_});
       }
       if (error.code() == ErrorCode::gone) {
         gripper_.reset();

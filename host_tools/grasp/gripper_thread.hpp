@@ -57,7 +57,7 @@ private:
   GripCommand command_{};
   std::uint64_t number_ = 0, sent_ = 0; // of commands that differ
   std::deque<News> news_;
-  std::string told_;
+  std::string reported_;
   Thread thread_;
 };
 

@@ -45,8 +45,8 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_GRIPPER_FAULT, "gripper_fault", "the gripper reports a fault"},
     {GRIP_GRIPPER_INACTIVE, "gripper_inactive", "the gripper is not active"},
     {GRIP_NO_LOAD, "no_load", "no load can be estimated"},
-    {GRIP_FINGER_0_UNTOLD, "finger_0_untold", "left: no force can be estimated"},
-    {GRIP_FINGER_1_UNTOLD, "finger_1_untold", "right: no force can be estimated"},
+    {GRIP_FINGER_0_NO_FORCE, "finger_0_untold", "left: no force can be estimated"},
+    {GRIP_FINGER_1_NO_FORCE, "finger_1_untold", "right: no force can be estimated"},
     {GRIP_FINGER_0_LATE, "finger_0_late", "left: late"},
     {GRIP_FINGER_1_LATE, "finger_1_late", "right: late"},
 };
@@ -107,7 +107,7 @@ std::vector<std::string> trouble_texts(const GripReport &report) {
     }
     std::string text = each.text;
     if (each.bit == GRIP_FINGERS_DIFFER) {
-      text += ", " + fixed(report.felt_N[0], 1) + " and " + fixed(report.felt_N[1], 1) +
+      text += ", " + fixed(report.finger_N[0], 1) + " and " + fixed(report.finger_N[1], 1) +
               " N: let the object move freely between them, or fingertip calibrate";
     } else if (each.bit == GRIP_FINGER_0_LATE || each.bit == GRIP_FINGER_1_LATE) {
       text += " by " + fixed(1e3 * report.delay_s, 0) + " ms";

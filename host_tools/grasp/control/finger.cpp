@@ -12,21 +12,21 @@ namespace fingertip {
 
 namespace {
 
-// A fingertip whose values stay to the last bit for so long, and over so many frames, is stuck:
-// noise changes them with every frame.
+// A fingertip whose values stay the same to the last bit for this time and this number of frames is
+// stuck: noise changes them with every frame.
 constexpr double FROZEN_s = 0.05;
 constexpr int FROZEN_FRAMES = 5;
-constexpr double OLD_s = 0.5;        // an older frame says nothing of now
-constexpr double DELAY_SHARE = 0.05; // that a frame has in the mean delay
+constexpr double OLD_s = 0.5;        // an older frame is no evidence of the present
+constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average of the delay
 constexpr int ZERO_FRAMES = 3;
-// A force with a larger standard deviation, as a share of it, is no measurement.
+// A force whose standard deviation is a larger share of it is no measurement.
 constexpr double FORCE_SD_MOST = 1.0;
-// What a load is not to be believed with.
+// A tangential force with one of these flags is not trusted.
 constexpr std::uint32_t FORCE_ONLY = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND |
                                      CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
-// A contact with a larger sigma is a plate's. Its Gaussian reaches far beyond the pad, which takes
-// of its force what lies on so much of it: a block of 36 by 54 mm does.
+// A contact with a larger sigma is a plate. Its Gaussian reaches far beyond the pad, so only the part
+// of its force that lies on the pad counts. A block of 36 by 54 mm is such a plate.
 constexpr double WIDE_mm = 15.0, PAD_mm2 = 1400.0;
 
 double force_on_pad(const GripTouch &touch) {
@@ -36,9 +36,9 @@ double force_on_pad(const GripTouch &touch) {
   return touch.force_N * PAD_mm2 / (PAD_mm2 + 0.85 * 2.0 * M_PI * touch.sigma_mm * touch.sigma_mm);
 }
 
-bool tells_force(const GripTouch &touch) {
+bool force_is_valid(const GripTouch &touch) {
   if ((touch.flags & CONTACT_FLAG_CONTACT) == 0) {
-    return true; // none
+    return true; // the force is 0
   }
   return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 &&
          ((touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 || touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
@@ -55,8 +55,8 @@ void GripFinger::take(const GripTouch &touch) {
   if (is_heard_ && touch.t_s <= touch_.t_s) {
     return;
   }
-  const bool says_something = (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
-  if (!is_heard_ || !says_something || !is_same(touch_, touch)) {
+  const bool has_contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
+  if (!is_heard_ || !has_contact || !is_same(touch_, touch)) {
     changed_s_ = touch.t_s;
     unchanged_ = 0;
   } else {
@@ -64,20 +64,20 @@ void GripFinger::take(const GripTouch &touch) {
   }
   touch_ = touch;
   is_heard_ = is_new_ = true;
-  if (tells_force(touch)) {
+  if (force_is_valid(touch)) {
     const bool contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0;
     force_t_s_ = touch.t_s;
     force_N_ = contact ? std::max(force_on_pad(touch), 0.0) : 0.0;
     sd_N_ = (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) != 0 ? touch.force_sd_N : 0.0;
   }
-  if (tells_load()) {
+  if (has_load()) {
     sum_x_N_ += touch.qx_N;
     sum_y_N_ += touch.qy_N;
     sums_++;
   }
 }
 
-bool GripFinger::tells_load() const {
+bool GripFinger::has_load() const {
   return (touch_.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch_.flags & FORCE_ONLY) == 0;
 }
 
@@ -94,78 +94,79 @@ void GripFinger::end_zero() {
 }
 
 bool GripFinger::has_zero() const {
-  return !tells_load() || sums_ >= ZERO_FRAMES;
+  return !has_load() || sums_ >= ZERO_FRAMES;
 }
 
-GripFelt GripFinger::look(double now_s, const GripSettings &settings) {
-  GripFelt felt;
-  felt.fresh = is_new_;
+GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
+  GripReading reading;
+  reading.fresh = is_new_;
   if (is_new_) {
     const double delay_s = std::max(now_s - touch_.t_s, 0.0);
     delay_s_ += (has_delay_ ? DELAY_SHARE : 1.0) * (delay_s - delay_s_);
     has_delay_ = true;
     heard_s_ = now_s;
-    told_s_ = force_t_s_ == touch_.t_s ? now_s : told_s_;
+    force_s_ = force_t_s_ == touch_.t_s ? now_s : force_s_;
     is_new_ = false;
   }
   const bool stale = !is_heard_ || now_s > heard_s_ + settings.stale_s || now_s > touch_.t_s + OLD_s;
   const bool frozen = !stale && unchanged_ >= FROZEN_FRAMES && touch_.t_s - changed_s_ >= FROZEN_s;
-  const bool untold = !stale && now_s > told_s_ + settings.stale_s;
-  felt.trouble = (stale ? GRIP_FINGER_0_STALE : 0u) | (frozen ? GRIP_FINGER_0_FROZEN : 0u) |
-                 (untold ? GRIP_FINGER_0_UNTOLD : 0u) |
-                 (!stale && delay_s_ > settings.late_s ? GRIP_FINGER_0_LATE : 0u);
-  felt.counts = !stale && !frozen;
-  if (!felt.counts) {
-    return felt;
+  const bool no_force = !stale && now_s > force_s_ + settings.stale_s;
+  reading.trouble = (stale ? GRIP_FINGER_0_STALE : 0u) | (frozen ? GRIP_FINGER_0_FROZEN : 0u) |
+                    (no_force ? GRIP_FINGER_0_NO_FORCE : 0u) |
+                    (!stale && delay_s_ > settings.late_s ? GRIP_FINGER_0_LATE : 0u);
+  reading.counts = !stale && !frozen;
+  if (!reading.counts) {
+    return reading;
   }
-  felt.contact = (touch_.flags & CONTACT_FLAG_CONTACT) != 0;
-  felt.over = (touch_.flags & OVER) != 0;
-  felt.trouble |= felt.over ? GRIP_FINGER_0_OVER : 0u;
-  felt.trouble |= felt.contact && (touch_.flags & FORCE_ONLY) != 0 ? GRIP_FINGER_0_FORCE_ONLY : 0u;
-  felt.tells_force = !untold;
-  felt.t_s = force_t_s_;
-  felt.force_N = force_N_;
-  felt.sd_N = sd_N_;
-  felt.tells_load = felt.contact && tells_load();
-  if (felt.tells_load) {
-    felt.load_N = std::hypot(touch_.qx_N - zero_x_N_, touch_.qy_N - zero_y_N_);
-    felt.speed_mm_s = touch_.speed_mm_s;
+  reading.contact = (touch_.flags & CONTACT_FLAG_CONTACT) != 0;
+  reading.over = (touch_.flags & OVER) != 0;
+  reading.trouble |= reading.over ? GRIP_FINGER_0_OVER : 0u;
+  reading.trouble |= reading.contact && (touch_.flags & FORCE_ONLY) != 0 ? GRIP_FINGER_0_FORCE_ONLY : 0u;
+  reading.has_force = !no_force;
+  reading.t_s = force_t_s_;
+  reading.force_N = force_N_;
+  reading.sd_N = sd_N_;
+  reading.has_load = reading.contact && has_load();
+  if (reading.has_load) {
+    reading.load_N = std::hypot(touch_.qx_N - zero_x_N_, touch_.qy_N - zero_y_N_);
+    reading.speed_mm_s = touch_.speed_mm_s;
   }
-  // Eq. (7) takes loads for slides: it counts only where nothing else tells either.
-  const std::uint32_t slide = felt.tells_load ? CONTACT_FLAG_SLIDING : CONTACT_FLAG_SLIP;
-  felt.slides = felt.contact && (touch_.flags & slide) != 0;
-  return felt;
+  // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence.
+  const std::uint32_t slide = reading.has_load ? CONTACT_FLAG_SLIDING : CONTACT_FLAG_SLIP;
+  reading.slides = reading.contact && (touch_.flags & slide) != 0;
+  return reading;
 }
 
-GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings) {
-  GripFelts all;
+GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s,
+                              const GripSettings &settings) {
+  GripReadings all;
   all.low_N = all.t_s = std::numeric_limits<double>::infinity();
   double loads_N = 0.0, most_N = 0.0, normal_N = 0.0;
   int loads = 0;
   all.speed_mm_s = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fingers.size(); i++) {
-    const GripFelt felt = fingers[i].look(now_s, settings);
-    all.trouble |= felt.trouble << i;
-    all.fresh = all.fresh || felt.fresh;
-    all.over = all.over || felt.over;
-    all.touches += felt.contact;
-    all.slides = all.slides || felt.slides;
-    all.delay_s = std::max(all.delay_s, felt.counts ? fingers[i].delay_s() : 0.0);
-    if (felt.tells_force) {
+    const GripReading reading = fingers[i].sample(now_s, settings);
+    all.trouble |= reading.trouble << i;
+    all.fresh = all.fresh || reading.fresh;
+    all.over = all.over || reading.over;
+    all.touches += reading.contact;
+    all.slides = all.slides || reading.slides;
+    all.delay_s = std::max(all.delay_s, reading.counts ? fingers[i].delay_s() : 0.0);
+    if (reading.has_force) {
       all.fingers++;
-      all.force_N[i] = felt.force_N;
-      all.mean_N += felt.force_N;
-      all.low_N = std::min(all.low_N, felt.force_N);
-      all.high_N = std::max(all.high_N, felt.force_N);
-      all.sd_N = std::max(all.sd_N, felt.sd_N);
-      all.t_s = std::min(all.t_s, felt.t_s);
+      all.force_N[i] = reading.force_N;
+      all.mean_N += reading.force_N;
+      all.low_N = std::min(all.low_N, reading.force_N);
+      all.high_N = std::max(all.high_N, reading.force_N);
+      all.sd_N = std::max(all.sd_N, reading.sd_N);
+      all.t_s = std::min(all.t_s, reading.t_s);
     }
-    if (felt.tells_load) {
+    if (reading.has_load) {
       loads++;
-      loads_N += felt.load_N;
-      normal_N += felt.force_N;
-      most_N = std::max(most_N, felt.load_N);
-      all.speed_mm_s = std::min(all.speed_mm_s, felt.speed_mm_s);
+      loads_N += reading.load_N;
+      normal_N += reading.force_N;
+      most_N = std::max(most_N, reading.load_N);
+      all.speed_mm_s = std::min(all.speed_mm_s, reading.speed_mm_s);
     }
   }
   if (all.fingers == 0) {
@@ -174,11 +175,11 @@ GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, c
   } else {
     all.mean_N /= all.fingers;
   }
-  // In the air both carry the same force, and the mean is the better estimate of it.
+  // An object in the air presses on both alike, so the mean is the better estimate.
   all.grip_N = all.high_N - all.low_N > settings.differ * all.high_N ? all.low_N : all.mean_N;
-  all.tells_load = loads > 0;
+  all.has_load = loads > 0;
   if (loads > 0) {
-    // They share a load; where one carries far more, it is that one's that slides.
+    // Both share the load; if one carries far more, that one slides first.
     all.load_N = std::max(loads_N / loads, 0.8 * most_N);
     all.ratio = normal_N > 0.0 ? loads_N / normal_N : 0.0;
   } else {

@@ -1,4 +1,4 @@
-// What each fingertip says, whether it is to be believed, and how late it is.
+// The readings of each fingertip, whether they are trusted, and how late they are.
 #pragma once
 
 #include "grasp/control/settings.hpp"
@@ -17,63 +17,63 @@ struct GripTouch {
   std::uint32_t flags = 0; // enum contact_flag
   double force_N = 0.0, force_sd_N = 0.0;
   double x_mm = 0.0, y_mm = 0.0, sigma_mm = 0.0;
-  double qx_N = 0.0, qy_N = 0.0, q_sd_N = 0.0; // tangential load of the object on the rubber
+  double qx_N = 0.0, qy_N = 0.0, q_sd_N = 0.0; // tangential force of the object on the rubber
   double speed_mm_s = 0.0;                     // of the contact on the rubber
 };
 
-// Troubles; bits. Each is on while it lasts, those of GRIP_FAULT stay.
+// Bits. Each is on while its trouble lasts; those that led to GRIP_FAULT stay on.
 enum GripTrouble : std::uint32_t {
   GRIP_FINGER_0_STALE = 1u << 0, // no new frame for settings.stale_s
   GRIP_FINGER_1_STALE = 1u << 1,
   GRIP_FINGER_0_FROZEN = 1u << 2, // frames whose values never change
   GRIP_FINGER_1_FROZEN = 1u << 3,
-  GRIP_FINGER_0_FORCE_ONLY = 1u << 4, // load not to be trusted: UNCERTAIN, FLAT...
+  GRIP_FINGER_0_FORCE_ONLY = 1u << 4, // the tangential force is not trusted: UNCERTAIN, FLAT...
   GRIP_FINGER_1_FORCE_ONLY = 1u << 5,
   GRIP_FINGER_0_OVER = 1u << 6, // SATURATED or FORCE_LOWER_BOUND: never tightens further
   GRIP_FINGER_1_OVER = 1u << 7,
-  GRIP_FINGERS_DIFFER = 1u << 8,    // forces by more than settings.differ while the gripper rests
-  GRIP_AT_CAP = 1u << 9,            // more force than cap_N is wanted
-  GRIP_AT_TRAVEL_CAP = 1u << 10,    // closing further than travel_cap_mm since the touch is wanted
-  GRIP_GRIPPER_SILENT = 1u << 11,   // no status for settings.silent_s
-  GRIP_GRIPPER_FAULT = 1u << 12,    // its own code in the report
-  GRIP_GRIPPER_INACTIVE = 1u << 13, // it was activated and is no longer
-  GRIP_NO_LOAD = 1u << 14,          // mode hold: no fingertip reports a load; the grip does not loosen
-  GRIP_FINGER_0_UNTOLD = 1u << 15,  // frames, but none with a measured force
-  GRIP_FINGER_1_UNTOLD = 1u << 16,
+  GRIP_FINGERS_DIFFER = 1u << 8,     // forces by more than settings.differ while the gripper rests
+  GRIP_AT_CAP = 1u << 9,             // the wanted force exceeds cap_N
+  GRIP_AT_TRAVEL_CAP = 1u << 10,     // the wanted width is further than travel_cap_mm from the touch
+  GRIP_GRIPPER_SILENT = 1u << 11,    // no status for settings.silent_s
+  GRIP_GRIPPER_FAULT = 1u << 12,     // its own code in the report
+  GRIP_GRIPPER_INACTIVE = 1u << 13,  // it was activated and is no longer
+  GRIP_NO_LOAD = 1u << 14,           // mode hold: no fingertip reports a load; the grip does not loosen
+  GRIP_FINGER_0_NO_FORCE = 1u << 15, // frames, but none with a measured force
+  GRIP_FINGER_1_NO_FORCE = 1u << 16,
   GRIP_FINGER_0_LATE = 1u << 17, // frames older than settings.late_s when they come
   GRIP_FINGER_1_LATE = 1u << 18,
 };
 
 constexpr std::uint32_t GRIP_GRIPPER_FAULTS = GRIP_GRIPPER_FAULT | GRIP_GRIPPER_INACTIVE;
 
-// Of one fingertip, now.
-struct GripFelt {
-  std::uint32_t trouble = 0; // of finger 0's bits
-  bool fresh = false;        // a frame has come since the last look
-  bool counts = false;       // its frames come and change
-  bool tells_force = false, tells_load = false;
+// The present reading of one fingertip.
+struct GripReading {
+  std::uint32_t trouble = 0; // GripTrouble, as bits of finger 0
+  bool fresh = false;        // a frame has come since the last sample
+  bool counts = false;       // frames arrive, and their values change
+  bool has_force = false, has_load = false;
   bool contact = false, over = false, slides = false;
-  double t_s = 0.0; // of the force
+  double t_s = 0.0; // time of the force
   double force_N = 0.0, sd_N = 0.0, load_N = 0.0, speed_mm_s = 0.0;
 };
 
 class GripFinger {
 public:
   void take(const GripTouch &touch);
-  GripFelt look(double now_s, const GripSettings &settings);
-  double delay_s() const { return delay_s_; } // of its frames, the mean of some
+  GripReading sample(double now_s, const GripSettings &settings);
+  double delay_s() const { return delay_s_; } // moving average of the delay of its frames
 
-  // The present load counts as zero: from begin on its mean, from end on less that.
+  // Sets the zero of the tangential force to its mean between begin and end.
   void begin_zero();
   void end_zero();
-  bool has_zero() const; // enough for end, or it tells no load
+  bool has_zero() const; // enough frames for end_zero, or no tangential force at all
 
 private:
-  bool tells_load() const;
+  bool has_load() const;
 
   GripTouch touch_;
   bool is_heard_ = false, is_new_ = false, has_delay_ = false;
-  double heard_s_ = 0.0, changed_s_ = 0.0, told_s_ = 0.0; // told_s_: when a force came
+  double heard_s_ = 0.0, changed_s_ = 0.0, force_s_ = 0.0; // arrival of a frame, a change, a force
   double delay_s_ = 0.0;
   double force_t_s_ = 0.0, force_N_ = 0.0, sd_N_ = 0.0;
   int unchanged_ = 0; // frames whose values are those of the one before
@@ -81,22 +81,23 @@ private:
   int sums_ = 0;
 };
 
-// Of both, as far as they are believed.
-struct GripFelts {
+// The combined reading of both fingertips; a reading that is not trusted is left out.
+struct GripReadings {
   std::uint32_t trouble = 0;
-  int fingers = 0, touches = 0;                               // so many tell a force; feel a contact
-  double low_N = 0.0, high_N = 0.0, mean_N = 0.0, sd_N = 0.0; // 0 without any
-  double grip_N = 0.0;                                        // what the object is held with
-  double t_s = 0.0;                                           // of the older of them
+  int fingers = 0, touches = 0;                               // fingertips with a force; with a contact
+  double low_N = 0.0, high_N = 0.0, mean_N = 0.0, sd_N = 0.0; // 0 if fingers is 0
+  double grip_N = 0.0;                                        // force that holds the object
+  double t_s = 0.0;                                           // time of the older of the two forces
   double delay_s = 0.0;
-  bool fresh = false, over = false, tells_load = false, slides = false;
-  double load_N = 0.0;     // tangential load of one fingertip, since its zero
-  double ratio = 0.0;      // tangential over normal force, of those that tell both
-  double speed_mm_s = 0.0; // of the slower
+  bool fresh = false, over = false, has_load = false, slides = false;
+  double load_N = 0.0;     // tangential force at one fingertip, less its zero
+  double ratio = 0.0;      // tangential over normal force, of the fingertips that have both
+  double speed_mm_s = 0.0; // sliding speed at the slower fingertip
   std::array<double, GRIP_FINGERS> force_N{};
-  bool is_alone() const { return low_N < 0.5 * high_N; } // one presses, the other hardly
+  bool is_alone() const { return low_N < 0.5 * high_N; } // one fingertip carries most of the force
 };
 
-GripFelts look_at(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings);
+GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s,
+                              const GripSettings &settings);
 
 } // namespace fingertip

@@ -7,27 +7,27 @@ namespace fingertip {
 
 namespace {
 
-constexpr double READY_s = 0.15; // of the zero of the load
-constexpr double RISES_s = 0.27; // in which the start force rises
-// An approach or a release that was kept waiting makes up for no more: a leap would be a blow.
+constexpr double READY_s = 0.15; // measurement of the zero of the load
+constexpr double RISES_s = 0.27; // rise of the start force
+// After a pause an approach or a release catches up on no more than this: a leap would be a blow.
 constexpr double RAMP_s = 0.1;
-constexpr double SQUEEZE_s = 3.0; // squeezing takes no longer, or it is what it is
-constexpr double SQUEEZED = 0.8;  // of the start force: it is there
+constexpr double SQUEEZE_s = 3.0; // squeezing ends after this time with the force that it reached
+constexpr double SQUEEZED = 0.8;  // share of the start force that is enough
 constexpr double ACTIVATION_s = 10.0;
-constexpr double EMPTY_s = 0.06;  // neither fingertip feels anything: the object is gone
-constexpr double STANDS_s = 0.4;  // a gripper that stands where it was sent has closed on nothing
-constexpr double UNEVEN_s = 0.3;  // the fingertips' forces differ for so long at rest
-constexpr double AGAIN_s = 0.003; // a bad answer of the gripper is looked at again, after so long
-// An approach waits for a status that is no older: where the fingers are when they touch, and that
-// they follow, is what all forces are turned into widths by.
+constexpr double EMPTY_s = 0.06;  // without any contact for this time the object is gone
+constexpr double CLOSED_s = 0.4;  // a gripper at rest where it was sent for this time has missed
+constexpr double UNEVEN_s = 0.3;  // forces that differ at rest for this time are reported
+constexpr double AGAIN_s = 0.003; // bad answers over this time are a fault
+// An approach waits while the latest status is older than this: the width at the touch is the
+// reference for all conversions from force to width.
 constexpr double WIDTH_STALE_s = 0.1;
-// What the fingers go on by after the touch, until the controller knows of it, at most.
+// Largest travel from the touch until the controller knows of it.
 constexpr double OVERSHOOT_mm = 0.4;
 constexpr double APPROACH_LEAST_mm_s = 1.0;
-constexpr double MOVE_s = 0.02;        // a move is to take so long, but where the object slides
-constexpr double WIDTH_SLACK_mm = 1.0; // of the gripper's own units
+constexpr double MOVE_s = 0.02;        // duration of a move, unless the object slides
+constexpr double WIDTH_SLACK_mm = 1.0; // rounding of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
-constexpr double ONLY_HELD_s = 1.0; // nothing has pulled for so long
+constexpr double ONLY_HELD_s = 1.0; // without a load for this time
 
 double seconds(const GripperStatus &status) {
   return 1e-6 * static_cast<double>(status.host_us);
@@ -102,7 +102,7 @@ std::uint32_t Grip::gripper_trouble() {
   if (!hears_status_ || now_s_ > seconds(status_) + settings_.silent_s) {
     return GRIP_GRIPPER_SILENT;
   }
-  // One bad answer alone may be the line's.
+  // A single bad answer may be a transmission error.
   if (seconds(status_) - fault_s_ < AGAIN_s) {
     return 0;
   }
@@ -111,20 +111,20 @@ std::uint32_t Grip::gripper_trouble() {
 }
 
 double Grip::dead_s() const {
-  return felt_.delay_s + traits_.latency_s + reach_.poll_s();
+  return readings_.delay_s + traits_.latency_s + reach_.poll_s();
 }
 
 double Grip::start_force() const {
   return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.blind_N : settings_.start_N;
 }
 
-// A step of the width at this speed since the last.
+// Moves the width towards to_mm, as far as this speed allows since the last step.
 void Grip::ramp(double to_mm, double speed_mm_s) {
   if (is_entered_) {
     reach_.stop();
     ramped_s_ = now_s_;
   }
-  // A slow one takes longer than that for a step.
+  // At a low speed one step takes longer than RAMP_s.
   const double most_s = std::max(RAMP_s, traits_.step_mm / speed_mm_s);
   const double passed_s = std::min(now_s_ - ramped_s_, most_s);
   const double steps = std::floor(speed_mm_s * passed_s / traits_.step_mm + 1e-9);
@@ -137,28 +137,28 @@ void Grip::ramp(double to_mm, double speed_mm_s) {
 }
 
 void Grip::approach() {
-  if (reach_.goes_round()) {
-    if (felt_.fingers > 0 && reach_.comes_round(now_s_, felt_.t_s)) {
+  if (reach_.is_in_detour()) {
+    if (readings_.fingers > 0 && reach_.continue_detour(now_s_, readings_.t_s)) {
       enter(GRIP_SQUEEZE);
     }
     return;
   }
-  const bool blind = felt_.fingers == 0 && felt_.touches == 0;
+  const bool blind = readings_.fingers == 0 && readings_.touches == 0;
   if (blind || now_s_ > seconds(status_) + WIDTH_STALE_s) {
     ramped_s_ = now_s_;
     return;
   }
-  // One fingertip alone pushes the object to the other, unless it has to push as hard as a grip,
-  // or as the cap lets it. The other may be frozen, or the object fixed; that looks the same.
-  const bool both = felt_.touches >= felt_.fingers && felt_.low_N >= settings_.touch_N;
-  if (felt_.touches == 0 || is_entered_) {
-    reach_.first_touch(felt_.t_s);
+  // One fingertip alone pushes the object to the other, but not harder than a grip or the cap. The
+  // other may be frozen, or the object fixed; the controller cannot distinguish these.
+  const bool both = readings_.touches >= readings_.fingers && readings_.low_N >= settings_.touch_N;
+  if (readings_.touches == 0 || is_entered_) {
+    reach_.first_touch(readings_.t_s);
   }
-  const bool presses = felt_.high_N > 0.0;
-  const double least_mm = presses ? std::max(reach_.last_below_cap_mm(felt_, settings_), 0.0) : 0.0;
-  const bool no_room = presses && least_mm == reach_.target_mm();
-  if (felt_.fingers == 0 || both || no_room || felt_.high_N >= start_force()) {
-    reach_.both_touch(felt_.t_s);
+  const bool presses = readings_.high_N > 0.0;
+  const double least_mm = presses ? std::max(reach_.last_below_cap_mm(readings_, settings_), 0.0) : 0.0;
+  const bool at_cap = presses && least_mm == reach_.target_mm();
+  if (readings_.fingers == 0 || both || at_cap || readings_.high_N >= start_force()) {
+    reach_.both_touch(readings_.t_s);
     reach_.approach_ends(now_s_);
     enter(GRIP_SQUEEZE);
     return;
@@ -166,8 +166,8 @@ void Grip::approach() {
   const double speed_mm_s = std::min(settings_.approach_mm_s, OVERSHOOT_mm / dead_s());
   ramp(least_mm, std::max(speed_mm_s, std::min(APPROACH_LEAST_mm_s, settings_.approach_mm_s)));
   if (status_.moving || reach_.target_mm() != 0.0) {
-    stood_s_ = now_s_;
-  } else if (now_s_ - stood_s_ > STANDS_s) {
+    moved_s_ = now_s_;
+  } else if (now_s_ - moved_s_ > CLOSED_s) {
     enter(GRIP_MISSED);
   }
 }
@@ -175,39 +175,39 @@ void Grip::approach() {
 std::uint32_t Grip::aim(const GripAim &aim) {
   GripAim below = aim;
   wanted_N_ = below.wanted_N = std::min(aim.wanted_N, settings_.cap_N);
-  return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) | reach_.aim(below, felt_, settings_, now_s_);
+  return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) | reach_.aim(below, readings_, settings_, now_s_);
 }
 
 std::uint32_t Grip::squeeze() {
   const bool fixed = settings_.mode == GRIP_MODE_FIXED;
   const double aimed_N = start_force();
-  // What one fingertip alone pushes is not gripped yet.
-  const bool alone = felt_.fingers == 2 && felt_.low_N < settings_.touch_N;
+  // An object that one fingertip alone pushes is not gripped yet.
+  const bool alone = readings_.fingers == 2 && readings_.low_N < settings_.touch_N;
   was_held_ = was_held_ || !alone;
   if (alone) {
-    reach_.both_touch(felt_.t_s);
+    reach_.both_touch(readings_.t_s);
   }
   const double from_N = is_blind_ ? settings_.start_N : settings_.touch_N;
   const double risen_N = from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
-  const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
+  const std::uint32_t trouble = fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
                                       : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
-  // Or as near to it as a move brings it.
-  const bool nearest = !fixed && felt_.fingers > 0 && reach_.has_come(now_s_, felt_.t_s);
-  const bool there = (felt_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
-  const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, felt_.t_s);
-  // A step nearer than its least moves bring it: to a set force, or where it is far too weak.
-  const bool may_round = nearest && (capped || there);
-  if (may_round && (settings_.sets_force()
-                        ? reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)
-                        : felt_.low_N < SQUEEZED * aimed_N && reach_.goes_round_closer(felt_, settings_, now_s_))) {
+  // A force as near to it as a move brings it is enough as well.
+  const bool nearest = !fixed && readings_.fingers > 0 && reach_.has_come(now_s_, readings_.t_s);
+  const bool there = (readings_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
+  const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, readings_.t_s);
+  // A detour brings it one step nearer: to a set force, or if the grip is far too weak.
+  const bool may_detour = nearest && (capped || there);
+  if (may_detour && (settings_.sets_force() ? reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)
+                                            : readings_.low_N < SQUEEZED * aimed_N &&
+                                                  reach_.start_detour_closer(readings_, settings_, now_s_))) {
     enter(GRIP_APPROACH);
     return trouble;
   }
   const bool over = now_s_ - since_s_ > SQUEEZE_s;
   if (!alone && (((there || capped) && !status_.moving) || over)) {
-    if (!fixed && !is_blind_ && !felt_.tells_load) {
-      is_blind_ = true; // on to the grip that holds without a load
+    if (!fixed && !is_blind_ && !readings_.has_load) {
+      is_blind_ = true; // squeeze on to the grip that holds without a load
       since_s_ = now_s_;
     } else {
       for (GripFinger &finger : fingers_) {
@@ -221,7 +221,7 @@ std::uint32_t Grip::squeeze() {
 
 std::uint32_t Grip::make_ready() {
   const bool fixed = settings_.mode == GRIP_MODE_FIXED;
-  const std::uint32_t trouble = fixed ? fixed_.step(felt_, settings_, traits_, now_s_, reach_)
+  const std::uint32_t trouble = fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
                                       : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
   if (now_s_ - since_s_ >= READY_s && fingers_[0].has_zero() && fingers_[1].has_zero()) {
     for (GripFinger &finger : fingers_) {
@@ -235,20 +235,20 @@ std::uint32_t Grip::make_ready() {
 
 std::uint32_t Grip::hold() {
   if (settings_.mode == GRIP_MODE_FIXED) {
-    return fixed_.step(felt_, settings_, traits_, now_s_, reach_);
+    return fixed_.step(readings_, settings_, traits_, now_s_, reach_);
   }
-  const double wanted_N = hold_.wants(felt_, reach_.coming_N(felt_, now_s_), settings_, now_s_, dead_s());
+  const double wanted_N = hold_.wants(readings_, reach_.coming_N(readings_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
-  std::uint32_t trouble = felt_.tells_load ? 0u : GRIP_NO_LOAD;
-  // The rubber has relaxed, and a step brings it nearer to a force that is only held. Without a
-  // load it may have been lifted.
-  const bool only_held = hold_.is_set() && felt_.tells_load && now_s_ - since_s_ > ONLY_HELD_s;
+  std::uint32_t trouble = readings_.has_load ? 0u : GRIP_NO_LOAD;
+  // After the rubber has relaxed, a detour brings the grip nearer to a set force. Without a measured
+  // load the object may have been lifted, so there is no detour then.
+  const bool only_held = hold_.is_set() && readings_.has_load && now_s_ - since_s_ > ONLY_HELD_s;
   if (!only_held) {
-    reach_.leave_round();
+    reach_.cancel_detour();
   }
-  if (reach_.goes_round()) {
-    reach_.comes_round(now_s_, felt_.t_s);
-  } else if (!only_held || !reach_.goes_round_to(settings_.start_N, felt_, settings_, now_s_)) {
+  if (reach_.is_in_detour()) {
+    reach_.continue_detour(now_s_, readings_.t_s);
+  } else if (!only_held || !reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)) {
     trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set()});
   }
   if (slides != (state_ == GRIP_SLIPPING)) {
@@ -258,7 +258,7 @@ std::uint32_t Grip::hold() {
 }
 
 bool Grip::is_gone() {
-  const bool empty = felt_.fingers > 0 && felt_.touches == 0;
+  const bool empty = readings_.fingers > 0 && readings_.touches == 0;
   filled_s_ = empty ? filled_s_ : now_s_;
   return empty && now_s_ - filled_s_ >= EMPTY_s;
 }
@@ -269,11 +269,11 @@ std::uint32_t Grip::go_on() {
     if (status_.active) {
       reach_.stop();
       reach_.first_touch(seconds(status_));
-      enter(felt_.touches == 0 ? GRIP_APPROACH : GRIP_SQUEEZE);
+      enter(readings_.touches == 0 ? GRIP_APPROACH : GRIP_SQUEEZE);
       return 0;
     }
-    // Activating opens a gripper: not with something between its fingers.
-    may_activate_ = may_activate_ || (felt_.fingers > 0 && felt_.touches == 0);
+    // Activation opens a gripper, so it waits until nothing is between the fingers.
+    may_activate_ = may_activate_ || (readings_.fingers > 0 && readings_.touches == 0);
     return may_activate_ && now_s_ - since_s_ < ACTIVATION_s ? 0u : GRIP_GRIPPER_INACTIVE;
   case GRIP_APPROACH:
     approach();
@@ -296,18 +296,18 @@ std::uint32_t Grip::go_on() {
   }
 }
 
-void Grip::look() {
-  felt_ = look_at(fingers_, now_s_, settings_);
-  trouble_ = felt_.trouble | gripper_trouble();
-  // Their frames are of different moments: while the force changes they always differ.
-  const bool uneven = felt_.fingers == 2 && felt_.high_N > 4.0 * settings_.touch_N &&
-                      felt_.high_N - felt_.low_N > settings_.differ * felt_.high_N;
+void Grip::sample() {
+  readings_ = combine_readings(fingers_, now_s_, settings_);
+  trouble_ = readings_.trouble | gripper_trouble();
+  // The frames of the two are not simultaneous, so the forces always differ while they change.
+  const bool uneven = readings_.fingers == 2 && readings_.high_N > 4.0 * settings_.touch_N &&
+                      readings_.high_N - readings_.low_N > settings_.differ * readings_.high_N;
   const bool rests = state_ >= GRIP_SQUEEZE && state_ <= GRIP_STILL && state_ != GRIP_SLIPPING;
-  even_s_ = uneven && rests && reach_.has_come(now_s_, felt_.t_s) ? even_s_ : now_s_;
+  even_s_ = uneven && rests && reach_.has_come(now_s_, readings_.t_s) ? even_s_ : now_s_;
   trouble_ |= now_s_ - even_s_ >= UNEVEN_s ? GRIP_FINGERS_DIFFER : 0u;
 }
 
-void Grip::tell(GripCommand &command) const {
+void Grip::fill(GripCommand &command) const {
   command = {};
   command.width_mm = reach_.target_mm();
   double speed_mm_s = traits_.speed_max_mm_s;
@@ -346,17 +346,17 @@ GripReport Grip::report() const {
   report.trouble = trouble_;
   report.gripper_fault = failed ? fault_code_ : status_.fault;
   report.wanted_N = wanted_N_;
-  report.force_N = felt_.grip_N;
-  report.felt_N = felt_.force_N;
+  report.force_N = readings_.grip_N;
+  report.finger_N = readings_.force_N;
   report.friction = hold_.friction(settings_);
   report.width_mm = status_.width_mm;
-  report.delay_s = felt_.delay_s;
+  report.delay_s = readings_.delay_s;
   report.slides = hold_.slides();
   const bool loaded = state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING;
-  if (loaded && felt_.tells_load && settings_.mode == GRIP_MODE_HOLD) {
+  if (loaded && readings_.has_load && settings_.mode == GRIP_MODE_HOLD) {
     report.load_N = hold_.load_N();
     if (hold_.is_loaded()) {
-      report.margin = std::min(felt_.grip_N * report.friction / report.load_N, MARGIN_MOST);
+      report.margin = std::min(readings_.grip_N * report.friction / report.load_N, MARGIN_MOST);
     }
   }
   return report;
@@ -364,7 +364,7 @@ GripReport Grip::report() const {
 
 GripReport Grip::step(double now_s, GripCommand &command) {
   now_s_ = std::max(now_s, now_s_);
-  look();
+  sample();
   const bool silent = (trouble_ & GRIP_GRIPPER_SILENT) != 0, grasps = is_grasping();
   const GripState before = state_;
   if (before != GRIP_IDLE && before != GRIP_FAULT && (trouble_ & GRIP_GRIPPER_FAULTS) != 0) {
@@ -372,16 +372,16 @@ GripReport Grip::step(double now_s, GripCommand &command) {
     fault_code_ = status_.fault;
     enter(GRIP_FAULT);
   } else if (grasps && is_gone()) {
-    // What only one fingertip has pushed was never held: on to the other.
+    // An object that only one fingertip has pushed was never held: the approach goes on.
     enter(was_held_ || state_ != GRIP_SQUEEZE ? GRIP_DROPPED : GRIP_APPROACH);
-  } else if (!silent && !(grasps && felt_.fingers > 0 && felt_.touches == 0)) {
+  } else if (!silent && !(grasps && readings_.fingers > 0 && readings_.touches == 0)) {
     trouble_ |= go_on();
   }
   is_entered_ = state_ != before;
   if (state_ == GRIP_FAULT) {
     trouble_ |= fault_trouble_;
   }
-  tell(command);
+  fill(command);
   return report();
 }
 

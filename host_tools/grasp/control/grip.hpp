@@ -29,31 +29,31 @@
 
 namespace fingertip {
 
-// What the gripper is to do.
+// The motion that the gripper is asked for.
 enum GripMotion : std::uint8_t {
-  GRIP_STAY,     // hold the position: nothing is sent but what keeps the line alive
-  GRIP_ACTIVATE, // only where nothing is gripped
+  GRIP_STAY,     // hold the position: only keep the line alive
+  GRIP_ACTIVATE, // only while nothing is gripped
   GRIP_MOVE,
 };
 struct GripCommand : GripperMove {
   std::uint8_t motion = GRIP_STAY; // GripMotion
 };
 
-// Romano et al., "Human-inspired robotic grasp control with tactile sensing", IEEE Trans. Robotics
-// 27, 2011, has the course of it.
+// The phases of a grasp follow Romano et al., "Human-inspired robotic grasp control with tactile
+// sensing", IEEE Trans. Robotics 27, 2011.
 enum GripState : std::uint8_t {
   GRIP_IDLE, // no request yet
   GRIP_ACTIVATING,
-  GRIP_APPROACH, // closing until both fingertips feel the object
-  GRIP_SQUEEZE,  // up to the start force
-  GRIP_READY,    // that force stands; the present load counts as zero
+  GRIP_APPROACH, // closing until both fingertips have contact
+  GRIP_SQUEEZE,  // closing until the start force is reached
+  GRIP_READY,    // the start force is reached; the zero of the load is measured
   GRIP_HOLDING,
-  GRIP_SLIPPING, // as HOLDING, and an object that slides is being caught
-  GRIP_STILL,    // the width stays, because it was asked for
-  GRIP_RELEASE,  // opening, because it was asked for
-  GRIP_OPEN,     // done
-  GRIP_DROPPED,  // nothing is between the fingertips any more; the width stays
-  GRIP_MISSED,   // closed, and nothing was there
+  GRIP_SLIPPING, // as HOLDING, while the object slides
+  GRIP_STILL,    // the width stays, on request
+  GRIP_RELEASE,  // opening, on request
+  GRIP_OPEN,     // opened
+  GRIP_DROPPED,  // the object is gone; the width stays
+  GRIP_MISSED,   // closed without an object
   GRIP_FAULT,    // the width stays
   GRIP_STATES,
 };
@@ -61,18 +61,18 @@ enum GripState : std::uint8_t {
 enum GripRequest { GRIP_REQUEST_GRASP, GRIP_REQUEST_HOLD, GRIP_REQUEST_RELEASE };
 
 struct GripReport {
-  std::uint8_t state = GRIP_IDLE;            // GripState
-  std::uint32_t trouble = 0;                 // GripTrouble
-  std::uint8_t gripper_fault = 0;            // its own code; that of FAULT stays, until there is another
-  double wanted_N = 0.0;                     // the grip force that it aims at
-  double force_N = 0.0;                      // as reported: of both fingertips
-  std::array<double, GRIP_FINGERS> felt_N{}; // and of each
-  double load_N = 0.0;                       // tangential load of one fingertip since READY; 0: unknown
-  double margin = 0.0;                       // force x friction / load; 0: no load
+  std::uint8_t state = GRIP_IDLE;              // GripState
+  std::uint32_t trouble = 0;                   // GripTrouble
+  std::uint8_t gripper_fault = 0;              // the gripper's own code; in FAULT the last one stays
+  double wanted_N = 0.0;                       // grip force that the controller aims at
+  double force_N = 0.0;                        // grip force, from both fingertips
+  std::array<double, GRIP_FINGERS> finger_N{}; // force of each fingertip
+  double load_N = 0.0;                         // tangential force at one fingertip since READY; 0: unknown
+  double margin = 0.0;                         // force x friction / load; 0: no load
   double friction = 0.0;
   double width_mm = 0.0;
-  double delay_s = 0.0;     // from a fingertip's measurement to here
-  std::uint32_t slides = 0; // so many since GRASP
+  double delay_s = 0.0;     // from a fingertip's measurement to the controller
+  std::uint32_t slides = 0; // slides since GRASP
 };
 
 class Grip {
@@ -88,13 +88,13 @@ public:
   // state.
   bool request(GripRequest request);
 
-  // Decides what to do now. Call it after every input, and every 10 ms without one.
+  // Computes the command. Call it after every input, and every 10 ms without one.
   GripReport step(double now_s, GripCommand &command);
 
 private:
   void enter(GripState state);
   bool is_grasping() const;
-  void look();
+  void sample();
   bool is_gone();
   std::uint32_t gripper_trouble();
   std::uint32_t go_on();
@@ -106,32 +106,32 @@ private:
   void ramp(double to_mm, double speed_mm_s);
   double dead_s() const;
   double start_force() const;
-  void tell(GripCommand &command) const;
+  void fill(GripCommand &command) const;
   GripReport report() const;
 
   GripSettings settings_;
   GripperTraits traits_;
   std::array<GripFinger, GRIP_FINGERS> fingers_;
-  GripFelts felt_;
+  GripReadings readings_;
   GripReach reach_;
   GripHold hold_;
   GripFixed fixed_;
   GripperStatus status_;
   bool hears_status_ = false;
-  double now_s_ = 0.0, since_s_ = 0.0; // the state has been since
+  double now_s_ = 0.0, since_s_ = 0.0; // since_s_: the state was entered
   GripState state_ = GRIP_IDLE;
-  std::uint32_t trouble_ = 0, fault_trouble_ = 0; // as of the last step; that of FAULT,
-  std::uint8_t fault_code_ = 0;                   // and the gripper's own
-  double fault_s_ = 0.0;                          // of the first of its bad answers in a row
+  std::uint32_t trouble_ = 0, fault_trouble_ = 0; // of the last step; of FAULT
+  std::uint8_t fault_code_ = 0;                   // the gripper's own code
+  double fault_s_ = 0.0;                          // time of the first bad answer in a row
   double wanted_N_ = 0.0;
-  double filled_s_ = 0.0; // when a fingertip last felt anything
-  double stood_s_ = 0.0;  // the gripper has not stood where an approach ends
-  double ramped_s_ = 0.0; // the last step of an approach or a release
-  double even_s_ = 0.0;   // the fingertips' forces were last alike, or the gripper moved
+  double filled_s_ = 0.0; // last contact of any fingertip
+  double moved_s_ = 0.0;  // last motion of an approach
+  double ramped_s_ = 0.0; // last step of an approach or a release
+  double even_s_ = 0.0;   // last time that both forces were alike, or the gripper moved
   bool may_activate_ = false, is_entered_ = false;
   bool still_grasps_ = false; // STILL with an object
-  bool was_held_ = false;     // both fingertips have felt the object
-  bool is_blind_ = false;     // squeezed without a fingertip that could tell a load
+  bool was_held_ = false;     // both fingertips have had contact
+  bool is_blind_ = false;     // squeezed while no fingertip reported a tangential force
 };
 
 } // namespace fingertip

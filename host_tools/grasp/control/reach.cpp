@@ -10,36 +10,37 @@ namespace {
 
 // Layers of 12 mm under spheres of 6 to 30 mm, 1 to 10 N (host_tools/simulation/twin).
 constexpr double EXPONENT = 1.6;
-constexpr double STIFFER = 1.2; // than what the moves have shown, where a cap is to hold
-// An elastic force over what relaxation has left of it: a move adds to the elastic one.
+constexpr double STIFFER = 1.2; // safety factor on the stiffness that moves have shown, for the cap
+// Elastic over relaxed force: a move adds to the elastic one.
 constexpr double RELAXED = 1.1;
-// Both pads, at the force of a touch; less is not told from nothing.
+// Indentation of both pads at the force of a touch; less cannot be distinguished from none.
 constexpr double TOUCHED_mm = 0.3;
 constexpr double LEAST_N = 0.05;
-// What is learnt: from moves that make so much, by so large a share, within these limits.
-constexpr double TEACHES = 0.1; // of the force: the bound learns from no less
+// A move teaches if it changes the force by this share or this force; how fast, within which limits.
+constexpr double TEACHES = 0.1; // least share of the force, for the bound
 constexpr double TEACHES_N = 0.15, LEARNS = 0.5, LEAST_STEEP = 0.4, MOST_STEEP = 3.0;
 
-constexpr double SPACED_s = 0.003;     // widths of the ring
-constexpr double WIDTH_LAGS_s = 0.008; // newer forces tell nothing while the gripper moves
-constexpr double SHOWS_s = 0.02;       // after a move, in the force, whatever the clocks differ by
-constexpr double POLL_SHARE = 0.05;    // that an answer has in the mean
-constexpr double MISSES = 0.35;        // of what the least move makes: less may be missing
-constexpr double NEAR = 0.03;          // of the wanted force: near enough
-constexpr double WEAK = 0.8;           // and too weak, where the cap leaves no room
-constexpr double SHORT_mm = 0.5;       // a short move
-constexpr double OPENS_mm = 0.3;       // at once
-// A set force may be off by so many steps: by more than half of one, or it goes to and fro. Going
-// round it keeps so much of it, and does so no more often in a grasp.
+constexpr double SPACED_s = 0.003;     // least spacing of the widths in the ring
+constexpr double WIDTH_LAGS_s = 0.008; // while the gripper moves, the width of a newer force is unknown
+constexpr double SHOWS_s = 0.02;       // from a move to its effect in the force, clock errors included
+constexpr double POLL_SHARE = 0.05;    // weight of an answer in the moving average
+constexpr double MISSES = 0.35;        // share of the effect of the least move that may be missing
+constexpr double NEAR = 0.03;          // error that is near enough, as a share of the wanted force
+constexpr double WEAK = 0.8;           // a grip below this share of it is too weak
+constexpr double SHORT_mm = 0.5;       // length of a short move
+constexpr double OPENS_mm = 0.3;       // largest single opening
+// A set force may be off by OFF steps: more than half a step, or the gripper would oscillate. During
+// a detour the grip keeps the share KEEPS of it. A grasp has DETOURS_MOST detours at most.
 constexpr double OFF = 0.65, KEEPS = 0.25;
-constexpr int ROUNDS = 4;
-// Of a fingertip's force, below the cap. UNCERTAIN contacts report far more than the force is off;
-// chosen with cylinders of fingertip_grasp_trials, seed 1.
+constexpr int DETOURS_MOST = 4;
+// Distance from the cap in standard deviations of a fingertip's force; the deviation is limited to
+// these shares of the force, because UNCERTAIN contacts report far more than the true error. Chosen
+// with cylinders of fingertip_grasp_trials, seed 1.
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
 
-// The larger force as it may truly be.
-double most_N(const GripFelts &felt) {
-  return felt.high_N + SDS * std::clamp(felt.sd_N, SD_LEAST * felt.high_N, SD_MOST * felt.high_N);
+// Upper limit of the larger of both true forces.
+double most_N(const GripReadings &readings) {
+  return readings.high_N + SDS * std::clamp(readings.sd_N, SD_LEAST * readings.high_N, SD_MOST * readings.high_N);
 }
 
 double indentation_mm(double width_mm, double touch_mm) {
@@ -51,7 +52,7 @@ double way_to_mm(double force_N, double at_1_mm_N, double exponent) {
   return std::pow(force_N / at_1_mm_N, 1.0 / exponent);
 }
 
-// Its force at 1 mm, if this way turned one force into the other.
+// The pad's force at 1 mm, if this travel turned one force into the other.
 double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double exponent) {
   const double unit_mm = way_to_mm(to_N, 1.0, exponent) - way_to_mm(from_N, 1.0, exponent);
   return std::pow(unit_mm / way_mm, exponent);
@@ -105,14 +106,14 @@ double GripBound::first_N(double way_mm) {
 }
 
 double GripBound::width_below(double cap_N, double force_N, double from_mm) const {
-  double room_mm = std::numeric_limits<double>::infinity();
+  double travel_mm = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < EXPONENTS.size(); i++) {
     const double elastic_N = RELAXED * force_N;
     const double most_N = std::max(elastic_N + cap_N - force_N, 0.0);
-    room_mm = std::min(room_mm, way_to_mm(most_N, at_1_mm_N_[i], EXPONENTS[i]) -
-                                    way_to_mm(elastic_N, at_1_mm_N_[i], EXPONENTS[i]));
+    travel_mm = std::min(travel_mm, way_to_mm(most_N, at_1_mm_N_[i], EXPONENTS[i]) -
+                                        way_to_mm(elastic_N, at_1_mm_N_[i], EXPONENTS[i]));
   }
-  return from_mm - 2.0 * room_mm;
+  return from_mm - 2.0 * travel_mm;
 }
 
 void GripBound::learn(double force_N, double width_mm) {
@@ -133,7 +134,7 @@ void GripReach::take(const GripperStatus &status, double silent_s) {
   const double t_s = 1e-6 * static_cast<double>(status.host_us);
   if (is_heard_) {
     const double passed_s = t_s - 1e-6 * static_cast<double>(status_.host_us);
-    // Between what was said before a silence and after it no width is known.
+    // The widths during a silence are unknown.
     if (passed_s > silent_s) {
       count_ = 0;
     } else {
@@ -142,7 +143,7 @@ void GripReach::take(const GripperStatus &status, double silent_s) {
   } else {
     poll_s_ = traits_.poll_s;
   }
-  stood_s_ = is_heard_ && !status_.moving ? stood_s_ : t_s;
+  stopped_s_ = is_heard_ && !status_.moving ? stopped_s_ : t_s;
   status_ = status;
   is_heard_ = true;
   const double before_s = widths_[(newest_ + widths_.size() - 1) % widths_.size()].t_s;
@@ -171,29 +172,29 @@ double GripReach::width_at(double t_s) const {
   return after.width_mm;
 }
 
-bool GripReach::stands(double now_s) const {
+bool GripReach::has_stopped(double now_s) const {
   const double t_s = 1e-6 * static_cast<double>(status_.host_us);
   const double late_s = std::max(now_s - t_s, 0.0);
   return !status_.moving && t_s > aimed_s_ + traits_.latency_s + late_s + poll_s_;
 }
 
 bool GripReach::has_come(double now_s, double frame_s) const {
-  return stands(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
+  return has_stopped(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
 }
 
 bool GripReach::rests(double now_s, double frame_s) const {
-  return has_come(now_s, frame_s) && frame_s > stood_s_;
+  return has_come(now_s, frame_s) && frame_s > stopped_s_;
 }
 
 void GripReach::first_touch(double t_s) {
   rubber_.begin(width_at(t_s));
   bound_ = GripBound();
-  rounds_ = 0;
+  detours_ = 0;
 }
 
-// Where it is going to be. Where it stands, it makes no move that is shorter than its deadband.
+// The width at which the gripper will stop. At rest it makes no move shorter than its deadband.
 double GripReach::coming_mm(double now_s) const {
-  const bool stays = stands(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
+  const bool stays = has_stopped(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
   return stays ? status_.width_mm : target_mm_;
 }
 
@@ -209,28 +210,28 @@ double GripReach::least_move_N(double force_N) const {
   return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N;
 }
 
-double GripReach::coming_N(const GripFelts &felt, double now_s) const {
-  return rubber_.force_at(coming_mm(now_s), felt.grip_N, width_at(felt.t_s));
+double GripReach::coming_N(const GripReadings &readings, double now_s) const {
+  return rubber_.force_at(coming_mm(now_s), readings.grip_N, width_at(readings.t_s));
 }
 
-double GripReach::last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const {
-  const double least_mm = bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
+double GripReach::last_below_cap_mm(const GripReadings &readings, const GripSettings &settings) const {
+  const double least_mm = bound_.width_below(settings.cap_N, most_N(readings), width_at(readings.t_s));
   const double steps = std::floor((target_mm_ - least_mm) / traits_.step_mm);
   return target_mm_ - std::max(steps, 0.0) * traits_.step_mm;
 }
 
-double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSettings &settings,
+double GripReach::allowed(double width_mm, const GripReadings &readings, const GripSettings &settings,
                           std::uint32_t &trouble) const {
   const double least_mm = touch_width_mm() - settings.travel_cap_mm;
   if (width_mm < least_mm) {
     width_mm = least_mm;
     trouble |= GRIP_AT_TRAVEL_CAP;
   }
-  // What is not believed to be below the cap is not added to.
-  if (width_mm < target_mm_ && (felt.over || felt.fingers == 0)) {
+  // A force that may be above the cap is never increased.
+  if (width_mm < target_mm_ && (readings.over || readings.fingers == 0)) {
     width_mm = target_mm_;
   }
-  // Where it touched is as far as it opens without being asked to.
+  // Without a request the gripper opens no further than the width of the touch.
   return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
 }
 
@@ -238,143 +239,197 @@ double GripReach::steps_off(double wanted_N, double force_N, double from_mm, dou
   return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
 }
 
-bool GripReach::may_go_round(const GripFelts &felt) const {
-  return least_mm() > traits_.step_mm && !felt.is_alone() && !felt.over;
+bool GripReach::can_detour(const GripReadings &readings) const {
+  return least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over;
 }
 
-double GripReach::room_mm(const GripFelts &felt, const GripSettings &settings, double coming_mm) const {
-  return coming_mm - bound_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s));
+double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings,
+                                      double coming_mm) const {
+  return coming_mm - bound_.width_below(settings.cap_N, most_N(readings), width_at(readings.t_s));
 }
 
-void GripReach::go_round(double to_mm, double now_s) {
+void GripReach::begin_detour(double to_mm, double now_s) {
   const double coming = coming_mm(now_s);
-  goes_round_ = true;
-  round_mm_ = to_mm;
+  in_detour_ = true;
+  detour_end_mm_ = to_mm;
   target_mm_ = std::max(coming, to_mm) + least_mm();
   aimed_s_ = now_s;
 }
 
-bool GripReach::goes_round_closer(const GripFelts &felt, const GripSettings &settings, double now_s) {
+bool GripReach::start_detour_closer(const GripReadings &readings, const GripSettings &settings, double now_s) {
   const double coming = coming_mm(now_s);
-  const bool goes = !limits_itself(settings) && may_go_round(felt) && room_mm(felt, settings, coming) > traits_.step_mm;
+  const bool goes = !limits_itself(settings) && can_detour(readings) &&
+                    travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
   if (goes) {
-    go_round(coming - traits_.step_mm, now_s);
+    begin_detour(coming - traits_.step_mm, now_s);
   }
   return goes;
 }
 
-bool GripReach::goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings, double now_s) {
-  if (!may_go_round(felt) || rounds_ >= ROUNDS || !rests(now_s, felt.t_s)) {
+bool GripReach::start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings,
+                                double now_s) {
+  if (!can_detour(readings) || detours_ >= DETOURS_MOST || !rests(now_s, readings.t_s)) {
     return false;
   }
-  const double coming = coming_mm(now_s), width_mm = width_at(felt.t_s);
-  const double off = steps_off(set_N, felt.low_N, width_mm, coming);
+  const double coming = coming_mm(now_s), width_mm = width_at(readings.t_s);
+  const double off = steps_off(set_N, readings.low_N, width_mm, coming);
   const double to_mm = coming - std::copysign(traits_.step_mm, off);
   const double widest_mm = std::max(coming, to_mm) + least_mm();
-  const bool has_room = off < 0.0 || room_mm(felt, settings, coming) > traits_.step_mm;
-  if (std::abs(off) < OFF || !has_room || rubber_.force_at(widest_mm, felt.low_N, width_mm) < KEEPS * set_N) {
+  const bool stays_below_cap = off < 0.0 || travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
+  if (std::abs(off) < OFF || !stays_below_cap ||
+      rubber_.force_at(widest_mm, readings.low_N, width_mm) < KEEPS * set_N) {
     return false;
   }
-  rounds_++;
-  go_round(to_mm, now_s);
+  detours_++;
+  begin_detour(to_mm, now_s);
   return true;
 }
 
-bool GripReach::comes_round(double now_s, double frame_s) {
+bool GripReach::continue_detour(double now_s, double frame_s) {
   if (!rests(now_s, frame_s)) {
     return false;
   }
-  goes_round_ = target_mm_ != round_mm_;
-  if (goes_round_) {
-    target_mm_ = round_mm_;
+  in_detour_ = target_mm_ != detour_end_mm_;
+  if (in_detour_) {
+    target_mm_ = detour_end_mm_;
     aimed_s_ = now_s;
   }
-  return !goes_round_;
+  return !in_detour_;
 }
 
-// Whole steps to the position whose force is nearest. Less than the least move is left to going
-// round, or where that is not possible to the least move.
-double GripReach::nearest_steps(double off, double least_mm, bool may_round) const {
+// Whole steps to the position whose force is nearest. A distance below the least move is left to a
+// detour; if that is not possible, the least move is made when it reduces the error.
+double GripReach::nearest_steps(double off, double least_mm, bool may_detour) const {
   const double least = std::round(least_mm / traits_.step_mm);
   const double steps = std::abs(off) > OFF ? std::round(off) : 0.0;
   if (std::abs(steps) >= least) {
     return steps;
   }
   const bool worth = std::abs(off) > 0.5 * least + OFF - 0.5;
-  return worth && !(may_round && rounds_ < ROUNDS) ? std::copysign(least, off) : 0.0;
+  return worth && !(may_detour && detours_ < DETOURS_MOST) ? std::copysign(least, off) : 0.0;
 }
 
-std::uint32_t GripReach::aim(const GripAim &aim, const GripFelts &felt, const GripSettings &settings, double now_s) {
-  const double wanted_N = aim.wanted_N;
-  const Haste haste = aim.haste;
-  const bool nearest = aim.nearest;
-  std::uint32_t trouble = 0;
-  if (felt.fingers == 0 || !knows(felt.t_s)) {
-    return trouble;
-  }
+bool GripReach::knows_width(double frame_s, double now_s) const {
   const double status_s = 1e-6 * static_cast<double>(status_.host_us);
-  const bool come = has_come(now_s, felt.t_s);
-  if (!stands(now_s) && felt.t_s > status_s + WIDTH_LAGS_s) {
-    return trouble; // forces of widths that are not known yet
-  }
-  const double width_mm = width_at(felt.t_s), coming = coming_mm(now_s);
-  const bool rested = rests(now_s, felt.t_s);
+  return knows(frame_s) && (has_stopped(now_s) || frame_s <= status_s + WIDTH_LAGS_s);
+}
+
+void GripReach::learn(const GripReadings &readings, const GripSettings &settings, double now_s) {
+  const double width_mm = width_at(readings.t_s);
+  const bool come = has_come(now_s, readings.t_s);
   if (come) {
-    rubber_.learn(felt.grip_N, width_mm);
+    rubber_.learn(readings.grip_N, width_mm);
   }
-  // A gripper that limits itself does not wait until a move has ended: the bound is not all that
-  // keeps it below the cap.
-  if (limits_itself(settings) ? come : rested) {
-    felt.low_N > settings.touch_N && !felt.is_alone() ? bound_.learn(felt.grip_N, width_mm) : bound_.forget_pair();
+  // A gripper that limits its own force may be bounded from moves that overlap: the bound alone does
+  // not have to keep it below the cap.
+  if (limits_itself(settings) ? come : rests(now_s, readings.t_s)) {
+    if (readings.low_N > settings.touch_N && !readings.is_alone()) {
+      bound_.learn(readings.grip_N, width_mm);
+    } else {
+      bound_.forget_pair();
+    }
   }
-  // Nor does a gripper that cannot keep the cap itself add a move to one that does not show yet.
-  if (!(limits_itself(settings) ? haste != Haste::patient || come : rested)) {
+}
+
+GripReach::Outlook GripReach::predict(const GripAim &aim, const GripReadings &readings, double now_s) const {
+  Outlook outlook;
+  outlook.force_N = aim.nearest || aim.haste == Haste::patient ? readings.low_N : readings.grip_N;
+  outlook.width_mm = width_at(readings.t_s);
+  outlook.coming_mm = coming_mm(now_s);
+  outlook.come = has_come(now_s, readings.t_s);
+  const bool at_rest = std::abs(outlook.coming_mm - status_.width_mm) < 1e-6;
+  outlook.least_mm = at_rest ? least_mm() : traits_.step_mm;
+  outlook.coming_N = force_at(outlook, outlook.coming_mm);
+  outlook.near_N = NEAR * aim.wanted_N;
+  // A contact whose tangential force is unknown will not report a slide either, so no force may miss.
+  outlook.exact = aim.haste == Haste::slides || !readings.has_load;
+  // Until the effect of an opening is measured, the controller does not reverse it for less than a
+  // step. Nor does it add a smaller move to one under way if a slide is already slowing down.
+  const bool waits = !outlook.come && (target_mm_ > outlook.width_mm || readings.slides);
+  const double least_N = force_at(outlook, outlook.coming_mm - outlook.least_mm) - outlook.coming_N;
+  outlook.misses_N = outlook.exact ? outlook.near_N : std::max(outlook.near_N, (waits ? 1.0 : MISSES) * least_N);
+  const bool may_detour = readings.has_load || aim.haste == Haste::patient;
+  if (std::abs(outlook.coming_N - aim.wanted_N) > outlook.near_N) {
+    outlook.nearest_steps = nearest_steps(steps_to(outlook, aim.wanted_N), outlook.least_mm, may_detour);
+  }
+  return outlook;
+}
+
+double GripReach::force_at(const Outlook &outlook, double width_mm) const {
+  return rubber_.force_at(width_mm, outlook.force_N, outlook.width_mm);
+}
+
+double GripReach::steps_to(const Outlook &outlook, double wanted_N) const {
+  return steps_off(wanted_N, outlook.force_N, outlook.width_mm, outlook.coming_mm);
+}
+
+double GripReach::whole_steps(double mm) const {
+  return traits_.step_mm * std::floor(mm / traits_.step_mm);
+}
+
+double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings,
+                            const GripSettings &settings, std::uint32_t &trouble) const {
+  const double steps =
+      aim.nearest ? outlook.nearest_steps : std::ceil(steps_to(outlook, aim.wanted_N - outlook.misses_N) - 1e-6);
+  double way_mm = traits_.step_mm * steps;
+  if (aim.haste == Haste::patient) {
+    way_mm = std::min(way_mm, whole_steps(SHORT_mm));
+  }
+  way_mm = std::max(way_mm, outlook.least_mm);
+  const double below_cap_mm = travel_below_cap_mm(readings, settings, outlook.coming_mm);
+  if (way_mm > below_cap_mm) {
+    // A grip that is too weak gets a short move even then, if the gripper's own limit keeps it below
+    // the cap.
+    const bool too_weak = !readings.is_alone() && (outlook.exact || outlook.coming_N < WEAK * aim.wanted_N);
+    const double short_mm =
+        too_weak && limits_itself(settings) ? std::max(outlook.least_mm, whole_steps(SHORT_mm)) : 0.0;
+    way_mm = std::min(way_mm, std::max(whole_steps(below_cap_mm), short_mm));
+    trouble |= GRIP_AT_CAP;
+  }
+  return way_mm >= outlook.least_mm - 1e-9 ? outlook.coming_mm - way_mm : outlook.coming_mm;
+}
+
+double GripReach::opened_mm(const Outlook &outlook, const GripAim &aim) const {
+  const double least_mm = outlook.least_mm;
+  double way_mm = 0.0;
+  if (aim.nearest) {
+    way_mm = -traits_.step_mm * outlook.nearest_steps;
+  } else {
+    way_mm = std::min(traits_.step_mm * std::floor(1e-6 - steps_to(outlook, aim.wanted_N + outlook.near_N)),
+                      std::max(whole_steps(OPENS_mm), least_mm));
+    if (force_at(outlook, outlook.coming_mm + least_mm) >= aim.wanted_N) {
+      way_mm = std::max(way_mm, least_mm);
+    }
+  }
+  return way_mm >= least_mm - 1e-9 ? outlook.coming_mm + way_mm : outlook.coming_mm;
+}
+
+std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
+                             double now_s) {
+  std::uint32_t trouble = 0;
+  if (readings.fingers == 0 || !knows_width(readings.t_s, now_s)) {
     return trouble;
   }
-  const double low_N = nearest || haste == Haste::patient ? felt.low_N : felt.grip_N;
-  const auto low_at = [&](double to_mm) { return rubber_.force_at(to_mm, low_N, width_mm); };
-  const double now_N = low_at(coming), step_mm = traits_.step_mm;
-  const bool standing = std::abs(coming - status_.width_mm) < 1e-6;
-  const double least = standing ? least_mm() : step_mm;
-  const double closes_N = low_at(coming - least) - now_N;
-  const double near_N = NEAR * wanted_N;
-  // What tells no load will not tell a slide either.
-  const bool exact = haste == Haste::slides || !felt.tells_load;
-  // An opening that does not show yet is not taken back for less than a step, nor is a move added to
-  // where what slides slows down already.
-  const bool waits = !come && (target_mm_ > width_mm || felt.slides);
-  const double misses_N = exact ? near_N : std::max(near_N, (waits ? 1.0 : MISSES) * closes_N);
-  const auto off = [&](double force_N) { return steps_off(force_N, low_N, width_mm, coming); };
-  const bool may_round = felt.tells_load || haste == Haste::patient;
-  const double near_steps = std::abs(now_N - wanted_N) > near_N ? nearest_steps(off(wanted_N), least, may_round) : 0.0;
-  const bool closes = nearest ? near_steps > 0.0 : now_N < wanted_N - misses_N;
-  double to_mm = coming;
-  if (closes) {
-    double way_mm = step_mm * (nearest ? near_steps : std::ceil(off(wanted_N - misses_N) - 1e-6));
-    way_mm = haste == Haste::patient ? std::min(way_mm, step_mm * std::floor(SHORT_mm / step_mm)) : way_mm;
-    way_mm = std::max(way_mm, least);
-    const double room_mm = this->room_mm(felt, settings, coming);
-    if (way_mm > room_mm) {
-      // What is held too weakly gets a short move all the same, if the gripper's own limit keeps it
-      // below the cap.
-      const bool too_weak = !felt.is_alone() && (exact || now_N < WEAK * wanted_N);
-      const double short_mm =
-          too_weak && limits_itself(settings) ? std::max(least, step_mm * std::floor(SHORT_mm / step_mm)) : 0.0;
-      way_mm = std::min(way_mm, std::max(step_mm * std::floor(room_mm / step_mm), short_mm));
-      trouble |= GRIP_AT_CAP;
-    }
-    to_mm = way_mm >= least - 1e-9 ? coming - way_mm : coming;
-  } else if (haste != Haste::patient && come && now_N - wanted_N > near_N) {
-    double way_mm = std::min(step_mm * std::floor(1e-6 - off(wanted_N + near_N)),
-                             std::max(step_mm * std::floor(OPENS_mm / step_mm), least));
-    way_mm = low_at(coming + least) >= wanted_N ? std::max(way_mm, least) : way_mm;
-    way_mm = nearest ? -step_mm * near_steps : way_mm;
-    to_mm = way_mm >= least - 1e-9 ? coming + way_mm : coming;
+  learn(readings, settings, now_s);
+  const bool patient = aim.haste == Haste::patient;
+  // A gripper that cannot limit its own force moves only after the effect of its last move is measured.
+  const bool may_move =
+      limits_itself(settings) ? !patient || has_come(now_s, readings.t_s) : rests(now_s, readings.t_s);
+  if (!may_move) {
+    return trouble;
   }
-  if (to_mm != coming) {
-    // In whole steps of where it was last sent.
-    const double steps = std::round((to_mm - target_mm_) / step_mm);
-    const double sent_mm = allowed(target_mm_ + steps * step_mm, felt, settings, trouble);
+  const Outlook outlook = predict(aim, readings, now_s);
+  const bool closes = aim.nearest ? outlook.nearest_steps > 0.0 : outlook.coming_N < aim.wanted_N - outlook.misses_N;
+  const bool opens = !closes && !patient && outlook.come && outlook.coming_N - aim.wanted_N > outlook.near_N;
+  double to_mm = outlook.coming_mm;
+  if (closes) {
+    to_mm = closed_mm(outlook, aim, readings, settings, trouble);
+  } else if (opens) {
+    to_mm = opened_mm(outlook, aim);
+  }
+  if (to_mm != outlook.coming_mm) {
+    const double steps = std::round((to_mm - target_mm_) / traits_.step_mm);
+    const double sent_mm = allowed(target_mm_ + steps * traits_.step_mm, readings, settings, trouble);
     if (sent_mm != target_mm_) {
       target_mm_ = sent_mm;
       aimed_s_ = now_s;

@@ -1,4 +1,4 @@
-// From a wanted force to a width: where the gripper is, how the rubber's force follows it, and the
+// Converts a wanted force to a width: the gripper's width, the rubber's force over width, and the
 // least move whose predicted force is enough.
 #pragma once
 
@@ -10,15 +10,15 @@
 
 namespace fingertip {
 
-// Force over width. The shape is a power of the indentation; how steep it is, closing and opening,
-// is learnt from the moves themselves.
+// Force over width: a power of the indentation. The slopes of closing and opening are learnt from the
+// moves themselves.
 class GripRubber {
 public:
-  // One fingertip touches; both do.
+  // One fingertip touches at this width; both do.
   void begin(double width_mm);
   void both_touch(double width_mm) { both_mm_ = width_mm; }
   double both_mm() const { return both_mm_; }
-  // The force at another width, from what it is at this one.
+  // The force at another width, from the force at this one.
   double force_at(double to_mm, double force_N, double from_mm) const;
   // The width for another force.
   double width_for(double wanted_N, double force_N, double from_mm) const;
@@ -27,28 +27,28 @@ public:
 
 private:
   double both_mm_ = 0.0;
-  double closing_ = 1.0, opening_ = 1.3; // steeper than the power law by so much
+  double closing_ = 1.0, opening_ = 1.3; // slopes, relative to the power law
   bool has_pair_ = false;
   double pair_N_ = 0.0, pair_mm_ = 0.0;
 };
 
-// The most force that a move may make, on the stiffest contact that what has been seen allows. No
-// touch has to be known for it: of two power laws, a flat and a steep one, the stiffer counts.
+// An upper bound of the force after a move, on the stiffest contact that the earlier moves allow. It
+// does not need the width of the touch: the stiffer of two power laws counts, a flat and a steep one.
 class GripBound {
 public:
-  // Force of one pad at 1 mm of indentation before a move of both has shown it: round objects on
-  // 12 mm of rubber make 2 to 5 N, and one pad of two may be a tenth stiffer.
+  // Force of one pad at 1 mm of indentation, assumed before a move of both pads has shown it. Round
+  // objects on 12 mm of rubber make 2 to 5 N, and one pad of two may be a tenth stiffer.
   static constexpr double EXPECTED_N = 5.5;
   static constexpr std::array<double, 2> EXPONENTS = {1.3, 1.9};
 
-  // The most that a first move makes of both pads from where they touch.
+  // Upper bound of the force after a first move from where both pads touch.
   static double first_N(double way_mm);
 
-  // The least width at which a fingertip stays below the cap, whether or not the other touches: a
-  // pad takes half of the way, or less where the object gives.
+  // The least width at which a fingertip stays below the cap, whether or not the other touches. A pad
+  // takes half of the travel, or less if the object gives way.
   double width_below(double cap_N, double force_N, double from_mm) const;
-  // Force and width at rest, while both fingertips touch. A move that begins before they do shows a
-  // contact softer than it is.
+  // Learns from force and width at rest, while both fingertips touch. A move that begins before the
+  // touch would show a contact softer than it is.
   void learn(double force_N, double width_mm);
   void forget_pair() { pair_N_ = 0.0; }
 
@@ -57,84 +57,107 @@ private:
   double pair_N_ = 0.0, pair_mm_ = 0.0; // 0: none
 };
 
-// What a gripper is to reach.
+// What the gripper is to reach.
 struct GripAim {
   enum class Haste {
-    patient, // closes only, by short moves, each after the last one shows
+    patient, // only closes, by short moves, each after the effect of the last one is measured
     usual,
-    slides, // at once
+    slides, // as soon as possible
   };
-  double wanted_N; // of a fingertip
+  double wanted_N; // force of a fingertip
   Haste haste;
-  bool nearest = false; // as near to it as moves come: a set force. Else enough of it
+  bool nearest = false; // true: a set force, as near as moves come. false: at least the wanted force
 };
 
 class GripReach {
 public:
   using Haste = GripAim::Haste;
-  // Of the cap: the gripper's own limit.
+  // The gripper's own force limit, as a share of the cap.
   static constexpr double LIMIT = 0.97;
 
   explicit GripReach(const GripperTraits &traits) : traits_(traits) {}
 
   void take(const GripperStatus &status, double silent_s);
-  // The gripper had this width then; false: not known.
+  // Whether the width at this time is known.
   bool knows(double t_s) const;
   double width_at(double t_s) const;
-  double poll_s() const { return poll_s_; } // between two answers, the mean of some
-  // Where it was last sent.
+  double poll_s() const { return poll_s_; } // moving average of the time between two answers
+  // The width that was last sent.
   double target_mm() const { return target_mm_; }
   void send(double width_mm) { target_mm_ = width_mm; }
   void stop() {
     target_mm_ = status_.width_mm;
-    goes_round_ = false;
+    in_detour_ = false;
   }
-  // What was sent last has been made, and a frame since then tells of it.
+  // The last move is complete, and this frame was measured after it.
   bool has_come(double now_s, double frame_s) const;
-  // And the gripper's own answers say that it stood when the frame was measured.
+  // In addition, the gripper's own answers state that it was not moving when the frame was measured.
   bool rests(double now_s, double frame_s) const;
-  bool stands(double now_s) const;
+  bool has_stopped(double now_s) const; // the last move is complete
 
-  // One fingertip touches; both do. t_s: of the frames that tell it.
+  // One fingertip touches at this width; both do. t_s: time of the frames that report it.
   void first_touch(double t_s);
   void both_touch(double t_s) { rubber_.both_touch(width_at(t_s)); }
-  void approach_ends(double now_s) { aimed_s_ = now_s; } // it is still under way
+  void approach_ends(double now_s) { aimed_s_ = now_s; } // the gripper is still moving
   double touch_width_mm() const { return rubber_.both_mm(); }
-  // A gripper makes no shorter move than this when it stands.
+  // The shortest move that a gripper at rest makes.
   double least_mm() const;
-  // What that makes of this force, at where the gripper was last sent.
+  // The change of this force by that move, from the width that was last sent.
   double least_move_N(double force_N) const;
-  // The grip once it is where it was last sent.
-  double coming_N(const GripFelts &felt, double now_s) const;
-  // The last whole step from where it was last sent that keeps the fingertip that feels more below
-  // the cap.
-  double last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const;
-  // A width that no cap forbids.
-  double allowed(double width_mm, const GripFelts &felt, const GripSettings &settings, std::uint32_t &trouble) const;
+  // The predicted grip at the width that was last sent.
+  double coming_N(const GripReadings &readings, double now_s) const;
+  // The furthest whole step from the width last sent that keeps the larger of both forces below the
+  // cap.
+  double last_below_cap_mm(const GripReadings &readings, const GripSettings &settings) const;
+  // The nearest width within all caps.
+  double allowed(double width_mm, const GripReadings &readings, const GripSettings &settings,
+                 std::uint32_t &trouble) const;
 
-  // Sends it to where the force is what is wanted. Troubles: which cap keeps it from that.
-  std::uint32_t aim(const GripAim &aim, const GripFelts &felt, const GripSettings &settings, double now_s);
+  // Sends the gripper to the width of the wanted force. Returns the caps that prevent it.
+  std::uint32_t aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s);
 
-  // Going round: a gripper whose least move is several steps gets one step further by two moves,
-  // back and on again. Only while nothing pulls. True: it does.
-  // Closer, where only the fingertips keep the cap, and it has room for the step.
-  bool goes_round_closer(const GripFelts &felt, const GripSettings &settings, double now_s);
-  // Either way, where that is nearer to this force. On the way it keeps some of it.
-  bool goes_round_to(double set_N, const GripFelts &felt, const GripSettings &settings, double now_s);
-  bool goes_round() const { return goes_round_; }
-  void leave_round() { goes_round_ = false; }
-  // Goes on with it; true once it stands there.
-  bool comes_round(double now_s, double frame_s);
+  // Detour: a gripper whose least move is several steps moves by a single step in two moves, back and
+  // on again. Only while there is no load. Both return true if a detour begins.
+  // One step closer, if only the fingertips keep the cap and one step stays below it.
+  bool start_detour_closer(const GripReadings &readings, const GripSettings &settings, double now_s);
+  // One step in either direction, if that is nearer to this force. On the way the grip keeps a share of it.
+  bool start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings, double now_s);
+  bool is_in_detour() const { return in_detour_; }
+  void cancel_detour() { in_detour_ = false; }
+  // Continues the detour; true once the gripper is at its end.
+  bool continue_detour(double now_s, double frame_s);
 
 private:
   double coming_mm(double now_s) const;
-  // Steps to this force, more are closing; force_N is that of from_mm.
+  // Steps to this force, closing positive; force_N is the force at from_mm.
   double steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const;
-  bool may_go_round(const GripFelts &felt) const;
-  void go_round(double to_mm, double now_s);
-  double room_mm(const GripFelts &felt, const GripSettings &settings, double coming_mm) const;
-  double nearest_steps(double off, double least_mm, bool may_round) const;
-  // Its own limit of force can be set to the cap.
+  bool can_detour(const GripReadings &readings) const;
+  void begin_detour(double to_mm, double now_s);
+  double travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const;
+  double nearest_steps(double off, double least_mm, bool may_detour) const;
+
+  // What one call of aim() decides by.
+  struct Outlook {
+    double force_N = 0.0, width_mm = 0.0;   // measured force, and the width when it was measured
+    double coming_N = 0.0, coming_mm = 0.0; // predicted force, and the width at which the gripper will stop
+    double least_mm = 0.0;                  // shortest move that is possible now
+    double near_N = 0.0, misses_N = 0.0;    // errors that are near enough; that may be missing
+    double nearest_steps = 0.0;             // steps to a set force, closing positive
+    bool come = false;                      // the effect of the last move is measured
+    bool exact = false;                     // no force may be missing
+  };
+  // Whether the width is known at which this frame was measured.
+  bool knows_width(double frame_s, double now_s) const;
+  void learn(const GripReadings &readings, const GripSettings &settings, double now_s);
+  Outlook predict(const GripAim &aim, const GripReadings &readings, double now_s) const;
+  double force_at(const Outlook &outlook, double width_mm) const;
+  double steps_to(const Outlook &outlook, double wanted_N) const;
+  double whole_steps(double mm) const; // rounded down, in mm
+  // The widths to close and to open to. closed_mm reports a cap that shortens the move.
+  double closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings,
+                   const GripSettings &settings, std::uint32_t &trouble) const;
+  double opened_mm(const Outlook &outlook, const GripAim &aim) const;
+  // Whether the gripper's own force limit can be set as low as the cap.
   bool limits_itself(const GripSettings &settings) const;
 
   GripperTraits traits_;
@@ -143,12 +166,12 @@ private:
   GripBound bound_;
   bool is_heard_ = false;
   double target_mm_ = 0.0;
-  double aimed_s_ = 0.0; // when it last changed for a force
+  double aimed_s_ = 0.0; // last change of target_mm_ for a force
   double poll_s_ = 0.0;
-  double stood_s_ = 0.0; // of the first answer that it stands, since it last moved
-  bool goes_round_ = false;
-  double round_mm_ = 0.0; // where to
-  int rounds_ = 0;
+  double stopped_s_ = 0.0; // time of the first answer without motion since the last move
+  bool in_detour_ = false;
+  double detour_end_mm_ = 0.0;
+  int detours_ = 0;
   struct Width {
     double t_s, width_mm;
   };

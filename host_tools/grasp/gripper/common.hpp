@@ -17,7 +17,7 @@ struct GripperUsual {
 };
 GripperWay complete(GripperWay way, const GripperUsual &usual);
 
-// An extra question makes sure that no older answer is on its way. It waits so much longer than any
+// An extra question makes sure that no older answer is on its way. It waits this much longer than any
 // other question, and is then asked in another form. An answer that is late by less than that is
 // never taken for another's.
 constexpr int SURE_TIMEOUTS = 5;

@@ -6,7 +6,7 @@
 //   gripper->move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
 //   GripperStatus now = gripper->poll();
 //
-// No function waits longer than one exchange on the line, unless its comment says so. GripperWay
+// No function waits longer than one exchange on the line, unless its comment states otherwise. GripperWay
 // has the timeout of an exchange. To wait for the end of a motion, poll for it. Not for two threads
 // at once.
 //

@@ -230,10 +230,10 @@ RobotiqGripper::Registers RobotiqGripper::read(int count) {
 
 GripperStatus RobotiqGripper::read_status() {
   make_sure();
-  return told(read(REGISTERS));
+  return status_of(read(REGISTERS));
 }
 
-GripperStatus RobotiqGripper::told(const Registers &registers) {
+GripperStatus RobotiqGripper::status_of(const Registers &registers) {
   const int gsta = registers[0] >> gSTA_SHIFT & 3, gobj = registers[0] >> gOBJ_SHIFT & 3;
   goes_ = (registers[0] & gGTO) != 0;
   active_ = (registers[0] & gACT) != 0 && gsta == ACTIVATED;
@@ -318,7 +318,7 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
       put_values(&request, REGISTERS - 1, command.data() + 1);
       const Registers registers = registers_of(exchange(request, answer_length(REGISTERS)), REGISTERS);
       both_worked_ = true;
-      return told(registers);
+      return status_of(registers);
     } catch (const Error &error) {
       const bool refused = error.code() == ErrorCode::gripper_refused;
       if (both_worked_ || !(refused || error.code() == ErrorCode::gripper_silent)) {

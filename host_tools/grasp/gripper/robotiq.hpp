@@ -39,7 +39,7 @@ private:
   using Bytes = std::vector<std::uint8_t>;
 
   // request: the function and what belongs to it. Returns what follows the function in the answer,
-  // which has so many bytes.
+  // which has this number of bytes.
   Bytes exchange(const Bytes &request, std::size_t length);
   HostTime ask(const Bytes &request); // until when to wait
   Bytes hear(const Bytes &request, std::size_t length, HostTime until);
@@ -48,7 +48,7 @@ private:
   void make_sure();
   Registers read(int count);
   GripperStatus read_status();
-  GripperStatus told(const Registers &registers);
+  GripperStatus status_of(const Registers &registers);
   void write(int address, int count, const std::uint16_t *values);
 
   GripperTraits traits_;
@@ -57,7 +57,7 @@ private:
   modbus_t *modbus_;
   int read_function_ = 4;
   bool both_at_once_ = true; // function 23
-  int both_failed_ = 0;      // so many times in a row, without ever having worked
+  int both_failed_ = 0;      // failures of both in a row, while neither has ever worked
   bool both_worked_ = false;
   bool doubtful_ = false;              // an answer may still come that is not expected
   int sure_count_ = 0;                 // registers that make_sure has asked for, 0: none yet,

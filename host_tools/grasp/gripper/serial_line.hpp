@@ -34,7 +34,7 @@ std::optional<int> latency_timer_ms(const std::string &port, const std::string &
 
 struct GripperPort {
   std::string path;    // the stable name where there is one
-  std::string adapter; // maker and product as USB tells them; empty: unknown
+  std::string adapter; // maker and product from USB; empty: unknown
   std::optional<int> latency_timer_ms;
 };
 

@@ -109,16 +109,16 @@ private:
   GripTouch feel(std::size_t finger) {
     GripTouch touch;
     touch.t_s = t_s;
-    const double felt_N = gain[finger] * pad_N(finger);
-    if (felt_N < 0.02) {
+    const double sensed_N = gain[finger] * pad_N(finger);
+    if (sensed_N < 0.02) {
       return touch;
     }
     touch.flags = (CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                    CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
                    (slides[finger] ? std::uint32_t{CONTACT_FLAG_SLIDING} : 0u) | add_flags[finger]) &
                   ~drop_flags[finger];
-    touch.force_N = felt_N;
-    touch.force_sd_N = sd_share * felt_N;
+    touch.force_N = sensed_N;
+    touch.force_sd_N = sd_share * sensed_N;
     touch.sigma_mm = 6.0;
     touch.x_mm = frozen[finger] ? 0.0 : 1e-3 * (frames_ % 7);
     touch.qy_N = (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 ? load_N : 0.0;

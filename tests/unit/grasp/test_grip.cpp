@@ -61,8 +61,8 @@ TEST(Grip, OneFingertipsTouchIsNoGrasp) {
   GripWorld world;
   world.off_mm = 0.15;
   world.grasp();
-  EXPECT_GT(world.report.felt_N[1], world.settings.touch_N);
-  EXPECT_LT(world.report.felt_N[0], 2.0 * world.settings.start_N);
+  EXPECT_GT(world.report.finger_N[1], world.settings.touch_N);
+  EXPECT_LT(world.report.finger_N[0], 2.0 * world.settings.start_N);
 }
 
 TEST(Grip, NoJumpWhileItSqueezes) {
@@ -152,7 +152,7 @@ TEST(Grip, ForcesThatDifferAreToldAtRestWithBothNumbers) {
   }
   world.run(1.0);
   EXPECT_NE(world.report.trouble & GRIP_FINGERS_DIFFER, 0u);
-  EXPECT_GT(world.report.felt_N[0], 1.8 * world.report.felt_N[1]);
+  EXPECT_GT(world.report.finger_N[0], 1.8 * world.report.finger_N[1]);
 }
 
 // One bad answer is looked at again.
@@ -264,7 +264,7 @@ TEST(GripFixed, HoldsItsForceByEquationsFiveAndSix) {
     world.gain = {gain, 1.0};
     world.grasp();
     world.run(3.0);
-    expect_share(6.0, 0.5 * (world.report.felt_N[0] + world.report.felt_N[1]), 0.03);
+    expect_share(6.0, 0.5 * (world.report.finger_N[0] + world.report.finger_N[1]), 0.03);
   }
 }
 

@@ -58,18 +58,18 @@ TEST(GripHold, WhatHasBeenCaughtTeachesNoFriction) {
     const GripSettings settings;
     GripHold hold;
     hold.begin();
-    GripFelts felt;
-    felt.fresh = felt.tells_load = true;
+    GripReadings readings;
+    readings.fresh = readings.has_load = true;
     double now_s = 1.0;
     const auto frames = [&](double grip_N, double carries_N, double speed_mm_s) {
-      felt.slides = speed_mm_s > 0.0;
-      felt.speed_mm_s = speed_mm_s;
-      felt.grip_N = grip_N;
-      felt.load_N = carries_N;
-      felt.ratio = carries_N / grip_N;
+      readings.slides = speed_mm_s > 0.0;
+      readings.speed_mm_s = speed_mm_s;
+      readings.grip_N = grip_N;
+      readings.load_N = carries_N;
+      readings.ratio = carries_N / grip_N;
       for (int i = 0; i < 20; i++) {
         now_s += 2.4e-3;
-        hold.wants(felt, grip_N, settings, now_s, 0.04);
+        hold.wants(readings, grip_N, settings, now_s, 0.04);
       }
     };
     frames(5.0, 1.5, 0.0);

@@ -43,21 +43,21 @@ public:
   }
   // Frames of both fingertips, so old, which ask for no move.
   void feel(double low_N, double high_N, double old_s = 0.006) {
-    felt.fingers = felt.touches = 2;
-    felt.t_s = t_s - old_s;
-    felt.low_N = low_N;
-    felt.high_N = high_N;
-    felt.grip_N = low_N < 0.7 * high_N ? low_N : 0.5 * (low_N + high_N);
-    felt.tells_load = true;
-    reach.aim({0.1, GripAim::Haste::patient}, felt, settings, t_s);
+    readings.fingers = readings.touches = 2;
+    readings.t_s = t_s - old_s;
+    readings.low_N = low_N;
+    readings.high_N = high_N;
+    readings.grip_N = low_N < 0.7 * high_N ? low_N : 0.5 * (low_N + high_N);
+    readings.has_load = true;
+    reach.aim({0.1, GripAim::Haste::patient}, readings, settings, t_s);
   }
   void feel() { feel(pad_N(width_mm), pad_N(width_mm)); }
   // How far it may close now.
-  double room_mm() const { return width_mm - reach.last_below_cap_mm(felt, settings); }
+  double room_mm() const { return width_mm - reach.last_below_cap_mm(readings, settings); }
 
   GripReach reach;
   GripSettings settings;
-  GripFelts felt;
+  GripReadings readings;
   double t_s = 1.0, width_mm;
 };
 
@@ -132,13 +132,13 @@ TEST(GripReach, NothingLessThanAStepIsAddedToAMoveThatCatchesASlide) {
     bench.feel();
     bench.send(2);
     bench.answer(bench.width_mm + 0.5, true, 0.1);
-    bench.felt.slides = slides;
-    bench.felt.t_s = bench.t_s - 0.006;
+    bench.readings.slides = slides;
+    bench.readings.t_s = bench.t_s - 0.006;
     const double sent_mm = bench.reach.target_mm();
-    const double comes_N = bench.reach.coming_N(bench.felt, bench.t_s);
+    const double comes_N = bench.reach.coming_N(bench.readings, bench.t_s);
     const double step_N = 0.5 * bench.reach.least_move_N(comes_N);
     const double wanted_N = comes_N + 0.6 * step_N;
-    bench.reach.aim({wanted_N, GripAim::Haste::usual}, bench.felt, bench.settings, bench.t_s);
+    bench.reach.aim({wanted_N, GripAim::Haste::usual}, bench.readings, bench.settings, bench.t_s);
     EXPECT_EQ(bench.reach.target_mm() < sent_mm, !slides);
   }
 }
