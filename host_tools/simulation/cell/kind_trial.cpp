@@ -2,7 +2,7 @@
 
 #include "libfingertip/random.hpp"
 #include "simulation/cell/arrivals.hpp"
-#include "simulation/cell/felt_finger.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/pinch.hpp"
 #include "simulation/cell/slips.hpp"

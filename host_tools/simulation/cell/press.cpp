@@ -20,7 +20,7 @@ enum Stream : std::uint64_t { GAINS = 861, PLACES = 862 };
 constexpr double GRAVITY_m_s2 = 9.80665, AIR_Pa = 101325.0;
 constexpr std::chrono::milliseconds ROUND{1};
 constexpr std::int64_t ROUND_us = 1'000;
-// Where the twin's placements are (twin/acts.hpp). Long enough for a calibration to take each.
+// Where the twin's placements are (twin/episodes.hpp). Long enough for a calibration to take each.
 constexpr double HALF_WIDTH_mm = 9.0, HALF_LENGTH_mm = 18.0;
 constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, STANDS_s = 1.5;
 constexpr double FOLLOWS_s = 0.012; // time constant of the ball after the hand

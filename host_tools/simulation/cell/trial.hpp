@@ -10,7 +10,7 @@
 
 #include "simulation/cell/controller.hpp"
 #include "simulation/cell/faults.hpp"
-#include "simulation/cell/felt_finger.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/scene.hpp"
 #include "simulation/cell/slips.hpp"

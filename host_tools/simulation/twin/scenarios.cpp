@@ -2,7 +2,7 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
-#include "simulation/twin/acts.hpp"
+#include "simulation/twin/episodes.hpp"
 
 extern "C" {
 #include "config/geometry.h"

@@ -13,7 +13,7 @@
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 #include "tool/cli/gripper_options.hpp"
-#include "tool/cli/keeper.hpp"
+#include "tool/cli/live_recording.hpp"
 #include "tool/cli/usage.hpp"
 #include "tool/cli/view.hpp"
 

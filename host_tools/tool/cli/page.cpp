@@ -2,7 +2,7 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/beside.hpp"
+#include "tool/cli/installed_files.hpp"
 
 #include <fstream>
 #include <optional>

@@ -1,5 +1,5 @@
 #include "grasp/convert.hpp"
-#include "simulation/cell/felt_finger.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/trial.hpp"
 
 extern "C" {

@@ -1,5 +1,5 @@
 #include "libfingertip/error.hpp"
-#include "tool/cli/beside.hpp"
+#include "tool/cli/installed_files.hpp"
 #include "tool/cli/commands/commands.hpp"
 
 namespace fingertip {

@@ -1,4 +1,4 @@
-#include "tool/cli/beside.hpp"
+#include "tool/cli/installed_files.hpp"
 
 #include "libfingertip/error.hpp"
 

@@ -1,5 +1,5 @@
 // Acts in which something pulls along the rubber. README.md says what is assumed and left out.
-#include "simulation/twin/acts.hpp"
+#include "simulation/twin/episodes.hpp"
 #include "simulation/twin/held_object.hpp"
 
 #include <algorithm>

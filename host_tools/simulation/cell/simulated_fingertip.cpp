@@ -1,4 +1,4 @@
-#include "simulation/cell/felt_finger.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 
 #include "library/pad/profile.hpp"
 

@@ -1,4 +1,4 @@
-#include "tool/cli/keeper.hpp"
+#include "tool/cli/live_recording.hpp"
 
 #include "libfingertip/clock.hpp"
 #include "libfingertip/recording.hpp"

@@ -1,4 +1,4 @@
-#include "simulation/twin/acts.hpp"
+#include "simulation/twin/episodes.hpp"
 
 #include <utility>
 
