@@ -3,7 +3,7 @@ import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import { button, element, write } from './elements';
 import { HandPanel } from './hand_panel';
-import { contactAt, trailAt } from './moment';
+import { contactAt, trailAt } from './recorded_contact';
 import { fixed } from './numbers';
 import { sceneOf } from './pad_scene';
 import { PadView } from './pad_view';
