@@ -1,4 +1,4 @@
-"""Reads and commands fingertips: fifteen barometers under rubber that tell where they are touched, how hard, and whether it slips.
+"""Reads and commands fingertips: fifteen barometers under rubber that measure where they are touched, how hard, and whether it slips.
 
 from fingertip import Fingertip
 with Fingertip() as fingertip:

@@ -9,11 +9,11 @@ class FingertipError(Exception):
 
 
 class InputError(FingertipError):
-    """A file or an argument that the user can mend; the text names file and line and says what to do."""
+    """A file or an argument that the user can mend; the text names file and line and states what to do."""
 
 
 class BadValueError(FingertipError, ValueError):
-    """A wrong argument; the text says which values are good. Nothing was sent."""
+    """A wrong argument; the text states which values are good. Nothing was sent."""
 
 
 class NoFingertipError(FingertipError):

@@ -12,9 +12,9 @@ without contact belong to neither.
     force_rmse_N               root mean square error of the force
     force_mape_percent         median absolute percentage error, as in De Clercq et al., RA-L 2022, section IV.C
     force_mape_frames          only frames with a true force above 0.2 N count for it
-    tangential_frames          of the fitted ones, those with a tangential load; null, as what follows, unless the scenario says
+    tangential_frames          of the fitted ones, those with a tangential force; null, as what follows, unless the scenario has
                                the true one and the recording has some
-    tangential_ratio_error_p50, tangential_ratio_error_p95      of the load over the normal force, as a vector
+    tangential_ratio_error_p50, tangential_ratio_error_p95      of tangential over normal force, as a vector
     tangential_direction_p90_deg     only frames with a true ratio above 0.1 count for it
     tangential_from_touch      frames whose load is what changed since the touch: their truth is taken as it is all the same
     contact_missed, contact_false     frames above 0.2 N without CONTACT; frames without contact but with CONTACT
@@ -22,7 +22,7 @@ without contact belong to neither.
     slip_delay_ms              of the found ones, from the start of the slip to the first SLIP frame
     slip_valid_lost            of these true slips, those with a frame without SLIP_VALID between start and end
     slip_false                 SLIP frames outside of all true slips; a slip's end is widened by the slip window,
-                               over which the measure looks back
+                               the time that the measure covers
     total_us_median            from the first bus activity of a frame to its packet
     stages_sum_wrong           frames whose stages do not add up to their total
     dropped_packets, crc_errors, format_errors       as the recorder counted; null if it was killed
@@ -98,9 +98,9 @@ class Comparison:
         for start, end in self.slips:
             if end - start < SLIP_MIN_s:
                 continue
-            told = self.t_s[self.slip & (self.t_s >= start) & (self.t_s <= end + SLIP_LATE_s)]
-            if len(told):
-                delays_ms.append(round(1000 * float(told[0] - start), 1))
+            found = self.t_s[self.slip & (self.t_s >= start) & (self.t_s <= end + SLIP_LATE_s)]
+            if len(found):
+                delays_ms.append(round(1000 * float(found[0] - start), 1))
             else:
                 missed += 1
             during = (self.t_s >= start) & (self.t_s <= end)
@@ -137,7 +137,7 @@ class Comparison:
         }
 
     def tangential(self, recording, scenario, rows):
-        """The part of the summary that is about the tangential load."""
+        """The part of the summary that is about the tangential force."""
         pulled = self.compared & recording.flag(TANGENTIAL_VALID)[rows] & (self.true_force_N > FORCE_MIN_N)
         keys = ("frames", "ratio_error_p50", "ratio_error_p95", "direction_p90_deg", "from_touch")
         if not scenario.has_pull or not pulled.any():
@@ -160,7 +160,7 @@ class Comparison:
 
 
 def add_recording_options(parser):
-    parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and say how many")
+    parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and print how many")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
 
 

@@ -40,7 +40,7 @@ class Edge(NamedTuple):
 
 
 class Frame(ContactQuantities):
-    """What a fingertip said of one moment: a contact packet, a raw packet, or both.
+    """One frame of a fingertip: a contact packet, a raw packet, or both.
 
     A quantity whose flag is off, or whose packet did not come, is NaN, never 0. Lengths are mm from the centre of the pad, x across the
     strips and y along them. frame counts every frame since the fingertip's start; t_us is its own clock, the middle of the sensors'

@@ -23,7 +23,7 @@ class HostTime:
         time.sleep(seconds)
 
     def readable(self, descriptor: int, seconds: float) -> bool:
-        """Whether there is something to read, waiting for it so long."""
+        """Whether there is something to read, within this time."""
         return bool(select.select([descriptor], [], [], seconds)[0])
 
     def condition(self) -> threading.Condition:

@@ -1,6 +1,6 @@
-"""Draws a recording, with the truth behind it if there is one; force along three axes where it has tangential loads.
-Of a grasp it draws what was wanted and felt, load, width and state, unless --device chooses one of its fingertips.
-With --beside it draws what another fingertip of the recording felt of the same scenario, for example before a calibration.
+"""Draws a recording, with the truth behind it if there is one; force along three axes where it has tangential forces.
+Of a grasp it draws wanted and measured force, load, width and state, unless --device chooses one of its fingertips.
+With --beside it draws what another fingertip of the recording measured of the same scenario, for example before a calibration.
 
     fingertip-plot RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
@@ -152,7 +152,7 @@ def draw_marks(panel, marks):
 
 
 def draw_pull(axes, recording, rows, t_s, restarts_s, force, good, doubtful, truth):
-    """Tangential load along x and y, and how large it is beside the normal force."""
+    """Tangential force along x and y, and its ratio to the normal force."""
     loads, ratios = axes
     there = recording.flag(TANGENTIAL_VALID)[rows]
     good, doubtful = good & there, doubtful & there
@@ -278,7 +278,7 @@ def spans(t_s, on):
 
 
 def draw_grasp(path, grip, fingertips):
-    """Into this file; what a line says of it."""
+    """Draws into this file. Returns a line about it."""
     set_style()
     figure = plt.figure(figsize=(14, 8.5))
     grid = figure.add_gridspec(4, 1, height_ratios=[3, 1.6, 1.6, 0.7], hspace=0.18, left=0.055, right=0.985, top=0.9, bottom=0.07)
@@ -289,12 +289,12 @@ def draw_grasp(path, grip, fingertips):
     controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping"))
     for recording, colour, label in zip(fingertips, (MEASURED, ALONG_Y), ("left", "right")):
         rows = recording.has_contact
-        felt_s, flags = recording.time_us[rows] / 1e6, recording.flag(FIT_VALID)[rows]
+        measured_s, flags = recording.time_us[rows] / 1e6, recording.flag(FIT_VALID)[rows]
         doubtful = flags & recording.flag(WARNINGS)[rows]
         values = recording["force_N"][rows]
-        force.plot(felt_s, gaps_as_nan(felt_s, values, flags & ~doubtful), color=colour, lw=1.1, label=label, zorder=2)
+        force.plot(measured_s, gaps_as_nan(measured_s, values, flags & ~doubtful), color=colour, lw=1.1, label=label, zorder=2)
         low, high = force.get_ylim()
-        force.scatter(felt_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, zorder=2)
+        force.scatter(measured_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, zorder=2)
         force.set_ylim(low, high)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.4, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
@@ -328,16 +328,16 @@ def draw_grasp(path, grip, fingertips):
     force.legend(loc="upper left", ncol=3, fontsize=8, frameon=False)
     width.legend(loc="upper right", ncol=2, fontsize=8, frameon=False)
     slides = int(grip["slides"].max())
-    told = f"{slides} slide{'' if slides == 1 else 's'}, held by at most {np.nanmax(grip['force_N']):.1f} N, at last {grip['state'][-1]}"
+    summary = f"{slides} slide{'' if slides == 1 else 's'}, held by at most {np.nanmax(grip['force_N']):.1f} N, at last {grip['state'][-1]}"
     figure.text(0.055, 0.955, "Fingertip, a grasp", size=17, weight="bold")
     identity = "  ·  ".join(
         text for text in (*(f.metadata.get("serial", "") for f in fingertips), fingertips[0].metadata.get("grasp_gripper", "")) if text
     )
-    figure.text(0.055, 0.925, f"{identity}  ·  {told}", size=9, color=FAINT)
+    figure.text(0.055, 0.925, f"{identity}  ·  {summary}", size=9, color=FAINT)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=110, format="png")
     write_bytes(path, picture.getvalue())
-    return told
+    return summary
 
 
 def set_style():
@@ -391,7 +391,7 @@ def main(argv):
     parser.add_argument("--truth", metavar="SCENARIO.csv", help="the scenario that was played")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
-    parser.add_argument("--beside", metavar="SERIAL", help="another fingertip of the recording that felt the same scenario; with --truth")
+    parser.add_argument("--beside", metavar="SERIAL", help="another fingertip of the recording with the same scenario; with --truth")
     parser.add_argument("--beside-run", metavar="run.json", help="the emulator's report of that one")
     add_recording_options(parser)
     options = parser.parse_args(argv)

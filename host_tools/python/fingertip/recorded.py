@@ -1,4 +1,4 @@
-"""What may stand in a line of a recording. What libfingertip refuses is refused here too (recording_reader.cpp; the test formats)."""
+"""What may be in a line of a recording. What libfingertip refuses is refused here too (recording_reader.cpp; the test formats)."""
 
 import io
 import math
@@ -208,7 +208,7 @@ class Rows:
         return None if (flags & self._untold).any() or empty[has_raw, first_raw:].any() else table
 
     def tables(self, texts: Sequence[str]) -> Iterator[npt.NDArray[np.float64] | ValueError]:
-        """All of them in their order: so many rows, or what is wrong with one."""
+        """All of them in their order: a count of rows, or what is wrong with one."""
         table = self.table(texts)
         if table is not None:
             yield table
@@ -234,7 +234,7 @@ class Rows:
         if has_raw and not self.sensors:
             raise ValueError("pressures in a recording without sensors")
         if has_contact and whole("flags", cells[3], "I") & self._untold:
-            raise ValueError("its flags tell of columns that are not there")
+            raise ValueError("its flags need columns that are not there")
         there = [True, True, *(first_raw - 2) * [has_contact], *(len(cells) - first_raw) * [has_raw]]
         return [self._cell(at, cell, cells) if there[at] else math.nan for at, cell in enumerate(cells)]
 

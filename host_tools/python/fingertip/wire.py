@@ -317,7 +317,7 @@ def decode_stream_packet(frame: bytes) -> Packet | None:
                 return None
             at += data[at]
         at = 0
-    while at < end:  # in place: all codes but the first become the zeros that they stand for
+    while at < end:  # in place: all codes but the first become the zeros that they replace
         code = data[at]
         data[at] = 0
         at += code
@@ -348,7 +348,7 @@ def decode_stream_packet(frame: bytes) -> Packet | None:
 
 
 class LineStatistics:
-    """What a line has said, and what went wrong on it, as fingertip's recordings end with. Nothing is ever dropped without being counted.
+    """The counts of a line, and of what went wrong on it, as at the end of fingertip's recordings. Nothing is ever dropped without being counted.
 
     bytes; packets: undamaged and of a known type; dropped_packets: missing from the sequence; out_of_order: repeated, or older than
     one before; crc_errors; format_errors: no frame of this protocol; version_errors; unknown_types: undamaged, of a newer firmware.

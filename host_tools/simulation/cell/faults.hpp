@@ -1,8 +1,8 @@
 // What fails in a trial, from a moment on: fingertips, the gripper, its line, the object.
 #pragma once
 
-#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/gripper_line.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 
 #include <limits>
 #include <optional>

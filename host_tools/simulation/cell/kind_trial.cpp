@@ -2,9 +2,9 @@
 
 #include "libfingertip/random.hpp"
 #include "simulation/cell/arrivals.hpp"
-#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/pinch.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/slips.hpp"
 #include "simulation/cell/trial.hpp"
 

@@ -10,9 +10,9 @@
 
 #include "simulation/cell/controller.hpp"
 #include "simulation/cell/faults.hpp"
-#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/scene.hpp"
+#include "simulation/cell/simulated_fingertip.hpp"
 #include "simulation/cell/slips.hpp"
 
 #include <optional>

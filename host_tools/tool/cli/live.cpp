@@ -9,8 +9,8 @@
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/cli/joint_progress.hpp"
-#include "tool/cli/live_recording.hpp"
 #include "tool/cli/keys.hpp"
+#include "tool/cli/live_recording.hpp"
 #include "tool/cli/names_of_values.hpp"
 #include "tool/cli/view.hpp"
 

@@ -1,4 +1,4 @@
-"""A robot that feels."""
+"""A robot with fingertips."""
 
 import contextlib
 from functools import cached_property
@@ -21,7 +21,7 @@ def _way(place: str) -> dict[str, str]:
 
 class FingertipRobot(Robot):
     """The robot of its options, whose observations also hold what fingertips feel (observation.py). Raises DeviceNotConnectedError for a
-    fingertip that is not there or says nothing any more."""
+    fingertip that is not there or is silent."""
 
     config_class = FingertipRobotConfig
     name = "fingertip"

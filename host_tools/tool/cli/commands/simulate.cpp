@@ -1,6 +1,6 @@
 #include "libfingertip/error.hpp"
-#include "tool/cli/installed_files.hpp"
 #include "tool/cli/commands/commands.hpp"
+#include "tool/cli/installed_files.hpp"
 
 namespace fingertip {
 
