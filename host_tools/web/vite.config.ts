@@ -7,7 +7,7 @@ export default defineConfig({
   base: './',
   build: { target: 'es2022', outDir: '../../build/page', emptyOutDir: true, assetsInlineLimit: 0, modulePreload: { polyfill: false } },
   worker: { format: 'es' },
-  // The tool that serves the page looks whether it is of its own version.
+  // The tool that serves the page checks that it is of its own version.
   plugins: [
     {
       name: 'fingertip-version',

@@ -171,7 +171,7 @@ PageServer::~PageServer() = default;
 
 void PageServer::serve(const std::function<bool()> &is_over) {
   std::thread answering([this] { server_->listen_after_bind(); });
-  /* Before it runs, it does not heed a stop. */
+  /* Before it runs, it ignores a stop. */
   while (!is_over() || !server_->is_running()) {
     wait_until(host_now() + LOOK_INTERVAL);
   }

@@ -130,7 +130,7 @@ public:
   }
   const std::string &side() const { return side_; }
   /* What is true now, as JSON; or why the command cannot be. */
-  std::string tell_hand(const std::string &command, std::string *why_not) {
+  std::string send_to_hand(const std::string &command, std::string *why_not) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!command.empty()) {
       (void)!::send(truth_, command.data(), command.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -274,7 +274,7 @@ void Simulations::hand(const httplib::Request &request, httplib::Response &respo
     return refuse(response, BAD_REQUEST, "give press X_mm Y_mm FORCE_N, lift, or nothing");
   }
   std::string why_not;
-  const std::string truth = of->tell_hand(*command, &why_not);
+  const std::string truth = of->send_to_hand(*command, &why_not);
   if (!why_not.empty()) {
     return refuse(response, CONFLICT, why_not);
   }

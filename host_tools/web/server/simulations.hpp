@@ -2,7 +2,7 @@
  * are pseudo-terminals. Simulated ones only; real ones stay the browser's own affair.
  *
  *   GET  /simulated                        [{"serial": ..., "hand": true}]; hand: one is obeyed
- * (--mouse) GET  /simulated/line?serial=&client=   what the fingertip says, without end. client: 8
+ * (--mouse) GET  /simulated/line?serial=&client=   the fingertip's packets, without end. client: 8
  * to 32 hexadecimal digits of the page's own, new for each POST /simulated/line?client= bytes for
  * the fingertip POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or
  * nothing; the answer is what is true: {"t_us", "x_mm", "y_mm", "force_N", "qx_N", "qy_N"}, or {}

@@ -7,7 +7,7 @@ import type { Contact, DevicePacket, Info, Raw } from './line/line_facts';
 
 export { CoreError };
 
-/** What a line counted, as the end of a recording says it. */
+/** The counts of a line, as at the end of a recording. */
 export interface LineCounts {
   bytes: number;
   /** Undamaged and of a known type. */

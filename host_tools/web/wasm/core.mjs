@@ -1,4 +1,4 @@
-// libfingertip from core.wasm, by its C interface (libfingertip/fingertip.h): src/core.ts says what the page sees of it.
+// libfingertip from core.wasm, by its C interface (libfingertip/fingertip.h): src/core.ts is the page's view of it.
 import { start } from './module.mjs';
 
 const OK = 0;
@@ -358,13 +358,13 @@ class Core {
     const SIZE = TEXT_BYTES / 4;
     const at = wasm.call('malloc', bytes.length + 1);
     wasm.bytes(at, bytes.length).set(bytes);
-    const told = [0, 1, 2].map((i) => text + SIZE * i);
+    const texts = [0, 1, 2].map((i) => text + SIZE * i);
     try {
-      this.checked(this.withText(name, (name_at) => wasm.call('fingertip_firmware', name_at, at, bytes.length, ...told, SIZE)));
+      this.checked(this.withText(name, (name_at) => wasm.call('fingertip_firmware', name_at, at, bytes.length, ...texts, SIZE)));
     } finally {
       wasm.call('free', at);
     }
-    const [board, version, git_hash] = told.map((each) => this.textAt(each));
+    const [board, version, git_hash] = texts.map((each) => this.textAt(each));
     return { board, version, git_hash };
   }
 

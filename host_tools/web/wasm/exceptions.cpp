@@ -1,8 +1,8 @@
-// What C++ throws, on the exceptions of WebAssembly (legacy proposal; Chrome 95, node 17): Debian's
-// libc++ for it is built without. The compiler writes try, catch and rethrow; here is what it calls:
-// the objects that are thrown, and which landing pad takes which (Itanium C++ ABI, its tables of
-// language-specific data). A class has one base at most. What nothing catches ends in the page's call:
-// module.mjs asks thrown_text for its words.
+// The runtime of C++ exceptions, on the exceptions of WebAssembly (legacy proposal; Chrome 95, node
+// 17): Debian's libc++ for it is built without. The compiler writes try, catch and rethrow; here is
+// what it calls: the exception objects, and which landing pad takes which (Itanium C++ ABI, its tables
+// of language-specific data). A class has one base at most. An uncaught exception ends the page's
+// call: module.mjs asks exception_text for its message.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -12,20 +12,20 @@
 
 namespace {
 
-// Before each thrown object. Destructors return their object on this machine.
-struct Thrown {
+// The header before each exception object. Destructors return their object on this machine.
+struct Exception {
   const std::type_info *type;
   void *(*destroy)(void *);
-  Thrown *outer;     // that which was being handled before it
-  unsigned handlers; // that are at work on it
-  bool rethrown;     // the handler that ends next hands it on
+  Exception *outer;  // the one that was being handled before it
+  unsigned handlers; // handlers that are at work on it
+  bool is_passed_on; // the handler that ends next passes it on
 
   void *object() { return this + 1; }
-  static Thrown *of(void *object) { return static_cast<Thrown *>(object) - 1; }
+  static Exception *of(void *object) { return static_cast<Exception *>(object) - 1; }
 };
 
-Thrown *handled = nullptr; // innermost
-Thrown *in_flight = nullptr;
+Exception *handled = nullptr; // innermost
+Exception *in_flight = nullptr;
 
 extern "C" const void *const _ZTVN10__cxxabiv120__si_class_type_infoE[];
 
@@ -61,16 +61,16 @@ std::int32_t read_sleb(const std::uint8_t *&at) {
   return static_cast<std::int32_t>(negative ? value | ~0u << bits : value);
 }
 
-void destroy(Thrown *thrown) {
-  if (thrown->destroy) {
-    thrown->destroy(thrown->object());
+void destroy(Exception *exception) {
+  if (exception->destroy) {
+    exception->destroy(exception->object());
   }
-  std::free(thrown);
+  std::free(exception);
 }
 
-[[noreturn]] void fly(Thrown *thrown) {
-  in_flight = thrown;
-  __builtin_wasm_throw(0, thrown);
+[[noreturn]] void fly(Exception *exception) {
+  in_flight = exception;
+  __builtin_wasm_throw(0, exception);
 }
 
 } // namespace
@@ -84,7 +84,7 @@ struct {
   std::uintptr_t selector;
 } __wasm_lpad_context;
 
-int _Unwind_CallPersonality(void *thrown) {
+int _Unwind_CallPersonality(void *exception) {
   constexpr std::uint8_t OMITTED = 0xFF;
   auto &pad = __wasm_lpad_context;
   pad.selector = 0;
@@ -107,7 +107,7 @@ int _Unwind_CallPersonality(void *thrown) {
     if (filter > 0) {
       const std::type_info *wanted; // null: catch (...)
       std::memcpy(&wanted, types - filter * static_cast<int>(sizeof wanted), sizeof wanted);
-      if (!wanted || is_a(static_cast<Thrown *>(thrown)->type, wanted)) {
+      if (!wanted || is_a(static_cast<Exception *>(exception)->type, wanted)) {
         pad.selector = static_cast<std::uintptr_t>(filter);
         break;
       }
@@ -121,61 +121,61 @@ int _Unwind_CallPersonality(void *thrown) {
 }
 
 void *__cxa_allocate_exception(std::size_t size) {
-  auto *thrown = static_cast<Thrown *>(std::calloc(1, sizeof(Thrown) + size));
-  if (!thrown) {
+  auto *exception = static_cast<Exception *>(std::calloc(1, sizeof(Exception) + size));
+  if (!exception) {
     std::abort();
   }
-  return thrown->object();
+  return exception->object();
 }
 
 void __cxa_free_exception(void *object) {
-  std::free(Thrown::of(object));
+  std::free(Exception::of(object));
 }
 
 [[noreturn]] void __cxa_throw(void *object, std::type_info *type, void *(*destroy)(void *)) {
-  Thrown *thrown = Thrown::of(object);
-  thrown->type = type;
-  thrown->destroy = destroy;
-  fly(thrown);
+  Exception *exception = Exception::of(object);
+  exception->type = type;
+  exception->destroy = destroy;
+  fly(exception);
 }
 
-[[noreturn]] void _Unwind_Resume(void *thrown) {
-  fly(static_cast<Thrown *>(thrown));
+[[noreturn]] void _Unwind_Resume(void *exception) {
+  fly(static_cast<Exception *>(exception));
 }
 
 void *__cxa_begin_catch(void *object) {
-  auto *thrown = static_cast<Thrown *>(object);
-  if (thrown->handlers++ == 0) {
-    thrown->outer = handled;
-    handled = thrown;
+  auto *exception = static_cast<Exception *>(object);
+  if (exception->handlers++ == 0) {
+    exception->outer = handled;
+    handled = exception;
   }
-  thrown->rethrown = false;
+  exception->is_passed_on = false;
   in_flight = nullptr;
-  return thrown->object();
+  return exception->object();
 }
 
-void *__cxa_get_exception_ptr(void *thrown) {
-  return static_cast<Thrown *>(thrown)->object();
+void *__cxa_get_exception_ptr(void *exception) {
+  return static_cast<Exception *>(exception)->object();
 }
 
 void __cxa_end_catch() {
-  Thrown *thrown = handled;
-  if (--thrown->handlers > 0) {
+  Exception *exception = handled;
+  if (--exception->handlers > 0) {
     return;
   }
-  handled = thrown->outer;
-  if (!thrown->rethrown) {
-    destroy(thrown);
+  handled = exception->outer;
+  if (!exception->is_passed_on) {
+    destroy(exception);
   }
 }
 
 [[noreturn]] void __cxa_rethrow() {
-  handled->rethrown = true;
+  handled->is_passed_on = true;
   fly(handled);
 }
 
-// The words of what nothing caught, until the next call of it; null where it is no std::exception.
-__attribute__((export_name("thrown_text"))) const char *thrown_text() {
+// The message of the uncaught exception, until the next call; empty if it is no std::exception.
+__attribute__((export_name("exception_text"))) const char *exception_text() {
   static char text[1024];
   if (!in_flight) {
     return nullptr;

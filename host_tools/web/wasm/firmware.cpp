@@ -1,5 +1,5 @@
 // The simulated fingertip's firmware for the page: simulation/player/native_fingertip.h, one a module. Times
-// are in microseconds since power-up; what feels them is the scenario or the pad of the page.
+// are in microseconds since power-up; the pressures are those of the scenario or of the page's pad.
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/samples.hpp"
 #include "web/wasm/world.hpp"
@@ -80,7 +80,7 @@ EXPORT(sensor_y_mm) float sensor_y_mm(unsigned sensor) {
   return geometry.y_mm[sensor];
 }
 
-// Room for a scenario of so many rows: then fill in what the next three say.
+// Makes room for a scenario of count rows; fill them in by the next three.
 EXPORT(rows_begin) void rows_begin(unsigned count, double ambient_Pa) {
   rows.resize(count, ambient_Pa);
 }
@@ -115,7 +115,7 @@ EXPORT(world_begin) void world_begin(double seed) {
       std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors), static_cast<std::uint64_t>(seed));
   file = {};
 }
-// The command that tells the firmware its pad.
+// The command that sets the firmware's pad profile.
 EXPORT(pad_command_at) const std::uint8_t *pad_command_at() {
   return pad_command.data();
 }
@@ -160,8 +160,8 @@ EXPORT(flash_bytes) unsigned flash_bytes() {
   return NATIVE_FLASH_BYTES;
 }
 
-// The pad's profile that acts from the start on, without being kept: that of a command of so many
-// bytes in line_bytes. 1: it is none.
+// Sets the pad profile from the start on, without storing it, from the command of length bytes in
+// line_bytes. 1: it is no such command.
 EXPORT(pad_of_command) int pad_of_command(unsigned length) {
   wire_packet packet;
   if (length < 1 || wire_decode(wire_commands, line, length - 1, &packet) != FT_OK || packet.type != WIRE_CMD_PAD) {
@@ -171,7 +171,7 @@ EXPORT(pad_of_command) int pad_of_command(unsigned length) {
   return 0;
 }
 
-// Power-up at time 0. of_rows: the scenario acts, else the pad. A module powers up once.
+// Power-up at time 0. of_rows: by the scenario, else by the pad. A module powers up once.
 EXPORT(power_up)
 void power_up(double seed, double noise, double prom_spread, int parallel_bus, int of_rows, int keeps) {
   native_set_serial_number(serial);

@@ -37,16 +37,16 @@ export class Firmware {
     this.wasm.call('world_begin', seed);
   }
 
-  /** The command that tells the firmware its pad; not before setWorld. */
+  /** The command that sets the firmware's pad profile; not before setWorld. */
   padCommand() {
     return this.wasm.bytes(this.wasm.call('pad_command_at'), this.wasm.call('pad_command_bytes')).slice();
   }
 
-  /** Acts from power-up on without being kept: a command as padCommand's. */
+  /** Sets the pad profile from power-up on, without storing it: a command as padCommand's. */
   usePad(command) {
     this.wasm.bytes(this.wasm.call('line_bytes'), command.length).set(command);
     if (this.wasm.call('pad_of_command', command.length) !== 0) {
-      throw new Error('no command that tells a pad');
+      throw new Error('no command that sets a pad profile');
     }
   }
 

@@ -1,6 +1,6 @@
-// The tool's calibrations and its doctor for the page (src/judges/judges.ts says what each is).
-// Packets and texts come in by room(), answers go out as JSON by told(). Sessions are the
-// page's to free. What is wrong is thrown (thrown.cpp).
+// The tool's calibrations and its doctor for the page (src/judges/judges.ts explains each).
+// Packets and texts come in by room(), answers go out as JSON by answer_at().
+// The page frees the sessions. Errors are exceptions (exceptions.cpp).
 #include "libfingertip/error.hpp"
 #include "tool/calibration/gain_session.hpp"
 #include "tool/calibration/pull_session.hpp"
@@ -88,11 +88,11 @@ ErrorCode code_of(const std::string &name) {
   return found == codes.end() ? ErrorCode::other : found->second;
 }
 
-void tell(const Json &json) {
+void answer_with(const Json &json) {
   answer = json.text();
 }
 
-void tell_scatter(Json &json, const char *name, const calibrating::Scatter &scatter) {
+void add_scatter(Json &json, const char *name, const calibrating::Scatter &scatter) {
   json.name(name).begin();
   json.field("location_mm", scatter.location_mm).field("force", scatter.force);
   json.end();
@@ -109,10 +109,10 @@ EXPORT(room) std::uint8_t *room(unsigned bytes) {
   given.resize(bytes);
   return given.data();
 }
-EXPORT(told) const char *told() {
+EXPORT(answer_at) const char *answer_at() {
   return answer.data();
 }
-EXPORT(told_bytes) unsigned told_bytes() {
+EXPORT(answer_bytes) unsigned answer_bytes() {
   return static_cast<unsigned>(answer.size());
 }
 
@@ -135,7 +135,7 @@ EXPORT(gains_take) int gains_take(GainSession *session) {
 EXPORT(gains_take_back) void gains_take_back(GainSession *session) {
   session->take_back();
 }
-EXPORT(gains_tell) void gains_tell(const GainSession *session) {
+EXPORT(gains_status) void gains_status(const GainSession *session) {
   const calibrating::Judgement &judgement = session->judgement();
   const calibrating::Solution &solution = judgement.solution;
   const bool any = !session->placements().empty();
@@ -162,7 +162,7 @@ EXPORT(gains_tell) void gains_tell(const GainSession *session) {
   }
   json.name("unsure").list(judgement.unsure).name("silent").list(judgement.silent);
   json.name("gain").list(solution.gain).name("gain_sd").list(solution.gain_sd);
-  tell(json.end());
+  answer_with(json.end());
 }
 // force_N: NaN where it is not known.
 EXPORT(gains_result)
@@ -195,9 +195,9 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   json.name("gain").list(gain).name("gain_sd").list(gain_sd);
   json.name("off_x_um").list(off_x_um).name("off_y_um").list(off_y_um);
   json.name("wider_q15").list(wider_q15).end();
-  tell_scatter(json, "before", session->scatter(false));
-  tell_scatter(json, "after", session->scatter(true));
-  tell(json.end());
+  add_scatter(json, "before", session->scatter(false));
+  add_scatter(json, "after", session->scatter(true));
+  answer_with(json.end());
 }
 
 EXPORT(pulls_begin) PullSession *pulls_begin(double known_N) {
@@ -216,7 +216,7 @@ EXPORT(pulls_take) int pulls_take(PullSession *session) {
   session->judge(false);
   return 1;
 }
-EXPORT(pulls_tell) void pulls_tell(const PullSession *session) {
+EXPORT(pulls_status) void pulls_status(const PullSession *session) {
   Json json;
   json.begin();
   json.field("state", std::string_view(name_of(session->judgement().state)));
@@ -229,7 +229,7 @@ EXPORT(pulls_tell) void pulls_tell(const PullSession *session) {
     json.begin().field("x_mm", pull.x_mm).field("y_mm", pull.y_mm);
     json.field("qx_N", pull.qx_N).field("qy_N", pull.qy_N).end();
   }
-  tell(json.end_list().end());
+  answer_with(json.end_list().end());
 }
 // What the page gave last is the fingertip's info.
 EXPORT(pulls_result) void pulls_result(const PullSession *session) {
@@ -241,7 +241,7 @@ EXPORT(pulls_result) void pulls_result(const PullSession *session) {
   json.begin();
   json.field("tangential_scale", static_cast<double>(made.tangential_scale));
   json.field("tangential_scale_sd", static_cast<double>(made.tangential_scale_sd));
-  tell(json.end());
+  answer_with(json.end());
 }
 
 namespace {
@@ -305,7 +305,7 @@ EXPORT(doctor_failure) void doctor_failure(Examined *examined) {
   examined->facts.failure =
       Failure{code_of(all.substr(0, line)), line == std::string::npos ? "" : all.substr(line + 1)};
 }
-EXPORT(doctor_tell) void doctor_tell(Examined *examined) {
+EXPORT(doctor_status) void doctor_status(Examined *examined) {
   if (examined->measured) {
     examined->facts.rest = examined->rest.result();
   }
@@ -319,5 +319,5 @@ EXPORT(doctor_tell) void doctor_tell(Examined *examined) {
     json.field("advice", std::string_view(finding.advice));
     json.name("sensors").list(finding.sensors).end();
   }
-  tell(json.end_list());
+  answer_with(json.end_list());
 }

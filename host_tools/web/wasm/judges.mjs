@@ -1,4 +1,4 @@
-// The tool's judgement from judges.wasm: src/judges/judges.ts says what each part is.
+// The tool's judgement from judges.wasm: src/judges/judges.ts explains each part.
 import { start } from './module.mjs';
 
 class Session {
@@ -15,9 +15,9 @@ class Session {
     return this.wasm.call(`${this.kind}_${name}`, this.handle, ...values);
   }
 
-  told(name, ...values) {
+  answer(name, ...values) {
     this.ask(name, ...values);
-    const bytes = this.wasm.bytes(this.wasm.call('told'), this.wasm.call('told_bytes'));
+    const bytes = this.wasm.bytes(this.wasm.call('answer_at'), this.wasm.call('answer_bytes'));
     return JSON.parse(new TextDecoder().decode(bytes));
   }
 
@@ -43,10 +43,10 @@ class Gains extends Session {
     this.ask('take_back');
   }
   status() {
-    return this.told('tell');
+    return this.answer('status');
   }
   result(force_N, date_s) {
-    return this.told('result', null, force_N ?? NaN, date_s);
+    return this.answer('result', null, force_N ?? NaN, date_s);
   }
 }
 
@@ -55,10 +55,10 @@ class Pulls extends Session {
     return this.ask('take', frame) !== 0;
   }
   status() {
-    return this.told('tell');
+    return this.answer('status');
   }
   result(info_frame) {
-    return this.told('result', info_frame);
+    return this.answer('result', info_frame);
   }
 }
 
@@ -89,7 +89,7 @@ class Doctor extends Session {
     this.ask('failure', new TextEncoder().encode(`${code}\n${text}`));
   }
   findings() {
-    return this.told('tell');
+    return this.answer('status');
   }
 }
 

@@ -9,9 +9,9 @@
 namespace fingertip::mcap {
 namespace {
 
-/* Bytes that a zstd frame says it holds (RFC 8878, 3.1.1.1), which the page does not compare;
- * none: it does not say. */
-std::optional<std::uint64_t> said_size(std::string_view frame) {
+/* The content size that a zstd frame declares (RFC 8878, 3.1.1.1), which the page does not compare;
+ * none: it declares none. */
+std::optional<std::uint64_t> declared_size(std::string_view frame) {
   constexpr std::size_t MAGIC_bytes = 4, DICTIONARY_bytes[] = {0, 1, 2, 4};
   const auto byte = [&](std::size_t at) -> std::uint64_t {
     return at < frame.size() ? static_cast<unsigned char>(frame[at]) : 0;
@@ -51,7 +51,7 @@ std::string unpacked(std::string_view compression, std::string_view packed, std:
   if (size > CHUNK_MOST_bytes) {
     throw Damage("a chunk of " + std::to_string(size) + " bytes");
   }
-  if (said_size(packed).value_or(size) != size) {
+  if (declared_size(packed).value_or(size) != size) {
     throw Damage("a chunk's length is wrong");
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');

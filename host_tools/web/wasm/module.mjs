@@ -1,6 +1,6 @@
 // The page's WebAssembly modules, in the browser and in node: what they import, and errors.
 
-/** What C++ threw and nothing caught, or what a library wrote before it gave up. The message is for people. */
+/** An uncaught exception of C++, or the last output of a library that gave up. The message is for people. */
 export class WasmError extends Error {}
 
 /** The firmware ended itself, for its loader or in a panic; the module cannot be run again. */
@@ -67,7 +67,7 @@ export async function start(module, unpack = null) {
     } catch (error) {
       exports.__stack_pointer.value = stack;
       if (error instanceof WebAssembly.Exception) {
-        throw new WasmError(textAt(exports.thrown_text()));
+        throw new WasmError(textAt(exports.exception_text()));
       }
       throw error instanceof WebAssembly.RuntimeError && written ? new WasmError(written) : error;
     }

@@ -1,5 +1,5 @@
 // libfingertip/text.hpp's numbers for the page: libc++ 14 has no std::from_chars of floats, and its
-// std::to_chars of so many digits needs a hundred kilobytes of tables.
+// std::to_chars with a number of digits needs a hundred kilobytes of tables.
 #include "libfingertip/text.hpp"
 
 #include <charconv>

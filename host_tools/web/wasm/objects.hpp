@@ -1,5 +1,5 @@
-// What may press on the simulated pad, as a file: what the base of the rubber feels of each object
-// per force, from the twin's tables (twin/contact_table.hpp, simulation/twin/traction_table.hpp), at places
+// The contact shapes of the simulated pad, as a file: the pressure on the base of the rubber per force
+// of each object, from the twin's tables (twin/contact_table.hpp, simulation/twin/traction_table.hpp), at places
 // farther apart and in 16 bits.
 //
 // All values are little-endian. The file begins with 8 bytes "FTPAD 1\n" and the number of objects
@@ -10,8 +10,8 @@
 //   fields     3 times: under a force down, along x, along y: [force] of a float, the largest
 //   value,
 //              Pa / N, and [x][y] int16, parts of 32767 of it
-// with forces and symmetries as in simulation/twin/force_planes.hpp. The rest are the bytes of a command that
-// tells the fingertip its pad.
+// with forces and symmetries as in simulation/twin/force_planes.hpp. The rest are the bytes of the
+// command that sets the fingertip's pad profile.
 #pragma once
 
 #include "simulation/twin/force_planes.hpp"

@@ -56,7 +56,7 @@ void World::set_friction(double friction) {
   }
 }
 
-void World::touch_anew(Way way, double x_mm, double y_mm) {
+void World::begin_touch(Way way, double x_mm, double y_mm) {
   way_ = way;
   bundle_ = cell::Bundle(friction_, KINETIC_SHARE);
   x_mm_ = x_mm;
@@ -70,7 +70,7 @@ void World::press(double x_mm, double y_mm, double force_N) {
     return;
   }
   if (way_ != Way::hand) {
-    touch_anew(Way::hand, x_mm, y_mm);
+    begin_touch(Way::hand, x_mm, y_mm);
   }
   wanted_x_mm_ = x_mm;
   wanted_y_mm_ = y_mm;
@@ -82,7 +82,7 @@ void World::hold(double x_mm, double y_mm, double force_N, double load_N, double
     return;
   }
   if (way_ != Way::grip) {
-    touch_anew(Way::grip, x_mm, y_mm);
+    begin_touch(Way::grip, x_mm, y_mm);
   }
   wanted_force_N_ = std::clamp(force_N, 0.0, FORCE_MAX_N);
   const double pulls_N = std::clamp(load_N, 0.0, FORCE_MAX_N);
@@ -95,7 +95,7 @@ void World::drop(double x_mm, double y_mm, double mass_kg) {
   if (!all_finite({x_mm, y_mm, mass_kg})) {
     return;
   }
-  touch_anew(Way::fallen, x_mm, y_mm);
+  begin_touch(Way::fallen, x_mm, y_mm);
   mass_kg_ = std::clamp(mass_kg, MASS_MIN_kg, MASS_MAX_kg);
   depth_mm_ = -DROP_mm;
   deeper_mm_s_ = 0.0;
@@ -151,7 +151,7 @@ void World::move(double seconds) {
 }
 
 void World::report() {
-  const bool touches = acts() && force_N_ > 0.0 && on_pad(x_mm_, y_mm_);
+  const bool touches = is_pressing() && force_N_ > 0.0 && on_pad(x_mm_, y_mm_);
   truth_ = {};
   truth_.t_s = static_cast<double>(steps_) * STEP_s;
   std::fill(base_Pa_.begin(), base_Pa_.end(), 0.0);
@@ -178,7 +178,7 @@ void World::report() {
 
 void World::step() {
   before_Pa_ = now_Pa_;
-  for (int i = 0; i < STEPS_WITHIN && acts(); i++) {
+  for (int i = 0; i < STEPS_WITHIN && is_pressing(); i++) {
     move(STEP_s / STEPS_WITHIN);
   }
   steps_++;

@@ -74,8 +74,8 @@ public:
 private:
   enum class Way { none, hand, grip, fallen, lost };
 
-  bool acts() const { return way_ != Way::none && way_ != Way::lost; }
-  void touch_anew(Way way, double x_mm, double y_mm);
+  bool is_pressing() const { return way_ != Way::none && way_ != Way::lost; }
+  void begin_touch(Way way, double x_mm, double y_mm);
   void step();
   void move(double seconds);
   void report();

@@ -9,7 +9,7 @@ import { History } from '../../../host_tools/web/src/model/history';
 import { Buckets, Trust, intervalOf } from '../../../host_tools/web/src/view/buckets';
 import { cameraOf, picked, seen, type Box } from '../../../host_tools/web/src/view/camera';
 import { chartOf, clock, roundAbove, spansOf } from '../../../host_tools/web/src/view/curves';
-import { contactAt, trailAt } from '../../../host_tools/web/src/view/moment';
+import { contactAt, trailAt } from '../../../host_tools/web/src/view/recorded_contact';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
 import { Speech } from '../../../host_tools/web/src/view/speech';
@@ -296,16 +296,16 @@ test('contrast is that of WCAG', () => {
 
 test('readers of the screen are told what begins, ends and changes, no faster than one can listen', () => {
   const speech = new Speech();
-  assert.equal(speech.say(null, 'live', 0), 'Live.');
+  assert.equal(speech.sentence(null, 'live', 0), 'Live.');
   const pressed = contactOf({ force_N: 3.24, x_mm: 2, y_mm: -4 });
-  assert.equal(speech.say(pressed, 'live', 1000), null);
-  assert.equal(speech.say(pressed, 'live', 3000), 'Contact, 3.2 newtons at 2, -4 millimetres.');
-  assert.equal(speech.say({ ...pressed, force_N: 3.4 }, 'live', 60_000), null);
-  assert.match(speech.say({ ...pressed, force_N: 8 }, 'live', 70_000) ?? '', /8\.0 newtons/);
+  assert.equal(speech.sentence(pressed, 'live', 1000), null);
+  assert.equal(speech.sentence(pressed, 'live', 3000), 'Contact, 3.2 newtons at 2, -4 millimetres.');
+  assert.equal(speech.sentence({ ...pressed, force_N: 3.4 }, 'live', 60_000), null);
+  assert.match(speech.sentence({ ...pressed, force_N: 8 }, 'live', 70_000) ?? '', /8\.0 newtons/);
   const slips = { ...pressed, force_N: 8, flags: FITTED | Flag.SLIP | Flag.ELONGATED };
-  assert.match(speech.say(slips, 'live', 80_000) ?? '', /^Slips; .*round/);
-  assert.equal(speech.say(slips, 'live', 90_000), null);
-  assert.equal(speech.say(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'No contact.');
+  assert.match(speech.sentence(slips, 'live', 80_000) ?? '', /^Slips; .*round/);
+  assert.equal(speech.sentence(slips, 'live', 90_000), null);
+  assert.equal(speech.sentence(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'No contact.');
 });
 
 const LAYOUT = { x_mm: [-9, 0, 9], y_mm: [0, 0, 0] };

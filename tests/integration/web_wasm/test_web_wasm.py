@@ -245,7 +245,7 @@ class Judges(WebWasm):
         self.assertIn("taken: lift it", found["advice"])
         # Not the weight that was on it.
         wrong = self.judged("gains", capture, "0.01")
-        self.assertIn("give the weight that stood on the pad", wrong["error"])
+        self.assertIn("give the weight that was on the pad", wrong["error"])
 
     def test_too_few_placements_are_told(self):
         capture = self.captured(self.scenario("placements", "--seconds", "14"))

@@ -3,7 +3,7 @@
  * numbers, bounds and sentences as `fingertip calibrate` and `fingertip doctor`.
  *
  * A fingertip's packets go in as frames: the bytes of one frame of the line, COBS encoded, without
- * its delimiter. Whatever C++ throws comes out as a JudgeError, whose message says what to do.
+ * its delimiter. An exception of C++ becomes a JudgeError, whose message states what to do.
  */
 import { load } from '../../wasm/judges.mjs';
 import { WasmError } from '../../wasm/module.mjs';
@@ -43,7 +43,7 @@ export interface GainStatus {
   /** "12 placements, the last at ...; gains known to 3.1 %, wanted 1.5 %" */
   progress: string;
   finder: 'resting' | 'settling' | 'taken' | 'refused';
-  /** What presses now, [sensor], above what was before the contact. */
+  /** The present pressures, [sensor], above those before the contact. */
   above_Pa: number[];
   /** kept: fits the others. */
   placements: { x_mm: number; y_mm: number; kept: boolean }[];

@@ -18,7 +18,7 @@ export function whyNoWebSerial(): string {
     ? 'This browser cannot reach serial ports: open this page in Chrome, Edge or Opera on a desktop computer. ' +
         'Simulated fingertips and replays work here too.'
     : 'Browsers let a page reach serial ports only over https or from localhost: start "fingertip web" on this ' +
-        'computer and open the address that it says.';
+        'computer and open the address that it prints.';
 }
 
 function nameOf(port: SerialPort): string {
@@ -43,7 +43,7 @@ export class SerialLine implements Line {
     } catch (error) {
       throw new Error(this.whyNotOpened(error));
     }
-    // Streams end where DTR is low; opening raises it, so where this cannot be said it is no loss.
+    // Streams end where DTR is low; opening raises it, so it is no loss if this fails.
     await this.port.setSignals({ dataTerminalReady: true }).catch(() => undefined);
     void this.read(receive, closed);
   }

@@ -1,7 +1,7 @@
 /**
- * One fingertip: its line, what it said last, what it said over the last minutes, and the commands
- * that it takes. The view reads; listeners hear of rare changes alone (state, info, health), not
- * of packets: draw on requestAnimationFrame from `contact`, `raw` and `history`.
+ * One fingertip: its line, its last packets, their history over the last minutes, and its commands.
+ * The view reads. Listeners are called on rare changes alone (state, info, health), not on packets:
+ * draw on requestAnimationFrame from `contact`, `raw` and `history`.
  */
 import { core, type LineCounts } from '../core';
 import type { Line } from '../line/line';
@@ -25,7 +25,7 @@ import { History } from './history';
 import { PATIENCE } from './patience';
 
 /** opening: until its info came. live: it streams. silent: nothing for a while, though the line is
- * open. closed: by the page, or it left; `why` says so. */
+ * open. closed: by the page, or it left; `why` has the reason. */
 export type FingertipState = 'opening' | 'live' | 'silent' | 'closed';
 
 /** Why a command failed, a sentence; result: Result of the acknowledgement, null where none came. */
@@ -49,6 +49,19 @@ const SILENT_ms = 1500;
 const CLOCK_EVERY_ms = 1000;
 /** Versions of the protocol that ever were. */
 const OLDEST_VERSION = 1;
+
+/** Packets of the streams. All others are rare. */
+const STREAMED: ReadonlySet<number> = new Set([PacketType.CONTACT, PacketType.RAW]);
+/** Commands that write flash, so that their answer may take long. */
+const STORING: ReadonlySet<number> = new Set([
+  PacketType.CMD_CALIBRATE,
+  PacketType.CMD_ERASE_CALIBRATION,
+  PacketType.CMD_KEEP,
+  PacketType.CMD_PAD,
+  PacketType.CMD_ERASE_PAD,
+]);
+/** Commands that a packet of their own answers, after the acknowledgement. */
+type Question = typeof PacketType.CMD_INFO | typeof PacketType.CMD_HEALTH | typeof PacketType.CMD_CRASH;
 
 interface Waiting {
   command: number;
@@ -134,7 +147,7 @@ export class Fingertip {
   }
 
   /** Opens its line, or another after it was gone, asks who it is, and lets it stream all it can.
-   * Rejects with an Error whose message says what to do; it is closed then. */
+   * Rejects with an Error whose message states what to do; it is closed then. */
   async open(line: Line = this.line): Promise<void> {
     this.line = line;
     this.state = 'opening';
@@ -232,7 +245,7 @@ export class Fingertip {
   }
 
   /** The command, then the packet that follows its acknowledgement. */
-  private async ask(command: 0x85 | 0x86 | 0x8f, answer: number): Promise<DevicePacket> {
+  private async ask(command: Question, answer: number): Promise<DevicePacket> {
     let take: (packet: DevicePacket) => void = () => undefined;
     const came = new Promise<DevicePacket>((done) => (take = done));
     const queue = this.awaited.get(answer) ?? [];
@@ -306,10 +319,7 @@ export class Fingertip {
     if (this.state === 'closed') {
       return Promise.reject(new CommandError('the fingertip is not connected', null));
     }
-    const is_stored =
-      (command.type >= PacketType.CMD_CALIBRATE && command.type <= PacketType.CMD_KEEP) ||
-      command.type === PacketType.CMD_PAD ||
-      command.type === PacketType.CMD_ERASE_PAD;
+    const answer_ms = STORING.has(command.type) ? PATIENCE.stored_ms : PATIENCE.answer_ms;
     return new Promise((done, failed) => {
       const sent: Waiting[] = [];
       let refused: Ack | null = null;
@@ -352,7 +362,7 @@ export class Fingertip {
         };
         sent.push(waiting);
         this.waiting.push(waiting);
-        timer = setTimeout(send, is_stored ? PATIENCE.stored_ms : PATIENCE.answer_ms);
+        timer = setTimeout(send, answer_ms);
         this.line
           .send(core.encode({ ...command, sequence, t_us: sent_us }))
           .catch((error: unknown) => fail(error instanceof Error ? error : new Error(String(error))));
@@ -412,7 +422,7 @@ export class Fingertip {
     for (const tap of this.taps) {
       tap(packet, () => core.encode(packet).slice(0, -1));
     }
-    if (packet.type > PacketType.RAW) {
+    if (!STREAMED.has(packet.type)) {
       const awaited = this.awaited.get(packet.type)?.shift();
       awaited?.(packet);
       if (packet.type !== PacketType.ACK) {

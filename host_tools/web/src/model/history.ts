@@ -3,7 +3,7 @@
  *
  * Rows are numbered from the first one on, for good: row i, begin <= i < end, is at slot(i) of every
  * column. What was not reported is NaN: no fit, no x; a packet that did not come. A row takes what
- * the contact and the raw packet of one frame say; nothing is allocated for it.
+ * the contact and the raw packet of one frame report; nothing is allocated for it.
  */
 import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, type Raw } from '../line/line_facts';
 
@@ -43,7 +43,7 @@ export class History {
   readonly columns: Readonly<Record<ContactField, Float32Array>>;
   /** [slot * sensor_count + sensor], as Readings has it; NaN where no raw packet came. */
   readonly pressure_Pa: Float32Array;
-  /** [sensor], of the calibration that acts; empty: none. */
+  /** [sensor], of the calibration in use; empty: none. */
   gain: ArrayLike<number> = [];
   /** How long nothing was heard before what comes next; counts where its clock restarts. */
   gap_s = 0;

@@ -1,6 +1,6 @@
 /**
  * How long the page waits for what may never come. A page whose time a test owns waits as long as
- * `fingertipPatience` says: some of these, set before the page starts.
+ * `fingertipPatience` overrides some of these, if it is set before the page starts.
  */
 const USUAL = {
   /** Of a command, answer_ms apart. An answer to any of them is one. */

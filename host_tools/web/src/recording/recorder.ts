@@ -73,7 +73,7 @@ export class Recorder {
     return this.writer?.frames ?? 0;
   }
 
-  /** Rejects with an Error whose message says what was not written. */
+  /** Rejects with an Error whose message states what was not written. */
   async finish(reason = 'stopped'): Promise<void> {
     this.end_tap();
     this.end_listen();

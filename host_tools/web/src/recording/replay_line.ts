@@ -97,14 +97,14 @@ function problemOf(reader: Reader, packets: number): string {
 const STEP_MOST_ms = 250;
 const TICK_ms = 10;
 const ENDED = 'the replay has ended';
-/** Of each pad; what is wrong with the file is said once, by onEnd. */
+/** For each pad; onEnd reports once what is wrong with the file. */
 const ENDED_EARLY = 'the replay has ended before the end of the file';
 
 class ReplayLine implements Line {
   private receive: ((bytes: Uint8Array, at_ms: number) => void) | null = null;
   private closed: ((why: string) => void) | null = null;
 
-  /** As its info packet says; empty before. */
+  /** From its info packet; empty before. */
   serial = '';
 
   constructor(private readonly replay: Replay) {}

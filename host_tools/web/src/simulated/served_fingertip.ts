@@ -118,12 +118,12 @@ export class ServedFingertip implements Line {
     try {
       const answer = await this.post('simulated/hand', command);
       if (answer.ok && this.timer !== null) {
-        const told = (await answer.json()) as Partial<ServedTruth>;
-        const { force_N = 0 } = told;
-        this.truth = { ...NOTHING, ...told, contact: force_N > 0 };
+        const truth = (await answer.json()) as Partial<ServedTruth>;
+        const { force_N = 0 } = truth;
+        this.truth = { ...NOTHING, ...truth, contact: force_N > 0 };
       }
     } catch {
-      // The line says that the server has ended.
+      // The line reports that the server has ended.
     }
     this.asking = false;
     if (this.command !== '' && this.timer !== null) {

@@ -38,7 +38,7 @@ export interface Grip extends Hand {
 export type Truth = FirmwareTruth;
 
 export interface SimulatedOptions {
-  /** Sixteen hexadecimal digits tell several apart. */
+  /** Sixteen hexadecimal digits distinguish several. */
   serial?: string;
   /** Of noise and of the pad's errors; 1. */
   seed?: number;

@@ -21,7 +21,7 @@ async function fetched(url: string): Promise<ArrayBuffer> {
 
 async function start(message: ToWorker & { kind: 'start' }): Promise<RealTime> {
   const [wasm, objects] = await Promise.all([fetched(message.wasm), fetched(message.objects)]);
-  let told_ms = 0;
+  let truth_sent_ms = 0;
   const made = new RealTime({
     module: await WebAssembly.compile(wasm),
     objects: new Uint8Array(objects),
@@ -34,8 +34,8 @@ async function start(message: ToWorker & { kind: 'start' }): Promise<RealTime> {
       },
       truth(truth) {
         const now_ms = performance.now();
-        if (now_ms - told_ms >= TRUTH_ms) {
-          told_ms = now_ms;
+        if (now_ms - truth_sent_ms >= TRUTH_ms) {
+          truth_sent_ms = now_ms;
           post({ kind: 'truth', truth });
         }
       },

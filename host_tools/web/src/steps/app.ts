@@ -18,7 +18,7 @@ const replaying = () => import('../recording/replay_line');
 
 /** Linux gives a port its group and rights a moment after it is there. */
 const RIGHTS_ms = 300;
-/** Between two looks for fingertips of `fingertip simulate`. */
+/** Between two searches for fingertips of `fingertip simulate`. */
 const LOOK_ms = 1500;
 
 const NONE_CHOSEN =
@@ -29,7 +29,7 @@ export class App {
   readonly bench = new Bench();
   readonly recorders = new Map<Fingertip, Recorder>();
   readonly replays = new Map<Fingertip, Replay>();
-  /** Tells the user, until it is closed; set by main. */
+  /** Shows a message to the user, until it is closed; set by main. */
   notice: (text: string, kind: 'plain' | 'bad') => void = () => undefined;
 
   private readonly listeners = new Set<() => void>();
@@ -241,7 +241,7 @@ export class App {
         }
       }
     } catch {
-      // The server, or a simulation, has just ended: the next look tells.
+      // The server, or a simulation, has just ended: the next search shows it.
     }
     setTimeout(() => void this.lookForServed(), LOOK_ms);
   }

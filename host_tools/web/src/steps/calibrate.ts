@@ -1,6 +1,6 @@
 /**
  * Calibrate: the tool's sessions, judgement and sentences (host_tools/tool/calibration), for the sensors'
- * gains from placements of one weight, and for the scale of the tangential load from pulls.
+ * gains from placements of one weight, and for the scale of the tangential force from pulls.
  */
 import { Capability, PacketType, Stored, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
@@ -104,7 +104,7 @@ export function calibrate(fingertip: Fingertip): void {
       'p',
       {},
       'Sensors under cast rubber differ by some 10 %. Set one weight on a round foot (some 300 g on a ball of ' +
-        '15 mm) down at about twenty places, and say how heavy it is where forces are to be right too.',
+        '15 mm) down at about twenty places, and give its weight if forces are to be right too.',
     ),
     make(
       'p',
@@ -129,7 +129,7 @@ export function calibrate(fingertip: Fingertip): void {
     });
   dialog.choose([
     makeButton('Begin', () => start((judges, force_N) => gains(dialog, fingertip, judges, force_N)), true),
-    ...(knows_pad ? [makeButton('Tangential load', () => start((judges, force_N) => pulls(dialog, fingertip, judges, force_N)))] : []),
+    ...(knows_pad ? [makeButton('Tangential force', () => start((judges, force_N) => pulls(dialog, fingertip, judges, force_N)))] : []),
     ...(calibrated
       ? [
           makeButton(
@@ -138,7 +138,7 @@ export function calibrate(fingertip: Fingertip): void {
               void dialog.run(async () => {
                 await fingertip.command({ type: PacketType.CMD_ERASE_CALIBRATION });
                 await fingertip.askInfo();
-                dialog.say('Erased: it is as if never calibrated.');
+                dialog.setMessage('Erased: it is as if never calibrated.');
               }),
           ),
         ]
@@ -154,7 +154,7 @@ async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
   dialog.content.replaceChildren(progress, text, places);
   const undo = makeButton('Take back the last', () => session.takeBack());
   dialog.choose([undo]);
-  let told = '';
+  let listed = '';
   try {
     const ended = await follow(
       dialog,
@@ -163,13 +163,13 @@ async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
       (frame) => session.take(frame),
       () => {
         const status = session.status();
-        dialog.say(`${finderWords(status.finder)}${status.advice}`);
+        dialog.setMessage(`${finderWords(status.finder)}${status.advice}`);
         progress.textContent = status.progress;
         text.textContent = status.text;
         undo.disabled = status.placements.length === 0;
         const list = JSON.stringify(status.placements);
-        if (list !== told) {
-          told = list;
+        if (list !== listed) {
+          listed = list;
           places.replaceChildren(
             ...status.placements.map((each) =>
               make(
@@ -236,7 +236,7 @@ function confirmGains(dialog: Dialog, fingertip: Fingertip, session: GainSession
     ),
     sensorTable(calibration),
   );
-  dialog.say('Store it in the fingertip?');
+  dialog.setMessage('Store it in the fingertip?');
   dialog.choose([
     makeButton(
       'Store',
@@ -264,7 +264,7 @@ function confirmGains(dialog: Dialog, fingertip: Fingertip, session: GainSession
           if (!(info.stored & Stored.CALIBRATION) || info.calibration_date_s !== date_s) {
             throw new Error('it did not keep the calibration; see "Doctor"');
           }
-          dialog.say('Stored: it acts from now on, and without power.');
+          dialog.setMessage('Stored: it applies from now on, and without power.');
           dialog.choose([], 'Close');
         }),
       true,
@@ -279,7 +279,7 @@ function sensorTable(calibration: GainResult['calibration']): HTMLElement {
   return make(
     'table',
     {},
-    make('caption', {}, 'Of the sensors: gain, how far off its place, how much wider it feels a contact'),
+    make('caption', {}, 'For each sensor: gain, distance from its place, how much wider its response is'),
     make('tr', {}, ...heads.map((head) => make('th', { scope: 'col' }, head))),
     ...calibration.gain.map((gain, k) =>
       make(
@@ -310,7 +310,7 @@ async function pulls(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
       'p',
       {},
       'For each pull set an object of some 300 g down on the pad, leave it alone for a second, hang the weight on ' +
-        'its string, which runs level over a pulley, wait until it says "taken", lift the object off.',
+        'its string, which runs level over a pulley, wait for "taken", lift the object off.',
     ),
     last,
     text,
@@ -324,7 +324,7 @@ async function pulls(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
       (frame) => session.take(frame),
       () => {
         const status = session.status();
-        dialog.say(status.advice);
+        dialog.setMessage(status.advice);
         last.textContent = status.last;
         text.textContent = status.text;
         return status.state === 'more';
@@ -356,7 +356,7 @@ function confirmPulls(dialog: Dialog, fingertip: Fingertip, result: { tangential
         `standard deviation ${result.tangential_scale_sd.toFixed(3)}.`,
     ),
   );
-  dialog.say('Store it in the fingertip?');
+  dialog.setMessage('Store it in the fingertip?');
   dialog.choose([
     makeButton(
       'Store',
@@ -369,7 +369,7 @@ function confirmPulls(dialog: Dialog, fingertip: Fingertip, result: { tangential
           if (now.pad_tangential_scale !== pad_tangential_scale) {
             throw new Error('it did not keep the pad\'s profile; see "Doctor"');
           }
-          dialog.say('Stored: it acts from now on, and without power.');
+          dialog.setMessage('Stored: it applies from now on, and without power.');
           dialog.choose([], 'Close');
         }),
       true,

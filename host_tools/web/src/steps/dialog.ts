@@ -1,4 +1,4 @@
-/** Dialogs as plain DOM: what the steps of the page have in common. Their looks: src/styles. */
+/** Dialogs as plain DOM: what the steps of the page have in common. Their appearance: src/styles. */
 
 type Attributes = Record<string, string | boolean>;
 
@@ -23,19 +23,19 @@ export function makeButton(label: string, press: () => void, main = false): HTML
   return button;
 }
 
-/** What an error says, for people. */
+/** The text of an error, for people. */
 export function wordsOf(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
 let dialogs = 0;
 
-/** A dialog with a title, what it says, an error, and a row of choices. */
+/** A dialog with a title, a message, an error, and a row of choices. */
 export class Dialog {
   readonly element: HTMLDialogElement;
   readonly content = make('div');
   /** Spoken as it changes. */
-  readonly said = make('p', { role: 'status' });
+  readonly message = make('p', { role: 'status' });
   private readonly problem = make('p', { class: 'error', role: 'alert', hidden: true });
   private readonly choices = make('menu', { class: 'choices' });
   private closed = false;
@@ -48,7 +48,7 @@ export class Dialog {
       { class: 'step', 'aria-labelledby': id },
       make('h2', { id }, title),
       this.content,
-      this.said,
+      this.message,
       this.problem,
       this.choices,
     );
@@ -71,9 +71,9 @@ export class Dialog {
     this.choices.replaceChildren(...[...buttons, makeButton(close, () => this.close())].map((button) => make('li', {}, button)));
   }
 
-  say(text: string): void {
-    if (this.said.textContent !== text) {
-      this.said.textContent = text;
+  setMessage(text: string): void {
+    if (this.message.textContent !== text) {
+      this.message.textContent = text;
     }
   }
 

@@ -25,7 +25,7 @@ export function examine(fingertip: Fingertip): void {
       list.replaceChildren();
       bar.hidden = false;
       bar.value = 0;
-      dialog.say('Measuring …');
+      dialog.setMessage('Measuring …');
       try {
         const findings = await findingsOf(
           fingertip,
@@ -34,7 +34,7 @@ export function examine(fingertip: Fingertip): void {
         );
         list.replaceChildren(...findings.map(item));
         const wrong = findings.filter((finding) => finding.verdict !== 'ok').length;
-        dialog.say(wrong === 0 ? 'All is well.' : `${wrong} of ${findings.length} checks found something.`);
+        dialog.setMessage(wrong === 0 ? 'All is well.' : `${wrong} of ${findings.length} checks found something.`);
       } finally {
         bar.hidden = true;
       }

@@ -63,7 +63,7 @@ export function flash(app: App, fingertip: Fingertip): void {
         if (board && board !== image.board) {
           throw new Error(`${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`);
         }
-        dialog.say(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
+        dialog.setMessage(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
         show(1);
       }),
   );
@@ -79,7 +79,7 @@ export function flash(app: App, fingertip: Fingertip): void {
       });
       await port.close().catch(() => undefined);
     }
-    dialog.say('If no drive RPI-RP2 appears, hold BOOTSEL while plugging it in.');
+    dialog.setMessage('If no drive RPI-RP2 appears, hold BOOTSEL while plugging it in.');
     show(2);
   }
 
@@ -102,10 +102,10 @@ export function flash(app: App, fingertip: Fingertip): void {
       await file.write(bytes);
       // The loader restarts as soon as it has all of it, and its drive is gone before the file ends.
       await file.close().catch(() => undefined);
-      dialog.say('Written. Waiting for it to come back …');
+      dialog.setMessage('Written. Waiting for it to come back …');
     } else {
       download(new Blob([bytes]), name);
-      dialog.say(`This browser cannot write onto drives: move ${name} from your downloads onto RPI-RP2.`);
+      dialog.setMessage(`This browser cannot write onto drives: move ${name} from your downloads onto RPI-RP2.`);
     }
     show(3);
     await comesBack(image);
@@ -124,7 +124,7 @@ export function flash(app: App, fingertip: Fingertip): void {
               'hold BOOTSEL while plugging it in, and save the image onto the drive',
           );
         }
-        dialog.say(`It is back with firmware ${version} ${info.git_hash}.`);
+        dialog.setMessage(`It is back with firmware ${version} ${info.git_hash}.`);
         return;
       }
     }

@@ -114,13 +114,13 @@ export function settings(fingertip: Fingertip): void {
   show(info);
   dialog.content.append(form, kept);
 
-  const send = (commands: Command[], said: string): Promise<void> =>
+  const send = (commands: Command[], message: string): Promise<void> =>
     dialog.run(async () => {
       for (const command of commands) {
         await fingertip.command(command);
       }
       show(await fingertip.askInfo());
-      dialog.say(said);
+      dialog.setMessage(message);
     });
   const typed = (): Partial<Record<Name, string>> => Object.fromEntries([...inputs].map(([name, input]) => [name, input.value]));
   const apply = (keep: boolean): Promise<void> =>

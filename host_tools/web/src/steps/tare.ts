@@ -49,7 +49,7 @@ function explain(app: App, fingertip: Fingertip): void {
       'p',
       {},
       touched
-        ? `It reports a contact${force}: what presses would become the zero. Let go of the pad and try again.`
+        ? `It reports a contact${force}: it would become the zero. Let go of the pad and try again.`
         : info && info.stored & Stored.WRITING
           ? 'It writes into its flash: wait a moment and try again.'
           : 'No sensor answers: see "Doctor".',

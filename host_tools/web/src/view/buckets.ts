@@ -166,7 +166,7 @@ export function lostBefore(history: History, row: number): number {
   return lost < MOST_LOST ? lost : 0;
 }
 
-/** An interval of 1, 2 or 5 times a power of ten for a span on so many pixels, so that it seldom
+/** An interval of 1, 2 or 5 times a power of ten for a span on a number of pixels, so that it seldom
  * changes; and no shorter than 1 ms. */
 export function intervalOf(span_s: number, pixels: number): number {
   const least = Math.max(span_s / Math.max(pixels, 1), 0.001);

@@ -1,10 +1,10 @@
-/** The eye that looks at the pad. Millimetres; x across the pad, y along it, z out of the rubber,
+/** The camera above the pad. Millimetres; x across the pad, y along it, z out of the rubber,
  * its surface at 0. Matrices by columns, as WebGL takes them. */
 
 export type Matrix = Float32Array;
 export type Point = readonly [number, number, number];
 
-/** turn_deg about z, tilt_deg from the horizon: 90 looks from above, with y up. */
+/** turn_deg about z, tilt_deg from the horizon: 90 is from above, with y up. */
 export interface Look {
   turn_deg: number;
   tilt_deg: number;

@@ -52,10 +52,10 @@ export function slider(
     value: range.value,
   });
   const digits = range.step < 0.1 ? 2 : range.step < 1 ? 1 : 0;
-  const told = element('output', { for: id });
+  const output = element('output', { for: id });
   const show = () => {
     const text = `${Number(field.value).toFixed(digits)} ${unit}`.trim();
-    write(told, text);
+    write(output, text);
     field.setAttribute('aria-valuetext', text);
   };
   field.addEventListener('input', () => {
@@ -64,7 +64,7 @@ export function slider(
   });
   show();
   return {
-    element: element('div', { class: 'slider' }, element('label', { for: id }, name), field, told),
+    element: element('div', { class: 'slider' }, element('label', { for: id }, name), field, output),
     get value() {
       return Number(field.value);
     },

@@ -20,7 +20,7 @@ function nearest(around: readonly HTMLElement[]): HTMLElement | undefined {
   return undefined;
 }
 
-/** What stands around a control, from near to far; around a dialog stands what it was opened from. */
+/** The elements around a control, from near to far; around a dialog are those that it was opened from. */
 function placesAround(control: HTMLElement, before: readonly HTMLElement[]): HTMLElement[] {
   const places: HTMLElement[] = [];
   for (let place = control.parentElement; place; place = place.parentElement) {
@@ -32,7 +32,7 @@ function placesAround(control: HTMLElement, before: readonly HTMLElement[]): HTM
   return places;
 }
 
-/** From now on; it looks before each picture whether the focus is lost. */
+/** From now on; it checks before each picture whether the focus is lost. */
 export function keepFocus(): void {
   let around: HTMLElement[] = []; // first of all the control that has the focus
   let resting = false; // it is disabled for a while

@@ -1,10 +1,10 @@
-/** The hand on a simulated fingertip: with the pointer on its pad, or by what stands here. */
+/** The hand on a simulated fingertip: with the pointer on its pad, or by these controls. */
 import { button, element, slider } from './elements';
 import type { Touch } from './pad_view';
 import type { Hand } from './shown';
 
 const MOST_N = 20;
-/** Held down, a hand presses harder: from so much to what is set, most of it within so long. */
+/** Held down, a hand presses harder: from FIRST_N to the set force, most of it within RISE_s. */
 const FIRST_N = 0.2;
 const RISE_s = 0.45;
 const WHEEL_PART = 1.15;
@@ -80,7 +80,7 @@ export class HandPanel implements Touch {
     this.force.value = Math.max(0.5, this.force.value * WHEEL_PART ** turns + (turns > 0 ? 0.5 : 0));
   }
 
-  /** Once a picture: the hand tells where it is. */
+  /** Sends the place of the hand, once a picture. */
   apply(now_ms: number): void {
     if (this.doing === 'nothing') {
       return;
@@ -151,16 +151,16 @@ export class HandPanel implements Touch {
       this.since_ms = performance.now();
       this.apply(this.since_ms);
     }
-    this.tell();
+    this.showState();
   }
 
   private end(): void {
     this.doing = 'nothing';
     this.sent = '';
-    this.tell();
+    this.showState();
   }
 
-  private tell(): void {
+  private showState(): void {
     this.pressButton.setAttribute('aria-pressed', String(this.doing === 'press'));
     this.holdButton.setAttribute('aria-pressed', String(this.doing === 'hold'));
   }

@@ -18,7 +18,7 @@ const ENDS = ['none', 'hard fault', 'panic', 'watchdog', 'an exception without a
 /** A processor without a rest drops frames soon. */
 const BUSY_permille = 950;
 const LITTLE_STACK_bytes = 512;
-/** The most that the packet can say: no chip's stack, so firmware on a host, where neither load nor stack is measured. */
+/** The largest value of the packet: no chip's stack, so firmware on a host, where neither load nor stack is measured. */
 const HOST_STACK_bytes = 65535;
 
 export function factsOf(shown: Shown): FactGroup[] {

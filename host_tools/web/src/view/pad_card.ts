@@ -1,4 +1,4 @@
-/** One fingertip's pad with its name, its state and its force; several stand side by side. */
+/** One fingertip's pad with its name, its state and its force; several are side by side. */
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import { button, element, write } from './elements';
@@ -89,7 +89,7 @@ export class PadCard {
   }
 
   /** Texts, which cannot be read at the rate of pictures. */
-  tell(): void {
+  writeTexts(): void {
     const { shown, contact } = this;
     write(this.name, shown.name);
     const { words, level } = shown.state(performance.now());
@@ -109,8 +109,8 @@ export class PadCard {
     this.layoutSeen = layout;
     this.view?.dispose();
     const keys = hand
-      ? 'Arrow keys turn it, Home looks from above. Press on it with the pointer.'
-      : 'Arrow keys turn it, Home looks from above.';
+      ? 'Arrow keys turn it, Home shows it from above. Press on it with the pointer.'
+      : 'Arrow keys turn it, Home shows it from above.';
     const view = new PadView(layout, `Pad of ${this.shown.name}. ${keys}`);
     this.view = view;
     this.hand = hand ? new HandPanel(hand) : null;

@@ -323,7 +323,7 @@ export class PadGl {
     }
     const { x_mm, y_mm, p0_Pa } = fit.contact;
     const top = heatPart(p0_Pa) * HEIGHT_mm + 0.2;
-    /* On the rubber, as all places are, for aslant what is higher stands elsewhere. */
+    /* On the rubber, as all places are, because from aslant a higher point appears elsewhere. */
     const at = [x_mm, y_mm, 0.1] as const;
     const colour = fit.doubtful ? warning : text;
     const part = fit.doubtful ? 0.6 : 1;

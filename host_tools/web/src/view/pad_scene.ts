@@ -8,10 +8,10 @@ export const RIM_mm = 6;
 /** Height of a bar and of the surface at full scale; the root of the pressure, as its colour. */
 export const HEIGHT_mm = 17;
 export const THICKNESS_mm = 6;
-/** Length of the arrow whose tangential load is as large as the normal force: rubber slides at a
+/** Length of the arrow whose tangential force is as large as the normal force: rubber slides at a
  * half to one of it. */
 const ARROW_mm = 30;
-/** A load below so many of its standard deviations has no direction. */
+/** A tangential force below this number of its standard deviations has no direction. */
 const ARROW_SDS = 2;
 /** Of the arrow that presses: half of MOST_mm at 5 N. */
 const MOST_mm = 40;

@@ -13,7 +13,7 @@ const ASLANT: Look = { turn_deg: -32, tilt_deg: 40 };
 const ASLANT_WIDE: Look = { turn_deg: -62, tilt_deg: 42 };
 const WIDE = 1.5;
 const TURN_STEP_deg = 5;
-/** Of the axes along two edges of the rubber; the numbers stand so far outside it. */
+/** The axes along two edges of the rubber; the numbers are this far outside it. */
 const TICK_STEP_mm = 10;
 const TICK_mm = 1.5;
 const NUMBER_mm = 4;
@@ -28,9 +28,9 @@ const SLOW_ms = 36;
 const QUICK_ms = 25;
 const LOWER_AFTER_ms = 2000;
 const RAISE_AFTER_ms = 10_000;
-/** After so long without a picture their rate is not shown. */
+/** Without a picture for this time their rate is not shown. */
 const PAUSE_ms = 400;
-/** What has not changed for so long is drawn once more, as sharp as can be. */
+/** A picture that has not changed for this time is drawn once more, as sharp as can be. */
 const STILL_ms = 500;
 const LEAST_SHARPNESS = 0.6;
 
@@ -171,12 +171,12 @@ export class PadView {
       this.gl.draw(this.scene, this.camera, palette);
     }
     this.plan?.draw(this.scene, this.camera, palette);
-    this.heed(now_ms, took_ms);
+    this.adaptSharpness(now_ms, took_ms);
     return true;
   }
 
   /** Fewer pixels where pictures come slowly, whatever the reason: drawing is over before it is done. */
-  private heed(now_ms: number, took_ms: number): void {
+  private adaptSharpness(now_ms: number, took_ms: number): void {
     if (took_ms > PAUSE_ms) {
       this.slow_ms = QUICK_ms;
       this.sharpened_ms = now_ms;
@@ -300,14 +300,14 @@ export class PadView {
     element.addEventListener('keydown', (event) => {
       const step = TURN_STEP_deg;
       const { turn_deg, tilt_deg } = this.look;
-      const looks: Record<string, Look> = {
+      const turns: Record<string, Look> = {
         ArrowLeft: { turn_deg: turn_deg - step, tilt_deg },
         ArrowRight: { turn_deg: turn_deg + step, tilt_deg },
         ArrowUp: { turn_deg, tilt_deg: tilt_deg + step },
         ArrowDown: { turn_deg, tilt_deg: tilt_deg - step },
         Home: this.fromAbove ? this.aslant : FROM_ABOVE,
       };
-      const look = looks[event.key];
+      const look = turns[event.key];
       if (look && this.solid && !event.ctrlKey && !event.metaKey && !event.altKey) {
         event.preventDefault();
         event.stopPropagation();
@@ -370,7 +370,7 @@ export class PadView {
     this.scale(pen, palette, height);
   }
 
-  /** Millimetres on the edges of the surface that are nearest to who looks. */
+  /** Millimetres on the edges of the surface that are nearest to the viewer. */
   private axes(pen: CanvasRenderingContext2D, palette: Palette, at: (x_mm: number, y_mm: number, z_mm: number) => [number, number]): void {
     const { x_mm, y_mm } = this.size;
     const turn = (this.look.turn_deg * Math.PI) / 180;

@@ -20,7 +20,7 @@ export function heatPart(pressure_Pa: number): number {
   return Math.min(1, Math.sqrt(Math.max(0, pressure_Pa) / FULL_SCALE_Pa));
 }
 
-/** declared: the value of a name as it stands in tokens.css. */
+/** declared: the value of a name as in tokens.css. */
 export function paletteOf(declared: (name: string) => string, dark: boolean): Palette {
   const css = (name: string) => {
     const both = /light-dark\(\s*(#[0-9a-f]{6})\s*,\s*(#[0-9a-f]{6})\s*\)/i.exec(declared(name));

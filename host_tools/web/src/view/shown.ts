@@ -35,7 +35,7 @@ export interface ShownTruth {
   readonly qy_N?: number;
 }
 
-/** What presses on a simulated fingertip: SimulatedFingertip of src/simulated is one, and
+/** The hand that presses on a simulated fingertip: SimulatedFingertip of src/simulated is one, and
  * ServedFingertip, whose hand can press only. */
 export interface Hand {
   readonly objects?: readonly { readonly name: string; readonly title: string }[];
@@ -46,7 +46,7 @@ export interface Hand {
   setFriction?(friction: number): void;
 }
 
-/** No frame for so long is shown as a stall, as in the terminal's monitor. */
+/** A longer time without a frame is shown as a stall, as in the terminal's monitor. */
 const STALLED_ms = 700;
 
 export class Shown {
@@ -67,7 +67,7 @@ export class Shown {
     return this.place % FINGERS;
   }
 
-  /** Short: the end of the serial number tells several apart. */
+  /** Short: the end of the serial number distinguishes several. */
   get name(): string {
     const { info, line, is_replay } = this.fingertip;
     if (this.truth) {
@@ -98,7 +98,7 @@ export class Shown {
     return this.fingertip.history;
   }
 
-  /** Its firmware tells tangential load and knows the pad. */
+  /** Its firmware estimates tangential force and has a pad profile. */
   get tangential(): boolean {
     return ((this.fingertip.info?.stored ?? 0) & Stored.PAD) !== 0;
   }
@@ -126,8 +126,8 @@ export class Shown {
   /** Whether the newest frame's report still holds. now_ms: performance.now(). */
   isCurrent(now_ms: number): boolean {
     const { is_replay, state, heard_ms, contacts, raws } = this.fingertip;
-    const told = contacts + raws > 0;
-    return told && (is_replay || (state === 'live' && now_ms - heard_ms < STALLED_ms));
+    const reported = contacts + raws > 0;
+    return reported && (is_replay || (state === 'live' && now_ms - heard_ms < STALLED_ms));
   }
 
   get contact(): ShownContact | null {

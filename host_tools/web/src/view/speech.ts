@@ -1,14 +1,14 @@
-/** What a screen reader says, at a rate that one can listen to. */
+/** The sentences for a screen reader, at a rate that one can listen to. */
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import type { ShownContact } from './shown';
 
 /** Between two sentences. */
 const PACE_ms = 2500;
-/** While nothing begins or ends a change of force below this share of it is not said. */
+/** While nothing begins or ends a change of force below this share of it is not spoken. */
 const NOTED_PART = 0.25;
 
-interface Told {
+interface Spoken {
   contact: boolean;
   slips: boolean;
   warnings: number;
@@ -17,23 +17,23 @@ interface Told {
 }
 
 export class Speech {
-  private told: Told = { contact: false, slips: false, warnings: 0, force_N: 0, state: '' };
+  private spoken: Spoken = { contact: false, slips: false, warnings: 0, force_N: 0, state: '' };
   private at_ms = -Infinity;
 
   /** A sentence, or null where there is nothing new or it would be too soon. state: "live". */
-  say(contact: ShownContact | null, state: string, now_ms: number): string | null {
+  sentence(contact: ShownContact | null, state: string, now_ms: number): string | null {
     if (now_ms - this.at_ms < PACE_ms) {
       return null;
     }
     const flags = contact?.flags ?? 0;
-    const is: Told = {
+    const is: Spoken = {
       contact: (flags & Flag.CONTACT) !== 0,
       slips: (flags & (Flag.SLIP | Flag.SLIDING)) !== 0,
       warnings: flags & WARNING_FLAGS,
       force_N: flags & Flag.FIT_VALID ? (contact?.force_N ?? 0) : 0,
       state,
     };
-    const was = this.told;
+    const was = this.spoken;
     const parts: string[] = [];
     if (is.state !== was.state) {
       parts.push(is.state);
@@ -59,7 +59,7 @@ export class Speech {
     if (parts.length === 0) {
       return null;
     }
-    this.told = is;
+    this.spoken = is;
     this.at_ms = now_ms;
     const sentence = parts.join('; ');
     return `${sentence.charAt(0).toUpperCase()}${sentence.slice(1)}.`;

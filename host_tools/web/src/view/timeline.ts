@@ -9,14 +9,14 @@ export class Timeline {
   readonly element: HTMLElement;
   /** What the traces span. */
   window_s = 20;
-  /** How far before the newest frame, of the pause, is looked at; null: live. */
+  /** How far before the newest frame, or that of the pause, the view is; null: live. */
   behind_s: number | null = null;
   onChange: (() => void) | null = null;
   private kept_s = 0;
   private replay = false;
   private readonly pauseButton: HTMLButtonElement;
   private readonly slider: HTMLInputElement;
-  private readonly told: HTMLOutputElement;
+  private readonly output: HTMLOutputElement;
 
   constructor() {
     this.pauseButton = button('Pause', () => this.toggle(), {
@@ -31,7 +31,7 @@ export class Timeline {
       value: 0,
       'aria-label': 'Moment shown, seconds before now',
     });
-    this.told = element('output', { class: 'moment' });
+    this.output = element('output', { class: 'moment' });
     this.slider.addEventListener('input', () => this.seek(-Number(this.slider.value)));
     this.slider.addEventListener('keydown', (event) => {
       const steps: Record<string, number> = {
@@ -64,7 +64,7 @@ export class Timeline {
       { class: 'timeline', role: 'group', 'aria-label': 'Time' },
       this.pauseButton,
       this.slider,
-      this.told,
+      this.output,
       choice,
     );
     this.show();
@@ -79,7 +79,7 @@ export class Timeline {
     }
   }
 
-  /** What is looked at is a replay: nothing in it is live, and it has a pause of its own. */
+  /** The view is of a replay: nothing in it is live, and it has a pause of its own. */
   set isReplay(is_replay: boolean) {
     if (is_replay !== this.replay) {
       this.replay = is_replay;
@@ -111,7 +111,7 @@ export class Timeline {
     this.slider.value = String(-(this.behind_s ?? 0));
     const behind_s = (this.behind_s ?? 0).toFixed(1);
     const text = newest ? now : `${behind_s} s before the ${this.replay ? 'newest' : 'pause'}`;
-    write(this.told, newest ? now : `−${behind_s} s`);
+    write(this.output, newest ? now : `−${behind_s} s`);
     this.slider.setAttribute('aria-valuetext', text);
   }
 }

@@ -8,7 +8,7 @@ import { FINGERS, cssOf, type Palette } from './palette';
 import type { History } from '../model/history';
 import type { Shown } from './shown';
 
-/** Room for the names of values; the flags keep it too, so that times stand below one another. */
+/** Room for the names of values; the flags keep it too, so that times are below one another. */
 const AXIS_px = 52;
 const RIGHT_px = 12;
 const MOST_INTERVALS = 1400;

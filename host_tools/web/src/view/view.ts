@@ -1,4 +1,4 @@
-/** The page: who is there, their pads, numbers, traces and health, and the time that is looked at. It
+/** The page: who is there, their pads, numbers, traces and health, and the time in view. It
  * reads the fingertips when it draws, and changes nothing of them by itself. */
 import 'uplot/dist/uPlot.min.css';
 import '../styles/tokens.css';
@@ -127,9 +127,9 @@ export class View {
 
   /** A sentence that stays until it is closed. */
   notice(text: string, level: 'plain' | 'bad' = 'plain'): void {
-    const told = element('div', { class: `notice ${level}` }, element('p', {}, text));
-    told.append(button('Close', () => told.remove(), { class: 'small' }));
-    this.notices.append(told);
+    const notice = element('div', { class: `notice ${level}` }, element('p', {}, text));
+    notice.append(button('Close', () => notice.remove(), { class: 'small' }));
+    this.notices.append(notice);
   }
 
   private gather(): void {
@@ -268,7 +268,7 @@ export class View {
     }
     if (now_ms - this.textAt_ms >= TEXT_INTERVAL_ms) {
       this.textAt_ms = now_ms;
-      this.tell(shown, card, now_ms);
+      this.writeTexts(shown, card, now_ms);
     }
     if (now_ms - this.healthAt_ms >= HEALTH_INTERVAL_ms) {
       this.healthAt_ms = now_ms;
@@ -280,9 +280,9 @@ export class View {
     return drawn;
   }
 
-  private tell(shown: Shown, card: PadCard, now_ms: number): void {
+  private writeTexts(shown: Shown, card: PadCard, now_ms: number): void {
     for (const each of this.cards.values()) {
-      each.tell();
+      each.writeTexts();
     }
     const { contact, hand } = card;
     write(this.heading, shown.name);
@@ -296,7 +296,7 @@ export class View {
     if (this.timeline.behind_s === null) {
       const several = this.shown.size > 1 ? `${shown.name}: ` : '';
       const state = shown.state(performance.now()).words.replace(/ for \d+ s$/, '');
-      const sentence = this.speech.say(contact, state, now_ms);
+      const sentence = this.speech.sentence(contact, state, now_ms);
       if (sentence) {
         write(this.live, several + sentence);
       }
