@@ -17,7 +17,7 @@
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
  *     mux_dead (mux)                acknowledges nothing and connects nothing
  *     sensor_missing (sensor)       is not there; when it comes back it has just been powered
- *     line_stuck_low (sensor)       its SDA is tied to ground; behind a multiplexer the bus feels it while it is on
+ *     line_stuck_low (sensor)       its SDA is tied to ground; behind a multiplexer only while its channel is on
  *     line_stuck_high (sensor)      its SDA is tied to VDD
  *     scl_stuck_low, scl_stuck_high SCL is tied to ground, to VDD
  *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
@@ -29,7 +29,7 @@
  *     usb_busy_hub                  other devices talk on the bus: after a reset of it it is never idle for 800 us
  *     usb_deaf                      erratum E15 strikes in the first IN transfer from from_s on: the USB controller answers nothing until its block is reset
  *     usb_dead                      the same, and it does not hear the bus either
- *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
+ *     usb_late_resume               the controller reports the end of a suspend 45 ms late
  *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
  *     sram_upset (address, bytes)   at from_s the bytes, as hexadecimal digits, get into the chip's SRAM at this address
  *     chip_reset                    the chip alone is held in reset until to_s, as when its brown-out detector trips; its SRAM is lost
@@ -148,7 +148,7 @@ export function readFaults(file, limits) {
 
 const NONE = Object.freeze({});
 
-/** The faults in force. `on[type](target, active)` is called when one that acts by itself begins or ends. */
+/** The faults in force. `on[type](target, active)` is called when one that has its own effect begins or ends. */
 export class Faults {
   constructor(list, scope, on = {}) {
     this.sensors = new Map();

@@ -3,7 +3,7 @@ const AMBIENT_Pa = 101325;
 const TEMPERATURE_degC = 25;
 
 export class LivePressures {
-  /** @param slice_ns length of a slice; at 0 nothing is felt */
+  /** @param slice_ns length of a slice; at 0 there is no pressure */
   constructor(sensors, slice_ns) {
     this.slice_ns = slice_ns;
     this.rows = [new Float64Array(sensors)];

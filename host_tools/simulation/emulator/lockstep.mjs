@@ -1,5 +1,5 @@
 #!/usr/bin/env node
-/** Emulated boards in lock step with a program that plays the world around them: see USAGE. */
+/** Emulated boards in lock step with a program that simulates the world around them: see USAGE. */
 import { spawn } from 'node:child_process';
 import { parseArgs } from 'node:util';
 import { BOARDS, findBoard } from './board/boards.mjs';
@@ -11,11 +11,11 @@ import { DEFAULT_SERIAL, Machine } from './machine.mjs';
 const USAGE = `usage: lockstep.mjs --image FILE.bin --board NAME [options] -- PROGRAM [ARGUMENT...]
 
 Runs emulated boards with the same firmware image and a program in slices of emulated time, each waiting for the other:
-the same bit for bit each time, whatever the clock on the wall says. The ports of the boards are open from the start.
+the same bit for bit each time, whatever the wall clock. The ports of the boards are open from the start.
 
   --image FILE       raw flash image (.bin), loaded at flash offset 0
   --board NAME       ${BOARDS.join(' or ')}
-  --boards N         so many, 1 to 8; default 2
+  --boards N         number of boards, 1 to 8; default 2
   --clock-ppm LIST   how fast the clock of each is, split by commas; default 0
   --slice-us N       length of a slice, 100 to 10000; default 500
   --seconds N        the program must be done by then, emulated; default 10
@@ -77,7 +77,7 @@ function parseOptions(argv) {
   };
 }
 
-/** The program that plays the world. */
+/** The program that simulates the world. */
 class World {
   constructor([program, ...rest]) {
     this.name = program;
@@ -110,7 +110,7 @@ class World {
     return (await this.read(4)).readUInt32LE(0);
   }
 
-  tell(t_ns, chunks) {
+  send(t_ns, chunks) {
     const parts = [Buffer.alloc(12)];
     parts[0].writeBigUInt64LE(BigInt(Math.round(t_ns)), 0);
     parts[0].writeUInt32LE(chunks.length, 8);
@@ -134,7 +134,7 @@ class World {
       const values = await this.read(8 * sensors);
       const pressures_Pa = Array.from({ length: sensors }, (_, k) => values.readDoubleLE(8 * k));
       const wrong = pressures_Pa.find((p_Pa) => !(Math.abs(p_Pa) <= PRESSURE_LIMIT_Pa));
-      if (wrong !== undefined) throw new InputError(`${this.name}: tells a pressure of ${wrong} Pa`);
+      if (wrong !== undefined) throw new InputError(`${this.name}: gives a pressure of ${wrong} Pa`);
       const length = await this.u32();
       if (length > SENT_LIMIT) throw new InputError(`${this.name}: sends ${length} bytes at once`);
       answers.push({ pressures_Pa, bytes: Uint8Array.from(await this.read(length)) });
@@ -179,7 +179,7 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
   let result;
   try {
     for (let slice = 0; ; slice++) {
-      world.tell(slice * slice_ns, chunks);
+      world.send(slice * slice_ns, chunks);
       chunks = [];
       const answers = await world.answer(boards, Board.sensors);
       if (!answers) break;
@@ -197,7 +197,7 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
     world.child.kill();
   }
   const ran = machines.map((machine) => machine.result);
-  const told = ran.map(({ emulated_s, busy_fraction, clock_ppm, warnings, image_sha256 }) => ({
+  const summary = ran.map(({ emulated_s, busy_fraction, clock_ppm, warnings, image_sha256 }) => ({
     emulated_s,
     busy_fraction,
     clock_ppm,
@@ -205,7 +205,7 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
     image_sha256,
   }));
   process.stdout.write(
-    `${JSON.stringify({ ...result, slice_us: slice_ns / 1e3, boards: told, wall_s: (performance.now() - started_ms) / 1e3 }, null, 1)}\n`,
+    `${JSON.stringify({ ...result, slice_us: slice_ns / 1e3, boards: summary, wall_s: (performance.now() - started_ms) / 1e3 }, null, 1)}\n`,
   );
   for (const [i, { warnings }] of ran.entries()) for (const line of warnings) process.stderr.write(`board ${i}: ${line}\n`);
   return ran.every(({ warnings }) => warnings.length === 0) ? 0 : 1;

@@ -18,7 +18,7 @@ import { CdcClient } from './usb/cdc_client.mjs';
 import { UsbHost } from './usb/host.mjs';
 
 export const DEFAULT_SERIAL = 'e660583883265a2c';
-/** So long after a start the firmware must run at the board's frequency, unless the bus sleeps. */
+/** This time after a start the firmware must run at the board's frequency, unless the bus sleeps. */
 const CLOCK_CHECK_NS = 200e6;
 
 export class Machine {

@@ -110,7 +110,7 @@ const OPTIONS = {
   help: { type: 'boolean', short: 'h', default: false },
 };
 
-/** Emulated time run between looks at the wall clock and the pseudo-terminal. */
+/** Emulated time between two checks of the wall clock and the pseudo-terminal. */
 const SLICE_NS = 1e6;
 /** A virtual machine waits for each control request. */
 const USBREDIR_SLICE_NS = 200e3;

@@ -170,7 +170,7 @@ int play(const PlayOptions &options) {
   settings.pad = pad ? &*pad : nullptr;
   native_set_serial_number(options.serial.c_str());
   if (!native_fingertip_start(&settings)) {
-    throw Error("--pad: this player reports no tangential load; build it with "
+    throw Error("--pad: this player reports no tangential force; build it with "
                 "-DFINGERTIP_SCENE=grasp");
   }
   native_cdc_open();
@@ -379,7 +379,7 @@ int run(int argc, char **argv) {
   app.get_formatter()->column_width(28);
   PlayOptions play_options;
   CLI::App *player =
-      app.add_subcommand("play", "Play a scenario to simulated sensors and record what the firmware says");
+      app.add_subcommand("play", "Apply a scenario to simulated sensors and record the firmware's packets");
   player->add_option("scenario", play_options.scenario, "CSV file, from twin or fingertip-scenario")
       ->required()
       ->type_name("FILE.csv");
@@ -398,7 +398,7 @@ int run(int argc, char **argv) {
       ->check(CLI::Range(0.001, 100.0))
       ->type_name("MM");
   CLI::Option *pad =
-      player->add_option("--pad", play_options.pad_mm, "Thickness of the pad: the firmware tells tangential load")
+      player->add_option("--pad", play_options.pad_mm, "Thickness of the pad: the firmware estimates tangential force")
           ->type_name("MM");
   player->add_option("--overhang", play_options.overhang_mm, "Of the pad")->type_name("MM")->needs(pad);
   player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
@@ -468,7 +468,7 @@ int main(int argc, char **argv) {
   try {
     return fingertip::run(argc, argv);
   } catch (const fingertip::Error &error) {
-    fingertip::tell("fingertip_player", error);
+    fingertip::print_error("fingertip_player", error);
   }
   return 1;
 }

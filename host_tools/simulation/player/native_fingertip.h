@@ -19,7 +19,7 @@ struct native_fingertip_settings {
                            this share; the firmware reads it and calculates with it */
   float prior_sigma_mm; /* prior on the width; prior_width_mm 0: the build's own */
   float prior_width_mm;
-  const struct pad_profile *pad; /* that acts, and outlives the fingertip; NULL: the one kept */
+  const struct pad_profile *pad; /* the profile in use, which outlives the fingertip; NULL: the stored one */
   struct sim_world world;
   uint32_t absent;      /* bitmap of the sensors that are not fitted */
   bool parallel_bus;    /* a data line for each sensor (sim_array.h): faster than multiplexers */
@@ -30,7 +30,7 @@ struct native_fingertip_settings {
 extern "C" {
 #endif
 
-/* Powers up at time 0. False: there is a pad, and this build reports no tangential load. */
+/* Powers up at time 0. False: there is a pad, and this build reports no tangential force. */
 bool native_fingertip_start(const struct native_fingertip_settings *settings);
 
 /* Runs to t_us. False: the firmware left for the loader or panicked. */

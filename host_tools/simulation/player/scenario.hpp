@@ -1,5 +1,5 @@
 /* What the sensors feel over time: the files that fingertip-scenario and the twin write and that
- * the emulator plays.
+ * the emulator applies.
  *
  *   # fingertip-scenario 1
  *   # key: value                     name, ambient_Pa (101325), temperature_degC (25), sensors (15)

@@ -11,7 +11,7 @@ namespace fingertip::twin {
 namespace {
 
 constexpr double FINE_STEP_mm = 0.25, STEP_mm = 0.5;
-// Wider ones press a wider area: the base cannot tell the finer step.
+// Wider ones press a wider area: the base cannot resolve the finer step.
 constexpr double SMALL_REACH_mm = 5.0;
 constexpr double TABLE_REACH_mm = 45.0;
 constexpr double ROOM_THICKNESSES = 3.0;

@@ -15,7 +15,7 @@ namespace {
 // the holds of 8 s that begin with a ramp of 1.3 s in the recordings named below.
 constexpr std::array<double, Pad::TIMES_s.size()> PRONY{0.206, 0.153};
 constexpr double RAMP_s = 1.3, HOLD_s = 8.0;
-// 9..26 % is 17.5 % and so much to either side; 130..210 Pa is 170 Pa and so much.
+// 9..26 % is 17.5 % and this share to either side; 130..210 Pa is 170 Pa and this share.
 constexpr double RELAXATION_SPREAD = 8.5 / 17.5;
 constexpr double DRIFT_SPREAD = 40.0 / 170.0;
 constexpr double DRIFT_SPAN_s = 16.0 * 60.0;
@@ -24,8 +24,8 @@ constexpr double SPECIFIED_Pa = 120000.0, RANGE_END_Pa = 200000.0;
 // Silicone rubber: 0.2 W/(m K), 1100 kg/m3, 1500 J/(kg K).
 constexpr double DIFFUSIVITY_mm2_s = 0.12;
 
-// About the usual 4 %: what stood off was 0.4..8 % of the peak, what dipped 1..9 %.
-constexpr double STANDS_OFF_LEAST = 0.4 / 4.0, STANDS_OFF_MOST = 8.0 / 4.0;
+// The usual amount is 4 %. Measured: residuals of 0.4..8 % of the peak, dips of 1..9 %.
+constexpr double RESIDUAL_LEAST = 0.4 / 4.0, RESIDUAL_MOST = 8.0 / 4.0;
 constexpr double DIPS_LEAST = 1.0 / 4.0, DIPS_MOST = 9.0 / 4.0;
 constexpr double DIPS_SHARE = 1.0 / 3.0; // of the sensors; assumed
 constexpr double BACK_LEAST_s = 0.5, BACK_MOST_s = 10.0;
@@ -98,7 +98,7 @@ const std::vector<Effect> &effects() {
       {"dip", "%", 5.0, 0.0, 10.0,
        "around a contact the pressure is lower by this share of its middle, 2.5 times as wide",
        std::string(GRIDS) + ": 5 % by calibrations on them, -1 to -2 % is left at 3.5 to 4 widths"},
-      {"widths", "%", 3.5, 0.0, 20.0, "each sensor feels a contact wider or narrower by this sd",
+      {"widths", "%", 3.5, 0.0, 20.0, "each sensor's response is wider or narrower by this sd",
        std::string(GRIDS) + ": widths of sensors' responses differ by 3 to 4 % (sd)"},
       {"places", "mm", 0.1, 0.0, 1.0, "each sensor sits off its place by this sd, each way",
        std::string(GRIDS) + ": 0.1 to 0.23 mm from the board's drawing"},
@@ -114,13 +114,13 @@ const std::vector<Effect> &effects() {
        "loop of loading and unloading at any speed, as a share of the work of loading",
        "2.7 to 4.2 % at 0.1 Hz in silicone pads: Romano et al., Soft Science 4:31, 2024, table 2"},
       {"aftereffect", "%", 4.0, 0.0, 20.0,
-       "after a release each sensor stands off by 0.1 to 2 times this share of its peak, one in "
+       "after a release each sensor is off by 0.1 to 2 times this share of its peak, one in "
        "three undershoots by 0.25 to 2.25 times, back with a time constant of 0.5 to 10 s",
        std::string(STRIP) + ": 0.4 to 8 % above or 1 to 9 % below, back in 0.5 to 10 s; how many "
                             "undershoot is assumed"},
       {"creep", "%", 2.5, 0.0, 10.0, "each sensor rises in a hold by this share, and falls as slowly after: 3 s",
-       "presses beside a load cell: Shaevitzaiden/slip_detection, two of seven read: per newton a "
-       "sensor rises by 0.9 to 1.7 % in a hold, and stands 1.2 to 2.1 % of the peak above its zero "
+       "presses next to a load cell: Shaevitzaiden/slip_detection, two of seven read: per newton a "
+       "sensor rises by 0.9 to 1.7 % in a hold, and is 1.2 to 2.1 % of the peak above its zero "
        "0.5 s after it, 0.8 to 1.3 % at 1.5 s"},
       {"temperature", "K", 6.0, -40.0, 40.0,
        "the sensors warm up slowly by this, as in a hand; pressures are compensated",
@@ -221,7 +221,7 @@ Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, doub
         Random random(seed, AFTEREFFECT, k);
         const bool dips = random.uniform(0.0, 1.0) < DIPS_SHARE;
         const double times =
-            dips ? -random.uniform(DIPS_LEAST, DIPS_MOST) : random.uniform(STANDS_OFF_LEAST, STANDS_OFF_MOST);
+            dips ? -random.uniform(DIPS_LEAST, DIPS_MOST) : random.uniform(RESIDUAL_LEAST, RESIDUAL_MOST);
         aftereffects_.push_back({0.01 * value * times, random.log_uniform(BACK_LEAST_s, BACK_MOST_s)});
       }
     } else if (name == "branch") {
@@ -284,13 +284,13 @@ double Pad::relaxed(Rubber &r, double pressure_Pa) {
 }
 
 double Pad::left_behind(Rubber &r, const Aftereffect &effect, double base_Pa) const {
-  const double felt_Pa = std::max(base_Pa, 0.0);
-  const double rate = step_s_ > 0.0 ? (felt_Pa - r.felt_Pa) / step_s_ : 0.0;
+  const double sensed_Pa = std::max(base_Pa, 0.0);
+  const double rate = step_s_ > 0.0 ? (sensed_Pa - r.sensed_Pa) / step_s_ : 0.0;
   const double lag = rate * effect.time_s;
   // Exact as above, and where the pressure overtakes what is remembered.
-  r.remembered_Pa = std::max(felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
-  r.felt_Pa = felt_Pa;
-  return effect.share * (r.remembered_Pa - felt_Pa);
+  r.remembered_Pa = std::max(sensed_Pa, sensed_Pa - lag + (r.remembered_Pa - r.sensed_Pa + lag) * r.forgetting);
+  r.sensed_Pa = sensed_Pa;
+  return effect.share * (r.remembered_Pa - sensed_Pa);
 }
 
 double Pad::crept(Rubber &r, double base_Pa) const {

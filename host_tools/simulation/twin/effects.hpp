@@ -17,11 +17,11 @@
 //   aftereffect  plus a share of the peak that each sensor remembers and p has left: a (m - p).
 //                m is p while p rises above it, and otherwise returns to p with a time constant of
 //                0.5 to 10 s. So presses and holds are as they were, and after a release the
-//                reading stands off by a of the peak. a is 0.1 to 2 V for two sensors of three
+//                reading is off by a of the peak. a is 0.1 to 2 V for two sensors of three
 //                and -0.25 to -2.25 V, an undershoot, for the third; both drawn for each sensor.
 //                p is the pressure on the base: relaxation makes nothing to be remembered.
 //   creep        plus V of what follows p with a time constant of CREEP_s: a sensor rises in a hold
-//                beside the others' loss, and stands above its zero after a release
+//                in addition to the others' loss, and is above its zero after a release
 //   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
 //   drift        p plus a ramp in time, drawn for each sensor: slope and sign
 //   branch       the sensors begin at V degC and warm up by WARMING_K_s to ROOM_degC. Where they
@@ -36,7 +36,7 @@
 //   clip         never above V absolute
 //   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with
 //                the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above, from
-//                ROOM_degC or on top of what `branch` says
+//                ROOM_degC or on top of the temperature of `branch`
 //
 // Relaxation and hysteresis act on the reported pressure while the scenario's force is what it is:
 // as if the press were force-controlled and the sensor's share of the load went down. Where a robot
@@ -86,8 +86,7 @@ public:
   double temperature_degC(double t_s) const;
 
   double dip_share() const { return dip_share_; }
-  // How a sensor sits: off its place, and its distances over those of a contact as wide as it
-  // feels it.
+  // How a sensor sits: its offset from its place, and the width of its response over the usual one.
   struct Seat {
     double dx_mm = 0.0, dy_mm = 0.0, width = 1.0;
   };
@@ -118,7 +117,7 @@ private:
     double turn_Pa = 0.0, turn_lacks_Pa = 0.0, largest_Pa = 0.0;
     double base_Pa = 0.0, crept_Pa = 0.0; // creep: the pressure at the last time, what follows it
     // After-effect: the pressure at the last time, what is remembered, its decay over a step.
-    double felt_Pa = 0.0, remembered_Pa = 0.0, forgetting = 1.0;
+    double sensed_Pa = 0.0, remembered_Pa = 0.0, forgetting = 1.0;
   };
   double with_hysteresis(Rubber &rubber, double pressure_Pa) const;
   double relaxed(Rubber &rubber, double pressure_Pa);

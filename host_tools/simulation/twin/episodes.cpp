@@ -8,19 +8,19 @@ Stage::Stage(const ScenarioOptions &scenario_options, const ContactTable &contac
     : options(scenario_options), table(contact_table), forces(options.forces), tangential(options.tangential),
       friction("--friction", options.friction), mass_kg("--mass", options.mass_kg.empty() ? "0" : options.mass_kg) {}
 
-bool Stage::play(Act act) {
-  const double length_s = act.phases.back().end_s;
+bool Stage::add(Episode episode) {
+  const double length_s = episode.phases.back().end_s;
   if (t_s_ + length_s + options.quiet_s > *options.seconds + 1e-9) {
     return false;
   }
-  act.begin_s = t_s_;
-  act.end_s = t_s_ + length_s;
-  for (Phase &phase : act.phases) {
+  episode.begin_s = t_s_;
+  episode.end_s = t_s_ + length_s;
+  for (Phase &phase : episode.phases) {
     phase.begin_s += t_s_;
     phase.end_s += t_s_;
   }
-  t_s_ = milliseconds(act.end_s + options.quiet_s);
-  acts.push_back(std::move(act));
+  t_s_ = milliseconds(episode.end_s + options.quiet_s);
+  episodes.push_back(std::move(episode));
   return true;
 }
 
@@ -29,9 +29,9 @@ Place Stage::random_place(Random &random) const {
   return {at_x, random.uniform(-half_y_mm(), half_y_mm())};
 }
 
-void phase(Act &act, const std::string &name, double end_s, bool slip) {
-  const double begin_s = act.phases.empty() ? 0.0 : act.phases.back().end_s;
-  act.phases.push_back({name, begin_s, milliseconds(end_s), slip});
+void phase(Episode &episode, const std::string &name, double end_s, bool slip) {
+  const double begin_s = episode.phases.empty() ? 0.0 : episode.phases.back().end_s;
+  episode.phases.push_back({name, begin_s, milliseconds(end_s), slip});
 }
 
 Track track_at(Place place) {

@@ -1,6 +1,5 @@
-// What scenarios are put together from: the stage on which acts follow each other, and the acts of
-// each kind. acts_pulled.cpp has those in which something pulls along the rubber, scenarios.cpp the
-// others.
+// The parts of scenarios: the stage on which episodes follow each other, and the episodes of each
+// kind. pulled_episodes.cpp has those with a tangential force, scenarios.cpp the others.
 #pragma once
 
 #include "libfingertip/random.hpp"
@@ -14,7 +13,7 @@ namespace fingertip::twin {
 constexpr double GRID_STEP_mm = 4.5;
 constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
 constexpr double SPEED_UP_s = 0.01;
-constexpr double SLIDE_SPEED_MAX_mm_s = 200.0; // of the hand; faster, an object is thrown off the pad
+constexpr double SLIDE_SPEED_MAX_mm_s = 200.0; // of the hand; a faster hand throws the object off the pad
 constexpr double DEGREE = M_PI / 180.0;
 
 constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
@@ -42,18 +41,18 @@ inline double milliseconds(double seconds) {
   return 1e-3 * std::round(1e3 * seconds);
 }
 
-// Puts acts one after the other.
+// Puts episodes one after the other.
 class Stage {
 public:
   Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table);
 
-  // The act's times count from its beginning; false, and the scenario is full, if it does not fit.
-  bool play(Act act);
+  // The episode's times count from its beginning; false, and the scenario is full, if it does not fit.
+  bool add(Episode episode);
   Place random_place(Random &random) const;
   // Half of where random places are.
   double half_x_mm() const { return GRID_HALF_X_mm + *options.margin_mm; }
   double half_y_mm() const { return GRID_HALF_Y_mm + *options.margin_mm; }
-  // Of what is pushed or pulled in the nth act.
+  // The speed of what is pushed or pulled in the nth episode.
   template <std::size_t N> double speed_mm_s(std::size_t n, const std::array<double, N> &usual_mm_s) const {
     const std::vector<double> &given_mm_s = options.speeds_mm_s;
     return given_mm_s.empty() ? usual_mm_s[n % N] : given_mm_s[n % given_mm_s.size()];
@@ -64,28 +63,28 @@ public:
   const Forces forces;
   const Tangential tangential;
   const Range friction, mass_kg;
-  std::vector<Act> acts;
+  std::vector<Episode> episodes;
 
 private:
   double t_s_ = START_QUIET_s;
 };
 
-// A phase of an act that ends where its profiles' pieces do.
-void phase(Act &act, const std::string &name, double end_s, bool slip = false);
+// A phase of an episode that ends where its profiles' pieces do.
+void phase(Episode &episode, const std::string &name, double end_s, bool slip = false);
 
 Track track_at(Place place);
 
-// The functions below make the nth act of a kind.
-Act lift(const Stage &stage, std::size_t n);
-Act drag(const Stage &stage, std::size_t n);
-Act slide(const Stage &stage, std::size_t n);
-Act screw(const Stage &stage, std::size_t n);
+// The functions below make the nth episode of a kind.
+Episode lift(const Stage &stage, std::size_t n);
+Episode drag(const Stage &stage, std::size_t n);
+Episode slide(const Stage &stage, std::size_t n);
+Episode screw(const Stage &stage, std::size_t n);
 // The strongest grip of any slide of an object that is at most so heavy and at least so rough, but
 // for --force itself.
 double slide_force_N(double mass_kg, double friction, double kinetic_share);
 
-// Gives the nth act of a kind that is not about pulling the tangential force that the options ask
+// Gives the nth episode of a kind that is not about pulling the tangential force that the options ask
 // for.
-void pull(Act &act, const Stage &stage, std::size_t n);
+void pull(Episode &episode, const Stage &stage, std::size_t n);
 
 } // namespace fingertip::twin

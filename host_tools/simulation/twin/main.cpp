@@ -1,5 +1,5 @@
 // twin: writes scenarios that emulator and native pipeline play. Exit status: 0 done; 1 something
-// went wrong, said in one line; 2 wrong usage.
+// went wrong, reported in one line; 2 wrong usage.
 #include "libfingertip/error.hpp"
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/output_file.hpp"
@@ -127,7 +127,7 @@ int tables(const Options &options) {
   ProgressBar bar("contact tables", ProgressBar::Lines::tenths);
   std::mutex telling;
   const auto make = [&](std::size_t i) {
-    const auto tell = [&](double share) {
+    const auto report = [&](double share) {
       const std::lock_guard<std::mutex> lock(telling);
       jobs[i].share = share;
       double sum = 0.0;
@@ -136,7 +136,7 @@ int tables(const Options &options) {
       }
       show(bar, sum / static_cast<double>(jobs.size()));
     };
-    ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
+    ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, report);
     const std::lock_guard<std::mutex> lock(telling);
     jobs[i].share = 1.0; // without a word: it may have been there
   };
@@ -196,7 +196,7 @@ int scenario(Options &options) {
                              [&](double share) { show(bar, share); });
   }
   std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n", printable(options.output).c_str(),
-              made.name.c_str(), made.acts.size(), number(*made.options.seconds).c_str(), written.rows,
+              made.name.c_str(), made.episodes.size(), number(*made.options.seconds).c_str(), written.rows,
               fixed(1e-6 * static_cast<double>(written.bytes), 1).c_str(), fixed(1e-3 * written.peak_Pa, 1).c_str());
   return 0;
 }
@@ -247,7 +247,7 @@ int run(int argc, char **argv) {
   const auto with_contact = [&](CLI::App *command) {
     command
         ->add_option("--indenter", options.scenario.indenter,
-                     "What presses; default sphere6, for placements and drags sphere15")
+                     "Contact shape; default sphere6, for placements and drags sphere15")
         ->type_name("NAME");
     command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")->type_name("MM");
   };
@@ -256,7 +256,7 @@ int run(int argc, char **argv) {
                                               "a force best, its share of the force, and "
                                               "its peak");
   with_contact(fit);
-  fit->add_option("--force", options.width_force_N, "What presses")
+  fit->add_option("--force", options.width_force_N, "Normal force")
       ->check(CLI::Range(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))
       ->type_name("N")
       ->capture_default_str();
@@ -275,8 +275,7 @@ int run(int argc, char **argv) {
       ->type_name("MM");
   write
       ->add_option("--second", s.second_indenter,
-                   "What presses too, in scenarios of two contacts; "
-                   "default: the same")
+                   "Contact shape of the second contact, in scenarios of two; default: the same")
       ->type_name("NAME");
   write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")->type_name("PERCENT");
   write
@@ -346,7 +345,7 @@ int main(int argc, char **argv) {
   try {
     return run(argc, argv);
   } catch (const Error &error) {
-    tell("twin", error);
+    print_error("twin", error);
     return 1;
   } catch (const std::exception &error) {
     std::fprintf(stderr, "twin: %s\n", printable(error.what()).c_str());

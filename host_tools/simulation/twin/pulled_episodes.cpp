@@ -1,4 +1,4 @@
-// Acts in which something pulls along the rubber. README.md says what is assumed and left out.
+// Episodes with a tangential force. README.md states what is assumed and left out.
 #include "simulation/twin/episodes.hpp"
 #include "simulation/twin/held_object.hpp"
 
@@ -14,7 +14,7 @@ constexpr std::array<double, 3> LIFTS_s{0.1, 0.3, 1.0};
 constexpr std::array<double, 1> DRAG_SPEEDS_mm_s{10};
 constexpr double GRAVITY_m_s2 = 9.81;
 
-// What pulls in the nth act, as far as the options leave it open.
+// What pulls in the nth episode, as far as the options leave it open.
 struct Pulling {
   double angle_rad, share, friction;
 };
@@ -45,63 +45,63 @@ void place_way(Track &track, double way_mm, const Stage &stage, Random &random) 
 
 } // namespace
 
-void pull(Act &act, const Stage &stage, std::size_t n) {
+void pull(Episode &episode, const Stage &stage, std::size_t n) {
   const Pulling chosen = pulling(stage, n);
-  for (Track &track : act.tracks) {
+  for (Track &track : episode.tracks) {
     track.pull.along_x = std::cos(chosen.angle_rad);
     track.pull.along_y = std::sin(chosen.angle_rad);
     track.pull.share = chosen.share;
   }
-  act.friction = chosen.friction;
+  episode.friction = chosen.friction;
 }
 
 // A gripped object whose weight the pad takes over, carries and gives back.
-Act lift(const Stage &stage, std::size_t n) {
+Episode lift(const Stage &stage, std::size_t n) {
   constexpr double CARRIES_s = 1.0;
   Random random(stage.options.seed, LIFT, n);
   const Place place = stage.random_place(random);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
   const double lift_s = LIFTS_s[n % LIFTS_s.size()];
   const Pulling chosen = pulling(stage, n);
-  Act act;
-  act.press = "lift";
-  act.friction = chosen.friction;
+  Episode episode;
+  episode.press = "lift";
+  episode.friction = chosen.friction;
   Track track = track_at(place);
   aim(track, chosen.angle_rad);
   track.pull.friction = Profile(chosen.friction);
   track.pull.travel_mm = stage.options.dead_travel_mm;
   track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.5, 0.7));
   const double begin_s = track.force_N.end_s();
-  phase(act, "hold", begin_s);
+  phase(episode, "hold", begin_s);
   Profile &load_N = track.pull.load_N;
   load_N.hold(begin_s);
   load_N.ease(lift_s, chosen.share * force_N);
-  phase(act, "lift", load_N.end_s());
+  phase(episode, "lift", load_N.end_s());
   load_N.hold(CARRIES_s);
-  phase(act, "carry", load_N.end_s());
+  phase(episode, "carry", load_N.end_s());
   load_N.ease(lift_s, 0.0);
-  phase(act, "lower", load_N.end_s());
+  phase(episode, "lower", load_N.end_s());
   track.force_N.hold(load_N.end_s() - begin_s + 0.3);
-  phase(act, "after", track.force_N.end_s());
+  phase(episode, "after", track.force_N.end_s());
   track.force_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
-// A weight that stands on the pad; on a string a known load, then as much as makes it slide.
-Act drag(const Stage &stage, std::size_t n) {
+// A weight rests on the pad; a string pulls it with a known force, then until it slides.
+Episode drag(const Stage &stage, std::size_t n) {
   constexpr double WAY_mm = 8.0, KNOWN_s = 3.0, LOADS_s = 0.5;
   Random random(stage.options.seed, DRAG, n);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
   const Pulling chosen = pulling(stage, n);
-  Act act;
-  act.press = "drag";
-  act.friction = chosen.friction;
-  act.mass_kg = force_N / GRAVITY_m_s2;
-  act.speed_mm_s = stage.speed_mm_s(n, DRAG_SPEEDS_mm_s);
+  Episode episode;
+  episode.press = "drag";
+  episode.friction = chosen.friction;
+  episode.mass_kg = force_N / GRAVITY_m_s2;
+  episode.speed_mm_s = stage.speed_mm_s(n, DRAG_SPEEDS_mm_s);
   Track track;
   // x, y and back, by default.
   aim(track, stage.tangential.angle_deg.value_or(90.0 * static_cast<double>(n % 4)) * DEGREE);
@@ -109,30 +109,30 @@ Act drag(const Stage &stage, std::size_t n) {
   track.pull.travel_mm = stage.options.dead_travel_mm;
   place_way(track, WAY_mm + track.pull.travel_mm, stage, random);
   track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.9, 1.1));
   const double begin_s = track.force_N.end_s();
-  phase(act, "hold", begin_s);
+  phase(episode, "hold", begin_s);
   Profile &load_N = track.pull.load_N;
   load_N.hold(begin_s);
   load_N.ease(LOADS_s, chosen.share * force_N);
-  phase(act, "load", load_N.end_s());
+  phase(episode, "load", load_N.end_s());
   load_N.hold(KNOWN_s);
-  phase(act, "carry", load_N.end_s());
+  phase(episode, "carry", load_N.end_s());
   load_N.line(LOADS_s, chosen.friction * force_N);
-  phase(act, "pull", load_N.end_s());
+  phase(episode, "pull", load_N.end_s());
   track.pusher_mm.hold(load_N.end_s());
-  track.pusher_mm.travel(WAY_mm, act.speed_mm_s, std::min(SPEED_UP_s, 0.5 * WAY_mm / act.speed_mm_s));
+  track.pusher_mm.travel(WAY_mm, episode.speed_mm_s, std::min(SPEED_UP_s, 0.5 * WAY_mm / episode.speed_mm_s));
   load_N.hold(track.pusher_mm.end_s() - load_N.end_s());
-  phase(act, "slip", load_N.end_s(), true);
+  phase(episode, "slip", load_N.end_s(), true);
   load_N.ease(LOADS_s, 0.0);
-  phase(act, "unload", load_N.end_s());
+  phase(episode, "unload", load_N.end_s());
   track.force_N.hold(load_N.end_s() - begin_s + 0.5);
-  phase(act, "after", track.force_N.end_s());
+  phase(episode, "after", track.force_N.end_s());
   track.force_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
 namespace {
@@ -147,7 +147,7 @@ struct Script {
   Profile hand_mm;  // pulls on a string that is just straight when the hand sets out
   double hand_begin_s = std::numeric_limits<double>::infinity();
   double over_s = std::numeric_limits<double>::infinity(); // then the load is taken away
-  // Gross slip for so long or so far is noticed; then the grip gets this strong.
+  // Gross slip for this time or this distance is noticed; then the grip gets this strong.
   double notice_s = std::numeric_limits<double>::infinity();
   double notice_mm = std::numeric_limits<double>::infinity();
   double caught_N = 0.0;
@@ -251,9 +251,8 @@ Course run(const Script &script, const Stage &stage) {
   return course;
 }
 
-// A moment of sticking or of partial slip, which no recording could tell, goes with what was
-// before.
-void slide_phases(Act &act, const std::vector<std::string> &phases, double begin_s) {
+// Sticking or partial slip that is too short for any recording counts as the phase before it.
+void slide_phases(Episode &episode, const std::vector<std::string> &phases, double begin_s) {
   constexpr std::size_t MOMENT_ms = 5;
   for (std::size_t begin = 0, end; begin < phases.size(); begin = end) {
     end = begin + 1;
@@ -262,10 +261,10 @@ void slide_phases(Act &act, const std::vector<std::string> &phases, double begin
     }
     const bool slips = phases[begin] == SLIPS;
     const double end_s = begin_s + 1e-3 * static_cast<double>(end);
-    if (begin > 0 && ((end - begin < MOMENT_ms && !slips) || act.phases.back().name == phases[begin])) {
-      act.phases.back().end_s = milliseconds(end_s);
+    if (begin > 0 && ((end - begin < MOMENT_ms && !slips) || episode.phases.back().name == phases[begin])) {
+      episode.phases.back().end_s = milliseconds(end_s);
     } else {
-      phase(act, phases[begin], end_s, slips);
+      phase(episode, phases[begin], end_s, slips);
     }
   }
 }
@@ -279,7 +278,7 @@ double slide_force_N(double mass_kg, double friction, double kinetic_share) {
 
 // A gripped object that friction holds, or does not: pulled by hand, heavier than the grip can
 // hold, held by a grip that loosens, or carried.
-Act slide(const Stage &stage, std::size_t n) {
+Episode slide(const Stage &stage, std::size_t n) {
   constexpr double RESERVE = 0.6; // of kinetic friction: what the weight takes in a firm grip
   constexpr double FORCE_MIN_N = 1.0;
   constexpr double WAY_MAX_mm = 13.0; // fits between the usual borders, whatever its direction
@@ -358,11 +357,11 @@ Act slide(const Stage &stage, std::size_t n) {
     course = run(script, stage);
   }
 
-  Act act;
-  act.press = script.name;
-  act.friction = script.friction;
-  act.mass_kg = script.mass_kg;
-  act.speed_mm_s = course.fastest_mm_s;
+  Episode episode;
+  episode.press = script.name;
+  episode.friction = script.friction;
+  episode.mass_kg = script.mass_kg;
+  episode.speed_mm_s = course.fastest_mm_s;
   Track track;
   double angle_rad = random.uniform(-M_PI, M_PI);
   for (int i = 0; i < 50 && course.farthest_mm * std::abs(std::cos(angle_rad)) > 2.0 * stage.half_x_mm(); i++) {
@@ -371,26 +370,26 @@ Act slide(const Stage &stage, std::size_t n) {
   aim(track, angle_rad);
   place_way(track, course.farthest_mm, stage, random);
   track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.5, 0.7));
   const double begin_s = track.force_N.end_s();
-  phase(act, "hold", begin_s);
+  phase(episode, "hold", begin_s);
   track.force_N.trace(course.force_N, 1e-5);
   track.pusher_mm.hold(begin_s).trace(course.way_mm, 1e-4);
   track.pull.load_N.hold(begin_s).trace(course.pull_N, 1e-5);
   track.pull.friction = Profile(script.friction);
   track.pull.friction.hold(begin_s).trace(course.friction, 1e-5);
-  slide_phases(act, course.phases, begin_s);
+  slide_phases(episode, course.phases, begin_s);
   track.force_N.ease(0.3, 0.0);
   track.pull.load_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
 // A gripped object is turned about the grasp's axis, to either side: rubber winds up until friction
 // gives way, then the object spins.
-Act screw(const Stage &stage, std::size_t n) {
+Episode screw(const Stage &stage, std::size_t n) {
   constexpr double TORQUE_RISES_s = 0.4; // from none to what friction holds
   constexpr double LOADS_s = 0.3;
   Random random(stage.options.seed, SCREW, n);
@@ -406,24 +405,24 @@ Act screw(const Stage &stage, std::size_t n) {
   // Where all of a Hertz contact turns, friction that points against a slow way as well holds it
   // back by (3 pi / 8) mu F v / (turning a): so far it gives way to the load.
   const double way_per_turn_mm = 8.0 / (3.0 * M_PI) * radius_mm * chosen.share / chosen.friction;
-  Act act;
-  act.press = "screw";
-  act.friction = chosen.friction;
+  Episode episode;
+  episode.press = "screw";
+  episode.friction = chosen.friction;
   Track track = track_at(place);
   aim(track, chosen.angle_rad);
   track.pull.friction = Profile(chosen.friction);
   track.pull.travel_mm = stage.options.dead_travel_mm;
   track.angle_rad = Profile(random.uniform(-45.0, 45.0) * DEGREE);
   track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.5, 0.7));
   const double begin_s = track.force_N.end_s();
-  phase(act, "hold", begin_s);
+  phase(episode, "hold", begin_s);
   Profile &loaded_N = track.pull.load_N;
   loaded_N.hold(begin_s);
   if (load_N > 0.0) {
     loaded_N.ease(LOADS_s, load_N);
-    phase(act, "load", loaded_N.end_s());
+    phase(episode, "load", loaded_N.end_s());
   }
   track.angle_rad.hold(loaded_N.end_s());
   // The torque goes on at one rate; by Masing's rule the rubber follows from each turn of it on
@@ -439,7 +438,7 @@ Act screw(const Stage &stage, std::size_t n) {
                            side * turns * wind_up_rad(change / turns, chosen.friction * force_N, shear_MPa, radius_mm));
     }
     track.angle_rad.trace(angles_rad, 1e-5);
-    phase(act, name, track.angle_rad.end_s());
+    phase(episode, name, track.angle_rad.end_s());
   };
   const auto spin = [&](double way_round, double turn_rad) {
     track.pusher_mm.hold(track.angle_rad.end_s() - track.pusher_mm.end_s());
@@ -447,7 +446,7 @@ Act screw(const Stage &stage, std::size_t n) {
       track.pusher_mm.travel(way_per_turn_mm * turn_rad, way_per_turn_mm * rate, SPEED_UP_s);
     }
     track.angle_rad.travel(way_round * turn_rad, way_round * rate, SPEED_UP_s);
-    phase(act, "spin", track.angle_rad.end_s());
+    phase(episode, "spin", track.angle_rad.end_s());
   };
   wind("wind", 0.0, 1.0);
   spin(side, random.uniform(30.0, 90.0) * DEGREE);
@@ -458,14 +457,14 @@ Act screw(const Stage &stage, std::size_t n) {
   loaded_N.hold(end_s - loaded_N.end_s());
   if (load_N > 0.0) {
     loaded_N.ease(LOADS_s, 0.0);
-    phase(act, "lower", loaded_N.end_s());
+    phase(episode, "lower", loaded_N.end_s());
   }
   track.force_N.hold(loaded_N.end_s() - begin_s + 0.3);
-  phase(act, "after", track.force_N.end_s());
+  phase(episode, "after", track.force_N.end_s());
   track.force_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
 } // namespace fingertip::twin

@@ -57,7 +57,7 @@ struct Row {
   std::vector<double> sensors_Pa;
 };
 
-// Leaves out rows that the line through their neighbours tells.
+// Leaves out rows that lie on the line through their neighbours.
 class RowWriter {
 public:
   RowWriter(OutputFile &file, bool pulls, bool temperature) : file_(file), pulls_(pulls), temperature_(temperature) {}
@@ -320,42 +320,42 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
           "force_end_N,angle_end_deg,x2_mm,y2_mm,force2_N,force2_end_N,sensors_near,speed_mm_s,"
           "dead_travel_mm,stick_slip_mm"
        << (scenario.pulls ? ",Qx_N,Qy_N,Qx_end_N,Qy_end_N,friction,mass_kg\n" : "\n");
-  for (std::size_t n = 0; n < scenario.acts.size(); n++) {
-    const Act &act = scenario.acts[n];
+  for (std::size_t n = 0; n < scenario.episodes.size(); n++) {
+    const Episode &episode = scenario.episodes[n];
     const bool pushed = scenario.options.kind == "slip";
-    for (const Phase &phase : act.phases) {
-      const double begin_s = phase.begin_s - act.begin_s, end_s = phase.end_s - act.begin_s;
-      text << std::to_string(n + 1) << "," << act.press << "," << phase.name;
+    for (const Phase &phase : episode.phases) {
+      const double begin_s = phase.begin_s - episode.begin_s, end_s = phase.end_s - episode.begin_s;
+      text << std::to_string(n + 1) << "," << episode.press << "," << phase.name;
       text.cell(phase.begin_s, 3);
       text.cell(phase.end_s, 3);
       for (double t_s : {begin_s, end_s}) {
-        const Touch contact = act.tracks[0].at(t_s);
+        const Touch contact = episode.tracks[0].at(t_s);
         text.cell(contact.x_mm, 4);
         text.cell(contact.y_mm, 4);
         text.cell(contact.force_N, 5);
         text.cell(contact.angle_rad * 180.0 / M_PI, 3);
       }
-      if (act.tracks.size() > 1) {
-        const Touch contact = act.tracks[1].at(begin_s);
+      if (episode.tracks.size() > 1) {
+        const Touch contact = episode.tracks[1].at(begin_s);
         text.cell(contact.x_mm, 4);
         text.cell(contact.y_mm, 4);
         text.cell(contact.force_N, 5);
-        text.cell(act.tracks[1].at(end_s).force_N, 5);
+        text.cell(episode.tracks[1].at(end_s).force_N, 5);
       } else {
         text << ",,,,";
       }
-      text << "," << std::to_string(act.sensors_near);
-      text.cell(act.speed_mm_s, 1);
+      text << "," << std::to_string(episode.sensors_near);
+      text.cell(episode.speed_mm_s, 1);
       text.cell(pushed || moves_under_load(scenario.options.kind) ? scenario.options.dead_travel_mm : 0.0, 3);
       text.cell(pushed ? scenario.options.stick_slip_mm : 0.0, 3);
       if (scenario.pulls) {
         for (double t_s : {begin_s, end_s}) {
-          const Touch contact = act.tracks[0].at(t_s);
+          const Touch contact = episode.tracks[0].at(t_s);
           text.cell(contact.pull_x_N, 5);
           text.cell(contact.pull_y_N, 5);
         }
-        text.cell(act.friction, 4);
-        text.cell(act.mass_kg, 4);
+        text.cell(episode.friction, 4);
+        text.cell(episode.mass_kg, 4);
       }
       text << "\n";
     }
@@ -436,15 +436,15 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
 
   std::vector<Touch> contacts, before;
   std::vector<double> base_Pa(sensors);
-  for (const Act &act : scenario.acts) {
-    quiet_until(act.begin_s);
-    const long long steps = std::llround((act.end_s - act.begin_s) / STEP_s);
+  for (const Episode &episode : scenario.episodes) {
+    quiet_until(episode.begin_s);
+    const long long steps = std::llround((episode.end_s - episode.begin_s) / STEP_s);
     before.clear();
     for (long long i = 0; i < steps; i++) {
-      t_s = act.begin_s + static_cast<double>(i) * STEP_s;
+      t_s = episode.begin_s + static_cast<double>(i) * STEP_s;
       contacts.clear();
-      for (const Track &track : act.tracks) {
-        contacts.push_back(track.at(t_s - act.begin_s));
+      for (const Track &track : episode.tracks) {
+        contacts.push_back(track.at(t_s - episode.begin_s));
       }
       if (contacts != before) {
         std::fill(base_Pa.begin(), base_Pa.end(), 0.0);
@@ -454,7 +454,7 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
           const ContactTable &pressing = c == 0 ? table : second;
           const double radius_mm = pressing.contact_radius_mm(contact.force_N);
           if (block) {
-            check_inside(block->block(), contact, act.tracks[c], radius_mm);
+            check_inside(block->block(), contact, episode.tracks[c], radius_mm);
           }
           const double cosine = std::cos(contact.angle_rad), sine = std::sin(contact.angle_rad);
           for (std::size_t k = 0; k < sensors; k++) {
@@ -489,10 +489,10 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
         row.sigma_mm = one ? fit.sigma_mm : 0.0;
         before = contacts;
       }
-      row.slip = row.contact && act.slips(t_s);
+      row.slip = row.contact && episode.slips(t_s);
       add(t_s, base_Pa);
     }
-    t_s = act.end_s;
+    t_s = episode.end_s;
     if (on_progress) {
       on_progress(t_s / *options.seconds);
     }

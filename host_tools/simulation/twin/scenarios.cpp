@@ -28,23 +28,23 @@ std::string number(double value) {
 }
 
 // Press, hold and let go at one place.
-Act press(const std::string &name, Place place, double force_N, double ramp_s, double hold_s) {
-  Act act;
-  act.press = name;
+Episode press(const std::string &name, Place place, double force_N, double ramp_s, double hold_s) {
+  Episode episode;
+  episode.press = name;
   Track track = track_at(place);
   track.force_N.ease(ramp_s, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(hold_s);
-  phase(act, "hold", track.force_N.end_s());
+  phase(episode, "hold", track.force_N.end_s());
   track.force_N.ease(ramp_s, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
-// The functions below make the nth act of a kind.
+// The functions below make the nth episode of a kind.
 
-Act grid(const Stage &stage, std::size_t n) {
+Episode grid(const Stage &stage, std::size_t n) {
   struct Way {
     const char *name;
     double ramp_s, hold_s;
@@ -64,13 +64,13 @@ Act grid(const Stage &stage, std::size_t n) {
   Random strength(stage.options.seed, GRID, n);
   // Forces in turn: after some passes every place has had all of them in every way.
   const std::size_t turn = static_cast<std::size_t>(at) + pass + 2 * way;
-  Act act = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row},
-                  stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
-  act.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
-  return act;
+  Episode episode = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row},
+                          stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
+  episode.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
+  return episode;
 }
 
-Act random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
+Episode random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
   Random random(stage.options.seed, TAPS, n);
   const Place place = stage.random_place(random);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
@@ -78,29 +78,29 @@ Act random_press(const Stage &stage, std::size_t n, const std::string &name, dou
   return press(name, place, force_N, ramps_s, hold_s);
 }
 
-Act tap(const Stage &stage, std::size_t n) {
+Episode tap(const Stage &stage, std::size_t n) {
   return random_press(stage, n, "tap", 0.12, 0.3);
 }
 
-Act high(const Stage &stage, std::size_t n) {
+Episode high(const Stage &stage, std::size_t n) {
   return random_press(stage, n, "hold", 0.5, 0.6);
 }
 
-// A weight is set down by hand, stands by itself and is lifted.
-Act placement(const Stage &stage, std::size_t n) {
-  constexpr double STANDS_s = 2.0;
+// A weight is set down by hand, rests by itself and is lifted.
+Episode placement(const Stage &stage, std::size_t n) {
+  constexpr double RESTS_s = 2.0;
   Random random(stage.options.seed, PLACEMENTS, n);
   const Place place = stage.random_place(random);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  return press("placement", place, force_N, milliseconds(random.uniform(0.2, 0.5)), STANDS_s);
+  return press("placement", place, force_N, milliseconds(random.uniform(0.2, 0.5)), RESTS_s);
 }
 
 // By hand: never at rest, and not quite at one place.
-Act poke(const Stage &stage, std::size_t n) {
+Episode poke(const Stage &stage, std::size_t n) {
   constexpr double WANDER_mm = 1.5;
   Random random(stage.options.seed, POKES, n);
-  Act act;
-  act.press = "poke";
+  Episode episode;
+  episode.press = "poke";
   Track track = track_at(stage.random_place(random));
   const double direction = random.uniform(0.0, 2.0 * M_PI);
   track.along_x = std::cos(direction);
@@ -111,30 +111,30 @@ Act poke(const Stage &stage, std::size_t n) {
     track.force_N.ease(seconds, stage.forces.pick(n, random.uniform(0.0, 1.0)));
     track.pusher_mm.ease(seconds, random.uniform(0.0, WANDER_mm));
     if (i == 0) {
-      phase(act, "touch", track.force_N.end_s());
+      phase(episode, "touch", track.force_N.end_s());
     }
   }
-  phase(act, "poke", track.force_N.end_s());
+  phase(episode, "poke", track.force_N.end_s());
   track.force_N.ease(random.uniform(0.15, 0.4), 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
 // Slow enough that only what does not depend on the rate makes a loop, save relaxation.
-Act cycle(const Stage &stage, std::size_t n) {
+Episode cycle(const Stage &stage, std::size_t n) {
   constexpr double RAMP_s = 15.0;
   Random random(stage.options.seed, CYCLE, n);
   const Place place = n == 0 ? Place{0.0, 0.0} : stage.random_place(random);
-  Act act;
-  act.press = "cycle";
+  Episode episode;
+  episode.press = "cycle";
   Track track = track_at(place);
   track.force_N.line(RAMP_s, stage.forces.pick(n, random.uniform(0.0, 1.0)));
-  phase(act, "load", track.force_N.end_s());
+  phase(episode, "load", track.force_N.end_s());
   track.force_N.line(RAMP_s, 0.0);
-  phase(act, "unload", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "unload", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
 // When the pusher's way, which never falls, first is this long; whole milliseconds.
@@ -147,15 +147,15 @@ double time_of(const Profile &way, double length_mm, double begin_s, double end_
   return milliseconds(high);
 }
 
-Act slip(const Stage &stage, std::size_t n) {
+Episode slip(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, SLIP, n);
   const bool upward = random.uniform(0.0, 1.0) < 0.5;
   const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
   const double x_mm = random.uniform(-GRID_HALF_X_mm, GRID_HALF_X_mm);
   const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
-  Act act;
-  act.press = "grip";
-  act.speed_mm_s = stage.speed_mm_s(n, SLIP_SPEEDS_mm_s);
+  Episode episode;
+  episode.press = "grip";
+  episode.speed_mm_s = stage.speed_mm_s(n, SLIP_SPEEDS_mm_s);
   Track track = track_at({x_mm, upward ? y_mm : -y_mm});
   track.along_y = upward ? 1.0 : -1.0;
   track.grip = {stage.options.dead_travel_mm, stage.options.creep_share, stage.options.stick_slip_mm};
@@ -163,49 +163,49 @@ Act slip(const Stage &stage, std::size_t n) {
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
 
   track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.8, 1.2));
   const double push_s = track.force_N.end_s();
-  phase(act, "hold", push_s);
+  phase(episode, "hold", push_s);
   track.pusher_mm.hold(push_s);
-  track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), act.speed_mm_s, SPEED_UP_s);
+  track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), episode.speed_mm_s, SPEED_UP_s);
   const double stop_s = track.pusher_mm.end_s();
   if (track.grip.dead_travel_mm > 0.0) {
-    phase(act, "dead_travel", time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s), true);
+    phase(episode, "dead_travel", time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s), true);
   }
-  phase(act, "slip", stop_s, true);
+  phase(episode, "slip", stop_s, true);
   track.force_N.hold(stop_s - push_s + 0.5);
-  phase(act, "after", track.force_N.end_s());
+  phase(episode, "after", track.force_N.end_s());
   track.force_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
-Act twist(const Stage &stage, std::size_t n) {
+Episode twist(const Stage &stage, std::size_t n) {
   constexpr double TURN_deg = 90.0;
   Random random(stage.options.seed, TWIST, n);
-  Act act;
-  act.press = "grip";
+  Episode episode;
+  episode.press = "grip";
   Track track = track_at(stage.random_place(random));
   const double from = random.uniform(-45.0, 45.0) * DEGREE;
   track.angle_rad = Profile(from);
   track.force_N.ease(0.3, stage.forces.pick(n, random.uniform(0.0, 1.0)));
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.5, 0.7));
   const double begin_s = track.force_N.end_s();
-  phase(act, "hold", begin_s);
+  phase(episode, "hold", begin_s);
   track.angle_rad.hold(begin_s);
   const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
   track.angle_rad.travel(TURN_deg * DEGREE, rate, SPEED_UP_s);
   const double end_s = track.angle_rad.end_s();
-  phase(act, "twist", end_s);
+  phase(episode, "twist", end_s);
   track.force_N.hold(end_s - begin_s + 0.5);
-  phase(act, "after", track.force_N.end_s());
+  phase(episode, "after", track.force_N.end_s());
   track.force_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
 double outermost(const float *places_mm) {
@@ -221,11 +221,11 @@ double half_width_mm(const ScenarioOptions &options) {
 }
 
 // The contact rolls across the pad's long edge, until nothing of it is left on the pad.
-Act rolloff(const Stage &stage, std::size_t n) {
+Episode rolloff(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, ROLLOFF, n);
-  Act act;
-  act.press = "roll";
-  act.speed_mm_s = stage.speed_mm_s(n, ROLL_SPEEDS_mm_s);
+  Episode episode;
+  episode.press = "roll";
+  episode.speed_mm_s = stage.speed_mm_s(n, ROLL_SPEEDS_mm_s);
   Track track = track_at({random.uniform(-2.0, 2.0), random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
   track.along_x = 1.0;
   track.along_y = 0.0;
@@ -233,18 +233,18 @@ Act rolloff(const Stage &stage, std::size_t n) {
   track.edge_x_mm = half_width_mm(stage.options);
   track.radius_mm = stage.table.contact_radius_mm(force_N);
   track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
+  phase(episode, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.4, 0.6));
-  phase(act, "hold", track.force_N.end_s());
+  phase(episode, "hold", track.force_N.end_s());
   track.pusher_mm.hold(track.force_N.end_s());
-  track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, act.speed_mm_s, SPEED_UP_s);
+  track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, episode.speed_mm_s, SPEED_UP_s);
   track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
-  phase(act, "roll", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
+  phase(episode, "roll", track.force_N.end_s());
+  episode.tracks.push_back(track);
+  return episode;
 }
 
-Act two(const Stage &stage, std::size_t n) {
+Episode two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
   // The far ones lie along the pad, which is too narrow for them.
@@ -254,16 +254,16 @@ Act two(const Stage &stage, std::size_t n) {
   const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
   const double one_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
   const double other_N = stage.forces.pick(n + 1, random.uniform(0.0, 1.0));
-  Act act = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
-  act.tracks.push_back(press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
-  return act;
+  Episode episode = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
+  episode.tracks.push_back(press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
+  return episode;
 }
 
 constexpr const char *USUAL_FRICTION = "0.5", *USUAL_MASS_kg = "0.1..0.5"; // assumed
 
 struct Kind {
   ScenarioKind kind;
-  Act (*act)(const Stage &stage, std::size_t n);
+  Episode (*episode)(const Stage &stage, std::size_t n);
   const char *usual_indenter = "sphere6";
   double usual_margin_mm = 0.5 * GRID_STEP_mm;
   const char *usual_tangential = "0";
@@ -444,7 +444,7 @@ Tangential::Tangential(const std::string &text) : share("--tangential", text.sub
   }
 }
 
-bool Act::slips(double t_s) const {
+bool Episode::slips(double t_s) const {
   constexpr double ROUNDING_s = 1e-7;
   bool slips = false;
   for (std::size_t i = 0; i < phases.size(); i++) {
@@ -492,12 +492,12 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   const auto is = [&](std::initializer_list<const char *> names) {
     return std::find(names.begin(), names.end(), chosen.kind) != names.end();
   };
-  const auto says_nothing = [&](const char *option, const char *others) {
-    throw Error(std::string(option) + " says nothing in a scenario of \"" + chosen.kind +
+  const auto no_effect = [&](const char *option, const char *others) {
+    throw Error(std::string(option) + " has no effect in a scenario of \"" + chosen.kind +
                 "\"; leave it out, or choose " + others);
   };
   if (!chosen.speeds_mm_s.empty() && !is({"slip", "rolloff", "drag", "slide"})) {
-    says_nothing("--speed", "slip, rolloff, drag or slide");
+    no_effect("--speed", "slip, rolloff, drag or slide");
   }
   const Kind &usual = kind_of(options);
   chosen.tangential = options.tangential.empty() ? usual.usual_tangential : options.tangential;
@@ -505,7 +505,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   if (is({"slide"})) {
     chosen.mass_kg = options.mass_kg.empty() ? USUAL_MASS_kg : options.mass_kg;
   } else if (!options.mass_kg.empty()) {
-    says_nothing("--mass", "slide");
+    no_effect("--mass", "slide");
   }
   const Range share = Tangential(chosen.tangential).share;
   const Range friction("--friction", chosen.friction);
@@ -513,7 +513,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
     check("--friction", end, 0.05, 5.0);
   }
   if (share.highest > 0.0 && is({"slip", "rolloff", "slide"})) {
-    says_nothing("--tangential", "another");
+    no_effect("--tangential", "another");
   }
   if (!(share.lowest >= 0.0 && share.highest <= friction.lowest)) {
     throw Error("--tangential " + number(share.lowest < 0.0 ? share.lowest : share.highest) +
@@ -524,7 +524,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
     check_slide(chosen, friction.lowest);
   }
   if (!chosen.second_indenter.empty() && chosen.kind != "two") {
-    throw Error("--second says nothing in a scenario of \"" + chosen.kind + "\"; leave it out, or choose two");
+    throw Error("--second has no effect in a scenario of \"" + chosen.kind + "\"; leave it out, or choose two");
   }
   static_cast<void>(Forces(chosen.forces));
   return chosen;
@@ -539,19 +539,19 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
   scenario.pulls = pulled_by_share || chosen.kind == "drag" || chosen.kind == "slide";
   Stage stage(chosen, table);
   for (std::size_t n = 0;; n++) {
-    Act act = kind.act(stage, n);
+    Episode episode = kind.episode(stage, n);
     if (pulled_by_share && !kind.pulls_itself) {
-      pull(act, stage, n);
+      pull(episode, stage, n);
     }
-    if (!stage.play(std::move(act))) {
+    if (!stage.add(std::move(episode))) {
       break;
     }
   }
-  if (stage.acts.empty()) {
+  if (stage.episodes.empty()) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" + chosen.kind +
                 "\"; leave it out for " + number(kind.kind.usual_seconds));
   }
-  scenario.acts = std::move(stage.acts);
+  scenario.episodes = std::move(stage.episodes);
   scenario.name = name_of(chosen);
   return scenario;
 }

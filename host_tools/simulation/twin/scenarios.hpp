@@ -13,15 +13,15 @@
 //
 // What the truth calls slip in the kind "slip" is what the paper calls it (section IV.D): the
 // pusher is in contact and moves. So the dead travel, in which nothing slides yet, counts as slip;
-// the events tell it apart. In "drag" and "slide" it is gross slip: all of the contact slides. A
+// the events separate it. In "drag" and "slide" it is gross slip: all of the contact slides. A
 // twist, a screw and a contact that rolls are no slip.
 //
-// Objects pull along the rubber if `tangential` says so: then in each contact, in one direction,
+// `tangential` adds a tangential force: in each contact, in one direction,
 // with that share of the normal force, rising and falling with it; in a lift with an object's
 // weight, which is that share of the force of the grip, in a drag with a known load, in a screw
 // with a constant one. In a slide what pulls follows from motion and friction (held_object.hpp).
 //
-// Left out: edges of the rubber, unless `overhang_mm` says where they are, friction where a
+// Left out: edges of the rubber, unless `overhang_mm` is set, friction where a
 // kinematic slip slides, which moves the middle of the pressure on the base by up to friction times
 // thickness ("drag" and "slide" have it),
 // influence of two contacts on each other's shape.
@@ -41,7 +41,7 @@ namespace fingertip::twin {
 
 constexpr double START_QUIET_s = 1.5;
 constexpr double AMBIENT_Pa = 101325.0;
-// In x, if overhang_mm does not say; the paper's box is 30 mm by 50 mm.
+// In x, without overhang_mm; the paper's box is 30 mm by 50 mm.
 constexpr double PAD_HALF_WIDTH_mm = 15.0;
 
 struct ScenarioKind {
@@ -103,7 +103,7 @@ struct ScenarioOptions {
   double quiet_s = 1.2;
 };
 
-// A stretch of one act in which one thing goes on.
+// A stretch of one episode in which one thing goes on.
 struct Phase {
   std::string name;
   double begin_s, end_s; // in the scenario
@@ -111,7 +111,7 @@ struct Phase {
 };
 
 // From touch to loss.
-struct Act {
+struct Episode {
   std::string press;
   double begin_s = 0.0, end_s = 0.0;
   std::vector<Track> tracks; // one or two; their time 0 is begin_s
@@ -126,11 +126,11 @@ struct Act {
 struct Scenario {
   ScenarioOptions options; // complete
   std::string name;
-  bool pulls = false;    // something tangential may be in it
-  std::vector<Act> acts; // in order of time, none overlap
+  bool pulls = false;            // something tangential may be in it
+  std::vector<Episode> episodes; // in order of time, none overlap
 };
 
-// The block that reaches so far beyond the outer sensors, and these.
+// The block that reaches this far beyond the outer sensors, and these.
 Block block_around(const Layer &layer, double overhang_mm);
 std::vector<Place> sensor_places();
 

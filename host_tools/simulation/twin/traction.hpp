@@ -1,4 +1,4 @@
-// A tangential load on a contact, and what the base feels of it (traction_table.hpp), given the
+// A tangential force on a contact, and its pressure on the base (traction_table.hpp), given the
 // planes of a sliding contact.
 #pragma once
 

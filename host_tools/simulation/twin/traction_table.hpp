@@ -13,7 +13,7 @@
 //                     68, 1998)
 // S = 0 is exact for a sliding contact. The other two are exact on a half-space whose tangential
 // displacements follow tractions as its normal ones do. On a layer another region sticks; of that
-// the base feels 0.4 % of the field's peak under spheres on 12 mm, 1.2 % under wide ones on 6 mm,
+// the base gets 0.4 % of the field's peak under spheres on 12 mm, 1.2 % under wide ones on 6 mm,
 // 2 to 3 % under a cube, whose corners slide first. Contacts wider than the layer is thick stick in
 // the middle and carry Q near the rim: under the bottle cap that is 15 % on 12 mm, 40 % on 6 mm.
 // Left out everywhere: rubber rises ahead of what pulls it, which moves the pressure ahead. At Q =

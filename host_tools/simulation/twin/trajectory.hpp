@@ -46,7 +46,7 @@ private:
 // of the pusher. Both in mm, 0 at rest; the way never falls.
 //
 // At first the object is held. The pusher's way goes into the rubber and all else that gives: the
-// dead travel. Of it, what the base feels creeps along with the tangential load, which Cattaneo and
+// dead travel. The part of it at the base creeps along with the tangential force, which Cattaneo and
 // Mindlin's contact lets rise as 1 - (1 - s / dead travel)^(3/2) until the last ring slips
 // (Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949). Its amount for a
 // sphere on a half-space, 3 (2-nu) mu F / (16 G a), is 0.8 to 1.7 mm for 2 to 6 N of a sphere of 6
@@ -99,7 +99,7 @@ struct Track {
   Profile angle_rad;
   Pull pull;
   // Where the pad ends in x, and the radius of the contact then: what is beyond carries nothing.
-  // The disc's part on the pad acts at that part's centre, with its share of the force.
+  // The disc's part on the pad is applied at that part's centre, with its share of the force.
   double edge_x_mm = std::numeric_limits<double>::infinity();
   double radius_mm = 0.0;
 

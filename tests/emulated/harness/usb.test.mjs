@@ -142,7 +142,7 @@ test('two runs are equal to the byte and the cycle', () => {
 
 for (const [name, defines, pattern, body] of [
   ['controller without PHY', '#define MUXING 0', /TO_PHY is not set/],
-  ['controller without VBUS', '#define POWER 0', /USB_PWR does not say that VBUS/],
+  ['controller without VBUS', '#define POWER 0', /USB_PWR does not report that VBUS/],
   ['EP0 interrupt per buffer off: requests time out or lack an address', '#define PULLUP_BITS (1u << 16)', /no answer|not finished/],
   ['AVAILABLE in the same write', '#define ARM(c, v) (c) = (v) | 1 << 10', /same write as the other fields/],
   [

@@ -356,7 +356,7 @@ class Usage(TwinTest):
             ("taps", "--tangential", "0.3,left"): '--tangential "0.3,left" has no direction; after the comma give degrees',
             ("lift", "--tangential", "0.1..0.6"): "--tangential 0.6 does not hold; give 0 to 0.5, or another --friction",
             ("lift", "--friction", "9"): "--friction 9 is out of range; give 0.05 to 5",
-            ("lift", "--mass", "0.2"): '--mass says nothing in a scenario of "lift"; leave it out, or choose slide',
+            ("lift", "--mass", "0.2"): '--mass has no effect in a scenario of "lift"; leave it out, or choose slide',
             ("slide", "--tangential", "0.2"): "--tangential says nothing",
             (
                 "slide",

@@ -25,8 +25,9 @@ double way_mm(const Touch &from, const Touch &to) {
   return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
 }
 
-const Phase &phase_of(const Act &act, const std::string &name) {
-  return *std::find_if(act.phases.begin(), act.phases.end(), [&](const Phase &one) { return one.name == name; });
+const Phase &phase_of(const Episode &episode, const std::string &name) {
+  return *std::find_if(episode.phases.begin(), episode.phases.end(),
+                       [&](const Phase &one) { return one.name == name; });
 }
 
 TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
@@ -39,15 +40,15 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
   EXPECT_TRUE(scenario.pulls);
   std::set<std::pair<long, long>> directions;
   std::set<double> frictions;
-  for (const Act &act : scenario.acts) {
-    const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
-    const Phase &load = phase_of(act, "load"), &carry = phase_of(act, "carry"), &slip = phase_of(act, "slip"),
-                &after = phase_of(act, "after");
+  for (const Episode &episode : scenario.episodes) {
+    const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
+    const Phase &load = phase_of(episode, "load"), &carry = phase_of(episode, "carry"),
+                &slip = phase_of(episode, "slip"), &after = phase_of(episode, "after");
     EXPECT_GE(carry.end_s - carry.begin_s, 3.0 - 1e-9);
-    const double force_N = at(load.begin_s).force_N, slides_N = act.friction * force_N;
+    const double force_N = at(load.begin_s).force_N, slides_N = episode.friction * force_N;
     EXPECT_EQ(force_N, 3.0);
-    EXPECT_NEAR(act.mass_kg * GRAVITY_m_s2, force_N, 1e-9);
-    frictions.insert(act.friction);
+    EXPECT_NEAR(episode.mass_kg * GRAVITY_m_s2, force_N, 1e-9);
+    frictions.insert(episode.friction);
     const Touch before = at(load.begin_s), known = at(carry.end_s), slides = at(slip.begin_s);
     EXPECT_NEAR(pull_N(before), 0.0, 1e-9);
     for (double t_s = carry.begin_s; t_s <= carry.end_s; t_s += 0.1) {
@@ -62,9 +63,9 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
     }
     EXPECT_NEAR(way_mm(before, slides), 1.0, 1e-4);
     const double middle_s = 0.5 * (slip.begin_s + slip.end_s);
-    EXPECT_NEAR(way_mm(at(middle_s), at(middle_s + 0.05)) / 0.05, act.speed_mm_s, 0.1);
-    for (double t_s = act.begin_s; t_s < act.end_s; t_s += MS_s) {
-      EXPECT_LE(pull_N(at(t_s)), act.friction * at(t_s).force_N + 1e-9);
+    EXPECT_NEAR(way_mm(at(middle_s), at(middle_s + 0.05)) / 0.05, episode.speed_mm_s, 0.1);
+    for (double t_s = episode.begin_s; t_s < episode.end_s; t_s += MS_s) {
+      EXPECT_LE(pull_N(at(t_s)), episode.friction * at(t_s).force_N + 1e-9);
       EXPECT_LE(std::abs(at(t_s).x_mm), 6.75 + 1e-9);
       EXPECT_LE(std::abs(at(t_s).y_mm), 15.75 + 1e-9);
     }
@@ -85,18 +86,18 @@ const Scenario &slides() {
 }
 
 TEST(Slide, SlipsWhereTheLoadReachesFrictionAndNowhereElse) {
-  EXPECT_GT(slides().acts.size(), 100u);
+  EXPECT_GT(slides().episodes.size(), 100u);
   int slid = 0;
-  for (const Act &act : slides().acts) {
-    const Track &track = act.tracks[0];
+  for (const Episode &episode : slides().episodes) {
+    const Track &track = episode.tracks[0];
     bool began = false;
-    for (const Phase &phase : act.phases) {
+    for (const Phase &phase : episode.phases) {
       EXPECT_EQ(phase.slip, phase.name == "slip");
       // To the millisecond in which the phases are given, and 1e-5 to which tracks are.
       for (double t_s = phase.begin_s; t_s < phase.end_s; t_s += MS_s) {
-        const double local_s = t_s - act.begin_s;
+        const double local_s = t_s - episode.begin_s;
         const Touch touch = track.at(local_s);
-        const double holds_N = act.friction * touch.force_N;
+        const double holds_N = episode.friction * touch.force_N;
         EXPECT_LE(pull_N(touch), holds_N + 1e-4);
         if (phase.slip && t_s > phase.begin_s + 1.5 * MS_s && t_s < phase.end_s - 1.5 * MS_s) {
           EXPECT_NEAR(pull_N(touch), track.pull.friction.at(local_s) * touch.force_N, 2e-4);
@@ -104,20 +105,20 @@ TEST(Slide, SlipsWhereTheLoadReachesFrictionAndNowhereElse) {
           EXPECT_NEAR(touch.stuck_N, 0.0, 5e-4);
         }
         if (!began && !phase.slip && touch.force_N > 0.1) {
-          EXPECT_LT(pull_N(touch), holds_N + 1e-4) << act.press;
+          EXPECT_LT(pull_N(touch), holds_N + 1e-4) << episode.press;
         }
       }
       if (phase.slip && !began) {
         began = true;
         // In the millisecond that ends in slip, a fast hand's load rises by a few percent.
-        const double local_s = phase.begin_s - act.begin_s;
+        const double local_s = phase.begin_s - episode.begin_s;
         const double most = std::max(pull_N(track.at(local_s)) / track.at(local_s).force_N,
                                      pull_N(track.at(local_s + MS_s)) / track.at(local_s + MS_s).force_N);
-        EXPECT_GE(most, 0.97 * act.friction) << act.press;
+        EXPECT_GE(most, 0.97 * episode.friction) << episode.press;
       }
     }
-    EXPECT_EQ(began, act.press != "carry");
-    EXPECT_EQ(act.speed_mm_s > 0.0, began);
+    EXPECT_EQ(began, episode.press != "carry");
+    EXPECT_EQ(episode.speed_mm_s > 0.0, began);
     slid += began;
   }
   EXPECT_GT(slid, 75);
@@ -125,18 +126,18 @@ TEST(Slide, SlipsWhereTheLoadReachesFrictionAndNowhereElse) {
 
 TEST(Slide, MovesAsMassAndForcesSay) {
   int compared = 0;
-  for (const Act &act : slides().acts) {
-    if (act.press != "loosen") {
+  for (const Episode &episode : slides().episodes) {
+    if (episode.press != "loosen") {
       continue;
     }
     // All of the weight is carried when the grip gives way; the finger has half of it.
-    const double mass_kg = 0.5 * act.mass_kg;
-    const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
-    const Phase &slip = phase_of(act, "slip");
+    const double mass_kg = 0.5 * episode.mass_kg;
+    const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
+    const Phase &slip = phase_of(episode, "slip");
     constexpr double SPAN_s = 0.008;
     for (double t_s = slip.begin_s + 0.01; t_s < slip.end_s - 0.012; t_s += 0.004) {
-      const Track &track = act.tracks[0];
-      const auto way = [&](double at_s) { return track.pusher_mm.at(at_s - act.begin_s); };
+      const Track &track = episode.tracks[0];
+      const auto way = [&](double at_s) { return track.pusher_mm.at(at_s - episode.begin_s); };
       const double found_mm_s2 = (way(t_s + SPAN_s) - 2.0 * way(t_s) + way(t_s - SPAN_s)) / (SPAN_s * SPAN_s);
       // The mean pull with the weights of that difference.
       double mean_N = 0.0;
@@ -152,20 +153,20 @@ TEST(Slide, MovesAsMassAndForcesSay) {
 }
 
 TEST(Slide, IsCaughtAndRestsOnThePad) {
-  for (const Act &act : slides().acts) {
-    const Track &track = act.tracks[0];
-    const double end_s = phase_of(act, "release").begin_s - act.begin_s;
-    EXPECT_NEAR(track.pusher_mm.at(end_s), track.pusher_mm.at(end_s - 0.05), 0.01) << act.press;
+  for (const Episode &episode : slides().episodes) {
+    const Track &track = episode.tracks[0];
+    const double end_s = phase_of(episode, "release").begin_s - episode.begin_s;
+    EXPECT_NEAR(track.pusher_mm.at(end_s), track.pusher_mm.at(end_s - 0.05), 0.01) << episode.press;
     EXPECT_NEAR(pull_N(track.at(end_s)), 0.0, 0.01);
     const double gripped_N = track.at(0.3).force_N, held_N = track.at(end_s).force_N;
-    if (act.press == "overload" || act.press == "loosen") {
-      const Phase &slip = phase_of(act, "slip");
-      EXPECT_GT(held_N, 1.5 * track.at(slip.begin_s - act.begin_s).force_N);
+    if (episode.press == "overload" || episode.press == "loosen") {
+      const Phase &slip = phase_of(episode, "slip");
+      EXPECT_GT(held_N, 1.5 * track.at(slip.begin_s - episode.begin_s).force_N);
       EXPECT_LT(slip.end_s - slip.begin_s, 0.3);
     } else {
       EXPECT_EQ(held_N, gripped_N);
     }
-    for (double t_s = 0.0; t_s < act.end_s - act.begin_s; t_s += 5 * MS_s) {
+    for (double t_s = 0.0; t_s < episode.end_s - episode.begin_s; t_s += 5 * MS_s) {
       EXPECT_LE(std::abs(track.at(t_s).x_mm), 6.75 + 0.5);
       EXPECT_LE(std::abs(track.at(t_s).y_mm), 15.75 + 0.5);
     }
@@ -176,17 +177,17 @@ TEST(Slide, DiffersFromActToActFromCreepingToFalling) {
   std::set<std::string> presses;
   double slowest = 1e9, fastest = 0.0, lightest = 1e9, heaviest = 0.0, smooth = 1e9, rough = 0.0;
   std::array<int, 4> quadrants{};
-  for (const Act &act : slides().acts) {
-    presses.insert(act.press);
-    if (act.press != "carry") {
-      slowest = std::min(slowest, act.speed_mm_s);
+  for (const Episode &episode : slides().episodes) {
+    presses.insert(episode.press);
+    if (episode.press != "carry") {
+      slowest = std::min(slowest, episode.speed_mm_s);
     }
-    fastest = std::max(fastest, act.speed_mm_s);
-    lightest = std::min(lightest, act.mass_kg);
-    heaviest = std::max(heaviest, act.mass_kg);
-    smooth = std::min(smooth, act.friction);
-    rough = std::max(rough, act.friction);
-    const Track &track = act.tracks[0];
+    fastest = std::max(fastest, episode.speed_mm_s);
+    lightest = std::min(lightest, episode.mass_kg);
+    heaviest = std::max(heaviest, episode.mass_kg);
+    smooth = std::min(smooth, episode.friction);
+    rough = std::max(rough, episode.friction);
+    const Track &track = episode.tracks[0];
     quadrants[std::size_t((track.along_x > 0.0) + 2 * (track.along_y > 0.0))]++;
   }
   EXPECT_EQ(presses, (std::set<std::string>{"pull", "overload", "loosen", "carry"}));
@@ -212,8 +213,8 @@ TEST(Slide, SticksAndSlipsWhereKineticFrictionIsLow) {
     o.seconds = 60;
   });
   int most = 0;
-  for (const Act &act : scenario.acts) {
-    most = std::max(most, static_cast<int>(std::count_if(act.phases.begin(), act.phases.end(),
+  for (const Episode &episode : scenario.episodes) {
+    most = std::max(most, static_cast<int>(std::count_if(episode.phases.begin(), episode.phases.end(),
                                                          [](const Phase &p) { return p.slip; })));
   }
   EXPECT_GE(most, 4);
@@ -243,9 +244,9 @@ TEST(Screw, PressesTheBaseAsIfNothingTurnedUnlessTheContactIsNotRound) {
     const ContactTable &table = table_of(name);
     const TractionTable traction(table, silicone(LAYER_mm));
     double worst = 0.0;
-    for (const Act &act : scenario.acts) {
-      const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
-      const double begin_s = phase_of(act, "wind").begin_s, end_s = phase_of(act, "after").end_s;
+    for (const Episode &episode : scenario.episodes) {
+      const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
+      const double begin_s = phase_of(episode, "wind").begin_s, end_s = phase_of(episode, "after").end_s;
       const auto before_Pa = base_Pa(at(begin_s), table, traction);
       const double peak_Pa = *std::max_element(before_Pa.begin(), before_Pa.end());
       for (double t_s = begin_s; t_s < end_s; t_s += 0.02) {
@@ -271,12 +272,12 @@ TEST(Screw, WindsUpUntilFrictionGivesWayToBothSides) {
   const double radius_mm = table_of("sphere6").contact_radius_mm(6.0);
   const double limit_rad = wind_up_rad(1.0, 0.4 * 6.0, shear_MPa, radius_mm);
   std::set<bool> sides;
-  for (const Act &act : scenario.acts) {
+  for (const Episode &episode : scenario.episodes) {
     std::vector<std::string> names;
     std::vector<double> turns;
-    for (const Phase &one : act.phases) {
+    for (const Phase &one : episode.phases) {
       names.push_back(one.name);
-      const auto angle = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).angle_rad; };
+      const auto angle = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s).angle_rad; };
       turns.push_back(angle(one.end_s) - angle(one.begin_s));
       EXPECT_FALSE(one.slip);
     }
@@ -297,9 +298,9 @@ TEST(Screw, GivesWayToALoadWhileItSpins) {
   const Scenario scenario = scenario_of("screw", [](ScenarioOptions &o) { o.tangential = "0.2"; });
   EXPECT_TRUE(scenario.pulls);
   const double radius_mm = table_of("sphere6").contact_radius_mm(6.0);
-  for (const Act &act : scenario.acts) {
-    const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
-    for (const Phase &one : act.phases) {
+  for (const Episode &episode : scenario.episodes) {
+    const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
+    for (const Phase &one : episode.phases) {
       const Touch from = at(one.begin_s), to = at(one.end_s);
       if (one.name == "wind" || one.name == "unwind" || one.name == "spin") {
         EXPECT_NEAR(pull_N(from), 1.2, 1e-9);
@@ -320,11 +321,11 @@ TEST(Lift, ThreeTimesTwoHundredWithShareForceAndPlaceOfTheirOwn) {
   EXPECT_EQ(scenario.name, "lift-sphere6-h12-gain0-tangential0.1..0.4");
   std::array<int, 3> counts{}; // 0.1, 0.3, 1 s
   std::array<int, 6> shares{}; // each 0.05
-  for (const Act &act : scenario.acts) {
-    const Phase &lift = phase_of(act, "lift"), &carry = phase_of(act, "carry");
+  for (const Episode &episode : scenario.episodes) {
+    const Phase &lift = phase_of(episode, "lift"), &carry = phase_of(episode, "carry");
     const long ms = std::lround(1e3 * (lift.end_s - lift.begin_s));
     counts[ms == 100 ? 0 : ms == 300 ? 1 : 2]++;
-    const Touch carried = act.tracks[0].at(carry.begin_s - act.begin_s);
+    const Touch carried = episode.tracks[0].at(carry.begin_s - episode.begin_s);
     const double share = pull_N(carried) / carried.force_N;
     EXPECT_GE(share, 0.1);
     EXPECT_LE(share, 0.4);

@@ -97,10 +97,10 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
     Random random(7, 7, 7);
     for (int i = 0; i < 3000; i++) {
       const double t_s = 1e-3 * std::round(random.uniform(0.0, 30000.0)); // where it was computed
-      const auto act = std::find_if(scenario.acts.begin(), scenario.acts.end(),
-                                    [&](const Act &one) { return t_s >= one.begin_s && t_s < one.end_s; });
-      const bool touched = act != scenario.acts.end();
-      const Touch touch = touched ? act->tracks[0].at(t_s - act->begin_s) : Touch{};
+      const auto episode = std::find_if(scenario.episodes.begin(), scenario.episodes.end(),
+                                        [&](const Episode &one) { return t_s >= one.begin_s && t_s < one.end_s; });
+      const bool touched = episode != scenario.episodes.end();
+      const Touch touch = touched ? episode->tracks[0].at(t_s - episode->begin_s) : Touch{};
       double peak_Pa = 0.0, expected[15];
       for (int k = 0; k < 15; k++) {
         expected[k] = table_of("sphere6").base_pressure_Pa(touch.force_N, double(geometry.x_mm[k]) - touch.x_mm,
@@ -113,7 +113,7 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
       }
       EXPECT_NEAR(file.at("force_N", t_s), touch.force_N, 2e-4 + 1.1e-4 * touch.force_N);
       EXPECT_NEAR(file.at("contact", t_s), touch.force_N > 0.0, 1e-9);
-      EXPECT_NEAR(file.at("slip", t_s), touched && act->slips(t_s), 1e-9) << t_s;
+      EXPECT_NEAR(file.at("slip", t_s), touched && episode->slips(t_s), 1e-9) << t_s;
       if (touch.force_N > 0.0) {
         EXPECT_NEAR(file.at("x_mm", t_s), touch.x_mm, 3e-3);
         EXPECT_NEAR(file.at("y_mm", t_s), touch.y_mm, 3e-3);
@@ -167,9 +167,9 @@ TEST(ScenarioFile, AddsTwoContactsAndTurnsObjects) {
     o.second_indenter = "cube6";
   });
   const File file = written(two);
-  const Act &act = two.acts[0];
-  const double t_s = act.begin_s + 0.4;
-  const Touch a = act.tracks[0].at(0.4), b = act.tracks[1].at(0.4);
+  const Episode &episode = two.episodes[0];
+  const double t_s = episode.begin_s + 0.4;
+  const Touch a = episode.tracks[0].at(0.4), b = episode.tracks[1].at(0.4);
   for (int k = 0; k < 15; k++) {
     const double x = double(geometry.x_mm[k]), y = double(geometry.y_mm[k]);
     EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s),
@@ -191,10 +191,10 @@ TEST(ScenarioFile, TurnsObjects) {
   const Scenario scenario = make_scenario(options, table_of("cube6"));
   const File file = written(scenario);
   // The pressure is the same after a quarter turn, another after an eighth.
-  const Act &act = scenario.acts[0];
-  const Phase &twist = act.phases[2];
+  const Episode &episode = scenario.episodes[0];
+  const Phase &twist = episode.phases[2];
   EXPECT_EQ(twist.name, "twist");
-  const auto angle = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).angle_rad; };
+  const auto angle = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s).angle_rad; };
   EXPECT_NEAR(angle(twist.end_s) - angle(twist.begin_s), M_PI / 2, 1e-9);
   const double middle_s = 0.5 * (twist.begin_s + twist.end_s);
   double difference_Pa = 0.0, peak_Pa = 0.0;
@@ -226,10 +226,10 @@ TEST(ScenarioFile, HasTheTangentialPressureInIt) {
     for (double t_s = 0.05; t_s < 30.0; t_s += 0.05) {
       std::array<double, 15> expected_Pa{};
       double pull_x_N = 0.0, pull_y_N = 0.0, force_N = 0.0, peak_Pa = 0.0;
-      for (const Act &act : scenario.acts) {
-        for (const Track &track : act.tracks) {
-          const Touch touch = track.at(t_s - act.begin_s);
-          if (t_s < act.begin_s || t_s >= act.end_s) {
+      for (const Episode &episode : scenario.episodes) {
+        for (const Track &track : episode.tracks) {
+          const Touch touch = track.at(t_s - episode.begin_s);
+          if (t_s < episode.begin_s || t_s >= episode.end_s) {
             continue;
           }
           force_N += touch.force_N;
@@ -278,10 +278,10 @@ TEST(ScenarioFile, HasThePadsEdgesInIt) {
     double most_Pa = 0.0;
     for (double t_s = 0.05; t_s < 20.0; t_s += 0.05) {
       std::array<double, 15> added_Pa{};
-      for (const Act &act : scenario.acts) {
-        for (const Track &track : act.tracks) {
-          const Touch touch = track.at(t_s - act.begin_s);
-          if (t_s < act.begin_s || t_s >= act.end_s) {
+      for (const Episode &episode : scenario.episodes) {
+        for (const Track &track : episode.tracks) {
+          const Touch touch = track.at(t_s - episode.begin_s);
+          if (t_s < episode.begin_s || t_s >= episode.end_s) {
             continue;
           }
           for (std::size_t k = 0; k < 15; k++) {
@@ -325,7 +325,7 @@ TEST(ScenarioFile, ContactsLeaveThePadOnlyByRolling) {
   written(make_scenario(options, table_of("sphere6")), &block);
   options.kind = "rolloff";
   const Scenario rolls = make_scenario(options, table_of("sphere6"));
-  EXPECT_EQ(rolls.acts[0].tracks[0].edge_x_mm, 12.0);
+  EXPECT_EQ(rolls.episodes[0].tracks[0].edge_x_mm, 12.0);
   written(rolls, &block);
 }
 
@@ -389,7 +389,7 @@ TEST(ScenarioFile, HasAftereffectsAndAColdBeginningInIt) {
   EXPECT_EQ(file.metadata.at("temperature_degC"), "8");
   EXPECT_NEAR(file.at("temperature_degC", 17.0), 9.7, 0.003);
   // From the first release on, a share of its peak; after the branch, near 17 s, the step.
-  const double end_s = scenario.acts[0].end_s, wait_s = scenario.acts[1].begin_s - end_s;
+  const double end_s = scenario.episodes[0].end_s, wait_s = scenario.episodes[1].begin_s - end_s;
   ASSERT_GT(wait_s, 1.0);
   ASSERT_LT(end_s, 16.0);
   ASSERT_EQ(plain.at("contact", 39.9), 0.0);

@@ -22,16 +22,16 @@ TEST(Scenarios, placements_are_one_weight_that_stands) {
   options.kind = "placements";
   const Scenario scenario = make_scenario(options, table_of("sphere15"));
   EXPECT_EQ(scenario.options.indenter, "sphere15");
-  EXPECT_GE(scenario.acts.size(), 30u);
+  EXPECT_GE(scenario.episodes.size(), 30u);
   double farthest_x = 0.0, farthest_y = 0.0;
-  for (const Act &act : scenario.acts) {
-    ASSERT_EQ(act.phases.size(), 3u);
-    EXPECT_EQ(act.phases[1].name, "hold");
-    EXPECT_NEAR(act.phases[1].end_s - act.phases[1].begin_s, 2.0, 1e-9);
-    const double middle_s = 0.5 * (act.phases[1].begin_s + act.phases[1].end_s) - act.begin_s;
-    EXPECT_EQ(act.tracks[0].at(middle_s).force_N, 3.0);
-    farthest_x = std::max(farthest_x, std::abs(act.tracks[0].x_mm));
-    farthest_y = std::max(farthest_y, std::abs(act.tracks[0].y_mm));
+  for (const Episode &episode : scenario.episodes) {
+    ASSERT_EQ(episode.phases.size(), 3u);
+    EXPECT_EQ(episode.phases[1].name, "hold");
+    EXPECT_NEAR(episode.phases[1].end_s - episode.phases[1].begin_s, 2.0, 1e-9);
+    const double middle_s = 0.5 * (episode.phases[1].begin_s + episode.phases[1].end_s) - episode.begin_s;
+    EXPECT_EQ(episode.tracks[0].at(middle_s).force_N, 3.0);
+    farthest_x = std::max(farthest_x, std::abs(episode.tracks[0].x_mm));
+    farthest_y = std::max(farthest_y, std::abs(episode.tracks[0].y_mm));
   }
   /* To the outer sensors, and not beyond. */
   EXPECT_GT(farthest_x, 7.5);
@@ -43,20 +43,20 @@ TEST(Scenarios, placements_are_one_weight_that_stands) {
 TEST(Scenarios, HaveQuietTimeAndNoJumps) {
   for (const ScenarioKind &kind : scenario_kinds()) {
     const Scenario scenario = scenario_of(kind.name);
-    ASSERT_GE(scenario.acts.size(), 3u) << kind.name;
+    ASSERT_GE(scenario.episodes.size(), 3u) << kind.name;
     double free_s = START_QUIET_s;
-    for (const Act &act : scenario.acts) {
-      EXPECT_GE(act.begin_s, free_s - 1e-9) << kind.name;
-      free_s = act.end_s + scenario.options.quiet_s;
+    for (const Episode &episode : scenario.episodes) {
+      EXPECT_GE(episode.begin_s, free_s - 1e-9) << kind.name;
+      free_s = episode.end_s + scenario.options.quiet_s;
       EXPECT_LE(free_s, *scenario.options.seconds + 1e-9);
-      EXPECT_EQ(act.phases.front().begin_s, act.begin_s);
-      EXPECT_NEAR(act.phases.back().end_s, act.end_s, 1e-9);
-      for (std::size_t i = 1; i < act.phases.size(); i++) {
-        EXPECT_EQ(act.phases[i].begin_s, act.phases[i - 1].end_s);
-        EXPECT_GT(act.phases[i].end_s, act.phases[i].begin_s) << act.phases[i].name;
+      EXPECT_EQ(episode.phases.front().begin_s, episode.begin_s);
+      EXPECT_NEAR(episode.phases.back().end_s, episode.end_s, 1e-9);
+      for (std::size_t i = 1; i < episode.phases.size(); i++) {
+        EXPECT_EQ(episode.phases[i].begin_s, episode.phases[i - 1].end_s);
+        EXPECT_GT(episode.phases[i].end_s, episode.phases[i].begin_s) << episode.phases[i].name;
       }
-      for (const Track &track : act.tracks) {
-        const double length_s = act.end_s - act.begin_s;
+      for (const Track &track : episode.tracks) {
+        const double length_s = episode.end_s - episode.begin_s;
         EXPECT_EQ(track.at(0.0).force_N, 0.0);
         EXPECT_NEAR(track.at(length_s).force_N, 0.0, 1e-9) << kind.name;
         Touch before = track.at(0.0);
@@ -85,15 +85,15 @@ TEST(Scenarios, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
     }
     const bool set = kind.name == "slip" || kind.name == "drag";
     const Scenario scenario = scenario_of(kind.name);
-    for (const Act &act : scenario.acts) {
-      const Track &track = act.tracks[0];
+    for (const Episode &episode : scenario.episodes) {
+      const Track &track = episode.tracks[0];
       int slipping = 0;
-      for (long ms = 0; ms < std::lround(1e3 * (act.end_s - act.begin_s)); ms++) {
+      for (long ms = 0; ms < std::lround(1e3 * (episode.end_s - episode.begin_s)); ms++) {
         const double local_s = 1e-3 * static_cast<double>(ms);
         // Half a millisecond to either side tells at the very beginning and end.
         const bool moved = track.pusher_mm.at(local_s) > track.pusher_mm.at(local_s - 5e-4);
         const bool moves = track.pusher_mm.at(local_s + 5e-4) > track.pusher_mm.at(local_s);
-        const bool slips = act.slips(act.begin_s + local_s);
+        const bool slips = episode.slips(episode.begin_s + local_s);
         EXPECT_EQ(slips, set && moved && moves) << kind.name << local_s;
         EXPECT_TRUE(!slips || track.at(local_s).force_N > 0.0);
         slipping += slips;
@@ -106,18 +106,20 @@ TEST(Scenarios, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
 TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
   const Scenario scenario = scenario_of("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 2.0; });
   std::set<double> speeds;
-  for (const Act &act : scenario.acts) {
-    speeds.insert(act.speed_mm_s);
+  for (const Episode &episode : scenario.episodes) {
+    speeds.insert(episode.speed_mm_s);
     const auto phase = [&](const std::string &name) {
-      return *std::find_if(act.phases.begin(), act.phases.end(), [&](const Phase &one) { return one.name == name; });
+      return *std::find_if(episode.phases.begin(), episode.phases.end(),
+                           [&](const Phase &one) { return one.name == name; });
     };
     const Phase dead = phase("dead_travel"), slip = phase("slip");
-    const auto y = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).y_mm; };
+    const auto y = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s).y_mm; };
     EXPECT_NEAR(std::abs(y(dead.end_s) - y(dead.begin_s)), 1.0, 0.21);
     EXPECT_NEAR(std::abs(y(slip.end_s) - y(dead.begin_s)), 24.0, 1e-6);
-    EXPECT_NEAR(dead.end_s - dead.begin_s, 2.0 / act.speed_mm_s + 0.005, 1.2e-3);
+    EXPECT_NEAR(dead.end_s - dead.begin_s, 2.0 / episode.speed_mm_s + 0.005, 1.2e-3);
     const double middle_s = 0.5 * (slip.begin_s + slip.end_s);
-    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, act.speed_mm_s, 0.006 * act.speed_mm_s);
+    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, episode.speed_mm_s,
+                0.006 * episode.speed_mm_s);
   }
   EXPECT_EQ(speeds, (std::set<double>{20, 50, 100, 150, 200}));
 }
@@ -126,10 +128,10 @@ TEST(Scenarios, GridIsThePapers) {
   const Scenario scenario = scenario_of("grid", [](ScenarioOptions &o) { o.seconds = 1100; });
   std::map<std::pair<double, double>, std::set<double>> forces;
   std::map<std::pair<double, double>, int> near;
-  for (const Act &act : scenario.acts) {
-    const Touch held = act.tracks[0].at(act.phases[1].end_s - act.begin_s);
+  for (const Episode &episode : scenario.episodes) {
+    const Touch held = episode.tracks[0].at(episode.phases[1].end_s - episode.begin_s);
     forces[{held.x_mm, held.y_mm}].insert(held.force_N);
-    near[{held.x_mm, held.y_mm}] = act.sensors_near;
+    near[{held.x_mm, held.y_mm}] = episode.sensors_near;
   }
   EXPECT_EQ(forces.size(), 21u);
   int count[5] = {};
@@ -153,8 +155,8 @@ TEST(Scenarios, GridIsThePapers) {
 TEST(Scenarios, RandomPlacesFillTheAreaAndForcesTheRange) {
   const Scenario scenario = scenario_of("taps", [](ScenarioOptions &o) { o.seconds = 2000; });
   double x_max = 0, y_max = 0, force_min = 99, force_max = 0;
-  for (const Act &act : scenario.acts) {
-    const Touch held = act.tracks[0].at(act.phases[1].begin_s - act.begin_s);
+  for (const Episode &episode : scenario.episodes) {
+    const Touch held = episode.tracks[0].at(episode.phases[1].begin_s - episode.begin_s);
     x_max = std::max(x_max, std::abs(held.x_mm));
     y_max = std::max(y_max, std::abs(held.y_mm));
     force_min = std::min(force_min, held.force_N);
@@ -172,9 +174,9 @@ TEST(Scenarios, RandomPlacesFillTheAreaAndForcesTheRange) {
 
 TEST(Scenarios, TwoContactsAreApartAsTold) {
   std::set<long> distances;
-  for (const Act &act : scenario_of("two").acts) {
-    ASSERT_EQ(act.tracks.size(), 2u);
-    const Touch a = act.tracks[0].at(0.4), b = act.tracks[1].at(0.4);
+  for (const Episode &episode : scenario_of("two").episodes) {
+    ASSERT_EQ(episode.tracks.size(), 2u);
+    const Touch a = episode.tracks[0].at(0.4), b = episode.tracks[1].at(0.4);
     distances.insert(std::lround(std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) * 1e6));
     EXPECT_LE(std::abs(a.y_mm), 18.0);
     EXPECT_LE(std::abs(b.x_mm), 10.0);
@@ -191,13 +193,13 @@ TEST(Scenarios, LiftsTakeAWeightOverWhileTheGripStays) {
   EXPECT_TRUE(scenario.pulls);
   std::set<long> times_ms;
   std::set<int> quadrants;
-  for (const Act &act : scenario.acts) {
+  for (const Episode &episode : scenario.episodes) {
     std::map<std::string, Phase> phases;
-    for (const Phase &one : act.phases) {
+    for (const Phase &one : episode.phases) {
       EXPECT_FALSE(one.slip);
       phases[one.name] = one;
     }
-    const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
+    const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
     const auto pull_N = [&](double t_s) { return std::hypot(at(t_s).pull_x_N, at(t_s).pull_y_N); };
     const Phase &lift = phases.at("lift"), &carry = phases.at("carry"), &lower = phases.at("lower");
     times_ms.insert(std::lround(1e3 * (lift.end_s - lift.begin_s)));
@@ -227,12 +229,12 @@ TEST(Scenarios, WhatIsPulledIsPressedAsBefore) {
   const Scenario pulled = scenario_of("taps", [](ScenarioOptions &o) { o.tangential = "0.3"; });
   const Scenario aimed = scenario_of("taps", [](ScenarioOptions &o) { o.tangential = "0.3,-120"; });
   EXPECT_FALSE(plain.pulls);
-  ASSERT_EQ(plain.acts.size(), pulled.acts.size());
-  for (std::size_t i = 0; i < plain.acts.size(); i++) {
-    EXPECT_EQ(plain.acts[i].begin_s, pulled.acts[i].begin_s);
+  ASSERT_EQ(plain.episodes.size(), pulled.episodes.size());
+  for (std::size_t i = 0; i < plain.episodes.size(); i++) {
+    EXPECT_EQ(plain.episodes[i].begin_s, pulled.episodes[i].begin_s);
     for (double t_s : {0.05, 0.2, 0.45}) {
-      const Touch before = plain.acts[i].tracks[0].at(t_s);
-      const Touch now = pulled.acts[i].tracks[0].at(t_s), there = aimed.acts[i].tracks[0].at(t_s);
+      const Touch before = plain.episodes[i].tracks[0].at(t_s);
+      const Touch now = pulled.episodes[i].tracks[0].at(t_s), there = aimed.episodes[i].tracks[0].at(t_s);
       EXPECT_EQ(now.force_N, before.force_N);
       EXPECT_EQ(now.x_mm, before.x_mm);
       EXPECT_EQ(now.y_mm, before.y_mm);
@@ -250,13 +252,13 @@ TEST(Scenarios, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
                                                 o.effects = parse_effects("all");
                                                 o.pad_seed = 77;
                                               });
-  ASSERT_GT(longer.acts.size(), brief.acts.size());
-  for (std::size_t i = 0; i < brief.acts.size(); i++) {
-    EXPECT_EQ(brief.acts[i].begin_s, longer.acts[i].begin_s);
-    EXPECT_EQ(brief.acts[i].tracks[0].at(0.2), longer.acts[i].tracks[0].at(0.2));
+  ASSERT_GT(longer.episodes.size(), brief.episodes.size());
+  for (std::size_t i = 0; i < brief.episodes.size(); i++) {
+    EXPECT_EQ(brief.episodes[i].begin_s, longer.episodes[i].begin_s);
+    EXPECT_EQ(brief.episodes[i].tracks[0].at(0.2), longer.episodes[i].tracks[0].at(0.2));
   }
   const Scenario other = scenario_of("taps", [](ScenarioOptions &o) { o.seed = 2; });
-  EXPECT_FALSE(brief.acts[0].tracks[0].at(0.2) == other.acts[0].tracks[0].at(0.2));
+  EXPECT_FALSE(brief.episodes[0].tracks[0].at(0.2) == other.episodes[0].tracks[0].at(0.2));
 }
 
 TEST(Scenarios, WrongOptionsAreToldInOneLine) {

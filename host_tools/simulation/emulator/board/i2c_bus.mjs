@@ -83,7 +83,7 @@ export class I2cBus {
     return this.gpio.scl;
   }
 
-  /** A target let go of (or grabbed) SDA: tell the pins and a waiting controller. */
+  /** A target let go of (or grabbed) SDA: update the pins and a waiting controller. */
   linesChanged() {
     this.onLines();
     this.waveform?.lines(!this.sdaLow, !this.sclLow, this.now_ns());

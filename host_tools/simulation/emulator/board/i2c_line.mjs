@@ -1,8 +1,8 @@
 /**
- * One data line of a bit-parallel I2C bus: the target on it, bit by bit from the levels, what UM10204 says about
- * its timing, and a log of its transfers.
+ * One data line of a bit-parallel I2C bus: the target on it, bit by bit from the levels, the timing checks of
+ * UM10204, and a log of its transfers.
  *
- * The board calls, in the order of time, `sclFell`, `sclRose`, `sdaFell`, `sdaRose`; `pulls` says whether the
+ * The board calls, in the order of time, `sclFell`, `sclRose`, `sdaFell`, `sdaRose`; `pulls` is whether the
  * target wants SDA low, and changes only in `sclFell` and where the target loses its place (START, STOP).
  */
 

@@ -15,7 +15,7 @@ import { Ms5840 } from './ms5840.mjs';
 const RELEASE_TO_HIGH = Math.log(0.3) / Math.log(0.3 / 0.7);
 /** From the fall of SCL to a sensor's change of SDA: assumed; UM10204 asks for 300 ns internal hold, 900 ns to valid. */
 const SENSOR_SDA_NS = 350;
-/** A clock that was high for so long begins again after a fault of SCL. */
+/** A clock that was high for this time begins again after a fault of SCL. */
 const QUIET_NS = 3000;
 /** Where in a clock's high time a glitch falls. */
 const GLITCH_AT_NS = 200;

@@ -1,5 +1,5 @@
 /**
- * What is wired to the sync pin of a board: perhaps a source of edges, and somebody who looks.
+ * What is wired to the sync pin of a board: perhaps a source of edges, and an observer.
  *
  *     new SyncPin({ gpio, scope, report, next, onLevel })
  *

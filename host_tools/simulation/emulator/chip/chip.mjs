@@ -56,9 +56,9 @@ const WAKES = new Map([
 ]);
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
-/** So many cycles of the ring oscillator the boot ROM tries to load the second stage, 128 times (pico-bootrom, bootrom_main.c), which waits for a flash that is still erasing: 255 ms at 12 MHz. */
+/** Cycles of the ring oscillator in which the boot ROM tries to load the second stage, 128 times (pico-bootrom, bootrom_main.c), which waits for a flash that is still erasing: 255 ms at 12 MHz. */
 const BOOT_TRIES_CYCLES = 3.06e6;
-/** Asleep for so long without one wake-up means the firmware hung. */
+/** A longer sleep without one wake-up means that the firmware hung. */
 const HUNG_AFTER_NS = 2e9;
 
 /** Page (address >> 14) to bit in RESETS. */
@@ -522,7 +522,7 @@ export class Chip extends RP2040 {
       }
       if (core.waiting) {
         if (this.slept_since_ns < 0) this.slept_since_ns = now;
-        if (!core.wakeable && !(core.waitsForEvent && second.acts)) this.fail('core', 'firmware hung: WFI with no interrupt enabled');
+        if (!core.wakeable && !(core.waitsForEvent && second.isActive)) this.fail('core', 'firmware hung: WFI with no interrupt enabled');
         if (now - this.slept_since_ns >= HUNG_AFTER_NS) {
           this.fail('core', `firmware hung: asleep for ${HUNG_AFTER_NS / 1e9} s without an interrupt`);
         }

@@ -12,7 +12,7 @@ export const XOSC_HZ = 12e6;
 export const ROSC_HZ = 6.5e6;
 /** Modelled time from PLL power-up to lock. */
 const PLL_LOCK_NS = 50e3;
-/** So long after its power-up a PLL that was locked before still says that it is, unless its block was reset. */
+/** Time after its power-up for which a PLL that was locked before still reports a lock, unless its block was reset. */
 const PLL_STALE_NS = 5e3;
 
 const RESET_BITS = 0x1ffffff;
@@ -146,7 +146,7 @@ export class Pll extends BasePeripheral {
       this.locked = true;
     });
     this.staleAlarm = chip.clock.createAlarm(() => {
-      this.saysLocked = false;
+      this.reportsLock = false;
     });
     this.reset();
   }
@@ -155,7 +155,7 @@ export class Pll extends BasePeripheral {
     this.alarm.cancel();
     this.staleAlarm.cancel();
     /** Of the lock before the power went. */
-    this.saysLocked = false;
+    this.reportsLock = false;
     this.cs = 1;
     this.pwr = 0x2d;
     this.fbdiv = 0;
@@ -181,7 +181,7 @@ export class Pll extends BasePeripheral {
   }
 
   readUint32(offset) {
-    if (offset === 0x00) return ((this.locked || this.saysLocked ? 1 << 31 : 0) | this.cs) >>> 0;
+    if (offset === 0x00) return ((this.locked || this.reportsLock ? 1 << 31 : 0) | this.cs) >>> 0;
     if (offset === 0x04) return this.pwr;
     if (offset === 0x08) return this.fbdiv;
     if (offset === 0x0c) return this.prim;
@@ -218,7 +218,7 @@ export class Pll extends BasePeripheral {
       this.staleAlarm.schedule(PLL_STALE_NS);
       this.lock();
     } else if (!running) {
-      this.saysLocked ||= this.locked;
+      this.reportsLock ||= this.locked;
       this.locked = false;
       this.alarm.cancel();
     }

@@ -383,7 +383,7 @@ export class I2cBlock extends BasePeripheral {
     return true;
   }
 
-  /** Without a receive hold an acknowledgement right after SCL fell looks like another controller's bit. */
+  /** Without a receive hold an acknowledgement right after SCL fell is mistaken for another controller's bit. */
   #confused() {
     if (!this.bus.wasFast || this.sdaHold >>> 16) return false;
     this.#loseArbitration();

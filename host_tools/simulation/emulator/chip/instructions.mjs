@@ -1,6 +1,6 @@
 /**
  * The frequent instructions of the Cortex-M0+, for core.mjs: `execute` runs what only computes, branches, or loads and
- * stores in SRAM; it hands everything else to the core. Same results and cycles as rp2040js, but for what core.mjs says.
+ * stores in SRAM; it hands everything else to the core. Same results and cycles as rp2040js, except as stated in core.mjs.
  *
  * Cycles, pc and flags are kept in variables meanwhile. The core has them again before it does anything itself: before it
  * takes an exception, reaches what is not SRAM, or faults.

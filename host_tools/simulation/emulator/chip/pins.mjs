@@ -134,8 +134,8 @@ export class Pins {
   /** What the pins read that no other part sets. */
   #resolve() {
     const { low, high } = this;
-    const keeper = this.pullUp & this.pullDown & this.levels;
-    const floating = (this.pullUp & ~this.pullDown) | keeper | (this.levels & ~this.pullUp & ~this.pullDown);
+    const held = this.pullUp & this.pullDown & this.levels;
+    const floating = (this.pullUp & ~this.pullDown) | held | (this.levels & ~this.pullUp & ~this.pullDown);
     const own = high | (floating & ~low);
     this.#become((this.levels & this.worlds) | (own & ~this.worlds & ALL));
   }

@@ -1,7 +1,7 @@
 /**
  * PIO block of the RP2040 (datasheet chapter 3), in lock-step with emulated time.
  *
- * A state machine acts at the edges of clk_sys that its divider lets through: what it does in a cycle shows at the
+ * A state machine runs at the edges of clk_sys that its divider lets through: what it does in a cycle shows at the
  * edge that ends the cycle. Only edges at which something happens are visited: a stalled machine, or one that counts
  * down a delay, costs nothing until data, a pin or a flag that it waits for changes. Inputs pass two flip-flops unless
  * bypassed: an instruction sees a pin as it was two cycles before its edge. Within one edge every machine sees the

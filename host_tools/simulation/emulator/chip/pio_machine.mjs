@@ -1,5 +1,5 @@
 /**
- * One state machine of the PIO: its program counter, registers, FIFOs, divider and the instructions. pio.mjs says what is
+ * One state machine of the PIO: its program counter, registers, FIFOs, divider and the instructions. pio.mjs lists what is
  * modelled.
  */
 export const FIFO_DEPTH = 4;

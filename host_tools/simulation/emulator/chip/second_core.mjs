@@ -63,7 +63,7 @@ export class SecondCore {
   }
 
   /** It will do something by itself. */
-  get acts() {
+  get isActive() {
     return this.isAwake || this.answer.scheduled;
   }
 

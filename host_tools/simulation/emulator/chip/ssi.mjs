@@ -21,7 +21,7 @@ export class Ssi extends BasePeripheral {
     this.forcedSelect = false;
     this.selected = false;
     this.alarm = chip.clock.createAlarm(() => this.#shifted());
-    /** The next byte takes so much longer, for a test. */
+    /** Extra time of the next byte, for a test. */
     this.stall_ns = 0;
     // As the boot ROM leaves it: single-bit 03h reads.
     this.ctrlr0 = (31 << 16) | (TMOD_EEPROM_READ << 8);

@@ -26,7 +26,7 @@ export class SysClock {
     return this.origin_ns + (edge - this.origin_edge) * this.period_ns;
   }
 
-  /** A moment when everything that acts at the edge has acted. */
+  /** A time when everything at the edge is complete. */
   afterEdge_ns(edge) {
     return this.ns(edge) + this.period_ns / 4;
   }

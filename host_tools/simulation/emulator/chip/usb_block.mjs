@@ -44,7 +44,7 @@ const AWAKE_NS = 3e3;
 const AWAKE_LATE_NS = 45e6;
 
 const DPRAM_BYTES = 4096;
-/** So long a controller before revision B2 must see the bus idle after a reset until it takes part (erratum E5). */
+/** Idle time of the bus after a reset until a controller before revision B2 takes part (erratum E5). */
 const IDLE_NS = 800e3;
 const MUX_TO_PADS = 0xc;
 
@@ -71,7 +71,7 @@ export class UsbBlock extends BasePeripheral {
     this.idleAlarm.cancel();
     this.connected = !this.isOld;
     this.inReset = false;
-    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. Erratum E15 strikes amid an IN transfer: `hangsAtIn` says how. */
+    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. Erratum E15 strikes amid an IN transfer: `hangsAtIn` is how. */
     this.hung = null;
     this.hangsAtIn = null;
     this.buffStatus = 0;
@@ -131,7 +131,7 @@ export class UsbBlock extends BasePeripheral {
     if (!(this.mainCtrl & 1)) return 'MAIN_CTRL.CONTROLLER_EN is not set';
     if (!(this.muxing & 1) && !this.feigned) return 'USB_MUXING.TO_PHY is not set';
     if (!(this.muxing & 8)) return 'USB_MUXING.SOFTCON is not set';
-    if (!this.vbusDetected) return 'USB_PWR does not say that VBUS is present';
+    if (!this.vbusDetected) return 'USB_PWR does not report that VBUS is present';
     if (Math.abs(this.rp2040.clkUsbHz - CLK_USB_HZ) > 1) return `clk_usb is ${this.rp2040.clkUsbHz / 1e6} MHz instead of 48 MHz`;
     return null;
   }
@@ -393,7 +393,7 @@ export class UsbBlock extends BasePeripheral {
     return true;
   }
 
-  /** The controller moves data on clk_sys too; what it does on a slower one than clk_usb nobody has written down. */
+  /** The controller moves data on clk_sys too; its behaviour on a slower one than clk_usb is not documented. */
   #checkClock() {
     if (this.attached && this.rp2040.clkSys < CLK_USB_HZ)
       this.rp2040.fail('USB', `traffic while clk_sys is ${this.rp2040.clkSys / 1e6} MHz`);
@@ -433,7 +433,7 @@ export class UsbBlock extends BasePeripheral {
     if (!this.connected) this.idleAlarm.schedule(IDLE_NS);
   }
 
-  /** SUSPENDED is a level that is never written; DEV_SUSPEND says that it changed, and is cleared through the same bit. */
+  /** SUSPENDED is a level that is never written; DEV_SUSPEND reports that it changed, and is cleared through the same bit. */
   #setSuspended(is) {
     this.awakeAlarm.cancel();
     if (this.hung === 'dead') return;

@@ -12,7 +12,7 @@
  *     to the program:   'D' time, bytes           for the client
  *                       'T' time, u8 0|1          ends the answer to 'R': emulated time now; 1: the run has ended
  *
- * What happens "at" a time must be said before emulated time is there. A pipe that
+ * What happens "at" a time must be requested before emulated time is there. A pipe that
  * closes without 'E' breaks the run off, as wrong usage does.
  */
 import { readSync, writeSync } from 'node:fs';

@@ -86,7 +86,7 @@ export class CdcClient {
     if (this.bound) this.host.pause(this.bound.bulkIn.address, on);
   }
 
-  /** The consumer of `onData` is full: stop reading until it says otherwise. */
+  /** The consumer of `onData` is full: stop reading until it is resumed. */
   setBlocked(on) {
     this.blocked = on;
     if (!on) this.#read();

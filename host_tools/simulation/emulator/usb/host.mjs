@@ -13,7 +13,7 @@
  *     host.cancel(transfer)      host.unplug()      host.plug()
  *     host.suspend()  /  host.resume()                          the bus idles; transfers wait
  *     host.resetDevice(() => ...)                               transfers are cancelled; the device has an address again
- *     host.holdReset(for_ns)                                    the bus is low for so long; then as in resetDevice
+ *     host.holdReset(for_ns)                                    the bus is low for this time; then as in resetDevice
  *     host.restartToggles(addresses)                            after SET_CONFIGURATION, SET_INTERFACE, CLEAR_FEATURE(HALT)
  *
  * With `companion` it is an EHCI controller, whose ports a companion serves at full speed: at each connection and each

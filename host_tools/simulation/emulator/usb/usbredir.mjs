@@ -56,7 +56,7 @@ const ENDPOINTS = 32;
 const VERSION_BYTES = 64;
 const READER_GRACE_MS = 2000;
 const LARGEST_MESSAGE = 1 << 20;
-const STANDARD = { get_configuration: 8, get_interface: 10, set_interface: 11, clear_feature: 1 };
+const REQUEST = { get_configuration: 8, get_interface: 10, set_interface: 11, clear_feature: 1 };
 
 const endpointIndex = (address) => ((address & 0x80) >> 3) | (address & 15);
 
@@ -355,18 +355,18 @@ export class UsbRedirServer {
         });
         return;
       case TYPE.get_configuration:
-        this.#queueStandard(id, setupPacket(0x80, STANDARD.get_configuration, 0, 0, 1), (code, data) => {
+        this.#queueStandard(id, setupPacket(0x80, REQUEST.get_configuration, 0, 0, 1), (code, data) => {
           this.#send(TYPE.configuration_status, id, Buffer.of(code, data[0] ?? 0));
         });
         return;
       case TYPE.set_alt_setting:
-        this.#queueStandard(id, setupPacket(0x01, STANDARD.set_interface, payload[1], payload[0], 0), (code) => {
+        this.#queueStandard(id, setupPacket(0x01, REQUEST.set_interface, payload[1], payload[0], 0), (code) => {
           if (code === STATUS.ok) this.host.restartToggles(this.#endpointsOf(payload[0]));
           this.#send(TYPE.alt_setting_status, id, Buffer.of(code, payload[0], payload[1]));
         });
         return;
       case TYPE.get_alt_setting:
-        this.#queueStandard(id, setupPacket(0x81, STANDARD.get_interface, 0, payload[0], 1), (code, data) => {
+        this.#queueStandard(id, setupPacket(0x81, REQUEST.get_interface, 0, payload[0], 1), (code, data) => {
           this.#send(TYPE.alt_setting_status, id, Buffer.of(code, payload[0], data[0] ?? 0));
         });
         return;
@@ -454,7 +454,7 @@ export class UsbRedirServer {
       setupPacket(requestType, request, value, index, length),
       isIn ? null : Buffer.from(payload.subarray(10)),
       (code, got = Buffer.alloc(0)) => {
-        const clearsHalt = requestType === 0x02 && request === STANDARD.clear_feature && value === 0;
+        const clearsHalt = requestType === 0x02 && request === REQUEST.clear_feature && value === 0;
         if (code === STATUS.ok && clearsHalt && this.#endpoint(index)) this.host.restartToggles([index]);
         const answer = Buffer.from(payload.subarray(0, 10));
         const data = isIn && code === STATUS.ok ? got : Buffer.alloc(0);
