@@ -1,5 +1,5 @@
 /* CDR as ROS 2 serializes its messages: little-endian, every number aligned to its own size,
- * counted from behind the four bytes that say so. */
+ * counted from behind the four bytes of the encapsulation header. */
 #pragma once
 
 #include "libfingertip/little_endian.hpp"

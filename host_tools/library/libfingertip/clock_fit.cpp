@@ -12,7 +12,7 @@ constexpr double WINDOW_us = 30e6;
 constexpr std::size_t EXCHANGES = 512;
 /* Crystals are good to 100 ppm with all their errors, at both ends. */
 constexpr double SLOPE_LIMIT = 200e-6;
-/* What drift is worth in gap: while the exchanges span less time than this, they do not tell it. */
+/* What drift is worth in gap: exchanges that span less time than this do not determine it. */
 constexpr double DRIFT_COST_us = 1.5e6;
 /* (2/3)^40 of SLOPE_LIMIT, over WINDOW_us: nanoseconds. */
 constexpr int STEPS = 40;

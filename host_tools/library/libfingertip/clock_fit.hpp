@@ -1,7 +1,7 @@
 /* A fingertip's clock in terms of the host's, from commands and their acknowledgements.
  *
- * An exchange shows that the host's clock stood between sent and received when the fingertip's
- * stood at device_us. A straight line, offset and drift, must pass between all of these of the last
+ * An exchange shows that the host's clock was between sent and received when the fingertip's was
+ * at device_us. A straight line, offset and drift, must pass between all of these of the last
  * half minute. The distance between the possible lines at one time bounds the error, whatever the
  * delays were. The estimate is the line in the middle, as far from the nearest limits on both sides
  * as it can be. Slow exchanges do not touch it. It is exact where the fastest command and the

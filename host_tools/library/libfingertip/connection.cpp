@@ -38,7 +38,7 @@ bool never() {
                                                    "loaded, or another program uses it by libusb");
 }
 
-/* Its serial number; where it does not tell, its port. */
+/* Its serial number, or its port if that is unknown. */
 std::string name_of(const Found &found, Reach reach, const std::string &root) {
   if (!found.serial.empty()) {
     return found.serial;

@@ -18,7 +18,7 @@ using Kind = DeviceNews::Kind;
 
 constexpr milliseconds POLL{20};
 constexpr milliseconds REOPEN_INTERVAL{200};
-/* Without a frame for so long the streams are asked for again: the device may have restarted
+/* Without a frame for this time the streams are requested again: the device may have restarted
  * without the port noticing. */
 constexpr milliseconds REVIVE_AFTER{3000};
 /* Exchanges before the streams begin, when nothing delays them; then one this often. */

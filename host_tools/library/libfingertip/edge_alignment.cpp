@@ -10,9 +10,9 @@ namespace {
 
 /* A stamp is right to half a microsecond, by rounding, and a few cycles. */
 constexpr std::int64_t STAMPS_us = 2;
-/* Ties more often than this tell nothing new, and cost a fit each. */
+/* More frequent ties add no information, and cost a fit each. */
 constexpr std::uint64_t TIE_INTERVAL_us = 20'000;
-/* Before so many ties over so long the drift is not known well enough to reach the next one. */
+/* With fewer ties or over less time, the drift is not known well enough to reach the next tie. */
 constexpr unsigned TIES = 6;
 constexpr double SPAN_us = 5e6;
 constexpr double EDGE_LIFE_us = 2e6;
@@ -135,7 +135,7 @@ std::optional<EdgeAlignment::Place> EdgeAlignment::place(std::size_t device, std
   if (!is_tied(member) || !member.clock) {
     return std::nullopt;
   }
-  /* Beyond the last tie the drift between both is known only as well as the ties' span tells. */
+  /* Beyond the last tie the drift between both is known only as well as the ties' span allows. */
   const ClockEstimate &estimate = *member.fit.estimate();
   const double span_us = static_cast<double>(member.last_tie_us - member.first_tie_us);
   const double beyond_us = std::abs(at_us - static_cast<double>(member.last_tie_us));

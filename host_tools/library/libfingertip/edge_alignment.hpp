@@ -3,7 +3,7 @@
  * The recorder knows each fingertip's clock to some ten or hundred microseconds (clock_fit.hpp). An
  * edge that two of them have stamped ties their clocks to a microsecond. Two stamps are of one edge
  * if both rise or both fall, and the recorder places them as near as it must, and no others. So
- * edges are no help that follow one another faster than the recorder can tell.
+ * edges are no help that follow one another faster than the recorder can distinguish.
  *
  * One fingertip is the reference. Its time goes to the recorder's clock along a line with knots, a
  * second apart, each set by the estimate of the moment, ahead of the rows. So a time of the
@@ -35,7 +35,7 @@ public:
     double host_us;
     double uncertainty_us; /* against the reference; no error is larger */
   };
-  /* Of a time of this device, by edges; nothing: they do not tell it better than the recorder. */
+  /* The place of a device's time, by edges; nothing if the recorder knows it better. */
   std::optional<Place> place(std::size_t device, std::uint64_t t_us) const;
 
 private:

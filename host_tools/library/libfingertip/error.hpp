@@ -1,6 +1,6 @@
-/* Errors that a user can mend, as facts: a code for programs, and a line for people that says what
- * is wrong. The program adds what to do about it, since it knows its own options and its user's
- * rights. Anything else that is thrown is a bug of ours. */
+/* Errors that a user can correct, as facts: a code for programs, and a line for people that states
+ * what is wrong. The program adds what to do about it, since it knows its own options and its user's
+ * rights. Any other exception is a bug of ours. */
 #pragma once
 
 #include <stdexcept>
@@ -10,7 +10,7 @@
 namespace fingertip {
 
 enum class ErrorCode {
-  other, /* only the text says */
+  other, /* see the text */
 
   /* Ways to a fingertip. */
   no_port,            /* nothing has this name, or not any more */
@@ -47,7 +47,7 @@ enum class ErrorCode {
   gripper_refused, /* the gripper refuses */
 
   /* Values. */
-  bad_value, /* the text says which are good */
+  bad_value, /* the text has the good ones */
 
   /* Files. */
   cannot_read,        /* for the system's reason in the text */
@@ -72,7 +72,7 @@ enum class ErrorCode {
 class Error : public std::runtime_error {
 public:
   Error(ErrorCode code, const std::string &facts) : std::runtime_error(facts), code_(code) {}
-  /* A text that leaves nothing to say. */
+  /* A text that is complete. */
   explicit Error(const std::string &text) : Error(ErrorCode::other, text) {}
 
   ErrorCode code() const { return code_; }

@@ -171,7 +171,7 @@ enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, s
                                               const double *values, size_t count, double host_us);
 /* "gone ..." and "back ..." with the time: the port vanished, and was there again. */
 enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device, const char *text);
-/* Of a recording of several: what fingertip_clock says of a device now; and that rows of before
+/* In a recording of several: the present estimate of fingertip_clock for a device. Rows from before
  * host_us will not come any more, so that lines until then may be written. */
 enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4],
                                              unsigned jumps);
@@ -204,7 +204,7 @@ void fingertip_clock_restart(struct fingertip_clock *clock);
 /* ---- Names and texts */
 
 /* The flag number index, lowest bit first; NULL: there are fewer. bit and is_warning may be NULL. A
- * warning says that the numbers deserve less trust. */
+ * warning means that the numbers deserve less trust. */
 const char *fingertip_flag(size_t index, uint32_t *bit, int *is_warning);
 size_t fingertip_flags_text(uint32_t flags, char *text, size_t size); /* "CONTACT FIT_VALID" */
 size_t fingertip_command_name(uint8_t type, char *text, size_t size); /* "tare" */

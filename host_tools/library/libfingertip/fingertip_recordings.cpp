@@ -24,7 +24,7 @@ using namespace fingertip::values;
 
 namespace {
 
-/* Thrown through a reader that needs bytes which were not fed yet; its next call begins again. */
+/* An exception through a reader that needs bytes which were not fed yet; its next call begins again. */
 struct NotYet {};
 
 /* The part of a file that was fed and is still needed. */
@@ -189,7 +189,7 @@ private:
   void look();
 };
 
-/* Tells by the first bytes what it is, as PacketFile does. */
+/* Detects the kind by the first bytes, as PacketFile does. */
 void fingertip_reader::look() {
   constexpr std::uint64_t START = 4096; /* several frames, each of which would end with 0x00 */
   const std::string_view bytes = window.all();

@@ -22,7 +22,7 @@ void put(const wire_packet &packet, double *values);
 void put(const LineStatistics &statistics, double counts[FINGERTIP_COUNTS]);
 LineStatistics statistics_of(const double counts[FINGERTIP_COUNTS]);
 
-/* What fingertip_error says from now on. */
+/* Sets the text of fingertip_error. */
 fingertip_status failed(fingertip_status status, const std::string &text);
 fingertip_status failed(const Error &error);
 

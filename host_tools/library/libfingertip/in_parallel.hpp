@@ -1,6 +1,5 @@
-// work(0) .. work(count - 1), in any order, on so many threads, this one among them. What one of
-// them throws ends all and is thrown here. Few and long or many and short: each thread takes up to
-// 64 at a time.
+// Runs work(0) .. work(count - 1) in any order on this number of threads, this one among them. An
+// exception in one ends all and is rethrown here. Each thread takes up to 64 at a time.
 #pragma once
 
 #include <algorithm>

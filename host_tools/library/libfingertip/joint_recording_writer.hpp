@@ -27,7 +27,7 @@ public:
   JointRecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos, const Metadata &extra,
                        std::int64_t host_zero_us, bool raw_expected);
 
-  /* host_us: its time on the recorder's clock, unless edges at the sync pins tell it better. */
+  /* host_us: its time on the recorder's clock, unless edges at the sync pins give a better one. */
   void packet(std::size_t device, const wire_packet &packet, double host_us);
   void event(std::size_t device, const std::string &text);
   void clock(std::size_t device, const ClockEstimate &estimate, unsigned jumps);
@@ -52,7 +52,7 @@ private:
     PacketLines lines;
     std::uint64_t packet_t_us = 0;   /* of the packet under way, */
     double packet_host_us = 0;       /* on both clocks */
-    double last_line_us = 0;         /* where its last line stands among those that wait */
+    double last_line_us = 0;         /* position of its last line among those that wait */
     std::uint64_t newest_us = 0;     /* of its times */
     double edges_uncertainty_us = 0; /* of its last packet, if edges have placed it; else 0 */
     std::optional<ClockEstimate> clock;

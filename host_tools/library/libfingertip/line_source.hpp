@@ -28,7 +28,7 @@ public:
   /* False at the end. Throws Error with file and place where they are damaged; the next call goes
    * on behind the damage. */
   virtual bool next(Line &line) = 0;
-  /* Where reading stands, to go back to. */
+  /* The position of reading, to go back to. */
   virtual Place place() = 0;
   virtual void go_to(const Place &place) = 0;
 };

@@ -37,8 +37,8 @@ std::string unpacked(std::string_view compression, std::string_view packed, std:
   if (size > CHUNK_MOST_bytes) {
     throw Damage("a chunk of " + std::to_string(size) + " bytes");
   }
-  unsigned long long told = ZSTD_getFrameContentSize(packed.data(), packed.size());
-  if (told != size && told != ZSTD_CONTENTSIZE_UNKNOWN) {
+  unsigned long long declared = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  if (declared != size && declared != ZSTD_CONTENTSIZE_UNKNOWN) {
     throw Damage("a chunk's length is wrong");
   }
   std::string bytes(size, '\0');

@@ -7,7 +7,7 @@
 
 namespace fingertip::mcap {
 
-/* What the file says of chunks that compressed made. */
+/* The name in the file of the compression of compressed(). */
 extern const char *const COMPRESSION;
 std::string compressed(const std::string &bytes);
 

@@ -32,7 +32,7 @@ public:
   };
   struct Place {
     std::streamoff offset = 0;
-    std::size_t message = 0; /* that so many messages come before, of what begins there */
+    std::size_t message = 0; /* messages between the offset and the position */
   };
 
   explicit Reader(std::unique_ptr<ByteSource> bytes);
@@ -50,7 +50,7 @@ private:
     std::string topic, encoding, type;
   };
 
-  /* The messages in the record, and what it says of channels. Throws Damage. */
+  /* The messages and the channels in the record. Throws Damage. */
   void judge(std::uint8_t opcode, std::string_view content, int depth);
   void read_chunk(std::string_view content);
   bool read_record();

@@ -424,8 +424,8 @@ bool McapLineSource::next(Line &line) {
                 path_ + (reader_.is_torn() ? ": breaks off before a recording begins"
                                            : ": an MCAP file, but no recording of a fingertip"));
   }
-  if (reader_.is_torn() && !told_torn_) {
-    told_torn_ = true;
+  if (reader_.is_torn() && !reported_torn_) {
+    reported_torn_ = true;
     throw Error(ErrorCode::damaged_line, path_ + ": the last chunk is torn");
   }
   return false;
@@ -444,7 +444,7 @@ LineSource::Place McapLineSource::place() {
 void McapLineSource::go_to(const Place &place) {
   reader_.go_to({place.offset, place.message});
   number_ = place.number;
-  told_torn_ = false;
+  reported_torn_ = false;
 }
 
 } // namespace fingertip

@@ -51,7 +51,7 @@ private:
     std::uint16_t contact = 0, wrench = 0, place = 0, pressures = 0; /* channels */
     std::vector<float> x_mm, y_mm;
     unsigned sensors = 0;
-    std::optional<std::uint32_t> warnings; /* as last said */
+    std::optional<std::uint32_t> warnings; /* as last written */
     mcap::Pairs calibration;
   };
 
@@ -73,7 +73,7 @@ private:
   std::uint64_t number_ = 0;
   bool joint_ = false;
   std::uint8_t sensor_count_ = 0;
-  int sets_ = 0;          /* of columns that came later, as the header says */
+  int sets_ = 0;          /* of columns that came later, as in the header */
   bool has_rows_ = false; /* the header is a known one */
   std::vector<Device> devices_;
   std::uint16_t lines_ = 0, diagnostics_ = 0; /* channels */
@@ -98,9 +98,9 @@ private:
   std::uint64_t number_ = 0;
   bool joint_ = false;
   std::uint8_t sensor_count_ = 0;
-  int sets_ = 0;                                /* of columns that came later, as the header says */
+  int sets_ = 0;                                /* of columns that came later, as in the header */
   bool has_first_ = false, has_header_ = false; /* lines seen */
-  bool told_torn_ = false;
+  bool reported_torn_ = false;
 };
 
 } // namespace fingertip

@@ -1,5 +1,5 @@
 /* Files that the tools write. They replace a file only if that is allowed, and never one that is
- * being read. Errors are thrown as Error. */
+ * being read. They throw Error. */
 #pragma once
 
 #include "libfingertip/bytes.hpp"

@@ -30,7 +30,7 @@ public:
   /* Nothing at the end of the file. */
   std::optional<Item> next();
 
-  /* Where reading stands, to go back to. */
+  /* The position of reading, to go back to. */
   struct Place {
     std::optional<RecordingReader::Place> in_recording;
     std::streamoff offset = 0; /* in a capture */

@@ -1,5 +1,5 @@
-/* Columns, cells and comments of recordings, for their writers and their reader; which there are says
- * line_fields.hpp. No interface of the library. */
+/* Columns, cells and comments of recordings, for their writers and their reader; line_fields.hpp lists
+ * them. No interface of the library. */
 #pragma once
 
 #include "libfingertip/line_fields.hpp"
@@ -207,7 +207,7 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, in
     visit_contact(reader, packet, sets);
     packet.body.contact.frame = frame;
     if (packet.body.contact.flags & flags_beyond(sets)) {
-      throw Damage{"its flags tell of columns that are not there"};
+      throw Damage{"its flags need columns that are not there"};
     }
   }
   if (!is_empty(2 + contact_count, raw_count)) {

@@ -99,7 +99,7 @@ bool RecordingReader::read_next() {
     if (error.code() != ErrorCode::damaged_line) {
       throw;
     }
-    damaged(error.what(), 0); /* how many lines are lost tells the next one's number */
+    damaged(error.what(), 0); /* the next line's number shows how many lines are lost */
     return true;
   }
   auto place = [&] { return path_ + ":" + std::to_string(line.number) + ": "; };
@@ -401,7 +401,7 @@ std::vector<std::string> fingertips_in(const std::string &path) {
       }
     }
   } catch (const Error &) {
-    serials.clear(); /* who reads it will say */
+    serials.clear(); /* the reader will report it */
   }
   return serials;
 }

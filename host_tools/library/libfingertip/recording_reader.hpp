@@ -44,7 +44,7 @@ public:
   /* Nothing at the end of the file. */
   std::optional<Item> next();
 
-  /* Where reading stands, to go back to. */
+  /* The position of reading, to go back to. */
   struct Place {
     LineSource::Place in_file;
     std::uint64_t line_number = 0, skipped_lines = 0;
@@ -84,7 +84,7 @@ private:
   std::optional<LineStatistics> end_statistics_;
   Metadata recorder_metadata_;
   std::uint8_t sensor_count_ = 0;
-  int sets_ = 0;       /* of columns that came later, as the header says */
+  int sets_ = 0;       /* of columns that came later, as in the header */
   bool joint_ = false; /* of several fingertips */
   bool all_ = false;   /* of them are read */
   bool begun_ = false;

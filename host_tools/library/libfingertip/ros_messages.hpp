@@ -22,7 +22,7 @@ std::string schema_of(const std::string &name);
  * digit. */
 std::string name_in_ros(const std::string &serial);
 
-/* The latest time that a message can say, ns since 1970. */
+/* The latest time that a message can hold, ns since 1970. */
 inline constexpr std::uint64_t LATEST_ns = 2'147'483'647'000'000'000;
 
 struct Header {

@@ -54,7 +54,7 @@ ServedPort::~ServedPort() {
   ::close(fd_);
 }
 
-/* And hangs up, which only a port that was open once tells. */
+/* Opens and closes it once as well: only then does a port report a hang-up. */
 void ServedPort::make_raw() {
   const int slave = open(name_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
   termios settings;

@@ -128,7 +128,7 @@ struct Shape {
   Index x, y, z;
 };
 
-// Fields [x + nx (y + ny z)]: multiplied along one axis, and added to what is there if said.
+// Fields [x + nx (y + ny z)]: multiplied along one axis, and added to `out` if add is set.
 void along_x(const Matrix &by, const Shape &from, const Vector &in, Vector &out, bool add) {
   if (!add) {
     out.setZero(by.rows() * from.y * from.z);
@@ -259,7 +259,7 @@ private:
   Field diagonal_;
 };
 
-// From the middle (or the base) to an end, where elements are small; at the beginning too if said.
+// From the middle (or the base) to an end, where elements are small; at the beginning too if both_ends.
 std::vector<double> edges_of(double length, double element, double edge, double growth, bool both_ends) {
   std::vector<double> sizes;
   double small = 0.0;

@@ -3,7 +3,7 @@
 // layer.hpp, but the block ends.
 //
 // Betti's theorem: displace one point of the base alone. The surface's displacement at (x, y) along
-// a force is then what that point feels of the force at (x, y). So one solution for each point
+// a force is then the pressure of that point per force at (x, y). So one solution for each point
 // answers every load. The solver computes only the difference from the infinite layer: it takes the
 // stress of point_lift.hpp from the block's sides. The point itself, where all is singular, is not
 // in the equations. The remainder is smooth except at the edges along the base, where held rubber
@@ -50,7 +50,7 @@ struct BlockGrid {
   double element_mm = 8.0, element_thicknesses = 0.7, edge_thicknesses = 0.02, growth = 4.0;
 };
 
-// What a point of the base feels in the block more than in the layer without end.
+// The pressure of a point of the base in the block, less that in the layer without end.
 struct BlockAnswer {
   // Lines along x and y, equally spaced from side to side.
   int nodes_x, nodes_y;

@@ -24,9 +24,9 @@ constexpr double GAIN_SD = 0.015; // of a calibrated pad: what the readings are 
 constexpr double LEAST_SHARE = 0.5;
 
 struct Contact {
-  double x_mm, y_mm;                                         // its place
-  double qx, qy;                                             // its load, Q / F
-  double told_x_mm, told_y_mm, told_qx, told_qy, told_force; // the estimate; the last over F
+  double x_mm, y_mm;                                                                  // its place
+  double qx, qy;                                                                      // its load, Q / F
+  double estimated_x_mm, estimated_y_mm, estimated_qx, estimated_qy, estimated_force; // the estimate; the last over F
 };
 
 double of(float value) {
@@ -57,7 +57,7 @@ Prepared prepare(const pad_profile &profile, const wire_info &info) {
   Prepared made{};
   if (fit_array_init(&made.array, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
       fit_pad_init(&made.pad, &made.array, &profile) != FT_OK) {
-    throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential load is estimated on");
+    throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
   }
   return made;
 }
@@ -93,11 +93,11 @@ public:
     if (!found.valid) {
       return false;
     }
-    contact.told_x_mm = of(found.x_mm);
-    contact.told_y_mm = of(found.y_mm);
-    contact.told_qx = of(found.qx_N / found.force_N);
-    contact.told_qy = of(found.qy_N / found.force_N);
-    contact.told_force = of(found.force_N) / FORCE_N;
+    contact.estimated_x_mm = of(found.x_mm);
+    contact.estimated_y_mm = of(found.y_mm);
+    contact.estimated_qx = of(found.qx_N / found.force_N);
+    contact.estimated_qy = of(found.qy_N / found.force_N);
+    contact.estimated_force = of(found.force_N) / FORCE_N;
     return true;
   }
 
@@ -111,14 +111,14 @@ private:
 
 using Terms = Eigen::Vector3d;
 
-// Least squares of value_i = factor_i even(c) over contacts, by the place that the estimate tells.
+// Least squares of value_i = factor_i even(c) over contacts, by the estimated location.
 template <typename Factor, typename Value>
 Terms fitted(const std::vector<Contact> &contacts, const Factor &factor, const Value &value) {
   Eigen::MatrixXd rows(contacts.size(), PAD_EDGE_TERMS);
   Eigen::VectorXd right(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); i++) {
-    const double u = contacts[i].told_x_mm / of(PAD_EDGE_UNIT_mm);
-    const double v = contacts[i].told_y_mm / of(PAD_EDGE_UNIT_mm);
+    const double u = contacts[i].estimated_x_mm / of(PAD_EDGE_UNIT_mm);
+    const double v = contacts[i].estimated_y_mm / of(PAD_EDGE_UNIT_mm);
     const auto row = static_cast<Eigen::Index>(i);
     rows.row(row) = factor(contacts[i]) * Eigen::RowVector3d(1.0, u * u, v * v);
     right[row] = value(contacts[i]);
@@ -127,29 +127,29 @@ Terms fitted(const std::vector<Contact> &contacts, const Factor &factor, const V
 }
 
 double even(const Terms &c, const Contact &contact) {
-  const double u = contact.told_x_mm / of(PAD_EDGE_UNIT_mm);
-  const double v = contact.told_y_mm / of(PAD_EDGE_UNIT_mm);
+  const double u = contact.estimated_x_mm / of(PAD_EDGE_UNIT_mm);
+  const double v = contact.estimated_y_mm / of(PAD_EDGE_UNIT_mm);
   return c[0] + c[1] * u * u + c[2] * v * v;
 }
 
 // The members of a contact along one axis.
 struct Axis {
-  double Contact::*place, Contact::*told_place, Contact::*load, Contact::*told_load;
+  double Contact::*place, Contact::*estimated_place, Contact::*load, Contact::*estimated_load;
 };
-constexpr Axis ALONG_X{&Contact::x_mm, &Contact::told_x_mm, &Contact::qx, &Contact::told_qx};
-constexpr Axis ALONG_Y{&Contact::y_mm, &Contact::told_y_mm, &Contact::qy, &Contact::told_qy};
+constexpr Axis ALONG_X{&Contact::x_mm, &Contact::estimated_x_mm, &Contact::qx, &Contact::estimated_qx};
+constexpr Axis ALONG_Y{&Contact::y_mm, &Contact::estimated_y_mm, &Contact::qy, &Contact::estimated_qy};
 
 struct AxisTerms {
   Terms ratio, gain, place, pull;
 };
 
 AxisTerms terms_along(const Axis &axis, const std::vector<Contact> &free, const std::vector<Contact> &pulled) {
-  const auto lever = [&](const Contact &c) { return c.*axis.told_place / of(PAD_EDGE_UNIT_mm); };
-  const auto off = [&](const Contact &c) { return c.*axis.told_place - c.*axis.place; };
+  const auto lever = [&](const Contact &c) { return c.*axis.estimated_place / of(PAD_EDGE_UNIT_mm); };
+  const auto off = [&](const Contact &c) { return c.*axis.estimated_place - c.*axis.place; };
   AxisTerms terms;
-  terms.ratio = fitted(free, lever, [&](const Contact &c) { return c.*axis.told_load; });
+  terms.ratio = fitted(free, lever, [&](const Contact &c) { return c.*axis.estimated_load; });
   terms.place = fitted(free, lever, off);
-  const auto load = [&](const Contact &c) { return c.*axis.told_load - lever(c) * even(terms.ratio, c); };
+  const auto load = [&](const Contact &c) { return c.*axis.estimated_load - lever(c) * even(terms.ratio, c); };
   terms.gain = fitted(
       pulled, [](const Contact &) { return RATIO; }, [&](const Contact &c) { return load(c) - RATIO; });
   terms.pull = fitted(
@@ -204,13 +204,13 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
   for (const auto &some : contacts) {
     if (static_cast<double>(some.size()) < LEAST_SHARE * static_cast<double>(places)) {
       throw Error(ErrorCode::bad_value, "the rubber ends " + shortest(profile.overhang_mm) +
-                                            " mm beyond the outer sensors, too near to estimate a tangential load");
+                                            " mm beyond the outer sensors, too near to estimate a tangential force");
     }
   }
   const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);
   const AxisTerms y = terms_along(ALONG_Y, contacts[0], contacts[2]);
   const Terms force = fitted(
-      contacts[0], [](const Contact &) { return 1.0; }, [](const Contact &c) { return c.told_force - 1.0; });
+      contacts[0], [](const Contact &) { return 1.0; }, [](const Contact &c) { return c.estimated_force - 1.0; });
   pad_edges edges{};
   put(x.ratio, edges.ratio_x);
   put(y.ratio, edges.ratio_y);

@@ -1,4 +1,4 @@
-// The effect of the ends of a pad's rubber on the fingertip's estimate of tangential load, and its
+// The effect of the ends of a pad's rubber on the fingertip's estimate of tangential force, and its
 // correction: coefficients of pad_edges (firmware/common/pad_profile.h).
 //
 // The estimate assumes a layer without end. edges_of passes contacts on the pad's own block

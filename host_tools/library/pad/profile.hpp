@@ -1,5 +1,5 @@
 // How a pad's rubber spreads a press and a pull: the profile for the fingertip's estimate of
-// tangential load (firmware/common/pad_profile.h), from the pad's thickness.
+// tangential force (firmware/common/pad_profile.h), from the pad's thickness.
 //
 // The base pressure under one bonded layer is known wave by wave (pad/layer.hpp): T(H) of a press,
 // Q(H) of a pull, H = wave number times thickness. The profile has a sum of Gaussians for each,
@@ -33,7 +33,7 @@ pad_profile profile_over_own_sensors(const Shape &shape);
 // The sensors of this build, as profile_of takes them.
 wire_info own_sensors();
 
-// So little overhang that the tangential load stays doubtful even after the correction of edges_of
+// So little overhang that the tangential force stays doubtful even after the correction of edges_of
 // (pad/edges.hpp): less than half a thickness (blocks of 12 mm in the report's part shear, no real
 // pad).
 bool edges_spoil_the_zero(const Shape &shape);

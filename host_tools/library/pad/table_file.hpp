@@ -23,7 +23,7 @@ private:
   std::string key_;
 };
 
-// Where the tables of a user are kept, if not said otherwise: fingertip/contact-tables in
+// Where the tables of a user are kept, by default: fingertip/contact-tables in
 // XDG_CACHE_HOME or ~/.cache.
 std::filesystem::path default_cache_directory();
 

@@ -101,7 +101,7 @@ std::string disagreement(const Thickness &found, double set_mm) {
     return {};
   }
   return "the profile is of " + fixed(set_mm, 1) + " mm of rubber, but the calibration's width is that of " +
-         text_of(found) + ": with a wrong thickness the tangential load and the place are off, or there are none";
+         text_of(found) + ": with a wrong thickness the tangential force and the place are off, or there are none";
 }
 
 } // namespace fingertip::pad

@@ -228,8 +228,8 @@ void Hub::take_answer(Envelope packet) {
     answers_.erase(at);
   }
   if (packet.type() == WIRE_INFO) {
-    if (auto told = decoded(packet)) {
-      info_ = told->body.info;
+    if (auto info = decoded(packet)) {
+      info_ = info->body.info;
     }
   } else if (packet.type() == WIRE_HEALTH && !is_surely_the_answer) {
     for (auto &[client, state] : clients_) {

@@ -1,5 +1,5 @@
-/* One fingertip for many programs. The hub passes what its line says to the clients that it
- * concerns, and the clients' commands to its line. To each client the hub is a fingertip of its own
+/* One fingertip for many programs. The hub passes its packets to the clients that they
+ * concern, and the clients' commands to its line. To each client the hub is a fingertip of its own
  * (PROTOCOL.md). Nothing is read, written or waited for here.
  *
  * - Frames and health go to the clients that asked for them. The hub asks the fingertip for what
@@ -60,7 +60,7 @@ public:
   void took(Client client, std::size_t length);
   /* Packets that it did not take in time. */
   std::uint64_t lost(Client client) const { return clients_.at(client).lost; }
-  /* It lost so many that it has to begin again. */
+  /* It lost too many packets in a row, and has to begin again. */
   bool is_lost_for_good(Client client) const { return clients_.at(client).lost_in_a_row > MOST_LOST_IN_A_ROW; }
 
   /* As last reported by the fingertip. */

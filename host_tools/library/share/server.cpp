@@ -187,7 +187,7 @@ public:
   void step(const std::vector<pollfd> &all) {
     Hub::Time now = host_now();
     more_ = false;
-    say_farewell(now);
+    send_farewell(now);
     if (!hub_) {
       reopen(now);
       return;
@@ -212,8 +212,8 @@ private:
     Descriptor fd;
     Hub::Client client;
     std::string peer;
-    bool is_heard = false; /* it has said something, or is gone */
-    bool told_losses = false;
+    bool is_heard = false; /* it has sent something, or is gone */
+    bool reported_losses = false;
     bool over = false;
   };
   /* Its line has gone; it gets what came until then. */
@@ -232,10 +232,10 @@ private:
   }
 
   /* Not the same twice in a row. */
-  void tell(const std::string &what) {
-    if (told_ != what) {
-      told_ = what;
-      server_.tell_(what);
+  void log(const std::string &what) {
+    if (logged_ != what) {
+      logged_ = what;
+      server_.log_(what);
     }
   }
 
@@ -247,7 +247,7 @@ private:
       return;
     }
     listener_.emplace(server_.folder_, serial_, way_.port.empty() ? "" : transport_->description(), server_.group_);
-    tell(serial_ + ": shared as " + listener_->path());
+    log(serial_ + ": shared as " + listener_->path());
   }
 
   void accept_clients() {
@@ -258,7 +258,7 @@ private:
       }
       std::string peer = peer_of(fd.get());
       if (connections_.size() == MOST_CLIENTS) {
-        tell(name() + ": " + peer + " is one too many, after " + std::to_string(MOST_CLIENTS));
+        log(name() + ": " + peer + " is one too many, after " + std::to_string(MOST_CLIENTS));
         continue;
       }
       connections_.push_back({std::move(fd), hub_->join(), std::move(peer)});
@@ -284,7 +284,7 @@ private:
   void drop_those_over() {
     for (Connection &each : connections_) {
       if (each.over) {
-        tell_losses(each, true);
+        report_losses(each, true);
         hub_->leave(each.client);
       }
     }
@@ -293,20 +293,20 @@ private:
         connections_.end());
   }
 
-  void tell_losses(Connection &connection, bool finally) {
+  void report_losses(Connection &connection, bool finally) {
     std::uint64_t lost = hub_->lost(connection.client);
     if (lost > 0 && finally) {
-      tell(name() + ": " + connection.peer + " lost " + std::to_string(lost) + " packets that it did not read in time");
-    } else if (lost > 0 && !connection.told_losses) {
-      connection.told_losses = true;
-      tell(name() + ": " + connection.peer + " does not read in time and loses packets");
+      log(name() + ": " + connection.peer + " lost " + std::to_string(lost) + " packets that it did not read in time");
+    } else if (lost > 0 && !connection.reported_losses) {
+      connection.reported_losses = true;
+      log(name() + ": " + connection.peer + " does not read in time and loses packets");
     }
   }
 
   /* Whether anything was written: reading may have something then. */
   bool flush_line() {
     if (hub_->take_loader_wish() && transport_->ask_loader()) {
-      tell(name() + ": asked into its loader");
+      log(name() + ": asked into its loader");
     }
     Bytes bytes = hub_->take_for_line();
     if (!bytes.empty()) {
@@ -333,9 +333,9 @@ private:
   }
 
   void lose_line() {
-    tell(name() + ": gone, its clients wait for it");
+    log(name() + ": gone, its clients wait for it");
     for (Connection &each : connections_) {
-      tell_losses(each, true);
+      report_losses(each, true);
       std::size_t length = 0;
       const std::uint8_t *bytes = hub_->waiting(each.client, &length);
       leaving_.push_back({std::move(each.fd), Bytes(bytes, bytes + length), host_now() + LAST_PACKETS});
@@ -343,10 +343,10 @@ private:
     connections_.clear();
     listener_.reset();
     hub_.reset();
-    say_farewell(host_now());
+    send_farewell(host_now());
   }
 
-  void say_farewell(Hub::Time now) {
+  void send_farewell(Hub::Time now) {
     for (Leaving &each : leaving_) {
       auto sent = send_now(each.fd.get(), each.rest.data(), each.rest.size());
       auto taken = static_cast<std::ptrdiff_t>(sent.value_or(each.rest.size()));
@@ -369,7 +369,7 @@ private:
       }
     } catch (const Error &error) {
       hub_.reset();
-      tell(error.what());
+      log(error.what());
     }
   }
 
@@ -380,7 +380,7 @@ private:
       auto sent = send_now(each.fd.get(), bytes, length);
       each.over = !sent || hub_->is_lost_for_good(each.client);
       hub_->took(each.client, sent.value_or(0));
-      tell_losses(each, false);
+      report_losses(each, false);
     }
     drop_those_over();
   }
@@ -395,12 +395,11 @@ private:
   std::size_t connections_at_ = 0; /* among what is waited for */
   std::vector<Leaving> leaving_;
   Hub::Time reopen_at_{};
-  std::string told_; /* last */
+  std::string logged_; /* last */
   bool more_ = false;
 };
 
-Server::Server(const Options &options, Tell tell)
-    : folder_(options.folder), group_(options.group), tell_(std::move(tell)) {
+Server::Server(const Options &options, Log log) : folder_(options.folder), group_(options.group), log_(std::move(log)) {
   struct stat status;
   bool made = mkdir(folder_.c_str(), FOLDER_MODE) == 0;
   if ((!made && errno != EEXIST) || lstat(folder_.c_str(), &status) != 0) {

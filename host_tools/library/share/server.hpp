@@ -6,7 +6,7 @@
  *     server.step(500ms);
  *   }
  *
- * It has one thread, which sleeps in poll(2) until a line or a client has something to say. A
+ * It has one thread, which sleeps in poll(2) until a line or a client sends something. A
  * signal wakes it. A socket exists while its fingertip is there. When the fingertip goes, its
  * clients get all packets until then and the end of their connections, as if their own port had
  * vanished. */
@@ -32,10 +32,10 @@ public:
     std::optional<gid_t> group; /* who may connect beside this user; else this process's */
   };
   /* What happens, as lines for people. */
-  using Tell = std::function<void(const std::string &)>;
+  using Log = std::function<void(const std::string &)>;
 
   /* Throws Error if the folder cannot be. */
-  Server(const Options &options, Tell tell);
+  Server(const Options &options, Log log);
   /* The fingertips' streams end, the sockets go. */
   ~Server();
   Server(const Server &) = delete;
@@ -56,7 +56,7 @@ private:
 
   std::string folder_;
   std::optional<gid_t> group_;
-  Tell tell_;
+  Log log_;
   std::vector<std::unique_ptr<Station>> stations_;
 };
 
