@@ -122,13 +122,13 @@ std::string gripper_advice(ErrorCode code) {
   }
 }
 
-std::string told(const Error &error) {
+std::string error_text(const Error &error) {
   std::string what_to_do = advice(error.code());
   return printable(error.what() + (what_to_do.empty() ? "" : "; " + what_to_do));
 }
 
-void tell(const char *program, const Error &error) {
-  std::fprintf(stderr, "%s: %s\n", program, told(error).c_str());
+void print_error(const char *program, const Error &error) {
+  std::fprintf(stderr, "%s: %s\n", program, error_text(error).c_str());
 }
 
 } // namespace fingertip

@@ -1,4 +1,4 @@
-/* What the command line tools say to their users beyond the library's facts, in one place. */
+/* The messages that the command line tools add to the library's errors. */
 #pragma once
 
 #include "libfingertip/error.hpp"
@@ -7,17 +7,17 @@
 
 namespace fingertip {
 
-/* For the end of a sentence, of an error of this kind; "" where its text says all. */
+/* The end of a sentence about an error of this kind: what to do; "" if its text is enough. */
 std::string advice(ErrorCode code);
 
 /* The same for a gripper's line. */
 std::string gripper_advice(ErrorCode code);
 
 /* One line, harmless to a terminal: what is wrong; what to do. */
-std::string told(const Error &error);
+std::string error_text(const Error &error);
 
 /* "NAME: what is wrong; what to do" on standard error. */
-void tell(const char *program, const Error &error);
+void print_error(const char *program, const Error &error);
 
 /* While something streams: it is waited for. */
 inline constexpr const char *GONE_ADVICE = "gone, plug it in again";

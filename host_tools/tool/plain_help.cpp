@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t HELP_COLUMNS = 80;
 
-/* Lines of at most this many characters, broken at blanks; all but the first begin with so many. */
+/* Lines of at most this many characters, broken at blanks; all but the first are indented. */
 std::string wrapped(const std::string &line, std::size_t columns, std::size_t indent) {
   std::string text = line;
   std::string lines;
@@ -36,7 +36,7 @@ std::string wrapped(const std::string &line, std::size_t columns, std::size_t in
   return lines + text;
 }
 
-/* What CLI11 says of a value: "GRAMS:FLOAT in [50 - 2000]", "TEXT:{csv,mcap}", "FILE.csv". */
+/* CLI11's description of a value: "GRAMS:FLOAT in [50 - 2000]", "TEXT:{csv,mcap}", "FILE.csv". */
 struct Values {
   std::string word, unit, allowed; /* GRAMS, grams, "50 to 2000"; or empty */
 };
@@ -139,7 +139,7 @@ std::string refused_value(const std::string &text) {
   return after.substr(0, after.find(" not in "));
 }
 
-/* What CLI11 says, as people say it. */
+/* CLI11's message, in plain words. */
 std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
   std::string text = error.what();
   std::string kind = error.get_name();
@@ -147,7 +147,7 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
     return text.substr(0, text.find(':')) + " is given twice; give it once";
   }
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {
-    /* Its name is the command's. It tells the words from the last to the first. */
+    /* Its name is the command's. It lists the words from the last to the first. */
     const std::string first = text.substr(text.rfind(' ') + 1);
     return "\"" + first + (first[0] == '-' ? "\" is no option of it" : "\" is one word too many");
   }

@@ -1,4 +1,4 @@
-/* Help and wrong usage as all programs of the tool say them. */
+/* Help and wrong usage, as all programs of the tool print them. */
 #pragma once
 
 namespace CLI {

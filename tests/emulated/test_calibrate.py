@@ -87,7 +87,7 @@ class Calibrate(unittest.TestCase):
 
         process = self.start()
         said = self.tool("calibrate", "--force", FORCE_N, "--yes", "--colour", "plain")
-        self.assertIn("calibrated: it acts from now on", said)
+        self.assertIn("calibrated: it applies from now on", said)
         before_mm, after_mm = map(float, re.search(r"location off by +([\d.]+) mm +([\d.]+) mm", said).groups())
         self.assertGreater(before_mm, 0.3)
         self.assertLess(after_mm, 0.15)

@@ -127,7 +127,7 @@ class Doctor(unittest.TestCase):
         text = self.only(self.examine(port, "--elf", self.elf(board)), "crash", "bad")["text"]
         self.assertRegex(
             text,
-            r"^the watchdog struck: the main loop stood still; the processor was at scan_take\+0x0 \(0x2000[0-9a-f]{4}\), called "
+            r"^the watchdog struck: the main loop made no progress; the processor was at scan_take\+0x0 \(0x2000[0-9a-f]{4}\), called "
             r"from app_run\+0x[0-9a-f]+ \(.*\), in the main loop, taking readings, [01]\.[0-9]. s after its start; before that: ",
         )
         self.assertEqual(self.result["crash"]["place"], "scan_take+0x0")

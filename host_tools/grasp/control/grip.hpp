@@ -9,7 +9,7 @@
 //   }
 //
 // Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds
-// an object of unknown weight by its load: grip force = margin x tangential load / friction. The
+// an object of unknown weight by its load: grip force = margin x tangential force / friction. The
 // grip rises at once where the object slides, and falls slowly while it rests. CONTROL.md has the
 // reasons.
 //

@@ -44,7 +44,7 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
     }
     if (o.held) {
       margin.push_back(o.margin);
-      told.push_back(o.force_told);
+      told.push_back(o.force_reported);
       taken.push_back(o.force_taken);
       slid_mm.push_back(o.slid_mm);
       if (!one->scene.disturbances.empty()) {
@@ -197,8 +197,8 @@ ordered_json trace_of(const Set &set, std::uint64_t n) {
     add("turned_rad", m.turned_rad);
     add("friction", m.friction);
     add("slips", m.slips ? 1.0 : 0.0);
-    add("felt_N", m.felt_N);
-    add("felt_load_N", m.felt_load_N);
+    add("felt_N", m.sensed_N);
+    add("felt_load_N", m.sensed_load_N);
     add("wanted_N", m.wanted_N);
     add("state", m.state);
     add("trouble", m.trouble);

@@ -27,7 +27,7 @@ Cell::Cell(const Face &face, const Object &object, const Grasp &grasp)
       bundles_{Bundle(object.friction * (1.0 + object.uneven_friction), object.kinetic_share),
                Bundle(object.friction * (1.0 - object.uneven_friction), object.kinetic_share)},
       strength_(twin::relaxation_strengths(grasp.relaxation)), com_mm_(object.com_mm), mass_kg_(object.mass_kg),
-      stands_mm_(object.mass_kg * GRAVITY_m_s2 / (2.0 * TABLE_N_mm)) {
+      table_mm_(object.mass_kg * GRAVITY_m_s2 / (2.0 * TABLE_N_mm)) {
   // The squeeze over the force is the known direction.
   const double gives = 1.0 / grasp.fingers_N_mm + 1.0 / object.stiffness_N_mm;
   const auto squeezed = [&](double force_N) { return 2.0 * face_.indentation_mm(force_N) + gives * force_N; };
@@ -100,7 +100,7 @@ Wrench Cell::table(const Drive &drive) {
     const Vector now = turned(foot, turn_rad_);
     const Vector moved{com_mm_.x - object_.com_mm.x + now.x - foot.x, com_mm_.y - object_.com_mm.y + now.y - foot.y};
     const Vector speed{com_mm_s_.x - turning_ * now.y, com_mm_s_.y + turning_ * now.x};
-    const double depth_mm = stands_mm_ + moved.dot(down_) - drive.lifted_mm;
+    const double depth_mm = table_mm_ + moved.dot(down_) - drive.lifted_mm;
     const double closing_mm_s = speed.dot(down_) - drive.lift_mm_s;
     if (depth_mm <= 0.0) {
       continue;
@@ -130,19 +130,19 @@ void Cell::step(double seconds, const Drive &drive) {
     held.y_N += one.y_N;
     held.turn_Nmm += one.turn_Nmm;
   }
-  const Wrench stands = table(drive);
+  const Wrench feet = table(drive);
   const Vector outer_N{mass_kg_ * (GRAVITY_m_s2 * down_.x - drive.hand_m_s2.x) + drive.knock_N.x,
                        mass_kg_ * (GRAVITY_m_s2 * down_.y - drive.hand_m_s2.y) + drive.knock_N.y};
   const Vector to_com = arm();
   const double inertia_kg_mm2 = mass_kg_ * object_.gyration_mm * object_.gyration_mm;
-  const double torque_Nmm = held.turn_Nmm + stands.turn_Nmm - (to_com.x * held.y_N - to_com.y * held.x_N);
+  const double torque_Nmm = held.turn_Nmm + feet.turn_Nmm - (to_com.x * held.y_N - to_com.y * held.x_N);
   const Vector before = com_mm_s_;
-  com_mm_s_.x += PER_M * (outer_N.x + held.x_N + stands.x_N) / mass_kg_ * seconds;
-  com_mm_s_.y += PER_M * (outer_N.y + held.y_N + stands.y_N) / mass_kg_ * seconds;
+  com_mm_s_.x += PER_M * (outer_N.x + held.x_N + feet.x_N) / mass_kg_ * seconds;
+  com_mm_s_.y += PER_M * (outer_N.y + held.y_N + feet.y_N) / mass_kg_ * seconds;
   turning_ += PER_M * torque_Nmm / inertia_kg_mm2 * seconds;
   const Vector mean{0.5 * (before.x + com_mm_s_.x), 0.5 * (before.y + com_mm_s_.y)};
   work_mJ_ += outer_N.dot(mean) * seconds;
-  table_lost_mJ_ -= (stands.x_N * mean.x + stands.y_N * mean.y + stands.turn_Nmm * turning_) * seconds;
+  table_lost_mJ_ -= (feet.x_N * mean.x + feet.y_N * mean.y + feet.turn_Nmm * turning_) * seconds;
   com_mm_.x += com_mm_s_.x * seconds;
   com_mm_.y += com_mm_s_.y * seconds;
   turn_rad_ += turning_ * seconds;

@@ -7,12 +7,12 @@
 //
 // Grip. Both pads and whatever else gives are springs in a row, so both carry the same force F:
 //   2 indentation(F) + F / compliance = object's width - gripper's width
-// less what the rubber relaxes: the Prony series of simulation/twin/effects.hpp acts on the force, since a
+// less what the rubber relaxes: the Prony series of simulation/twin/effects.hpp applies to the force, since a
 // gripper holds its position. The rubber's width is that between its faces when nothing presses.
 //
 // Object. A rigid body in the plane, gravity and what the hand's acceleration adds at its centre of
 // mass, which need not lie on the grasp's axis: then it turns there against both contacts
-// (bundle.hpp). On the table it stands on two feet, each a stiff spring with a damper that only
+// (bundle.hpp). On the table it has two feet, each a stiff spring with a damper that only
 // pushes. Contacts go along with the object over the pads.
 //
 // Checked by tests: static force against width, slip at mu, free fall, torque against closed forms,
@@ -42,7 +42,7 @@ struct Object {
   double width_mm = 40.0, mass_kg = 0.3;
   double friction = 0.5, kinetic_share = 0.8;
   double uneven_friction = 0.0;                                    // fingertip 0 has 1 + this of it, the other 1 - this
-  Vector com_mm;                                                   // centre of mass from the grasp's axis, as it stands
+  Vector com_mm;                                                   // centre of mass from the grasp's axis, on the table
   double gyration_mm = 25.0;                                       // radius of gyration about it
   double base_mm = 40.0;                                           // between its feet
   double stiffness_N_mm = std::numeric_limits<double>::infinity(); // when squeezed
@@ -61,7 +61,7 @@ struct Grasp {
   double fingers_N_mm = 50.0; // both fingers' own stiffness in a row; assumed
 };
 
-// What acts from outside, in the hand's frame.
+// External inputs, in the hand's frame.
 struct Drive {
   double width_mm = 100.0; // of the gripper
   Vector hand_m_s2;        // acceleration of the hand
@@ -80,13 +80,13 @@ public:
   // face must outlive it.
   Cell(const Face &face, const Object &object, const Grasp &grasp);
 
-  // Goes on by so much, in steps of its own.
+  // Advances by this time, in steps of its own.
   void run(double seconds, const Drive &drive);
 
   double force_N() const { return force_N_; }
   // What the gripper at this width would have to press against now.
   double force_at_N(double width_mm) const;
-  // As fingertip 0 or 1 feels it, in its own x and y.
+  // The touch of fingertip 0 or 1, in its own x and y.
   twin::Touch touch(std::size_t finger) const;
 
   Vector way_mm() const; // of the grasped point, from where it was touched
@@ -130,7 +130,7 @@ private:
   Vector speed_; // of the grasped point
   double turn_rad_ = 0.0, turning_ = 0.0;
   double mass_kg_;
-  double stands_mm_; // how deep the feet press the table by its weight
+  double table_mm_; // depth of the feet in the table under its weight
   double table_N_ = 0.0;
   double slid_mm_ = 0.0, work_mJ_ = 0.0, table_lost_mJ_ = 0.0;
 };

@@ -71,9 +71,7 @@ int main(int argc, char **argv) {
   app.add_option("--line", options.trouble.fault, "What befalls each answer")
       ->type_name("FAULT")
       ->transform(CLI::CheckedTransformer(faults));
-  app.add_option("--late", options.late_ms, "Answers come so much later")
-      ->type_name("MS")
-      ->check(CLI::NonNegativeNumber);
+  app.add_option("--late", options.late_ms, "Delay of the answers")->type_name("MS")->check(CLI::NonNegativeNumber);
   app.add_option("--latency-timer", options.latency_timer_ms, "Of its USB adapter: 16 is usual")
       ->type_name("MS")
       ->check(CLI::NonNegativeNumber);
@@ -89,7 +87,7 @@ int main(int argc, char **argv) {
   try {
     return serve(options);
   } catch (const Error &error) {
-    tell("fingertip_cell_gripper", error);
+    print_error("fingertip_cell_gripper", error);
     return 1;
   }
 }

@@ -30,7 +30,7 @@ public:
     double measured_us, arrived_us;
     GripTouch touch;
   };
-  // Bytes that came at arrived_us and are looked at now; calls the handler for each frame. Throws
+  // Decodes bytes that came at arrived_us; calls the handler for each frame. Throws
   // std::runtime_error where a command is refused.
   template <typename Handler>
   void take(const std::uint8_t *bytes, std::size_t length, double arrived_us, std::int64_t now_us,

@@ -18,7 +18,7 @@ using nlohmann::ordered_json;
 enum Stream : std::uint64_t { LINE = 841 };
 
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
-constexpr double MOVES_s = 2.5e-4; // between two looks at the gripper
+constexpr double MOVES_s = 2.5e-4; // between two samples of the gripper
 constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
 constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
@@ -35,14 +35,14 @@ ordered_json to_us(double s) {
 
 CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
   CalibratedRubber rubber{};
-  rubber.told.placements = 20;
-  rubber.told.force_scale = 1.0F / profile.force_ratio;
-  rubber.told.force_scale_sd = static_cast<float>(FORCE_SCALE_SD);
+  rubber.stored.placements = 20;
+  rubber.stored.force_scale = 1.0F / profile.force_ratio;
+  rubber.stored.force_scale_sd = static_cast<float>(FORCE_SCALE_SD);
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
     rubber.gain[k] = gain;
-    rubber.told.sensors[k].gain = static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
-    rubber.told.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
+    rubber.stored.sensors[k].gain = static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
+    rubber.stored.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
   }
   return rubber;
 }
@@ -50,8 +50,8 @@ CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
 Rubber rubber_after(const CalibratedRubber &rubber) {
   Rubber left;
   for (std::size_t k = 0; k < SENSORS; k++) {
-    left.gain[k] = rubber.gain[k] / static_cast<double>(rubber.told.sensors[k].gain);
-    left.gain_sd[k] = static_cast<double>(rubber.told.sensors[k].gain_sd);
+    left.gain[k] = rubber.gain[k] / static_cast<double>(rubber.stored.sensors[k].gain);
+    left.gain_sd[k] = static_cast<double>(rubber.stored.sensors[k].gain_sd);
   }
   return left;
 }
@@ -59,7 +59,7 @@ Rubber rubber_after(const CalibratedRubber &rubber) {
 EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
     : trial_(trial), face_(face), cell_(face, trial.scene.object, trial.scene.grasp),
       gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm, Random(trial.seed, LINE, 0)),
-      fingers_{EmulatedFingertip(profile, trial.rubber[0].told), EmulatedFingertip(profile, trial.rubber[1].told)},
+      fingers_{EmulatedFingertip(profile, trial.rubber[0].stored), EmulatedFingertip(profile, trial.rubber[1].stored)},
       holds_s_(NEVER_s), lift_s_(NEVER_s), touched_s_(NEVER_s) {
   gripper_.press(cell_);
 }
@@ -72,8 +72,8 @@ void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::siz
         }
         const GripTouch &touch = frame.touch;
         controller_->take_touch(finger, touch);
-        told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us, finger,
-                         (touch.flags & CONTACT_FLAG_SLIDING) != 0, std::hypot(touch.qx_N, touch.qy_N)});
+        reports_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us, finger,
+                            (touch.flags & CONTACT_FLAG_SLIDING) != 0, std::hypot(touch.qx_N, touch.qy_N)});
         frames_[finger]++;
         loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
         step_controller();
@@ -159,26 +159,26 @@ std::vector<std::uint8_t> EmulatedGrasp::to_send(std::size_t finger) {
   return fingers_[finger].to_send(std::llround(1e6 * t_s_));
 }
 
-Pressures EmulatedGrasp::felt_Pa(std::size_t finger) const {
-  Pressures felt_Pa = face_.base_Pa(cell_.touch(finger), trial_.tangential);
+Pressures EmulatedGrasp::sensed_Pa(std::size_t finger) const {
+  Pressures sensed_Pa = face_.base_Pa(cell_.touch(finger), trial_.tangential);
   for (std::size_t k = 0; k < SENSORS; k++) {
-    felt_Pa[k] *= trial_.rubber[finger].gain[k];
+    sensed_Pa[k] *= trial_.rubber[finger].gain[k];
   }
-  return felt_Pa;
+  return sensed_Pa;
 }
 
 ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
   std::array<double, 2> load_N{};
-  const Told *first = nullptr;
-  for (const Told &told : told_) {
-    if (told.arrived_s < slip.begin_s) {
-      load_N[told.finger] = told.load_N;
-    } else if (told.slides || told.load_N > MORE_LOAD * load_N[told.finger] + MORE_LOAD_N) {
-      first = &told;
+  const Report *first = nullptr;
+  for (const Report &report : reports_) {
+    if (report.arrived_s < slip.begin_s) {
+      load_N[report.finger] = report.load_N;
+    } else if (report.slides || report.load_N > MORE_LOAD * load_N[report.finger] + MORE_LOAD_N) {
+      first = &report;
       break;
     }
   }
-  // The first step that closes further than what stood before.
+  // The first step that closes further than the width before it.
   const auto closed = [&](const std::vector<Change> &changes) {
     double width_mm = NEVER_s;
     for (const Change &change : changes) {
@@ -202,7 +202,7 @@ ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
   return out;
 }
 
-ordered_json EmulatedGrasp::tell() const {
+ordered_json EmulatedGrasp::summary() const {
   ordered_json out;
   out["held"] = !dropped_;
   out["dropped"] = dropped_;
@@ -220,7 +220,7 @@ ordered_json EmulatedGrasp::tell() const {
   for (std::size_t f = 0; f < fingers_.size(); f++) {
     ordered_json one;
     one["frames"] = frames_[f];
-    one["loads"] = loads_[f]; // frames that tell one
+    one["loads"] = loads_[f]; // frames that report one
     one["lost_packets"] = fingers_[f].line().dropped_packets;
     one["damaged_packets"] = fingers_[f].line().crc_errors + fingers_[f].line().format_errors;
     one["clock_uncertainty_us"] = fingers_[f].clock_uncertainty_us();

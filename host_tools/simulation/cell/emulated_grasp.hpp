@@ -16,20 +16,20 @@
 
 namespace fingertip::cell {
 
-// A pad's sensors as they are and as its calibration has them.
+// The gains of a pad's sensors: the true ones and the calibration.
 struct CalibratedRubber {
   Pressures gain;
-  calibration told;
+  calibration stored;
 };
 // Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
 CalibratedRubber draw_rubber(const pad_profile &profile, Random &random);
-// What is left of it, for felt fingers.
+// The gains that are left after it, for SimulatedFingertip.
 Rubber rubber_after(const CalibratedRubber &rubber);
 
 struct EmulatedTrial {
   Scene scene;
   GripperMechanics gripper;
-  double tangential = 1.0; // share of a pull's field that acts on the readings
+  double tangential = 1.0; // share of a tangential force's field that reaches the readings
   std::array<CalibratedRubber, 2> rubber;
   std::uint64_t seed = 0; // of the gripper's first exchange
 };
@@ -44,8 +44,8 @@ public:
   // To the end of the next slice.
   void run(double until_s);
   std::vector<std::uint8_t> to_send(std::size_t finger);
-  // Now.
-  Pressures felt_Pa(std::size_t finger) const;
+  // The present pressures of the sensors.
+  Pressures sensed_Pa(std::size_t finger) const;
   bool over() const { return over_; }
 
   // What happened, and when, of the first slip after the lift:
@@ -53,11 +53,11 @@ public:
   //   by ms after it: measured_ms the first frame that reported it, sent_ms the packet that left its
   //   chip whole, answered_ms the controller's command, asked_ms on the gripper's line, moved_ms
   //   the fingers, reaction_ms 5 % more force; null: never
-  // told_by: "SLIDING", or "load", that of a fingertip a tenth and 0.1 N above what it was.
-  nlohmann::ordered_json tell() const;
+  // told_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
+  nlohmann::ordered_json summary() const;
 
 private:
-  struct Told {
+  struct Report {
     double arrived_s, measured_s;
     std::size_t finger;
     bool slides;
@@ -76,7 +76,7 @@ private:
   GripperLine gripper_;
   std::array<EmulatedFingertip, 2> fingers_;
   std::unique_ptr<CoreController> controller_; // none before both are ready
-  std::deque<GripperLine::Said> line_;
+  std::deque<GripperLine::Answer> line_;
   GripCommand command_{};
   GripReport report_{};
   Slips slips_;
@@ -85,7 +85,7 @@ private:
   std::uint32_t trouble_ = 0;
   bool over_ = false, dropped_ = false;
   std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready
-  std::vector<Told> told_;
+  std::vector<Report> reports_;
   std::vector<Change> commanded_, asked_, moved_;
 };
 

@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 
 constexpr double LAYER_mm = 12.0;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
-constexpr int FELT_TRIALS = 21;
+constexpr int SENSED_TRIALS = 21;
 enum Stream : std::uint64_t { PAD = 842 };
 
 struct Options {
@@ -76,12 +76,12 @@ void put_u32(std::size_t value) {
 }
 
 // The same with the cell's own model of fingertips, at other moments of sensors and line.
-ordered_json felt(const EmulatedTrial &emulated, const Face &face) {
+ordered_json simulated(const EmulatedTrial &emulated, const Face &face) {
   std::vector<double> reactions_ms, slid_mm;
   const GripperTraits &traits = emulated.gripper.traits;
   const GripSettings settings = default_settings(traits);
   int drops = 0;
-  for (int n = 0; n < FELT_TRIALS; n++) {
+  for (int n = 0; n < SENSED_TRIALS; n++) {
     Trial trial;
     trial.scene = emulated.scene;
     trial.gripper = emulated.gripper;
@@ -104,7 +104,7 @@ ordered_json felt(const EmulatedTrial &emulated, const Face &face) {
                           : ordered_json{values.front(), values[values.size() / 2], values.back()};
   };
   ordered_json out;
-  out["grasps"] = FELT_TRIALS;
+  out["grasps"] = SENSED_TRIALS;
   out["dropped"] = drops;
   out["reaction_least_median_most_ms"] = spread(reactions_ms);
   out["slid_least_median_most_mm"] = spread(slid_mm);
@@ -143,8 +143,8 @@ int serve(const Options &options) {
     grasp.run(t_s + 1e-6 * options.slice_us);
     put_u32(grasp.over());
     for (std::size_t f = 0; !grasp.over() && f < sent.size(); f++) {
-      const Pressures felt_Pa = grasp.felt_Pa(f);
-      put(felt_Pa.data(), sizeof felt_Pa);
+      const Pressures sensed_Pa = grasp.sensed_Pa(f);
+      put(sensed_Pa.data(), sizeof sensed_Pa);
       put_u32(sent[f].size());
       put(sent[f].data(), sent[f].size());
     }
@@ -156,8 +156,8 @@ int serve(const Options &options) {
   out["mass_kg"] = trial.scene.object.mass_kg;
   out["friction"] = trial.scene.object.friction;
   out["friction_falls"] = options.friction_falls;
-  out.update(grasp.tell());
-  out["felt"] = felt(trial, face);
+  out.update(grasp.summary());
+  out["felt"] = simulated(trial, face);
   const std::string text = out.dump();
   put(text.data(), text.size());
   return std::fflush(stdout) == 0 ? 0 : 1;

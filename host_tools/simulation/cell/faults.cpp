@@ -14,17 +14,18 @@ constexpr double LIES_mm = 10.0; // about where it touches
 
 } // namespace
 
-void Faults::look(double t_s, std::uint8_t state) {
+void Faults::watch(double t_s, std::uint8_t state) {
   if (state == fault_.state && std::isinf(begins_s_)) {
     begins_s_ = t_s + fault_.after_s;
   }
 }
 
-std::optional<FeltFinger::Frame> Faults::frame(std::size_t finger, const FeltFinger::Frame &felt, double t_s) {
+std::optional<SimulatedFingertip::Frame> Faults::frame(std::size_t finger, const SimulatedFingertip::Frame &measured,
+                                                       double t_s) {
   using Kind = Fault::Kind;
-  FeltFinger::Frame frame = felt;
+  SimulatedFingertip::Frame frame = measured;
   if (!lasts(t_s) || !fault_.fingers[finger]) {
-    last_[finger] = felt.touch;
+    last_[finger] = measured.touch;
     return frame;
   }
   GripTouch &touch = frame.touch;

@@ -1,4 +1,4 @@
-// What fails in a trial, from a moment on: fingertips, the gripper, its line, the object.
+// The faults of a trial: of fingertips, the gripper, its line, the object.
 #pragma once
 
 #include "simulation/cell/gripper_line.hpp"
@@ -12,23 +12,23 @@ namespace fingertip::cell {
 struct Fault {
   enum class Kind {
     none,
-    gone,          // no frames
-    frozen,        // readings stay, so every frame is the last one
-    uncertain,     // UNCERTAIN: location and load are anything, the force is half where one lies
-    saturated,     // SATURATED and FORCE_LOWER_BOUND: half the force
-    silent,        // neither commands nor answers come through
-    garbage,       // half of the commands do
-    unanswered,    // all commands do
-    noisy,         // half of the commands, half of the answers
+    gone,          // no frames arrive
+    frozen,        // the readings do not change, so every frame is the last one
+    uncertain,     // UNCERTAIN: location and load are random; the force is halved if only one fingertip has it
+    saturated,     // SATURATED and FORCE_LOWER_BOUND: the force is halved
+    silent,        // neither commands nor answers arrive
+    garbage,       // half of the commands arrive, no answer does
+    unanswered,    // all commands arrive, no answer does
+    noisy,         // half of the commands and half of the answers arrive
     late,          // answers come 30 ms late, and the line waits for them
     latency_timer, // answers come at the end of 16 ms, and the line waits for them
     fault,         // 9: the gripper stops and takes no moves
-    power,         // was lost and is back: not active
-    taken,         // nothing is between the fingers any more
+    power,         // power was lost and is back: the gripper is not active
+    taken,         // the object is taken away
   };
   Kind kind = Kind::none;
   std::array<bool, 2> fingers{}; // of which fingertips
-  // Begins so long after the controller first said this state, lasts so long, is watched so long.
+  // The fault begins after_s after the controller first reported this state.
   std::uint8_t state = GRIP_HOLDING;
   double after_s = 0.0, lasts_s = std::numeric_limits<double>::infinity(), watched_s = 2.0;
 };
@@ -38,14 +38,15 @@ public:
   Faults(const Fault &fault, Random random) : fault_(fault), random_(random) {}
 
   // After each step of the controller.
-  void look(double t_s, std::uint8_t state);
+  void watch(double t_s, std::uint8_t state);
   const Fault &fault() const { return fault_; }
   bool has_begun(double t_s) const { return t_s >= begins_s_; }
   double begins_s() const { return begins_s_; } // infinity: not known yet
   bool is(Fault::Kind kind, double t_s) const { return fault_.kind == kind && lasts(t_s); }
 
-  // What comes of a frame; none: nothing.
-  std::optional<FeltFinger::Frame> frame(std::size_t finger, const FeltFinger::Frame &felt, double t_s);
+  // The frame that arrives, if any.
+  std::optional<SimulatedFingertip::Frame> frame(std::size_t finger, const SimulatedFingertip::Frame &measured,
+                                                 double t_s);
   struct Line {
     bool commands = true, answers = true; // come through
     double late_s = 0.0;                  // the answer, and what is asked next

@@ -48,7 +48,7 @@ void FeetechSlave::lose_power() {
 }
 
 void FeetechSlave::refresh() {
-  put(PRESENT_POSITION, static_cast<int>(std::lround(jaw_.count(motion_.told_width_mm()))));
+  put(PRESENT_POSITION, static_cast<int>(std::lround(jaw_.count(motion_.reported_width_mm()))));
   const double effort = motion_.effort();
   const bool down = (effort < 0) == (jaw_.open_count() > jaw_.closed_count());
   put(PRESENT_LOAD, static_cast<int>(std::lround(std::abs(effort) * 1000)) | (down && effort != 0 ? LOAD_SIGN : 0));
@@ -125,7 +125,7 @@ std::optional<Packet> FeetechSlave::answer(const Packet &question) {
       waiting_.clear();
     }
     break;
-  case SYNC_WRITE: // address, length, then of each servo its id and so many bytes
+  case SYNC_WRITE: // address, length, then of each servo its id and its bytes
     for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size(); at += given[1] + 1u) {
       if (given[at] == id_) {
         write(given[0], given.data() + at + 1, given[1]);

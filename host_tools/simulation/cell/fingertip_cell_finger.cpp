@@ -100,16 +100,16 @@ private:
 
   void calibrate(double sd) {
     Random random(finger_.seed, CALIBRATION, 0);
-    calibration told{};
-    told.date_s = 1767225600;
-    told.placements = 20;
-    told.force_scale = 1.0F / pad_.force_ratio;
-    told.force_scale_sd = FORCE_SCALE_SD;
+    calibration stored{};
+    stored.date_s = 1767225600;
+    stored.placements = 20;
+    stored.force_scale = 1.0F / pad_.force_ratio;
+    stored.force_scale_sd = FORCE_SCALE_SD;
     for (std::size_t k = 0; k < SENSORS; k++) {
-      told.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd), 0,
-                         0, 0};
+      stored.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd),
+                           0, 0, 0};
     }
-    order(command_calibrate(told, SENSORS));
+    order(command_calibrate(stored, SENSORS));
   }
 
   void order(const wire_packet &command) {
@@ -270,9 +270,9 @@ pid_t start_finger(const FingerProcess &finger, SharedPressures &pressures) {
   try {
     Fingertip(finger, pressures).run();
   } catch (const Error &error) {
-    tell("fingertip", error);
+    print_error("fingertip", error);
   } catch (const std::exception &error) {
-    tell("fingertip", Error(error.what()));
+    print_error("fingertip", Error(error.what()));
   }
   std::_Exit(1);
 }

@@ -33,7 +33,7 @@ public:
   std::atomic<std::int64_t> reached_us{0};
   // Host time at which its own clock was 0.
   std::atomic<std::int64_t> zero_us{0};
-  // It stands, as a process that is stopped.
+  // The process is stopped.
   std::atomic<bool> frozen{false};
 
 private:

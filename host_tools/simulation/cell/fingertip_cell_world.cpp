@@ -12,8 +12,8 @@ namespace {
 
 using Disturbs = Disturbance::Kind;
 
-constexpr double STEP_s = 2.5e-4;                    // between two looks at the gripper
-constexpr double STANDS = 0.1, STANDS_LEAST_N = 0.2; // a force that changes by no more, stands
+constexpr double STEP_s = 2.5e-4;                    // between two samples of the gripper
+constexpr double STEADY = 0.1, STEADY_LEAST_N = 0.2; // a force that changes by this share at most is steady
 constexpr double LOST_N = 0.01;
 constexpr double JOINED_s = 0.03; // what goes on after less rest is one slip
 
@@ -113,7 +113,7 @@ bool World::disturb(Disturbs kind, double amount) {
 Drive World::drive(double since_s) const {
   Drive drive = scene_.drive(since_s);
   if (options_.kind && since_s >= 0.0) {
-    const KindOfGrasp::Acts acts = options_.kind->acts(since_s);
+    const KindOfGrasp::Inputs inputs = options_.kind->inputs(since_s);
     // The kind's y is upwards.
     const Vector up{-std::cos(scene_.grasp.down_rad), -std::sin(scene_.grasp.down_rad)};
     const Vector side{-up.y, up.x};
@@ -121,10 +121,10 @@ Drive World::drive(double since_s) const {
       to.x += what.x * side.x + what.y * up.x;
       to.y += what.x * side.y + what.y * up.y;
     };
-    add(drive.hand_m_s2, acts.hand_m_s2);
-    add(drive.knock_N, acts.push_N);
-    drive.mass_kg += acts.mass_kg - options_.kind->mass_kg;
-    drive.friction_share *= acts.friction_share;
+    add(drive.hand_m_s2, inputs.hand_m_s2);
+    add(drive.knock_N, inputs.push_N);
+    drive.mass_kg += inputs.mass_kg - options_.kind->mass_kg;
+    drive.friction_share *= inputs.friction_share;
   }
   return drive;
 }
@@ -150,12 +150,12 @@ void World::advance(double seconds) {
       cell_.run(step_s, now);
     }
     time_s_ += step_s;
-    look_at_force();
-    look_at_object();
+    watch_force();
+    watch_object();
   }
 }
 
-void World::look_at_force() {
+void World::watch_force() {
   const double force_N = is_there_ ? cell_.force_N() : 0.0;
   peak_N_ = std::max(peak_N_, force_N);
   if (force_N > scene_.object.crushes_N && !is_crushed_) {
@@ -165,31 +165,31 @@ void World::look_at_force() {
   if (lift_s_ || !options_.lift_after_s) {
     return;
   }
-  if (!stands_ || force_N < STANDS_LEAST_N || std::abs(force_N - stands_->force_N) > STANDS * stands_->force_N) {
-    stands_ = {time_s_, force_N};
-  } else if (time_s_ - stands_->since_s >= *options_.lift_after_s) {
+  if (!steady_ || force_N < STEADY_LEAST_N || std::abs(force_N - steady_->force_N) > STEADY * steady_->force_N) {
+    steady_ = {time_s_, force_N};
+  } else if (time_s_ - steady_->since_s >= *options_.lift_after_s) {
     lift();
   }
 }
 
-void World::look_at_object() {
+void World::watch_object() {
   const double since_s = since_lift_s();
   if (!is_there_) {
     return;
   }
-  told_.resize(scene_.disturbances.size());
-  for (std::size_t i = 0; i < told_.size(); i++) {
-    if (!told_[i] && since_s >= scene_.disturbances[i].begin_s) {
-      told_[i] = true;
+  begun_.resize(scene_.disturbances.size());
+  for (std::size_t i = 0; i < begun_.size(); i++) {
+    if (!begun_[i] && since_s >= scene_.disturbances[i].begin_s) {
+      begun_[i] = true;
       events_.push_back(name_of(scene_.disturbances[i].kind));
     }
   }
   const std::size_t events = options_.kind ? options_.kind->events.size() : 0;
-  kind_told_.resize(events);
+  kind_begun_.resize(events);
   for (std::size_t i = 0; i < events; i++) {
     const Event &event = options_.kind->events[i];
-    if (!kind_told_[i] && since_s >= event.begin_s) {
-      kind_told_[i] = true;
+    if (!kind_begun_[i] && since_s >= event.begin_s) {
+      kind_begun_[i] = true;
       events_.push_back(name_of(event.kind));
     }
   }

@@ -1,6 +1,6 @@
 // The cell's world as time passes, its truth, and what can be done to it by name.
 //
-// The object stands on the table between the fingers. Once the grip's force has stood for a while,
+// The object is on the table between the fingers. Once the grip's force has been steady for a while,
 // or by a command, the hand lifts it; disturbances (scene.hpp) come then, planned or by
 // a command, and what happens in a grasp of a kind (kinds.hpp). What slides by less than SLIP_mm at
 // a time has not slipped. An object that slid DROP_mm, or that nothing presses any more, is gone.
@@ -37,7 +37,7 @@ public:
     std::optional<KindOfGrasp> kind; // of_kind fills in the rest
   };
 
-  // What the kind says of object, lift and what happens then; lift_after_s stays. Left out is what
+  // Takes object, lift and events from the kind; lift_after_s stays. Left out is what
   // is no part of this world: the rubber's law, a place off the gripper's middle, errors and delays
   // of frames, a fingertip that goes silent.
   static void be_of_kind(Options &options, const KindOfGrasp &kind);
@@ -45,7 +45,7 @@ public:
   // Both outlive it. From now on the object is between the fingers of motion.
   World(const Options &options, const Face &face, GripperMotion &motion);
 
-  // Goes on by so much, fingers and all.
+  // Advances by this time, fingers included.
   void advance(double seconds);
 
   // False: it has been.
@@ -59,11 +59,11 @@ public:
   twin::Touch touch(std::size_t finger) const { return is_there_ ? cell_.touch(finger) : twin::Touch{}; }
 
   // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
-  // With a kind, against all that acts; without, knocks are left out.
+  // With a kind, all inputs are considered; without, knocks are left out.
   double need_N(double since_lift_s) const;
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
-  // Of what truth tells, in its order.
+  // The columns of the truth, in order.
   static const char *columns();
   std::string cells() const;
   // What has happened since it was last asked: "lift", "slick", "slip", "dropped", ...
@@ -74,8 +74,8 @@ private:
 
   Drive drive(double since_lift_s) const;
   double since_lift_s() const { return lift_s_ ? time_s_ - *lift_s_ : -1.0; }
-  void look_at_force();
-  void look_at_object();
+  void watch_force();
+  void watch_object();
 
   Scene scene_;
   Options options_;
@@ -83,11 +83,11 @@ private:
   GripperMotion &motion_;
   Cell cell_;
   std::vector<std::string> events_;
-  struct Standing {
+  struct Steady {
     double since_s, force_N;
   };
-  std::optional<Standing> stands_;     // the force
-  std::vector<bool> told_, kind_told_; // of the scene's disturbances and the kind's events: begun
+  std::optional<Steady> steady_;         // the force
+  std::vector<bool> begun_, kind_begun_; // of the scene's disturbances and of the kind's events
   bool is_there_ = true, is_dropped_ = false, is_crushed_ = false, slips_ = false;
   double time_s_ = 0.0, peak_N_ = 0.0, slid_before_mm_ = 0.0, slipped_s_ = 0.0;
   std::optional<double> lift_s_;

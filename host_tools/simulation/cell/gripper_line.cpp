@@ -27,7 +27,7 @@ void GripperLine::press(const Cell &cell) {
   };
 }
 
-GripperLine::Said GripperLine::exchange(const GripCommand &command) {
+GripperLine::Answer GripperLine::exchange(const GripCommand &command) {
   const double t_s = next_s_, poll_s = motion_.mechanics().traits.poll_s;
   if (command.motion == GRIP_ACTIVATE && sent_.motion != GRIP_ACTIVATE) {
     motion_.activate();

@@ -1,5 +1,5 @@
 // A simulated gripper at its line: once every poll_s a command goes out, if it is new, and what
-// the gripper says of that moment comes half of that time later.
+// the gripper's state at that time arrives half of that time later.
 #pragma once
 
 #include "grasp/control/grip.hpp"
@@ -11,7 +11,7 @@ namespace fingertip::cell {
 
 class GripperLine {
 public:
-  // Before the time begins it is activated and stands at this width. random: when the first
+  // At the start it is activated and has this width. random: when the first
   // exchange is.
   GripperLine(const GripperMechanics &mechanics, double width_mm, Random random);
 
@@ -21,12 +21,12 @@ public:
   GripperMotion &motion() { return motion_; }
   const GripperMotion &motion() const { return motion_; }
   double next_s() const { return next_s_; } // of the exchange
-  struct Said {
+  struct Answer {
     double known_s;
     GripperStatus status;
   };
   // At next_s, to where motion() has been brought.
-  Said exchange(const GripCommand &command);
+  Answer exchange(const GripCommand &command);
   // The last move that went out.
   const GripCommand &sent() const { return sent_; }
 

@@ -56,7 +56,7 @@ double GripperMotion::nearest_step_mm(double width_mm) const {
   return std::clamp(std::round(width_mm / traits.step_mm) * traits.step_mm, 0.0, traits.stroke_mm);
 }
 
-double GripperMotion::told_width_mm() const {
+double GripperMotion::reported_width_mm() const {
   return nearest_step_mm(drive_mm_);
 }
 
@@ -206,7 +206,7 @@ GripperStatus GripperMotion::status() const {
   if (!status.moving) {
     status.object = blocked_ != 0;
   }
-  status.width_mm = told_width_mm();
+  status.width_mm = reported_width_mm();
   return status;
 }
 

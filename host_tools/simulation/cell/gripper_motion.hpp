@@ -49,27 +49,27 @@ public:
   void activate();
   // Power is lost: the fingers stay, commands do nothing until activate.
   void power_off();
-  // Ignored unless active, and where it says what the last one said; values beyond the traits'
-  // limits are taken to their ends.
+  // Ignored unless active, or if it repeats the last one; values beyond the traits'
+  // limits are clamped.
   void move(const GripperMove &move);
   // Stops after the latency where the fingers are then.
   void stop();
 
-  // Goes on by so much; any length, but contacts are found to 1 um only where no step is longer
-  // than it takes an object to be passed through. O(1) apart from blocked_at: at most 20 calls.
+  // Advances by this time. Contacts are found to 1 um only if no step is longer
+  // than it takes to pass through an object. O(1) apart from blocked_at: at most 20 calls.
   void step(double seconds);
 
-  // Of the fingers, as it is.
+  // The true width between the fingers.
   double width_mm() const { return fingers_mm_; }
-  // As the gripper knows it: its drive's position, in its steps.
-  double told_width_mm() const;
-  // Between -1 (closing at full speed) and 1, for the currents that a line tells.
+  // The width that the gripper reports: its drive's position, in its steps.
+  double reported_width_mm() const;
+  // Between -1 (closing at full speed) and 1, for the currents that a gripper reports.
   double effort() const;
   bool active() const { return phase_ == Phase::active; }
   bool activating() const { return phase_ != Phase::off && phase_ != Phase::active; }
   // Or a command has yet to count.
   bool moving() const { return moving_ || activating() || !commands_.empty(); }
-  // Stopped by what blocked_at tells: 1 while opening, -1 while closing; 0: not.
+  // Stopped by blocked_at: 1 while opening, -1 while closing; 0: not.
   int blocked() const { return blocked_; }
   double time_s() const { return time_s_; }
   const GripperMechanics &mechanics() const { return mechanics_; }

@@ -18,7 +18,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::chrono::milliseconds FRAME_GAP{20}; // what is no whole frame by then is none
 constexpr double BITS_PER_BYTE = 10;
-// While a machine stalls for longer, the gripper's time stands: no command could have reached it.
+// While a machine stalls for longer, the gripper's time stops: no command could have reached it.
 constexpr double STALL_s = 0.1;
 constexpr double LONGEST_STEP_s = 0.01; // of the motion
 
@@ -115,7 +115,7 @@ public:
         return {};
       }
       modbus_reply(modbus_, query.data(), length, mapping_);
-      registers_.told();
+      registers_.answered();
     }
     const ssize_t size = recv(ends_[1], bytes.data(), bytes.size(), 0);
     bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);

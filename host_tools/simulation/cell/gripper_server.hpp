@@ -36,8 +36,8 @@ enum class LineFault {
 
 struct LineTrouble {
   LineFault fault = LineFault::none;
-  int answers = -1;           // so many have the fault; -1: all
-  double late_s = 0.0;        // each of those comes so much later
+  int answers = -1;           // number of answers with the fault; -1: all
+  double late_s = 0.0;        // delay of each of them
   double latency_timer_s = 0; // of a USB adapter: answers go on only at its ticks
 };
 

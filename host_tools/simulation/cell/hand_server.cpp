@@ -138,14 +138,14 @@ void HandServer::leave(int client) {
 }
 
 bool HandServer::is_due(std::int64_t host_us) {
-  if (host_us - told_us_ < TRUTH_EVERY_us) {
+  if (host_us - sent_us_ < TRUTH_EVERY_us) {
     return false;
   }
-  told_us_ = host_us;
+  sent_us_ = host_us;
   return true;
 }
 
-void HandServer::tell(std::size_t finger, std::int64_t device_us, const TrueTouch &truth) {
+void HandServer::send(std::size_t finger, std::int64_t device_us, const TrueTouch &truth) {
   std::string line = "truth " + std::string(SIDES[finger]) + " " + std::to_string(device_us);
   for (const double value : {truth.x_mm, truth.y_mm, truth.force_N, truth.qx_N, truth.qy_N}) {
     line += " " + fixed(value, 4);

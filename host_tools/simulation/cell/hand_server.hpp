@@ -39,13 +39,13 @@ public:
   HandServer(const HandServer &) = delete;
   HandServer &operator=(const HandServer &) = delete;
 
-  // Takes what clients have said; waits for nothing.
+  // Takes the clients' lines; does not wait.
   void step();
   // Of a fingertip; none: nothing presses there.
   const std::optional<HandAt> &hand(std::size_t finger) const { return hands_[finger].at; }
-  // Host time, and the fingertip's own; where it is time again.
+  // Whether the truth is due again. Host time.
   bool is_due(std::int64_t host_us);
-  void tell(std::size_t finger, std::int64_t device_us, const TrueTouch &truth);
+  void send(std::size_t finger, std::int64_t device_us, const TrueTouch &truth);
 
 private:
   struct Held {
@@ -55,7 +55,7 @@ private:
 
   void come();
   bool listen_to(int client, std::string &came); // false: it is gone
-  // Answers; empty: nothing to say.
+  // The answer; empty: none.
   std::string obey(int client, const std::string &line);
   void leave(int client);
 
@@ -65,7 +65,7 @@ private:
   int listening_ = -1;
   std::map<int, std::string> clients_; // by descriptor: what came of their next line
   std::array<Held, SIDES.size()> hands_;
-  std::int64_t told_us_ = 0;
+  std::int64_t sent_us_ = 0;
 };
 
 } // namespace fingertip::cell

@@ -34,7 +34,7 @@ std::uint64_t in_us(double s) {
   return static_cast<std::uint64_t>(std::llround(1e6 * s));
 }
 
-// What one fingertip tells.
+// The reports of one fingertip.
 class Tip {
 public:
   Tip(const KindOfPad &pad, double mirror, Random random)
@@ -51,14 +51,14 @@ public:
     return known_s_;
   }
 
-  GripTouch feel(double force_N, const Vector &load_N, const Vector &way_mm) {
-    GripTouch told{};
-    told.t_s = next_s_;
-    const double felt_N =
+  GripTouch measure(double force_N, const Vector &load_N, const Vector &way_mm) {
+    GripTouch touch{};
+    touch.t_s = next_s_;
+    const double sensed_N =
         pad_.gain * force_N * (1.0 + FORCE_NOISE * random_.normal()) + FORCE_NOISE_N * random_.normal();
     contact_input input{};
     input.t_us = in_us(next_s_);
-    input.contact = felt_N > GATE_N;
+    input.contact = sensed_N > GATE_N;
     fit_result fitted{};
     fitted.used = 0x7fff;
     input.fit = &fitted;
@@ -69,9 +69,9 @@ public:
       const double share = 1.0 / std::max(force_N, GATE_N);
       const auto noise = [&](double sd) { return sd * random_.normal(); };
       found.valid = true;
-      found.force_N = static_cast<float>(felt_N);
-      found.qx_N = static_cast<float>(mirror_ * (pad_.gain * load_N.x + pad_.ratio.x * felt_N) + noise(LOAD_NOISE_N));
-      found.qy_N = static_cast<float>(pad_.gain * load_N.y + pad_.ratio.y * felt_N + noise(LOAD_NOISE_N));
+      found.force_N = static_cast<float>(sensed_N);
+      found.qx_N = static_cast<float>(mirror_ * (pad_.gain * load_N.x + pad_.ratio.x * sensed_N) + noise(LOAD_NOISE_N));
+      found.qy_N = static_cast<float>(pad_.gain * load_N.y + pad_.ratio.y * sensed_N + noise(LOAD_NOISE_N));
       found.x_mm = static_cast<float>(mirror_ * (way_mm.x + pad_.crosstalk * load_N.x * share) + noise(PLACE_NOISE_mm));
       found.y_mm = static_cast<float>(way_mm.y + pad_.crosstalk * load_N.y * share + noise(PLACE_NOISE_mm));
       found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);
@@ -81,19 +81,19 @@ public:
                      CONTACT_FLAG_TARED | CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_TANGENTIAL_VALID;
     }
     motion_update(&history_, &settings_, &input, &result, &moved);
-    told.flags = result.flags;
+    touch.flags = result.flags;
     if (input.contact) {
-      told.force_N = felt_N;
-      told.force_sd_N = 0.05 * felt_N;
-      told.x_mm = static_cast<double>(found.x_mm);
-      told.y_mm = static_cast<double>(found.y_mm);
-      told.sigma_mm = 6.0;
-      told.qx_N = static_cast<double>(found.qx_N);
-      told.qy_N = static_cast<double>(found.qy_N);
-      told.q_sd_N = 0.05 * felt_N;
-      told.speed_mm_s = speed_of(moved);
+      touch.force_N = sensed_N;
+      touch.force_sd_N = 0.05 * sensed_N;
+      touch.x_mm = static_cast<double>(found.x_mm);
+      touch.y_mm = static_cast<double>(found.y_mm);
+      touch.sigma_mm = 6.0;
+      touch.qx_N = static_cast<double>(found.qx_N);
+      touch.qy_N = static_cast<double>(found.qy_N);
+      touch.q_sd_N = 0.05 * sensed_N;
+      touch.speed_mm_s = speed_of(moved);
     }
-    return told;
+    return touch;
   }
 
 private:
@@ -168,23 +168,23 @@ public:
     while (!over_) {
       t_s_ += Pinch::STEP_s;
       gripper_.motion().step(Pinch::STEP_s);
-      const KindOfGrasp::Acts acts = grasp_.acts(since_lift_s());
-      pinch_.step(Pinch::STEP_s, gripper_.motion().width_mm(), acts);
+      const KindOfGrasp::Inputs inputs = grasp_.inputs(since_lift_s());
+      pinch_.step(Pinch::STEP_s, gripper_.motion().width_mm(), inputs);
       look();
       deliver();
       if (t_s_ - stepped_s_ >= STEPS_s) {
         step_controller();
       }
-      feel();
+      measure();
       if (gripper_.next_s() <= t_s_) {
-        const GripperLine::Said said = gripper_.exchange(command_);
-        arrivals_.status(said.known_s, said.status);
+        const GripperLine::Answer answer = gripper_.exchange(command_);
+        arrivals_.status(answer.known_s, answer.status);
       }
       if (t_s_ >= sample_s_) {
         sample();
       }
     }
-    return tell();
+    return outcome();
   }
 
 private:
@@ -196,13 +196,13 @@ private:
 
   double since_lift_s() const { return t_s_ - lift_s_; }
 
-  void feel() {
+  void measure() {
     for (std::size_t i = 0; i < tips_.size(); i++) {
       Tip &tip = tips_[i];
       if (tip.next_s() > t_s_) {
         continue;
       }
-      const GripTouch touch = tip.feel(pinch_.force_N(i), pinch_.load_N(i), pinch_.way_mm());
+      const GripTouch touch = tip.measure(pinch_.force_N(i), pinch_.load_N(i), pinch_.way_mm());
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone) {
         arrivals_.touch(tip.known_s(grasp_.jitter_s, later_s_), i, touch);
@@ -267,7 +267,7 @@ private:
     }
   }
 
-  KindOutcome tell() {
+  KindOutcome outcome() {
     outcome_.slid_mm = pinch_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = book_.catches;

@@ -1,8 +1,8 @@
 // One grasp of a kind (kinds.hpp), closed loop, in simulated time: the pinch (pinch.hpp), what two
-// fingertips tell of it, a controller, and a gripper's mechanics.
+// fingertips report of it, a controller, and a gripper's mechanics.
 //
-// What a fingertip tells is sketched: the truth with the kind's errors and noise. Whether it
-// slides, the firmware's own motion.c decides from that. Frames come 410 times a second.
+// A simplified fingertip reports the truth with the kind's errors and noise. The firmware's own
+// motion.c decides from that whether it slides. Frames come 410 times a second.
 //
 // Deterministic: the same grasp, seed and controller give the same bits.
 #pragma once
@@ -45,7 +45,7 @@ struct KindTrial {
   KindOfGrasp grasp;
   GripperMechanics gripper;
   std::uint64_t seed = 0;
-  double later_s = 0.0; // all frames come later by so much
+  double later_s = 0.0; // additional delay of all frames
 };
 
 // trace: called every 2 ms.

@@ -176,13 +176,13 @@ Kind kind_of(const std::string &name) {
   throw std::runtime_error("there is no kind \"" + name + "\"; choose one of: gentle usual rough slick fragile");
 }
 
-KindOfGrasp::Acts KindOfGrasp::acts(double t_s) const {
-  Acts acts;
-  acts.mass_kg = mass_kg;
-  acts.lifted_mm = lift_mm * way_of(t_s / lift_s);
-  acts.lift_mm_s = lift_mm * speed_of(t_s / lift_s) / lift_s;
-  acts.hand_m_s2.y = 1e-3 * lift_mm * acceleration_of(t_s / lift_s) / (lift_s * lift_s);
-  acts.table = t_s < lift_s;
+KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
+  Inputs inputs;
+  inputs.mass_kg = mass_kg;
+  inputs.lifted_mm = lift_mm * way_of(t_s / lift_s);
+  inputs.lift_mm_s = lift_mm * speed_of(t_s / lift_s) / lift_s;
+  inputs.hand_m_s2.y = 1e-3 * lift_mm * acceleration_of(t_s / lift_s) / (lift_s * lift_s);
+  inputs.table = t_s < lift_s;
   for (const Event &event : events) {
     const double share = (t_s - event.begin_s) / event.seconds;
     const bool lasts = share > 0.0 && share < 1.0;
@@ -199,24 +199,24 @@ KindOfGrasp::Acts KindOfGrasp::acts(double t_s) const {
       hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * event.rate_Hz * share * event.seconds) : 0.0;
       break;
     case Event::Kind::pour:
-      acts.mass_kg += event.amount * mass_kg * way_of(share);
+      inputs.mass_kg += event.amount * mass_kg * way_of(share);
       break;
     case Event::Kind::carry:
       hand_m_s2 = event.amount / EASED_ACCELERATION * acceleration_of(share);
       break;
     case Event::Kind::slick:
-      acts.friction_share *= 1.0 - event.amount * way_of(share);
+      inputs.friction_share *= 1.0 - event.amount * way_of(share);
     }
-    acts.hand_m_s2.x += hand_m_s2 * way.x;
-    acts.hand_m_s2.y += hand_m_s2 * way.y;
-    acts.push_N.x += push_N * way.x;
-    acts.push_N.y += push_N * way.y;
+    inputs.hand_m_s2.x += hand_m_s2 * way.x;
+    inputs.hand_m_s2.y += hand_m_s2 * way.y;
+    inputs.push_N.x += push_N * way.x;
+    inputs.push_N.y += push_N * way.y;
   }
-  return acts;
+  return inputs;
 }
 
 double KindOfGrasp::least_N(double t_s) const {
-  const Acts now = acts(t_s);
+  const Inputs now = inputs(t_s);
   const double x_N = now.push_N.x - now.mass_kg * now.hand_m_s2.x;
   const double y_N = now.push_N.y - now.mass_kg * (GRAVITY_m_s2 + now.hand_m_s2.y);
   return std::hypot(x_N, y_N) / (now.friction_share * (pads[0].friction + pads[1].friction));

@@ -24,7 +24,7 @@ Kind kind_of(const std::string &name);
 struct Event {
   enum class Kind {
     knock,   // amount: speed that the object would get, m/s
-    push,    // in weights of the object, for so long
+    push,    // in weights of the object, for its duration
     vibrate, // the hand's acceleration, m/s2, at rate_Hz
     pour,    // mass that comes, of the object's own
     carry,   // the hand's largest acceleration, m/s2, on a way of minimum jerk
@@ -44,7 +44,7 @@ struct KindOfPad {
   double gain;       // of the force that it reports, over the true one
   Vector ratio;      // error of tangential over normal force
   double crosstalk;  // mm that a load as large as the force moves the reported location
-  double delay_s;    // of its frames, beyond FeltFinger's
+  double delay_s;    // of its frames, beyond SimulatedFingertip's
 };
 
 struct KindOfGrasp {
@@ -68,16 +68,16 @@ struct KindOfGrasp {
   double lost_share;       // of frames
   int gone;                // this fingertip goes silent, -1: none
   double gone_s;           // since the lift began
-  double poll_factor;      // the gripper's line is slower than its traits say
+  double poll_factor;      // how much slower the gripper's line is than its traits
 
-  struct Acts {
+  struct Inputs { // external inputs
     double lifted_mm = 0.0, lift_mm_s = 0.0;
     Vector hand_m_s2; // y is upwards
     Vector push_N;
     double mass_kg = 0.0, friction_share = 1.0;
     bool table = true;
   };
-  Acts acts(double since_lift_s) const;
+  Inputs inputs(double since_lift_s) const;
   // Grip of one fingertip that holds what is carried then, by static friction.
   double least_N(double since_lift_s) const;
 };

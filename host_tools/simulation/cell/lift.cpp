@@ -71,7 +71,7 @@ private:
 };
 
 // A gripper on its own line, activated and as far open as it is to begin with.
-void stand_open(GripperServer &server, GripperMotion &motion, const std::string &model, double width_mm) {
+void open_gripper(GripperServer &server, GripperMotion &motion, const std::string &model, double width_mm) {
   constexpr double HURRY_s = 0.02; // in a round: too short to notice
   std::atomic<bool> is_done{false};
   std::string why;
@@ -113,11 +113,11 @@ public:
         fingers_(place, fingers_of(options, place)), motion_(GripperServer::mechanics(options.model)),
         server_(motion_, server_options()) {
     fingers_.wait_until_ready();
-    stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
+    open_gripper(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
     world_.emplace(options.world, face_, motion_);
     if (place.is_shared()) {
-      tells_.emplace(place, FINGERS, false);
+      server_of_truth_.emplace(place, FINGERS, false);
     }
     truth_.emplace(options.truth, options.overwrite, head() + "time_us," + World::columns() + "\n");
   }
@@ -135,9 +135,9 @@ public:
       over_ = over_ || (options_.seconds && world_->time_s() >= *options_.seconds);
     }
     const double all_s = 1e-6 * static_cast<double>(last_us_ - began_us);
-    const double stood_s = 1e-6 * static_cast<double>(stood_us_);
-    if (stood_s > 0.01 * all_s) {
-      std::fprintf(stderr, "the world stood still for %.2f of %.2f s: this machine is busy\n", stood_s, all_s);
+    const double paused_s = 1e-6 * static_cast<double>(paused_us_);
+    if (paused_s > 0.01 * all_s) {
+      std::fprintf(stderr, "the world was paused for %.2f of %.2f s: this machine is busy\n", paused_s, all_s);
     }
   }
 
@@ -179,7 +179,7 @@ private:
 
   void round(std::int64_t now_us) {
     const std::int64_t passed_us = is_waited_for(now_us) ? 0 : std::min(now_us - last_us_, LONGEST_ROUND_us);
-    stood_us_ += now_us - last_us_ - passed_us;
+    paused_us_ += now_us - last_us_ - passed_us;
     last_us_ = now_us;
     world_->advance(1e-6 * static_cast<double>(passed_us));
     fingers_.put(now_us, {world_->pressures_Pa(0), world_->pressures_Pa(1)});
@@ -190,16 +190,16 @@ private:
       }
     }
     for (const std::string &event : world_->take_events()) {
-      tell_event(event);
+      write_event(event);
     }
     truth_->row(now_us, world_->cells());
-    tell_truth(now_us);
+    send_truth(now_us);
     for (const std::string &line : lines_.take()) {
       std::string answer;
       try {
         answer = obey(line);
       } catch (const Error &error) {
-        answer = "error: " + told(error);
+        answer = "error: " + error_text(error);
       }
       std::printf("%s\n", answer.c_str());
       std::fflush(stdout);
@@ -207,21 +207,21 @@ private:
     fingers_.look();
   }
 
-  void tell_truth(std::int64_t now_us) {
-    if (!tells_) {
+  void send_truth(std::int64_t now_us) {
+    if (!server_of_truth_) {
       return;
     }
-    tells_->step();
-    if (tells_->is_due(now_us)) {
+    server_of_truth_->step();
+    if (server_of_truth_->is_due(now_us)) {
       for (std::size_t i = 0; i < FINGERS; i++) {
         const twin::Touch touch = world_->touch(i);
-        tells_->tell(i, fingers_.device_us(i, now_us),
-                     {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
+        server_of_truth_->send(i, fingers_.device_us(i, now_us),
+                               {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
       }
     }
   }
 
-  void tell_event(const std::string &text) {
+  void write_event(const std::string &text) {
     truth_->event(steady_now_us(), text);
     std::fprintf(stderr, "%.2f s: %s\n", world_->time_s(), printable(text).c_str());
   }
@@ -241,8 +241,8 @@ private:
     if (!(verb.empty() ? false : act(verb, what))) {
       throw Error(ErrorCode::bad_value, "\"" + printable(command) + "\" cannot be; " + COMMANDS);
     }
-    if (verb != "lift" && !is_disturbance(verb)) { // which the world tells
-      tell_event(command);
+    if (verb != "lift" && !is_disturbance(verb)) { // the world reports those itself
+      write_event(command);
     }
     return "ok";
   }
@@ -312,12 +312,12 @@ private:
   GripperServer server_;
   std::optional<World> world_;
   std::optional<Truth> truth_;
-  std::optional<HandServer> tells_; // and obeys no hand
+  std::optional<HandServer> server_of_truth_; // it obeys no hand
   Lines lines_;
   LineTrouble line_;
   std::string at_touch_; // a command
   bool over_ = false;
-  std::int64_t last_us_ = 0, stood_us_ = 0;
+  std::int64_t last_us_ = 0, paused_us_ = 0;
 };
 
 } // namespace

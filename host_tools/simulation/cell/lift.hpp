@@ -21,7 +21,7 @@ struct LiftOptions {
 };
 
 // The first grasp of this kind at the options' seed (kinds.hpp, World::be_of_kind), and how far the
-// gripper stands open then.
+// gripper is open then.
 void be_of_kind(LiftOptions &options, Kind kind);
 
 // Throws Error, bad_value: the gripper does not open so far.

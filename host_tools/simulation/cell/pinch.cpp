@@ -76,12 +76,12 @@ void Pinch::drag(std::size_t i, double seconds, double friction_share) {
 }
 
 // On the object, upwards.
-double Pinch::table_N(const KindOfGrasp::Acts &acts) const {
-  const double stands_mm = grasp_.mass_kg * GRAVITY_m_s2 / TABLE_N_mm;
-  const double depth_mm = stands_mm - at_mm_.y - acts.lifted_mm;
-  const double damping = 2.0 * TABLE_DAMPING * std::sqrt(acts.mass_kg * TABLE_N_mm / PER_M);
-  const double closing_mm_s = -(speed_mm_s_.y + acts.lift_mm_s);
-  return acts.table && depth_mm > 0.0 ? std::max(0.0, TABLE_N_mm * depth_mm + damping * closing_mm_s) : 0.0;
+double Pinch::table_N(const KindOfGrasp::Inputs &inputs) const {
+  const double table_mm = grasp_.mass_kg * GRAVITY_m_s2 / TABLE_N_mm;
+  const double depth_mm = table_mm - at_mm_.y - inputs.lifted_mm;
+  const double damping = 2.0 * TABLE_DAMPING * std::sqrt(inputs.mass_kg * TABLE_N_mm / PER_M);
+  const double closing_mm_s = -(speed_mm_s_.y + inputs.lift_mm_s);
+  return inputs.table && depth_mm > 0.0 ? std::max(0.0, TABLE_N_mm * depth_mm + damping * closing_mm_s) : 0.0;
 }
 
 void Pinch::push_along(double seconds, double squeezed_mm, double mass_kg, double table_N) {
@@ -107,20 +107,20 @@ void Pinch::push_along(double seconds, double squeezed_mm, double mass_kg, doubl
   along_mm_ += along_mm_s_ * seconds;
 }
 
-void Pinch::step(double seconds, double width_mm, const KindOfGrasp::Acts &acts) {
+void Pinch::step(double seconds, double width_mm, const KindOfGrasp::Inputs &inputs) {
   const double squeezed_mm = 0.5 * (grasp_.width_mm - width_mm);
   press(0, seconds, squeezed_mm - along_mm_);
   press(1, seconds, squeezed_mm + along_mm_);
-  const double stands_N = table_N(acts);
-  push_along(seconds, squeezed_mm, acts.mass_kg, stands_N);
-  drag(0, seconds, acts.friction_share);
-  drag(1, seconds, acts.friction_share);
-  const Vector force_N{acts.push_N.x - acts.mass_kg * acts.hand_m_s2.x - pads_[0].load_N.x - pads_[1].load_N.x,
-                       acts.push_N.y - acts.mass_kg * (GRAVITY_m_s2 + acts.hand_m_s2.y) + stands_N - pads_[0].load_N.y -
-                           pads_[1].load_N.y};
-  speed_mm_s_.x += PER_M * force_N.x / acts.mass_kg * seconds;
-  speed_mm_s_.y += PER_M * force_N.y / acts.mass_kg * seconds;
-  if (stands_N > 0.0 && force_N.y <= 0.0) { // the table's friction holds it in the plane too
+  const double feet_N = table_N(inputs);
+  push_along(seconds, squeezed_mm, inputs.mass_kg, feet_N);
+  drag(0, seconds, inputs.friction_share);
+  drag(1, seconds, inputs.friction_share);
+  const Vector force_N{inputs.push_N.x - inputs.mass_kg * inputs.hand_m_s2.x - pads_[0].load_N.x - pads_[1].load_N.x,
+                       inputs.push_N.y - inputs.mass_kg * (GRAVITY_m_s2 + inputs.hand_m_s2.y) + feet_N -
+                           pads_[0].load_N.y - pads_[1].load_N.y};
+  speed_mm_s_.x += PER_M * force_N.x / inputs.mass_kg * seconds;
+  speed_mm_s_.y += PER_M * force_N.y / inputs.mass_kg * seconds;
+  if (feet_N > 0.0 && force_N.y <= 0.0) { // the table's friction holds it in the plane too
     speed_mm_s_.x = 0.0;
   }
   at_mm_.x += speed_mm_s_.x * seconds;

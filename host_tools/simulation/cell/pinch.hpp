@@ -19,7 +19,7 @@ public:
   explicit Pinch(const KindOfGrasp &grasp);
 
   static constexpr double STEP_s = 2.5e-4; // the longest
-  void step(double seconds, double width_mm, const KindOfGrasp::Acts &acts);
+  void step(double seconds, double width_mm, const KindOfGrasp::Inputs &inputs);
 
   double force_N(std::size_t pad) const { return pads_[pad].force_N; }
   double mean_N() const { return 0.5 * (pads_[0].force_N + pads_[1].force_N); }
@@ -41,7 +41,7 @@ private:
 
   void press(std::size_t pad, double seconds, double indentation_mm);
   void drag(std::size_t pad, double seconds, double friction_share);
-  double table_N(const KindOfGrasp::Acts &acts) const;
+  double table_N(const KindOfGrasp::Inputs &inputs) const;
   void push_along(double seconds, double squeezed_mm, double mass_kg, double table_N);
 
   const KindOfGrasp &grasp_;

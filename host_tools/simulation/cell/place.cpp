@@ -172,13 +172,13 @@ Truth::~Truth() {
   try {
     flush();
   } catch (const Error &error) {
-    tell("fingertip", error);
+    print_error("fingertip", error);
   }
 }
 
 void Truth::row(std::int64_t host_us, const std::string &cells) {
-  if (file_ && host_us - told_us_ >= ROW_us) {
-    told_us_ = host_us;
+  if (file_ && host_us - written_us_ >= ROW_us) {
+    written_us_ = host_us;
     rows_ += std::to_string(host_us) + "," + cells + "\n";
     if (rows_.size() > ROWS_BYTES) {
       flush();

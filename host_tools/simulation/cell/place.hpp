@@ -1,5 +1,5 @@
-// What a simulation of fingertips in real time stands on, whatever happens to their rubber: a folder
-// with their ports, a process for each, the server that shares them, the file of what is true.
+// The common base of simulations of fingertips in real time, whatever touches their rubber: a folder
+// with their ports, a process for each, the server that shares them, the file of the truth.
 #pragma once
 
 #include "libfingertip/output_file.hpp"
@@ -97,7 +97,7 @@ private:
 
   std::optional<OutputFile> file_;
   std::string rows_;
-  std::int64_t told_us_ = 0;
+  std::int64_t written_us_ = 0;
 };
 
 } // namespace fingertip::cell

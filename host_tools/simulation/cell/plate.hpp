@@ -2,13 +2,13 @@
 // the base when it slides.
 //
 // The pad is a block of rubber, PAD_OVERHANG_mm beyond the outer sensors. Pressed flat between two
-// plates that hold it, the base feels Gent and Lindley's sum of plain compression and of what keeps
+// plates that hold it, the base has Gent and Lindley's sum of plain compression and of what keeps
 // nearly incompressible rubber from being squeezed out ("The compression of bonded rubber blocks",
 // Proc. Inst. Mech. Eng. 173, 1959; for rectangles Gent and Meinecke, Polymer Eng. Sci. 10, 1970):
 //   p = E strain (1 + P),  Laplacian of P = -4 / h^2, P = 0 at the sides
 // Sheared, nothing presses but near the ends, which balance the moment Q h / 2 that a plate which
 // does not tilt leaves to the base; it fades inwards as exp(-4.2 s / h), the strip's first
-// Papkovich-Fadle root. So a load is hardly felt.
+// Papkovich-Fadle root. So a tangential force is hardly measurable.
 //
 // Approximate: ends of a block as high as a third of its width, whose field is taken as one of
 // thin blocks. Left out: tilting, a flat that is not, friction that does not hold the rubber.

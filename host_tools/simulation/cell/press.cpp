@@ -20,12 +20,12 @@ enum Stream : std::uint64_t { GAINS = 861, PLACES = 862 };
 constexpr double GRAVITY_m_s2 = 9.80665, AIR_Pa = 101325.0;
 constexpr std::chrono::milliseconds ROUND{1};
 constexpr std::int64_t ROUND_us = 1'000;
-// Where the twin's placements are (twin/episodes.hpp). Long enough for a calibration to take each.
+// The twin's placements (twin/episodes.hpp). Each lasts long enough for a calibration to take it.
 constexpr double HALF_WIDTH_mm = 9.0, HALF_LENGTH_mm = 18.0;
-constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, STANDS_s = 1.5;
+constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, HOLDS_s = 1.5;
 constexpr double FOLLOWS_s = 0.012; // time constant of the ball after the hand
 constexpr double LIFTED_N = 0.005;
-constexpr double PERIOD_s = RESTS_s + SETS_DOWN_s + STANDS_s + SETS_DOWN_s;
+constexpr double PERIOD_s = RESTS_s + SETS_DOWN_s + HOLDS_s + SETS_DOWN_s;
 
 // 0 to 1 within 0 to 1, smooth at both ends.
 double smooth(double share) {
@@ -48,7 +48,7 @@ public:
   Pressed(const Face &face, const PressOptions &options, std::uint64_t seed)
       : face_(face), weight_N_(1e-3 * options.weight_g * GRAVITY_m_s2),
         rubber_(twin::parse_effects("relaxation"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS),
-        felt_Pa_(SENSORS) {
+        sensed_Pa_(SENSORS) {
     Random random(seed, PLACES, 0);
     begin_x_ = random.uniform(0.0, 1.0);
     begin_y_ = random.uniform(0.0, 1.0);
@@ -63,7 +63,7 @@ public:
     touch_.x_mm = HALF_WIDTH_mm * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
     touch_.y_mm = HALF_LENGTH_mm * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
     touch_.force_N =
-        weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - STANDS_s) / SETS_DOWN_s));
+        weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - HOLDS_s) / SETS_DOWN_s));
     feel(time_s);
   }
   // Or where the hand is.
@@ -84,7 +84,7 @@ public:
   TrueTouch truth() const { return {{touch_.x_mm, touch_.y_mm, touch_.force_N}}; }
   Pressures pressures_Pa() const {
     Pressures pressures;
-    std::copy(felt_Pa_.begin(), felt_Pa_.end(), pressures.begin());
+    std::copy(sensed_Pa_.begin(), sensed_Pa_.end(), pressures.begin());
     return pressures;
   }
   // x_mm, y_mm, force_N; places only while it touches.
@@ -102,7 +102,7 @@ private:
   void feel(double time_s) {
     const Pressures pressures = touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
     std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
-    rubber_.report(time_s, base_Pa_, felt_Pa_);
+    rubber_.report(time_s, base_Pa_, sensed_Pa_);
   }
 
   const Face &face_;
@@ -110,7 +110,7 @@ private:
   twin::Pad rubber_;
   double begin_x_, begin_y_; // of both sequences
   twin::Touch touch_;
-  std::vector<double> base_Pa_, felt_Pa_; // [sensor]
+  std::vector<double> base_Pa_, sensed_Pa_; // [sensor]
 };
 
 std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &place) {
@@ -183,7 +183,7 @@ void press(const PressOptions &options, const Place &place) {
       if (hands) {
         hands->step();
       }
-      const bool tells = hands && hands->is_due(now_us);
+      const bool sends = hands && hands->is_due(now_us);
       std::vector<Pressures> pressures;
       std::string cells;
       for (std::size_t i = 0; i < pressed.size(); i++) {
@@ -191,8 +191,8 @@ void press(const PressOptions &options, const Place &place) {
         options.by_hand ? one.follow(time_s, hands->hand(i)) : one.advance(time_s);
         pressures.push_back(one.pressures_Pa());
         cells += (cells.empty() ? "" : ",") + one.cells();
-        if (tells) {
-          hands->tell(i, fingers.device_us(i, now_us), one.truth());
+        if (sends) {
+          hands->send(i, fingers.device_us(i, now_us), one.truth());
         }
       }
       fingers.put(now_us, pressures);

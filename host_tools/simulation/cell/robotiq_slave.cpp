@@ -27,8 +27,8 @@ void RobotiqSlave::write(int address, std::uint16_t value) {
 GripperMove RobotiqSlave::wanted() const {
   const GripperTraits &traits = motion_.mechanics().traits;
   const auto scaled = [](int value, double least, double most) { return least + (most - least) * value / 255.0; };
-  if (says(rATR)) {
-    return {.width_mm = says(rARD) ? traits.stroke_mm : 0.0,
+  if (has(rATR)) {
+    return {.width_mm = has(rARD) ? traits.stroke_mm : 0.0,
             .speed_mm_s = traits.speed_min_mm_s,
             .force_N = traits.force_max_N};
   }
@@ -40,25 +40,25 @@ GripperMove RobotiqSlave::wanted() const {
 
 void RobotiqSlave::update() {
   const bool was_active = (done_[0] & rACT) != 0, went = (done_[0] & (rGTO | rATR)) != 0;
-  if (!says(rACT)) {
+  if (!has(rACT)) {
     motion_.power_off();
   } else if (!was_active) {
     failed_ = NO_FAULT;
     released_ = false;
     motion_.activate();
   }
-  if (says(rACT) && motion_.active() && failed_ == NO_FAULT && !released_) {
-    const bool goes = says(rGTO) || says(rATR);
+  if (has(rACT) && motion_.active() && failed_ == NO_FAULT && !released_) {
+    const bool goes = has(rGTO) || has(rATR);
     if (goes && (!went || command_ != done_)) {
       motion_.move(wanted());
     } else if (!goes && went) {
       motion_.stop();
     }
-    released_ = says(rATR);
+    released_ = has(rATR);
     done_ = command_;
   } else {
     // What moves is done once activation is complete.
-    done_[0] = says(rACT) ? rACT : 0;
+    done_[0] = has(rACT) ? rACT : 0;
   }
 }
 
@@ -69,10 +69,10 @@ std::uint8_t RobotiqSlave::fault() const {
   if (released_) {
     return motion_.moving() ? RELEASING : RELEASED;
   }
-  if (says(rGTO) && !says(rACT)) {
+  if (has(rGTO) && !has(rACT)) {
     return NOT_ACTIVATED;
   }
-  if (says(rGTO) && motion_.activating()) {
+  if (has(rGTO) && motion_.activating()) {
     return ACTION_DELAYED;
   }
   return silence_ ? NO_COMMUNICATION : NO_FAULT;
@@ -80,22 +80,22 @@ std::uint8_t RobotiqSlave::fault() const {
 
 std::array<std::uint16_t, REGISTERS> RobotiqSlave::status() const {
   const GripperTraits &traits = motion_.mechanics().traits;
-  const bool goes = says(rGTO) && motion_.active() && failed_ == NO_FAULT && !released_;
-  const int gsta = !says(rACT) || failed_ != NO_FAULT || released_ ? RESET : motion_.active() ? ACTIVATED : ACTIVATING;
+  const bool goes = has(rGTO) && motion_.active() && failed_ == NO_FAULT && !released_;
+  const int gsta = !has(rACT) || failed_ != NO_FAULT || released_ ? RESET : motion_.active() ? ACTIVATED : ACTIVATING;
   const int gobj = !goes || motion_.moving() ? IN_MOTION
                    : motion_.blocked() > 0   ? STOPPED_OPENING
                    : motion_.blocked() < 0   ? STOPPED_CLOSING
                                              : AT_REQUEST;
   const long count =
-      CLOSED_COUNT - std::lround(motion_.told_width_mm() / traits.stroke_mm * (CLOSED_COUNT - OPEN_COUNT));
+      CLOSED_COUNT - std::lround(motion_.reported_width_mm() / traits.stroke_mm * (CLOSED_COUNT - OPEN_COUNT));
   const long current = std::lround(std::abs(motion_.effort()) * FULL_CURRENT_A / AMPERE_PER_COUNT);
   return {
-      static_cast<std::uint16_t>((says(rACT) ? gACT : 0) | (goes ? gGTO : 0) | gsta << gSTA_SHIFT | gobj << gOBJ_SHIFT),
+      static_cast<std::uint16_t>((has(rACT) ? gACT : 0) | (goes ? gGTO : 0) | gsta << gSTA_SHIFT | gobj << gOBJ_SHIFT),
       static_cast<std::uint16_t>(fault() << 8 | (command_[1] & 0xFF)),
       static_cast<std::uint16_t>(count << 8 | current)};
 }
 
-void RobotiqSlave::told() {
+void RobotiqSlave::answered() {
   silence_ = false;
 }
 

@@ -24,11 +24,11 @@ public:
   void heard();
   // address: of a register from COMMAND_REGISTER on.
   void write(int address, std::uint16_t value);
-  // After the writes of a frame; carries out what they say.
+  // Carries out the writes of a frame, after all of them.
   void update();
-  // The content of the status registers. told: an answer has them.
+  // The content of the status registers. answered: an answer has them.
   std::array<std::uint16_t, robotiq::REGISTERS> status() const;
-  void told();
+  void answered();
 
   // Without power all that was written is lost.
   void lose_power();
@@ -37,7 +37,7 @@ public:
 
 private:
   std::uint8_t fault() const;
-  bool says(std::uint16_t bit) const { return (command_[0] & bit) != 0; }
+  bool has(std::uint16_t bit) const { return (command_[0] & bit) != 0; }
   GripperMove wanted() const;
 
   GripperMotion &motion_;

@@ -2,7 +2,7 @@
 // lifted, and what disturbs it then.
 //
 // Drawn so that the grip that just holds it, at the worst of it but for knocks, needs at most
-// FORCE_MOST_N: what no gripper with a usual cap can hold tells nothing about a controller. Ranges
+// FORCE_MOST_N: an object that no gripper with a usual cap can hold is no test of a controller. Ranges
 // are assumptions about a household, no measurements.
 #pragma once
 
@@ -32,7 +32,7 @@ struct Scene {
   std::string face;
   Object object;
   Grasp grasp;
-  double opens_mm = 4.0;              // the gripper stands so much wider at first
+  double opens_mm = 4.0;              // how much wider than the object the gripper is at first
   double waits_s = 0.2;               // from the controller's HOLDING to the lift
   double lift_mm = 0.0, lift_s = 0.0; // minimum jerk; then the table is gone
   std::vector<Disturbance> disturbances;

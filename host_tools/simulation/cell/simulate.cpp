@@ -1,6 +1,6 @@
 // The program behind `fingertip simulate`: simulated fingertips on ports, in real time, each with
 // its firmware on this machine and on simulated rubber. The tool itself knows no simulation: it
-// starts this program, which stands beside it (tool/cli/commands/simulate.cpp).
+// starts this program, which is next to it (tool/cli/commands/simulate.cpp).
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
 #include "library/pad/table_file.hpp"
@@ -124,7 +124,7 @@ int main(int argc, char **argv) {
                                  "begins: the weight at each mark of the template, a hold, a rest")
           ->excludes(press_flag, mouse_flag, lift_flag);
   app.add_option("--pull", options.pull_g,
-                 "The hand of --validate pulls in the end, by so much on a thread, as that of "
+                 "The hand of --validate pulls a thread in the end, with this weight, for "
                  "`fingertip validate --pull`")
       ->needs(validate_flag)
       ->check(CLI::Range(10.0, 1000.0))
@@ -142,7 +142,7 @@ int main(int argc, char **argv) {
                  "Standard deviation between sensors; default 0.1, with --lift 0.05")
       ->type_name("SHARE")
       ->check(CLI::Range(0.0, 0.2));
-  app.add_option("--seconds", options.seconds, "Ends after so long")->type_name("S")->check(CLI::Range(0.1, 1e6));
+  app.add_option("--seconds", options.seconds, "End after this time")->type_name("S")->check(CLI::Range(0.1, 1e6));
   app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.csv");
   app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
   app.add_option("--cache", options.cache, "Of contact tables; default: those installed, else ~/.cache/fingertip")
@@ -191,17 +191,18 @@ int main(int argc, char **argv) {
   of_lift.push_back(app.add_option("--crushes", object.crushes_N, "More force breaks it; default: none does")
                         ->type_name("N")
                         ->check(CLI::Range(0.1, 1e6)));
-  lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0, "The gripper stands so much wider at first");
+  lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0,
+              "How much wider than the object the gripper is at first");
   lift_number("--height", options.lift.world.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
   lift_number("--lift-time", options.lift.world.lift_s, "S", 0.05, 60.0, "And how long that takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
-    if (i != stiffness) { // which no kind says
+    if (i != stiffness) { // no kind sets it
       kind->excludes(of_lift[i]);
     }
   }
   of_lift.push_back(kind);
   CLI::Option *after =
-      lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Lifted once the force has stood for so long");
+      lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Lift once the force has been steady for this time");
   of_lift.push_back(app.add_flag("--by-command", by_command, "Lift only on the command")->excludes(after));
   of_lift.push_back(app.add_option("--then", planned_texts,
                                    "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S or "
@@ -209,8 +210,7 @@ int main(int argc, char **argv) {
                         ->type_name("KIND:AMOUNT@S"));
   lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2, "That calibration left of the gains");
   lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
-              "The world stands still at most so long while fingertips or the gripper's client "
-              "are held up");
+              "Longest pause of the world while fingertips or the gripper's client are held up");
   for (CLI::Option *option : of_lift) {
     option->needs(lift_flag)->group("Lifts");
   }
@@ -233,9 +233,9 @@ int main(int argc, char **argv) {
     run(options, lift_flag->count() > 0, validate_flag->count() > 0);
     return 0;
   } catch (const Error &error) {
-    tell("fingertip", error);
+    print_error("fingertip", error);
   } catch (const std::runtime_error &error) { // of the twin: a face that there is not
-    tell("fingertip", Error(error.what()));
+    print_error("fingertip", Error(error.what()));
   }
   return 1;
 }

@@ -25,7 +25,7 @@ namespace {
 constexpr double GATE_NOISES = 8.0;
 constexpr float FORCE_SCALE_SD = 0.05F; // of a calibrated pad
 
-// Of one layer: found once, by least squares.
+// The model of one layer, found once by least squares.
 struct Model {
   fit_array array;
   pad_profile profile;
@@ -56,7 +56,7 @@ double speed_of(const ::motion &motion) {
   return static_cast<double>(std::hypot(motion.vx_mm_s, motion.vy_mm_s));
 }
 
-struct FeltFinger::Firmware {
+struct SimulatedFingertip::Firmware {
   fit_array array;
   fit_pad pad;
   fit_settings fit{};
@@ -71,7 +71,7 @@ struct FeltFinger::Firmware {
   GripTouch frame(std::uint64_t t_us, bool pressed, const std::int32_t *readings);
 };
 
-FeltFinger::Firmware::Firmware(double layer_mm, const Rubber &rubber, double noise_Pa)
+SimulatedFingertip::Firmware::Firmware(double layer_mm, const Rubber &rubber, double noise_Pa)
     : array(model_of(layer_mm).array), pad(model_of(layer_mm).pad) {
   fit.iterations = DEFAULT_FIT_ITERATIONS;
   fit_set_errors(&fit, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
@@ -86,7 +86,7 @@ FeltFinger::Firmware::Firmware(double layer_mm, const Rubber &rubber, double noi
   tangential.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed, const std::int32_t *readings) {
+GripTouch SimulatedFingertip::Firmware::frame(std::uint64_t t_us, bool pressed, const std::int32_t *readings) {
   fit_result fitted{};
   fit_tangential estimate{};
   if (pressed) {
@@ -113,22 +113,22 @@ GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed, const st
   motion_update(&motion, &tangential, &input, &result, &moved);
 
   const bool pulls = (result.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
-  GripTouch told{};
-  told.t_s = 1e-6 * static_cast<double>(t_us);
-  told.flags = result.flags;
-  told.force_N = static_cast<double>(pulls ? pull.force_N : force.force_N);
-  told.force_sd_N = static_cast<double>(pulls ? pull.force_sd_N : force.force_sd_N);
-  told.x_mm = static_cast<double>(pulls ? pull.x_mm : fitted.x_mm);
-  told.y_mm = static_cast<double>(pulls ? pull.y_mm : fitted.y_mm);
-  told.sigma_mm = static_cast<double>(fitted.sigma_mm);
-  told.qx_N = static_cast<double>(pull.qx_N);
-  told.qy_N = static_cast<double>(pull.qy_N);
-  told.q_sd_N = static_cast<double>(pull.q_sd_N);
-  told.speed_mm_s = speed_of(moved);
-  return told;
+  GripTouch touch{};
+  touch.t_s = 1e-6 * static_cast<double>(t_us);
+  touch.flags = result.flags;
+  touch.force_N = static_cast<double>(pulls ? pull.force_N : force.force_N);
+  touch.force_sd_N = static_cast<double>(pulls ? pull.force_sd_N : force.force_sd_N);
+  touch.x_mm = static_cast<double>(pulls ? pull.x_mm : fitted.x_mm);
+  touch.y_mm = static_cast<double>(pulls ? pull.y_mm : fitted.y_mm);
+  touch.sigma_mm = static_cast<double>(fitted.sigma_mm);
+  touch.qx_N = static_cast<double>(pull.qx_N);
+  touch.qy_N = static_cast<double>(pull.qy_N);
+  touch.q_sd_N = static_cast<double>(pull.q_sd_N);
+  touch.speed_mm_s = speed_of(moved);
+  return touch;
 }
 
-FeltFinger::FeltFinger(const Face &face, const Rubber &rubber, const Sensing &sensing, Random random)
+SimulatedFingertip::SimulatedFingertip(const Face &face, const Rubber &rubber, const Sensing &sensing, Random random)
     : face_(&face), rubber_(rubber), sensing_(sensing), random_(random) {
   const ms58xx_osr *osr = ms58xx_find_osr(sensing.osr);
   if (!osr) {
@@ -140,10 +140,10 @@ FeltFinger::FeltFinger(const Face &face, const Rubber &rubber, const Sensing &se
   firmware_ = std::make_unique<Firmware>(face.layer_mm(), rubber, noise_Pa_);
 }
 
-FeltFinger::~FeltFinger() = default;
-FeltFinger::FeltFinger(FeltFinger &&) noexcept = default;
+SimulatedFingertip::~SimulatedFingertip() = default;
+SimulatedFingertip::SimulatedFingertip(SimulatedFingertip &&) noexcept = default;
 
-FeltFinger::Frame FeltFinger::feel(const twin::Touch &touch) {
+SimulatedFingertip::Frame SimulatedFingertip::measure(const twin::Touch &touch) {
   const Pressures base_Pa = face_->base_Pa(touch, sensing_.tangential);
   std::array<std::int32_t, SENSORS> readings{};
   double largest_Pa = 0.0;

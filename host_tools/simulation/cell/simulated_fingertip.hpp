@@ -1,5 +1,5 @@
-// A fingertip that feels what the cell does to it: pressures on the base, the errors of its
-// sensors, then the firmware's own fit, estimate of tangential load, slip and motion, as app.c
+// A simulated fingertip: the pressures of a touch on the base, the errors of its
+// sensors, then the firmware's own fit, estimate of tangential force, slip and motion, as app.c
 // has them do it, to what the controller of a grasp takes.
 //
 // What condition does is left out: readings are relative to the true zero, and no frame is given
@@ -27,7 +27,7 @@ struct Rubber {
 struct Sensing {
   std::uint16_t osr = 1024;
   double rate_Hz = 410.0;
-  double tangential = 1.0; // share of a pull's field that acts on the readings
+  double tangential = 1.0; // share of a tangential force's field that reaches the readings
 };
 
 // A frame takes its conversion, of which the middle is its time; then it is read, fitted and sent
@@ -36,12 +36,12 @@ struct Sensing {
 // frames are shorter than that.
 constexpr double PROCESSING_s = 1.6e-3, JITTER_s = 2e-4;
 
-class FeltFinger {
+class SimulatedFingertip {
 public:
   // rubber's gains hold the error of the force's scale too.
-  FeltFinger(const Face &face, const Rubber &rubber, const Sensing &sensing, Random random);
-  ~FeltFinger();
-  FeltFinger(FeltFinger &&) noexcept;
+  SimulatedFingertip(const Face &face, const Rubber &rubber, const Sensing &sensing, Random random);
+  ~SimulatedFingertip();
+  SimulatedFingertip(SimulatedFingertip &&) noexcept;
 
   // When the next frame is measured, and when it will be known.
   double next_s() const { return next_s_; }
@@ -49,8 +49,8 @@ public:
     double known_s;
     GripTouch touch;
   };
-  // That frame, of this touch at next_s.
-  Frame feel(const twin::Touch &touch);
+  // The frame of this touch at next_s.
+  Frame measure(const twin::Touch &touch);
 
 private:
   struct Firmware;

@@ -11,10 +11,10 @@ namespace {
 enum Stream : std::uint64_t { FINGER = 821, LINE, FAULT };
 
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
-constexpr double MOVES_s = 2.5e-4, STANDS_s = 1e-3; // between two looks at the gripper
-constexpr double PATIENCE_s = 8.0;                  // until the controller holds
-constexpr double STEPS_s = 0.01;                    // without any input
-constexpr double BEGINS_s = 12.0;                   // a fault, at the latest
+constexpr double MOVES_s = 2.5e-4, RESTS_s = 1e-3; // between two samples of the gripper
+constexpr double PATIENCE_s = 8.0;                 // until the controller holds
+constexpr double STEPS_s = 0.01;                   // without any input
+constexpr double BEGINS_s = 12.0;                  // a fault, at the latest
 constexpr double APART_mm = 1e3, FREE_mm = 0.5;
 constexpr double LIFTS_AFTER_s = 0.8, POURS_AFTER_s = 1.2, POURS_s = 0.4, POURED = 1.0;
 constexpr double SLICK_s = 0.05, SLICK_SHARE = 0.9;
@@ -42,8 +42,8 @@ class SetPoint {
 public:
   explicit SetPoint(const Trial &trial) : trial_(trial) {}
   // closed_mm: since the touch
-  void look(double t_s, double felt_N, double width_mm, double touched_s, double closed_mm) {
-    const double off = felt_N / trial_.set_N - 1.0;
+  void sample(double t_s, double sensed_N, double width_mm, double touched_s, double closed_mm) {
+    const double off = sensed_N / trial_.set_N - 1.0;
     if (std::abs(off) > NEAR && !settle_s_) {
       near_s_ = NEVER_s;
     } else if (!settle_s_) {
@@ -68,7 +68,7 @@ public:
       width_mm_ = width_mm;
     }
   }
-  void tell(Outcome &outcome) const {
+  void fill(Outcome &outcome) const {
     outcome.settle_s = settle_s_;
     outcome.rms = samples_ > 0 ? std::sqrt(squares_ / samples_) : 0.0;
     outcome.rms_of_steps = samples_ > 0 ? std::sqrt(step_squares_ / samples_) : 0.0;
@@ -98,8 +98,8 @@ public:
         gripper_(trial.gripper,
                  trial.activates ? trial.gripper.traits.stroke_mm : trial.scene.object.width_mm + trial.scene.opens_mm,
                  Random(trial.seed, LINE, 0)),
-        fingers_{FeltFinger(face, trial.rubber[0], trial.sensing, Random(trial.seed, FINGER, 0)),
-                 FeltFinger(face, trial.rubber[1], trial.sensing, Random(trial.seed, FINGER, 1))},
+        fingers_{SimulatedFingertip(face, trial.rubber[0], trial.sensing, Random(trial.seed, FINGER, 0)),
+                 SimulatedFingertip(face, trial.rubber[1], trial.sensing, Random(trial.seed, FINGER, 1))},
         set_point_(trial), faults_(trial.fault.value_or(never()), Random(trial.seed, FAULT, 0)) {
     if (trial.activates) {
       gripper_.motion().power_off();
@@ -112,7 +112,7 @@ public:
     while (!over_) {
       const double next_s = std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
                                       stepped_s_ + STEPS_s, faults_.has_begun(t_s_) ? NEVER_s : faults_.begins_s(),
-                                      t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
+                                      t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : RESTS_s)});
       advance(std::min(next_s, arrivals_.next_s()));
       fail();
       deliver();
@@ -121,8 +121,8 @@ public:
       }
       for (std::size_t f = 0; f < fingers_.size(); f++) {
         if (fingers_[f].next_s() <= t_s_) {
-          const double felt_s = fingers_[f].next_s();
-          if (const auto frame = faults_.frame(f, fingers_[f].feel(touch(f)), felt_s)) {
+          const double measured_s = fingers_[f].next_s();
+          if (const auto frame = faults_.frame(f, fingers_[f].measure(touch(f)), measured_s)) {
             arrivals_.touch(frame->known_s, f, frame->touch);
           }
         }
@@ -134,7 +134,7 @@ public:
         sample();
       }
     }
-    return tell();
+    return outcome();
   }
 
 private:
@@ -235,16 +235,16 @@ private:
       return;
     }
     const bool lifted = lift_s_ < NEVER_s && since_lift_s(t_s_) >= trial_.scene.ends_s;
-    const bool stood = trial_.still_s > 0.0 && t_s_ - touched_s_ >= trial_.still_s;
+    const bool waited = trial_.still_s > 0.0 && t_s_ - touched_s_ >= trial_.still_s;
     outcome_.never_held = lift_s_ == NEVER_s && trial_.still_s == 0.0 && t_s_ > PATIENCE_s;
-    over_ = outcome_.dropped || outcome_.never_held || lifted || stood ||
+    over_ = outcome_.dropped || outcome_.never_held || lifted || waited ||
             (trial_.still_s > 0.0 && t_s_ > trial_.still_s + PATIENCE_s);
   }
 
   void step_controller() {
     report_ = controller_.step(t_s_, command_);
     stepped_s_ = t_s_;
-    faults_.look(t_s_, report_.state);
+    faults_.watch(t_s_, report_.state);
     if (faults_.has_begun(t_s_)) {
       outcome_.failed.trouble |= report_.trouble;
       outcome_.failed.state = report_.state;
@@ -272,7 +272,7 @@ private:
     arrivals_.deliver(
         t_s_, controller_,
         [this](std::size_t finger, const GripTouch &touch) {
-          felt_[finger] = touch;
+          touches_[finger] = touch;
           step_controller();
         },
         [this] { step_controller(); });
@@ -282,32 +282,32 @@ private:
     const Faults::Line line = faults_.line(t_s_);
     const bool waits = t_s_ < answered_s_;
     const bool commands = line.commands && !waits;
-    GripperLine::Said said = gripper_.exchange(commands ? command_ : gripper_.sent());
+    GripperLine::Answer answer = gripper_.exchange(commands ? command_ : gripper_.sent());
     if (waits || !line.answers) {
       return;
     }
     if (line.late_s > 0.0) {
-      answered_s_ = said.known_s + line.late_s;
-      said.known_s = answered_s_;
-      said.status.host_us += in_us(0.5 * line.late_s); /* the exchange's middle */
+      answered_s_ = answer.known_s + line.late_s;
+      answer.known_s = answered_s_;
+      answer.status.host_us += in_us(0.5 * line.late_s); /* the exchange's middle */
     }
-    said.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : said.status.fault;
-    arrivals_.status(said.known_s, said.status);
+    answer.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : answer.status.fault;
+    arrivals_.status(answer.known_s, answer.status);
   }
 
   void sample() {
     sample_s_ += SAMPLED_s;
-    const double felt_N = 0.5 * (felt_[0].force_N + felt_[1].force_N);
+    const double sensed_N = 0.5 * (touches_[0].force_N + touches_[1].force_N);
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
-      const double smaller_N = std::min(felt_[0].force_N, felt_[1].force_N);
-      set_point_.look(t_s_, trial_.set_of_smaller ? smaller_N : felt_N, gripper_.sent().width_mm, touched_s_,
-                      touched_mm_ - gripper_.motion().width_mm());
+      const double smaller_N = std::min(touches_[0].force_N, touches_[1].force_N);
+      set_point_.sample(t_s_, trial_.set_of_smaller ? smaller_N : sensed_N, gripper_.sent().width_mm, touched_s_,
+                        touched_mm_ - gripper_.motion().width_mm());
     }
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_) : -1.0;
     if (since_s >= trial_.scene.lift_s) {
       margins_.push_back(cell_.force_N() / trial_.scene.least_N(since_s));
       if (force_N() > LOST_N) {
-        told_.push_back(felt_N / force_N());
+        reported_.push_back(sensed_N / force_N());
         taken_.push_back(report_.force_N / force_N());
       }
     }
@@ -326,8 +326,8 @@ private:
       moment.turned_rad = cell_.turned_rad();
       moment.friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
       moment.slips = cell_.slips();
-      moment.felt_N = felt_N;
-      moment.felt_load_N = report_.load_N;
+      moment.sensed_N = sensed_N;
+      moment.sensed_load_N = report_.load_N;
       moment.wanted_N = report_.wanted_N;
       moment.state = report_.state;
       moment.trouble = report_.trouble;
@@ -335,7 +335,7 @@ private:
     }
   }
 
-  Outcome tell() {
+  Outcome outcome() {
     slips_.end();
     outcome_.held = !outcome_.dropped && !outcome_.never_held;
     outcome_.crushed = outcome_.peak_N > trial_.scene.object.crushes_N;
@@ -343,12 +343,12 @@ private:
     outcome_.turned_rad = cell_.turned_rad();
     outcome_.disturbance_slip_mm = outcome_.slid_mm - outcome_.lift_slip_mm;
     outcome_.margin = median(margins_);
-    outcome_.force_told = median(told_);
+    outcome_.force_reported = median(reported_);
     outcome_.force_taken = median(taken_);
     outcome_.holding_s = held_s_ < NEVER_s && touched_s_ < NEVER_s ? held_s_ - touched_s_ : 0.0;
     outcome_.slips = slips_.slips;
     if (trial_.still_s > 0.0) {
-      set_point_.tell(outcome_);
+      set_point_.fill(outcome_);
     }
     return outcome_;
   }
@@ -358,16 +358,16 @@ private:
   const std::function<void(const Moment &)> &trace_;
   Cell cell_;
   GripperLine gripper_;
-  std::array<FeltFinger, 2> fingers_;
+  std::array<SimulatedFingertip, 2> fingers_;
   Arrivals arrivals_;
-  std::array<GripTouch, 2> felt_{};
+  std::array<GripTouch, 2> touches_{};
   GripCommand command_{};
   GripReport report_{};
   Outcome outcome_;
   Slips slips_;
   SetPoint set_point_;
   Faults faults_;
-  std::vector<double> margins_, told_, taken_;
+  std::vector<double> margins_, reported_, taken_;
   bool over_ = false, is_between_ = false, is_taken_ = false, has_asked_ = false;
   double began_mm_ = 0.0, stepped_s_ = 0.0, answered_s_ = 0.0;
   double slick_s_ = NEVER_s, slick_share_ = 1.0;

@@ -1,5 +1,5 @@
-// One grasp, closed loop, in simulated time: a scene's object in the cell, two fingertips that feel
-// it, a controller, and a gripper's mechanics between them.
+// One grasp, closed loop, in simulated time: a scene's object in the cell, two fingertips, a
+// controller, and a gripper's mechanics between them.
 //
 // The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
 // every 10 ms.
@@ -39,16 +39,16 @@ struct Trial {
   Sensing sensing;
   std::array<Rubber, 2> rubber;
   std::uint64_t seed = 0; // of noise and moments
-  // Instead of a lift: the grip's force is held on the table for so long, and should be that.
+  // Instead of a lift: the object stays on the table for still_s, and the grip's force should be set_N.
   double still_s = 0.0, set_N = 0.0;
-  bool set_of_smaller = false; // of what both fingertips say, not their mean
+  bool set_of_smaller = false; // set_N is compared with the smaller force, not with the mean
   // The gripper is not active at first and open; what it is to grasp comes between its fingers only
   // once it is active.
   bool activates = false;
-  // So long after the first HOLDING.
+  // A request, asked_after_s after the first HOLDING.
   std::optional<GripRequest> asked;
   double asked_after_s = 0.0;
-  // So long after the lift friction falls to what does not hold the object any more, by a tenth.
+  // This time after the lift, friction falls a tenth below the value that holds the object.
   std::optional<double> slick_after_s;
   // Ends when it has been watched. Where nothing is lifted by then, the hand lifts 0.8 s after it
   // began; after 1.2 s as much again is poured in: whatever controls would then like more force.
@@ -63,7 +63,7 @@ struct Moment {
   double way_mm, slid_mm, turned_rad;
   double friction;
   bool slips;
-  double felt_N, felt_load_N, wanted_N; // as the controller has it
+  double sensed_N, sensed_load_N, wanted_N; // as the controller has it
   std::uint8_t state;
   std::uint32_t trouble;
 };
@@ -86,9 +86,9 @@ struct Outcome {
   bool dropped = false, never_held = false, crushed = false;
   double slid_mm = 0.0, turned_rad = 0.0, peak_N = 0.0;
   double lift_slip_mm = 0.0, disturbance_slip_mm = 0.0; // until the lift is over; after it
-  // Medians from the lift's end on: force over least force; over the true force what the fingertips
-  // tell, and what the controller takes it for.
-  double margin = 0.0, force_told = 0.0, force_taken = 0.0;
+  // Medians from the lift's end on: force over least force; reported over true force; the controller's
+  // force over the true force.
+  double margin = 0.0, force_reported = 0.0, force_taken = 0.0;
   double holding_s = 0.0;  // from the first touch to the controller's HOLDING
   std::vector<Slip> slips; // since the lift began
   // Of a still trial.

@@ -127,7 +127,7 @@ std::string GainSession::advice() const {
   case PlacementFinder::State::taken:
     return "taken: lift it";
   case PlacementFinder::State::refused:
-    return "it did not stand still: lift it, and let it stand by itself";
+    return "it did not rest: lift it, and let it rest by itself";
   case PlacementFinder::State::resting:
     break;
   }
@@ -182,8 +182,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
     if (!scale || scale->scale < static_cast<double>(CALIBRATION_FORCE_SCALE_MIN) ||
         scale->scale > static_cast<double>(CALIBRATION_FORCE_SCALE_MAX)) {
       throw Error("the readings are not those of " + fixed(*force_N, 2) + " N: they make " +
-                  fixed(scale ? *force_N / scale->scale : 0.0, 2) +
-                  " N; give the weight that stood on the pad, or none");
+                  fixed(scale ? *force_N / scale->scale : 0.0, 2) + " N; give the weight that was on the pad, or none");
     }
   }
   calibration made = calibration_of(solution, scale, date_s);
@@ -198,7 +197,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
 Shape GainSession::shape() const {
   Shape shape = shape_of(judgement_.solution);
   if (has_profile_) {
-    shape = beside_profile(std::move(shape));
+    shape = without_width(std::move(shape));
   }
   if (prior_.sigma_sd_mm > 0.0) {
     shape.sigma_mm = prior_.sigma_mm;

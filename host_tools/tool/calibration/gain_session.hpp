@@ -61,7 +61,7 @@ private:
 
   Array array_;
   Shape prior_;             /* that the user has set */
-  bool has_profile_;        /* a pad's profile acts: no width is assumed */
+  bool has_profile_;        /* a pad profile is in use: no width is assumed */
   double ambient_Pa_ = 0.0; /* the mean zero at the last placement */
   PlacementFinder finder_;
   std::vector<Placement> placements_;

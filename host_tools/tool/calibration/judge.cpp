@@ -23,14 +23,14 @@ constexpr double FORCE_MODEL_SD = 0.01;
 constexpr double FADED_BEFORE = 2.7;
 /* Contacts add to sigma^2, each its own spread; sd of that, about the calibration's foot. */
 constexpr double CONTACTS_SD_mm2 = 0.6;
-/* Evidence against a session speaks for itself from so many placements, or when it is so many times
- * the bound from fewer; until then it only keeps a session from being good. */
+/* Evidence refuses a session from EVIDENCE_SURE placements on. From EVIDENCE_MIN on it does so if it
+ * is EVIDENCE_CLEAR times its bound; otherwise it only keeps a session from being good. */
 constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
 constexpr double EVIDENCE_CLEAR = 3.0;
 /* Of the halves' difference at a sensor: how sure it must be, and how many of its sds are chance.
  */
 constexpr double HALVES_SD_MAX = 0.025, HALVES_SDS = 2.0;
-/* Halves that disagree are given so many placements to agree. */
+/* Halves that disagree may agree until there is this number of placements. */
 constexpr std::size_t HALVES_SURE = 40;
 
 double rms(const std::vector<double> &values) {
@@ -97,11 +97,11 @@ std::string list_of(const std::vector<std::size_t> &sensors) {
   return text;
 }
 
-std::string felt_too_little(const std::vector<std::size_t> &sensors) {
-  return sensors.empty() ? "" : ", so sensors " + list_of(sensors) + " felt too little";
+std::string too_little_load(const std::vector<std::size_t> &sensors) {
+  return sensors.empty() ? "" : ", so sensors " + list_of(sensors) + " had too little load";
 }
 
-/* Differences of the gains of odd and even placements beyond what either can not tell, and whether
+/* Differences of the gains of odd and even placements beyond their uncertainty, and whether
  * either's make the firmware's fit of the other better. */
 void compare_halves(const Array &array, std::vector<Placement> placements, const Solution &solution,
                     Judgement &judgement) {
@@ -152,7 +152,7 @@ void compare_halves(const Array &array, std::vector<Placement> placements, const
 }
 
 /* What the placements lack where gains are not known: by where they are. Where they are not all
- * over the pad the dip seems to tell gains. */
+ * over the pad the dip is mistaken for gains. */
 Reason lacking(const Array &array, const std::vector<Placement> &placements, const Solution &solution) {
   if (placements.size() < PLACEMENTS_WANTED || !solution.solved) {
     return Reason::too_few;
@@ -198,21 +198,21 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "good: every gain is known to " + percent(s.worst_shape_sd());
   case Reason::too_few:
     if (placements == 0) {
-      return "no placement was found: set a weight of about 3 N on a round foot down, let it stand "
+      return "no placement was found: set a weight of about 3 N on a round foot down, let it rest "
              "by "
              "itself for a second, and lift it";
     }
     return "too few placements (" + std::to_string(placements) + "): place the weight at more places all over the pad";
   case Reason::cluster:
-    return "all placements are near one place" + felt_too_little(j.unsure) + ": place the weight all over the pad";
+    return "all placements are near one place" + too_little_load(j.unsure) + ": place the weight all over the pad";
   case Reason::one_end:
-    return "part of the pad has no placements" + felt_too_little(j.unsure) + ": place the weight there too";
+    return "part of the pad has no placements" + too_little_load(j.unsure) + ": place the weight there too";
   case Reason::unsure:
     return "the gains of sensors " + list_of(j.unsure) + " are only known to " + percent(s.worst_shape_sd()) +
-           ": place the weight near them; on thin rubber too few sensors feel a placement";
+           ": place the weight near them; on thin rubber too few sensors measure a placement";
   case Reason::weights:
     return "the force differed by " + percent(j.force_share) +
-           " between placements: use one and the same weight, standing freely";
+           " between placements: use one and the same weight, resting freely";
   case Reason::elongated:
     return "the contact is not round (its axes differ by " + percent(2.0 * j.ellipse) +
            "): use a weight with a round foot, as a ball";
@@ -224,22 +224,22 @@ std::string text_of(const Judgement &j, std::size_t placements) {
            " of the peak meanwhile: let the fingertip warm up, and begin again";
   case Reason::stray:
     return "only " + percent(j.kept_share) +
-           " of the placements fit each other: let the same weight stand freely each time";
+           " of the placements fit each other: let the same weight rest freely each time";
   case Reason::residual:
     return "the readings are " + percent(s.residual_share) +
            " of the peak off that of one round foot: use one, and see that the pad is whole";
   case Reason::halves:
-    return "every other placement says other gains, by " + percent(std::max(j.halves_shape, j.halves_gauge)) +
+    return "every other placement gives other gains, by " + percent(std::max(j.halves_shape, j.halves_gauge)) +
            ": something changed meanwhile; begin again";
   case Reason::useless:
-    return "what half of the placements say does not make the other half better, so the gains "
+    return "the gains from half of the placements do not make the other half better, so the gains "
            "are as good without: the sensors are alike, or something changed meanwhile";
   case Reason::layout:
     return "the sensors seem to sit " + std::to_string(s.spread.position_mm).substr(0, 4) +
            " mm from where the firmware has them: see geometry.c";
   case Reason::silent:
     return "sensors " + list_of(j.silent) +
-           " gave no reading to rely on: fingertip info says whether they answer and their PROM is "
+           " gave no reading to rely on: fingertip info shows whether they answer and their PROM is "
            "good";
   }
   return "";
@@ -388,7 +388,7 @@ Shape shape_of(const Solution &solution) {
   return shape;
 }
 
-Shape beside_profile(Shape shape) {
+Shape without_width(Shape shape) {
   shape.sigma_mm = shape.sigma_sd_mm = 0.0;
   return shape;
 }

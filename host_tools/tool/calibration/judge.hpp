@@ -2,7 +2,7 @@
  *
  * Good: the calibration helps, and nothing in the session speaks against it. It helps if every gain
  * is known to SHAPE_SD_WANTED, or after PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ,
- * and if what half of the placements say makes the firmware's fit of the other half better.
+ * and if the gains from half of the placements make the firmware's fit of the other half better.
  * Refused: what speaks against it does not go away with more placements. More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm,
@@ -36,7 +36,7 @@ constexpr double ELLIPSE_MAX = 0.05;          /* rms of q1, q2 beyond their sds:
                                                  0.031 at most (report truth, part calibration, seed 20000) */
 constexpr double OFFSET_MAX = 0.012;          /* rms over the sensors, of the peak: zeros */
 constexpr double DRIFT_MAX = 0.006;           /* the same, from first to last placement */
-constexpr double POSITION_MAX_mm = 0.5;       /* rms: sensors where the layout says */
+constexpr double POSITION_MAX_mm = 0.5;       /* rms: distance of sensors from the layout */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */
 constexpr std::size_t PLACEMENTS_ENOUGH = 20; /* more hardly make gains surer that are not by then */
 constexpr std::size_t PLACEMENTS_MAX = 60;    /* who is not done by then never will be */
@@ -53,9 +53,9 @@ enum class Reason {
   drift,     /* zeros moved */
   stray,     /* too many placements do not fit the others */
   residual,  /* no such profile */
-  halves,    /* odd and even placements say different gains */
-  useless,   /* what half of the placements say makes the other half no better */
-  layout,    /* sensors are not where the firmware says */
+  halves,    /* odd and even placements give different gains */
+  useless,   /* the gains from half of the placements make the other half no better */
+  layout,    /* sensors are not where the firmware's layout has them */
   silent,    /* a sensor has no reading in any placement */
 };
 
@@ -82,8 +82,8 @@ struct Judgement {
 /* last: there will be no more placements, so what is not good is refused. */
 Judgement judge(const Array &array, const std::vector<Placement> &placements, bool last);
 
-/* Of one sensor: how far it lies from its place, and the log of the width in which it feels a
- * contact, over that of the others. */
+/* How far a sensor is from its place, and the log of the width of its response over that of the
+ * others. */
 struct Own {
   double off_x_mm = 0.0, off_y_mm = 0.0, wider = 0.0;
 };
@@ -94,14 +94,14 @@ struct Shape {
   std::vector<Own> own = {}; /* [sensor] */
 };
 Shape shape_of(const Solution &solution);
-/* What of it the firmware's fit has where a pad's profile acts: it assumes no width then. */
-Shape beside_profile(Shape shape);
+/* The part of it that the firmware's fit uses with a pad profile: no width. */
+Shape without_width(Shape shape);
 /* As the fit takes it: [sensor], or nothing. */
 std::vector<fit_own> own_of(const Array &array, const Shape &shape);
 
 /* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains, half a
  * second to a second after the weight was down. Rubber that relaxes reads more before and less
- * after: sd holds what the readings' fading in that time says of it. */
+ * after: sd includes that, from the readings' fading in that time. */
 struct ForceScale {
   double scale = 1.0, sd = 0.0;
 };

@@ -12,7 +12,7 @@ namespace {
  * --pads 30). Where sensors sit where they should and rubber does not relax, the spreads cannot be
  * seen to be nothing, so the sds are twice too large. */
 constexpr double SEEN_BEFORE = 4.0;
-constexpr double CAPPED = 4.0; /* sds: one odd placement says little of the others */
+constexpr double CAPPED = 4.0; /* sds: one odd placement is weak evidence on the others */
 
 } // namespace
 

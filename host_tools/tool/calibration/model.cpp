@@ -121,10 +121,10 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, dou
   const double dip_per = 0.5 / (dip_mm * dip_mm);
   const double h = g[layout.dip()];
   const double dip = std::exp(-dip_per * square);
-  const double felt = full * ((1.0 - m) * wide + m * narrow - h * dip);
-  const Hidden hidden = hidden_by(g[layout.memory(k)] * earlier_Pa, felt);
-  const double left = 1.0 - hidden.by_felt;
-  const double strength = left * full, value = left * felt;
+  const double sensed = full * ((1.0 - m) * wide + m * narrow - h * dip);
+  const RelaxationEffect hidden = relaxation_effect(g[layout.memory(k)] * earlier_Pa, sensed);
+  const double left = 1.0 - hidden.by_sensed;
+  const double strength = left * full, value = left * sensed;
   const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
   const double by_square = core_by_square + strength * h * dip * dip_per;
   const double by_log_width = -2.0 * square * core_by_square;
@@ -132,7 +132,7 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, dou
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
   Reading r;
-  r.model = felt - hidden.Pa + g[layout.offset(k)] + g[layout.drift(k)] * tau;
+  r.model = sensed - hidden.Pa + g[layout.offset(k)] + g[layout.drift(k)] * tau;
   const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
   const int at[TOUCHED] = {k,
                            layout.log_peak(),

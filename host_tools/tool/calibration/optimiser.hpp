@@ -11,7 +11,7 @@ public:
   explicit Optimiser(const Model &model);
 
   static constexpr int ITERATIONS_MAX = 60;
-  /* Until the cost settles, or for so many steps. */
+  /* Until the cost settles, for at most this number of steps. */
   void descend(int steps = ITERATIONS_MAX);
   double cost() const { return cost_; }
 

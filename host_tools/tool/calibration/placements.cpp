@@ -26,10 +26,10 @@ constexpr double SWAY_NOISES = 2.5;
 } // namespace
 
 PlacementFinder::PlacementFinder(std::size_t sensors) : sensors_(sensors) {
-  begin_anew();
+  restart();
 }
 
-void PlacementFinder::begin_anew() {
+void PlacementFinder::restart() {
   state_ = State::resting;
   refusal_ = Refusal::none;
   begun_ = false;
@@ -42,7 +42,7 @@ void PlacementFinder::begin_anew() {
 std::optional<Placement> PlacementFinder::take(const Frame &frame) {
   double t_s = frame.t_s + ahead_s_;
   if (begun_ && (t_s <= last_s_ || t_s > last_s_ + GAP_s)) {
-    begin_anew();
+    restart();
     if (t_s <= last_s_) {
       ahead_s_ += last_s_ + GAP_s - t_s;
       t_s = last_s_ + GAP_s;

@@ -1,4 +1,4 @@
-/* Finds placements in a stream of frames: a weight was set down, stands, and was lifted again.
+/* Finds placements in a stream of frames: a weight was set down, rested, and was lifted again.
  *
  * Frames of any rate from 12 a second and any oversampling; all times are the frames' own. What
  * touches the pad is decided by absolute pressures alone, against those just before, so neither
@@ -6,12 +6,12 @@
  * beginning is asked of the zero.
  *
  * A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it
- * stood still for a second: then the mean of the readings from 0.5 to 1 s is taken, above the mean
- * of the half second before the contact. Standing still means that over that time nothing but a
- * steady decay goes on, as rubber relaxes (the limits below, noise allowed for). A finger is not as
+ * has rested for a second: then the mean of the readings from 0.5 to 1 s is taken, above the mean
+ * of the half second before the contact. To rest means that over that time the readings only decay
+ * steadily, as rubber relaxes (the limits below, noise allowed for). A finger is not as
  * still: it sways by tenths of a millimetre, each of which is 1.7 % on the flank of a contact, and
- * its force trembles by percents. What stood still for the first time more than LATE_s after it
- * touched is no placement either.
+ * its force trembles by percents. A contact that rests for the first time more than LATE_s after the
+ * touch is no placement either.
  */
 #pragma once
 
@@ -69,7 +69,7 @@ private:
     std::vector<double> means;
   };
 
-  void begin_anew();
+  void restart();
   std::optional<Placement> close(const Slot &slot);
   std::vector<double> mean_of(double begin_s, double end_s, std::uint32_t *seen) const;
   void find_rest(double t_s);

@@ -11,7 +11,7 @@
 namespace fingertip::calibrating {
 namespace {
 
-/* Warnings that say nothing against a load: its standard deviation has what they are about. */
+/* Warnings that do not concern a tangential force: its standard deviation includes their causes. */
 constexpr std::uint32_t HARMLESS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_SENSOR_MASKED;
 
 /* Without its scale's own uncertainty, which is what is sought. */
@@ -27,7 +27,7 @@ double sd_without_scale_N(const wire_contact &contact, const pad_profile &pad) {
 void check_pad(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
     throw Error(what + ": its firmware (scene " + text_field(info.scene) +
-                ") reports no tangential load; flash one of scene grasp");
+                ") reports no tangential force; flash one of scene grasp");
   }
   if (!(info.stored & WIRE_STORED_PAD)) {
     throw Error(what + ": no pad profile; fingertip pad --thickness MM first");

@@ -112,11 +112,11 @@ std::optional<Pull> PullFinder::refuse(Refusal why) {
 }
 
 std::optional<Pull> PullFinder::take(const PullFrame &frame) {
-  const bool begins_anew = !frames_.empty() && frame.t_s <= frames_.back().t_s;
-  if (begins_anew || !frame.contact || !frame.good) {
+  const bool restarted = !frames_.empty() && frame.t_s <= frames_.back().t_s;
+  if (restarted || !frame.contact || !frame.good) {
     frames_.clear();
   }
-  if (begins_anew || !frame.contact) {
+  if (restarted || !frame.contact) {
     state_ = State::free;
   }
   if (!frame.contact) {

@@ -1,4 +1,4 @@
-/* One scale of the tangential force from pulls of one known force: an object stands on the pad, is
+/* One scale of the tangential force from pulls of one known force: an object is on the pad, is
  * left alone for a moment, then a string pulls it level along the rubber and holds.
  *
  * Of each contact counts what changed between the rest and the pull, so a zero that gains or the
@@ -18,7 +18,7 @@
 namespace fingertip::calibrating {
 
 constexpr double REST_s = 0.5, PULL_s = 1.0;
-constexpr double SETTLED_s = 0.5;  /* still for so long before, so that no rise is in the mean */
+constexpr double SETTLED_s = 0.5;  /* still for this time before, so that no rise is in the mean */
 constexpr double TOUCHED_s = 0.3;  /* a hand lets go; its contact is none yet */
 constexpr double PULLED_MIN = 0.2; /* of the known force: a pull, whatever the scale */
 /* Between the halves of a span that is still, of the known force and of the normal force. What is

@@ -37,18 +37,17 @@ MatrixXd gauge(const Array &array) {
   return MatrixXd(qr.householderQ()).leftCols(qr.rank());
 }
 
-/* A sum of Gaussians about the contact, by their widths; of infinite width: what is the same all
- * over. */
-struct Bells {
-  std::vector<std::pair<double, double>> bells; /* height, width */
+/* A sum of Gaussians about the contact; a term of infinite width is an offset. */
+struct GaussianMixture {
+  std::vector<std::pair<double, double>> terms; /* height, width */
 };
 
 /* The mean product over the sensors: seen from contacts on the array they lie about as a Gaussian
  * of the width reach does. */
-double overlap(const Bells &a, const Bells &b, double reach) {
+double overlap(const GaussianMixture &a, const GaussianMixture &b, double reach) {
   double sum = 0.0;
-  for (const auto &[height, width] : a.bells) {
-    for (const auto &[other_height, other_width] : b.bells) {
+  for (const auto &[height, width] : a.terms) {
+    for (const auto &[other_height, other_width] : b.terms) {
       sum +=
           height * other_height / (1.0 / (width * width) + 1.0 / (other_width * other_width) + 1.0 / (reach * reach));
     }
@@ -59,17 +58,17 @@ double overlap(const Bells &a, const Bells &b, double reach) {
 /* What is found, as the firmware has it: the Gaussian nearest to the response, and a dip. A dip is
  * what the response has less than a layer's own profile: that, the offset that all sensors share
  * and a wide dip look alike, so the response is taken as they make it together. */
-struct Nearest {
+struct EquivalentGaussian {
   double width = 1.0; /* of the Gaussian, over that of the wide part, as all widths here */
   double dip = 0.0;   /* of its amplitude */
 };
-Nearest nearest(const Bells &response, double dip_width, double reach) {
-  const Bells dip{{{1.0, dip_width}}};
+EquivalentGaussian equivalent_gaussian(const GaussianMixture &response, double dip_width, double reach) {
+  const GaussianMixture dip{{{1.0, dip_width}}};
   const double of_dip = overlap(dip, dip, reach), with_dip = overlap(response, dip, reach);
   double most = 0.0, depth = 0.0;
   constexpr double STEP = 0.002, WIDEST = 1.3;
   for (double width = NARROW; width <= WIDEST; width += STEP) {
-    const Bells layer{{{1.0 - LAYER_MIXING, width}, {LAYER_MIXING, NARROW * width}}};
+    const GaussianMixture layer{{{1.0 - LAYER_MIXING, width}, {LAYER_MIXING, NARROW * width}}};
     const double own = overlap(layer, layer, reach), cross = overlap(layer, dip, reach);
     const double with = overlap(response, layer, reach);
     const double determinant = own * of_dip - cross * cross;
@@ -81,12 +80,12 @@ Nearest nearest(const Bells &response, double dip_width, double reach) {
       depth = std::max(less, 0.0);
     }
   }
-  Bells core = response;
-  core.bells.emplace_back(depth, dip_width);
-  Nearest best;
+  GaussianMixture core = response;
+  core.terms.emplace_back(depth, dip_width);
+  EquivalentGaussian best;
   most = 0.0;
   for (double width = NARROW; width <= WIDEST; width += STEP) {
-    const Bells gaussian{{{1.0, width}}};
+    const GaussianMixture gaussian{{{1.0, width}}};
     const double own = overlap(gaussian, gaussian, reach), with = overlap(core, gaussian, reach);
     if (with * with > most * own) {
       most = with * with / own;
@@ -167,16 +166,16 @@ double Solution::worst_shape_sd() const {
                           : *std::max_element(shape_sd.begin(), shape_sd.end());
 }
 
-Hidden hidden_by(double remembered_Pa, double felt_Pa) {
+RelaxationEffect relaxation_effect(double remembered_Pa, double sensed_Pa) {
   if (remembered_Pa <= 0.0) {
     return {remembered_Pa, 1.0, 0.0};
   }
-  if (felt_Pa <= 0.0) {
+  if (sensed_Pa <= 0.0) {
     return {0.0, 0.0, 0.0};
   }
-  const double ratio = felt_Pa / remembered_Pa, square = 1.0 + ratio * ratio;
-  const double root = 1.0 / std::sqrt(square), by_felt = root / square;
-  return {felt_Pa * root, by_felt * ratio * ratio * ratio, by_felt};
+  const double ratio = sensed_Pa / remembered_Pa, square = 1.0 + ratio * ratio;
+  const double root = 1.0 / std::sqrt(square), by_sensed = root / square;
+  return {sensed_Pa * root, by_sensed * ratio * ratio * ratio, by_sensed};
 }
 
 void remember(std::vector<Placement> &placements) {

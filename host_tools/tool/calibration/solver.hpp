@@ -18,21 +18,21 @@
  * Cast rubber has a dip (h) around that: -1 to -2 % of the peak three to five widths away, on every
  * pad of host_tools/report/real; bonded rubber in the twin has none.
  *
- * A tilt and a bowl over the pad are no gains that a touch of unknown strength and width could
- * tell: they move and widen the Gaussian. That all placements have the same force (e, up to
- * Assumptions::force_sd) is what tells them, less surely than the rest. They are the gauge: the
+ * A touch of unknown strength and width cannot determine a tilt and a bowl of the gains over the
+ * pad: they move and widen the Gaussian. Only the equal force of all placements (e, up to
+ * Assumptions::force_sd) determines them, less surely than the rest. They are the gauge: the
  * subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
  *
  * All else that a session may hold is in the model with a prior around nothing, so that it neither
  * passes for a gain nor stays unseen: where the sensors sit (they are soldered by hand), sensors
- * that feel a contact wider or narrower than the others do (b), zeros that were off (o) or move
+ * whose response is wider or narrower than that of the others (b), zeros that were off (o) or move
  * (d), rubber that has not let go of the placements before (r), contacts that are not round (q, of
- * all and of each). The posterior of each is in the Solution; judge.hpp says what is too much.
+ * all and of each). The posterior of each is in the Solution; judge.hpp has the limits.
  *
  * How large the spreads of b, e, w, q, r and of the places are, and the model's own error, is
  * learnt from the session itself (expectation and maximisation, from the Assumptions as the start):
- * sensors that sit where they should tell the gains better than others, and the standard deviations
- * say so.
+ * sensors that are where they should be determine the gains better than others, with smaller standard
+ * deviations.
  *
  * Robust least squares (Huber) by Levenberg-Marquardt, the placements' own unknowns eliminated; a
  * placement that does not fit the others is dropped as a whole. The same input gives the same
@@ -63,15 +63,16 @@ struct Placement {
 
 /* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,
  * (exp(-age / 10 s) + 20 exp(-age / 1 s)) of its reading: two times and their proportion after two
- * seconds of standing, as in the holds of a real strip (twin/effects.hpp). What is left of them
- * hides at most what the sensor feels now. */
+ * seconds of rest, as in the holds of a real strip (twin/effects.hpp). The rest of them
+ * hides at most the present pressure. */
 void remember(std::vector<Placement> &placements);
-/* Of what is felt, with its derivatives: the less of both, rounded off where they are alike. What
- * was remembered the other way round stands above what is felt, and hides nothing. */
-struct Hidden {
-  double Pa, by_remembered, by_felt;
+/* The pressure that relaxation hides, with its derivatives: the smaller of the remembered and the
+ * sensed pressure, rounded off where they are alike. A remembered pressure of the other sign adds to
+ * the sensed one and hides nothing. */
+struct RelaxationEffect {
+  double Pa, by_remembered, by_sensed;
 };
-Hidden hidden_by(double remembered_Pa, double felt_Pa);
+RelaxationEffect relaxation_effect(double remembered_Pa, double sensed_Pa);
 
 /* Standard gravity: the force of a weight. */
 constexpr double GRAVITY_N_PER_g = 9.80665e-3;
@@ -94,9 +95,9 @@ struct Assumptions {
   double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
   double dip = 0.05;                    /* of h: 0.05 on real pads, 0 on the twin's */
-  /* Of log B. So narrow because zeros and a model that is off look like another width where the
-   * readings tell little: with 0.05 and more, places and forces on the recording of
-   * host_tools/report/real that chooses are worse. Readings that tell it move it all the same: the
+  /* Of log B. It is this narrow because zeros and model errors look like another width where the
+   * readings contain little: with 0.05 and more, places and forces on the recording of
+   * host_tools/report/real that chooses are worse. Readings that determine it still move it: the
    * dip of the twin's pads is 1.6 pitches wide, and is found within some per cent. */
   double dip_log_sd = 0.03;
   /* Of log A from that of what a strong placement reads, which was near a sensor: without it a
@@ -109,10 +110,10 @@ constexpr double NARROW = 0.64;
 /* m of the profile of a bonded layer of 12 mm under a foot of 15 mm (pad/profile.hpp). */
 constexpr double LAYER_MIXING = 0.22;
 /* Standard deviation B of the dip's Gaussian that is expected, in pitches: about as wide as the
- * array can still tell from zeros that were off. As the assumed spread of forces, chosen on the
+ * array can still distinguish from zeros that were off. As the assumed spread of forces, chosen on the
  * recording of host_tools/report/real that chooses. */
 constexpr double DIP_PITCHES = 2.3;
-/* An own width b takes b R / S^2 of a reading. The readings that tell where a contact is have
+/* An own width b takes b R / S^2 of a reading. The readings that locate a contact have
  * R / S^2 of 1 to 2. */
 constexpr double OWN_WIDTH_SQUARE = 1.5;
 /* In residual standard deviations: where a reading's weight begins to fall. */
@@ -181,11 +182,11 @@ Solution solve_from(const Array &array, const std::vector<Placement> &placements
 /* The log gains with their mean, tilt and bowl taken out. */
 std::vector<double> outside_gauge(const Array &array, const std::vector<double> &gain);
 
-/* How far inside the outer sensors a place is asked for. Right above them a foot stands where the
- * rubber may end, which no profile of one thickness explains. Pads that end 6 mm beyond got worse
+/* How far inside the outer sensors a place is asked for. Right above them a foot may be where the
+ * rubber ends, which no profile of one thickness explains. Pads that end 6 mm beyond got worse
  * by calibrations with such places, 4 of 60, and none does with these (report truth, part calibration, seed
  * 31000). Wide pads of 12 mm are located as well. The price is on 6 mm of rubber, where a sensor
- * feels only what is near: 8 % more location error. */
+ * measures only what is near: 8 % more location error. */
 constexpr double INSET_PITCHES = 0.5;
 
 /* Where a placement more would lower the largest shape_sd most: a place on the array, in steps of

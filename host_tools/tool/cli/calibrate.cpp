@@ -107,8 +107,8 @@ int erase(const CalibrateOptions &options) {
   return 0;
 }
 
-/* A fingertip that estimates the tangential load needs the thickness. Where the user has set one,
- * this says whether it is the one found. Else the pad's profile follows from the one found. */
+/* A fingertip that estimates tangential force needs the thickness. If the user has set one, this
+ * reports whether it is the one found. Otherwise the pad's profile follows from the one found. */
 void use_thickness(CalibratedDevice &device, const calibration &made,
                    const std::optional<pad::Thickness> &for_profile) {
   const wire_info &info = device.info();
@@ -164,7 +164,7 @@ int calibrate(const CalibrateOptions &options) {
   ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
   device->write(made);
   use_thickness(*device, made, for_profile);
-  std::printf("calibrated: it acts from now on\n");
+  std::printf("calibrated: it applies from now on\n");
   return 0;
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::chrono::milliseconds DEVICE_POLL{20};
 constexpr std::int64_t PATIENCE_us = 5000000;        /* without a frame */
-constexpr std::chrono::milliseconds ASKED_STOP{100}; /* until a stop is looked for */
+constexpr std::chrono::milliseconds ASKED_STOP{100}; /* between two checks for a stop */
 
 } // namespace
 

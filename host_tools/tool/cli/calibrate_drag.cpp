@@ -19,11 +19,11 @@ using calibrating::PullJudgement;
 using calibrating::PullSession;
 
 void pull_live(CalibratedDevice &device, PullSession &work) {
-  std::string said;
-  const auto say = [&] {
-    if (work.advice() != said) {
-      said = work.advice();
-      std::printf("%s\n", said.c_str());
+  std::string printed;
+  const auto print_advice = [&] {
+    if (work.advice() != printed) {
+      printed = work.advice();
+      std::printf("%s\n", printed.c_str());
       std::fflush(stdout);
     }
   };
@@ -32,9 +32,9 @@ void pull_live(CalibratedDevice &device, PullSession &work) {
       work.judge(false);
       std::printf("%s; %s\n", work.last_pull_text().c_str(), work.judgement().text.c_str());
     }
-    say();
+    print_advice();
   };
-  say();
+  print_advice();
   device.follow(WIRE_STREAM_CONTACT, WIRE_CONTACT, take,
                 [&] { return work.judgement().state == PullJudgement::State::more; });
 }
@@ -124,7 +124,7 @@ int calibrate_drag(const CalibrateOptions &options) {
   }
   ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
   device->write(made);
-  std::printf("calibrated: it acts from now on\n");
+  std::printf("calibrated: it applies from now on\n");
   return 0;
 }
 

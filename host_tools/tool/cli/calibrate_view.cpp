@@ -17,7 +17,7 @@ using calibrating::Judgement;
 
 constexpr Colour INK = {222, 222, 228}, FAINT = {128, 130, 145}, RULE = {66, 68, 84};
 constexpr Colour GOOD = {92, 214, 140}, WARNING = {250, 190, 60}, ACCENT = {96, 190, 255};
-constexpr Colour WHITE = {255, 255, 255}, FELT = {120, 60, 30};
+constexpr Colour WHITE = {255, 255, 255}, PRESSED = {120, 60, 30};
 constexpr double FULL_Pa = 20000.0;
 
 constexpr double RIM_mm = 6.0;      /* beyond the outer sensors */
@@ -86,9 +86,9 @@ Canvas draw(const GainSession &session, int columns, int rows) {
   }
   for (std::size_t k = 0; k < array.sensors(); k++) {
     const bool unsure = !judgement || std::count(judgement->unsure.begin(), judgement->unsure.end(), k) > 0;
-    const double felt = std::clamp(session.finder().above_Pa()[k] / FULL_Pa, 0.0, 1.0);
+    const double pressure = std::clamp(session.finder().above_Pa()[k] / FULL_Pa, 0.0, 1.0);
     at(array.x_mm[k], array.y_mm[k], std::to_string(k),
-       {unsure ? WARNING : GOOD, mix({0, 0, 0}, FELT, static_cast<float>(std::sqrt(felt))), true});
+       {unsure ? WARNING : GOOD, mix({0, 0, 0}, PRESSED, static_cast<float>(std::sqrt(pressure))), true});
   }
   if (session.wanted()) {
     at(session.wanted()->x_mm, session.wanted()->y_mm, "○", {WHITE, std::nullopt, true});
@@ -96,23 +96,23 @@ Canvas draw(const GainSession &session, int columns, int rows) {
 
   const int text_left = left + pad.columns() + 3;
   int row = top;
-  const auto say = [&](const std::string &text, Colour colour, bool bold = false) {
+  const auto add_line = [&](const std::string &text, Colour colour, bool bold = false) {
     for (const std::string &line : wrapped(text, TEXT_COLUMNS)) {
       canvas.text(text_left, row++, line, {colour, std::nullopt, bold});
     }
   };
-  say(session.advice(), WHITE, true);
+  add_line(session.advice(), WHITE, true);
   row++;
-  say(session.progress(), INK);
+  add_line(session.progress(), INK);
   if (judgement && session.placements().size() >= calibrating::PLACEMENTS_MIN) {
     row++;
-    say(judgement->text, judgement->state == Judgement::State::more ? FAINT : GOOD);
+    add_line(judgement->text, judgement->state == Judgement::State::more ? FAINT : GOOD);
   }
   row++;
   if (session.wanted()) {
-    say("○ where the next one helps most", FAINT);
+    add_line("○ where the next one helps most", FAINT);
   }
-  say("● placements, green numbers: sensors that are done", FAINT);
+  add_line("● placements, green numbers: sensors that are done", FAINT);
   canvas.text(text_left, rows - 1, "q quit   u take the last one back", {FAINT, std::nullopt, false});
   return canvas;
 }

@@ -1,4 +1,4 @@
-/* What a calibration under way looks like. */
+/* The screen of a calibration. */
 #pragma once
 
 #include "tool/calibration/gain_session.hpp"

@@ -1,4 +1,4 @@
-/* What stands below everything on a screen. */
+/* The last lines of a screen. */
 #pragma once
 
 #include <string>

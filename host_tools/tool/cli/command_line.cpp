@@ -14,7 +14,7 @@ namespace fingertip {
 
 namespace {
 
-/* So many letters of a word may be mistyped: two that change places count as two. */
+/* The letters of a word that may be mistyped: two that change places count as two. */
 constexpr std::size_t letters_mistyped(std::size_t letters) {
   return letters < 6 ? 1 : 2;
 }

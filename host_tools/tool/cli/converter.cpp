@@ -139,8 +139,8 @@ void convert_packets(const Conversion &conversion) {
   Contents contents = contents_of(conversion);
   Metadata metadata = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", conversion.from}};
   for (const auto &[key, value] : contents.recorder) {
-    bool told = key == "recorded_by" || key == "source" || key == "host_zero_us";
-    if (!told) {
+    bool replaced = key == "recorded_by" || key == "source" || key == "host_zero_us";
+    if (!replaced) {
       metadata.emplace_back(key, value);
     }
   }

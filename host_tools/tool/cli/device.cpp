@@ -11,11 +11,11 @@ namespace {
 /* A fingertip answers within milliseconds, one that starts within a second. */
 constexpr std::int64_t SILENCE_us = 1500000;
 
-/* For as long as the command lasts: whether to stop; tells once that nothing was heard. */
+/* Whether to stop; reports once that the fingertip has not answered. */
 std::function<bool()> patience(const Transport &transport, const Session &session) {
-  return [&transport, &session, begun_us = steady_now_us(), told = false]() mutable {
-    if (!told && session.statistics().bytes == 0 && steady_now_us() - begun_us > SILENCE_us) {
-      told = true;
+  return [&transport, &session, begun_us = steady_now_us(), reported = false]() mutable {
+    if (!reported && session.statistics().bytes == 0 && steady_now_us() - begun_us > SILENCE_us) {
+      reported = true;
       std::fprintf(stderr, "%s: waiting for an answer\n", printable(transport.description()).c_str());
     }
     return stop_requested();

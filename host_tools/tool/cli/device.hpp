@@ -9,8 +9,8 @@
 
 namespace fingertip {
 
-/* A fingertip with a session on it. Says on standard error that it waits for an answer, where that
- * takes long; ends by the signals. */
+/* A fingertip with a session on it. Reports on standard error if it waits long for an answer; the
+ * signals end it. */
 struct Device {
   std::unique_ptr<Transport> transport;
   Session session;

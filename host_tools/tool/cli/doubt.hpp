@@ -1,4 +1,4 @@
-/* What a contact's warning flags say, for people. */
+/* A contact's warning flags in words. */
 #pragma once
 
 #include <cstdint>

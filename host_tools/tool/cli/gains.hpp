@@ -15,7 +15,7 @@ std::string date_text(std::uint32_t date_s);
 std::string shape_text(const calibration &calibration);
 
 /* On standard output a row for each sensor: its gain, how far it lies from its place in the layout
- * along x and y, how much wider than the others it feels a contact, and a bar from the mean to its
+ * along x and y, how much wider than the others its response is, and a bar from the mean to its
  * gain. Of a calibration that has no places, only the gains. */
 void print_gains(const calibration &calibration, std::uint8_t sensor_count);
 

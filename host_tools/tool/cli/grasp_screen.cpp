@@ -58,12 +58,12 @@ void draw_head(Canvas &canvas, const GripModel &grip) {
   canvas.text(canvas.columns() - columns_of(text), 0, text, {colour_of(state), BAR, true});
 }
 
-struct Felt {
+struct Measured {
   std::optional<float> force_N;
   bool doubtful = false, at_least = false;
 };
 
-Felt felt_by(const Model &model) {
+Measured measured_by(const Model &model) {
   if (!model.is_current() || !model.contact()) {
     return {};
   }
@@ -93,19 +93,20 @@ int draw_fingertip(Canvas &canvas, const Area &area, const Model &model, std::si
 }
 
 /* Filled up to the force, with a mark where it is wanted; the whole is the cap. */
-void draw_force(Canvas &canvas, const Area &area, const Felt &felt, float wanted_N, float cap_N, Colour colour) {
+void draw_force(Canvas &canvas, const Area &area, const Measured &measured, float wanted_N, float cap_N,
+                Colour colour) {
   float full_N = cap_N > 0 ? cap_N : 20;
   auto cells = [&](float force_N) {
     return static_cast<int>(std::lround(std::clamp(force_N / full_N, 0.0f, 1.0f) * static_cast<float>(area.width)));
   };
-  int filled = felt.force_N ? cells(*felt.force_N) : 0;
-  bool over = felt.force_N && *felt.force_N > full_N;
+  int filled = measured.force_N ? cells(*measured.force_N) : 0;
+  bool over = measured.force_N && *measured.force_N > full_N;
   for (int i = 0; i < area.width; i++) {
     canvas.text(area.left + i, area.top, i < filled ? "█" : "░",
-                text_style(i >= filled     ? RULE
-                           : over          ? BAD
-                           : felt.doubtful ? WARNING
-                                           : colour));
+                text_style(i >= filled         ? RULE
+                           : over              ? BAD
+                           : measured.doubtful ? WARNING
+                                               : colour));
   }
   if (wanted_N > 0) {
     int at = std::min(cells(wanted_N), area.width - 1);
@@ -134,15 +135,15 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   }
   row++;
   for (std::size_t i = 0; i < fingertips.size() && i < 2; i++, row++) {
-    const Felt felt = felt_by(fingertips[i]);
+    const Measured measured = measured_by(fingertips[i]);
     column = draw_quantity(
         canvas, area.left, row,
         {i == 0 ? "left  " : "right ",
-         felt.force_N ? std::optional((felt.at_least ? "≥" : "") + number(*felt.force_N, 2)) : std::nullopt, 6, "N ",
-         felt.doubtful});
+         measured.force_N ? std::optional((measured.at_least ? "≥" : "") + number(*measured.force_N, 2)) : std::nullopt,
+         6, "N ", measured.doubtful});
     int width = area.left + area.width - column - 1;
     if (width >= 4) {
-      draw_force(canvas, {column + 1, row, width, 1}, felt, static_cast<float>(report.wanted_N), grip.cap_N(),
+      draw_force(canvas, {column + 1, row, width, 1}, measured, static_cast<float>(report.wanted_N), grip.cap_N(),
                  i == 0 ? LEFT : RIGHT);
     }
   }

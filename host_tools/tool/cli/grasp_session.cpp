@@ -35,8 +35,8 @@ constexpr milliseconds NEWS_POLL{20};
 constexpr std::int64_t ROW_us = 10000;
 /* A fingertip that starts measures its zero for half a second. */
 constexpr std::int64_t TARING_us = 3000000;
-/* Without a terminal it ends so long after the grasp did; and a gripper that may not be activated
- * is waited for no longer. */
+/* Without a terminal it ends TAIL_us after the grasp, and waits INACTIVE_us at most for a gripper
+ * that may not be activated. */
 constexpr std::int64_t TAIL_us = 300000, INACTIVE_us = 2000000;
 
 std::optional<Way> way_of(const std::string &text, Reach reach) {
@@ -145,8 +145,8 @@ private:
       LiveOptions live;
       live.recording = options_.recording;
       live.overwrite = options_.overwrite;
-      keeper_ = make_keeper(live, {ready.begin(), ready.end()}, {loop_.name(0), loop_.name(1)}, zero_us_, head);
-      keep([&] { keeper_->comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns()); });
+      recording_ = make_recording(live, {ready.begin(), ready.end()}, {loop_.name(0), loop_.name(1)}, zero_us_, head);
+      keep([&] { recording_->comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns()); });
     }
     loop_.begin(
         std::move(gripper), [way] { return open_gripper(way); }, settings_);
@@ -166,21 +166,21 @@ private:
 
   /* What writes. A disk that is full ends the recording, not the grasp. */
   template <typename Write> void keep(Write write) {
-    if (!keeper_) {
+    if (!recording_) {
       return;
     }
     try {
       write();
     } catch (const Error &error) {
-      lost_ = "not recorded any more: " + told(error);
-      keeper_.reset();
+      lost_ = "not recorded any more: " + error_text(error);
+      recording_.reset();
     }
   }
 
   void event(const std::string &text) {
     keep([&] {
-      keeper_->comment(GRIP_EVENT_KEY, static_cast<double>(steady_now_us()),
-                       fixed(static_cast<double>(steady_now_us() - zero_us_), 1) + "," + text);
+      recording_->comment(GRIP_EVENT_KEY, static_cast<double>(steady_now_us()),
+                          fixed(static_cast<double>(steady_now_us() - zero_us_), 1) + "," + text);
     });
   }
 
@@ -212,7 +212,7 @@ private:
         break;
       }
     }
-    keep([&] { keeper_->settle(settled_us - SETTLE_us); });
+    keep([&] { recording_->settle(settled_us - SETTLE_us); });
     return ended;
   }
 
@@ -223,15 +223,15 @@ private:
     case Kind::packet:
       model.take(news.packet);
       look_at_start(news);
-      keep([&] { keeper_->packet(news); });
+      keep([&] { recording_->packet(news); });
       break;
     case Kind::clock:
-      keep([&] { keeper_->clock(news); });
+      keep([&] { recording_->clock(news); });
       break;
     case Kind::gone:
     case Kind::back:
       model.set_state(news.kind == Kind::gone ? Model::State::gone : Model::State::live);
-      keep([&] { keeper_->event(news.device, news.kind == Kind::gone ? EVENT_GONE : EVENT_BACK); });
+      keep([&] { recording_->event(news.device, news.kind == Kind::gone ? EVENT_GONE : EVENT_BACK); });
       break;
     case Kind::ended:
       if (!ending_) {
@@ -258,7 +258,7 @@ private:
       requested_ = true;
       for (std::size_t i = 0; i < FINGERS; i++) {
         if (touches_[i]) {
-          say(std::string(SIDES[i]) + " feels something already, which is taken for the object");
+          show_message(std::string(SIDES[i]) + " has contact already, which is taken for the object");
         }
       }
       wish(GRIP_REQUEST_GRASP, "grasp");
@@ -289,7 +289,8 @@ private:
     }
     grip_.take(row);
     keep([&] {
-      keeper_->comment(GRIP_ROW_KEY, static_cast<double>(news.host_us), fixed(row.time_us, 1) + "," + grip_cells(row));
+      recording_->comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
+                          fixed(row.time_us, 1) + "," + grip_cells(row));
     });
   }
 
@@ -300,16 +301,16 @@ private:
     bool done = loop_.request(request);
     event(name + (done ? "" : ", which cannot be now"));
     if (!done) {
-      say("cannot " + name + " while it is " + state_name(state()));
+      show_message("cannot " + name + " while it is " + state_name(state()));
     }
   }
 
   /* At once, and in words of its own. */
   void answer_interrupts() {
-    if (interrupts() > told_interrupts_) {
-      told_interrupts_ = interrupts();
-      say(told_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly"
-                                : "Ctrl-C: opens slowly; again: ends here");
+    if (interrupts() > reported_interrupts_) {
+      reported_interrupts_ = interrupts();
+      show_message(reported_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly"
+                                             : "Ctrl-C: opens slowly; again: ends here");
       view_->hurry();
       event("interrupted");
     }
@@ -339,15 +340,15 @@ private:
       models_[i].set_statistics(loop_.statistics(i));
     }
     auto now = host_now();
-    if (now > said_until_) {
-      said_.clear();
+    if (now > message_until_) {
+      message_.clear();
     }
     Caption caption;
     caption.keys = "q end, holding  o open  h hold  g grasp";
-    for (const std::string &text : {said_, fault_.empty() ? trouble_ : fault_, lost_}) {
+    for (const std::string &text : {message_, fault_.empty() ? trouble_ : fault_, lost_}) {
       caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
     }
-    if (caption.note.empty() && keeper_) {
+    if (caption.note.empty() && recording_) {
       caption.note = has_keys_ ? "recording to " + printable(options_.recording) : "";
     }
     view_->update(models_, caption);
@@ -376,9 +377,9 @@ private:
     }
   }
 
-  void say(const std::string &text) {
-    said_ = text;
-    said_until_ = host_now() + SAID_FOR;
+  void show_message(const std::string &text) {
+    message_ = text;
+    message_until_ = host_now() + MESSAGE_TIME;
   }
 
   int status_of_end() const {
@@ -415,13 +416,13 @@ private:
     std::vector<LineStatistics> statistics = {loop_.statistics(0), loop_.statistics(1)};
     std::uint64_t frames = 0;
     keep([&] {
-      frames = keeper_->frames(0) + keeper_->frames(1);
-      keeper_->finish(statistics, "ended");
+      frames = recording_->frames(0) + recording_->frames(1);
+      recording_->finish(statistics, "ended");
     });
-    if (keeper_) {
+    if (recording_) {
       std::fprintf(stderr, "%s: %llu frames of 2 fingertips, aligned to %s us or better\n",
                    printable(options_.recording).c_str(), static_cast<unsigned long long>(frames),
-                   fixed(keeper_->alignment_us(), 0).c_str());
+                   fixed(recording_->alignment_us(), 0).c_str());
     }
     const std::string cause = cause_of_fault();
     for (const std::string &text : {cause.empty() ? trouble_ : cause, lost_}) {
@@ -444,7 +445,7 @@ private:
   GripSettings settings_;
   std::vector<Model> models_;
   GripModel grip_;
-  std::unique_ptr<Keeper> keeper_;
+  std::unique_ptr<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   GraspLoop loop_;
   std::optional<GraspNews> last_; /* of kind step, that was kept */
@@ -453,10 +454,10 @@ private:
   std::size_t lost_fingers_ = 0;
   bool requested_ = false, quit_ = false, has_keys_ = false, ending_ = false;
   bool silent_at_end_ = false;
-  unsigned told_interrupts_ = 0;
+  unsigned reported_interrupts_ = 0;
   std::uint8_t state_at_end_ = GRIP_IDLE;
-  std::string said_, trouble_, fault_, lost_, failure_;
-  KeyTime said_until_{};
+  std::string message_, trouble_, fault_, lost_, failure_;
+  KeyTime message_until_{};
 };
 
 } // namespace

@@ -51,7 +51,7 @@ private:
   std::int64_t last_interval_ = 0;
 };
 
-/* "left 4.02 N" and so on: what a line of text tells. */
+/* "left 4.02 N" and so on, for a line of text. */
 std::string grip_line(const GripModel &grip);
 
 } // namespace fingertip

@@ -16,7 +16,7 @@ void with_gripper_line(CLI::App *command, GripperWay &way);
  * the advice in it. */
 std::unique_ptr<Gripper> reach_gripper(GripperWay &way);
 
-/* What a gripper's error says, with what to do. */
+/* A gripper's error, with what to do. */
 Error with_gripper_advice(const Error &error);
 
 } // namespace fingertip

@@ -15,7 +15,7 @@ fs::path this_program() {
   return fs::read_symlink("/proc/self/exe", none);
 }
 
-std::optional<fs::path> beside(std::initializer_list<const char *> places) {
+std::optional<fs::path> find_installed(std::initializer_list<const char *> places) {
   std::error_code none;
   for (const char *place : places) {
     fs::path path = (this_program().parent_path() / place).lexically_normal();

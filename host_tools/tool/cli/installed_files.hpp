@@ -11,7 +11,7 @@ namespace fingertip {
 
 /* The first of these that exists, as seen from this program's folder: where it is installed, or in
  * the tree that it is built in. */
-std::optional<std::filesystem::path> beside(std::initializer_list<const char *> places);
+std::optional<std::filesystem::path> find_installed(std::initializer_list<const char *> places);
 
 /* This program's own path. */
 std::filesystem::path this_program();

@@ -32,7 +32,7 @@ class Live {
 public:
   Live(const LiveOptions &options, const std::vector<Way> &ways)
       : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()), taring_(ways.size()),
-        accepted_(ways.size()), told_missing_(ways.size()) {
+        accepted_(ways.size()), reported_missing_(ways.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
     wanted.follow_clock = several();
@@ -99,8 +99,8 @@ private:
     for (DeviceNews &news : feed_.take(POLL)) {
       take(news);
     }
-    if (keeper_) {
-      keeper_->settle(settled_us - SETTLE_us);
+    if (recording_) {
+      recording_->settle(settled_us - SETTLE_us);
     }
   }
 
@@ -111,11 +111,11 @@ private:
     case Kind::packet:
       model.take(news.packet);
       if (news.packet.type == WIRE_HEALTH) {
-        tell_missing(news.device);
+        report_missing(news.device);
       }
       take_answer(news.device, news.packet);
-      if (keeper_) {
-        keeper_->packet(news);
+      if (recording_) {
+        recording_->packet(news);
       } else if (ready_[news.device]) {
         early_[news.device].push_back(std::move(news));
       }
@@ -145,8 +145,8 @@ private:
       raw_bytes_->append(news.bytes.data(), news.bytes.size());
       break;
     case Kind::clock:
-      if (keeper_) {
-        keeper_->clock(news);
+      if (recording_) {
+        recording_->clock(news);
       }
       break;
     case Kind::ended:
@@ -172,10 +172,10 @@ private:
     }
     zero_us_ = steady_now_us();
     if (!options_.recording.empty()) {
-      keeper_ = make_keeper(options_, ready, ports, zero_us_);
+      recording_ = make_recording(options_, ready, ports, zero_us_);
       for (const auto &early : early_) {
         for (const DeviceNews &news : early) {
-          keeper_->packet(news);
+          recording_->packet(news);
         }
       }
     }
@@ -184,14 +184,14 @@ private:
       models_[i].set_state(Model::State::live);
       loops_[i]->start();
     }
-    if (several() && keeper_ && !view_) {
+    if (several() && recording_ && !view_) {
       progress_ = std::make_unique<JointProgress>();
     }
   }
 
   void event(std::size_t device, const std::string &text) {
-    if (keeper_) {
-      keeper_->event(device, text);
+    if (recording_) {
+      recording_->event(device, text);
     }
   }
 
@@ -228,7 +228,7 @@ private:
   void show() {
     update_statistics();
     if (progress_) {
-      progress_->update(models_, seconds(), keeper_->alignment_us());
+      progress_->update(models_, seconds(), recording_->alignment_us());
     }
     if (!view_) {
       return;
@@ -240,8 +240,8 @@ private:
       view_->hurry();
     }
     tare_.expire(now);
-    if (now > said_until_) {
-      said_.clear();
+    if (now > message_until_) {
+      message_.clear();
     }
   }
 
@@ -252,9 +252,9 @@ private:
         for (const auto &loop : loops_) {
           loop->send(command_tare());
         }
-        say("taring");
+        show_message("taring");
       } else {
-        say("not tared");
+        show_message("not tared");
       }
     } else if (key == 'q') {
       quit_ = true;
@@ -264,26 +264,26 @@ private:
     }
   }
 
-  void say(const std::string &text) {
-    said_ = text;
-    said_until_ = host_now() + SAID_FOR;
+  void show_message(const std::string &text) {
+    message_ = text;
+    message_until_ = host_now() + MESSAGE_TIME;
   }
 
-  /* What the fingertips answered to a key: done is a tare once frames of all say so. */
+  /* Takes the answers to a key: a tare is done once the frames of all fingertips report it. */
   void take_answer(std::size_t device, const wire_packet &packet) {
     if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
       accepted_[device] = packet.body.ack.result == WIRE_RESULT_DONE;
       if (!accepted_[device]) {
         taring_[device] = false;
-        say((is_refused() ? said_ + "; " : "") + name_of(device) +
-            "not tared: " + refusal(device, packet.body.ack.result));
+        show_message((is_refused() ? message_ + "; " : "") + name_of(device) +
+                     "not tared: " + refusal(device, packet.body.ack.result));
       }
     } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
       std::uint32_t flags = packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
       if (flags & CONTACT_FLAG_TARED) {
         accepted_[device] = taring_[device] = false;
         if (!is_refused() && std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
-          say("tared");
+          show_message("tared");
         }
       }
     }
@@ -296,7 +296,7 @@ private:
                : result_text(result);
   }
 
-  bool is_refused() const { return said_.find("not tared: ") != std::string::npos; }
+  bool is_refused() const { return message_.find("not tared: ") != std::string::npos; }
 
   /* Which of several. */
   std::string name_of(std::size_t device) const {
@@ -313,7 +313,7 @@ private:
     auto add = [&](const std::string &text) {
       caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
     };
-    add(said_);
+    add(message_);
     for (std::size_t i = 0; i < models_.size(); i++) {
       std::uint32_t missing = models_[i].missing_sensors();
       add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
@@ -323,12 +323,12 @@ private:
   }
 
   /* For programs and log files: once, and when it changes. */
-  void tell_missing(std::size_t device) {
+  void report_missing(std::size_t device) {
     std::uint32_t missing = models_[device].missing_sensors();
-    if (options_.monitor || missing == told_missing_[device]) {
+    if (options_.monitor || missing == reported_missing_[device]) {
       return;
     }
-    told_missing_[device] = missing;
+    reported_missing_[device] = missing;
     std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "",
                  printable(loops_[device]->name()).c_str(),
                  missing ? ("sensors missing: " + sensors_text(missing) + "; see their wiring (fingertip info)").c_str()
@@ -342,15 +342,15 @@ private:
       statistics.push_back(model.statistics());
       sum += model.statistics();
     }
-    if (keeper_) {
-      keeper_->finish(statistics, reason_);
+    if (recording_) {
+      recording_->finish(statistics, reason_);
     }
-    std::string name = keeper_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
+    std::string name = recording_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
     if (!several()) {
       std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(), summary_text(models_[0]).c_str());
       return;
     }
-    if (!keeper_) {
+    if (!recording_) {
       for (std::size_t i = 0; i < models_.size(); i++) {
         std::printf("%s%s\n", name_of(i).c_str(), summary_text(models_[i]).c_str());
       }
@@ -359,36 +359,36 @@ private:
     std::uint64_t frames = 0;
     std::string edges;
     for (std::size_t i = 0; i < models_.size(); i++) {
-      frames += keeper_->frames(i);
+      frames += recording_->frames(i);
       edges += edges_text(models_[i]);
     }
-    const double edges_us = keeper_->edges_alignment_us();
+    const double edges_us = recording_->edges_alignment_us();
     const std::string by_edges = edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
     std::fprintf(stderr,
                  "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets "
                  "dropped, %llu CRC errors%s\n",
                  name.c_str(), static_cast<unsigned long long>(frames), models_.size(),
-                 fixed(keeper_->alignment_us(), 0).c_str(), by_edges.c_str(),
+                 fixed(recording_->alignment_us(), 0).c_str(), by_edges.c_str(),
                  static_cast<unsigned long long>(sum.dropped_packets), static_cast<unsigned long long>(sum.crc_errors),
                  edges.c_str());
   }
 
   const LiveOptions &options_;
-  const bool to_standard_output_ = options_.recording == STANDARD_OUTPUT;
+  const bool to_standard_output_ = options_.recording == STDOUT_NAME;
   DeviceFeed feed_;
   std::vector<Model> models_;
   std::vector<std::optional<DeviceNews>> ready_;
   std::vector<std::vector<DeviceNews>> early_; /* packets before all were ready */
   std::unique_ptr<OutputFile> raw_bytes_;
-  std::unique_ptr<Keeper> keeper_;
+  std::unique_ptr<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   std::unique_ptr<JointProgress> progress_;
   std::string note_;
-  std::string said_;
-  KeyTime said_until_{};
+  std::string message_;
+  KeyTime message_until_{};
   Confirmation tare_;
   std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
-  std::vector<std::uint32_t> told_missing_;
+  std::vector<std::uint32_t> reported_missing_;
   std::string reason_;
   std::int64_t zero_us_ = 0;
   std::size_t running_ = 0;
@@ -402,7 +402,7 @@ private:
 
 void check_outputs(const LiveOptions &options) {
   for (const std::string &path : {options.recording, options.raw_bytes}) {
-    if (!path.empty() && path != STANDARD_OUTPUT) {
+    if (!path.empty() && path != STDOUT_NAME) {
       check_output(path, options.overwrite);
     }
   }

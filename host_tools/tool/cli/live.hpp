@@ -11,7 +11,7 @@
 
 namespace fingertip {
 
-inline constexpr const char *STANDARD_OUTPUT = "-";
+inline constexpr const char *STDOUT_NAME = "-";
 
 struct LiveOptions {
   std::optional<double> seconds; /* of device time from the first frame; of several fingertips, of

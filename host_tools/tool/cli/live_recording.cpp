@@ -24,10 +24,10 @@ Metadata begun(const Metadata &extra = {}) {
   return all;
 }
 
-class OneKeeper : public Keeper {
+class SingleRecording : public LiveRecording {
 public:
-  OneKeeper(const LiveOptions &options, const DeviceNews &ready, const std::string &port)
-      : to_standard_output_(options.recording == STANDARD_OUTPUT),
+  SingleRecording(const LiveOptions &options, const DeviceNews &ready, const std::string &port)
+      : to_standard_output_(options.recording == STDOUT_NAME),
         writer_(options.recording, options.overwrite, &ready.packet.body.info, ready.packet.body.info.sensor_count,
                 metadata(ready, port), raw_expected(ready.packet.body.info),
                 to_standard_output_ ? OutputFile::Appears::on_standard_output : OutputFile::Appears::at_once) {
@@ -74,10 +74,10 @@ private:
   RecordingWriter writer_;
 };
 
-class JointKeeper : public Keeper {
+class JointRecording : public LiveRecording {
 public:
-  JointKeeper(const LiveOptions &options, const std::vector<DeviceNews> &ready, std::int64_t host_zero_us,
-              const Metadata &extra)
+  JointRecording(const LiveOptions &options, const std::vector<DeviceNews> &ready, std::int64_t host_zero_us,
+                 const Metadata &extra)
       : writer_(options.recording, options.overwrite, infos(ready), begun(extra), host_zero_us,
                 raw_expected(ready[0].packet.body.info), OutputFile::Appears::at_once) {
     for (std::size_t i = 0; i < ready.size(); i++) {
@@ -126,13 +126,13 @@ std::string utc_now() {
   return whole;
 }
 
-std::unique_ptr<Keeper> make_keeper(const LiveOptions &options, const std::vector<DeviceNews> &ready,
-                                    const std::vector<std::string> &ports, std::int64_t host_zero_us,
-                                    const Metadata &extra) {
+std::unique_ptr<LiveRecording> make_recording(const LiveOptions &options, const std::vector<DeviceNews> &ready,
+                                              const std::vector<std::string> &ports, std::int64_t host_zero_us,
+                                              const Metadata &extra) {
   if (ready.size() == 1) {
-    return std::make_unique<OneKeeper>(options, ready[0], ports[0]);
+    return std::make_unique<SingleRecording>(options, ready[0], ports[0]);
   }
-  return std::make_unique<JointKeeper>(options, ready, host_zero_us, extra);
+  return std::make_unique<JointRecording>(options, ready, host_zero_us, extra);
 }
 
 } // namespace fingertip

@@ -1,4 +1,4 @@
-/* What is kept of what fingertips say: a recording of one, or of several on one clock. */
+/* A live recording: of one fingertip, or of several on one clock. */
 #pragma once
 
 #include "libfingertip/device_loop.hpp"
@@ -17,9 +17,9 @@ constexpr double SETTLE_us = 250e3;
 /* Now, as recordings write it. */
 std::string utc_now();
 
-class Keeper {
+class LiveRecording {
 public:
-  virtual ~Keeper() = default;
+  virtual ~LiveRecording() = default;
 
   virtual void packet(const DeviceNews &news) = 0;
   virtual void event(std::size_t device, const std::string &text) = 0;
@@ -39,8 +39,8 @@ public:
 
 /* ready: the news of that kind of each fingertip, and its port. extra: for the head of a recording
  * of several. */
-std::unique_ptr<Keeper> make_keeper(const LiveOptions &options, const std::vector<DeviceNews> &ready,
-                                    const std::vector<std::string> &ports, std::int64_t host_zero_us,
-                                    const Metadata &extra = {});
+std::unique_ptr<LiveRecording> make_recording(const LiveOptions &options, const std::vector<DeviceNews> &ready,
+                                              const std::vector<std::string> &ports, std::int64_t host_zero_us,
+                                              const Metadata &extra = {});
 
 } // namespace fingertip

@@ -1,4 +1,4 @@
-/* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
+/* fingertip: the command line tool. Exit status: 0 done; 1 an error, reported in one line;
  * 2 wrong usage; of grasp also those of GraspEnd. */
 #include "libfingertip/session.hpp"
 #include "tool/advice.hpp"
@@ -27,10 +27,10 @@ int main(int argc, char **argv) {
     }
     return status;
   } catch (const WrongUsage &error) {
-    tell("fingertip", error);
+    print_error("fingertip", error);
     return 2;
   } catch (const Error &error) {
-    tell("fingertip", error);
+    print_error("fingertip", error);
   } catch (const Interrupted &) {
     std::fprintf(stderr, "fingertip: interrupted\n");
   } catch (const std::exception &error) {

@@ -12,7 +12,7 @@
 
 namespace fingertip {
 
-/* No frame for so long is shown as a stall. */
+/* A longer time without a frame is shown as a stall. */
 inline constexpr double STALLED_s = 0.7;
 
 class Model {
@@ -68,8 +68,8 @@ public:
   bool slipped_lately() const { return is_late(last_slip_us_); }
   bool slid_lately() const { return is_late(last_sliding_us_); }
   bool moved_lately() const { return is_late(last_moving_us_); }
-  /* Its firmware can tell tangential load; and knows the pad, without which it does not. */
-  bool tells_tangential() const;
+  /* Whether its firmware can estimate tangential force, and has the pad profile that this needs. */
+  bool estimates_tangential() const;
   bool has_pad() const;
   /* Since the last frame, by the host's clock; nothing before the first. */
   std::optional<double> seconds_since_frame() const;

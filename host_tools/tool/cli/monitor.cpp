@@ -16,12 +16,12 @@ namespace {
 
 /* The least that a fingertip among several is given. */
 constexpr int LEAST_COLUMNS = 40, LEAST_ROWS = 22;
-/* From this width on the numbers stand in lines, below it one to a line. */
+/* From this width on a line has several numbers, below it one. */
 constexpr int WIDE = 60;
-/* Of firmware that could tell tangential load. */
+/* For firmware that could estimate tangential force. */
 constexpr const char *NO_PAD = "no pad profile:", *PAD_COMMAND = "fingertip pad";
 
-/* "+3.20": always with a sign, so that columns stand still. */
+/* "+3.20": always with a sign, so that columns do not move. */
 std::string signed_number(float value, int digits) {
   std::string text = number(value, digits);
   return text[0] == '-' ? text : "+" + text;
@@ -186,7 +186,7 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     row++;
     draw_lamp(canvas, draw_lamp(canvas, left, row, contact, "CONTACT", GOOD) + 2, row, slipped, "SLIP", BAD);
     row++;
-    if (!model.tells_tangential()) {
+    if (!model.estimates_tangential()) {
       return row;
     }
     lamps_of_motion(left);
@@ -236,7 +236,7 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     if (numbers.edge) {
       line("edge ", numbers.edge);
     }
-  } else if (model.tells_tangential()) {
+  } else if (model.estimates_tangential()) {
     canvas.text(left, row, std::string(NO_PAD) + " " + PAD_COMMAND, text_style(WARNING));
     row++;
     lamps_of_motion(left);
@@ -256,7 +256,7 @@ struct Item {
   Colour colour = INK;
 };
 
-/* What the line, the firmware and the bus tell, the most important first. */
+/* Statistics of the line, the firmware and the bus, the most important first. */
 std::vector<Item> items_of(const Model &model) {
   const LineStatistics &line = model.statistics();
   auto count = [](const char *label, std::uint64_t value, bool trouble, int width) {

@@ -12,7 +12,7 @@ namespace fingertip {
 
 inline constexpr int MONITOR_COLUMNS = 80, MONITOR_ROWS = 24;
 
-/* Fits any size from those upwards; below that it says so, and shows the numbers alone. */
+/* Fits any size from those upwards; below that it shows a note and the numbers alone. */
 Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, int columns, int rows);
 
 } // namespace fingertip

@@ -9,7 +9,7 @@ namespace fingertip {
 /* "3 7": the sensors of these bits; "" for none. */
 std::string sensors_text(std::uint32_t sensors);
 
-/* Those of so many that are not among the present ones. */
+/* The sensors of a count that are not among the present ones. */
 std::uint32_t missing_sensors(std::uint32_t present, std::uint8_t sensor_count);
 
 /* "13 of 15, missing: 3 7" */

@@ -14,7 +14,7 @@ namespace {
 constexpr float RIM_mm = 5.0f;
 /* Pressure of the brightest colour. The scale is the square root, so that a light touch shows. */
 constexpr float FULL_SCALE_Pa = 100000.0f;
-/* So many steps of colour: fewer show bands, more send bytes for what no eye tells apart. */
+/* Steps of colour: fewer show bands, more send bytes for differences that no eye sees. */
 constexpr float HEAT_STEPS = 20;
 /* Sensors 9 mm apart measure nothing that is finer. */
 constexpr float FINEST_mm = 0.75f;
@@ -22,10 +22,10 @@ constexpr float FINEST_mm = 0.75f;
 constexpr float NOTED_Pa = 500;
 /* As a doubtful fit is drawn, beside one that can be trusted. */
 constexpr float DOUBTFUL_PART = 0.45f;
-/* Length of the arrow whose tangential load is as large as the normal force: rubber slides at a
+/* Length of the arrow whose tangential force is as large as the normal force: rubber slides at a
  * half to one of it, and the array is 36 mm long. */
 constexpr float ARROW_mm = 30.0f;
-/* A load below so many of its standard deviations has no direction. */
+/* A tangential force below this number of its standard deviations has no direction. */
 constexpr float ARROW_SDS = 2.0f;
 /* As what the arrow may be is drawn, beside what it is for sure. */
 constexpr float UNSURE_PART = 0.4f;
@@ -121,7 +121,7 @@ void paint_fit(Picture &picture, const Model &model, const wire_contact &contact
   }
 }
 
-/* Tangential load over normal force as an arrow from the contact: solid as far as it is for sure,
+/* Tangential force over normal force as an arrow from the contact: solid as far as it is for sure,
  * around it where it ends but for one standard deviation. A load that may be none is a round spot
  * of that size. */
 struct Arrow {
@@ -306,7 +306,7 @@ void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int
   }
 }
 
-/* The frame; its upper side says what the numbers are, its lower what the colours mean. */
+/* The frame; its upper side has the legend of the numbers, its lower that of the colours. */
 void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
   bool slides = model.slid_lately() && model.is_current();
   bool moves = model.moved_lately() && model.is_current();
@@ -325,8 +325,8 @@ void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
   canvas.text(area.left, bottom, "╰", style);
   canvas.text(right, bottom, "╯", style);
   if (slides || moves) {
-    std::string told = slides ? " SLIDING " : " MOVING ";
-    canvas.text(area.left + std::max(1, (area.width - columns_of(told)) / 2), area.top, told,
+    std::string warning = slides ? " SLIDING " : " MOVING ";
+    canvas.text(area.left + std::max(1, (area.width - columns_of(warning)) / 2), area.top, warning,
                 {slides ? WHITE : BLACK, slides ? BAD : WARNING, true});
   }
   for (const char *legend : {"no., measured, fitted", "no., kPa, fit", "no., kPa"}) {

@@ -1,6 +1,5 @@
 /* The pad as the monitor draws it: the fitted pressure as colour, over it each sensor with its
- * number, what it measured, and what the fit says of it, and what pulls along the rubber as an
- * arrow. */
+ * number, its measured and its fitted pressure, and the tangential force as an arrow. */
 #pragma once
 
 #include "tool/cli/canvas.hpp"

@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::optional<fs::path> find_page() {
-  return beside({"../share/fingertip/web/index.html", "../../web/page/index.html"});
+  return find_installed({"../share/fingertip/web/index.html", "../../web/page/index.html"});
 }
 
 } // namespace

@@ -1,4 +1,4 @@
-/* The page that stands beside this program. */
+/* The page that is installed with this program. */
 #pragma once
 
 #include <filesystem>

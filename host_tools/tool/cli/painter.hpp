@@ -2,8 +2,8 @@
  * change it.
  *
  * Our own, because the pad needs two free colours to a cell: ncurses has the colours that TERM
- * names, 8 for xterm and 256 at most, whatever COLORTERM says, unless a "-direct" entry is
- * installed and asked for; and it neither brackets pastes nor tells a terminal's answers from keys.
+ * names, 8 for xterm and 256 at most, whatever COLORTERM is, unless a "-direct" entry is
+ * installed and asked for; and it neither brackets pastes nor separates a terminal's answers from keys.
  */
 #pragma once
 

@@ -11,7 +11,7 @@ std::string right_aligned(const std::string &text, int width) {
   return std::string(static_cast<std::size_t>(std::max(0, width - columns_of(text))), ' ') + text;
 }
 
-Told state_of(const Model &model) {
+StateText state_of(const Model &model) {
   auto silence_s = model.seconds_since_frame();
   switch (model.state()) {
   case Model::State::connecting:
@@ -32,7 +32,7 @@ Told state_of(const Model &model) {
   if (*silence_s > STALLED_s) {
     return {"STALLED for " + fixed(*silence_s, 1) + " s", BAD};
   }
-  return model.is_tared() ? Told{"live", GOOD} : Told{"taring", WARNING};
+  return model.is_tared() ? StateText{"live", GOOD} : StateText{"taring", WARNING};
 }
 
 void draw_bar(Canvas &canvas, const Area &area) {

@@ -1,5 +1,4 @@
-/* The pieces that screens are made of: bars, numbers with their units, lamps, and what stands below
- * all of it. */
+/* The pieces that screens are made of: bars, numbers with their units, lamps, and the caption. */
 #pragma once
 
 #include "tool/cli/canvas.hpp"
@@ -13,13 +12,13 @@
 
 namespace fingertip {
 
-struct Told {
+struct StateText {
   std::string text;
   Colour colour;
 };
 
-/* How a fingertip is. */
-Told state_of(const Model &model);
+/* The state of a fingertip. */
+StateText state_of(const Model &model);
 
 /* A number with its label and unit. */
 struct Quantity {

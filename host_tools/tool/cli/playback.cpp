@@ -15,7 +15,7 @@ namespace {
 /* Takes some 6 ms: 2.7 us each, as measured by a replay of 31 424 frames at --speed max. */
 constexpr int PACKETS_AT_ONCE = 2000;
 constexpr double SHORT_WAY_us = 5e6, LONG_WAY_us = 60e6;
-/* Where to go back to, all so many us. */
+/* Spacing of the positions to go back to. */
 constexpr double MARKS_us = 10e6;
 constexpr double END = std::numeric_limits<double>::infinity();
 
@@ -187,7 +187,7 @@ void Playback::seek(double time_us) {
   if (grip_track_) {
     grip_track_->go_back(time_us_, grip_);
   }
-  is_there_ = false; /* time stands until it was read */
+  is_there_ = false; /* time stops until it was read */
 }
 
 void Playback::key(Key key) {
@@ -214,7 +214,7 @@ void Playback::key(Key key) {
     seek(0);
     break;
   case KEY_END:
-    paused_ = true; /* to be looked at */
+    paused_ = true; /* to show the end */
     seek(END);
     break;
   default:

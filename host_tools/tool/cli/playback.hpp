@@ -30,7 +30,7 @@ public:
   double next_us() const { return next_us_; }
   double last_us() const { return last_us_; }
 
-  /* Takes at most so many packets, up to this time; false if there are more. */
+  /* Takes at most this number of packets, up to this time; false if there are more. */
   bool read_to(double time_us, int packets, Model &model);
   /* Back to somewhere not after this time, from where it can be read. */
   void go_back(double time_us, Model &model);

@@ -19,7 +19,7 @@ namespace fingertip {
 
 namespace {
 
-constexpr std::chrono::milliseconds OUTPUT_WAIT{100}; /* until a stop is looked for */
+constexpr std::chrono::milliseconds OUTPUT_WAIT{100}; /* between two checks for a stop */
 
 volatile std::sig_atomic_t stop_signal = 0;
 std::atomic<unsigned> interrupt_count{0}; /* the handler may run in several threads */

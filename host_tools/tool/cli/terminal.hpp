@@ -30,7 +30,7 @@ enum class ColourMode { automatic, truecolour, palette_256, plain };
  * automatic mode NO_COLOR (no-color.org) is heeded. */
 std::optional<ColourDepth> screen_depth(ColourMode mode);
 
-/* What the locale says that the terminal can show: UTF-8 or, in any other, ASCII. */
+/* The locale's encoding for the terminal: UTF-8 or, in any other, ASCII. */
 Characters screen_characters();
 
 /* The full screen, given back as it was when this ends; also over a suspend (Ctrl-Z). */

@@ -36,7 +36,7 @@ private:
   HostTime next_{};
 };
 
-/* Tells when a text is another than before. */
+/* Detects when a text changes. */
 class Change {
 public:
   bool is_new(const std::string &text) {
@@ -96,7 +96,7 @@ private:
   Interval interval_{std::chrono::milliseconds(40)};
 };
 
-/* Of the last frame: a doubtful one says so before its numbers. */
+/* The last frame: a doubtful one begins with a note. */
 std::string contact_text(const Model &model) {
   if (!model.contact() || !model.is_current()) {
     return "";
@@ -145,8 +145,8 @@ public:
     }
     const GripReport &report = grip_.row()->report;
     bool changed = change_.is_new(state_name(report.state) + trouble_names(report.trouble));
-    bool says = !caption.note.empty() && note_.is_new(caption.note);
-    if (!changed && !says && (quiet_ || !interval_.is_due())) {
+    bool noted = !caption.note.empty() && note_.is_new(caption.note);
+    if (!changed && !noted && (quiet_ || !interval_.is_due())) {
       return;
     }
     std::FILE *to = quiet_ ? stderr : stdout;

@@ -13,8 +13,8 @@
 
 namespace fingertip {
 
-/* What was said to a key stays this long. */
-constexpr std::chrono::milliseconds SAID_FOR{5000};
+/* How long the answer to a key is shown. */
+constexpr std::chrono::milliseconds MESSAGE_TIME{5000};
 
 class View {
 public:

@@ -137,8 +137,8 @@ std::string crash_text(const Crash &crash) {
       return "the watchdog struck: nothing went on, interrupts neither, the main loop " +
              activity_text(record.activity) + since;
     }
-    return "the watchdog struck: " + stuck_text(record.stuck) + " stood still; the processor was" + at_text(crash) +
-           where_text(record) + since;
+    return "the watchdog struck: " + stuck_text(record.stuck) + " made no progress; the processor was" +
+           at_text(crash) + where_text(record) + since;
   case CRASH_START:
     return "a start that gave up: clocks that did not come, or a fault in the start-up code";
   default:

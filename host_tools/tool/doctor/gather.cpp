@@ -48,7 +48,7 @@ std::string usual_elf(const wire_info &info) {
 }
 
 /* An image is known by what cmake/write_build_info.cmake marks in it. */
-Crash told_crash(const crash_record &record, const wire_info &info, const std::string &elf) {
+Crash read_crash(const crash_record &record, const wire_info &info, const std::string &elf) {
   std::string path = elf.empty() ? usual_elf(info) : elf;
   std::error_code ignored;
   if (elf.empty() && !std::filesystem::exists(path, ignored)) {
@@ -71,7 +71,7 @@ void ask_for_crash(Session &session, Facts &facts, const std::string &elf) {
   try {
     crash_record record = session.crash().body.crash;
     if (record.kind != CRASH_NONE) {
-      facts.crash = told_crash(record, *facts.info, elf);
+      facts.crash = read_crash(record, *facts.info, elf);
     }
   } catch (const Error &error) {
     if (error.code() != ErrorCode::unknown_command) {

@@ -42,14 +42,14 @@ constexpr double TEMPERATURE_Pa_per_degC = 240, TEMPERATURE_INTERVAL_MAX_s = 2;
   { ratio, noise_degC }
 constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TABLE(ROW)};
 #undef ROW
-/* With fewer than four temperatures a slope says nothing. */
+/* A slope needs at least four temperatures. */
 constexpr double DRIFT_SECONDS_MIN = 8;
 /* Readings of sound sensors under cast rubber differ by less: readings.h. */
 constexpr double APART_MAX_Pa = 20000;
 /* Of air, from the highest mountain to the deepest mine. */
 constexpr double AIR_MIN_Pa = 30000, AIR_MAX_Pa = 115000;
-/* The formulas of the family differ by powers of two and by what a count is (sensors.h): those of
- * one sensor make so many times the pressure from another's codes, or that part of it. */
+/* The formulas of the family differ by powers of two and by what a count is (sensors.h). The formula
+ * of one sensor turns another's codes into this multiple of the pressure, or this fraction. */
 constexpr double OF_ANOTHER_TYPE = 20;
 constexpr unsigned STACK_FREE_MIN_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes;
 constexpr unsigned BUSY_MAX_permille = 950;
@@ -147,7 +147,7 @@ private:
       add(denied ? Verdict::bad : Verdict::warn, "rule", "no udev rule lets users without privileges open fingertips",
           advice(ErrorCode::permission_denied));
     } else if (denied) {
-      add(Verdict::ok, "rule", facts_.rule + "; it acts on what is plugged in from now on");
+      add(Verdict::ok, "rule", facts_.rule + "; it applies to devices that are plugged in from now on");
     } else {
       add(Verdict::ok, "rule", facts_.rule);
     }
@@ -303,7 +303,7 @@ private:
           "release the pad; if it stays, replace it", {k});
     } else if (sensor.doubtful_share > DOUBTFUL_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors",
-          named(k) + " stands apart from the others: its pressure at rest, or a temperature that "
+          named(k) + " differs from the others: its pressure at rest, or a temperature that "
                      "fits neither its own before nor theirs",
           check_of(k) + "; if it stays, replace it", {k});
     }
@@ -514,7 +514,7 @@ private:
       std::string text = named(k) + " has a noise of " + fixed(*sensor.noise_Pa, 1) + " Pa rms, " + sheet;
       if (times < NOISE_DEAD) {
         dead = true;
-        add(Verdict::bad, "noise", text + ": it stands still", "replace the sensor", {k});
+        add(Verdict::bad, "noise", text + ": its readings do not change", "replace the sensor", {k});
       } else if (times > NOISE_WARN) {
         any = true;
         add(times > NOISE_BAD ? Verdict::bad : Verdict::warn, "noise", text,
@@ -536,7 +536,7 @@ private:
     if (rest.frames_touched > 0) {
       double share = static_cast<double>(rest.frames_touched) / static_cast<double>(rest.frames_received);
       add(Verdict::warn, "zero",
-          std::string(noisy ? "contact is felt in " : "something touches the pad in ") + percent(share) +
+          std::string(noisy ? "contact is reported in " : "something touches the pad in ") + percent(share) +
               " of the frames: drift was not measured",
           noisy ? "see to the noise first; else let go of the pad and run this again"
                 : "let go of the pad and run this again; where nothing touches it, `fingertip tare "

@@ -1,5 +1,5 @@
-/* What the computer itself tells about a fingertip's port. root: where etc, usr, run, dev and proc
- * are looked for. */
+/* The computer's own facts about a fingertip's port. root: the folder with etc, usr, run, dev and
+ * proc. */
 #pragma once
 
 #include <string>

@@ -48,14 +48,12 @@ class Tool(unittest.TestCase):
                 options = ("--model", model, "--port", port)
                 self.assertRegex(self.tool("info", *options), r"(?m)^active +no$")
                 self.assertIn("is not active", self.tool("open", *options, expect=1))
-                self.assertRegex(
-                    self.tool("open", "--activate", *options), r"^activated at [\d.]+ mm\nstands at [\d.]+ mm, without an object\n$"
-                )
+                self.assertRegex(self.tool("open", "--activate", *options), r"^activated at [\d.]+ mm\nat [\d.]+ mm, without an object\n$")
                 said = re.fullmatch(r"holds an object at ([\d.]+) mm, asked for 0.0 mm\n", self.tool("close", *options))
                 self.assertTrue(said)
                 self.assertLess(float(said[1]), 30)
                 self.assertRegex(self.tool("info", *options), r"(?m)^object +yes$")
-                self.assertRegex(self.tool("move", "40", *options), r"^stands at (39|40)\.\d mm, without an object\n$")
+                self.assertRegex(self.tool("move", "40", *options), r"^at (39|40)\.\d mm, without an object\n$")
 
     def test_an_interrupt_stops_it(self):
         with self.simulated("--model", "2f85") as port:

@@ -78,7 +78,7 @@ class FromRecording(CalibrateTest):
         serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
         with self.device(f"serial={serial}"):
             out, _ = self.calibrate("--from", recording, "--yes", "--port", self.port)
-            self.assertIn("calibrated: it acts from now on", out)
+            self.assertIn("calibrated: it applies from now on", out)
             shown, _ = self.calibrate("--show", "--port", self.port)
             self.assert_gains(shown)
             self.assertRegex(shown, r"^calibrated 20\d\d-\d\d-\d\d \d\d:\d\d UTC from \d\d placements, force scale 1.000 sd 0.100\n")
@@ -158,7 +158,7 @@ class Live(CalibrateTest):
             self.assertLessEqual(known[-1], 2.0)  # the gains differ by more: from twenty placements on that is enough
             self.assertNotIn("\x1b", out)
             self.assert_gains(out)
-            self.assertTrue(out.endswith("calibrated: it acts from now on\n"))
+            self.assertTrue(out.endswith("calibrated: it applies from now on\n"))
             shown, _ = self.calibrate("--show", "--port", self.port)
             self.assert_gains(shown)
             self.assertAlmostEqual(float(re.search(r"force scale (\d\.\d+) sd 0\.01", shown)[1]) * mean_gain, 1.11, delta=0.02)

@@ -104,7 +104,7 @@ class FromRecording(DragTest):
             self.run_cli("pad", "--thickness", "12", "--port", self.port)
             before, _ = self.run_cli("info", "--port", self.port)
             out, _ = self.calibrate("--from", recording, "--yes", "--port", self.port)
-            self.assertTrue(out.endswith("calibrated: it acts from now on\n"), out)
+            self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
             scale, sd = self.scale(out)
             after, _ = self.run_cli("info", "--port", self.port)
             kept = {k: float(v) for k, v in re.findall(r"^(pad_tangential_scale\w*) +(\S+)$", after, re.M)}
@@ -119,7 +119,7 @@ class FromRecording(DragTest):
             ((f"serial={serial}", GRASP), "15", "is of a pad of 12 mm"),
             ((GRASP,), "12", "is of fingertip"),
             ((f"serial={serial}", GRASP), None, "no pad profile; fingertip pad --thickness MM first"),
-            ((f"serial={serial}", SLIP), None, "reports no tangential load; flash one of scene grasp"),
+            ((f"serial={serial}", SLIP), None, "reports no tangential force; flash one of scene grasp"),
         ):
             with self.subTest(reason), self.device(*options):
                 if thickness:
@@ -182,7 +182,7 @@ class Live(DragTest):
                 self.assertIn(advice, out)
             self.assertNotIn("\x1b", out)
             self.assertIn("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n", out)
-            self.assertTrue(out.endswith("calibrated: it acts from now on\n"), out)
+            self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
             scale, _ = self.scale(out)
             self.assertAlmostEqual(scale, self.scale(self.calibrate("--from", recording, "--dry-run")[0])[0], delta=0.02)
             shown, _ = self.run_cli("info", "--port", self.port)
@@ -195,7 +195,7 @@ class Live(DragTest):
 
     def test_what_cannot_be_calibrated_is_told(self):
         for options, reason in (
-            ((SLIP,), "reports no tangential load"),
+            ((SLIP,), "reports no tangential force"),
             ((GRASP,), "no pad profile"),
             ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3"),
         ):

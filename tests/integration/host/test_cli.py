@@ -505,7 +505,7 @@ class Commands(CliTest):
                 self.assertIn("out of range; give", self.error("pad", *wrong, status=2))
         self.assertIn("excludes", self.error("pad", "--erase", "--thickness", "12", status=2))
         with self.device():
-            self.assertIn("of scene slip, reports no tangential load; install one of scene grasp", self.error("pad", "--thickness", "12"))
+            self.assertIn("of scene slip, reports no tangential force; install one of scene grasp", self.error("pad", "--thickness", "12"))
         with self.device("capabilities=15", "refuse=1"):
             self.assertIn('refused "pad": not possible now', self.error("pad", "--thickness", "12"))
 

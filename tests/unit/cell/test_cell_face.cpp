@@ -35,7 +35,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
       touch.pull_x_N = pull_N * std::cos(direction);
       touch.pull_y_N = pull_N * std::sin(direction);
       const double share = random.uniform(0.0, 1.0);
-      const Pressures felt_Pa = face.base_Pa(touch, share);
+      const Pressures sensed_Pa = face.base_Pa(touch, share);
       const double peak_Pa = table.base_pressure_Pa(touch.force_N, 0.0, 0.0);
       const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
       const twin::TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
@@ -46,7 +46,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
         const double along_x = c * dx + s * dy, along_y = c * dy - s * dx;
         const double expected_Pa = table.base_pressure_Pa(touch.force_N, along_x, along_y) +
                                    share * traction.base_pressure_Pa(load, along_x, along_y);
-        ASSERT_NEAR(felt_Pa[k], expected_Pa, 0.002 * peak_Pa) << name << " " << i;
+        ASSERT_NEAR(sensed_Pa[k], expected_Pa, 0.002 * peak_Pa) << name << " " << i;
       }
       EXPECT_NEAR(face.indentation_mm(touch.force_N), table.indentation_mm(touch.force_N), 1e-3);
       EXPECT_NEAR(face.radius_mm(touch.force_N), table.contact_radius_mm(touch.force_N), 0.03);

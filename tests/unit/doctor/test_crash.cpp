@@ -112,7 +112,7 @@ TEST(Crash, InWords) {
   record.lr = 0xfffffff9;
   record.t_us = 500000;
   EXPECT_EQ(crash_text(with_places(record, symbols)),
-            "the watchdog struck: the scan of the sensors and USB stood still; the processor was at "
+            "the watchdog struck: the scan of the sensors and USB made no progress; the processor was at "
             "fit_frame+0x0 (0x20001000), in interrupt 23 (I2C), the main loop fitting, 0.50 s after "
             "its start");
   record.stuck = CRASH_STUCK_INTERRUPTS;

@@ -271,7 +271,7 @@ TEST(Judge, Noise) {
   only(facts, Verdict::warn, "noise"); /* 11 Pa are its noise */
   facts = good();
   facts.rest->sensors[9].noise_Pa = 0;
-  EXPECT_TRUE(contains(only(facts, Verdict::bad, "noise").text, "stands still"));
+  EXPECT_TRUE(contains(only(facts, Verdict::bad, "noise").text, "do not change"));
 }
 
 TEST(Judge, NoiseOfTooFewOrNoReadings) {

@@ -253,7 +253,7 @@ TEST(Feetech, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   Served simulated(options());
   std::unique_ptr<Gripper> gripper = activated(simulated.port());
   const auto width_mm = [&] {
-    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
+    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.reported_width_mm(); });
   };
   Random random(7, 0, 0);
   int answers = 0;

@@ -58,15 +58,15 @@ TEST(GripperMotion, BeginsAfterItsLatencyAndRunsAtItsSpeed) {
   for (const char *model : {"2f85", "sts3215", "ideal"}) {
     GripperMotion motion = activated(model);
     const GripperTraits &traits = motion.mechanics().traits;
-    const double begin_mm = motion.told_width_mm();
+    const double begin_mm = motion.reported_width_mm();
     motion.move({.width_mm = 30, .speed_mm_s = 50});
     run(motion, traits.latency_s);
-    EXPECT_EQ(motion.told_width_mm(), begin_mm) << model;
+    EXPECT_EQ(motion.reported_width_mm(), begin_mm) << model;
     run(motion, 0.1);
-    EXPECT_NEAR(motion.told_width_mm(), begin_mm - 5, traits.step_mm / 2 + 0.051) << model;
+    EXPECT_NEAR(motion.reported_width_mm(), begin_mm - 5, traits.step_mm / 2 + 0.051) << model;
     EXPECT_TRUE(motion.moving());
     run(motion, 1.5);
-    EXPECT_NEAR(motion.told_width_mm(), 30, traits.step_mm / 2 + 1e-9) << model;
+    EXPECT_NEAR(motion.reported_width_mm(), 30, traits.step_mm / 2 + 1e-9) << model;
     EXPECT_FALSE(motion.moving());
     EXPECT_EQ(motion.status().object, false);
   }
@@ -146,19 +146,19 @@ TEST(GripperMotion, FingersLagByTheBacklash) {
   const double half_mm = motion.mechanics().backlash_mm / 2;
   motion.move({.width_mm = 40, .speed_mm_s = 100});
   run(motion, 1.0);
-  EXPECT_NEAR(motion.width_mm(), motion.told_width_mm() + half_mm, 0.08);
+  EXPECT_NEAR(motion.width_mm(), motion.reported_width_mm() + half_mm, 0.08);
   const double closed_mm = motion.width_mm();
   motion.move({.width_mm = 40.5, .speed_mm_s = 100});
   run(motion, 1.0);
   EXPECT_EQ(motion.width_mm(), closed_mm);
   motion.move({.width_mm = 60, .speed_mm_s = 100});
   run(motion, 1.0);
-  EXPECT_NEAR(motion.width_mm(), motion.told_width_mm() - half_mm, 0.08);
+  EXPECT_NEAR(motion.width_mm(), motion.reported_width_mm() - half_mm, 0.08);
 
   /* What presses on them takes it up. */
   motion.blocked_at = spring(70, 1);
   motion.step(STEP_s);
-  EXPECT_NEAR(motion.width_mm(), motion.told_width_mm() + half_mm, 0.08);
+  EXPECT_NEAR(motion.width_mm(), motion.reported_width_mm() + half_mm, 0.08);
 }
 
 TEST(GripperMotion, ACommandCountsAfterItsOwnLatency) {

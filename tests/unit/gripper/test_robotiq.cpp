@@ -327,7 +327,7 @@ TEST(Robotiq, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   Served simulated(served("2f85"));
   std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
   const auto width_mm = [&] {
-    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
+    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.reported_width_mm(); });
   };
   Random random(7, 0, 0);
   int answers = 0;

@@ -113,7 +113,7 @@ private:
     }
     calibrating::Shape shape = calibrating::shape_of(solution);
     if (options_.knows_pad) {
-      shape = calibrating::beside_profile(std::move(shape));
+      shape = calibrating::without_width(std::move(shape));
       const pad::Thickness thickness = pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);
       send(command_pad(pad::profile_over_own_sensors({thickness.shown_mm()})));
     }
@@ -240,9 +240,9 @@ int main(int argc, char **argv) {
   try {
     return fingertip::cell::run(argc, argv);
   } catch (const fingertip::Error &error) {
-    fingertip::tell("simulated_pad", error);
+    fingertip::print_error("simulated_pad", error);
   } catch (const std::exception &error) {
-    fingertip::tell("simulated_pad", fingertip::Error(error.what()));
+    fingertip::print_error("simulated_pad", fingertip::Error(error.what()));
   }
   return 1;
 }

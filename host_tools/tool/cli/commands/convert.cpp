@@ -16,7 +16,7 @@ bool ends_with(const std::string &text, const std::string &end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-/* By its content; what is neither, the reader says. */
+/* By its content; the reader reports a file that is neither. */
 bool is_recording(const std::string &path) {
   std::string begin(12, '\0');
   std::ifstream(path, std::ios::binary).read(begin.data(), 12);
@@ -26,7 +26,8 @@ bool is_recording(const std::string &path) {
 int convert(const Conversion &conversion) {
   bool to_capture = ends_with(conversion.to, ".ftr");
   if (!to_capture && !ends_with(conversion.to, ".csv") && !is_mcap_name(conversion.to)) {
-    throw WrongUsage("\"" + printable(conversion.to) + "\" must end with .csv, .mcap or .ftr, which says what to make");
+    throw WrongUsage("\"" + printable(conversion.to) +
+                     "\" must end with .csv, .mcap or .ftr, which selects the format");
   }
   if (to_capture) {
     convert_to_capture(conversion);
@@ -47,7 +48,7 @@ void add_convert(CommandLine &line) {
   command->add_option("from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")
       ->required()
       ->type_name("FILE");
-  command->add_option("to", options->to, "File to write; its name says which kind")
+  command->add_option("to", options->to, "File to write; its ending selects the format")
       ->required()
       ->type_name("OUT.csv|OUT.mcap|OUT.ftr");
   command

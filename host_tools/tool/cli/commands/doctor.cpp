@@ -190,8 +190,7 @@ void add_doctor(CommandLine &line) {
       ->type_name("FILE");
   command->add_flag("--json", options->json, "Print all of it as JSON");
   command
-      ->add_option("--root", options->examination.root,
-                   "Where the folders etc, dev, proc, sys and usr are looked for; default /")
+      ->add_option("--root", options->examination.root, "Folder that contains etc, dev, proc, sys and usr; default /")
       ->type_name("FOLDER");
 }
 

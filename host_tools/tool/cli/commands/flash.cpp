@@ -236,7 +236,7 @@ std::optional<wire_info> wait_for_return(const Choice &choice) {
     if (last.code() != ErrorCode::permission_denied) {
       not_refused = host_now();
     } else if (host_now() - not_refused > PERMITTED_WITHIN) {
-      std::fprintf(stderr, "written, and it came back; its version was not read: %s\n", told(last).c_str());
+      std::fprintf(stderr, "written, and it came back; its version was not read: %s\n", error_text(last).c_str());
       return std::nullopt;
     }
   }
@@ -261,7 +261,7 @@ int flash(const FlashOptions &options) {
     try {
       way = choose_way(choice);
     } catch (const Error &error) {
-      throw Error(told(error) + "; or " + PRESS);
+      throw Error(error_text(error) + "; or " + PRESS);
     }
     std::string serial = ask_into_loader(options, image, *way);
     if (choice.port.empty() && !serial.empty()) {

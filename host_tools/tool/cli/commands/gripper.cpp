@@ -198,7 +198,7 @@ int move(Gripper &gripper, const GripperOptions &options) {
   if (end.object.value_or(false)) {
     std::printf("holds an object at %s, asked for %s\n", mm(end.width_mm).c_str(), mm(width_mm).c_str());
   } else {
-    std::printf("stands at %s, without an object\n", mm(end.width_mm).c_str());
+    std::printf("at %s, without an object\n", mm(end.width_mm).c_str());
   }
   return 0;
 }

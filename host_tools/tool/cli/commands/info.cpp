@@ -63,7 +63,7 @@ int info(const Choice &choice) {
   Metadata counters;
   for (const auto &[key, value] : health_fields(health)) {
     if (key == "capabilities") {
-      continue; // said above
+      continue; // printed above
     }
     std::string bad = sensors_text(health.sensors_prom_bad);
     counters.emplace_back(key, key == "sensors_present"    ? present_text(value, info.sensor_count)

@@ -41,7 +41,7 @@ int list(Reach reach) {
         info = info_metadata(ask(*way, stop_requested));
       }
     } catch (const Error &error) {
-      reached += " (" + told(error) + ")";
+      reached += " (" + error_text(error) + ")";
     }
     for (const char *key : {"serial", "board", "firmware"}) {
       auto pair = std::find_if(info.begin(), info.end(), [&](auto &p) { return p.first == key; });

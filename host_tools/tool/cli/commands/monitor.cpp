@@ -15,11 +15,11 @@ struct MonitorOptions {
 };
 
 int monitor(const MonitorOptions &options) {
-  if (options.live.recording == STANDARD_OUTPUT) {
+  if (options.live.recording == STDOUT_NAME) {
     throw WrongUsage("monitor shows on standard output; give --record a file, or use `fingertip "
                      "record -`");
   }
-  if (options.live.raw_bytes == STANDARD_OUTPUT) {
+  if (options.live.raw_bytes == STDOUT_NAME) {
     throw WrongUsage("--raw-bytes needs a file; give it a name");
   }
   check_outputs(options.live);

@@ -27,7 +27,7 @@ struct PadOptions {
 
 int erase_pad(Session &session) {
   session.command(command_erase_pad());
-  std::printf("pad erased; no tangential load from now on\n");
+  std::printf("pad erased; no tangential force from now on\n");
   return 0;
 }
 
@@ -47,7 +47,7 @@ double thickness_mm(const PadOptions &options, const wire_info &info) {
   }
   if (!pad::profile_suits(*found)) {
     throw Error("the calibration's width is that of " + text_of(*found) +
-                " of rubber; the tangential load is accurate enough on 9 to 20 mm");
+                " of rubber; the tangential force is accurate enough on 9 to 20 mm");
   }
   std::printf("thickness found in the calibration: %s\n", text_of(*found).c_str());
   return found->shown_mm();
@@ -59,13 +59,13 @@ int pad_command(const PadOptions &options) {
   wire_info info = session.info().body.info;
   if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
     throw Error("its firmware, of scene " + text_field(info.scene) +
-                ", reports no tangential load; install one of scene grasp");
+                ", reports no tangential force; install one of scene grasp");
   }
   if (options.erase) {
     return erase_pad(session);
   }
   if (options.thickness_mm && *options.thickness_mm < pad::THINNEST_mm) {
-    throw WrongUsage("on less than 9 mm of rubber the tangential load is not accurate enough; "
+    throw WrongUsage("on less than 9 mm of rubber the tangential force is not accurate enough; "
                      "--thickness goes from 9 to 20 mm");
   }
   const pad::Shape shape{thickness_mm(options, info), options.overhang_mm, options.from_touch};
@@ -83,12 +83,12 @@ int pad_command(const PadOptions &options) {
               profile.from_touch ? " from_touch" : "", fixed(static_cast<double>(profile.force_ratio), 3).c_str());
   if (shape.overhang_mm == 0) {
     std::fprintf(stderr, "fingertip: a pad without end, as there is no --overhang: where the rubber "
-                         "ends, location and tangential load are off\n");
+                         "ends, location and tangential force are off\n");
   }
   if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
     std::fprintf(stderr,
                  "fingertip: the rubber ends %s mm beyond the outer sensors, less than "
-                 "half its thickness, which spoils the zero of the tangential load; --from-touch "
+                 "half its thickness, which spoils the zero of the tangential force; --from-touch "
                  "reports the change instead\n",
                  shortest(profile.overhang_mm).c_str());
   }
@@ -100,7 +100,7 @@ int pad_command(const PadOptions &options) {
 void add_pad(CommandLine &line) {
   auto options = std::make_shared<PadOptions>();
   CLI::App *command =
-      line.add("pad", "Set the pad's profile, for the tangential load (the fingertip keeps it without power)",
+      line.add("pad", "Set the pad's profile, for the tangential force (the fingertip keeps it without power)",
                [options] { return pad_command(*options); });
   with_port(command, options->choice);
   CLI::Option *thickness = command
@@ -118,7 +118,7 @@ void add_pad(CommandLine &line) {
       command->add_flag("--from-touch", options->from_touch,
                         "Report the change since the first 100 ms of each contact: for pads whose "
                         "rubber ends within half its thickness of the outer sensors");
-  command->add_flag("--erase", options->erase, "Erase the pad's profile: no tangential load")
+  command->add_flag("--erase", options->erase, "Erase the pad's profile: no tangential force")
       ->excludes(thickness)
       ->excludes(overhang)
       ->excludes(from_touch);

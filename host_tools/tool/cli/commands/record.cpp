@@ -15,11 +15,11 @@ struct RecordOptions {
 };
 
 int record(const RecordOptions &options) {
-  if (options.live.recording == STANDARD_OUTPUT && options.several.is_several()) {
+  if (options.live.recording == STDOUT_NAME && options.several.is_several()) {
     throw WrongUsage("several fingertips need a file; for - run one `fingertip record - --device "
                      "SERIAL` for each");
   }
-  if (options.live.raw_bytes == STANDARD_OUTPUT) {
+  if (options.live.raw_bytes == STDOUT_NAME) {
     throw WrongUsage("--raw-bytes needs a file; give it a name");
   }
   check_outputs(options.live);

@@ -25,7 +25,7 @@ struct ServeOptions {
 
 constexpr std::chrono::milliseconds DEVICE_LOOK_INTERVAL{1000};
 
-void say(const std::string &line) {
+void print_line(const std::string &line) {
   std::fprintf(stderr, "%s\n", printable(line).c_str());
 }
 
@@ -37,7 +37,7 @@ gid_t group_of(const std::string &name) {
   return found->gr_gid;
 }
 
-/* Those plugged in that are not served yet; what keeps one from being served is said once. */
+/* Serves fingertips that are plugged in later; an error that prevents this is printed once. */
 class Watch {
 public:
   Watch(Server &server, Reach reach) : server_(server), reach_(reach) {}
@@ -50,11 +50,11 @@ public:
       }
       try {
         server_.add(*way);
-        said_.erase(found.serial);
+        errors_.erase(found.serial);
       } catch (const Error &error) {
-        if (said_[found.serial] != error.what()) {
-          said_[found.serial] = error.what();
-          say(told(error));
+        if (errors_[found.serial] != error.what()) {
+          errors_[found.serial] = error.what();
+          print_line(error_text(error));
         }
       }
     }
@@ -63,11 +63,11 @@ public:
 private:
   Server &server_;
   Reach reach_;
-  std::map<std::string, std::string> said_;
+  std::map<std::string, std::string> errors_;
 };
 
 int serve(const ServeOptions &options) {
-  Server server({options.common ? COMMON_SHARE_FOLDER : own_share_folder(), options.group}, say);
+  Server server({options.common ? COMMON_SHARE_FOLDER : own_share_folder(), options.group}, print_line);
   bool all = options.devices.empty() && options.choice.port.empty();
   Watch watch(server, options.choice.reach);
   if (all) {
@@ -82,13 +82,13 @@ int serve(const ServeOptions &options) {
     server.add(choose_way(options.choice));
   }
   if (server.is_empty()) {
-    say("no fingertip here yet; each that is plugged in will be shared");
+    print_line("no fingertip here yet; each that is plugged in will be shared");
   }
-  HostTime looked = host_now();
+  HostTime searched = host_now();
   while (!stop_requested()) {
     server.step(DEVICE_LOOK_INTERVAL);
-    if (all && host_now() - looked > DEVICE_LOOK_INTERVAL) {
-      looked = host_now();
+    if (all && host_now() - searched > DEVICE_LOOK_INTERVAL) {
+      searched = host_now();
       watch.look();
     }
   }

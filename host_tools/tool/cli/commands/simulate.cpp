@@ -8,8 +8,8 @@ namespace {
 
 /* The tool links no simulation: this is a program of its own, which takes this one's place. */
 int simulate(const std::vector<std::string> &options) {
-  const auto program =
-      beside({"../" FINGERTIP_LIBEXECDIR "/fingertip/fingertip-simulate", "../../simulation/cell/fingertip-simulate"});
+  const auto program = find_installed(
+      {"../" FINGERTIP_LIBEXECDIR "/fingertip/fingertip-simulate", "../../simulation/cell/fingertip-simulate"});
   if (!program) {
     throw Error("the program that simulates is not installed; install all of the tool, or build "
                 "the target fingertip in the project's tree");
