@@ -1,5 +1,5 @@
 # The boards, by their descriptors (boards/README.md). FINGERTIP_BOARDS: the names of all, native first. In ${CMAKE_BINARY_DIR}/boards
-# stands what C and C++ include of them: <board>/board.h has the wiring as constants, boards.inc a line for each board (wiring.cpp).
+# is what C and C++ include of them: <board>/board.h has the wiring as constants, boards.inc a line for each board (wiring.cpp).
 set(FINGERTIP_BOARDS native)
 set(FINGERTIP_BOARD_HEADERS ${CMAKE_BINARY_DIR}/boards)
 

@@ -3,7 +3,7 @@
 # usage: see below, or run it without an argument
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
-# A folder that the caller names is looked for where the caller is.
+# A folder that the caller names is relative to the caller's folder.
 if [ $# -eq 3 ]; then
   folder=$(cd "$3" && pwd) || exit 2
 fi
@@ -19,16 +19,16 @@ part_runs() {
 
 usage() {
   echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|docs|report [all|PART [FOLDER]]|fuzz HOURS" >&2
-  echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, say and draw both" >&2
+  echo "  demo    build what it needs, calibrate an emulated fingertip, let a lime slip on it, grasp an object in a simulated gripper, report and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  docs    build the documents as a site with search, into build/docs/site, and check their links" >&2
   echo "  test    build everything and run the test suite: the labels quick, host, emulated, accuracy and realtime" >&2
   echo "  test quick    build what the quick tests need and run them: about half a minute once built" >&2
   echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser, linux, or nightly, which has the last two and takes hours" >&2
-  echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
+  echo "  report  build everything, measure fit, rate, cost, truth, tangential force and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp; some hours" >&2
   echo "  report PART [FOLDER]  build everything and measure one part whole: $(echo $(parts)); real needs the FOLDER of its recordings" >&2
-  echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
+  echo "  fuzz    build the fuzz targets and run them for HOURS; their findings are kept in build/fuzz/findings" >&2
   exit 2
 }
 case $# in
@@ -50,7 +50,7 @@ case "$1 ${2:-}" in
   "test browser" | "test linux" | "test nightly") job=nightly ;;
 esac
 
-say() { printf '%s\n' "== $*"; }
+note() { printf '%s\n' "== $*"; }
 
 # command or file that shows a package is there, then the package
 needed() {
@@ -127,7 +127,7 @@ openssl openssl
 /bin/ip iproute2
 LIST
   [ -z "$own_node" ] || echo /usr/share/doc/python3-venv python3-venv
-  # Ubuntu has no package of it; without it the page's tests say why they do not run.
+  # Ubuntu has no package of it; without it the page's tests report why they do not run.
   case $1.$(sed -n 's/^ID=//p' /etc/os-release) in nightly.debian) echo chromium chromium ;; esac
 }
 
@@ -147,7 +147,7 @@ if [ "$job" = docs ]; then :; elif [ -e build/node ] || ! { is_there node && is_
 
 missing=$(needed "$job" | sort -u | while read -r probe package; do is_there "$probe" || echo "$package"; done)
 if [ -n "$missing" ]; then
-  say "missing packages:" $missing
+  note "missing packages:" $missing
   command -v apt-get > /dev/null 2>&1 || {
     echo "bootstrap: apt-get is not here; install the packages above with your system's tools" >&2
     exit 1
@@ -160,14 +160,14 @@ if [ -n "$missing" ]; then
     }
     as_root=sudo
   fi
-  say "installing them"
+  note "installing them"
   $as_root apt-get -qq update
   $as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y install --no-install-recommends $missing
 fi
 
 if [ "$job" = docs ]; then
   if ! cmp -s cmake/docs.txt build/docs/venv/.installed-requirements; then
-    say "fetching mkdocs-material with pip into build/docs"
+    note "fetching mkdocs-material with pip into build/docs"
     mkdir -p build/docs
     /usr/bin/python3 -m venv --clear build/docs/venv
     build/docs/venv/bin/pip --quiet --disable-pip-version-check install -r cmake/docs.txt
@@ -175,7 +175,7 @@ if [ "$job" = docs ]; then
   fi
   /usr/bin/python3 cmake/docs.py
   NO_MKDOCS_2_WARNING=1 build/docs/venv/bin/mkdocs build --quiet
-  say "open build/docs/site/index.html"
+  note "open build/docs/site/index.html"
   exit 0
 fi
 
@@ -189,7 +189,7 @@ at_least() {
 at_least cmake "$(cmake --version | sed -n 's/^cmake version //p')" 3.25
 
 if [ -n "$own_node" ] && ! cmp -s cmake/node.txt build/node/.installed-requirements; then
-  say "fetching node and npm with pip into build/node"
+  note "fetching node and npm with pip into build/node"
   rm -rf build/node
   mkdir -p build/node/bin
   /usr/bin/python3 -m venv build/node/venv
@@ -207,7 +207,7 @@ at_least node "$(node --version | sed 's/^v//')" 18
 
 emulator=host_tools/simulation/emulator
 if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; then
-  say "fetching the emulator's one dependency with npm"
+  note "fetching the emulator's one dependency with npm"
   (cd $emulator && npm ci --no-audit --no-fund --loglevel=error)
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
 fi
@@ -215,7 +215,7 @@ fi
 mkdir -p build
 judges=
 if { [ "$job" = test ] || [ "$job" = nightly ] || [ "$job" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
-  say "fetching the judges with pip, while the rest is built"
+  note "fetching the judges with pip, while the rest is built"
   {
     /usr/bin/python3 -m venv --clear build/venv &&
       build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt &&
@@ -228,12 +228,12 @@ configure() {
   cmake --preset "$@" > build/configure.log 2>&1 || { cat build/configure.log >&2; exit 1; }
 }
 if [ "$1" = fuzz ]; then
-  say "building the fuzz targets into build/fuzz"
+  note "building the fuzz targets into build/fuzz"
   configure fuzz
   cmake --build --preset fuzz
   exec /usr/bin/python3 tests/fuzz/fuzz.py --build build/fuzz --hours "$2"
 fi
-say "building firmware and host tools into build/"
+note "building firmware and host tools into build/"
 case $job in
   demo)
     configure host -DBUILD_TESTING=OFF

@@ -89,7 +89,7 @@ if(NOT FINGERTIP_FIT_ITERATIONS MATCHES "^([1-9]|1[0-9]|20)$")
   message(FATAL_ERROR "FINGERTIP_FIT_ITERATIONS=${FINGERTIP_FIT_ITERATIONS} must be a whole number from 1 to 20")
 endif()
 
-# Prior on the width of the contact, for rubber so stiff that the array can hardly tell it: the sigma
+# Prior on the width of the contact, for rubber so stiff that the array can hardly measure it: the sigma
 # that the pad gives (`twin width` computes it) and how sure that is. 0: none.
 set(FINGERTIP_PRIOR_SIGMA_UM 0 CACHE STRING "Prior on sigma, micrometres; 0 for none")
 set(FINGERTIP_PRIOR_WIDTH_UM 500 CACHE STRING "Standard deviation of that prior, micrometres")

@@ -12,7 +12,7 @@ function(rp2040_image target)
   target_link_libraries(${target} PRIVATE "$<LINK_GROUP:BOTH_WAYS,board_rp2040,ft_usb,ft_store>" rp2040_boot2)
   target_link_options(${target} PRIVATE
     -T ${linker_script} -Wl,--gc-sections,--orphan-handling=error,--fatal-warnings
-    -Wl,--undefined=__aeabi_fsub # before the library's own is looked for
+    -Wl,--undefined=__aeabi_fsub # before the library's own is searched
     -Wl,-Map=${CMAKE_BINARY_DIR}/${target}.map)
   set_target_properties(${target} PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR} SUFFIX .elf LINK_DEPENDS ${linker_script})

@@ -15,7 +15,7 @@ set(CMAKE_C_COMPILER_TARGET wasm32-wasi)
 set(CMAKE_CXX_COMPILER_TARGET wasm32-wasi)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 # A module of functions, without main, in what every browser with Web Serial knows for some years.
-# What throwing and catching needs is in web/wasm/thrown.cpp.
+# The runtime of exceptions is in web/wasm/exceptions.cpp.
 set(CMAKE_C_FLAGS_INIT "-mmutable-globals -mbulk-memory -msign-ext")
 set(CMAKE_CXX_FLAGS_INIT "${CMAKE_C_FLAGS_INIT} -fwasm-exceptions")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-mexec-model=reactor")

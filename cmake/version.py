@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The version number stands in CMakeLists.txt, project VERSION. Packages that others build from their own files carry a copy of it.
+"""The version number is in CMakeLists.txt, project VERSION. Packages that others build from their own files carry a copy of it.
 
 version.py            writes the copies
 version.py --check    fails if one differs, or if CHANGELOG.md does not begin with this version
@@ -11,7 +11,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-# Where each copy is, and what stands before it: between quotation marks, at its first place in the file.
+# Where each copy is, and what comes before it: between quotation marks, at its first place in the file.
 COPIES = [("host_tools/python/fingertip/version.py", r"__version__ = "), ("host_tools/python/lerobot/pyproject.toml", r"\nversion = ")]
 for folder in ("host_tools/web", "host_tools/simulation/emulator"):
     COPIES += [

@@ -1,5 +1,5 @@
 # What the web page runs as WebAssembly, built from here into build/wasm exactly as `cmake --preset wasm`
-# does, and what the twin tells its simulated pad: all of it in build/host/host_tools/web/wasm, by the
+# does, and the twin's tables for its simulated pad: all of it in build/host/host_tools/web/wasm, by the
 # target web_wasm.
 include_guard(GLOBAL)
 include(ExternalProject)

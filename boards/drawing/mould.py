@@ -9,7 +9,7 @@ from geometry import PACKAGE_HIGH_mm, PACKAGE_mm
 from sheet import across, circle, cross, down, rectangle, ruler, sheet, text
 
 RUBBER_mm = 12.0  # above the sensors: the layer of most figures in host_tools/report
-OVERHANG_mm = 9.0  # of rubber beyond the outer sensors: three quarters of its thickness (host_tools/README.md, "Tangential load")
+OVERHANG_mm = 9.0  # of rubber beyond the outer sensors: three quarters of its thickness (host_tools/README.md, "Tangential force")
 FLANGE_mm = 5.0  # of the skin, all around, under the frame
 FLANGE_HIGH_mm = 3.0
 SQUEEZED = 0.1  # share of its height that the frame takes from the flange

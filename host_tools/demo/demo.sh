@@ -1,7 +1,7 @@
 #!/bin/sh
 # A fingertip is calibrated with twenty placements of a weight. Then a lime is gripped and slips, three times, on two emulated
-# fingertips of the same rubber side by side: that one, and one that was never calibrated. Says how far each was off, and
-# draws both. Then a gripper with two fingertips lifts an object in the simulated cell: a grasp of kind usual. Says what
+# fingertips of the same rubber side by side: that one, and one that was never calibrated. Prints how far each was off, and
+# draws both. Then a gripper with two fingertips lifts an object in the simulated cell: a grasp of kind usual. Prints what
 # became of it, and draws it.
 # Everything goes to build/demo; run by `sh cmake/bootstrap.sh demo`.
 # usage: demo.sh [--stay]; --stay: goes on with the lime until Enter, to look at it
@@ -54,7 +54,7 @@ wait_for_answer() {
   fail "the emulated fingertip does not answer; try again when this machine has less to do"
 }
 
-# FILE KIND OPTION...: what the pad feels
+# FILE KIND OPTION...: the scenario of the pad
 play() {
   file=$1
   shift

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Says what fingertip-evaluate found, a column for each pad.
+"""Prints the results of fingertip-evaluate, a column for each pad.
 
 errors.py NAME=SUMMARY.json...
 """
@@ -35,7 +35,7 @@ def main(argv):
         with open(path, encoding="utf-8") as file:
             summaries[name] = json.load(file)
     table = [
-        ("what the fingertip felt, against the truth", list(summaries)),
+        ("what the fingertip measured, against the truth", list(summaries)),
         *((label, [value(summary) for summary in summaries.values()]) for label, value in ROWS),
     ]
     width = max(len(label) for label, _ in table)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws a grasp in the simulated cell over its truth, and says what became of its slips.
+"""Draws a grasp in the simulated cell over its truth, and prints what became of its slips.
 
     grasp.py RECORDING.csv TRUTH.csv -o FILE.png
 
@@ -88,7 +88,7 @@ def draw(grip, t_s, truth, truth_s, slips, happened):
         ls="--",
         label="need: the least that holds it",
     )
-    force.plot(t_s, grip["force_N"], color=MEASURED, lw=1.1, label="felt", zorder=2)
+    force.plot(t_s, grip["force_N"], color=MEASURED, lw=1.1, label="measured", zorder=2)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.3, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
     width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
@@ -132,21 +132,21 @@ def main(argv):
     need_N = truth["least_N"].max()
     peak = f"peak force {truth['peak_N'].max():.1f} N" + (f", {truth['peak_N'].max() / need_N:.1f} times the need" if need_N > 0 else "")
     if truth["dropped"].max() > 0:
-        told = f"dropped after it slid by {truth['slid_mm'].max():.1f} mm; {peak}"
+        result = f"dropped after it slid by {truth['slid_mm'].max():.1f} mm; {peak}"
     elif slips:
         begin, reaction, end, way_mm = max(slips, key=lambda slip: slip[3])
         answered = f", more force after {1e3 * (reaction - begin):.0f} ms" if reaction else ""
-        told = f"slid by {way_mm:.1f} mm{answered}, caught after {1e3 * (end - begin):.0f} ms"
+        result = f"slid by {way_mm:.1f} mm{answered}, caught after {1e3 * (end - begin):.0f} ms"
         all_mm = truth["slid_mm"].max()
-        told += f" ({all_mm:.1f} mm in all); {peak}" if all_mm >= way_mm + SLIP_mm else f"; {peak}"
+        result += f" ({all_mm:.1f} mm in all); {peak}" if all_mm >= way_mm + SLIP_mm else f"; {peak}"
     else:
-        told = f"never slipped; {peak}"
+        result = f"never slipped; {peak}"
     figure.text(0.065, 0.955, "A grasp in the simulated cell" + (f", of kind {kind}" if kind != "none" else ""), size=15, weight="bold")
-    figure.text(0.065, 0.927, f"{told}  ·  simulated rubber, object and gripper; the firmware itself on the host", size=9, color=FAINT)
+    figure.text(0.065, 0.927, f"{result}  ·  simulated rubber, object and gripper; the firmware itself on the host", size=9, color=FAINT)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=100, format="png")
     write_bytes(options.output, picture.getvalue())
-    print(f"the grasp: {told}")
+    print(f"the grasp: {result}")
     return 0
 
 

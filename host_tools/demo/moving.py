@@ -1,4 +1,4 @@
-"""Screens of a terminal as a PNG that moves, and what a cell looks like."""
+"""Screens of a terminal as a PNG that moves, and the drawing of a cell."""
 
 import io
 import pathlib
@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 WIDTH, HEIGHT = 8, 16  # of a cell
 BACKGROUND, FOREGROUND = "#0c0d16", "#dededf"
 COLOURS = 64  # of all screens together
-LAST_s = 1.5  # the last screen stands so much longer
+LAST_s = 1.5  # the last screen stays longer by this
 BRAILLE = 0x2800
 PLACES = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]  # of a braille character's dots, by bit
 FONTS = pathlib.Path(matplotlib.get_data_path()) / "fonts/ttf"
@@ -47,7 +47,7 @@ def image(screen, fonts):
 
 
 def png(screens, every_s):
-    """The bytes of an APNG that plays the screens for ever."""
+    """The bytes of an APNG that repeats the screens for ever."""
     fonts = {bold: ImageFont.truetype(str(FONTS / f"DejaVuSansMono{'-Bold' if bold else ''}.ttf"), 13) for bold in (False, True)}
     pictures = [image(screen, fonts) for screen in screens]
     together = Image.new("RGB", (pictures[0].width, sum(picture.height for picture in pictures)))

@@ -42,13 +42,13 @@ PATIENCE_s = 120
 SPEED = 8  # times the recorded one, to save time
 STEPS_PER_s = 12  # of a monitor that replays, at least: so it shows each step of a picture that moves
 SLOWEST = 1 / 16  # times the recorded speed: a busy machine shows fewer steps a second
-TENTH_s = 0.1  # in which the monitor's last line tells the time
+TENTH_s = 0.1  # resolution of the time in the monitor's last line
 NEAR_s = 0.5  # of one screen to the time that was asked for
 WIDTH, HEIGHT, BACKGROUND, FOREGROUND = moving.WIDTH, moving.HEIGHT, moving.BACKGROUND, moving.FOREGROUND
 
 
 def screens_at(command, columns, rows, times_s):
-    """The screen as soon as it says that it is at each of these times, which rise; and how late the latest was, s."""
+    """The screens at these times, which rise, by the time in their last line; and how late the latest was, s."""
     pid, terminal = pty.fork()
     if pid == 0:
         time.sleep(0.1)  # until the terminal has its size
@@ -68,10 +68,10 @@ def screens_at(command, columns, rows, times_s):
                 break
             for part in re.split(rb"(?<=\x1b\[\?2026l)", output):
                 stream.feed(part)
-                told = re.search(r"at (\d+\.\d) s of ", screen.display[-1])
-                if not part.endswith(b"\x1b[?2026l") or not told:
+                shown = re.search(r"at (\d+\.\d) s of ", screen.display[-1])
+                if not part.endswith(b"\x1b[?2026l") or not shown:
                     continue
-                tenths = round(float(told.group(1)) / TENTH_s)
+                tenths = round(float(shown.group(1)) / TENTH_s)
                 while len(found) < len(times_s) and tenths >= round(times_s[len(found)] / TENTH_s):
                     late_s = max(late_s, TENTH_s * (tenths - round(times_s[len(found)] / TENTH_s)))
                     found.append(copy.deepcopy(screen))

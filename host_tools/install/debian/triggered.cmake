@@ -1,4 +1,4 @@
-# The triggers of the library's package say what ldconfig's scripts would, which cpack adds to any
+# The triggers of the library's package replace ldconfig's scripts, which cpack adds to any
 # package with a library.
 list(FILTER CPACK_PACKAGE_FILES INCLUDE REGEX "/libfingertip[0-9][^/]*$")
 foreach(package IN LISTS CPACK_PACKAGE_FILES)
