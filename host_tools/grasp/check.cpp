@@ -8,7 +8,7 @@ namespace fingertip {
 
 namespace {
 
-// Of the frames between two of which an object slides by a millimetre unnoticed, at 0.1 m/s.
+// At this frame rate an object at 0.1 m/s slides by a millimetre between two frames.
 constexpr std::uint32_t RATE_mHz = 100000;
 
 } // namespace

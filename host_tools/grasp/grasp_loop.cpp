@@ -17,7 +17,7 @@ using Kind = GraspNews::Kind;
 constexpr milliseconds STEP{5};
 // At the end: for the gripper to have heard the last command.
 constexpr std::int64_t LAST_WORD_us = 500000;
-// Of news that are not taken: ten seconds of two fingertips at 1308 frames a second, and the steps.
+// News that wait: ten seconds of two fingertips at 1308 frames a second, and the steps.
 constexpr std::size_t MOST_NEWS = 80000;
 
 } // namespace

@@ -73,14 +73,14 @@ public:
 
   // Opens both ports; the left is 0. Throws Error.
   GraspLoop(const std::array<Way, FINGERS> &ways, Options options);
-  // As end, but does not wait.
+  // Ends it as end() does, but does not wait.
   ~GraspLoop();
   GraspLoop(const GraspLoop &) = delete;
   GraspLoop &operator=(const GraspLoop &) = delete;
 
   std::string name(std::size_t finger) const { return loops_[finger]->name(); }
   LineStatistics statistics(std::size_t finger) const { return loops_[finger]->statistics(); }
-  // As DeviceLoop has it, of both.
+  // The earlier of both DeviceLoops' read_until_us.
   double read_until_us() const;
 
   // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports

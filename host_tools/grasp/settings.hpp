@@ -30,7 +30,7 @@ struct GraspPreset {
   double breaks_N;
 };
 const std::vector<GraspPreset> &grasp_presets();
-// Of it: cap, start and floor well below that force, and a slow approach. Throws Error, bad_value:
+// The settings of a preset: cap, start and floor well below that force, and a slow approach. Throws Error, bad_value:
 // there is none.
 std::map<std::string, double> preset_values(const std::string &preset);
 std::map<std::string, double> breaking_values(double breaks_N);

@@ -133,7 +133,7 @@ public:
   }
 };
 
-/* Of "Value 5 not in range 10 to 1000" and "x not in {a,b}". */
+/* The value in "Value 5 not in range 10 to 1000" and "x not in {a,b}". */
 std::string refused_value(const std::string &text) {
   const std::string after = text.rfind("Value ", 0) == 0 ? text.substr(6) : text;
   return after.substr(0, after.find(" not in "));

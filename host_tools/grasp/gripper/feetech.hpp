@@ -19,16 +19,16 @@ namespace fingertip {
 class Jaw {
 public:
   Jaw(int closed_count, int open_count, double jaw_mm);
-  // Of a way's, or the usual.
+  // The jaw of this way, or the usual one.
   explicit Jaw(const GripperWay &complete);
 
   double stroke_mm() const { return width_mm(open_); }
   double step_mm() const; // of one count, closed, where it is the largest
   // Below 0 beyond where the pads touch.
   double width_mm(double count) const;
-  // Of widths from 0 to the stroke.
+  // The count of a width from 0 to the stroke.
   double count(double width_mm) const;
-  // Of the width for one count, there.
+  // The change of width for one count, at this width.
   double slope_mm(double width_mm) const;
   int closed_count() const { return closed_; }
   int open_count() const { return open_; }

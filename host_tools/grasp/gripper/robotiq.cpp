@@ -75,7 +75,7 @@ void put_values(Bytes *to, int count, const std::uint16_t *values) {
   }
 }
 
-// Of registers read: their bytes' count, and they.
+// Length of the answer to a read: the count of bytes, and the registers.
 std::size_t answer_length(int count) {
   return 1 + 2 * static_cast<std::size_t>(count);
 }

@@ -18,7 +18,7 @@ constexpr int COMMAND_REGISTER = 1000; // three: action; rPR; rSP and rFR
 constexpr int STATUS_REGISTER = 2000;  // three: status; gFLT and gPR; gPO and gCU
 constexpr int REGISTERS = 3;
 
-// Of the action, in the high byte of the first command register. Activation begins where rACT
+// Bits of the action, in the high byte of the first command register. Activation begins where rACT
 // rises; while it is 0 the gripper is reset, which clears major faults.
 enum Action : std::uint16_t {
   rACT = 1 << 8,
@@ -27,7 +27,7 @@ enum Action : std::uint16_t {
   rARD = 1 << 13, // of it: to open instead of to close
 };
 
-// Of the status, in the high byte of the first status register.
+// Bits of the status, in the high byte of the first status register.
 enum Status : std::uint16_t {
   gACT = 1 << 8,
   gGTO = 1 << 11,

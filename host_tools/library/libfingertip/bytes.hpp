@@ -13,7 +13,7 @@ public:
 
   /* Fewer than length only where the bytes end, or cannot be read. */
   virtual std::size_t read(std::uint64_t at, char *to, std::size_t length) = 0;
-  /* Of all. */
+  /* The total size. */
   virtual std::uint64_t size() const = 0;
 };
 

@@ -28,7 +28,7 @@ std::string spoken(const Setting &setting) {
   return name;
 }
 
-/* Of its choices, by number; nullptr: it is none, or numbers are what people type. */
+/* The word of a choice; nullptr: there is no such choice, or people type its number. */
 const char *word_of(const SettingValue &value, double number) {
   for (std::size_t i = 0; value.words && value.choices[i]; i++) {
     if (value.choices[i] == number) {

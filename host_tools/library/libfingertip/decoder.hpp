@@ -58,7 +58,7 @@ public:
   void restart();
 
   const LineStatistics &statistics() const { return statistics_; }
-  /* Of the last packet that counted as a version error. */
+  /* The version of the last packet that counted as a version error. */
   std::uint8_t other_version() const { return other_version_; }
 
 private:

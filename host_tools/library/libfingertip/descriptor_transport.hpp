@@ -28,7 +28,7 @@ protected:
   int fd_ = -1; /* -1: gone */
 
 private:
-  /* As write(2). */
+  /* Works like write(2). */
   virtual ssize_t put(const std::uint8_t *bytes, std::size_t length) = 0;
 };
 

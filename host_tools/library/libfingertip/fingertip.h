@@ -73,7 +73,7 @@ struct fingertip_field {
 
 /* The field number index, from 0. FINGERTIP_END: there are fewer. */
 enum fingertip_status fingertip_field_of(uint8_t type, size_t index, struct fingertip_field *field);
-/* Of all its fields together; 0: there is no such type. */
+/* The number of values of all its fields; 0: there is no such type. */
 size_t fingertip_value_count(uint8_t type);
 
 /* The frame of a packet or a command as it goes onto the line, final zero included. count: of values,
@@ -113,7 +113,7 @@ size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *
 /* The line was interrupted: join again, and expect no particular sequence number. */
 void fingertip_decoder_restart(struct fingertip_decoder *decoder);
 void fingertip_decoder_counts(const struct fingertip_decoder *decoder, double counts[FINGERTIP_COUNTS]);
-/* Of the last packet that counted as a version error; 0: there was none. */
+/* The version of the last packet that counted as a version error; 0: there was none. */
 uint8_t fingertip_decoder_other_version(const struct fingertip_decoder *decoder);
 
 /* ---- Reading recordings: CSV, MCAP, and captures of the line, known by their first bytes */
@@ -146,7 +146,7 @@ int fingertip_reader_has_end(const struct fingertip_reader *reader);
 /* Lines that were skipped, and in a capture the line's counters by its packets. */
 uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader);
 void fingertip_reader_counts(const struct fingertip_reader *reader, double counts[FINGERTIP_COUNTS]);
-/* Of a capture, as fingertip_decoder_other_version. */
+/* The same as fingertip_decoder_other_version, for a capture. */
 uint8_t fingertip_reader_other_version(const struct fingertip_reader *reader);
 
 /* ---- Writing recordings */

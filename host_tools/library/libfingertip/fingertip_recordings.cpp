@@ -340,7 +340,7 @@ template <typename Make> fingertip_writer *made(enum fingertip_format format, Ma
   return status == FINGERTIP_OK ? writer.release() : nullptr;
 }
 
-/* Of a writer's call about a device. */
+/* Runs a writer's call about a device. */
 template <typename Body> fingertip_status written(fingertip_writer *writer, std::size_t device, Body body) {
   return guarded([&] {
     if (!writer || device >= writer->devices) {

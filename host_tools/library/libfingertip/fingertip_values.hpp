@@ -37,7 +37,7 @@ template <typename Body> fingertip_status guarded(Body body) {
   }
 }
 
-/* As snprintf. */
+/* Works like snprintf. */
 std::size_t put_text(const std::string &from, char *text, std::size_t size);
 
 } // namespace fingertip::values

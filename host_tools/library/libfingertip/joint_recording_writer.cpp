@@ -15,7 +15,7 @@ namespace {
 
 /* A clock that goes back by more than packets overtake each other has begun again. */
 constexpr std::uint64_t RESTART_us = 1'000'000;
-/* As times are written. */
+/* The resolution of written times. */
 constexpr double ROUNDING_us = 0.1;
 
 } // namespace

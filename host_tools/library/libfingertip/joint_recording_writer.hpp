@@ -31,7 +31,7 @@ public:
   void packet(std::size_t device, const wire_packet &packet, double host_us);
   void event(std::size_t device, const std::string &text);
   void clock(std::size_t device, const ClockEstimate &estimate, unsigned jumps);
-  /* Of the recorder's own, "# key: value", in order of time with the rows. The key holds no slash
+  /* A comment of the recorder's own, "# key: value", in order of time with the rows. The key holds no slash
    * and is no key of the format. */
   void comment(const std::string &key, double host_us, const std::string &value);
   /* Lines older than this on the recorder's clock may go to the file. */

@@ -10,7 +10,7 @@ namespace fingertip::mcap {
 namespace {
 
 constexpr int LEVEL = 3;
-/* Of a chunk, as little memory for a lie; others write up to some MB. */
+/* Largest chunk; it bounds the memory that a false size costs. Others write up to some MB. */
 constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26;
 
 } // namespace

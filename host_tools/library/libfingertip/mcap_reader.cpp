@@ -10,7 +10,7 @@ namespace fingertip::mcap {
 
 namespace {
 
-/* As little memory for a lie; others write chunks of up to some MB. */
+/* Largest record; it bounds the memory that a false size costs. Others write chunks of up to some MB. */
 constexpr std::uint64_t RECORD_MOST_bytes = (1 << 26) + (1 << 16);
 
 /* The fields of a record's content. */

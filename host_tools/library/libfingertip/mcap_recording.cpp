@@ -18,13 +18,13 @@ namespace {
 constexpr const char *CONTACT = "fingertip_msgs/Contact";
 constexpr const char *LINE = "fingertip_msgs/Line";
 
-/* As schemas name them: "fingertip_msgs/msg/Line". */
+/* The name in schemas: "fingertip_msgs/msg/Line". */
 std::string full_name(const std::string &name) {
   std::size_t slash = name.find('/');
   return name.substr(0, slash) + "/msg" + name.substr(slash);
 }
 
-/* Of a time as recordings write it, ns since 1970. */
+/* Parses a time of a recording to ns since 1970. */
 std::optional<std::uint64_t> utc_ns(const std::string &text) {
   std::tm parts{};
   const char *rest = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &parts);

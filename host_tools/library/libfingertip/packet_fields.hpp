@@ -13,7 +13,7 @@ namespace fingertip {
 
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
-/* Of a field that is padded with zeros, if there is room. */
+/* The text of a field that is padded with zeros, if there is room. */
 std::string text_field(const char *field);
 
 /* Serial numbers are hexadecimal digits; people type either case. */

@@ -15,7 +15,7 @@ using namespace recording;
 
 namespace {
 
-/* Of the first line, "1" or "2". Throws Error with what it is instead. */
+/* The format in the first line, "1" or "2". Throws Error with what it is instead. */
 std::string format_of(const std::string &path, const std::string &line) {
   std::string_view words = trim(line);
   std::string_view begin = FIRST_WORDS;

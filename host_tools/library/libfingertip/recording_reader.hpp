@@ -33,8 +33,8 @@ public:
   /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.
    * device: the serial number of one of several fingertips; empty: the only one. */
   RecordingReader(const std::string &path, bool salvage, const std::string &device = "");
-  /* Of all fingertips, from other lines than those of a file. Nothing is read before next, and what
-   * the lines throw beside Error passes: next may then be called again. path: for messages. */
+  /* Reads all fingertips, from other lines than those of a file. Nothing is read before next. Other
+   * exceptions of the lines than Error pass: next may then be called again. path: for messages. */
   RecordingReader(std::string path, bool salvage, std::unique_ptr<LineSource> lines);
 
   ~RecordingReader();
@@ -58,7 +58,7 @@ public:
   std::uint64_t skipped_lines() const { return skipped_lines_; }
   /* Whether the end line was seen: without one the recording was cut short. */
   bool has_end() const { return has_end_; }
-  /* Of this fingertip, as its recorder counted; once the end was seen. */
+  /* This fingertip's counts by its recorder, once the end was read. */
   const std::optional<LineStatistics> &end_statistics() const { return end_statistics_; }
   /* The recorder's own keys (recorded_by, started_utc, port, ...), once the first item was read. */
   const Metadata &recorder_metadata() const { return recorder_metadata_; }

@@ -14,11 +14,11 @@
 
 namespace fingertip::ros {
 
-/* Of a message: "geometry_msgs/WrenchStamped", with all that it needs, as the schema encoding
- * ros2msg has it. */
+/* The schema of a message such as "geometry_msgs/WrenchStamped", with all that it needs, in the
+ * encoding ros2msg. */
 std::string schema_of(const std::string &name);
 
-/* As a part of topics and coordinate frames, which hold letters, digits and _, and begin with no
+/* A name for topics and coordinate frames, which hold letters, digits and _, and begin with no
  * digit. */
 std::string name_in_ros(const std::string &serial);
 

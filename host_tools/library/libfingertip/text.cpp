@@ -6,7 +6,7 @@ namespace fingertip {
 
 namespace {
 
-/* Of the character that the text begins with: 0 if it is none, or a control character. */
+/* Length of the first character: 0 if it is none, or a control character. */
 std::size_t printable_length(std::string_view text) {
   auto first = static_cast<unsigned char>(text[0]);
   if (first < 0x80) {

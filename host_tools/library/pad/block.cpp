@@ -186,7 +186,7 @@ public:
   const Modes &z_of() const { return z_; }
   Shape shape(std::size_t c) const { return {x_of(c).stiffness.size(), y_of(c).stiffness.size(), z_.stiffness.size()}; }
 
-  // By conjugate gradients, the diagonal taken as the whole.
+  // Solves by conjugate gradients, with the diagonal as preconditioner.
   Field solve(const Field &load) const {
     Field at, rest = load, way, image, scaled;
     double before = 0.0, first = 0.0;

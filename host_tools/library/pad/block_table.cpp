@@ -91,7 +91,7 @@ double BlockTable::added_Pa(std::size_t sensor, const Load &load, double x_mm, d
   const Sensor &at = sensors_[sensor];
   const std::array<double, 3> by{load.force_N, at.sign_x * load.x_N, at.sign_y * load.y_N};
   const float *values = values_.data() + 3 * at.place * std::size_t(nodes_x_) * std::size_t(nodes_y_);
-  // As far from the middle as the force is in the mean square.
+  // The root mean square distance of the force from the middle.
   const double away_mm = std::sqrt(SPREAD) * load.radius_mm;
   double sum = 0.0;
   for (const auto &[dx, dy] : {std::pair{away_mm, 0.0}, {-away_mm, 0.0}, {0.0, away_mm}, {0.0, -away_mm}}) {

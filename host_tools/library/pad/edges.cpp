@@ -33,7 +33,7 @@ double of(float value) {
   return static_cast<double>(value);
 }
 
-// Of a layer without end, per newton, with the contact dx, dy away.
+// Pressure of a layer without end, per newton, with the contact dx, dy away.
 double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, double dy_mm) {
   const double r2 = dx_mm * dx_mm + dy_mm * dy_mm;
   double sum = 0.0;

@@ -1,7 +1,7 @@
 // A layer (layer.hpp) with one point of its base lifted. The base moves by a unit of volume (1
 // mm^3) upwards at r = 0 and nowhere else. The surface is free.
 //
-// By Betti's theorem the surface's displacement there is the pressure of that point of the base per
+// Betti's theorem: the surface's displacement there is the pressure of that point of the base per
 // force on the surface (block.hpp). This header gives the stress inside. An infinite layer holds
 // itself with that stress. A block with free sides lacks it.
 //

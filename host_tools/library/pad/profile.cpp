@@ -227,7 +227,7 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
   profile.spread_mm2 = 4;
   profile.spread_sd_mm2 = 6;
   profile.force_ratio = static_cast<float>(force_ratio(profile, info));
-  // Of one layer exactly known; no weight has been dragged yet. Real rubber differs from nu = 0.49
+  // The scale of an exactly known layer; no weight has been dragged yet. Real rubber differs from nu = 0.49
   // and from the set thickness, each by some per cent.
   profile.tangential_scale = 1;
   profile.tangential_scale_sd = 0.1F;

@@ -12,7 +12,7 @@ public:
   // key: all that the numbers depend on. name: what a user sees of it.
   TableFile(const std::filesystem::path &directory, const std::string &name, std::string key);
 
-  // As many as `values` holds. False, and whatever in them, if there is no such table or it is
+  // Reads as many as `values` holds. False, with undefined values, if there is no such table or it is
   // damaged.
   bool read(std::vector<float> &values) const;
   // Whole or not at all. Throws std::filesystem::filesystem_error or std::runtime_error.

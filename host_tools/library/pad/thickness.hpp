@@ -25,7 +25,7 @@ struct Thickness {
 // sigma_mm: of the Gaussian nearest to the response, without its dip; its standard deviation.
 Thickness thickness_of(double sigma_mm, double sigma_sd_mm);
 
-// As a calibration found the width; none if it did not.
+// The thickness from the width that a calibration found, if any.
 std::optional<Thickness> thickness_of(const calibration &calibration);
 
 // On thinner rubber than the sensors are apart the corrected location is worse than the fit's, and

@@ -63,7 +63,7 @@ public:
   /* It lost too many packets in a row, and has to begin again. */
   bool is_lost_for_good(Client client) const { return clients_.at(client).lost_in_a_row > MOST_LOST_IN_A_ROW; }
 
-  /* As last reported by the fingertip. */
+  /* The last info packet of the fingertip. */
   const std::optional<wire_info> &info() const { return info_; }
 
 private:

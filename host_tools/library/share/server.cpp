@@ -36,7 +36,7 @@ constexpr int READS_IN_A_ROW = 4;
 /* At most on one fingertip: with sixteen of these the process is still within 1024 descriptors,
  * which is what systems allow by default. */
 constexpr std::size_t MOST_CLIENTS = 60;
-/* Of a client at once: some dozen commands. */
+/* Bytes taken of a client at once: some dozen commands. */
 constexpr std::size_t CLIENT_BYTES = 256;
 
 Error cannot_share(const std::string &path) {
@@ -76,7 +76,7 @@ private:
   int fd_;
 };
 
-/* As many as it takes now; nothing: it is gone. */
+/* Sends as many as it takes now; nothing: it is gone. */
 std::optional<std::size_t> send_now(int fd, const std::uint8_t *bytes, std::size_t length) {
   std::size_t sent = 0;
   while (sent < length) {

@@ -1,6 +1,6 @@
 // One contact of a held object, along the rubber: two displacements and a turn.
 //
-// As simulation/twin/held_object.hpp, in three directions: a bundle of elements side by side, each a spring
+// The model of simulation/twin/held_object.hpp in three directions: a bundle of elements side by side, each a spring
 // with a damper that ends in a slider (Iwan, J. Appl. Mech. 34, 1967), such that a growing pull
 // meets what Cattaneo and Mindlin's contact does. A turn counts by the way LEVER contact radii out
 // make of it, so that what friction holds is an ellipsoid,

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double PER_M = 1e3;
 constexpr double SQUEEZE_STEP_mm = 0.005;
-// Of each foot, and of the damper beside it.
+// Stiffness of each foot, and its damping.
 constexpr double TABLE_N_mm = 20.0, TABLE_DAMPING = 0.3;
 constexpr double FEET_BELOW_mm = 40.0; // the centre of mass
 

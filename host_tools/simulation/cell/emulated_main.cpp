@@ -51,7 +51,7 @@ Scene scene_of(const Options &options) {
   return scene;
 }
 
-// Of the standard input; false: it has ended.
+// Reads from the standard input; false: it has ended.
 bool read_whole(void *to, std::size_t length) {
   return std::fread(to, 1, length, stdin) == length;
 }

@@ -22,7 +22,7 @@ constexpr std::size_t ROOTS = 1001; // of lookups by force
 
 using Weights = std::array<float, 4>;
 
-// Of the cubic through four equally spaced nodes, at `t` between the second and the third.
+// Weights of the cubic through four equally spaced nodes, at `t` between the second and the third.
 Weights cubic(double t) {
   return {static_cast<float>(-t * (t - 1.0) * (t - 2.0) / 6.0),
           static_cast<float>((t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0),

@@ -22,14 +22,14 @@ class SharedPressures {
 public:
   // At this time, later than all before; Pa above what the air presses.
   void put(std::int64_t host_us, const Pressures &pressures);
-  // Of the newest; 0: none yet.
+  // The time of the newest; 0: none yet.
   std::int64_t newest_us() const;
   // In between straight; before the oldest that is kept, 0.5 s, as then; the same after the newest.
   double at(std::int64_t host_us, std::size_t sensor) const;
 
   // The other way: how often a program has set its frame rate.
   std::atomic<std::uint32_t> rates_set{0};
-  // And up to where its fingertip has got; 0: it has not begun.
+  // The time that its fingertip has reached; 0: it has not begun.
   std::atomic<std::int64_t> reached_us{0};
   // Host time at which its own clock was 0.
   std::atomic<std::int64_t> zero_us{0};

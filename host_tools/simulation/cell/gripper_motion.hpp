@@ -30,7 +30,7 @@ struct GripperMechanics {
   double activation_s = 0.0; // of searching its ends: open, closed, open; 0: active at once
 };
 
-// Of gripper_models(), and "ideal": steps of 0.01 mm, 3 ms. Throws Error: an unknown model.
+// The mechanics of gripper_models(), and of "ideal": steps of 0.01 mm, 3 ms. Throws Error: an unknown model.
 GripperMechanics gripper_mechanics(const std::string &model);
 
 class GripperMotion {
@@ -67,7 +67,7 @@ public:
   double effort() const;
   bool active() const { return phase_ == Phase::active; }
   bool activating() const { return phase_ != Phase::off && phase_ != Phase::active; }
-  // Or a command has yet to count.
+  // Whether it moves, or will by a command that is under way.
   bool moving() const { return moving_ || activating() || !commands_.empty(); }
   // Stopped by blocked_at: 1 while opening, -1 while closing; 0: not.
   int blocked() const { return blocked_; }

@@ -41,7 +41,7 @@ public:
 
   // Takes the clients' lines; does not wait.
   void step();
-  // Of a fingertip; none: nothing presses there.
+  // The hand on a fingertip, if any.
   const std::optional<HandAt> &hand(std::size_t finger) const { return hands_[finger].at; }
   // Whether the truth is due again. Host time.
   bool is_due(std::int64_t host_us);

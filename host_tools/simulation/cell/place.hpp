@@ -32,7 +32,7 @@ public:
 
   bool is_shared() const { return is_shared_; }
   std::string port(const std::string &name) const { return folder_ + "/" + name; }
-  // Of this side, on its port; the rest is for the caller to fill in.
+  // The process of this side, on its port; the caller fills in the rest.
   FingerProcess finger(std::size_t side, std::uint64_t seed) const;
 
 private:

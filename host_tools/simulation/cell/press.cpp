@@ -32,7 +32,7 @@ double smooth(double share) {
   return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
 }
 
-// Of the van der Corput sequence, 0 to 1: evenly spread however many are taken.
+// The van der Corput sequence, 0 to 1: evenly spread for any count.
 double spread(std::uint64_t number, unsigned base) {
   double sum = 0.0, part = 1.0;
   for (; number > 0; number /= base) {
@@ -66,7 +66,7 @@ public:
         weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - HOLDS_s) / SETS_DOWN_s));
     feel(time_s);
   }
-  // Or where the hand is.
+  // Follows the hand instead.
   void follow(double time_s, const std::optional<HandAt> &hand) {
     const double share = 1.0 - std::exp(-(time_s - followed_s_) / FOLLOWS_s);
     followed_s_ = time_s;

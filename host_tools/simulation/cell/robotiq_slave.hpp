@@ -17,7 +17,7 @@ namespace fingertip {
 
 class RobotiqSlave {
 public:
-  // Of the motion's model, which must be a Robotiq's. Time is the motion's.
+  // Takes model and time from the motion; the model must be a Robotiq's.
   explicit RobotiqSlave(GripperMotion &motion);
 
   // A frame for this slave came.

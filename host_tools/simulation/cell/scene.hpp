@@ -40,7 +40,7 @@ struct Scene {
 
   // Since the lift began; before it, below 0. All but the gripper's width.
   Drive drive(double t_s) const;
-  // Of one fingertip, the grip that just holds what is carried then, by static friction.
+  // The grip of one fingertip that just holds the object then, by static friction.
   double least_N(double t_s) const;
 };
 

@@ -91,7 +91,7 @@ struct Outcome {
   double margin = 0.0, force_reported = 0.0, force_taken = 0.0;
   double holding_s = 0.0;  // from the first touch to the controller's HOLDING
   std::vector<Slip> slips; // since the lift began
-  // Of a still trial.
+  // Only for a still trial.
   std::optional<double> settle_s; // from the touch until it stays within 10 % for SETTLED_s
   double rms = 0.0;               // of the error, share of the set force, from there on
   double rms_of_steps = 0.0;      // what rounding the width to the gripper's steps makes alone

@@ -202,7 +202,7 @@ function inOrder(scope, wall_ns) {
   };
 }
 
-/** As far as the program on stdin asks, to the end of the run or of that program's interest in it. */
+/** Runs as far as the program on stdin asks, until the run or that program ends. */
 function runStepped(machine, port, end_ns) {
   for (;;) {
     const step = port.next();

@@ -101,7 +101,7 @@ struct CalibrateOptions {
   bool replace = false;
 };
 
-// As fingertip calibrate --from does it: the thickness that is found makes the pad's profile.
+// Calibrates like fingertip calibrate --from: the thickness that is found makes the pad's profile.
 int calibrate(const CalibrateOptions &options) {
   check_output(options.commands, options.replace);
   auto [info, session] = calibrating::session_from(options.placements, {}, {});

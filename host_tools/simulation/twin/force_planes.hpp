@@ -28,10 +28,10 @@ public:
   ForcePlanes(std::vector<float> values, Symmetry in_x, Symmetry in_y, double step_mm = STEP_mm, int nodes = NODES)
       : values_(std::move(values)), in_x_(in_x), in_y_(in_y), step_mm_(step_mm), nodes_(nodes) {}
 
-  // By dx, dy from the middle of the contact; for the whole of the force.
+  // The value at dx, dy from the middle of the contact; for the whole force.
   double at(double force_N, double dx_mm, double dy_mm) const;
   double node(int force, int i, int j) const;
-  // Of one value for each force.
+  // Interpolates one value for each force.
   static double between_forces(const std::vector<float> &values, double force_N);
 
 private:

@@ -165,7 +165,7 @@ constexpr double LOWERS_s = 0.3, RESTS_s = 0.3;
 constexpr double BRAKES = 2.0;                         // times the weight: braked by the weight again
 constexpr double CARRIED_MIN = 0.4, CARRIED_MAX = 0.9; // of what static friction holds
 
-// As stiff as lets the usual grip's object slip after the usual dead travel.
+// Rubber of the stiffness at which the usual grip's object slips after the usual dead travel.
 class Rubber {
 public:
   explicit Rubber(const Stage &stage) : stage_(stage) {}

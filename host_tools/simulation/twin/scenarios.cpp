@@ -95,7 +95,7 @@ Episode placement(const Stage &stage, std::size_t n) {
   return press("placement", place, force_N, milliseconds(random.uniform(0.2, 0.5)), RESTS_s);
 }
 
-// By hand: never at rest, and not quite at one place.
+// A poke by hand: never at rest, and not quite at one place.
 Episode poke(const Stage &stage, std::size_t n) {
   constexpr double WANDER_mm = 1.5;
   Random random(stage.options.seed, POKES, n);

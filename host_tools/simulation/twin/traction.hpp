@@ -19,7 +19,7 @@ inline double stuck_force_N(double force_N, double tangential_N, double friction
   return std::max(0.0, force_N - tangential_N / friction);
 }
 
-// By dx, dy from the middle of the contact, along the same axes. along_x, along_y: under a traction
+// The pressure at dx, dy from the middle of the contact, along the same axes. along_x, along_y: under a traction
 // p along that axis, Pa.
 double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y, const TractionLoad &load,
                             double dx_mm, double dy_mm);

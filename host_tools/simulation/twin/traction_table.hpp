@@ -39,7 +39,7 @@ public:
   TractionTable(const ContactTable &table, const Layer &layer);
 
   using Load = TractionLoad;
-  // By dx, dy from the middle of the contact, along the same axes.
+  // The pressure at dx, dy from the middle of the contact, along the same axes.
   double base_pressure_Pa(const Load &load, double dx_mm, double dy_mm) const {
     return traction_pressure_Pa(along_x_, along_y_, load, dx_mm, dy_mm);
   }

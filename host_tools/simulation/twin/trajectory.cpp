@@ -63,7 +63,7 @@ Profile &Profile::travel(double distance, double speed, double accelerate_s) {
 
 Profile &Profile::trace(const std::vector<double> &values, double tolerance) {
   for (std::size_t begin = 0; begin < values.size();) {
-    // As far as a straight line leaves none of them.
+    // Extends the segment while a straight line stays near all of them.
     double lowest = -std::numeric_limits<double>::infinity(), highest = -lowest;
     std::size_t end = begin;
     for (std::size_t i = begin; i < values.size(); i++) {

@@ -21,7 +21,7 @@ public:
   Profile &ease(double seconds, double to);
   // At constant rate.
   Profile &line(double seconds, double to);
-  // By `distance`, at this speed but for a constant acceleration at either end. Throws
+  // Moves by `distance`, at this speed except for a constant acceleration at either end. Throws
   // std::invalid_argument if the accelerations alone would take the distance.
   Profile &travel(double distance, double speed, double accelerate_s);
   // Through these values, one for each millisecond to come, but for less than the tolerance.

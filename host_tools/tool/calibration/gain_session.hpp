@@ -16,7 +16,7 @@ namespace fingertip::calibrating {
 
 /* Its sensors; the pitch of a free layout is the distance of the nearest two. */
 Array array_of(const wire_info &info);
-/* Of a raw packet. */
+/* The frame of a raw packet. */
 Frame frame_of(const wire_packet &packet);
 
 /* What a fingertip must be able to do. what: it, for the message. Throws Error. */
@@ -47,7 +47,7 @@ public:
   /* The calibration for the fingertip; date_s: Unix time. Of a good judgement. Throws Error where
    * the readings are not those of force_N, or a gain is none. */
   calibration made(std::optional<double> force_N, std::uint32_t date_s) const;
-  /* Of the firmware's own fit to the placements, without and with what was found. */
+  /* Scatter of the firmware's own fit to the placements, without and with the calibration. */
   Scatter scatter(bool calibrated) const;
 
   const Array &array() const { return array_; }

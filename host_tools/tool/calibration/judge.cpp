@@ -27,8 +27,7 @@ constexpr double CONTACTS_SD_mm2 = 0.6;
  * is EVIDENCE_CLEAR times its bound; otherwise it only keeps a session from being good. */
 constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
 constexpr double EVIDENCE_CLEAR = 3.0;
-/* Of the halves' difference at a sensor: how sure it must be, and how many of its sds are chance.
- */
+/* The halves' difference at a sensor: its largest sd, and how many of its sds are chance. */
 constexpr double HALVES_SD_MAX = 0.025, HALVES_SDS = 2.0;
 /* Halves that disagree may agree until there is this number of placements. */
 constexpr std::size_t HALVES_SURE = 40;
@@ -296,7 +295,7 @@ struct FirmwareFit {
     }
     return result;
   }
-  /* As many as any setting of the firmware needs; a mean of many frames has hardly any noise. */
+  /* Enough for any setting of the firmware; a mean of many frames has hardly any noise. */
   static constexpr std::uint8_t ITERATIONS = 10;
   static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
   std::vector<fit_own> own;
@@ -423,7 +422,7 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
   for (double force : forces) {
     off.push_back(std::abs(force / middle - 1.0));
   }
-  /* Of a median: 1.2533 of a mean's; of a normal spread: 1.4826 of the median deviation. */
+  /* The sd of a median is 1.2533 of a mean's; a normal spread is 1.4826 of the median deviation. */
   const double by_chance = 1.2533 * 1.4826 * median(off) / std::sqrt(double(off.size()));
   const double faded = FADED_BEFORE * median(fadings);
   return ForceScale{force_N / middle, force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD, faded)};

@@ -96,7 +96,7 @@ struct Shape {
 Shape shape_of(const Solution &solution);
 /* The part of it that the firmware's fit uses with a pad profile: no width. */
 Shape without_width(Shape shape);
-/* As the fit takes it: [sensor], or nothing. */
+/* The shape in the form of the fit: [sensor], or nothing. */
 std::vector<fit_own> own_of(const Array &array, const Shape &shape);
 
 /* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains, half a

@@ -6,7 +6,7 @@
 namespace fingertip::calibrating {
 namespace {
 
-/* As many values more hold a spread to what was assumed. With fewer the gains of good sessions are
+/* This number of extra values holds a spread to the assumed one. With fewer the gains of good sessions are
  * better known, by 15 % with 1, and sooner thought so; but then 13 (with 2) and 37 % (with 1) of
  * the sessions whose zeros move pass as good, with 4 none (truth.py --parts calibration --seed 20000
  * --pads 30). Where sensors sit where they should and rubber does not relax, the spreads cannot be

@@ -19,9 +19,9 @@ public:
   Eigen::MatrixXd information();
   /* The same of one more placement. */
   Eigen::MatrixXd information_at(double x_mm, double y_mm) const;
-  /* Of the global unknowns at the solution. */
+  /* The covariance of the global unknowns at the solution. */
   Eigen::MatrixXd covariance();
-  /* Of a placement's own unknowns, given that of the global ones, where covariance() was last. */
+  /* The covariance of a placement's own unknowns, given that of the global ones by covariance(). */
   LocalSquare local_covariance(std::size_t i, const Eigen::MatrixXd &covariance) const;
 
   Unknowns at;

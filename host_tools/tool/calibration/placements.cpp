@@ -18,7 +18,7 @@ constexpr double RISING = 0.1; /* of TOUCH_Pa, in a twentieth of a second */
 constexpr double LIFTED_SHARE = 0.1;
 constexpr double SEEN_MIN = 0.8; /* share of the frames in which a sensor must have been measured */
 constexpr double SLOTS_MIN = 5.0;
-/* Of a frame, rms: no sensor at any oversampling has more than 11 Pa (ms58xx.h). */
+/* Rms noise of a frame: no sensor at any oversampling has more than 11 Pa (ms58xx.h). */
 constexpr double NOISE_Pa = 11.0, NOISE_SDS = 4.0;
 /* The largest of fifteen rms of ten readings is hardly ever beyond this many times the noise. */
 constexpr double SWAY_NOISES = 2.5;

@@ -27,7 +27,7 @@ public:
   std::string advice() const;
   /* "pull 3 at x ... reads ..."; not before the first. */
   std::string last_pull_text() const;
-  /* Of a fingertip that hardly knows such loads. */
+  /* The message for a fingertip that hardly knows such forces. */
   std::string weak_text() const;
 
   /* pad with the scale with which the known force would have been read as what it was. Of a good

@@ -14,13 +14,13 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/* Of rubber letting go; see remember. */
+/* Times of the rubber's recovery; see remember. */
 constexpr double SLOW_s = 10.0, FAST_s = 1.0, FAST_SHARE = 20.0;
 /* A placement whose residuals are beyond these many times what is expected, and as many times the
  * median placement's, was no such placement: another object, a hand, a weight that tipped. */
 constexpr double DROP_MISFIT = 3.0;
 constexpr int DROP_ROUNDS = 4;
-/* Of learning the spreads. */
+/* Iterations of learning the spreads. */
 constexpr int LEARN_ROUNDS = 12;
 constexpr double LEARNT = 0.02; /* relative change */
 
@@ -95,7 +95,7 @@ EquivalentGaussian equivalent_gaussian(const GaussianMixture &response, double d
   return best;
 }
 
-/* Of a sensor from a contact along an axis, where contacts lie as the sensors do. */
+/* Rms distance of a sensor from a contact along an axis, if contacts lie as the sensors do. */
 double reach_mm(const Array &array) {
   double squares = 0.0;
   for (const std::vector<double> *axis : {&array.x_mm, &array.y_mm}) {
@@ -107,13 +107,13 @@ double reach_mm(const Array &array) {
   return std::sqrt(squares); /* half of it by axis, twice for both */
 }
 
-/* Of the log gains less their mean, given that of all global unknowns. */
+/* The covariance of the log gains less their mean, given that of all global unknowns. */
 MatrixXd gain_covariance(const MatrixXd &covariance, Eigen::Index n) {
   const MatrixXd centre = MatrixXd::Identity(n, n) - MatrixXd::Constant(n, n, 1.0 / double(n));
   return centre * covariance.topLeftCorner(n, n) * centre;
 }
 
-/* As solve() left it. */
+/* Restores the state that solve() left. */
 void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
   const Layout &layout = model.layout;
   auto &[global, locals] = optimiser.at;
@@ -343,7 +343,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
   solution.sigma_mm = solution.width_mm * width;
   solution.dip_share = std::max(dip_share, 0.0);
   solution.dip_sd_mm = solution.dip_pitches * array.pitch_mm;
-  /* By the width and the mixing, which go against each other. */
+  /* Derivatives by the width and the mixing, which counteract each other. */
   constexpr double STEP = 0.05;
   const double by_mixing =
       (near(solution.mixing + STEP).width - near(solution.mixing - STEP).width) / (2.0 * STEP * width);

@@ -95,12 +95,12 @@ struct Assumptions {
   double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
   double dip = 0.05;                    /* of h: 0.05 on real pads, 0 on the twin's */
-  /* Of log B. It is this narrow because zeros and model errors look like another width where the
+  /* Sd of log B. It is this narrow because zeros and model errors look like another width where the
    * readings contain little: with 0.05 and more, places and forces on the recording of
    * host_tools/report/real that chooses are worse. Readings that determine it still move it: the
    * dip of the twin's pads is 1.6 pitches wide, and is found within some per cent. */
   double dip_log_sd = 0.03;
-  /* Of log A from that of what a strong placement reads, which was near a sensor: without it a
+  /* Sd of log A around the reading of a strong placement, which was near a sensor: without it a
    * narrow peak that is far from every sensor explains a few placements as well. */
   double peak = 0.15;
 };
@@ -152,7 +152,7 @@ struct Solution {
   double width_mm = 0.0, mixing = 0.0;
   double dip = 0.0, dip_sd = 0.0; /* h */
   double dip_pitches = 0.0;       /* B */
-  /* Of the firmware's model that is nearest to the profile: one Gaussian less a dip. */
+  /* The firmware's model that is nearest to the profile: one Gaussian less a dip. */
   double sigma_mm = 0.0, sigma_sd_mm = 0.0, dip_share = 0.0, dip_sd_mm = 0.0;
   std::vector<Fitted> placements; /* as given */
   std::size_t kept = 0;
@@ -174,7 +174,7 @@ constexpr std::size_t PLACEMENTS_MIN = 3;
 Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions = {},
                bool keep_all = false);
 
-/* Of some of the placements of a session, with the spreads that all of it showed, beginning where
+/* The solution of some placements of a session, with the spreads of all of it, beginning where
  * all of it ended; from.placements are theirs. A few placements alone may have a second optimum. */
 Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from,
                     const Assumptions &assumptions = {});

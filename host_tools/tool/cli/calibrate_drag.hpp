@@ -5,7 +5,7 @@
 
 namespace fingertip {
 
-/* As run_calibrate. */
+/* Calibrates the scale of tangential force; returns as run_calibrate. */
 int calibrate_drag(const CalibrateOptions &options);
 
 } // namespace fingertip

@@ -52,7 +52,7 @@ private:
   int columns_, rows_;
 };
 
-/* As lines of at most this many characters. */
+/* Breaks text into lines of at most this many characters. */
 std::vector<std::string> wrapped(const std::string &text, std::size_t columns) {
   std::vector<std::string> lines(1);
   std::istringstream words(text);

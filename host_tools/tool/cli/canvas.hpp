@@ -23,7 +23,7 @@ struct Style {
 
 class Canvas {
 public:
-  /* Of a cell with two square halves the front is the upper one's colour. */
+  /* In a cell with two square halves the front is the upper one's colour. */
   struct Cell {
     std::string character = " ";
     Style style;

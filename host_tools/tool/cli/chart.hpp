@@ -11,7 +11,7 @@
 
 namespace fingertip {
 
-/* Of one interval. */
+/* The values of one interval. */
 struct ChartPoint {
   std::optional<float> value;
   bool doubtful = false; /* shown only where there is no other, and dashed */

@@ -35,7 +35,7 @@ void check_paths(const Conversion &conversion) {
   check_output(conversion.to, conversion.overwrite);
 }
 
-/* Of a file that is read for them once. */
+/* The facts of a file that is read for them once. */
 struct Contents {
   std::optional<wire_info> info; /* the first */
   std::optional<std::uint8_t> sensor_count;

@@ -19,7 +19,7 @@ constexpr double INTERVAL_s = GripModel::INTERVAL_us / 1e6;
 static_assert(GripModel::INTERVAL_us == Model::SAMPLE_INTERVAL_us, "curves of one chart");
 /* Three charts of two rows each, and the time. */
 constexpr int CHART_ROWS = 7;
-/* Of all rows, where there are more. */
+/* The share of all rows on a higher screen. */
 constexpr int CHARTS_PERCENT = 40;
 constexpr Colour LEFT = ACCENT, RIGHT = {200, 140, 255};
 constexpr const char *SIDES[] = {"left", "right"};

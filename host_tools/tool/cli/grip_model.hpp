@@ -14,7 +14,7 @@ namespace fingertip {
 
 class GripModel {
 public:
-  /* Of an interval: the last values, and whether it ever was so. */
+  /* The last values of an interval, and whether a flag was ever on. */
   struct Sample {
     bool controlled = false; /* wanted_N holds */
     bool loaded = false;     /* load_N holds */
@@ -26,7 +26,7 @@ public:
   static constexpr std::size_t SAMPLES = 800;
 
   void take(const GripRow &row);
-  /* Of the recording's head: gripper and cap. */
+  /* Takes gripper and cap from the recording's head. */
   void take(const Metadata &head);
   void set_gripper(const std::string &gripper) { gripper_ = gripper; }
   void set_cap_N(float cap_N) { cap_N_ = cap_N; }
@@ -38,7 +38,7 @@ public:
   /* The last of before this grasp's newest state: for how long it has been. */
   double state_seconds() const { return row_ ? (row_->time_us - state_since_us_) / 1e6 : 0; }
 
-  /* Of an interval of time, 0 the recording's first. */
+  /* The sample of an interval of time, 0 is the recording's first. */
   const Sample &sample(std::int64_t interval) const;
   std::int64_t last_interval() const { return last_interval_; }
 

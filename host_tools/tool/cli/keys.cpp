@@ -65,7 +65,7 @@ void KeyParser::feed(const char *bytes, std::size_t length, KeyTime now) {
   }
 }
 
-/* As xterm, the Linux console and rxvt send them. */
+/* The keys in the encodings of xterm, the Linux console and rxvt. */
 void KeyParser::take_special(char final_byte) {
   struct Special {
     const char *parameters;

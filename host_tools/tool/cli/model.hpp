@@ -23,7 +23,7 @@ public:
     std::uint64_t t_us;
     float x_mm, y_mm;
   };
-  /* Of an interval: frames that carry a warning count only where there is no other. */
+  /* The values of an interval: frames with a warning count only if there is no other. */
   struct Sample {
     bool fitted = false;
     bool doubtful = false;

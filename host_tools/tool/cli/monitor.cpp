@@ -45,7 +45,7 @@ void draw_header(Canvas &canvas, const Area &area, const Model &model, bool alon
   canvas.text(area.left + area.width - columns_of(text), area.top, text, {colour, BAR, true});
 }
 
-/* Of the last frame, as far as it holds them. */
+/* The values of the last frame, as far as it has them. */
 struct Numbers {
   std::optional<std::string> force, force_sd, x, y, location_sd, sigma, peak, residual, slip;
   std::optional<std::string> qx, qy, q_sd, ratio, ratio_sd;
@@ -298,7 +298,7 @@ std::vector<Item> items_of(const Model &model) {
   return items;
 }
 
-/* As many as there is room for; how many rows they would take. */
+/* Draws as many as fit. Returns the rows that all would take. */
 int draw_items(Canvas *canvas, const Area &area, const std::vector<Item> &items) {
   int column = area.left, row = 0;
   for (const Item &item : items) {

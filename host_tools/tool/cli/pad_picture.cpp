@@ -20,14 +20,14 @@ constexpr float HEAT_STEPS = 20;
 constexpr float FINEST_mm = 0.75f;
 /* A pressure that a reader should notice. */
 constexpr float NOTED_Pa = 500;
-/* As a doubtful fit is drawn, beside one that can be trusted. */
+/* Brightness of a doubtful fit, over that of a trusted one. */
 constexpr float DOUBTFUL_PART = 0.45f;
 /* Length of the arrow whose tangential force is as large as the normal force: rubber slides at a
  * half to one of it, and the array is 36 mm long. */
 constexpr float ARROW_mm = 30.0f;
 /* A tangential force below this number of its standard deviations has no direction. */
 constexpr float ARROW_SDS = 2.0f;
-/* As what the arrow may be is drawn, beside what it is for sure. */
+/* Brightness of the uncertain part of the arrow, over that of the certain one. */
 constexpr float UNSURE_PART = 0.4f;
 
 /* Perceptually ordered, dark to bright, for 0 to 1. */

@@ -26,7 +26,7 @@ public:
 
   const PacketFile &file() const { return file_; }
   bool is_ended() const { return !next_; }
-  /* Of the next frame, us from the file's beginning; of the last one where none follows. */
+  /* Time of the next frame, us from the file's beginning; of the last one if none follows. */
   double next_us() const { return next_us_; }
   double last_us() const { return last_us_; }
 
@@ -106,7 +106,7 @@ public:
 
   const std::vector<Track> &tracks() const { return tracks_; }
   const std::vector<Model> &models() const { return models_; }
-  /* Of a grasp that is shown whole. */
+  /* The model of a grasp that is shown whole. */
   const GripModel *grip() const { return grip_track_ ? &grip_ : nullptr; }
   Caption caption(const std::string &name) const;
 

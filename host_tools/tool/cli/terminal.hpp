@@ -13,8 +13,8 @@ namespace fingertip {
 /* SIGINT, SIGTERM and SIGHUP from now on only ask to stop, SIGPIPE is ignored. */
 void catch_signals();
 bool stop_requested();
-/* Of these, how often SIGINT came, for programs that do not end by the first; and whether another
- * did. */
+/* How often SIGINT came, for programs that do not end by the first, and whether another of these
+ * signals did. */
 unsigned interrupts();
 bool end_requested();
 

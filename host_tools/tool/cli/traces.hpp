@@ -14,7 +14,7 @@ namespace fingertip {
  * beyond the axis that the others need. */
 void draw_traces(Canvas &canvas, const Area &area, const Model &model);
 
-/* Of the model, which must outlive it; in intervals of Model::SAMPLE_INTERVAL_us. */
+/* Curves of the model, which must outlive them; in intervals of Model::SAMPLE_INTERVAL_us. */
 Curve force_curve(const Model &model);
 
 } // namespace fingertip

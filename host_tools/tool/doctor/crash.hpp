@@ -22,7 +22,7 @@ Crash with_places(const crash_record &record, const std::optional<Symbols> &symb
 std::string crash_text(const Crash &crash);
 /* "command stream 0.20 s, started 3 min": how long before; empty: none. */
 std::string events_text(const crash_record &record);
-/* Of an event, at the end. */
+/* The age of an event at the end. */
 double event_age_s(const crash_record &record, unsigned event);
 /* "r0 0x00000001 r1 ..."; empty where none are known. */
 std::string registers_text(const crash_record &record);

@@ -24,7 +24,7 @@ namespace {
 constexpr double RATE_SHARE_MIN = 0.97;
 /* No disturbance that the firmware mends by itself costs a quarter. */
 constexpr double RATE_SHARE_BAD = 0.75;
-/* Of frames without a sensor's reading: a NACK a second leaves 1 % of 186 frames a second
+/* Share of frames without a sensor's reading: a NACK a second leaves 1 % of 186 frames a second
  * incomplete (firmware/scan/scan.h). */
 constexpr double ABSENT_SHARE_MAX = 0.01;
 constexpr double DOUBTFUL_SHARE_MAX = 0.01;
@@ -46,7 +46,7 @@ constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TAB
 constexpr double DRIFT_SECONDS_MIN = 8;
 /* Readings of sound sensors under cast rubber differ by less: readings.h. */
 constexpr double APART_MAX_Pa = 20000;
-/* Of air, from the highest mountain to the deepest mine. */
+/* Air pressure, from the highest mountain to the deepest mine. */
 constexpr double AIR_MIN_Pa = 30000, AIR_MAX_Pa = 115000;
 /* The formulas of the family differ by powers of two and by what a count is (sensors.h). The formula
  * of one sensor turns another's codes into this multiple of the pressure, or this fraction. */
@@ -551,7 +551,7 @@ private:
     }
   }
 
-  /* Of a slope through steps of the temperature, as long as they may last. */
+  /* The sd of a slope through steps of the temperature, as long as they may last. */
   double temperature_sd_Pa_per_s() const {
     for (auto [osr, noise_degC] : TEMPERATURE_NOISE_degC) {
       if (osr == facts_.info->osr) {

@@ -34,7 +34,7 @@ struct Wiring {
   std::string check_multiplexer(unsigned strip) const;
   std::string check_all() const;
 
-  /* As in the descriptor. */
+  /* The name in the descriptor. */
   std::string board;
   unsigned sensor_count, sensors_of_strip;
   unsigned pin_scl;

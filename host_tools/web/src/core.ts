@@ -26,7 +26,7 @@ export interface LineCounts {
 
 export interface Decoder {
   readonly counts: LineCounts;
-  /** Of the last packet that counted as a version error; 0: none yet. */
+  /** The version of the last packet that counted as a version error; 0: none yet. */
   readonly other_version: number;
   /** The last of their kind, overwritten by the next. */
   readonly contact: Contact;
@@ -38,7 +38,7 @@ export interface Decoder {
 }
 
 export interface ClockEstimate {
-  /** Of the last exchange. */
+  /** The time of the last exchange. */
   device_us: number;
   /** The page's clock at that time. */
   host_us: number;
@@ -58,12 +58,12 @@ export interface ClockFit {
   restart(): void;
 }
 
-/** Of a file's bytes, fed from the first on; a CoreError is what is wrong with them. */
+/** Reads a file's bytes, fed from the first on; a CoreError states what is wrong with them. */
 export interface Reader {
   feed(bytes: Uint8Array): void;
   /** null: feed more. undefined: that was all. packet is null for an event. time_us: of a row, else NaN. */
   next(): { device: number; time_us: number; packet: DevicePacket | null } | null | undefined;
-  /** Of a line, and no recording. */
+  /** It is a capture of a line, no recording. */
   readonly is_capture: boolean;
   readonly has_end: boolean;
   readonly counts: LineCounts;
@@ -112,7 +112,7 @@ export interface Core {
 
 export let core: Core;
 
-/** Of zstd, in MCAP files of other programs; a reader of files sets it. */
+/** Unpacks zstd in MCAP files of other programs; a reader of files sets it. */
 let unpack: ((packed: Uint8Array, size: number) => Uint8Array) | null = null;
 export function setUnpack(of_zstd: (packed: Uint8Array, size: number) => Uint8Array): void {
   unpack = of_zstd;

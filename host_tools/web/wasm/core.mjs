@@ -8,7 +8,7 @@ const ERR_VALUE = -2;
 const CSV = 0;
 const MCAP = 1;
 const INFO = 0x03;
-// Of some hundred packets; one has 416 at most.
+// Values of some hundred packets; one has 416 at most.
 const VALUES = 8192;
 const BYTES = 1 << 16;
 const TEXT_BYTES = 512;
@@ -212,7 +212,7 @@ class Writer {
     return Number(this.core.wasm.call('fingertip_writer_frames', this.handle));
   }
 
-  /** Of the file, that were not taken yet: null, or the next. */
+  /** The next bytes of the file; null: none yet. */
   take() {
     const { core } = this;
     const count = core.wasm.call('fingertip_writer_take', this.handle, core.bytes, BYTES);

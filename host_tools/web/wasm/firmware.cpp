@@ -52,7 +52,7 @@ std::vector<std::uint8_t> file;
 std::string errors;
 std::unique_ptr<World> world;
 std::vector<std::uint8_t> pad_command;
-// As World's Truth; contact and slips are 0 or 1.
+// The fields of World's Truth; contact and slips are 0 or 1.
 double truth[8];
 
 double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) {

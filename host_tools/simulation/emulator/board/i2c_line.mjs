@@ -20,10 +20,10 @@ const FAST_MODE = {
 };
 const NAMES = Object.keys(FAST_MODE);
 const LIMITS_NS = Float64Array.from(Object.values(FAST_MODE));
-/** By number, since they are judged at every clock of every line. */
+/** Numbers, since they are checked at every clock of every line. */
 export const [HD_STA, LOW, HIGH, SU_STA, SU_DAT, SU_STO, BUF, VD_DAT, PERIOD] = NAMES.keys();
 
-/** Of emulated time, which is kept in floating point. */
+/** Tolerance of emulated time, which is in floating point. */
 const SLACK_NS = 1e-3;
 
 /** Warns of each time that is too short (or long), once per line and name with its first value, and counts the rest. */
@@ -37,7 +37,7 @@ export class TimingCheck {
     this.excused = false;
   }
 
-  /** By name: of what was seen, the shortest, of tVD_DAT the longest. */
+  /** The shortest times that were seen, by name; of tVD_DAT the longest. */
   get extremes() {
     return Object.fromEntries(NAMES.map((name, what) => [name, this.seen_ns[what]]).filter(([, value_ns]) => !Number.isNaN(value_ns)));
   }

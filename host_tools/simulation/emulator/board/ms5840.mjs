@@ -18,10 +18,10 @@ const RESET_NS = 2.8e6;
 const CONVERSION_FRACTION = 0.96;
 const OSCILLATOR_TOLERANCE = 0.04;
 const CODE_MAX = 0xffffff;
-/** Of a noisy sensor, times the datasheet's noise. */
+/** Noise of a noisy sensor, times the datasheet's. */
 const NOISY = 10;
 
-/** By osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. Of the MS5840. */
+/** MS5840, by osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. */
 export const OSR = [
   { name: 256, max_ns: 0.56e6, noise_Pa: 11, noise_degC: 0.012 },
   { name: 512, max_ns: 1.1e6, noise_Pa: 6.2, noise_degC: 0.009 },
@@ -172,7 +172,7 @@ export class Ms5840 extends I2cTarget {
     this.stimulus = stimulus;
     this.faults = faults;
     this.prom = makeProm(prng, this.kind);
-    /** As it reads under the fault sensor_prom_collision. */
+    /** The PROM's content under the fault sensor_prom_collision. */
     this.collidingProm = collide(new Prng(this.prom.reduce((sum, word) => Math.imul(sum, 31) + word, 7)), this.prom);
     this.timeFactor = CONVERSION_FRACTION * (1 + prng.range(-OSCILLATOR_TOLERANCE, OSCILLATOR_TOLERANCE));
     this.heldClocks = 0;
@@ -299,7 +299,7 @@ export class Ms5840 extends I2cTarget {
     };
   }
 
-  /** Of a corrupt temperature: never the same twice running, or two would agree. */
+  /** The wrong bit of a corrupt temperature: never the same twice running, or two would agree. */
   #otherBit() {
     this.wrongBit = (this.wrongBit + 1 + Math.floor(this.prng.range(0, 23))) % 24;
     return this.wrongBit;

@@ -85,7 +85,7 @@ export class ParallelBoard {
     this.sclRose_ns = -Infinity;
   }
 
-  /** By name, as in TimingCheck: the shortest (tVD_DAT: longest) of all lines. */
+  /** The shortest times (tVD_DAT: longest) of all lines, by name as in TimingCheck. */
   get times_ns() {
     const times = { ...this.sclCheck.extremes };
     for (const { check } of this.lines) {

@@ -154,7 +154,7 @@ export class Pll extends BasePeripheral {
   reset() {
     this.alarm.cancel();
     this.staleAlarm.cancel();
-    /** Of the lock before the power went. */
+    /** Reports the lock from before the power went. */
     this.reportsLock = false;
     this.cs = 1;
     this.pwr = 0x2d;

@@ -56,7 +56,7 @@ export class StrictCore extends CortexM0Core {
     if (more) this.chip.fail('MPU', 'more than one region in SRAM is not modelled');
     this.guardFrom = first - RAM_BASE;
     this.guardBytes = bytes;
-    /** Of SRAM, before any guard. */
+    /** Bytes of SRAM before any guard. */
     this.codeBytes = bytes ? this.guardFrom : RAM_BYTES;
   }
 

@@ -88,7 +88,7 @@ export class Dma extends BasePeripheral {
   reset() {
     this.alarm.cancel();
     this.channels = Array.from({ length: CHANNELS }, (_, i) => makeChannel(i));
-    /** By request: the busy channel that it paces. */
+    /** The busy channel that each request paces. */
     this.paced = new Array(PIO_REQUESTS).fill(null);
     this.reads = [];
     this.writes = [];

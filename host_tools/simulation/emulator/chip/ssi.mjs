@@ -23,7 +23,7 @@ export class Ssi extends BasePeripheral {
     this.alarm = chip.clock.createAlarm(() => this.#shifted());
     /** Extra time of the next byte, for a test. */
     this.stall_ns = 0;
-    // As the boot ROM leaves it: single-bit 03h reads.
+    // The state that the boot ROM leaves: single-bit 03h reads.
     this.ctrlr0 = (31 << 16) | (TMOD_EEPROM_READ << 8);
     this.ctrlr1 = 0;
     this.enabled = 1;
@@ -168,7 +168,7 @@ export class Ssi extends BasePeripheral {
         return;
       case 0x08:
         if (!(value & 1)) {
-          // As the datasheet of its maker has it, the transfer ends at once.
+          // By its maker's datasheet the transfer ends at once.
           if (this.shifting !== null && !this.forcedSelect) this.rp2040.fail('SSI', 'disabled in mid-transfer');
           this.shifting = null;
           this.alarm.cancel();

@@ -71,7 +71,7 @@ export class UsbBlock extends BasePeripheral {
     this.idleAlarm.cancel();
     this.connected = !this.isOld;
     this.inReset = false;
-    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. Erratum E15 strikes amid an IN transfer: `hangsAtIn` is how. */
+    /** Set by a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. Erratum E15 strikes amid an IN transfer: `hangsAtIn` is how. */
     this.hung = null;
     this.hangsAtIn = null;
     this.buffStatus = 0;

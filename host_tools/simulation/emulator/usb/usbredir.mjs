@@ -62,7 +62,7 @@ const endpointIndex = (address) => ((address & 0x80) >> 3) | (address & 15);
 
 class ProtocolError extends Error {}
 
-// Of what a message of a type holds before its data.
+// Bytes of a message of each type before its data.
 const LEAST_BYTES = new Map([
   [TYPE.control, 10],
   [TYPE.bulk, 10],
@@ -209,7 +209,7 @@ export class UsbRedirServer {
     });
   }
 
-  /** As Machine's `makeClient`. */
+  /** For Machine's `makeClient`. */
   attachTo({ host, report }) {
     this.host = host;
     this.report = report;

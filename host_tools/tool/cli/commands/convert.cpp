@@ -16,7 +16,7 @@ bool ends_with(const std::string &text, const std::string &end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-/* By its content; the reader reports a file that is neither. */
+/* Whether its content is a recording; the reader reports a file that is neither. */
 bool is_recording(const std::string &path) {
   std::string begin(12, '\0');
   std::ifstream(path, std::ios::binary).read(begin.data(), 12);

@@ -24,7 +24,7 @@ std::string range_of(const GraspSetting &setting) {
   return number(setting.low) + " to " + number(setting.high);
 }
 
-/* Of the usual gripper, and of a servo if it has another. */
+/* The default for the usual gripper, and for a servo if it differs. */
 std::string default_of(const GraspSetting &setting, const GripSettings &usual, const GripSettings &servo) {
   if (setting.name == std::string("fixed")) {
     return "";

@@ -31,7 +31,7 @@ int erase_pad(Session &session) {
   return 0;
 }
 
-// As the user sets it, or as the fingertip's calibration found it.
+// The thickness that the user sets, or that the fingertip's calibration found.
 double thickness_mm(const PadOptions &options, const wire_info &info) {
   const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0;
   const auto found = calibrated ? pad::thickness_of(info.calibration) : std::nullopt;

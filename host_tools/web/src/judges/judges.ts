@@ -125,7 +125,7 @@ export interface Finding {
   sensors: number[];
 }
 
-/** As in libfingertip/error.hpp. */
+/** The codes of libfingertip/error.hpp. */
 export type FailureCode = 'no_port' | 'port_in_use' | 'cannot_open' | 'not_a_fingertip' | 'gone' | 'no_answer' | 'other_version' | 'other';
 
 /** What the line counted during the measurement. */
@@ -141,7 +141,7 @@ export interface Examination {
   crash(frame: Uint8Array): void;
   /** Contact and raw packets, in order. */
   take(frame: Uint8Array): void;
-  /** Of the packets taken, device time. */
+  /** Duration of the packets taken, device time. */
   seconds(): number;
   after(health_frame: Uint8Array): void;
   line(counts: MeasuredCounts): void;

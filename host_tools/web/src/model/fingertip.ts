@@ -74,10 +74,10 @@ interface Waiting {
 let fingertips_made = 0;
 
 export class Fingertip {
-  /** Of this page, from 1 on. */
+  /** Its number on this page, from 1 on. */
   readonly id = ++fingertips_made;
   state: FingertipState = 'opening';
-  /** Of a closed one: why, and what to do. */
+  /** Why it is closed, and what to do. */
   why = '';
   info: Info | null = null;
   health: Health | null = null;

@@ -15,7 +15,7 @@ export function flagOf(field: ContactField): number {
   return CONTACT_FLAG[field];
 }
 
-/** Of one frame; bitmaps by sensor. pressure_Pa [sensor]: above the tare, over the gain, as the fit
+/** The readings of one frame; bitmaps by sensor. pressure_Pa [sensor]: above the tare, over the gain, as the fit
  * gets it; NaN where the reading is no measurement. */
 export interface Readings {
   valid: number;

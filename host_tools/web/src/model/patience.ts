@@ -3,7 +3,7 @@
  * `fingertipPatience` overrides some of these, if it is set before the page starts.
  */
 const USUAL = {
-  /** Of a command, answer_ms apart. An answer to any of them is one. */
+  /** Tries of a command, answer_ms apart. An answer to any of them counts. */
   tries: 3,
   answer_ms: 1000,
   /** Where the firmware first writes its flash: within half a second, and a margin. */

@@ -32,8 +32,8 @@ export class ReadError extends Error {
 export interface Item {
   /** Number of the fingertip in the file, from 0. */
   device: number;
-  /** Of the recorder's clock in a recording of several, else of the fingertip's; NaN for what has no
-   * time of its own. */
+  /** Time on the recorder's clock in a recording of several, else on the fingertip's; NaN for a packet
+   * without a time. */
   time_us: number;
   packet: DevicePacket;
 }
@@ -78,7 +78,7 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
   }
 }
 
-/** Of a file that was read to its end; empty: none. */
+/** The problem of a file that was read to its end; empty: none. */
 function problemOf(reader: Reader, packets: number): string {
   if (!reader.is_capture) {
     return reader.has_end ? '' : 'has no end line: it was cut short, its recorder killed or its disk full. What there is, is shown';
@@ -150,7 +150,7 @@ export class Replay {
   paused = false;
   /** Times the pace of the recording. */
   speed = 1;
-  /** Of the recording. */
+  /** Length of the recording. */
   seconds = 0;
 
   private readonly lines: ReplayLine[] = [];

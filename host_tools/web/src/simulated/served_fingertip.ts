@@ -4,7 +4,7 @@
  */
 import type { Line } from '../line/line';
 
-/** As `fingertip simulate` has it, some 30 ms old. */
+/** The truth of `fingertip simulate`, some 30 ms old. */
 export interface ServedTruth {
   contact: boolean;
   x_mm: number;

@@ -40,11 +40,11 @@ export type Truth = FirmwareTruth;
 export interface SimulatedOptions {
   /** Sixteen hexadecimal digits distinguish several. */
   serial?: string;
-  /** Of noise and of the pad's errors; 1. */
+  /** Seed of noise and of the pad's errors; 1. */
   seed?: number;
   /** Times the data sheet's noise; 1. */
   noise?: number;
-  /** Of pad and sensors, as `twin scenario --effects` takes them: "gain=10,drift"; gains as cast,
+  /** Errors of pad and sensors, as in `twin scenario --effects`: "gain=10,drift"; gains as cast,
    * "gain=10", by default; "none": a perfect pad. */
   errors?: string;
   /** Where simulated.wasm and objects.bin are; the page's folder wasm/. */
@@ -114,7 +114,7 @@ export class SimulatedFingertip implements Line {
     return Promise.resolve();
   }
 
-  /** By name; lifts what was there. */
+  /** Chooses an object by name; lifts the one that was there. */
   choose(name: string): void {
     const at = OBJECTS.findIndex((object) => object.name === name);
     if (at < 0) {

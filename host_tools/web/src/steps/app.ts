@@ -34,7 +34,7 @@ export class App {
 
   private readonly listeners = new Set<() => void>();
   private readonly ports = new Map<SerialPort, Fingertip>();
-  /** Of `fingertip simulate`, by serial number; null: the user took it off the page. */
+  /** Fingertips of `fingertip simulate`, by serial number; null: the user took it off the page. */
   private readonly served = new Map<string, Fingertip | null>();
   private finding: Promise<void> = Promise.resolve();
   private simulated = 0;
@@ -194,7 +194,7 @@ export class App {
     return this.finding;
   }
 
-  /** As the fingertip that it was before, if it was; else as a new one. */
+  /** Opens a port as the fingertip that it was before, if any; else as a new one. */
   private async take(port: SerialPort): Promise<void> {
     const known = this.ports.get(port);
     const others = this.bench.fingertips.filter((each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine);

@@ -8,7 +8,7 @@ type Setting = (typeof SETTINGS)[number];
 type Name = Setting['name'];
 type Value = Setting['values'][number];
 
-/** Of a choice, as people type it. */
+/** The word of a choice, as people type it. */
 function wordOf({ choices, words }: Value, number: number): string {
   const at = (choices as readonly number[] | null)?.indexOf(number) ?? -1;
   return words?.[at] ?? String(number);

@@ -31,7 +31,7 @@ export enum Trust {
   good = 2,
 }
 
-/** Of one column. Frames that carry a warning count only in intervals where there is no other. */
+/** The intervals of one column. Frames with a warning count only in intervals without another. */
 export interface Track {
   readonly trust: Uint8Array;
   readonly low: Float32Array;

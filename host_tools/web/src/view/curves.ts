@@ -13,7 +13,7 @@ export interface Curves {
 export interface Chart {
   t_s: number[];
   curves: Map<ColumnName, Curves>;
-  /** Of the values that carry no warning, with their band; of those that do where there are no
+  /** The range of the values without a warning, with their band; of those with one if there are no
    * others. */
   reach: Map<ColumnName, { low: number; high: number } | null>;
 }

@@ -12,7 +12,7 @@ interface Number_ {
   /** Whether warnings make it doubtful. */
   readonly value: (contact: ShownContact) => string;
   readonly sd?: (contact: ShownContact) => string;
-  /** Of a simulated fingertip; undefined: not known. */
+  /** The true value of a simulated fingertip; undefined: not known. */
   readonly truth?: (truth: ShownTruth) => string | undefined;
   readonly tangential?: boolean;
   /** Shown only where it has a value. */

@@ -8,7 +8,7 @@ import { HEIGHT_mm, THICKNESS_mm, padSize, type Scene } from './pad_scene';
 const BAR_HALF_mm = 1.35;
 const SENSOR_mm = 2.4;
 const GRID = 56;
-/** As what may be is drawn, beside what is for sure. */
+/** Brightness of the uncertain, over that of the certain. */
 const UNSURE = 0.4;
 const DOUBTFUL = 0.5;
 
@@ -513,7 +513,7 @@ export class PadGl {
 
 let renderer: string | null = null;
 
-/** Of another canvas, for smooth edges must be asked for before it can be known. */
+/** The renderer of another canvas, because smooth edges must be requested before it is known. */
 function rendererOf(): string {
   if (renderer === null) {
     const gl = document.createElement('canvas').getContext('webgl2');

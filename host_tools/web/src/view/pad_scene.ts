@@ -13,7 +13,7 @@ export const THICKNESS_mm = 6;
 const ARROW_mm = 30;
 /** A tangential force below this number of its standard deviations has no direction. */
 const ARROW_SDS = 2;
-/** Of the arrow that presses: half of MOST_mm at 5 N. */
+/** Length of the arrow of the normal force: half of MOST_mm at 5 N. */
 const MOST_mm = 40;
 const HALF_N = 5;
 
@@ -54,12 +54,12 @@ export interface Scene {
     force_low_mm: number;
     force_high_mm: number;
     arrow: Arrow | null;
-    /** Of two contacts, the stronger first, instead of the place of one. */
+    /** Two contacts, the stronger first, instead of the place of one. */
     two: Spot[];
     /** From the place of a long contact to its end. */
     edge: { x_mm: number; y_mm: number } | null;
   } | null;
-  /** Of the last second, oldest first. */
+  /** Places of the last second, oldest first. */
   trail: readonly Place[];
   /** What really is, of a simulated fingertip. */
   truth: Place | null;

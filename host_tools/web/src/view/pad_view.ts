@@ -39,7 +39,7 @@ export interface Touch {
   down(x_mm: number, y_mm: number): void;
   move(x_mm: number, y_mm: number): void;
   up(): void;
-  /** By how much more to press: turns of the wheel, up is more. */
+  /** Changes the force by turns of the wheel, up is more. */
   wheel(turns: number): void;
 }
 
@@ -51,7 +51,7 @@ export class PadView {
   private plan: PadPlan | null = null;
   private look: Look = { ...ASLANT };
   private camera: Camera | null = null;
-  /** By somebody. */
+  /** A user has turned it. */
   private turned = false;
   private readonly size: { x_mm: number; y_mm: number };
   private readonly box: Box;

@@ -5,7 +5,7 @@ export type Colour = readonly [number, number, number];
 
 export interface Palette {
   readonly dark: boolean;
-  /** By the name in tokens.css without its dashes in front. */
+  /** The value of a name in tokens.css, without its dashes in front. */
   css(name: string): string;
   of(name: string): Colour;
   readonly heat: readonly Colour[];
@@ -59,7 +59,7 @@ export function parsed(hex: string): Colour {
   return [at(1), at(3), at(5)];
 }
 
-/** Of WCAG 2.2, 1 to 21. */
+/** The contrast of WCAG 2.2, 1 to 21. */
 export function contrast(a: Colour, b: Colour): number {
   const [light, dark] = [luminance(a), luminance(b)].sort((p, q) => q - p);
   return ((light ?? 0) + 0.05) / ((dark ?? 0) + 0.05);

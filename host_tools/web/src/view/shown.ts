@@ -134,7 +134,7 @@ export class Shown {
     return this.fingertip.contacts > 0 ? this.fingertip.contact : null;
   }
 
-  /** Of the last frame that was not held: a held one holds no measurement. */
+  /** Readings of the last frame that was not held: a held one is no measurement. */
   get readings(): ShownReadings | null {
     const { raw, raws } = this.fingertip;
     if (raws === 0) {
@@ -154,7 +154,7 @@ export class Shown {
     return this.kept;
   }
 
-  /** Of a row that is kept; null where its raw packet is missing. */
+  /** Readings of a row that is kept; null if its raw packet is missing. */
   readingsAt(row: number): ShownReadings | null {
     const { history } = this;
     if (!history) {

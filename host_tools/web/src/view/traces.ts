@@ -19,7 +19,7 @@ const LEAST_PULL_N = 0.5;
 const ROW_px = 15;
 const TITLE_px = 20;
 const TIMES_px = 22;
-/** Of the height of a plot: below this nothing can be read off it. */
+/** The least height at which a plot can be read. */
 const LEAST_PLOT_px = 40;
 const MOST_PLOT_px = 240;
 /** Longer between frames than this, and a line is broken. */
@@ -66,7 +66,7 @@ export class Traces {
   private width = 0;
   private height = 0;
   private names: string[] = [];
-  /** Of the strip of flags: the most until now, so that plots do not jump as flags come and go. */
+  /** Rows of the strip of flags: the most until now, so that plots do not jump as flags come and go. */
   private rows = 2;
   /** Its size is another: draw it again, in a pause too. */
   onResize: (() => void) | null = null;
@@ -198,7 +198,7 @@ export class Traces {
     this.resize();
   }
 
-  /** Of a plot's curves: the first has that of the fingertip's pad. */
+  /** The colour of a plot's curve: the first has that of the fingertip's pad. */
   private colour(curve: number): number {
     return (this.finger + curve) % FINGERS;
   }

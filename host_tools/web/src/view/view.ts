@@ -62,7 +62,7 @@ export class View {
   private healthAt_ms = 0;
   private tracesDue = true;
   private tracedEnd = -1;
-  /** Of each fingertip when the pause began. */
+  /** The end of each fingertip's history when the pause began. */
   private readonly ends = new Map<Fingertip, number>();
 
   constructor(
