@@ -333,11 +333,11 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
   const double dip_width = solution.dip_pitches * array.pitch_mm / solution.width_mm;
   const double offset = global.segment(layout.offset(0), layout.sensors).mean() / peak_Pa;
   const auto near = [&](double mixing) {
-    return nearest({{{1.0 - mixing, 1.0},
-                     {mixing, NARROW},
-                     {-solution.dip, dip_width},
-                     {offset, std::numeric_limits<double>::infinity()}}},
-                   dip_width, reach_mm(array) / solution.width_mm);
+    return equivalent_gaussian({{{1.0 - mixing, 1.0},
+                                 {mixing, NARROW},
+                                 {-solution.dip, dip_width},
+                                 {offset, std::numeric_limits<double>::infinity()}}},
+                               dip_width, reach_mm(array) / solution.width_mm);
   };
   const auto [width, dip_share] = near(solution.mixing);
   solution.sigma_mm = solution.width_mm * width;
