@@ -1,6 +1,6 @@
 #include "libfingertip/error.hpp"
-#include "tool/cli/beside.hpp"
 #include "tool/cli/commands/commands.hpp"
+#include "tool/cli/installed_files.hpp"
 
 #include <cstdlib>
 
@@ -10,7 +10,7 @@ namespace {
 
 /* The evaluator of a pad is in the Python package, which asks this program for the gains. */
 int validate(const std::vector<std::string> &options) {
-  const auto package = beside({"../share/fingertip/python", "python"});
+  const auto package = find_installed({"../share/fingertip/python", "python"});
   if (!package) {
     throw Error("the package that validates is not installed; install all of the tool, or build the target fingertip "
                 "in the project's tree");
