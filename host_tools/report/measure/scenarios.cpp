@@ -142,7 +142,7 @@ static void scenario_begin(Batch<const scenario_options, 1> options, std::string
   twin::Scenario made = twin::make_scenario(chosen, table_of(given.contact_shape, given.layer_mm, cache));
   facts[0] = scenarios().empty() ? 0 : scenarios().rbegin()->first + 1;
   facts[1] = facts[2] = 0;
-  for (const twin::Act &act : made.acts) {
+  for (const twin::Episode &act : made.episodes) {
     facts[1]++;
     facts[2] += static_cast<std::int64_t>(act.phases.size());
   }
@@ -159,7 +159,7 @@ MEASURE_ENTRY(scenario_end)
 static void scenario_phases(std::int64_t number, Batch<double, 1> last_s, Batch<scenario_phase, 1> phases) {
   std::size_t at = 0;
   std::int64_t i = 0;
-  for (const twin::Act &act : scenarios().at(number).acts) {
+  for (const twin::Episode &act : scenarios().at(number).episodes) {
     last_s[static_cast<std::size_t>(i)] = act.end_s - act.begin_s;
     for (const twin::Phase &phase : act.phases) {
       scenario_phase &found = phases[at++];
@@ -177,7 +177,7 @@ static void scenario_touches(std::int64_t number, Batch<const std::int64_t, 1> a
   same_length(act, t_s, touches);
   const twin::Scenario &scenario = scenarios().at(number);
   in_parallel(touches.size(), [&](std::size_t i) {
-    touches[i] = scenario.acts.at(static_cast<std::size_t>(act[i])).tracks[0].at(t_s[i]);
+    touches[i] = scenario.episodes.at(static_cast<std::size_t>(act[i])).tracks[0].at(t_s[i]);
   });
 }
 MEASURE_ENTRY(scenario_touches)
