@@ -382,7 +382,7 @@ class Demo(Folder):
             [sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"], capture_output=True, text=True
         )
         self.assertEqual(done.stderr, "")
-        self.assertIn("what the fingertip felt, against the truth      rubber       ideal\n", done.stdout)
+        self.assertIn("what the fingertip measured, against the truth      rubber       ideal\n", done.stdout)
         self.assertRegex(done.stdout, r"location off by, median +0\.43 mm +0\.43 mm\n")
         self.assertRegex(done.stdout, r"force off by, median +- +-\n")
         self.assertRegex(done.stdout, r"slips found +2 of 3 +2 of 3\nafter their start by +78, 30 ms")
