@@ -1,9 +1,9 @@
 /* written by firmware/wire/line.py from line.toml; change it there.
  *
- * What a contact result says about itself. The bits travel unchanged in the contact packet.
+ * What a contact result reports about itself. The bits travel unchanged in the contact packet.
  *
  * A quantity may be used only under its VALID flag; where the flag is off its field is zero.
- * The warnings leave the numbers in place and say why they deserve less trust.
+ * The warnings leave the numbers in place and state why they deserve less trust.
  */
 #ifndef COMMON_CONTACT_FLAGS_H
 #define COMMON_CONTACT_FLAGS_H

@@ -72,7 +72,7 @@ enum wire_result {
   WIRE_RESULT_NOT_NOW = 3,
 };
 
-/* Bits of the word that says what the fingertip keeps without power. */
+/* Bits of the word that reports what the fingertip keeps without power. */
 enum wire_stored {
   /* a calibration, and it is applied; never without capability fit */
   WIRE_STORED_CALIBRATION = 1 << 0,

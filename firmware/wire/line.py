@@ -2,7 +2,7 @@
 """Writes, from line.toml, what each language needs to know of the line between fingertip and host.
 
     line.py            write the files
-    line.py --check    say which of them differ, and exit with 1
+    line.py --check    list which of them differ, and exit with 1
 
 Needs nothing but Python 3.11.
 """
@@ -13,12 +13,14 @@ import sys
 import textwrap
 
 import line_protocol
+import line_python
+import line_ros
 import line_settings
 import line_values
 import tomllib
+from line_names import MADE_BY, SETS
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-MADE_BY = "written by firmware/wire/line.py from line.toml; change it there"
 BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "n": 1}
 C_TYPES = {
     "u8": "uint8_t",
@@ -30,8 +32,6 @@ C_TYPES = {
     "f32": "float",
     "n": "uint8_t",
 }
-STRUCT_CODES = {"u8": "B", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "n": "n", "text": "16s"}
-SETS = {"flags": "Flag", "streams": "Streams", "capabilities": "Capability", "stored": "Stored"}
 
 
 class Field:
@@ -190,10 +190,10 @@ def contact_flags_h(line):
     lines = [
         f"/* {MADE_BY}.",
         " *",
-        " * What a contact result says about itself. The bits travel unchanged in the contact packet.",
+        " * What a contact result reports about itself. The bits travel unchanged in the contact packet.",
         " *",
         " * A quantity may be used only under its VALID flag; where the flag is off its field is zero.",
-        " * The warnings leave the numbers in place and say why they deserve less trust.",
+        " * The warnings leave the numbers in place and state why they deserve less trust.",
         " */",
         "#ifndef COMMON_CONTACT_FLAGS_H",
         "#define COMMON_CONTACT_FLAGS_H",
@@ -290,7 +290,7 @@ def bodies_h(line):
         ("Bits of the stream mask.", "STREAM", line.streams),
         ("What a build can do: cmake/options.cmake.", "CAPABILITY", line.capabilities),
         ("The result code of an acknowledgement.", "RESULT", line.results),
-        ("Bits of the word that says what the fingertip keeps without power.", "STORED", line.stored),
+        ("Bits of the word that reports what the fingertip keeps without power.", "STORED", line.stored),
     ):
         lines += c_bits(title, prefix, entries)
         if prefix == "STREAM":
@@ -555,247 +555,6 @@ def line_fields_hpp(line):
     return [*lines, "};", "", "} // namespace fingertip::words"]
 
 
-# ---- Python
-
-
-def py_wire(field, line):
-    if field.is_struct:
-        kind = line.structs[field.kind].python
-        when = f", when={py_when(field)}" if field.when else ""
-        return f'Annotated[{kind}{" | None" if field.when else ""}, Wire("{kind}"{when})]'
-    code = STRUCT_CODES[field.kind]
-    base = {"f32": "float", "text": "str"}.get(field.kind, "int")
-    if field.times > 1 or field.per_sensor:
-        base = f"tuple[{base}, ...]"
-    wire = (
-        f'"{code}"'
-        + (f", {field.times}" if field.times > 1 else "")
-        + (f", {field.per_sensor}, each_sensor=True" if field.per_sensor else "")
-    )
-    if field.when:
-        absent = "math.nan" if field.kind == "f32" else "0" if field.when[0] == "flags" else None
-        base += "" if absent else " | None"
-        wire += f", when={py_when(field)}" + (f", absent={absent}" if absent else "")
-    return f"Annotated[{base}, Wire({wire})]"
-
-
-def py_when(field):
-    return f'("{field.when[0]}", {SETS[field.when[0]]}.{field.when[1]})'
-
-
-def py_doc(text, indent="    ", width=140):
-    if len(text) <= width - len(indent) - 6:
-        return [f'{indent}"""{text}"""']
-    return [f'{indent}"""' + f"\n{indent}".join(textwrap.wrap(text, width - len(indent) - 3)), f'{indent}"""']
-
-
-def py_class(body, line):
-    lines = [f"class {body.python}(NamedTuple):", *py_doc(body.text), ""]
-    for field in body.fields:
-        lines += [f"    {field.python}: {py_wire(field, line)}", *(py_doc(field.text) if field.text else [])]
-    if not body.fields:
-        lines.pop()
-    for field in body.fields:
-        names = field.keys or (field.pair if field.kind == "f32" else None) or ()
-        for i, name in enumerate(names):
-            lines += [
-                "",
-                "    @property",
-                f"    def {name}(self) -> tuple[{'float' if field.kind == 'f32' else 'int'}, ...]:",
-                '        """Of each sensor."""',
-                f"        return self.{field.python}[{i}::{field.per_sensor}]",
-            ]
-    return [*lines, "", ""]
-
-
-def line_py(line):
-    lines = [
-        f'"""{MADE_BY}.',
-        "",
-        "The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a",
-        "body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.",
-        '"""',
-        "import enum",
-        "import math",
-        "from typing import TYPE_CHECKING, Annotated, Any, NamedTuple",
-        "",
-        "if TYPE_CHECKING:",
-        "    import numpy as np",
-        "    import numpy.typing as npt",
-        "",
-        f"VERSION = {line.version}",
-        f"SENSORS_MAX = {line.sensors_max}",
-        f"MAX_FRAME_BYTES = {line.longest_frame()}  # longer is damage",
-        f"LOADER_MAGIC = 0x{line.loader_magic:08X}",
-        "",
-        "",
-        "class Wire(NamedTuple):",
-        '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, and under which bit of which field."""',
-        "",
-        "    code: str",
-        "    times: int = 1",
-        "    each_sensor: bool = False",
-        "    when: tuple[str, int] | None = None",
-        "    absent: Any = None",
-        "",
-        "",
-    ]
-
-    def bits(name, doc, entries, before=(), after=()):
-        text = [f"class {name}(enum.IntFlag):", f'    """{doc}"""', "", *before]
-        for each in entries:
-            warning = "warning: " if each.get("warning") else ""
-            text.append(f"    {each['name']} = 1 << {each['bit']}  #: {warning}{each['text']}")
-        return [*text, *after, "", ""]
-
-    lines += bits(
-        "Flag", "What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here.", line.flags
-    )
-    lines += [
-        f"WARNINGS = Flag(0x{line.warnings():X})",
-        '"""The numbers are there, but deserve less trust: look at these before you use them."""',
-        "",
-        "",
-    ]
-    lines += bits(
-        "Streams",
-        "What a fingertip sends unasked.",
-        line.streams,
-        ["    NONE = 0"],
-        [f"    ALL = {' | '.join(each['name'] for each in line.streams)}"],
-    )
-    lines += bits("Capability", "What a firmware can do.", line.capabilities) + bits(
-        "Stored", "What a fingertip keeps without power.", line.stored
-    )
-    lines += [
-        "class Result(enum.IntEnum):",
-        '    """What an acknowledgement says."""',
-        "",
-        *(f"    {each['name']} = {each['number']}  #: {each['text']}" for each in line.results),
-        "",
-        "",
-    ]
-    for body in (*line.structs.values(), *line.packets.values(), *line.commands.values()):
-        lines += py_class(body, line)
-    bodies = [*line.packets.values(), *line.commands.values()]
-    lines += [
-        f"Body = {bodies[0].python} | " + " | ".join(body.python for body in bodies[1:]),
-        f"CONTACT, RAW = 0x{line.packets['contact'].type:02x}, 0x{line.packets['raw'].type:02x}",
-        "TYPES: dict[int, type[Body]] = {",
-        *(f"    0x{body.type:02X}: {body.python}," for body in bodies),
-        "}",
-        "NESTED: dict[str, Any] = {" + ", ".join(f'"{body.python}": {body.python}' for body in line.structs.values()) + "}",
-        "",
-        "",
-    ]
-    lines += line_settings.python_settings(line)
-    contact, raw = line.packets["contact"], line.packets["raw"]
-    lines += [
-        "# Columns of recordings, and what their comments have of an info packet.",
-        py_tuple("STAGES", line.stages()[:-1]),
-        py_tuple("CONTACT_COLUMNS", contact.columns),
-        *(
-            py_tuple(f"{name}_COLUMNS", [field.name for field in fields], "NaN in recordings of before there were any")
-            for name, fields in line.later().items()
-        ),
-        "LATER_COLUMNS = (" + ", ".join(f"*{name}_COLUMNS" for name in line.later()) + ")",
-        py_tuple(
-            "RAW_COLUMNS",
-            ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"],
-        ),
-        py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]),
-        "# Of a calibration, one value for each sensor, and struct's code of it.",
-        "SENSOR_LISTS = {"
-        + ", ".join(
-            f'"{key}": "{STRUCT_CODES[field.kind]}"' for field in line.structs["calibration"].fields if field.each for key in field.keys
-        )
-        + "}",
-        "",
-        "",
-    ]
-    lines += [
-        "class ContactQuantities:",
-        '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""',
-        "",
-        "    __slots__ = ()",
-        "    contact: Contact",
-    ]
-    for field in contact.fields:
-        if field.when:
-            lines += [
-                "",
-                "    @property",
-                f"    def {field.name}(self) -> {'float' if field.kind == 'f32' else 'int'}:",
-                *py_doc(field.text[0].upper() + field.text[1:] + ".", "        "),
-                f"        return self.contact.{field.name}",
-            ]
-    return [*lines, "", "", *py_arrays(line)]
-
-
-def py_arrays(line):
-    """The class of a block's arrays."""
-    contact, raw = line.packets["contact"], line.packets["raw"]
-    lines = ["class BlockQuantities:", '    """The quantities of both packets by their names, an array each."""', ""]
-    for field in (*contact.fields, *raw.fields):
-        if (field.kind == "f32" or field.kind.startswith("u")) and field.name not in ("frame", "flags"):
-            lines.append(f'    {field.name}: "npt.NDArray[np.{"float64" if field.kind == "f32" else "int64"}]"')
-    return lines
-
-
-def py_tuple(name, words, comment=""):
-    body = textwrap.wrap(", ".join(f'"{word}"' for word in words), 140)
-    return f"{name} = ({' # ' + comment if comment else ''}\n    " + "\n    ".join(body) + ")"
-
-
-# ---- ROS 2
-
-ROS_TYPES = {"u16": "uint16", "u32": "uint32", "f32": "float32"}
-
-
-def contact_msg(line):
-    contact, raw = line.packets["contact"], line.packets["raw"]
-
-    def described(code, text):
-        return f"{code:<27} # {text}" if text else code
-
-    def of(field):
-        return described(f"{ROS_TYPES[field.kind]} {field.key.lower()}", field.text)
-
-    lines = [
-        f"# {MADE_BY}.",
-        "#",
-        "# A frame of a fingertip: its contact packet, its raw packet, or both, unchanged. NaN is what there is not: a quantity whose flag is off.",
-        "# Use a number only if its flag is on, and no warning: flags & (FIT_VALID | WARNINGS) == FIT_VALID.",
-        "",
-        described("std_msgs/Header header", "as log time: begin of the recording, and what the clocks show since then"),
-        described(
-            "uint64 line", "of the recording, from 1, 0 outside of one; counts those of fingertip_msgs/Line and of other fingertips too"
-        ),
-        described("uint32 device", "number of the fingertip in a recording of several"),
-        described("float64 time_us", "on the recorder's clock, since the recording's host_zero_us; NaN in a recording of one"),
-        described("uint64 t_us", "on the fingertip's clock: the middle of the sensors' conversion"),
-        described("uint32 frame", "number, from the fingertip's start"),
-        "",
-        described("bool has_contact", "without: all below, until raw_sequence, is 0 and NaN"),
-        described("uint16 sequence", "of the packet"),
-        "uint32 flags",
-    ]
-    for flag in line.flags:
-        lines.append(described(f"uint32 {flag['name']}={1 << flag['bit']}", "warning: " * bool(flag.get("warning")) + flag["text"]))
-    lines.append(described(f"uint32 WARNINGS={line.warnings()}", "all of them"))
-    lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [
-        of(field) for fields in line.later().values() for field in fields
-    ]
-    lines += ["", described("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
-    lines += [of(field) for field in raw.fields if field.kind == "u32" and field.name != "frame"]
-    return [
-        *lines,
-        described("float64 temperature_degc", "mean of the sensors; 0 until measured"),
-        described("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"),
-        described("float64[] tare_pa", "the zero of each sensor"),
-    ]
-
-
 # ---- the page
 
 
@@ -814,7 +573,7 @@ def line_facts_ts(line):
         ("Bits of the stream mask.", "Stream", line.streams),
         ("What a firmware can do.", "Capability", line.capabilities),
         ("What a fingertip keeps without power.", "Stored", line.stored),
-        ("What a frame says about itself.", "Flag", line.flags),
+        ("What a frame reports about itself.", "Flag", line.flags),
     ):
         lines += [
             f"/** {doc} */",
@@ -823,7 +582,7 @@ def line_facts_ts(line):
             "} as const;",
         ]
     lines += [
-        "/** What an acknowledgement says. */",
+        "/** What an acknowledgement reports. */",
         "export const Result = {",
         *(f"  {each['name']}: {each['number']}," for each in line.results),
         "} as const;",
@@ -861,8 +620,8 @@ FILES = {
     "host_tools/library/libfingertip/line_fields.hpp": line_fields_hpp,
     "host_tools/library/libfingertip/line_settings.hpp": lambda line: line_settings.line_settings_hpp(line, MADE_BY),
     "host_tools/library/libfingertip/line_values.hpp": lambda line: line_values.line_values_hpp(line, MADE_BY),
-    "host_tools/python/fingertip/line.py": line_py,
-    "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": contact_msg,
+    "host_tools/python/fingertip/line.py": line_python.line_py,
+    "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": line_ros.contact_msg,
     "host_tools/web/src/line/line_facts.ts": line_facts_ts,
 }
 
@@ -888,7 +647,7 @@ def main():
             continue
         different += 1
         if options.check:
-            print(f"{name}: is not what line.toml says; python3 firmware/wire/line.py writes it")
+            print(f"{name}: is not what line.toml states; python3 firmware/wire/line.py writes it")
         else:
             path.write_text(text, encoding="utf-8")
             print(f"{name}: written")

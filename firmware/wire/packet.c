@@ -17,7 +17,7 @@ enum kind {
   F32,
   PAIRS,     /* of 32 bits: for each sensor an element of each of two arrays behind one another */
   F32_PAIRS, /* the same */
-  /* For each sensor so many as the count says, of members behind one another of one struct each */
+  /* As many members as the count states, one behind the other, of one struct each */
   SENSORS_F32,
   SENSORS_U16,
   WHEN, /* no field: the next run is there if bit `count` of this word is set */

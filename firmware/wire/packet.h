@@ -41,7 +41,7 @@ extern const struct wire_layout *const wire_all_layouts[];
 /* NULL: the set has no such type. */
 const struct wire_layout *wire_find_layout(const struct wire_layout *const *set, uint8_t type);
 
-/* Encodes one packet as its layout says, of which its type is too, into a complete frame, delimiter
+/* Encodes one packet by its layout, which has its type too, into a complete frame, delimiter
  * included: *length bytes. FT_ERR_ARGUMENT: layout is NULL, sensor_count is 0 or too large, a text
  * is not printable, or a float is not finite; frame is scratch then. Cost: about 40 Cortex-M0+
  * cycles a byte.

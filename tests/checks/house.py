@@ -45,14 +45,14 @@ LIMITS = {
     "circles": (0, 0),
     "format_disagreements": (0, 0),
     "page_codec_lines": (0, 0),
-    "longest_file": (700, 960),
+    "longest_file": (700, 700),
     "readme_words": (600, 600),
-    "product_lines": (105000, 122700),
-    "test_lines": (62000, 75800),
-    "private_words": (150, 3550),
+    "product_lines": (105000, 116700),
+    "test_lines": (62000, 75450),
+    "private_words": (150, 150),
     "unformatted_files": (0, 0),
-    "longest_function_lines": (60, 155),
-    "app_ifs": (1, 27),
+    "longest_function_lines": (60, 60),
+    "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
@@ -107,7 +107,11 @@ def product(root):
 def private_words(files):
     """{path: how many private words} of those that have any. A name counts by its parts: told_frames, toldFrames."""
     pattern = re.compile("|".join(rf"(?<![A-Za-z])(?i:{each})(?![a-z])" for each in PRIVATE_WORDS))
-    counts = {name: len(pattern.findall(text)) for name, text in files.items() if name != "CHANGELOG.md"}
+
+    def is_whole(found):  # CMAKE_C_STANDARD has no word "STAND"
+        return not (found[0].isupper() and found.string[found.end() : found.end() + 1].isupper())
+
+    counts = {name: sum(map(is_whole, pattern.finditer(text))) for name, text in files.items() if name != "CHANGELOG.md"}
     return {name: count for name, count in counts.items() if count}
 
 

@@ -28,7 +28,7 @@ class Wire(NamedTuple):
 
 
 class Flag(enum.IntFlag):
-    """What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here."""
+    """What a frame reports about itself. A quantity may be used only under its VALID flag; without it, it is NaN here."""
 
     CONTACT = 1 << 0  #: a sensor is pressed
     FIT_VALID = 1 << 1  #: x, y, p0, sigma, force and residual hold a fit
@@ -97,7 +97,7 @@ class Stored(enum.IntFlag):
 
 
 class Result(enum.IntEnum):
-    """What an acknowledgement says."""
+    """What an acknowledgement reports."""
 
     DONE = 0  #: the command was carried out
     UNKNOWN_COMMAND = 1  #: the firmware does not know this command

@@ -113,7 +113,7 @@ Trial trial_of(const Thing &thing, const std::string &gripper, const When &when,
   return trial;
 }
 
-// What must be said, where that depends on the state.
+// What must be reported, where that depends on the state.
 void expect(FaultTrial &one, const When &when, const Happening &happening) {
   one.all_of = happening.all_of;
   one.any_of = happening.any_of;
@@ -132,7 +132,7 @@ void expect(FaultTrial &one, const When &when, const Happening &happening) {
     one.ends_in = {untouched ? std::uint8_t{GRIP_MISSED} : std::uint8_t{GRIP_DROPPED}};
   }
   if (when.state == GRIP_ACTIVATING && happening.kind == Kind::power) {
-    one.ends_in.clear(); // it says that it is not active when it should be, and waits for it
+    one.ends_in.clear(); // it reports that it is not active when it should be, and waits for it
   }
   // As long as it takes to close, or to give up.
   if (untouched && (happening.kind == Kind::taken || happening.kind == Kind::power)) {

@@ -17,7 +17,7 @@ struct FaultTrial {
   std::string fault, state, gripper, object;
   cell::Trial trial;
   double cap_N;
-  // What must be said, of GripTrouble: each of these, one of those; and where it must end.
+  // What must be reported, of GripTrouble: each of these, one of those; and where it must end.
   std::uint32_t all_of = 0, any_of = 0;
   std::vector<std::uint8_t> ends_in; // empty: anywhere
   std::uint8_t gripper_fault = 0;
@@ -25,7 +25,7 @@ struct FaultTrial {
   bool is_untold = false; // the frames are those of fingertips that nothing touches
 };
 
-// Of fingertips whose readings froze before they touched (is_untold) nothing can be said.
+// Of fingertips whose readings froze before they touched (is_untold) nothing can be reported.
 std::vector<FaultTrial> fault_trials();
 
 struct FaultOutcome {

@@ -8,7 +8,7 @@
     grasp.png     the same to look at, and a slip that is caught
 
 The controller is the tool's own and the fingertips' code the firmware's; rubber, objects, sensors and grippers are simulated (host_tools/simulation/cell,
-whose headers say what is assumed). The controller's constants were chosen with other seeds (--seed refuses them) and
+whose headers state what is assumed). The controller's constants were chosen with other seeds (--seed refuses them) and
 other pads. What is judged are grasps of all kinds in a world that disagrees with the controller (kinds.py). In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
 """
 
@@ -30,7 +30,7 @@ from reporting import Steps, finish, option_parser, output_folder, run, write_js
 
 SEED = 27001  # seen by no choice of a constant
 CHOSE = (5001, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101, 18001, 18101)  # and all below 1000
-# In the twin's cell: a set force of 8 to 15 N is there within so long, and held so well.
+# In the twin's cell: a set force of 8 to 15 N is reached within this time, and held as well as this.
 LIMITS = {"settle_s": 1.2, "hold_rms_percent": 5}
 GOALS = (
     kinds.GOALS
@@ -41,8 +41,8 @@ GOALS = (
 # set: what it is, its options; all are of each gripper
 SETS = {
     "hold": ("round objects at 410 frames a second", ()),
-    "half": ("the same, half of a load's field acts on the readings", ("--effect", "0.5")),
-    "without": ("the same, no load can be felt", ("--effect", "0")),
+    "half": ("the same, half of a tangential force's field reaches the readings", ("--effect", "0.5")),
+    "without": ("the same, no tangential force can be sensed", ("--effect", "0")),
     "flats": ("flats larger than the pad", ("--objects", "flats")),
     "faces": ("flat faces within the pad", ("--objects", "faces")),
     "hold_20": ("20 frames a second", ("--rate", "20")),

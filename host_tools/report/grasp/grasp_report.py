@@ -22,7 +22,7 @@ COLUMNS = {
     "margin_p50": "grip over least grip: p50",
     "margin_p5": "p5",
     "margin_p95": "p95",
-    "force_told_p50": "force told over true",
+    "force_told_p50": "reported over true force",
     "force_taken_p50": "taken for over true",
     "slips": "slips",
     "unanswered": "never answered",
@@ -48,15 +48,15 @@ STILL = {
 ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller is the tool's own,
 the fingertips' code the firmware's. Nothing was checked on hardware.
 
-In the twin's cell, each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 stands on a table; the gripper closes, holds, lifts it within 0.1 to 1 s; then come up to
+In the twin's cell, each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 is on a table; the gripper closes, holds, lifts it within 0.1 to 1 s; then come up to
 two of: 30 to 150 % more mass is poured in, the hand jerks by 2 to 9 m/s2, a knock of 0.03 to 0.12 m/s, friction falls by 20 to 45 %. What would take more than
 15 N to hold at its worst is not drawn. The rubber relaxes by 9 to 26 % in 8 s, each fingertip's force is off by 5 % (sd), gains are those after a
 calibration. This rubber has no dip, though cast rubber has one: what a dip does to the load that a fingertip estimates is in the part `shear` (`dip_*`), to
-location and force in `truth` and `validation`. The kinds below are judged without readings: there a fingertip says force and load with an error that is drawn.
+location and force in `truth` and `validation`. The kinds below are judged without readings: there a fingertip reports force and load with an error that is drawn.
 Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
-what a turning object takes of the friction. Force told: the mean of what both fingertips say; taken for: what the controller reckons with,
+what a turning object takes of the friction. Reported force: the mean of what both fingertips report; taken for: what the controller reckons with,
 of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
-0.5 s, by what the fingertips say. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
+0.5 s, by what the fingertips report. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
 FIRM = """Set forces of 8 N and more. The oracle knows the true force, how it follows the width and how the rubber is going to relax. Of the positions that
 the gripper can reach it takes the one whose mean squared error over the rest of the hold is least, and it moves no more often than ours may. It plans no
 second move, so it shows what is possible, and is no least bound. Ours does not know how the rubber is going to relax."""
@@ -201,7 +201,7 @@ def draw_caught(axes, series, shots):
     t_ms = [1e3 * (at - begin) for at in series["lift_s"]]
     for key, colour, label in (
         ("force_N", BLUE, "grip"),
-        ("felt_N", FAINT, "as felt"),
+        ("felt_N", FAINT, "as measured"),
         ("least_N", GOAL, "least that holds"),
         ("load_N", ORANGE, "load of a fingertip"),
     ):

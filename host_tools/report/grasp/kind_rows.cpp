@@ -90,8 +90,8 @@ KindDone run_one(const KindOptions &options, std::uint64_t n,
   std::function<void(const KindMoment &)> seen = trace;
   if (options.controller == "oracle") {
     auto oracle = std::make_unique<Oracle>(trial.grasp, trial.gripper, settings);
-    seen = [&trace, &told = *oracle](const KindMoment &moment) {
-      told.see(moment);
+    seen = [&trace, &knowing = *oracle](const KindMoment &moment) {
+      knowing.see(moment);
       trace ? trace(moment) : void();
     };
     controller = std::move(oracle);

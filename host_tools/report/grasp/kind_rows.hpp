@@ -14,7 +14,7 @@ struct KindOptions {
   // ours, textbook, fixed (15 N), paper: eq. (5) and (6) at 6 N, oracle
   std::string controller = "ours";
   std::string settings; // of ours: name=value, split by commas
-  double later_s = 0.0; // all frames come later by so much
+  double later_s = 0.0; // delay of all frames
   std::uint64_t seed = 1, first = 0, count = 100, jobs = 2;
   bool each = false;
 };

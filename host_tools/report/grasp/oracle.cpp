@@ -34,8 +34,8 @@ double Oracle::wanted_N() const {
     return settings_.start_N;
   }
   double need_N = 0.0;
-  for (auto one = moments_.rbegin(); one != moments_.rend() && one->t_s > told_s_ - REMEMBERS_s; ++one) {
-    need_N = one->t_s <= told_s_ ? std::max(need_N, one->need_N) : need_N;
+  for (auto one = moments_.rbegin(); one != moments_.rend() && one->t_s > newest_s_ - REMEMBERS_s; ++one) {
+    need_N = one->t_s <= newest_s_ ? std::max(need_N, one->need_N) : need_N;
   }
   return std::max(MARGIN * need_N, settings_.floor_N);
 }

@@ -1,9 +1,9 @@
-// A controller that is told what no controller knows: the true load, friction and stiffness, to
+// A controller that is given what no controller knows: the true load, friction and stiffness, to
 // compare with: what the gripper itself allows. It has the same frames' delay, gripper and least
 // move as the others.
 //
 // Its grip is 1.2 times the most that kinetic friction needed in the last half second, as of the
-// moment that the newest frame tells of. It takes the widest position whose force is enough.
+// moment of the newest frame. It takes the widest position whose force is enough.
 #pragma once
 
 #include "simulation/cell/kind_trial.hpp"
@@ -17,7 +17,7 @@ public:
   // grasp must outlive it.
   Oracle(const cell::KindOfGrasp &grasp, const GripperMechanics &gripper, const GripSettings &settings);
   void see(const cell::KindMoment &moment);
-  void take_touch(std::size_t, const GripTouch &touch) override { told_s_ = touch.t_s; }
+  void take_touch(std::size_t, const GripTouch &touch) override { newest_s_ = touch.t_s; }
   void take_status(const GripperStatus &status) override { status_ = status; }
   GripReport step(double now_s, GripCommand &command) override;
 
@@ -36,7 +36,7 @@ private:
   std::vector<Moment> moments_;
   GripperStatus status_{};
   GripReport report_{};
-  double told_s_ = 0.0, target_mm_ = 0.0, moved_s_ = 0.0;
+  double newest_s_ = 0.0, target_mm_ = 0.0, moved_s_ = 0.0;
 };
 
 } // namespace fingertip::grasp

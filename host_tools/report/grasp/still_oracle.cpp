@@ -9,12 +9,12 @@
 namespace fingertip::grasp {
 namespace {
 
-constexpr double TOUCHED_N = 0.05, TELLS_N = 1.0; // what tells how a fingertip's force is off
-constexpr double TOLD_s = 0.2;                    // the mean of so long
-constexpr double SHOWS_s = 0.02;                  // as ours: after a move, in the force
-constexpr int PARTS = 24;                         // of the rest of a hold
-constexpr double FIRST_mm = 6.0;                  // from the touch, at most
-constexpr int LOOKS_STEPS = 12;                   // and from there
+constexpr double TOUCHED_N = 0.05, REPORTS_N = 1.0; // what shows how a fingertip's force is off
+constexpr double REPORTED_s = 0.2;                  // time of the mean
+constexpr double SHOWS_s = 0.02;                    // as ours: after a move, in the force
+constexpr int PARTS = 24;                           // of the rest of a hold
+constexpr double FIRST_mm = 6.0;                    // from the touch, at most
+constexpr int LOOKS_STEPS = 12;                     // and from there
 
 } // namespace
 
@@ -28,7 +28,7 @@ double StillOracle::elastic_N(double drive_mm) const {
 }
 
 double StillOracle::error_of(double force_N) const {
-  return told_ * force_N / trial_.set_N - 1.0;
+  return reported_ * force_N / trial_.set_N - 1.0;
 }
 
 void StillOracle::see(const cell::Moment &moment) {
@@ -41,9 +41,9 @@ void StillOracle::see(const cell::Moment &moment) {
     touched_s_ = std::min(touched_s_, moment.t_s);
   }
   const bool rests = moment.t_s > sent_s_ + gripper_.traits.latency_s + SHOWS_s && !status_.moving;
-  if (rests && moment.force_N > TELLS_N) {
+  if (rests && moment.force_N > REPORTS_N) {
     const double weaker_N = std::min(touch_[0].force_N, touch_[1].force_N);
-    told_ += (moment.t_s - seen_s_) / TOLD_s * (weaker_N / moment.force_N - told_);
+    reported_ += (moment.t_s - seen_s_) / REPORTED_s * (weaker_N / moment.force_N - reported_);
   }
   seen_s_ = moment.t_s;
 }

@@ -3,7 +3,7 @@
 // follows the width, and how the rubber is going to relax.
 //
 // Of the positions that the gripper can reach it takes the one whose mean squared error over the
-// rest of the hold is least, by what the weaker fingertip says. It goes there at once, or round
+// rest of the hold is least, by what the weaker fingertip reports. It goes there at once, or round
 // (back by the least move, and on by that and a step) where that is worth what the way costs. It
 // has the others' gripper, and moves only after its last move shows in the frames, as ours does. It
 // plans no second move: with fine steps, which follow the rubber, others do better.
@@ -32,12 +32,12 @@ private:
 
   const cell::Trial &trial_;
   GripperMechanics gripper_;
-  cell::Cell untouched_; // tells the elastic force
+  cell::Cell untouched_; // computes the elastic force
   std::array<double, 2> strength_{}, follows_N_{};
   std::array<GripTouch, 2> touch_{};
   GripperStatus status_{};
   GripReport report_{};
-  double told_ = 1.0; // what the weaker fingertip says, over the true force
+  double reported_ = 1.0; // by the weaker fingertip, over the true force
   double seen_s_ = 0.0, touched_s_;
   double target_mm_ = 0.0, then_mm_ = 0.0; // then: where it goes on to from there
   double sent_s_ = 0.0;

@@ -16,8 +16,8 @@ namespace {
 
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
   std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
-  std::vector<double> margin, told, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s, settle_s,
-      rms, rms_of_steps;
+  std::vector<double> margin, reported, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s,
+      settle_s, rms, rms_of_steps;
   for (const Done *one : all) {
     const Outcome &o = one->outcome;
     drops += o.dropped ? 1 : 0;
@@ -44,7 +44,7 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
     }
     if (o.held) {
       margin.push_back(o.margin);
-      told.push_back(o.force_reported);
+      reported.push_back(o.force_reported);
       taken.push_back(o.force_taken);
       slid_mm.push_back(o.slid_mm);
       if (!one->scene.disturbances.empty()) {
@@ -70,7 +70,7 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
   out["margin_p50"] = quantile(margin, 0.5);
   out["margin_p5"] = quantile(margin, 0.05);
   out["margin_p95"] = quantile(margin, 0.95);
-  out["force_told_p50"] = quantile(told, 0.5);
+  out["force_told_p50"] = quantile(reported, 0.5);
   out["force_taken_p50"] = quantile(taken, 0.5);
   out["slips"] = reaction_ms.size();
   out["unanswered"] = unanswered;

@@ -23,7 +23,7 @@ struct SetOptions {
   std::string objects = "round"; // of cell::faces_of(), or faces split by commas
   std::string settings;          // of the controller: name=value, split by commas
   double rate_Hz = 410.0;        // above 600 at OSR 256, else 1024
-  double effect = 1.0;           // share of a pull's field that acts on the readings
+  double effect = 1.0;           // share of a tangential force's field that reaches the readings
   double still_s = 12.0;         // length of a still grasp
   std::uint64_t seed = 1;
   std::string cache; // folder of the contact tables

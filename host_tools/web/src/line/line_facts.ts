@@ -52,7 +52,7 @@ export const Stored = {
   DAMAGED: 1 << 3,
   PAD: 1 << 4,
 } as const;
-/** What a frame says about itself. */
+/** What a frame reports about itself. */
 export const Flag = {
   CONTACT: 1 << 0,
   FIT_VALID: 1 << 1,
@@ -85,7 +85,7 @@ export const Flag = {
   EDGE: 1 << 28,
   SHAPE_UNKNOWN: 1 << 29,
 } as const;
-/** What an acknowledgement says. */
+/** What an acknowledgement reports. */
 export const Result = {
   DONE: 0,
   UNKNOWN_COMMAND: 1,
