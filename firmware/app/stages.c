@@ -107,6 +107,7 @@ void stages_process(struct stages *stages, struct findings *found, uint32_t take
 
 #if FT_WITH_FIT
 static void send_contact(const struct stages *stages, const struct findings *found, struct line *line) {
+  (void)stages; /* only shapes are not in the findings */
   struct wire_contact *packet = &line->packet.body.contact;
   contact_stage_put(found, packet);
   location_stage_put(found, packet);

@@ -27,9 +27,10 @@ class Contacts(Measure):
         super().__init__(build)
         self.own_array = self.array()
         self.x_mm, self.y_mm, _ = self.layout()
-        constants = self.made("firmware_constants", 1)
-        self.call("constants", constants)
-        self.tangential_frames, self.shapes_frames, self.gain_sd, self.location_sd_limit_mm, self.max_pressure_Pa = constants[0].tolist()
+        constants = self.constants
+        self.tangential_frames, self.shapes_frames = (int(constants[name]) for name in ("tangential_frames", "shapes_frames"))
+        self.gain_sd, self.location_sd_limit_mm = float(constants["default_gain_sd"]), float(constants["location_sd_limit_mm"])
+        self.max_pressure_Pa = float(constants["sensor_max_pressure_Pa"])
         self.pad = np.dtype(
             [
                 # Factors of readings: what is left after the calibration of a calibrated pad; the standard deviation is the firmware's.

@@ -1,5 +1,8 @@
 #include "report/measure/entry.hpp"
 
+#include <cstdio>
+#include <cstdlib>
+
 namespace fingertip::measure {
 namespace {
 
@@ -13,6 +16,12 @@ std::vector<Record> &records() {
 } // namespace
 
 bool list_record(Record record) {
+  for (const Record &other : records()) {
+    if (other.name == record.name) {
+      std::fprintf(stderr, "measure: two records have the name %s\n", record.name.c_str());
+      std::abort(); // while the object is loaded, nothing can catch an exception
+    }
+  }
   records().push_back(std::move(record));
   return true;
 }

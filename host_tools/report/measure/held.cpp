@@ -9,7 +9,6 @@ extern "C" {
 #include "contact/motion.h"
 #include "contact/shapes.h"
 #include "fit/fit_doubt.h"
-#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -17,19 +16,6 @@ extern "C" {
 
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
-
-struct firmware_constants {
-  std::int32_t tangential_frames, shapes_frames; // until the first answer
-  double gain_sd, location_sd_limit_mm, max_pressure_Pa;
-};
-MEASURE_RECORD(firmware_constants, FIELD(tangential_frames), FIELD(shapes_frames), FIELD(gain_sd),
-               FIELD(location_sd_limit_mm), FIELD(max_pressure_Pa))
-
-static void constants(Batch<firmware_constants, 1> found) {
-  found[0] = {FIT_TANGENTIAL_FRAMES, FIT_SHAPES_FRAMES, static_cast<double>(DEFAULT_GAIN_SD),
-              static_cast<double>(FIT_LOCATION_SD_LIMIT_mm), MS58XX_MAX_PRESSURE_Pa};
-}
-MEASURE_ENTRY(constants)
 
 // In the scales of a calibration: the corrected location and force where the estimate is valid, otherwise the
 // Gaussian's.

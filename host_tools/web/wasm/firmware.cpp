@@ -208,7 +208,7 @@ EXPORT(line_takes) unsigned line_takes() {
   return NATIVE_CDC_RECEIVE_BYTES;
 }
 // 1: the firmware holds the host off, none was taken.
-EXPORT(line_send) int line_send(unsigned length) {
+EXPORT(line_take) int line_take(unsigned length) {
   return native_cdc_send(line, length) != FT_OK;
 }
 EXPORT(line_receive) unsigned line_receive() {

@@ -114,7 +114,7 @@ export class Firmware {
     for (let at = 0; at < bytes.length; ) {
       const part = bytes.subarray(at, at + most);
       this.wasm.bytes(this.wasm.call('line_bytes'), part.length).set(part);
-      if (this.wasm.call('line_send', part.length) !== 0) {
+      if (this.wasm.call('line_take', part.length) !== 0) {
         return at;
       }
       at += part.length;
