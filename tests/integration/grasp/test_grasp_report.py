@@ -149,7 +149,7 @@ class Grasp(unittest.TestCase):
         for words in (
             "Simulated rubber",
             "Nothing was checked on hardware",
-            "no load can be felt",
+            "no tangential force can be sensed",
             "## By friction",
             "## By kind",
             "MISSED",
