@@ -49,9 +49,7 @@ void native_cdc_reset(void) {
   memset(&cdc, 0, sizeof cdc);
 }
 
-const struct cdc_identity *native_cdc_identity(void) {
-  return cdc.identity;
-}
+const struct cdc_identity *native_cdc_identity(void) { return cdc.identity; }
 
 static void deliver(void) {
   if (cdc.stalled || cdc.queued.length == 0) {
@@ -70,9 +68,7 @@ static void lose_what_is_queued(bool was_open) {
   cdc.sent.length = 0;
 }
 
-void native_cdc_open(void) {
-  cdc.wanted = cdc.identity != NULL;
-}
+void native_cdc_open(void) { cdc.wanted = cdc.identity != NULL; }
 
 void native_cdc_close(void) {
   const bool was_open = cdc_is_open();
@@ -111,29 +107,17 @@ void native_cdc_request_loader(void) {
   cdc.news++;
 }
 
-size_t native_cdc_receive(uint8_t *bytes, size_t capacity) {
-  return take(&cdc.received, bytes, capacity);
-}
+size_t native_cdc_receive(uint8_t *bytes, size_t capacity) { return take(&cdc.received, bytes, capacity); }
 
-void cdc_start(const struct cdc_identity *identity) {
-  cdc.identity = identity;
-}
+void cdc_start(const struct cdc_identity *identity) { cdc.identity = identity; }
 
-bool cdc_is_open(void) {
-  return cdc.wanted && !cdc.suspended;
-}
+bool cdc_is_open(void) { return cdc.wanted && !cdc.suspended; }
 
-bool cdc_is_suspended(void) {
-  return cdc.suspended;
-}
+bool cdc_is_suspended(void) { return cdc.suspended; }
 
-uint32_t cdc_news(void) {
-  return cdc.news;
-}
+uint32_t cdc_news(void) { return cdc.news; }
 
-uint32_t cdc_close_count(void) {
-  return cdc.close_count;
-}
+uint32_t cdc_close_count(void) { return cdc.close_count; }
 
 enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
   if (length > NATIVE_CDC_TRANSMIT_BYTES) {
@@ -150,10 +134,6 @@ enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
   return FT_OK;
 }
 
-size_t cdc_read(uint8_t *bytes, size_t capacity) {
-  return take(&cdc.sent, bytes, capacity);
-}
+size_t cdc_read(uint8_t *bytes, size_t capacity) { return take(&cdc.sent, bytes, capacity); }
 
-bool cdc_loader_requested(void) {
-  return cdc.loader_requested;
-}
+bool cdc_loader_requested(void) { return cdc.loader_requested; }

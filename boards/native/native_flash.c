@@ -35,9 +35,7 @@ static uint64_t random_u64(void) {
   return state.random * UINT64_C(2685821657736338717);
 }
 
-static uint8_t random_bits(void) {
-  return (uint8_t)(random_u64() >> 56);
-}
+static uint8_t random_bits(void) { return (uint8_t)(random_u64() >> 56); }
 
 /* Eight bits, each set with a chance of n in 256. */
 static uint8_t bits_with_chance(unsigned chance) {
@@ -111,13 +109,9 @@ static bool take_step(void) {
   return !state.dead;
 }
 
-void native_flash_cut_after(uint64_t steps) {
-  state.cut_at = state.steps + steps;
-}
+void native_flash_cut_after(uint64_t steps) { state.cut_at = state.steps + steps; }
 
-bool native_flash_is_dead(void) {
-  return state.dead;
-}
+bool native_flash_is_dead(void) { return state.dead; }
 
 void native_flash_power_up(void) {
   if (!state.dead) {
@@ -133,13 +127,9 @@ void native_flash_power_up(void) {
   }
 }
 
-void native_flash_wear_out(void) {
-  state.worn_out = true;
-}
+void native_flash_wear_out(void) { state.worn_out = true; }
 
-uint64_t native_flash_steps(void) {
-  return state.steps;
-}
+uint64_t native_flash_steps(void) { return state.steps; }
 
 static void begin(enum operation operation, uint32_t at, const uint8_t *bytes, size_t length, unsigned polls) {
   if (state.operation != NONE && !state.dead) {

@@ -124,26 +124,18 @@ enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context
   return NATIVE_TIME_UP;
 }
 
-bool native_watchdog_expired(void) {
-  return native.watchdog_expired;
-}
+bool native_watchdog_expired(void) { return native.watchdog_expired; }
 
-uint64_t native_event_count(void) {
-  return native.events;
-}
+uint64_t native_event_count(void) { return native.events; }
 
-uint64_t port_now_us(void) {
-  return native.now_us;
-}
+uint64_t port_now_us(void) { return native.now_us; }
 
 void port_set_event_handler(void (*handler)(void *context), void *context) {
   native.handler = handler;
   native.handler_context = context;
 }
 
-void port_alarm_at_us(uint64_t t_us) {
-  native.alarm_us = t_us;
-}
+void port_alarm_at_us(uint64_t t_us) { native.alarm_us = t_us; }
 
 static void serve_all(void) {
   if (worker.end) {
@@ -177,9 +169,7 @@ void native_set_worker(bool exists, uint64_t takes_us) {
   worker.takes_us = takes_us;
 }
 
-unsigned native_worker_starts(void) {
-  return worker.starts;
-}
+unsigned native_worker_starts(void) { return worker.starts; }
 
 void native_set_worker_thread(void (*begin)(bool (*serve)(void *context), void *context), void (*end)(void)) {
   worker.begin = begin;
@@ -209,9 +199,7 @@ void port_worker_stop(void) {
   }
 }
 
-void port_save_power(bool saving) {
-  (void)saving;
-}
+void port_save_power(bool saving) { (void)saving; }
 
 void port_watchdog_feed(void) {
   for (unsigned part = 0; part < PORT_PARTS; part++) {
@@ -227,9 +215,7 @@ void port_alive(enum port_part part) {
   native.watched[part] = true;
 }
 
-void port_at(enum crash_activity activity) {
-  (void)activity;
-}
+void port_at(enum crash_activity activity) { (void)activity; }
 
 void port_event(enum crash_event event, uint8_t detail) {
   native.last_event = event;
@@ -243,32 +229,20 @@ enum crash_event native_last_event(uint8_t *detail) {
 
 static struct crash_record last_crash;
 
-void native_set_last_crash(const struct crash_record *crash) {
-  last_crash = *crash;
-}
+void native_set_last_crash(const struct crash_record *crash) { last_crash = *crash; }
 
-uint32_t port_watchdog_resets(void) {
-  return native.started_by_watchdog ? 1 : 0;
-}
+uint32_t port_watchdog_resets(void) { return native.started_by_watchdog ? 1 : 0; }
 
-const struct crash_record *port_last_crash(void) {
-  return &last_crash;
-}
+const struct crash_record *port_last_crash(void) { return &last_crash; }
 
 static char serial_number[17] = "0000000000000001";
 
-void native_set_serial_number(const char *text) {
-  memcpy(serial_number, text, sizeof serial_number - 1);
-}
+void native_set_serial_number(const char *text) { memcpy(serial_number, text, sizeof serial_number - 1); }
 
-void port_serial_number(char text[17]) {
-  memcpy(text, serial_number, sizeof serial_number);
-}
+void port_serial_number(char text[17]) { memcpy(text, serial_number, sizeof serial_number); }
 
 /* The host's stack is not watched; there is plenty. */
-size_t port_stack_free_bytes(void) {
-  return SIZE_MAX;
-}
+size_t port_stack_free_bytes(void) { return SIZE_MAX; }
 
 static _Noreturn void leave(enum native_end how, const char *why) {
   if (!native.running) {
@@ -277,10 +251,6 @@ static _Noreturn void leave(enum native_end how, const char *why) {
   longjmp(native.out, how);
 }
 
-void port_reboot_to_loader(void) {
-  leave(NATIVE_LOADER, "left for the boot loader");
-}
+void port_reboot_to_loader(void) { leave(NATIVE_LOADER, "left for the boot loader"); }
 
-void port_panic(void) {
-  leave(NATIVE_PANIC, "panic");
-}
+void port_panic(void) { leave(NATIVE_PANIC, "panic"); }

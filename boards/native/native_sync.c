@@ -12,9 +12,7 @@ static struct {
   uint64_t t_us[PORT_SYNC_KEPT]; /* of the newest edges */
 } native;
 
-void native_sync_reset(void) {
-  memset(&native, 0, sizeof native);
-}
+void native_sync_reset(void) { memset(&native, 0, sizeof native); }
 
 void native_sync_edge(void) {
   if (native.mode == PORT_SYNC_IN || native.mode == PORT_SYNC_SECOND) {
@@ -23,17 +21,11 @@ void native_sync_edge(void) {
   }
 }
 
-enum port_sync native_sync_mode(void) {
-  return native.mode;
-}
+enum port_sync native_sync_mode(void) { return native.mode; }
 
-bool native_sync_level(void) {
-  return native.level;
-}
+bool native_sync_level(void) { return native.level; }
 
-unsigned native_sync_pulses(void) {
-  return native.pulses;
-}
+unsigned native_sync_pulses(void) { return native.pulses; }
 
 void port_sync_set(enum port_sync mode) {
   native.mode = mode;

@@ -17,9 +17,7 @@ static uint64_t random_u64(struct sim_array *array) {
   return z ^ z >> 31;
 }
 
-static double uniform(struct sim_array *array) {
-  return (double)(random_u64(array) >> 11) / 9007199254740992.0;
-}
+static double uniform(struct sim_array *array) { return (double)(random_u64(array) >> 11) / 9007199254740992.0; }
 
 /* Libraries differ in the last bits of logarithm and cosine; these are the same on every machine.
  * Within 4e-16 of the true values. */

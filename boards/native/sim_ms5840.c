@@ -30,15 +30,9 @@ static unsigned row_of(unsigned osr) {
   return row;
 }
 
-uint32_t sim_ms5840_conversion_us(unsigned osr) {
-  return rows[row_of(osr)].conversion_us;
-}
-double sim_ms5840_noise_Pa(unsigned osr) {
-  return rows[row_of(osr)].noise_Pa;
-}
-double sim_ms5840_noise_degC(unsigned osr) {
-  return rows[row_of(osr)].noise_degC;
-}
+uint32_t sim_ms5840_conversion_us(unsigned osr) { return rows[row_of(osr)].conversion_us; }
+double sim_ms5840_noise_Pa(unsigned osr) { return rows[row_of(osr)].noise_Pa; }
+double sim_ms5840_noise_degC(unsigned osr) { return rows[row_of(osr)].noise_degC; }
 
 uint8_t sim_ms5840_crc4(const uint16_t prom[SIM_MS5840_PROM_WORDS]) {
   /* The words without the CRC nibble, and twelve bits 0 of an eighth word, modulo x^4 + x + 1. */

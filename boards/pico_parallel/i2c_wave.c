@@ -28,9 +28,7 @@ _Static_assert(I2C_WAVE_COMMAND_CELLS % 2 == 0 && I2C_WAVE_READ_CELLS % 2 == 0 &
                "the player takes pairs of cells");
 
 /* Where the steps of a cell's bit begin: with the low phase before it. */
-static uint16_t *bit_at(uint16_t *steps, unsigned cell) {
-  return &steps[cell * WAVE_STEPS_PER_CELL - 1];
-}
+static uint16_t *bit_at(uint16_t *steps, unsigned cell) { return &steps[cell * WAVE_STEPS_PER_CELL - 1]; }
 
 static void put(uint16_t *steps, unsigned step0, unsigned step1, unsigned step2, unsigned step3) {
   steps[0] = (uint16_t)step0;
@@ -58,9 +56,7 @@ static void put_byte(uint16_t *bit, uint8_t byte) {
 }
 
 /* Leaves SCL and SDA released. */
-static void put_stop(uint16_t *bit, unsigned lines) {
-  put(bit, SCL | lines, lines, lines, NONE);
-}
+static void put_stop(uint16_t *bit, unsigned lines) { put(bit, SCL | lines, lines, lines, NONE); }
 
 /* From the command to the answer. */
 static void put_turn(uint16_t *steps) {
@@ -80,9 +76,7 @@ static void put_start_address_command(uint16_t *steps, uint8_t command) {
   put_byte(bit_at(steps, AT_COMMAND), command);
 }
 
-void i2c_wave_set_command(uint16_t *steps, uint8_t command) {
-  put_bits(bit_at(steps, AT_COMMAND), command);
-}
+void i2c_wave_set_command(uint16_t *steps, uint8_t command) { put_bits(bit_at(steps, AT_COMMAND), command); }
 
 void i2c_wave_command(uint16_t steps[I2C_WAVE_COMMAND_STEPS], uint8_t command) {
   put_start_address_command(steps, command);

@@ -59,9 +59,7 @@ static NOINIT struct {
 static struct crash_record last;
 static uint32_t resets;
 
-static uint32_t kept_crc(void) {
-  return crc32_iso_hdlc((const uint8_t *)&kept.record, sizeof kept.record);
-}
+static uint32_t kept_crc(void) { return crc32_iso_hdlc((const uint8_t *)&kept.record, sizeof kept.record); }
 
 static void put_events(struct crash_record *record) {
   for (uint32_t i = 0; i < CRASH_EVENTS && i < trace.event_count; i++) {
@@ -91,9 +89,7 @@ static uint8_t all_stuck(uint32_t now_us) {
   return stuck ? stuck : CRASH_STUCK_MAIN;
 }
 
-static bool timer_runs(void) {
-  return (REG32(RESETS_RESET_DONE) & RESETS_TIMER) != 0;
-}
+static bool timer_runs(void) { return (REG32(RESETS_RESET_DONE) & RESETS_TIMER) != 0; }
 
 _Noreturn void rp2040_take_crash(void);
 _Noreturn void rp2040_take_crash(void) {
@@ -189,9 +185,7 @@ void port_watchdog_feed(void) {
   TIMER_ALARM2 = (uint32_t)now_us + PORT_WATCHDOG_PERIOD_us;
 }
 
-void port_at(enum crash_activity activity) {
-  trace.activity = (uint8_t)activity;
-}
+void port_at(enum crash_activity activity) { trace.activity = (uint8_t)activity; }
 
 /* One of a kind at a time, so that what goes on does not push out what led to it. */
 void port_event(enum crash_event event, uint8_t detail) {
@@ -201,10 +195,6 @@ void port_event(enum crash_event event, uint8_t detail) {
   *newest = (struct event){.t_us = port_now_us(), .code = (uint8_t)event, .detail = detail};
 }
 
-uint32_t port_watchdog_resets(void) {
-  return resets;
-}
+uint32_t port_watchdog_resets(void) { return resets; }
 
-const struct crash_record *port_last_crash(void) {
-  return &last;
-}
+const struct crash_record *port_last_crash(void) { return &last; }

@@ -41,13 +41,9 @@ static struct {
 } operation;
 
 /* The pad holds chip select through a whole command, whatever the FIFO does. */
-static void select_chip(void) {
-  REG32_SET(IO_QSPI_SS_CTRL) = IO_QSPI_SS_CTRL_OUTOVER_LOW;
-}
+static void select_chip(void) { REG32_SET(IO_QSPI_SS_CTRL) = IO_QSPI_SS_CTRL_OUTOVER_LOW; }
 
-static void deselect_chip(void) {
-  REG32_CLEAR(IO_QSPI_SS_CTRL) = IO_QSPI_SS_CTRL_OUTOVER_MASK;
-}
+static void deselect_chip(void) { REG32_CLEAR(IO_QSPI_SS_CTRL) = IO_QSPI_SS_CTRL_OUTOVER_MASK; }
 
 /* Ends what is under way, and empties the FIFOs (RP2040 datasheet 4.10.13, SSIENR). */
 static void restart_interface(void) {
@@ -117,17 +113,13 @@ static void begin(enum command command, uint32_t at, const uint8_t *bytes, size_
   operation.phase = PHASE_ENABLE;
 }
 
-void port_flash_erase(unsigned sector) {
-  begin(COMMAND_SECTOR_ERASE, sector * PORT_FLASH_SECTOR_BYTES, NULL, 0);
-}
+void port_flash_erase(unsigned sector) { begin(COMMAND_SECTOR_ERASE, sector * PORT_FLASH_SECTOR_BYTES, NULL, 0); }
 
 void port_flash_program(uint32_t at, const uint8_t *bytes, size_t length) {
   begin(COMMAND_PAGE_PROGRAM, at, bytes, length);
 }
 
-bool flash_may_erase(void) {
-  return operation.phase != PHASE_IDLE && operation.head[0] == COMMAND_SECTOR_ERASE;
-}
+bool flash_may_erase(void) { return operation.phase != PHASE_IDLE && operation.head[0] == COMMAND_SECTOR_ERASE; }
 
 /* What goes wrong shows when it is read back: the rest of it is not sent. */
 static void send_slice(void) {

@@ -25,26 +25,16 @@ void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
                                 (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0) | (pull == GPIO_PULL_DOWN ? PAD_PULL_DOWN : 0);
 }
 
-void gpio_set_function(unsigned pin, enum gpio_function function) {
-  REG32(IO_BANK0_CTRL(pin)) = (uint32_t)function;
-}
+void gpio_set_function(unsigned pin, enum gpio_function function) { REG32(IO_BANK0_CTRL(pin)) = (uint32_t)function; }
 
 void gpio_set_function_reading_high(unsigned pin, enum gpio_function function) {
   REG32(IO_BANK0_CTRL(pin)) = (uint32_t)function | IO_OEOVER_DISABLE | IO_INOVER_HIGH;
 }
 
-void gpio_write(unsigned pin, bool high) {
-  REG32(high ? SIO_GPIO_OUT_SET : SIO_GPIO_OUT_CLR) = UINT32_C(1) << pin;
-}
+void gpio_write(unsigned pin, bool high) { REG32(high ? SIO_GPIO_OUT_SET : SIO_GPIO_OUT_CLR) = UINT32_C(1) << pin; }
 
-void gpio_drive(unsigned pin, bool enabled) {
-  REG32(enabled ? SIO_GPIO_OE_SET : SIO_GPIO_OE_CLR) = UINT32_C(1) << pin;
-}
+void gpio_drive(unsigned pin, bool enabled) { REG32(enabled ? SIO_GPIO_OE_SET : SIO_GPIO_OE_CLR) = UINT32_C(1) << pin; }
 
-uint32_t gpio_read_all(void) {
-  return REG32(SIO_GPIO_IN);
-}
+uint32_t gpio_read_all(void) { return REG32(SIO_GPIO_IN); }
 
-bool gpio_read(unsigned pin) {
-  return (gpio_read_all() >> pin & 1u) != 0;
-}
+bool gpio_read(unsigned pin) { return (gpio_read_all() >> pin & 1u) != 0; }

@@ -106,13 +106,9 @@ static enum ft_status start(uint8_t address, uint8_t byte, uint8_t read_count) {
   return load_when_idle();
 }
 
-enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
-  return start(address, byte, 0);
-}
+enum ft_status i2c_start_write(uint8_t address, uint8_t byte) { return start(address, byte, 0); }
 
-enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) {
-  return start(address, 0, byte_count);
-}
+enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) { return start(address, 0, byte_count); }
 
 static enum ft_status end(enum ft_status status) {
   IC_INTR_MASK = 0;
@@ -154,17 +150,11 @@ static uint8_t pin_of(const struct i2c_pins *pins, enum i2c_line line) {
   return line == I2C_LINE_SDA ? pins->sda : pins->scl;
 }
 
-void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line) {
-  gpio_drive(pin_of(pins, line), true);
-}
+void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line) { gpio_drive(pin_of(pins, line), true); }
 
-void i2c_line_release(const struct i2c_pins *pins, enum i2c_line line) {
-  gpio_drive(pin_of(pins, line), false);
-}
+void i2c_line_release(const struct i2c_pins *pins, enum i2c_line line) { gpio_drive(pin_of(pins, line), false); }
 
-bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) {
-  return gpio_read(pin_of(pins, line));
-}
+bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) { return gpio_read(pin_of(pins, line)); }
 
 /* The interrupts are levels, cleared by the next transaction: masked until i2c_poll has read them. */
 void i2c0_irq_handler(void) {

@@ -11,8 +11,6 @@ static inline uint32_t disable_interrupts(void) {
 }
 
 /* As they were before. */
-static inline void restore_interrupts(uint32_t primask) {
-  __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
-}
+static inline void restore_interrupts(uint32_t primask) { __asm volatile("msr primask, %0" ::"r"(primask) : "memory"); }
 
 #endif

@@ -19,10 +19,6 @@ void rp2040_irq_enable(unsigned irq) {
   REG32(NVIC_ISER) = UINT32_C(1) << irq;
 }
 
-void rp2040_irq_disable(unsigned irq) {
-  REG32(NVIC_ICER) = UINT32_C(1) << irq;
-}
+void rp2040_irq_disable(unsigned irq) { REG32(NVIC_ICER) = UINT32_C(1) << irq; }
 
-void rp2040_irq_pend(unsigned irq) {
-  REG32(NVIC_ISPR) = UINT32_C(1) << irq;
-}
+void rp2040_irq_pend(unsigned irq) { REG32(NVIC_ISPR) = UINT32_C(1) << irq; }

@@ -5,9 +5,7 @@
 
 enum { PIN_REGULATOR_MODE = 23 }; /* PICO_SMPS_MODE_PIN: high is PWM */
 
-void pico_set_supply(enum pico_supply supply) {
-  gpio_write(PIN_REGULATOR_MODE, supply == PICO_SUPPLY_STEADY);
-}
+void pico_set_supply(enum pico_supply supply) { gpio_write(PIN_REGULATOR_MODE, supply == PICO_SUPPLY_STEADY); }
 
 enum ft_status pico_start(void) {
   const enum ft_status status = resets_release(RESETS_IO_BANK0 | RESETS_PADS_BANK0);

@@ -44,9 +44,7 @@ uint64_t port_now_us(void) {
 }
 
 /* Of times within the horizon */
-static bool is_past(uint32_t t_us) {
-  return (int32_t)(t_us - TIMER_TIMERAWL) <= 0;
-}
+static bool is_past(uint32_t t_us) { return (int32_t)(t_us - TIMER_TIMERAWL) <= 0; }
 
 void port_set_event_handler(void (*handler)(void *context), void *context) {
   uint32_t primask = disable_interrupts();
@@ -94,9 +92,7 @@ void timer0_irq_handler(void) {
 
 /* Leaving an exception sets the event register (ARMv6-M B1.5.18), so an interrupt between the
  * caller's check and WFE makes WFE return at once. */
-void port_sleep(void) {
-  __asm volatile("wfe" ::: "memory");
-}
+void port_sleep(void) { __asm volatile("wfe" ::: "memory"); }
 
 /* Read back, so that it is in force (pico-sdk, multicore_reset_core1). */
 void port_worker_stop(void) {

@@ -29,9 +29,7 @@
 #define RESETS_RESET_DONE 0x4000c008u
 
 /* Puts the blocks into reset, at once and whatever they are doing. */
-static inline void resets_assert(uint32_t blocks) {
-  REG32_SET(RESETS_RESET) = blocks;
-}
+static inline void resets_assert(uint32_t blocks) { REG32_SET(RESETS_RESET) = blocks; }
 
 /* Releases the blocks and waits, a few cycles of the slowest block's own clock, until all report
  * that they are out of reset. FT_ERR_TIMEOUT: a block did not, because its clock does not run. */

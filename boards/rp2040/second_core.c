@@ -21,9 +21,7 @@ static struct {
 extern uint32_t __second_stack_top[];
 extern const uint32_t __second_stack_guard[], __vectors[];
 
-static void send_event(void) {
-  __asm volatile("sev" ::: "memory");
-}
+static void send_event(void) { __asm volatile("sev" ::: "memory"); }
 
 static _Noreturn void run(void) {
   guard_memory(__second_stack_guard, 8u);
@@ -82,6 +80,4 @@ bool port_worker_start(bool (*serve)(void *context), void *context) {
   return started;
 }
 
-void port_worker_wake(void) {
-  send_event();
-}
+void port_worker_wake(void) { send_event(); }

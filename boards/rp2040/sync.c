@@ -57,9 +57,7 @@ static struct {
   bool is_high;     /* the same output */
 } sync;
 
-static bool stamps(enum port_sync mode) {
-  return mode == PORT_SYNC_IN || mode == PORT_SYNC_SECOND;
-}
+static bool stamps(enum port_sync mode) { return mode == PORT_SYNC_IN || mode == PORT_SYNC_SECOND; }
 
 /* Once armed, one of the two is always busy: an edge makes the first chain to the second, and back at once. Both could
  * be read idle if an edge came between the two reads, so the first is read again: the next edge is some time off. */
@@ -171,9 +169,7 @@ void port_sync_set(enum port_sync mode) {
     start_pulses();
 }
 
-void port_sync_write(bool high) {
-  gpio_write(sync_pin, high);
-}
+void port_sync_write(bool high) { gpio_write(sync_pin, high); }
 
 /* The bus of a board may reset DMA, and both channels with it. */
 bool port_sync_take(struct port_sync_edge *edge) {

@@ -95,9 +95,7 @@ static void hand_over(uint8_t endpoint, uint32_t fields) {
   USB_BUFFER_CONTROL(endpoint) = fields | USB_BUFFER_AVAILABLE;
 }
 
-static uint32_t pid(uint8_t endpoint) {
-  return data1 & USB_BIT(endpoint) ? USB_BUFFER_DATA1 : 0;
-}
+static uint32_t pid(uint8_t endpoint) { return data1 & USB_BIT(endpoint) ? USB_BUFFER_DATA1 : 0; }
 
 static bool in_frame_tail(void) {
   uint32_t frame_us = TIMER_TIMERAWL - frame_start_us;
@@ -174,9 +172,7 @@ bool usb_controller_withdraw(uint8_t endpoint) {
   return !done;
 }
 
-void usb_controller_set_address(uint8_t address) {
-  USB_ADDR_ENDP = address;
-}
+void usb_controller_set_address(uint8_t address) { USB_ADDR_ENDP = address; }
 
 void usb_controller_open(uint8_t endpoint, enum usb_endpoint_type type) {
   usb_controller_withdraw(endpoint);
@@ -245,9 +241,7 @@ void usb_controller_unstall(uint8_t endpoint) {
   data1 &= ~USB_BIT(endpoint);
 }
 
-static void look_in(uint32_t us) {
-  TIMER_ALARM1 = TIMER_TIMERAWL + us;
-}
+static void look_in(uint32_t us) { TIMER_ALARM1 = TIMER_TIMERAWL + us; }
 
 /* Erratum E5: after a reset of the bus the controller waits for 800 us of idle bus, which it may
  * never see. So it is shown the state J for a millisecond: D+ high, through GPIO15. */
@@ -312,9 +306,7 @@ static bool bus_may_be_silent(void) {
   return (status & USB_SIE_STATUS_SUSPENDED) || stays_low;
 }
 
-static bool is_deaf(void) {
-  return awaited == AWAIT_SETUP && TIMER_TIMERAWL - asking_us >= UNASKED_us;
-}
+static bool is_deaf(void) { return awaited == AWAIT_SETUP && TIMER_TIMERAWL - asking_us >= UNASKED_us; }
 
 void timer1_irq_handler(void) {
   TIMER_INTR = TIMER_ALARM1_BIT;
@@ -470,9 +462,7 @@ void usbctrl_irq_handler(void) {
   rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
 }
 
-void usb_controller_request_service(void) {
-  rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
-}
+void usb_controller_request_service(void) { rp2040_irq_pend(RP2040_IRQ_USB_SERVICE); }
 
 void usb_controller_start(void) {
   resets_assert(RESETS_USBCTRL);

@@ -77,17 +77,11 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
                                  DMA_CTRL_TREQ(DMA_DREQ_PIO0_TX0) | DMA_CTRL_IRQ_QUIET;
 }
 
-unsigned wave_player_sampled(void) {
-  return cells - 2 * DMA_TRANS_COUNT(CHANNEL_SAMPLES);
-}
+unsigned wave_player_sampled(void) { return cells - 2 * DMA_TRANS_COUNT(CHANNEL_SAMPLES); }
 
-bool wave_player_has_ended(void) {
-  return (DMA_CTRL_TRIG(CHANNEL_SAMPLES) & DMA_CTRL_BUSY) == 0;
-}
+bool wave_player_has_ended(void) { return (DMA_CTRL_TRIG(CHANNEL_SAMPLES) & DMA_CTRL_BUSY) == 0; }
 
-uint16_t wave_player_levels(void) {
-  return (uint16_t)gpio_read_all();
-}
+uint16_t wave_player_levels(void) { return (uint16_t)gpio_read_all(); }
 
 void dma0_irq_handler(void) {
   DMA_INTS0 = 1u << CHANNEL_SAMPLES;

@@ -95,9 +95,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
 }
 
 /* While the bus sleeps so do the sensors, and once they do, the chip. */
-static bool may_save_power(const struct app *app) {
-  return cdc_is_suspended() && scan_rests(&app->scan);
-}
+static bool may_save_power(const struct app *app) { return cdc_is_suspended() && scan_rests(&app->scan); }
 
 static void follow_suspend(struct app *app) {
   const bool saves = may_save_power(app);
@@ -134,9 +132,7 @@ static void follow_port(struct app *app) {
   }
 }
 
-static uint8_t saturate_u8(uint32_t value) {
-  return value < UINT8_MAX ? (uint8_t)value : UINT8_MAX;
-}
+static uint8_t saturate_u8(uint32_t value) { return value < UINT8_MAX ? (uint8_t)value : UINT8_MAX; }
 
 static void note_more(uint32_t *before, uint32_t now, enum crash_event event) {
   if (now != *before) {

@@ -28,9 +28,7 @@ void contact_stage_hold(struct findings *found) {
   found->contact.flags |= is_sensor_doubtful(found) ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
 }
 
-static uint16_t saturated(uint64_t value) {
-  return value < UINT16_MAX ? (uint16_t)value : UINT16_MAX;
-}
+static uint16_t saturated(uint64_t value) { return value < UINT16_MAX ? (uint16_t)value : UINT16_MAX; }
 
 void contact_stage_put(const struct findings *found, struct wire_contact *packet) {
   const struct frame *frame = &found->frame;

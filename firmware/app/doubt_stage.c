@@ -7,9 +7,7 @@
 /* Interval from which on a frame has time for all parts of the search and for the gains, us. */
 #define ALL_AT_ONCE_us 4500u
 
-static bool is_estimated(const struct findings *found) {
-  return found->tangential && found->tangential->valid;
-}
+static bool is_estimated(const struct findings *found) { return found->tangential && found->tangential->valid; }
 
 void doubt_stage_process(const struct doubt_stage *own, const struct location_stage *location, struct findings *found) {
   if (found->conditioned.contact && !is_estimated(found)) {
@@ -53,6 +51,4 @@ void doubt_stage_follow(struct doubt_stage *own, struct location_stage *location
   }
 }
 
-void doubt_stage_forget_gains(struct doubt_stage *own) {
-  fit_gains_begin(&own->gains, DEFAULT_GAIN_SD);
-}
+void doubt_stage_forget_gains(struct doubt_stage *own) { fit_gains_begin(&own->gains, DEFAULT_GAIN_SD); }

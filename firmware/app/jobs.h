@@ -36,9 +36,7 @@ void jobs_begin_frame(struct jobs *jobs, uint64_t t_us);
 /* Ends what is under way: all jobs are free. */
 void jobs_cancel(struct jobs *jobs);
 
-static inline bool jobs_is_free(const struct jobs *jobs, enum job job) {
-  return worker_is_free(&jobs->worker[job]);
-}
+static inline bool jobs_is_free(const struct jobs *jobs, enum job job) { return worker_is_free(&jobs->worker[job]); }
 
 /* Does this job here if there is no second processor. */
 static inline void jobs_serve_alone(struct jobs *jobs, enum job job) {

@@ -79,9 +79,7 @@ void location_stage_put(const struct findings *found, struct wire_contact *packe
   packet->width_correlation = found->fit.width_correlation;
 }
 
-static float millimetres(uint16_t length_um) {
-  return 1e-3f * (float)length_um;
-}
+static float millimetres(uint16_t length_um) { return 1e-3f * (float)length_um; }
 
 /* The prior that is set, or else the calibration's, and the calibration's dip. */
 static void set_shape(struct location_stage *own) {

@@ -10,9 +10,7 @@ void shapes_stage_start(struct shapes_stage *own, const struct fit_array *array,
   jobs_set(jobs, JOB_SHAPES, shapes_estimate, &own->job);
 }
 
-void shapes_stage_forget(struct shapes_stage *own) {
-  own->begins = true;
-}
+void shapes_stage_forget(struct shapes_stage *own) { own->begins = true; }
 
 static void set_question(struct shapes_question *question, bool begins, const struct location_stage *location,
                          const struct tangential_settings *scales, const struct findings *found) {

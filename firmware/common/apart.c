@@ -14,9 +14,7 @@ int32_t apart_median(int32_t values[], int count) {
   return values[count / 2];
 }
 
-static int32_t size_of(int32_t value) {
-  return value < 0 ? -value : value;
-}
+static int32_t size_of(int32_t value) { return value < 0 ? -value : value; }
 
 uint32_t apart_find(const int32_t value[], uint32_t which, uint8_t sensor_count, int32_t floor) {
   int32_t sorted[FT_MAX_SENSORS];

@@ -1,13 +1,9 @@
 #include "common/calibration.h"
 
 /* False for NaN too. */
-static bool is_within(float value, float least, float greatest) {
-  return value >= least && value <= greatest;
-}
+static bool is_within(float value, float least, float greatest) { return value >= least && value <= greatest; }
 
-static bool is_to_both_sides(int value, int greatest) {
-  return value >= -greatest && value <= greatest;
-}
+static bool is_to_both_sides(int value, int greatest) { return value >= -greatest && value <= greatest; }
 
 bool calibration_is_valid(const struct calibration *calibration, unsigned sensor_count) {
   bool valid = is_within(calibration->force_scale, CALIBRATION_FORCE_SCALE_MIN, CALIBRATION_FORCE_SCALE_MAX) &&

@@ -7,9 +7,7 @@ _Static_assert(offsetof(struct pad_profile, from_touch) == PAD_PROFILE_FLOATS * 
                "floats lie behind one another");
 
 /* False for NaN too. */
-static bool is_within(float value, float least, float greatest) {
-  return value >= least && value <= greatest;
-}
+static bool is_within(float value, float least, float greatest) { return value >= least && value <= greatest; }
 
 bool pad_profile_is_valid(const struct pad_profile *profile) {
   bool valid = is_within(profile->thickness_mm, PAD_THICKNESS_MIN_mm, PAD_THICKNESS_MAX_mm) &&

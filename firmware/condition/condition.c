@@ -14,9 +14,7 @@ static void begin(struct condition *condition, uint32_t warm) {
   }
 }
 
-void condition_start(struct condition *condition) {
-  begin(condition, 0);
-}
+void condition_start(struct condition *condition) { begin(condition, 0); }
 
 void condition_tare(struct condition *condition) {
   uint32_t warm = ~condition->taring;

@@ -16,10 +16,6 @@ int32_t part_of(int32_t value, int32_t share_q16) {
   return (value >> 16) * share_q16 + (int32_t)((low + 0x8000) >> 16);
 }
 
-int32_t share_in(int32_t ms, int32_t time_constant_ms) {
-  return port_divide(ms << 16, time_constant_ms + ms);
-}
+int32_t share_in(int32_t ms, int32_t time_constant_ms) { return port_divide(ms << 16, time_constant_ms + ms); }
 
-int32_t in_step(int32_t each_second, int32_t ms) {
-  return (each_second >> 4) * ms >> 6;
-}
+int32_t in_step(int32_t each_second, int32_t ms) { return (each_second >> 4) * ms >> 6; }

@@ -14,17 +14,11 @@ static inline int32_t clamp(int32_t value, int32_t lowest, int32_t highest) {
   return value < lowest ? lowest : value > highest ? highest : value;
 }
 
-static inline int32_t size_of(int32_t value) {
-  return value < 0 ? -value : value;
-}
+static inline int32_t size_of(int32_t value) { return value < 0 ? -value : value; }
 
-static inline int32_t larger(int32_t a, int32_t b) {
-  return a > b ? a : b;
-}
+static inline int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
 
-static inline int32_t and_half(int32_t value) {
-  return value + (value >> 1);
-}
+static inline int32_t and_half(int32_t value) { return value + (value >> 1); }
 
 /* a - b, or the end of the range. */
 int32_t clamped_difference(int32_t a, int32_t b);

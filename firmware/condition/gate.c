@@ -1,8 +1,6 @@
 #include "condition/gate.h"
 
-static uint32_t older(uint32_t age_ms, int32_t ms) {
-  return age_ms < AGE_MAX_ms ? age_ms + (uint32_t)ms : age_ms;
-}
+static uint32_t older(uint32_t age_ms, int32_t ms) { return age_ms < AGE_MAX_ms ? age_ms + (uint32_t)ms : age_ms; }
 
 void gate_age(struct gate *gate, int32_t ms, int32_t noise_Pa_q10) {
   gate->pressed_ms = older(gate->pressed_ms, ms);

@@ -25,9 +25,7 @@ struct band {
   int32_t remains_Pa_q10_s; /* and towards the remainder; 1/1024 Pa in a second */
 };
 
-static int32_t faded(int32_t value, int32_t share) {
-  return value - part_of(value, share);
-}
+static int32_t faded(int32_t value, int32_t share) { return value - part_of(value, share); }
 
 int32_t update_drift_in(uint32_t pressed_ms) {
   const uint32_t drift = pressed_ms >> DRIFT_SHIFT;

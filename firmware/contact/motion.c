@@ -90,17 +90,11 @@ struct change {
   int32_t variance_um2; /* of the noise of x and y together */
 };
 
-static int32_t clamped(int32_t value, int32_t most) {
-  return value > most ? most : value < -most ? -most : value;
-}
+static int32_t clamped(int32_t value, int32_t most) { return value > most ? most : value < -most ? -most : value; }
 
-static int32_t mean_of(uint32_t to, uint32_t from, int32_t count) {
-  return port_divide((int32_t)(to - from), count);
-}
+static int32_t mean_of(uint32_t to, uint32_t from, int32_t count) { return port_divide((int32_t)(to - from), count); }
 
-static int32_t um_from_q11(int32_t mm_q11) {
-  return clamped(mm_q11 * 125 / 256, CHANGE_MAX_um);
-}
+static int32_t um_from_q11(int32_t mm_q11) { return clamped(mm_q11 * 125 / 256, CHANGE_MAX_um); }
 
 /* Beyond every CHANGE_MAX_um, whatever the scale: a force that vanishes within a frame leaves dQ /
  * F of any size. */

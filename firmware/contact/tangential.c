@@ -52,9 +52,7 @@ void tangential_estimate(void *job) {
   } while (!own->estimate.valid && --steps > 0);
 }
 
-void tangential_reset(struct tangential_history *history) {
-  memset(history, 0, sizeof *history);
-}
+void tangential_reset(struct tangential_history *history) { memset(history, 0, sizeof *history); }
 
 /* As struct pad_edges has them. */
 enum edge {
@@ -91,9 +89,7 @@ static int32_t factor(const struct tangential_settings *settings, enum edge edge
   return fixed_clamp((1 << 20) + even(settings, edge, at), 0, FACTOR_MAX_Q20);
 }
 
-static float inverse(int32_t factor_q20) {
-  return fit_float(fixed_div_q26(1 << 26, factor_q20 * 64), -26);
-}
+static float inverse(int32_t factor_q20) { return fit_float(fixed_div_q26(1 << 26, factor_q20 * 64), -26); }
 
 /* A value over a force, at most 4 of it. */
 static int32_t per_force_q26(float value_N, int32_t force_N_q24) {

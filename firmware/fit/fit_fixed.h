@@ -49,9 +49,7 @@ FIXED_INLINE int32_t fixed_mul_near_q28(int32_t a, int32_t b) {
 }
 
 /* a * b / 2^16 for any a and |b| < 2^15. */
-FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) {
-  return (a >> 16) * b + (((int32_t)(uint16_t)a * b) >> 16);
-}
+FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) { return (a >> 16) * b + (((int32_t)(uint16_t)a * b) >> 16); }
 
 /* Position of the highest set bit plus one; 0 for 0. */
 FIXED_INLINE int32_t fixed_bits(uint32_t value) {
@@ -68,9 +66,7 @@ FIXED_INLINE int32_t fixed_bits(uint32_t value) {
 }
 
 /* |value| without its last unit for negative ones: good for judging sizes. */
-FIXED_INLINE uint32_t fixed_size(int32_t value) {
-  return (uint32_t)(value ^ (value >> 31));
-}
+FIXED_INLINE uint32_t fixed_size(int32_t value) { return (uint32_t)(value ^ (value >> 31)); }
 
 FIXED_INLINE int32_t fixed_clamp(int32_t value, int32_t low, int32_t high) {
   return value < low ? low : value > high ? high : value;
@@ -241,9 +237,7 @@ FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
 }
 
 /* 15-bit mantissa from one of up to 31 bits. */
-FIXED_INLINE struct scaled short_of(struct scaled a) {
-  return scaled_from(a.mantissa, a.exponent);
-}
+FIXED_INLINE struct scaled short_of(struct scaled a) { return scaled_from(a.mantissa, a.exponent); }
 
 /* value * 2^shift, saturated to +-2^30. */
 FIXED_INLINE int32_t shifted(int32_t value, int32_t shift) {

@@ -20,9 +20,7 @@
 #define READING_BITS 13 /* so that the squares of all FT_MAX_SENSORS fit into 32 bits */
 _Static_assert(FT_MAX_SENSORS <= 1 << (32 - 2 * READING_BITS), "sum of squares");
 
-static float share_of(float width) {
-  return SHARE_PER_CUBE * width * width * width;
-}
+static float share_of(float width) { return SHARE_PER_CUBE * width * width * width; }
 
 /* Pa^2; the largest reading in Pa. */
 static float squares_of(const int32_t *pressure_Pa_q10, unsigned count, float *largest_Pa) {

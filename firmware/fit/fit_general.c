@@ -71,9 +71,7 @@ static float clamp(float value, float low, float high) {
 }
 
 /* NaN and infinity count as high. */
-static float at_most(float value, float high) {
-  return value < high ? value : high;
-}
+static float at_most(float value, float high) { return value < high ? value : high; }
 
 /* In place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to
  * it, which shortens the step in a direction that the readings do not determine. Returns whether

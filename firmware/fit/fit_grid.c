@@ -99,17 +99,13 @@ FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t 
 /* Largest |.| of the vector as a bit pattern: only its highest bit means anything. */
 FIXED_INLINE uint32_t vector_size(const int32_t *vector, int count) {
   uint32_t size = 1;
-  UNROLL for (int i = 0; i < count; i++) {
-    size |= fixed_size(vector[i]);
-  }
+  UNROLL for (int i = 0; i < count; i++) { size |= fixed_size(vector[i]); }
   return size;
 }
 
 FIXED_INLINE void vector_shift(const int32_t *from, int32_t *to, int count, int32_t shift) {
   int32_t half = (1 << shift) >> 1;
-  UNROLL for (int i = 0; i < count; i++) {
-    to[i] = (from[i] + half) >> shift;
-  }
+  UNROLL for (int i = 0; i < count; i++) { to[i] = (from[i] + half) >> shift; }
 }
 
 /* The shift that brings a size to this many bits; what is smaller stays as it is, since there is
@@ -137,9 +133,7 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
   int32_t mean_square = fixed_div_q26(second, mass);
 
   int32_t values[MAX_NODES];
-  UNROLL for (int i = 0; i < nodes; i++) {
-    values[i] = fixed_mul_q32(f->g[i], ((i - origin) * ONE_Q26 - f->mean) * 4);
-  }
+  UNROLL for (int i = 0; i < nodes; i++) { values[i] = fixed_mul_q32(f->g[i], ((i - origin) * ONE_Q26 - f->mean) * 4); }
   int32_t shift = shift_to(15, vector_size(values, nodes));
   vector_shift(values, f->linear, nodes, shift);
   f->linear_q = 26 - shift;
@@ -164,9 +158,7 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
 
 FIXED_INLINE int32_t sum_of_squares(const int32_t *vector, int count) {
   int32_t sum = 0;
-  UNROLL for (int i = 0; i < count; i++) {
-    sum += (vector[i] * vector[i]) >> 3;
-  }
+  UNROLL for (int i = 0; i < count; i++) { sum += (vector[i] * vector[i]) >> 3; }
   return sum;
 }
 
@@ -187,9 +179,7 @@ static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t 
   int32_t product = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0;
-    UNROLL for (int j = 0; j < ROWS; j++) {
-      sum += p_q14[i * ROWS + j] * y[j];
-    }
+    UNROLL for (int j = 0; j < ROWS; j++) { sum += p_q14[i * ROWS + j] * y[j]; }
     product += fixed_mul_16(sum, x[i]);
   }
   return product;
@@ -216,9 +206,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
   int32_t shift = shift_to(RESIDUAL_SUM_BITS - 4, sum), half = (1 << shift) >> 1;
   for (int i = 0; i < COLUMNS; i++) {
     residual -= ROWS;
-    UNROLL for (int j = 0; j < ROWS; j++) {
-      residual[j] = (residual[j] + half) >> shift;
-    }
+    UNROLL for (int j = 0; j < ROWS; j++) { residual[j] = (residual[j] + half) >> shift; }
   }
   return shift;
 }
@@ -315,9 +303,7 @@ static struct scaled project_slant(const struct moments *m, const struct reading
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t over_y = 0;
-    UNROLL for (int j = 0; j < ROWS; j++) {
-      over_y += (r[j] >> 1) * m->y.linear[j];
-    }
+    UNROLL for (int j = 0; j < ROWS; j++) { over_y += (r[j] >> 1) * m->y.linear[j]; }
     sum += fixed_mul_16(over_y, m->x.linear[i]);
     r += ROWS;
   }
@@ -465,9 +451,7 @@ static NOINLINE void add_tail_moves(const struct moments *m, const struct moves 
 
 /* A coefficient times the linear and one times the square column of an axis. */
 FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, int32_t square, int32_t *parts) {
-  UNROLL for (int i = 0; i < nodes; i++) {
-    parts[i] = (linear * f->linear[i] + square * (f->square[i] >> 1)) >> 14;
-  }
+  UNROLL for (int i = 0; i < nodes; i++) { parts[i] = (linear * f->linear[i] + square * (f->square[i] >> 1)) >> 14; }
 }
 
 /* What errors of single sensors make of the result. */
@@ -478,9 +462,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
   int32_t *moved = room->q28;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t g = x->g_q14[i];
-    UNROLL for (int j = 0; j < ROWS; j++) {
-      *moved++ = (g * y->g_q14[j]) >> 13;
-    }
+    UNROLL for (int j = 0; j < ROWS; j++) { *moved++ = (g * y->g_q14[j]) >> 13; }
   }
   fit_grid_set_errors(grid, settings, &system->at, room, spread);
   struct moves moves;
@@ -492,9 +474,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
   add_moves(m, &moves, room, &spread->by_gains, &spread->shape_y);
   set_parts(x, COLUMNS, spread->f1, spread->f3, moves.column);
   set_parts(y, ROWS, spread->f2, spread->f3, moves.row);
-  UNROLL for (int j = 0; j < ROWS; j++) {
-    moves.row[j] += (spread->f0 * y->g_q14[j]) >> 13;
-  }
+  UNROLL for (int j = 0; j < ROWS; j++) { moves.row[j] += (spread->f0 * y->g_q14[j]) >> 13; }
   add_moves(m, &moves, room, &spread->force_by_gains, &spread->shape_force);
   set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
   set_parts(y, ROWS, 0, shape->y * 2, moves.row);
@@ -567,9 +547,7 @@ static NOINLINE void set_marginal(struct factor *f, const int32_t *marginal, int
 
 FIXED_INLINE int32_t product_of(const int32_t *a, const int32_t *b, int count) {
   int32_t sum = 0;
-  UNROLL for (int i = 0; i < count; i++) {
-    sum += a[i] * b[i];
-  }
+  UNROLL for (int i = 0; i < count; i++) { sum += a[i] * b[i]; }
   return sum;
 }
 

@@ -191,9 +191,7 @@ FIXED_INLINE int32_t factor(int32_t product, int32_t norm) {
   return fixed_clamp(port_divide(product, norm >> 12), -INT16_MAX, INT16_MAX);
 }
 
-FIXED_INLINE int32_t times_factor(int32_t value, int32_t factor_q12) {
-  return times_q12(value, factor_q12);
-}
+FIXED_INLINE int32_t times_factor(int32_t value, int32_t factor_q12) { return times_q12(value, factor_q12); }
 
 /* From Q12 in units of columns to LINEAR_Q. */
 FIXED_INLINE int32_t to_poly(int32_t factor_q12, int32_t finer, int32_t limit) {
@@ -242,9 +240,7 @@ static NOINLINE void set_mean(const struct readings *readings, struct columns *c
 }
 
 /* The model with its dip, Q15. */
-FIXED_INLINE int32_t model_q15(const struct node *node) {
-  return (node->mantissa >> node->shift) - (node->d >> 15);
-}
+FIXED_INLINE int32_t model_q15(const struct node *node) { return (node->mantissa >> node->shift) - (node->d >> 15); }
 
 /* Mass and product with the dip. */
 static NOINLINE void set_mass(const struct readings *readings, struct columns *c) {

@@ -6,17 +6,11 @@
 
 #include <string.h>
 
-uint64_t fit_packed_from(int32_t value, int32_t exponent) {
-  return scaled_pack(scaled_from(value, exponent));
-}
+uint64_t fit_packed_from(int32_t value, int32_t exponent) { return scaled_pack(scaled_from(value, exponent)); }
 
-uint64_t fit_packed_sqrt(struct scaled a) {
-  return scaled_pack(scaled_sqrt(a));
-}
+uint64_t fit_packed_sqrt(struct scaled a) { return scaled_pack(scaled_sqrt(a)); }
 
-int32_t fit_scaled_to_fixed(struct scaled a, int32_t q) {
-  return scaled_to_fixed(a, q);
-}
+int32_t fit_scaled_to_fixed(struct scaled a, int32_t q) { return scaled_to_fixed(a, q); }
 
 uint64_t fit_packed_float(float value) {
   uint32_t bits = bytes_from_f32(value);

@@ -81,12 +81,8 @@ uint64_t fit_packed_sqrt(struct scaled a);
 FIXED_INLINE struct scaled fit_scaled_from(int32_t value, int32_t exponent) {
   return scaled_unpack(fit_packed_from(value, exponent));
 }
-FIXED_INLINE struct scaled fit_scaled_short(struct scaled a) {
-  return fit_scaled_from(a.mantissa, a.exponent);
-}
-FIXED_INLINE struct scaled fit_scaled_sqrt(struct scaled a) {
-  return scaled_unpack(fit_packed_sqrt(a));
-}
+FIXED_INLINE struct scaled fit_scaled_short(struct scaled a) { return fit_scaled_from(a.mantissa, a.exponent); }
+FIXED_INLINE struct scaled fit_scaled_sqrt(struct scaled a) { return scaled_unpack(fit_packed_sqrt(a)); }
 int32_t fit_scaled_to_fixed(struct scaled a, int32_t q);
 
 /* usable: bitmap of the sensors, of which those left out read 0. False: nothing positive. */
@@ -122,9 +118,7 @@ void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pres
 
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);
-FIXED_INLINE struct scaled fit_grid_scaled(float value) {
-  return scaled_unpack(fit_packed_float(value));
-}
+FIXED_INLINE struct scaled fit_grid_scaled(float value) { return scaled_unpack(fit_packed_float(value)); }
 
 /* sigma in Q26 pitches. */
 int32_t fit_grid_sigma(int32_t height);

@@ -19,13 +19,9 @@
 #define FLAT_HEIGHT_Q26 2016200                           /* FIT_FLAT_SIGMA */
 #define BOUND_SD ((struct scaled){19661, -14})            /* FIT_BOUND_SD */
 
-FIXED_INLINE struct scaled scaled_square(struct scaled a) {
-  return scaled_mul(a, a);
-}
+FIXED_INLINE struct scaled scaled_square(struct scaled a) { return scaled_mul(a, a); }
 
-FIXED_INLINE struct scaled long_of(struct scaled a) {
-  return (struct scaled){a.mantissa * (1 << 14), a.exponent - 14};
-}
+FIXED_INLINE struct scaled long_of(struct scaled a) { return (struct scaled){a.mantissa * (1 << 14), a.exponent - 14}; }
 
 void fit_grid_add_prior(const struct readings *readings, struct fit_system *system) {
   struct scaled sigma = scaled_from(fit_grid_sigma(system->at.height), -26);

@@ -33,9 +33,7 @@ static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equ
   return fit_scaled_from(sum_q13, 2 * q - 30 - 13);
 }
 
-static float composed(struct scaled value) {
-  return fit_float(value.mantissa, value.exponent);
-}
+static float composed(struct scaled value) { return fit_float(value.mantissa, value.exponent); }
 
 static float mm(const struct fit_shapes_pad *pad, int32_t place_q20) {
   return fit_float(fixed_mul_q26(place_q20 * 8, pad->pitch_q22_mm), -19);

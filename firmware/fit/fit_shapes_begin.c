@@ -5,9 +5,7 @@
 
 #include <math.h>
 
-static int32_t pitches_q20(float pitches) {
-  return fixed_clamp(fit_fixed(pitches, 20), -PLACE_Y_MAX, PLACE_Y_MAX);
-}
+static int32_t pitches_q20(float pitches) { return fixed_clamp(fit_fixed(pitches, 20), -PLACE_Y_MAX, PLACE_Y_MAX); }
 
 /* Where the pair may be: along the Gaussian's longer axis, equal or three to one either way; or
  * under the largest reading and where it leaves most. */

@@ -14,9 +14,7 @@ struct blob {
   int32_t x_q12, y_q12, weight_q14, lever_q14;
 };
 
-static int32_t q26_from(float value) {
-  return fit_fixed(value, 26);
-}
+static int32_t q26_from(float value) { return fit_fixed(value, 26); }
 
 enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
                                const struct pad_profile *profile) {

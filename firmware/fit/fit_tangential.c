@@ -61,9 +61,7 @@
 #define DIP_SD_LEAST_Q13 (1 << 11) /* the narrowest that a term may be */
 #define DIP_SD_MOST_Q13 (1 << 15)
 
-static int32_t q26_from(float value) {
-  return (int32_t)(value * 67108864.0f);
-}
+static int32_t q26_from(float value) { return (int32_t)(value * 67108864.0f); }
 
 /* What the formats of the sums and of what is made of them carry; layers need 1.3, 9.5 and 97 of
  * the first three, and pads of 5 to 20 mm a pitch of 0.47 to 1.88 units of 4.8 to 19.1 mm. */
@@ -198,9 +196,7 @@ static int32_t sum_of(const struct readings *readings) {
 }
 
 /* Of 2^bits. */
-static int32_t to_multiple(int32_t value, int bits) {
-  return rounded(value, bits) * (1 << bits);
-}
+static int32_t to_multiple(int32_t value, int bits) { return rounded(value, bits) * (1 << bits); }
 
 static int32_t in_proportion(int32_t value, int32_t share_q13, int32_t most) {
   return fixed_clamp(scaled_by(value, share_q13, 13), -most, most);
@@ -275,9 +271,7 @@ static int32_t moved_q20(const struct outcome *outcome, struct scaled length, in
   return shifted(with_pull_q8 * length.mantissa, q + length.exponent + 20);
 }
 
-static bool exceeds(struct scaled a, struct scaled b) {
-  return scaled_sub(a, b).mantissa > 0;
-}
+static bool exceeds(struct scaled a, struct scaled b) { return scaled_sub(a, b).mantissa > 0; }
 
 /* square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
 static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square,
@@ -292,13 +286,9 @@ static bool is_elongated(const struct fit_tangential_room *room, const struct ou
   return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
-static float composed(struct scaled value) {
-  return fit_float(value.mantissa, value.exponent);
-}
+static float composed(struct scaled value) { return fit_float(value.mantissa, value.exponent); }
 
-static struct scaled root_of_product(struct scaled a, struct scaled b) {
-  return fit_scaled_sqrt(scaled_mul(a, b));
-}
+static struct scaled root_of_product(struct scaled a, struct scaled b) { return fit_scaled_sqrt(scaled_mul(a, b)); }
 
 /* What the stated variance is to be multiplied by. */
 static struct scaled misfit_factor(const struct problem *problem, int32_t misfit_q16) {

@@ -97,9 +97,7 @@ FIXED_INLINE int32_t scaled_by(int32_t a, int32_t b, int shift) {
 }
 
 /* value / 2^shift to the nearest. */
-FIXED_INLINE int32_t rounded(int32_t value, int shift) {
-  return (value + (1 << (shift - 1))) >> shift;
-}
+FIXED_INLINE int32_t rounded(int32_t value, int shift) { return (value + (1 << (shift - 1))) >> shift; }
 
 /* fit_tangential_model.c: residuals and columns of the model there, with the weights. column_q: Qs
  * in which it leaves the columns. */

@@ -134,18 +134,14 @@ static void form(struct fit_tangential_room *room, const int32_t *scale) {
 #define STEP_MAX_Q20 (1 << 26)
 
 /* a - b modulo 2^32: rounding may take what a matrix that is nearly singular leaves anywhere. */
-FIXED_INLINE int32_t less(int32_t a, uint32_t b) {
-  return (int32_t)((uint32_t)a - b);
-}
+FIXED_INLINE int32_t less(int32_t a, uint32_t b) { return (int32_t)((uint32_t)a - b); }
 
 /* Takes from column j of the matrix what the unknowns before j explain. */
 FIXED_INLINE void reduce(int32_t matrix[UNKNOWNS][UNKNOWNS], int j) {
   int32_t *row = matrix[UNKNOWNS - 1];
   do {
     uint32_t sum = 0;
-    _Pragma("GCC unroll 8") for (int k = 0; k < j; k++) {
-      sum += (uint32_t)(row[k] * matrix[k][j]);
-    }
+    _Pragma("GCC unroll 8") for (int k = 0; k < j; k++) { sum += (uint32_t)(row[k] * matrix[k][j]); }
     row[j] = less(row[j], sum << 1);
     row -= UNKNOWNS;
   } while (row != matrix[j - 1]);

@@ -71,9 +71,7 @@ enum ms58xx_branch ms58xx_branch_of(enum ms58xx_branch previous, int32_t tempera
   return temperature_cC >= very_cold_edge_cC ? MS58XX_BRANCH_COLD : MS58XX_BRANCH_VERY_COLD;
 }
 
-static int32_t first_order_cC(int32_t dT, uint16_t c6) {
-  return 2000 + (int32_t)(((int64_t)dT * c6) >> 23);
-}
+static int32_t first_order_cC(int32_t dT, uint16_t c6) { return 2000 + (int32_t)(((int64_t)dT * c6) >> 23); }
 
 static int32_t difference_from(const struct ms58xx_prom *prom, uint32_t d2) {
   return (int32_t)d2 - ((int32_t)prom->word[5] << 8);

@@ -21,13 +21,9 @@ static uint8_t index_of(uint32_t bitmap) {
 }
 
 /* Less one if the value is negative. */
-static uint32_t size_of(int32_t value) {
-  return (uint32_t)(value ^ -(value < 0));
-}
+static uint32_t size_of(int32_t value) { return (uint32_t)(value ^ -(value < 0)); }
 
-static int32_t difference(int32_t a, int32_t b) {
-  return (int32_t)((uint32_t)a - (uint32_t)b);
-}
+static int32_t difference(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
 
 /* The sensor whose reading has stepped while all others of these did not move, as a bitmap. */
 static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[]) {

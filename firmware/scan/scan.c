@@ -34,13 +34,9 @@ static void count(_Atomic uint32_t *counter, uint32_t amount) {
   atomic_store_explicit(counter, value + amount, memory_order_relaxed);
 }
 
-static uint32_t get(const _Atomic uint32_t *value) {
-  return atomic_load_explicit(value, memory_order_relaxed);
-}
+static uint32_t get(const _Atomic uint32_t *value) { return atomic_load_explicit(value, memory_order_relaxed); }
 
-static void set(_Atomic uint32_t *to, uint32_t value) {
-  atomic_store_explicit(to, value, memory_order_relaxed);
-}
+static void set(_Atomic uint32_t *to, uint32_t value) { atomic_store_explicit(to, value, memory_order_relaxed); }
 
 /* An interrupt and what it interrupts share one core: the compiler alone must keep the order. */
 static void hand_over(_Atomic uint32_t *state, enum scan_slot_state to) {
@@ -98,13 +94,9 @@ void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) {
   set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz);
 }
 
-void scan_ask_temperature(struct scan *scan) {
-  set(&scan->temperature_within_us, TEMPERATURE_RETRY_us);
-}
+void scan_ask_temperature(struct scan *scan) { set(&scan->temperature_within_us, TEMPERATURE_RETRY_us); }
 
-void scan_rest(struct scan *scan, bool resting) {
-  set(&scan->must_rest, resting);
-}
+void scan_rest(struct scan *scan, bool resting) { set(&scan->must_rest, resting); }
 
 static void wait_in(struct scan *scan, enum scan_state state, uint64_t until_us) {
   scan->state = state;
@@ -150,9 +142,7 @@ static struct scan_slot *slot_for(struct scan *scan, const struct scan_conversio
   return get(&scan->slot_state) == SCAN_SLOT_CLAIMED ? NULL : &scan->slot;
 }
 
-static bool is_near(uint32_t code, uint32_t last) {
-  return code - last + TORN_TOLERANCE <= 2 * TORN_TOLERANCE;
-}
+static bool is_near(uint32_t code, uint32_t last) { return code - last + TORN_TOLERANCE <= 2 * TORN_TOLERANCE; }
 
 /* Judges what came of the last conversion of each sensor, for its admission and for the next
  * reading. Returns the bitmap of those whose reading counts, if its code does. */
@@ -250,9 +240,7 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state, SCAN_SLOT_FULL);
 }
 
-static bool temperature_waits(const struct scan *scan) {
-  return get(&scan->temperature_state) != SCAN_SLOT_EMPTY;
-}
+static bool temperature_waits(const struct scan *scan) { return get(&scan->temperature_state) != SCAN_SLOT_EMPTY; }
 
 static void obey_wish(struct scan *scan, uint64_t now_us) {
   uint32_t within_us = get(&scan->temperature_within_us);
@@ -275,9 +263,7 @@ static uint64_t temperature_in_pause_us(const struct scan *scan, uint64_t now_us
   return scan->next_frame_us - slot_us - slot_us / 8;
 }
 
-static uint64_t earlier(uint64_t a, uint64_t b) {
-  return a < b ? a : b;
-}
+static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* Between two operations: true if none is to follow for now. */
 static bool rest(struct scan *scan, uint64_t now_us) {

@@ -12,9 +12,7 @@
 /* A sensor that is in doubt for ever must not cost a frame in ten. */
 #define HASTY_DOUBTS_MAX 4
 
-static bool within(int32_t value, int32_t limit) {
-  return value >= -limit && value <= limit;
-}
+static bool within(int32_t value, int32_t limit) { return value >= -limit && value <= limit; }
 
 static int16_t clamped_i16(int32_t value) {
   return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);

@@ -52,18 +52,12 @@ static uint32_t slot_address(const struct store *store, unsigned sector, unsigne
   return sector * PORT_FLASH_SECTOR_BYTES + slot * store->slot_bytes;
 }
 
-static unsigned slots_of(const struct store *store) {
-  return PORT_FLASH_SECTOR_BYTES / store->slot_bytes;
-}
+static unsigned slots_of(const struct store *store) { return PORT_FLASH_SECTOR_BYTES / store->slot_bytes; }
 
 /* The two marks at the end of a slot. */
-static unsigned sealed_at(const struct store *store) {
-  return store->slot_bytes - 8u;
-}
+static unsigned sealed_at(const struct store *store) { return store->slot_bytes - 8u; }
 
-static unsigned final_at(const struct store *store) {
-  return store->slot_bytes - 4u;
-}
+static unsigned final_at(const struct store *store) { return store->slot_bytes - 4u; }
 
 static uint32_t read_u32(uint32_t at) {
   uint8_t bytes[4];
@@ -71,9 +65,7 @@ static uint32_t read_u32(uint32_t at) {
   return bytes_get_u32(bytes);
 }
 
-static unsigned calibration_bytes(unsigned sensor_count) {
-  return 14 + 8 * sensor_count;
-}
+static unsigned calibration_bytes(unsigned sensor_count) { return 14 + 8 * sensor_count; }
 
 /* Record ------------------------------------------------------------------------------------- */
 
@@ -319,9 +311,7 @@ static bool is_older(uint32_t generation, uint32_t than) {
   return than != 0 && (generation == 0 || generation - than > UINT32_MAX / 2);
 }
 
-static uint32_t next_generation(uint32_t generation) {
-  return generation == UINT32_MAX ? 1 : generation + 1;
-}
+static uint32_t next_generation(uint32_t generation) { return generation == UINT32_MAX ? 1 : generation + 1; }
 
 /* What start-up finds in one sector. */
 struct sector {
@@ -409,9 +399,7 @@ static void begin_step(struct store *store, enum store_step step, uint64_t now_u
   store->step_ends_us = now_us + STEP_MAX_us;
 }
 
-static uint32_t to_address(const struct store *store) {
-  return slot_address(store, store->to_sector, store->to_slot);
-}
+static uint32_t to_address(const struct store *store) { return slot_address(store, store->to_sector, store->to_slot); }
 
 static void program_mark(const struct store *store, unsigned at) {
   port_flash_program(to_address(store) + at, mark, sizeof mark);

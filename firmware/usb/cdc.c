@@ -205,21 +205,13 @@ void cdc_start(const struct cdc_identity *identity) {
   device_start(identity);
 }
 
-bool cdc_is_open(void) {
-  return atomic_load_explicit(&is_open, memory_order_acquire);
-}
+bool cdc_is_open(void) { return atomic_load_explicit(&is_open, memory_order_acquire); }
 
-bool cdc_is_suspended(void) {
-  return atomic_load_explicit(&is_suspended, memory_order_relaxed) != 0;
-}
+bool cdc_is_suspended(void) { return atomic_load_explicit(&is_suspended, memory_order_relaxed) != 0; }
 
-uint32_t cdc_news(void) {
-  return atomic_load_explicit(&news, memory_order_acquire);
-}
+uint32_t cdc_news(void) { return atomic_load_explicit(&news, memory_order_acquire); }
 
-uint32_t cdc_close_count(void) {
-  return atomic_load_explicit(&close_count, memory_order_acquire);
-}
+uint32_t cdc_close_count(void) { return atomic_load_explicit(&close_count, memory_order_acquire); }
 
 enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
   if (length > TRANSMIT_BYTES)
@@ -240,6 +232,4 @@ size_t cdc_read(uint8_t *bytes, size_t capacity) {
   return length;
 }
 
-bool cdc_loader_requested(void) {
-  return atomic_load_explicit(&loader_requested, memory_order_relaxed);
-}
+bool cdc_loader_requested(void) { return atomic_load_explicit(&loader_requested, memory_order_relaxed); }

@@ -308,17 +308,11 @@ void usb_device_on_bus_reset(void) {
   cdc_on_suspended(false);
 }
 
-void usb_device_on_suspend(void) {
-  cdc_on_suspended(true);
-}
+void usb_device_on_suspend(void) { cdc_on_suspended(true); }
 
-void usb_device_on_resume(void) {
-  cdc_on_suspended(false);
-}
+void usb_device_on_resume(void) { cdc_on_suspended(false); }
 
-void usb_device_on_service(void) {
-  cdc_on_service();
-}
+void usb_device_on_service(void) { cdc_on_service(); }
 
 void device_start(const struct cdc_identity *identity) {
   device.identity = identity;

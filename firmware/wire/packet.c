@@ -66,9 +66,7 @@ const struct wire_layout *wire_find_layout(const struct wire_layout *const *set,
   return *set;
 }
 
-static bool is_printable(uint8_t byte) {
-  return byte >= 0x20 && byte <= 0x7E;
-}
+static bool is_printable(uint8_t byte) { return byte >= 0x20 && byte <= 0x7E; }
 
 /* Whether these fields, in the machine's form, hold what the protocol allows. */
 static bool is_text(const uint8_t *field, unsigned count) {
@@ -241,9 +239,7 @@ static bool is_left_out(const struct run *when, const uint8_t *field) {
   return (flags >> when->count & 1u) == 0;
 }
 
-static bool is_sensor_count(uint8_t count) {
-  return count >= 1 && count <= FT_MAX_SENSORS;
-}
+static bool is_sensor_count(uint8_t count) { return count >= 1 && count <= FT_MAX_SENSORS; }
 
 /* A run as so many of a simpler one, each for a sensor. */
 struct repeat {

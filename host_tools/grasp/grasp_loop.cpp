@@ -39,9 +39,7 @@ GraspLoop::~GraspLoop() {
   }
 }
 
-double GraspLoop::read_until_us() const {
-  return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us());
-}
+double GraspLoop::read_until_us() const { return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us()); }
 
 std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<bool()> &stop) {
   std::array<std::optional<DeviceNews>, FINGERS> ready;
@@ -109,9 +107,7 @@ void GraspLoop::put(GraspNews news) {
   filled_.set();
 }
 
-void GraspLoop::end() {
-  end_ = true;
-}
+void GraspLoop::end() { end_ = true; }
 
 void GraspLoop::rethrow() const {
   for (const auto &loop : loops_) {

@@ -19,9 +19,7 @@ constexpr const char *FIXED = "fixed";
 constexpr double CAP = 0.8, START = 0.33, FLOOR = 0.25;
 constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
 
-[[noreturn]] void impossible(const std::string &text) {
-  throw Error(ErrorCode::bad_value, text);
-}
+[[noreturn]] void impossible(const std::string &text) { throw Error(ErrorCode::bad_value, text); }
 
 } // namespace
 
@@ -67,9 +65,7 @@ const std::vector<GraspSetting> &grasp_settings() {
   return all;
 }
 
-double value_of(const GraspSetting &setting, GripSettings settings) {
-  return setting.field(settings) / setting.scale;
-}
+double value_of(const GraspSetting &setting, GripSettings settings) { return setting.field(settings) / setting.scale; }
 
 const std::vector<GraspPreset> &grasp_presets() {
   static const std::vector<GraspPreset> all = {{"egg", 25.0}, {"strawberry", 5.0}, {"cup", 3.0}, {"crisp", 1.5}};

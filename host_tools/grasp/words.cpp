@@ -53,9 +53,7 @@ constexpr Trouble TROUBLES[] = {
 
 } // namespace
 
-std::string state_name(std::uint8_t state) {
-  return state < GRIP_STATES ? STATES[state].name : std::to_string(state);
-}
+std::string state_name(std::uint8_t state) { return state < GRIP_STATES ? STATES[state].name : std::to_string(state); }
 
 std::optional<std::uint8_t> state_of_name(std::string_view name) {
   for (std::uint8_t state = 0; state < GRIP_STATES; state++) {
@@ -66,9 +64,7 @@ std::optional<std::uint8_t> state_of_name(std::string_view name) {
   return std::nullopt;
 }
 
-std::string state_text(std::uint8_t state) {
-  return state < GRIP_STATES ? STATES[state].text : std::to_string(state);
-}
+std::string state_text(std::uint8_t state) { return state < GRIP_STATES ? STATES[state].text : std::to_string(state); }
 
 bool is_end_state(std::uint8_t state) {
   return state == GRIP_OPEN || state == GRIP_DROPPED || state == GRIP_MISSED || state == GRIP_FAULT;

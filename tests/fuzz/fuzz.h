@@ -36,13 +36,9 @@ struct fuzz_input {
   const uint8_t *at, *end;
 };
 
-static inline size_t fuzz_left(const struct fuzz_input *input) {
-  return (size_t)(input->end - input->at);
-}
+static inline size_t fuzz_left(const struct fuzz_input *input) { return (size_t)(input->end - input->at); }
 
-static inline uint8_t fuzz_u8(struct fuzz_input *input) {
-  return input->at < input->end ? *input->at++ : 0;
-}
+static inline uint8_t fuzz_u8(struct fuzz_input *input) { return input->at < input->end ? *input->at++ : 0; }
 
 static inline uint64_t fuzz_bits(struct fuzz_input *input, unsigned bytes) {
   uint64_t value = 0;
@@ -52,17 +48,11 @@ static inline uint64_t fuzz_bits(struct fuzz_input *input, unsigned bytes) {
   return value;
 }
 
-static inline uint16_t fuzz_u16(struct fuzz_input *input) {
-  return (uint16_t)fuzz_bits(input, 2);
-}
+static inline uint16_t fuzz_u16(struct fuzz_input *input) { return (uint16_t)fuzz_bits(input, 2); }
 
-static inline uint32_t fuzz_u32(struct fuzz_input *input) {
-  return (uint32_t)fuzz_bits(input, 4);
-}
+static inline uint32_t fuzz_u32(struct fuzz_input *input) { return (uint32_t)fuzz_bits(input, 4); }
 
-static inline uint64_t fuzz_u64(struct fuzz_input *input) {
-  return fuzz_bits(input, 8);
-}
+static inline uint64_t fuzz_u64(struct fuzz_input *input) { return fuzz_bits(input, 8); }
 
 /* As many as there are, `length` at most. */
 static inline const uint8_t *fuzz_bytes(struct fuzz_input *input, size_t *length) {

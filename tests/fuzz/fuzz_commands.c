@@ -26,17 +26,11 @@ static double pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
   return 101325.0 + (sensor == 7 && t_us > 30000 ? 4000.0 : 0.0);
 }
 
-static uint64_t next_event_us(const void *context) {
-  return sim_array_next_event_us(context);
-}
+static uint64_t next_event_us(const void *context) { return sim_array_next_event_us(context); }
 
-static void on_event(void *context) {
-  app_on_event(context);
-}
+static void on_event(void *context) { app_on_event(context); }
 
-static void main_round(void *context) {
-  app_run(context);
-}
+static void main_round(void *context) { app_run(context); }
 
 static void power_up(void) {
   native_flash_power_up();

@@ -10,9 +10,7 @@ using namespace fingertip;
 
 namespace {
 
-double draw(fuzz_input &input, double low, double high) {
-  return low + (high - low) * fuzz_u8(&input) / 255.0;
-}
+double draw(fuzz_input &input, double low, double high) { return low + (high - low) * fuzz_u8(&input) / 255.0; }
 
 GripTouch draw_touch(fuzz_input &input, double now_s) {
   GripTouch touch;

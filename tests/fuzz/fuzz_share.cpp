@@ -192,6 +192,4 @@ private:
 
 } // namespace
 
-void fuzz_one(const uint8_t *bytes, size_t length) {
-  Scene({bytes, bytes + length}).run();
-}
+void fuzz_one(const uint8_t *bytes, size_t length) { Scene({bytes, bytes + length}).run(); }

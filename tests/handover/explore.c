@@ -95,9 +95,7 @@ static void point(const void *address) {
   }
 }
 
-void explore_begin(void) {
-  explorer->active = true;
-}
+void explore_begin(void) { explorer->active = true; }
 
 void explore_end(void) {
   let_interrupts_come();
@@ -160,9 +158,7 @@ void __tsan_write_range(void *address, size_t size);
 void __tsan_atomic_signal_fence(int order);
 
 void __tsan_init(void) {}
-void __tsan_func_entry(void *caller) {
-  (void)caller;
-}
+void __tsan_func_entry(void *caller) { (void)caller; }
 void __tsan_func_exit(void) {}
 void __tsan_read_range(void *address, size_t size) {
   (void)size;
@@ -172,15 +168,11 @@ void __tsan_write_range(void *address, size_t size) {
   (void)size;
   point(address);
 }
-void __tsan_atomic_signal_fence(int order) {
-  (void)order;
-}
+void __tsan_atomic_signal_fence(int order) { (void)order; }
 
 #define ACCESS(name)                                                                                                   \
   void name(void *address);                                                                                            \
-  void name(void *address) {                                                                                           \
-    point(address);                                                                                                    \
-  }
+  void name(void *address) { point(address); }
 #define ACCESSES(bytes)                                                                                                \
   ACCESS(__tsan_read##bytes)                                                                                           \
   ACCESS(__tsan_write##bytes)                                                                                          \

@@ -68,9 +68,7 @@ static void main_step(void) {
   }
 }
 
-static void serve(void) {
-  worker_serve(&worker);
-}
+static void serve(void) { worker_serve(&worker); }
 
 static void judge_end(void) {
   for (int i = 0; i < 2 * QUESTIONS; i++) {

@@ -22,14 +22,10 @@ static struct {
 } host;
 
 /* Each byte tells its write and its place in it. */
-static uint8_t byte_of(unsigned write, unsigned at) {
-  return (uint8_t)(write * WRITE_BYTES + at);
-}
+static uint8_t byte_of(unsigned write, unsigned at) { return (uint8_t)(write * WRITE_BYTES + at); }
 
 /* Of what the host sends; no byte of a turn of the ring is that of the turn before. */
-static uint8_t sent_byte(unsigned at) {
-  return (uint8_t)(at % 251);
-}
+static uint8_t sent_byte(unsigned at) { return (uint8_t)(at % 251); }
 
 static void judge_read(const uint8_t *bytes, size_t length) {
   for (size_t i = 0; i < length; i++) {

@@ -23,15 +23,9 @@ void misuse_if(bool wrong, const char *how) {
 
 } // namespace
 
-std::vector<std::shared_ptr<Device>> &bus() {
-  return devices;
-}
-int leaks() {
-  return balance;
-}
-const std::string &misuse() {
-  return misused;
-}
+std::vector<std::shared_ptr<Device>> &bus() { return devices; }
+int leaks() { return balance; }
+const std::string &misuse() { return misused; }
 int events_descriptor() {
   static const int fd = eventfd(0, EFD_CLOEXEC);
   return fd;
@@ -105,9 +99,7 @@ ssize_t LIBUSB_CALL libusb_get_device_list(libusb_context *context, libusb_devic
   return static_cast<ssize_t>(context->seen.size());
 }
 
-void LIBUSB_CALL libusb_free_device_list(libusb_device **list, int) {
-  delete[] list;
-}
+void LIBUSB_CALL libusb_free_device_list(libusb_device **list, int) { delete[] list; }
 
 int LIBUSB_CALL libusb_get_device_descriptor(libusb_device *device, libusb_device_descriptor *descriptor) {
   std::memset(descriptor, 0, sizeof *descriptor);
@@ -117,12 +109,8 @@ int LIBUSB_CALL libusb_get_device_descriptor(libusb_device *device, libusb_devic
   return 0;
 }
 
-std::uint8_t LIBUSB_CALL libusb_get_bus_number(libusb_device *device) {
-  return device->fake->bus;
-}
-std::uint8_t LIBUSB_CALL libusb_get_device_address(libusb_device *device) {
-  return device->fake->address;
-}
+std::uint8_t LIBUSB_CALL libusb_get_bus_number(libusb_device *device) { return device->fake->bus; }
+std::uint8_t LIBUSB_CALL libusb_get_device_address(libusb_device *device) { return device->fake->address; }
 
 int LIBUSB_CALL libusb_get_active_config_descriptor(libusb_device *device, libusb_config_descriptor **configuration) {
   static libusb_endpoint_descriptor notify, data[2];
@@ -338,8 +326,6 @@ void LIBUSB_CALL libusb_free_pollfds(const libusb_pollfd **list) {
   delete[] list;
 }
 
-const char *LIBUSB_CALL libusb_error_name(int) {
-  return "LIBUSB_ERROR";
-}
+const char *LIBUSB_CALL libusb_error_name(int) { return "LIBUSB_ERROR"; }
 
 } // extern "C"

@@ -60,9 +60,7 @@ Served::Served(const GripperServer::Options &options)
   std::signal(SIGPIPE, SIG_IGN); // of a port that is gone, which is a socket here
 }
 
-void Served::pass(double seconds) {
-  wait_until(host_now() + std::chrono::microseconds(std::llround(1e6 * seconds)));
-}
+void Served::pass(double seconds) { wait_until(host_now() + std::chrono::microseconds(std::llround(1e6 * seconds))); }
 
 Tape::Tape(std::vector<std::pair<std::string, std::string>> exchanges)
     : exchanges_(std::move(exchanges)), port_(""), plays_([this] { play(); }) {}
@@ -164,9 +162,7 @@ struct PlainSlave::Mapped {
 
 PlainSlave::PlainSlave() : port_(""), mapped_(std::make_unique<Mapped>()), serves_([this] { serve(); }) {}
 
-PlainSlave::~PlainSlave() {
-  serves_.end();
-}
+PlainSlave::~PlainSlave() { serves_.end(); }
 
 void PlainSlave::serve() {
   port_.wait(host_now() + ROUND);

@@ -17,9 +17,7 @@ static inline uint64_t random_u64(struct random *random) {
   return random->state * UINT64_C(2685821657736338717);
 }
 
-static inline uint32_t random_u32(struct random *random) {
-  return (uint32_t)(random_u64(random) >> 32);
-}
+static inline uint32_t random_u32(struct random *random) { return (uint32_t)(random_u64(random) >> 32); }
 
 /* In [0, limit), limit at least 1. */
 static inline uint32_t random_below(struct random *random, uint32_t limit) {

@@ -114,8 +114,6 @@ std::size_t ServedPort::unread() const {
   return is_open_ && ioctl(fd_, SIOCOUTQ, &count) == 0 ? static_cast<std::size_t>(count) : 0;
 }
 
-unsigned ServedPort::speed() const {
-  return 0;
-}
+unsigned ServedPort::speed() const { return 0; }
 
 } // namespace fingertip

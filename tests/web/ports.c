@@ -63,9 +63,7 @@ static struct udev_device *device_of(const char *name, const char *action) {
   return device;
 }
 
-API struct udev *udev_new(void) {
-  return calloc(1, sizeof(struct udev));
-}
+API struct udev *udev_new(void) { return calloc(1, sizeof(struct udev)); }
 
 API struct udev *udev_unref(struct udev *udev) {
   free(udev);
@@ -99,9 +97,7 @@ API int udev_enumerate_scan_devices(struct udev_enumerate *enumerate) {
   return 0;
 }
 
-API struct udev_list_entry *udev_enumerate_get_list_entry(struct udev_enumerate *enumerate) {
-  return enumerate->first;
-}
+API struct udev_list_entry *udev_enumerate_get_list_entry(struct udev_enumerate *enumerate) { return enumerate->first; }
 
 API struct udev_enumerate *udev_enumerate_unref(struct udev_enumerate *enumerate) {
   while (enumerate->first) {
@@ -113,13 +109,9 @@ API struct udev_enumerate *udev_enumerate_unref(struct udev_enumerate *enumerate
   return NULL;
 }
 
-API struct udev_list_entry *udev_list_entry_get_next(struct udev_list_entry *entry) {
-  return entry->next;
-}
+API struct udev_list_entry *udev_list_entry_get_next(struct udev_list_entry *entry) { return entry->next; }
 
-API const char *udev_list_entry_get_name(struct udev_list_entry *entry) {
-  return entry->syspath;
-}
+API const char *udev_list_entry_get_name(struct udev_list_entry *entry) { return entry->syspath; }
 
 API struct udev_device *udev_device_new_from_syspath(struct udev *udev, const char *syspath) {
   (void)udev;
@@ -131,21 +123,11 @@ API struct udev_device *udev_device_unref(struct udev_device *device) {
   return NULL;
 }
 
-API const char *udev_device_get_action(struct udev_device *device) {
-  return device->action;
-}
-API const char *udev_device_get_devnode(struct udev_device *device) {
-  return device->devname;
-}
-API const char *udev_device_get_subsystem(struct udev_device *device) {
-  return device ? "tty" : NULL;
-}
-API const char *udev_device_get_syspath(struct udev_device *device) {
-  return device->syspath;
-}
-API const char *udev_device_get_sysname(struct udev_device *device) {
-  return device->syspath + sizeof SYSPATH - 1;
-}
+API const char *udev_device_get_action(struct udev_device *device) { return device->action; }
+API const char *udev_device_get_devnode(struct udev_device *device) { return device->devname; }
+API const char *udev_device_get_subsystem(struct udev_device *device) { return device ? "tty" : NULL; }
+API const char *udev_device_get_syspath(struct udev_device *device) { return device->syspath; }
+API const char *udev_device_get_sysname(struct udev_device *device) { return device->syspath + sizeof SYSPATH - 1; }
 
 API const char *udev_device_get_property_value(struct udev_device *device, const char *key) {
   return strcmp(key, "DEVNAME") == 0           ? device->devname
@@ -158,15 +140,9 @@ API const char *udev_device_get_property_value(struct udev_device *device, const
 }
 
 /* What else a browser may ask: there is nothing. */
-API const char *udev_device_get_devtype(struct udev_device *device) {
-  return (void)device, NULL;
-}
-API const char *udev_device_get_driver(struct udev_device *device) {
-  return (void)device, NULL;
-}
-API struct udev_device *udev_device_get_parent(struct udev_device *device) {
-  return (void)device, NULL;
-}
+API const char *udev_device_get_devtype(struct udev_device *device) { return (void)device, NULL; }
+API const char *udev_device_get_driver(struct udev_device *device) { return (void)device, NULL; }
+API struct udev_device *udev_device_get_parent(struct udev_device *device) { return (void)device, NULL; }
 API struct udev_list_entry *udev_device_get_properties_list_entry(struct udev_device *device) {
   return (void)device, NULL;
 }
@@ -207,9 +183,7 @@ API int udev_monitor_enable_receiving(struct udev_monitor *monitor) {
   return 0;
 }
 
-API int udev_monitor_get_fd(struct udev_monitor *monitor) {
-  return monitor->fd;
-}
+API int udev_monitor_get_fd(struct udev_monitor *monitor) { return monitor->fd; }
 
 /* One event at a time, so that those behind it keep the descriptor readable: the least room that one fits in. */
 API struct udev_device *udev_monitor_receive_device(struct udev_monitor *monitor) {

@@ -93,9 +93,7 @@ void GripFinger::end_zero() {
   }
 }
 
-bool GripFinger::has_zero() const {
-  return !has_load() || sums_ >= ZERO_FRAMES;
-}
+bool GripFinger::has_zero() const { return !has_load() || sums_ >= ZERO_FRAMES; }
 
 GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   GripReading reading;

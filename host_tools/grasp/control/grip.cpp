@@ -29,9 +29,7 @@ constexpr double WIDTH_SLACK_mm = 1.0; // rounding of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
 constexpr double ONLY_HELD_s = 1.0; // without a load for this time
 
-double seconds(const GripperStatus &status) {
-  return 1e-6 * static_cast<double>(status.host_us);
-}
+double seconds(const GripperStatus &status) { return 1e-6 * static_cast<double>(status.host_us); }
 
 } // namespace
 
@@ -110,9 +108,7 @@ std::uint32_t Grip::gripper_trouble() {
   return (status_.fault != 0 ? GRIP_GRIPPER_FAULT : 0u) | (was_active && !status_.active ? GRIP_GRIPPER_INACTIVE : 0u);
 }
 
-double Grip::dead_s() const {
-  return readings_.delay_s + traits_.latency_s + reach_.poll_s();
-}
+double Grip::dead_s() const { return readings_.delay_s + traits_.latency_s + reach_.poll_s(); }
 
 double Grip::start_force() const {
   return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.blind_N : settings_.start_N;

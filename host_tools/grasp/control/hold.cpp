@@ -37,24 +37,18 @@ constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
 constexpr double GROWN = 1.4;
 constexpr double MORE = 1.3; // factor on the grip of an object that slides without a known load
 
-double late_s(double delay_s) {
-  return std::clamp(delay_s - SOON_s, 0.0, LATEST_s);
-}
+double late_s(double delay_s) { return std::clamp(delay_s - SOON_s, 0.0, LATEST_s); }
 
 } // namespace
 
-void GripFriction::held(double ratio) {
-  held_ = std::clamp(ratio, held_, FRICTION_MOST);
-}
+void GripFriction::held(double ratio) { held_ = std::clamp(ratio, held_, FRICTION_MOST); }
 
 void GripFriction::slid(double ratio) {
   ratio = std::clamp(ratio, FRICTION_LEAST, FRICTION_MOST);
   slid_ = slid_ > 0.0 ? std::min(slid_, ratio) : ratio;
 }
 
-double GripFriction::value(double assumed) const {
-  return slid_ > 0.0 ? slid_ : std::max(assumed, held_);
-}
+double GripFriction::value(double assumed) const { return slid_ > 0.0 ? slid_ : std::max(assumed, held_); }
 
 void GripLoad::rests(double load_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
@@ -73,9 +67,7 @@ double GripLoad::ahead_N(double seconds) const {
   return load_N_ + std::min(rate_N_s_ * seconds, std::max(AHEAD * load_N_, AHEAD_N));
 }
 
-bool GripLoad::is_steady() const {
-  return rate_N_s_ * STEADY_s < std::max(STEADY * load_N_, STEADY_N);
-}
+bool GripLoad::is_steady() const { return rate_N_s_ * STEADY_s < std::max(STEADY * load_N_, STEADY_N); }
 
 void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
   const double stops_N = load_N * (1.0 + speed_mm_s / (GRAVITY_mm_s2 * STOPS_s));
@@ -85,9 +77,7 @@ void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
   rate_N_s_ = 0.0;
 }
 
-void GripHold::begin() {
-  *this = GripHold();
-}
+void GripHold::begin() { *this = GripHold(); }
 
 double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
   const double load_N = sliding_ ? load_.now_N() : std::max(load_.ahead_N(dead_s), was_N_);

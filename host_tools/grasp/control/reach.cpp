@@ -182,9 +182,7 @@ bool GripReach::has_come(double now_s, double frame_s) const {
   return has_stopped(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
 }
 
-bool GripReach::rests(double now_s, double frame_s) const {
-  return has_come(now_s, frame_s) && frame_s > stopped_s_;
-}
+bool GripReach::rests(double now_s, double frame_s) const { return has_come(now_s, frame_s) && frame_s > stopped_s_; }
 
 void GripReach::first_touch(double t_s) {
   rubber_.begin(width_at(t_s));
@@ -363,9 +361,7 @@ double GripReach::steps_to(const Outlook &outlook, double wanted_N) const {
   return steps_off(wanted_N, outlook.force_N, outlook.width_mm, outlook.coming_mm);
 }
 
-double GripReach::whole_steps(double mm) const {
-  return traits_.step_mm * std::floor(mm / traits_.step_mm);
-}
+double GripReach::whole_steps(double mm) const { return traits_.step_mm * std::floor(mm / traits_.step_mm); }
 
 double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings,
                             const GripSettings &settings, std::uint32_t &trouble) const {

@@ -33,9 +33,7 @@ constexpr GripperUsual USUAL = {.slave = SLAVE,
 
 constexpr std::uint8_t STATUS_FROM = TORQUE_ENABLE;
 
-int word(const Bytes &bytes, std::size_t at) {
-  return bytes[at] | bytes[at + 1] << 8;
-}
+int word(const Bytes &bytes, std::size_t at) { return bytes[at] | bytes[at + 1] << 8; }
 
 void put_word(Bytes *bytes, int value) {
   bytes->push_back(static_cast<std::uint8_t>(value & 0xFF));
@@ -48,9 +46,7 @@ Jaw::Jaw(int closed_count, int open_count, double jaw_mm) : closed_(closed_count
 
 Jaw::Jaw(const GripperWay &complete) : Jaw(*complete.closed_count, *complete.open_count, complete.jaw_mm) {}
 
-double Jaw::step_mm() const {
-  return jaw_mm_ * COUNT_rad;
-}
+double Jaw::step_mm() const { return jaw_mm_ * COUNT_rad; }
 
 double Jaw::width_mm(double count) const {
   const double turned = open_ > closed_ ? count - closed_ : closed_ - count;

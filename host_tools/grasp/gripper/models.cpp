@@ -86,12 +86,8 @@ std::string gripper_model_names() {
   return names;
 }
 
-const GripperTraits &gripper_traits(const std::string &model) {
-  return model_of(model).traits;
-}
+const GripperTraits &gripper_traits(const std::string &model) { return model_of(model).traits; }
 
-std::unique_ptr<Gripper> open_gripper(const GripperWay &way) {
-  return model_of(way.model).open(way);
-}
+std::unique_ptr<Gripper> open_gripper(const GripperWay &way) { return model_of(way.model).open(way); }
 
 } // namespace fingertip

@@ -76,9 +76,7 @@ void put_values(Bytes *to, int count, const std::uint16_t *values) {
 }
 
 // Length of the answer to a read: the count of bytes, and the registers.
-std::size_t answer_length(int count) {
-  return 1 + 2 * static_cast<std::size_t>(count);
-}
+std::size_t answer_length(int count) { return 1 + 2 * static_cast<std::size_t>(count); }
 
 std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
   std::array<std::uint16_t, 3> registers{};
@@ -284,9 +282,7 @@ void RobotiqGripper::activate() {
   goes_ = active_ = false;
 }
 
-GripperStatus RobotiqGripper::poll() {
-  return read_status();
-}
+GripperStatus RobotiqGripper::poll() { return read_status(); }
 
 GripperStatus RobotiqGripper::move(const GripperMove &move) {
   check_move(move);

@@ -7,13 +7,9 @@ namespace fingertip {
 
 using std::chrono::nanoseconds;
 
-HostTime host_now() {
-  return std::chrono::steady_clock::now();
-}
+HostTime host_now() { return std::chrono::steady_clock::now(); }
 
-std::chrono::system_clock::time_point wall_now() {
-  return std::chrono::system_clock::now();
-}
+std::chrono::system_clock::time_point wall_now() { return std::chrono::system_clock::now(); }
 
 int wait_for(pollfd *descriptors, std::size_t count, HostTime until) {
   timespec left = {};

@@ -12,9 +12,7 @@ std::int64_t steady_now_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(host_now().time_since_epoch()).count();
 }
 
-void wait_until(HostTime until) {
-  wait_for(nullptr, 0, until);
-}
+void wait_until(HostTime until) { wait_for(nullptr, 0, until); }
 
 Wake::Wake() : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (fd_ < 0) {
@@ -22,13 +20,9 @@ Wake::Wake() : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   }
 }
 
-Wake::~Wake() {
-  close(fd_);
-}
+Wake::~Wake() { close(fd_); }
 
-void Wake::set() {
-  eventfd_write(fd_, 1);
-}
+void Wake::set() { eventfd_write(fd_, 1); }
 
 void Wake::clear() {
   eventfd_t count;

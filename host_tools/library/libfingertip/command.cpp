@@ -167,13 +167,9 @@ wire_packet command_tare(bool force) {
   return packet;
 }
 
-wire_packet command_rate_mHz(std::uint32_t rate_mHz) {
-  return command_with("rate", {static_cast<double>(rate_mHz)});
-}
+wire_packet command_rate_mHz(std::uint32_t rate_mHz) { return command_with("rate", {static_cast<double>(rate_mHz)}); }
 
-wire_packet command_osr(std::uint32_t osr) {
-  return command_with("osr", {static_cast<double>(osr)});
-}
+wire_packet command_osr(std::uint32_t osr) { return command_with("osr", {static_cast<double>(osr)}); }
 
 wire_packet command_slip(float threshold_mm, std::uint32_t window_ms) {
   wire_packet packet = command_with("slip_threshold", {threshold_mm});
@@ -181,15 +177,9 @@ wire_packet command_slip(float threshold_mm, std::uint32_t window_ms) {
   return packet;
 }
 
-wire_packet command_info() {
-  return packet_of(WIRE_CMD_INFO);
-}
-wire_packet command_health() {
-  return packet_of(WIRE_CMD_HEALTH);
-}
-wire_packet command_crash() {
-  return packet_of(WIRE_CMD_CRASH);
-}
+wire_packet command_info() { return packet_of(WIRE_CMD_INFO); }
+wire_packet command_health() { return packet_of(WIRE_CMD_HEALTH); }
+wire_packet command_crash() { return packet_of(WIRE_CMD_CRASH); }
 
 wire_packet command_loader() {
   wire_packet packet = packet_of(WIRE_CMD_LOADER);
@@ -207,9 +197,7 @@ wire_packet command_calibrate(const calibration &calibration, std::uint8_t senso
   return packet;
 }
 
-wire_packet command_erase_calibration() {
-  return packet_of(WIRE_CMD_ERASE_CALIBRATION);
-}
+wire_packet command_erase_calibration() { return packet_of(WIRE_CMD_ERASE_CALIBRATION); }
 
 wire_packet command_keep(bool keep) {
   wire_packet packet = packet_of(WIRE_CMD_KEEP);
@@ -217,13 +205,9 @@ wire_packet command_keep(bool keep) {
   return packet;
 }
 
-wire_packet command_prior(float sigma_mm, float width_mm) {
-  return command_with("prior", {sigma_mm, width_mm});
-}
+wire_packet command_prior(float sigma_mm, float width_mm) { return command_with("prior", {sigma_mm, width_mm}); }
 
-wire_packet command_location_limit(float limit_mm) {
-  return command_with("limit", {limit_mm});
-}
+wire_packet command_location_limit(float limit_mm) { return command_with("limit", {limit_mm}); }
 
 wire_packet command_pad(const pad_profile &profile) {
   if (!pad_profile_is_valid(&profile)) {
@@ -234,9 +218,7 @@ wire_packet command_pad(const pad_profile &profile) {
   return packet;
 }
 
-wire_packet command_erase_pad() {
-  return packet_of(WIRE_CMD_ERASE_PAD);
-}
+wire_packet command_erase_pad() { return packet_of(WIRE_CMD_ERASE_PAD); }
 
 WantedSetting setting_from_text(const std::string &text) {
   const std::size_t equals = text.find('=');

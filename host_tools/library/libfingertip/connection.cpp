@@ -22,13 +22,9 @@ const Found *with_serial(const std::vector<Found> &found, const std::string &ser
   return at == found.end() ? nullptr : &*at;
 }
 
-std::string serial_of(const wire_info &info) {
-  return std::string(info.serial, strnlen(info.serial, WIRE_TEXT_BYTES));
-}
+std::string serial_of(const wire_info &info) { return std::string(info.serial, strnlen(info.serial, WIRE_TEXT_BYTES)); }
 
-bool never() {
-  return false;
-}
+bool never() { return false; }
 
 [[noreturn]] void no_way(const Found &found, Reach reach) {
   if (reach == Reach::socket) {

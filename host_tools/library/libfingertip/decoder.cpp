@@ -41,9 +41,7 @@ LineStatistics &LineStatistics::operator+=(const LineStatistics &other) {
   return *this;
 }
 
-Decoder::Decoder() {
-  wire_receiver_init(&receiver_, wire_all_layouts);
-}
+Decoder::Decoder() { wire_receiver_init(&receiver_, wire_all_layouts); }
 
 void Decoder::restart() {
   wire_receiver_init(&receiver_, wire_all_layouts);

@@ -13,9 +13,7 @@ constexpr std::chrono::milliseconds WRITE_TIMEOUT{1000};
 
 } // namespace
 
-DescriptorTransport::~DescriptorTransport() {
-  close();
-}
+DescriptorTransport::~DescriptorTransport() { close(); }
 
 void DescriptorTransport::close() {
   if (fd_ >= 0) {

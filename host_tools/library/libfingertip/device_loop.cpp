@@ -58,9 +58,7 @@ void DeviceFeed::put(DeviceNews news, const std::atomic<bool> &abandoned) {
   }
 }
 
-void DeviceFeed::wake() {
-  drained_.set();
-}
+void DeviceFeed::wake() { drained_.set(); }
 
 DeviceLoop::DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed)
     : number_(number), options_(options), feed_(feed), transport_(open_way(way)),
@@ -270,8 +268,6 @@ void DeviceLoop::put(DeviceNews news) {
   }
 }
 
-void DeviceLoop::put(Kind kind) {
-  put(DeviceNews{kind, number_});
-}
+void DeviceLoop::put(Kind kind) { put(DeviceNews{kind, number_}); }
 
 } // namespace fingertip

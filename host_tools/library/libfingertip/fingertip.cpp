@@ -228,9 +228,7 @@ struct fingertip_clock {
   ClockFit fit;
 };
 
-const char *fingertip_error(void) {
-  return last_error.c_str();
-}
+const char *fingertip_error(void) { return last_error.c_str(); }
 
 enum fingertip_status fingertip_field_of(uint8_t type, size_t index, struct fingertip_field *field) {
   const Packet *packet = find(type);
@@ -249,9 +247,7 @@ enum fingertip_status fingertip_field_of(uint8_t type, size_t index, struct fing
   return FINGERTIP_OK;
 }
 
-size_t fingertip_value_count(uint8_t type) {
-  return count_of(type);
-}
+size_t fingertip_value_count(uint8_t type) { return count_of(type); }
 
 enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size,
                                        size_t *length) {
@@ -290,9 +286,7 @@ struct fingertip_decoder *fingertip_decoder_new(void) {
   return new (std::nothrow) fingertip_decoder;
 }
 
-void fingertip_decoder_free(struct fingertip_decoder *decoder) {
-  delete decoder;
-}
+void fingertip_decoder_free(struct fingertip_decoder *decoder) { delete decoder; }
 
 size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values,
                               size_t size, size_t *filled) {
@@ -319,9 +313,7 @@ size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *
   return taken;
 }
 
-void fingertip_decoder_restart(struct fingertip_decoder *decoder) {
-  decoder->decoder.restart();
-}
+void fingertip_decoder_restart(struct fingertip_decoder *decoder) { decoder->decoder.restart(); }
 
 void fingertip_decoder_counts(const struct fingertip_decoder *decoder, double counts[FINGERTIP_COUNTS]) {
   put(decoder->decoder.statistics(), counts);
@@ -335,9 +327,7 @@ struct fingertip_clock *fingertip_clock_new(void) {
   return new (std::nothrow) fingertip_clock;
 }
 
-void fingertip_clock_free(struct fingertip_clock *clock) {
-  delete clock;
-}
+void fingertip_clock_free(struct fingertip_clock *clock) { delete clock; }
 
 void fingertip_clock_add(struct fingertip_clock *clock, double sent_us, double received_us, double device_us) {
   if (std::isfinite(sent_us) && std::isfinite(received_us) && device_us >= 0) {
@@ -356,13 +346,9 @@ enum fingertip_status fingertip_clock_estimate(const struct fingertip_clock *clo
   return FINGERTIP_OK;
 }
 
-unsigned fingertip_clock_jumps(const struct fingertip_clock *clock) {
-  return clock->fit.jumps();
-}
+unsigned fingertip_clock_jumps(const struct fingertip_clock *clock) { return clock->fit.jumps(); }
 
-void fingertip_clock_restart(struct fingertip_clock *clock) {
-  clock->fit = ClockFit();
-}
+void fingertip_clock_restart(struct fingertip_clock *clock) { clock->fit = ClockFit(); }
 
 const char *fingertip_flag(size_t index, uint32_t *bit, int *is_warning) {
   const auto &all = flag_names();
@@ -378,9 +364,7 @@ const char *fingertip_flag(size_t index, uint32_t *bit, int *is_warning) {
   return all[index].name;
 }
 
-size_t fingertip_flags_text(uint32_t flags, char *text, size_t size) {
-  return put_text(flags_text(flags), text, size);
-}
+size_t fingertip_flags_text(uint32_t flags, char *text, size_t size) { return put_text(flags_text(flags), text, size); }
 
 size_t fingertip_command_name(uint8_t type, char *text, size_t size) {
   return put_text(command_name(type), text, size);
@@ -402,9 +386,7 @@ size_t fingertip_columns(uint8_t sensor_count, char *text, size_t size) {
   return put_text(recording::header_text(std::min<std::uint8_t>(sensor_count, FT_MAX_SENSORS)), text, size);
 }
 
-size_t fingertip_number_text(float value, char *text, size_t size) {
-  return put_text(shortest(value), text, size);
-}
+size_t fingertip_number_text(float value, char *text, size_t size) { return put_text(shortest(value), text, size); }
 
 enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board,
                                          char *version, char *git_hash, size_t size) {

@@ -252,9 +252,7 @@ struct fingertip_reader *fingertip_reader_new(const char *name, uint64_t size, i
   return reader;
 }
 
-void fingertip_reader_free(struct fingertip_reader *reader) {
-  delete reader;
-}
+void fingertip_reader_free(struct fingertip_reader *reader) { delete reader; }
 
 enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, const uint8_t *bytes, size_t length) {
   return guarded([&] {
@@ -303,13 +301,9 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, str
   });
 }
 
-const char *fingertip_reader_event(const struct fingertip_reader *reader) {
-  return reader->event.c_str();
-}
+const char *fingertip_reader_event(const struct fingertip_reader *reader) { return reader->event.c_str(); }
 
-int fingertip_reader_is_capture(const struct fingertip_reader *reader) {
-  return reader->known && !reader->recording;
-}
+int fingertip_reader_is_capture(const struct fingertip_reader *reader) { return reader->known && !reader->recording; }
 
 int fingertip_reader_has_end(const struct fingertip_reader *reader) {
   return reader->recording ? reader->recording->has_end() : reader->ended;
@@ -369,9 +363,7 @@ struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format
   });
 }
 
-void fingertip_writer_free(struct fingertip_writer *writer) {
-  delete writer;
-}
+void fingertip_writer_free(struct fingertip_writer *writer) { delete writer; }
 
 enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type,
                                               const double *values, size_t count, double host_us) {

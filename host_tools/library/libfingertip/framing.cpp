@@ -46,13 +46,9 @@ std::optional<Envelope> Envelope::opened(const Bytes &frame) {
   return Envelope(std::move(*packet));
 }
 
-std::uint16_t Envelope::sequence() const {
-  return bytes_get_u16(packet_.data() + SEQUENCE_AT);
-}
+std::uint16_t Envelope::sequence() const { return bytes_get_u16(packet_.data() + SEQUENCE_AT); }
 
-void Envelope::set_sequence(std::uint16_t sequence) {
-  bytes_put_u16(packet_.data() + SEQUENCE_AT, sequence);
-}
+void Envelope::set_sequence(std::uint16_t sequence) { bytes_put_u16(packet_.data() + SEQUENCE_AT, sequence); }
 
 void Envelope::append_frame(Bytes &to) const {
   std::uint8_t crc[WIRE_CRC_BYTES];

@@ -68,9 +68,7 @@ JointRecordingWriter::JointRecordingWriter(std::unique_ptr<LineSink> file, const
   head_written_ = true;
 }
 
-void JointRecordingWriter::line(const std::string &text) {
-  file_->line(text);
-}
+void JointRecordingWriter::line(const std::string &text) { file_->line(text); }
 
 void JointRecordingWriter::line(std::size_t device, double host_us, const std::string &text) {
   double &last_us = devices_[device].last_line_us;

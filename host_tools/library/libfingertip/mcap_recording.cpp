@@ -67,9 +67,7 @@ bool is_list(const std::string &key) {
          std::any_of(std::begin(pad_lists), std::end(pad_lists), [&](const auto &each) { return key == each.name; });
 }
 
-bool begins_with(const std::string &text, const char *begin) {
-  return text.rfind(begin, 0) == 0;
-}
+bool begins_with(const std::string &text, const char *begin) { return text.rfind(begin, 0) == 0; }
 
 bool is_of_calibration(const std::string &key) {
   return begins_with(key, "calibration_") || begins_with(key, "force_scale") || begins_with(key, "pad_") ||
@@ -152,13 +150,9 @@ McapLineSink::McapLineSink(std::unique_ptr<ByteSink> file)
     : file_(std::move(file)),
       writer_([this](const std::string &bytes) { file_->append(bytes.data(), bytes.size()); }, "ros2", "fingertip") {}
 
-void McapLineSink::line(const std::string &text) {
-  take(text, false);
-}
+void McapLineSink::line(const std::string &text) { take(text, false); }
 
-void McapLineSink::torn_line(const std::string &text) {
-  take(text, true);
-}
+void McapLineSink::torn_line(const std::string &text) { take(text, true); }
 
 void McapLineSink::take(const std::string &text, bool torn) {
   if (!in_head_) {
@@ -293,9 +287,7 @@ void McapLineSink::put_line(const std::string &text, bool torn) {
   writer_.message(lines_, clock_.now_ns(), ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
 }
 
-void McapLineSink::diagnose(const std::string &message) {
-  writer_.message(diagnostics_, clock_.now_ns(), message);
-}
+void McapLineSink::diagnose(const std::string &message) { writer_.message(diagnostics_, clock_.now_ns(), message); }
 
 void McapLineSink::comment(const std::string &text) {
   auto pair = key_and_value(text);

@@ -81,13 +81,9 @@ std::string capabilities_text(std::uint32_t capabilities) {
   return bits_text(words::capabilities, capabilities, "none");
 }
 
-std::string stored_text(std::uint32_t stored) {
-  return bits_text(words::stored, stored, "nothing");
-}
+std::string stored_text(std::uint32_t stored) { return bits_text(words::stored, stored, "nothing"); }
 
-std::string streams_text(std::uint8_t streams) {
-  return bits_text(words::streams, streams, "none");
-}
+std::string streams_text(std::uint8_t streams) { return bits_text(words::streams, streams, "none"); }
 
 std::uint8_t streams_from_text(const std::string &text) {
   std::uint8_t streams = 0;

@@ -28,25 +28,13 @@ template <typename Number> std::optional<Number> finite(std::optional<Number> va
 
 } // namespace
 
-std::string shortest(float value) {
-  return written(value);
-}
+std::string shortest(float value) { return written(value); }
 
-std::string fixed(double value, int digits) {
-  return written(value, std::chars_format::fixed, digits);
-}
+std::string fixed(double value, int digits) { return written(value, std::chars_format::fixed, digits); }
 
-std::optional<double> to_double(std::string_view text) {
-  return finite(parsed<double>(text));
-}
-std::optional<float> to_float(std::string_view text) {
-  return finite(parsed<float>(text));
-}
-std::optional<std::uint64_t> to_u64(std::string_view text) {
-  return parsed<std::uint64_t>(text);
-}
-std::optional<std::int64_t> to_i64(std::string_view text) {
-  return parsed<std::int64_t>(text);
-}
+std::optional<double> to_double(std::string_view text) { return finite(parsed<double>(text)); }
+std::optional<float> to_float(std::string_view text) { return finite(parsed<float>(text)); }
+std::optional<std::uint64_t> to_u64(std::string_view text) { return parsed<std::uint64_t>(text); }
+std::optional<std::int64_t> to_i64(std::string_view text) { return parsed<std::int64_t>(text); }
 
 } // namespace fingertip

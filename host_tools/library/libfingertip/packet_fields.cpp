@@ -21,13 +21,9 @@ template <typename ValueOf> std::string list_text(ValueOf value_of, std::size_t 
 
 } // namespace
 
-std::string text_field(const char *field) {
-  return std::string(field, strnlen(field, WIRE_TEXT_BYTES));
-}
+std::string text_field(const char *field) { return std::string(field, strnlen(field, WIRE_TEXT_BYTES)); }
 
-bool is_same_serial(const std::string &a, const std::string &b) {
-  return strcasecmp(a.c_str(), b.c_str()) == 0;
-}
+bool is_same_serial(const std::string &a, const std::string &b) { return strcasecmp(a.c_str(), b.c_str()) == 0; }
 
 Metadata info_metadata(const wire_info &info) {
   const std::uint8_t *version = info.firmware_version;

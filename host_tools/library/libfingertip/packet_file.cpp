@@ -24,9 +24,7 @@ PacketFile::PacketFile(const std::string &path, bool salvage, const std::string 
   }
 }
 
-std::optional<PacketFile::Item> PacketFile::next() {
-  return reader_ ? next_of_recording() : next_of_capture();
-}
+std::optional<PacketFile::Item> PacketFile::next() { return reader_ ? next_of_recording() : next_of_capture(); }
 
 std::optional<PacketFile::Item> PacketFile::next_of_recording() {
   auto item = reader_->next();

@@ -30,13 +30,9 @@ RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info
   line(header_text(sensor_count));
 }
 
-void RecordingWriter::line(const std::string &text) {
-  file_->line(text);
-}
+void RecordingWriter::line(const std::string &text) { file_->line(text); }
 
-void RecordingWriter::packet(const wire_packet &packet) {
-  lines_.packet(packet);
-}
+void RecordingWriter::packet(const wire_packet &packet) { lines_.packet(packet); }
 
 void RecordingWriter::event(const std::string &text) {
   lines_.write_pending();

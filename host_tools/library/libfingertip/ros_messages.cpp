@@ -18,9 +18,7 @@ namespace {
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-double metres(float mm) {
-  return double{mm} / 1000;
-}
+double metres(float mm) { return double{mm} / 1000; }
 
 CdrWriter begun(const Header &header) {
   constexpr std::uint64_t NS_IN_A_S = 1'000'000'000;

@@ -140,21 +140,13 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
   throw Error(ErrorCode::no_answer, transport_.description() + ": no answer to \"" + name + "\"");
 }
 
-void Session::command(const wire_packet &command, Policy policy) {
-  exchange(command, 0, policy);
-}
+void Session::command(const wire_packet &command, Policy policy) { exchange(command, 0, policy); }
 
-wire_packet Session::info(Policy policy) {
-  return exchange(command_info(), WIRE_INFO, policy);
-}
+wire_packet Session::info(Policy policy) { return exchange(command_info(), WIRE_INFO, policy); }
 
-wire_packet Session::health() {
-  return exchange(command_health(), WIRE_HEALTH, Policy());
-}
+wire_packet Session::health() { return exchange(command_health(), WIRE_HEALTH, Policy()); }
 
-wire_packet Session::crash() {
-  return exchange(command_crash(), WIRE_CRASH, Policy());
-}
+wire_packet Session::crash() { return exchange(command_crash(), WIRE_CRASH, Policy()); }
 
 bool Session::reopen() {
   if (!transport_.reopen()) {

@@ -45,9 +45,7 @@ int connect_to(const std::string &path, int *error) {
 }
 
 /* Where everybody may make folders. */
-std::string own_folder_in_tmp() {
-  return "/tmp/fingertip-" + std::to_string(geteuid());
-}
+std::string own_folder_in_tmp() { return "/tmp/fingertip-" + std::to_string(geteuid()); }
 
 bool is_of_this_user(const std::string &folder) {
   struct stat status;
@@ -71,9 +69,7 @@ std::string own_share_folder() {
   return geteuid() == 0 ? COMMON_SHARE_FOLDER : own_folder_in_tmp();
 }
 
-std::string simulated_folder() {
-  return own_share_folder() + "/simulated";
-}
+std::string simulated_folder() { return own_share_folder() + "/simulated"; }
 
 std::string port_of(const std::string &path) {
   if (path.rfind(SIMULATED, 0) != 0) {
@@ -88,13 +84,9 @@ std::string port_of(const std::string &path) {
   return port;
 }
 
-std::string share_socket_name(const std::string &serial) {
-  return as_name(serial) + SOCKET_END;
-}
+std::string share_socket_name(const std::string &serial) { return as_name(serial) + SOCKET_END; }
 
-std::string share_port_name(const std::string &serial) {
-  return as_name(serial) + PORT_END;
-}
+std::string share_port_name(const std::string &serial) { return as_name(serial) + PORT_END; }
 
 std::vector<Shared> find_shared() {
   std::vector<std::string> folders = {own_share_folder()};

@@ -419,9 +419,7 @@ Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, 
   return Result::gone;
 }
 
-bool UsbTransport::write(const std::uint8_t *bytes, std::size_t length) {
-  return link_ && link_->write(bytes, length);
-}
+bool UsbTransport::write(const std::uint8_t *bytes, std::size_t length) { return link_ && link_->write(bytes, length); }
 
 bool UsbTransport::reopen() {
   link_.reset();
@@ -430,16 +428,12 @@ bool UsbTransport::reopen() {
   return link_ != nullptr;
 }
 
-bool UsbTransport::ask_loader() {
-  return link_ && link_->ask_loader();
-}
+bool UsbTransport::ask_loader() { return link_ && link_->ask_loader(); }
 
 std::vector<pollfd> UsbTransport::poll_descriptors() const {
   return link_ ? link_->poll_descriptors() : std::vector<pollfd>();
 }
 
-std::string UsbTransport::description() const {
-  return link_ ? link_->description() : "usb " + serial_;
-}
+std::string UsbTransport::description() const { return link_ ? link_->description() : "usb " + serial_; }
 
 } // namespace fingertip

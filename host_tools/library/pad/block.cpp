@@ -390,9 +390,7 @@ private:
 
 } // namespace
 
-int block_nodes(double half_mm, double step_mm) {
-  return static_cast<int>(std::ceil(2.0 * half_mm / step_mm)) + 1;
-}
+int block_nodes(double half_mm, double step_mm) { return static_cast<int>(std::ceil(2.0 * half_mm / step_mm)) + 1; }
 
 std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm,
                                      const BlockGrid &grid, const std::function<void(double)> &on_progress) {

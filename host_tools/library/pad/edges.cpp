@@ -29,9 +29,7 @@ struct Contact {
   double estimated_x_mm, estimated_y_mm, estimated_qx, estimated_qy, estimated_force; // the estimate; the last over F
 };
 
-double of(float value) {
-  return static_cast<double>(value);
-}
+double of(float value) { return static_cast<double>(value); }
 
 // Pressure of a layer without end, per newton, with the contact dx, dy away.
 double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, double dy_mm) {
@@ -164,9 +162,7 @@ void put(const Terms &terms, float (&to)[PAD_EDGE_TERMS]) {
   }
 }
 
-double outermost(const float *places, int count) {
-  return of(*std::max_element(places, places + count));
-}
+double outermost(const float *places, int count) { return of(*std::max_element(places, places + count)); }
 
 } // namespace
 

@@ -24,9 +24,7 @@ double youngs_modulus_Pa(double shore_a) {
   return 1e6 * 0.0981 * (56.0 + 7.62336 * shore_a) / (0.137505 * (254.0 - 2.54 * shore_a));
 }
 
-Layer silicone(double thickness_mm) {
-  return {thickness_mm, youngs_modulus_Pa(SHORE_A), POISSON};
-}
+Layer silicone(double thickness_mm) { return {thickness_mm, youngs_modulus_Pa(SHORE_A), POISSON}; }
 
 double base_transfer(double H, double poisson) {
   if (H > H_LARGE) {

@@ -28,9 +28,7 @@ constexpr int H_COUNT = 4000;
 // sum strength_j exp(-(H sd_j)^2 / 2), lengths in thicknesses: strengths first, then the sds.
 using Sum = Eigen::VectorXd;
 
-double wave_number(int i) {
-  return H_STEP * (i + 0.5);
-}
+double wave_number(int i) { return H_STEP * (i + 0.5); }
 
 double gaussian(const Sum &sum, Eigen::Index term, double H) {
   const double sd = sum[sum.size() / 2 + term];
@@ -244,9 +242,7 @@ wire_info own_sensors() {
   return info;
 }
 
-pad_profile profile_over_own_sensors(const Shape &shape) {
-  return profile_of(shape, own_sensors());
-}
+pad_profile profile_over_own_sensors(const Shape &shape) { return profile_of(shape, own_sensors()); }
 
 bool edges_spoil_the_zero(const Shape &shape) {
   return shape.overhang_mm > 0 && shape.overhang_mm < 0.5 * shape.thickness_mm;

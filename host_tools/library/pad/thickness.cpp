@@ -74,13 +74,9 @@ std::optional<Thickness> thickness_of(const calibration &calibration) {
   return thickness_of(1e-3 * calibration.sigma_um, 1e-3 * calibration.sigma_sd_um);
 }
 
-double Thickness::shown_mm() const {
-  return 0.1 * std::round(10.0 * mm);
-}
+double Thickness::shown_mm() const { return 0.1 * std::round(10.0 * mm); }
 
-bool Thickness::agrees_with(double set_mm) const {
-  return std::abs(set_mm - mm) <= AGREES_SDS * sd_mm;
-}
+bool Thickness::agrees_with(double set_mm) const { return std::abs(set_mm - mm) <= AGREES_SDS * sd_mm; }
 
 bool profile_suits(const Thickness &thickness) {
   return thickness.mm >= THINNEST_mm && thickness.mm <= static_cast<double>(PAD_THICKNESS_MAX_mm);

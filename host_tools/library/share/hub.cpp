@@ -44,9 +44,7 @@ Hub::Client Hub::join() {
   return last_client_;
 }
 
-void Hub::leave(Client client) {
-  clients_.erase(client);
-}
+void Hub::leave(Client client) { clients_.erase(client); }
 
 void Hub::from_client(Client client, const std::uint8_t *bytes, std::size_t length, Time now) {
   clients_.at(client).cutter.feed(bytes, length, [&](const Bytes &frame, bool) {
@@ -278,13 +276,9 @@ bool Hub::has_room(const ClientState &state, std::size_t length) const {
   return state.queue.size() - state.taken + length <= queue_bytes_;
 }
 
-Bytes Hub::take_for_line() {
-  return std::exchange(for_line_, {});
-}
+Bytes Hub::take_for_line() { return std::exchange(for_line_, {}); }
 
-bool Hub::take_loader_wish() {
-  return std::exchange(loader_wished_, false);
-}
+bool Hub::take_loader_wish() { return std::exchange(loader_wished_, false); }
 
 const std::uint8_t *Hub::waiting(Client client, std::size_t *length) const {
   const ClientState &state = clients_.at(client);

@@ -36,9 +36,7 @@ constexpr double SIGMA_MIN = 0.158;
 constexpr double SIGMA_MAX = 5.0;
 constexpr double PIVOT_FLOOR = 1e-15; // the resolution of double
 
-double limited(double value, double low, double high) {
-  return value > low ? std::min(value, high) : low;
-}
+double limited(double value, double low, double high) { return value > low ? std::min(value, high) : low; }
 
 // L D L^T with pivots raised to their floor.
 struct Factors {

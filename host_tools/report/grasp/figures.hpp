@@ -8,9 +8,7 @@
 
 namespace fingertip::grasp {
 
-inline double rounded(double value) {
-  return std::round(1e3 * value) / 1e3;
-}
+inline double rounded(double value) { return std::round(1e3 * value) / 1e3; }
 
 inline nlohmann::ordered_json quantile(std::vector<double> values, double share) {
   if (values.empty()) {

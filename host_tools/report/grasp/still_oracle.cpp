@@ -27,9 +27,7 @@ double StillOracle::elastic_N(double drive_mm) const {
   return untouched_.force_at_N(drive_mm + 0.5 * gripper_.backlash_mm);
 }
 
-double StillOracle::error_of(double force_N) const {
-  return reported_ * force_N / trial_.set_N - 1.0;
-}
+double StillOracle::error_of(double force_N) const { return reported_ * force_N / trial_.set_N - 1.0; }
 
 void StillOracle::see(const cell::Moment &moment) {
   const double elastic_N = untouched_.force_at_N(moment.width_mm);
@@ -89,9 +87,7 @@ void StillOracle::choose(double rest_s, double far_mm) {
   }
 }
 
-void StillOracle::take_touch(std::size_t finger, const GripTouch &touch) {
-  touch_[finger] = touch;
-}
+void StillOracle::take_touch(std::size_t finger, const GripTouch &touch) { touch_[finger] = touch; }
 
 GripReport StillOracle::step(double now_s, GripCommand &command) {
   const GripperTraits &traits = gripper_.traits;

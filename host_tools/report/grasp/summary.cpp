@@ -96,9 +96,7 @@ std::string mass_band(double mass_kg) {
   return mass_kg < 0.2 ? "0.1 to 0.2 kg" : mass_kg < 0.45 ? "0.2 to 0.45 kg" : "0.45 to 1 kg";
 }
 
-std::string set_band(double set_N) {
-  return set_N < 4.0 ? "below 4 N" : set_N < 8.0 ? "4 to 8 N" : "8 N and more";
-}
+std::string set_band(double set_N) { return set_N < 4.0 ? "below 4 N" : set_N < 8.0 ? "4 to 8 N" : "8 N and more"; }
 
 ordered_json by(const std::vector<Done> &done, bool still,
                 const std::function<std::vector<std::string>(const Done &)> &names) {

@@ -26,9 +26,7 @@ bool list_record(Record record) {
   return true;
 }
 
-void failed(const char *entry, const char *what) {
-  last_failure = entry + std::string(": ") + what;
-}
+void failed(const char *entry, const char *what) { last_failure = entry + std::string(": ") + what; }
 
 } // namespace fingertip::measure
 

@@ -150,9 +150,7 @@ static void scenario_begin(Batch<const scenario_options, 1> options, std::string
 }
 MEASURE_ENTRY(scenario_begin)
 
-static void scenario_end(std::int64_t number) {
-  scenarios().erase(number);
-}
+static void scenario_end(std::int64_t number) { scenarios().erase(number); }
 MEASURE_ENTRY(scenario_end)
 
 // last_s: how long each act takes.

@@ -40,9 +40,7 @@ twin::EffectValues effects_of(const PadOptions &options) {
   return values;
 }
 
-double noise_of_one_Pa() {
-  return ms58xx_find_osr(OSR)->noise_Pa_q10 / 1024.0;
-}
+double noise_of_one_Pa() { return ms58xx_find_osr(OSR)->noise_Pa_q10 / 1024.0; }
 
 const twin::Indenter &lying_cylinder() {
   static const twin::Indenter cylinder{"cylinder6x12", "", twin::Indenter::Shape::roller, 6, 12, 0, 0.4, 0};

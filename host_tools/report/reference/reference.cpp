@@ -123,9 +123,7 @@ void hold_at_box(const Box &box, const Vector4 &theta, const Vector4 &gradient, 
   }
 }
 
-Vector4 into_box(const Box &box, const Vector4 &theta) {
-  return theta.cwiseMax(box.low).cwiseMin(box.high);
-}
+Vector4 into_box(const Box &box, const Vector4 &theta) { return theta.cwiseMax(box.low).cwiseMin(box.high); }
 
 Vector4 levenberg_marquardt(const std::vector<Sample> &samples, const Box &box, Vector4 theta) {
   double lambda = 1e-4;
@@ -238,9 +236,7 @@ Box box_of(const Array &array) {
 
 } // namespace
 
-bool observable(const Fit &fit) {
-  return fit.location_sd_mm < 0.5 && fit.condition_number < 1e12;
-}
+bool observable(const Fit &fit) { return fit.location_sd_mm < 0.5 && fit.condition_number < 1e12; }
 
 Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_t usable, double noise_Pa,
         const std::vector<Parameters> &starts, Starts effort) {

@@ -19,9 +19,7 @@ constexpr double SPREAD_LEAST = 0.3; // of the narrowest term's variance, below 
 constexpr double SPREAD_MOST = 2.0;  // of the widest term's
 
 // Standard deviations add as in the firmware: the longer and three eighths of the shorter.
-double together(double a, double b) {
-  return std::max(a, b) + 0.375 * std::min(a, b);
-}
+double together(double a, double b) { return std::max(a, b) + 0.375 * std::min(a, b); }
 
 struct Reading {
   const pad_profile &profile;

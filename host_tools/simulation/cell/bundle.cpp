@@ -12,9 +12,7 @@ namespace {
 using twin::HeldObject;
 
 // Q / (mu F) over x / d.
-double mindlin(double share) {
-  return 1.0 - std::pow(1.0 - share, 1.5);
-}
+double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
 
 } // namespace
 

@@ -76,9 +76,7 @@ void Cell::press(double seconds, double width_mm) {
   force_N_ = std::clamp(elastic - loss_N, 0.0, elastic);
 }
 
-Vector Cell::arm() const {
-  return turned(object_.com_mm, turn_rad_);
-}
+Vector Cell::arm() const { return turned(object_.com_mm, turn_rad_); }
 
 Vector Cell::way_mm() const {
   const Vector to = arm();

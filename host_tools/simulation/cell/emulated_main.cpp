@@ -52,9 +52,7 @@ Scene scene_of(const Options &options) {
 }
 
 // Reads from the standard input; false: it has ended.
-bool read_whole(void *to, std::size_t length) {
-  return std::fread(to, 1, length, stdin) == length;
-}
+bool read_whole(void *to, std::size_t length) { return std::fread(to, 1, length, stdin) == length; }
 
 template <typename Value> Value next() {
   Value value;

@@ -246,8 +246,6 @@ std::string World::cells() const {
   return text;
 }
 
-std::vector<std::string> World::take_events() {
-  return std::exchange(events_, {});
-}
+std::vector<std::string> World::take_events() { return std::exchange(events_, {}); }
 
 } // namespace fingertip::cell

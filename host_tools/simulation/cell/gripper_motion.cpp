@@ -56,9 +56,7 @@ double GripperMotion::nearest_step_mm(double width_mm) const {
   return std::clamp(std::round(width_mm / traits.step_mm) * traits.step_mm, 0.0, traits.stroke_mm);
 }
 
-double GripperMotion::reported_width_mm() const {
-  return nearest_step_mm(drive_mm_);
-}
+double GripperMotion::reported_width_mm() const { return nearest_step_mm(drive_mm_); }
 
 void GripperMotion::activate() {
   commands_.clear();

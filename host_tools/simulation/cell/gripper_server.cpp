@@ -237,9 +237,7 @@ GripperServer::GripperServer(GripperMotion &motion, const Options &options)
 
 GripperServer::~GripperServer() = default;
 
-void GripperServer::trouble(const LineTrouble &trouble) {
-  trouble_ = trouble;
-}
+void GripperServer::trouble(const LineTrouble &trouble) { trouble_ = trouble; }
 
 void GripperServer::power(bool on) {
   if (power_ != on) {
@@ -248,9 +246,7 @@ void GripperServer::power(bool on) {
   power_ = on;
 }
 
-void GripperServer::fail(std::uint8_t fault) {
-  slave_->fail(fault);
-}
+void GripperServer::fail(std::uint8_t fault) { slave_->fail(fault); }
 
 void GripperServer::take() {
   Bytes frame;

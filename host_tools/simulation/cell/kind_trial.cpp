@@ -30,9 +30,7 @@ constexpr double JOINED_s = 0.03, MORE_FORCE = 1.05, AFTER_s = 1.0;
 constexpr double SWINGS_mm = 0.05; // a width that turns by less makes no difference
 constexpr double HUNTS_s = 0.5;
 
-std::uint64_t in_us(double s) {
-  return static_cast<std::uint64_t>(std::llround(1e6 * s));
-}
+std::uint64_t in_us(double s) { return static_cast<std::uint64_t>(std::llround(1e6 * s)); }
 
 // The reports of one fingertip.
 class Tip {

@@ -46,16 +46,10 @@ double way_of(double t) {
   t = std::clamp(t, 0.0, 1.0);
   return t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
 }
-double speed_of(double t) {
-  return t <= 0.0 || t >= 1.0 ? 0.0 : 30.0 * t * t * (1.0 - t) * (1.0 - t);
-}
-double acceleration_of(double t) {
-  return t <= 0.0 || t >= 1.0 ? 0.0 : 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t);
-}
+double speed_of(double t) { return t <= 0.0 || t >= 1.0 ? 0.0 : 30.0 * t * t * (1.0 - t) * (1.0 - t); }
+double acceleration_of(double t) { return t <= 0.0 || t >= 1.0 ? 0.0 : 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t); }
 
-double draw(Random &random, const Range &range) {
-  return random.uniform(range.low, range.high);
-}
+double draw(Random &random, const Range &range) { return random.uniform(range.low, range.high); }
 
 Event draw_event(Random &random, const Ranges &ranges, double begin_s, bool calm) {
   Event event{};

@@ -337,8 +337,6 @@ void check(const LiftOptions &options) {
   }
 }
 
-void lift(const LiftOptions &options, const Place &place) {
-  Lift(options, place).run();
-}
+void lift(const LiftOptions &options, const Place &place) { Lift(options, place).run(); }
 
 } // namespace fingertip::cell

@@ -11,9 +11,7 @@ namespace {
 constexpr double PER_M = 1e3;
 constexpr double TABLE_N_mm = 20.0, TABLE_DAMPING = 0.3;
 
-double size_of(const Vector &v) {
-  return std::hypot(v.x, v.y);
-}
+double size_of(const Vector &v) { return std::hypot(v.x, v.y); }
 
 } // namespace
 

@@ -25,9 +25,7 @@ Plate::Plate(const twin::Layer &layer, double half_x_mm, double half_y_mm)
   stiffness_N_mm_ = layer.youngs_modulus_Pa / PA_PER_MPA * mean_ * area_mm2 / thickness_mm_;
 }
 
-double Plate::radius_mm() const {
-  return std::sqrt(4.0 * half_x_mm_ * half_y_mm_ / M_PI);
-}
+double Plate::radius_mm() const { return std::sqrt(4.0 * half_x_mm_ * half_y_mm_ / M_PI); }
 
 double Plate::squeezed(double x_mm, double y_mm) const {
   double sum = 0.0;
@@ -53,12 +51,8 @@ double Plate::edge_Pa_N(double half_mm, double at_mm) const {
   return 0.5 * thickness_mm_ * std::sinh(rate * at_mm) / moment;
 }
 
-double Plate::along_x_Pa_N(double x_mm) const {
-  return PA_PER_MPA * edge_Pa_N(half_x_mm_, x_mm) / (2.0 * half_y_mm_);
-}
+double Plate::along_x_Pa_N(double x_mm) const { return PA_PER_MPA * edge_Pa_N(half_x_mm_, x_mm) / (2.0 * half_y_mm_); }
 
-double Plate::along_y_Pa_N(double y_mm) const {
-  return PA_PER_MPA * edge_Pa_N(half_y_mm_, y_mm) / (2.0 * half_x_mm_);
-}
+double Plate::along_y_Pa_N(double y_mm) const { return PA_PER_MPA * edge_Pa_N(half_y_mm_, y_mm) / (2.0 * half_x_mm_); }
 
 } // namespace fingertip::cell

@@ -28,9 +28,7 @@ constexpr double LIFTED_N = 0.005;
 constexpr double PERIOD_s = RESTS_s + SETS_DOWN_s + HOLDS_s + SETS_DOWN_s;
 
 // 0 to 1 within 0 to 1, smooth at both ends.
-double smooth(double share) {
-  return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
-}
+double smooth(double share) { return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0)); }
 
 // The van der Corput sequence, 0 to 1: evenly spread for any count.
 double spread(std::uint64_t number, unsigned base) {

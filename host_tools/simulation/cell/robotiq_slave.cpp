@@ -95,9 +95,7 @@ std::array<std::uint16_t, REGISTERS> RobotiqSlave::status() const {
       static_cast<std::uint16_t>(count << 8 | current)};
 }
 
-void RobotiqSlave::answered() {
-  silence_ = false;
-}
+void RobotiqSlave::answered() { silence_ = false; }
 
 void RobotiqSlave::lose_power() {
   command_ = done_ = {};

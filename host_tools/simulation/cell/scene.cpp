@@ -59,9 +59,7 @@ Disturbance draw_disturbance(Random &random, double begin_s) {
 }
 
 // A turn of the hand's frame that has its first axis point upwards.
-double upwards_rad(const Grasp &grasp) {
-  return grasp.down_rad + M_PI;
-}
+double upwards_rad(const Grasp &grasp) { return grasp.down_rad + M_PI; }
 
 } // namespace
 

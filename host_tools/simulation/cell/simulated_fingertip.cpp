@@ -52,9 +52,7 @@ const Model &model_of(double layer_mm) {
 
 } // namespace
 
-double speed_of(const ::motion &motion) {
-  return static_cast<double>(std::hypot(motion.vx_mm_s, motion.vy_mm_s));
-}
+double speed_of(const ::motion &motion) { return static_cast<double>(std::hypot(motion.vx_mm_s, motion.vy_mm_s)); }
 
 struct SimulatedFingertip::Firmware {
   fit_array array;

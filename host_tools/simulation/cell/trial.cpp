@@ -22,9 +22,7 @@ constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
 constexpr double SAMPLED_s = 2e-3, NEAR = 0.1;
 constexpr double SWINGS_mm = 0.02; // a move that counts
 
-std::int64_t in_us(double s) {
-  return std::llround(1e6 * s);
-}
+std::int64_t in_us(double s) { return std::llround(1e6 * s); }
 
 // Begins in no state.
 Fault never() {
@@ -33,9 +31,7 @@ Fault never() {
   return fault;
 }
 
-bool holds(const GripReport &report) {
-  return report.state == GRIP_HOLDING || report.state == GRIP_SLIPPING;
-}
+bool holds(const GripReport &report) { return report.state == GRIP_HOLDING || report.state == GRIP_SLIPPING; }
 
 // A force that is to be held.
 class SetPoint {

@@ -55,13 +55,9 @@ std::vector<Mark> template_marks() {
   return marks;
 }
 
-std::string text_of(double value) {
-  return shortest(static_cast<float>(value));
-}
+std::string text_of(double value) { return shortest(static_cast<float>(value)); }
 
-double smooth(double share) {
-  return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
-}
+double smooth(double share) { return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0)); }
 
 } // namespace
 

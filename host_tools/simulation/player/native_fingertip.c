@@ -13,17 +13,11 @@
 static struct app app;
 static struct sim_array array;
 
-static void on_event(void *context) {
-  app_on_event(context);
-}
+static void on_event(void *context) { app_on_event(context); }
 
-static void main_round(void *context) {
-  app_run(context);
-}
+static void main_round(void *context) { app_run(context); }
 
-static uint64_t bus_next_us(const void *context) {
-  return sim_array_next_event_us(context);
-}
+static uint64_t bus_next_us(const void *context) { return sim_array_next_event_us(context); }
 
 bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   native_start(false);
@@ -58,6 +52,4 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
 #endif
 }
 
-bool native_fingertip_run_until(uint64_t t_us) {
-  return native_run_until(t_us, main_round, &app) == NATIVE_TIME_UP;
-}
+bool native_fingertip_run_until(uint64_t t_us) { return native_run_until(t_us, main_round, &app) == NATIVE_TIME_UP; }

@@ -38,9 +38,7 @@ bool repeat_begin(const struct wire_info *info) {
   return true;
 }
 
-void repeat_tare(void) {
-  condition_tare(&app.stages.condition.condition);
-}
+void repeat_tare(void) { condition_tare(&app.stages.condition.condition); }
 
 void repeat_frame(const struct wire_packet *packet, bool held, struct wire_contact *contact) {
   const struct wire_raw *raw = &packet->body.raw;

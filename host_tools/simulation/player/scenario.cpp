@@ -35,9 +35,7 @@ double number(const char *begin, const char *end) {
   return error == std::errc() && stop == end ? value : std::nan("");
 }
 
-double number(const std::string &text) {
-  return number(text.data(), text.data() + text.size());
-}
+double number(const std::string &text) { return number(text.data(), text.data() + text.size()); }
 
 } // namespace
 

@@ -37,9 +37,7 @@ enum Stream : std::uint64_t {
   SCREW
 };
 
-inline double milliseconds(double seconds) {
-  return 1e-3 * std::round(1e3 * seconds);
-}
+inline double milliseconds(double seconds) { return 1e-3 * std::round(1e3 * seconds); }
 
 // Puts episodes one after the other.
 class Stage {

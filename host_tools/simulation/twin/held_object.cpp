@@ -10,9 +10,7 @@ namespace {
 constexpr double mN_PER_N = 1e3; // and mm/s2 per m/s2
 
 // Q / (mu F) over x / d.
-double mindlin(double share) {
-  return 1.0 - std::pow(1.0 - share, 1.5);
-}
+double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
 
 } // namespace
 
@@ -29,9 +27,7 @@ HeldObject::HeldObject(double mass_kg, double friction, double kinetic_share)
   }
 }
 
-double HeldObject::friction() const {
-  return kinetic_ + (static_ - kinetic_) * rested_;
-}
+double HeldObject::friction() const { return kinetic_ + (static_ - kinetic_) * rested_; }
 
 void HeldObject::step(double seconds, double force_N, double stiffness_N_mm, double load_N) {
   const double holds_N = friction() * force_N;

@@ -79,9 +79,7 @@ double Indenter::profile_mm(double x_mm, double y_mm) const {
   return NOTHING_mm;
 }
 
-double Indenter::reach_mm() const {
-  return 0.5 * std::max(size_x_mm, size_y_mm);
-}
+double Indenter::reach_mm() const { return 0.5 * std::max(size_x_mm, size_y_mm); }
 
 const std::vector<Indenter> &indenters() {
   static const std::vector<Indenter> all = make();

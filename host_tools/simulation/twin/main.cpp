@@ -51,9 +51,7 @@ void catch_signals() {
   }
 }
 
-std::string number(double value) {
-  return shortest(static_cast<float>(value));
-}
+std::string number(double value) { return shortest(static_cast<float>(value)); }
 
 // Throws Error once a signal asked for the end.
 void show(ProgressBar &bar, double share) {

@@ -197,9 +197,7 @@ void metadata(Text &text, const std::string &key, const std::string &value) {
   text << "# " << key << ": " << value << "\n";
 }
 
-std::string number(double value) {
-  return shortest(static_cast<float>(value));
-}
+std::string number(double value) { return shortest(static_cast<float>(value)); }
 
 std::string list(const std::vector<double> &values, double factor, int digits) {
   std::string text;
@@ -209,9 +207,7 @@ std::string list(const std::vector<double> &values, double factor, int digits) {
   return text;
 }
 
-std::string file_name(const std::string &path) {
-  return std::filesystem::path(path).filename().string();
-}
+std::string file_name(const std::string &path) { return std::filesystem::path(path).filename().string(); }
 
 const ScenarioKind &kind_of(const Scenario &scenario) {
   return *std::find_if(scenario_kinds().begin(), scenario_kinds().end(),

@@ -23,9 +23,7 @@ constexpr std::array<double, 5> SLIP_SPEEDS_mm_s{20, 50, 100, 150, 200}; // the 
 constexpr std::array<double, 3> ROLL_SPEEDS_mm_s{10, 25, 50};
 constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
 
-std::string number(double value) {
-  return shortest(static_cast<float>(value));
-}
+std::string number(double value) { return shortest(static_cast<float>(value)); }
 
 // Press, hold and let go at one place.
 Episode press(const std::string &name, Place place, double force_N, double ramp_s, double hold_s) {
@@ -78,13 +76,9 @@ Episode random_press(const Stage &stage, std::size_t n, const std::string &name,
   return press(name, place, force_N, ramps_s, hold_s);
 }
 
-Episode tap(const Stage &stage, std::size_t n) {
-  return random_press(stage, n, "tap", 0.12, 0.3);
-}
+Episode tap(const Stage &stage, std::size_t n) { return random_press(stage, n, "tap", 0.12, 0.3); }
 
-Episode high(const Stage &stage, std::size_t n) {
-  return random_press(stage, n, "hold", 0.5, 0.6);
-}
+Episode high(const Stage &stage, std::size_t n) { return random_press(stage, n, "hold", 0.5, 0.6); }
 
 // A weight is set down by hand, rests by itself and is lifted.
 Episode placement(const Stage &stage, std::size_t n) {
@@ -418,9 +412,7 @@ double Forces::pick(std::size_t turn, double random_share) const {
   return range_ ? values_[0] + random_share * (values_[1] - values_[0]) : values_[turn % values_.size()];
 }
 
-double Forces::largest() const {
-  return *std::max_element(values_.begin(), values_.end());
-}
+double Forces::largest() const { return *std::max_element(values_.begin(), values_.end()); }
 
 Range::Range(const std::string &option, const std::string &text) {
   const std::size_t dots = text.find("..");

@@ -46,9 +46,7 @@ Transform::~Transform() {
   fftw_free(plans_->spectrum);
 }
 
-std::size_t Transform::waves() const {
-  return std::size_t(nodes_) * std::size_t(nodes_ / 2 + 1);
-}
+std::size_t Transform::waves() const { return std::size_t(nodes_) * std::size_t(nodes_ / 2 + 1); }
 
 template <typename Response>
 const double *Transform::apply_any(const std::vector<double> &field, const Response &response) {

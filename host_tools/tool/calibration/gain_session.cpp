@@ -17,9 +17,7 @@ namespace {
 
 constexpr double Q10 = 1024.0;
 
-std::string percent(double share) {
-  return fixed(100.0 * share, 1) + " %";
-}
+std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
 
 double mean_zero_Pa(const Frame &frame) {
   double sum_Pa = 0.0, count = 0.0;

@@ -11,9 +11,7 @@ using Eigen::VectorXd;
 double huber(double square) {
   return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER;
 }
-double huber_weight(double square) {
-  return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square);
-}
+double huber_weight(double square) { return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square); }
 
 Model::Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions)
     : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements), assumed_(assumptions) {

@@ -25,9 +25,7 @@ constexpr double SWAY_NOISES = 2.5;
 
 } // namespace
 
-PlacementFinder::PlacementFinder(std::size_t sensors) : sensors_(sensors) {
-  restart();
-}
+PlacementFinder::PlacementFinder(std::size_t sensors) : sensors_(sensors) { restart(); }
 
 void PlacementFinder::restart() {
   state_ = State::resting;

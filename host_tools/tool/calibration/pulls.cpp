@@ -38,13 +38,9 @@ template <typename Iterator> Mean mean_of(Iterator begin, Iterator end) {
   return of;
 }
 
-double place_mm(const PullFrame &a, const PullFrame &b) {
-  return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm);
-}
+double place_mm(const PullFrame &a, const PullFrame &b) { return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm); }
 
-double size_of(const Pull &pull) {
-  return std::hypot(pull.qx_N, pull.qy_N);
-}
+double size_of(const Pull &pull) { return std::hypot(pull.qx_N, pull.qy_N); }
 
 /* 0 to 3: +x, +y, -x, -y. */
 std::size_t way_of(const Pull &pull) {

@@ -15,9 +15,7 @@ namespace fingertip {
 namespace {
 
 /* The letters of a word that may be mistyped: two that change places count as two. */
-constexpr std::size_t letters_mistyped(std::size_t letters) {
-  return letters < 6 ? 1 : 2;
-}
+constexpr std::size_t letters_mistyped(std::size_t letters) { return letters < 6 ? 1 : 2; }
 
 /* Letters to put in, take out or change, to make one word of the other; many for long words. */
 std::size_t letters_apart(const std::string &one, const std::string &other) {

@@ -18,9 +18,7 @@ namespace {
 using Kind = PacketFile::Item::Kind;
 using Count = unsigned long long;
 
-bool is_frame(const wire_packet &packet) {
-  return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
-}
+bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
 
 /* That a recording has a place for. */
 bool is_kept(const wire_packet &packet) {

@@ -18,16 +18,12 @@ inline constexpr Colour WARNING = {250, 190, 60};
 inline constexpr Colour BAD = {255, 84, 84};
 inline constexpr Colour ACCENT = {96, 190, 255};
 
-constexpr Style text_style(Colour colour, bool bold = false) {
-  return {colour, std::nullopt, bold};
-}
+constexpr Style text_style(Colour colour, bool bold = false) { return {colour, std::nullopt, bold}; }
 
 struct Area {
   int left, top, width, height;
 };
 
-inline std::string number(float value, int digits) {
-  return fixed(static_cast<double>(value), digits);
-}
+inline std::string number(float value, int digits) { return fixed(static_cast<double>(value), digits); }
 
 } // namespace fingertip

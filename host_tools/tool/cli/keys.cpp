@@ -103,8 +103,6 @@ bool Confirmation::answer(Key key, KeyTime now) {
   return yes;
 }
 
-void Confirmation::expire(KeyTime now) {
-  asked_ = asked_ && now - since_ <= PATIENCE;
-}
+void Confirmation::expire(KeyTime now) { asked_ = asked_ && now - since_ <= PATIENCE; }
 
 } // namespace fingertip

@@ -14,9 +14,7 @@ namespace {
 constexpr std::uint32_t CAN_BOTH = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_RAW_STREAM;
 
 /* A raw packet follows each contact packet. */
-bool raw_expected(const wire_info &info) {
-  return (info.capabilities & CAN_BOTH) == CAN_BOTH;
-}
+bool raw_expected(const wire_info &info) { return (info.capabilities & CAN_BOTH) == CAN_BOTH; }
 
 Metadata begun(const Metadata &extra = {}) {
   Metadata all = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};

@@ -164,13 +164,9 @@ bool Model::is_late(const std::optional<std::uint64_t> &at_us) const {
   return at_us && last_us_ - *at_us <= SLIP_SHOWN_us;
 }
 
-bool Model::estimates_tangential() const {
-  return info_ && (info_->capabilities & WIRE_CAPABILITY_TANGENTIAL);
-}
+bool Model::estimates_tangential() const { return info_ && (info_->capabilities & WIRE_CAPABILITY_TANGENTIAL); }
 
-bool Model::has_pad() const {
-  return estimates_tangential() && (info_->stored & WIRE_STORED_PAD);
-}
+bool Model::has_pad() const { return estimates_tangential() && (info_->stored & WIRE_STORED_PAD); }
 
 std::optional<double> Model::seconds_since_frame() const {
   if (!last_arrival_) {

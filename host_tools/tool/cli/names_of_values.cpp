@@ -29,8 +29,6 @@ std::string present_text(std::uint32_t present, std::uint8_t sensor_count) {
          (missing ? ", missing: " + sensors_text(missing) : "");
 }
 
-std::string rate_text(std::uint32_t rate_mHz) {
-  return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max";
-}
+std::string rate_text(std::uint32_t rate_mHz) { return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max"; }
 
 } // namespace fingertip

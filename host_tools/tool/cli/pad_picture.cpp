@@ -40,9 +40,7 @@ Colour heat(float part) {
   return mix(stops[below], stops[below + 1], at - static_cast<float>(below));
 }
 
-float heat_part(float pressure_Pa) {
-  return std::sqrt(std::max(pressure_Pa, 0.0f) / FULL_SCALE_Pa);
-}
+float heat_part(float pressure_Pa) { return std::sqrt(std::max(pressure_Pa, 0.0f) / FULL_SCALE_Pa); }
 
 bool is_bright(const std::optional<Colour> &colour) {
   return colour && colour->r * 3 + colour->g * 6 + colour->b > 1300;
@@ -356,9 +354,7 @@ void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
 }
 
 /* A mark covers no number. */
-bool is_free(const Canvas::Cell &cell) {
-  return cell.halves || cell.character == " ";
-}
+bool is_free(const Canvas::Cell &cell) { return cell.halves || cell.character == " "; }
 
 } // namespace
 

@@ -19,9 +19,7 @@ constexpr double SHORT_WAY_us = 5e6, LONG_WAY_us = 60e6;
 constexpr double MARKS_us = 10e6;
 constexpr double END = std::numeric_limits<double>::infinity();
 
-bool is_frame(const wire_packet &packet) {
-  return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
-}
+bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
 
 } // namespace
 

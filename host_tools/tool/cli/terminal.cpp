@@ -34,9 +34,7 @@ void on_stop(int signal) {
     end_signal = signal;
   }
 }
-void on_suspend(int signal) {
-  suspend_signal = signal;
-}
+void on_suspend(int signal) { suspend_signal = signal; }
 
 void handle(int signal, void (*handler)(int)) {
   struct sigaction action = {};
@@ -92,17 +90,11 @@ bool wait_for_standard_output() {
   return true;
 }
 
-bool stop_requested() {
-  return stop_signal != 0;
-}
+bool stop_requested() { return stop_signal != 0; }
 
-unsigned interrupts() {
-  return interrupt_count;
-}
+unsigned interrupts() { return interrupt_count; }
 
-bool end_requested() {
-  return end_signal != 0;
-}
+bool end_requested() { return end_signal != 0; }
 
 std::optional<ColourDepth> screen_depth(ColourMode mode) {
   const char *term = std::getenv("TERM");
@@ -172,12 +164,8 @@ void Screen::leave() {
   }
 }
 
-int Screen::columns() const {
-  return window().ws_col;
-}
-int Screen::rows() const {
-  return window().ws_row;
-}
+int Screen::columns() const { return window().ws_col; }
+int Screen::rows() const { return window().ws_row; }
 
 void Screen::draw(const Canvas &canvas) {
   if (suspend_signal) {

@@ -226,13 +226,9 @@ std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip) {
   return std::make_unique<GraspLineView>(grip, true);
 }
 
-std::unique_ptr<View> make_progress_view() {
-  return std::make_unique<ProgressView>();
-}
+std::unique_ptr<View> make_progress_view() { return std::make_unique<ProgressView>(); }
 
-std::unique_ptr<View> make_state_view() {
-  return std::make_unique<StateView>();
-}
+std::unique_ptr<View> make_state_view() { return std::make_unique<StateView>(); }
 
 std::string summary_text(const Model &model) {
   const LineStatistics &line = model.statistics();

@@ -146,9 +146,7 @@ std::string crash_text(const Crash &crash) {
   }
 }
 
-double event_age_s(const crash_record &record, unsigned event) {
-  return record.event_ages_1024us[event] * 1024e-6;
-}
+double event_age_s(const crash_record &record, unsigned event) { return record.event_ages_1024us[event] * 1024e-6; }
 
 std::string events_text(const crash_record &record) {
   std::string text;

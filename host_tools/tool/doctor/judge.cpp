@@ -72,9 +72,7 @@ std::vector<unsigned> sensors_in(std::uint32_t bitmap) {
   return sensors;
 }
 
-std::string percent(double share) {
-  return fixed(100 * share, share < 0.1 ? 1 : 0) + " %";
-}
+std::string percent(double share) { return fixed(100 * share, share < 0.1 ? 1 : 0) + " %"; }
 
 std::string count(std::uint64_t number, const std::string &what) {
   return std::to_string(number) + " " + what + (number == 1 ? "" : "s");
@@ -608,9 +606,7 @@ private:
 
 } // namespace
 
-std::vector<Finding> judge(const Facts &facts) {
-  return Judge(facts).findings();
-}
+std::vector<Finding> judge(const Facts &facts) { return Judge(facts).findings(); }
 
 Verdict worst_of(const std::vector<Finding> &findings) {
   Verdict worst = Verdict::ok;

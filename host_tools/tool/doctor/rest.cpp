@@ -15,9 +15,7 @@ constexpr std::size_t COMPANY_MIN = 5;
  */
 constexpr double NOISE_OF_MEDIAN_STEP = 1.4826 / 1.41421356;
 
-bool has(std::uint32_t bitmap, unsigned sensor) {
-  return (bitmap >> sensor & 1u) != 0;
-}
+bool has(std::uint32_t bitmap, unsigned sensor) { return (bitmap >> sensor & 1u) != 0; }
 
 double median(std::vector<double> values) {
   auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -98,9 +96,7 @@ void RestMeter::add(const wire_packet &packet) {
   readings_.push_back(reading);
 }
 
-double RestMeter::seconds() const {
-  return any_ ? static_cast<double>(last_us_ - first_us_) * 1e-6 : 0;
-}
+double RestMeter::seconds() const { return any_ ? static_cast<double>(last_us_ - first_us_) * 1e-6 : 0; }
 
 /* From each reading to the next, [reading - 1]. */
 std::vector<double> RestMeter::steps_together() const {

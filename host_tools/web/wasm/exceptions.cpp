@@ -128,9 +128,7 @@ void *__cxa_allocate_exception(std::size_t size) {
   return exception->object();
 }
 
-void __cxa_free_exception(void *object) {
-  std::free(Exception::of(object));
-}
+void __cxa_free_exception(void *object) { std::free(Exception::of(object)); }
 
 [[noreturn]] void __cxa_throw(void *object, std::type_info *type, void *(*destroy)(void *)) {
   Exception *exception = Exception::of(object);
@@ -139,9 +137,7 @@ void __cxa_free_exception(void *object) {
   fly(exception);
 }
 
-[[noreturn]] void _Unwind_Resume(void *exception) {
-  fly(static_cast<Exception *>(exception));
-}
+[[noreturn]] void _Unwind_Resume(void *exception) { fly(static_cast<Exception *>(exception)); }
 
 void *__cxa_begin_catch(void *object) {
   auto *exception = static_cast<Exception *>(object);
@@ -154,9 +150,7 @@ void *__cxa_begin_catch(void *object) {
   return exception->object();
 }
 
-void *__cxa_get_exception_ptr(void *exception) {
-  return static_cast<Exception *>(exception)->object();
-}
+void *__cxa_get_exception_ptr(void *exception) { return static_cast<Exception *>(exception)->object(); }
 
 void __cxa_end_catch() {
   Exception *exception = handled;

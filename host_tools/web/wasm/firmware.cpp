@@ -41,12 +41,8 @@ public:
 
 Rows rows;
 
-double pressure_of_rows_Pa(void *, unsigned sensor, std::uint64_t t_us) {
-  return rows.pressure_Pa(sensor, t_us);
-}
-double temperature_of_rows_degC(void *, unsigned, std::uint64_t t_us) {
-  return rows.temperature_degC(t_us);
-}
+double pressure_of_rows_Pa(void *, unsigned sensor, std::uint64_t t_us) { return rows.pressure_Pa(sensor, t_us); }
+double temperature_of_rows_degC(void *, unsigned, std::uint64_t t_us) { return rows.temperature_degC(t_us); }
 
 std::vector<std::uint8_t> file;
 std::string errors;
@@ -55,9 +51,7 @@ std::vector<std::uint8_t> pad_command;
 // The fields of World's Truth; contact and slips are 0 or 1.
 double truth[8];
 
-double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) {
-  return world->pressure_Pa(sensor, t_us);
-}
+double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) { return world->pressure_Pa(sensor, t_us); }
 
 std::uint8_t line[NATIVE_CDC_TRANSMIT_BYTES];
 std::uint8_t kept[NATIVE_FLASH_BYTES];
@@ -70,34 +64,18 @@ char serial[17] = "0000000000000001";
 using namespace fingertip;
 using namespace fingertip::web;
 
-EXPORT(sensor_count) unsigned sensor_count() {
-  return geometry.sensor_count;
-}
-EXPORT(sensor_x_mm) float sensor_x_mm(unsigned sensor) {
-  return geometry.x_mm[sensor];
-}
-EXPORT(sensor_y_mm) float sensor_y_mm(unsigned sensor) {
-  return geometry.y_mm[sensor];
-}
+EXPORT(sensor_count) unsigned sensor_count() { return geometry.sensor_count; }
+EXPORT(sensor_x_mm) float sensor_x_mm(unsigned sensor) { return geometry.x_mm[sensor]; }
+EXPORT(sensor_y_mm) float sensor_y_mm(unsigned sensor) { return geometry.y_mm[sensor]; }
 
 // Makes room for a scenario of count rows; fill them in by the next three.
-EXPORT(rows_begin) void rows_begin(unsigned count, double ambient_Pa) {
-  rows.resize(count, ambient_Pa);
-}
-EXPORT(rows_times) double *rows_times() {
-  return rows.times_s();
-}
-EXPORT(rows_pressures) float *rows_pressures() {
-  return rows.pressures_Pa();
-}
-EXPORT(rows_temperatures) float *rows_temperatures() {
-  return rows.temperatures_degC();
-}
+EXPORT(rows_begin) void rows_begin(unsigned count, double ambient_Pa) { rows.resize(count, ambient_Pa); }
+EXPORT(rows_times) double *rows_times() { return rows.times_s(); }
+EXPORT(rows_pressures) float *rows_pressures() { return rows.pressures_Pa(); }
+EXPORT(rows_temperatures) float *rows_temperatures() { return rows.temperatures_degC(); }
 
 // [16] hexadecimal digits, to be set before power-up.
-EXPORT(serial_number) char *serial_number() {
-  return serial;
-}
+EXPORT(serial_number) char *serial_number() { return serial; }
 // Room for the file of objects and for the errors of the pad as text (twin::parse_effects), to be
 // filled in; then the world is made of both.
 EXPORT(objects_begin) std::uint8_t *objects_begin(unsigned bytes) {
@@ -116,31 +94,17 @@ EXPORT(world_begin) void world_begin(double seed) {
   file = {};
 }
 // The command that sets the firmware's pad profile.
-EXPORT(pad_command_at) const std::uint8_t *pad_command_at() {
-  return pad_command.data();
-}
-EXPORT(pad_command_bytes) unsigned pad_command_bytes() {
-  return static_cast<unsigned>(pad_command.size());
-}
-EXPORT(world_choose) void world_choose(unsigned object) {
-  world->choose(object);
-}
-EXPORT(world_press) void world_press(double x_mm, double y_mm, double force_N) {
-  world->press(x_mm, y_mm, force_N);
-}
+EXPORT(pad_command_at) const std::uint8_t *pad_command_at() { return pad_command.data(); }
+EXPORT(pad_command_bytes) unsigned pad_command_bytes() { return static_cast<unsigned>(pad_command.size()); }
+EXPORT(world_choose) void world_choose(unsigned object) { world->choose(object); }
+EXPORT(world_press) void world_press(double x_mm, double y_mm, double force_N) { world->press(x_mm, y_mm, force_N); }
 EXPORT(world_hold)
 void world_hold(double x_mm, double y_mm, double force_N, double load_N, double angle_rad) {
   world->hold(x_mm, y_mm, force_N, load_N, angle_rad);
 }
-EXPORT(world_drop) void world_drop(double x_mm, double y_mm, double mass_kg) {
-  world->drop(x_mm, y_mm, mass_kg);
-}
-EXPORT(world_lift) void world_lift() {
-  world->lift();
-}
-EXPORT(world_friction) void world_friction(double friction) {
-  world->set_friction(friction);
-}
+EXPORT(world_drop) void world_drop(double x_mm, double y_mm, double mass_kg) { world->drop(x_mm, y_mm, mass_kg); }
+EXPORT(world_lift) void world_lift() { world->lift(); }
+EXPORT(world_friction) void world_friction(double friction) { world->set_friction(friction); }
 EXPORT(world_truth) const double *world_truth() {
   const Truth &now = world->truth();
   const double values[] = {now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N, now.qx_N,
@@ -150,15 +114,9 @@ EXPORT(world_truth) const double *world_truth() {
 }
 
 // What it keeps without power: to be filled in before power-up where keeps is 1, read at any time.
-EXPORT(flash_to_start_with) std::uint8_t *flash_to_start_with() {
-  return kept;
-}
-EXPORT(flash_now) std::uint8_t *flash_now() {
-  return native_flash.bytes;
-}
-EXPORT(flash_bytes) unsigned flash_bytes() {
-  return NATIVE_FLASH_BYTES;
-}
+EXPORT(flash_to_start_with) std::uint8_t *flash_to_start_with() { return kept; }
+EXPORT(flash_now) std::uint8_t *flash_now() { return native_flash.bytes; }
+EXPORT(flash_bytes) unsigned flash_bytes() { return NATIVE_FLASH_BYTES; }
 
 // Sets the pad profile from the start on, without storing it, from the command of length bytes in
 // line_bytes. 1: it is no such command.
@@ -187,30 +145,14 @@ void power_up(double seed, double noise, double prom_spread, int parallel_bus, i
   (void)native_fingertip_start(&settings); // this scene refuses nothing
 }
 // Imports fingertip.leave where the firmware ends itself.
-EXPORT(run_until) void run_until(double t_us) {
-  (void)native_fingertip_run_until(static_cast<std::uint64_t>(t_us));
-}
+EXPORT(run_until) void run_until(double t_us) { (void)native_fingertip_run_until(static_cast<std::uint64_t>(t_us)); }
 
-EXPORT(line_open) void line_open() {
-  native_cdc_open();
-}
-EXPORT(line_close) void line_close() {
-  native_cdc_close();
-}
+EXPORT(line_open) void line_open() { native_cdc_open(); }
+EXPORT(line_close) void line_close() { native_cdc_close(); }
 // Where bytes for the next two are: as many as they may be.
-EXPORT(line_bytes) std::uint8_t *line_bytes() {
-  return line;
-}
-EXPORT(line_capacity) unsigned line_capacity() {
-  return sizeof line;
-}
-EXPORT(line_takes) unsigned line_takes() {
-  return NATIVE_CDC_RECEIVE_BYTES;
-}
+EXPORT(line_bytes) std::uint8_t *line_bytes() { return line; }
+EXPORT(line_capacity) unsigned line_capacity() { return sizeof line; }
+EXPORT(line_takes) unsigned line_takes() { return NATIVE_CDC_RECEIVE_BYTES; }
 // 1: the firmware holds the host off, none was taken.
-EXPORT(line_take) int line_take(unsigned length) {
-  return native_cdc_send(line, length) != FT_OK;
-}
-EXPORT(line_receive) unsigned line_receive() {
-  return static_cast<unsigned>(native_cdc_receive(line, sizeof line));
-}
+EXPORT(line_take) int line_take(unsigned length) { return native_cdc_send(line, length) != FT_OK; }
+EXPORT(line_receive) unsigned line_receive() { return static_cast<unsigned>(native_cdc_receive(line, sizeof line)); }

@@ -44,9 +44,7 @@ wire_packet packet_of(wire_type type) {
   return decoded;
 }
 
-std::string given_text() {
-  return {given.begin(), given.end()};
-}
+std::string given_text() { return {given.begin(), given.end()}; }
 
 const char *name_of(calibrating::Judgement::State state) {
   using State = calibrating::Judgement::State;
@@ -88,9 +86,7 @@ ErrorCode code_of(const std::string &name) {
   return found == codes.end() ? ErrorCode::other : found->second;
 }
 
-void answer_with(const Json &json) {
-  answer = json.text();
-}
+void answer_with(const Json &json) { answer = json.text(); }
 
 void add_scatter(Json &json, const char *name, const calibrating::Scatter &scatter) {
   json.name(name).begin();
@@ -109,21 +105,15 @@ EXPORT(room) std::uint8_t *room(unsigned bytes) {
   given.resize(bytes);
   return given.data();
 }
-EXPORT(answer_at) const char *answer_at() {
-  return answer.data();
-}
-EXPORT(answer_bytes) unsigned answer_bytes() {
-  return static_cast<unsigned>(answer.size());
-}
+EXPORT(answer_at) const char *answer_at() { return answer.data(); }
+EXPORT(answer_bytes) unsigned answer_bytes() { return static_cast<unsigned>(answer.size()); }
 
 EXPORT(gains_begin) GainSession *gains_begin() {
   const wire_info info = packet_of(WIRE_INFO).body.info;
   calibrating::check_firmware(info, "this fingertip");
   return new GainSession(info);
 }
-EXPORT(gains_free) void gains_free(GainSession *session) {
-  delete session;
-}
+EXPORT(gains_free) void gains_free(GainSession *session) { delete session; }
 // 1: a placement was completed, and judged.
 EXPORT(gains_take) int gains_take(GainSession *session) {
   if (session->judgement().state != calibrating::Judgement::State::more || !session->take(packet())) {
@@ -132,9 +122,7 @@ EXPORT(gains_take) int gains_take(GainSession *session) {
   session->judge(false);
   return 1;
 }
-EXPORT(gains_take_back) void gains_take_back(GainSession *session) {
-  session->take_back();
-}
+EXPORT(gains_take_back) void gains_take_back(GainSession *session) { session->take_back(); }
 EXPORT(gains_status) void gains_status(const GainSession *session) {
   const calibrating::Judgement &judgement = session->judgement();
   const calibrating::Solution &solution = judgement.solution;
@@ -205,9 +193,7 @@ EXPORT(pulls_begin) PullSession *pulls_begin(double known_N) {
   calibrating::check_pad(info, "this fingertip");
   return new PullSession(info, known_N);
 }
-EXPORT(pulls_free) void pulls_free(PullSession *session) {
-  delete session;
-}
+EXPORT(pulls_free) void pulls_free(PullSession *session) { delete session; }
 // 1: a pull was completed, and judged.
 EXPORT(pulls_take) int pulls_take(PullSession *session) {
   if (session->judgement().state != calibrating::PullJudgement::State::more || !session->take(packet())) {
@@ -262,12 +248,8 @@ EXPORT(doctor_begin) Examined *doctor_begin(unsigned major, unsigned minor, unsi
   examined->facts.port = given_text();
   return examined.release();
 }
-EXPORT(doctor_free) void doctor_free(Examined *examined) {
-  delete examined;
-}
-EXPORT(doctor_info) void doctor_info(Examined *examined) {
-  examined->facts.info = packet_of(WIRE_INFO).body.info;
-}
+EXPORT(doctor_free) void doctor_free(Examined *examined) { delete examined; }
+EXPORT(doctor_info) void doctor_info(Examined *examined) { examined->facts.info = packet_of(WIRE_INFO).body.info; }
 EXPORT(doctor_before) void doctor_before(Examined *examined) {
   examined->facts.before = packet_of(WIRE_HEALTH).body.health;
 }
@@ -284,9 +266,7 @@ EXPORT(doctor_take) void doctor_take(Examined *examined) {
   examined->rest.add(packet());
   examined->measured = true;
 }
-EXPORT(doctor_seconds) double doctor_seconds(const Examined *examined) {
-  return examined->rest.seconds();
-}
+EXPORT(doctor_seconds) double doctor_seconds(const Examined *examined) { return examined->rest.seconds(); }
 EXPORT(doctor_line)
 void doctor_line(Examined *examined, double bytes, double packets, double dropped_packets, double out_of_order,
                  double crc_errors, double format_errors) {

@@ -36,9 +36,7 @@ fingertip_unpack(const char *packed, std::size_t packed_bytes, char *to, std::si
 
 const char *const COMPRESSION = "";
 
-std::string compressed(const std::string &bytes) {
-  return bytes;
-}
+std::string compressed(const std::string &bytes) { return bytes; }
 
 std::string unpacked(std::string_view compression, std::string_view packed, std::uint64_t size) {
   constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26;

@@ -46,17 +46,9 @@ std::string fixed(double value, int digits) {
   return text;
 }
 
-std::optional<double> to_double(std::string_view text) {
-  return parsed<double>(text, std::strtod);
-}
-std::optional<float> to_float(std::string_view text) {
-  return parsed<float>(text, std::strtof);
-}
-std::optional<std::uint64_t> to_u64(std::string_view text) {
-  return whole<std::uint64_t>(text);
-}
-std::optional<std::int64_t> to_i64(std::string_view text) {
-  return whole<std::int64_t>(text);
-}
+std::optional<double> to_double(std::string_view text) { return parsed<double>(text, std::strtod); }
+std::optional<float> to_float(std::string_view text) { return parsed<float>(text, std::strtof); }
+std::optional<std::uint64_t> to_u64(std::string_view text) { return whole<std::uint64_t>(text); }
+std::optional<std::int64_t> to_i64(std::string_view text) { return whole<std::int64_t>(text); }
 
 } // namespace fingertip

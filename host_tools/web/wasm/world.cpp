@@ -45,9 +45,7 @@ void World::choose(std::size_t object) {
   }
 }
 
-void World::lift() {
-  way_ = Way::none;
-}
+void World::lift() { way_ = Way::none; }
 
 void World::set_friction(double friction) {
   if (std::isfinite(friction)) {

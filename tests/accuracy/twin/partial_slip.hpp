@@ -31,9 +31,7 @@ inline double surface_shift_along(double H, double poisson) {
   return (1.0 - poisson) * (c * std::sinh(H) * cosh + H) / (H * (c * cosh * cosh + H * H + b * b));
 }
 
-inline double surface_shift_across(double H) {
-  return H < 1e-4 ? 1.0 : std::tanh(H) / H;
-}
+inline double surface_shift_across(double H) { return H < 1e-4 ? 1.0 : std::tanh(H) / H; }
 
 // Upward displacement of the surface is i (k . t / |k|) times this, h / G: incompressible rubber
 // rises ahead of what pulls it.

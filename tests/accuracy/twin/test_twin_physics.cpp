@@ -71,9 +71,7 @@ TEST(TwinLayer, TractionHasItsLimits) {
   }
 }
 
-TEST(TwinLayer, GentGivesTheRubberOfThePaper) {
-  EXPECT_NEAR(youngs_modulus_Pa(15.0), 0.563e6, 0.001e6);
-}
+TEST(TwinLayer, GentGivesTheRubberOfThePaper) { EXPECT_NEAR(youngs_modulus_Pa(15.0), 0.563e6, 0.001e6); }
 
 // Uniform pressure on a disc of a half-space: 2 (1-nu^2) p a / E in the middle, 2 / pi of that at
 // the edge (Boussinesq). The layer is far thicker than the grid is wide; that shifts all alike.

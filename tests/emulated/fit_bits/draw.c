@@ -3,9 +3,7 @@
 /* xorshift64* (Vigna, 2016) */
 static uint64_t state;
 
-void draw_from(uint64_t seed) {
-  state = seed;
-}
+void draw_from(uint64_t seed) { state = seed; }
 
 uint32_t draw(void) {
   state ^= state >> 12;

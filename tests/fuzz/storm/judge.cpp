@@ -31,13 +31,9 @@ __attribute__((format(printf, 1, 2))) std::string text(const char *format, ...) 
   return out;
 }
 
-template <typename T> unsigned long long number(T value) {
-  return static_cast<unsigned long long>(value);
-}
+template <typename T> unsigned long long number(T value) { return static_cast<unsigned long long>(value); }
 
-bool is_frame(const wire_packet &packet) {
-  return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
-}
+bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
 
 } // namespace
 

@@ -9,17 +9,11 @@
 static struct app app;
 static struct sim_array array;
 
-static void on_event(void *context) {
-  app_on_event(context);
-}
+static void on_event(void *context) { app_on_event(context); }
 
-static void main_round(void *context) {
-  app_run(context);
-}
+static void main_round(void *context) { app_run(context); }
 
-static uint64_t bus_next_us(const void *context) {
-  return sim_array_next_event_us(context);
-}
+static uint64_t bus_next_us(const void *context) { return sim_array_next_event_us(context); }
 
 struct sim_array *storm_firmware_array(void) {
   return &array;
@@ -48,6 +42,4 @@ void storm_firmware_start(uint64_t elapsed_us, uint64_t clock_us) {
   app_start(&app, sim_array_bus(&array));
 }
 
-enum native_end storm_firmware_run_until(uint64_t t_us) {
-  return native_run_until(t_us, main_round, &app);
-}
+enum native_end storm_firmware_run_until(uint64_t t_us) { return native_run_until(t_us, main_round, &app); }

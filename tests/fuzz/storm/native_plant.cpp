@@ -63,13 +63,9 @@ NativePlant::NativePlant(const World &world, std::uint64_t seed, std::uint64_t c
   start(0, clock_us, nullptr);
 }
 
-NativePlant::~NativePlant() {
-  native_cdc_reset();
-}
+NativePlant::~NativePlant() { native_cdc_reset(); }
 
-const std::vector<Target> &NativePlant::faults() {
-  return FAULTS;
-}
+const std::vector<Target> &NativePlant::faults() { return FAULTS; }
 
 void NativePlant::start(std::uint64_t t_us, std::uint64_t clock_us, Judge *judge) {
   const std::uint64_t elapsed_us = t_us - zero_us_;

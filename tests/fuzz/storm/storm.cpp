@@ -24,13 +24,9 @@ constexpr std::uint64_t EXCUSED_us = 5000000;
 // At a time.
 constexpr unsigned MOST_FAULTS = 5;
 
-bool inverts_bits(const std::string &kind) {
-  return kind == "inverted_bits" || kind == "d2_corrupt";
-}
+bool inverts_bits(const std::string &kind) { return kind == "inverted_bits" || kind == "d2_corrupt"; }
 
-bool takes_power(const std::string &kind) {
-  return kind == "power_cut" || kind == "chip_reset";
-}
+bool takes_power(const std::string &kind) { return kind == "power_cut" || kind == "chip_reset"; }
 
 // What is done to the line.
 constexpr Target ON_THE_LINE[] = {

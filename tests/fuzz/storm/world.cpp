@@ -23,15 +23,11 @@ double smooth(double share) {
   return s * s * (3 - 2 * s);
 }
 
-double mix(double a, double b, double share) {
-  return a + (b - a) * share;
-}
+double mix(double a, double b, double share) { return a + (b - a) * share; }
 
 } // namespace
 
-double Row::force_N() const {
-  return 2 * PI * p0_Pa * sigma_mm * sigma_mm * 1e-6;
-}
+double Row::force_N() const { return 2 * PI * p0_Pa * sigma_mm * sigma_mm * 1e-6; }
 
 World::World(std::uint64_t seed) : random_{seed * 2 + 1} {
   for (int i = 0; i < 8; i++) {

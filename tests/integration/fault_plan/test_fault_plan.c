@@ -66,17 +66,11 @@ static double pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
   return 101000.0 + 500.0 * sensor + (rests ? 0 : SLOPE_Pa_per_us * triangle_us);
 }
 
-static void on_event(void *context) {
-  app_on_event(context);
-}
+static void on_event(void *context) { app_on_event(context); }
 
-static void main_round(void *context) {
-  app_run(context);
-}
+static void main_round(void *context) { app_run(context); }
 
-static uint64_t bus_next_us(const void *context) {
-  return sim_array_next_event_us(context);
-}
+static uint64_t bus_next_us(const void *context) { return sim_array_next_event_us(context); }
 
 static void look_at(const struct wire_packet *packet) {
   const struct wire_raw *raw = &packet->body.raw;
@@ -147,9 +141,7 @@ void setUp(void) {
   problems[0] = '\0';
 }
 
-void tearDown(void) {
-  native_cdc_reset();
-}
+void tearDown(void) { native_cdc_reset(); }
 
 static void complain(const char *what, uint32_t transfer) {
   const size_t length = strlen(problems);
@@ -232,9 +224,7 @@ static void test_without_a_fault(void) {
   TEST_ASSERT_FALSE(native_watchdog_expired());
 }
 
-static void test_nack(void) {
-  at_every_place((struct sim_fault){.kind = SIM_FAULT_NACK});
-}
+static void test_nack(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_NACK}); }
 
 static void test_sensor_silent_for_a_while(void) {
   for (uint32_t count = 2; count <= 40; count += 19) {
@@ -242,21 +232,13 @@ static void test_sensor_silent_for_a_while(void) {
   }
 }
 
-static void test_timeout(void) {
-  at_every_place((struct sim_fault){.kind = SIM_FAULT_TIMEOUT});
-}
+static void test_timeout(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_TIMEOUT}); }
 
-static void test_stuck_bus(void) {
-  at_every_place((struct sim_fault){.kind = SIM_FAULT_STUCK, .count = 3});
-}
+static void test_stuck_bus(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_STUCK, .count = 3}); }
 
-static void test_zero_bytes(void) {
-  at_every_place((struct sim_fault){.kind = SIM_FAULT_ZERO});
-}
+static void test_zero_bytes(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_ZERO}); }
 
-static void test_bytes_of_ones(void) {
-  at_every_place((struct sim_fault){.kind = SIM_FAULT_ONES});
-}
+static void test_bytes_of_ones(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_ONES}); }
 
 static void test_inverted_bits(void) {
   /* First, middle and last bit of a PROM word; bits 23, 16 and 8 of a conversion result. */

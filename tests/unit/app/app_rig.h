@@ -51,17 +51,11 @@ static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t 
   return AMBIENT_Pa + (world_gain ? world_gain(sensor) : 1.0) * pressure_Pa;
 }
 
-static inline uint64_t next_event_us(const void *context) {
-  return sim_array_next_event_us(context);
-}
+static inline uint64_t next_event_us(const void *context) { return sim_array_next_event_us(context); }
 
-static inline void on_event(void *context) {
-  app_on_event(context);
-}
+static inline void on_event(void *context) { app_on_event(context); }
 
-static inline void main_round(void *context) {
-  app_run(context);
-}
+static inline void main_round(void *context) { app_run(context); }
 
 /* Power goes and comes back, when the clock shows this; what the flash holds stays, and so does the
  * world. */
@@ -81,9 +75,7 @@ static inline void rig_power_up_at(uint64_t t_us) {
   host_sequence = 0;
 }
 
-static inline void rig_power_up(void) {
-  rig_power_up_at(0);
-}
+static inline void rig_power_up(void) { rig_power_up_at(0); }
 
 static inline void rig_start(void) {
   memset(&press, 0, sizeof press);

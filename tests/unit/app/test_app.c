@@ -3,13 +3,9 @@
 #include "common/contact_flags.h"
 #include "config/build_info.h"
 
-void setUp(void) {
-  rig_start();
-}
+void setUp(void) { rig_start(); }
 
-void tearDown(void) {
-  rig_end();
-}
+void tearDown(void) { rig_end(); }
 
 static void nothing_streams_before_a_command(void) {
   uint8_t byte;

@@ -4,13 +4,9 @@
 #include "config/defaults.h"
 #include "support/pad.h"
 
-void setUp(void) {
-  rig_start();
-}
+void setUp(void) { rig_start(); }
 
-void tearDown(void) {
-  rig_end();
-}
+void tearDown(void) { rig_end(); }
 
 static const uint32_t CAPABILITIES =
     (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) | (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |

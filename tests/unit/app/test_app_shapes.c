@@ -99,9 +99,7 @@ static struct wire_contact last_of_press(void) {
   return contacts[take_contacts(contacts) - 1];
 }
 
-static float scale(void) {
-  return 1.25f * pad_of_12_mm().force_ratio;
-}
+static float scale(void) { return 1.25f * pad_of_12_mm().force_ratio; }
 
 static void two_contacts_have_their_places_and_forces(void) {
   put(1.0, 7.0, 3.0);

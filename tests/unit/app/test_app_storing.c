@@ -2,17 +2,11 @@
 #include "app_rig.h"
 #include "common/contact_flags.h"
 
-void setUp(void) {
-  rig_start();
-}
+void setUp(void) { rig_start(); }
 
-void tearDown(void) {
-  rig_end();
-}
+void tearDown(void) { rig_end(); }
 
-static uint8_t keep(uint8_t what) {
-  return ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {what}});
-}
+static uint8_t keep(uint8_t what) { return ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {what}}); }
 
 static struct wire_packet calibrate_command(void) {
   struct wire_packet command = {.type = WIRE_CMD_CALIBRATE};
@@ -26,9 +20,7 @@ static struct wire_packet calibrate_command(void) {
   return command;
 }
 
-static double gain_of_calibration(unsigned sensor) {
-  return 0.8 + 0.02 * (double)sensor;
-}
+static double gain_of_calibration(unsigned sensor) { return 0.8 + 0.02 * (double)sensor; }
 
 /* A pad whose sensors are as sensitive as the calibration says is located and weighed as one of
  * equal sensors is; without the calibration it is not. */

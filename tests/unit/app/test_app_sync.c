@@ -8,13 +8,9 @@ void setUp(void) {
   run_for(300);
 }
 
-void tearDown(void) {
-  rig_end();
-}
+void tearDown(void) { rig_end(); }
 
-static uint8_t set(uint8_t mode) {
-  return ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {mode}});
-}
+static uint8_t set(uint8_t mode) { return ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {mode}}); }
 
 static void it_is_off_until_it_is_set(void) {
   start_streams(WIRE_STREAM_HEALTH);

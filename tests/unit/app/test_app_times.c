@@ -121,26 +121,16 @@ static void check(uint64_t crossing_us, uint32_t count) {
                         flags);
 }
 
-static void the_clock_crosses_2_to_the_32_us(void) {
-  check(UINT64_C(1) << 32, 0);
-}
+static void the_clock_crosses_2_to_the_32_us(void) { check(UINT64_C(1) << 32, 0); }
 
-static void the_clock_crosses_2_to_the_32_ms(void) {
-  check((UINT64_C(1) << 32) * 1000, 0);
-}
+static void the_clock_crosses_2_to_the_32_ms(void) { check((UINT64_C(1) << 32) * 1000, 0); }
 
 /* Milliseconds as the zero counts them: 1024 us each. */
-static void the_clock_crosses_2_to_the_42_us(void) {
-  check(UINT64_C(1) << 42, 0);
-}
+static void the_clock_crosses_2_to_the_42_us(void) { check(UINT64_C(1) << 42, 0); }
 
-static void sixty_days_have_passed(void) {
-  check(60 * DAY_us, 60u * 86400u);
-}
+static void sixty_days_have_passed(void) { check(60 * DAY_us, 60u * 86400u); }
 
-static void frames_and_sequences_cross_their_ends(void) {
-  check(60 * DAY_us, UINT32_MAX - 300);
-}
+static void frames_and_sequences_cross_their_ends(void) { check(60 * DAY_us, UINT32_MAX - 300); }
 
 int main(void) {
   UNITY_BEGIN();

@@ -5,13 +5,9 @@
 #include "common/crc32.h"
 #include "config/build_info.h"
 
-void setUp(void) {
-  rig_start();
-}
+void setUp(void) { rig_start(); }
 
-void tearDown(void) {
-  rig_end();
-}
+void tearDown(void) { rig_end(); }
 
 static void damage_is_counted_and_unknown_commands_are_answered(void) {
   native_cdc_open();

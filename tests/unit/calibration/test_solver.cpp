@@ -21,9 +21,7 @@ double rms_error(const std::vector<double> &gain, const std::vector<double> &tru
   return std::sqrt(sum / static_cast<double>(truth.size()));
 }
 
-double bell(double r_mm, double sd_mm) {
-  return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm));
-}
+double bell(double r_mm, double sd_mm) { return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm)); }
 
 /* Presses of one foot whose response over the distance is this, of its peak. */
 template <typename Response> Solution solve_presses(const KnownPad &pad, Response response) {

@@ -55,9 +55,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
   }
 }
 
-TEST(Face, KnowsNoOther) {
-  EXPECT_THROW(Face("banana", 12.0, FINGERTIP_TEST_TABLES), std::runtime_error);
-}
+TEST(Face, KnowsNoOther) { EXPECT_THROW(Face("banana", 12.0, FINGERTIP_TEST_TABLES), std::runtime_error); }
 
 TEST(Plate, CarriesForceAndMoment) {
   constexpr double HALF_X_mm = 18.0, HALF_Y_mm = 27.0, STEP_mm = 0.25;

@@ -83,8 +83,6 @@ TEST(Scene, DisturbancesAddUp) {
   EXPECT_NEAR(way_mm, 8.0, 0.01);
 }
 
-TEST(Scene, KnowsNoOtherObjects) {
-  EXPECT_THROW(faces_of("bananas"), std::runtime_error);
-}
+TEST(Scene, KnowsNoOtherObjects) { EXPECT_THROW(faces_of("bananas"), std::runtime_error); }
 
 } // namespace

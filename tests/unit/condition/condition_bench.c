@@ -21,13 +21,9 @@ void run(int count) {
   }
 }
 
-int frames_in(float seconds) {
-  return (int)(seconds * 1e6f / (float)period_us + 0.5f);
-}
+int frames_in(float seconds) { return (int)(seconds * 1e6f / (float)period_us + 0.5f); }
 
-void run_s(float seconds) {
-  run(frames_in(seconds));
-}
+void run_s(float seconds) { run(frames_in(seconds)); }
 
 float contact_s, unflagged_s;
 
@@ -77,9 +73,7 @@ void begin_calm(uint32_t frame_period_us) {
 
 const uint32_t periods_us[PERIODS] = {4854, 765, 17544, 1000000, 10000000};
 
-void setUp(void) {
-  begin(4854);
-}
+void setUp(void) { begin(4854); }
 
 void tearDown(void) {}
 

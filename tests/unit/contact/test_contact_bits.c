@@ -33,9 +33,7 @@ static struct {
 void setUp(void) {}
 void tearDown(void) {}
 
-static float between(float low, float high) {
-  return low + (high - low) * (float)(draw() >> 8) / 16777216.0f;
-}
+static float between(float low, float high) { return low + (high - low) * (float)(draw() >> 8) / 16777216.0f; }
 
 static void change_course(void) {
   course.left = draw_between(5, 300);

@@ -57,9 +57,7 @@ static uint32_t go(float seconds, float vx_mm_s, float vy_mm_s, float load_per_s
   return said;
 }
 
-static void rest(float seconds) {
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, go(seconds, 0, 0, 0));
-}
+static void rest(float seconds) { TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, go(seconds, 0, 0, 0)); }
 
 static void a_steady_velocity_is_told_at_any_rate(void) {
   static const uint32_t intervals_us[] = {50000, 10000, 5000, 2439, 765, 700};

@@ -10,9 +10,7 @@
 
 static struct slip_history history;
 
-void setUp(void) {
-  slip_reset(&history);
-}
+void setUp(void) { slip_reset(&history); }
 void tearDown(void) {}
 
 /* Eq. (7) of the paper as it stands. */
@@ -63,9 +61,7 @@ static uint64_t at_5_Hz(struct random *random, int i) {
   return 200000u * (uint64_t)i;
 }
 
-static void test_twenty_hertz_is_the_papers_metric(void) {
-  compare_with_eq7(at_20_Hz, 2, WINDOW_us);
-}
+static void test_twenty_hertz_is_the_papers_metric(void) { compare_with_eq7(at_20_Hz, 2, WINDOW_us); }
 
 static void test_jitter_does_not_change_n(void) {
   compare_with_eq7(at_20_Hz_with_jitter, 2, WINDOW_us);

@@ -72,9 +72,7 @@ static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
 
 #define MOVED_mm 3.5
 
-static void use_moved(void) {
-  found.moved_q20_mm[0] = found.moved_q20_mm[1] = (int32_t)(MOVED_mm * 1048576.0);
-}
+static void use_moved(void) { found.moved_q20_mm[0] = found.moved_q20_mm[1] = (int32_t)(MOVED_mm * 1048576.0); }
 
 /* A load of 0.1 either way is usual; one that the estimate hardly sees is likely none. */
 static void a_small_load_may_be_none_and_the_place_knows_it(void) {

@@ -80,9 +80,7 @@ Finding only(const Facts &facts, Verdict verdict, const std::string &check) {
   return findings[0];
 }
 
-bool contains(const std::string &text, const std::string &part) {
-  return text.find(part) != std::string::npos;
-}
+bool contains(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
 
 void fail(Facts &facts, ErrorCode code, const std::string &text) {
   facts.failure = Failure{code, text};

@@ -49,9 +49,7 @@ Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, double r
   return meter.result();
 }
 
-double nothing(unsigned, double) {
-  return 0;
-}
+double nothing(unsigned, double) { return 0; }
 
 } // namespace
 

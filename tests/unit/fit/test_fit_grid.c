@@ -111,9 +111,7 @@ static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
   TEST_ASSERT_TRUE(worst_force_sd < 0.04f);
 }
 
-static void the_kernels_agree(void) {
-  hold_to_the_general_kernel(11, 20000, 0);
-}
+static void the_kernels_agree(void) { hold_to_the_general_kernel(11, 20000, 0); }
 
 static void the_kernels_agree_without_some_sensors(void) {
   for (int masked = 1; masked <= 4; masked++) {
@@ -193,13 +191,9 @@ static void an_outlier_is_left_out(bool by_the_general_kernel) {
   TEST_ASSERT_LESS_THAN_INT(presses / 100, unwarned);
 }
 
-static void the_grid_kernels_leave_an_outlier_out(void) {
-  an_outlier_is_left_out(false);
-}
+static void the_grid_kernels_leave_an_outlier_out(void) { an_outlier_is_left_out(false); }
 
-static void the_general_kernel_leaves_an_outlier_out(void) {
-  an_outlier_is_left_out(true);
-}
+static void the_general_kernel_leaves_an_outlier_out(void) { an_outlier_is_left_out(true); }
 
 static void no_sensor_of_a_clean_press_is_left_out(void) {
   struct random random = {31};
@@ -387,9 +381,7 @@ static void warnings_are_given(void) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_LOW_SIGNAL, result.flags);
 }
 
-static int32_t any_q15(struct random *random) {
-  return (int32_t)random_below(random, 65535) - 32767;
-}
+static int32_t any_q15(struct random *random) { return (int32_t)random_below(random, 65535) - 32767; }
 
 static void any_bits_give_finite_results(void) {
   struct random random = {21};

@@ -74,9 +74,7 @@ static void make_arrays(struct random *random) {
   make_array(&arrays[11], 5, same, same, 2.0f);
 }
 
-static int32_t any_bits(struct random *random) {
-  return (int32_t)(random_u32(random) - UINT32_C(0x80000000));
-}
+static int32_t any_bits(struct random *random) { return (int32_t)(random_u32(random) - UINT32_C(0x80000000)); }
 
 static int32_t to_int32(double value) {
   if (!(value > -2147483648.0)) {
@@ -156,9 +154,7 @@ static float any_float(struct random *random) {
   return value;
 }
 
-static int32_t any_q15(struct random *random) {
-  return (int32_t)random_below(random, 65535) - 32767;
-}
+static int32_t any_q15(struct random *random) { return (int32_t)random_below(random, 65535) - 32767; }
 
 static struct input draw(uint32_t number) {
   struct random random = {SEED + number * UINT64_C(0x9E3779B97F4A7C15)};
@@ -216,9 +212,7 @@ static bool is_zero(const struct fit_result *result) {
   return memcmp(&zero, result, sizeof zero) == 0;
 }
 
-static bool within(float value, float low, float high) {
-  return value >= low && value <= high;
-}
+static bool within(float value, float low, float high) { return value >= low && value <= high; }
 
 /* What is wrong with it, or NULL. */
 static const char *complaint(const struct input *input, const struct fit_result *result) {

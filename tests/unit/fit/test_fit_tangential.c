@@ -168,9 +168,7 @@ static void judge_pad(double thickness_mm, uint32_t usable, double mm, double sh
   TEST_ASSERT_GREATER_OR_EQUAL_INT(least, valid);
 }
 
-static void test_contacts_of_the_model_are_found(void) {
-  judge_pad(12.0, ALL, 0.02, 0.002, 285, 0);
-}
+static void test_contacts_of_the_model_are_found(void) { judge_pad(12.0, ALL, 0.02, 0.002, 285, 0); }
 
 /* On thin pads a contact is narrower than the pitch: a tenth is off by more than it says. */
 static void test_pads_of_5_to_20_mm(void) {
@@ -542,9 +540,7 @@ static void test_profiles_that_no_layer_has_are_refused(void) {
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &other, &wrong));
 }
 
-static int32_t any_bits(struct random *random) {
-  return (int32_t)(random_u32(random) - UINT32_C(0x80000000));
-}
+static int32_t any_bits(struct random *random) { return (int32_t)(random_u32(random) - UINT32_C(0x80000000)); }
 
 /* Of any profile that is valid and taken. */
 static void draw_pad(struct random *random) {

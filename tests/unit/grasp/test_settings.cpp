@@ -10,9 +10,7 @@ using namespace fingertip;
 
 namespace {
 
-const GripperTraits &any() {
-  return gripper_traits("2f85");
-}
+const GripperTraits &any() { return gripper_traits("2f85"); }
 
 std::string error_of(const std::map<std::string, double> &wanted) {
   try {

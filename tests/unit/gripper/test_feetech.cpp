@@ -18,9 +18,7 @@ GripperServer::Options options() {
   return options;
 }
 
-std::unique_ptr<Gripper> opened(const std::string &port) {
-  return open_gripper({.model = "sts3215", .port = port});
-}
+std::unique_ptr<Gripper> opened(const std::string &port) { return open_gripper({.model = "sts3215", .port = port}); }
 
 std::unique_ptr<Gripper> activated(const std::string &port) {
   std::unique_ptr<Gripper> gripper = opened(port);

@@ -221,6 +221,4 @@ TEST(GripperMotion, TheSameAtAnyStep) {
   EXPECT_NEAR(fine.width_mm(), coarse.width_mm(), 1e-9);
 }
 
-TEST(GripperMotion, AnUnknownModelIsRefused) {
-  EXPECT_THROW(gripper_mechanics("3f"), Error);
-}
+TEST(GripperMotion, AnUnknownModelIsRefused) { EXPECT_THROW(gripper_mechanics("3f"), Error); }

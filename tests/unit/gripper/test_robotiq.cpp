@@ -35,13 +35,9 @@ template <typename Until> GripperStatus wait_for(Served &simulated, Gripper &gri
   return {};
 }
 
-bool rests(const GripperStatus &status) {
-  return !status.moving;
-}
+bool rests(const GripperStatus &status) { return !status.moving; }
 
-bool is_active(const GripperStatus &status) {
-  return status.active;
-}
+bool is_active(const GripperStatus &status) { return status.active; }
 
 std::unique_ptr<Gripper> activated(const std::string &model, Served &simulated) {
   std::unique_ptr<Gripper> gripper = opened(model, simulated.port());

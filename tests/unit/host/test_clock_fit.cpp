@@ -60,9 +60,7 @@ TEST(ClockFit, AMinuteFiftyPartsPerMillionApart) {
   }
 }
 
-TEST(ClockFit, WarmingUpAndBurstsOfDelay) {
-  EXPECT_LT(worst_error_us({HOST_us - 1e6, 90, -1}, 240, 7, 100000), 500);
-}
+TEST(ClockFit, WarmingUpAndBurstsOfDelay) { EXPECT_LT(worst_error_us({HOST_us - 1e6, 90, -1}, 240, 7, 100000), 500); }
 
 TEST(ClockFit, FindsTheDrift) {
   ClockFit fit;

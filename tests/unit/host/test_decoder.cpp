@@ -14,9 +14,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 namespace {
 
-Bytes frame(std::uint16_t sequence) {
-  return frame_bytes(test::make_contact(sequence, 1000u * sequence, sequence));
-}
+Bytes frame(std::uint16_t sequence) { return frame_bytes(test::make_contact(sequence, 1000u * sequence, sequence)); }
 
 Bytes joined(std::initializer_list<Bytes> parts) {
   Bytes all;

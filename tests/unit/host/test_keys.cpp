@@ -31,9 +31,7 @@ std::vector<std::string> bytewise(const std::string &text) {
 
 } // namespace
 
-TEST(Keys, PlainOnesComeInOrder) {
-  EXPECT_EQ(keys_of({"qt", "y"}), "qty");
-}
+TEST(Keys, PlainOnesComeInOrder) { EXPECT_EQ(keys_of({"qt", "y"}), "qty"); }
 
 TEST(Keys, WhatATerminalAnswersIsNone) {
   for (const char *answer : {"\x1b[8;24;80t", "\x1b[?2026;2$y", "\x1b[>41;354;0c", "\x1b[Z", "\x1bOt", "\x1b[1;5t",
@@ -56,9 +54,7 @@ TEST(Keys, WhatIsPastedIsNone) {
   EXPECT_EQ(keys_of(bytewise("\x1b[200~tyq\x1b[201~q")), "q");
 }
 
-TEST(Keys, AnEscapeByItselfDoesNotTakeTheNextOne) {
-  EXPECT_EQ(keys_of({"\x1b", "q"}, milliseconds(500)), "q");
-}
+TEST(Keys, AnEscapeByItselfDoesNotTakeTheNextOne) { EXPECT_EQ(keys_of({"\x1b", "q"}, milliseconds(500)), "q"); }
 
 TEST(Confirmation, TakesTimeToRead) {
   Confirmation confirmation;

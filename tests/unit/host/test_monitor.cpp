@@ -87,9 +87,7 @@ std::string text_of(const Canvas &canvas) {
   return text;
 }
 
-bool shows(const Canvas &canvas, const std::string &text) {
-  return text_of(canvas).find(text) != std::string::npos;
-}
+bool shows(const Canvas &canvas, const std::string &text) { return text_of(canvas).find(text) != std::string::npos; }
 
 Canvas one(const Model &model, int columns = 80, int rows = 24) {
   return draw_monitor({model}, {"keys", "note", ""}, columns, rows);

@@ -23,9 +23,7 @@ std::string contents(const std::string &path) {
   return text.str();
 }
 
-void write(const std::string &path, const std::string &text) {
-  std::ofstream(path, std::ios::binary) << text;
-}
+void write(const std::string &path, const std::string &text) { std::ofstream(path, std::ios::binary) << text; }
 
 /* Nothing: it may be written. */
 std::optional<ErrorCode> refusal(const std::string &path, bool replace) {

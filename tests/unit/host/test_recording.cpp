@@ -24,9 +24,7 @@ std::string contents(const std::string &path) {
   return text.str();
 }
 
-void write(const std::string &path, const std::string &text) {
-  std::ofstream(path, std::ios::binary) << text;
-}
+void write(const std::string &path, const std::string &text) { std::ofstream(path, std::ios::binary) << text; }
 
 /* Two packets are the same if their frames are. */
 std::vector<std::vector<std::uint8_t>> frames_of(const std::vector<wire_packet> &packets) {
@@ -82,9 +80,7 @@ Error thrown_by(const std::string &path, bool salvage = false) {
   return Error("");
 }
 
-std::string error_of(const std::string &path) {
-  return thrown_by(path).what();
-}
+std::string error_of(const std::string &path) { return thrown_by(path).what(); }
 
 } // namespace
 

@@ -34,13 +34,9 @@ void fake_i2c_power_up(void) {
   memset(heard, 0, sizeof heard);
 }
 
-void rp2040_event(void) {
-  fake.events++;
-}
+void rp2040_event(void) { fake.events++; }
 
-void fake_i2c_interrupt(void) {
-  owner.on_event(owner.context);
-}
+void fake_i2c_interrupt(void) { owner.on_event(owner.context); }
 
 uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) {
   return (uint8_t)(0x35u + 11u * sensor + 3u * command + 71u * index);
@@ -54,9 +50,7 @@ static uint32_t open_channels(void) {
   return sensors;
 }
 
-static bool hangs(void) {
-  return transaction.number == fake.hang_at || (open_channels() & fake.tied_low) != 0;
-}
+static bool hangs(void) { return transaction.number == fake.hang_at || (open_channels() & fake.tied_low) != 0; }
 
 uint64_t fake_i2c_next_event_us(void) {
   const bool will_end = transaction.active && transaction.busy_polls == 0 && !hangs();
@@ -95,13 +89,9 @@ static enum ft_status start(uint8_t address, uint8_t byte, uint8_t byte_count) {
   return transaction.busy_polls > 0 ? FT_ERR_BUSY : FT_PENDING;
 }
 
-enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
-  return start(address, byte, 0);
-}
+enum ft_status i2c_start_write(uint8_t address, uint8_t byte) { return start(address, byte, 0); }
 
-enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) {
-  return start(address, 0, byte_count);
-}
+enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) { return start(address, 0, byte_count); }
 
 static uint32_t reachable(void) {
   uint32_t sensors = 0;

@@ -36,9 +36,7 @@ static void next_case(void) {
   setUp();
 }
 
-static uint64_t earlier(uint64_t a, uint64_t b) {
-  return a < b ? a : b;
-}
+static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* Time passes until this wake-up or an event, whichever comes first. */
 static void sleep_until(uint64_t wake_us) {

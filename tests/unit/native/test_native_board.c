@@ -26,9 +26,7 @@ static void round_of_main(void *context) {
   port_sleep();
 }
 
-static uint64_t next_us(const void *context) {
-  return *(const uint64_t *)context;
-}
+static uint64_t next_us(const void *context) { return *(const uint64_t *)context; }
 
 void setUp(void) {
   native_start(false);
@@ -39,9 +37,7 @@ void setUp(void) {
   native_set_event_source(next_us, &source_us);
 }
 
-void tearDown(void) {
-  native_cdc_reset();
-}
+void tearDown(void) { native_cdc_reset(); }
 
 static void test_time_passes_from_event_to_event(void) {
   port_alarm_at_us(700);

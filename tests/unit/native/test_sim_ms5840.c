@@ -17,9 +17,7 @@ static uint32_t measure(void *context, int type, unsigned osr, uint64_t t_us) {
   return type == 1 ? EXAMPLE_D1 : EXAMPLE_D2;
 }
 
-static bool command(uint8_t byte, uint64_t t_us) {
-  return sim_ms5840_command(&sensor, byte, t_us, measure, NULL);
-}
+static bool command(uint8_t byte, uint64_t t_us) { return sim_ms5840_command(&sensor, byte, t_us, measure, NULL); }
 
 static uint32_t read_adc(uint64_t t_us) {
   uint8_t bytes[3];

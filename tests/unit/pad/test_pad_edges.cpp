@@ -17,9 +17,7 @@ namespace {
 
 constexpr double OVERHANG_mm = 9.0;
 
-pad_profile profile() {
-  return pad::profile_over_own_sensors({12.0, OVERHANG_mm, false});
-}
+pad_profile profile() { return pad::profile_over_own_sensors({12.0, OVERHANG_mm, false}); }
 
 twin::BlockTable block(const wire_info &info) {
   std::vector<twin::Place> sensors;

@@ -13,9 +13,7 @@ namespace {
 
 const wire_info INFO = test::make_info(0, 0).body.info;
 
-pad_profile profile_of(double thickness_mm) {
-  return pad::profile_of({thickness_mm}, INFO);
-}
+pad_profile profile_of(double thickness_mm) { return pad::profile_of({thickness_mm}, INFO); }
 
 /* The integral of f over wave numbers, by the trapezoidal rule of other nodes than the profile's.
  */

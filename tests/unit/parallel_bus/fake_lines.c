@@ -55,9 +55,7 @@ void fake_lose_its_place(unsigned sensor) {
   sensors[sensor] = (struct sensor){.state = SEND, .clock = 3, .zeros = true, .low = true};
 }
 
-uint64_t fake_lines_next_event_us(void) {
-  return wave.active && !fake.hangs ? wave.end_us : UINT64_MAX;
-}
+uint64_t fake_lines_next_event_us(void) { return wave.active && !fake.hangs ? wave.end_us : UINT64_MAX; }
 
 static uint16_t levels(void) {
   uint16_t low = pulled | fake.held_low;
@@ -269,6 +267,4 @@ bool wave_player_has_ended(void) {
   return !wave.active;
 }
 
-uint16_t wave_player_levels(void) {
-  return levels();
-}
+uint16_t wave_player_levels(void) { return levels(); }

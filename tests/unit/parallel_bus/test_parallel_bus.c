@@ -30,9 +30,7 @@ void setUp(void) {
   memset(&result, 0xA5, sizeof result);
 }
 
-void tearDown(void) {
-  TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fake.misuses, fake.misuse ? fake.misuse : "");
-}
+void tearDown(void) { TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fake.misuses, fake.misuse ? fake.misuse : ""); }
 
 static void next_case(void) {
   tearDown();

@@ -22,13 +22,9 @@ void power_up(uint8_t sensor_count, const struct scan_settings *settings) {
 
 const struct scan_settings usual = {.sensor_count = SENSORS, .osr = 1024, .rate_mHz = 0};
 
-void setUp(void) {
-  power_up(SENSORS, &usual);
-}
+void setUp(void) { power_up(SENSORS, &usual); }
 
-void tearDown(void) {
-  TEST_ASSERT_EQUAL_INT_MESSAGE(0, fake.misuses, fake.misuse ? fake.misuse : "");
-}
+void tearDown(void) { TEST_ASSERT_EQUAL_INT_MESSAGE(0, fake.misuses, fake.misuse ? fake.misuse : ""); }
 
 void next_case(const struct scan_settings *settings) {
   tearDown();
@@ -65,9 +61,7 @@ void skip_frames(int count) {
   }
 }
 
-uint32_t value_of(const _Atomic uint32_t *value) {
-  return atomic_load(value);
-}
+uint32_t value_of(const _Atomic uint32_t *value) { return atomic_load(value); }
 
 void assert_entry(int at, enum fake_operation operation, uint8_t command) {
   TEST_ASSERT_LESS_THAN_INT(fake.logged, at);

@@ -65,13 +65,9 @@ static void next_case(void) {
   start();
 }
 
-static void step_by(int k, double Pa) {
-  d1[k] = (uint32_t)(d1[k] + Pa * CODES_PER_Pa);
-}
+static void step_by(int k, double Pa) { d1[k] = (uint32_t)(d1[k] + Pa * CODES_PER_Pa); }
 
-static void warm_by(int k, double degC) {
-  d2[k] = (uint32_t)(d2[k] + degC * CODES_PER_degC);
-}
+static void warm_by(int k, double degC) { d2[k] = (uint32_t)(d2[k] + degC * CODES_PER_degC); }
 
 static double true_Pa(int k, uint32_t true_d2) {
   struct ms58xx_thermal thermal;

@@ -250,9 +250,7 @@ static void lose_power_at_any_step(unsigned updates, struct store_content before
   TEST_ASSERT_GREATER_THAN_UINT(updates, new_ones);
 }
 
-static void power_may_be_lost_at_any_step(void) {
-  lose_power_at_any_step(UPDATES, (struct store_content){0});
-}
+static void power_may_be_lost_at_any_step(void) { lose_power_at_any_step(UPDATES, (struct store_content){0}); }
 
 static void power_may_be_lost_with_the_largest_array(void) {
   begin_with(FT_MAX_SENSORS);

@@ -14,13 +14,9 @@ constexpr double FORCE_N = 6.0, STIFFNESS_N_mm = 4.5;
 constexpr double HOLDS_N = FRICTION * FORCE_N;
 constexpr double DEAD_TRAVEL_mm = 1.5 * HOLDS_N / STIFFNESS_N_mm;
 
-HeldObject object() {
-  return HeldObject(MASS_kg, FRICTION, KINETIC_SHARE);
-}
+HeldObject object() { return HeldObject(MASS_kg, FRICTION, KINETIC_SHARE); }
 
-double mindlin_mm(double load_share) {
-  return DEAD_TRAVEL_mm * (1.0 - std::pow(1.0 - load_share, 2.0 / 3.0));
-}
+double mindlin_mm(double load_share) { return DEAD_TRAVEL_mm * (1.0 - std::pow(1.0 - load_share, 2.0 / 3.0)); }
 
 void play(
     HeldObject &held, double seconds, const std::function<double(double)> &load_N,

@@ -17,13 +17,9 @@ using namespace fingertip::twin;
 
 constexpr double MS_s = 1e-3, GRAVITY_m_s2 = 9.81;
 
-double pull_N(const Touch &touch) {
-  return std::hypot(touch.pull_x_N, touch.pull_y_N);
-}
+double pull_N(const Touch &touch) { return std::hypot(touch.pull_x_N, touch.pull_y_N); }
 
-double way_mm(const Touch &from, const Touch &to) {
-  return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
-}
+double way_mm(const Touch &from, const Touch &to) { return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm); }
 
 const Phase &phase_of(const Episode &episode, const std::string &name) {
   return *std::find_if(episode.phases.begin(), episode.phases.end(),

@@ -33,9 +33,7 @@ void enumerate(void) {
   host_reset_toggles();
 }
 
-void set_dtr(int on) {
-  TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x22, on ? 3 : 0, 0, NULL, 0));
-}
+void set_dtr(int on) { TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x22, on ? 3 : 0, 0, NULL, 0)); }
 
 void open_port(void) {
   uint8_t packet[USB_MAX_PACKET_BYTES];

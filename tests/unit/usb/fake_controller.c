@@ -41,9 +41,7 @@ static void enter_interrupt(void) {
   fake.in_interrupt = true;
 }
 
-static void leave_interrupt(void) {
-  fake.in_interrupt = false;
-}
+static void leave_interrupt(void) { fake.in_interrupt = false; }
 
 static void assert_device_context(void) {
   TEST_ASSERT_TRUE_MESSAGE(fake.in_interrupt, "called outside the interrupt context");
@@ -52,9 +50,7 @@ static void assert_device_context(void) {
 /* usb_controller.h ------------------------------------------------------------------------------
  */
 
-void usb_controller_start(void) {
-  fake.attached = true;
-}
+void usb_controller_start(void) { fake.attached = true; }
 
 void usb_controller_request_service(void) {
   TEST_ASSERT_FALSE(fake.in_interrupt);
@@ -69,9 +65,7 @@ void port_alive(enum port_part part) {
   fake.signs_of_life++;
 }
 
-unsigned fake_signs_of_life(void) {
-  return fake.signs_of_life;
-}
+unsigned fake_signs_of_life(void) { return fake.signs_of_life; }
 
 void fake_service(void) {
   enter_interrupt();
@@ -164,13 +158,9 @@ void fake_power_on(void) {
   find(USB_ENDPOINT_IN)->open = true;
 }
 
-bool fake_is_attached(void) {
-  return fake.attached;
-}
+bool fake_is_attached(void) { return fake.attached; }
 
-void fake_hold_interrupts(void) {
-  fake.interrupts_held = true;
-}
+void fake_hold_interrupts(void) { fake.interrupts_held = true; }
 
 void fake_run_interrupts(void) {
   fake.interrupts_held = false;
@@ -182,13 +172,9 @@ void fake_run_interrupts(void) {
   }
 }
 
-void fake_take_at_next_withdrawal(void) {
-  fake.take_at_next_withdrawal = true;
-}
+void fake_take_at_next_withdrawal(void) { fake.take_at_next_withdrawal = true; }
 
-bool fake_accepts(uint8_t endpoint) {
-  return find(endpoint)->held;
-}
+bool fake_accepts(uint8_t endpoint) { return find(endpoint)->held; }
 
 void host_bus_reset(void) {
   enter_interrupt();
@@ -308,19 +294,13 @@ int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t ind
   return n;
 }
 
-void host_address(uint8_t address) {
-  fake.host_address = address;
-}
+void host_address(uint8_t address) { fake.host_address = address; }
 
 void host_reset_toggles(void) {
   for (int number = 1; number < NUMBERS; number++)
     fake.endpoints[number][0].host_data1 = fake.endpoints[number][1].host_data1 = false;
 }
 
-void host_reset_toggle(uint8_t endpoint) {
-  find(endpoint)->host_data1 = false;
-}
+void host_reset_toggle(uint8_t endpoint) { find(endpoint)->host_data1 = false; }
 
-void host_follow_toggles(void) {
-  fake.host_follows = true;
-}
+void host_follow_toggles(void) { fake.host_follows = true; }

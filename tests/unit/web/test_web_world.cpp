@@ -26,9 +26,7 @@ const std::vector<std::uint8_t> &file() {
   return bytes;
 }
 
-std::vector<Object> objects() {
-  return read_objects(file().data(), file().size()).objects;
-}
+std::vector<Object> objects() { return read_objects(file().data(), file().size()).objects; }
 
 class WorldTest : public ::testing::Test {
 protected:

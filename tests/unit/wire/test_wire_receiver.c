@@ -10,9 +10,7 @@ struct frame_bytes {
 
 static struct wire_receiver receiver;
 
-void setUp(void) {
-  wire_receiver_init(&receiver, wire_all_layouts);
-}
+void setUp(void) { wire_receiver_init(&receiver, wire_all_layouts); }
 void tearDown(void) {}
 
 static struct frame_bytes good_frame(uint8_t type, uint16_t sequence) {

@@ -55,9 +55,7 @@ static inline int32_t sample_i32(struct sampler *sampler) {
   }
 }
 
-static inline int16_t sample_i16(struct sampler *sampler) {
-  return (int16_t)(sample_i32(sampler) >> 16);
-}
+static inline int16_t sample_i16(struct sampler *sampler) { return (int16_t)(sample_i32(sampler) >> 16); }
 
 /* Finite: the extremes, the smallest denormal, -0 and random bits. */
 static inline float sample_f32(struct sampler *sampler) {

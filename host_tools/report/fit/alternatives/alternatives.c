@@ -31,12 +31,8 @@ struct samples {
 
 enum { P0, X, Y, SIGMA, PARAMETERS };
 
-static real larger(real a, real b) {
-  return a > b ? a : b;
-}
-static real smaller(real a, real b) {
-  return a < b ? a : b;
-}
+static real larger(real a, real b) { return a > b ? a : b; }
+static real smaller(real a, real b) { return a < b ? a : b; }
 
 struct normal {
   real matrix[PARAMETERS][PARAMETERS]; /* lower triangle */

@@ -97,13 +97,9 @@ static void tangential(void) {
 
 /* One part of a search for a tangential force, after `fit` of the same readings and the parts before,
  * which are not counted. */
-static void follow_doubt(void) {
-  fit_doubt_follow(&doubt, &layout, job.pressure_Pa_q10, &chosen, &contact);
-}
+static void follow_doubt(void) { fit_doubt_follow(&doubt, &layout, job.pressure_Pa_q10, &chosen, &contact); }
 #define DOUBT_PART(part)                                                                                               \
-  static void doubt_##part(void) {                                                                                     \
-    follow_doubt();                                                                                                    \
-  }
+  static void doubt_##part(void) { follow_doubt(); }
 DOUBT_PART(0)
 DOUBT_PART(1)
 DOUBT_PART(2)
@@ -113,9 +109,7 @@ DOUBT_PART(5)
 static void (*const doubt_parts[FIT_DOUBT_PARTS])(void) = {doubt_0, doubt_1, doubt_2, doubt_3, doubt_4, doubt_5};
 
 /* A touch that rests, after `fit` of the same readings. */
-static void gains_of_touch(void) {
-  fit_gains_learn(&gains, &layout, job.pressure_Pa_q10, &chosen, &contact);
-}
+static void gains_of_touch(void) { fit_gains_learn(&gains, &layout, job.pressure_Pa_q10, &chosen, &contact); }
 
 /* The two parts of a contact's first frame, and the parts of one that ends with an answer, on a pad with a dip;
  * after `fit` of the same readings and what comes before, which is not counted. */
@@ -129,9 +123,7 @@ static void shapes(void) {
 }
 #define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS)
 #define SHAPES_PART(part)                                                                                              \
-  static void shapes_##part(void) {                                                                                    \
-    shapes();                                                                                                          \
-  }
+  static void shapes_##part(void) { shapes(); }
 SHAPES_PART(0)
 SHAPES_PART(1)
 SHAPES_PART(2)

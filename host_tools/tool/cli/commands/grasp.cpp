@@ -20,9 +20,7 @@ std::string number(double value) {
   return text;
 }
 
-std::string range_of(const GraspSetting &setting) {
-  return number(setting.low) + " to " + number(setting.high);
-}
+std::string range_of(const GraspSetting &setting) { return number(setting.low) + " to " + number(setting.high); }
 
 /* The default for the usual gripper, and for a servo if it differs. */
 std::string default_of(const GraspSetting &setting, const GripSettings &usual, const GripSettings &servo) {

@@ -36,13 +36,9 @@ struct GripperOptions {
   bool activate = false;
 };
 
-std::string mm(double width_mm) {
-  return fixed(width_mm, 1) + " mm";
-}
+std::string mm(double width_mm) { return fixed(width_mm, 1) + " mm"; }
 
-void row(const char *name, const std::string &value) {
-  std::printf("%-24s%s\n", name, printable(value).c_str());
-}
+void row(const char *name, const std::string &value) { std::printf("%-24s%s\n", name, printable(value).c_str()); }
 
 std::string timer_text(const GripperPort &port) {
   if (!port.latency_timer_ms) {

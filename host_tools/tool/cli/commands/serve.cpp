@@ -25,9 +25,7 @@ struct ServeOptions {
 
 constexpr std::chrono::milliseconds DEVICE_LOOK_INTERVAL{1000};
 
-void print_line(const std::string &line) {
-  std::fprintf(stderr, "%s\n", printable(line).c_str());
-}
+void print_line(const std::string &line) { std::fprintf(stderr, "%s\n", printable(line).c_str()); }
 
 gid_t group_of(const std::string &name) {
   const group *found = getgrnam(name.c_str());

@@ -13,9 +13,7 @@ static void fit(void *context) {
   job.crc = fit_bits_of((enum fit_bits_kernel)job.kernel, job.press);
 }
 
-static bool serve(void *context) {
-  return worker_serve(context);
-}
+static bool serve(void *context) { return worker_serve(context); }
 
 int main(void) {
   bool is_started = false;

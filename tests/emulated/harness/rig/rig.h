@@ -50,9 +50,7 @@ static inline void start_clocks(void) {
   REG(0x4005802c) = 0x200 | 12;
 }
 
-static inline uint32_t now_us(void) {
-  return REG(0x40054028);
-}
+static inline uint32_t now_us(void) { return REG(0x40054028); }
 
 static inline void wait_us(uint32_t us) {
   const uint32_t start = now_us();
@@ -113,9 +111,7 @@ static inline uint32_t i2c_run(uint32_t address, const uint8_t *out, int n, uint
 /* Results for the test: RAM words from 0x20030000 on. */
 #define RESULT(i) REG(0x20030000 + 4 * (i))
 /* The end: the test catches this breakpoint as "entered the USB boot loader". */
-static inline void done(void) {
-  __asm volatile("bkpt 0x42");
-}
+static inline void done(void) { __asm volatile("bkpt 0x42"); }
 
 void reset_entry(void);
 void reset_entry(void) {
@@ -126,9 +122,7 @@ void reset_entry(void) {
 /* An image with interrupts defines HAS_ISR and isr(). */
 void isr(void);
 #ifndef HAS_ISR
-void isr(void) {
-  __asm volatile("bkpt 1");
-}
+void isr(void) { __asm volatile("bkpt 1"); }
 #endif
 __attribute__((section(".vectors"), used)) const void *const vectors[48] = {(void *)0x20010000,
                                                                             (void *)reset_entry,
