@@ -11,10 +11,10 @@
 #include "native/native_sync.h"
 #include "native/sim_array.h"
 #include "port/port.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <string.h>
-#include <unity.h>
 
 #define AMBIENT_Pa 101325.0
 #define PI 3.14159265358979

@@ -7,14 +7,14 @@ void setUp(void) { rig_start(); }
 
 void tearDown(void) { rig_end(); }
 
-static void nothing_streams_before_a_command(void) {
+TEST(nothing_streams_before_a_command) {
   uint8_t byte;
   native_cdc_open();
   run_for(500);
   TEST_ASSERT_EQUAL(0, native_cdc_receive(&byte, 1));
 }
 
-static void a_press_is_located_and_weighed(void) {
+TEST(a_press_is_located_and_weighed) {
   press.force_N = 5.0;
   press.x_mm = 2.5;
   press.y_mm = -7.0;
@@ -73,7 +73,7 @@ static void a_press_is_located_and_weighed(void) {
   TEST_ASSERT_FALSE(contact.flags & CONTACT_FLAG_SLIP);
 }
 
-static void a_moving_contact_slips(void) {
+TEST(a_moving_contact_slips) {
   press.force_N = 5.0;
   press.y_mm = -10.0;
   press.speed_y_mm_s = 40.0;
@@ -97,7 +97,7 @@ static void a_moving_contact_slips(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.05f, 40.0f * 0.1055f / 2.0f, last_mm);
 }
 
-static void info_tells_what_this_is(void) {
+TEST(info_tells_what_this_is) {
   native_cdc_open();
   run_for(1500);
   struct wire_info info = get_info();
@@ -112,7 +112,7 @@ static void info_tells_what_this_is(void) {
   TEST_ASSERT_EQUAL_FLOAT(0.75f, info.slip_threshold_mm);
 }
 
-static void settings_are_checked_and_kept(void) {
+TEST(settings_are_checked_and_kept) {
   native_cdc_open();
   run_for(300);
   static const struct {
@@ -146,7 +146,7 @@ static void settings_are_checked_and_kept(void) {
                     ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {8}}));
 }
 
-static void priors_and_limits_are_checked(void) {
+TEST(priors_and_limits_are_checked) {
   native_cdc_open();
   run_for(300);
   static const struct {
@@ -170,7 +170,7 @@ static void priors_and_limits_are_checked(void) {
   TEST_ASSERT_EQUAL_FLOAT(0.8f, get_info().location_limit_mm);
 }
 
-static void at_20_Hz_frames_are_50_ms_apart(void) {
+TEST(at_20_Hz_frames_are_50_ms_apart) {
   native_cdc_open();
   run_for(300);
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {20000}});
@@ -192,7 +192,7 @@ static void at_20_Hz_frames_are_50_ms_apart(void) {
   TEST_ASSERT_INT_WITHIN(1, 100, frames);
 }
 
-static void a_tare_takes_the_present_as_zero(void) {
+TEST(a_tare_takes_the_present_as_zero) {
   press.force_N = 2.0;
   native_cdc_open();
   run_for(1000); /* the start-up tare took the press for the zero */
@@ -212,7 +212,7 @@ static void a_tare_takes_the_present_as_zero(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.02f, 4.0f, last.force_N);
 }
 
-static void a_tare_in_contact_is_refused_unless_forced(void) {
+TEST(a_tare_in_contact_is_refused_unless_forced) {
   struct wire_packet tare = {.type = WIRE_CMD_TARE};
   native_cdc_open();
   run_for(1000);
@@ -232,26 +232,11 @@ static void a_tare_in_contact_is_refused_unless_forced(void) {
   TEST_ASSERT_FALSE(newest_contact().flags & CONTACT_FLAG_CONTACT);
 }
 
-static void a_tare_without_sensors_is_refused(void) {
+TEST(a_tare_without_sensors_is_refused) {
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     array.absent[k] = true;
   }
   native_cdc_open();
   run_for(1000);
   TEST_ASSERT_EQUAL(WIRE_RESULT_NOT_NOW, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(nothing_streams_before_a_command);
-  RUN_TEST(a_press_is_located_and_weighed);
-  RUN_TEST(a_moving_contact_slips);
-  RUN_TEST(info_tells_what_this_is);
-  RUN_TEST(settings_are_checked_and_kept);
-  RUN_TEST(priors_and_limits_are_checked);
-  RUN_TEST(at_20_Hz_frames_are_50_ms_apart);
-  RUN_TEST(a_tare_takes_the_present_as_zero);
-  RUN_TEST(a_tare_in_contact_is_refused_unless_forced);
-  RUN_TEST(a_tare_without_sensors_is_refused);
-  return UNITY_END();
 }

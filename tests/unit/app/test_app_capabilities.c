@@ -14,7 +14,7 @@ static const uint32_t CAPABILITIES =
     (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0);
 static const uint8_t STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
 
-static void it_tells_its_capabilities_and_their_settings_only(void) {
+TEST(it_tells_its_capabilities_and_their_settings_only) {
   native_cdc_open();
   run_for(300);
   struct wire_info info = get_info();
@@ -26,7 +26,7 @@ static void it_tells_its_capabilities_and_their_settings_only(void) {
   TEST_ASSERT_EQUAL_HEX32(CAPABILITIES, get_health().capabilities);
 }
 
-static void it_refuses_streams_and_commands_that_it_lacks(void) {
+TEST(it_refuses_streams_and_commands_that_it_lacks) {
   native_cdc_open();
   run_for(300);
   for (uint8_t streams = 0; streams <= 8; streams++) {
@@ -51,7 +51,7 @@ static void it_refuses_streams_and_commands_that_it_lacks(void) {
   TEST_ASSERT_EQUAL_UINT8(of_tangential, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
 }
 
-static void it_streams_what_it_has(void) {
+TEST(it_streams_what_it_has) {
   press.force_N = 5.0;
   press.y_mm = -10.0;
   press.speed_y_mm_s = 40.0;
@@ -97,7 +97,7 @@ static void it_streams_what_it_has(void) {
 }
 
 /* Settings that it has; what another firmware has stored beside them stays. */
-static void it_keeps_settings(void) {
+TEST(it_keeps_settings) {
   native_cdc_open();
   run_for(300);
   struct calibration calibration = {.placements = 20, .force_scale = 1.0f};
@@ -127,7 +127,7 @@ static void it_keeps_settings(void) {
   TEST_ASSERT_EQUAL_UINT16(20, app.store.content.calibration.placements);
 }
 
-static void it_tares(void) {
+TEST(it_tares) {
   native_cdc_open();
   run_for(300);
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
@@ -139,14 +139,4 @@ static void it_tares(void) {
     flags = packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
   }
   TEST_ASSERT_TRUE(flags & CONTACT_FLAG_TARED);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(it_tells_its_capabilities_and_their_settings_only);
-  RUN_TEST(it_refuses_streams_and_commands_that_it_lacks);
-  RUN_TEST(it_streams_what_it_has);
-  RUN_TEST(it_keeps_settings);
-  RUN_TEST(it_tares);
-  return UNITY_END();
 }

@@ -101,7 +101,7 @@ static struct wire_contact last_of_press(void) {
 
 static float scale(void) { return 1.25f * pad_of_12_mm().force_ratio; }
 
-static void two_contacts_have_their_places_and_forces(void) {
+TEST(two_contacts_have_their_places_and_forces) {
   put(1.0, 7.0, 3.0);
   put(-2.0, -7.0, 6.0);
   const struct wire_contact contact = last_of_press();
@@ -120,7 +120,7 @@ static void two_contacts_have_their_places_and_forces(void) {
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contact.x_mm);
 }
 
-static void a_long_contact_has_its_direction(void) {
+TEST(a_long_contact_has_its_direction) {
   for (int turn = -1; turn <= 1; turn++) {
     tearDown();
     setUp();
@@ -139,7 +139,7 @@ static void a_long_contact_has_its_direction(void) {
 }
 
 /* Partly beyond the sensors, where the Gaussian is off. */
-static void a_long_contact_doubts_its_place_by_what_its_line_has(void) {
+TEST(a_long_contact_doubts_its_place_by_what_its_line_has) {
   for (int i = 0; i < OBJECTS_MAX; i++) {
     double at = 20.0 * ((i + 0.5) / OBJECTS_MAX - 0.5);
     put(5.0 + 0.8 * at, -13.0 + 0.6 * at, 8.0 / OBJECTS_MAX);
@@ -158,7 +158,7 @@ static void a_long_contact_doubts_its_place_by_what_its_line_has(void) {
 }
 
 /* Noise makes one pull of six look like a short line (two.json: round, Q/F 0.3). */
-static void one_contact_is_one_with_a_load_or_without(void) {
+TEST(one_contact_is_one_with_a_load_or_without) {
   const struct pad_profile profile = pad_of_12_mm();
   for (int pulled = 0; pulled < 2; pulled++) {
     tearDown();
@@ -187,7 +187,7 @@ static void one_contact_is_one_with_a_load_or_without(void) {
                    app.found.contact.flags);
 }
 
-static void what_is_none_of_these_is_warned_of_all_the_time(void) {
+TEST(what_is_none_of_these_is_warned_of_all_the_time) {
   put(7.0, -14.0, 4.0);
   put(-7.0, 0.0, 4.0);
   put(7.0, 14.0, 4.0);
@@ -206,7 +206,7 @@ static void what_is_none_of_these_is_warned_of_all_the_time(void) {
 
 /* Frames that come fast keep what a search for an outlier found; slow ones have time for their own.
  */
-static void a_search_for_an_outlier_is_of_fast_frames(void) {
+TEST(a_search_for_an_outlier_is_of_fast_frames) {
   put(1.5, -4.0, 5.0);
   last_of_press();
   app.stages.location.watch = (struct fit_watch){.usable = app.found.conditioned.usable,
@@ -226,7 +226,7 @@ static void a_search_for_an_outlier_is_of_fast_frames(void) {
 }
 
 /* Here each frame has time for several frames' worth of parts. */
-static void each_answer_says_how_old_it_is(void) {
+TEST(each_answer_says_how_old_it_is) {
   put(0.0, 8.0, 4.0);
   put(0.0, -8.0, 4.0);
   const struct pad_profile profile = pad_of_12_mm();
@@ -253,7 +253,7 @@ static void each_answer_says_how_old_it_is(void) {
 }
 
 /* The next contact is not called what the one before was. */
-static void a_contact_that_ends_is_forgotten(void) {
+TEST(a_contact_that_ends_is_forgotten) {
   put(0.0, 8.0, 4.0);
   put(0.0, -8.0, 4.0);
   ends_us = PRESS_us + 150000;
@@ -272,7 +272,7 @@ static void a_contact_that_ends_is_forgotten(void) {
   TEST_ASSERT_BITS(SHAPES, CONTACT_FLAG_SHAPE_VALID, contacts[count - 1].flags);
 }
 
-static void rubber_that_is_too_thin_has_no_shapes(void) {
+TEST(rubber_that_is_too_thin_has_no_shapes) {
   put(0.0, 8.0, 4.0);
   put(0.0, -8.0, 4.0);
   struct pad_profile thin = pad_of_12_mm();
@@ -291,7 +291,7 @@ static void rubber_that_is_too_thin_has_no_shapes(void) {
   }
 }
 
-static void a_second_processor_gives_the_same_answers(void) {
+TEST(a_second_processor_gives_the_same_answers) {
   static struct wire_contact two[FRAMES_MAX];
   const struct pad_profile profile = pad_of_12_mm();
   unsigned counts[2];
@@ -313,7 +313,7 @@ static void a_second_processor_gives_the_same_answers(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TWO_CONTACTS, two[counts[1] - 1].flags);
 }
 
-static void without_a_second_processor_that_answers_there_are_no_shapes(void) {
+TEST(without_a_second_processor_that_answers_there_are_no_shapes) {
   tearDown();
   native_set_worker(true, UINT64_MAX);
   setUp();
@@ -325,20 +325,4 @@ static void without_a_second_processor_that_answers_there_are_no_shapes(void) {
   for (unsigned i = 0; i < count; i++) {
     TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, contacts[i].flags);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(two_contacts_have_their_places_and_forces);
-  RUN_TEST(a_long_contact_has_its_direction);
-  RUN_TEST(a_long_contact_doubts_its_place_by_what_its_line_has);
-  RUN_TEST(one_contact_is_one_with_a_load_or_without);
-  RUN_TEST(what_is_none_of_these_is_warned_of_all_the_time);
-  RUN_TEST(a_search_for_an_outlier_is_of_fast_frames);
-  RUN_TEST(each_answer_says_how_old_it_is);
-  RUN_TEST(a_contact_that_ends_is_forgotten);
-  RUN_TEST(rubber_that_is_too_thin_has_no_shapes);
-  RUN_TEST(a_second_processor_gives_the_same_answers);
-  RUN_TEST(without_a_second_processor_that_answers_there_are_no_shapes);
-  return UNITY_END();
 }

@@ -24,7 +24,7 @@ static double gain_of_calibration(unsigned sensor) { return 0.8 + 0.02 * (double
 
 /* A pad whose sensors are as sensitive as the calibration says is located and weighed as one of
  * equal sensors is; without the calibration it is not. */
-static void a_calibration_acts_on_readings_and_force(void) {
+TEST(a_calibration_acts_on_readings_and_force) {
   press.force_N = 5.0;
   press.x_mm = 2.5;
   press.y_mm = -7.0;
@@ -76,7 +76,7 @@ static struct wire_info info_after_restart(void) {
 }
 
 /* The pad's shape acts until the user sets a prior, and again when it is taken back. */
-static void a_calibration_tells_the_fit_the_pads_shape(void) {
+TEST(a_calibration_tells_the_fit_the_pads_shape) {
   native_cdc_open();
   run_for(300);
   struct wire_packet command = calibrate_command();
@@ -121,7 +121,7 @@ static void a_calibration_tells_the_fit_the_pads_shape(void) {
   TEST_ASSERT_NULL(app.stages.location.settings.own);
 }
 
-static void a_calibration_outlives_power(void) {
+TEST(a_calibration_outlives_power) {
   native_cdc_open();
   run_for(300);
   struct wire_packet command = calibrate_command();
@@ -137,7 +137,7 @@ static void a_calibration_outlives_power(void) {
   TEST_ASSERT_EQUAL_HEX32(0, info_after_restart().stored);
 }
 
-static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
+TEST(settings_are_kept_when_asked_for_and_forgotten_likewise) {
   native_cdc_open();
   run_for(300);
   const struct wire_info built = get_info();
@@ -178,7 +178,7 @@ static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
 
 /* A frame that is held after it must not say what was so before: who waits for TARED would go on.
  */
-static void after_a_tare_no_frame_says_tared_before_it_is(void) {
+TEST(after_a_tare_no_frame_says_tared_before_it_is) {
   press.force_N = 5.0;
   native_cdc_open();
   run_for(300);
@@ -202,7 +202,7 @@ static void after_a_tare_no_frame_says_tared_before_it_is(void) {
 }
 
 /* The answer to a command that stores is late; until then all goes on as before. */
-static void storing_takes_its_time_and_keeps_nobody_waiting(void) {
+TEST(storing_takes_its_time_and_keeps_nobody_waiting) {
   native_cdc_open();
   run_for(300);
   start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
@@ -241,7 +241,7 @@ static void storing_takes_its_time_and_keeps_nobody_waiting(void) {
 }
 
 /* At the slowest rate nothing else wakes the main loop. */
-static void storing_is_as_quick_at_the_slowest_rate(void) {
+TEST(storing_is_as_quick_at_the_slowest_rate) {
   native_cdc_open();
   run_for(300);
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
@@ -257,7 +257,7 @@ static void storing_is_as_quick_at_the_slowest_rate(void) {
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, packet.body.ack.result);
 }
 
-static void the_loader_waits_for_what_is_being_stored(void) {
+TEST(the_loader_waits_for_what_is_being_stored) {
   native_cdc_open();
   run_for(300);
   struct wire_packet calibrate = calibrate_command();
@@ -273,7 +273,7 @@ static void the_loader_waits_for_what_is_being_stored(void) {
   TEST_ASSERT_TRUE(info_after_restart().stored & WIRE_STORED_CALIBRATION);
 }
 
-static void a_flash_that_fails_is_no_calibration(void) {
+TEST(a_flash_that_fails_is_no_calibration) {
   native_cdc_open();
   run_for(300);
   native_flash_wear_out();
@@ -285,7 +285,7 @@ static void a_flash_that_fails_is_no_calibration(void) {
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
 }
 
-static void damage_is_told_and_not_used(void) {
+TEST(damage_is_told_and_not_used) {
   native_cdc_open();
   run_for(300);
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
@@ -296,7 +296,7 @@ static void damage_is_told_and_not_used(void) {
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info_after_restart().stored);
 }
 
-static void a_calibration_out_of_range_is_refused(void) {
+TEST(a_calibration_out_of_range_is_refused) {
   native_cdc_open();
   run_for(300);
   struct wire_packet good = calibrate_command();
@@ -337,20 +337,4 @@ static void a_calibration_out_of_range_is_refused(void) {
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(other));
   TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_CALIBRATION);
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(good));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_calibration_acts_on_readings_and_force);
-  RUN_TEST(a_calibration_tells_the_fit_the_pads_shape);
-  RUN_TEST(a_calibration_outlives_power);
-  RUN_TEST(settings_are_kept_when_asked_for_and_forgotten_likewise);
-  RUN_TEST(storing_takes_its_time_and_keeps_nobody_waiting);
-  RUN_TEST(storing_is_as_quick_at_the_slowest_rate);
-  RUN_TEST(after_a_tare_no_frame_says_tared_before_it_is);
-  RUN_TEST(the_loader_waits_for_what_is_being_stored);
-  RUN_TEST(a_flash_that_fails_is_no_calibration);
-  RUN_TEST(damage_is_told_and_not_used);
-  RUN_TEST(a_calibration_out_of_range_is_refused);
-  return UNITY_END();
 }

@@ -12,7 +12,7 @@ void tearDown(void) { rig_end(); }
 
 static uint8_t set(uint8_t mode) { return ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {mode}}); }
 
-static void it_is_off_until_it_is_set(void) {
+TEST(it_is_off_until_it_is_set) {
   start_streams(WIRE_STREAM_HEALTH);
   TEST_ASSERT_EQUAL(PORT_SYNC_OFF, native_sync_mode());
   TEST_ASSERT_EQUAL_UINT8(0, get_info().sync);
@@ -23,7 +23,7 @@ static void it_is_off_until_it_is_set(void) {
   TEST_ASSERT_EQUAL_UINT(0, native_sync_pulses());
 }
 
-static void it_knows_four_modes(void) {
+TEST(it_knows_four_modes) {
   for (uint8_t mode = 0; mode < 5; mode++) {
     TEST_ASSERT_EQUAL_UINT8(mode < 4 ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE, set(mode));
     TEST_ASSERT_EQUAL_UINT8(mode < 4 ? mode : PORT_SYNC_SECOND, native_sync_mode());
@@ -31,7 +31,7 @@ static void it_knows_four_modes(void) {
   }
 }
 
-static void edges_are_sent_with_their_times(void) {
+TEST(edges_are_sent_with_their_times) {
   TEST_ASSERT_EQUAL_UINT8(WIRE_RESULT_DONE, set(PORT_SYNC_IN));
   start_streams(WIRE_STREAM_CONTACT);
   for (uint32_t number = 1; number <= 6; number++) {
@@ -47,7 +47,7 @@ static void edges_are_sent_with_their_times(void) {
 }
 
 /* At a slow rate nothing else wakes the main loop. */
-static void an_edge_waits_for_no_frame(void) {
+TEST(an_edge_waits_for_no_frame) {
   set(PORT_SYNC_SECOND);
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1000}});
   start_streams(WIRE_STREAM_CONTACT);
@@ -57,7 +57,7 @@ static void an_edge_waits_for_no_frame(void) {
   TEST_ASSERT_TRUE(next_of_type(WIRE_SYNC, &packet));
 }
 
-static void nothing_is_sent_to_a_host_without_streams(void) {
+TEST(nothing_is_sent_to_a_host_without_streams) {
   set(PORT_SYNC_IN);
   native_sync_edge();
   run_for(20);
@@ -70,7 +70,7 @@ static void nothing_is_sent_to_a_host_without_streams(void) {
   TEST_ASSERT_EQUAL_UINT32(2, packet.body.sync.number);
 }
 
-static void a_storm_is_sent_at_a_bounded_rate(void) {
+TEST(a_storm_is_sent_at_a_bounded_rate) {
   set(PORT_SYNC_IN);
   start_streams(WIRE_STREAM_HEALTH);
   for (unsigned ms = 0; ms < 100; ms++) {
@@ -94,7 +94,7 @@ static void a_storm_is_sent_at_a_bounded_rate(void) {
   TEST_ASSERT_UINT32_WITHIN(20, 100 * SYNC_EDGES_PER_ms + PORT_SYNC_KEPT, sent);
 }
 
-static void a_pulse_is_a_frame(void) {
+TEST(a_pulse_is_a_frame) {
   set(PORT_SYNC_FRAME);
   for (unsigned rate_Hz = 20; rate_Hz <= 100; rate_Hz += 80) {
     ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1000 * rate_Hz}});
@@ -113,7 +113,7 @@ static void a_pulse_is_a_frame(void) {
   TEST_ASSERT_FALSE(native_sync_level());
 }
 
-static void it_is_off_while_the_bus_sleeps(void) {
+TEST(it_is_off_while_the_bus_sleeps) {
   set(PORT_SYNC_SECOND);
   native_cdc_suspend(true);
   run_for(200);
@@ -127,7 +127,7 @@ static void it_is_off_while_the_bus_sleeps(void) {
   TEST_ASSERT_EQUAL_UINT8(PORT_SYNC_SECOND, get_info().sync);
 }
 
-static void it_is_kept_like_other_settings(void) {
+TEST(it_is_kept_like_other_settings) {
   set(PORT_SYNC_FRAME);
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
   rig_power_up();
@@ -138,18 +138,4 @@ static void it_is_kept_like_other_settings(void) {
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {0}}));
   rig_power_up();
   TEST_ASSERT_EQUAL(PORT_SYNC_OFF, native_sync_mode());
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(it_is_off_until_it_is_set);
-  RUN_TEST(it_knows_four_modes);
-  RUN_TEST(edges_are_sent_with_their_times);
-  RUN_TEST(an_edge_waits_for_no_frame);
-  RUN_TEST(nothing_is_sent_to_a_host_without_streams);
-  RUN_TEST(a_storm_is_sent_at_a_bounded_rate);
-  RUN_TEST(a_pulse_is_a_frame);
-  RUN_TEST(it_is_off_while_the_bus_sleeps);
-  RUN_TEST(it_is_kept_like_other_settings);
-  return UNITY_END();
 }

@@ -82,7 +82,7 @@ static const uint32_t TANGENTIAL = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_
 
 /* The Gaussian fit is pulled along by the load; with the profile it is not, and the load is told.
  */
-static void a_profile_tells_the_load_and_corrects_the_location(void) {
+TEST(a_profile_tells_the_load_and_corrects_the_location) {
   load.qx_N = 1.2;
   load.qy_N = -0.9;
   struct wire_packet command = pad_command();
@@ -104,7 +104,7 @@ static void a_profile_tells_the_load_and_corrects_the_location(void) {
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.sigma_mm, contact.sigma_mm);
 }
 
-static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
+TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is) {
   load.qx_N = 1.2;
   native_cdc_open();
   run_for(300);
@@ -117,7 +117,7 @@ static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
 
 /* Until the readings have been looked at it is 0.2 of the force: for one frame where they are far
  * apart. */
-static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
+TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
   for (int kind = 0; kind < 4; kind++) {
     const bool loaded = kind % 2 != 0, slow = kind < 2;
     load.qx_N = loaded ? 1.5 : 0.0;
@@ -150,7 +150,7 @@ static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
 }
 
 /* One touch, of gains that are alike: what was assumed is less then, and stays so. */
-static void touches_tell_the_gains_of_a_pad_without_a_calibration(void) {
+TEST(touches_tell_the_gains_of_a_pad_without_a_calibration) {
   const uint16_t assumed_q16 = (uint16_t)(65536.0f * DEFAULT_GAIN_SD + 0.5f);
   native_cdc_open();
   run_for(1400);
@@ -165,7 +165,7 @@ static void touches_tell_the_gains_of_a_pad_without_a_calibration(void) {
   TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.stages.location.settings.gain_sd_q16[14]);
 }
 
-static void a_profile_outlives_power_until_it_is_erased(void) {
+TEST(a_profile_outlives_power_until_it_is_erased) {
   struct wire_packet command = pad_command();
   store_pad(&command);
   for (int restart = 0; restart < 2; restart++) {
@@ -188,7 +188,7 @@ static void a_profile_outlives_power_until_it_is_erased(void) {
 }
 
 /* The Gaussian is where the estimate begins, and what is left where there is none. */
-static void beside_a_profile_the_fit_has_the_dip_and_assumes_no_width(void) {
+TEST(beside_a_profile_the_fit_has_the_dip_and_assumes_no_width) {
   native_cdc_open();
   run_for(300);
   struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE};
@@ -211,7 +211,7 @@ static void beside_a_profile_the_fit_has_the_dip_and_assumes_no_width(void) {
   TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
 }
 
-static void a_profile_out_of_range_is_refused(void) {
+TEST(a_profile_out_of_range_is_refused) {
   native_cdc_open();
   run_for(300);
   struct wire_packet command = pad_command();
@@ -225,7 +225,7 @@ static void a_profile_out_of_range_is_refused(void) {
 }
 
 /* Of a firmware that knew other ranges. */
-static void a_stored_profile_out_of_range_does_not_act(void) {
+TEST(a_stored_profile_out_of_range_does_not_act) {
   native_cdc_open();
   run_for(300);
   struct pad_profile pad = pad_of_12_mm();
@@ -242,7 +242,7 @@ static void a_stored_profile_out_of_range_does_not_act(void) {
   }
 }
 
-static void a_calibration_and_the_scale_of_the_profile_act(void) {
+TEST(a_calibration_and_the_scale_of_the_profile_act) {
   load.qx_N = 1.2;
   struct wire_packet command = pad_command();
   command.body.cmd_pad.profile.tangential_scale = 1.5f;
@@ -266,7 +266,7 @@ static void a_calibration_and_the_scale_of_the_profile_act(void) {
   TEST_ASSERT_TRUE(app.found.load.location_sd_mm != app.found.fit.location_sd_mm);
 }
 
-static void from_touch_tells_what_changed(void) {
+TEST(from_touch_tells_what_changed) {
   load.qx_N = 1.2;
   load.later_qx_N = 0.2;
   load.later_us = 1800000;
@@ -281,7 +281,7 @@ static void from_touch_tells_what_changed(void) {
 }
 
 /* While the sensors measure their temperature the frame before goes out again, whole. */
-static void a_held_frame_repeats_the_load(void) {
+TEST(a_held_frame_repeats_the_load) {
   load.qx_N = 1.2;
   struct wire_packet packet, command = pad_command();
   store_pad(&command);
@@ -325,7 +325,7 @@ static unsigned take_contacts(struct wire_contact contacts[CONTACTS]) {
   return count;
 }
 
-static void a_second_processor_gives_the_same_estimates(void) {
+TEST(a_second_processor_gives_the_same_estimates) {
   static struct wire_contact alone[CONTACTS], two[CONTACTS];
   const unsigned count = take_contacts(alone);
   TEST_ASSERT_FALSE(app.stages.jobs.has_processor);
@@ -341,7 +341,7 @@ static void a_second_processor_gives_the_same_estimates(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, two[count - 1].flags);
 }
 
-static void without_an_answer_frames_go_out_with_the_fit_and_say_so(void) {
+TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so) {
   static struct wire_contact contacts[CONTACTS];
   native_set_worker(true, UINT64_MAX);
   const unsigned count = take_contacts(contacts);
@@ -373,7 +373,7 @@ static void feed_fast(double share) {
   app_process_frame(&app, app.found.frame.t_read_us);
 }
 
-static void fast_frames_take_the_load_of_the_frame_before(void) {
+TEST(fast_frames_take_the_load_of_the_frame_before) {
   for (int processors = 1; processors <= 2; processors++) {
     tearDown();
     native_set_worker(processors == 2, 10);
@@ -406,7 +406,7 @@ static void fast_frames_take_the_load_of_the_frame_before(void) {
   }
 }
 
-static void fast_frames_say_that_the_one_before_got_no_answer(void) {
+TEST(fast_frames_say_that_the_one_before_got_no_answer) {
   tearDown();
   native_set_worker(true, 10);
   setUp();
@@ -426,24 +426,4 @@ static void fast_frames_say_that_the_one_before_got_no_answer(void) {
     TEST_ASSERT_BITS(TANGENTIAL | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, app.found.contact.flags);
   }
   TEST_ASSERT_EQUAL(starts + 4, native_worker_starts());
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
-  RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
-  RUN_TEST(a_load_that_is_not_estimated_is_part_of_the_error);
-  RUN_TEST(touches_tell_the_gains_of_a_pad_without_a_calibration);
-  RUN_TEST(a_profile_outlives_power_until_it_is_erased);
-  RUN_TEST(beside_a_profile_the_fit_has_the_dip_and_assumes_no_width);
-  RUN_TEST(a_profile_out_of_range_is_refused);
-  RUN_TEST(a_stored_profile_out_of_range_does_not_act);
-  RUN_TEST(a_calibration_and_the_scale_of_the_profile_act);
-  RUN_TEST(from_touch_tells_what_changed);
-  RUN_TEST(a_held_frame_repeats_the_load);
-  RUN_TEST(a_second_processor_gives_the_same_estimates);
-  RUN_TEST(fast_frames_take_the_load_of_the_frame_before);
-  RUN_TEST(fast_frames_say_that_the_one_before_got_no_answer);
-  RUN_TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so);
-  return UNITY_END();
 }

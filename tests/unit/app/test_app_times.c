@@ -31,9 +31,6 @@ static double field_Pa(double dx_mm, double dy_mm, uint64_t t_us) {
   return 5.0 / (2.0 * PI * v * 1e-6) * exp(-(dx_mm * dx_mm + dy_mm * dy_mm) / (2.0 * v));
 }
 
-void setUp(void) {}
-void tearDown(void) {}
-
 struct start {
   uint64_t t_us;
   uint32_t count; /* of everything that counts up */
@@ -121,23 +118,13 @@ static void check(uint64_t crossing_us, uint32_t count) {
                         flags);
 }
 
-static void the_clock_crosses_2_to_the_32_us(void) { check(UINT64_C(1) << 32, 0); }
+TEST(the_clock_crosses_2_to_the_32_us) { check(UINT64_C(1) << 32, 0); }
 
-static void the_clock_crosses_2_to_the_32_ms(void) { check((UINT64_C(1) << 32) * 1000, 0); }
+TEST(the_clock_crosses_2_to_the_32_ms) { check((UINT64_C(1) << 32) * 1000, 0); }
 
 /* Milliseconds as the zero counts them: 1024 us each. */
-static void the_clock_crosses_2_to_the_42_us(void) { check(UINT64_C(1) << 42, 0); }
+TEST(the_clock_crosses_2_to_the_42_us) { check(UINT64_C(1) << 42, 0); }
 
-static void sixty_days_have_passed(void) { check(60 * DAY_us, 60u * 86400u); }
+TEST(sixty_days_have_passed) { check(60 * DAY_us, 60u * 86400u); }
 
-static void frames_and_sequences_cross_their_ends(void) { check(60 * DAY_us, UINT32_MAX - 300); }
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(the_clock_crosses_2_to_the_32_us);
-  RUN_TEST(the_clock_crosses_2_to_the_32_ms);
-  RUN_TEST(the_clock_crosses_2_to_the_42_us);
-  RUN_TEST(sixty_days_have_passed);
-  RUN_TEST(frames_and_sequences_cross_their_ends);
-  return UNITY_END();
-}
+TEST(frames_and_sequences_cross_their_ends) { check(60 * DAY_us, UINT32_MAX - 300); }

@@ -9,7 +9,7 @@ void setUp(void) { rig_start(); }
 
 void tearDown(void) { rig_end(); }
 
-static void damage_is_counted_and_unknown_commands_are_answered(void) {
+TEST(damage_is_counted_and_unknown_commands_are_answered) {
   native_cdc_open();
   run_for(300);
   static const uint8_t echo[] = {5, 'h', 'e', 'l', 'l', 0, 'x', 0, 0, 0};
@@ -40,7 +40,7 @@ static void damage_is_counted_and_unknown_commands_are_answered(void) {
   TEST_ASSERT_EQUAL_UINT32(3, get_health().commands_rejected);
 }
 
-static void closing_the_port_ends_the_streams(void) {
+TEST(closing_the_port_ends_the_streams) {
   native_cdc_open();
   run_for(300);
   start_streams(WIRE_STREAM_CONTACT);
@@ -55,7 +55,7 @@ static void closing_the_port_ends_the_streams(void) {
   TEST_ASSERT_FALSE(next_packet(&packet));
 }
 
-static void a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap(void) {
+TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap) {
   native_cdc_open();
   run_for(300);
   start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
@@ -79,7 +79,7 @@ static void a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap(void)
   TEST_ASSERT_EQUAL_UINT32(health.packets_dropped, missing);
 }
 
-static void health_comes_each_second(void) {
+TEST(health_comes_each_second) {
   native_cdc_open();
   run_for(300);
   start_streams(WIRE_STREAM_HEALTH);
@@ -94,7 +94,7 @@ static void health_comes_each_second(void) {
   TEST_ASSERT_INT_WITHIN(1, 5, count);
 }
 
-static void the_loader_is_reached_by_command_and_by_touch(void) {
+TEST(the_loader_is_reached_by_command_and_by_touch) {
   native_cdc_open();
   run_for(300);
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
@@ -118,7 +118,7 @@ static struct crash_record get_crash(void) {
   return packet.body.crash;
 }
 
-static void the_last_crash_is_told_when_asked_for(void) {
+TEST(the_last_crash_is_told_when_asked_for) {
   native_cdc_open();
   run_for(300);
   TEST_ASSERT_EQUAL(CRASH_NONE, get_crash().kind);
@@ -131,7 +131,7 @@ static void the_last_crash_is_told_when_asked_for(void) {
   native_set_last_crash(&crash);
 }
 
-static void what_happens_is_noted_for_the_record_of_a_crash(void) {
+TEST(what_happens_is_noted_for_the_record_of_a_crash) {
   uint8_t detail;
   native_cdc_open();
   run_for(300);
@@ -147,7 +147,7 @@ static void what_happens_is_noted_for_the_record_of_a_crash(void) {
   TEST_ASSERT_EQUAL(0, detail);
 }
 
-static void more_failures_in_a_second_than_a_byte_holds_are_noted_as_255(void) {
+TEST(more_failures_in_a_second_than_a_byte_holds_are_noted_as_255) {
   uint8_t detail;
   run_for(1500);
   static const struct {
@@ -162,7 +162,7 @@ static void more_failures_in_a_second_than_a_byte_holds_are_noted_as_255(void) {
   }
 }
 
-static void at_the_slowest_rate_the_watchdog_is_fed(void) {
+TEST(at_the_slowest_rate_the_watchdog_is_fed) {
   native_cdc_open();
   run_for(300);
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
@@ -172,7 +172,7 @@ static void at_the_slowest_rate_the_watchdog_is_fed(void) {
 /* In the frame that is held for the temperature already, and until a temperature says otherwise. */
 /* Two supplies dip at once, so that neither steps alone: the temperatures tell it before the zeros
  * give in, half a second later. */
-static void test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in(void) {
+TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in) {
   run_for(8000);
   while (array.command >> 4 != 5) { /* the next temperature would come in two seconds */
     native_run_until(port_now_us() + 50, main_round, &app);
@@ -192,7 +192,7 @@ static void test_sensors_that_lost_their_state_are_reset_before_their_zeros_give
   TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.found.frame.valid);
 }
 
-static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
+TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful) {
   press.force_N = 5.0;
   press.from_us = 700000;
   native_cdc_open();
@@ -231,7 +231,7 @@ static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
   } while (next_of_type(WIRE_CONTACT, &packet));
 }
 
-static void test_stages_end_at_what_fits(void) {
+TEST(test_stages_end_at_what_fits) {
   static const uint32_t spent_us[] = {0, 65534, 65535, 65536, UINT32_MAX};
   for (unsigned i = 0; i < 5; i++) {
     struct wire_contact contact;
@@ -241,7 +241,7 @@ static void test_stages_end_at_what_fits(void) {
   }
 }
 
-static void test_uptime_keeps_the_rest_of_each_second(void) {
+TEST(test_uptime_keeps_the_rest_of_each_second) {
   native_cdc_open();
   run_for(300);
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1300}});
@@ -250,7 +250,7 @@ static void test_uptime_keeps_the_rest_of_each_second(void) {
   TEST_ASSERT_UINT32_WITHIN(2, now_s, get_health().uptime_s);
 }
 
-static void test_whether_the_watchdog_struck_is_told(void) {
+TEST(test_whether_the_watchdog_struck_is_told) {
   native_cdc_open();
   run_for(300);
   TEST_ASSERT_EQUAL(0, get_health().watchdog_resets);
@@ -267,12 +267,12 @@ static void test_whether_the_watchdog_struck_is_told(void) {
 }
 
 /* USB 2.0, 9.6.1: bcdDevice is 0xJJMN. */
-static void test_the_port_tells_the_version(void) {
+TEST(test_the_port_tells_the_version) {
   const uint8_t *version = build_info.version;
   TEST_ASSERT_EQUAL_HEX16(version[0] * 256 + version[1] * 16 + version[2], native_cdc_identity()->device_version_bcd);
 }
 
-static void test_what_is_being_stored_is_told(void) {
+TEST(test_what_is_being_stored_is_told) {
   native_cdc_open();
   run_for(300);
   struct wire_packet keep = {.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}};
@@ -286,25 +286,4 @@ static void test_what_is_being_stored_is_told(void) {
   while (next_packet(&info)) {
   }
   TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_WRITING);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(damage_is_counted_and_unknown_commands_are_answered);
-  RUN_TEST(closing_the_port_ends_the_streams);
-  RUN_TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap);
-  RUN_TEST(health_comes_each_second);
-  RUN_TEST(the_loader_is_reached_by_command_and_by_touch);
-  RUN_TEST(the_last_crash_is_told_when_asked_for);
-  RUN_TEST(what_happens_is_noted_for_the_record_of_a_crash);
-  RUN_TEST(more_failures_in_a_second_than_a_byte_holds_are_noted_as_255);
-  RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
-  RUN_TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in);
-  RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);
-  RUN_TEST(test_stages_end_at_what_fits);
-  RUN_TEST(test_uptime_keeps_the_rest_of_each_second);
-  RUN_TEST(test_whether_the_watchdog_struck_is_told);
-  RUN_TEST(test_the_port_tells_the_version);
-  RUN_TEST(test_what_is_being_stored_is_told);
-  return UNITY_END();
 }

@@ -3,14 +3,11 @@
 #include "common/crc32.h"
 #include "support/pad.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
-#include <unity.h>
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /* The definition: one bit at a time, no table. */
 static uint32_t crc32_bitwise(const uint8_t *bytes, size_t length) {
@@ -24,12 +21,12 @@ static uint32_t crc32_bitwise(const uint8_t *bytes, size_t length) {
   return ~crc;
 }
 
-static void test_crc_check_value(void) {
+TEST(test_crc_check_value) {
   TEST_ASSERT_EQUAL_HEX32(0xCBF43926, crc32_iso_hdlc((const uint8_t *)"123456789", 9));
   TEST_ASSERT_EQUAL_HEX32(0, crc32_iso_hdlc((const uint8_t *)"", 0));
 }
 
-static void test_crc_equals_bitwise_at_every_length_and_alignment(void) {
+TEST(test_crc_equals_bitwise_at_every_length_and_alignment) {
   struct random random = {1};
   uint8_t bytes[520];
   for (size_t i = 0; i < sizeof bytes; i++) {
@@ -48,7 +45,7 @@ static void test_crc_equals_bitwise_at_every_length_and_alignment(void) {
 
 /* A message followed by its CRC, low byte first, always leaves the same remainder: sender and
  * receiver agree on the byte order, wherever the message is cut into body and CRC. */
-static void test_crc_of_message_with_crc_is_constant(void) {
+TEST(test_crc_of_message_with_crc_is_constant) {
   struct random random = {2};
   uint8_t bytes[104];
   for (size_t length = 0; length <= 100; length++) {
@@ -60,7 +57,7 @@ static void test_crc_of_message_with_crc_is_constant(void) {
   }
 }
 
-static void test_crc_sees_every_flip_of_one_or_two_bits(void) {
+TEST(test_crc_sees_every_flip_of_one_or_two_bits) {
   uint8_t bytes[40] = "a message of forty bytes, zero at its en";
   const uint32_t right = crc32_iso_hdlc(bytes, sizeof bytes);
   for (unsigned first = 0; first < 8 * sizeof bytes; first++) {
@@ -78,7 +75,7 @@ static void test_crc_sees_every_flip_of_one_or_two_bits(void) {
   }
 }
 
-static void test_bytes_are_little_endian(void) {
+TEST(test_bytes_are_little_endian) {
   const uint8_t expected[8] = {0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11};
   uint8_t bytes[8];
   bytes_put_u64(bytes, UINT64_C(0x1122334455667788));
@@ -93,7 +90,7 @@ static void test_bytes_are_little_endian(void) {
   TEST_ASSERT_EQUAL_HEX8(0, bytes[2]);
 }
 
-static void test_bytes_round_trip_at_every_alignment(void) {
+TEST(test_bytes_round_trip_at_every_alignment) {
   static const uint64_t values[] = {0,      1,       0x7F,       0x80,       0xFF,       0x100,     0x7FFF,    0x8000,
                                     0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, INT64_MAX, UINT64_MAX};
   uint8_t bytes[16];
@@ -109,7 +106,7 @@ static void test_bytes_round_trip_at_every_alignment(void) {
   }
 }
 
-static void test_floats_travel_by_their_bits(void) {
+TEST(test_floats_travel_by_their_bits) {
   TEST_ASSERT_EQUAL_HEX32(0x3F800000, bytes_from_f32(1.0f));
   TEST_ASSERT_EQUAL_HEX32(0x80000000, bytes_from_f32(-0.0f));
   TEST_ASSERT_EQUAL_HEX32(0x40490FDB, bytes_from_f32(3.14159265f));
@@ -123,7 +120,7 @@ static void test_floats_travel_by_their_bits(void) {
   }
 }
 
-static void test_calibrations_are_in_their_ranges(void) {
+TEST(test_calibrations_are_in_their_ranges) {
   struct calibration calibration = {.force_scale = 1.0f};
   for (int k = 0; k < FT_MAX_SENSORS; k++) {
     calibration.sensors[k].gain = 1.0f;
@@ -186,7 +183,7 @@ static void test_calibrations_are_in_their_ranges(void) {
 }
 
 /* What is behind the last coefficient is none. */
-static void test_a_pad_profile_ends_where_it_does(void) {
+TEST(test_a_pad_profile_ends_where_it_does) {
   struct pad_profile pad;
   const struct pad_profile good = pad_of_12_mm();
   memset(&pad, 0xFF, sizeof pad);
@@ -195,7 +192,7 @@ static void test_a_pad_profile_ends_where_it_does(void) {
   TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
 }
 
-static void test_pad_profiles_are_in_their_ranges(void) {
+TEST(test_pad_profiles_are_in_their_ranges) {
   struct pad_profile pad = pad_of_12_mm();
   TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
   const struct {
@@ -250,19 +247,4 @@ static void test_pad_profiles_are_in_their_ranges(void) {
     pad.from_touch = (uint8_t)from_touch;
     TEST_ASSERT_EQUAL(from_touch <= 1, pad_profile_is_valid(&pad));
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_crc_check_value);
-  RUN_TEST(test_crc_equals_bitwise_at_every_length_and_alignment);
-  RUN_TEST(test_crc_of_message_with_crc_is_constant);
-  RUN_TEST(test_crc_sees_every_flip_of_one_or_two_bits);
-  RUN_TEST(test_bytes_are_little_endian);
-  RUN_TEST(test_bytes_round_trip_at_every_alignment);
-  RUN_TEST(test_floats_travel_by_their_bits);
-  RUN_TEST(test_calibrations_are_in_their_ranges);
-  RUN_TEST(test_a_pad_profile_ends_where_it_does);
-  RUN_TEST(test_pad_profiles_are_in_their_ranges);
-  return UNITY_END();
 }

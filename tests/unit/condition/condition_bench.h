@@ -5,8 +5,7 @@
 
 #include "condition/condition.h"
 #include "support/random.h"
-
-#include <unity.h>
+#include "support/unit.h"
 
 enum { SENSORS = 15 };
 #define ALL 0x7FFFu

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static void test_gate_has_a_hysteresis_in_pascals_and_sigmas(void) {
+TEST(test_gate_has_a_hysteresis_in_pascals_and_sigmas) {
   static const int32_t noises[] = {0, 16 * Pa / 10, 4 * Pa, 11 * Pa};
   for (size_t n = 0; n < sizeof noises / sizeof noises[0]; n++) {
     begin_calm(4854);
@@ -23,7 +23,7 @@ static void test_gate_has_a_hysteresis_in_pascals_and_sigmas(void) {
   }
 }
 
-static void test_invalid_sensors_are_left_out(void) {
+TEST(test_invalid_sensors_are_left_out) {
   frame.valid = ALL & ~4u;
   frame.pressure_Pa_q10[2] = 0;
   run(17);
@@ -53,7 +53,7 @@ static void test_invalid_sensors_are_left_out(void) {
   TEST_ASSERT_EQUAL_INT32(AMBIENT + 777, condition.zero_Pa_q10[2]);
 }
 
-static void test_unsettled_readings_move_no_zero(void) {
+TEST(test_unsettled_readings_move_no_zero) {
   begin_calm(4854);
   frame.doubtful = frame.unsettled = 1u << 7;
   frame.pressure_Pa_q10[7] += 100 * Pa;
@@ -64,7 +64,7 @@ static void test_unsettled_readings_move_no_zero(void) {
   TEST_ASSERT_INT32_WITHIN(Pa, AMBIENT + 100 * Pa, condition.zero_Pa_q10[7]);
 }
 
-static void test_saturated_sensor_means_contact_and_is_left_out(void) {
+TEST(test_saturated_sensor_means_contact_and_is_left_out) {
   begin_calm(4854);
   frame.saturated = 8;
   frame.pressure_Pa_q10[3] = INT32_MAX;
@@ -92,7 +92,7 @@ static void test_saturated_sensor_means_contact_and_is_left_out(void) {
   TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[3]);
 }
 
-static void test_gains_act_on_what_is_above_zero(void) {
+TEST(test_gains_act_on_what_is_above_zero) {
   struct condition_gains gains;
   static const uint32_t inverses_q16[] = {16384, 50000, 65535, 65536, 65537, 80000, 131072, 262144};
   for (size_t i = 0; i < sizeof inverses_q16 / sizeof inverses_q16[0]; i++) {
@@ -127,7 +127,7 @@ static void assert_condition_is(const struct condition *expected) {
 }
 
 /* The zeros that an answer is sent with are those it was measured from. */
-static void test_what_the_answer_does_not_need_can_wait(void) {
+TEST(test_what_the_answer_does_not_need_can_wait) {
   struct condition before;
   begin_calm(1000);
   memcpy(&before, &condition, sizeof before);
@@ -156,7 +156,7 @@ static void test_what_the_answer_does_not_need_can_wait(void) {
   }
 }
 
-static void test_extremes(void) {
+TEST(test_extremes) {
   static const int32_t extremes[] = {INT32_MIN, INT32_MIN + 1, -1, 0, 1, INT32_MAX - 1, INT32_MAX};
   static const int32_t megapascal = 1 << 30;
   for (size_t tare = 0; tare < 7; tare++) {
@@ -182,7 +182,7 @@ static void test_extremes(void) {
   }
 }
 
-static void test_random_frames(void) {
+TEST(test_random_frames) {
   struct random random = {42};
   for (int i = 0; i < 200000; i++) {
     if (random_below(&random, 200) == 0) {
@@ -211,17 +211,4 @@ static void test_random_frames(void) {
     }
     TEST_ASSERT_EQUAL_INT32(peak, conditioned.peak_Pa_q10);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_gate_has_a_hysteresis_in_pascals_and_sigmas);
-  RUN_TEST(test_invalid_sensors_are_left_out);
-  RUN_TEST(test_unsettled_readings_move_no_zero);
-  RUN_TEST(test_saturated_sensor_means_contact_and_is_left_out);
-  RUN_TEST(test_gains_act_on_what_is_above_zero);
-  RUN_TEST(test_what_the_answer_does_not_need_can_wait);
-  RUN_TEST(test_extremes);
-  RUN_TEST(test_random_frames);
-  return UNITY_END();
 }

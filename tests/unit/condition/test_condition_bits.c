@@ -5,7 +5,7 @@
 #include "condition/condition.h"
 #include "emulated/fit_bits/draw.h"
 #include "support/golden.h"
-#include "unity.h"
+#include "support/unit.h"
 
 #include <string.h>
 
@@ -16,9 +16,6 @@ enum { SENSORS = 15, COURSES = 64, FRAMES = 6000 };
 static struct condition condition;
 static struct conditioned conditioned;
 static struct frame frame;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /* What presses on each sensor, how it grows in a frame, and the frames that it still does. */
 static struct {
@@ -105,7 +102,7 @@ static uint32_t course(void) {
   return crc;
 }
 
-static void test_frames_are_conditioned_the_same_to_the_bit(void) {
+TEST(test_frames_are_conditioned_the_same_to_the_bit) {
   static const uint32_t golden[GOLDEN_BLOCKS] = {0xA2413B9B, 0xC812874A, 0x3B834EFF, 0x0C615192,
                                                  0x4F8F95F5, 0x939D7D5E, 0x78E3A139, 0x78FB3ECE};
   uint32_t found[GOLDEN_BLOCKS] = {0};
@@ -115,10 +112,4 @@ static void test_frames_are_conditioned_the_same_to_the_bit(void) {
     *block = golden_join(*block, course());
   }
   golden_assert("courses", COURSES, golden, found);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_frames_are_conditioned_the_same_to_the_bit);
-  return UNITY_END();
 }

@@ -1,7 +1,7 @@
 #include "condition_bench.h"
 
 /* Where a strong press was meanwhile, it may be what remains of that. */
-static void test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt(void) {
+TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
     frame.pressure_Pa_q10[3] += 3000 * Pa;
@@ -30,7 +30,7 @@ static void press_in_steps(int32_t from, int32_t to, float seconds) {
 
 /* Held, a touch that the band lets in part into the zero comes out of the band: what the zero took
  * stays in doubt, and a strong press on it is none. */
-static void test_a_touch_that_a_zero_took_part_of_stays_in_doubt(void) {
+TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
     press_in_steps(0, 47000 * Pa, 0.2f);
@@ -62,7 +62,7 @@ static void test_a_touch_that_a_zero_took_part_of_stays_in_doubt(void) {
 }
 
 /* What the end of a release feels is no remainder. */
-static void test_presses_in_quick_succession_move_no_zero(void) {
+TEST(test_presses_in_quick_succession_move_no_zero) {
   static const float falls_s[] = {0.05f, 0.1f, 0.2f, 0.4f};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t j = 0; j < sizeof falls_s / sizeof falls_s[0]; j++) {
@@ -82,7 +82,7 @@ static void test_presses_in_quick_succession_move_no_zero(void) {
 }
 
 /* Sensors that felt nothing stand off by a share of what others felt. */
-static void test_far_sensors_stand_off_too(void) {
+TEST(test_far_sensors_stand_off_too) {
   begin_calm(4854);
   frame.pressure_Pa_q10[7] = AMBIENT + 20000 * Pa;
   run_s(5);
@@ -94,7 +94,7 @@ static void test_far_sensors_stand_off_too(void) {
 }
 
 /* A contact that is no stronger than the drift of its time is in doubt, and followed slowly. */
-static void test_weak_contact_for_long_is_in_doubt(void) {
+TEST(test_weak_contact_for_long_is_in_doubt) {
   begin_calm(17544);
   frame.pressure_Pa_q10[7] += 300 * Pa;
   watch_s(600, 0, 0);
@@ -108,7 +108,7 @@ static void test_weak_contact_for_long_is_in_doubt(void) {
 }
 
 /* A zero that wanders makes a weak contact on it doubtful. */
-static void test_contact_on_a_wandering_zero_is_in_doubt(void) {
+TEST(test_contact_on_a_wandering_zero_is_in_doubt) {
   for (int wanders = 0; wanders <= 1; wanders++) {
     begin_calm(17544);
     for (int i = 0; i < 3; i++) {
@@ -129,7 +129,7 @@ static void test_contact_on_a_wandering_zero_is_in_doubt(void) {
 }
 
 /* Some real sensors creep by 10 Pa/s for minutes: more than the zero may follow. */
-static void test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not(void) {
+TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not) {
   for (int p = 0; p < FAST_PERIODS; p++) {
     begin_calm(periods_us[p]);
     watch_s(60, 10.0f, 1 << 3);
@@ -155,7 +155,7 @@ static void test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not(void) {
 }
 
 /* Wrong zeros may make a contact, so the wait has an end. */
-static void test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends(void) {
+TEST(test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends) {
   begin_calm(4854);
   press(20000 * Pa);
   run_s(0.5f);
@@ -178,7 +178,7 @@ static void test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends(void) 
 }
 
 /* A zero taken under a press would be off by it. */
-static void test_one_sensor_is_not_tared_in_a_contact(void) {
+TEST(test_one_sensor_is_not_tared_in_a_contact) {
   begin_calm(4854);
   press(20000 * Pa);
   run_s(0.5f);
@@ -194,18 +194,4 @@ static void test_one_sensor_is_not_tared_in_a_contact(void) {
   TEST_ASSERT_TRUE(conditioned.tared);
   TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
   TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt);
-  RUN_TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt);
-  RUN_TEST(test_presses_in_quick_succession_move_no_zero);
-  RUN_TEST(test_far_sensors_stand_off_too);
-  RUN_TEST(test_weak_contact_for_long_is_in_doubt);
-  RUN_TEST(test_contact_on_a_wandering_zero_is_in_doubt);
-  RUN_TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not);
-  RUN_TEST(test_one_sensor_is_not_tared_in_a_contact);
-  RUN_TEST(test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends);
-  return UNITY_END();
 }

@@ -1,7 +1,7 @@
 #include "condition_bench.h"
 
 /* Ten minutes with drift: five seconds later the zero is right, and there was no phantom. */
-static void test_zero_recovers_after_a_long_contact(void) {
+TEST(test_zero_recovers_after_a_long_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (int sign = -1; sign <= 1; sign += 2) {
       begin(periods_us[i]);
@@ -21,7 +21,7 @@ static void test_zero_recovers_after_a_long_contact(void) {
   }
 }
 
-static void test_what_rubber_does_after_a_release_is_no_contact(void) {
+TEST(test_what_rubber_does_after_a_release_is_no_contact) {
   static const float shares[] = {-0.15f, -0.09f, -0.03f, 0.004f, 0.03f, 0.08f};
   static const float times_s[] = {0.5f, 2, 10};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
@@ -49,7 +49,7 @@ static void test_what_rubber_does_after_a_release_is_no_contact(void) {
 }
 
 /* What stays for good is taken up, and said to be. */
-static void test_a_force_left_after_a_release_is_flagged(void) {
+TEST(test_a_force_left_after_a_release_is_flagged) {
   static const float shares[] = {0.03f, 0.06f, 0.1f};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t s = 0; s < 3; s++) {
@@ -76,7 +76,7 @@ static void test_a_force_left_after_a_release_is_flagged(void) {
   }
 }
 
-static void test_press_after_a_release_is_not_taken_for_a_remainder(void) {
+TEST(test_press_after_a_release_is_not_taken_for_a_remainder) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
     press(20000 * Pa);
@@ -99,7 +99,7 @@ static void test_press_after_a_release_is_not_taken_for_a_remainder(void) {
 }
 
 /* What the zero comes back to after a certain press is the zero: no force is left there twice. */
-static void test_a_press_proves_the_zero_that_it_leaves(void) {
+TEST(test_a_press_proves_the_zero_that_it_leaves) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (int more = 0; more <= 1; more++) {
       begin_calm(periods_us[i]);
@@ -130,14 +130,4 @@ static void test_a_press_proves_the_zero_that_it_leaves(void) {
     run_s(3);
     TEST_ASSERT_TRUE(conditioned.zero_doubtful);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_zero_recovers_after_a_long_contact);
-  RUN_TEST(test_what_rubber_does_after_a_release_is_no_contact);
-  RUN_TEST(test_a_force_left_after_a_release_is_flagged);
-  RUN_TEST(test_press_after_a_release_is_not_taken_for_a_remainder);
-  RUN_TEST(test_a_press_proves_the_zero_that_it_leaves);
-  return UNITY_END();
 }

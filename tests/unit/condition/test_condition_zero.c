@@ -1,6 +1,6 @@
 #include "condition_bench.h"
 
-static void test_tare_is_the_mean_without_the_extremes(void) {
+TEST(test_tare_is_the_mean_without_the_extremes) {
   struct random random = {41};
   int64_t sum[SENSORS] = {0};
   for (int i = 0; i < ZERO_TARE_FRAMES; i++) {
@@ -28,7 +28,7 @@ static void test_tare_is_the_mean_without_the_extremes(void) {
   }
 }
 
-static void test_slow_frames_need_fewer_readings_for_a_tare(void) {
+TEST(test_slow_frames_need_fewer_readings_for_a_tare) {
   static const struct {
     uint32_t period_us;
     int frames;
@@ -44,7 +44,7 @@ static void test_slow_frames_need_fewer_readings_for_a_tare(void) {
 }
 
 /* By the first readings after a tare nothing is known but the noise; later the zero is right. */
-static void test_zero_improves_after_the_tare(void) {
+TEST(test_zero_improves_after_the_tare) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     fill(AMBIENT);
@@ -57,7 +57,7 @@ static void test_zero_improves_after_the_tare(void) {
 }
 
 /* Sensors rise by 130 Pa in the first seconds after power-up; that is no contact. */
-static void test_warming_up_is_no_contact(void) {
+TEST(test_warming_up_is_no_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     run(16);
@@ -69,7 +69,7 @@ static void test_warming_up_is_no_contact(void) {
 }
 
 /* Most of it comes in the first second: as much as real sensors rise after power-up. */
-static void test_what_a_cold_sensor_rises_is_no_contact(void) {
+TEST(test_what_a_cold_sensor_rises_is_no_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     float fast = 300, slow = 250, certain_s = 0;
@@ -98,7 +98,7 @@ static void assert_touch_of_is_seen(int32_t peak) {
 }
 
 /* Of a pad that was off its zeros settle first; of one that was calm they are known at once. */
-static void test_a_light_touch_is_seen_once_zeros_have_settled(void) {
+TEST(test_a_light_touch_is_seen_once_zeros_have_settled) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     run_s(2.5f);
@@ -113,7 +113,7 @@ static void test_a_light_touch_is_seen_once_zeros_have_settled(void) {
 }
 
 /* A force that rises with the start is followed for no longer than a sensor warms. */
-static void test_a_ramp_from_the_start_is_a_contact(void) {
+TEST(test_a_ramp_from_the_start_is_a_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     run(ZERO_TARE_FRAMES);
@@ -124,7 +124,7 @@ static void test_a_ramp_from_the_start_is_a_contact(void) {
 }
 
 /* A flipped bit must not become a false touch that lasts, nor be remembered as a pressure. */
-static void test_one_disturbed_reading_moves_no_zero(void) {
+TEST(test_one_disturbed_reading_moves_no_zero) {
   static const int32_t readings[] = {INT32_MIN, 0, AMBIENT - 300 * Pa, AMBIENT + 300 * Pa, INT32_MAX};
   for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++) {
     for (int at = 0; at < 14; at++) { /* when the sensor is tracked, too */
@@ -147,7 +147,7 @@ static void test_one_disturbed_reading_moves_no_zero(void) {
   }
 }
 
-static void test_zero_follows_any_drift_of_a_barometer(void) {
+TEST(test_zero_follows_any_drift_of_a_barometer) {
   for (size_t i = 0; i < PERIODS; i++) {
     for (int sign = -1; sign <= 1; sign += 2) {
       begin_calm(periods_us[i]);
@@ -161,7 +161,7 @@ static void test_zero_follows_any_drift_of_a_barometer(void) {
 }
 
 /* The flanks of the press are below too, by less; what its peak comes back by is none of theirs. */
-static void test_a_tare_under_a_press_is_mended_for_all_sensors(void) {
+TEST(test_a_tare_under_a_press_is_mended_for_all_sensors) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     press(5000 * Pa);
@@ -179,7 +179,7 @@ static void test_a_tare_under_a_press_is_mended_for_all_sensors(void) {
 
 /* One whose PROM has a wrong CRC is used, and doubtful for good: its zero drifts like the others'.
  */
-static void test_zero_follows_the_drift_of_a_doubtful_sensor(void) {
+TEST(test_zero_follows_the_drift_of_a_doubtful_sensor) {
   for (size_t i = 0; i < PERIODS; i++) {
     begin(periods_us[i]);
     frame.doubtful = 1u << 3;
@@ -192,7 +192,7 @@ static void test_zero_follows_the_drift_of_a_doubtful_sensor(void) {
 
 /* 0.005 N/s above one sensor and between four, and a fifth of it: what it lost is about 0.02 N.
  * Below 3.9 kPa it cannot be told from the drift of some sensors. */
-static void test_no_slow_force_is_taken_for_a_drift(void) {
+TEST(test_no_slow_force_is_taken_for_a_drift) {
   static const float slopes_Pa_s[] = {22, 12, 2.4f};
   for (size_t i = 0; i < PERIODS; i++) {
     for (size_t s = 0; s < 3; s++) {
@@ -208,7 +208,7 @@ static void test_no_slow_force_is_taken_for_a_drift(void) {
 }
 
 /* 60 Pa where the compensation changes its branch, and up to 48 Pa between two temperatures. */
-static void test_what_compensation_costs_is_no_contact(void) {
+TEST(test_what_compensation_costs_is_no_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (int sign = -1; sign <= 1; sign += 2) {
       begin_calm(periods_us[i]);
@@ -221,7 +221,7 @@ static void test_what_compensation_costs_is_no_contact(void) {
   }
 }
 
-static void test_zero_stands_still_during_contact(void) {
+TEST(test_zero_stands_still_during_contact) {
   begin_calm(4854);
   press(10000 * Pa);
   run_s(60);
@@ -233,7 +233,7 @@ static void test_zero_stands_still_during_contact(void) {
 }
 
 /* A drift seen before goes on in the contact, for an hour; what is no drift does not. */
-static void test_drift_goes_on_during_contact(void) {
+TEST(test_drift_goes_on_during_contact) {
   for (size_t i = 0; i < PERIODS; i++) {
     begin(periods_us[i]);
     watch_s(200, 0.2f, 1u << 3);
@@ -248,7 +248,7 @@ static void test_drift_goes_on_during_contact(void) {
 }
 
 /* Nor is warming up a drift, or what rubber still gives back. */
-static void test_other_changes_are_learnt_as_no_drift(void) {
+TEST(test_other_changes_are_learnt_as_no_drift) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
     watch_s(25, 1, 1u << 7);
@@ -268,7 +268,7 @@ static void test_other_changes_are_learnt_as_no_drift(void) {
   }
 }
 
-static void test_a_slow_press_is_learnt_as_no_drift(void) {
+TEST(test_a_slow_press_is_learnt_as_no_drift) {
   begin_calm(4854);
   watch_s(300, 12, 1u << 7);
   int32_t began = condition.zero_Pa_q10[7];
@@ -277,7 +277,7 @@ static void test_a_slow_press_is_learnt_as_no_drift(void) {
 }
 
 /* The press becomes the zero; after it the pad reads negative, says so, and is tared again. */
-static void test_tare_during_contact(void) {
+TEST(test_tare_during_contact) {
   begin_calm(4854);
   frame.pressure_Pa_q10[7] += 20000 * Pa;
   run(50);
@@ -299,7 +299,7 @@ static void test_tare_during_contact(void) {
 }
 
 /* A dip that rubber makes is waited for; one that stays is the zero, and may come back in doubt. */
-static void test_reading_below_zero_is_tared_anew_when_it_stays(void) {
+TEST(test_reading_below_zero_is_tared_anew_when_it_stays) {
   static const int32_t depths_Pa[] = {400, 900};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t j = 0; j < 2; j++) {
@@ -323,7 +323,7 @@ static void test_reading_below_zero_is_tared_anew_when_it_stays(void) {
 }
 
 /* A sensor that took another's place has another zero; the others keep theirs. */
-static void test_another_sensor_is_tared_anew(void) {
+TEST(test_another_sensor_is_tared_anew) {
   begin_calm(4854);
   TEST_ASSERT_TRUE(conditioned.tared);
   frame.pressure_Pa_q10[4] += 300 * 1024;
@@ -341,7 +341,7 @@ static void test_another_sensor_is_tared_anew(void) {
 
 /* Its supply dipped while the zero was taken, which is found out when it has been reset. A zero
  * from long before is its own. */
-static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
+TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew) {
   for (int late = 0; late <= 1; late++) {
     begin(4854);
     frame.pressure_Pa_q10[4] -= 17000 * 1024;
@@ -355,30 +355,4 @@ static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
     TEST_ASSERT_TRUE(conditioned.tared);
     TEST_ASSERT_EQUAL_INT(late, conditioned.contact);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_tare_is_the_mean_without_the_extremes);
-  RUN_TEST(test_slow_frames_need_fewer_readings_for_a_tare);
-  RUN_TEST(test_zero_improves_after_the_tare);
-  RUN_TEST(test_warming_up_is_no_contact);
-  RUN_TEST(test_what_a_cold_sensor_rises_is_no_contact);
-  RUN_TEST(test_a_light_touch_is_seen_once_zeros_have_settled);
-  RUN_TEST(test_a_ramp_from_the_start_is_a_contact);
-  RUN_TEST(test_one_disturbed_reading_moves_no_zero);
-  RUN_TEST(test_zero_follows_any_drift_of_a_barometer);
-  RUN_TEST(test_a_tare_under_a_press_is_mended_for_all_sensors);
-  RUN_TEST(test_zero_follows_the_drift_of_a_doubtful_sensor);
-  RUN_TEST(test_no_slow_force_is_taken_for_a_drift);
-  RUN_TEST(test_what_compensation_costs_is_no_contact);
-  RUN_TEST(test_zero_stands_still_during_contact);
-  RUN_TEST(test_drift_goes_on_during_contact);
-  RUN_TEST(test_other_changes_are_learnt_as_no_drift);
-  RUN_TEST(test_a_slow_press_is_learnt_as_no_drift);
-  RUN_TEST(test_tare_during_contact);
-  RUN_TEST(test_reading_below_zero_is_tared_anew_when_it_stays);
-  RUN_TEST(test_another_sensor_is_tared_anew);
-  RUN_TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew);
-  return UNITY_END();
 }

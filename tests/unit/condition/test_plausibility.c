@@ -1,7 +1,7 @@
 /* A sensor that reads apart from the others at rest is known from the first frame on, and no press
  * changes that. */
 #include "condition/plausibility.h"
-#include "unity.h"
+#include "support/unit.h"
 
 #include <string.h>
 
@@ -30,14 +30,12 @@ void setUp(void) {
   read_all(100000);
 }
 
-void tearDown(void) {}
-
-static void test_sensors_that_agree_are_not_apart(void) {
+TEST(test_sensors_that_agree_are_not_apart) {
   next_frame(0);
   TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
 }
 
-static void test_one_apart_is_known_from_the_first_frame_on(void) {
+TEST(test_one_apart_is_known_from_the_first_frame_on) {
   frame.pressure_Pa_q10[ODD] += 1200 * 1024;
   next_frame(0);
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
@@ -46,7 +44,7 @@ static void test_one_apart_is_known_from_the_first_frame_on(void) {
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
-static void test_moulded_sensors_that_differ_by_kilopascals_are_not_apart(void) {
+TEST(test_moulded_sensors_that_differ_by_kilopascals_are_not_apart) {
   for (int k = 0; k < SENSORS; k++) {
     frame.pressure_Pa_q10[k] += 1500 * (k % 4) * 1024;
   }
@@ -58,7 +56,7 @@ static void test_moulded_sensors_that_differ_by_kilopascals_are_not_apart(void) 
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
-static void test_a_press_changes_nothing(void) {
+TEST(test_a_press_changes_nothing) {
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
   next_frame(0);
   conditioned.contact = true;
@@ -70,7 +68,7 @@ static void test_a_press_changes_nothing(void) {
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
-static void test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press(void) {
+TEST(test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press) {
   conditioned.contact = true;
   conditioned.usable = ALL & ~1;
   frame.saturated = 1;
@@ -79,7 +77,7 @@ static void test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press(void)
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
-static void test_comparisons_are_rare_unless_others_are_used(void) {
+TEST(test_comparisons_are_rare_unless_others_are_used) {
   next_frame(0);
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
   next_frame(1000);
@@ -89,21 +87,9 @@ static void test_comparisons_are_rare_unless_others_are_used(void) {
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
-static void test_few_sensors_cannot_tell(void) {
+TEST(test_few_sensors_cannot_tell) {
   conditioned.usable = 7 << ODD;
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
   next_frame(0);
   TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_sensors_that_agree_are_not_apart);
-  RUN_TEST(test_one_apart_is_known_from_the_first_frame_on);
-  RUN_TEST(test_moulded_sensors_that_differ_by_kilopascals_are_not_apart);
-  RUN_TEST(test_a_press_changes_nothing);
-  RUN_TEST(test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press);
-  RUN_TEST(test_comparisons_are_rare_unless_others_are_used);
-  RUN_TEST(test_few_sensors_cannot_tell);
-  return UNITY_END();
 }

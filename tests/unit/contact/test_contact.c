@@ -1,8 +1,8 @@
 #include "common/contact_flags.h"
 #include "contact/contact.h"
+#include "support/unit.h"
 
 #include <string.h>
-#include <unity.h>
 
 #define GOOD_FIT (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID)
 
@@ -22,8 +22,6 @@ void setUp(void) {
   input = (struct contact_input){.contact = true, .tared = true, .fit = &fit};
 }
 
-void tearDown(void) {}
-
 static uint32_t update(void) {
   memset(&result, 0xA5, sizeof result);
   input.t_us += 50000;
@@ -37,7 +35,7 @@ static void fill_history(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
 }
 
-static void test_nothing_fitted(void) {
+TEST(test_nothing_fitted) {
   input = (struct contact_input){.fit = NULL};
   TEST_ASSERT_EQUAL_HEX32(0, update());
   TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
@@ -56,7 +54,7 @@ static void test_nothing_fitted(void) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_ZERO_DOUBTFUL, update());
 }
 
-static void test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale(void) {
+TEST(test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale) {
   const struct contact_settings scaled = {.force_scale = 1.25f, .force_scale_sd = 0.03f};
   fit.force_N = 4.0f;
   fit.force_sd_N = 0.128f; /* times 1.25 0.16; 0.03 of 4 N is 0.12 */
@@ -67,7 +65,7 @@ static void test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale
   TEST_ASSERT_EQUAL_FLOAT(0.0f, contact_weigh(&scaled, &fit).force_sd_N);
 }
 
-static void test_flags_of_the_fit_pass(void) {
+TEST(test_flags_of_the_fit_pass) {
   static const uint32_t flags[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT,          CONTACT_FLAG_UNCERTAIN,
                                    CONTACT_FLAG_MODEL,      CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND};
   for (size_t i = 0; i < sizeof flags / sizeof flags[0]; i++) {
@@ -77,7 +75,7 @@ static void test_flags_of_the_fit_pass(void) {
   }
 }
 
-static void test_slip_flag_and_threshold(void) {
+TEST(test_slip_flag_and_threshold) {
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
   TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
@@ -107,7 +105,7 @@ static void assert_history_begins_anew(void) {
   setUp();
 }
 
-static void test_doubtful_locations_end_the_history(void) {
+TEST(test_doubtful_locations_end_the_history) {
   static const uint32_t spoilers[] = {CONTACT_FLAG_FLAT, CONTACT_FLAG_AT_BOUND};
   for (size_t i = 0; i < 2; i++) {
     fill_history();
@@ -134,7 +132,7 @@ static void test_doubtful_locations_end_the_history(void) {
   TEST_ASSERT_EQUAL_UINT16(0, history.count);
 }
 
-static void test_a_location_that_noise_moves_ends_the_history(void) {
+TEST(test_a_location_that_noise_moves_ends_the_history) {
   fill_history();
   fit.location_noise_mm = 0.99f * CONTACT_JITTER_MAX_mm;
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
@@ -147,7 +145,7 @@ static void test_a_location_that_noise_moves_ends_the_history(void) {
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
 }
 
-static void test_other_warnings_keep_the_history(void) {
+TEST(test_other_warnings_keep_the_history) {
   static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL, CONTACT_FLAG_SENSOR_MASKED,
                                       CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_ELONGATED};
   for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) {
@@ -158,7 +156,7 @@ static void test_other_warnings_keep_the_history(void) {
   }
 }
 
-static void test_saturation_and_lower_bound(void) {
+TEST(test_saturation_and_lower_bound) {
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND, update());
   input.saturated = 0x80;
   fit.used = 0x7F7F;
@@ -174,17 +172,4 @@ static void test_saturation_and_lower_bound(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND, update());
   input.saturated = 0;
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND, update());
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_nothing_fitted);
-  RUN_TEST(test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale);
-  RUN_TEST(test_flags_of_the_fit_pass);
-  RUN_TEST(test_slip_flag_and_threshold);
-  RUN_TEST(test_doubtful_locations_end_the_history);
-  RUN_TEST(test_a_location_that_noise_moves_ends_the_history);
-  RUN_TEST(test_other_warnings_keep_the_history);
-  RUN_TEST(test_saturation_and_lower_bound);
-  return UNITY_END();
 }

@@ -8,7 +8,7 @@
 #include "contact/tangential.h"
 #include "emulated/fit_bits/draw.h"
 #include "support/golden.h"
-#include "unity.h"
+#include "support/unit.h"
 
 #include <string.h>
 
@@ -29,9 +29,6 @@ static struct {
   float x, y, qx, qy, force, noise_mm;
   int32_t left;
 } course;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static float between(float low, float high) { return low + (high - low) * (float)(draw() >> 8) / 16777216.0f; }
 
@@ -143,7 +140,7 @@ static uint32_t judge(uint32_t crc) {
   return crc32_iso_hdlc((const uint8_t *)&told, sizeof told);
 }
 
-static void test_contacts_are_judged_the_same_to_the_bit(void) {
+TEST(test_contacts_are_judged_the_same_to_the_bit) {
   static const uint32_t golden[GOLDEN_BLOCKS] = {0xE65208E3, 0x1EAD59DC, 0x37BAEF5F, 0x3D4B6303,
                                                  0xD05CC00E, 0x023B3AF6, 0xBD282272, 0x16D75E77};
   uint32_t crcs[GOLDEN_BLOCKS] = {0};
@@ -158,10 +155,4 @@ static void test_contacts_are_judged_the_same_to_the_bit(void) {
     }
   }
   golden_assert("courses", COURSES, golden, crcs);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_contacts_are_judged_the_same_to_the_bit);
-  return UNITY_END();
 }

@@ -1,10 +1,10 @@
 #include "common/contact_flags.h"
 #include "contact/motion.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <string.h>
-#include <unity.h>
 
 #define SAYS (CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING)
 
@@ -25,8 +25,6 @@ void setUp(void) {
   input = (struct contact_input){.t_us = 5000000, .contact = true, .fit = &fit, .tangential = &found};
   interval_us = 2439;
 }
-
-void tearDown(void) {}
 
 /* Of a frame, an interval after the one before. */
 static uint32_t update(void) {
@@ -59,7 +57,7 @@ static uint32_t go(float seconds, float vx_mm_s, float vy_mm_s, float load_per_s
 
 static void rest(float seconds) { TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, go(seconds, 0, 0, 0)); }
 
-static void a_steady_velocity_is_told_at_any_rate(void) {
+TEST(a_steady_velocity_is_told_at_any_rate) {
   static const uint32_t intervals_us[] = {50000, 10000, 5000, 2439, 765, 700};
   for (unsigned i = 0; i < sizeof intervals_us / sizeof intervals_us[0]; i++) {
     setUp();
@@ -71,7 +69,7 @@ static void a_steady_velocity_is_told_at_any_rate(void) {
   }
 }
 
-static void the_velocity_is_as_uncertain_as_least_squares_are(void) {
+TEST(the_velocity_is_as_uncertain_as_least_squares_are) {
   struct random random = {1};
   double squares = 0;
   const int runs = 4000, frames = 13; /* 30 ms */
@@ -90,7 +88,7 @@ static void the_velocity_is_as_uncertain_as_least_squares_are(void) {
 
 /* As the estimate's noise is: what the location says ahead, the load says back, by 4 mm per Q / F.
  */
-static void noise_alone_never_speaks(void) {
+TEST(noise_alone_never_speaks) {
   static const float noises_mm[] = {0.005f, 0.02f, 0.1f, 0.35f};
   struct random random = {7};
   for (unsigned k = 0; k < sizeof noises_mm / sizeof noises_mm[0]; k++) {
@@ -108,7 +106,7 @@ static void noise_alone_never_speaks(void) {
   }
 }
 
-static void creeping_along_with_a_load_is_no_slide(void) {
+TEST(creeping_along_with_a_load_is_no_slide) {
   rest(0.4f);
   /* 0.4 in 0.1 s, 5 mm for each unit; and back. */
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING, go(0.1f, 20.0f, 0, 4.0f));
@@ -116,39 +114,39 @@ static void creeping_along_with_a_load_is_no_slide(void) {
   TEST_ASSERT_EQUAL_HEX32(0, go(0.1f, -20.0f, 0, -4.0f) & CONTACT_FLAG_SLIDING);
 }
 
-static void the_scale_of_the_pad_is_in_the_load(void) {
+TEST(the_scale_of_the_pad_is_in_the_load) {
   settings.tangential_scale = 0.4f; /* the load is less than it seems */
   rest(0.4f);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.1f, 20.0f, 0, 4.0f) & CONTACT_FLAG_SLIDING);
 }
 
-static void moving_on_under_a_steady_load_is_a_slide(void) {
+TEST(moving_on_under_a_steady_load_is_a_slide) {
   found.qx_N = 2.0f;
   rest(0.4f);
   TEST_ASSERT_EQUAL_HEX32(0, go(0.007f, 20.0f, 0, 0) & CONTACT_FLAG_SLIDING);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.02f, 20.0f, 0, 0) & CONTACT_FLAG_SLIDING);
 }
 
-static void a_falling_friction_shows_a_slide_sooner(void) {
+TEST(a_falling_friction_shows_a_slide_sooner) {
   found.qx_N = 2.0f;
   rest(0.4f);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.013f, 10.0f, 0, -4.0f) & CONTACT_FLAG_SLIDING);
 }
 
-static void the_lift_that_comes_before_does_not_hide_a_slide(void) {
+TEST(the_lift_that_comes_before_does_not_hide_a_slide) {
   rest(0.4f);
   TEST_ASSERT_EQUAL_HEX32(0, go(0.06f, 40.0f, 0, 8.0f) & CONTACT_FLAG_SLIDING);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.02f, 20.0f, 0, 0) & CONTACT_FLAG_SLIDING);
 }
 
-static void a_slow_slide_is_found_by_and_by(void) {
+TEST(a_slow_slide_is_found_by_and_by) {
   found.qx_N = 2.0f;
   rest(0.4f);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, go(0.08f, 2.0f, 0, 0));
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SLIDING, go(0.2f, 2.0f, 0, 0));
 }
 
-static void a_slide_ends_soon_and_once(void) {
+TEST(a_slide_ends_soon_and_once) {
   rest(0.4f);
   go(0.1f, 100.0f, 0, 0);
   TEST_ASSERT_EQUAL_HEX32(SAYS, go(0.07f, 0, 0, 0));
@@ -157,7 +155,7 @@ static void a_slide_ends_soon_and_once(void) {
   }
 }
 
-static void what_rings_after_a_slide_is_none(void) {
+TEST(what_rings_after_a_slide_is_none) {
   rest(0.4f);
   go(0.1f, 50.0f, 0, 0);
   go(0.06f, 0, 0, 0);
@@ -169,7 +167,7 @@ static void what_rings_after_a_slide_is_none(void) {
 }
 
 /* At five times what least squares over three frames leave of 0.4 mm, a speed needs 140 mm/s. */
-static void a_fast_slide_is_seen_through_much_noise(void) {
+TEST(a_fast_slide_is_seen_through_much_noise) {
   interval_us = 10100;
   found.location_noise_mm = 0.001f * MOTION_NOISE_MAX_um;
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_MOVING, go(0.1f, 200.0f, 0, 0));
@@ -179,7 +177,7 @@ static void a_fast_slide_is_seen_through_much_noise(void) {
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_MOVING, go(0.1f, 120.0f, 0, 0));
 }
 
-static void hours_leave_no_trace(void) {
+TEST(hours_leave_no_trace) {
   interval_us = 1000;
   go(0.5f, 0.02f, 0, 0);
   const struct motion early = motion;
@@ -197,7 +195,7 @@ static void hours_leave_no_trace(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.003f, early.vx_mm_s, motion.vx_mm_s);
 }
 
-static void what_interrupts_a_contact_starts_anew(void) {
+TEST(what_interrupts_a_contact_starts_anew) {
   for (int what = 0; what < 6; what++) {
     setUp();
     rest(0.4f);
@@ -232,7 +230,7 @@ static void what_interrupts_a_contact_starts_anew(void) {
   }
 }
 
-static void frames_without_an_estimate_say_nothing_and_are_passed_over(void) {
+TEST(frames_without_an_estimate_say_nothing_and_are_passed_over) {
   rest(0.4f);
   for (int i = 0; i < 5; i++) {
     found.valid = false;
@@ -251,7 +249,7 @@ static void frames_without_an_estimate_say_nothing_and_are_passed_over(void) {
   }
 }
 
-static void nothing_overflows(void) {
+TEST(nothing_overflows) {
   found.location_noise_mm = 0.001f * MOTION_NOISE_MAX_um;
   found.location_sd_mm = 1e9f;
   for (int i = 0; i < 2000; i++) {
@@ -264,25 +262,4 @@ static void nothing_overflows(void) {
     update();
     TEST_ASSERT_TRUE(isfinite(motion.vx_mm_s) && isfinite(motion.vy_mm_s));
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_steady_velocity_is_told_at_any_rate);
-  RUN_TEST(the_velocity_is_as_uncertain_as_least_squares_are);
-  RUN_TEST(noise_alone_never_speaks);
-  RUN_TEST(creeping_along_with_a_load_is_no_slide);
-  RUN_TEST(the_scale_of_the_pad_is_in_the_load);
-  RUN_TEST(moving_on_under_a_steady_load_is_a_slide);
-  RUN_TEST(a_falling_friction_shows_a_slide_sooner);
-  RUN_TEST(the_lift_that_comes_before_does_not_hide_a_slide);
-  RUN_TEST(a_slow_slide_is_found_by_and_by);
-  RUN_TEST(a_slide_ends_soon_and_once);
-  RUN_TEST(what_rings_after_a_slide_is_none);
-  RUN_TEST(a_fast_slide_is_seen_through_much_noise);
-  RUN_TEST(hours_leave_no_trace);
-  RUN_TEST(what_interrupts_a_contact_starts_anew);
-  RUN_TEST(frames_without_an_estimate_say_nothing_and_are_passed_over);
-  RUN_TEST(nothing_overflows);
-  return UNITY_END();
 }

@@ -1,7 +1,7 @@
 /* The one place of a contact: the Gaussian's, the load's or its shape's. And how much of the work
  * on shapes a frame has time for. */
 #include "contact/shapes.h"
-#include "unity.h"
+#include "support/unit.h"
 
 static struct shapes_report report;
 static struct fit_result fit;
@@ -13,10 +13,8 @@ void setUp(void) {
   load = (struct tangential_load){.x_mm = 4.0f, .y_mm = -8.0f, .location_sd_mm = 0.4f};
 }
 
-void tearDown(void) {}
-
 /* Each as long as the longest, and the load, which takes several steps of slow frames. */
-static void parts_and_the_load_take_no_longer_than_frames_are_apart(void) {
+TEST(parts_and_the_load_take_no_longer_than_frames_are_apart) {
   for (uint64_t apart_us = 765; apart_us < 100000; apart_us += 5) {
     const uint8_t parts = shapes_parts(apart_us);
     const unsigned load_us = apart_us < 4500 ? 450 : 2250;
@@ -40,7 +38,7 @@ static void is_at(float x_mm, float y_mm, float sd_mm, const struct tangential_l
   TEST_ASSERT_FLOAT_WITHIN(2e-3f * sd_mm, sd_mm, place.location_sd_mm);
 }
 
-static void what_presses_is_where_the_load_or_the_Gaussian_has_it(void) {
+TEST(what_presses_is_where_the_load_or_the_Gaussian_has_it) {
   static const enum fit_shape shapes[] = {FIT_SHAPE_UNDECIDED, FIT_SHAPE_TWO, FIT_SHAPE_NONE};
   for (unsigned i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
     report.shape = shapes[i];
@@ -49,7 +47,7 @@ static void what_presses_is_where_the_load_or_the_Gaussian_has_it(void) {
   }
 }
 
-static void what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_the_error(void) {
+TEST(what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_the_error) {
   static const enum fit_shape shapes[] = {FIT_SHAPE_PULLED, FIT_SHAPE_ELONGATED};
   for (unsigned i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
     has_middle(shapes[i]);
@@ -60,7 +58,7 @@ static void what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_th
   }
 }
 
-static void what_the_load_and_a_long_shape_differ_by_is_part_of_the_error(void) {
+TEST(what_the_load_and_a_long_shape_differ_by_is_part_of_the_error) {
   has_middle(FIT_SHAPE_ELONGATED);
   is_at(4.0f, -8.0f, 4.62709f, &load); /* 0.4, 3 and 3.5 mm */
   load.x_mm = 0.0f;
@@ -69,21 +67,11 @@ static void what_the_load_and_a_long_shape_differ_by_is_part_of_the_error(void) 
   is_at(0.0f, -8.0f, 0.4f, &load);
 }
 
-static void what_a_round_shape_leaves_is_doubt(void) {
+TEST(what_a_round_shape_leaves_is_doubt) {
   report.shape = FIT_SHAPE_ROUND;
   report.doubt = 1.0f;
   is_at(2.0f, -5.0f, 0.3f, NULL);
   report.doubt = 2.5f;
   is_at(2.0f, -5.0f, 0.75f, NULL);
   is_at(4.0f, -8.0f, 1.0f, &load);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(parts_and_the_load_take_no_longer_than_frames_are_apart);
-  RUN_TEST(what_presses_is_where_the_load_or_the_Gaussian_has_it);
-  RUN_TEST(what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_the_error);
-  RUN_TEST(what_the_load_and_a_long_shape_differ_by_is_part_of_the_error);
-  RUN_TEST(what_a_round_shape_leaves_is_doubt);
-  return UNITY_END();
 }

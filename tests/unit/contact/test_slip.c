@@ -1,8 +1,8 @@
 #include "contact/slip.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <math.h>
-#include <unity.h>
 
 /* Positions are cut off towards zero at 1/16 um: two coordinates, two points. */
 #define ROUNDING_mm 1.9e-4f
@@ -11,8 +11,6 @@
 static struct slip_history history;
 
 void setUp(void) { slip_reset(&history); }
-void tearDown(void) {}
-
 /* Eq. (7) of the paper as it stands. */
 static double eq7(const double (*r)[2], int i, int n) {
   double mean[2] = {0.0, 0.0};
@@ -61,21 +59,21 @@ static uint64_t at_5_Hz(struct random *random, int i) {
   return 200000u * (uint64_t)i;
 }
 
-static void test_twenty_hertz_is_the_papers_metric(void) { compare_with_eq7(at_20_Hz, 2, WINDOW_us); }
+TEST(test_twenty_hertz_is_the_papers_metric) { compare_with_eq7(at_20_Hz, 2, WINDOW_us); }
 
-static void test_jitter_does_not_change_n(void) {
+TEST(test_jitter_does_not_change_n) {
   compare_with_eq7(at_20_Hz_with_jitter, 2, WINDOW_us);
   compare_with_eq7(at_200_Hz_with_jitter, 20, WINDOW_us);
 }
 
-static void test_window_shorter_than_the_interval_compares_with_the_frame_before(void) {
+TEST(test_window_shorter_than_the_interval_compares_with_the_frame_before) {
   compare_with_eq7(at_5_Hz, 1, WINDOW_us);
   compare_with_eq7(at_20_Hz, 1, 5000);
   compare_with_eq7(at_20_Hz, 1, 0);
 }
 
 /* n counts the frames of the window: v (window + interval) / 2, whatever the rate. */
-static void test_constant_speed(void) {
+TEST(test_constant_speed) {
   static const uint64_t intervals_us[] = {50000, 20000, 10000, 5000, 2500, 1000, 625};
   for (size_t i = 0; i < sizeof intervals_us / sizeof intervals_us[0]; i++) {
     static const float speeds_mm_s[] = {0.0f, 1.0f, 10.0f, 100.0f};
@@ -96,7 +94,7 @@ static void test_constant_speed(void) {
 }
 
 /* At 3 kHz the window holds more than the memory: the newest SLIP_CAPACITY count. */
-static void test_window_beyond_the_capacity(void) {
+TEST(test_window_beyond_the_capacity) {
   const uint64_t interval_us = 333;
   const float step_mm = 0.01f;
   float distance_mm = 0.0f;
@@ -110,7 +108,7 @@ static void test_window_beyond_the_capacity(void) {
   }
 }
 
-static void test_reset_forgets(void) {
+TEST(test_reset_forgets) {
   float distance_mm = -1.0f;
   for (uint64_t i = 0; i < 10; i++) {
     slip_update(&history, 50000 * i, 10.0f, 10.0f, WINDOW_us, &distance_mm);
@@ -124,7 +122,7 @@ static void test_reset_forgets(void) {
 }
 
 /* After a pause without a reset the frame before is all there is; then the window fills again. */
-static void test_pause(void) {
+TEST(test_pause) {
   float distance_mm = -1.0f;
   for (uint64_t i = 0; i < 100; i++) {
     slip_update(&history, 5000 * i, 1.0f, 0.0f, WINDOW_us, &distance_mm);
@@ -139,7 +137,7 @@ static void test_pause(void) {
 }
 
 /* Running sums in integers do not drift: after a million updates they are those of the ring. */
-static void test_sums_stay_exact(void) {
+TEST(test_sums_stay_exact) {
   struct random random = {52};
   uint64_t t_us = 0;
   float distance_mm;
@@ -160,7 +158,7 @@ static void test_sums_stay_exact(void) {
 }
 
 /* The farthest positions in a full memory must not overflow the sums. */
-static void test_farthest_positions(void) {
+TEST(test_farthest_positions) {
   float distance_mm = -1.0f;
   for (uint64_t i = 0; i <= SLIP_CAPACITY; i++) {
     slip_update(&history, 300 * i, 800.0f, -800.0f, WINDOW_us, &distance_mm);
@@ -171,7 +169,7 @@ static void test_farthest_positions(void) {
 }
 
 /* A temperature conversion takes the place of a frame every 64: the interval doubles once. */
-static void test_a_missing_frame_does_not_void_the_window(void) {
+TEST(test_a_missing_frame_does_not_void_the_window) {
   uint64_t t_us = 0;
   int full_frames = 0;
   for (int i = 0; i < 400; i++) {
@@ -185,19 +183,4 @@ static void test_a_missing_frame_does_not_void_the_window(void) {
     }
   }
   TEST_ASSERT_GREATER_THAN_INT(380, full_frames);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_twenty_hertz_is_the_papers_metric);
-  RUN_TEST(test_jitter_does_not_change_n);
-  RUN_TEST(test_window_shorter_than_the_interval_compares_with_the_frame_before);
-  RUN_TEST(test_constant_speed);
-  RUN_TEST(test_window_beyond_the_capacity);
-  RUN_TEST(test_reset_forgets);
-  RUN_TEST(test_pause);
-  RUN_TEST(test_sums_stay_exact);
-  RUN_TEST(test_farthest_positions);
-  RUN_TEST(test_a_missing_frame_does_not_void_the_window);
-  return UNITY_END();
 }

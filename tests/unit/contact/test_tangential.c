@@ -2,10 +2,10 @@
 #include "contact/tangential.h"
 #include "support/pad.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <string.h>
-#include <unity.h>
 
 static struct tangential_settings settings;
 static struct tangential_history history;
@@ -29,8 +29,6 @@ void setUp(void) {
   input = (struct contact_input){.t_us = 5000000, .contact = true, .tangential = &found};
 }
 
-void tearDown(void) {}
-
 static uint32_t update(uint32_t flags) {
   memset(&load, 0xA5, sizeof load);
   result = (struct contact_result){.flags = flags, .slip_mm = 0.25f};
@@ -46,7 +44,7 @@ static void assert_nothing(uint32_t flags) {
   TEST_ASSERT_EQUAL_MEMORY(&none, &load, sizeof load);
 }
 
-static void an_estimate_that_is_not_there_says_nothing(void) {
+TEST(an_estimate_that_is_not_there_says_nothing) {
   const uint32_t flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_UNCERTAIN;
   found.valid = false;
   assert_nothing(flags);
@@ -57,7 +55,7 @@ static void an_estimate_that_is_not_there_says_nothing(void) {
   assert_nothing(flags);
 }
 
-static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
+TEST(an_estimate_passes_as_it_is_with_scales_of_one) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_CONTACT));
   TEST_ASSERT_EQUAL_FLOAT(2.5f, load.x_mm);
   TEST_ASSERT_EQUAL_FLOAT(-7.0f, load.y_mm);
@@ -75,7 +73,7 @@ static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
 static void use_moved(void) { found.moved_q20_mm[0] = found.moved_q20_mm[1] = (int32_t)(MOVED_mm * 1048576.0); }
 
 /* A load of 0.1 either way is usual; one that the estimate hardly sees is likely none. */
-static void a_small_load_may_be_none_and_the_place_knows_it(void) {
+TEST(a_small_load_may_be_none_and_the_place_knows_it) {
   use_moved();
   found.location_sd_mm = 0.25f;
   found.q_sd_N = 0.2f; /* 0.05 of the force */
@@ -101,7 +99,7 @@ static void a_small_load_may_be_none_and_the_place_knows_it(void) {
 /* Half of the contacts are pulled, by 0.1 of the force along each axis. Errors of the load and of
  * the place go together, and their standard deviation is known as well as 15 readings less 8
  * unknowns tell it. */
-static void places_are_nearer_than_with_any_load_or_none(void) {
+TEST(places_are_nearer_than_with_any_load_or_none) {
   enum { CONTACTS = 20000 };
   const double sd = 0.03, own_mm = 0.05, force_N = 4.0;
   struct random random = {UINT64_C(0x6C6F6164)};
@@ -153,7 +151,7 @@ static void use_edges(const struct pad_edges *edges) {
 }
 
 /* At u = 0.25, v = -0.75: u^2 = 0.0625, v^2 = 0.5625. */
-static void edges_are_taken_back(void) {
+TEST(edges_are_taken_back) {
   found.x_mm = 2.5f;
   found.y_mm = -7.5f;
   const struct pad_edges edges = {
@@ -178,7 +176,7 @@ static void edges_are_taken_back(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.064f, 0.064f, load.q_sd_N); /* 0.04 / (1.25 0.5) */
 }
 
-static void a_load_that_edges_hide_is_not_told(void) {
+TEST(a_load_that_edges_hide_is_not_told) {
   struct pad_edges edges = {.gain_y = {-0.74f, 0.0f, 0.0f}};
   use_edges(&edges);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(0));
@@ -187,7 +185,7 @@ static void a_load_that_edges_hide_is_not_told(void) {
   assert_nothing(0);
 }
 
-static void scales_and_their_uncertainties_enter(void) {
+TEST(scales_and_their_uncertainties_enter) {
   settings.force_scale = 1.25f;
   settings.force_scale_sd = 0.03f;
   settings.tangential_scale = 0.8f;
@@ -204,7 +202,7 @@ static void scales_and_their_uncertainties_enter(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.25f, 0.25f, load.ratio);
 }
 
-static void a_calibration_scales_what_its_force_scale_was_found_with(void) {
+TEST(a_calibration_scales_what_its_force_scale_was_found_with) {
   struct pad_profile pad = pad_of_12_mm();
   pad.tangential_scale = 1.5f;
   pad.from_touch = 1;
@@ -223,7 +221,7 @@ static void a_calibration_scales_what_its_force_scale_was_found_with(void) {
   TEST_ASSERT_FALSE(settings.from_touch);
 }
 
-static void uncertain_speaks_of_the_corrected_location(void) {
+TEST(uncertain_speaks_of_the_corrected_location) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN));
   found.elongated = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_ELONGATED, update(0));
@@ -253,7 +251,7 @@ static void assert_from_touch(float qx_N, float qy_N) {
   TEST_ASSERT_FLOAT_WITHIN(1e-3f, size_N / load.force_N, load.ratio);
 }
 
-static void from_touch_takes_the_first_100_ms_for_none(void) {
+TEST(from_touch_takes_the_first_100_ms_for_none) {
   settings.from_touch = true;
   touch();
   found.force_N = 5.0f;
@@ -268,7 +266,7 @@ static void from_touch_takes_the_first_100_ms_for_none(void) {
   assert_from_touch(-1.0f, 0.5f);
 }
 
-static void a_new_contact_has_a_zero_of_its_own(void) {
+TEST(a_new_contact_has_a_zero_of_its_own) {
   settings.from_touch = true;
   touch();
   found.valid = false; /* for a while only: the contact goes on */
@@ -292,7 +290,7 @@ static void a_new_contact_has_a_zero_of_its_own(void) {
   assert_from_touch(0.0f, 1.0f);
 }
 
-static void slow_frames_settle_with_those_there_were(void) {
+TEST(slow_frames_settle_with_those_there_were) {
   settings.from_touch = true;
   assert_nothing(0);
   input.t_us += 2000000;
@@ -302,7 +300,7 @@ static void slow_frames_settle_with_those_there_were(void) {
   TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.0f, load.qy_N);
 }
 
-static void fits_that_an_estimate_is_worthwhile_for(void) {
+TEST(fits_that_an_estimate_is_worthwhile_for) {
   struct fit_result fit = {.flags = CONTACT_FLAG_FIT_VALID, .used = 0x7FFF};
   TEST_ASSERT_TRUE(tangential_is_worthwhile(&fit, 0));
   TEST_ASSERT_TRUE(tangential_is_worthwhile(&fit, 1));
@@ -357,7 +355,7 @@ static struct fit_tangential frame(struct tangential_job *job, float x_mm, float
   return job->estimate;
 }
 
-static void slow_frames_have_time_for_more_steps(void) {
+TEST(slow_frames_have_time_for_more_steps) {
   for (int slow = 0; slow < 2; slow++) {
     const uint64_t interval_us = slow ? TANGENTIAL_SLOW_us : TANGENTIAL_SLOW_us - 1;
     struct tangential_job job = {0};
@@ -373,7 +371,7 @@ static void slow_frames_have_time_for_more_steps(void) {
   }
 }
 
-static void what_is_not_worthwhile_ends_the_course(void) {
+TEST(what_is_not_worthwhile_ends_the_course) {
   static const struct tangential_course none;
   static const struct fit_tangential nothing;
   struct tangential_job job = {0};
@@ -384,7 +382,7 @@ static void what_is_not_worthwhile_ends_the_course(void) {
   TEST_ASSERT_EQUAL_MEMORY(&nothing, &estimate, sizeof estimate);
 }
 
-static void a_question_that_begins_forgets_the_contact_before(void) {
+TEST(a_question_that_begins_forgets_the_contact_before) {
   struct tangential_job job = {0}, fresh = {0};
   uint64_t t_us = 9000000;
   for (int i = 0; i < FIT_TANGENTIAL_FRAMES + 1; i++) {
@@ -395,25 +393,4 @@ static void a_question_that_begins_forgets_the_contact_before(void) {
   TEST_ASSERT_FALSE(frame(&job, 2.0f, 3.0f, t_us += 1000, 0).valid);
   frame(&fresh, 2.0f, 3.0f, t_us, 0);
   TEST_ASSERT_EQUAL_MEMORY(&fresh.course, &job.course, sizeof job.course);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(an_estimate_that_is_not_there_says_nothing);
-  RUN_TEST(an_estimate_passes_as_it_is_with_scales_of_one);
-  RUN_TEST(a_small_load_may_be_none_and_the_place_knows_it);
-  RUN_TEST(places_are_nearer_than_with_any_load_or_none);
-  RUN_TEST(edges_are_taken_back);
-  RUN_TEST(a_load_that_edges_hide_is_not_told);
-  RUN_TEST(scales_and_their_uncertainties_enter);
-  RUN_TEST(a_calibration_scales_what_its_force_scale_was_found_with);
-  RUN_TEST(uncertain_speaks_of_the_corrected_location);
-  RUN_TEST(from_touch_takes_the_first_100_ms_for_none);
-  RUN_TEST(a_new_contact_has_a_zero_of_its_own);
-  RUN_TEST(slow_frames_settle_with_those_there_were);
-  RUN_TEST(slow_frames_have_time_for_more_steps);
-  RUN_TEST(what_is_not_worthwhile_ends_the_course);
-  RUN_TEST(a_question_that_begins_forgets_the_contact_before);
-  RUN_TEST(fits_that_an_estimate_is_worthwhile_for);
-  return UNITY_END();
 }

@@ -1,9 +1,9 @@
 /* The driver and the simulated sensor as an image for the MS5837-30BA has them. */
 #include "ms58xx/ms58xx.h"
 #include "native/sim_ms5840.h"
+#include "support/unit.h"
 
 #include <string.h>
-#include <unity.h>
 
 /* Worked example of the MS5837-30BA datasheet: 10/2015, page 7, and rev. C2, page 11. */
 static const uint16_t EXAMPLE_C[6] = {34982, 36352, 20328, 22354, 26646, 26146};
@@ -18,14 +18,12 @@ void setUp(void) {
   memcpy(&prom.word[1], EXAMPLE_C, sizeof EXAMPLE_C);
   prom.word[0] |= (uint16_t)(sim_ms5840_crc4(prom.word) << 12);
 }
-void tearDown(void) {}
-
 static int32_t pressure_Pa_q10(uint32_t d1, uint32_t d2, struct ms58xx_thermal *thermal) {
   ms58xx_compensate_temperature(&prom, d2, MS58XX_BRANCH_UNKNOWN, thermal);
   return ms58xx_compensate_pressure(thermal, d1);
 }
 
-static void test_worked_example(void) {
+TEST(test_worked_example) {
   struct ms58xx_thermal thermal;
   const int32_t q10 = pressure_Pa_q10(EXAMPLE_D1, EXAMPLE_D2, &thermal);
   TEST_ASSERT_EQUAL_INT32(-5962, thermal.dT);
@@ -40,14 +38,14 @@ static void test_worked_example(void) {
   TEST_ASSERT_EQUAL_DOUBLE(19.81, sim_ms5840_temperature_degC(prom.word, EXAMPLE_D2));
 }
 
-static void test_prom(void) {
+TEST(test_prom) {
   TEST_ASSERT_EQUAL_INT(MS58XX_PROM_GOOD, ms58xx_check_prom(&prom));
   prom.word[3] ^= 0x0100;
   TEST_ASSERT_EQUAL_INT(MS58XX_PROM_CRC_DIFFERS, ms58xx_check_prom(&prom));
 }
 
 /* Two programs written apart: every branch, up to the end of the range. */
-static void test_driver_and_simulated_sensor_agree(void) {
+TEST(test_driver_and_simulated_sensor_agree) {
   unsigned branches[4] = {0};
   for (double degC = -39.0; degC <= 85.0; degC += 0.37) {
     const uint32_t d2 = sim_ms5840_d2(prom.word, degC);
@@ -67,14 +65,14 @@ static void test_driver_and_simulated_sensor_agree(void) {
   TEST_ASSERT_GREATER_THAN(100, branches[MS58XX_BRANCH_VERY_COLD]);
 }
 
-static void test_what_32_bits_do_not_hold_is_beyond_the_range(void) {
+TEST(test_what_32_bits_do_not_hold_is_beyond_the_range) {
   struct ms58xx_thermal thermal;
   TEST_ASSERT_EQUAL_INT32(INT32_MAX, pressure_Pa_q10(CODE_MAX, EXAMPLE_D2, &thermal));
   TEST_ASSERT_GREATER_THAN_INT32(MS58XX_MAX_PRESSURE_Pa, INT32_MAX / 1024);
 }
 
 /* The firmware waits longer than the slowest sensor takes, and knows its noise. */
-static void test_conversions(void) {
+TEST(test_conversions) {
   for (unsigned osr = 256; osr <= 8192; osr *= 2) {
     const struct ms58xx_osr *row = ms58xx_find_osr((uint16_t)osr);
     TEST_ASSERT_EQUAL_UINT32(sim_ms5840_conversion_us(osr), row->maximum_us);
@@ -82,14 +80,4 @@ static void test_conversions(void) {
     TEST_ASSERT_EQUAL_INT32((int32_t)(sim_ms5840_noise_Pa(osr) * 1024), row->noise_Pa_q10);
     TEST_ASSERT_LESS_OR_EQUAL_INT32(MS58XX_NOISE_MAX_Pa * 1024, row->noise_Pa_q10);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_worked_example);
-  RUN_TEST(test_prom);
-  RUN_TEST(test_driver_and_simulated_sensor_agree);
-  RUN_TEST(test_what_32_bits_do_not_hold_is_beyond_the_range);
-  RUN_TEST(test_conversions);
-  return UNITY_END();
 }

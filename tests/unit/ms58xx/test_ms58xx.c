@@ -1,10 +1,10 @@
 #include "ms58xx/ms58xx.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
-#include <unity.h>
 
 #define CODE_MAX 0xFFFFFFu
 
@@ -15,9 +15,6 @@ static const struct ms58xx_prom example = {{0, 46372, 43981, 29059, 27842, 31553
 
 /* The PROM of a real MS5840 as a driver's author published it. */
 static const struct ms58xx_prom real_part = {{26785, 41335, 41466, 26840, 27317, 31225, 28780}};
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /* The datasheet's formulas once more, with divisions that round down and integers that hold
  * everything. */
@@ -93,7 +90,7 @@ static int32_t pressure_Pa_q10(const struct ms58xx_prom *prom, uint32_t d1, uint
   return ms58xx_compensate_pressure(&thermal, d1);
 }
 
-static void test_osr_table(void) {
+TEST(test_osr_table) {
   static const struct {
     uint16_t osr;
     uint32_t longest_us, noise_mPa;
@@ -110,7 +107,7 @@ static void test_osr_table(void) {
   }
 }
 
-static void test_other_osrs_are_unknown(void) {
+TEST(test_other_osrs_are_unknown) {
   int known = 0;
   for (uint32_t osr = 0; osr <= UINT16_MAX; osr++) {
     known += ms58xx_find_osr((uint16_t)osr) != NULL;
@@ -118,13 +115,13 @@ static void test_other_osrs_are_unknown(void) {
   TEST_ASSERT_EQUAL_INT(6, known);
 }
 
-static void test_crc_of_an520(void) {
+TEST(test_crc_of_an520) {
   static const uint8_t bytes[16] = {0x31, 0x32, 0x33, 0x34, 0x35, 0x36, 0x37, 0x38,
                                     0x39, 0x40, 0x41, 0x42, 0x43, 0x44, 0x45, 0x00};
   TEST_ASSERT_EQUAL_HEX8(0xB, ms58xx_crc4_bytes(bytes));
 }
 
-static void test_real_prom_with_differing_nibble(void) {
+TEST(test_real_prom_with_differing_nibble) {
   TEST_ASSERT_EQUAL_HEX8(6, real_part.word[0] >> 12);
   TEST_ASSERT_EQUAL_HEX8(5, ms58xx_prom_crc4(&real_part));
   TEST_ASSERT_EQUAL_INT(MS58XX_PROM_CRC_DIFFERS, ms58xx_check_prom(&real_part));
@@ -133,7 +130,7 @@ static void test_real_prom_with_differing_nibble(void) {
   TEST_ASSERT_EQUAL_INT(MS58XX_PROM_GOOD, ms58xx_check_prom(&mended));
 }
 
-static void test_all_sixteen_crcs_occur_and_are_accepted(void) {
+TEST(test_all_sixteen_crcs_occur_and_are_accepted) {
   uint32_t seen = 0;
   for (uint32_t value = 0; value < 4096; value++) {
     struct ms58xx_prom prom = example;
@@ -152,7 +149,7 @@ static void test_all_sixteen_crcs_occur_and_are_accepted(void) {
   TEST_ASSERT_EQUAL_HEX32(0xFFFF, seen);
 }
 
-static void test_crc_sees_every_flipped_bit(void) {
+TEST(test_crc_sees_every_flipped_bit) {
   struct ms58xx_prom prom = example;
   prom.word[0] = (uint16_t)(ms58xx_prom_crc4(&example) << 12);
   TEST_ASSERT_EQUAL_INT(MS58XX_PROM_GOOD, ms58xx_check_prom(&prom));
@@ -163,7 +160,7 @@ static void test_crc_sees_every_flipped_bit(void) {
   }
 }
 
-static void test_blank_proms(void) {
+TEST(test_blank_proms) {
   struct ms58xx_prom prom = {{0}};
   TEST_ASSERT_EQUAL_HEX8(0, ms58xx_prom_crc4(&prom)); /* the CRC alone would accept it */
   TEST_ASSERT_EQUAL_INT(MS58XX_PROM_BLANK, ms58xx_check_prom(&prom));
@@ -181,7 +178,7 @@ static void test_blank_proms(void) {
   }
 }
 
-static void test_worked_example(void) {
+TEST(test_worked_example) {
   struct ms58xx_thermal thermal;
   ms58xx_compensate_temperature(&example, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN, &thermal);
   TEST_ASSERT_EQUAL_INT32(68, thermal.dT);
@@ -192,7 +189,7 @@ static void test_worked_example(void) {
   TEST_ASSERT_EQUAL_INT32(110002, ms58xx_compensate_pressure(&thermal, EXAMPLE_D1) >> 10);
 }
 
-static void test_reading_of_the_real_part(void) {
+TEST(test_reading_of_the_real_part) {
   struct ms58xx_thermal thermal;
   ms58xx_compensate_temperature(&real_part, 8073757, MS58XX_BRANCH_UNKNOWN, &thermal);
   TEST_ASSERT_EQUAL_INT32(2275, thermal.temperature_cC);
@@ -201,7 +198,7 @@ static void test_reading_of_the_real_part(void) {
 
 /* One count is about 0.04 Pa and stays visible; the code clips only near 5 bar, far above the
  * extended range. */
-static void test_resolution_and_range(void) {
+TEST(test_resolution_and_range) {
   int32_t thousand_counts_Pa_q10 = pressure_Pa_q10(&example, EXAMPLE_D1 + 1000, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN) -
                                    pressure_Pa_q10(&example, EXAMPLE_D1, EXAMPLE_D2, MS58XX_BRANCH_UNKNOWN);
   TEST_ASSERT_INT32_WITHIN(5 * 1024, 44 * 1024, thousand_counts_Pa_q10);
@@ -212,7 +209,7 @@ static void test_resolution_and_range(void) {
   TEST_ASSERT_GREATER_THAN_INT32(2 * MS58XX_MAX_PRESSURE_Pa, clipped);
 }
 
-static void test_both_sides_of_every_edge(void) {
+TEST(test_both_sides_of_every_edge) {
   static const struct {
     int32_t temperature_cC;
     enum ms58xx_branch branch;
@@ -238,14 +235,14 @@ static void test_both_sides_of_every_edge(void) {
 }
 
 /* The error of drivers that swap the two cold branches must not hide from these tests. */
-static void test_swapped_cold_branches_would_show(void) {
+TEST(test_swapped_cold_branches_would_show) {
   uint32_t d2 = code_of_temperature(&example, 500);
   int64_t right = datasheet(&example, EXAMPLE_D1, d2, MS58XX_BRANCH_VERY_COLD).pressure_Pa;
   int64_t swapped = datasheet(&example, EXAMPLE_D1, d2, MS58XX_BRANCH_COLD).pressure_Pa;
   TEST_ASSERT_INT64_WITHIN(50, 125, swapped - right);
 }
 
-static void test_branch_hysteresis(void) {
+TEST(test_branch_hysteresis) {
   enum { W = MS58XX_BRANCH_WARM, C = MS58XX_BRANCH_COLD, V = MS58XX_BRANCH_VERY_COLD };
   static const struct {
     int previous;
@@ -278,7 +275,7 @@ static void test_branch_hysteresis(void) {
 }
 
 /* The rule itself steps by some -60 Pa at 10 degC and 1.08 bar; a latched branch does not. */
-static void test_step_at_ten_degrees_is_not_crossed_by_noise(void) {
+TEST(test_step_at_ten_degrees_is_not_crossed_by_noise) {
   uint32_t at_edge = code_of_temperature(&example, 1000);
   uint32_t just_below = at_edge - 1;
   uint32_t d1 = EXAMPLE_D1;
@@ -307,7 +304,7 @@ static void test_step_at_ten_degrees_is_not_crossed_by_noise(void) {
   }
 }
 
-static void test_extremes_saturate(void) {
+TEST(test_extremes_saturate) {
   static const uint16_t words[] = {0, UINT16_MAX, 28165};
   static const uint32_t codes[] = {0, CODE_MAX, EXAMPLE_D1, EXAMPLE_D2, 1};
   for (int combination = 0; combination < 729; combination++) {
@@ -329,7 +326,7 @@ static void test_extremes_saturate(void) {
   TEST_ASSERT_EQUAL_INT32(INT32_MIN, pressure_Pa_q10(&lowest, CODE_MAX, 0, MS58XX_BRANCH_UNKNOWN));
 }
 
-static void test_q10_holds_the_datasheets_integer(void) {
+TEST(test_q10_holds_the_datasheets_integer) {
   struct random random = {5};
   int plausible = 0;
   for (int i = 0; i < 100000; i++) {
@@ -350,25 +347,4 @@ static void test_q10_holds_the_datasheets_integer(void) {
     }
   }
   TEST_ASSERT_GREATER_THAN_INT(90000, plausible);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_osr_table);
-  RUN_TEST(test_other_osrs_are_unknown);
-  RUN_TEST(test_crc_of_an520);
-  RUN_TEST(test_real_prom_with_differing_nibble);
-  RUN_TEST(test_all_sixteen_crcs_occur_and_are_accepted);
-  RUN_TEST(test_crc_sees_every_flipped_bit);
-  RUN_TEST(test_blank_proms);
-  RUN_TEST(test_worked_example);
-  RUN_TEST(test_reading_of_the_real_part);
-  RUN_TEST(test_resolution_and_range);
-  RUN_TEST(test_both_sides_of_every_edge);
-  RUN_TEST(test_swapped_cold_branches_would_show);
-  RUN_TEST(test_branch_hysteresis);
-  RUN_TEST(test_step_at_ten_degrees_is_not_crossed_by_noise);
-  RUN_TEST(test_extremes_saturate);
-  RUN_TEST(test_q10_holds_the_datasheets_integer);
-  return UNITY_END();
 }

@@ -1,8 +1,8 @@
 #include "fake_i2c.h"
 #include "pico_mux/mux_bus.h"
+#include "support/unit.h"
 
 #include <string.h>
-#include <unity.h>
 
 #define ALL_SENSORS 0x7FFFu
 #define STRIP(mux) (0x1Fu << 5 * (mux))
@@ -108,7 +108,7 @@ static void expect_good_frame(void) {
   expect_readings(ALL_SENSORS);
 }
 
-static void test_a_command_reaches_all_sensors_in_one_write(void) {
+TEST(test_a_command_reaches_all_sensors_in_one_write) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, result.acknowledged);
   TEST_ASSERT_EQUAL_UINT(0, result.nacks);
@@ -118,13 +118,13 @@ static void test_a_command_reaches_all_sensors_in_one_write(void) {
   TEST_ASSERT_EQUAL_UINT(1, fake.commands);
 }
 
-static void test_a_command_ends_with_its_own_stop(void) {
+TEST(test_a_command_ends_with_its_own_stop) {
   const uint64_t start_us = fake.now_us;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_UINT64(start_us + COMMAND_TRANSACTIONS * I2C_WRITE_us, fake.now_us);
 }
 
-static void test_transactions_and_bus_time_of_a_frame(void) {
+TEST(test_transactions_and_bus_time_of_a_frame) {
   for (int n = 0; n < 3; n++) {
     const unsigned before = fake.transactions;
     TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
@@ -141,7 +141,7 @@ static void test_transactions_and_bus_time_of_a_frame(void) {
   }
 }
 
-static void test_a_read_opens_the_channels_itself(void) {
+TEST(test_a_read_opens_the_channels_itself) {
   for (int n = 0; n < 3; n++) {
     const unsigned before = fake.transactions;
     TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
@@ -150,13 +150,13 @@ static void test_a_read_opens_the_channels_itself(void) {
   }
 }
 
-static void test_a_read_may_follow_a_command_at_once(void) {
+TEST(test_a_read_may_follow_a_command_at_once) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
   expect_readings(ALL_SENSORS);
 }
 
-static void test_commands_in_a_row_reach_everybody(void) {
+TEST(test_commands_in_a_row_reach_everybody) {
   for (uint8_t byte = 1; byte < 5; byte++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, command(byte));
     TEST_ASSERT_EQUAL_HEX8(byte, fake.last_command);
@@ -164,7 +164,7 @@ static void test_commands_in_a_row_reach_everybody(void) {
   }
 }
 
-static void test_reads_of_every_length_without_a_command(void) {
+TEST(test_reads_of_every_length_without_a_command) {
   for (uint8_t count = 1; count <= ARRAY_BUS_MAX_READ_BYTES; count++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, read_back(0xA2, count));
     TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, result.acknowledged);
@@ -174,12 +174,12 @@ static void test_reads_of_every_length_without_a_command(void) {
   }
 }
 
-static void test_a_controller_that_is_slow_to_become_idle_is_asked_again(void) {
+TEST(test_a_controller_that_is_slow_to_become_idle_is_asked_again) {
   fake.busy_polls = 3;
   expect_good_frame();
 }
 
-static void test_arguments_and_order_of_calls(void) {
+TEST(test_arguments_and_order_of_calls) {
   uint64_t wake_us;
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, 0, &result, &wake_us));
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 0, 0));
@@ -191,7 +191,7 @@ static void test_arguments_and_order_of_calls(void) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, fake.now_us, &result, &wake_us));
 }
 
-static void test_a_missing_multiplexer_costs_its_own_sensors_only(void) {
+TEST(test_a_missing_multiplexer_costs_its_own_sensors_only) {
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
     next_case();
     fake.mux_missing[mux] = true;
@@ -213,7 +213,7 @@ static void test_a_missing_multiplexer_costs_its_own_sensors_only(void) {
   }
 }
 
-static void test_without_any_multiplexer_nobody_acknowledges(void) {
+TEST(test_without_any_multiplexer_nobody_acknowledges) {
   memset(fake.mux_missing, true, sizeof fake.mux_missing);
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
@@ -223,7 +223,7 @@ static void test_without_any_multiplexer_nobody_acknowledges(void) {
   TEST_ASSERT_EQUAL_UINT32(3, result.nacks);
 }
 
-static void test_a_missing_sensor_shows_when_it_is_read(void) {
+TEST(test_a_missing_sensor_shows_when_it_is_read) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
     fake.sensor_missing[k] = true;
@@ -236,7 +236,7 @@ static void test_a_missing_sensor_shows_when_it_is_read(void) {
   }
 }
 
-static void test_without_any_sensor_the_command_is_refused(void) {
+TEST(test_without_any_sensor_the_command_is_refused) {
   memset(fake.sensor_missing, true, sizeof fake.sensor_missing);
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
@@ -244,7 +244,7 @@ static void test_without_any_sensor_the_command_is_refused(void) {
 }
 
 /* tearDown checks the point: its open channels never answer for another strip. */
-static void test_a_selection_that_is_missed_once_is_repeated(void) {
+TEST(test_a_selection_that_is_missed_once_is_repeated) {
   for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
     next_case();
     expect_good_frame();
@@ -258,7 +258,7 @@ static void test_a_selection_that_is_missed_once_is_repeated(void) {
   }
 }
 
-static void test_a_fetch_that_is_missed_once_is_repeated(void) {
+TEST(test_a_fetch_that_is_missed_once_is_repeated) {
   for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
     next_case();
     expect_good_frame();
@@ -270,7 +270,7 @@ static void test_a_fetch_that_is_missed_once_is_repeated(void) {
 }
 
 /* Asked twice in the frame in which it fell silent, and once in every other. */
-static void test_a_sensor_that_is_gone_takes_no_time(void) {
+TEST(test_a_sensor_that_is_gone_takes_no_time) {
   expect_good_frame();
   fake.sensor_missing[7] = true;
   for (uint32_t asked = 2; asked > 0; asked--) {
@@ -284,7 +284,7 @@ static void test_a_sensor_that_is_gone_takes_no_time(void) {
   expect_good_frame();
 }
 
-static void test_a_transaction_that_never_ends_at_every_place(void) {
+TEST(test_a_transaction_that_never_ends_at_every_place) {
   for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
     next_case();
     expect_good_frame();
@@ -297,7 +297,7 @@ static void test_a_transaction_that_never_ends_at_every_place(void) {
   }
 }
 
-static void test_lost_arbitration_at_every_place(void) {
+TEST(test_lost_arbitration_at_every_place) {
   for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
     next_case();
     expect_good_frame();
@@ -309,7 +309,7 @@ static void test_lost_arbitration_at_every_place(void) {
 }
 
 /* Without interrupts the alarms alone carry an operation through. */
-static void test_lost_interrupts_only_cost_time(void) {
+TEST(test_lost_interrupts_only_cost_time) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   wait_for_conversion();
   TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
@@ -322,7 +322,7 @@ static void test_lost_interrupts_only_cost_time(void) {
   expect_readings(ALL_SENSORS);
 }
 
-static void test_a_failed_bus_is_left_alone_until_recovery(void) {
+TEST(test_a_failed_bus_is_left_alone_until_recovery) {
   fake.hang_at = 2;
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
   const unsigned before = fake.transactions;
@@ -331,7 +331,7 @@ static void test_a_failed_bus_is_left_alone_until_recovery(void) {
   TEST_ASSERT_EQUAL_UINT(before, fake.transactions);
 }
 
-static void test_recovery_frees_sda_within_nine_clocks(void) {
+TEST(test_recovery_frees_sda_within_nine_clocks) {
   for (unsigned clocks = 1; clocks <= 9; clocks++) {
     next_case();
     fake.sda_held = true;
@@ -344,7 +344,7 @@ static void test_recovery_frees_sda_within_nine_clocks(void) {
 }
 
 /* SDA may be high because a sensor is sending a one: it needs its clocks all the same. */
-static void test_recovery_of_a_free_bus_clocks_too(void) {
+TEST(test_recovery_of_a_free_bus_clocks_too) {
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
   TEST_ASSERT_EQUAL_UINT(9, fake.clocks);
   TEST_ASSERT_EQUAL_UINT(1, fake.stops);
@@ -366,7 +366,7 @@ static int run_for(uint64_t duration_us, uint32_t *sensors) {
   return failed;
 }
 
-static void test_a_line_tied_low_costs_its_multiplexer_only(void) {
+TEST(test_a_line_tied_low_costs_its_multiplexer_only) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
     const uint32_t rest = ALL_SENSORS & ~STRIP(k / BOARD_SENSORS_OF_STRIP);
@@ -397,7 +397,7 @@ static void test_a_line_tied_low_costs_its_multiplexer_only(void) {
   }
 }
 
-static void test_lines_tied_low_behind_all_multiplexers_leave_nobody(void) {
+TEST(test_lines_tied_low_behind_all_multiplexers_leave_nobody) {
   uint32_t sensors = ALL_SENSORS;
   fake.tied_low = 1u << 0 | 1u << 7 | 1u << 14;
   TEST_ASSERT_LESS_THAN_INT(60, run_for(10000000, &sensors));
@@ -408,7 +408,7 @@ static void test_lines_tied_low_behind_all_multiplexers_leave_nobody(void) {
 }
 
 /* What stands still once, or at another place each time, is no held line. */
-static void test_single_standstills_shut_nobody(void) {
+TEST(test_single_standstills_shut_nobody) {
   for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
     next_case();
     for (int n = 0; n < 3; n++) {
@@ -420,7 +420,7 @@ static void test_single_standstills_shut_nobody(void) {
   }
 }
 
-static void test_recovery_by_the_multiplexer_reset(void) {
+TEST(test_recovery_by_the_multiplexer_reset) {
   fake.sda_held = true;
   fake.sda_free_by_mux_reset = true;
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
@@ -428,7 +428,7 @@ static void test_recovery_by_the_multiplexer_reset(void) {
   expect_good_frame();
 }
 
-static void test_a_line_held_for_good_is_reported_and_asked_again(void) {
+TEST(test_a_line_held_for_good_is_reported_and_asked_again) {
   for (int line = 0; line < 2; line++) {
     next_case();
     *(line == 0 ? &fake.sda_held : &fake.scl_held) = true;
@@ -442,7 +442,7 @@ static void test_a_line_held_for_good_is_reported_and_asked_again(void) {
   }
 }
 
-static void test_recovery_abandons_whatever_is_under_way(void) {
+TEST(test_recovery_abandons_whatever_is_under_way) {
   for (uint64_t after_us = 0; after_us < 2100; after_us += 77) {
     next_case();
     TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
@@ -457,11 +457,9 @@ static void test_recovery_abandons_whatever_is_under_way(void) {
   }
 }
 
-static void test_start_resets_every_multiplexer(void) {
-  TEST_ASSERT_EQUAL_HEX8((1u << BOARD_MUX_COUNT) - 1u, fake.driven);
-}
+TEST(test_start_resets_every_multiplexer) { TEST_ASSERT_EQUAL_HEX8((1u << BOARD_MUX_COUNT) - 1u, fake.driven); }
 
-static void test_recovery_lets_every_multiplexer_go(void) {
+TEST(test_recovery_lets_every_multiplexer_go) {
   expect_good_frame();
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
   const unsigned before = fake.transactions;
@@ -470,51 +468,14 @@ static void test_recovery_lets_every_multiplexer_go(void) {
 }
 
 /* Half periods of 5 us: nine clocks of two, and six of the STOP and the resets. */
-static void test_time_of_a_recovery(void) {
+TEST(test_time_of_a_recovery) {
   const uint64_t begun_us = fake.now_us;
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
   TEST_ASSERT_EQUAL_UINT64(RECOVERY_us, fake.now_us - begun_us);
 }
 
-static void test_a_failure_leaves_the_result_alone(void) {
+TEST(test_a_failure_leaves_the_result_alone) {
   fake.hang_at = fake.transactions + 2;
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(0xA5A5A5A5u, result.acknowledged);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_command_reaches_all_sensors_in_one_write);
-  RUN_TEST(test_a_command_ends_with_its_own_stop);
-  RUN_TEST(test_transactions_and_bus_time_of_a_frame);
-  RUN_TEST(test_a_read_opens_the_channels_itself);
-  RUN_TEST(test_a_read_may_follow_a_command_at_once);
-  RUN_TEST(test_commands_in_a_row_reach_everybody);
-  RUN_TEST(test_reads_of_every_length_without_a_command);
-  RUN_TEST(test_a_controller_that_is_slow_to_become_idle_is_asked_again);
-  RUN_TEST(test_arguments_and_order_of_calls);
-  RUN_TEST(test_a_missing_multiplexer_costs_its_own_sensors_only);
-  RUN_TEST(test_without_any_multiplexer_nobody_acknowledges);
-  RUN_TEST(test_a_missing_sensor_shows_when_it_is_read);
-  RUN_TEST(test_without_any_sensor_the_command_is_refused);
-  RUN_TEST(test_a_selection_that_is_missed_once_is_repeated);
-  RUN_TEST(test_a_fetch_that_is_missed_once_is_repeated);
-  RUN_TEST(test_a_sensor_that_is_gone_takes_no_time);
-  RUN_TEST(test_a_transaction_that_never_ends_at_every_place);
-  RUN_TEST(test_lost_arbitration_at_every_place);
-  RUN_TEST(test_lost_interrupts_only_cost_time);
-  RUN_TEST(test_a_failed_bus_is_left_alone_until_recovery);
-  RUN_TEST(test_recovery_frees_sda_within_nine_clocks);
-  RUN_TEST(test_recovery_of_a_free_bus_clocks_too);
-  RUN_TEST(test_a_line_tied_low_costs_its_multiplexer_only);
-  RUN_TEST(test_lines_tied_low_behind_all_multiplexers_leave_nobody);
-  RUN_TEST(test_single_standstills_shut_nobody);
-  RUN_TEST(test_recovery_by_the_multiplexer_reset);
-  RUN_TEST(test_a_line_held_for_good_is_reported_and_asked_again);
-  RUN_TEST(test_recovery_abandons_whatever_is_under_way);
-  RUN_TEST(test_start_resets_every_multiplexer);
-  RUN_TEST(test_recovery_lets_every_multiplexer_go);
-  RUN_TEST(test_time_of_a_recovery);
-  RUN_TEST(test_a_failure_leaves_the_result_alone);
-  return UNITY_END();
 }

@@ -1,9 +1,9 @@
 #include "native/native_cdc.h"
 #include "native/native_port.h"
 #include "port/port.h"
+#include "support/unit.h"
 
 #include <string.h>
-#include <unity.h>
 
 static unsigned handled, rounds;
 static uint64_t handled_at_us[8];
@@ -39,7 +39,7 @@ void setUp(void) {
 
 void tearDown(void) { native_cdc_reset(); }
 
-static void test_time_passes_from_event_to_event(void) {
+TEST(test_time_passes_from_event_to_event) {
   port_alarm_at_us(700);
   source_us = 300;
   TEST_ASSERT_EQUAL_INT(NATIVE_TIME_UP, native_run_until(600, round_of_main, NULL));
@@ -53,7 +53,7 @@ static void test_time_passes_from_event_to_event(void) {
   TEST_ASSERT_EQUAL_UINT(3, rounds);
 }
 
-static void test_an_alarm_strikes_once_and_a_new_one_replaces_it(void) {
+TEST(test_an_alarm_strikes_once_and_a_new_one_replaces_it) {
   port_alarm_at_us(100);
   port_alarm_at_us(200);
   native_run_until(1000, NULL, NULL);
@@ -61,7 +61,7 @@ static void test_an_alarm_strikes_once_and_a_new_one_replaces_it(void) {
   TEST_ASSERT_EQUAL_UINT64(200, handled_at_us[0]);
 }
 
-static void test_an_alarm_in_the_past_strikes_at_once(void) {
+TEST(test_an_alarm_in_the_past_strikes_at_once) {
   native_run_until(1000, NULL, NULL);
   TEST_ASSERT_EQUAL_UINT(0, handled);
   port_alarm_at_us(10);
@@ -70,7 +70,7 @@ static void test_an_alarm_in_the_past_strikes_at_once(void) {
   TEST_ASSERT_EQUAL_UINT64(1000, handled_at_us[0]);
 }
 
-static void test_sleep_lasts_until_the_next_event(void) {
+TEST(test_sleep_lasts_until_the_next_event) {
   port_alarm_at_us(250);
   port_sleep();
   TEST_ASSERT_EQUAL_UINT64(250, port_now_us());
@@ -84,7 +84,7 @@ static void fed_round(void *context) {
   port_sleep();
 }
 
-static void test_the_watchdog_strikes_if_it_is_not_fed(void) {
+TEST(test_the_watchdog_strikes_if_it_is_not_fed) {
   native_run_until(5 * PORT_WATCHDOG_PERIOD_us, fed_round, NULL);
   TEST_ASSERT_FALSE(native_watchdog_expired());
   native_run_until(7 * PORT_WATCHDOG_PERIOD_us, NULL, NULL);
@@ -98,7 +98,7 @@ static void alive_round(void *context) {
   }
 }
 
-static void test_it_is_fed_in_vain_while_a_part_is_not_alive(void) {
+TEST(test_it_is_fed_in_vain_while_a_part_is_not_alive) {
   native_run_until(10 * PORT_WATCHDOG_PERIOD_us, alive_round, NULL);
   TEST_ASSERT_FALSE(native_watchdog_expired());
   native_run_until(13 * PORT_WATCHDOG_PERIOD_us, alive_round, NULL);
@@ -115,14 +115,14 @@ static void to_panic(void *context) {
   port_panic();
 }
 
-static void test_ends_of_the_program(void) {
+TEST(test_ends_of_the_program) {
   TEST_ASSERT_EQUAL_INT(NATIVE_LOADER, native_run_until(1000, to_loader, NULL));
   TEST_ASSERT_EQUAL_INT(NATIVE_PANIC, native_run_until(1000, to_panic, NULL));
 }
 
 static const struct cdc_identity IDENTITY = {.product = "test"};
 
-static void test_stream_to_the_host(void) {
+TEST(test_stream_to_the_host) {
   uint8_t received[8];
   cdc_start(&IDENTITY);
   TEST_ASSERT_EQUAL_PTR(&IDENTITY, native_cdc_identity());
@@ -137,7 +137,7 @@ static void test_stream_to_the_host(void) {
   TEST_ASSERT_EQUAL_MEMORY("ef", received, 2);
 }
 
-static void test_a_stalled_host_fills_the_queue(void) {
+TEST(test_a_stalled_host_fills_the_queue) {
   uint8_t block[1000] = {0};
   cdc_start(&IDENTITY);
   native_cdc_open();
@@ -153,7 +153,7 @@ static void test_a_stalled_host_fills_the_queue(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, cdc_write(block, sizeof block));
 }
 
-static void test_closing_loses_what_is_queued_and_is_counted(void) {
+TEST(test_closing_loses_what_is_queued_and_is_counted) {
   uint8_t byte;
   cdc_start(&IDENTITY);
   native_cdc_open();
@@ -166,7 +166,7 @@ static void test_closing_loses_what_is_queued_and_is_counted(void) {
   TEST_ASSERT_EQUAL_size_t(0, native_cdc_receive(&byte, 1));
 }
 
-static void test_asleep_the_port_is_closed_and_it_wakes_up_open(void) {
+TEST(test_asleep_the_port_is_closed_and_it_wakes_up_open) {
   uint8_t bytes[8];
   cdc_start(&IDENTITY);
   native_cdc_open();
@@ -187,7 +187,7 @@ static void test_asleep_the_port_is_closed_and_it_wakes_up_open(void) {
   TEST_ASSERT_EQUAL_size_t(0, native_cdc_receive(bytes, sizeof bytes));
 }
 
-static void test_stream_from_the_host(void) {
+TEST(test_stream_from_the_host) {
   uint8_t got[4];
   uint8_t much[NATIVE_CDC_RECEIVE_BYTES] = {0};
   cdc_start(&IDENTITY);
@@ -201,21 +201,4 @@ static void test_stream_from_the_host(void) {
   TEST_ASSERT_FALSE(cdc_loader_requested());
   native_cdc_request_loader();
   TEST_ASSERT_TRUE(cdc_loader_requested());
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_time_passes_from_event_to_event);
-  RUN_TEST(test_an_alarm_strikes_once_and_a_new_one_replaces_it);
-  RUN_TEST(test_an_alarm_in_the_past_strikes_at_once);
-  RUN_TEST(test_sleep_lasts_until_the_next_event);
-  RUN_TEST(test_the_watchdog_strikes_if_it_is_not_fed);
-  RUN_TEST(test_it_is_fed_in_vain_while_a_part_is_not_alive);
-  RUN_TEST(test_ends_of_the_program);
-  RUN_TEST(test_stream_to_the_host);
-  RUN_TEST(test_a_stalled_host_fills_the_queue);
-  RUN_TEST(test_closing_loses_what_is_queued_and_is_counted);
-  RUN_TEST(test_asleep_the_port_is_closed_and_it_wakes_up_open);
-  RUN_TEST(test_stream_from_the_host);
-  return UNITY_END();
 }

@@ -1,15 +1,10 @@
 /* Which part of the firmware the watchdog does not wait for: boards/rp2040/progress.h. */
 #include "rp2040/progress.h"
-
-#include <unity.h>
+#include "support/unit.h"
 
 enum { LIMIT_us = 400000 };
 
-void setUp(void) {}
-
-void tearDown(void) {}
-
-static void a_part_is_overdue_after_its_limit(void) {
+TEST(a_part_is_overdue_after_its_limit) {
   static const uint32_t begins_us[] = {0, 1000000, UINT32_MAX - 1000, UINT32_MAX};
   for (unsigned i = 0; i < 4; i++) {
     TEST_ASSERT_FALSE(is_overdue(begins_us[i], begins_us[i], LIMIT_us));
@@ -18,14 +13,7 @@ static void a_part_is_overdue_after_its_limit(void) {
   }
 }
 
-static void progress_in_an_interrupt_after_the_time_was_read_counts(void) {
+TEST(progress_in_an_interrupt_after_the_time_was_read_counts) {
   TEST_ASSERT_FALSE(is_overdue(1000000, 1000001, LIMIT_us));
   TEST_ASSERT_FALSE(is_overdue(UINT32_MAX, 3, LIMIT_us));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_part_is_overdue_after_its_limit);
-  RUN_TEST(progress_in_an_interrupt_after_the_time_was_read_counts);
-  return UNITY_END();
 }

@@ -1,8 +1,8 @@
 #include "native/sim_array.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <string.h>
-#include <unity.h>
 
 enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
 enum { RESET = 0x1E, CONVERT = 0x40, CONVERT_us = 600, READ_ADC = 0x00, READ_C1 = 0xA2 };
@@ -76,14 +76,12 @@ void setUp(void) {
   now_us += SIM_MS5840_RESET_us;
 }
 
-void tearDown(void) {}
-
 static void strike(enum sim_fault_kind kind, uint32_t at, uint32_t count, uint8_t sensor) {
   array.fault = (struct sim_fault){
       .kind = kind, .transfer = array.transfers + at, .count = count, .mask = 0x800001, .sensor = sensor};
 }
 
-static void test_a_frame_and_its_bus_time(void) {
+TEST(test_a_frame_and_its_bus_time) {
   const uint64_t start_us = now_us;
   expect_good_frame();
   TEST_ASSERT_EQUAL_UINT64(start_us + SIM_ARRAY_BROADCAST_us + CONVERT_us + SENSORS * SIM_ARRAY_READ_us, now_us);
@@ -91,7 +89,7 @@ static void test_a_frame_and_its_bus_time(void) {
   TEST_ASSERT_EQUAL_UINT32(0, array.early_reads);
 }
 
-static void test_proms_differ_and_are_read(void) {
+TEST(test_proms_differ_and_are_read) {
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_C1, 2));
   for (unsigned k = 0; k < SENSORS; k++) {
     TEST_ASSERT_EQUAL_UINT16(array.sensor[k].prom[1], result.bytes[k][0] << 8 | result.bytes[k][1]);
@@ -104,7 +102,7 @@ static double ramp_Pa(void *context, unsigned sensor, uint64_t t_us) {
   return 100000.0 + 1000.0 * sensor + (double)t_us / 1000.0;
 }
 
-static void test_the_world_is_measured_in_the_middle_of_the_conversion(void) {
+TEST(test_the_world_is_measured_in_the_middle_of_the_conversion) {
   memset(array.d1, 0, sizeof array.d1);
   array.world.pressure_Pa = ramp_Pa;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
@@ -119,7 +117,7 @@ static void test_the_world_is_measured_in_the_middle_of_the_conversion(void) {
 }
 
 /* 3000 readings: the standard deviation is known to 1.3 % (1 sigma), the mean to 0.2 Pa. */
-static void test_noise_is_the_datasheets(void) {
+TEST(test_noise_is_the_datasheets) {
   memset(array.d1, 0, sizeof array.d1);
   array.noise = 1.0;
   double sum = 0, squares = 0;
@@ -137,7 +135,7 @@ static void test_noise_is_the_datasheets(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.05 * 11.0, 11.0, sqrt(squares / readings));
 }
 
-static void test_the_same_seed_gives_the_same_noise(void) {
+TEST(test_the_same_seed_gives_the_same_noise) {
   uint32_t codes[2][2];
   for (int run = 0; run < 2; run++) {
     setUp();
@@ -150,7 +148,7 @@ static void test_the_same_seed_gives_the_same_noise(void) {
   TEST_ASSERT_EQUAL_UINT32_ARRAY(codes[0], codes[1], 2);
 }
 
-static void test_early_reads_are_seen(void) {
+TEST(test_early_reads_are_seen) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
   /* The first three reads end within the 560 us of the conversion. */
@@ -160,7 +158,7 @@ static void test_early_reads_are_seen(void) {
   TEST_ASSERT_EQUAL_UINT32(1000002, code(2));
 }
 
-static void test_an_absent_sensor(void) {
+TEST(test_an_absent_sensor) {
   array.absent[4] = true;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
@@ -170,7 +168,7 @@ static void test_an_absent_sensor(void) {
   TEST_ASSERT_EQUAL_UINT32(1, result.nacks);
 }
 
-static void test_nack_of_a_command_and_of_a_read(void) {
+TEST(test_nack_of_a_command_and_of_a_read) {
   strike(SIM_FAULT_NACK, 1, 0, 0);
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
@@ -185,7 +183,7 @@ static void test_nack_of_a_command_and_of_a_read(void) {
   expect_good_frame();
 }
 
-static void test_a_dead_sensor_comes_back_after_its_transfers(void) {
+TEST(test_a_dead_sensor_comes_back_after_its_transfers) {
   strike(SIM_FAULT_DEAD, 1, 3, 7);
   for (int n = 0; n < 2; n++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, frame());
@@ -195,7 +193,7 @@ static void test_a_dead_sensor_comes_back_after_its_transfers(void) {
   expect_good_frame();
 }
 
-static void test_spoilt_bytes(void) {
+TEST(test_spoilt_bytes) {
   const struct {
     enum sim_fault_kind kind;
     uint32_t code;
@@ -209,7 +207,7 @@ static void test_spoilt_bytes(void) {
   }
 }
 
-static void test_a_power_cycle_needs_a_reset(void) {
+TEST(test_a_power_cycle_needs_a_reset) {
   strike(SIM_FAULT_POWER_CYCLE, 1 + 3, 0, 0);
   for (int n = 0; n < 2; n++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, frame());
@@ -221,7 +219,7 @@ static void test_a_power_cycle_needs_a_reset(void) {
   expect_good_frame();
 }
 
-static void test_a_timeout_needs_a_recovery(void) {
+TEST(test_a_timeout_needs_a_recovery) {
   for (uint32_t at = 1; at <= 1 + SENSORS; at++) {
     strike(SIM_FAULT_TIMEOUT, at, 0, 0);
     const uint64_t start_us = now_us;
@@ -234,7 +232,7 @@ static void test_a_timeout_needs_a_recovery(void) {
   }
 }
 
-static void test_a_stuck_bus_needs_several_recoveries(void) {
+TEST(test_a_stuck_bus_needs_several_recoveries) {
   strike(SIM_FAULT_STUCK, 5, 3, 0);
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, frame());
   for (int n = 0; n < 3; n++) {
@@ -245,7 +243,7 @@ static void test_a_stuck_bus_needs_several_recoveries(void) {
 }
 
 /* What a sensor converts when the chip is reset it has at the same moment as without. */
-static void test_a_restart_of_the_bus_leaves_the_sensors_at_work(void) {
+TEST(test_a_restart_of_the_bus_leaves_the_sensors_at_work) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_read(bus->context, READ_C1, 2, now_us));
   const uint64_t elapsed_us = now_us;
@@ -258,7 +256,7 @@ static void test_a_restart_of_the_bus_leaves_the_sensors_at_work(void) {
   expect_good_frame();
 }
 
-static void test_arguments_and_order_of_calls(void) {
+TEST(test_arguments_and_order_of_calls) {
   uint64_t wake_us;
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus->poll(bus->context, now_us, &result, &wake_us));
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus->start_read(bus->context, READ_ADC, 0, now_us));
@@ -266,24 +264,4 @@ static void test_arguments_and_order_of_calls(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_command(bus->context, CONVERT, now_us));
   TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus->start_command(bus->context, CONVERT, now_us));
   TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus->start_read(bus->context, READ_ADC, 3, now_us));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_a_frame_and_its_bus_time);
-  RUN_TEST(test_proms_differ_and_are_read);
-  RUN_TEST(test_the_world_is_measured_in_the_middle_of_the_conversion);
-  RUN_TEST(test_noise_is_the_datasheets);
-  RUN_TEST(test_the_same_seed_gives_the_same_noise);
-  RUN_TEST(test_early_reads_are_seen);
-  RUN_TEST(test_an_absent_sensor);
-  RUN_TEST(test_nack_of_a_command_and_of_a_read);
-  RUN_TEST(test_a_dead_sensor_comes_back_after_its_transfers);
-  RUN_TEST(test_spoilt_bytes);
-  RUN_TEST(test_a_power_cycle_needs_a_reset);
-  RUN_TEST(test_a_timeout_needs_a_recovery);
-  RUN_TEST(test_a_stuck_bus_needs_several_recoveries);
-  RUN_TEST(test_a_restart_of_the_bus_leaves_the_sensors_at_work);
-  RUN_TEST(test_arguments_and_order_of_calls);
-  return UNITY_END();
 }

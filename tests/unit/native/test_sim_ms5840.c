@@ -1,8 +1,8 @@
 #include "native/sim_ms5840.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <string.h>
-#include <unity.h>
 
 /* MS5837-02BA datasheet, page 7; the MS5840-02BA has the same first-order arithmetic. */
 static const uint16_t EXAMPLE_C[6] = {46372, 43981, 29059, 27842, 31553, 28165};
@@ -31,22 +31,20 @@ void setUp(void) {
   TEST_ASSERT_TRUE(command(0x1E, 0));
 }
 
-void tearDown(void) {}
-
-static void test_worked_example(void) {
+TEST(test_worked_example) {
   TEST_ASSERT_EQUAL_DOUBLE(20.00, sim_ms5840_temperature_degC(sensor.prom, EXAMPLE_D2));
   TEST_ASSERT_EQUAL_DOUBLE(EXAMPLE_Pa, sim_ms5840_pressure_Pa(sensor.prom, EXAMPLE_D1, EXAMPLE_D2));
 }
 
 /* A genuine MS5840 (public dump): 22.75 degC, 1002.41 mbar. */
-static void test_a_genuine_part(void) {
+TEST(test_a_genuine_part) {
   const uint16_t prom[7] = {26785, 41335, 41466, 26840, 27317, 31225, 28780};
   TEST_ASSERT_EQUAL_DOUBLE(22.75, sim_ms5840_temperature_degC(prom, 8073757));
   TEST_ASSERT_EQUAL_DOUBLE(100241, sim_ms5840_pressure_Pa(prom, 6735203, 8073757));
   TEST_ASSERT_EQUAL_HEX8(5, sim_ms5840_crc4(prom));
 }
 
-static void test_the_inverse_meets_pressure_and_temperature(void) {
+TEST(test_the_inverse_meets_pressure_and_temperature) {
   for (double degC = -10; degC <= 60; degC += 2.5) {
     const uint32_t d2 = sim_ms5840_d2(sensor.prom, degC);
     TEST_ASSERT_DOUBLE_WITHIN(0.011, degC, sim_ms5840_temperature_degC(sensor.prom, d2));
@@ -58,7 +56,7 @@ static void test_the_inverse_meets_pressure_and_temperature(void) {
   }
 }
 
-static void test_the_crc_covers_every_bit(void) {
+TEST(test_the_crc_covers_every_bit) {
   uint16_t prom[7];
   memcpy(prom, sensor.prom, sizeof prom);
   const uint8_t crc = (uint8_t)(prom[0] >> 12);
@@ -70,7 +68,7 @@ static void test_the_crc_covers_every_bit(void) {
   }
 }
 
-static void test_reset_reloads_for_2800_us(void) {
+TEST(test_reset_reloads_for_2800_us) {
   uint8_t bytes[2];
   TEST_ASSERT_FALSE(sim_ms5840_read(&sensor, 0xA2, bytes, 2, SIM_MS5840_RESET_us - 1));
   TEST_ASSERT_FALSE(command(0x40, SIM_MS5840_RESET_us - 1));
@@ -78,7 +76,7 @@ static void test_reset_reloads_for_2800_us(void) {
   TEST_ASSERT_EQUAL_UINT16(EXAMPLE_C[0], bytes[0] << 8 | bytes[1]);
 }
 
-static void test_seven_prom_words_and_no_eighth(void) {
+TEST(test_seven_prom_words_and_no_eighth) {
   uint8_t bytes[2];
   for (unsigned word = 0; word < 7; word++) {
     TEST_ASSERT_TRUE(sim_ms5840_read(&sensor, (uint8_t)(0xA0 + 2 * word), bytes, 2, 5000));
@@ -87,14 +85,14 @@ static void test_seven_prom_words_and_no_eighth(void) {
   TEST_ASSERT_FALSE(sim_ms5840_read(&sensor, 0xAE, bytes, 2, 5000));
 }
 
-static void test_undefined_commands_are_refused(void) {
+TEST(test_undefined_commands_are_refused) {
   const uint8_t undefined[] = {0x01, 0x1F, 0x41, 0x4C, 0x5E, 0x60, 0xFF};
   for (unsigned i = 0; i < sizeof undefined; i++) {
     TEST_ASSERT_FALSE(command(undefined[i], 5000));
   }
 }
 
-static void test_each_ratio_takes_the_datasheets_time(void) {
+TEST(test_each_ratio_takes_the_datasheets_time) {
   const struct {
     unsigned osr;
     uint32_t us;
@@ -111,14 +109,14 @@ static void test_each_ratio_takes_the_datasheets_time(void) {
   }
 }
 
-static void test_a_result_is_read_once(void) {
+TEST(test_a_result_is_read_once) {
   TEST_ASSERT_EQUAL_UINT32(0, read_adc(5000));
   command(0x40, 5000);
   TEST_ASSERT_EQUAL_UINT32(EXAMPLE_D1, read_adc(6000));
   TEST_ASSERT_EQUAL_UINT32(0, read_adc(6100));
 }
 
-static void test_an_early_read_is_0_and_spoils_the_conversion(void) {
+TEST(test_an_early_read_is_0_and_spoils_the_conversion) {
   command(0x40, 5000);
   TEST_ASSERT_EQUAL_UINT32(0, read_adc(5559));
   const uint32_t spoiled = read_adc(5560);
@@ -128,20 +126,20 @@ static void test_an_early_read_is_0_and_spoils_the_conversion(void) {
   TEST_ASSERT_EQUAL_UINT32(EXAMPLE_D1, read_adc(6560));
 }
 
-static void test_a_conversion_during_a_conversion_spoils_it(void) {
+TEST(test_a_conversion_during_a_conversion_spoils_it) {
   command(0x40, 5000);
   TEST_ASSERT_TRUE(command(0x40, 5300));
   TEST_ASSERT_EQUAL_UINT(1, measurements);
   TEST_ASSERT_NOT_EQUAL_UINT32(EXAMPLE_D1, read_adc(5560));
 }
 
-static void test_a_reset_ends_a_conversion_without_a_result(void) {
+TEST(test_a_reset_ends_a_conversion_without_a_result) {
   command(0x40, 5000);
   TEST_ASSERT_TRUE(command(0x1E, 5100));
   TEST_ASSERT_EQUAL_UINT32(0, read_adc(8000));
 }
 
-static void test_after_power_up_only_a_reset_helps(void) {
+TEST(test_after_power_up_only_a_reset_helps) {
   uint8_t bytes[2];
   command(0x40, 5000);
   sim_ms5840_power_cycle(&sensor);
@@ -153,22 +151,4 @@ static void test_after_power_up_only_a_reset_helps(void) {
   TEST_ASSERT_TRUE(command(0x1E, 7000));
   TEST_ASSERT_TRUE(command(0x40, 10000));
   TEST_ASSERT_EQUAL_UINT32(EXAMPLE_D1, read_adc(11000));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_worked_example);
-  RUN_TEST(test_a_genuine_part);
-  RUN_TEST(test_the_inverse_meets_pressure_and_temperature);
-  RUN_TEST(test_the_crc_covers_every_bit);
-  RUN_TEST(test_reset_reloads_for_2800_us);
-  RUN_TEST(test_seven_prom_words_and_no_eighth);
-  RUN_TEST(test_undefined_commands_are_refused);
-  RUN_TEST(test_each_ratio_takes_the_datasheets_time);
-  RUN_TEST(test_a_result_is_read_once);
-  RUN_TEST(test_an_early_read_is_0_and_spoils_the_conversion);
-  RUN_TEST(test_a_conversion_during_a_conversion_spoils_it);
-  RUN_TEST(test_a_reset_ends_a_conversion_without_a_result);
-  RUN_TEST(test_after_power_up_only_a_reset_helps);
-  return UNITY_END();
 }

@@ -1,8 +1,8 @@
 #include "fake_lines.h"
 #include "pico_parallel/parallel_bus.h"
+#include "support/unit.h"
 
 #include <string.h>
-#include <unity.h>
 
 #define ALL ((1u << 15) - 1u)
 #define CONVERT 0x44
@@ -90,7 +90,7 @@ static void expect_good_frame(void) {
   expect_bytes(ALL, READ_ADC, 3);
 }
 
-static void test_sensors_that_an_earlier_life_left_in_mid_byte(void) {
+TEST(test_sensors_that_an_earlier_life_left_in_mid_byte) {
   power_up();
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k += 2) {
     fake_lose_its_place(k);
@@ -98,7 +98,7 @@ static void test_sensors_that_an_earlier_life_left_in_mid_byte(void) {
   expect_good_frame();
 }
 
-static void test_every_command_reaches_every_sensor(void) {
+TEST(test_every_command_reaches_every_sensor) {
   for (unsigned byte = 0; byte < 256; byte++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, command((uint8_t)byte));
     TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
@@ -113,7 +113,7 @@ static void test_every_command_reaches_every_sensor(void) {
   }
 }
 
-static void test_reads_of_every_length_and_command(void) {
+TEST(test_reads_of_every_length_and_command) {
   for (unsigned byte = 0; byte < 256; byte++) {
     for (uint8_t count = 1; count <= ARRAY_BUS_MAX_READ_BYTES; count++) {
       TEST_ASSERT_EQUAL_INT(FT_OK, read_back((uint8_t)byte, count));
@@ -129,7 +129,7 @@ static void test_reads_of_every_length_and_command(void) {
   }
 }
 
-static void test_time_on_the_bus(void) {
+TEST(test_time_on_the_bus) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_UINT64(50, fake.now_us);
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
@@ -137,7 +137,7 @@ static void test_time_on_the_bus(void) {
   TEST_ASSERT_EQUAL_UINT(1 + FT_READ_STOPS, fake.stops_of_first);
 }
 
-static void test_arguments_and_order_of_calls(void) {
+TEST(test_arguments_and_order_of_calls) {
   uint64_t wake_us;
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, 0, &result, &wake_us));
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 0, 0));
@@ -149,7 +149,7 @@ static void test_arguments_and_order_of_calls(void) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, fake.now_us, &result, &wake_us));
 }
 
-static void test_a_chip_that_does_not_start(void) {
+TEST(test_a_chip_that_does_not_start) {
   fake.opens = false;
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, parallel_bus_init(&parallel_bus, &bus));
   fake.opens = true;
@@ -167,7 +167,7 @@ static void test_a_chip_that_does_not_start(void) {
   expect_good_frame();
 }
 
-static void test_missing_sensors_in_every_place(void) {
+TEST(test_missing_sensors_in_every_place) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
     fake.missing = (uint16_t)(1u << k | 1u << (4 * k + 1) % BOARD_SENSOR_COUNT);
@@ -184,7 +184,7 @@ static void test_missing_sensors_in_every_place(void) {
   }
 }
 
-static void test_nobody_answers(void) {
+TEST(test_nobody_answers) {
   fake.missing = ALL;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
@@ -193,7 +193,7 @@ static void test_nobody_answers(void) {
   TEST_ASSERT_EQUAL_UINT32(BOARD_SENSOR_COUNT, result.nacks);
 }
 
-static void test_a_refused_command_is_not_acknowledged(void) {
+TEST(test_a_refused_command_is_not_acknowledged) {
   fake.deaf = 1u << 6;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 6), result.acknowledged);
@@ -201,7 +201,7 @@ static void test_a_refused_command_is_not_acknowledged(void) {
   expect_bytes(ALL & ~(1u << 6), READ_ADC, 3);
 }
 
-static void test_a_line_held_low_costs_its_own_sensor_only(void) {
+TEST(test_a_line_held_low_costs_its_own_sensor_only) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
     fake.held_low = (uint16_t)(1u << k);
@@ -217,7 +217,7 @@ static void test_a_line_held_low_costs_its_own_sensor_only(void) {
   }
 }
 
-static void test_a_line_held_high_costs_its_own_sensor_only(void) {
+TEST(test_a_line_held_high_costs_its_own_sensor_only) {
   fake.held_high = 1u << 14;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 14), result.acknowledged);
@@ -225,7 +225,7 @@ static void test_a_line_held_high_costs_its_own_sensor_only(void) {
   expect_bytes(ALL & ~(1u << 14), READ_ADC, 3);
 }
 
-static void test_a_sensor_that_lost_its_place_is_clocked_free_alone(void) {
+TEST(test_a_sensor_that_lost_its_place_is_clocked_free_alone) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
     expect_good_frame();
@@ -244,7 +244,7 @@ static void test_a_sensor_that_lost_its_place_is_clocked_free_alone(void) {
   }
 }
 
-static void test_a_line_held_for_good_is_clocked_ever_more_rarely(void) {
+TEST(test_a_line_held_for_good_is_clocked_ever_more_rarely) {
   fake.held_low = 1u << 3;
   unsigned attempts = 0;
   for (int n = 0; n < 5000; n++) {
@@ -268,7 +268,7 @@ static void test_a_line_held_for_good_is_clocked_ever_more_rarely(void) {
 /* A sensor that misses a clock, or sees one too many, at every place of a read: it is left out, or
  * wrong in the last byte only, or it has seen no acknowledgement and the last byte is all ones. It
  * is back two commands later. */
-static void test_a_disturbed_clock_at_every_place(void) {
+TEST(test_a_disturbed_clock_at_every_place) {
   for (int doubles = 0; doubles < 2; doubles++) {
     for (unsigned at = 1; at <= 57; at++) {
       next_case();
@@ -289,7 +289,7 @@ static void test_a_disturbed_clock_at_every_place(void) {
   }
 }
 
-static void test_scl_held_low_is_a_failure_of_the_bus(void) {
+TEST(test_scl_held_low_is_a_failure_of_the_bus) {
   expect_good_frame();
   fake.held_low = BOARD_SCL_LINE;
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
@@ -304,7 +304,7 @@ static void test_scl_held_low_is_a_failure_of_the_bus(void) {
   expect_good_frame();
 }
 
-static void test_without_clocks_nobody_acknowledges(void) {
+TEST(test_without_clocks_nobody_acknowledges) {
   fake.held_high = BOARD_SCL_LINE;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
@@ -313,7 +313,7 @@ static void test_without_clocks_nobody_acknowledges(void) {
   expect_good_frame();
 }
 
-static void test_a_wave_that_never_ends(void) {
+TEST(test_a_wave_that_never_ends) {
   expect_good_frame();
   fake.hangs = true;
   const uint64_t start_us = fake.now_us;
@@ -325,7 +325,7 @@ static void test_a_wave_that_never_ends(void) {
   expect_good_frame();
 }
 
-static void test_recovery_gives_nine_clocks_and_a_stop_to_all(void) {
+TEST(test_recovery_gives_nine_clocks_and_a_stop_to_all) {
   fake_lose_its_place(2);
   fake_lose_its_place(11);
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
@@ -335,7 +335,7 @@ static void test_recovery_gives_nine_clocks_and_a_stop_to_all(void) {
   expect_good_frame();
 }
 
-static void test_recovery_abandons_whatever_is_under_way(void) {
+TEST(test_recovery_abandons_whatever_is_under_way) {
   for (uint64_t after_us = 0; after_us < 150; after_us += 7) {
     next_case();
     TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
@@ -346,7 +346,7 @@ static void test_recovery_abandons_whatever_is_under_way(void) {
 }
 
 /* All bytes but the last, while that is on its way; before the last cells nothing else is due. */
-static void test_bytes_are_taken_while_the_last_one_comes(void) {
+TEST(test_bytes_are_taken_while_the_last_one_comes) {
   uint64_t look_us = 0, end_us = 0;
   TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
   TEST_ASSERT_EQUAL_INT(FT_PENDING, bus.poll(bus.context, fake.now_us, &result, &look_us));
@@ -361,34 +361,8 @@ static void test_bytes_are_taken_while_the_last_one_comes(void) {
 
 /* START, address and command of 18 clocks at 2.52 us each, up to the sample of the last, and 2 us.
  */
-static void test_a_read_leads_by_its_command(void) {
+TEST(test_a_read_leads_by_its_command) {
   TEST_ASSERT_EQUAL_UINT((I2C_WAVE_COMMAND_ns + 2000u) / 1000u, bus.read_lead_us);
   TEST_ASSERT_UINT_WITHIN(5, 48, bus.read_lead_us);
   TEST_ASSERT_TRUE(bus.answers_are_single);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_sensors_that_an_earlier_life_left_in_mid_byte);
-  RUN_TEST(test_every_command_reaches_every_sensor);
-  RUN_TEST(test_reads_of_every_length_and_command);
-  RUN_TEST(test_time_on_the_bus);
-  RUN_TEST(test_arguments_and_order_of_calls);
-  RUN_TEST(test_a_chip_that_does_not_start);
-  RUN_TEST(test_missing_sensors_in_every_place);
-  RUN_TEST(test_nobody_answers);
-  RUN_TEST(test_a_refused_command_is_not_acknowledged);
-  RUN_TEST(test_a_line_held_low_costs_its_own_sensor_only);
-  RUN_TEST(test_a_line_held_high_costs_its_own_sensor_only);
-  RUN_TEST(test_a_sensor_that_lost_its_place_is_clocked_free_alone);
-  RUN_TEST(test_a_line_held_for_good_is_clocked_ever_more_rarely);
-  RUN_TEST(test_a_disturbed_clock_at_every_place);
-  RUN_TEST(test_scl_held_low_is_a_failure_of_the_bus);
-  RUN_TEST(test_without_clocks_nobody_acknowledges);
-  RUN_TEST(test_a_wave_that_never_ends);
-  RUN_TEST(test_recovery_gives_nine_clocks_and_a_stop_to_all);
-  RUN_TEST(test_recovery_abandons_whatever_is_under_way);
-  RUN_TEST(test_bytes_are_taken_while_the_last_one_comes);
-  RUN_TEST(test_a_read_leads_by_its_command);
-  return UNITY_END();
 }

@@ -6,8 +6,7 @@
 #include "fake_bus.h"
 #include "scan/scan.h"
 #include "support/random.h"
-
-#include <unity.h>
+#include "support/unit.h"
 
 enum { SENSORS = 15, PROM_READS = MS58XX_PROM_WORDS };
 #define ALL 0x7FFFu

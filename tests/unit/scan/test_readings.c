@@ -1,9 +1,9 @@
 #include "scan/readings.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <unity.h>
 
 enum { SENSORS = 15, ONE = 7 };
 #define ALL 0x7FFFu
@@ -32,8 +32,6 @@ void setUp(void) {
   }
   temperature = (struct readings_temperature){.prom = prom, .code = d2, .good = ALL, .returned = ALL, .admitted = ALL};
 }
-
-void tearDown(void) {}
 
 static uint32_t take_temperature(void) {
   uint32_t news = readings_take_temperature(&readings, SENSORS, &temperature);
@@ -80,7 +78,7 @@ static void expect(uint32_t valid, uint32_t left_out) {
   TEST_ASSERT_EQUAL_UINT32(left_out, readings.left_out);
 }
 
-static void test_the_scales_of_this_test(void) {
+TEST(test_the_scales_of_this_test) {
   start();
   const double before_Pa = frame.pressure_Pa_q10[ONE] / 1024.0;
   step_by(ONE, 1000);
@@ -92,7 +90,7 @@ static void test_the_scales_of_this_test(void) {
   TEST_ASSERT_INT_WITHIN(1, before_cC + 50, readings.thermal[ONE].first_order_cC);
 }
 
-static void test_a_step_of_one_sensor_alone_is_left_out_of_its_frame(void) {
+TEST(test_a_step_of_one_sensor_alone_is_left_out_of_its_frame) {
   static const double steps_Pa[] = {9e3, -9e3, 60e3, -60e3, 150e3};
   for (int i = 0; i < 5; i++) {
     next_case();
@@ -107,7 +105,7 @@ static void test_a_step_of_one_sensor_alone_is_left_out_of_its_frame(void) {
   }
 }
 
-static void test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns(void) {
+TEST(test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns) {
   start();
   step_by(ONE, 12e3);
   take_pressures(ALL);
@@ -128,7 +126,7 @@ static void test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_return
 }
 
 /* Also after frames in which it had no reading. */
-static void test_a_step_behind_a_gap_is_noticed(void) {
+TEST(test_a_step_behind_a_gap_is_noticed) {
   start();
   take_pressures(ALL & ~ONE_BIT);
   take_pressures(ALL & ~ONE_BIT);
@@ -138,7 +136,7 @@ static void test_a_step_behind_a_gap_is_noticed(void) {
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
 }
 
-static void test_a_step_that_another_feels_counts_at_once(void) {
+TEST(test_a_step_that_another_feels_counts_at_once) {
   start();
   step_by(ONE, 60e3);
   step_by(ONE + 1, 300);
@@ -152,7 +150,7 @@ static void test_a_step_that_another_feels_counts_at_once(void) {
 }
 
 /* Whichever it is, the caller is told. */
-static void test_a_step_of_any_sensor_alone_is_told(void) {
+TEST(test_a_step_of_any_sensor_alone_is_told) {
   for (int k = 0; k < SENSORS; k++) {
     next_case();
     step_by(k, 20e3);
@@ -161,7 +159,7 @@ static void test_a_step_of_any_sensor_alone_is_told(void) {
   }
 }
 
-static void test_where_presses_are_not_shared_every_step_counts(void) {
+TEST(test_where_presses_are_not_shared_every_step_counts) {
   start();
   readings.presses_are_shared = false;
   step_by(ONE, 60e3);
@@ -170,7 +168,7 @@ static void test_where_presses_are_not_shared_every_step_counts(void) {
 }
 
 /* The neighbour that would feel it may be the one that is missing. */
-static void test_with_a_sensor_missing_every_step_counts(void) {
+TEST(test_with_a_sensor_missing_every_step_counts) {
   start();
   step_by(ONE, 60e3);
   take_pressures(ALL & ~1u);
@@ -179,7 +177,7 @@ static void test_with_a_sensor_missing_every_step_counts(void) {
 
 /* Admitted again between two frames, of which it is missing in none: from its first reading on its
  * steps are seen. */
-static void test_a_step_after_an_admission_between_frames_is_left_out(void) {
+TEST(test_a_step_after_an_admission_between_frames_is_left_out) {
   start();
   temperature.returned = ONE_BIT;
   take_temperature();
@@ -191,7 +189,7 @@ static void test_a_step_after_an_admission_between_frames_is_left_out(void) {
 }
 
 /* Whose zero may have been taken meanwhile is told once. */
-static void test_a_suspect_that_was_reset_is_told(void) {
+TEST(test_a_suspect_that_was_reset_is_told) {
   start();
   TEST_ASSERT_EQUAL_HEX32(0, frame.restored);
   warm_by(ONE, -20);
@@ -209,7 +207,7 @@ static void test_a_suspect_that_was_reset_is_told(void) {
 
 /* What had lost its state and was reset for another's sake shows it by a step that it makes alone.
  */
-static void test_a_step_alone_at_a_reset_is_told(void) {
+TEST(test_a_step_alone_at_a_reset_is_told) {
   for (int shared = 0; shared < 2; shared++) {
     setUp();
     start();
@@ -228,7 +226,7 @@ static void test_a_step_alone_at_a_reset_is_told(void) {
   }
 }
 
-static void test_a_press_of_one_alone_is_at_most_two_frames_late(void) {
+TEST(test_a_press_of_one_alone_is_at_most_two_frames_late) {
   start();
   static const double rise_Pa[] = {20e3, 40e3, 30e3, 10e3};
   for (int i = 0; i < 4; i++) {
@@ -242,7 +240,7 @@ static void test_a_press_of_one_alone_is_at_most_two_frames_late(void) {
 }
 
 /* Always, and never without a step. */
-static void test_steps_alone_amid_the_noise(void) {
+TEST(test_steps_alone_amid_the_noise) {
   static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
   struct random random = {77};
   for (int i = 0; i < 6; i++) {
@@ -272,7 +270,7 @@ static void test_steps_alone_amid_the_noise(void) {
   }
 }
 
-static void test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect(void) {
+TEST(test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect) {
   start();
   step_by(ONE, -190e3);
   step_by(ONE + 1, 1000);
@@ -292,7 +290,7 @@ static void test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspec
 }
 
 /* All of them, of every sensor: what the pad is pressed with. */
-static void test_saturation_counts(void) {
+TEST(test_saturation_counts) {
   start();
   for (int k = 0; k < SENSORS; k++) {
     step_by(k, 150e3);
@@ -302,7 +300,7 @@ static void test_saturation_counts(void) {
   TEST_ASSERT_EQUAL_HEX32(ALL, frame.saturated);
 }
 
-static void test_a_temperature_step_needs_a_second_and_the_others(void) {
+TEST(test_a_temperature_step_needs_a_second_and_the_others) {
   static const struct {
     double first_degC, second_degC;
     bool used, suspect;
@@ -336,7 +334,7 @@ static void test_a_temperature_step_needs_a_second_and_the_others(void) {
   }
 }
 
-static void test_doubt_ends_with_a_temperature_like_the_last(void) {
+TEST(test_doubt_ends_with_a_temperature_like_the_last) {
   start();
   const uint32_t rest = d2[ONE];
   warm_by(ONE, 9);
@@ -348,7 +346,7 @@ static void test_doubt_ends_with_a_temperature_like_the_last(void) {
 }
 
 /* As when a pad that is read every ten seconds is taken into the hand. */
-static void test_a_step_of_all_temperatures_counts_at_once(void) {
+TEST(test_a_step_of_all_temperatures_counts_at_once) {
   start();
   for (int k = 0; k < SENSORS; k++) {
     warm_by(k, 3.0 + 0.02 * k);
@@ -361,7 +359,7 @@ static void test_a_step_of_all_temperatures_counts_at_once(void) {
 }
 
 /* Doubt for ever is asked about soon a few times, and then as ever. */
-static void test_doubt_for_ever_is_not_asked_about_for_ever(void) {
+TEST(test_doubt_for_ever_is_not_asked_about_for_ever) {
   start();
   const uint32_t rest = d2[ONE];
   int asked = 0;
@@ -379,7 +377,7 @@ static void test_doubt_for_ever_is_not_asked_about_for_ever(void) {
   TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN, take_temperature());
 }
 
-static void test_a_first_temperature_far_from_the_others_is_believed_after_two_resets(void) {
+TEST(test_a_first_temperature_far_from_the_others_is_believed_after_two_resets) {
   warm_by(ONE, 12);
   TEST_ASSERT_EQUAL_HEX32(READINGS_MOVED | READINGS_ASK_AGAIN, take_temperature());
   for (int resets = 0; resets < 2; resets++) {
@@ -414,7 +412,7 @@ static void look_again(double warmer_degC, uint32_t doubtful) {
 }
 
 /* Until it has been like the others twice in a row. */
-static void test_a_temperature_apart_from_the_start_is_doubtful(void) {
+TEST(test_a_temperature_apart_from_the_start_is_doubtful) {
   look_again(3.0, ONE_BIT);
   look_again(-0.6, ONE_BIT);
   look_again(0, ONE_BIT);
@@ -430,7 +428,7 @@ static void test_a_temperature_apart_from_the_start_is_doubtful(void) {
   look_again(0, ONE_BIT);
 }
 
-static void test_a_temperature_at_which_no_sensor_works_is_never_used(void) {
+TEST(test_a_temperature_at_which_no_sensor_works_is_never_used) {
   warm_by(ONE, 90);
   for (int i = 0; i < 10; i++) {
     take_temperature();
@@ -440,7 +438,7 @@ static void test_a_temperature_at_which_no_sensor_works_is_never_used(void) {
   }
 }
 
-static void test_one_and_two_sensors_have_nobody_to_ask(void) {
+TEST(test_one_and_two_sensors_have_nobody_to_ask) {
   for (uint8_t count = 1; count <= 2; count++) {
     setUp();
     frame.sensor_count = count;
@@ -458,7 +456,7 @@ static void test_one_and_two_sensors_have_nobody_to_ask(void) {
 }
 
 /* Every third temperature has one bit wrong, of every sensor, all the time. */
-static void test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted(void) {
+TEST(test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted) {
   for (uint64_t seed = 1; seed <= 20; seed++) {
     next_case();
     struct random random = {seed};
@@ -486,7 +484,7 @@ static void test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corru
   }
 }
 
-static void test_a_sensor_with_a_bad_prom_must_read_like_the_others(void) {
+TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others) {
   static const struct {
     double apart_Pa;
     bool used;
@@ -513,34 +511,4 @@ static void test_a_sensor_with_a_bad_prom_must_read_like_the_others(void) {
     take_pressures(ALL);
     expect(cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_the_scales_of_this_test);
-  RUN_TEST(test_a_step_of_one_sensor_alone_is_left_out_of_its_frame);
-  RUN_TEST(test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns);
-  RUN_TEST(test_a_step_behind_a_gap_is_noticed);
-  RUN_TEST(test_a_step_that_another_feels_counts_at_once);
-  RUN_TEST(test_a_step_of_any_sensor_alone_is_told);
-  RUN_TEST(test_where_presses_are_not_shared_every_step_counts);
-  RUN_TEST(test_with_a_sensor_missing_every_step_counts);
-  RUN_TEST(test_a_step_after_an_admission_between_frames_is_left_out);
-  RUN_TEST(test_a_suspect_that_was_reset_is_told);
-  RUN_TEST(test_a_step_alone_at_a_reset_is_told);
-  RUN_TEST(test_a_press_of_one_alone_is_at_most_two_frames_late);
-  RUN_TEST(test_steps_alone_amid_the_noise);
-  RUN_TEST(test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect);
-  RUN_TEST(test_saturation_counts);
-  RUN_TEST(test_a_temperature_step_needs_a_second_and_the_others);
-  RUN_TEST(test_doubt_ends_with_a_temperature_like_the_last);
-  RUN_TEST(test_a_step_of_all_temperatures_counts_at_once);
-  RUN_TEST(test_doubt_for_ever_is_not_asked_about_for_ever);
-  RUN_TEST(test_a_first_temperature_far_from_the_others_is_believed_after_two_resets);
-  RUN_TEST(test_a_temperature_apart_from_the_start_is_doubtful);
-  RUN_TEST(test_a_temperature_at_which_no_sensor_works_is_never_used);
-  RUN_TEST(test_one_and_two_sensors_have_nobody_to_ask);
-  RUN_TEST(test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted);
-  RUN_TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others);
-  return UNITY_END();
 }

@@ -1,6 +1,6 @@
 #include "scan_bench.h"
 
-static void test_settings_outside_their_range(void) {
+TEST(test_settings_outside_their_range) {
   struct scan_settings settings = usual;
   settings.sensor_count = 0;
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_init(&scan, &bus, &settings));
@@ -11,7 +11,7 @@ static void test_settings_outside_their_range(void) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_init(&scan, &bus, &settings));
 }
 
-static void test_start_up_sequence(void) {
+TEST(test_start_up_sequence) {
   next_frame();
   next_frame();
   TEST_ASSERT_GREATER_OR_EQUAL_UINT64(10000, fake.log[0].start_us);
@@ -27,7 +27,7 @@ static void test_start_up_sequence(void) {
   TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.prom_bad));
 }
 
-static void test_frame_contents(void) {
+TEST(test_frame_contents) {
   next_frame();
   const struct fake_entry *convert = &fake.log[find_entry(0, 0x44, FAKE_COMMAND)];
   const struct fake_entry *read = convert + 1;
@@ -58,7 +58,7 @@ static void test_frame_contents(void) {
   TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.bus_nacks));
 }
 
-static void test_saturation_is_reported_at_the_end_of_the_range(void) {
+TEST(test_saturation_is_reported_at_the_end_of_the_range) {
   next_frame();
   uint32_t low = 0;
   uint32_t high = 0xFFFFFF;
@@ -77,7 +77,7 @@ static void test_saturation_is_reported_at_the_end_of_the_range(void) {
 
 /* The fake counts as misuse what comes before the datasheet's longest times; here: not much later.
  */
-static void test_waits_at_every_osr(void) {
+TEST(test_waits_at_every_osr) {
   static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
   for (size_t i = 0; i < 6; i++) {
     struct scan_settings settings = usual;
@@ -102,7 +102,7 @@ static void test_waits_at_every_osr(void) {
   }
 }
 
-static void test_twenty_hertz_without_drift(void) {
+TEST(test_twenty_hertz_without_drift) {
   struct scan_settings settings = usual;
   settings.rate_mHz = 20000;
   next_case(&settings);
@@ -116,7 +116,7 @@ static void test_twenty_hertz_without_drift(void) {
 }
 
 /* Wake-ups that come late delay their own frame and no other. */
-static void test_late_wake_ups_do_not_add_up(void) {
+TEST(test_late_wake_ups_do_not_add_up) {
   struct scan_settings settings = usual;
   settings.rate_mHz = 20000;
   next_case(&settings);
@@ -130,7 +130,7 @@ static void test_late_wake_ups_do_not_add_up(void) {
 }
 
 /* Beyond what the sensors can do the rate is theirs, and a pause is not made up for afterwards. */
-static void test_rate_beyond_the_sensors(void) {
+TEST(test_rate_beyond_the_sensors) {
   struct scan_settings settings = usual;
   settings.osr = 8192;
   settings.rate_mHz = 2000000;
@@ -154,7 +154,7 @@ static void test_rate_beyond_the_sensors(void) {
   }
 }
 
-static void test_rate_changes(void) {
+TEST(test_rate_changes) {
   skip_frames(3);
   scan_set_rate_mHz(&scan, 100000);
   skip_frames(3);
@@ -169,7 +169,7 @@ static void test_rate_changes(void) {
 }
 
 /* One frame in ten seconds must not keep a new rate waiting for ten seconds. */
-static void test_raised_rate_does_not_wait_for_the_old_period(void) {
+TEST(test_raised_rate_does_not_wait_for_the_old_period) {
   struct scan_settings settings = usual;
   settings.rate_mHz = 100;
   next_case(&settings);
@@ -184,7 +184,7 @@ static void test_raised_rate_does_not_wait_for_the_old_period(void) {
   TEST_ASSERT_EQUAL_UINT64(50000, frame.t_begin_us - last_us);
 }
 
-static void test_osr_changes_between_frames(void) {
+TEST(test_osr_changes_between_frames) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_set_osr(&scan, 1023));
   skip_frames(3);
   while (scan.state != SCAN_WAIT_CONVERSION || scan.conversion->is_temperature) {
@@ -204,7 +204,7 @@ static void test_osr_changes_between_frames(void) {
 
 /* A processor that falls behind gets the newest frame, each one it missed is counted, and the
  * conversions keep their time. */
-static void test_frames_that_nobody_takes_are_counted(void) {
+TEST(test_frames_that_nobody_takes_are_counted) {
   skip_frames(3);
   uint64_t first_us = frame.t_us;
   uint32_t first = frame.number;
@@ -226,7 +226,7 @@ static void test_frames_that_nobody_takes_are_counted(void) {
 
 /* Frames and temperatures that wait are taken in the order in which they were measured, and no PROM
  * changes under a temperature that waits. */
-static void test_a_temperature_waits_for_the_processor(void) {
+TEST(test_a_temperature_waits_for_the_processor) {
   skip_frames(3);
   uint32_t frames_before = frame.number + 1;
   taking = false;
@@ -253,7 +253,7 @@ static void test_a_temperature_waits_for_the_processor(void) {
   assert_good_frame(ALL);
 }
 
-static void test_one_and_thirty_two_sensors(void) {
+TEST(test_one_and_thirty_two_sensors) {
   struct scan_settings settings = usual;
   settings.sensor_count = 1;
   next_case(&settings);
@@ -267,7 +267,7 @@ static void test_one_and_thirty_two_sensors(void) {
 }
 
 /* What is under way ends first; nothing begins before the end of the rest is noticed. */
-static void test_a_scan_that_rests_leaves_the_bus_alone(void) {
+TEST(test_a_scan_that_rests_leaves_the_bus_alone) {
   skip_frames(3);
   TEST_ASSERT_FALSE(scan_rests(&scan));
   scan_rest(&scan, true);
@@ -289,32 +289,11 @@ static void test_a_scan_that_rests_leaves_the_bus_alone(void) {
   skip_frames(3);
 }
 
-static void test_a_scan_that_rests_from_its_start_resets_nobody(void) {
+TEST(test_a_scan_that_rests_from_its_start_resets_nobody) {
   scan_rest(&scan, true);
   run_until(500000);
   TEST_ASSERT_TRUE(scan_rests(&scan));
   TEST_ASSERT_EQUAL(0, fake.logged);
   scan_rest(&scan, false);
   skip_frames(3);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_settings_outside_their_range);
-  RUN_TEST(test_start_up_sequence);
-  RUN_TEST(test_frame_contents);
-  RUN_TEST(test_saturation_is_reported_at_the_end_of_the_range);
-  RUN_TEST(test_waits_at_every_osr);
-  RUN_TEST(test_twenty_hertz_without_drift);
-  RUN_TEST(test_late_wake_ups_do_not_add_up);
-  RUN_TEST(test_rate_beyond_the_sensors);
-  RUN_TEST(test_rate_changes);
-  RUN_TEST(test_raised_rate_does_not_wait_for_the_old_period);
-  RUN_TEST(test_osr_changes_between_frames);
-  RUN_TEST(test_frames_that_nobody_takes_are_counted);
-  RUN_TEST(test_a_temperature_waits_for_the_processor);
-  RUN_TEST(test_one_and_thirty_two_sensors);
-  RUN_TEST(test_a_scan_that_rests_leaves_the_bus_alone);
-  RUN_TEST(test_a_scan_that_rests_from_its_start_resets_nobody);
-  return UNITY_END();
 }

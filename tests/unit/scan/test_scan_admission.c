@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static void test_prom_misread_once_is_read_again(void) {
+TEST(test_prom_misread_once_is_read_again) {
   fake.misread_prom = DISTURBED_BIT;
   fake.misread_passes = 1;
   next_frame();
@@ -12,7 +12,7 @@ static void test_prom_misread_once_is_read_again(void) {
 }
 
 /* It is used once it has been seen to read like the others, and doubtful. */
-static void test_prom_with_differing_crc_is_used_and_reported(void) {
+TEST(test_prom_with_differing_crc_is_used_and_reported) {
   fake.prom[DISTURBED].word[0] ^= 0x3000;
   skip_frames(2);
   assert_entry(assert_admission(0, 3), FAKE_COMMAND, 0x54);
@@ -29,7 +29,7 @@ static void test_prom_with_differing_crc_is_used_and_reported(void) {
 }
 
 /* It may not be what it was to be cured of. */
-static void test_who_did_not_hear_the_reset_is_not_admitted(void) {
+TEST(test_who_did_not_hear_the_reset_is_not_admitted) {
   fake.answering = ALL & ~DISTURBED_BIT;
   while (count_entries(0x1E, FAKE_COMMAND) == 0 || fake.running) {
     step();
@@ -46,7 +46,7 @@ static void test_who_did_not_hear_the_reset_is_not_admitted(void) {
 }
 
 /* As where the line was disturbed in all of the first admission. */
-static void test_prom_misread_in_a_whole_admission_is_read_again(void) {
+TEST(test_prom_misread_in_a_whole_admission_is_read_again) {
   fake.misread_prom = DISTURBED_BIT;
   fake.misread_passes = 3;
   skip_frames(2);
@@ -59,7 +59,7 @@ static void test_prom_misread_in_a_whole_admission_is_read_again(void) {
 }
 
 /* One bit of C1, and the sensor reads 28 kPa more than the others: its gain is off by 10 %. */
-static void test_prom_that_makes_a_sensor_stand_apart_is_not_used(void) {
+TEST(test_prom_that_makes_a_sensor_stand_apart_is_not_used) {
   fake.prom[DISTURBED].word[1] ^= 0x1000;
   run_until(8000000);
   TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
@@ -67,7 +67,7 @@ static void test_prom_that_makes_a_sensor_stand_apart_is_not_used(void) {
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
-static void test_blank_prom_is_not_admitted_and_asked_ever_more_rarely(void) {
+TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely) {
   memset(&fake.prom[DISTURBED], 0, sizeof fake.prom[DISTURBED]);
   run_until(32000000);
   TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
@@ -98,7 +98,7 @@ static void test_blank_prom_is_not_admitted_and_asked_ever_more_rarely(void) {
   assert_good_frame(ALL);
 }
 
-static void test_nobody_answers(void) {
+TEST(test_nobody_answers) {
   fake.answering = 0;
   run_until(25000000);
   TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.present));
@@ -110,16 +110,4 @@ static void test_nobody_answers(void) {
   fake.answering = ALL;
   run_until(34000000);
   assert_good_frame(ALL);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_prom_misread_once_is_read_again);
-  RUN_TEST(test_prom_with_differing_crc_is_used_and_reported);
-  RUN_TEST(test_prom_misread_in_a_whole_admission_is_read_again);
-  RUN_TEST(test_who_did_not_hear_the_reset_is_not_admitted);
-  RUN_TEST(test_prom_that_makes_a_sensor_stand_apart_is_not_used);
-  RUN_TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely);
-  RUN_TEST(test_nobody_answers);
-  return UNITY_END();
 }

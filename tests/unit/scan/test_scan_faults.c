@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static void test_zero_reading_voids_the_next_one_too(void) {
+TEST(test_zero_reading_voids_the_next_one_too) {
   skip_frames(5);
   fake.zero_next = DISTURBED_BIT; /* of the conversion that runs now */
   skip_frames(1);
@@ -16,7 +16,7 @@ static void test_zero_reading_voids_the_next_one_too(void) {
   TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* no reason for a reset */
 }
 
-static void test_zeros_for_ever_do_not_wedge(void) {
+TEST(test_zeros_for_ever_do_not_wedge) {
   skip_frames(3);
   for (int i = 0; i < 1000; i++) {
     fake.zero_next = ALL;
@@ -29,7 +29,7 @@ static void test_zeros_for_ever_do_not_wedge(void) {
 
 /* A sensor that lost its reset answers 0 for ever: the second 0 in a row costs its admission, and
  * it is reset within a second. */
-static void test_two_zeros_in_a_row_lead_to_a_reset(void) {
+TEST(test_two_zeros_in_a_row_lead_to_a_reset) {
   run_until(3000000);
   for (int i = 0; i < 2; i++) {
     TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
@@ -47,7 +47,7 @@ static void test_two_zeros_in_a_row_lead_to_a_reset(void) {
 
 /* A sensor that missed two reads before all were reset restarts: one more does not cost its
  * admission, as the third in a row would. */
-static void test_what_was_missed_before_a_reset_does_not_count_after_it(void) {
+TEST(test_what_was_missed_before_a_reset_does_not_count_after_it) {
   const uint32_t other = 1u << (SENSORS - 1);
   run_until(3000000);
   fake.zero_next = other;
@@ -70,7 +70,7 @@ static void test_what_was_missed_before_a_reset_does_not_count_after_it(void) {
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
 }
 
-static void test_sensor_stops_and_comes_back(void) {
+TEST(test_sensor_stops_and_comes_back) {
   skip_frames(10);
   fake.answering = ALL & ~DISTURBED_BIT;
   skip_frames(2);
@@ -97,7 +97,7 @@ static void test_sensor_stops_and_comes_back(void) {
 
 /* A part that took another's place has no temperature yet when its first one reads 0: until the
  * next one its pressures are invalid, not computed with what belonged to the other. */
-static void test_replaced_sensor_waits_for_its_own_temperature(void) {
+TEST(test_replaced_sensor_waits_for_its_own_temperature) {
   run_until(3000000);
   fake.answering = ALL & ~DISTURBED_BIT;
   skip_frames(3);
@@ -126,7 +126,7 @@ static void test_replaced_sensor_waits_for_its_own_temperature(void) {
 }
 
 /* Minutes may have passed, and the pad be warmer: no frame is computed with what was before. */
-static void test_sensor_that_was_away_gets_a_new_temperature(void) {
+TEST(test_sensor_that_was_away_gets_a_new_temperature) {
   run_until(3000000);
   skip_to_temperature();
   skip_frames(2);
@@ -162,7 +162,7 @@ static void test_sensor_that_was_away_gets_a_new_temperature(void) {
 
 /* A sensor with a loose contact, silent for 20 ms ten times a second, must not cost the others more
  * than 5 % of the time for its admissions. */
-static void test_flickering_sensor_costs_the_others_little(void) {
+TEST(test_flickering_sensor_costs_the_others_little) {
   while (now_us < 10000000) {
     fake.answering = now_us % 100000 < 20000 ? ALL & ~DISTURBED_BIT : ALL;
     step();
@@ -173,7 +173,7 @@ static void test_flickering_sensor_costs_the_others_little(void) {
 }
 
 /* Where only a branch acknowledges a command, the reading after one that is missing may be old. */
-static void test_single_nacks_cost_the_frames_they_touch(void) {
+TEST(test_single_nacks_cost_the_frames_they_touch) {
   for (int single = 0; single < 2; single++) {
     next_case(&usual);
     bus.answers_are_single = single != 0;
@@ -194,7 +194,7 @@ static void test_single_nacks_cost_the_frames_they_touch(void) {
 }
 
 /* Three in a row cost the admission, and it comes back at once. */
-static void test_silence_for_three_readings_leads_to_a_reset(void) {
+TEST(test_silence_for_three_readings_leads_to_a_reset) {
   run_until(1000000);
   fake.answering = ALL & ~DISTURBED_BIT;
   skip_frames(2);
@@ -209,7 +209,7 @@ static void test_silence_for_three_readings_leads_to_a_reset(void) {
 }
 
 /* It acknowledged the command and has nothing to tell: its supply has failed. */
-static void test_zero_after_an_acknowledged_command_leads_to_a_reset(void) {
+TEST(test_zero_after_an_acknowledged_command_leads_to_a_reset) {
   bus.answers_are_single = true;
   run_until(1000000);
   fake.zero_next = DISTURBED_BIT;
@@ -220,7 +220,7 @@ static void test_zero_after_an_acknowledged_command_leads_to_a_reset(void) {
   assert_good_frame(ALL);
 }
 
-static void test_timeout_leads_to_recovery_and_admission(void) {
+TEST(test_timeout_leads_to_recovery_and_admission) {
   skip_frames(10);
   int before = fake.logged;
   fake.fail_at = 0;
@@ -237,7 +237,7 @@ static void test_timeout_leads_to_recovery_and_admission(void) {
   TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_recoveries));
 }
 
-static void test_failure_at_any_operation_is_survived(void) {
+TEST(test_failure_at_any_operation_is_survived) {
   static const enum ft_status failures[] = {FT_ERR_TIMEOUT, FT_ERR_STUCK, FT_ERR_ARGUMENT};
   for (int which = 0; which < 3; which++) {
     for (int at = 0; at < 60; at++) {
@@ -253,7 +253,7 @@ static void test_failure_at_any_operation_is_survived(void) {
   }
 }
 
-static void test_stuck_bus_is_tried_ever_more_rarely(void) {
+TEST(test_stuck_bus_is_tried_ever_more_rarely) {
   skip_frames(3);
   fake.recovery_is = FT_ERR_STUCK;
   fake.fail_at = 0;
@@ -279,7 +279,7 @@ static void test_stuck_bus_is_tried_ever_more_rarely(void) {
 }
 
 /* Recovery itself may run into a timeout: not for the bus to spin on. */
-static void test_failing_recoveries_are_bounded(void) {
+TEST(test_failing_recoveries_are_bounded) {
   skip_frames(3);
   fake.recovery_is = FT_ERR_TIMEOUT;
   fake.fail_at = 0;
@@ -289,7 +289,7 @@ static void test_failing_recoveries_are_bounded(void) {
   assert_good_frame(ALL);
 }
 
-static void test_refused_starts_are_survived(void) {
+TEST(test_refused_starts_are_survived) {
   skip_frames(3);
   fake.refuse_starts = true;
   run_until(now_us + 1000000);
@@ -300,7 +300,7 @@ static void test_refused_starts_are_survived(void) {
 
 /* What a sensor that lost count of the clocks sends ends in ones. A pressure of all ones that comes
  * again is beyond what the sensor can say, which is a measurement. */
-static void test_readings_that_break_off_are_invalid(void) {
+TEST(test_readings_that_break_off_are_invalid) {
   bus.answers_are_single = true;
   skip_frames(3);
   uint32_t d1[SENSORS];
@@ -340,7 +340,7 @@ static void test_readings_that_break_off_are_invalid(void) {
 
 /* A sensor that hears no command to read sends ones, and has its result still: the next one may be
  * that. */
-static void test_ones_of_a_branch_void_the_next_reading_too(void) {
+TEST(test_ones_of_a_branch_void_the_next_reading_too) {
   skip_frames(3);
   uint32_t d1 = fake.d1[DISTURBED];
   fake.d1[DISTURBED] = 0xFFFFFF;
@@ -354,7 +354,7 @@ static void test_ones_of_a_branch_void_the_next_reading_too(void) {
 }
 
 /* Events that come early or for nothing change nothing. */
-static void test_spurious_calls_change_nothing(void) {
+TEST(test_spurious_calls_change_nothing) {
   struct random random = {32};
   while (now_us < 500000) {
     uint64_t wake_us = scan_step(&scan, now_us);
@@ -369,7 +369,7 @@ static void test_spurious_calls_change_nothing(void) {
   TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
 }
 
-static void test_random_faults_are_survived(void) {
+TEST(test_random_faults_are_survived) {
   for (uint64_t seed = 1; seed <= 20; seed++) {
     next_case(&usual);
     struct random random = {seed};
@@ -418,29 +418,4 @@ static void test_random_faults_are_survived(void) {
     run_until(now_us + 20000000);
     assert_good_frame(ALL);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_zero_reading_voids_the_next_one_too);
-  RUN_TEST(test_zeros_for_ever_do_not_wedge);
-  RUN_TEST(test_two_zeros_in_a_row_lead_to_a_reset);
-  RUN_TEST(test_what_was_missed_before_a_reset_does_not_count_after_it);
-  RUN_TEST(test_sensor_stops_and_comes_back);
-  RUN_TEST(test_replaced_sensor_waits_for_its_own_temperature);
-  RUN_TEST(test_sensor_that_was_away_gets_a_new_temperature);
-  RUN_TEST(test_flickering_sensor_costs_the_others_little);
-  RUN_TEST(test_single_nacks_cost_the_frames_they_touch);
-  RUN_TEST(test_silence_for_three_readings_leads_to_a_reset);
-  RUN_TEST(test_zero_after_an_acknowledged_command_leads_to_a_reset);
-  RUN_TEST(test_timeout_leads_to_recovery_and_admission);
-  RUN_TEST(test_failure_at_any_operation_is_survived);
-  RUN_TEST(test_stuck_bus_is_tried_ever_more_rarely);
-  RUN_TEST(test_failing_recoveries_are_bounded);
-  RUN_TEST(test_refused_starts_are_survived);
-  RUN_TEST(test_readings_that_break_off_are_invalid);
-  RUN_TEST(test_ones_of_a_branch_void_the_next_reading_too);
-  RUN_TEST(test_spurious_calls_change_nothing);
-  RUN_TEST(test_random_faults_are_survived);
-  return UNITY_END();
 }

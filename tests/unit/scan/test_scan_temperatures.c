@@ -1,6 +1,6 @@
 #include "scan_bench.h"
 
-static void test_temperature_that_is_asked_for_comes_soon(void) {
+TEST(test_temperature_that_is_asked_for_comes_soon) {
   run_until(10000000); /* the interval has grown to its longest */
   const int before = count_entries(0x54, FAKE_COMMAND);
   run_until(now_us + 300000);
@@ -11,7 +11,7 @@ static void test_temperature_that_is_asked_for_comes_soon(void) {
   TEST_ASSERT_EQUAL_INT(before + without + 1, count_entries(0x54, FAKE_COMMAND));
 }
 
-static void test_temperature_of_all_ones_is_no_reading(void) {
+TEST(test_temperature_of_all_ones_is_no_reading) {
   next_frame();
   skip_to_temperature();
   uint32_t d2 = fake.d2[DISTURBED];
@@ -22,7 +22,7 @@ static void test_temperature_of_all_ones_is_no_reading(void) {
   assert_good_frame(ALL);
 }
 
-static void test_zero_temperature_keeps_the_last_and_is_repeated_soon(void) {
+TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon) {
   next_frame();
   skip_to_temperature();
   uint32_t d2 = fake.d2[DISTURBED];
@@ -46,7 +46,7 @@ static void test_zero_temperature_keeps_the_last_and_is_repeated_soon(void) {
 }
 
 /* A flipped bit: the pressures keep the temperature before it. A jump that stays is believed. */
-static void test_jump_of_the_temperature_must_be_confirmed(void) {
+TEST(test_jump_of_the_temperature_must_be_confirmed) {
   next_frame();
   skip_to_temperature();
   uint32_t d2 = fake.d2[DISTURBED];
@@ -81,7 +81,7 @@ static void test_jump_of_the_temperature_must_be_confirmed(void) {
 
 /* Two temperatures that agree with each other and with no other sensor: it has lost its state. Its
  * reset makes it the sensor it was. */
-static void test_sensor_that_tells_another_temperature_is_reset(void) {
+TEST(test_sensor_that_tells_another_temperature_is_reset) {
   run_until(3000000);
   skip_to_temperature();
   uint32_t d1 = fake.d1[DISTURBED];
@@ -109,7 +109,7 @@ static void test_sensor_that_tells_another_temperature_is_reset(void) {
 }
 
 /* A supply that dips once does so twice: what it says amid a reset is not what it says for good. */
-static void test_sensor_that_loses_its_state_again_amid_a_reset_is_reset_again(void) {
+TEST(test_sensor_that_loses_its_state_again_amid_a_reset_is_reset_again) {
   run_until(3000000);
   const uint32_t d1 = fake.d1[DISTURBED];
   const uint32_t d2 = fake.d2[DISTURBED];
@@ -128,7 +128,7 @@ static void test_sensor_that_loses_its_state_again_amid_a_reset_is_reset_again(v
 }
 
 /* One that comes back wrong again and again is reset ever more rarely. */
-static void test_incurable_sensor_is_reset_ever_more_rarely(void) {
+TEST(test_incurable_sensor_is_reset_ever_more_rarely) {
   run_until(3000000);
   fake.d1[DISTURBED] = 1000000; /* below zero */
   run_until(now_us + 32000000);
@@ -144,7 +144,7 @@ static void test_incurable_sensor_is_reset_ever_more_rarely(void) {
 
 /* At most one frame in twenty: that frame comes in its turn, at its time, with the pressures of the
  * one before. */
-static void test_temperature_takes_the_place_of_a_frame(void) {
+TEST(test_temperature_takes_the_place_of_a_frame) {
   static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
   for (size_t i = 0; i < 6; i++) {
     struct scan_settings settings = usual;
@@ -199,7 +199,7 @@ static void warm_up(uint64_t until_us) {
   }
 }
 
-static void test_temperature_is_read_less_often_while_it_stands_still(void) {
+TEST(test_temperature_is_read_less_often_while_it_stands_still) {
   run_until(6000000);
   skip_to_temperature();
   TEST_ASSERT_UINT64_WITHIN(10000, LONGEST_INTERVAL_us, to_next_temperature_us());
@@ -218,7 +218,7 @@ static void test_temperature_is_read_less_often_while_it_stands_still(void) {
 }
 
 /* A requested rate leaves pauses: there no frame is held, and the temperature is fresh. */
-static void test_temperature_fits_into_the_pauses(void) {
+TEST(test_temperature_fits_into_the_pauses) {
   static const uint32_t rates_mHz[] = {75000, 20000, 1000, 100};
   for (size_t i = 0; i < sizeof rates_mHz / sizeof rates_mHz[0]; i++) {
     struct scan_settings settings = usual;
@@ -247,19 +247,4 @@ static void test_temperature_fits_into_the_pauses(void) {
     }
     TEST_ASSERT_GREATER_THAN_INT(3, temperatures);
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_temperature_that_is_asked_for_comes_soon);
-  RUN_TEST(test_temperature_of_all_ones_is_no_reading);
-  RUN_TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon);
-  RUN_TEST(test_jump_of_the_temperature_must_be_confirmed);
-  RUN_TEST(test_sensor_that_tells_another_temperature_is_reset);
-  RUN_TEST(test_sensor_that_loses_its_state_again_amid_a_reset_is_reset_again);
-  RUN_TEST(test_incurable_sensor_is_reset_ever_more_rarely);
-  RUN_TEST(test_temperature_takes_the_place_of_a_frame);
-  RUN_TEST(test_temperature_is_read_less_often_while_it_stands_still);
-  RUN_TEST(test_temperature_fits_into_the_pauses);
-  return UNITY_END();
 }

@@ -5,9 +5,9 @@
 #include "store/store.h"
 #include "support/pad.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <string.h>
-#include <unity.h>
 
 /* PROFILE_BYTES: without the struct's padding. */
 enum { SENSORS = 15, UPDATES = 2000, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
@@ -28,8 +28,6 @@ void setUp(void) {
   random = (struct random){2026};
   begin_with(SENSORS);
 }
-
-void tearDown(void) {}
 
 static struct calibration some_calibration(void) {
   struct calibration calibration = {0};
@@ -157,7 +155,7 @@ static void restart(void) {
   store_init(&store, sensors);
 }
 
-static void a_new_fingertip_keeps_nothing(void) {
+TEST(a_new_fingertip_keeps_nothing) {
   TEST_ASSERT_FALSE(store.content.has_calibration || store.content.has_settings);
   TEST_ASSERT_FALSE(store.content.has_profile);
   TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
@@ -167,7 +165,7 @@ static void a_new_fingertip_keeps_nothing(void) {
   TEST_ASSERT_EQUAL(0, native_flash_steps());
 }
 
-static void what_was_put_is_there_after_a_restart(void) {
+TEST(what_was_put_is_there_after_a_restart) {
   struct store_content expected = {0};
   for (int i = 0; i < 200; i++) {
     struct change change = some_change();
@@ -250,15 +248,15 @@ static void lose_power_at_any_step(unsigned updates, struct store_content before
   TEST_ASSERT_GREATER_THAN_UINT(updates, new_ones);
 }
 
-static void power_may_be_lost_at_any_step(void) { lose_power_at_any_step(UPDATES, (struct store_content){0}); }
+TEST(power_may_be_lost_at_any_step) { lose_power_at_any_step(UPDATES, (struct store_content){0}); }
 
-static void power_may_be_lost_with_the_largest_array(void) {
+TEST(power_may_be_lost_with_the_largest_array) {
   begin_with(FT_MAX_SENSORS);
   lose_power_at_any_step(UPDATES / 4, (struct store_content){0});
 }
 
 /* The same of changes one after another without a restart between, over both sectors and back. */
-static void power_may_be_lost_amid_many_changes(void) {
+TEST(power_may_be_lost_amid_many_changes) {
   struct store_content before = {0};
   for (int update = 0; update < 5 * STORE_SLOTS; update++) {
     const struct native_flash start = native_flash;
@@ -289,7 +287,7 @@ static void power_may_be_lost_amid_many_changes(void) {
 
 /* A supply that comes and goes: each mending is cut short in its turn, many times in a row, so that
  * whole sectors fill with records that were never sealed. */
-static void power_may_come_and_go(void) {
+TEST(power_may_come_and_go) {
   struct store_content before = {0};
   for (int storm = 0; storm < 2000; storm++) {
     struct change change = some_change();
@@ -331,7 +329,7 @@ static struct store_content keep_something(void) {
 
 /* The newest record, the third one, is damaged: the one before it is not what the user has stored
  * last, so it is not used in its place. */
-static void damage_is_told_and_nothing_is_used(void) {
+TEST(damage_is_told_and_nothing_is_used) {
   static const struct store_content nothing;
   keep_something();
   const struct native_flash whole = native_flash;
@@ -354,7 +352,7 @@ static void damage_is_told_and_nothing_is_used(void) {
   TEST_ASSERT_TRUE(is(&again));
 }
 
-static void forgetting_mends_damage(void) {
+TEST(forgetting_mends_damage) {
   keep_something();
   native_flash.bytes[2 * STORE_SHORT_SLOT_BYTES + 100] ^= 1;
   restart();
@@ -381,7 +379,7 @@ static void alter_record(uint32_t at, uint16_t value) {
 #define LENGTH_OF_3(sensors) (4 + 14 + 8 * (sensors) + 24 + PROFILE_BYTES + 9)
 enum { LENGTH_3 = LENGTH_OF_3(SENSORS) };
 
-static void what_another_firmware_wrote_is_left_alone(void) {
+TEST(what_another_firmware_wrote_is_left_alone) {
   struct calibration calibration = some_calibration();
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
@@ -406,7 +404,7 @@ static void what_another_firmware_wrote_is_left_alone(void) {
 }
 
 /* Of the newest record, of any writer. */
-static void generations_go_round(void) {
+TEST(generations_go_round) {
   for (uint32_t generation = UINT32_MAX - 2; generation != 3; generation++) {
     native_flash_reset(7);
     restart();
@@ -438,7 +436,7 @@ static void forget_places(struct calibration *calibration) {
 }
 
 /* As the firmware before the sensors' places wrote it, without their bytes. */
-static void records_of_version_3_are_read(void) {
+TEST(records_of_version_3_are_read) {
   struct store_content kept = keep_something();
   begin_with(SENSORS);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
@@ -458,7 +456,7 @@ static void records_of_version_3_are_read(void) {
 /* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as
  * it wrote them: the last counts, and the next goes into the other sector, whenever power is lost.
  */
-static void short_slots_of_the_largest_array_are_read(void) {
+TEST(short_slots_of_the_largest_array_are_read) {
   enum { SLOT = STORE_SHORT_SLOT_BYTES, LENGTH = LENGTH_OF_3(FT_MAX_SENSORS) };
   for (unsigned records = 1; records <= STORE_SLOTS; records++) {
     uint8_t earlier[STORE_SLOTS * SLOT];
@@ -487,7 +485,7 @@ static void short_slots_of_the_largest_array_are_read(void) {
 }
 
 /* As the firmware before the calibration's shape wrote it, without its bytes. */
-static void records_of_version_2_are_read(void) {
+TEST(records_of_version_2_are_read) {
   struct store_content kept = keep_something();
   begin_with(SENSORS);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
@@ -513,7 +511,7 @@ static void records_of_version_2_are_read(void) {
 
 /* As the firmware before pad profiles wrote it: without their bytes, whatever bit 2 of the parts
  * said. The next write brings it to this version. */
-static void records_of_version_1_are_read(void) {
+TEST(records_of_version_1_are_read) {
   struct store_content kept = keep_something();
   kept.calibration.sigma_um = kept.calibration.sigma_sd_um = 0;
   kept.calibration.dip_share_q16 = kept.calibration.dip_sd_um = 0;
@@ -547,7 +545,7 @@ static void records_of_version_1_are_read(void) {
 }
 
 /* Sectors that something else has used before. */
-static void rubbish_is_no_damage_and_in_nobodys_way(void) {
+TEST(rubbish_is_no_damage_and_in_nobodys_way) {
   for (int kind = 0; kind < 3; kind++) {
     native_flash_reset(3);
     for (size_t i = 0; i < NATIVE_FLASH_BYTES; i++) {
@@ -566,7 +564,7 @@ static void rubbish_is_no_damage_and_in_nobodys_way(void) {
   }
 }
 
-static void a_flash_that_has_worn_out_is_told_and_what_was_stays(void) {
+TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays) {
   struct store_content kept = keep_something();
   native_flash_wear_out();
   struct calibration other = some_calibration();
@@ -579,7 +577,7 @@ static void a_flash_that_has_worn_out_is_told_and_what_was_stays(void) {
 }
 
 /* Bits that something else has written, in slots that no mark calls used: in how many is all one. */
-static void slots_that_do_not_hold_what_is_written_are_given_up(void) {
+TEST(slots_that_do_not_hold_what_is_written_are_given_up) {
   for (int bad = 0; bad <= 7; bad++) {
     setUp();
     keep_something();
@@ -598,7 +596,7 @@ static void slots_that_do_not_hold_what_is_written_are_given_up(void) {
   }
 }
 
-static void a_flash_that_does_not_answer_is_not_waited_for(void) {
+TEST(a_flash_that_does_not_answer_is_not_waited_for) {
   native_flash_cut_after(2);
   struct store_settings settings = some_settings();
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &settings));
@@ -614,7 +612,7 @@ static void a_flash_that_does_not_answer_is_not_waited_for(void) {
 
 /* A record of the most sensors takes three pages; the most that fit into a short slot, and one
  * more. */
-static void large_arrays_fit(void) {
+TEST(large_arrays_fit) {
   static const uint8_t counts[] = {STORE_SENSORS_OF_SHORT_SLOT, STORE_SENSORS_OF_SHORT_SLOT + 1, FT_MAX_SENSORS};
   for (size_t n = 0; n < sizeof counts; n++) {
     begin_with(counts[n]);
@@ -631,28 +629,4 @@ static void large_arrays_fit(void) {
       TEST_ASSERT_EQUAL_MEMORY(&profile, &store.content.profile, PROFILE_BYTES);
     }
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(a_new_fingertip_keeps_nothing);
-  RUN_TEST(what_was_put_is_there_after_a_restart);
-  RUN_TEST(damage_is_told_and_nothing_is_used);
-  RUN_TEST(forgetting_mends_damage);
-  RUN_TEST(what_another_firmware_wrote_is_left_alone);
-  RUN_TEST(generations_go_round);
-  RUN_TEST(records_of_version_1_are_read);
-  RUN_TEST(records_of_version_2_are_read);
-  RUN_TEST(records_of_version_3_are_read);
-  RUN_TEST(short_slots_of_the_largest_array_are_read);
-  RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
-  RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
-  RUN_TEST(slots_that_do_not_hold_what_is_written_are_given_up);
-  RUN_TEST(a_flash_that_does_not_answer_is_not_waited_for);
-  RUN_TEST(large_arrays_fit);
-  RUN_TEST(power_may_be_lost_at_any_step);
-  RUN_TEST(power_may_be_lost_with_the_largest_array);
-  RUN_TEST(power_may_be_lost_amid_many_changes);
-  RUN_TEST(power_may_come_and_go);
-  return UNITY_END();
 }

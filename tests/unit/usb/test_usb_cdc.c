@@ -1,7 +1,7 @@
 /* The serial port: line state, and the two byte streams. */
 #include "enumerate.h"
 #include "fake_controller.h"
-#include "unity.h"
+#include "support/unit.h"
 #include "usb/cdc.h"
 
 #include <string.h>
@@ -18,8 +18,6 @@ void setUp(void) {
   plug_in();
   enumerate();
 }
-
-void tearDown(void) {}
 
 /* Reads as cdc_acm does: a transfer of 128 bytes ends when full or with a short packet. Returns its
  * bytes, or -1 if it does not end, with what has come so far in *so_far. */
@@ -42,7 +40,7 @@ static int read_transfer(uint8_t *to, int *so_far) {
 }
 
 /* Whatever is written arrives at once, whole, whatever its length. */
-static void test_every_length_arrives_without_waiting_for_more(void) {
+TEST(test_every_length_arrives_without_waiting_for_more) {
   open_port();
   for (size_t length = 1; length <= 300; length++) {
     TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes + length, length));
@@ -56,7 +54,7 @@ static void test_every_length_arrives_without_waiting_for_more(void) {
   }
 }
 
-static void test_packets_of_a_write(void) {
+TEST(test_packets_of_a_write) {
   open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
   TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
@@ -73,7 +71,7 @@ static void test_packets_of_a_write(void) {
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
 }
 
-static void test_write_takes_all_or_nothing(void) {
+TEST(test_write_takes_all_or_nothing) {
   open_port();
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, cdc_write(bytes, QUEUE_BYTES + 1));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES - 100));
@@ -93,7 +91,7 @@ static void test_write_takes_all_or_nothing(void) {
 }
 
 /* Random writes and reads: the stream that comes out is the stream that went in. */
-static void test_stream_keeps_order_and_loses_nothing(void) {
+TEST(test_stream_keeps_order_and_loses_nothing) {
   open_port();
   uint32_t random = 1;
   uint32_t written = 0;
@@ -119,7 +117,7 @@ static void test_stream_keeps_order_and_loses_nothing(void) {
   TEST_ASSERT_EQUAL(written, read);
 }
 
-static void test_closed_port_swallows_writes(void) {
+TEST(test_closed_port_swallows_writes) {
   fake_hold_interrupts();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES));
@@ -129,7 +127,7 @@ static void test_closed_port_swallows_writes(void) {
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
 }
 
-static void test_close_discards_what_waits(void) {
+TEST(test_close_discards_what_waits) {
   open_port();
   uint32_t closes = cdc_close_count();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 64));
@@ -148,7 +146,7 @@ static void test_close_discards_what_waits(void) {
 }
 
 /* Once, and before the first bytes only: a terminal that still echoes gets nothing to send back. */
-static void test_what_follows_a_cut_is_set_apart_from_what_came_before(void) {
+TEST(test_what_follows_a_cut_is_set_apart_from_what_came_before) {
   set_dtr(1);
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
@@ -167,7 +165,7 @@ static void test_what_follows_a_cut_is_set_apart_from_what_came_before(void) {
 
 /* The port closes between the look at it and the queueing: the bytes must not greet the next one.
  */
-static void test_write_overtaken_by_close(void) {
+TEST(test_write_overtaken_by_close) {
   set_dtr(1);
   fake_hold_interrupts();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 30));
@@ -177,7 +175,7 @@ static void test_write_overtaken_by_close(void) {
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
 }
 
-static void test_suspended_port_is_closed(void) {
+TEST(test_suspended_port_is_closed) {
   set_dtr(1);
   uint32_t closes = cdc_close_count();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
@@ -200,7 +198,7 @@ static void test_suspended_port_is_closed(void) {
   TEST_ASSERT_FALSE(cdc_is_open());
 }
 
-static void test_halt_keeps_the_packet_that_the_host_has_not_got(void) {
+TEST(test_halt_keeps_the_packet_that_the_host_has_not_got) {
   open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
   TEST_ASSERT_EQUAL(0, host_control_out(0x02, 3, 0, 0x82, NULL, 0));
@@ -214,7 +212,7 @@ static void test_halt_keeps_the_packet_that_the_host_has_not_got(void) {
   TEST_ASSERT_EQUAL_MEMORY(bytes, got, 90);
 }
 
-static void test_halt_does_not_repeat_a_packet_that_the_host_has_got(void) {
+TEST(test_halt_does_not_repeat_a_packet_that_the_host_has_got) {
   open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
   fake_take_at_next_withdrawal();
@@ -224,7 +222,7 @@ static void test_halt_does_not_repeat_a_packet_that_the_host_has_got(void) {
   TEST_ASSERT_EQUAL_MEMORY(bytes + 64, packet, 16);
 }
 
-static void test_host_waits_while_nobody_reads(void) {
+TEST(test_host_waits_while_nobody_reads) {
   for (int i = 0; i < 4; i++)
     TEST_ASSERT_EQUAL(0, host_out(0x02, bytes + 64 * i, 64));
   TEST_ASSERT_EQUAL(HOST_NAK, host_out(0x02, "x", 1));
@@ -239,7 +237,7 @@ static void test_host_waits_while_nobody_reads(void) {
 
 /* A terminal in cooked mode echoes the stream byte for byte, before anybody has opened and after.
  */
-static void test_echoing_terminal(void) {
+TEST(test_echoing_terminal) {
   for (int round = 0; round < 2; round++) {
     for (int i = 0; i < 1000; i++) {
       uint8_t byte = (uint8_t)i;
@@ -252,7 +250,7 @@ static void test_echoing_terminal(void) {
   }
 }
 
-static void test_line_coding_is_kept(void) {
+TEST(test_line_coding_is_kept) {
   static const uint8_t initial[7] = {0x00, 0xc2, 0x01, 0, 0, 0, 8};
   static const uint8_t coding[7] = {0x80, 0x25, 0, 0, 2, 1, 7};
   TEST_ASSERT_EQUAL(7, host_control_in(0xa1, 0x21, 0, 0, 7, got));
@@ -266,7 +264,7 @@ static void test_line_coding_is_kept(void) {
   TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x23, 0xffff, 0, NULL, 0));
 }
 
-static void test_line_coding_of_another_length_than_announced_stalls(void) {
+TEST(test_line_coding_of_another_length_than_announced_stalls) {
   static const size_t lengths[] = {0, 2, 6, 8, 64};
   for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
     host_setup(0x21, 0x20, 0, 0, 7);
@@ -276,7 +274,7 @@ static void test_line_coding_of_another_length_than_announced_stalls(void) {
 }
 
 /* Last, as the request cannot be taken back. */
-static void test_1200_baud_asks_for_the_loader(void) {
+TEST(test_1200_baud_asks_for_the_loader) {
   set_baud(9600);
   set_dtr(1);
   set_dtr(0);
@@ -294,33 +292,11 @@ static void test_1200_baud_asks_for_the_loader(void) {
 }
 
 /* Whether anybody is there or not. */
-static void test_each_service_is_a_sign_of_life(void) {
+TEST(test_each_service_is_a_sign_of_life) {
   const unsigned before = fake_signs_of_life();
   fake_service();
   TEST_ASSERT_EQUAL(before + 1, fake_signs_of_life());
   host_suspend();
   fake_service();
   TEST_ASSERT_EQUAL(before + 2, fake_signs_of_life());
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_every_length_arrives_without_waiting_for_more);
-  RUN_TEST(test_packets_of_a_write);
-  RUN_TEST(test_write_takes_all_or_nothing);
-  RUN_TEST(test_stream_keeps_order_and_loses_nothing);
-  RUN_TEST(test_closed_port_swallows_writes);
-  RUN_TEST(test_close_discards_what_waits);
-  RUN_TEST(test_what_follows_a_cut_is_set_apart_from_what_came_before);
-  RUN_TEST(test_write_overtaken_by_close);
-  RUN_TEST(test_suspended_port_is_closed);
-  RUN_TEST(test_halt_keeps_the_packet_that_the_host_has_not_got);
-  RUN_TEST(test_halt_does_not_repeat_a_packet_that_the_host_has_got);
-  RUN_TEST(test_host_waits_while_nobody_reads);
-  RUN_TEST(test_echoing_terminal);
-  RUN_TEST(test_line_coding_is_kept);
-  RUN_TEST(test_line_coding_of_another_length_than_announced_stalls);
-  RUN_TEST(test_1200_baud_asks_for_the_loader);
-  RUN_TEST(test_each_service_is_a_sign_of_life);
-  return UNITY_END();
 }

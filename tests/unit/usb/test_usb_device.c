@@ -1,7 +1,7 @@
 /* What every USB device owes: USB 2.0 chapter 9. */
 #include "enumerate.h"
 #include "fake_controller.h"
-#include "unity.h"
+#include "support/unit.h"
 #include "usb/cdc.h"
 
 #include <stdio.h>
@@ -29,13 +29,11 @@ void setUp(void) {
   plug_in();
 }
 
-void tearDown(void) {}
-
 static int get_descriptor(uint16_t type_and_index, uint16_t length) {
   return host_control_in(0x80, GET_DESCRIPTOR, type_and_index, 0, length, answer);
 }
 
-static void test_enumeration_as_linux_does(void) {
+TEST(test_enumeration_as_linux_does) {
   static const uint8_t device[18] = {18, 1, 0x00, 0x02, 0xef, 2, 1, 64, 0x09, 0x12, 1, 0, 0x23, 0x01, 1, 2, 3, 1};
   TEST_ASSERT_EQUAL(18, get_descriptor(DEVICE, 64));
   TEST_ASSERT_EQUAL_HEX8_ARRAY(device, answer, sizeof device);
@@ -69,7 +67,7 @@ static void test_enumeration_as_linux_does(void) {
 }
 
 /* The lengths of the descriptors in a configuration add up, and each endpoint is announced once. */
-static void test_configuration_descriptor_is_well_formed(void) {
+TEST(test_configuration_descriptor_is_well_formed) {
   int total = get_descriptor(CONFIGURATION, 255);
   TEST_ASSERT_EQUAL(75, total);
   int interfaces = 0;
@@ -93,7 +91,7 @@ static void test_configuration_descriptor_is_well_formed(void) {
 }
 
 /* Byte by byte: USB 2.0 tables 9-8 to 9-13, CDC 1.20 tables 15 and 16, PSTN 1.2 tables 3 and 4. */
-static void test_descriptors_are_these(void) {
+TEST(test_descriptors_are_these) {
   static const uint8_t device[] = {18, 1, 0, 2, 0xEF, 2, 1, 64, 0x09, 0x12, 0x01, 0x00, 0x23, 0x01, 1, 2, 3, 1};
   static const uint8_t configuration[] = {
       9, 2,    75,   0,    2,  1,  0,  0x80, 50, /* configuration, 100 mA from the bus */
@@ -117,7 +115,7 @@ static void test_descriptors_are_these(void) {
   TEST_ASSERT_EQUAL_HEX8_ARRAY(languages, answer, sizeof languages);
 }
 
-static void test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_than_asked(void) {
+TEST(test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_than_asked) {
   uint8_t packet[64];
   host_setup(0x80, GET_DESCRIPTOR, STRING | 2, 0x0409, 255);
   TEST_ASSERT_EQUAL(64, host_in(0x80, packet));
@@ -131,17 +129,17 @@ static void test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_tha
   TEST_ASSERT_EQUAL(0, host_out(0, NULL, 0));
 }
 
-static void test_answer_is_cut_to_what_was_asked_for(void) {
+TEST(test_answer_is_cut_to_what_was_asked_for) {
   for (uint16_t length = 1; length <= 75; length++)
     TEST_ASSERT_EQUAL(length, get_descriptor(CONFIGURATION, length));
 }
 
-static void test_question_for_no_bytes_gets_none(void) {
+TEST(test_question_for_no_bytes_gets_none) {
   host_setup(0x80, GET_DESCRIPTOR, DEVICE, 0, 0);
   TEST_ASSERT_EQUAL(0, host_in(0x80, answer));
 }
 
-static void test_host_may_end_the_data_stage_early(void) {
+TEST(test_host_may_end_the_data_stage_early) {
   host_setup(0x80, GET_DESCRIPTOR, CONFIGURATION, 0, 75);
   TEST_ASSERT_EQUAL(64, host_in(0x80, answer));
   TEST_ASSERT_EQUAL(0, host_out(0, NULL, 0));
@@ -149,7 +147,7 @@ static void test_host_may_end_the_data_stage_early(void) {
   TEST_ASSERT_EQUAL(18, get_descriptor(DEVICE, 64));
 }
 
-static void test_new_setup_replaces_a_transfer_at_any_point(void) {
+TEST(test_new_setup_replaces_a_transfer_at_any_point) {
   host_setup(0x80, GET_DESCRIPTOR, CONFIGURATION, 0, 75);
   TEST_ASSERT_EQUAL(18, get_descriptor(DEVICE, 64));
   host_setup(0x80, GET_DESCRIPTOR, CONFIGURATION, 0, 75);
@@ -163,7 +161,7 @@ static void test_new_setup_replaces_a_transfer_at_any_point(void) {
   TEST_ASSERT_EQUAL(18, get_descriptor(DEVICE, 64));
 }
 
-static void test_status_stage_with_data_stalls(void) {
+TEST(test_status_stage_with_data_stalls) {
   host_setup(0x80, GET_DESCRIPTOR, DEVICE, 0, 18);
   TEST_ASSERT_EQUAL(18, host_in(0x80, answer));
   TEST_ASSERT_EQUAL(0, host_out(0, "x", 1));
@@ -187,7 +185,7 @@ static void assert_refused(const struct refused *r, size_t count) {
   }
 }
 
-static void test_refused_in_any_state(void) {
+TEST(test_refused_in_any_state) {
   static const struct refused always[] = {
       {0x80, GET_DESCRIPTOR, QUALIFIER, 0, 10},
       {0x80, GET_DESCRIPTOR, 0x700, 0, 9},  /* other speed */
@@ -232,7 +230,7 @@ static void test_refused_in_any_state(void) {
   TEST_ASSERT_EQUAL(18, get_descriptor(DEVICE, 64));
 }
 
-static void test_refused_before_configuration(void) {
+TEST(test_refused_before_configuration) {
   static const struct refused early[] = {
       {0x81, GET_STATUS, 0, 0, 2},    {0x82, GET_STATUS, 0, 0x82, 2},  {0x81, GET_INTERFACE, 0, 0, 1},
       {0x01, SET_INTERFACE, 0, 0, 0}, {0x02, SET_FEATURE, 0, 0x82, 0}, {0x02, CLEAR_FEATURE, 0, 0x82, 0},
@@ -249,7 +247,7 @@ static void test_refused_before_configuration(void) {
   assert_refused(configured, 1);
 }
 
-static void test_status_and_interface_questions(void) {
+TEST(test_status_and_interface_questions) {
   enumerate();
   static const struct refused questions[] = {
       {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 1, 2},
@@ -265,7 +263,7 @@ static void test_status_and_interface_questions(void) {
   TEST_ASSERT_EQUAL(0, answer[0]);
 }
 
-static void test_halted_endpoint_stalls_until_cleared_and_starts_at_data0(void) {
+TEST(test_halted_endpoint_stalls_until_cleared_and_starts_at_data0) {
   static const uint8_t all[] = {0x81, 0x82, 0x02};
   enumerate();
   open_port();
@@ -290,7 +288,7 @@ static void test_halted_endpoint_stalls_until_cleared_and_starts_at_data0(void) 
   TEST_ASSERT_EQUAL_MEMORY("ac", answer, 2);
 }
 
-static void test_configuration_ends_halts(void) {
+TEST(test_configuration_ends_halts) {
   enumerate();
   TEST_ASSERT_EQUAL(0, host_control_out(0x02, SET_FEATURE, 0, 0x82, NULL, 0));
   TEST_ASSERT_EQUAL(0, host_control_out(0x00, SET_CONFIGURATION, 1, 0, NULL, 0));
@@ -302,7 +300,7 @@ static void test_configuration_ends_halts(void) {
   TEST_ASSERT_EQUAL(1, host_in(0x82, answer));
 }
 
-static void test_configuration_may_be_set_again_and_again(void) {
+TEST(test_configuration_may_be_set_again_and_again) {
   enumerate();
   for (int i = 0; i < 3; i++) {
     set_dtr(1);
@@ -321,7 +319,7 @@ static void test_configuration_may_be_set_again_and_again(void) {
   TEST_ASSERT_EQUAL(0, host_control_out(0x00, SET_CONFIGURATION, 1, 0, NULL, 0));
 }
 
-static void test_interface_set_empties_the_data_endpoints(void) {
+TEST(test_interface_set_empties_the_data_endpoints) {
   enumerate();
   open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"old", 3));
@@ -337,7 +335,7 @@ static void test_interface_set_empties_the_data_endpoints(void) {
   TEST_ASSERT_EQUAL(4, host_in(0x82, answer));
 }
 
-static void test_bus_reset_in_mid_transfer(void) {
+TEST(test_bus_reset_in_mid_transfer) {
   enumerate();
   set_dtr(1);
   uint32_t closes = cdc_close_count();
@@ -352,26 +350,4 @@ static void test_bus_reset_in_mid_transfer(void) {
   TEST_ASSERT_EQUAL(HOST_NO_ANSWER, host_in(0x82, answer));
   test_enumeration_as_linux_does();
   TEST_ASSERT_EQUAL(closes + 1, cdc_close_count());
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_enumeration_as_linux_does);
-  RUN_TEST(test_configuration_descriptor_is_well_formed);
-  RUN_TEST(test_descriptors_are_these);
-  RUN_TEST(test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_than_asked);
-  RUN_TEST(test_answer_is_cut_to_what_was_asked_for);
-  RUN_TEST(test_question_for_no_bytes_gets_none);
-  RUN_TEST(test_host_may_end_the_data_stage_early);
-  RUN_TEST(test_new_setup_replaces_a_transfer_at_any_point);
-  RUN_TEST(test_status_stage_with_data_stalls);
-  RUN_TEST(test_refused_in_any_state);
-  RUN_TEST(test_refused_before_configuration);
-  RUN_TEST(test_status_and_interface_questions);
-  RUN_TEST(test_halted_endpoint_stalls_until_cleared_and_starts_at_data0);
-  RUN_TEST(test_configuration_ends_halts);
-  RUN_TEST(test_configuration_may_be_set_again_and_again);
-  RUN_TEST(test_interface_set_empties_the_data_endpoints);
-  RUN_TEST(test_bus_reset_in_mid_transfer);
-  return UNITY_END();
 }

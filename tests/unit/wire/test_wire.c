@@ -1,10 +1,7 @@
+#include "support/unit.h"
 #include "wire_samples.h"
 
 #include <stdbool.h>
-#include <unity.h>
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /* Body length by PROTOCOL.md. */
 static size_t body_length(const struct wire_packet *packet) {
@@ -76,7 +73,7 @@ static enum ft_status decode_sealed(uint8_t *bytes, size_t length, struct wire_p
   return status;
 }
 
-static void test_round_trip_of_every_type(void) {
+TEST(test_round_trip_of_every_type) {
   for (int kind = 0; kind < SAMPLE_KINDS; kind++) {
     struct sampler sampler = {(enum sample_kind)kind, {11}};
     for (size_t i = 0; i < WIRE_TYPES; i++) {
@@ -104,7 +101,7 @@ static void test_round_trip_of_every_type(void) {
   }
 }
 
-static void test_quantities_travel_under_their_flags(void) {
+TEST(test_quantities_travel_under_their_flags) {
   static const struct {
     uint32_t flag;
     size_t length;
@@ -162,7 +159,7 @@ static void test_quantities_travel_under_their_flags(void) {
 }
 
 /* What a device decodes: its commands, and nothing that itself sends. */
-static void test_sets_of_commands(void) {
+TEST(test_sets_of_commands) {
   static const struct wire_layout *const
       always[] = {WIRE_COMMANDS, NULL},
       *const of_fit[] = {WIRE_COMMANDS_OF_FIT, NULL}, *const of_slip[] = {WIRE_COMMANDS_OF_SLIP, NULL},
@@ -233,7 +230,7 @@ static void assert_pad_guarded(uint8_t type, size_t body_offset, struct pad_prof
 }
 
 /* PROTOCOL.md says how long a frame may be. */
-static void test_the_longest_frame_is_as_documented(void) {
+TEST(test_the_longest_frame_is_as_documented) {
   TEST_ASSERT_EQUAL(1039, WIRE_MAX_FRAME_BYTES);
   struct sampler sampler = {SAMPLE_GREATEST, {16}};
   struct wire_packet packet;
@@ -241,7 +238,7 @@ static void test_the_longest_frame_is_as_documented(void) {
   TEST_ASSERT_EQUAL_size_t(WIRE_MAX_BODY_BYTES, body_length(&packet));
 }
 
-static void test_infinity_and_nan_are_refused_both_ways(void) {
+TEST(test_infinity_and_nan_are_refused_both_ways) {
   struct sampler sampler = {SAMPLE_GREATEST, {13}};
   struct wire_packet packet;
   sample_packet(&sampler, WIRE_CONTACT, &packet);
@@ -308,7 +305,7 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
   assert_float_guarded(WIRE_CMD_SLIP, 0, &packet.body.cmd_slip.threshold_mm, &packet);
 }
 
-static void test_sensor_counts_outside_their_range_are_refused_both_ways(void) {
+TEST(test_sensor_counts_outside_their_range_are_refused_both_ways) {
   static const struct {
     uint8_t type;
     size_t offset;
@@ -337,7 +334,7 @@ static void test_sensor_counts_outside_their_range_are_refused_both_ways(void) {
   }
 }
 
-static void test_text_is_printable(void) {
+TEST(test_text_is_printable) {
   static const size_t offsets[] = {8, 24, 40, 56};
   for (int text = 0; text < 4; text++) {
     for (int value = 0; value < 256; value++) {
@@ -361,7 +358,7 @@ static void test_text_is_printable(void) {
   }
 }
 
-static void test_wrong_lengths_are_refused(void) {
+TEST(test_wrong_lengths_are_refused) {
   struct sampler sampler = {SAMPLE_RANDOM, {14}};
   for (size_t i = 0; i < WIRE_TYPES; i++) {
     struct wire_packet packet;
@@ -381,7 +378,7 @@ static void test_wrong_lengths_are_refused(void) {
   }
 }
 
-static void test_unknown_types_keep_their_header(void) {
+TEST(test_unknown_types_keep_their_header) {
   struct random random = {15};
   for (int type = 0; type < 256; type++) {
     bool known = memchr(wire_types, type, sizeof wire_types) != NULL;
@@ -412,7 +409,7 @@ static void test_unknown_types_keep_their_header(void) {
   }
 }
 
-static void test_other_versions_are_told_from_damage(void) {
+TEST(test_other_versions_are_told_from_damage) {
   for (int version = 0; version < 256; version++) {
     uint8_t bytes[32] = {(uint8_t)version, WIRE_CMD_INFO};
     struct wire_packet decoded;
@@ -423,7 +420,7 @@ static void test_other_versions_are_told_from_damage(void) {
   }
 }
 
-static void test_bytes_that_are_not_cobs_are_refused(void) {
+TEST(test_bytes_that_are_not_cobs_are_refused) {
   struct wire_packet packet;
   uint8_t empty[1] = {1};
   TEST_ASSERT_EQUAL_INT(FT_ERR_FORMAT, wire_decode(wire_all_layouts, empty, 0, &packet));
@@ -441,7 +438,7 @@ static void test_bytes_that_are_not_cobs_are_refused(void) {
 
 /* Runs without a zero of 250 to 279 bytes, so around the 254 at which a block is full, ended by a
  * zero or by the end of the packet, where the CRC's own bytes decide. */
-static void test_cobs_blocks_at_their_limit(void) {
+TEST(test_cobs_blocks_at_their_limit) {
   unsigned full_at_end = 0;
   for (size_t run = 1; run <= 279; run++) {
     for (uint16_t sequence = 0; sequence < 300; sequence++) {
@@ -483,21 +480,4 @@ static void test_cobs_blocks_at_their_limit(void) {
     }
   }
   TEST_ASSERT_GREATER_THAN_UINT(250, full_at_end);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_round_trip_of_every_type);
-  RUN_TEST(test_quantities_travel_under_their_flags);
-  RUN_TEST(test_sets_of_commands);
-  RUN_TEST(test_the_longest_frame_is_as_documented);
-  RUN_TEST(test_infinity_and_nan_are_refused_both_ways);
-  RUN_TEST(test_sensor_counts_outside_their_range_are_refused_both_ways);
-  RUN_TEST(test_text_is_printable);
-  RUN_TEST(test_wrong_lengths_are_refused);
-  RUN_TEST(test_unknown_types_keep_their_header);
-  RUN_TEST(test_other_versions_are_told_from_damage);
-  RUN_TEST(test_bytes_that_are_not_cobs_are_refused);
-  RUN_TEST(test_cobs_blocks_at_their_limit);
-  return UNITY_END();
 }

@@ -1,7 +1,7 @@
+#include "support/unit.h"
 #include "wire_samples.h"
 
 #include <stdbool.h>
-#include <unity.h>
 
 struct frame_bytes {
   uint8_t bytes[WIRE_MAX_FRAME_BYTES];
@@ -11,8 +11,6 @@ struct frame_bytes {
 static struct wire_receiver receiver;
 
 void setUp(void) { wire_receiver_init(&receiver, wire_all_layouts); }
-void tearDown(void) {}
-
 static struct frame_bytes good_frame(uint8_t type, uint16_t sequence) {
   struct sampler sampler = {SAMPLE_RANDOM, {1000u + sequence}};
   struct wire_packet packet;
@@ -60,7 +58,7 @@ static void expect(const struct frame_bytes *frame) {
   TEST_ASSERT_TRUE(is_of(&tally.last, frame));
 }
 
-static void test_every_type_and_empty_frames(void) {
+TEST(test_every_type_and_empty_frames) {
   static const uint8_t fill[] = {0, 0, 0};
   for (size_t i = 0; i < WIRE_TYPES; i++) {
     struct frame_bytes frame = good_frame(wire_types[i], (uint16_t)i);
@@ -71,14 +69,14 @@ static void test_every_type_and_empty_frames(void) {
   }
 }
 
-static void test_duplicated_frames_come_twice(void) {
+TEST(test_duplicated_frames_come_twice) {
   struct frame_bytes frame = good_frame(WIRE_CONTACT, 7);
   expect(&frame);
   expect(&frame);
 }
 
 /* The tail is missing, delimiter included: the frame and the one glued to it are lost, no more. */
-static void test_torn_tail_at_every_position(void) {
+TEST(test_torn_tail_at_every_position) {
   struct frame_bytes torn = good_frame(WIRE_CONTACT, 1);
   struct frame_bytes glued = good_frame(WIRE_RAW, 2);
   struct frame_bytes next = good_frame(WIRE_CONTACT, 3);
@@ -94,7 +92,7 @@ static void test_torn_tail_at_every_position(void) {
 }
 
 /* A receiver that joins in the middle of a frame: only that frame is lost. */
-static void test_torn_head_at_every_position(void) {
+TEST(test_torn_head_at_every_position) {
   struct frame_bytes torn = good_frame(WIRE_RAW, 1);
   struct frame_bytes next = good_frame(WIRE_CONTACT, 2);
   for (size_t cut = 1; cut < torn.length - 1; cut++) {
@@ -107,7 +105,7 @@ static void test_torn_head_at_every_position(void) {
 }
 
 /* Bytes lost in the middle, any number at any place. */
-static void test_holes_at_every_position(void) {
+TEST(test_holes_at_every_position) {
   struct frame_bytes whole = good_frame(WIRE_CONTACT, 1);
   struct frame_bytes next = good_frame(WIRE_CMD_SLIP, 2);
   for (size_t from = 0; from < whole.length - 1; from++) {
@@ -121,7 +119,7 @@ static void test_holes_at_every_position(void) {
   }
 }
 
-static void test_every_flipped_bit(void) {
+TEST(test_every_flipped_bit) {
   for (size_t i = 0; i < WIRE_TYPES; i++) {
     struct frame_bytes frame = good_frame(wire_types[i], 1);
     struct frame_bytes second = good_frame(WIRE_CONTACT, 2);
@@ -144,7 +142,7 @@ static void test_every_flipped_bit(void) {
   }
 }
 
-static void test_every_pair_of_flipped_bits(void) {
+TEST(test_every_pair_of_flipped_bits) {
   struct frame_bytes frame = good_frame(WIRE_ACK, 1);
   struct frame_bytes next = good_frame(WIRE_ACK, 2);
   static const uint8_t delimiter = 0;
@@ -163,7 +161,7 @@ static void test_every_pair_of_flipped_bits(void) {
   }
 }
 
-static void test_interleaved_frames(void) {
+TEST(test_interleaved_frames) {
   struct frame_bytes a = good_frame(WIRE_CONTACT, 1);
   struct frame_bytes b = good_frame(WIRE_RAW, 2);
   struct frame_bytes next = good_frame(WIRE_HEALTH, 3);
@@ -184,7 +182,7 @@ static void test_interleaved_frames(void) {
   }
 }
 
-static void test_garbage_between_good_frames(void) {
+TEST(test_garbage_between_good_frames) {
   static const uint8_t delimiter = 0;
   struct random random = {22};
   for (int repeat = 0; repeat < 5000; repeat++) {
@@ -202,7 +200,7 @@ static void test_garbage_between_good_frames(void) {
   }
 }
 
-static void test_overlong_frames(void) {
+TEST(test_overlong_frames) {
   static const size_t lengths[] = {WIRE_MAX_FRAME_BYTES - 1, WIRE_MAX_FRAME_BYTES,     WIRE_MAX_FRAME_BYTES + 1,
                                    WIRE_MAX_FRAME_BYTES + 2, 2 * WIRE_MAX_FRAME_BYTES, 100000};
   struct frame_bytes next = good_frame(WIRE_CONTACT, 1);
@@ -226,7 +224,7 @@ static void test_overlong_frames(void) {
   expect(&next);
 }
 
-static void test_unknown_type_comes_with_its_header(void) {
+TEST(test_unknown_type_comes_with_its_header) {
   uint8_t bytes[32] = {WIRE_VERSION, 0x7F, 0x22, 0x11, 9};
   uint8_t frame[40];
   size_t length = seal(bytes, 20, frame);
@@ -242,7 +240,7 @@ static void test_unknown_type_comes_with_its_header(void) {
 
 /* Four million random bytes hold some 15 600 frames. One passes with a probability below 2^-32
  * each (its CRC, after COBS and before version and length): 4e-6 for all of them. */
-static void test_random_bytes_hold_no_packet(void) {
+TEST(test_random_bytes_hold_no_packet) {
   struct random random = {23};
   struct tally tally = {0};
   for (int i = 0; i < 500000; i++) {
@@ -256,7 +254,7 @@ static void test_random_bytes_hold_no_packet(void) {
 
 /* Right COBS and a right header around random bytes: only the CRC stands in the way. 200 000 times
  * 2^-32 is 5e-5. */
-static void test_random_packets_fail_by_their_crc(void) {
+TEST(test_random_packets_fail_by_their_crc) {
   struct random random = {24};
   for (int i = 0; i < 200000; i++) {
     uint8_t type = wire_types[random_below(&random, WIRE_TYPES)];
@@ -270,22 +268,4 @@ static void test_random_packets_fail_by_their_crc(void) {
     struct wire_packet packet;
     TEST_ASSERT_EQUAL_INT(FT_ERR_CRC, wire_decode(wire_all_layouts, frame, coded, &packet));
   }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_every_type_and_empty_frames);
-  RUN_TEST(test_duplicated_frames_come_twice);
-  RUN_TEST(test_torn_tail_at_every_position);
-  RUN_TEST(test_torn_head_at_every_position);
-  RUN_TEST(test_holes_at_every_position);
-  RUN_TEST(test_every_flipped_bit);
-  RUN_TEST(test_every_pair_of_flipped_bits);
-  RUN_TEST(test_interleaved_frames);
-  RUN_TEST(test_garbage_between_good_frames);
-  RUN_TEST(test_overlong_frames);
-  RUN_TEST(test_unknown_type_comes_with_its_header);
-  RUN_TEST(test_random_bytes_hold_no_packet);
-  RUN_TEST(test_random_packets_fail_by_their_crc);
-  return UNITY_END();
 }

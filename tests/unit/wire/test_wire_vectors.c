@@ -1,19 +1,16 @@
 /* The byte images of tests/vectors/wire, assembled by hand from PROTOCOL.md, against the codec. */
 #include "common/contact_flags.h"
+#include "support/unit.h"
 #include "wire/packet.h"
 
 #include <ctype.h>
 #include <stdio.h>
 #include <string.h>
-#include <unity.h>
 
 struct vector {
   uint8_t packet[WIRE_MAX_PACKET_BYTES], frame[WIRE_MAX_FRAME_BYTES];
   size_t packet_length, frame_length;
 };
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static struct vector read_vector(const char *name) {
   struct vector vector = {.packet_length = 0};
@@ -77,7 +74,7 @@ static struct wire_packet blank(uint8_t type, uint16_t sequence, uint64_t t_us) 
   return packet;
 }
 
-static void test_crash(void) {
+TEST(test_crash) {
   struct wire_packet packet = blank(0x06, 0x0201, UINT64_C(1234567));
   packet.body.crash = (struct crash_record){
       .kind = CRASH_WATCHDOG,
@@ -105,7 +102,7 @@ static void test_crash(void) {
   check("command_crash.txt", &packet);
 }
 
-static void test_contact(void) {
+TEST(test_contact) {
   struct wire_packet packet = blank(0x01, 0xA1B2, UINT64_C(123456789012));
   packet.body.contact = (struct wire_contact){
       .frame = 70000,
@@ -175,7 +172,7 @@ static void test_contact(void) {
   check("contact_none.txt", &packet);
 }
 
-static void test_raw(void) {
+TEST(test_raw) {
   struct wire_packet packet = blank(0x02, UINT16_MAX, UINT64_C(0x100000000));
   struct wire_raw *raw = &packet.body.raw;
   raw->frame = 256;
@@ -236,7 +233,7 @@ static struct pad_profile some_pad(void) {
   };
 }
 
-static void test_info(void) {
+TEST(test_info) {
   struct wire_packet packet = blank(0x03, 7, 1000000);
   struct wire_info *info = &packet.body.info;
   memcpy(info->firmware_version, "\1\2\3", 3);
@@ -297,7 +294,7 @@ static void test_info(void) {
   check("info_raw.txt", &packet);
 }
 
-static void test_health(void) {
+TEST(test_health) {
   struct wire_packet packet = blank(0x04, 8, 2000000);
   packet.body.health = (struct wire_health){
       .capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP | WIRE_CAPABILITY_RAW_STREAM,
@@ -328,7 +325,7 @@ static void test_health(void) {
   check("health_raw.txt", &packet);
 }
 
-static void test_sync(void) {
+TEST(test_sync) {
   struct wire_packet packet = blank(0x07, 45, 123456789);
   packet.body.sync = (struct wire_sync){.number = 3, .level = 1};
   check("sync.txt", &packet);
@@ -338,7 +335,7 @@ static void test_sync(void) {
   check("command_sync.txt", &packet);
 }
 
-static void test_acknowledgement(void) {
+TEST(test_acknowledgement) {
   struct wire_packet packet = blank(0x05, 9, 3000000);
   packet.body.ack.command = 0x84;
   packet.body.ack.result = WIRE_RESULT_OUT_OF_RANGE;
@@ -347,7 +344,7 @@ static void test_acknowledgement(void) {
   check("acknowledgement.txt", &packet);
 }
 
-static void test_commands(void) {
+TEST(test_commands) {
   struct wire_packet packet = blank(0x84, 0x0102, UINT64_C(0x1122334455667788));
   packet.body.cmd_slip.threshold_mm = 0.75f;
   packet.body.cmd_slip.window_ms = 100;
@@ -392,17 +389,4 @@ static void test_commands(void) {
   check("command_pad.txt", &packet);
   packet = blank(0x8E, 13, 130);
   check("command_erase_pad.txt", &packet);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_contact);
-  RUN_TEST(test_crash);
-  RUN_TEST(test_raw);
-  RUN_TEST(test_info);
-  RUN_TEST(test_health);
-  RUN_TEST(test_sync);
-  RUN_TEST(test_acknowledgement);
-  RUN_TEST(test_commands);
-  return UNITY_END();
 }
