@@ -7,11 +7,7 @@
     rate.md      the same to read
     rate.png     the same to look at
 
-In contact on every frame, four iterations of the fit from a cold start each time. Scene slip, which has the least latency; figures named
-grasp are of the boards' own images, with a pad's profile. Fitted frames hold a fit of pressures measured for them; the others are held:
-they repeat the fit before while the sensors measure their temperature. Latencies count from the end of the longest
-conversion that the datasheet allows. A packet is offered when the firmware gives its first part to the USB controller, and
-delivered with its last byte on the wire. Runs are the same bit for bit each time.
+text.md describes what is measured.
 """
 
 import json
@@ -26,9 +22,10 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import grasp_rate  # noqa: E402
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
+import text  # noqa: E402
 from boards import BOARDS, DESCRIPTORS, PARALLEL, short  # noqa: E402
 from emulated import CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
-from fingertip.files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
@@ -169,7 +166,7 @@ def main(argv):
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
     write_json(out / "rate.json", found)
-    write_text(out / "rate.md", rate_report.text(found, __doc__.split("\n\n")[-1]))
+    text.write(found, "rate", out)
     rate_report.draw(out / "rate.png", found, runs[PARALLEL, 256])
     return finish(found, options, ("rate.json", "rate.md", "rate.png"))
 

@@ -1,14 +1,5 @@
-#!/usr/bin/python3
-"""What each scene costs on each board: flash, RAM, stack, cycles of a frame by stage, frames a second by OSR.
+"""What each scene costs on each board: flash, RAM, stack, cycles of a frame by stage, frames a second by OSR, from images in the emulator."""
 
-    scenes.py --build build/host --scenes build/scenes -o build/report
-
-    scenes.json, scenes.md    the table
-
-Builds the images of all scenes in folders below --scenes and runs them in the emulator.
-"""
-
-import argparse
 import json
 import pathlib
 import sys
@@ -18,9 +9,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from boards import BOARDS  # noqa: E402
 from emulated import CLOCK_Hz, CONVERSION_us, Tools, scenario  # noqa: E402
-from fingertip.files import InputError, run_tool, write_text  # noqa: E402
-from reporting import Steps, run, write_json  # noqa: E402
-from presentation import table_md  # noqa: E402
+from reporting import run  # noqa: E402
 
 SCENES = ("raw", "press", "slip", "grasp", "shapes", "paper")
 STREAM = dict.fromkeys(SCENES, "contact") | {"raw": "raw"}
@@ -150,87 +139,3 @@ def measure(command_frame, scenes_folder, steps, scenes=SCENES, boards=BOARDS, o
             for scene in scenes
         }
         return list(steps.run_all(jobs).values())
-
-
-def text(rows):
-    """Lines of Markdown."""
-    osrs = list(rows[0]["frames_per_s"])
-    lines = [
-        "RAM is constants, variables and the whole stack; code runs from SRAM and is counted apart. Stack: the worst case by the call",
-        f"graph. Cycles of a frame are counted at OSR {osrs[0]}, in contact and at rest; frames are those that hold new pressures.",
-        "",
-    ]
-    names = [
-        "board",
-        "scene",
-        "flash",
-        "RAM",
-        "code in SRAM",
-        "stack",
-        "cycles in contact",
-        "at rest",
-        *(f"frames/s, OSR {osr}" for osr in osrs),
-    ]
-    lines += table_md(
-        names,
-        [
-            [
-                row["board"],
-                row["scene"],
-                *(row[f"{name}_bytes"] for name in ("flash", "ram", "code_in_sram", "stack")),
-                row["cycles_of_frame"],
-                row["cycles_of_frame_at_rest"],
-                *(f"{rate:.0f}" for rate in row["frames_per_s"].values()),
-            ]
-            for row in rows
-        ],
-    )
-    stages = list(rows[0]["cycles_by_stage"])
-    lines += ["", "Cycles of a frame in contact by stage; what an interrupt takes is its own stage, wherever it strikes.", ""]
-    lines += table_md(
-        ["board", "scene", *stages], [[row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages)] for row in rows]
-    )
-    lines += [
-        "",
-        "What the guards cost: the watchdog that wants signs of life of scan, USB and main loop, and the record of a crash. Cycles of a frame in",
-        "contact, in the functions that run all the time; bytes of the two files, without the calls. Frames at most: what the rate would lose if",
-        "the processor were what limits it. The guarded pages cost nothing but a bank of 4 KiB that is empty anyway.",
-        "",
-    ]
-    lines += table_md(
-        ["board", "scene", "cycles", "% of the processor", "frames/s at most", "flash", "RAM"],
-        [
-            [
-                row["board"],
-                row["scene"],
-                row["guard_cycles"],
-                f"{row['guard_percent']:.3f}",
-                f"{row['guard_percent'] / 100 * row['frames_per_s'][osrs[0]]:.1f}",
-                row["guard_flash_bytes"],
-                row["guard_ram_bytes"],
-            ]
-            for row in rows
-        ],
-    )
-    return lines
-
-
-def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
-    parser.add_argument("--scenes", required=True, metavar="DIR", help="where to build the scenes")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR")
-    options = parser.parse_args(argv)
-    command_frame, out = pathlib.Path(options.build) / "tests/support/command_frame", pathlib.Path(options.output)
-    if not command_frame.is_file():
-        raise InputError(f"{command_frame}: is not there; build it: cmake --preset host && cmake --build --preset host")
-    out.mkdir(parents=True, exist_ok=True)
-    rows = measure(command_frame, options.scenes, Steps())
-    write_json(out / "scenes.json", rows)
-    write_text(out / "scenes.md", "\n".join(["# Scenes", "", *text(rows)]) + "\n")
-    print(f"report: {out / 'scenes.json'}, {out / 'scenes.md'}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(run_tool("scenes.py", main))

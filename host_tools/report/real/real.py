@@ -29,6 +29,7 @@ import grids  # noqa: E402
 import pace  # noqa: E402
 import real_report  # noqa: E402
 import strips  # noqa: E402
+import text  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from measure import Measure  # noqa: E402
@@ -181,7 +182,11 @@ def judge_strips(firmware, source, here):
         "phantom_percent_57": mean_of(slow, "phantom_percent"),
         "doubted_percent": mean_of(fast, "doubted_percent"),
         "holds_missed": sum(one["held_missed"] for one in judged) if judged else None,
-        "strips": [{"name": name, "part": part, "holds": len(strip.holds), "rates": rates[name]} for name, (part, strip) in read.items()],
+        "strips": [
+            {"recording": name, "part": part, "holds": len(strip.holds)}
+            | {f"{key} at {rate['frames_per_s']:g}/s": rate[key] for rate in rates[name] for key in rate if key != "frames_per_s"}
+            for name, (part, strip) in read.items()
+        ],
     }
 
 
@@ -201,11 +206,12 @@ def main(argv):
     judges = [row["recording"] for row in found["grids"] if row["part"] == "judges"]
     found["pace"] = pace.twin_rows(firmware, options.pads) + pace.rows("real", [pad for key in judges for pad in shown[key]["to_pace"]])
     found |= judge_strips(firmware, sources["strips"], here)
-    found["missing"] = sorted(one["name"] for source in sources.values() for one in source["files"] if one["name"] not in here)
-    found["sources"] = {name: {key: source[key] for key in ("repository", "commit", "terms", "what")} for name, source in sources.items()}
+    missing = sorted(one["name"] for source in sources.values() for one in source["files"] if one["name"] not in here)
+    found["missing_recordings"] = ", ".join(missing) or "none"
+    found["recordings"] = [{key: source[key] for key in ("repository", "commit", "terms", "what")} for source in sources.values()]
     found = judge(found, GOALS)
     write_json(out / "real.json", found)
-    real_report.write(found, out / "real.md")
+    text.write(found, "real", out)
     real_report.draw(found, shown, out / "real.png")
     real_report.draw_pace(found["pace"], out / "pace.png")
     return finish(found, options, ("real.json", "real.md", "real.png", "pace.png"))

@@ -105,8 +105,9 @@ def save(figure, path):
     plt.close(figure)
 
 
-def tidy(axes, title, label):
+def tidy(axes, title, label="", grid="y"):
     axes.set_title(title, loc="left", size=10, color=INK)
     axes.set_ylabel(label, size=9)
-    axes.grid(axis="y")
+    if grid:
+        axes.grid(axis=grid)
     axes.tick_params(labelsize=8)

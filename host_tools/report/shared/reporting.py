@@ -11,6 +11,7 @@ import threading
 import time
 
 import page
+import text
 from fingertip.files import InputError, check_output, write_text
 from presentation import judge, missed, print_goals
 
@@ -154,7 +155,7 @@ def chosen_parts(options, parts, usual):
 
 def report_of_programs(options, name, parts, chosen, goals, measure, derive, pages):
     """A report of programs that run one after the other. parts: what each does; measure(part) -> figures; derive(found, out) -> figures
-    that follow from others; pages: the module that writes name.md and draws name.png. Exit status."""
+    that follow from others; pages: the module that draws name.png, and names in PICTURED the tables that only the picture shows. Exit status."""
     out = output_folder(options)
     path = out / f"{name}.json"
     found = {figure: None for figure, _, _ in goals}
@@ -165,6 +166,6 @@ def report_of_programs(options, name, parts, chosen, goals, measure, derive, pag
         found |= measure(part)
         found = judge({**found, **derive(found, out)}, goals)
         write_json(path, found)  # what is found is kept though a later part fails
-    pages.write(found, out / f"{name}.md")
+    text.write(found, name, out, pages.PICTURED)
     pages.draw(found, out / f"{name}.png")
     return finish(found, options, tuple(f"{name}.{kind}" for kind in ("json", "md", "png")))

@@ -1,34 +1,10 @@
-"""What truth.py measured as text and as a picture."""
+"""The picture of what truth.py measured."""
 
-from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_of_dicts_md, tidy
-from fingertip.files import write_text
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, tidy
 
 # Share of truths within one and two radial standard deviations of a normal distribution in the plane.
 IDEAL_PERCENT = (63.2, 98.2)
-
-
-def tables_of(found):
-    """(name, rows) of every table in it: a list of rows, each a dict of plain values."""
-    for name, value in found.items():
-        if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
-            yield name, [{key: cell for key, cell in row.items() if not isinstance(cell, (list, dict))} for row in value]
-
-
-def write(found, path):
-    lines = [
-        "# From the optimum to the truth",
-        "",
-        "Written by `sh cmake/bootstrap.sh report`. Simulated pads and presses, the firmware's own code;",
-        "`real_...`: recordings of real strips, where they are at hand.",
-        "",
-        "![Coverage, calibration, warnings](truth.png)",
-        "",
-        *goal_table_md(found),
-        "",
-    ]
-    for name, rows in tables_of(found):
-        lines += [f"## {name.replace('_', ' ')}", "", *table_of_dicts_md(rows), ""]
-    write_text(path, "\n".join(lines))
+PICTURED = ()
 
 
 def named(axes, names):
