@@ -6,7 +6,6 @@ usage: check_sources.py [ROOT]
 Prints one line for each violation and exits with 1 if there is any.
 """
 
-import ast
 import pathlib
 import re
 import sys
@@ -99,30 +98,7 @@ WAIT_MESSAGES = {
 }
 
 
-def circles(root):
-    """Modules of the Python package that import each other, by whatever way, also within functions."""
-    needs = {}
-    for path in sorted((root / "host_tools/python/fingertip").glob("*.py")):
-        imports = [
-            node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom) and node.level == 1
-        ]
-        needs[path.stem] = {name for node in imports for name in ([node.module] if node.module else [each.name for each in node.names])}
-
-    def reached(module):
-        seen, left = set(), list(needs[module])
-        while left:
-            each = left.pop()
-            if each not in seen:
-                seen.add(each)
-                left += needs.get(each, ())
-        return seen
-
-    return [module for module in needs if module in reached(module)]
-
-
 def violations(root):
-    for module in circles(root):
-        yield f"host_tools/python/fingertip/{module}.py: imports, by way of others, itself: move what both need into a module below them"
     for path, number, what in waits(root):
         yield f"{path}:{number}: {WAIT_MESSAGES[what]}"
     for folder in ("firmware", "boards", "host_tools", "tests"):

@@ -147,19 +147,20 @@ def worst(named):
     return max(named.items(), key=lambda one: len(one[1]), default=("", []))
 
 
+def reached(needs, one):
+    """All that one needs, by whatever way, in {one: what it needs}."""
+    seen, left = set(), list(needs[one])
+    while left:
+        each = left.pop()
+        if each not in seen:
+            seen.add(each)
+            left += needs.get(each, ())
+    return seen
+
+
 def circle(needs):
-    """What needs itself, by way of others, in {one: what it needs}."""
-
-    def reached(one):
-        seen, left = set(), list(needs[one])
-        while left:
-            each = left.pop()
-            if each not in seen:
-                seen.add(each)
-                left += needs.get(each, ())
-        return seen
-
-    return sorted(one for one in needs if one in reached(one))
+    """What needs itself, by way of others."""
+    return sorted(one for one in needs if one in reached(needs, one))
 
 
 def python_needs(folder):

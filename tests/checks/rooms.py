@@ -12,6 +12,8 @@ import pathlib
 import re
 import sys
 
+from house import circle, reached
+
 MARKS = "<!-- rooms: python3 tests/checks/rooms.py -->\n", "<!-- /rooms -->\n"
 WHOLE = (
     "host_tools/report",
@@ -51,17 +53,6 @@ def needs(lists):
     return {folder: others - {folder} for folder, others in found.items()}
 
 
-def reached(found, folder):
-    """All that a folder needs, by whatever way."""
-    seen, left = set(), list(found[folder])
-    while left:
-        each = left.pop()
-        if each not in seen:
-            seen.add(each)
-            left += found.get(each, ())
-    return seen
-
-
 def picture(found):
     """Lines, each folder above those that it needs."""
     everything = {folder: reached(found, folder) for folder in found}
@@ -84,8 +75,7 @@ def main():
     found = needs(
         {path.relative_to(root): path.read_text(encoding="utf-8") for path in paths if not {"node_modules", "example"} & set(path.parts)}
     )
-    circles = sorted(folder for folder in found if folder in reached(found, folder))
-    if circles:
+    if circles := circle(found):
         sys.exit("rooms.py: these folders need themselves, by way of others: " + ", ".join(circles))
     page = root / "CONTRIBUTING.md"
     text = page.read_text(encoding="utf-8")

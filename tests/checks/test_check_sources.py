@@ -6,7 +6,7 @@ import sys
 import tempfile
 import unittest
 
-from check_sources import circles, waits
+from check_sources import waits
 
 CHECK = pathlib.Path(__file__).with_name("check_sources.py")
 
@@ -58,22 +58,6 @@ class CheckSources(unittest.TestCase):
         code, output = self.check("boards/x/main.c", "\n" * 120)
         self.assertEqual(code, 1)
         self.assertIn("under 100 lines", output)
-
-
-class Circles(unittest.TestCase):
-    def test_modules_that_import_each_other_are_found_also_where_they_do_it_late(self):
-        with tempfile.TemporaryDirectory() as root:
-            package = pathlib.Path(root, "host_tools/python/fingertip")
-            package.mkdir(parents=True)
-            for name, text in (
-                ("a", "from .b import x\n"),
-                ("b", "def f():\n    from .c import y\n"),
-                ("c", "from . import a, d\n"),
-                ("d", "import e\n"),
-                ("e", "from .a import z\n"),
-            ):
-                (package / f"{name}.py").write_text(text)
-            self.assertEqual(circles(pathlib.Path(root)), ["a", "b", "c"])
 
 
 class Waits(unittest.TestCase):

@@ -23,6 +23,11 @@ class House(unittest.TestCase):
     def test_a_circle_by_way_of_a_third_is_found(self):
         self.assertEqual(house.circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}), ["a", "b", "c"])
 
+    def test_imports_within_a_package_are_needs_also_within_functions(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / "a.py").write_text("from .b import x\nimport e\n\n\ndef f():\n    from . import c, d\n")
+            self.assertEqual(house.python_needs(pathlib.Path(folder)), {"a": {"b", "c", "d"}})
+
     def test_calls_between_sources_are_needs(self):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
