@@ -4,6 +4,7 @@
 
 #include "common/pad_profile.h"
 
+#include <math.h>
 #include <string.h>
 
 static inline struct pad_profile pad_of_12_mm(void) {
@@ -27,6 +28,27 @@ static inline struct pad_profile pad_of_12_mm(void) {
   pad.tangential_scale = 1.0f;
   pad.tangential_scale_sd = 0.125f;
   return pad;
+}
+
+struct pad_load {
+  double force_N, qx_N, qy_N;
+};
+
+/* Pressure under the pad this far from the middle of a contact with this spread, by the definition in pad_profile.h. */
+static inline double pad_pressure_Pa(const struct pad_profile *pad, double spread_mm2, double dx_mm, double dy_mm,
+                                     struct pad_load load) {
+  const double two_pi = 6.28318530717958, r2 = dx_mm * dx_mm + dy_mm * dy_mm;
+  double sum = 0.0; /* N/mm^2 */
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    const double v = (double)pad->normal[j].sd_mm * (double)pad->normal[j].sd_mm + spread_mm2;
+    sum += load.force_N * (double)pad->normal[j].share / (two_pi * v) * exp(-r2 / (2 * v));
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    const double v = (double)pad->tangential[j].sd_mm * (double)pad->tangential[j].sd_mm + 1.3 * spread_mm2;
+    sum += (load.qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad->tangential[j].moment_mm / (two_pi * v * v) *
+           exp(-r2 / (2 * v));
+  }
+  return sum * 1e6;
 }
 
 #endif

@@ -115,6 +115,11 @@ static inline bool next_packet(struct wire_packet *packet) {
   return false;
 }
 
+static inline void drop_packets(void) {
+  for (struct wire_packet packet; next_packet(&packet);) {
+  }
+}
+
 static inline bool next_of_type(uint8_t type, struct wire_packet *packet) {
   while (next_packet(packet)) {
     if (packet->type == type) {
@@ -148,20 +153,36 @@ static inline uint8_t ask(struct wire_packet command) {
   return packet.body.ack.result;
 }
 
-static inline void start_streams(uint8_t streams) {
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {streams}}));
+#define COMMAND(NAME, name, ...) ((struct wire_packet){.type = WIRE_CMD_##NAME, .body.cmd_##name = {__VA_ARGS__}})
+
+static inline void obey(struct wire_packet command) { TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command)); }
+
+/* The host opens the port, and time passes. */
+static inline void connect_for(uint32_t ms) {
+  native_cdc_open();
+  run_for(ms);
+}
+
+static inline void start_streams(uint8_t streams) { obey(COMMAND(STREAM, stream, streams)); }
+
+/* A calibration of this array: all sensors are alike. */
+static inline struct wire_packet calibrate_command(struct calibration calibration) {
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    calibration.sensors[k] = (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
+  }
+  return COMMAND(CALIBRATE, calibrate, .sensor_count = geometry.sensor_count, .calibration = calibration);
 }
 
 static inline struct wire_info get_info(void) {
   struct wire_packet packet;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_INFO}));
+  obey((struct wire_packet){.type = WIRE_CMD_INFO});
   TEST_ASSERT_TRUE(next_of_type(WIRE_INFO, &packet));
   return packet.body.info;
 }
 
 static inline struct wire_health get_health(void) {
   struct wire_packet packet;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_HEALTH}));
+  obey((struct wire_packet){.type = WIRE_CMD_HEALTH});
   TEST_ASSERT_TRUE(next_of_type(WIRE_HEALTH, &packet));
   return packet.body.health;
 }

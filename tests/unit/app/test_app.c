@@ -9,8 +9,7 @@ void tearDown(void) { rig_end(); }
 
 TEST(nothing_streams_before_a_command) {
   uint8_t byte;
-  native_cdc_open();
-  run_for(500);
+  connect_for(500);
   TEST_ASSERT_EQUAL(0, native_cdc_receive(&byte, 1));
 }
 
@@ -19,8 +18,7 @@ TEST(a_press_is_located_and_weighed) {
   press.x_mm = 2.5;
   press.y_mm = -7.0;
   press.from_us = 700000;
-  native_cdc_open();
-  run_for(600);
+  connect_for(600);
   start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
   run_for(500);
 
@@ -78,8 +76,7 @@ TEST(a_moving_contact_slips) {
   press.y_mm = -10.0;
   press.speed_y_mm_s = 40.0;
   press.from_us = 700000;
-  native_cdc_open();
-  run_for(600);
+  connect_for(600);
   start_streams(WIRE_STREAM_CONTACT);
   run_for(400);
   struct wire_packet packet;
@@ -98,8 +95,7 @@ TEST(a_moving_contact_slips) {
 }
 
 TEST(info_tells_what_this_is) {
-  native_cdc_open();
-  run_for(1500);
+  connect_for(1500);
   struct wire_info info = get_info();
   TEST_ASSERT_EQUAL_UINT8(15, info.sensor_count);
   TEST_ASSERT_EQUAL_STRING("native", info.board);
@@ -113,20 +109,18 @@ TEST(info_tells_what_this_is) {
 }
 
 TEST(settings_are_checked_and_kept) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   static const struct {
     uint32_t rate_mHz;
     uint8_t result;
   } rates[] = {{0, 0}, {100, 0}, {2000000, 0}, {99, WIRE_RESULT_OUT_OF_RANGE}, {2000001, 2}, {20000, 0}};
   for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(rates[i].result,
-                            ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {rates[i].rate_mHz}}));
+    TEST_ASSERT_EQUAL_UINT8(rates[i].result, ask(COMMAND(RATE, rate, rates[i].rate_mHz)));
   }
   TEST_ASSERT_EQUAL_UINT32(20000, get_info().rate_mHz);
 
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {1000}}));
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {256}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(OSR, osr, 1000)));
+  obey(COMMAND(OSR, osr, 256));
   TEST_ASSERT_EQUAL_UINT16(256, get_info().osr);
 
   static const struct {
@@ -135,70 +129,40 @@ TEST(settings_are_checked_and_kept) {
     uint8_t result;
   } slips[] = {{0.009f, 100, 2}, {51.0f, 100, 2}, {1.0f, 4, 2}, {1.0f, 1001, 2}, {-1.0f, 100, 2}, {0.5f, 200, 0}};
   for (size_t i = 0; i < sizeof slips / sizeof slips[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(
-        slips[i].result,
-        ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {slips[i].threshold_mm, slips[i].window_ms}}));
+    TEST_ASSERT_EQUAL_UINT8(slips[i].result, ask(COMMAND(SLIP, slip, slips[i].threshold_mm, slips[i].window_ms)));
   }
   TEST_ASSERT_EQUAL_UINT16(200, get_info().slip_window_ms);
   TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().slip_threshold_mm);
 
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
-                    ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {8}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(STREAM, stream, 8)));
 }
 
 TEST(priors_and_limits_are_checked) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   static const struct {
     float sigma_mm, width_mm;
     uint8_t result;
   } priors[] = {{0.0f, 0.5f, 2},   {3.0f, 0.0f, 2},   {0.4f, 0.5f, 2}, {101.0f, 0.5f, 2},
                 {3.0f, 101.0f, 2}, {3.0f, 0.009f, 2}, {0.0f, 0.0f, 0}, {3.1f, 0.5f, 0}};
   for (size_t i = 0; i < sizeof priors / sizeof priors[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(
-        priors[i].result,
-        ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {priors[i].sigma_mm, priors[i].width_mm}}));
+    TEST_ASSERT_EQUAL_UINT8(priors[i].result, ask(COMMAND(PRIOR, prior, priors[i].sigma_mm, priors[i].width_mm)));
   }
   TEST_ASSERT_EQUAL_FLOAT(3.1f, get_info().prior_sigma_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().prior_width_mm);
   static const float limits[] = {0.009f, 100.1f, -1.0f, 0.8f};
   for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(
-        i < 3 ? WIRE_RESULT_OUT_OF_RANGE : WIRE_RESULT_DONE,
-        ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {limits[i]}}));
+    TEST_ASSERT_EQUAL_UINT8(i < 3 ? WIRE_RESULT_OUT_OF_RANGE : WIRE_RESULT_DONE,
+                            ask(COMMAND(LOCATION_LIMIT, location_limit, limits[i])));
   }
   TEST_ASSERT_EQUAL_FLOAT(0.8f, get_info().location_limit_mm);
 }
 
-TEST(at_20_Hz_frames_are_50_ms_apart) {
-  native_cdc_open();
-  run_for(300);
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {20000}});
-  start_streams(WIRE_STREAM_CONTACT);
-  run_for(200);
-  struct wire_packet packet;
-  while (next_of_type(WIRE_CONTACT, &packet)) {
-  }
-  uint64_t before_us = 0;
-  int frames = 0;
-  run_for(5000);
-  while (next_of_type(WIRE_CONTACT, &packet)) {
-    if (before_us) {
-      TEST_ASSERT_UINT64_WITHIN(1000, 50000, packet.t_us - before_us);
-    }
-    before_us = packet.t_us;
-    frames++;
-  }
-  TEST_ASSERT_INT_WITHIN(1, 100, frames);
-}
-
 TEST(a_tare_takes_the_present_as_zero) {
   press.force_N = 2.0;
-  native_cdc_open();
-  run_for(1000); /* the start-up tare took the press for the zero */
+  connect_for(1000); /* the start-up tare took the press for the zero */
   press.force_N = 0.0;
   run_for(20);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
+  obey((struct wire_packet){.type = WIRE_CMD_TARE});
   run_for(300);
   press.force_N = 4.0;
   start_streams(WIRE_STREAM_CONTACT);
@@ -214,8 +178,7 @@ TEST(a_tare_takes_the_present_as_zero) {
 
 TEST(a_tare_in_contact_is_refused_unless_forced) {
   struct wire_packet tare = {.type = WIRE_CMD_TARE};
-  native_cdc_open();
-  run_for(1000);
+  connect_for(1000);
   press.force_N = 3.0;
   run_for(50);
   TEST_ASSERT_EQUAL(WIRE_RESULT_NOT_NOW, ask(tare));
@@ -227,7 +190,7 @@ TEST(a_tare_in_contact_is_refused_unless_forced) {
   tare.body.cmd_tare.force = 2;
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(tare));
   tare.body.cmd_tare.force = 1;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(tare));
+  obey(tare);
   run_for(100);
   TEST_ASSERT_FALSE(newest_contact().flags & CONTACT_FLAG_CONTACT);
 }
@@ -236,7 +199,6 @@ TEST(a_tare_without_sensors_is_refused) {
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     array.absent[k] = true;
   }
-  native_cdc_open();
-  run_for(1000);
+  connect_for(1000);
   TEST_ASSERT_EQUAL(WIRE_RESULT_NOT_NOW, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
 }

@@ -15,8 +15,7 @@ static const uint32_t CAPABILITIES =
 static const uint8_t STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
 
 TEST(it_tells_its_capabilities_and_their_settings_only) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   struct wire_info info = get_info();
   TEST_ASSERT_EQUAL_HEX32(CAPABILITIES, info.capabilities);
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? DEFAULT_FIT_ITERATIONS : 0, info.fit_iterations);
@@ -27,27 +26,24 @@ TEST(it_tells_its_capabilities_and_their_settings_only) {
 }
 
 TEST(it_refuses_streams_and_commands_that_it_lacks) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   for (uint8_t streams = 0; streams <= 8; streams++) {
     bool known = (streams & ~(STREAMS | WIRE_STREAM_HEALTH)) == 0;
-    TEST_ASSERT_EQUAL_UINT8(known ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE,
-                            ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {streams}}));
+    TEST_ASSERT_EQUAL_UINT8(known ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(STREAM, stream, streams)));
   }
   start_streams(0);
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_SLIP ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}}));
+                          ask(COMMAND(SLIP, slip, 0.5f, 200)));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.5f}}));
+                          ask(COMMAND(PRIOR, prior, 3.1f, 0.5f)));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {1}}));
+                          ask(COMMAND(LOCATION_LIMIT, location_limit, 1)));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
                           ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_SYNC ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_IN}}));
+                          ask(COMMAND(SYNC, sync, PORT_SYNC_IN)));
   uint8_t of_tangential = FT_WITH_TANGENTIAL ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND;
-  TEST_ASSERT_EQUAL_UINT8(of_tangential,
-                          ask((struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}}));
+  TEST_ASSERT_EQUAL_UINT8(of_tangential, ask(COMMAND(PAD, pad, pad_of_12_mm())));
   TEST_ASSERT_EQUAL_UINT8(of_tangential, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
 }
 
@@ -56,8 +52,7 @@ TEST(it_streams_what_it_has) {
   press.y_mm = -10.0;
   press.speed_y_mm_s = 40.0;
   press.from_us = 700000;
-  native_cdc_open();
-  run_for(600);
+  connect_for(600);
   start_streams(STREAMS);
   run_for(400);
   struct wire_packet packet;
@@ -98,8 +93,7 @@ TEST(it_streams_what_it_has) {
 
 /* Settings that it has; what another firmware has stored beside them stays. */
 TEST(it_keeps_settings) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   struct calibration calibration = {.placements = 20, .force_scale = 1.0f};
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     calibration.sensors[k].gain = 1.0f;
@@ -109,12 +103,11 @@ TEST(it_keeps_settings) {
   const struct pad_profile pad = pad_of_12_mm();
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&app.store, &pad));
   run_for(500);
-  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
-  ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_SECOND}});
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
+  ask(COMMAND(OSR, osr, 512));
+  ask(COMMAND(SYNC, sync, PORT_SYNC_SECOND));
+  obey(COMMAND(KEEP, keep, 1));
   rig_power_up();
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   struct wire_info info = get_info();
   TEST_ASSERT_EQUAL_UINT16(512, info.osr);
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_SYNC ? PORT_SYNC_SECOND : 0, info.sync);
@@ -128,9 +121,8 @@ TEST(it_keeps_settings) {
 }
 
 TEST(it_tares) {
-  native_cdc_open();
-  run_for(300);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
+  connect_for(300);
+  obey((struct wire_packet){.type = WIRE_CMD_TARE});
   start_streams(STREAMS);
   run_for(300);
   struct wire_packet packet;

@@ -16,27 +16,17 @@ static uint64_t ends_us; /* 0: never */
 static const uint32_t SHAPES =
     CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_EDGE | CONTACT_FLAG_SHAPE_UNKNOWN;
 
-/* By the definition in pad_profile.h, from the middle of the pad. */
+/* x and y count from the middle of the pad. */
 static double field_Pa(double x_mm, double y_mm, uint64_t t_us) {
   const struct pad_profile pad = pad_of_12_mm();
-  const double t2 = 4.0;
-  double sum = 0.0; /* N/mm^2 */
-  if (ends_us != 0 && t_us >= ends_us && t_us < ends_us + 100000) {
-    return 0.0;
-  }
-  for (unsigned i = 0; i < object_count; i++) {
+  double sum_Pa = 0.0;
+  const bool is_away = ends_us != 0 && t_us >= ends_us && t_us < ends_us + 100000;
+  for (unsigned i = 0; i < object_count && !is_away; i++) {
     const struct object *object = &objects[i];
-    const double dx = x_mm - object->x_mm, dy = y_mm - object->y_mm, r2 = dx * dx + dy * dy;
-    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-      double v = (double)pad.normal[j].sd_mm * (double)pad.normal[j].sd_mm + t2;
-      sum += object->force_N * (double)pad.normal[j].share / (2 * PI * v) * exp(-r2 / (2 * v));
-    }
-    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-      double v = (double)pad.tangential[j].sd_mm * (double)pad.tangential[j].sd_mm + 1.3 * t2;
-      sum += load_qx_N * dx * (double)pad.tangential[j].moment_mm / (2 * PI * v * v) * exp(-r2 / (2 * v));
-    }
+    sum_Pa += pad_pressure_Pa(&pad, 4.0, x_mm - object->x_mm, y_mm - object->y_mm,
+                              (struct pad_load){object->force_N, load_qx_N, 0.0});
   }
-  return sum * 1e6;
+  return sum_Pa;
 }
 
 static void put(double x_mm, double y_mm, double force_N) {
@@ -60,19 +50,12 @@ void tearDown(void) {
 
 /* Until this time, frames as fast as they come, on a calibrated pad with this profile. */
 static void run_until(uint64_t t_us, const struct pad_profile *profile) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   const struct wire_packet osr = {.type = WIRE_CMD_OSR, .body.cmd_osr = {256}};
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(osr));
+  obey(osr);
   const struct wire_packet pad = {.type = WIRE_CMD_PAD, .body.cmd_pad = {*profile}};
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(pad));
-  struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE,
-                                  .body.cmd_calibrate.sensor_count = geometry.sensor_count,
-                                  .body.cmd_calibrate.calibration = {.placements = 20, .force_scale = 1.25f}};
-  for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
-  }
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
+  obey(pad);
+  obey(calibrate_command((struct calibration){.placements = 20, .force_scale = 1.25f}));
   start_streams(WIRE_STREAM_CONTACT);
   run_for((uint32_t)((t_us - port_now_us()) / 1000));
 }
@@ -93,11 +76,14 @@ static unsigned take_contacts(struct wire_contact *to) {
   return count;
 }
 
-static struct wire_contact last_of_press(void) {
+/* The contacts of a press of this time: how many. */
+static unsigned press_for(uint32_t us) {
   const struct pad_profile profile = pad_of_12_mm();
-  run_until(PRESS_us + 250000, &profile);
-  return contacts[take_contacts(contacts) - 1];
+  run_until(PRESS_us + us, &profile);
+  return take_contacts(contacts);
 }
+
+static struct wire_contact last_of_press(void) { return contacts[press_for(250000) - 1]; }
 
 static float scale(void) { return 1.25f * pad_of_12_mm().force_ratio; }
 
@@ -159,14 +145,12 @@ TEST(a_long_contact_doubts_its_place_by_what_its_line_has) {
 
 /* Noise makes one pull of six look like a short line (two.json: round, Q/F 0.3). */
 TEST(one_contact_is_one_with_a_load_or_without) {
-  const struct pad_profile profile = pad_of_12_mm();
   for (int pulled = 0; pulled < 2; pulled++) {
     tearDown();
     setUp();
     put(1.5, -4.0, 5.0);
     load_qx_N = pulled ? 1.5 : 0.0;
-    run_until(PRESS_us + 250000, &profile);
-    const unsigned count = take_contacts(contacts);
+    const unsigned count = press_for(250000);
     unsigned valid = 0, lines = 0;
     for (unsigned i = 0; i < count; i++) {
       valid += (contacts[i].flags & CONTACT_FLAG_SHAPE_VALID) != 0;
@@ -191,9 +175,7 @@ TEST(what_is_none_of_these_is_warned_of_all_the_time) {
   put(7.0, -14.0, 4.0);
   put(-7.0, 0.0, 4.0);
   put(7.0, 14.0, 4.0);
-  const struct pad_profile profile = pad_of_12_mm();
-  run_until(PRESS_us + 250000, &profile);
-  const unsigned count = take_contacts(contacts);
+  const unsigned count = press_for(250000);
   unsigned first = 0;
   while (first < count && !(contacts[first].flags & CONTACT_FLAG_SHAPE_VALID)) {
     first++;
@@ -229,9 +211,7 @@ TEST(a_search_for_an_outlier_is_of_fast_frames) {
 TEST(each_answer_says_how_old_it_is) {
   put(0.0, 8.0, 4.0);
   put(0.0, -8.0, 4.0);
-  const struct pad_profile profile = pad_of_12_mm();
-  run_until(PRESS_us + 250000, &profile);
-  const unsigned count = take_contacts(contacts);
+  const unsigned count = press_for(250000);
   const float frame_ms = 0.25f * 1000.0f / (float)count;
   unsigned without = 0;
   for (unsigned i = 0; i < count; i++) {
@@ -319,9 +299,7 @@ TEST(without_a_second_processor_that_answers_there_are_no_shapes) {
   setUp();
   put(0.0, 8.0, 4.0);
   put(0.0, -8.0, 4.0);
-  const struct pad_profile profile = pad_of_12_mm();
-  run_until(PRESS_us + 150000, &profile);
-  const unsigned count = take_contacts(contacts);
+  const unsigned count = press_for(150000);
   for (unsigned i = 0; i < count; i++) {
     TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, contacts[i].flags);
   }

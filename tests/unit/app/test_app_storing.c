@@ -6,21 +6,18 @@ void setUp(void) { rig_start(); }
 
 void tearDown(void) { rig_end(); }
 
-static uint8_t keep(uint8_t what) { return ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {what}}); }
+static uint8_t keep(uint8_t what) { return ask(COMMAND(KEEP, keep, what)); }
 
-static struct wire_packet calibrate_command(void) {
-  struct wire_packet command = {.type = WIRE_CMD_CALIBRATE};
-  struct wire_cmd_calibrate *body = &command.body.cmd_calibrate;
-  body->sensor_count = geometry.sensor_count;
-  body->calibration =
-      (struct calibration){.date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f};
+static double gain_of_calibration(unsigned sensor) { return 0.8 + 0.02 * (double)sensor; }
+
+static struct wire_packet calibrate_gains(void) {
+  struct wire_packet command = calibrate_command(
+      (struct calibration){.date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f});
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    body->calibration.sensors[k] = (struct sensor_calibration){.gain = 0.8f + 0.02f * (float)k, .gain_sd = 0.01f};
+    command.body.cmd_calibrate.calibration.sensors[k].gain = (float)gain_of_calibration(k);
   }
   return command;
 }
-
-static double gain_of_calibration(unsigned sensor) { return 0.8 + 0.02 * (double)sensor; }
 
 /* A pad whose sensors are as sensitive as the calibration says is located and weighed as one of
  * equal sensors is; without the calibration it is not. */
@@ -30,8 +27,7 @@ TEST(a_calibration_acts_on_readings_and_force) {
   press.y_mm = -7.0;
   press.from_us = 700000;
   world_gain = gain_of_calibration;
-  native_cdc_open();
-  run_for(600);
+  connect_for(600);
   start_streams(WIRE_STREAM_CONTACT);
   run_for(500);
   struct wire_contact before = newest_contact();
@@ -39,8 +35,8 @@ TEST(a_calibration_acts_on_readings_and_force) {
   TEST_ASSERT_TRUE(fabsf(before.force_N - 5.0f) > 0.1f);
   TEST_ASSERT_TRUE(before.force_sd_N > 0.4f); /* the scale of this pad is unknown */
 
-  struct wire_packet command = calibrate_command();
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  struct wire_packet command = calibrate_gains();
+  obey(command);
   run_for(100);
   struct wire_contact after = newest_contact();
   TEST_ASSERT_TRUE(after.flags & CONTACT_FLAG_CALIBRATED);
@@ -50,7 +46,7 @@ TEST(a_calibration_acts_on_readings_and_force) {
 
   command.body.cmd_calibrate.calibration.force_scale = 1.25f;
   command.body.cmd_calibrate.calibration.force_scale_sd = 0.125f;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  obey(command);
   run_for(100);
   struct wire_contact scaled = newest_contact();
   TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.25f * after.force_N, scaled.force_N);
@@ -59,7 +55,7 @@ TEST(a_calibration_acts_on_readings_and_force) {
   TEST_ASSERT_TRUE(info.stored & WIRE_STORED_CALIBRATION);
   TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_calibrate.calibration, &info.calibration, sizeof info.calibration);
 
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  obey((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION});
   run_for(100);
   struct wire_contact erased = newest_contact();
   TEST_ASSERT_FALSE(erased.flags & CONTACT_FLAG_CALIBRATED);
@@ -70,16 +66,14 @@ TEST(a_calibration_acts_on_readings_and_force) {
 /* Restarts, opens the port and asks. */
 static struct wire_info info_after_restart(void) {
   rig_power_up();
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   return get_info();
 }
 
 /* The pad's shape acts until the user sets a prior, and again when it is taken back. */
 TEST(a_calibration_tells_the_fit_the_pads_shape) {
-  native_cdc_open();
-  run_for(300);
-  struct wire_packet command = calibrate_command();
+  connect_for(300);
+  struct wire_packet command = calibrate_gains();
   struct calibration *calibration = &command.body.cmd_calibrate.calibration;
   calibration->sigma_um = 5552;
   calibration->sigma_sd_um = 60;
@@ -90,7 +84,7 @@ TEST(a_calibration_tells_the_fit_the_pads_shape) {
   calibration->sensors[14].wider_q15 = -1311;
   calibration->force_scale_sd = 0.01f;
   calibration->ambient_kPa = 101;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  obey(command);
   TEST_ASSERT_EQUAL_FLOAT(5.552f, app.stages.location.settings.prior_sigma_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.06f, app.stages.location.settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.stages.location.settings.dip_share);
@@ -102,7 +96,7 @@ TEST(a_calibration_tells_the_fit_the_pads_shape) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, get_info().prior_width_mm);
   run_for(1100);
   TEST_ASSERT_FLOAT_WITHIN(0.003f, 0.01f, app.stages.contact_settings.force_scale_sd);
-  ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
+  ask(COMMAND(PRIOR, prior, 3.1f, 0.4f));
   TEST_ASSERT_EQUAL_FLOAT(3.1f, app.stages.location.settings.prior_sigma_mm);
   TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
   ask((struct wire_packet){.type = WIRE_CMD_PRIOR});
@@ -110,22 +104,21 @@ TEST(a_calibration_tells_the_fit_the_pads_shape) {
 
   /* A force scale that was found 20 kPa away is doubted by 11 %. */
   calibration->ambient_kPa = 81;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  obey(command);
   run_for(1100);
   TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.11f * calibration->force_scale, app.stages.contact_settings.force_scale_sd);
   calibration->dip_share_q16 = 6554;
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  obey((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION});
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.dip_share);
   TEST_ASSERT_NULL(app.stages.location.settings.own);
 }
 
 TEST(a_calibration_outlives_power) {
-  native_cdc_open();
-  run_for(300);
-  struct wire_packet command = calibrate_command();
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  connect_for(300);
+  struct wire_packet command = calibrate_gains();
+  obey(command);
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, get_info().stored);
   struct wire_info info = info_after_restart();
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info.stored);
@@ -133,28 +126,27 @@ TEST(a_calibration_outlives_power) {
   start_streams(WIRE_STREAM_CONTACT);
   run_for(50);
   TEST_ASSERT_TRUE(newest_contact().flags & CONTACT_FLAG_CALIBRATED);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  obey((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION});
   TEST_ASSERT_EQUAL_HEX32(0, info_after_restart().stored);
 }
 
+static void set_all(void) {
+  ask(COMMAND(RATE, rate, 50000));
+  ask(COMMAND(OSR, osr, 512));
+  ask(COMMAND(SLIP, slip, 0.5f, 200));
+  ask(COMMAND(PRIOR, prior, 3.1f, 0.4f));
+  ask(COMMAND(LOCATION_LIMIT, location_limit, 0.8f));
+}
+
 TEST(settings_are_kept_when_asked_for_and_forgotten_likewise) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   const struct wire_info built = get_info();
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
-  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
-  ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
-  ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
-  ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
+  set_all();
   TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz, "it was not kept");
 
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
-  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
-  ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
-  ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
-  ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
+  set_all();
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, keep(1));
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
+  obey(calibrate_gains());
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, keep(2));
   struct wire_info info = info_after_restart();
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | WIRE_STORED_CALIBRATION, info.stored);
@@ -180,16 +172,14 @@ TEST(settings_are_kept_when_asked_for_and_forgotten_likewise) {
  */
 TEST(after_a_tare_no_frame_says_tared_before_it_is) {
   press.force_N = 5.0;
-  native_cdc_open();
-  run_for(300);
-  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {8192}});
+  connect_for(300);
+  ask(COMMAND(OSR, osr, 8192));
   start_streams(WIRE_STREAM_CONTACT);
   int held = 0;
   for (uint32_t i = 0; i < 300; i++) {
     run_for(400 + i * 7 % 50);
     struct wire_packet packet, command = {.type = WIRE_CMD_TARE, .body.cmd_tare = {1}};
-    while (next_packet(&packet)) {
-    }
+    drop_packets();
     send_packet(&command);
     run_for(100);
     TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
@@ -203,13 +193,11 @@ TEST(after_a_tare_no_frame_says_tared_before_it_is) {
 
 /* The answer to a command that stores is late; until then all goes on as before. */
 TEST(storing_takes_its_time_and_keeps_nobody_waiting) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
   run_for(100);
-  struct wire_packet packet, command = calibrate_command();
-  while (next_packet(&packet)) {
-  }
+  struct wire_packet packet, command = calibrate_gains();
+  drop_packets();
   send_packet(&command);
   run_for(10);
   send_packet(&command);
@@ -242,11 +230,10 @@ TEST(storing_takes_its_time_and_keeps_nobody_waiting) {
 
 /* At the slowest rate nothing else wakes the main loop. */
 TEST(storing_is_as_quick_at_the_slowest_rate) {
-  native_cdc_open();
-  run_for(300);
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
+  connect_for(300);
+  ask(COMMAND(RATE, rate, WIRE_RATE_MIN_mHz));
   run_for(1000);
-  struct wire_packet packet, command = calibrate_command();
+  struct wire_packet packet, command = calibrate_gains();
   send_packet(&command);
   for (int ms = 0; ms < 100 && !store_is_writing(&app.store); ms++) {
     run_for(1); /* until the main loop looks at what the host has sent */
@@ -258,9 +245,8 @@ TEST(storing_is_as_quick_at_the_slowest_rate) {
 }
 
 TEST(the_loader_waits_for_what_is_being_stored) {
-  native_cdc_open();
-  run_for(300);
-  struct wire_packet calibrate = calibrate_command();
+  connect_for(300);
+  struct wire_packet calibrate = calibrate_gains();
   struct wire_packet loader = {.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}};
   send_packet(&loader);
   while (app.commands.loader_at_us == 0 || port_now_us() + 2000 < app.commands.loader_at_us) {
@@ -274,10 +260,9 @@ TEST(the_loader_waits_for_what_is_being_stored) {
 }
 
 TEST(a_flash_that_fails_is_no_calibration) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   native_flash_wear_out();
-  struct wire_packet packet, command = calibrate_command();
+  struct wire_packet packet, command = calibrate_gains();
   send_packet(&command);
   run_for(1000);
   TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
@@ -286,20 +271,18 @@ TEST(a_flash_that_fails_is_no_calibration) {
 }
 
 TEST(damage_is_told_and_not_used) {
-  native_cdc_open();
-  run_for(300);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
+  connect_for(300);
+  obey(calibrate_gains());
   native_flash.bytes[100] ^= 4;
   struct wire_info info = info_after_restart();
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_DAMAGED, info.stored);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
+  obey(calibrate_gains());
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info_after_restart().stored);
 }
 
 TEST(a_calibration_out_of_range_is_refused) {
-  native_cdc_open();
-  run_for(300);
-  struct wire_packet good = calibrate_command();
+  connect_for(300);
+  struct wire_packet good = calibrate_gains();
   static const struct {
     size_t offset;
     float value;
@@ -318,23 +301,9 @@ TEST(a_calibration_out_of_range_is_refused) {
     memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad[i].offset, &bad[i].value, sizeof bad[i].value);
     TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
   }
-  static const struct {
-    size_t offset;
-    int16_t value;
-  } bad_places[] = {
-      {offsetof(struct calibration, sensors[0].off_x_um), -2001},
-      {offsetof(struct calibration, sensors[14].off_y_um), 2001},
-      {offsetof(struct calibration, sensors[7].wider_q15), 9831},
-  };
-  for (size_t i = 0; i < sizeof bad_places / sizeof bad_places[0]; i++) {
-    struct wire_packet command = good;
-    memcpy((uint8_t *)&command.body.cmd_calibrate.calibration + bad_places[i].offset, &bad_places[i].value,
-           sizeof bad_places[i].value);
-    TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
-  }
   struct wire_packet other = good;
   other.body.cmd_calibrate.sensor_count--;
   TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(other));
   TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_CALIBRATION);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(good));
+  obey(good);
 }

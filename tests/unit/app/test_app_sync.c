@@ -4,13 +4,12 @@
 
 void setUp(void) {
   rig_start();
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
 }
 
 void tearDown(void) { rig_end(); }
 
-static uint8_t set(uint8_t mode) { return ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {mode}}); }
+static uint8_t set(uint8_t mode) { return ask(COMMAND(SYNC, sync, mode)); }
 
 TEST(it_is_off_until_it_is_set) {
   start_streams(WIRE_STREAM_HEALTH);
@@ -49,7 +48,7 @@ TEST(edges_are_sent_with_their_times) {
 /* At a slow rate nothing else wakes the main loop. */
 TEST(an_edge_waits_for_no_frame) {
   set(PORT_SYNC_SECOND);
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1000}});
+  ask(COMMAND(RATE, rate, 1000));
   start_streams(WIRE_STREAM_CONTACT);
   native_sync_edge();
   run_for(3);
@@ -97,7 +96,7 @@ TEST(a_storm_is_sent_at_a_bounded_rate) {
 TEST(a_pulse_is_a_frame) {
   set(PORT_SYNC_FRAME);
   for (unsigned rate_Hz = 20; rate_Hz <= 100; rate_Hz += 80) {
-    ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1000 * rate_Hz}});
+    ask(COMMAND(RATE, rate, 1000 * rate_Hz));
     run_for(100);
     const uint32_t frames = get_health().frames;
     const unsigned pulses = native_sync_pulses();
@@ -129,13 +128,12 @@ TEST(it_is_off_while_the_bus_sleeps) {
 
 TEST(it_is_kept_like_other_settings) {
   set(PORT_SYNC_FRAME);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
+  obey(COMMAND(KEEP, keep, 1));
   rig_power_up();
   TEST_ASSERT_EQUAL(PORT_SYNC_FRAME, native_sync_mode());
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   TEST_ASSERT_EQUAL_UINT8(PORT_SYNC_FRAME, get_info().sync);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {0}}));
+  obey(COMMAND(KEEP, keep, 0));
   rig_power_up();
   TEST_ASSERT_EQUAL(PORT_SYNC_OFF, native_sync_mode());
 }

@@ -11,27 +11,17 @@ static struct {
   uint64_t later_us;
 } load;
 
-/* By the definition in pad_profile.h. */
+static struct pad_profile pad;
+
 static double field_Pa(double dx_mm, double dy_mm, uint64_t t_us) {
-  const struct pad_profile pad = pad_of_12_mm();
-  const double r2 = dx_mm * dx_mm + dy_mm * dy_mm, t2 = 4.0;
-  double qx_N = load.later_us != 0 && t_us >= load.later_us ? load.later_qx_N : load.qx_N;
-  double sum = 0.0; /* N/mm^2 */
-  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    double v = (double)pad.normal[j].sd_mm * (double)pad.normal[j].sd_mm + t2;
-    sum += load.force_N * (double)pad.normal[j].share / (2 * PI * v) * exp(-r2 / (2 * v));
-  }
-  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-    double v = (double)pad.tangential[j].sd_mm * (double)pad.tangential[j].sd_mm + 1.3 * t2;
-    sum += (qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad.tangential[j].moment_mm / (2 * PI * v * v) *
-           exp(-r2 / (2 * v));
-  }
-  return sum * 1e6;
+  const double qx_N = load.later_us != 0 && t_us >= load.later_us ? load.later_qx_N : load.qx_N;
+  return pad_pressure_Pa(&pad, 4.0, dx_mm, dy_mm, (struct pad_load){load.force_N, qx_N, load.qy_N});
 }
 
 void setUp(void) {
   rig_start();
   world_field_Pa = field_Pa;
+  pad = pad_of_12_mm();
   memset(&load, 0, sizeof load);
   press.force_N = load.force_N = 5.0;
   press.x_mm = 1.5;
@@ -44,14 +34,9 @@ void tearDown(void) {
   native_set_worker(false, 0);
 }
 
-static struct wire_packet pad_command(void) {
-  return (struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}};
-}
-
-static void store_pad(const struct wire_packet *command) {
-  native_cdc_open();
-  run_for(300);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(*command));
+static void store_pad(void) {
+  connect_for(300);
+  obey(COMMAND(PAD, pad, pad));
 }
 
 /* The last contact packet of the time until t_us; its flags hold for all from from_us on. */
@@ -85,8 +70,7 @@ static const uint32_t TANGENTIAL = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_
 TEST(a_profile_tells_the_load_and_corrects_the_location) {
   load.qx_N = 1.2;
   load.qy_N = -0.9;
-  struct wire_packet command = pad_command();
-  store_pad(&command);
+  store_pad();
   struct wire_contact contact =
       last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_FROM_TOUCH);
   TEST_ASSERT_FLOAT_WITHIN(0.15f, 1.2f, contact.qx_N);
@@ -106,8 +90,7 @@ TEST(a_profile_tells_the_load_and_corrects_the_location) {
 
 TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is) {
   load.qx_N = 1.2;
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
   struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_FIT_VALID, TANGENTIAL);
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contact.x_mm);
@@ -122,10 +105,8 @@ TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
     const bool loaded = kind % 2 != 0, slow = kind < 2;
     load.qx_N = loaded ? 1.5 : 0.0;
     rig_power_up();
-    native_cdc_open();
-    run_for(1300);
-    TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                      ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {slow ? 1024 : 256}}));
+    connect_for(1300);
+    obey(COMMAND(OSR, osr, slow ? 1024 : 256));
     start_streams(WIRE_STREAM_CONTACT);
     run_for(200);
     unsigned frames = 0;
@@ -152,8 +133,7 @@ TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
 /* One touch, of gains that are alike: what was assumed is less then, and stays so. */
 TEST(touches_tell_the_gains_of_a_pad_without_a_calibration) {
   const uint16_t assumed_q16 = (uint16_t)(65536.0f * DEFAULT_GAIN_SD + 0.5f);
-  native_cdc_open();
-  run_for(1400);
+  connect_for(1400);
   TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.stages.location.settings.gain_sd_q16[14]);
   run_for(400);
   const uint16_t learnt_q16 = app.stages.location.settings.gain_sd_q16[14];
@@ -166,19 +146,17 @@ TEST(touches_tell_the_gains_of_a_pad_without_a_calibration) {
 }
 
 TEST(a_profile_outlives_power_until_it_is_erased) {
-  struct wire_packet command = pad_command();
-  store_pad(&command);
+  store_pad();
   for (int restart = 0; restart < 2; restart++) {
     struct wire_info info = get_info();
     TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_PAD, info.stored);
-    TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_pad.profile, &info.pad, 4 * PAD_PROFILE_FLOATS + 1);
+    TEST_ASSERT_EQUAL_MEMORY(&pad, &info.pad, 4 * PAD_PROFILE_FLOATS + 1);
     TEST_ASSERT_NOT_NULL(app.stages.tangential.profile);
     TEST_ASSERT_EQUAL_UINT8(0, app.stages.location.settings.cut_noises);
     rig_power_up();
-    native_cdc_open();
-    run_for(300);
+    connect_for(300);
   }
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
+  obey((struct wire_packet){.type = WIRE_CMD_ERASE_PAD});
   TEST_ASSERT_NULL(app.stages.tangential.profile);
   TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.stages.location.settings.cut_noises);
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
@@ -189,46 +167,29 @@ TEST(a_profile_outlives_power_until_it_is_erased) {
 
 /* The Gaussian is where the estimate begins, and what is left where there is none. */
 TEST(beside_a_profile_the_fit_has_the_dip_and_assumes_no_width) {
-  native_cdc_open();
-  run_for(300);
-  struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE};
-  calibrate.body.cmd_calibrate.sensor_count = geometry.sensor_count;
-  calibrate.body.cmd_calibrate.calibration = (struct calibration){
-      .force_scale = 1.0f,
-      .sigma_um = 5552,
-      .sigma_sd_um = 60,
-      .dip_share_q16 = 3277,
-      .dip_sd_um = 13954,
-  };
-  for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    calibrate.body.cmd_calibrate.calibration.sensors[k].gain = 1.0f;
-  }
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
-  struct wire_packet command = pad_command();
-  store_pad(&command);
+  connect_for(300);
+  obey(calibrate_command((struct calibration){
+      .force_scale = 1.0f, .sigma_um = 5552, .sigma_sd_um = 60, .dip_share_q16 = 3277, .dip_sd_um = 13954}));
+  store_pad();
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.stages.location.settings.dip_share);
   TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
 }
 
 TEST(a_profile_out_of_range_is_refused) {
-  native_cdc_open();
-  run_for(300);
-  struct wire_packet command = pad_command();
-  command.body.cmd_pad.profile.thickness_mm = 3.9f;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
-  command = pad_command();
-  command.body.cmd_pad.profile.from_touch = 2;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
+  connect_for(300);
+  pad.thickness_mm = 3.9f;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(PAD, pad, pad)));
+  pad = pad_of_12_mm();
+  pad.from_touch = 2;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(PAD, pad, pad)));
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
   TEST_ASSERT_NULL(app.stages.tangential.profile);
 }
 
 /* Of a firmware that knew other ranges. */
 TEST(a_stored_profile_out_of_range_does_not_act) {
-  native_cdc_open();
-  run_for(300);
-  struct pad_profile pad = pad_of_12_mm();
+  connect_for(300);
   pad.thickness_mm = 25.0f;
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&app.store, &pad));
   run_for(300);
@@ -237,27 +198,18 @@ TEST(a_stored_profile_out_of_range_does_not_act) {
     TEST_ASSERT_NULL(app.stages.tangential.profile);
     TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
     rig_power_up();
-    native_cdc_open();
-    run_for(300);
+    connect_for(300);
   }
 }
 
 TEST(a_calibration_and_the_scale_of_the_profile_act) {
   load.qx_N = 1.2;
-  struct wire_packet command = pad_command();
-  command.body.cmd_pad.profile.tangential_scale = 1.5f;
-  store_pad(&command);
-  struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE,
-                                  .body.cmd_calibrate = {.sensor_count = geometry.sensor_count}};
-  calibrate.body.cmd_calibrate.calibration =
-      (struct calibration){.placements = 20, .force_scale = 1.25f, .force_scale_sd = 0.0f};
-  for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){.gain = 1.0f, .gain_sd = 0.01f};
-  }
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
+  pad.tangential_scale = 1.5f;
+  store_pad();
+  obey(calibrate_command((struct calibration){.placements = 20, .force_scale = 1.25f}));
   struct wire_contact contact =
       last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_CALIBRATED, 0);
-  const float scale = 1.25f * command.body.cmd_pad.profile.force_ratio;
+  const float scale = 1.25f * pad.force_ratio;
   TEST_ASSERT_FLOAT_WITHIN(0.2f, scale * 5.0f, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
   TEST_ASSERT_EQUAL_FLOAT(scale * app.found.tangential->force_N, contact.force_N);
@@ -270,9 +222,8 @@ TEST(from_touch_tells_what_changed) {
   load.qx_N = 1.2;
   load.later_qx_N = 0.2;
   load.later_us = 1800000;
-  struct wire_packet command = pad_command();
-  command.body.cmd_pad.profile.from_touch = 1;
-  store_pad(&command);
+  pad.from_touch = 1;
+  store_pad();
   last_contact(1510000, 1595000, CONTACT_FLAG_FIT_VALID, TANGENTIAL);
   struct wire_contact contact = last_contact(1620000, 1790000, TANGENTIAL, 0);
   TEST_ASSERT_FLOAT_WITHIN(0.1f, 0.0f, contact.qx_N);
@@ -283,12 +234,11 @@ TEST(from_touch_tells_what_changed) {
 /* While the sensors measure their temperature the frame before goes out again, whole. */
 TEST(a_held_frame_repeats_the_load) {
   load.qx_N = 1.2;
-  struct wire_packet packet, command = pad_command();
-  store_pad(&command);
+  struct wire_packet packet;
+  store_pad();
   start_streams(WIRE_STREAM_CONTACT);
   run_for((uint32_t)((1700000 - port_now_us()) / 1000));
-  while (next_packet(&packet)) {
-  }
+  drop_packets();
   struct wire_contact before = {0};
   unsigned held = 0;
   run_for(1500);
@@ -309,10 +259,10 @@ enum { CONTACTS = 300 };
 
 /* Contact packets of a press with a load, from power-on on. */
 static unsigned take_contacts(struct wire_contact contacts[CONTACTS]) {
-  struct wire_packet packet, command = pad_command();
+  struct wire_packet packet;
   setUp();
   load.qx_N = 1.2;
-  store_pad(&command);
+  store_pad();
   start_streams(WIRE_STREAM_CONTACT);
   run_for((uint32_t)((1700000 - port_now_us()) / 1000));
   unsigned count = 0;
@@ -379,8 +329,7 @@ TEST(fast_frames_take_the_load_of_the_frame_before) {
     native_set_worker(processors == 2, 10);
     setUp();
     load.qx_N = 1.2;
-    struct wire_packet command = pad_command();
-    store_pad(&command);
+    store_pad();
     last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, 0);
     feed_fast(0.0);
     for (int i = 0; i < 10; i++) {
@@ -410,8 +359,7 @@ TEST(fast_frames_say_that_the_one_before_got_no_answer) {
   tearDown();
   native_set_worker(true, 10);
   setUp();
-  struct wire_packet command = pad_command();
-  store_pad(&command);
+  store_pad();
   last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, 0);
   feed_fast(0.0);
   for (int i = 0; i < 3; i++) {

@@ -82,10 +82,8 @@ static void run(struct told *told, const struct start *start) {
   native_flash_reset(1);
   rig_power_up_at(start->t_us);
   count_on(start->count);
-  native_cdc_open();
-  run_for(300);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}}));
+  connect_for(300);
+  obey(COMMAND(PAD, pad, pad_of_12_mm()));
   start_streams(WIRE_STREAM_ALL);
   for (unsigned ms = 0; ms < RUN_ms; ms += 20) {
     struct wire_packet packet;

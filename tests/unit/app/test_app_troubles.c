@@ -10,8 +10,7 @@ void setUp(void) { rig_start(); }
 void tearDown(void) { rig_end(); }
 
 TEST(damage_is_counted_and_unknown_commands_are_answered) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   static const uint8_t echo[] = {5, 'h', 'e', 'l', 'l', 0, 'x', 0, 0, 0};
   TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(echo, sizeof echo));
   run_for(50);
@@ -41,23 +40,19 @@ TEST(damage_is_counted_and_unknown_commands_are_answered) {
 }
 
 TEST(closing_the_port_ends_the_streams) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   start_streams(WIRE_STREAM_CONTACT);
   native_cdc_close();
   run_for(100);
   struct wire_packet packet;
-  while (next_packet(&packet)) {
-  }
+  drop_packets();
   wire_receiver_init(&receiver, wire_all_layouts);
-  native_cdc_open();
-  run_for(200);
+  connect_for(200);
   TEST_ASSERT_FALSE(next_packet(&packet));
 }
 
 TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
   native_cdc_stall(true);
   run_for(5000);
@@ -80,8 +75,7 @@ TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap) {
 }
 
 TEST(health_comes_each_second) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   start_streams(WIRE_STREAM_HEALTH);
   run_for(5000);
   struct wire_packet packet;
@@ -95,32 +89,27 @@ TEST(health_comes_each_second) {
 }
 
 TEST(the_loader_is_reached_by_command_and_by_touch) {
-  native_cdc_open();
-  run_for(300);
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
-                    ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {0}}));
+  connect_for(300);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(LOADER, loader, 0)));
   TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(200));
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
-                    ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}}));
+  obey(COMMAND(LOADER, loader, WIRE_LOADER_MAGIC));
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
 
   setUp();
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   native_cdc_request_loader();
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
 }
 
 static struct crash_record get_crash(void) {
   struct wire_packet packet;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_CRASH}));
+  obey((struct wire_packet){.type = WIRE_CMD_CRASH});
   TEST_ASSERT_TRUE(next_of_type(WIRE_CRASH, &packet));
   return packet.body.crash;
 }
 
 TEST(the_last_crash_is_told_when_asked_for) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   TEST_ASSERT_EQUAL(CRASH_NONE, get_crash().kind);
   struct crash_record crash = {.kind = CRASH_PANIC, .pc = 0x20000100, .t_us = 7000000};
   native_set_last_crash(&crash);
@@ -133,8 +122,7 @@ TEST(the_last_crash_is_told_when_asked_for) {
 
 TEST(what_happens_is_noted_for_the_record_of_a_crash) {
   uint8_t detail;
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   get_health();
   TEST_ASSERT_EQUAL(CRASH_EVENT_COMMAND, native_last_event(&detail));
   TEST_ASSERT_EQUAL_HEX8(WIRE_CMD_HEALTH, detail);
@@ -142,7 +130,7 @@ TEST(what_happens_is_noted_for_the_record_of_a_crash) {
   run_for(30);
   TEST_ASSERT_EQUAL(CRASH_EVENT_CLOSED, native_last_event(&detail));
   native_cdc_open();
-  ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}});
+  ask(COMMAND(KEEP, keep, 1));
   TEST_ASSERT_EQUAL(CRASH_EVENT_STORED, native_last_event(&detail));
   TEST_ASSERT_EQUAL(0, detail);
 }
@@ -163,9 +151,8 @@ TEST(more_failures_in_a_second_than_a_byte_holds_are_noted_as_255) {
 }
 
 TEST(at_the_slowest_rate_the_watchdog_is_fed) {
-  native_cdc_open();
-  run_for(300);
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
+  connect_for(300);
+  ask(COMMAND(RATE, rate, WIRE_RATE_MIN_mHz));
   run_for(25000);
 }
 
@@ -195,16 +182,14 @@ TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in) {
 TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful) {
   press.force_N = 5.0;
   press.from_us = 700000;
-  native_cdc_open();
-  run_for(600);
+  connect_for(600);
   start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
   run_for(200);
   struct wire_packet packet;
   while (array.command >> 4 != 5) {
     native_run_until(port_now_us() + 50, main_round, &app);
   }
-  while (next_packet(&packet)) {
-  }
+  drop_packets();
   array.fault = (struct sim_fault){.kind = SIM_FAULT_FLIP, .transfer = array.transfers + 1 + 7, .mask = 0x80000};
   run_for(80);
   int held = 0;
@@ -222,8 +207,7 @@ TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful) {
   TEST_ASSERT_EQUAL(1, held);
   TEST_ASSERT_GREATER_THAN(10, doubtful);
   run_for(60);
-  while (next_packet(&packet)) {
-  }
+  drop_packets();
   run_for(60);
   TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
   do {
@@ -242,17 +226,15 @@ TEST(test_stages_end_at_what_fits) {
 }
 
 TEST(test_uptime_keeps_the_rest_of_each_second) {
-  native_cdc_open();
-  run_for(300);
-  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1300}});
+  connect_for(300);
+  ask(COMMAND(RATE, rate, 1300));
   run_for(100000);
   const uint32_t now_s = (uint32_t)(port_now_us() / 1000000u);
   TEST_ASSERT_UINT32_WITHIN(2, now_s, get_health().uptime_s);
 }
 
 TEST(test_whether_the_watchdog_struck_is_told) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   TEST_ASSERT_EQUAL(0, get_health().watchdog_resets);
   native_start(true);
   native_set_event_source(next_event_us, &array);
@@ -261,8 +243,7 @@ TEST(test_whether_the_watchdog_struck_is_told) {
   array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
   native_cdc_reset();
   app_start(&app, sim_array_bus(&array));
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   TEST_ASSERT_EQUAL(1, get_health().watchdog_resets);
 }
 
@@ -273,8 +254,7 @@ TEST(test_the_port_tells_the_version) {
 }
 
 TEST(test_what_is_being_stored_is_told) {
-  native_cdc_open();
-  run_for(300);
+  connect_for(300);
   struct wire_packet keep = {.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}};
   struct wire_packet info = {.type = WIRE_CMD_INFO};
   send_packet(&keep);
@@ -283,7 +263,6 @@ TEST(test_what_is_being_stored_is_told) {
   TEST_ASSERT_TRUE(next_of_type(WIRE_INFO, &info));
   TEST_ASSERT_TRUE(info.body.info.stored & WIRE_STORED_WRITING);
   run_for(500);
-  while (next_packet(&info)) {
-  }
+  drop_packets();
   TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_WRITING);
 }

@@ -9,6 +9,8 @@
 #include "wire/packet.h"
 
 #include <float.h>
+#include <stdbool.h>
+#include <stddef.h>
 #include <string.h>
 
 static const uint8_t wire_types[] = {WIRE_CONTACT,    WIRE_RAW,           WIRE_INFO,
@@ -43,19 +45,6 @@ static inline uint64_t sample_u64(struct sampler *sampler) {
   uint64_t high = sample_u32(sampler);
   return high << 32 | sample_u32(sampler);
 }
-
-static inline int32_t sample_i32(struct sampler *sampler) {
-  switch (sampler->kind) {
-  case SAMPLE_GREATEST:
-    return INT32_MAX;
-  case SAMPLE_LEAST:
-    return INT32_MIN;
-  default:
-    return (int32_t)sample_u32(sampler);
-  }
-}
-
-static inline int16_t sample_i16(struct sampler *sampler) { return (int16_t)(sample_i32(sampler) >> 16); }
 
 /* Finite: the extremes, the smallest denormal, -0 and random bits. */
 static inline float sample_f32(struct sampler *sampler) {
@@ -95,275 +84,100 @@ static inline uint8_t sample_sensor_count(struct sampler *sampler) {
                                             : 1;
 }
 
-/* A quantity that is not valid is 0. */
-static inline void sample_contact(struct sampler *sampler, struct wire_contact *contact) {
-  contact->frame = sample_u32(sampler);
-  contact->flags = sample_u32(sampler);
-  contact->stages.convert_us = (uint16_t)sample_u32(sampler);
-  contact->stages.read_us = (uint16_t)sample_u32(sampler);
-  contact->stages.queue_us = (uint16_t)sample_u32(sampler);
-  contact->stages.condition_us = (uint16_t)sample_u32(sampler);
-  contact->stages.fit_us = (uint16_t)sample_u32(sampler);
-  contact->stages.contact_us = (uint16_t)sample_u32(sampler);
-  contact->stages.total_us = (uint16_t)sample_u32(sampler);
-  if (contact->flags & CONTACT_FLAG_FIT_VALID) {
-    contact->sensors_used = sample_u32(sampler);
-    contact->x_mm = sample_f32(sampler);
-    contact->y_mm = sample_f32(sampler);
-    contact->p0_Pa = sample_f32(sampler);
-    contact->sigma_mm = sample_f32(sampler);
-    contact->force_N = sample_f32(sampler);
-    contact->residual_rms_Pa = sample_f32(sampler);
+/* The kinds of fields, and runs of them: as packet.c has them. */
+enum kind { BYTES, TEXTS, SENSOR_COUNT, U16, U32, U64, F32, PAIRS, F32_PAIRS, SENSORS_F32, SENSORS_U16, WHEN };
+struct run {
+  uint8_t kind, count;
+  uint16_t offset;
+};
+
+/* The values of a packet one by one, in the order of the line. */
+struct walk {
+  struct wire_packet *packet;
+  const struct run *run, *end;
+  unsigned next;          /* in the run */
+  size_t offset;          /* in the body on the line */
+  const uint8_t *sensors; /* how many there are */
+};
+struct value {
+  enum kind kind; /* up to F32 */
+  uint8_t *field;
+  size_t offset;
+};
+
+#define RUN(kind, count, field)                                                                                        \
+  { kind, count, offsetof(struct wire_packet, body.field) }
+#define LAYOUT(name, of)                                                                                               \
+  if (packet->type == (of)) {                                                                                          \
+    walk.run = name##_runs;                                                                                            \
+    walk.end = name##_runs + sizeof name##_runs / sizeof name##_runs[0];                                               \
   }
-  if (contact->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
-    contact->location_sd_mm = sample_f32(sampler);
-    contact->force_sd_N = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_SLIP_VALID) {
-    contact->slip_mm = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_WIDTHS_VALID) {
-    contact->sigma_x_mm = sample_f32(sampler);
-    contact->sigma_y_mm = sample_f32(sampler);
-    contact->width_correlation = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_TANGENTIAL_VALID) {
-    contact->qx_N = sample_f32(sampler);
-    contact->qy_N = sample_f32(sampler);
-    contact->q_sd_N = sample_f32(sampler);
-    contact->tangential_ratio = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_VELOCITY_VALID) {
-    contact->vx_mm_s = sample_f32(sampler);
-    contact->vy_mm_s = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_SHAPE_VALID) {
-    contact->shape_age_ms = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_TWO_CONTACTS) {
-    contact->x1_mm = sample_f32(sampler);
-    contact->y1_mm = sample_f32(sampler);
-    contact->location1_sd_mm = sample_f32(sampler);
-    contact->force1_N = sample_f32(sampler);
-    contact->force1_sd_N = sample_f32(sampler);
-    contact->x2_mm = sample_f32(sampler);
-    contact->y2_mm = sample_f32(sampler);
-    contact->location2_sd_mm = sample_f32(sampler);
-    contact->force2_N = sample_f32(sampler);
-    contact->force2_sd_N = sample_f32(sampler);
-  }
-  if (contact->flags & CONTACT_FLAG_EDGE) {
-    contact->edge_angle_deg = sample_f32(sampler);
-    contact->edge_angle_sd_deg = sample_f32(sampler);
-    contact->edge_length_mm = sample_f32(sampler);
-  }
+#define EMPTY_LAYOUT(name, of)
+static inline struct walk walk_begin(struct wire_packet *packet) {
+  struct walk walk = {.packet = packet};
+#include "wire/layouts.inc"
+  return walk;
 }
 
-static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
-  raw->frame = sample_u32(sampler);
-  raw->flags = sample_u32(sampler);
-  raw->valid = sample_u32(sampler);
-  raw->saturated = sample_u32(sampler);
-  raw->doubtful = sample_u32(sampler);
-  raw->temperature_cC = sample_i16(sampler);
-  raw->sensor_count = sample_sensor_count(sampler);
-  for (int k = 0; k < raw->sensor_count; k++) {
-    raw->pressure_Pa_q10[k] = sample_i32(sampler);
-    raw->baseline_Pa_q10[k] = sample_i32(sampler);
+static inline bool walk_on(struct walk *walk, struct value *value) {
+  static const uint8_t bytes[] = {1, WIRE_TEXT_BYTES, 1, 2, 4, 8, 4};
+  static const enum kind kinds[] = {BYTES, TEXTS, SENSOR_COUNT, U16, U32, U64, F32, U32, F32, F32, U16};
+  while (walk->run != walk->end) {
+    const struct run *run = walk->run;
+    uint8_t *field = (uint8_t *)walk->packet + run->offset;
+    if (run->kind == WHEN) {
+      uint32_t flags;
+      memcpy(&flags, field, sizeof flags);
+      walk->run += flags >> run->count & 1u ? 1 : 2;
+      continue;
+    }
+    const bool pairs = run->kind == PAIRS || run->kind == F32_PAIRS;
+    const unsigned each = pairs ? 2 : run->count, sensor = walk->next / each, at = walk->next % each;
+    if (walk->next == each * (run->kind >= PAIRS ? *walk->sensors : 1u)) {
+      walk->next = 0;
+      walk->run++;
+      continue;
+    }
+    value->kind = kinds[run->kind];
+    value->field = field + bytes[value->kind] * at + sizeof(struct sensor_calibration) * sensor;
+    if (pairs) {
+      value->field = field + 4 * (sensor + FT_MAX_SENSORS * at);
+    } else if (run->kind == SENSOR_COUNT) {
+      walk->sensors = field;
+    }
+    value->offset = walk->offset;
+    walk->offset += bytes[value->kind];
+    walk->next++;
+    return true;
   }
+  return false;
 }
 
-static inline void sample_calibration(struct sampler *sampler, unsigned sensor_count, struct calibration *calibration) {
-  calibration->date_s = sample_u32(sampler);
-  calibration->placements = (uint16_t)sample_u32(sampler);
-  calibration->force_scale = sample_f32(sampler);
-  calibration->force_scale_sd = sample_f32(sampler);
-  calibration->sigma_um = (uint16_t)sample_u32(sampler);
-  calibration->sigma_sd_um = (uint16_t)sample_u32(sampler);
-  calibration->dip_share_q16 = (uint16_t)sample_u32(sampler);
-  calibration->dip_sd_um = (uint16_t)sample_u32(sampler);
-  calibration->ambient_kPa = (uint8_t)sample_u32(sampler);
-  for (unsigned k = 0; k < sensor_count; k++) {
-    calibration->sensors[k].gain = sample_f32(sampler);
-    calibration->sensors[k].gain_sd = sample_f32(sampler);
+/* On a machine that is little-endian. */
+static inline void sample_value(struct sampler *sampler, const struct value *value) {
+  static const uint8_t bytes[] = {1, 0, 1, 2, 4, 8, 4};
+  const uint8_t size = bytes[value->kind];
+  if (value->kind == TEXTS) {
+    sample_text(sampler, (char *)value->field);
+    return;
   }
-  for (unsigned k = 0; k < sensor_count; k++) {
-    calibration->sensors[k].off_x_um = sample_i16(sampler);
-    calibration->sensors[k].off_y_um = sample_i16(sampler);
-    calibration->sensors[k].wider_q15 = sample_i16(sampler);
-  }
+  const uint64_t bits = value->kind == F32              ? bytes_from_f32(sample_f32(sampler))
+                        : value->kind == SENSOR_COUNT   ? sample_sensor_count(sampler)
+                        : sampler->kind == SAMPLE_LEAST ? UINT64_C(1) << (8 * size - 1)
+                                                        : sample_u64(sampler);
+  memcpy(value->field, &bits, size);
 }
 
-static inline void sample_pad(struct sampler *sampler, struct pad_profile *pad) {
-  for (size_t i = 0; i < PAD_PROFILE_FLOATS; i++) {
-    ((float *)(void *)pad)[i] = sample_f32(sampler);
-  }
-  pad->from_touch = (uint8_t)sample_u32(sampler);
-}
-
-static inline void sample_info(struct sampler *sampler, struct wire_info *info) {
-  for (int i = 0; i < 3; i++) {
-    info->firmware_version[i] = (uint8_t)sample_u32(sampler);
-  }
-  info->sensor_count = sample_sensor_count(sampler);
-  sample_text(sampler, info->git_hash);
-  sample_text(sampler, info->board);
-  sample_text(sampler, info->scene);
-  sample_text(sampler, info->serial);
-  info->rate_mHz = sample_u32(sampler);
-  info->measured_rate_mHz = sample_u32(sampler);
-  info->osr = (uint16_t)sample_u32(sampler);
-  info->temperature_interval_ms = (uint16_t)sample_u32(sampler);
-  info->streams = (uint8_t)sample_u32(sampler);
-  info->capabilities = sample_u32(sampler);
-  if (info->capabilities & WIRE_CAPABILITY_FIT) {
-    info->fit_iterations = (uint8_t)sample_u32(sampler);
-  }
-  if (info->capabilities & WIRE_CAPABILITY_SLIP) {
-    info->slip_window_ms = (uint16_t)sample_u32(sampler);
-    info->slip_threshold_mm = sample_f32(sampler);
-  }
-  info->pitch_mm = sample_f32(sampler);
-  for (int k = 0; k < info->sensor_count; k++) {
-    info->x_mm[k] = sample_f32(sampler);
-    info->y_mm[k] = sample_f32(sampler);
-  }
-  if (info->capabilities & WIRE_CAPABILITY_FIT) {
-    info->prior_sigma_mm = sample_f32(sampler);
-    info->prior_width_mm = sample_f32(sampler);
-    info->location_limit_mm = sample_f32(sampler);
-  }
-  if (info->capabilities & WIRE_CAPABILITY_SYNC) {
-    info->sync = (uint8_t)sample_u32(sampler);
-  }
-  info->stored = sample_u32(sampler);
-  if (info->stored & WIRE_STORED_CALIBRATION) {
-    sample_calibration(sampler, info->sensor_count, &info->calibration);
-  }
-  if (info->stored & WIRE_STORED_PAD) {
-    sample_pad(sampler, &info->pad);
-  }
-}
-
-static inline void sample_health(struct sampler *sampler, struct wire_health *health) {
-  uint32_t *counters[] = {&health->uptime_s,
-                          &health->frames,
-                          &health->frames_incomplete,
-                          &health->frames_skipped,
-                          &health->packets_sent,
-                          &health->packets_dropped,
-                          &health->commands_done,
-                          &health->commands_rejected,
-                          &health->bus_nacks,
-                          &health->bus_timeouts,
-                          &health->bus_recoveries,
-                          &health->zero_readings,
-                          &health->implausible_readings,
-                          &health->capabilities,
-                          &health->sensors_present,
-                          &health->sensors_prom_bad,
-                          &health->watchdog_resets};
-  for (size_t i = 0; i < sizeof counters / sizeof counters[0]; i++) {
-    *counters[i] = sample_u32(sampler);
-  }
-  health->cpu_busy_permille = (uint16_t)sample_u32(sampler);
-  health->stack_free_bytes = (uint16_t)sample_u32(sampler);
-  if (health->capabilities & WIRE_CAPABILITY_FIT) {
-    health->fit_failures = sample_u32(sampler);
-  }
-}
-
-static inline void sample_crash(struct sampler *sampler, struct crash_record *crash) {
-  uint8_t *bytes[] = {&crash->kind, &crash->exception, &crash->vector, &crash->activity, &crash->stuck};
-  for (size_t i = 0; i < sizeof bytes / sizeof bytes[0]; i++) {
-    *bytes[i] = (uint8_t)sample_u32(sampler);
-  }
-  uint32_t *registers[] = {&crash->r0, &crash->r1, &crash->r2,   &crash->r3, &crash->r12,
-                           &crash->lr, &crash->pc, &crash->xpsr, &crash->sp};
-  for (size_t i = 0; i < sizeof registers / sizeof registers[0]; i++) {
-    *registers[i] = sample_u32(sampler);
-  }
-  for (int i = 0; i < CRASH_EVENTS; i++) {
-    crash->event_codes[i] = (uint8_t)sample_u32(sampler);
-    crash->event_details[i] = (uint8_t)sample_u32(sampler);
-    crash->event_ages_1024us[i] = sample_u32(sampler);
-  }
-  crash->t_us = sample_u64(sampler);
-}
-
-/* Every byte of the packet is defined, so that two of them may be compared as memory. */
+/* Every byte of the packet is defined, so that two of them may be compared as memory. A quantity that is not valid is
+ * 0. test_wire_vectors.c shows that the layouts leave no field out. */
 static inline void sample_packet(struct sampler *sampler, uint8_t type, struct wire_packet *packet) {
   memset(packet, 0, sizeof *packet);
   packet->type = type;
   packet->sequence = (uint16_t)sample_u32(sampler);
   packet->t_us = sample_u64(sampler);
-  switch (type) {
-  case WIRE_CONTACT:
-    sample_contact(sampler, &packet->body.contact);
-    break;
-  case WIRE_RAW:
-    sample_raw(sampler, &packet->body.raw);
-    break;
-  case WIRE_INFO:
-    sample_info(sampler, &packet->body.info);
-    break;
-  case WIRE_HEALTH:
-    sample_health(sampler, &packet->body.health);
-    break;
-  case WIRE_CRASH:
-    sample_crash(sampler, &packet->body.crash);
-    break;
-  case WIRE_SYNC:
-    packet->body.sync.number = sample_u32(sampler);
-    packet->body.sync.level = (uint8_t)sample_u32(sampler);
-    break;
-  case WIRE_CMD_SYNC:
-    packet->body.cmd_sync.mode = (uint8_t)sample_u32(sampler);
-    break;
-  case WIRE_ACK:
-    packet->body.ack.command = (uint8_t)sample_u32(sampler);
-    packet->body.ack.result = (uint8_t)sample_u32(sampler);
-    packet->body.ack.sequence = (uint16_t)sample_u32(sampler);
-    packet->body.ack.host_time_us = sample_u64(sampler);
-    break;
-  case WIRE_CMD_STREAM:
-    packet->body.cmd_stream.streams = (uint8_t)sample_u32(sampler);
-    break;
-  case WIRE_CMD_RATE:
-    packet->body.cmd_rate.rate_mHz = sample_u32(sampler);
-    break;
-  case WIRE_CMD_OSR:
-    packet->body.cmd_osr.osr = (uint16_t)sample_u32(sampler);
-    break;
-  case WIRE_CMD_SLIP:
-    packet->body.cmd_slip.threshold_mm = sample_f32(sampler);
-    packet->body.cmd_slip.window_ms = (uint16_t)sample_u32(sampler);
-    break;
-  case WIRE_CMD_LOADER:
-    packet->body.cmd_loader.magic = sample_u32(sampler);
-    break;
-  case WIRE_CMD_CALIBRATE:
-    packet->body.cmd_calibrate.sensor_count = sample_sensor_count(sampler);
-    sample_calibration(sampler, packet->body.cmd_calibrate.sensor_count, &packet->body.cmd_calibrate.calibration);
-    break;
-  case WIRE_CMD_TARE:
-    packet->body.cmd_tare.force = (uint8_t)sample_u32(sampler);
-    break;
-  case WIRE_CMD_KEEP:
-    packet->body.cmd_keep.keep = (uint8_t)sample_u32(sampler);
-    break;
-  case WIRE_CMD_PRIOR:
-    packet->body.cmd_prior.sigma_mm = sample_f32(sampler);
-    packet->body.cmd_prior.width_mm = sample_f32(sampler);
-    break;
-  case WIRE_CMD_LOCATION_LIMIT:
-    packet->body.cmd_location_limit.limit_mm = sample_f32(sampler);
-    break;
-  case WIRE_CMD_PAD:
-    sample_pad(sampler, &packet->body.cmd_pad.profile);
-    break;
-  default:
-    break;
+  struct walk walk = walk_begin(packet);
+  for (struct value value; walk_on(&walk, &value);) {
+    sample_value(sampler, &value);
   }
 }
 
