@@ -64,15 +64,16 @@ REPORTS = {
         "found": {
             "touches": {
                 **{"two_right_percent_8mm": 59.0, "one_called_two_percent": 0.1},
-                "touches": [
-                    {"case": f"two, {apart} mm, {ratio}", **PAIR} for ratio in ("1:1", "3:1") for apart in (6, 8, 10, 12, 15, 20)
-                ],
+                "touches": [{"case": f"two, {apart} mm, {ratio}", **PAIR} for ratio in ("1:1", "3:1") for apart in (6, 8, 10, 12, 15, 20)],
             }
         },
         "met": ("one_called_two_percent",),
         "missed": ("two_right_percent_8mm",),
         "open": "cycles_core1_max",
-        "lines": ("| two_right_percent_8mm | 59 | >= 90 | MISSED |", "| two, 12 mm, 3:1 | 0 | 0 | 0 | 0 | 40 | 60 | 59 | 70 | 90 | 0.2 | 0.9 |"),
+        "lines": (
+            "| two_right_percent_8mm | 59 | >= 90 | MISSED |",
+            "| two, 12 mm, 3:1 | 0 | 0 | 0 | 0 | 40 | 60 | 59 | 70 | 90 | 0.2 | 0.9 |",
+        ),
         "not_built": "cycles",
     },
 }
@@ -147,7 +148,9 @@ if NAME == "truth":
 
     class Truth(Folder):
         def test_options_reach_the_parts_and_a_missing_build_is_an_error(self):
-            with mock.patch.dict(report.FIGURES, gate=lambda firmware, options: {"options": [options.seed, options.pads, options.recordings]}):
+            with mock.patch.dict(
+                report.FIGURES, gate=lambda firmware, options: {"options": [options.seed, options.pads, options.recordings]}
+            ):
                 self.run_parts("gate", "--seed", "3", "--pads", "2", "--recordings", "strips")
             self.assertEqual(json.loads((self.out / "truth.json").read_text())["options"], [3, 2, "strips"])
             with mock.patch.object(report, "Measure", side_effect=report.MeasureError("build it")):

@@ -72,27 +72,6 @@ TEST(test_window_shorter_than_the_interval_compares_with_the_frame_before) {
   compare_with_eq7(at_20_Hz, 1, 0);
 }
 
-/* n counts the frames of the window: v (window + interval) / 2, whatever the rate. */
-TEST(test_constant_speed) {
-  static const uint64_t intervals_us[] = {50000, 20000, 10000, 5000, 2500, 1000, 625};
-  for (size_t i = 0; i < sizeof intervals_us / sizeof intervals_us[0]; i++) {
-    static const float speeds_mm_s[] = {0.0f, 1.0f, 10.0f, 100.0f};
-    for (size_t s = 0; s < 4; s++) {
-      slip_reset(&history);
-      float distance_mm = 0.0f;
-      bool full = false;
-      uint64_t end_us = 2 * WINDOW_us;
-      for (uint64_t t_us = 0; t_us <= end_us; t_us += intervals_us[i]) {
-        float way_mm = speeds_mm_s[s] * 1e-6f * (float)t_us;
-        full = slip_update(&history, t_us, 0.6f * way_mm, -0.8f * way_mm, WINDOW_us, &distance_mm);
-        TEST_ASSERT_EQUAL(t_us >= WINDOW_us, full);
-      }
-      float expected_mm = speeds_mm_s[s] * 1e-6f * (float)(WINDOW_us + intervals_us[i]) / 2.0f;
-      TEST_ASSERT_FLOAT_WITHIN(ROUNDING_mm + 1e-5f * expected_mm, expected_mm, distance_mm);
-    }
-  }
-}
-
 /* At 3 kHz the window holds more than the memory: the newest SLIP_CAPACITY count. */
 TEST(test_window_beyond_the_capacity) {
   const uint64_t interval_us = 333;
@@ -106,19 +85,6 @@ TEST(test_window_beyond_the_capacity) {
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT16(SLIP_CAPACITY, history.count);
   }
-}
-
-TEST(test_reset_forgets) {
-  float distance_mm = -1.0f;
-  for (uint64_t i = 0; i < 10; i++) {
-    slip_update(&history, 50000 * i, 10.0f, 10.0f, WINDOW_us, &distance_mm);
-  }
-  TEST_ASSERT_FLOAT_WITHIN(1e-9f, 0.0f, distance_mm);
-  slip_reset(&history);
-  TEST_ASSERT_FALSE(slip_update(&history, 500000, -10.0f, 0.0f, WINDOW_us, &distance_mm));
-  TEST_ASSERT_FALSE(slip_update(&history, 550000, -10.0f, 0.0f, WINDOW_us, &distance_mm));
-  TEST_ASSERT_TRUE(slip_update(&history, 600000, -10.0f, 1.0f, WINDOW_us, &distance_mm));
-  TEST_ASSERT_FLOAT_WITHIN(ROUNDING_mm, 1.0f, distance_mm);
 }
 
 /* After a pause without a reset the frame before is all there is; then the window fills again. */

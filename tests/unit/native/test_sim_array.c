@@ -89,14 +89,6 @@ TEST(test_a_frame_and_its_bus_time) {
   TEST_ASSERT_EQUAL_UINT32(0, array.early_reads);
 }
 
-TEST(test_proms_differ_and_are_read) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_C1, 2));
-  for (unsigned k = 0; k < SENSORS; k++) {
-    TEST_ASSERT_EQUAL_UINT16(array.sensor[k].prom[1], result.bytes[k][0] << 8 | result.bytes[k][1]);
-  }
-  TEST_ASSERT_NOT_EQUAL_UINT16(array.sensor[0].prom[1], array.sensor[1].prom[1]);
-}
-
 static double ramp_Pa(void *context, unsigned sensor, uint64_t t_us) {
   (void)context;
   return 100000.0 + 1000.0 * sensor + (double)t_us / 1000.0;
@@ -135,19 +127,6 @@ TEST(test_noise_is_the_datasheets) {
   TEST_ASSERT_DOUBLE_WITHIN(0.05 * 11.0, 11.0, sqrt(squares / readings));
 }
 
-TEST(test_the_same_seed_gives_the_same_noise) {
-  uint32_t codes[2][2];
-  for (int run = 0; run < 2; run++) {
-    setUp();
-    array.noise = 1.0;
-    memset(array.d1, 0, sizeof array.d1);
-    TEST_ASSERT_EQUAL_INT(FT_OK, frame());
-    codes[run][0] = code(0);
-    codes[run][1] = code(1);
-  }
-  TEST_ASSERT_EQUAL_UINT32_ARRAY(codes[0], codes[1], 2);
-}
-
 TEST(test_early_reads_are_seen) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
@@ -156,16 +135,6 @@ TEST(test_early_reads_are_seen) {
   TEST_ASSERT_EQUAL_UINT32(0, code(0));
   TEST_ASSERT_EQUAL_UINT32(0, code(1));
   TEST_ASSERT_EQUAL_UINT32(1000002, code(2));
-}
-
-TEST(test_an_absent_sensor) {
-  array.absent[4] = true;
-  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
-  TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
-  now_us += CONVERT_us;
-  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 4), result.acknowledged);
-  TEST_ASSERT_EQUAL_UINT32(1, result.nacks);
 }
 
 TEST(test_nack_of_a_command_and_of_a_read) {

@@ -56,18 +56,6 @@ TEST(test_the_inverse_meets_pressure_and_temperature) {
   }
 }
 
-TEST(test_the_crc_covers_every_bit) {
-  uint16_t prom[7];
-  memcpy(prom, sensor.prom, sizeof prom);
-  const uint8_t crc = (uint8_t)(prom[0] >> 12);
-  TEST_ASSERT_EQUAL_HEX8(crc, sim_ms5840_crc4(prom));
-  for (unsigned bit = 4; bit < 112; bit++) {
-    prom[bit / 16] ^= (uint16_t)(0x8000u >> bit % 16);
-    TEST_ASSERT_NOT_EQUAL_HEX8(crc, sim_ms5840_crc4(prom));
-    prom[bit / 16] ^= (uint16_t)(0x8000u >> bit % 16);
-  }
-}
-
 TEST(test_reset_reloads_for_2800_us) {
   uint8_t bytes[2];
   TEST_ASSERT_FALSE(sim_ms5840_read(&sensor, 0xA2, bytes, 2, SIM_MS5840_RESET_us - 1));

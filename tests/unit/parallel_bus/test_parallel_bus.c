@@ -184,15 +184,6 @@ TEST(test_missing_sensors_in_every_place) {
   }
 }
 
-TEST(test_nobody_answers) {
-  fake.missing = ALL;
-  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
-  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
-  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
-  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
-  TEST_ASSERT_EQUAL_UINT32(BOARD_SENSOR_COUNT, result.nacks);
-}
-
 TEST(test_a_refused_command_is_not_acknowledged) {
   fake.deaf = 1u << 6;
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
@@ -215,14 +206,6 @@ TEST(test_a_line_held_low_costs_its_own_sensor_only) {
     fake.held_low = 0;
     expect_good_frame();
   }
-}
-
-TEST(test_a_line_held_high_costs_its_own_sensor_only) {
-  fake.held_high = 1u << 14;
-  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 14), result.acknowledged);
-  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
-  expect_bytes(ALL & ~(1u << 14), READ_ADC, 3);
 }
 
 TEST(test_a_sensor_that_lost_its_place_is_clocked_free_alone) {
@@ -357,12 +340,4 @@ TEST(test_bytes_are_taken_while_the_last_one_comes) {
   TEST_ASSERT_EQUAL_HEX8(fake_byte(7, READ_ADC, 1), result.bytes[7][1]);
   TEST_ASSERT_TRUE(end_us > fake_lines_next_event_us());
   TEST_ASSERT_EQUAL_INT(FT_OK, finish());
-}
-
-/* START, address and command of 18 clocks at 2.52 us each, up to the sample of the last, and 2 us.
- */
-TEST(test_a_read_leads_by_its_command) {
-  TEST_ASSERT_EQUAL_UINT((I2C_WAVE_COMMAND_ns + 2000u) / 1000u, bus.read_lead_us);
-  TEST_ASSERT_UINT_WITHIN(5, 48, bus.read_lead_us);
-  TEST_ASSERT_TRUE(bus.answers_are_single);
 }

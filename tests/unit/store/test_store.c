@@ -150,6 +150,11 @@ static enum ft_status finish(void) {
   return status;
 }
 
+static void expect_kept(enum ft_status begun) {
+  TEST_ASSERT_EQUAL(FT_PENDING, begun);
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+}
+
 static void restart(void) {
   native_flash_power_up();
   store_init(&store, sensors);
@@ -318,12 +323,9 @@ static struct store_content keep_something(void) {
   content.calibration = some_calibration();
   content.settings = some_settings();
   content.profile = some_profile();
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &content.profile));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &content.calibration));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &content.settings));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
+  expect_kept(store_put_profile(&store, &content.profile));
+  expect_kept(store_put_calibration(&store, &content.calibration));
+  expect_kept(store_put_settings(&store, &content.settings));
   return content;
 }
 
@@ -344,8 +346,7 @@ TEST(damage_is_told_and_nothing_is_used) {
     TEST_ASSERT_EQUAL_MEMORY(&damaged, &native_flash, sizeof damaged);
   }
   struct store_content again = {.has_calibration = true, .calibration = some_calibration()};
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &again.calibration));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
+  expect_kept(store_put_calibration(&store, &again.calibration));
   TEST_ASSERT_FALSE(store.damaged);
   restart();
   TEST_ASSERT_FALSE(store.damaged);
@@ -357,8 +358,7 @@ TEST(forgetting_mends_damage) {
   native_flash.bytes[2 * STORE_SHORT_SLOT_BYTES + 100] ^= 1;
   restart();
   TEST_ASSERT_TRUE(store.damaged);
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, NULL));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
+  expect_kept(store_put_settings(&store, NULL));
   restart();
   TEST_ASSERT_FALSE(store.damaged || store.content.has_settings);
 }
@@ -381,8 +381,7 @@ enum { LENGTH_3 = LENGTH_OF_3(SENSORS) };
 
 TEST(what_another_firmware_wrote_is_left_alone) {
   struct calibration calibration = some_calibration();
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
+  expect_kept(store_put_calibration(&store, &calibration));
   const struct native_flash ours = native_flash;
   alter_record(8, 4); /* as it was: the bytes are where the header says */
   TEST_ASSERT_EQUAL_MEMORY(&ours, &native_flash, sizeof ours);
@@ -417,8 +416,7 @@ TEST(generations_go_round) {
       finish();
       kept.has_settings = true;
       kept.settings = some_settings();
-      TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &kept.settings));
-      TEST_ASSERT_EQUAL(FT_OK, finish());
+      expect_kept(store_put_settings(&store, &kept.settings));
       restart();
       TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
       TEST_ASSERT_TRUE(store.content.has_settings);
@@ -435,24 +433,6 @@ static void forget_places(struct calibration *calibration) {
   }
 }
 
-/* As the firmware before the sensors' places wrote it, without their bytes. */
-TEST(records_of_version_3_are_read) {
-  struct store_content kept = keep_something();
-  begin_with(SENSORS);
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  memset(native_flash.bytes + 20 + LENGTH_3, 0xFF, 6 * SENSORS);
-  alter_record(8, 3);
-  alter_record(10, LENGTH_3);
-  restart();
-  TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
-  kept.has_settings = kept.has_profile = false;
-  memset(&kept.settings, 0, sizeof kept.settings);
-  memset(&kept.profile, 0, sizeof kept.profile);
-  forget_places(&kept.calibration);
-  TEST_ASSERT_TRUE(is(&kept));
-}
-
 /* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as
  * it wrote them: the last counts, and the next goes into the other sector, whenever power is lost.
  */
@@ -466,8 +446,7 @@ TEST(short_slots_of_the_largest_array_are_read) {
       begin_with(FT_MAX_SENSORS);
       kept.has_calibration = true;
       kept.calibration = some_calibration();
-      TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
-      TEST_ASSERT_EQUAL(FT_OK, finish());
+      expect_kept(store_put_calibration(&store, &kept.calibration));
       alter_record(8, 3);
       alter_record(10, LENGTH);
       memcpy(earlier + i * SLOT, native_flash.bytes, 20 + LENGTH);
@@ -484,64 +463,45 @@ TEST(short_slots_of_the_largest_array_are_read) {
   }
 }
 
-/* As the firmware before the calibration's shape wrote it, without its bytes. */
-TEST(records_of_version_2_are_read) {
-  struct store_content kept = keep_something();
-  begin_with(SENSORS);
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  enum { LENGTH_2 = 4 + 14 + 8 * SENSORS + 24 + 177 };
-  memset(native_flash.bytes + 20 + LENGTH_2, 0xFF, 9 + 6 * SENSORS);
-  alter_record(8, 2);
-  alter_record(10, LENGTH_2);
-  restart();
-  TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
-  TEST_ASSERT_TRUE(store.content.has_calibration);
-  struct calibration read = store.content.calibration;
-  TEST_ASSERT_EQUAL_UINT16(0, read.sigma_um);
-  TEST_ASSERT_EQUAL_UINT8(0, read.ambient_kPa);
-  read.sigma_um = kept.calibration.sigma_um;
-  read.sigma_sd_um = kept.calibration.sigma_sd_um;
-  read.dip_share_q16 = kept.calibration.dip_share_q16;
-  read.dip_sd_um = kept.calibration.dip_sd_um;
-  read.ambient_kPa = kept.calibration.ambient_kPa;
-  forget_places(&kept.calibration);
-  TEST_ASSERT_EQUAL_MEMORY(&kept.calibration, &read, sizeof read);
-}
-
-/* As the firmware before pad profiles wrote it: without their bytes, whatever bit 2 of the parts
- * said. The next write brings it to this version. */
-TEST(records_of_version_1_are_read) {
-  struct store_content kept = keep_something();
-  kept.calibration.sigma_um = kept.calibration.sigma_sd_um = 0;
-  kept.calibration.dip_share_q16 = kept.calibration.dip_sd_um = 0;
-  kept.calibration.ambient_kPa = 0;
-  forget_places(&kept.calibration);
-  begin_with(SENSORS);
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &kept.settings));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  memcpy(native_flash.bytes, native_flash.bytes + STORE_SHORT_SLOT_BYTES, STORE_SHORT_SLOT_BYTES);
-  memset(native_flash.bytes + STORE_SHORT_SLOT_BYTES, 0xFF, STORE_SHORT_SLOT_BYTES);
-  enum { LENGTH_1 = 4 + 14 + 8 * SENSORS + 24 };
-  memset(native_flash.bytes + 20 + LENGTH_1, 0xFF, PROFILE_BYTES + 9 + 6 * SENSORS);
-  alter_record(8, 1);
-  alter_record(10, LENGTH_1);
-  kept.has_profile = false;
-  memset(&kept.profile, 0, sizeof kept.profile);
-  for (int parts = 3; parts < 8; parts += 4) {
-    alter_record(20, (uint16_t)(SENSORS << 8 | parts));
+/* As earlier firmware wrote it, without the bytes that came later: the sensors' places, the calibration's shape, the
+ * profile. The next write brings it to this version. Bit 2 of the parts meant nothing in version 1. */
+TEST(records_of_earlier_versions_are_read) {
+  enum { OF_1 = 4 + 14 + 8 * SENSORS + 24, OF_2 = OF_1 + PROFILE_BYTES, LENGTH = LENGTH_3 + 6 * SENSORS };
+  static const uint16_t lengths[] = {OF_1, OF_2, LENGTH_3};
+  for (uint16_t version = 1; version <= 3; version++) {
+    struct store_content kept = keep_something();
+    if (version < 3) {
+      kept.calibration.sigma_um = kept.calibration.sigma_sd_um = 0;
+      kept.calibration.dip_share_q16 = kept.calibration.dip_sd_um = 0;
+      kept.calibration.ambient_kPa = 0;
+    }
+    forget_places(&kept.calibration);
+    begin_with(SENSORS);
+    if (version > 1) {
+      expect_kept(store_put_profile(&store, &kept.profile));
+    }
+    expect_kept(store_put_calibration(&store, &kept.calibration));
+    expect_kept(store_put_settings(&store, &kept.settings));
+    const int slot = version > 1 ? 2 : 1;
+    memmove(native_flash.bytes, native_flash.bytes + slot * STORE_SHORT_SLOT_BYTES, STORE_SHORT_SLOT_BYTES);
+    memset(native_flash.bytes + STORE_SHORT_SLOT_BYTES, 0xFF, 2 * STORE_SHORT_SLOT_BYTES);
+    memset(native_flash.bytes + 20 + lengths[version - 1], 0xFF, (size_t)(LENGTH - lengths[version - 1]));
+    alter_record(8, version);
+    alter_record(10, lengths[version - 1]);
+    if (version == 1) {
+      alter_record(20, SENSORS << 8 | 7);
+      kept.has_profile = false;
+      memset(&kept.profile, 0, sizeof kept.profile);
+    }
     restart();
     TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
     TEST_ASSERT_TRUE(is(&kept));
+    kept.has_profile = true;
+    kept.profile = some_profile();
+    expect_kept(store_put_profile(&store, &kept.profile));
+    restart();
+    TEST_ASSERT_TRUE(is(&kept));
   }
-  kept.has_profile = true;
-  kept.profile = some_profile();
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &kept.profile));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  restart();
-  TEST_ASSERT_TRUE(is(&kept));
 }
 
 /* Sectors that something else has used before. */
@@ -587,8 +547,7 @@ TEST(slots_that_do_not_hold_what_is_written_are_given_up) {
     }
     struct store_content changed = store.content;
     changed.calibration = some_calibration();
-    TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &changed.calibration));
-    TEST_ASSERT_EQUAL(FT_OK, finish());
+    expect_kept(store_put_calibration(&store, &changed.calibration));
     TEST_ASSERT_TRUE(is(&changed));
     restart();
     TEST_ASSERT_TRUE(is(&changed));
@@ -620,10 +579,8 @@ TEST(large_arrays_fit) {
     const struct pad_profile profile = some_profile();
     for (int i = 0; i < 20; i++) {
       calibration.date_s++;
-      TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &profile));
-      TEST_ASSERT_EQUAL(FT_OK, finish());
-      TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
-      TEST_ASSERT_EQUAL(FT_OK, finish());
+      expect_kept(store_put_profile(&store, &profile));
+      expect_kept(store_put_calibration(&store, &calibration));
       restart();
       TEST_ASSERT_EQUAL_MEMORY(&calibration, &store.content.calibration, sizeof calibration);
       TEST_ASSERT_EQUAL_MEMORY(&profile, &store.content.profile, PROFILE_BYTES);
