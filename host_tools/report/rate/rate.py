@@ -7,7 +7,7 @@
     rate.md      the same to read
     rate.png     the same to look at
 
-text.md describes what is measured.
+text.md.in describes what is measured.
 """
 
 import json

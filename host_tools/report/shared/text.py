@@ -1,6 +1,6 @@
-"""The text of a report: the file text.md of its folder with the figures filled in, then every table that this file does not name.
+"""The text of a report: the file text.md.in of its folder with the figures filled in, then every table that this file does not name.
 
-In text.md, {goals} is the table of goals, {table NAME} a table of the figures, and {NAME:.1f} a figure in Python's format. A section (##) whose
+In text.md.in, {goals} is the table of goals, {table NAME} a table of the figures, and {NAME:.1f} a figure in Python's format. A section (##) whose
 table was not measured is left out.
 """
 
@@ -50,5 +50,5 @@ def filled(template, found, pictured=()):
 
 def write(found, part, out, pictured=()):
     """PART.md in the folder of the reports."""
-    template = pathlib.Path(__file__).resolve().parents[1] / part / "text.md"
+    template = pathlib.Path(__file__).resolve().parents[1] / part / "text.md.in"
     write_text(out / f"{part}.md", filled(template.read_text(encoding="utf-8"), found, pictured))
