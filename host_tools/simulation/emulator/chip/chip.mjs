@@ -18,7 +18,7 @@
  */
 import { RP2040 } from 'rp2040js';
 import { Prng } from '../prng.mjs';
-import { Clocks, makeRosc, Pll, RESET_NAMES, Resets, ROSC_HZ, Xosc } from './clocks.mjs';
+import { Clocks, makeRosc, Pll, RESET_BLOCKS, Resets, ROSC_HZ, Xosc } from './clocks.mjs';
 import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
 import { Dma } from './dma.mjs';
 import { FlashMemory } from './flash_memory.mjs';
@@ -62,35 +62,7 @@ const BOOT_TRIES_CYCLES = 3.06e6;
 const HUNG_AFTER_NS = 2e9;
 
 /** Page (address >> 14) to bit in RESETS. */
-const RESET_BIT_OF_PAGE = new Map(
-  Object.entries({
-    0x40004000: 18,
-    0x40000000: 19,
-    0x40014000: 5,
-    0x40018000: 6,
-    0x4001c000: 8,
-    0x40020000: 9,
-    0x40028000: 12,
-    0x4002c000: 13,
-    0x40030000: 1,
-    0x40034000: 22,
-    0x40038000: 23,
-    0x4003c000: 16,
-    0x40040000: 17,
-    0x40044000: 3,
-    0x40048000: 4,
-    0x4004c000: 0,
-    0x40050000: 14,
-    0x40054000: 21,
-    0x4005c000: 15,
-    0x4006c000: 20,
-    0x50000000: 2,
-    0x50100000: 24,
-    0x50110000: 24,
-    0x50200000: 10,
-    0x50300000: 11,
-  }).map(([address, bit]) => [Number(address) >>> 14, bit]),
-);
+const RESET_BIT_OF_PAGE = new Map([...RESET_BLOCKS.map(([, address], bit) => [address >>> 14, bit]), [DPRAM_BASE >>> 14, 24]]);
 
 /** Ends the run; `reason` is what the report calls it. */
 export class Stopped extends Error {
@@ -256,7 +228,7 @@ export class Chip extends RP2040 {
 
   /** Record a failure and end the run. */
   fail(source, message) {
-    const pc = this.core?.registers?.[15] >>> 0;
+    const pc = (this.core?.at ?? this.core?.registers?.[15]) >>> 0;
     this.report.fail(source, `${message} (pc 0x${pc.toString(16)})`);
     throw new Stopped('failure');
   }
@@ -338,17 +310,13 @@ export class Chip extends RP2040 {
   }
 
   resetBlock(bit) {
-    if (bit === 3 || bit === 4) this.i2c[bit - 3].reset();
-    else if (bit === 12 || bit === 13) {
-      (bit === 12 ? this.pllSys : this.pllUsb).reset();
-      this.updateClocks();
-    } else if (bit === 21) this.timer.reset();
-    else if (bit === 24) this.usbCtrl.reset();
-    else if (bit === 2) this.dma.reset();
-    else if (bit === 10 || bit === 11) {
-      this.pio[bit - 10].reset();
-      this.pins.drive();
-    } else if (bit === 5 || bit === 8) {
+    const [i2c0, i2c1] = this.i2c;
+    const [pio0, pio1] = this.pio;
+    const { dma, pllSys, pllUsb, timer, usbCtrl } = this;
+    ({ 2: dma, 3: i2c0, 4: i2c1, 10: pio0, 11: pio1, 12: pllSys, 13: pllUsb, 21: timer, 24: usbCtrl })[bit]?.reset();
+    if (bit === 12 || bit === 13) this.updateClocks();
+    else if (bit === 10 || bit === 11) this.pins.drive();
+    else if (bit === 5 || bit === 8) {
       for (const pin of this.gpio) {
         if (bit === 5) pin.ctrl = 0x1f;
         else pin.padValue = 0x56;
@@ -403,9 +371,9 @@ export class Chip extends RP2040 {
   }
 
   #checkPage(address, what) {
-    const bit = RESET_BIT_OF_PAGE.get(address >>> 14) ?? (address >>> 16 === 0x5010 ? 24 : undefined);
+    const bit = RESET_BIT_OF_PAGE.get(address >>> 14);
     if (bit !== undefined && this.resets.isHeld(bit)) {
-      this.fail('RESETS', `${what} 0x${address.toString(16)} while ${RESET_NAMES[bit]} is held in reset`);
+      this.fail('RESETS', `${what} 0x${address.toString(16)} while ${RESET_BLOCKS[bit][0]} is held in reset`);
     }
   }
 

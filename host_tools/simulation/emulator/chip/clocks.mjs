@@ -5,7 +5,7 @@
  * full yet (a fault) counts as stable when its STARTUP has passed, and stops the chip once it drives a clock.
  */
 import { BasePeripheral } from 'rp2040js';
-import { RegisterFile } from './registers.mjs';
+import { field, RegisterBlock, RegisterFile } from './registers.mjs';
 
 export const XOSC_HZ = 12e6;
 /** Typical frequency of the ring oscillator; that of a part is from 1.8 to 12 MHz (pico-bootrom, bootrom_main.c). */
@@ -20,35 +20,36 @@ const TIMER = 21;
 /** What the boot ROM has released when it enters the second stage: IO_QSPI, PADS_QSPI, TIMER. */
 const RELEASED_BY_BOOT_ROM = (1 << 6) | (1 << 9) | (1 << 21);
 
-export const RESET_NAMES = [
-  'ADC',
-  'BUSCTRL',
-  'DMA',
-  'I2C0',
-  'I2C1',
-  'IO_BANK0',
-  'IO_QSPI',
-  'JTAG',
-  'PADS_BANK0',
-  'PADS_QSPI',
-  'PIO0',
-  'PIO1',
-  'PLL_SYS',
-  'PLL_USB',
-  'PWM',
-  'RTC',
-  'SPI0',
-  'SPI1',
-  'SYSCFG',
-  'SYSINFO',
-  'TBMAN',
-  'TIMER',
-  'UART0',
-  'UART1',
-  'USBCTRL',
+/** Name and address of each block, by its bit in RESETS. */
+export const RESET_BLOCKS = [
+  ['ADC', 0x4004c000],
+  ['BUSCTRL', 0x40030000],
+  ['DMA', 0x50000000],
+  ['I2C0', 0x40044000],
+  ['I2C1', 0x40048000],
+  ['IO_BANK0', 0x40014000],
+  ['IO_QSPI', 0x40018000],
+  ['JTAG', 0],
+  ['PADS_BANK0', 0x4001c000],
+  ['PADS_QSPI', 0x40020000],
+  ['PIO0', 0x50200000],
+  ['PIO1', 0x50300000],
+  ['PLL_SYS', 0x40028000],
+  ['PLL_USB', 0x4002c000],
+  ['PWM', 0x40050000],
+  ['RTC', 0x4005c000],
+  ['SPI0', 0x4003c000],
+  ['SPI1', 0x40040000],
+  ['SYSCFG', 0x40004000],
+  ['SYSINFO', 0x40000000],
+  ['TBMAN', 0x4006c000],
+  ['TIMER', 0x40054000],
+  ['UART0', 0x40034000],
+  ['UART1', 0x40038000],
+  ['USBCTRL', 0x50110000],
 ];
 
-export class Resets extends BasePeripheral {
+export class Resets extends RegisterBlock {
   constructor(chip) {
     super(chip, 'RESETS');
     this.held = RESET_BITS & ~RELEASED_BY_BOOT_ROM;
@@ -59,29 +60,24 @@ export class Resets extends BasePeripheral {
     return (this.held >>> bit) & 1;
   }
 
-  readUint32(offset) {
-    if (offset === 0) return this.held;
-    if (offset === 4) return this.wdsel;
-    if (offset === 8) return ~this.held & RESET_BITS;
-    return super.readUint32(offset);
+  #hold(held) {
+    const entered = held & ~this.held;
+    const left = this.held & ~held;
+    this.held = held;
+    for (let bit = 0; entered >>> bit; bit++) {
+      if ((entered >>> bit) & 1) this.rp2040.resetBlock(bit);
+    }
+    if ((left >>> TIMER) & 1) this.rp2040.timer.tickChanged(this.rp2040.watchdog.tickHz);
   }
 
-  writeUint32(offset, value) {
-    if (offset === 4) this.wdsel = value & RESET_BITS;
-    else if (offset === 0) {
-      const held = value & RESET_BITS;
-      const entered = held & ~this.held;
-      const left = this.held & ~held;
-      this.held = held;
-      for (let bit = 0; entered >>> bit; bit++) {
-        if ((entered >>> bit) & 1) this.rp2040.resetBlock(bit);
-      }
-      if ((left >>> TIMER) & 1) this.rp2040.timer.tickChanged(this.rp2040.watchdog.tickHz);
-    } else super.writeUint32(offset, value);
-  }
+  static registers = {
+    0: { read: (b) => b.held, write: (b, value) => b.#hold(value & RESET_BITS) },
+    4: field('wdsel', RESET_BITS),
+    8: { read: (b) => ~b.held & RESET_BITS },
+  };
 }
 
-export class Xosc extends BasePeripheral {
+export class Xosc extends RegisterBlock {
   constructor(chip) {
     super(chip, 'XOSC');
     this.ctrl = 0;
@@ -103,43 +99,39 @@ export class Xosc extends BasePeripheral {
     this.alarm.schedule((cycles / this.rp2040.trueHz(XOSC_HZ)) * 1e9);
   }
 
-  readUint32(offset) {
-    if (offset === 0x00) return this.ctrl;
-    if (offset === 0x04) return ((this.stable ? 1 << 31 : 0) | (this.enabled ? 1 << 12 : 0)) >>> 0;
-    if (offset === 0x0c) return this.startup;
-    return super.readUint32(offset);
+  #writeCtrl(value) {
+    const enable = (value >>> 12) & 0xfff;
+    const wasEnabled = this.enabled;
+    if (enable === 0xfab && (value & 0xfff) !== 0xaa0)
+      this.rp2040.fail('XOSC', `enabled with FREQ_RANGE 0x${(value & 0xfff).toString(16)}; 1 to 15 MHz is 0xaa0`);
+    if (![0xfab, 0xd1e, 0].includes(enable))
+      this.rp2040.fail('XOSC', `CTRL.ENABLE written with 0x${enable.toString(16)}; use 0xfab or 0xd1e`);
+    this.ctrl = value & 0xffffff;
+    if (this.enabled && !wasEnabled) this.count();
+    else if (!this.enabled) {
+      this.stable = false;
+      this.alarm.cancel();
+      this.rp2040.updateClocks();
+    }
   }
 
-  writeUint32(offset, value) {
-    if (offset === 0x0c) {
-      if (this.enabled) this.rp2040.fail('XOSC', 'STARTUP written while the oscillator runs; write it before enabling');
-      this.startup = value & 0x103fff;
-    } else if (offset === 0x00) {
-      const enable = (value >>> 12) & 0xfff;
-      const wasEnabled = this.enabled;
-      if (enable === 0xfab && (value & 0xfff) !== 0xaa0) {
-        this.rp2040.fail('XOSC', `enabled with FREQ_RANGE 0x${(value & 0xfff).toString(16)}; 1 to 15 MHz is 0xaa0`);
-      }
-      if (enable !== 0xfab && enable !== 0xd1e && enable !== 0) {
-        this.rp2040.fail('XOSC', `CTRL.ENABLE written with 0x${enable.toString(16)}; use 0xfab or 0xd1e`);
-      }
-      this.ctrl = value & 0xffffff;
-      if (this.enabled && !wasEnabled) {
-        this.count();
-      } else if (!this.enabled) {
-        this.stable = false;
-        this.alarm.cancel();
-        this.rp2040.updateClocks();
-      }
-    } else super.writeUint32(offset, value);
+  #writeStartup(value) {
+    if (this.enabled) this.rp2040.fail('XOSC', 'STARTUP written while the oscillator runs; write it before enabling');
+    this.startup = value & 0x103fff;
   }
+
+  static registers = {
+    0x00: { read: (b) => b.ctrl, write: (b, value) => b.#writeCtrl(value) },
+    0x04: { read: (b) => (b.stable ? 1 << 31 : 0) | (b.enabled ? 1 << 12 : 0) },
+    0x0c: { read: (b) => b.startup, write: (b, value) => b.#writeStartup(value) },
+  };
 }
 
 const PLL_PD = 1;
 const PLL_POSTDIVPD = 8;
 const PLL_VCOPD = 32;
 
-export class Pll extends BasePeripheral {
+export class Pll extends RegisterBlock {
   constructor(chip, name) {
     super(chip, name);
     this.alarm = chip.clock.createAlarm(() => {
@@ -180,36 +172,32 @@ export class Pll extends BasePeripheral {
     return this.vcoHz / (((this.prim >>> 16) & 7) * ((this.prim >>> 12) & 7));
   }
 
-  readUint32(offset) {
-    if (offset === 0x00) return ((this.locked || this.reportsLock ? 1 << 31 : 0) | this.cs) >>> 0;
-    if (offset === 0x04) return this.pwr;
-    if (offset === 0x08) return this.fbdiv;
-    if (offset === 0x0c) return this.prim;
-    return super.readUint32(offset);
+  get #isRunning() {
+    return !(this.pwr & (PLL_PD | PLL_VCOPD));
   }
+
+  #writeCs(value) {
+    if (this.#isRunning && (value ^ this.cs) & 0x3f) this.rp2040.fail(this.name, 'REFDIV changed while the VCO runs');
+    this.cs = value & 0x13f;
+  }
+
+  #writeFbdiv(value) {
+    if (this.#isRunning && (value & 0xfff) !== this.fbdiv) this.rp2040.fail(this.name, 'FBDIV_INT changed while the VCO runs');
+    this.fbdiv = value & 0xfff;
+  }
+
+  static registers = {
+    0x00: { read: (b) => (b.locked || b.reportsLock ? 1 << 31 : 0) | b.cs, write: (b, value) => b.#writeCs(value) },
+    0x04: field('pwr', 0x2d),
+    0x08: { read: (b) => b.fbdiv, write: (b, value) => b.#writeFbdiv(value) },
+    0x0c: field('prim', 0x77000),
+  };
 
   writeUint32(offset, value) {
     const chip = this.rp2040;
-    const wasRunning = !(this.pwr & (PLL_PD | PLL_VCOPD));
-    switch (offset) {
-      case 0x00:
-        if (wasRunning && (value & 0x3f) !== (this.cs & 0x3f)) chip.fail(this.name, 'REFDIV changed while the VCO runs');
-        this.cs = value & 0x13f;
-        break;
-      case 0x04:
-        this.pwr = value & 0x2d;
-        break;
-      case 0x08:
-        if (wasRunning && (value & 0xfff) !== this.fbdiv) chip.fail(this.name, 'FBDIV_INT changed while the VCO runs');
-        this.fbdiv = value & 0xfff;
-        break;
-      case 0x0c:
-        this.prim = value & 0x77000;
-        break;
-      default:
-        super.writeUint32(offset, value);
-    }
-    const running = !(this.pwr & (PLL_PD | PLL_VCOPD));
+    const wasRunning = this.#isRunning;
+    super.writeUint32(offset, value);
+    const running = this.#isRunning;
     if (running && !wasRunning) {
       if (!chip.xosc.stable) chip.fail(this.name, 'powered up before the crystal oscillator was stable');
       if (this.vcoHz < 750e6 || this.vcoHz > 1600e6) {
@@ -231,17 +219,20 @@ export class Pll extends BasePeripheral {
 }
 
 const CTRL_ENABLE = 1 << 11;
+/** What the auxiliary multiplexer of each clock chooses from. */
+const AUXILIARY = {
+  ref: ['pll_usb'],
+  sys: ['pll_sys', 'pll_usb', 'rosc', 'xosc'],
+  usb: ['pll_usb', 'pll_sys', 'rosc', 'xosc'],
+  peri: ['sys', 'pll_sys', 'pll_usb', 'rosc', 'xosc'],
+};
 
 export class Clocks extends BasePeripheral {
   constructor(chip) {
     super(chip, 'CLOCKS');
-    this.ref = { ctrl: 0, div: 0x100 };
-    this.sys = { ctrl: 0, div: 0x100 };
-    this.peri = { ctrl: 0, div: 0x100 };
-    this.usb = { ctrl: 0, div: 0x100 };
-    this.adc = { ctrl: 0, div: 0x100 };
-    this.rtc = { ctrl: 0, div: 0x100 };
-    this.generators = [null, null, null, null, this.ref, this.sys, this.peri, this.usb, this.adc, this.rtc];
+    const generators = ['ref', 'sys', 'peri', 'usb', 'adc', 'rtc'];
+    for (const name of generators) this[name] = { ctrl: 0, div: 0x100 };
+    this.generators = [null, null, null, null, ...generators.map((name) => this[name])];
     this.others = new RegisterFile(chip, 'CLOCKS', {
       0x78: [0xff, 0x111ff],
       0x7c: [0, 0],
@@ -255,20 +246,22 @@ export class Clocks extends BasePeripheral {
     });
   }
 
+  #hz(source) {
+    const { pllSys, pllUsb, roscHz, xosc } = this.rp2040;
+    if (source === 'pll_sys') return pllSys.outputHz;
+    if (source === 'pll_usb') return pllUsb.outputHz;
+    if (source === 'rosc') return roscHz;
+    if (source === 'xosc') return xosc.stable ? XOSC_HZ : 0;
+    return source === 'sys' ? this.sysHz : 0;
+  }
+
+  #auxiliaryHz(name) {
+    return this.#hz(AUXILIARY[name][(this[name].ctrl >>> 5) & 7]);
+  }
+
   get refHz() {
-    const source = this.ref.ctrl & 3;
-    const auxiliary = (this.ref.ctrl >>> 5) & 3;
-    const hz =
-      source === 0
-        ? this.rp2040.roscHz
-        : source === 2
-          ? this.rp2040.xosc.stable
-            ? XOSC_HZ
-            : 0
-          : source === 1 && auxiliary === 0
-            ? this.rp2040.pllUsb.outputHz
-            : 0;
-    return hz / ((this.ref.div >>> 8) & 3 || 4);
+    const source = ['rosc', AUXILIARY.ref[(this.ref.ctrl >>> 5) & 3], 'xosc'][this.ref.ctrl & 3];
+    return this.#hz(source) / ((this.ref.div >>> 8) & 3 || 4);
   }
 
   /** clk_ref or clk_sys comes from the crystal. */
@@ -276,46 +269,16 @@ export class Clocks extends BasePeripheral {
     return (this.ref.ctrl & 3) !== 0 || ((this.sys.ctrl & 1) !== 0 && ((this.sys.ctrl >>> 5) & 7) !== 2);
   }
 
-  #auxiliaryHz(generator, sources) {
-    return sources[(generator.ctrl >>> 5) & 7]?.() ?? 0;
-  }
-
   get sysHz() {
-    const { pllSys, pllUsb, xosc } = this.rp2040;
-    const hz =
-      this.sys.ctrl & 1
-        ? this.#auxiliaryHz(this.sys, [
-            () => pllSys.outputHz,
-            () => pllUsb.outputHz,
-            () => this.rp2040.roscHz,
-            () => (xosc.stable ? XOSC_HZ : 0),
-          ])
-        : this.refHz;
-    return hz / (this.sys.div / 256 || 65536);
+    return (this.sys.ctrl & 1 ? this.#auxiliaryHz('sys') : this.refHz) / (this.sys.div / 256 || 65536);
   }
 
   get usbHz() {
-    if (!(this.usb.ctrl & CTRL_ENABLE)) return 0;
-    const { pllSys, pllUsb, xosc } = this.rp2040;
-    const hz = this.#auxiliaryHz(this.usb, [
-      () => pllUsb.outputHz,
-      () => pllSys.outputHz,
-      () => this.rp2040.roscHz,
-      () => (xosc.stable ? XOSC_HZ : 0),
-    ]);
-    return hz / ((this.usb.div >>> 8) & 3 || 4);
+    return this.usb.ctrl & CTRL_ENABLE ? this.#auxiliaryHz('usb') / ((this.usb.div >>> 8) & 3 || 4) : 0;
   }
 
   get periHz() {
-    if (!(this.peri.ctrl & CTRL_ENABLE)) return 0;
-    const { pllSys, pllUsb, xosc } = this.rp2040;
-    return this.#auxiliaryHz(this.peri, [
-      () => this.sysHz,
-      () => pllSys.outputHz,
-      () => pllUsb.outputHz,
-      () => this.rp2040.roscHz,
-      () => (xosc.stable ? XOSC_HZ : 0),
-    ]);
+    return this.peri.ctrl & CTRL_ENABLE ? this.#auxiliaryHz('peri') : 0;
   }
 
   readUint32(offset) {

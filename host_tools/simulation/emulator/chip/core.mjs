@@ -11,7 +11,7 @@
  * - SEV sets the event register of both cores, and ends their WFE (B1.5.18).
  */
 import { RP2040 } from 'rp2040js';
-import { bitCount, execute, RAM_BASE, RAM_BYTES } from './instructions.mjs';
+import { execute, RAM_BASE, RAM_BYTES } from './instructions.mjs';
 import { MemoryFault, Mpu } from './mpu.mjs';
 
 export { RAM_BASE, RAM_BYTES, RP2040 };
@@ -33,6 +33,8 @@ export class StrictCore extends CortexM0Core {
     this.chip = chip;
     this.id = id;
     this.scr = 0;
+    /** Address of the instruction that rp2040js executes. */
+    this.at = null;
     /** While `waiting`: by WFE. */
     this.waitsForEvent = false;
     this.ram8 = chip.sram;
@@ -183,11 +185,6 @@ export class StrictCore extends CortexM0Core {
     this.V = overflow < 0;
   }
 
-  /** Cycles beyond the first of a load or store. */
-  accessCycles(address, write) {
-    return (address - RAM_BASE) >>> 0 < RAM_BYTES ? 1 : this.cyclesIO(address, write);
-  }
-
   executeInstruction() {
     const before = this.cycles;
     this.execute(before + 1, NEVER);
@@ -199,170 +196,17 @@ export class StrictCore extends CortexM0Core {
     execute(this, stop, time);
   }
 
-  /** An instruction at pc that is not one of `execute`'s, or whose access is not one to SRAM. */
+  /** An instruction that is not one of `execute`'s, or whose access is not one to SRAM, by rp2040js, whose SEV does nothing. */
   executeOther(op) {
-    const r = this.signed;
-    const pc = r[15];
-    let cycles = 1;
-    switch (op >>> 11) {
-      case 9: {
-        // LDR literal
-        const address = ((pc + 4) & ~3) + ((op & 0xff) << 2);
-        cycles += this.accessCycles(address, false);
-        r[(op >>> 8) & 7] = this.readUint32(address);
-        break;
-      }
-      case 10:
-      case 11: {
-        // register offset
-        const address = (r[(op >>> 3) & 7] + r[(op >>> 6) & 7]) >>> 0;
-        const t = op & 7;
-        const kind = (op >>> 9) & 7;
-        cycles += this.accessCycles(address, kind < 3);
-        switch (kind) {
-          case 0:
-            this.writeUint32(address, r[t]);
-            break;
-          case 1:
-            this.writeUint16(address, r[t]);
-            break;
-          case 2:
-            this.writeUint8(address, r[t]);
-            break;
-          case 3:
-            r[t] = (this.readUint8(address) << 24) >> 24;
-            break;
-          case 4:
-            r[t] = this.readUint32(address);
-            break;
-          case 5:
-            r[t] = this.readUint16(address);
-            break;
-          case 6:
-            r[t] = this.readUint8(address);
-            break;
-          default:
-            r[t] = (this.readUint16(address) << 16) >> 16;
-        }
-        break;
-      }
-      case 12: {
-        const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
-        cycles += this.accessCycles(address, true);
-        this.writeUint32(address, r[op & 7]);
-        break;
-      }
-      case 13: {
-        const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
-        cycles += this.accessCycles(address, false);
-        r[op & 7] = this.readUint32(address);
-        break;
-      }
-      case 14: {
-        const address = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f)) >>> 0;
-        cycles += this.accessCycles(address, true);
-        this.writeUint8(address, r[op & 7]);
-        break;
-      }
-      case 15: {
-        const address = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f)) >>> 0;
-        cycles += this.accessCycles(address, false);
-        r[op & 7] = this.readUint8(address);
-        break;
-      }
-      case 16: {
-        const address = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e)) >>> 0;
-        cycles += this.accessCycles(address, true);
-        this.writeUint16(address, r[op & 7]);
-        break;
-      }
-      case 17: {
-        const address = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e)) >>> 0;
-        cycles += this.accessCycles(address, false);
-        r[op & 7] = this.readUint16(address);
-        break;
-      }
-      case 18: {
-        const address = r[13] + ((op & 0xff) << 2);
-        cycles += this.accessCycles(address, true);
-        this.writeUint32(address, r[(op >>> 8) & 7]);
-        break;
-      }
-      case 19: {
-        const address = r[13] + ((op & 0xff) << 2);
-        cycles += this.accessCycles(address, false);
-        r[(op >>> 8) & 7] = this.readUint32(address);
-        break;
-      }
-      case 22:
-      case 23: {
-        const kind = (op >>> 8) & 15;
-        if (kind === 4 || kind === 5) {
-          // PUSH
-          const count = bitCount(op & 0x1ff);
-          let address = r[13] - 4 * count;
-          const top = address;
-          for (let i = 0; i < 8; i++) {
-            if (!((op >>> i) & 1)) continue;
-            this.writeUint32(address, r[i]);
-            address += 4;
-          }
-          if (op & 0x100) this.writeUint32(address, r[14]);
-          r[13] = top;
-          cycles += count;
-        } else if (kind === 12) {
-          // POP without pc
-          let address = r[13];
-          for (let i = 0; i < 8; i++) {
-            if (!((op >>> i) & 1)) continue;
-            r[i] = this.readUint32(address);
-            address += 4;
-            cycles += 1;
-          }
-          r[13] = address;
-        } else {
-          this.slow(op);
-          return;
-        }
-        break;
-      }
-      case 24: {
-        // STMIA
-        const n = (op >>> 8) & 7;
-        let address = r[n];
-        for (let i = 0; i < 8; i++) {
-          if (!((op >>> i) & 1)) continue;
-          this.writeUint32(address, r[i]);
-          address += 4;
-          cycles += 1;
-        }
-        r[n] = address;
-        break;
-      }
-      case 25: {
-        // LDMIA
-        const n = (op >>> 8) & 7;
-        let address = r[n];
-        for (let i = 0; i < 8; i++) {
-          if (!((op >>> i) & 1)) continue;
-          r[i] = this.readUint32(address);
-          address += 4;
-          cycles += 1;
-        }
-        if (!((op >>> n) & 1)) r[n] = address;
-        break;
-      }
-      default:
-        this.slow(op);
-        return;
+    this.at = this.signed[15];
+    try {
+      super.executeInstruction();
+    } catch (error) {
+      if (error instanceof MemoryFault) this.signed[15] = this.at; // which the fault reports
+      throw error;
+    } finally {
+      this.at = null;
     }
-    r[15] = pc + 2;
-    this.cycles += cycles;
-  }
-
-  /** One instruction by rp2040js, whose SEV does nothing. */
-  slow(op) {
-    super.executeInstruction();
     if ((op & 0xf700) === 0xb500) this.cycles += 1;
     else if (op === SEV) this.chip.sendEvent();
     else if (op === WFE || op === WFI) this.waitsForEvent = op === WFE;

@@ -12,8 +12,8 @@
  * Fails the run: other requests than those of the PIO, pacing timers, the sniffer (not modelled); an address or a
  * count written while the channel is busy, misaligned addresses, two busy channels on one request.
  */
-import { BasePeripheral } from 'rp2040js';
 import { FLASH_BASE, RAM_BASE, RAM_BYTES } from './core.mjs';
+import { clearedByOnes, RegisterBlock } from './registers.mjs';
 
 const CHANNELS = 12;
 const PERMANENT = 0x3f;
@@ -29,29 +29,10 @@ const CTRL_BSWAP = 1 << 22;
 const CTRL_BUSY = 1 << 24;
 const CTRL_WRITABLE = 0xffffff;
 
-const READ_ADDR = 0;
-const WRITE_ADDR = 1;
-const TRANS_COUNT = 2;
-const CTRL = 3;
-/** What each word of a channel's four aliases is; the last of each triggers. */
-const ALIASES = [
-  READ_ADDR,
-  WRITE_ADDR,
-  TRANS_COUNT,
-  CTRL,
-  CTRL,
-  READ_ADDR,
-  WRITE_ADDR,
-  TRANS_COUNT,
-  CTRL,
-  TRANS_COUNT,
-  READ_ADDR,
-  WRITE_ADDR,
-  CTRL,
-  WRITE_ADDR,
-  TRANS_COUNT,
-  READ_ADDR,
-];
+/** What each word of a channel's four aliases is: read address, write address, number, control; the last of each triggers. */
+const ALIASES = ['RWNC', 'CRWN', 'CNRW', 'CWNR'].join('');
+const KEYS = { R: 'readAddress', W: 'writeAddress', N: 'reload' };
+const NAMES = { R: 'READ_ADDR', W: 'WRITE_ADDR', N: 'TRANS_COUNT' };
 
 const ACCESS_CYCLES = 2;
 const APB_EXTRA_CYCLES = 2;
@@ -77,7 +58,7 @@ function makeChannel(index) {
   };
 }
 
-export class Dma extends BasePeripheral {
+export class Dma extends RegisterBlock {
   constructor(chip) {
     super(chip, 'DMA');
     this.clock = chip.sysClock;
@@ -278,48 +259,49 @@ export class Dma extends BasePeripheral {
     for (const line of [0, 1]) this.rp2040.setInterrupt(11 + line, ((this.raw & this.enable[line]) | this.force[line]) !== 0);
   }
 
+  #requests({ treq, credit }) {
+    return treq < PIO_REQUESTS ? Math.max(0, this.rp2040.pio[treq >>> 3].requests(treq & 7) - credit) : 0;
+  }
+
+  #each(bits, action) {
+    for (const channel of this.channels) if ((bits >>> channel.index) & 1) action(channel);
+  }
+
+  static #masked = (line, key) => ({
+    read: (b) => b[key][line],
+    write: (b, value) => {
+      b[key][line] = value & (2 ** CHANNELS - 1);
+    },
+  });
+
+  static #status = (line) => ({ ...clearedByOnes('raw'), read: (b) => (b.raw & b.enable[line]) | b.force[line] });
+
+  static registers = {
+    0x400: clearedByOnes('raw'),
+    0x404: Dma.#masked(0, 'enable'),
+    0x408: Dma.#masked(0, 'force'),
+    0x40c: Dma.#status(0),
+    0x414: Dma.#masked(1, 'enable'),
+    0x418: Dma.#masked(1, 'force'),
+    0x41c: Dma.#status(1),
+    0x430: { read: () => 0, write: (b, value) => b.#each(value, (channel) => b.#start(channel)) },
+    0x444: { read: () => 0, write: (b, value) => b.#each(value, (channel) => b.#abort(channel)) },
+    0x448: { read: () => CHANNELS },
+  };
+
   readUint32(offset) {
+    const channel = this.channels[(offset & 0x7ff) >>> 6];
     if (offset < 0x300) {
-      const channel = this.channels[offset >>> 6];
-      switch (ALIASES[(offset & 0x3f) >> 2]) {
-        case READ_ADDR:
-          return channel.readAddress >>> 0;
-        case WRITE_ADDR:
-          return channel.writeAddress >>> 0;
-        case TRANS_COUNT:
-          return channel.remaining >>> 0;
-        default:
-          return (channel.ctrl | (channel.busy ? CTRL_BUSY : 0)) >>> 0;
-      }
+      const what = ALIASES[(offset & 0x3f) >> 2];
+      const value = {
+        R: channel.readAddress,
+        W: channel.writeAddress,
+        N: channel.remaining,
+        C: channel.ctrl | (channel.busy ? CTRL_BUSY : 0),
+      };
+      return value[what] >>> 0;
     }
-    if (offset >= 0x800 && offset < 0xb00) {
-      const channel = this.channels[(offset - 0x800) >>> 6];
-      if ((offset & 0x3f) === 4) return channel.reload >>> 0;
-      if ((offset & 0x3f) === 0)
-        return channel.treq < PIO_REQUESTS
-          ? Math.max(0, this.rp2040.pio[channel.treq >>> 3].requests(channel.treq & 7) - channel.credit)
-          : 0;
-    }
-    switch (offset) {
-      case 0x400:
-        return this.raw;
-      case 0x404:
-      case 0x414:
-        return this.enable[(offset >> 4) & 1];
-      case 0x408:
-      case 0x418:
-        return this.force[(offset >> 4) & 1];
-      case 0x40c:
-      case 0x41c: {
-        const line = (offset >> 4) & 1;
-        return (this.raw & this.enable[line]) | this.force[line];
-      }
-      case 0x430:
-      case 0x444:
-        return 0;
-      case 0x448:
-        return CHANNELS;
-    }
+    if (offset >= 0x800 && offset < 0xb00 && (offset & 0x3f) <= 4) return (offset & 4 ? channel.reload : this.#requests(channel)) >>> 0;
     return super.readUint32(offset);
   }
 
@@ -328,36 +310,13 @@ export class Dma extends BasePeripheral {
       this.#writeChannel(this.channels[offset >>> 6], (offset & 0x3f) >> 2, value >>> 0);
       return;
     }
-    const bits = value & (2 ** CHANNELS - 1);
-    switch (offset) {
-      case 0x400:
-      case 0x40c:
-      case 0x41c:
-        this.raw &= ~this.rawWriteValue;
-        break;
-      case 0x404:
-      case 0x414:
-        this.enable[(offset >> 4) & 1] = bits;
-        break;
-      case 0x408:
-      case 0x418:
-        this.force[(offset >> 4) & 1] = bits;
-        break;
-      case 0x430:
-        for (const channel of this.channels) if ((bits >>> channel.index) & 1) this.#start(channel);
-        return;
-      case 0x444:
-        for (const channel of this.channels) if ((bits >>> channel.index) & 1) this.#abort(channel);
-        return;
-      default:
-        super.writeUint32(offset, value);
-    }
+    super.writeUint32(offset, value);
     this.#interrupt();
   }
 
   #writeChannel(channel, word, value) {
     const what = ALIASES[word];
-    if (what === CTRL) {
+    if (what === 'C') {
       if (((value >>> 2) & 3) === 3) this.#fail(channel, 'DATA_SIZE 3 is reserved');
       if (channel.busy && (value ^ channel.ctrl) & CTRL_WRITABLE & ~CTRL_EN)
         this.#fail(channel, 'CTRL changed while the channel is busy; only EN may');
@@ -366,10 +325,8 @@ export class Dma extends BasePeripheral {
       channel.treq = (value >>> 15) & 63;
       if (channel.busy && channel.toIssue) this.#issueSoon();
     } else {
-      if (channel.busy) this.#fail(channel, `${['READ_ADDR', 'WRITE_ADDR', 'TRANS_COUNT'][what]} written while the channel is busy`);
-      if (what === READ_ADDR) channel.readAddress = value;
-      else if (what === WRITE_ADDR) channel.writeAddress = value;
-      else channel.reload = value;
+      if (channel.busy) this.#fail(channel, `${NAMES[what]} written while the channel is busy`);
+      channel[KEYS[what]] = value;
     }
     if ((word & 3) !== 3) return;
     if (value) this.#start(channel);

@@ -9,7 +9,7 @@
  * Fails the run: configuration written while enabled, FIFO overflow and underflow, counts below their minimum,
  * bus timing faster than the mode allows, pins not set up.
  */
-import { BasePeripheral } from 'rp2040js';
+import { constant, field, RegisterBlock } from './registers.mjs';
 
 const FIFO_DEPTH = 16;
 const CMD_READ = 0x100;
@@ -38,29 +38,24 @@ const ABRT_TXDATA_NOACK = 8;
 const ABRT_ARB_LOST = 1 << 12;
 const ABRT_USER = 1 << 16;
 
-/** The only register whose reading ends the flushed state of the transmit FIFO after an abort (4.3.17). */
-const CLR_TX_ABRT = 0x54;
-/** Reading one of these offsets clears the bits. */
-const CLEARS = new Map(
-  Object.entries({
-    0x44: RX_UNDER,
-    0x48: RX_OVER,
-    0x4c: TX_OVER,
-    0x50: 32,
-    0x54: TX_ABRT,
-    0x58: 128,
-    0x5c: ACTIVITY,
-    0x60: STOP_DET,
-    0x64: START_DET,
-    0x68: 2048,
-    0xa8: 4096,
-  }).map(([k, v]) => [Number(k), v]),
-);
-
 /** Minimum SCL low and high times of the I2C specification (UM10204, table 10), ns. */
 const MINIMUM_NS = { 1: { low: 4700, high: 4000, name: 'standard' }, 2: { low: 1300, high: 600, name: 'fast' } };
 
-export class I2cBlock extends BasePeripheral {
+const configuration = (key, mask, name) => ({
+  ...field(key, mask),
+  write(block, value) {
+    block.whileDisabled(name);
+    field(key, mask).write(block, value);
+  },
+});
+const threshold = (key) => ({
+  ...field(key),
+  write(block, value) {
+    block[key] = Math.min(value & 0xff, FIFO_DEPTH - 1);
+  },
+});
+
+export class I2cBlock extends RegisterBlock {
   constructor(chip, index) {
     super(chip, `I2C${index}`);
     this.irq = 23 + index;
@@ -74,8 +69,8 @@ export class I2cBlock extends BasePeripheral {
     this.alarm.cancel();
     this.con = 0x65;
     this.tar = 0x55;
-    this.hcnt = { 1: 0x28, 2: 0x06 };
-    this.lcnt = { 1: 0x2f, 2: 0x0d };
+    [this.hcntStandard, this.lcntStandard] = [0x28, 0x2f];
+    [this.hcntFast, this.lcntFast] = [0x06, 0x0d];
     this.spklen = 7;
     this.sdaHold = 1;
     this.sdaSetup = 0x64;
@@ -98,12 +93,20 @@ export class I2cBlock extends BasePeripheral {
     return (this.con >>> 1) & 3;
   }
 
+  get hcnt() {
+    return this.speed === 1 ? this.hcntStandard : this.hcntFast;
+  }
+
+  get lcnt() {
+    return this.speed === 1 ? this.lcntStandard : this.lcntFast;
+  }
+
   get low_ns() {
-    return ((this.lcnt[this.speed] + 1) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys) + this.bus.rise_ns;
+    return ((this.lcnt + 1) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys) + this.bus.rise_ns;
   }
 
   get high_ns() {
-    return ((this.hcnt[this.speed] + this.spklen + 7) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys);
+    return ((this.hcnt + this.spklen + 7) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys);
   }
 
   get enabled() {
@@ -126,88 +129,102 @@ export class I2cBlock extends BasePeripheral {
     this.rp2040.setInterrupt(this.irq, (this.raw & this.mask) !== 0);
   }
 
-  readUint32(offset) {
-    switch (offset) {
-      case 0x00:
-        return this.con;
-      case 0x04:
-        return this.tar;
-      case 0x08:
-        return 0x55;
-      case 0x10: {
-        if (!this.rx.length) this.rp2040.fail(this.name, 'IC_DATA_CMD read while the receive FIFO is empty');
-        const value = this.rx.shift();
-        if (this.state === 'rx-full') this.#receive();
-        this.#update();
-        return value;
-      }
-      case 0x14:
-        return this.hcnt[1];
-      case 0x18:
-        return this.lcnt[1];
-      case 0x1c:
-        return this.hcnt[2];
-      case 0x20:
-        return this.lcnt[2];
-      case 0x2c:
-        return this.raw & this.mask;
-      case 0x30:
-        return this.mask;
-      case 0x34:
-        return this.raw;
-      case 0x38:
-        return this.rxTl;
-      case 0x3c:
-        return this.txTl;
-      case 0x40: {
-        const any = this.latched ? 1 : 0;
-        this.#clear(0x1fff);
-        return any;
-      }
-      case 0x6c:
-        return this.enable;
-      case 0x70:
-        return (
-          (this.#active ? 0x21 : 0) |
-          (this.tx.length < FIFO_DEPTH ? 2 : 0) |
-          (this.tx.length ? 0 : 4) |
-          (this.rx.length ? 8 : 0) |
-          (this.rx.length >= FIFO_DEPTH ? 16 : 0)
-        );
-      case 0x74:
-        return this.tx.length;
-      case 0x78:
-        return this.rx.length;
-      case 0x7c:
-        return this.sdaHold;
-      case 0x80:
-        return this.abortSource >>> 0;
-      case 0x84:
-      case 0x88:
-      case 0x8c:
-      case 0x90:
-        return 0;
-      case 0x94:
-        return this.sdaSetup;
-      case 0x98:
-        return 1;
-      case 0x9c:
-        return this.enabled || this.#active ? 1 : 0;
-      case 0xa0:
-        return this.spklen;
-      case 0xf4:
-        return 0;
-      case 0xf8:
-        return 0x3230312a;
-      case 0xfc:
-        return 0x44570140;
-    }
-    const bits = CLEARS.get(offset);
-    if (bits === undefined) return super.readUint32(offset);
+  #pop() {
+    if (!this.rx.length) this.rp2040.fail(this.name, 'IC_DATA_CMD read while the receive FIFO is empty');
+    const value = this.rx.shift();
+    if (this.state === 'rx-full') this.#receive();
+    this.#update();
+    return value;
+  }
+
+  get #status() {
+    return (
+      (this.#active ? 0x21 : 0) |
+      (this.tx.length < FIFO_DEPTH ? 2 : 0) |
+      (this.tx.length ? 0 : 4) |
+      (this.rx.length ? 8 : 0) |
+      (this.rx.length >= FIFO_DEPTH ? 16 : 0)
+    );
+  }
+
+  #writeCon(value) {
+    this.whileDisabled('IC_CON');
+    this.con = value & 0x3ff;
+    if (!(this.con & 1) || !(this.con & CON_SLAVE_DISABLE) || this.con & CON_10BIT)
+      this.rp2040.fail(
+        this.name,
+        `IC_CON 0x${value.toString(16)}: only a 7-bit controller (MASTER_MODE and IC_SLAVE_DISABLE set) is modelled`,
+      );
+  }
+
+  #writeSpklen(value) {
+    this.whileDisabled('IC_FS_SPKLEN');
+    if (!(value & 0xff)) this.rp2040.fail(this.name, 'IC_FS_SPKLEN is 0; the minimum is 1');
+    this.spklen = value & 0xff;
+  }
+
+  /** Reading clears the bits, and reads whether one was set. */
+  #readClear(bits, cleared = bits) {
     const was = this.latched & bits ? 1 : 0;
-    if (offset === CLR_TX_ABRT) this.flushed = false;
-    this.#clear(bits);
+    this.#clear(cleared);
     return was;
+  }
+
+  /** The only reading that ends the flushed state of the transmit FIFO after an abort (4.3.17). */
+  #readClearAbort() {
+    this.flushed = false;
+    return this.#readClear(TX_ABRT);
+  }
+
+  static registers = {
+    0x00: { read: (b) => b.con, write: (b, value) => b.#writeCon(value) },
+    0x04: configuration('tar', 0xfff, 'IC_TAR'),
+    0x08: { read: () => 0x55 },
+    0x10: { read: (b) => b.#pop(), write: (b, value) => b.#push(value) },
+    0x14: configuration('hcntStandard', 0xffff, 'SCL_HCNT'),
+    0x18: configuration('lcntStandard', 0xffff, 'SCL_LCNT'),
+    0x1c: configuration('hcntFast', 0xffff, 'SCL_HCNT'),
+    0x20: configuration('lcntFast', 0xffff, 'SCL_LCNT'),
+    0x2c: { read: (b) => b.raw & b.mask },
+    0x30: field('mask', 0x1fff),
+    0x34: { read: (b) => b.raw },
+    0x38: threshold('rxTl'),
+    0x3c: threshold('txTl'),
+    0x40: { read: (b) => b.#readClear(-1, 0x1fff) },
+    0x44: { read: (b) => b.#readClear(RX_UNDER) },
+    0x48: { read: (b) => b.#readClear(RX_OVER) },
+    0x4c: { read: (b) => b.#readClear(TX_OVER) },
+    0x50: { read: (b) => b.#readClear(32) },
+    0x54: { read: (b) => b.#readClearAbort() },
+    0x58: { read: (b) => b.#readClear(128) },
+    0x5c: { read: (b) => b.#readClear(ACTIVITY) },
+    0x60: { read: (b) => b.#readClear(STOP_DET) },
+    0x64: { read: (b) => b.#readClear(START_DET) },
+    0x68: { read: (b) => b.#readClear(2048) },
+    0x6c: { read: (b) => b.enable, write: (b, value) => b.#writeEnable(value) },
+    0x70: { read: (b) => b.#status },
+    0x74: { read: (b) => b.tx.length },
+    0x78: { read: (b) => b.rx.length },
+    0x7c: configuration('sdaHold', 0xffffff, 'IC_SDA_HOLD'),
+    0x80: { read: (b) => b.abortSource },
+    0x84: constant(0),
+    0x88: { read: () => 0, write: (b, value) => value & 3 && b.rp2040.fail(b.name, 'DMA requests are not modelled') },
+    0x8c: constant(0),
+    0x90: constant(0),
+    0x94: configuration('sdaSetup', 0xff, 'IC_SDA_SETUP'),
+    0x98: constant(1),
+    0x9c: { read: (b) => (b.enabled || b.#active ? 1 : 0) },
+    0xa0: { read: (b) => b.spklen, write: (b, value) => b.#writeSpklen(value) },
+    0xa8: { read: (b) => b.#readClear(4096) },
+    0xf4: { read: () => 0 },
+    0xf8: { read: () => 0x3230312a },
+    0xfc: { read: () => 0x44570140 },
+  };
+
+  writeUint32(offset, value) {
+    super.writeUint32(offset, value);
+    this.#update();
+    this.#kick();
   }
 
   #clear(bits) {
@@ -218,78 +235,9 @@ export class I2cBlock extends BasePeripheral {
     this.#kick();
   }
 
-  #whileDisabled(what) {
+  whileDisabled(what) {
     if (this.enabled || this.#active)
       this.rp2040.fail(this.name, `${what} written while the block is enabled; clear IC_ENABLE and wait for IC_ENABLE_STATUS first`);
-  }
-
-  writeUint32(offset, value) {
-    switch (offset) {
-      case 0x00:
-        this.#whileDisabled('IC_CON');
-        this.con = value & 0x3ff;
-        if (!(this.con & 1) || !(this.con & CON_SLAVE_DISABLE) || this.con & CON_10BIT) {
-          this.rp2040.fail(
-            this.name,
-            `IC_CON 0x${value.toString(16)}: only a 7-bit controller (MASTER_MODE and IC_SLAVE_DISABLE set) is modelled`,
-          );
-        }
-        return;
-      case 0x04:
-        this.#whileDisabled('IC_TAR');
-        this.tar = value & 0xfff;
-        return;
-      case 0x10:
-        this.#push(value);
-        return;
-      case 0x14:
-      case 0x1c:
-        this.#whileDisabled('SCL_HCNT');
-        this.hcnt[offset === 0x14 ? 1 : 2] = value & 0xffff;
-        return;
-      case 0x18:
-      case 0x20:
-        this.#whileDisabled('SCL_LCNT');
-        this.lcnt[offset === 0x18 ? 1 : 2] = value & 0xffff;
-        return;
-      case 0x30:
-        this.mask = value & 0x1fff;
-        break;
-      case 0x38:
-        this.rxTl = Math.min(value & 0xff, FIFO_DEPTH - 1);
-        break;
-      case 0x3c:
-        this.txTl = Math.min(value & 0xff, FIFO_DEPTH - 1);
-        break;
-      case 0x6c:
-        this.#writeEnable(value);
-        break;
-      case 0x7c:
-        this.#whileDisabled('IC_SDA_HOLD');
-        this.sdaHold = value & 0xffffff;
-        return;
-      case 0x88:
-        if (value & 3) this.rp2040.fail(this.name, 'DMA requests are not modelled');
-        return;
-      case 0x84:
-      case 0x8c:
-      case 0x90:
-      case 0x98:
-        return;
-      case 0x94:
-        this.#whileDisabled('IC_SDA_SETUP');
-        this.sdaSetup = value & 0xff;
-        return;
-      case 0xa0:
-        this.#whileDisabled('IC_FS_SPKLEN');
-        if (!(value & 0xff)) this.rp2040.fail(this.name, 'IC_FS_SPKLEN is 0; the minimum is 1');
-        this.spklen = value & 0xff;
-        return;
-      default:
-        super.writeUint32(offset, value);
-    }
-    this.#update();
-    this.#kick();
   }
 
   #writeEnable(value) {
@@ -316,8 +264,7 @@ export class I2cBlock extends BasePeripheral {
     const limits = MINIMUM_NS[this.speed];
     if (!this.bus) chip.fail(this.name, 'enabled, but no bus is wired to this block on this board');
     if (!limits) chip.fail(this.name, `SPEED ${this.speed} in IC_CON; use standard (1) or fast (2)`);
-    const low = this.lcnt[this.speed];
-    const high = this.hcnt[this.speed];
+    const { lcnt: low, hcnt: high } = this;
     if (low <= this.spklen + 7 || high <= this.spklen + 5) {
       chip.fail(this.name, `SCL counts ${high}/${low} below the minimum for a spike length of ${this.spklen}`);
     }

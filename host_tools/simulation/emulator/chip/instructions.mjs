@@ -14,7 +14,7 @@ const STRETCH = 1 << 30;
 const WORDS = RAM_BYTES >>> 2;
 const HALFWORDS = RAM_BYTES >>> 1;
 
-export function bitCount(bits) {
+function bitCount(bits) {
   let count = 0;
   for (let b = bits; b; b &= b - 1) count += 1;
   return count;

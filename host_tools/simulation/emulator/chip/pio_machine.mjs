@@ -19,6 +19,12 @@ const FOR_FLAG = 8;
 const DONE = -1;
 const AGAIN = -2;
 
+/** Where IN and MOV read from, and OUT, MOV and SET write to; undefined is reserved. */
+const SOURCES = ['pins', 'x', 'y', 'null', undefined, undefined, 'isr', 'osr'];
+const OUT_TO = ['pins', 'x', 'y', 'null', 'pindirs', 'pc', 'isr', 'exec'];
+const MOV_TO = ['pins', 'x', 'y', undefined, 'exec', 'pc', 'isr', 'osr'];
+const SET_TO = ['pins', 'x', 'y', undefined, 'pindirs'];
+
 const maskOf = (bits) => (bits >= 32 ? -1 : (1 << bits) - 1);
 const rotateLeft = (value, by) => (by ? (value << by) | (value >>> (32 - by)) : value | 0);
 const reverse = (value) => {
@@ -360,7 +366,7 @@ export class StateMachine {
         ended = this.#irq(which, argument);
         break;
       default:
-        this.#set(which, argument, instruction);
+        this.#put(SET_TO[which] ?? this.#reserved(instruction), argument, this.setMask, this.setBase);
     }
     if (this.sideBits && !begun) this.#sideSetPins(instruction);
     return ended;
@@ -383,18 +389,14 @@ export class StateMachine {
         return true;
       case 1:
         return this.x === 0;
-      case 2: {
-        const was = this.x;
-        this.x = (was - 1) | 0;
-        return was !== 0;
-      }
+      case 2:
+        this.x = (this.x - 1) | 0;
+        return this.x !== -1;
       case 3:
         return this.y === 0;
-      case 4: {
-        const was = this.y;
-        this.y = (was - 1) | 0;
-        return was !== 0;
-      }
+      case 4:
+        this.y = (this.y - 1) | 0;
+        return this.y !== -1;
       case 5:
         return this.x !== this.y;
       case 6:
@@ -430,22 +432,8 @@ export class StateMachine {
 
   /** Source of IN and MOV; undefined where it is reserved. */
   #source(source, edge) {
-    switch (source) {
-      case 0:
-        return this.#pins(edge);
-      case 1:
-        return this.x;
-      case 2:
-        return this.y;
-      case 3:
-        return 0;
-      case 6:
-        return this.isr;
-      case 7:
-        return this.osr;
-      default:
-        return undefined;
-    }
+    if (source === 0) return this.#pins(edge);
+    return source === 3 ? 0 : this[SOURCES[source]];
   }
 
   #status() {
@@ -497,29 +485,7 @@ export class StateMachine {
       this.osr <<= bits;
     }
     this.osrCount = Math.min(32, this.osrCount + bits);
-    switch (destination) {
-      case 0:
-      case 4:
-        this.pio.write(destination === 4, this.outMask, rotateLeft(value, this.outBase));
-        break;
-      case 1:
-        this.x = value | 0;
-        break;
-      case 2:
-        this.y = value | 0;
-        break;
-      case 3:
-        break;
-      case 5:
-        this.jumped = value & 31;
-        break;
-      case 6:
-        this.isr = value | 0;
-        this.isrCount = bits;
-        break;
-      default:
-        this.newExecutee = value & 0xffff;
-    }
+    this.#put(OUT_TO[destination], value, this.outMask, this.outBase, bits);
     this.#refill();
     return DONE;
   }
@@ -554,44 +520,22 @@ export class StateMachine {
 
   #mov(instruction, edge) {
     let value = (instruction & 7) === 5 ? this.#status() : (this.#source(instruction & 7, edge) ?? this.#reserved(instruction));
-    switch ((instruction >>> 3) & 3) {
-      case 0:
-        break;
-      case 1:
-        value = ~value;
-        break;
-      case 2:
-        value = reverse(value);
-        break;
-      default:
-        this.#reserved(instruction);
-    }
-    switch ((instruction >>> 5) & 7) {
-      case 0:
-        this.pio.write(false, this.outMask, rotateLeft(value, this.outBase));
-        break;
-      case 1:
-        this.x = value | 0;
-        break;
-      case 2:
-        this.y = value | 0;
-        break;
-      case 4:
-        this.newExecutee = value & 0xffff;
-        break;
-      case 5:
-        this.jumped = value & 31;
-        break;
-      case 6:
-        this.isr = value | 0;
-        this.isrCount = 0;
-        break;
-      case 7:
-        this.osr = value | 0;
-        this.osrCount = 0;
-        break;
-      default:
-        this.#reserved(instruction);
+    const how = (instruction >>> 3) & 3;
+    if (how === 3) this.#reserved(instruction);
+    if (how === 1) value = ~value;
+    else if (how === 2) value = reverse(value);
+    this.#put(MOV_TO[(instruction >>> 5) & 7] ?? this.#reserved(instruction), value, this.outMask, this.outBase);
+  }
+
+  /** What OUT, MOV and SET write; `bits` are then in a shift register. */
+  #put(where, value, mask, base, bits = 0) {
+    if (where === 'pins' || where === 'pindirs') this.pio.write(where === 'pindirs', mask, rotateLeft(value, base));
+    else if (where === 'pc') this.jumped = value & 31;
+    else if (where === 'exec') this.newExecutee = value & 0xffff;
+    else if (where !== 'null') {
+      this[where] = value | 0;
+      if (where === 'isr') this.isrCount = bits;
+      else if (where === 'osr') this.osrCount = bits;
     }
   }
 
@@ -613,61 +557,20 @@ export class StateMachine {
     return DONE;
   }
 
-  #set(destination, value, instruction) {
-    switch (destination) {
-      case 0:
-      case 4:
-        this.pio.write(destination === 4, this.setMask, rotateLeft(value, this.setBase));
-        break;
-      case 1:
-        this.x = value;
-        break;
-      case 2:
-        this.y = value;
-        break;
-      default:
-        this.#reserved(instruction);
-    }
-  }
-
   // --- registers -----------------------------------------------------------------------------------------------
 
   readRegister(offset) {
-    switch (offset) {
-      case 0x00:
-        return this.clkdiv;
-      case 0x04:
-        return (this.execctrl | (this.forcedStall ? 0x80000000 : 0)) >>> 0;
-      case 0x08:
-        return this.shiftctrl;
-      case 0x0c:
-        return this.pc;
-      case 0x10:
-        return this.pio.memory[this.pc];
-      default:
-        return this.pinctrl;
-    }
+    const execctrl = (this.execctrl | (this.forcedStall ? 0x80000000 : 0)) >>> 0;
+    return [this.clkdiv, execctrl, this.shiftctrl, this.pc, this.pio.memory[this.pc], this.pinctrl][offset >> 2];
   }
 
   writeRegister(offset, value) {
-    switch (offset) {
-      case 0x00:
-        this.writeClkdiv(value);
-        break;
-      case 0x04:
-        this.writeExecctrl(value);
-        break;
-      case 0x08:
-        this.writeShiftctrl(value);
-        this.scheduleRefill(this.pio.clock.edge);
-        break;
-      case 0x0c:
-        break;
-      case 0x10:
-        this.force(value & 0xffff);
-        break;
-      default:
-        this.writePinctrl(value);
-    }
+    if (offset === 0x00) this.writeClkdiv(value);
+    else if (offset === 0x04) this.writeExecctrl(value);
+    else if (offset === 0x08) {
+      this.writeShiftctrl(value);
+      this.scheduleRefill(this.pio.clock.edge);
+    } else if (offset === 0x10) this.force(value & 0xffff);
+    else if (offset === 0x14) this.writePinctrl(value);
   }
 }

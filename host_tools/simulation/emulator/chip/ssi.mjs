@@ -5,13 +5,22 @@
  * the transmit FIFO holds data, or forced through IO_QSPI), and whether execute-in-place works with the present
  * settings and the flash as it is.
  */
-import { BasePeripheral } from 'rp2040js';
+import { field, RegisterBlock } from './registers.mjs';
 
 const FIFO_DEPTH = 16;
 const TMOD_TX_AND_RX = 0;
 const TMOD_EEPROM_READ = 3;
 
-export class Ssi extends BasePeripheral {
+const LOST = { write() {} };
+const configuration = (key, mask) => ({
+  ...field(key, mask),
+  write(block, value) {
+    if (block.enabled) block.rp2040.fail('SSI', `configuration register ${key} written while enabled`);
+    field(key, mask).write(block, value);
+  },
+});
+
+export class Ssi extends RegisterBlock {
   constructor(chip, flash) {
     super(chip, 'SSI');
     this.flash = flash;
@@ -104,106 +113,64 @@ export class Ssi extends BasePeripheral {
     }
   }
 
-  readUint32(offset) {
-    switch (offset) {
-      case 0x00:
-        return this.ctrlr0;
-      case 0x04:
-        return this.ctrlr1;
-      case 0x08:
-        return this.enabled;
-      case 0x10:
-        return this.ser;
-      case 0x14:
-        return this.baudr;
-      case 0x20:
-        return this.tx.length;
-      case 0x24:
-        return this.rx.length;
-      case 0x28: {
-        const busy = this.shifting !== null;
-        return (
-          (busy ? 1 : 0) |
-          (this.tx.length < FIFO_DEPTH ? 2 : 0) |
-          (this.tx.length === 0 ? 4 : 0) |
-          (this.rx.length ? 8 : 0) |
-          (this.rx.length >= FIFO_DEPTH ? 16 : 0)
-        );
-      }
-      case 0x48:
-        return 0;
-      case 0x58:
-        return 0x51535049;
-      case 0x5c:
-        return 0x3430312a;
-      case 0x60:
-        if (!this.rx.length) this.rp2040.fail('SSI', 'data register read while the receive FIFO is empty');
-        return this.rx.shift();
-      case 0xf0:
-        return this.sampleDelay;
-      case 0xf4:
-        return this.spiCtrlr0;
-      case 0xf8:
-        return this.driveEdge;
-    }
-    return super.readUint32(offset);
+  #pop() {
+    if (!this.rx.length) this.rp2040.fail('SSI', 'data register read while the receive FIFO is empty');
+    return this.rx.shift();
   }
 
+  get #status() {
+    return (
+      (this.shifting !== null ? 1 : 0) |
+      (this.tx.length < FIFO_DEPTH ? 2 : 0) |
+      (this.tx.length === 0 ? 4 : 0) |
+      (this.rx.length ? 8 : 0) |
+      (this.rx.length >= FIFO_DEPTH ? 16 : 0)
+    );
+  }
+
+  static registers = {
+    0x00: configuration('ctrlr0'),
+    0x04: configuration('ctrlr1', 0xffff),
+    0x08: { read: (b) => b.enabled, write: (b, value) => b.#enable(value & 1) },
+    0x10: { read: (b) => b.ser, write: (b, value) => b.#choose(value & 1) },
+    0x14: configuration('baudr', 0xfffe),
+    0x18: LOST,
+    0x1c: LOST,
+    0x20: { read: (b) => b.tx.length },
+    0x24: { read: (b) => b.rx.length },
+    0x28: { read: (b) => b.#status },
+    0x2c: LOST,
+    0x48: { read: () => 0 },
+    0x4c: LOST,
+    0x58: { read: () => 0x51535049 },
+    0x5c: { read: () => 0x3430312a },
+    0x60: { read: (b) => b.#pop(), write: (b, value) => b.#push(value) },
+    0xf0: configuration('sampleDelay', 0xff),
+    0xf4: configuration('spiCtrlr0'),
+    0xf8: configuration('driveEdge', 0xff),
+  };
+
   writeUint32(offset, value) {
-    this.#write(offset, value);
+    super.writeUint32(offset, value);
     this.#settingsChanged();
   }
 
-  #write(offset, value) {
-    const configuration = offset === 0x00 || offset === 0x04 || offset === 0x14 || offset === 0xf0 || offset === 0xf4 || offset === 0xf8;
-    if (configuration && this.enabled) {
-      this.rp2040.fail('SSI', `configuration register 0x${offset.toString(16)} written while enabled`);
+  #enable(enabled) {
+    if (!enabled) {
+      // By its maker's datasheet the transfer ends at once.
+      if (this.shifting !== null && !this.forcedSelect) this.rp2040.fail('SSI', 'disabled in mid-transfer');
+      this.shifting = null;
+      this.alarm.cancel();
+      this.tx = [];
+      this.rx = [];
+      this.entering = [];
     }
-    switch (offset) {
-      case 0x00:
-        this.ctrlr0 = value >>> 0;
-        return;
-      case 0x04:
-        this.ctrlr1 = value & 0xffff;
-        return;
-      case 0x08:
-        if (!(value & 1)) {
-          // By its maker's datasheet the transfer ends at once.
-          if (this.shifting !== null && !this.forcedSelect) this.rp2040.fail('SSI', 'disabled in mid-transfer');
-          this.shifting = null;
-          this.alarm.cancel();
-          this.tx = [];
-          this.rx = [];
-          this.entering = [];
-        }
-        this.enabled = value & 1;
-        return;
-      case 0x10:
-        this.ser = value & 1;
-        this.#start();
-        return;
-      case 0x14:
-        this.baudr = value & 0xfffe;
-        return;
-      case 0x18:
-      case 0x1c:
-      case 0x2c:
-      case 0x4c:
-        return;
-      case 0x60:
-        this.#push(value);
-        return;
-      case 0xf0:
-        this.sampleDelay = value & 0xff;
-        return;
-      case 0xf4:
-        this.spiCtrlr0 = value >>> 0;
-        return;
-      case 0xf8:
-        this.driveEdge = value & 0xff;
-        return;
-    }
-    super.writeUint32(offset, value);
+    this.enabled = enabled;
+  }
+
+  #choose(ser) {
+    this.ser = ser;
+    this.#start();
   }
 
   #push(value) {

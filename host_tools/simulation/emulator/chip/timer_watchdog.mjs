@@ -5,12 +5,12 @@
  * counter reaches a value exactly when the tick does, and an alarm fires at that tick, never earlier. The
  * watchdog counts down twice per tick (erratum RP2040-E1) and reboots what PSM_WDSEL selects.
  */
-import { BasePeripheral } from 'rp2040js';
+import { clearedByOnes, constant, field, RegisterBlock } from './registers.mjs';
 
 const WATCHDOG_MAX = 0xffffff;
 const TIMER_RESET = 21;
 
-export class Timer extends BasePeripheral {
+export class Timer extends RegisterBlock {
   /** @param begin_us what it counts from, out of reset: 0 on silicon */
   constructor(chip, begin_us = 0) {
     super(chip, 'TIMER');
@@ -33,7 +33,6 @@ export class Timer extends BasePeripheral {
     this.raw = 0;
     this.enable = 0;
     this.force = 0;
-    this.writeLow = 0;
     this.#interrupts();
   }
 
@@ -72,76 +71,51 @@ export class Timer extends BasePeripheral {
     return this.count_us;
   }
 
-  readUint32(offset) {
-    switch (offset) {
-      case 0x08:
-        return this.latchedHigh;
-      case 0x0c: {
-        const count = this.#count();
-        this.latchedHigh = Math.floor(count / 2 ** 32);
-        return count >>> 0;
-      }
-      case 0x10:
-      case 0x14:
-      case 0x18:
-      case 0x1c:
-        return this.alarms[(offset - 0x10) >> 2].target;
-      case 0x20:
-        return this.alarms.reduce((bits, a, i) => bits | (a.armed ? 1 << i : 0), 0);
-      case 0x24:
-        return Math.floor(this.#count() / 2 ** 32);
-      case 0x28:
-        return this.#count() >>> 0;
-      case 0x2c:
-        return 3;
-      case 0x30:
-        return 0;
-      case 0x34:
-        return this.raw;
-      case 0x38:
-        return this.enable;
-      case 0x3c:
-        return this.force;
-      case 0x40:
-        return (this.raw & this.enable) | this.force;
-    }
-    return super.readUint32(offset);
+  #readLow() {
+    const count = this.#count();
+    this.latchedHigh = Math.floor(count / 2 ** 32);
+    return count;
   }
 
+  #arm(a, target) {
+    a.target = target >>> 0;
+    a.armed = true;
+    if (this.zero_ns !== null) this.#schedule(a);
+  }
+
+  #disarm(bits) {
+    this.alarms.forEach((a, i) => {
+      if (!((bits >>> i) & 1)) return;
+      a.armed = false;
+      a.alarm.cancel();
+    });
+  }
+
+  static #alarm = (i) => ({ read: (b) => b.alarms[i].target, write: (b, value) => b.#arm(b.alarms[i], value) });
+
+  static registers = {
+    0x08: { read: (b) => b.latchedHigh },
+    0x0c: { read: (b) => b.#readLow() },
+    0x10: Timer.#alarm(0),
+    0x14: Timer.#alarm(1),
+    0x18: Timer.#alarm(2),
+    0x1c: Timer.#alarm(3),
+    0x20: {
+      read: (b) => b.alarms.reduce((bits, a, i) => bits | (a.armed ? 1 << i : 0), 0),
+      write: (b) => b.#disarm(b.rawWriteValue),
+    },
+    0x24: { read: (b) => Math.floor(b.#count() / 2 ** 32) },
+    0x28: { read: (b) => b.#count() },
+    0x2c: constant(3),
+    0x30: { read: () => 0 },
+    0x34: clearedByOnes('raw'),
+    0x38: field('enable', 0xf),
+    0x3c: field('force', 0xf),
+    0x40: { read: (b) => (b.raw & b.enable) | b.force },
+  };
+
   writeUint32(offset, value) {
-    switch (offset) {
-      case 0x10:
-      case 0x14:
-      case 0x18:
-      case 0x1c: {
-        const a = this.alarms[(offset - 0x10) >> 2];
-        a.target = value >>> 0;
-        a.armed = true;
-        if (this.zero_ns !== null) this.#schedule(a);
-        return;
-      }
-      case 0x20:
-        this.alarms.forEach((a, i) => {
-          if ((this.rawWriteValue >>> i) & 1) {
-            a.armed = false;
-            a.alarm.cancel();
-          }
-        });
-        return;
-      case 0x2c:
-        return;
-      case 0x34:
-        this.raw &= ~this.rawWriteValue;
-        break;
-      case 0x38:
-        this.enable = value & 0xf;
-        break;
-      case 0x3c:
-        this.force = value & 0xf;
-        break;
-      default:
-        super.writeUint32(offset, value);
-    }
+    super.writeUint32(offset, value);
     this.#interrupts();
   }
 
@@ -164,7 +138,7 @@ export class Timer extends BasePeripheral {
   }
 }
 
-export class Watchdog extends BasePeripheral {
+export class Watchdog extends RegisterBlock {
   /** @param kept what a previous life of the chip left: { reason, scratch } */
   constructor(chip, kept) {
     super(chip, 'WATCHDOG');
@@ -172,7 +146,6 @@ export class Watchdog extends BasePeripheral {
     this.scratch = kept?.scratch ?? new Uint32Array(8);
     this.ctrl = 0x07000000;
     this.tick = 0x200;
-    this.load = 0;
     this.tick_ns = Infinity;
     this.expires_ns = Infinity;
     this.remaining = 0;
@@ -214,31 +187,41 @@ export class Watchdog extends BasePeripheral {
     this.alarm.scheduleAt(this.expires_ns);
   }
 
-  readUint32(offset) {
-    if (offset === 0x00) return ((this.ctrl & 0x47000000) | this.#left()) >>> 0;
-    if (offset === 0x08) return this.reason;
-    if (offset >= 0x0c && offset <= 0x28) return this.scratch[(offset - 0x0c) >> 2];
-    if (offset === 0x2c) return this.tick | (this.ticking ? 0x400 : 0);
-    return super.readUint32(offset);
+  #writeCtrl(value) {
+    const left = this.#left();
+    this.ctrl = value & 0x47000000;
+    this.remaining = left;
+    this.#rearm();
+    if (value & 0x80000000) this.#expired(2);
   }
 
-  writeUint32(offset, value) {
-    if (offset === 0x00) {
-      const left = this.#left();
-      this.ctrl = value & 0x47000000;
-      this.remaining = left;
-      this.#rearm();
-      if (value & 0x80000000) this.#expired(2);
-    } else if (offset === 0x04) {
-      this.remaining = value & WATCHDOG_MAX;
-      this.#rearm();
-    } else if (offset >= 0x0c && offset <= 0x28) {
-      this.scratch[(offset - 0x0c) >> 2] = value;
-    } else if (offset === 0x2c) {
-      this.tick = value & 0x3ff;
-      this.tickChanged();
-    } else super.writeUint32(offset, value);
+  #feed(value) {
+    this.remaining = value & WATCHDOG_MAX;
+    this.#rearm();
   }
+
+  #writeTick(value) {
+    this.tick = value & 0x3ff;
+    this.tickChanged();
+  }
+
+  static #scratch = (i) => [
+    0x0c + 4 * i,
+    {
+      read: (b) => b.scratch[i],
+      write: (b, value) => {
+        b.scratch[i] = value;
+      },
+    },
+  ];
+
+  static registers = {
+    0x00: { read: (b) => (b.ctrl & 0x47000000) | b.#left(), write: (b, value) => b.#writeCtrl(value) },
+    0x04: { write: (b, value) => b.#feed(value) },
+    0x08: { read: (b) => b.reason },
+    ...Object.fromEntries([0, 1, 2, 3, 4, 5, 6, 7].map(Watchdog.#scratch)),
+    0x2c: { read: (b) => b.tick | (b.ticking ? 0x400 : 0), write: (b, value) => b.#writeTick(value) },
+  };
 
   #expired(reason) {
     this.expires_ns = Infinity;

@@ -8,7 +8,7 @@
  * no packet is under way), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller,
  * and tokens or frames while clk_sys is slower than clk_usb.
  */
-import { BasePeripheral } from 'rp2040js';
+import { clearedByOnes, field, RegisterBlock } from './registers.mjs';
 
 const IRQ = 5;
 const CLK_USB_HZ = 48e6;
@@ -48,7 +48,7 @@ const DPRAM_BYTES = 4096;
 const IDLE_NS = 800e3;
 const MUX_TO_PADS = 0xc;
 
-export class UsbBlock extends BasePeripheral {
+export class UsbBlock extends RegisterBlock {
   constructor(chip) {
     super(chip, 'USB');
     this.onPortChange = () => {};
@@ -91,7 +91,9 @@ export class UsbBlock extends BasePeripheral {
     this.sof_ns = 0;
     /** The longest from the start of a frame to the reading of SOF_RD. */
     this.slowestSof_ns = 0;
-    this.phy = new Map();
+    this.phyDirect = 0;
+    this.phyOverride = 0;
+    this.phyTrim = 0;
     this.select = new Uint8Array(32);
     this.fieldsWritten_ns = new Float64Array(64).fill(-1e9);
     this.quiet = true;
@@ -112,8 +114,8 @@ export class UsbBlock extends BasePeripheral {
       this.muxing === MUX_TO_PADS &&
       (ctrl & 0x1f) === 8 &&
       ((ctrl >>> 16) & 3) === 3 &&
-      ((this.phy.get(0x7c) ?? 0) & 2) !== 0 &&
-      ((this.phy.get(0x80) ?? 0) & 4) !== 0
+      (this.phyDirect & 2) !== 0 &&
+      (this.phyOverride & 4) !== 0
     );
   }
 
@@ -158,122 +160,73 @@ export class UsbBlock extends BasePeripheral {
     this.rp2040.setInterrupt(IRQ, ((this.raw & this.inte) | this.intf) !== 0);
   }
 
-  readUint32(offset) {
-    switch (offset) {
-      case 0x00:
-        return this.address;
-      case 0x40:
-        return this.mainCtrl;
-      case 0x48:
-        if (this.sofPending) this.slowestSof_ns = Math.max(this.slowestSof_ns, this.rp2040.clock.nanos - this.sof_ns);
-        this.sofPending = false;
-        this.#update();
-        return this.frame;
-      case 0x4c:
-        return this.sieCtrl >>> 0;
-      case 0x50:
-        return (
-          (this.sieStatus |
-            (this.vbusDetected ? 1 : 0) |
-            (this.inReset && !this.feigned ? 0 : ST_LINE_J) |
-            (this.connected ? ST_CONNECTED : 0)) >>>
-          0
-        );
-      case 0x58:
-        return this.buffStatus >>> 0;
-      case 0x5c:
-        return 0;
-      case 0x60:
-        return this.epAbort >>> 0;
-      case 0x64:
-        return this.epAbortDone >>> 0;
-      case 0x68:
-        return this.stallArm;
-      case 0x6c:
-        return this.nakPoll;
-      case 0x70:
-        return this.stallNak >>> 0;
-      case 0x74:
-        return this.muxing;
-      case 0x78:
-        return this.pwr;
-      case 0x7c:
-      case 0x80:
-      case 0x84:
-        return this.phy.get(offset) ?? 0;
-      case 0x8c:
-        return this.raw;
-      case 0x90:
-        return this.inte;
-      case 0x94:
-        return this.intf;
-      case 0x98:
-        return (this.raw & this.inte) | this.intf;
-    }
-    return super.readUint32(offset);
+  #readFrame() {
+    if (this.sofPending) this.slowestSof_ns = Math.max(this.slowestSof_ns, this.rp2040.clock.nanos - this.sof_ns);
+    this.sofPending = false;
+    this.#update();
+    return this.frame;
   }
 
+  get #status() {
+    const line = this.inReset && !this.feigned ? 0 : ST_LINE_J;
+    return this.sieStatus | (this.vbusDetected ? 1 : 0) | line | (this.connected ? ST_CONNECTED : 0);
+  }
+
+  #clearStatus(bits) {
+    this.sieStatus &= ~(bits & ST_WRITE_CLEAR);
+    if (bits & ST_SUSPENDED) this.suspendChanged = false;
+  }
+
+  #writeMainCtrl(value) {
+    if (value & 2) this.rp2040.fail('USB', 'host mode is not modelled');
+    this.mainCtrl = value & 0x80000003;
+  }
+
+  #abort(value) {
+    if (this.isOld && value) this.rp2040.fail('USB', 'EP_ABORT before revision B2 blocks the controller for good (erratum E2)');
+    this.epAbort = value >>> 0;
+    this.epAbortDone |= this.epAbort & ~this.inFlight;
+  }
+
+  #armStall(value) {
+    this.stallArm = value & 3;
+    this.#update();
+    if (value & 1) this.onArmed(0, true);
+    if (value & 2) this.onArmed(0, false);
+  }
+
+  #writeMuxing(value) {
+    this.muxing = value & 0xf;
+    if (this.feigned) this.#awaitIdle();
+    else if (this.rp2040.trouble.busyHub) this.idleAlarm.cancel();
+  }
+
+  static registers = {
+    0x00: field('address', 0x7f),
+    0x40: { read: (b) => b.mainCtrl, write: (b, value) => b.#writeMainCtrl(value) },
+    0x48: { read: (b) => b.#readFrame() },
+    0x4c: field('sieCtrl'),
+    0x50: { read: (b) => b.#status, write: (b) => b.#clearStatus(b.rawWriteValue) },
+    0x58: clearedByOnes('buffStatus'),
+    0x5c: { read: () => 0 },
+    0x60: { read: (b) => b.epAbort, write: (b, value) => b.#abort(value) },
+    0x64: clearedByOnes('epAbortDone'),
+    0x68: { read: (b) => b.stallArm, write: (b, value) => b.#armStall(value) },
+    0x6c: field('nakPoll'),
+    0x70: clearedByOnes('stallNak'),
+    0x74: { read: (b) => b.muxing, write: (b, value) => b.#writeMuxing(value) },
+    0x78: field('pwr', 0x3f),
+    0x7c: field('phyDirect'),
+    0x80: field('phyOverride'),
+    0x84: field('phyTrim'),
+    0x8c: { read: (b) => b.raw },
+    0x90: field('inte', 0xfffff),
+    0x94: field('intf', 0xfffff),
+    0x98: { read: (b) => (b.raw & b.inte) | b.intf },
+  };
+
   writeUint32(offset, value) {
-    switch (offset) {
-      case 0x00:
-        this.address = value & 0x7f;
-        return;
-      case 0x40:
-        if (value & 2) this.rp2040.fail('USB', 'host mode is not modelled');
-        this.mainCtrl = value & 0x80000003;
-        break;
-      case 0x4c:
-        this.sieCtrl = value >>> 0;
-        break;
-      case 0x50:
-        this.sieStatus &= ~(this.rawWriteValue & ST_WRITE_CLEAR);
-        if (this.rawWriteValue & ST_SUSPENDED) this.suspendChanged = false;
-        break;
-      case 0x58:
-        this.buffStatus &= ~this.rawWriteValue;
-        break;
-      case 0x60:
-        if (this.isOld && value) this.rp2040.fail('USB', 'EP_ABORT before revision B2 blocks the controller for good (erratum E2)');
-        this.epAbort = value >>> 0;
-        this.epAbortDone |= this.epAbort & ~this.inFlight;
-        break;
-      case 0x64:
-        this.epAbortDone &= ~this.rawWriteValue;
-        break;
-      case 0x68:
-        this.stallArm = value & 3;
-        this.#update();
-        if (value & 1) this.onArmed(0, true);
-        if (value & 2) this.onArmed(0, false);
-        return;
-      case 0x6c:
-        this.nakPoll = value;
-        return;
-      case 0x70:
-        this.stallNak &= ~this.rawWriteValue;
-        break;
-      case 0x74:
-        this.muxing = value & 0xf;
-        if (this.feigned) this.#awaitIdle();
-        else if (this.rp2040.trouble.busyHub) this.idleAlarm.cancel();
-        break;
-      case 0x78:
-        this.pwr = value & 0x3f;
-        break;
-      case 0x7c:
-      case 0x80:
-      case 0x84:
-        this.phy.set(offset, value >>> 0);
-        return;
-      case 0x90:
-        this.inte = value & 0xfffff;
-        break;
-      case 0x94:
-        this.intf = value & 0xfffff;
-        break;
-      default:
-        super.writeUint32(offset, value);
-    }
+    super.writeUint32(offset, value);
     this.#update();
     this.onPortChange();
   }
