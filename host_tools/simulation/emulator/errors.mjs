@@ -1,3 +1,4 @@
+import { readFileSync } from 'node:fs';
 import { getSystemErrorMap } from 'node:util';
 
 /** A mistake in what the user gave: one line that states what to do; the process exits with 2. */
@@ -7,3 +8,14 @@ export class InputError extends Error {}
 export function inWords(error) {
   return getSystemErrorMap().get(error.errno)?.[1] ?? error.message;
 }
+
+/** The content of a file that the user named, as text where an encoding is given. */
+export function readInput(path, what, { advice = 'check the path', encoding } = {}) {
+  try {
+    return readFileSync(path, encoding);
+  } catch (error) {
+    throw new InputError(`${path}: cannot read the ${what} (${inWords(error)}); ${advice}`);
+  }
+}
+
+export const readText = (path, what) => readInput(path, what, { encoding: 'utf8' });

@@ -3,94 +3,64 @@
  *
  *     { "type": TYPE, "sensor": 0..14 | "mux": 0..2, "from_s": seconds, "to_s": seconds }
  *
- *     sensor_dead (sensor)          acknowledges nothing
- *     sensor_prom_corrupt (sensor)  PROM words read back with flipped bits
- *     sensor_prom_collision (sensor)  two to four bits of C1 to C6 read back inverted, always the same, such that the CRC-4 is right
- *     sensor_prom_bit (sensor)      bit 10 of C1 reads back inverted: some 7 kPa
- *     sensor_adc_zero (sensor)      every ADC read gives 0
- *     sensor_nack (sensor)          does not acknowledge its address, once, the first time from from_s on
- *     sensor_brown_out (sensor)     its supply dips at from_s: a conversion is lost, and until a reset its codes are 1/16 too small
- *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted, another one each time
- *     sensor_noisy (sensor)         ten times the noise of the datasheet
- *     sensor_fast (sensor)          acknowledges so soon that an I2C controller without a receive hold takes it for lost arbitration
- *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
- *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
- *     mux_dead (mux)                acknowledges nothing and connects nothing
- *     sensor_missing (sensor)       is not there; when it comes back it has just been powered
- *     line_stuck_low (sensor)       its SDA is tied to ground; behind a multiplexer only while its channel is on
- *     line_stuck_high (sensor)      its SDA is tied to VDD
- *     scl_stuck_low, scl_stuck_high SCL is tied to ground, to VDD
- *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
- *     host_stall                    the USB host stops reading the CDC port
- *     usb_unplug                    the cable is out; it comes back at to_s
- *     crystal_dead                  the crystal does not swing before to_s
- *     crystal_weak                  it swings, but what it drives before to_s stops the chip until a reset
- *     pll_late                      no PLL locks before to_s
- *     usb_busy_hub                  other devices talk on the bus: after a reset of it it is never idle for 800 us
- *     usb_deaf                      erratum E15 strikes in the first IN transfer from from_s on: the USB controller answers nothing until its block is reset
- *     usb_dead                      the same, and it does not hear the bus either
- *     usb_late_resume               the controller reports the end of a suspend 45 ms late
- *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
- *     sram_upset (address, bytes)   at from_s the bytes, as hexadecimal digits, get into the chip's SRAM at this address
- *     chip_reset                    the chip alone is held in reset until to_s, as when its brown-out detector trips; its SRAM is lost
- *
- * sensor_missing, line_stuck_high, scl_stuck_* and clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
  */
-import { readFileSync } from 'node:fs';
 import { RAM_BASE, RAM_BYTES } from './chip/core.mjs';
-import { InputError, inWords } from './errors.mjs';
+import { InputError, readText } from './errors.mjs';
 
-const TARGET = {
-  sensor_dead: 'sensor',
-  sensor_prom_corrupt: 'sensor',
-  sensor_prom_collision: 'sensor',
-  sensor_prom_bit: 'sensor',
-  sensor_adc_zero: 'sensor',
-  sensor_nack: 'sensor',
-  sensor_brown_out: 'sensor',
-  sensor_d2_corrupt: 'sensor',
-  sensor_noisy: 'sensor',
-  sensor_fast: 'sensor',
-  sda_stuck_low: 'sensor',
-  mux_stuck: 'mux',
-  mux_dead: 'mux',
-  sensor_missing: 'sensor',
-  line_stuck_low: 'sensor',
-  line_stuck_high: 'sensor',
-  scl_stuck_low: null,
-  scl_stuck_high: null,
-  clock_glitch: 'sensor',
-  host_stall: null,
-  usb_unplug: null,
-  crystal_dead: null,
-  crystal_weak: null,
-  pll_late: null,
-  usb_busy_hub: null,
-  usb_deaf: null,
-  usb_dead: null,
-  usb_late_resume: null,
-  power_cut: null,
-  chip_reset: null,
-  sram_upset: null,
+/** Of one sensor: its name in Ms5840's `faults`. */
+const OF_SENSOR = {
+  sensor_dead: 'dead', // acknowledges nothing
+  sensor_prom_corrupt: 'promCorrupt', // PROM words read back with flipped bits
+  sensor_prom_collision: 'promCollision', // two to four bits of C1 to C6 read back inverted, always the same, such that the CRC-4 is right
+  sensor_prom_bit: 'promBit', // bit 10 of C1 reads back inverted: some 7 kPa
+  sensor_adc_zero: 'adcZero', // every ADC read gives 0
+  sensor_d2_corrupt: 'd2Corrupt', // every temperature has one bit inverted, another one each time
+  sensor_noisy: 'noisy', // ten times the noise of the datasheet
+  sensor_fast: 'fast', // acknowledges so soon that an I2C controller without a receive hold takes it for lost arbitration
+};
+
+/** The same, which strike once at from_s: how many have struck. */
+const ONCE_OF_SENSOR = {
+  sensor_nack: 'nacks', // does not acknowledge its address, the first time from then on
+  sensor_brown_out: 'brownOuts', // its supply dips: a conversion is lost, and until a reset its codes are 1/16 too small
+};
+
+/** Of a board: what it strikes. */
+const OF_BOARD = {
+  sda_stuck_low: 'sensor', // pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
+  mux_stuck: 'mux', // acknowledges nothing until its RESET line was pulsed
+  mux_dead: 'mux', // acknowledges nothing and connects nothing
+  line_stuck_low: 'sensor', // its SDA is tied to ground; behind a multiplexer only while its channel is on
+};
+
+/** Of a board with a data line for each sensor. */
+const OF_LINES = {
+  sensor_missing: 'sensor', // is not there; when it comes back it has just been powered
+  line_stuck_high: 'sensor', // its SDA is tied to VDD
+  scl_stuck_low: null, // SCL is tied to ground
+  scl_stuck_high: null, // SCL is tied to VDD
+  clock_glitch: 'sensor', // sees one clock too many, once, in the first transfer from from_s on
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = [
-  'host_stall',
-  'usb_unplug',
-  'crystal_dead',
-  'crystal_weak',
-  'pll_late',
-  'usb_busy_hub',
-  'usb_deaf',
-  'usb_dead',
-  'usb_late_resume',
-  'power_cut',
-  'chip_reset',
-  'sram_upset',
-];
-const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
+const OF_WORLD = {
+  host_stall: null, // the USB host stops reading the CDC port
+  usb_unplug: null, // the cable is out; it comes back at to_s
+  crystal_dead: null, // the crystal does not swing before to_s
+  crystal_weak: null, // it swings, but what it drives before to_s stops the chip until a reset
+  pll_late: null, // no PLL locks before to_s
+  usb_busy_hub: null, // other devices talk on the bus: after a reset of it it is never idle for 800 us
+  usb_deaf: null, // erratum E15 strikes in the first IN transfer from from_s on: the controller answers nothing until its block is reset
+  usb_dead: null, // the same, and it does not hear the bus either
+  usb_late_resume: null, // the controller reports the end of a suspend 45 ms late
+  power_cut: null, // chip, flash and sensors are without power until to_s; what the flash was doing is cut short
+  chip_reset: null, // the chip alone is held in reset until to_s, as when its brown-out detector trips; its SRAM is lost
+  sram_upset: null, // at from_s the "bytes", as hexadecimal digits, get into the chip's SRAM at this "address"
+};
+
+const eachSensor = Object.fromEntries(Object.keys({ ...OF_SENSOR, ...ONCE_OF_SENSOR }).map((type) => [type, 'sensor']));
+const TARGET = { ...eachSensor, ...OF_BOARD, ...OF_LINES, ...OF_WORLD };
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {
   const fail = (message) => {
@@ -111,7 +81,7 @@ export function parseFaults(text, file, { sensors, muxes, lines }) {
     if (fault.type === undefined) fail(`${at}: "type" is missing; ${known}`);
     if (!Object.hasOwn(TARGET, fault.type)) fail(`${at}: unknown type "${fault.type}"; ${known}`);
     const target = TARGET[fault.type];
-    if (OF_LINES.includes(fault.type) && !lines) fail(`${at}: ${fault.type} needs a board with a data line for each sensor`);
+    if (Object.hasOwn(OF_LINES, fault.type) && !lines) fail(`${at}: ${fault.type} needs a board with a data line for each sensor`);
     if (target === 'mux' && !muxes) fail(`${at}: ${fault.type} needs a board with multiplexers`);
     const own = fault.type === 'sram_upset' ? ['address', 'bytes'] : ['to_s', target];
     const extra = Object.keys(fault).find((key) => !['type', 'from_s', ...own].includes(key));
@@ -136,15 +106,7 @@ export function parseFaults(text, file, { sensors, muxes, lines }) {
   });
 }
 
-export function readFaults(file, limits) {
-  let text;
-  try {
-    text = readFileSync(file, 'utf8');
-  } catch (error) {
-    throw new InputError(`${file}: cannot read the faults (${inWords(error)}); check the path`);
-  }
-  return parseFaults(text, file, limits);
-}
+export const readFaults = (file, limits) => parseFaults(readText(file, 'faults'), file, limits);
 
 const NONE = Object.freeze({});
 
@@ -162,22 +124,11 @@ export class Faults {
   /** One more, that begins now or later. */
   add(fault) {
     const { scope, on } = this;
-    const key = {
-      sensor_dead: 'dead',
-      sensor_prom_corrupt: 'promCorrupt',
-      sensor_prom_collision: 'promCollision',
-      sensor_prom_bit: 'promBit',
-      sensor_adc_zero: 'adcZero',
-      sensor_d2_corrupt: 'd2Corrupt',
-      sensor_noisy: 'noisy',
-      sensor_fast: 'fast',
-    };
-    /** How many have begun. */
-    const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };
+    const [key, times] = [OF_SENSOR[fault.type], ONCE_OF_SENSOR[fault.type]];
     const set = (name, value) => this.sensors.set(fault.target, { ...this.sensor(fault.target), [name]: value });
     const change = (active) => {
-      if (key[fault.type]) set(key[fault.type], active);
-      else if (times[fault.type]) set(times[fault.type], (this.sensor(fault.target)[times[fault.type]] ?? 0) + (active ? 1 : 0));
+      if (key) set(key, active);
+      else if (times) set(times, (this.sensor(fault.target)[times] ?? 0) + (active ? 1 : 0));
       else {
         if (active) this.active.add(fault);
         else this.active.delete(fault);
@@ -190,7 +141,7 @@ export class Faults {
 
   /** On a board that has just been powered. */
   actAnew() {
-    for (const fault of this.active) if (!OF_THE_WORLD.includes(fault.type)) this.on[fault.type]?.(fault.target, true);
+    for (const fault of this.active) if (!Object.hasOwn(OF_WORLD, fault.type)) this.on[fault.type]?.(fault.target, true);
   }
 
   sensor(index) {

@@ -1,12 +1,12 @@
 #!/usr/bin/env node
 /** Emulated boards in lock step with a program that simulates the world around them: see USAGE. */
 import { spawn } from 'node:child_process';
-import { parseArgs } from 'node:util';
 import { BOARDS, findBoard } from './board/boards.mjs';
+import { isPositive, isWhole, main, numberOf } from './command_line.mjs';
 import { InputError } from './errors.mjs';
 import { readImage } from './image.mjs';
-import { LivePressures } from './live_pressures.mjs';
 import { DEFAULT_SERIAL, Machine } from './machine.mjs';
+import { restOf } from './scenario.mjs';
 
 const USAGE = `usage: lockstep.mjs --image FILE.bin --board NAME [options] -- PROGRAM [ARGUMENT...]
 
@@ -29,50 +29,27 @@ writes from there on is a JSON object, which goes to the standard output with wh
 
 Exit: 0 clean; 1 a warning or failure of firmware or emulation; 2 wrong usage or input, or a program that failed.`;
 
-const OPTIONS = {
-  image: { type: 'string' },
-  board: { type: 'string' },
-  boards: { type: 'string', default: '2' },
-  'clock-ppm': { type: 'string', default: '0' },
-  'slice-us': { type: 'string', default: '500' },
-  seconds: { type: 'string', default: '10' },
-  seed: { type: 'string', default: '1' },
-  help: { type: 'boolean', short: 'h', default: false },
-};
+const DEFAULTS = { boards: '2', 'clock-ppm': '0', 'slice-us': '500', seconds: '10', seed: '1' };
 const PRESSURE_LIMIT_Pa = 1e7;
 /** No client sends more within a slice. */
 const SENT_LIMIT = 65536;
 
-function parseOptions(argv) {
-  let values, positionals;
-  try {
-    ({ values, positionals } = parseArgs({ args: argv, options: OPTIONS, strict: true, allowPositionals: true }));
-  } catch (error) {
-    throw new InputError(`${error.message.split('\n')[0]}; see --help`);
-  }
-  if (values.help) return values;
-  for (const name of ['image', 'board']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
-  if (!positionals.length) throw new InputError('no program is named; see --help');
-  const number = (name, text, check, what) => {
-    const value = Number(text);
-    if (text.trim() === '' || !check(value)) throw new InputError(`--${name} "${text}" is not ${what}`);
-    return value;
-  };
-  const whole = (name, low, high) =>
-    number(name, values[name], (v) => Number.isInteger(v) && v >= low && v <= high, `a whole number from ${low} to ${high}`);
+function parseOptions(values, program) {
+  if (!program.length) throw new InputError('no program is named; see --help');
+  const whole = (name, low, high) => numberOf(name, values[name], isWhole(low, high), `a whole number from ${low} to ${high}`);
   const boards = whole('boards', 1, 8);
   const listed = values['clock-ppm']
     .split(',')
-    .map((text) => number('clock-ppm', text, (v) => Math.abs(v) <= 1000, 'a list of numbers from -1000 to 1000'));
+    .map((text) => numberOf('clock-ppm', text, (v) => Math.abs(v) <= 1000, 'a list of numbers from -1000 to 1000'));
   if (listed.length > boards) throw new InputError(`--clock-ppm has ${listed.length} numbers for ${boards} boards`);
   return {
     image: values.image,
     board: values.board,
     boards,
-    program: positionals,
+    program,
     slice_ns: 1000 * whole('slice-us', 100, 10000),
     seed: whole('seed', 0, 2 ** 32 - 16),
-    end_ns: 1e9 * number('seconds', values.seconds, (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds'),
+    end_ns: 1e9 * numberOf('seconds', values.seconds, isPositive, 'a positive number of seconds'),
     clocks_ppm: Array.from({ length: boards }, (_, i) => listed[i] ?? 0),
   };
 }
@@ -159,7 +136,7 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
   const Board = findBoard(board);
   const image = readImage(imagePath);
   let chunks = [];
-  const live = Array.from({ length: boards }, () => new LivePressures(Board.sensors, slice_ns));
+  const live = Array.from({ length: boards }, () => restOf(Board.sensors));
   const machines = live.map((scenario, i) => {
     const serial = DEFAULT_SERIAL.slice(0, -2) + (i + 1).toString(16).padStart(2, '0');
     const machine = new Machine({
@@ -185,7 +162,7 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
       if (!answers) break;
       if (slice * slice_ns >= end_ns) throw new InputError(`${world.name}: is not over after ${end_ns / 1e9} s`);
       answers.forEach(({ pressures_Pa, bytes }, i) => {
-        live[i].add(pressures_Pa);
+        live[i].add(((slice + 1) * slice_ns) / 1e9, pressures_Pa);
         if (bytes.length) machines[i].client.write(bytes);
       });
       const stopped = machines.findIndex((machine) => !machine.run((slice + 1) * slice_ns));
@@ -211,12 +188,6 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
   return ran.every(({ warnings }) => warnings.length === 0) ? 0 : 1;
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options.help) process.stdout.write(`${USAGE}\n`);
-  else process.exitCode = await run(options);
-} catch (error) {
-  if (!(error instanceof InputError)) throw error;
-  process.stderr.write(`error: ${error.message}\n`);
-  process.exitCode = 2;
-}
+await main(USAGE, { defaults: DEFAULTS, needed: ['image', 'board'], allowPositionals: true }, (values, program) =>
+  run(parseOptions(values, program)),
+);

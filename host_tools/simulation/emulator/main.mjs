@@ -1,13 +1,13 @@
 #!/usr/bin/env node
 /** Command line of the emulator: see USAGE. */
-import { readFileSync } from 'node:fs';
+import { existsSync } from 'node:fs';
 import { createInterface } from 'node:readline';
-import { parseArgs } from 'node:util';
 import { BOARDS, findBoard } from './board/boards.mjs';
 import { findSensor } from './board/ms5840.mjs';
 import { strobe } from './board/sync_pin.mjs';
 import { FLASH_BYTES } from './chip/flash_memory.mjs';
-import { InputError, inWords } from './errors.mjs';
+import { isPositive, isWhole, main, numberOf } from './command_line.mjs';
+import { InputError, readInput } from './errors.mjs';
 import { readFaults } from './faults.mjs';
 import { readImage } from './image.mjs';
 import { readHostScript, scheduleHostScript } from './port/host_script.mjs';
@@ -31,7 +31,6 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --seed N             noise, sensor tolerances, SRAM content at power-on; default 1
   --serial HEX16       unique id of the flash chip; default ${DEFAULT_SERIAL}
   --clock-ppm P        the chip's clocks are fast by P parts per million of emulated time, -1000 to 1000; default 0
-  --revision N         of the chip: 0, 1 or 2 for B0, B1, B2; default 2
   --faults FILE.json   faults of sensors, multiplexers, clocks, USB, power (format: faults.mjs)
   --flash FILE         what the flash holds beside the image, 2 MiB, from an earlier run; written again at the end of this one
   --slow-flash         the flash takes the longest times of its datasheet instead of the typical ones
@@ -41,12 +40,8 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --pty LINK           serve the CDC port as a pseudo-terminal, LINK is a symbolic link to it
   --wait-open          power on only when the pseudo-terminal was opened
   --wait-reader        while a client of the pseudo-terminal does not take what lies ready, emulated time waits, 2 s at most
-  --pace real|wall|fast
-                       real: never faster than the clock on the wall, a lag is dropped (default with --pty and
-                       --usbredir); wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
-                       a client writes arrives at the time of its writing, answers never come early, a lag is caught
-                       up and delays them, and the report has the largest of each second on the wall (wall_lag_s);
-                       fast: as fast as possible
+  --pace real|fast     real: never faster than the clock on the wall, a lag is dropped (default with --pty and
+                       --usbredir); fast: as fast as possible
   --stepped            serve the CDC port on stdin and stdout to a program that has a clock of its own: emulated time
                        passes only as far as that program asks (frames: port/stepped_port.mjs). So a test and its
                        emulators share one time, however slow the machine is: tests/support/emulated_fingertip.cpp
@@ -74,82 +69,20 @@ Runs without --pty and --usbredir are the same bit for bit each time; with --ste
 Exit: 0 clean; 1 a warning or failure of firmware or emulation, or an output that could not be written whole,
 each printed as a line; 2 wrong usage or input.`;
 
-const OPTIONS = {
-  image: { type: 'string' },
-  board: { type: 'string' },
-  scenario: { type: 'string' },
-  sensor: { type: 'string', default: 'ms5840' },
-  seconds: { type: 'string' },
-  seed: { type: 'string', default: '1' },
-  'clock-ppm': { type: 'string', default: '0' },
-  serial: { type: 'string', default: DEFAULT_SERIAL },
-  faults: { type: 'string' },
-  revision: { type: 'string', default: '2' },
-  flash: { type: 'string' },
-  'slow-flash': { type: 'boolean', default: false },
-  'fast-enumeration': { type: 'boolean', default: false },
-  'allow-watchdog': { type: 'boolean', default: false },
-  pty: { type: 'string' },
-  stepped: { type: 'boolean' },
-  usbredir: { type: 'string' },
-  'wait-open': { type: 'boolean', default: false },
-  'wait-reader': { type: 'boolean', default: false },
-  pace: { type: 'string' },
-  'host-script': { type: 'string' },
-  capture: { type: 'string' },
-  'sync-strobe': { type: 'string' },
-  'sync-log': { type: 'string' },
-  'bus-log': { type: 'string' },
-  'usb-log': { type: 'string' },
-  vcd: { type: 'string' },
-  'vcd-from': { type: 'string', default: '0' },
-  'vcd-to': { type: 'string' },
-  'rise-ns': { type: 'string' },
-  report: { type: 'string' },
-  progress: { type: 'boolean', default: false },
-  help: { type: 'boolean', short: 'h', default: false },
-};
+const DEFAULTS = { sensor: 'ms5840', seed: '1', 'clock-ppm': '0', serial: DEFAULT_SERIAL, 'vcd-from': '0' };
 
 /** Emulated time between two checks of the wall clock and the pseudo-terminal. */
 const SLICE_NS = 1e6;
 /** A virtual machine waits for each control request. */
 const USBREDIR_SLICE_NS = 200e3;
-/** An answer is late by this much at most. */
-const WALL_SLICE_NS = 250e3;
-const WALL_CATCH_UP_NS = 10e6;
 const SLICE_BATCH_NS = 50e6;
 const STROBE_HIGH_NS = 1e6;
 
-/** parseArgs takes "-1" behind "--name" for an option: join the two, so that the value is judged. */
-function joinNegativeNumbers(argv) {
-  const joined = [];
-  for (const argument of argv) {
-    const name = joined.at(-1) ?? '';
-    if (/^-[.0-9]/.test(argument) && name.startsWith('--') && OPTIONS[name.slice(2)]?.type === 'string')
-      joined[joined.length - 1] = `${name}=${argument}`;
-    else joined.push(argument);
-  }
-  return joined;
-}
-
-function parseOptions(argv) {
-  let values;
-  try {
-    ({ values } = parseArgs({ args: joinNegativeNumbers(argv), options: OPTIONS, strict: true }));
-  } catch (error) {
-    throw new InputError(`${error.message.split('\n')[0]}; see --help`);
-  }
-  if (values.help) return values;
-  for (const name of ['image', 'board', 'scenario']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
-  const number = (name, check, what) => {
-    const value = Number(values[name]);
-    if (values[name].trim() === '' || !check(value)) throw new InputError(`--${name} "${values[name]}" is not ${what}`);
-    return value;
-  };
-  values.seed = number('seed', (v) => Number.isInteger(v) && v >= 0 && v < 2 ** 32, 'a whole number from 0 to 4294967295');
+function judgeOptions(values) {
+  const number = (name, check, what) => numberOf(name, values[name], check, what);
+  values.seed = number('seed', isWhole(0, 2 ** 32 - 1), 'a whole number from 0 to 4294967295');
   values['clock-ppm'] = number('clock-ppm', (v) => Math.abs(v) <= 1000, 'a number from -1000 to 1000');
-  values.revision = number('revision', (v) => [0, 1, 2].includes(v), '0, 1 or 2');
-  if (values.seconds !== undefined) values.seconds = number('seconds', (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds');
+  if (values.seconds !== undefined) values.seconds = number('seconds', isPositive, 'a positive number of seconds');
   for (const name of ['vcd-from', 'vcd-to']) {
     values[name] =
       values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
@@ -160,47 +93,24 @@ function parseOptions(argv) {
   if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
-  if (!['real', 'wall', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real, wall nor fast`);
+  if (!['real', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real nor fast`);
   const drivers = ['pty', 'stepped', 'usbredir', 'host-script'].filter((name) => values[name] !== undefined);
   if (drivers.length > 1) throw new InputError(`--${drivers[0]} and --${drivers[1]} exclude each other`);
   if (values.stepped && values.pace !== 'fast') throw new InputError('--stepped has no --pace: time passes as its program asks');
-  if (values.pace === 'wall' && values.usbredir) throw new InputError('--pace wall and --usbredir exclude each other');
-  if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
-  if (values['wait-reader'] && !values.pty) throw new InputError('--wait-reader needs --pty');
-  return values;
+  for (const name of ['wait-open', 'wait-reader']) if (values[name] && !values.pty) throw new InputError(`--${name} needs --pty`);
 }
 
 /** Null before there is such a file. */
 function readFlash(path) {
-  let flash;
-  try {
-    flash = readFileSync(path);
-  } catch (error) {
-    if (error.code === 'ENOENT') return null;
-    throw new InputError(`${path}: cannot read the flash (${inWords(error)}); check the path`);
-  }
+  if (!existsSync(path)) return null;
+  const flash = readInput(path, 'flash');
   if (flash.length !== FLASH_BYTES)
     throw new InputError(`${path}: ${flash.length} bytes; the flash has ${FLASH_BYTES}; give the file of an earlier run, or a new name`);
   return flash;
 }
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-/** Finer than timers are, which count whole milliseconds. */
-const nap = (ms) => Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, ms);
 const breathe = () => new Promise((resolve) => setImmediate(resolve));
-
-/** Runs actions at the emulated time that it is on the wall; emulated time is never later. */
-function inOrder(scope, wall_ns) {
-  const waiting = [];
-  const alarm = scope.createAlarm(() => {
-    waiting.shift().action();
-    if (waiting.length) alarm.scheduleAt(waiting[0].at_ns);
-  });
-  return (action) => {
-    waiting.push({ at_ns: wall_ns(), action });
-    if (waiting.length === 1) alarm.scheduleAt(waiting[0].at_ns);
-  };
-}
 
 /** Runs as far as the program on stdin asks, until the run or that program ends. */
 function runStepped(machine, port, end_ns) {
@@ -221,6 +131,7 @@ function runStepped(machine, port, end_ns) {
 }
 
 async function run(options) {
+  judgeOptions(options);
   const Board = findBoard(options.board);
   findSensor(options.sensor);
   const image = readImage(options.image);
@@ -284,7 +195,6 @@ async function run(options) {
       seed: options.seed,
       serial: options.serial,
       clock_ppm: options['clock-ppm'],
-      revision: options.revision,
       fastEnumeration: options['fast-enumeration'],
       allowWatchdog: options['allow-watchdog'],
       sync: {
@@ -324,43 +234,21 @@ async function run(options) {
     });
     const end_ns = seconds * 1e9;
     const started_ms = performance.now();
-    const wall_zero_ns = process.hrtime.bigint();
-    const wall_ns = () => Number(process.hrtime.bigint() - wall_zero_ns);
-    if (pty) pty.connect(machine.client, options.pace === 'wall' ? inOrder(machine.scope, wall_ns) : undefined);
+    if (pty) pty.connect(machine.client);
     else if (stepped) stepped.connect(machine.scope, machine.client);
     else if (!usbredir) scheduleHostScript(script, machine.scope, machine.client);
 
     let paced_ms = started_ms;
     let paced_ns = 0;
     let shown_ms = started_ms;
-    const wall_lag_s = [];
-    const slice_ns = usbredir
-      ? USBREDIR_SLICE_NS
-      : options.pace === 'wall'
-        ? WALL_SLICE_NS
-        : pty || options.pace === 'real'
-          ? SLICE_NS
-          : SLICE_BATCH_NS;
+    const slice_ns = usbredir ? USBREDIR_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     if (stepped) runStepped(machine, stepped, end_ns);
     else
       for (;;) {
         const reader = usbredir ?? (options['wait-reader'] ? pty : null);
         while (reader?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
-        let target = Math.min(end_ns, machine.time.nanos + slice_ns);
-        if (options.pace === 'wall') {
-          target = Math.min(end_ns, Math.max(target, Math.min(wall_ns(), machine.time.nanos + WALL_CATCH_UP_NS)));
-          while (wall_ns() < target) {
-            nap((target - wall_ns()) / 1e6);
-            await breathe();
-          }
-        }
+        const target = Math.min(end_ns, machine.time.nanos + slice_ns);
         if (!machine.run(target) || target >= end_ns) break;
-        if (options.pace === 'wall') {
-          const now_s = wall_ns() / 1e9;
-          const lag_s = Math.max(0, now_s - machine.time.nanos / 1e9);
-          while (wall_lag_s.length <= now_s) wall_lag_s.push(lag_s);
-          wall_lag_s.push(Math.max(wall_lag_s.pop(), lag_s));
-        }
         const now_ms = performance.now();
         if (interrupted) {
           machine.endReason = 'interrupted';
@@ -393,11 +281,7 @@ async function run(options) {
     vcd?.close(machine.time.nanos);
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
-    reportFile.write(
-      Buffer.from(
-        `${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3, wall_lag_s } : {}) }, null, 2)}\n`,
-      ),
-    );
+    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));
     if (machine.memory.isBusy) machine.memory.cutPower(); // the end of the run is the end of its power
     if (options.flash) output(options.flash).write(machine.memory.bytes);
     for (const line of result.warnings) process.stderr.write(`${line}\n`);
@@ -414,12 +298,4 @@ async function run(options) {
   return clean && outputs.every((file) => !file.failure) ? 0 : 1;
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options.help) process.stdout.write(`${USAGE}\n`);
-  else process.exitCode = await run(options);
-} catch (error) {
-  if (!(error instanceof InputError)) throw error;
-  process.stderr.write(`error: ${error.message}\n`);
-  process.exitCode = 2;
-}
+await main(USAGE, { defaults: DEFAULTS, needed: ['image', 'board', 'scenario'] }, run);

@@ -9,8 +9,6 @@ export class Report {
   constructor(now_ns = () => 0) {
     this.now_ns = now_ns;
     this.entries = new Map();
-    this.failed = null;
-    this.onFailure = () => {};
   }
 
   warn(source, message) {
@@ -18,22 +16,14 @@ export class Report {
   }
 
   fail(source, message) {
-    const entry = this.#add('failure', source, message);
-    if (!this.failed) {
-      this.failed = entry;
-      this.onFailure(entry);
-    }
+    this.#add('failure', source, message);
   }
 
   #add(kind, source, message) {
     const key = `${kind}\0${source}\0${message}`;
-    let entry = this.entries.get(key);
+    const entry = this.entries.get(key);
     if (entry) entry.count += 1;
-    else {
-      entry = { kind, source, message, first_s: this.now_ns() / 1e9, count: 1 };
-      this.entries.set(key, entry);
-    }
-    return entry;
+    else this.entries.set(key, { kind, source, message, first_s: this.now_ns() / 1e9, count: 1 });
   }
 
   get list() {

@@ -11,8 +11,7 @@
  * everything is linear, before the first and after the last it holds. contact .. slip and Qx_N, Qy_N are the
  * truth to judge the answer by, and are not used here. Time 0 is power-on.
  */
-import { readFileSync } from 'node:fs';
-import { InputError, inWords } from './errors.mjs';
+import { InputError, readText } from './errors.mjs';
 
 /** Far above what a sensor takes, far below what its arithmetic cannot hold. */
 const PRESSURE_LIMIT_Pa = 1e7;
@@ -35,17 +34,24 @@ export class Scenario {
     return this.times_s.at(-1);
   }
 
+  /** One more row, above ambient; the temperature stays. */
+  add(t_s, pressures_Pa) {
+    this.times_s.push(t_s);
+    this.pressures_Pa.push(Float64Array.from(pressures_Pa));
+    this.temperatures_degC.push(this.temperatures_degC.at(-1));
+  }
+
   /** Absolute pressure and temperature at one sensor. */
   at_ns(sensor, t_ns) {
     const t = t_ns / 1e9;
     const times = this.times_s;
     let i = this.at;
-    if (times[i] > t) i = 0;
+    while (i > 0 && times[i] > t) i -= 1;
     while (i + 1 < times.length && times[i + 1] <= t) i += 1;
     this.at = i;
-    const last = i + 1 >= times.length || t <= times[i];
-    const f = last ? 0 : (t - times[i]) / (times[i + 1] - times[i]);
-    const j = last ? i : i + 1;
+    const isBetween = i + 1 < times.length && t > times[i];
+    const f = isBetween ? (t - times[i]) / (times[i + 1] - times[i]) : 0;
+    const j = isBetween ? i + 1 : i;
     const mix = (a, b) => a + (b - a) * f;
     return {
       pressure_Pa: this.ambient_Pa + mix(this.pressures_Pa[i][sensor], this.pressures_Pa[j][sensor]),
@@ -53,6 +59,9 @@ export class Scenario {
     };
   }
 }
+
+/** At rest; its rows come while it is in use. */
+export const restOf = (sensors) => new Scenario({}, [0], [new Float64Array(sensors)], [25]);
 
 export function parseScenario(text, file) {
   const fail = (line, message) => {
@@ -123,12 +132,4 @@ export function parseScenario(text, file) {
   return new Scenario(metadata, times_s, pressures_Pa, temperatures_degC);
 }
 
-export function readScenario(file) {
-  let text;
-  try {
-    text = readFileSync(file, 'utf8');
-  } catch (error) {
-    throw new InputError(`${file}: cannot read the scenario (${inWords(error)}); check the path`);
-  }
-  return parseScenario(text, file);
-}
+export const readScenario = (file) => parseScenario(readText(file, 'scenario'), file);

@@ -328,3 +328,19 @@ export class Ms5840 extends I2cTarget {
     return Math.max(0, Math.min(CODE_MAX, Math.round(codes * gain + spoil))) ^ wrong;
   }
 }
+
+/** Those of a board, each with random numbers of its own. */
+export const makeSensors = (count, { scope, report, seed, stimulus, faults, sensor }) =>
+  Array.from(
+    { length: count },
+    (_, index) =>
+      new Ms5840({
+        index,
+        prng: new Prng(Math.imul(seed, 1000003) + index),
+        now_ns: () => scope.nanos,
+        report,
+        stimulus,
+        sensor,
+        faults: (i) => faults().sensor(i),
+      }),
+  );

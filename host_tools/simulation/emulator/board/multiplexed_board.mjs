@@ -3,10 +3,9 @@
  * on the board), its sensors on channels from 0 on.
  */
 import { GPIOPinState } from 'rp2040js';
-import { Prng } from '../prng.mjs';
 import { I2cBus } from './i2c_bus.mjs';
 import { I2cWaveform, WAVEFORM_SCL, WAVEFORM_SDA } from './i2c_waveform.mjs';
-import { Ms5840 } from './ms5840.mjs';
+import { makeSensors } from './ms5840.mjs';
 import { Tca9548a } from './tca9548a.mjs';
 
 const FUNCTION_I2C = 3;
@@ -29,26 +28,23 @@ export class MultiplexedBoard {
    * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; sensor: see findSensor; rise_ns: of SCL;
    *   onLevels(levels, t_ns): the lines changed, bits as in `probes`
    */
-  constructor(descriptor, { scope, report, seed, stimulus, faults, onTransfer, onLevels, sensor, rise_ns = descriptor.rise_ns.scl }) {
+  constructor(descriptor, options) {
+    const { scope, report, onTransfer, onLevels, rise_ns = descriptor.rise_ns.scl } = options;
     this.wiring = descriptor.wiring;
     const { sensor_count, sensors_of_strip, mux_address_0 } = this.wiring;
     const now_ns = () => scope.nanos;
     this.report = report;
     this.bus = new I2cBus({ now_ns, rise_ns, report, onTransfer });
     if (onLevels) this.bus.waveform = new I2cWaveform(onLevels);
-    this.sensors = [];
+    this.sensors = makeSensors(sensor_count, options);
+    for (const sensor of this.sensors) {
+      sensor.onFast = () => {
+        this.bus.wasFast = true;
+      };
+    }
     this.muxes = Array.from({ length: sensor_count / sensors_of_strip }, (_, m) => {
       const mux = new Tca9548a(Number(mux_address_0) + m, m);
-      for (let channel = 0; channel < sensors_of_strip; channel++) {
-        const index = m * sensors_of_strip + channel;
-        const prng = new Prng(Math.imul(seed, 1000003) + index);
-        const part = new Ms5840({ index, prng, now_ns, report, stimulus, sensor, faults: (i) => faults().sensor(i) });
-        part.onFast = () => {
-          this.bus.wasFast = true;
-        };
-        this.sensors.push(part);
-        mux.connect(channel, part);
-      }
+      for (let channel = 0; channel < sensors_of_strip; channel++) mux.connect(channel, this.sensors[m * sensors_of_strip + channel]);
       mux.onReset = () => {
         mux.stuck = false;
         for (const s of mux.channels.flat()) s.release();

@@ -6,10 +6,9 @@
  * 0.7 VDD. A sensor changes SDA a while after the fall of SCL. Every line is checked against the times of UM10204's
  * fast mode. Of changes at one moment, SCL comes first where it falls and last where it rises.
  */
-import { Prng } from '../prng.mjs';
 import { I2cTarget } from './i2c_bus.mjs';
 import { HIGH, I2cLine, LOW, PERIOD, TimingCheck } from './i2c_line.mjs';
-import { Ms5840 } from './ms5840.mjs';
+import { makeSensors } from './ms5840.mjs';
 
 /** Time from release to 0.7 VDD over the time from 0.3 to 0.7 VDD, of a line that charges through a resistor. */
 const RELEASE_TO_HIGH = Math.log(0.3) / Math.log(0.3 / 0.7);
@@ -35,10 +34,8 @@ export class ParallelBoard {
    * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of every line;
    *   onLevels(levels, t_ns): lines changed, bits as in `probes`
    */
-  constructor(
-    { wiring, rise_ns: usual },
-    { scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, sensor, rise_ns: rise },
-  ) {
+  constructor({ wiring, rise_ns: usual }, options) {
+    const { scope, report, onTransfer, onLevels = () => {}, rise_ns: rise } = options;
     const rise_ns = rise === undefined ? usual : { sda: rise, scl: rise };
     /** Bitmaps of lines. */
     this.scl = 1 << wiring.pin_scl;
@@ -48,19 +45,7 @@ export class ParallelBoard {
     this.onLevels = onLevels;
     this.statistics = { transactions: 0, nacks: 0 };
     this.sclCheck = new TimingCheck(report, 'SCL');
-    this.sensors = Array.from(
-      { length: wiring.sensor_count },
-      (_, index) =>
-        new Ms5840({
-          index,
-          prng: new Prng(Math.imul(seed, 1000003) + index),
-          now_ns: () => scope.nanos,
-          report,
-          stimulus,
-          sensor,
-          faults: (i) => faults().sensor(i),
-        }),
-    );
+    this.sensors = makeSensors(wiring.sensor_count, options);
     this.lines = this.sensors.map(
       (target, k) => new I2cLine({ name: `SDA${k}`, target, rise_ns, report, statistics: this.statistics, onTransfer }),
     );

@@ -143,7 +143,6 @@ export class Chip extends RP2040 {
     this.clkUsbHz = 0;
     this.hooks = new Map();
     this.slept_since_ns = -1;
-    this.sleepCycles = 0;
     /** Time in which only what SLEEP_EN names had a clock. */
     this.deepSleep_ns = 0;
     /** Executes nothing that makes sense until it is reset: its clock is none. */

@@ -160,83 +160,59 @@ export function execute(core, stop, time) {
           const d = op & 7;
           const m = r[(op >>> 3) & 7];
           const a = r[d];
-          switch ((op >>> 6) & 15) {
-            case 0:
+          const kind = (op >>> 6) & 15;
+          const shift = m & 0xff;
+          switch (kind) {
+            case 0: // ANDS
+            case 8: // TST
               negative = a & m;
-              r[d] = negative;
               break;
-            case 1:
+            case 1: // EORS
               negative = a ^ m;
-              r[d] = negative;
               break;
-            case 2: {
-              // LSLS register
-              const shift = m & 0xff;
+            case 2: // LSLS register
               if (shift) carry = shift > 32 ? 0 : (shift === 32 ? a : a >>> (32 - shift)) & 1;
               negative = shift > 31 ? 0 : a << shift;
-              r[d] = negative;
               break;
-            }
-            case 3: {
-              // LSRS register
-              const shift = m & 0xff;
+            case 3: // LSRS register
               if (shift) carry = shift > 32 ? 0 : (a >>> (shift - 1)) & 1;
               negative = shift > 31 ? 0 : (a >>> shift) | 0;
-              r[d] = negative;
               break;
-            }
-            case 4: {
-              // ASRS register
-              const shift = m & 0xff;
+            case 4: // ASRS register
               if (shift) carry = (a >>> (shift > 32 ? 31 : shift - 1)) & 1;
               negative = a >> (shift > 31 ? 31 : shift);
-              r[d] = negative;
               break;
-            }
-            case 7: {
-              // RORS
-              const shift = m & 0xff;
-              const turn = shift & 31;
-              negative = turn ? (a >>> turn) | (a << (32 - turn)) : a;
+            case 7: // RORS
+              negative = shift & 31 ? (a >>> (shift & 31)) | (a << (32 - (shift & 31))) : a;
               if (shift) carry = negative >>> 31;
-              r[d] = negative;
               break;
-            }
-            case 5:
-            case 6:
-            case 9:
-            case 10:
+            case 5: // ADCS
+            case 6: // SBCS
+            case 9: // RSBS
+            case 10: // CMP
             case 11: {
-              // ADCS, SBCS, RSBS, CMP, CMN
-              const kind = (op >>> 6) & 15;
+              // CMN
               const first = kind === 9 ? 0 : a;
               const second = kind === 5 || kind === 11 ? m : ~m;
               const result = (first + second + (kind < 9 ? carry : kind < 11 ? 1 : 0)) | 0;
               carry = ((first & second) | ((first | second) & ~result)) >>> 31;
               overflow = (first ^ result) & (second ^ result);
               negative = result;
-              if (kind < 10) r[d] = result;
               break;
             }
-            case 8:
-              negative = a & m;
-              break;
-            case 12:
+            case 12: // ORRS
               negative = a | m;
-              r[d] = negative;
               break;
-            case 13:
+            case 13: // MULS
               negative = Math.imul(a, m);
-              r[d] = negative;
               break;
-            case 14:
+            case 14: // BICS
               negative = a & ~m;
-              r[d] = negative;
               break;
-            default:
+            default: // MVNS
               negative = ~m;
-              r[d] = negative;
           }
+          if (kind !== 8 && kind !== 10 && kind !== 11) r[d] = negative;
           zero = negative;
           break;
         }
@@ -294,23 +270,29 @@ export function execute(core, stop, time) {
           if (!isOthers) cycles += 1;
           break;
         }
-        case 12: {
-          const at = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c) - RAM_BASE) | 0;
+        case 12:
+        case 18: {
+          // STR immediate, or relative to sp
+          const isSp = op >>> 15;
+          const at = ((isSp ? r[13] + ((op & 0xff) << 2) : r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) - RAM_BASE) | 0;
           if (((at >>> 2) | (at << 30)) >>> 0 >= WORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes) {
             isOthers = true;
             break;
           }
-          ram32[at >>> 2] = r[op & 7];
+          ram32[at >>> 2] = r[(isSp ? op >>> 8 : op) & 7];
           cycles += 1;
           break;
         }
-        case 13: {
-          const at = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c) - RAM_BASE) | 0;
+        case 13:
+        case 19: {
+          // LDR immediate, or relative to sp
+          const isSp = op >>> 15;
+          const at = ((isSp ? r[13] + ((op & 0xff) << 2) : r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) - RAM_BASE) | 0;
           if (((at >>> 2) | (at << 30)) >>> 0 >= WORDS || (at - guardFrom) >>> 0 < guardBytes) {
             isOthers = true;
             break;
           }
-          r[op & 7] = ram32[at >>> 2];
+          r[(isSp ? op >>> 8 : op) & 7] = ram32[at >>> 2];
           cycles += 1;
           break;
         }
@@ -351,26 +333,6 @@ export function execute(core, stop, time) {
             break;
           }
           r[op & 7] = ram16[at >>> 1];
-          cycles += 1;
-          break;
-        }
-        case 18: {
-          const at = (r[13] + ((op & 0xff) << 2) - RAM_BASE) | 0;
-          if (((at >>> 2) | (at << 30)) >>> 0 >= WORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
-          ram32[at >>> 2] = r[(op >>> 8) & 7];
-          cycles += 1;
-          break;
-        }
-        case 19: {
-          const at = (r[13] + ((op & 0xff) << 2) - RAM_BASE) | 0;
-          if (((at >>> 2) | (at << 30)) >>> 0 >= WORDS || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
-          r[(op >>> 8) & 7] = ram32[at >>> 2];
           cycles += 1;
           break;
         }
@@ -465,54 +427,33 @@ export function execute(core, stop, time) {
         case 27: {
           // B conditional
           let isTaken;
-          switch ((op >>> 8) & 15) {
+          switch ((op >>> 9) & 7) {
             case 0:
               isTaken = zero === 0;
               break;
             case 1:
-              isTaken = zero !== 0;
-              break;
-            case 2:
               isTaken = carry !== 0;
               break;
-            case 3:
-              isTaken = carry === 0;
-              break;
-            case 4:
+            case 2:
               isTaken = negative < 0;
               break;
-            case 5:
-              isTaken = negative >= 0;
-              break;
-            case 6:
+            case 3:
               isTaken = overflow < 0;
               break;
-            case 7:
-              isTaken = overflow >= 0;
-              break;
-            case 8:
+            case 4:
               isTaken = carry !== 0 && zero !== 0;
               break;
-            case 9:
-              isTaken = carry === 0 || zero === 0;
-              break;
-            case 10:
+            case 5:
               isTaken = (negative ^ overflow) >= 0;
               break;
-            case 11:
-              isTaken = (negative ^ overflow) < 0;
-              break;
-            case 12:
+            case 6:
               isTaken = (negative ^ overflow) >= 0 && zero !== 0;
               break;
-            case 13:
-              isTaken = (negative ^ overflow) < 0 || zero === 0;
-              break;
             default:
-              isTaken = false;
               isOthers = true;
           }
-          if (isTaken) {
+          if (isOthers) break;
+          if (isTaken !== ((op & 0x100) !== 0)) {
             pc += 4 + ((op << 24) >> 23);
             cycles += 2;
             continue;

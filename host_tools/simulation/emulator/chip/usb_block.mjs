@@ -97,7 +97,6 @@ export class UsbBlock extends RegisterBlock {
     this.select = new Uint8Array(32);
     this.fieldsWritten_ns = new Float64Array(64).fill(-1e9);
     this.quiet = true;
-    this.resetDone = false;
     this.#update();
     this.onPortChange();
   }
@@ -368,7 +367,6 @@ export class UsbBlock extends RegisterBlock {
   busReset() {
     this.endTransaction();
     this.quiet = true;
-    this.resetDone = true;
     this.inReset = true;
     this.connected = !this.isOld;
     this.idleAlarm.cancel();

@@ -6,8 +6,7 @@
  *     1.0 a55a00
  *     2.5 baud 1200
  */
-import { readFileSync } from 'node:fs';
-import { InputError, inWords } from '../errors.mjs';
+import { InputError, readText } from '../errors.mjs';
 
 export function parseHostScript(text, file) {
   const steps = [];
@@ -28,15 +27,7 @@ export function parseHostScript(text, file) {
   return steps;
 }
 
-export function readHostScript(file) {
-  let text;
-  try {
-    text = readFileSync(file, 'utf8');
-  } catch (error) {
-    throw new InputError(`${file}: cannot read the host script (${inWords(error)}); check the path`);
-  }
-  return parseHostScript(text, file);
-}
+export const readHostScript = (file) => parseHostScript(readText(file, 'host script'), file);
 
 export function scheduleHostScript(steps, scope, cdc) {
   for (const step of steps) {

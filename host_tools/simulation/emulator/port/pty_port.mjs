@@ -34,7 +34,6 @@ export class PtyPort {
     this.full_ms = null;
     this.received = Buffer.alloc(0);
     this.early = [];
-    this.baud = null;
     this.errors = '';
     this.child = spawn(PYTHON, [fileURLToPath(new URL('./pty_port.py', import.meta.url)), link], {
       stdio: ['pipe', 'pipe', 'pipe'],
@@ -69,7 +68,7 @@ export class PtyPort {
       this.received = this.received.subarray(5 + length);
       if (type === 'R') this.onReady?.();
       else if (type === 'A') this.#taken(payload.readUInt32LE(0));
-      else if (this.cdc) this.at(() => this.#deliver(type, payload));
+      else if (this.cdc) this.#deliver(type, payload);
       else {
         if (type === 'O' || type === 'C') this.isOpen = type === 'O';
         this.early.push([type, Buffer.from(payload)]);
@@ -77,11 +76,10 @@ export class PtyPort {
     }
   }
 
-  /** From now on the client's doings reach this CDC client, when `at` calls what it is given. */
-  connect(cdc, at = (action) => action()) {
+  /** From now on the client's doings reach this CDC client. */
+  connect(cdc) {
     this.cdc = cdc;
-    this.at = at;
-    for (const [type, payload] of this.early) at(() => this.#deliver(type, payload));
+    for (const [type, payload] of this.early) this.#deliver(type, payload);
     this.early = [];
   }
 

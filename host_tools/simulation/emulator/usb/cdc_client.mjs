@@ -111,10 +111,6 @@ export class CdcClient {
     this.#write();
   }
 
-  get writeBacklog() {
-    return this.writes.reduce((n, w) => n + w.length, 0);
-  }
-
   #write() {
     if (!this.bound || !this.dtr || this.writing || !this.writes.length) return;
     this.writing = true;
