@@ -89,7 +89,6 @@ xz xz-utils
 qemu-system-arm qemu-system-arm
 sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
-/usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
 /usr/share/doc/python3-venv python3-venv

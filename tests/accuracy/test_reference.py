@@ -116,8 +116,19 @@ class Optimum(unittest.TestCase):
                     self.assertTrue((found["flags"] & errors.VALID).all(), kernel)
                     loose = 20 if kernel in errors.LIBRARIES else 2  # their own tolerances end them
                     self.assertLess(errors.distance_um(found, best).max(), loose, kernel)
-                    for name in ("p0_Pa", "sigma_mm", "force_N"):
+                    for name in ("p0_Pa", "sigma_mm"):
                         np.testing.assert_allclose(found[name], best[name], rtol=3e-4 * loose, err_msg=kernel)
+
+    def test_the_firmware_reaches_the_optimum_of_gaussians(self):
+        """float32 leaves about 0.15 um at p99.9; the limits leave a factor of three."""
+        bench = errors.Bench(MEASURE, SEED, 15000, self.cache)
+        of_sets = [one for one, _ in zip(errors.outcomes(bench, "fit", errors.Variant("")), "AB")]
+        um, flags = (np.concatenate([one[i][one[0]] for one in of_sets]) for i in (1, 4))
+        self.assertGreater(len(um), 8000)
+        self.assertLess(np.quantile(um, 0.5), 0.05)
+        self.assertLess(np.quantile(um, 0.999), 0.5)
+        self.assertLessEqual((um > 100).sum(), 2)
+        self.assertTrue((flags[um > 100] & errors.WARNINGS).all())
 
     def test_double_and_separable_reach_every_observable_optimum(self):
         bench = errors.Bench(MEASURE, SEED, 1200, self.cache)
@@ -127,18 +138,6 @@ class Optimum(unittest.TestCase):
                 found, _ = bench.fit(kernel, errors.Variant("", 10), these.readings, these.usable, these.noise_Pa)
                 self.assertLess(errors.distance_um(found, these.best)[these.observable].max(), 0.1, kernel)
                 np.testing.assert_allclose(found["sigma_mm"][these.observable], these.best["sigma_mm"][these.observable], rtol=1e-5)
-
-    def test_guesses_differ_and_the_log_linear_one_is_best(self):
-        bench = errors.Bench(MEASURE, SEED, 1200, self.cache)
-        these = bench.presses("A")
-        of_guess = [
-            errors.distance_um(
-                bench.fit("double", errors.Variant("", 0, guess=guess), these.readings, these.usable, these.noise_Pa)[0], these.best
-            )[these.observable].sum()
-            for guess in errors.GUESSES[:3]
-        ]
-        self.assertLess(2 * of_guess[0], min(of_guess[1:]))
-        self.assertNotEqual(*of_guess[1:])
 
     def test_nothing_positive_is_no_fit(self):
         bench = errors.Bench(MEASURE, SEED, 600, self.cache)
@@ -199,10 +198,6 @@ class Presses(unittest.TestCase):
             self.assertTrue((inside == (set_ != "B")).all())
             self.assertTrue(((np.abs(made.x_mm) <= 15) & (np.abs(made.y_mm) <= 24)).all())
 
-    def test_quantisation(self):
-        for pressure_Pa, lsb_Pa, found in ((1.0004, 1 / 1024, 1024), (-0.0007, 1 / 1024, -1), (1.6, 1.0, 2048), (0.2, 1 / 16, 64 * 3)):
-            self.assertEqual(errors.quantised(np.array([pressure_Pa]), lsb_Pa)[0], found)
-
 
 class Program(unittest.TestCase):
     def fitted(self, text, *options):
@@ -245,18 +240,6 @@ class Program(unittest.TestCase):
         self.assertEqual((row["observable"], row["distance_mm"]), ("0", ""))
         self.assertEqual(self.fitted(table(weak, noise_Pa=20), "--noise", "1")["observable"], "0")
 
-    def test_presses_are_the_same_again_and_are_found(self):
-        for letter in "ABCD":
-            printed = run("presses", "--set", letter, "--count", "40", "--seed", "3").stdout
-            self.assertEqual(printed, run("presses", "--set", letter, "--count", "40", "--seed", "3").stdout)
-            self.assertNotEqual(printed, run("presses", "--set", letter, "--count", "40", "--seed", "4").stdout)
-            drawn, found = rows_of(printed), rows_of(run("fit", text=printed).stdout)
-            self.assertEqual([row["press"] for row in found], [row["press"] for row in drawn])
-            distances_mm = sorted(float(row["distance_mm"]) for row in found if row["observable"] == "1")
-            self.assertGreater(len(distances_mm), 20)
-            # Of a Gaussian noise alone is left; of rubber its tails, too.
-            self.assertLess(distances_mm[len(distances_mm) // 2], 0.05 if letter in "AB" else 0.5, letter)
-
     def test_what_is_wrong_is_one_line(self):
         good = [pressure_Pa(k) for k in range(15)]
         for options, text, words in (
@@ -274,14 +257,7 @@ class Program(unittest.TestCase):
             self.assertEqual(done.returncode, 1, words)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
             self.assertIn(words, done.stderr)
-        for options in (
-            ("fit", "--noise", "0"),
-            ("presses", "--set", "E"),
-            ("presses", "--count", "0"),
-            ("presses", "--count", "-1"),
-            ("presses", "--seed", "-1"),
-            (),
-        ):
+        for options in (("fit", "--noise", "0"), ("presses",), ()):
             done = run(*options)
             self.assertEqual(done.returncode, 2, options)
             self.assertIn("error: ", done.stderr)

@@ -1,9 +1,8 @@
 // The fits that the firmware's kernels are compared with, and the reference optimum, on many presses.
+#include "report/fit/compared.hpp"
+
 #include "common/contact_flags.h"
 #include "libfingertip/in_parallel.hpp"
-#include "report/fit/double_kernel.hpp"
-#include "report/fit/libraries.hpp"
-#include "report/fit/separable.hpp"
 #include "report/measure/entry.hpp"
 #include "report/measure/stopwatch.hpp"
 #include "report/reference/reference.hpp"
@@ -21,30 +20,16 @@ namespace fitting = fingertip::fitting;
 namespace reference = fingertip::reference;
 
 using compared_fit = fitting::KernelResult;
-MEASURE_RECORD(compared_fit, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N), FIELD(used),
-               FIELD(flags))
-using compared_settings = fitting::KernelSettings;
-MEASURE_RECORD(compared_settings, FIELD(iterations), FIELD(noise_Pa), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
-               FIELD(guess))
+MEASURE_RECORD(compared_fit, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(flags))
 
 namespace {
 
-// It does not judge itself, so the only flag is whether it came to anything.
 template <auto SOLVE>
 compared_fit alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
-                         const compared_settings &settings) {
-  const alternative_settings chosen{settings.iterations, static_cast<alternative_guess>(settings.guess)};
-  const auto found = SOLVE(&array, pressure_Pa_q10, usable, &chosen);
-  compared_fit result{};
-  result.x_mm = static_cast<double>(found.x_mm);
-  result.y_mm = static_cast<double>(found.y_mm);
-  result.p0_Pa = static_cast<double>(found.p0_Pa);
-  result.sigma_mm = static_cast<double>(found.sigma_mm);
-  result.force_N = static_cast<double>(found.force_N);
-  const bool finite = std::isfinite(result.x_mm) && std::isfinite(result.y_mm);
-  result.flags = finite && result.sigma_mm != 0.0 ? std::uint32_t{CONTACT_FLAG_FIT_VALID} : 0;
-  result.used = usable;
-  return result;
+                         const fitting::KernelSettings &settings) {
+  const auto found = SOLVE(&array, pressure_Pa_q10, usable, settings.iterations);
+  const bool valid = std::isfinite(found.x_mm) && std::isfinite(found.y_mm) && found.sigma_mm != 0.0;
+  return {found.x_mm, found.y_mm, found.p0_Pa, found.sigma_mm, valid ? std::uint32_t{CONTACT_FLAG_FIT_VALID} : 0};
 }
 
 struct Named {
@@ -62,13 +47,13 @@ constexpr Named OWN[] = {
 
 } // namespace
 
-// kernel: of those above, or of libraries.hpp, which one thread at a time may call. us: of one fit, if a single thread
-// runs them.
-static void compare(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> array,
-                    Batch<const compared_settings, 1> settings, Batch<const std::int32_t, 2> pressure_Pa_q10,
-                    Batch<const std::uint32_t, 1> usable, Batch<compared_fit, 1> results, Batch<double, 1> us) {
-  same_length(results, pressure_Pa_q10, usable);
-  length_or_one(results, settings);
+// kernel: of those above, or a library, which one thread at a time may call. us: of one fit, if a single thread runs
+// them.
+static void compare(std::string kernel, std::int64_t threads, std::int64_t iterations, std::int64_t firmware_guess,
+                    Batch<const fit_array, 1> array, Batch<const double, 1> noise_Pa,
+                    Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
+                    Batch<compared_fit, 1> results, Batch<double, 1> us) {
+  same_length(results, pressure_Pa_q10, usable, noise_Pa);
   require(array[0].sensor_count == pressure_Pa_q10.size(1), "readings of another number of sensors");
   fitting::Solve solve = fitting::library_named(kernel);
   require(!solve || threads == 1, "a library takes one thread");
@@ -80,7 +65,8 @@ static void compare(std::string kernel, std::int64_t threads, Batch<const fit_ar
   fingertip::twin::in_parallel(
       results.size(),
       [&](std::size_t press) {
-        results[press] = solve(array[0], pressure_Pa_q10.row(press), usable[press], *settings.row_or_all(press));
+        results[press] = solve(array[0], pressure_Pa_q10.row(press), usable[press],
+                               {static_cast<int>(iterations), noise_Pa[press], firmware_guess != 0});
       },
       static_cast<std::size_t>(threads));
   us[0] = watch.us() / static_cast<double>(results.size());

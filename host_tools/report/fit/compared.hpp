@@ -5,34 +5,63 @@ extern "C" {
 #include "fit/fit.h"
 }
 
-#include <cstdint>
+#include <array>
+#include <string>
 
 namespace fingertip::fitting {
-
-// Where the iteration starts.
-enum class Guess {
-  log_linear, // paraboloid through the logarithms of the large readings
-  maximum,    // the strongest sensor, sigma 0.65 pitch
-  centroid,   // centre of the positive readings, sigma 0.65 pitch
-  firmware,   // what fit_gaussian starts from; double_kernel only
-};
 
 struct KernelSettings {
   int iterations;
   double noise_Pa;
-  double prior_sigma_mm = 0.0, prior_width_mm = 0.0; // as fit_settings; width 0 for none
-  Guess guess = Guess::log_linear;
+  bool firmware_guess; // double_kernel alone: starts where the firmware's fit does
 };
 
-// As fit_result, with the location in double so that a double kernel is not rounded.
+// As fit_result, in double so that a double kernel is not rounded. flags: FIT_VALID at most, for none of them judges
+// itself.
 struct KernelResult {
-  double x_mm, y_mm, p0_Pa, sigma_mm, force_N;
-  std::uint32_t used;  // bitmap of the sensors that entered
-  std::uint32_t flags; // of enum contact_flag
+  double x_mm, y_mm, p0_Pa, sigma_mm;
+  std::uint32_t flags;
 };
 
-// A fit of every usable sensor. The settings' prior is for double_kernel alone.
+// A fit of every usable sensor.
 using Solve = KernelResult (*)(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
                                const KernelSettings &settings);
+
+// The firmware's general kernel in double precision: the same guess, step limits and box.
+KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                           const KernelSettings &settings);
+
+// The grid kernel's iteration in double precision, for machines with a fast FPU: on a full rectangle of the build's
+// size, every sensor usable, the Gaussian separates into gx(i) gy(j). With the polynomials 1, p1, p2 and 1, q1, q2 that
+// are orthogonal under gx^2 and gy^2, the Gauss-Newton basis is orthogonal, so that there is no matrix to solve, and
+// three exponentials give all eight g. The amplitude is always the best for the shape. Steps are limited as in the
+// general kernel. It stops when it has settled: settings.iterations is the most it takes.
+KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                       const KernelSettings &settings);
+
+// Solvers that a host program might use instead, by name, or nullptr. Not for several threads at once: some keep their
+// workspace. They get the same scaled readings, start from the general kernel's first guess, with the analytic
+// Jacobian, take a full array of 15 sensors only, and stop by their own rules:
+//   ceres_reused   one problem object for every fit, dense QR, default tolerances
+//   tiny_solver    ceres::TinySolver, sizes fixed, default tolerances
+//   cminpack       lmder with the tolerances of lmder1 at the square root of epsilon
+Solve library_named(const std::string &name);
+
+// The readings that enter, in pitches and units of the largest.
+struct Samples {
+  std::size_t count = 0;
+  std::array<double, FT_MAX_SENSORS> x, y, p;
+  double unit_Pa = 0.0; // of p
+};
+
+// In pitches and units of the largest reading.
+struct Gaussian {
+  double p0, x, y, sigma;
+};
+
+Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable);
+// With the best amplitude for its shape. Needs four samples, one of them positive.
+Gaussian first_guess(const Samples &samples, double noise_Pa);
+KernelResult in_units(const fit_array &array, const Samples &samples, const Gaussian &theta);
 
 } // namespace fingertip::fitting

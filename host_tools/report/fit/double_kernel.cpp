@@ -1,6 +1,5 @@
-#include "report/fit/double_kernel.hpp"
-
 #include "common/contact_flags.h"
+#include "report/fit/compared.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -26,7 +25,6 @@ constexpr double GUESS_SHARE = 0.01;
 constexpr double GUESS_NOISES = 5.0;
 constexpr double GUESS_WEIGHT = 3e-3;
 constexpr double GUESS_SIGMA = 0.42;
-constexpr double PLAIN_GUESS_SIGMA = 0.65;
 constexpr double MOVE_LIMIT = 0.65;
 constexpr double WIDEN_LIMIT = 0.5;
 constexpr double OVERSHOOT = 0.25;
@@ -65,26 +63,6 @@ struct Factors {
     return lower.transpose().triangularView<Eigen::UnitUpper>().solve(v);
   }
 };
-
-// About the peak.
-Gaussian log_linear(const Samples &samples, double noise_Pa, const Gaussian &peak) {
-  const double least = std::clamp(GUESS_NOISES * noise_Pa / samples.unit_Pa, GUESS_SHARE, 0.99);
-  Normal normal;
-  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
-  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
-  for (std::size_t k = 0; k < samples.count; k++) {
-    const double p = samples.p[k];
-    if (p >= least) {
-      const double x = samples.x[k] - peak.x, y = samples.y[k] - peak.y;
-      normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p));
-    }
-  }
-  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
-  const double curvature = limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
-  const double half_inverse = 0.5 / curvature;
-  return {1.0, peak.x + limited(c[1] * half_inverse, -1.0, 1.0), peak.y + limited(c[2] * half_inverse, -1.0, 1.0),
-          std::sqrt(half_inverse)};
-}
 
 double best_amplitude(const Samples &samples, const Gaussian &theta) {
   double numerator = 0.0, denominator = 1e-30;
@@ -131,48 +109,52 @@ Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, s
       samples.x[samples.count] = static_cast<double>(array.x[k]);
       samples.y[samples.count] = static_cast<double>(array.y[k]);
       samples.p[samples.count++] = p;
-      samples.sum_squares += p * p;
     }
   }
   return samples;
 }
 
-Gaussian first_guess(const Samples &samples, double noise_Pa, Guess guess) {
+// A paraboloid through the logarithms of the large readings, about the peak.
+Gaussian first_guess(const Samples &samples, double noise_Pa) {
   const auto first = samples.p.begin();
   const auto peak =
       static_cast<std::size_t>(std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
-  Gaussian theta{1.0, samples.x[peak], samples.y[peak], PLAIN_GUESS_SIGMA};
-  if (guess == Guess::log_linear) {
-    theta = log_linear(samples, noise_Pa, theta);
-  } else if (guess == Guess::centroid) {
-    double sum = 0.0, sum_x = 0.0, sum_y = 0.0;
-    for (std::size_t k = 0; k < samples.count; k++) {
-      const double p = std::max(samples.p[k], 0.0);
-      sum += p;
-      sum_x += p * samples.x[k];
-      sum_y += p * samples.y[k];
+  const double x_peak = samples.x[peak], y_peak = samples.y[peak];
+  const double least = std::clamp(GUESS_NOISES * noise_Pa / samples.unit_Pa, GUESS_SHARE, 0.99);
+  Normal normal;
+  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
+  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
+  for (std::size_t k = 0; k < samples.count; k++) {
+    const double p = samples.p[k];
+    if (p >= least) {
+      const double x = samples.x[k] - x_peak, y = samples.y[k] - y_peak;
+      normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p));
     }
-    theta.x = sum_x / sum;
-    theta.y = sum_y / sum;
   }
+  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
+  const double half_inverse = 0.5 / limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
+  Gaussian theta{1.0, x_peak + limited(c[1] * half_inverse, -1.0, 1.0),
+                 y_peak + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
   theta.p0 = best_amplitude(samples, theta);
   return theta;
 }
 
+KernelResult in_units(const fit_array &array, const Samples &samples, const Gaussian &theta) {
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  return {theta.x * pitch_mm, theta.y * pitch_mm, theta.p0 * samples.unit_Pa, theta.sigma * pitch_mm,
+          CONTACT_FLAG_FIT_VALID};
+}
+
 KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
                            const KernelSettings &settings) {
-  KernelResult result{};
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   if (samples.count < 4) {
-    result.flags = samples.count == 0 ? CONTACT_FLAG_LOW_SIGNAL : 0;
-    return result;
+    return {};
   }
-  Gaussian theta = settings.guess == Guess::firmware ? firmware_guess(array, pressure_Pa_q10, usable, samples)
-                                                     : first_guess(samples, settings.noise_Pa, settings.guess);
+  Gaussian theta = settings.firmware_guess ? firmware_guess(array, pressure_Pa_q10, usable, samples)
+                                           : first_guess(samples, settings.noise_Pa);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
-  const double pitch_mm = static_cast<double>(array.pitch_mm);
-  const double prior_weight = static_cast<double>(FIT_PRIOR_WEIGHT) * pitch_mm / settings.prior_width_mm;
   for (int i = 0; i < settings.iterations; i++) {
     theta.p0 = best_amplitude(samples, theta);
     Normal normal;
@@ -183,10 +165,6 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
       normal.add(e * Vector4(1.0, x, y, r2), samples.p[k] - theta.p0 * e);
     }
     const double gain = theta.sigma * theta.sigma / theta.p0;
-    if (settings.prior_width_mm > 0.0) {
-      normal.add(Vector4(0.0, 0.0, 0.0, prior_weight * gain * theta.sigma),
-                 prior_weight * (settings.prior_sigma_mm / pitch_mm - theta.sigma));
-    }
     const Vector4 b = Factors(normal.matrix).solve(normal.rhs);
     const double excess =
         gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT, std::abs(b[3]) / WIDEN_LIMIT});
@@ -198,15 +176,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   }
   theta.x = limited(theta.x, x_min, x_max);
   theta.y = limited(theta.y, y_min, y_max);
-
-  result.x_mm = theta.x * pitch_mm;
-  result.y_mm = theta.y * pitch_mm;
-  result.p0_Pa = theta.p0 * samples.unit_Pa;
-  result.sigma_mm = theta.sigma * pitch_mm;
-  result.force_N = 2.0 * M_PI * result.p0_Pa * result.sigma_mm * result.sigma_mm * 1e-6;
-  result.used = usable;
-  result.flags = CONTACT_FLAG_FIT_VALID;
-  return result;
+  return in_units(array, samples, theta);
 }
 
 } // namespace fingertip::fitting

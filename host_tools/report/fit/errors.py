@@ -1,16 +1,8 @@
-"""How far fits are from the reference optimum, what their flags state, and how long they take on this computer.
+"""Distance of every kernel's location from the reference optimum, and its time on this computer (fit.py).
 
-A row for each kernel, variant, set (ABCD: all together) and observability; variants that a kernel does not have are left out:
-
-    presses       of the set that are (not) observable (presses.py)
-    p50_um ..     distance of the location from the reference optimum of the presses as received at 1/1024 Pa, with the sensors that the variant leaves
-                  usable; infinite where there is no fit
-    above_10um    presses farther than that from the reference
-    without_fit   presses that gave no fit
-    outlier       presses of which the fit left out a sensor by itself
-    truth_p50_mm  distance from where the contact truly is, of those with a fit
-    bad_unflagged share more than 1 mm wrong without a warning: against the reference in A and B, the truth in C and D
-    good_flagged  share within 1 mm with a warning
+A row of fit_error: kernel, variant, set (one, or all together), whether the readings determine the location, and of these presses: the errors' quantiles,
+and the shares that are bad without a warning or good with one. Bad is 1 mm and more: of A and B from the optimum, of C and D from the truth. A press without a
+fit counts as infinitely far.
 """
 
 import dataclasses
@@ -18,28 +10,25 @@ import dataclasses
 import numpy as np
 import presses
 from fingertip.line import Flag
-from measure import q10, round_half_away
 from presses import MASKS, SETS, load
 
 USUAL_ITERATIONS, BUILT_ITERATIONS = 7, 4  # BUILT: FINGERTIP_FIT_ITERATIONS
 BAD_mm = 1.0
 WARNINGS = np.uint32(Flag.UNCERTAIN | Flag.MODEL | Flag.FLAT | Flag.AT_BOUND | Flag.LOW_SIGNAL)
 VALID = np.uint32(Flag.FIT_VALID)
-GUESSES = ("log_linear", "maximum", "centroid", "firmware")
 
-# What a kernel can do beside fitting every sensor: fit without every sensor, fit the n largest readings, assume a width, start from another guess, start
-# where the firmware's starts, end early.
-SUBSET, LARGEST, PRIOR, GUESS, FIRMWARE_GUESS, ENDS = "subset", "n_largest", "prior", "guess", "firmware guess", "ends early"
-FIRMWARE = {"fit": {SUBSET, PRIOR}, "grid": {PRIOR}, "masked": {SUBSET, PRIOR}, "general": {SUBSET, LARGEST, PRIOR}}
+# What a kernel can do beside fitting every sensor: fit without every sensor, fit the n largest readings, start where the firmware's starts, end early.
+SUBSET, LARGEST, FIRMWARE_GUESS, ENDS = "subset", "n_largest", "firmware guess", "ends early"
+FIRMWARE = {"fit": {SUBSET}, "grid": set(), "masked": {SUBSET}, "general": {SUBSET, LARGEST}}
 KERNELS = FIRMWARE | {
-    "double": {SUBSET, LARGEST, PRIOR, GUESS, FIRMWARE_GUESS},  # the general kernel's steps in double
+    "double": {SUBSET, FIRMWARE_GUESS},  # the general kernel's steps in double
     "separable": set(),  # the grid kernel's iteration in double, for the host
-    "naive_float": {SUBSET, GUESS},
-    "naive_double": {SUBSET, GUESS},
-    "lm_float": {SUBSET, GUESS, ENDS},
-    "lm_double": {SUBSET, GUESS, ENDS},
+    "naive_float": {SUBSET},
+    "naive_double": {SUBSET},
+    "lm_float": {SUBSET, ENDS},
+    "lm_double": {SUBSET, ENDS},
 }
-LIBRARIES = ("tiny_solver", "tiny_tight", "cminpack", "gsl", "ceres_reused", "ceres_new", "ceres_tight")
+LIBRARIES = ("tiny_solver", "cminpack", "ceres_reused")
 HOST_KERNEL, HOST_ITERATIONS = "separable", 12  # made for the host, which the others are compared with
 BLOCK = 400
 
@@ -49,25 +38,18 @@ class Variant:
     name: str
     iterations: int = USUAL_ITERATIONS
     n_largest: int = 0
-    lsb_Pa: float = 1 / 1024
     mask: str = "none"
-    prior: tuple = (0.0, 0.0)  # sigma and its standard deviation, mm
-    guess: str = "log_linear"
+    firmware_guess: bool = False
     needs: frozenset = frozenset()
-    on_chip: bool = True  # its cycles are counted
 
 
 VARIANTS = (
     *(Variant(f"iterations={k}", k) for k in range(11)),
     *(Variant(f"iterations={k}", k, needs={ENDS}) for k in (20, 50)),
     *(Variant(f"n_largest={n}", n_largest=n, needs={LARGEST}) for n in range(4, 16)),
-    *(Variant(f"lsb_Pa=1/{n}", lsb_Pa=1 / n, on_chip=False) for n in (1, 16, 100, 1024)),
-    # The width that set D's layer gives a contact, one that is 20 % off, and set C's.
-    *(Variant(f"prior_mm={sigma_mm}", prior=(sigma_mm, 0.5), needs={PRIOR}) for sigma_mm in (3.2, 3.8, 5.7)),
-    *(Variant(f"guess={guess}", guess=guess, needs={FIRMWARE_GUESS if guess == "firmware" else GUESS}) for guess in GUESSES[1:]),
     *(Variant(f"mask={mask}", mask=mask, needs={SUBSET}) for mask in MASKS[1:]),
     *(Variant(f"mask={mask} iterations={BUILT_ITERATIONS}", BUILT_ITERATIONS, mask=mask, needs={SUBSET}) for mask in MASKS[1:3]),
-    *(Variant(f"mask={mask} guess=firmware", mask=mask, guess="firmware", needs={SUBSET, FIRMWARE_GUESS}) for mask in MASKS[1:3]),
+    *(Variant(f"mask={mask} guess=firmware", mask=mask, firmware_guess=True, needs={FIRMWARE_GUESS}) for mask in MASKS[1:3]),
 )
 
 
@@ -87,27 +69,12 @@ class Bench:
         return self.loaded[set_, mask, count]
 
     def fit(self, kernel, variant, readings, usable, noise_Pa, threads=2):
-        """(results with x_mm, y_mm, used, flags, microseconds for each)"""
+        """(results with x_mm, y_mm, flags, microseconds for each)"""
         if kernel in FIRMWARE:
-            settings = self.measure.settings(
-                len(readings), gain_sd=0.0, cut_noises=0, iterations=variant.iterations, n_largest=variant.n_largest
-            )
-            settings["noise_Pa_q10"], (settings["prior_sigma_mm"], settings["prior_width_mm"]) = (
-                (1024 * noise_Pa).astype(np.int32),
-                variant.prior,
-            )
+            fields = {"iterations": variant.iterations, "n_largest": variant.n_largest, "noise_Pa_q10": (1024 * noise_Pa).astype(np.int32)}
+            settings = self.measure.settings(len(readings), gain_sd=0.0, cut_noises=0, **fields)
             return self.measure.timed_fit(self.array, settings, readings, usable, kernel=kernel, threads=threads)
-        if variant.n_largest:
-            usable = largest_readings(readings, usable, variant.n_largest)
-        guess = GUESSES.index(variant.guess)
-        return self.compared.compare(kernel, variant.iterations, noise_Pa, readings, usable, variant.prior, guess, threads)
-
-
-def largest_readings(readings, usable, n):
-    """Bitmap [press] of the n largest usable ones, of equal ones those of lower number."""
-    bits = np.uint32(1) << np.arange(readings.shape[1], dtype=np.uint32)
-    order = np.argsort(np.where(usable[:, None] & bits, -readings.astype(np.int64), np.iinfo(np.int64).max), axis=1, kind="stable")
-    return usable & bits[order[:, :n]].sum(axis=1, dtype=np.uint32)
+        return self.compared.compare(kernel, variant.iterations, noise_Pa, readings, usable, variant.firmware_guess, threads)
 
 
 def quantile(values, share):
@@ -121,71 +88,54 @@ def distance_um(found, best):
 
 
 def outcomes(bench, kernel, variant):
-    """Of the presses of each set: (observable, um from the reference, mm from the truth, mm wrong, flags, outlier), each [press]."""
+    """Of the presses of each set: (observable, um from the reference, mm from the truth, mm wrong, flags), each [press]."""
     for set_ in SETS:
         these = bench.presses(set_, variant.mask)
-        readings = these.readings if variant.lsb_Pa == 1 / 1024 else quantised(these.pressure_Pa, variant.lsb_Pa)
-        found, _ = bench.fit(kernel, variant, readings, these.usable, these.noise_Pa)
+        found, _ = bench.fit(kernel, variant, these.readings, these.usable, these.noise_Pa)
         truth_mm = np.hypot(found["x_mm"].astype(float) - these.x_mm, found["y_mm"].astype(float) - these.y_mm)
-        outlier = (found["used"] != these.usable) & (variant.n_largest == 0)
         um = distance_um(found, these.best)
-        yield these.observable, um, truth_mm, um * 1e-3 if set_ in "AB" else truth_mm, found["flags"], outlier
-
-
-def quantised(pressure_Pa, lsb_Pa):
-    return q10(lsb_Pa * round_half_away(pressure_Pa / lsb_Pa))
+        yield these.observable, um, truth_mm, um * 1e-3 if set_ in "AB" else truth_mm, found["flags"]
 
 
 def row_of(kernel, variant, name, observable, of_sets):
     """of_sets: as outcomes() has them."""
-    um, truth_mm, wrong_mm, flags, outlier = (np.concatenate([one[i][one[0] == observable] for one in of_sets]) for i in range(1, 6))
+    um, truth_mm, wrong_mm, flags = (np.concatenate([one[i][one[0] == observable] for one in of_sets]) for i in range(1, 5))
     valid, warned = flags & VALID != 0, flags & WARNINGS != 0
-    errors, truths, count = np.sort(um), np.sort(truth_mm[valid]), max(len(um), 1)
+    errors, count = np.sort(um), max(len(um), 1)
     return {
         "kernel": kernel,
         "variant": variant,
         "set": name,
         "observable": observable,
         "presses": len(um),
-        "without_fit": int((~valid).sum()),
-        "outlier": int((valid & outlier).sum()),
-        "above_10um": int((um > 10).sum()),
         "above_100um": int((um > 100).sum()),
         **{f"{key}_um": quantile(errors, share) for key, share in (("p50", 0.5), ("p99", 0.99), ("p999", 0.999), ("worst", 1.0))},
-        **{f"truth_{key}_mm": quantile(truths, share) for key, share in (("p50", 0.5), ("p99", 0.99))},
+        "truth_p99_mm": quantile(np.sort(truth_mm[valid]), 0.99),
         "bad_unflagged": float((valid & (wrong_mm > BAD_mm) & ~warned).sum() / count),
         "good_flagged": float((valid & (wrong_mm <= BAD_mm) & warned).sum() / count),
     }
 
 
+def variants():
+    return ((kernel, variant) for kernel, abilities in KERNELS.items() for variant in VARIANTS if variant.needs <= abilities)
+
+
 def rows(bench):
     found = []
-    for kernel, abilities in KERNELS.items():
-        for variant in VARIANTS:
-            if variant.needs <= abilities:
-                of_sets = list(outcomes(bench, kernel, variant))
-                for name, some in (*zip(SETS, ([one] for one in of_sets)), ("".join(SETS), of_sets)):
-                    found += [row_of(kernel, variant.name, name, observable, some) for observable in (True, False)]
+    for kernel, variant in variants():
+        of_sets = list(outcomes(bench, kernel, variant))
+        for name, some in (*zip(SETS, ([one] for one in of_sets)), ("".join(SETS), of_sets)):
+            found += [row_of(kernel, variant.name, name, observable, some) for observable in (True, False)]
     return [row for row in found if row["presses"]]
 
 
 def jobs(bench):
     """For on_chip/bench.mjs: the variants, and of each mask a thousandth of the presses."""
+    fields = ("iterations", "n_largest", "mask")
     return {
         "variants": [
-            {
-                "kernel": kernel,
-                "variant": variant.name,
-                "iterations": variant.iterations,
-                "n_largest": variant.n_largest,
-                "guess": variant.guess,
-                "mask": variant.mask,
-                "prior_sigma_mm": variant.prior[0],
-                "prior_width_mm": variant.prior[1],
-            }
-            for kernel, abilities in KERNELS.items()
-            for variant in VARIANTS
-            if variant.needs <= abilities and variant.on_chip
+            {"kernel": kernel, "variant": variant.name, **{field: getattr(variant, field) for field in fields}}
+            for kernel, variant in variants()
         ],
         "presses": {mask: [job for set_ in SETS for job in jobs_of(bench, set_, mask)] for mask in MASKS},
     }
@@ -195,7 +145,6 @@ def jobs_of(bench, set_, mask):
     these = bench.presses(set_, mask)
     for i in range(max(1, len(bench.presses(set_).readings) // 1000)):
         yield {
-            "set": set_,
             "observable": bool(these.observable[i]),
             "usable": int(these.usable[i]),
             "noise_Pa_q10": int(these.noise_Pa[i] * 1024),
@@ -221,8 +170,8 @@ def mixed(bench, limit):
 
 def timed(bench, limit, passes):
     """Time and error of one fit on this computer, our kernels and libraries on the same presses, block after block in an order that rotates. Kernels that
-    run a number of iterations run seven; separable goes on until it has settled, twelve at the most. us: median over blocks and passes; ratio: the same
-    block's time over that of separable."""
+    run a number of iterations run seven; separable goes on until it has settled, twelve at the most. us: median over blocks and passes, and the tenths of
+    them; ratio: median of the same block's time over that of separable."""
     readings, usable, noise_Pa, best = mixed(bench, limit)
     kernels = [HOST_KERNEL, *(kernel for kernel in KERNELS if kernel != HOST_KERNEL), *LIBRARIES]
     us, um = {kernel: [] for kernel in kernels}, {kernel: np.zeros(len(readings)) for kernel in kernels}
@@ -233,24 +182,18 @@ def timed(bench, limit, passes):
             found, one_us = bench.fit(kernel, variant, readings[block], usable[block], noise_Pa[block], threads=1)
             us[kernel].append(one_us)
             um[kernel][block] = distance_um(found, best[block])
-    found = []
+    found = {}
     for kernel in kernels:
-        times, ratios, errors = np.sort(us[kernel]), np.sort(np.divide(us[kernel], us[HOST_KERNEL])), np.sort(um[kernel])
-        spread = {
-            f"{name}{key}": quantile(of, share)
-            for name, of in (("us", times), ("ratio", ratios))
-            for key, share in (("", 0.5), ("_p10", 0.1), ("_p90", 0.9))
+        times, errors = np.sort(us[kernel]), np.sort(um[kernel])
+        found[kernel] = {
+            **{key: quantile(times, share) for key, share in (("us", 0.5), ("us_p10", 0.1), ("us_p90", 0.9))},
+            "ratio": quantile(np.sort(np.divide(us[kernel], us[HOST_KERNEL])), 0.5),
+            "presses": len(errors),
+            "p50_um": quantile(errors, 0.5),
+            "p999_um": quantile(errors, 0.999),
+            "above_100um": int((errors > 100).sum()),
         }
-        found.append(
-            {
-                "kernel": kernel,
-                **spread,
-                "p50_um": quantile(errors, 0.5),
-                "p999_um": quantile(errors, 0.999),
-                "above_100um": int((errors > 100).sum()),
-            }
-        )
-    return {"processor": processor(), "presses": len(readings), "passes": passes, "seed": bench.seed, "rows": found}
+    return found
 
 
 def processor():

@@ -14,7 +14,6 @@ Errors are distances of the location from the reference optimum over the observa
 """
 
 import csv
-import json
 import math
 import pathlib
 import sys
@@ -28,7 +27,7 @@ from boards import TO_BUILD, fit_cycles_of  # noqa: E402
 from presentation import BLUE, FAINT, GOAL, INK, goal_table_md, judge, plt, save, table_md  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from measure import Measure  # noqa: E402
-from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
+from reporting import Steps, finish, option_parser, output_folder, positive, run, write_json  # noqa: E402
 
 CLOCK_Hz = 125e6
 SETS = errors.SETS
@@ -46,57 +45,39 @@ def measure(options, out):
     measure = Measure(options.build)
     bench = errors.Bench(measure, options.seed, options.limit, out / "cache")
     steps.report("error against the reference (the first run solves the reference, about eight minutes on two cores)")
-    write_json(out / "fit_error.json", {"seed": options.seed, "presses": options.limit, "rows": errors.rows(bench)})
+    rows = errors.rows(bench)
     steps.report("cycles on the emulated chip")
     write_json(out / "fit_jobs.json", errors.jobs(bench))
-    run(
-        "node",
-        HERE / "on_chip/bench.mjs",
-        "--image",
-        image,
-        "--jobs",
-        out / "fit_jobs.json",
-        "--out",
-        out / "fit_cycles.csv",
-        "--budget",
-        options.budget,
-    )
+    run("node", HERE / "on_chip/bench.mjs", image, out / "fit_jobs.json", out / "fit_cycles.csv", options.budget)
     steps.report("time on this computer")
-    write_json(out / "fit_bench.json", errors.timed(bench, max(1200, options.limit // 10), options.passes))
+    host = errors.timed(bench, max(1200, options.limit // 10), options.passes)
     steps.report("presses that are hard, extreme, or none")
-    write_json(out / "stiff.json", stiff.measure_cases(measure, max(200, options.limit // 15)))
+    hard = stiff.measure_cases(measure, max(200, options.limit // 15))
+    write_json(out / "stiff.json", hard)
     steps.report("table and picture")
-
-
-def read_json(path):
-    return json.loads(path.read_text(encoding="utf-8"))
+    with open(out / "fit_cycles.csv", newline="", encoding="utf-8") as file:
+        return Results(rows, list(csv.DictReader(file)), host, hard)
 
 
 class Results:
-    def __init__(self, out):
-        self.rows = {}
-        report = read_json(out / "fit_error.json")
-        self.seed = report["seed"]
-        for row in report["rows"]:
-            self.rows[row["kernel"], row["variant"], row["set"], row["observable"]] = row
-        with open(out / "fit_cycles.csv", newline="", encoding="utf-8") as file:
-            self.cycles = {(row["kernel"], row["variant"]): row for row in csv.DictReader(file)}
-        self.bench = read_json(out / "fit_bench.json")
-        self.host = {row["kernel"]: row for row in self.bench["rows"]}
-        self.stiff = read_json(out / "stiff.json")
+    def __init__(self, rows, cycles, host, hard):
+        self.rows = {(row["kernel"], row["variant"], row["set"], row["observable"]): row for row in rows}
+        self.cycles = {(row["kernel"], row["variant"]): row for row in cycles}
+        self.host, self.stiff = host, hard
 
     def error(self, kernel, variant, set_, key):
-        """null is infinite: too many presses without a fit."""
+        """Infinite: too many presses without a fit."""
         row = self.rows.get((kernel, variant, set_, True))
-        if row is None:
-            return None
-        return math.inf if row[key] is None else row[key]
+        return None if row is None else row[key]
+
+    def per_set(self, kernel, variant, key):
+        return {set_: self.error(kernel, variant, set_, key) for set_ in SETS}
 
     def worst(self, kernel, variant, key, sets=SETS):
         return max(self.error(kernel, variant, set_, key) for set_ in sets)
 
-    def per_set(self, kernel, variant, key):
-        return {set_: self.error(kernel, variant, set_, key) for set_ in SETS}
+    def sum(self, kernel, variant, key):
+        return sum(self.per_set(kernel, variant, key).values())
 
     def percent_of_all(self, kernel, variant, set_, key):
         """Of the observable presses of a set and the others together."""
@@ -107,10 +88,14 @@ class Results:
         return max(int(self.cycles[kernel, variant]["cycles_max"]) for variant in variants)
 
     def variants(self):
-        seen = {}
-        for kernel, variant, _, _ in self.rows:
-            seen[kernel, variant] = None
-        return list(seen)
+        return list(dict.fromkeys((kernel, variant) for kernel, variant, _, _ in self.rows))
+
+    def along_iterations(self, kernel):
+        """(median cycles, p99.9 um, iterations) of the variants that differ in these alone."""
+        for (of, variant), row in self.cycles.items():
+            if of == kernel and variant.startswith("iterations="):
+                error = self.error(kernel, variant, ALL_SETS, "p999_um")
+                yield int(row["cycles_median"]), error, int(variant.removeprefix("iterations="))
 
 
 # Of fit.json: what to stay below or above, as the fit is meant to be.
@@ -133,22 +118,20 @@ GOALS = (
 )
 
 
-def figures(results):
+def figures(results, seed):
     """fit.json. Shipped: with the iterations that the firmware makes; else with those that reach the optimum. Masked: one random sensor, or
     the peak sensor, is unusable for the reference too."""
     r = results
-    ours = errors.HOST_KERNEL
     libraries = ("ceres_reused", "tiny_solver", "cminpack")
-    speed = {name: r.host[name]["ratio"] for name in libraries}
     found = {
-        "observable_presses": sum(r.error("fit", USUAL, s, "presses") for s in SETS),
+        "observable_presses": r.sum("fit", USUAL, "presses"),
         "p99_9_um": r.worst("fit", USUAL, "p999_um"),
         "p99_9_um_per_set": r.per_set("fit", USUAL, "p999_um"),
-        "above_100um": sum(r.error("fit", USUAL, s, "above_100um") for s in SETS),
+        "above_100um": r.sum("fit", USUAL, "above_100um"),
         "above_100um_per_set": r.per_set("fit", USUAL, "above_100um"),
         "shipped_p99_9_um": r.worst("fit", BUILT, "p999_um"),
         "shipped_p99_9_um_per_set": r.per_set("fit", BUILT, "p999_um"),
-        "shipped_above_100um": sum(r.error("fit", BUILT, s, "above_100um") for s in SETS),
+        "shipped_above_100um": r.sum("fit", BUILT, "above_100um"),
         "shipped_bad_unflagged_percent_per_set": {s: r.percent_of_all("fit", BUILT, s, "bad_unflagged") for s in SETS},
         "masked_p99_9_um": r.worst("fit", "mask=random", "p999_um", SETS[:3]),
         "masked_p99_9_um_per_set": r.per_set("fit", "mask=random", "p999_um"),
@@ -157,7 +140,7 @@ def figures(results):
         "masked_peak_p99_um_per_set": r.per_set("fit", "mask=peak", "p99_um"),
         "masked_peak_above_100um_d": r.error("fit", "mask=peak", "D", "above_100um"),
         "masked_peak_above_100um_d_double": r.error("double", "mask=peak guess=firmware", "D", "above_100um"),
-        "masked_observable_presses": {mask[5:]: sum(r.error("fit", mask, s, "presses") for s in SETS) for mask in MASKS},
+        "masked_observable_presses": {mask[5:]: r.sum("fit", mask, "presses") for mask in MASKS},
         "bad_unflagged_percent_worst": 100 * r.stiff["bad_unflagged_worst"],
         "bad_unflagged_percent_per_set": {s: r.percent_of_all("fit", USUAL, s, "bad_unflagged") for s in SETS},
         "good_flagged_percent_c": r.percent_of_all("fit", USUAL, "C", "good_flagged"),
@@ -166,72 +149,71 @@ def figures(results):
         "masked_cycles": r.cycles_max("masked", BUILT_MASKS),
         "with_outlier_search_cycles": r.cycles_max("fit", [BUILT, *BUILT_MASKS]),
         "general_cycles": r.cycles_max("general", [USUAL]),
-        "speed_vs_ceres": speed["ceres_reused"],
-        "speed_vs_tinysolver": speed["tiny_solver"],
-        "speed_vs_cminpack": speed["cminpack"],
-        "host_p99_9_um": {name: r.host[name]["p999_um"] for name in (ours, *speed)},
-        "seed": r.seed,
-        "processor": r.bench["processor"],
+        "speed_vs_ceres": r.host["ceres_reused"]["ratio"],
+        "speed_vs_tinysolver": r.host["tiny_solver"]["ratio"],
+        "speed_vs_cminpack": r.host["cminpack"]["ratio"],
+        "host_p99_9_um": {name: r.host[name]["p999_um"] for name in (errors.HOST_KERNEL, *libraries)},
+        "seed": seed,
+        "processor": errors.processor(),
     }
     return judge(found, GOALS)
 
 
 def table(results):
-    """One dict for each kernel and variant."""
-    rows = []
+    """One dict for each kernel and variant, and one for each library of the host."""
     for kernel, variant in results.variants():
         cycles = results.cycles.get((kernel, variant), {})
-        median = cycles.get("cycles_median")
-        row = {
+        median = cycles.get("cycles_median", "")
+        yield {
             "kernel": kernel,
             "variant": variant,
             **{f"cycles_{k}": cycles.get(f"cycles_{k}", "") for k in ("min", "median", "max")},
-            "ms": "" if median is None else int(median) / CLOCK_Hz * 1e3,
-            "host_us": results.host[kernel]["us"] if variant == USUAL and kernel in results.host else "",
-            "presses": results.error(kernel, variant, ALL_SETS, "presses"),
-            "above_100um": results.error(kernel, variant, ALL_SETS, "above_100um"),
+            "ms": int(median) / CLOCK_Hz * 1e3 if median else None,
+            "host_us": results.host[kernel]["us"] if variant == USUAL and kernel in results.host else None,
+            **{key: results.error(kernel, variant, ALL_SETS, key) for key in ("presses", "above_100um")},
+            **{key: results.error(kernel, variant, ALL_SETS, key) for key in ("p50_um", "p99_um", "p999_um", "worst_um")},
+            **{f"{key}_{s}": results.error(kernel, variant, s, key) for key in ("p999_um", "truth_p99_mm") for s in SETS},
         }
-        for key in ("p50_um", "p99_um", "p999_um", "worst_um"):
-            row[key] = results.error(kernel, variant, ALL_SETS, key)
-            for set_ in SETS:
-                row[f"{key}_{set_}"] = results.error(kernel, variant, set_, key)
-        for set_ in SETS:
-            row[f"truth_p99_mm_{set_}"] = results.error(kernel, variant, set_, "truth_p99_mm")
-        rows.append(row)
-    for kernel, host in results.host.items():
-        if (kernel, USUAL) not in results.variants():
-            rows.append(
-                {
-                    "kernel": kernel,
-                    "variant": "host library",
-                    "host_us": host["us"],
-                    "presses": results.bench["presses"],
-                    "above_100um": host["above_100um"],
-                    "p50_um": host["p50_um"],
-                    "p999_um": math.inf if host["p999_um"] is None else host["p999_um"],
-                }
-            )
-    return rows
+    for kernel in errors.LIBRARIES:
+        host = results.host[kernel]
+        yield {
+            "kernel": kernel,
+            "variant": "host library",
+            "host_us": host["us"],
+            **{key: host[key] for key in ("presses", "above_100um", "p50_um", "p999_um")},
+        }
 
 
 def write_table_csv(path, rows):
     names = list(rows[0])
-    lines = [",".join(names)]
-    lines += [
-        ",".join("" if row.get(n) is None else f"{row[n]:.6g}" if isinstance(row.get(n), float) else str(row.get(n, "")) for n in names)
-        for row in rows
+    lines = [
+        ",".join("" if row.get(n) is None else f"{row[n]:.6g}" if isinstance(row[n], float) else str(row[n]) for n in names) for row in rows
     ]
-    write_text(path, "\n".join(lines) + "\n")
+    write_text(path, "\n".join([",".join(names), *lines]) + "\n")
 
 
 def number(value, digits=2):
-    if value is None or value == "":
+    if value is None:
         return ""
     if not math.isfinite(value):
         return "none"
-    if value >= 1e6:
-        return f"{value:.0e}"
-    return f"{value:.{digits}g}" if value < 100 else f"{value:.0f}"
+    return f"{value:.0e}" if value >= 1e6 else f"{value:.{digits}g}" if value < 100 else f"{value:.0f}"
+
+
+# Of fit_table.md: heading, and what of a row is below it.
+COLUMNS = {
+    "kernel": lambda row: row["kernel"],
+    "variant": lambda row: row["variant"],
+    "cycles": lambda row: row.get("cycles_median", ""),
+    "ms": lambda row: number(row.get("ms"), 3),
+    "host us": lambda row: number(row["host_us"], 3),
+    "p50": lambda row: number(row["p50_um"]),
+    "p99": lambda row: number(row.get("p99_um")),
+    "p99.9": lambda row: number(row["p999_um"]),
+    **{f"{s} p99.9": lambda row, s=s: number(row.get(f"p999_um_{s}")) for s in SETS},
+    "above 100 um": lambda row: f"{row['above_100um']} of {row['presses']}",
+    "C, D: p99 mm to the truth": lambda row: ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row),
+}
 
 
 def write_table_md(path, rows, found):
@@ -250,41 +232,8 @@ def write_table_md(path, rows, found):
         "`truth`, `validation` and, on real rubber, `real` have the effect of a dip, and of a fit that knows it, on the distance from the truth.",
         "",
         *goal_table_md(found),
-    ]
-    cells = [
-        [
-            row["kernel"],
-            row["variant"],
-            row.get("cycles_median", ""),
-            number(row.get("ms"), 3),
-            number(row["host_us"], 3),
-            *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),
-            f"{row['above_100um']} of {row['presses']}",
-            ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row),
-        ]
-        for row in rows
-    ]
-    lines += [
         "",
-        *table_md(
-            (
-                "kernel",
-                "variant",
-                "cycles",
-                "ms",
-                "host us",
-                "p50",
-                "p99",
-                "p99.9",
-                "A p99.9",
-                "B",
-                "C",
-                "D",
-                "above 100 um",
-                "C, D: p99 mm to the truth",
-            ),
-            cells,
-        ),
+        *table_md(COLUMNS, [[cell(row) for cell in COLUMNS.values()] for row in rows]),
     ]
     write_text(path, "\n".join(lines) + "\n")
 
@@ -298,180 +247,95 @@ def pareto(points):
     return front
 
 
-def plot(path, results, found):
-    colours = {
-        "fit": BLUE,
-        "general": "#0e9aa7",
-        "naive_float": "#e08a1e",
-        "naive_double": "#b5651d",
-        "lm_float": "#a05cc5",
-        "lm_double": "#6f3d94",
-        "double": FAINT,
-        "separable": GOAL,
-    }
-    labels = {
-        "fit": "firmware, fixed point",
-        "general": "firmware, float32, any layout",
-        "naive_float": "Gauss-Newton, expf",
-        "naive_double": "Gauss-Newton, exp",
-        "lm_float": "Levenberg-Marquardt, float",
-        "lm_double": "Levenberg-Marquardt, double",
-    }
-    # on the host: name, its side of the bar or else above the point, lifted by points
-    host_labels = {
-        "fit": ("firmware, fixed point", "left", 0),
-        "general": ("firmware, float32", "left", 0),
-        "masked": ("firmware, a sensor masked", "right", 0),
-        "double": ("the same steps in double", "right", 0),
-        "separable": ("fixed point's iteration in double", "right", 0),
-        "naive_float": ("Gauss-Newton, expf", "left", -5),
-        "naive_double": ("Gauss-Newton, exp", "left", 5),
-        "lm_float": ("Levenberg-Marquardt, float", "left", -4),
-        "lm_double": ("Levenberg-Marquardt, double", "right", -4),
-        "tiny_solver": ("TinySolver", "right", 4),
-        "tiny_tight": ("TinySolver, tight", "left", -9),
-        "gsl": ("GSL", "left", 0),
-        "ceres_reused": ("Ceres", "above, left", 9),
-        "ceres_tight": ("Ceres, tight", "above, right", 9),
-        "cminpack": ("cminpack", "right", 0),
-    }
-    low_um, high_um = 1e-3, 1e5
+# colour; name on the chip; name on the host, its side of the bar and lift in points
+DRAWN = {
+    "fit": (BLUE, "firmware, fixed point", ("firmware, fixed point", "left", 0)),
+    "general": ("#0e9aa7", "firmware, float32, any layout", ("firmware, float32", "left", 0)),
+    "naive_float": ("#e08a1e", "Gauss-Newton, expf", ("Gauss-Newton, expf", "left", -5)),
+    "naive_double": ("#b5651d", "Gauss-Newton, exp", ("Gauss-Newton, exp", "left", 5)),
+    "lm_float": ("#a05cc5", "Levenberg-Marquardt, float", ("Levenberg-Marquardt, float", "left", -4)),
+    "lm_double": ("#6f3d94", "Levenberg-Marquardt, double", ("Levenberg-Marquardt, double", "right", -4)),
+    "masked": (INK, None, ("firmware, a sensor masked", "right", 0)),
+    "double": (FAINT, None, ("the same steps in double", "right", 0)),
+    "separable": (GOAL, None, ("fixed point's iteration in double", "right", 0)),
+    "tiny_solver": (INK, None, ("TinySolver", "right", 4)),
+    "ceres_reused": (INK, None, ("Ceres", "right", 0)),
+    "cminpack": (INK, None, ("cminpack", "right", 0)),
+}
+LOW_um, HIGH_um = 1e-3, 1e5  # what is beyond is drawn there
 
-    def shown(um):
-        return min(max(um, low_um), high_um)
 
-    figure, (chip, host) = plt.subplots(1, 2, figsize=(13, 6.6), width_ratios=[1.5, 1], sharey=True)
-    figure.subplots_adjust(left=0.06, right=0.985, top=0.8, bottom=0.09, wspace=0.06)
+def shown(um):
+    return min(max(um, LOW_um), HIGH_um)
 
+
+def plot_chip(axes, results):
     every = []
-    for kernel, label in labels.items():
-        line = []
-        for k in range(51):
-            cycles, error = results.cycles.get((kernel, f"iterations={k}")), results.error(kernel, f"iterations={k}", ALL_SETS, "p999_um")
-            if cycles is not None and error is not None:
-                line.append((int(cycles["cycles_median"]), shown(error), k))
-        every += [point[:2] for point in line]
-        chip.plot([p[0] for p in line], [p[1] for p in line], "o-", color=colours[kernel], ms=4, lw=1.2, label=label, zorder=3)
-        labelled = []
+    for kernel, (colour, label, _) in DRAWN.items():
+        if label is None:
+            continue
+        line = [(cycles, shown(um), k) for cycles, um, k in results.along_iterations(kernel)]
+        every += line
+        axes.plot([p[0] for p in line], [p[1] for p in line], "o-", color=colour, ms=4, lw=1.2, label=label, zorder=3)
         for x, y, k in line:
-            apart = all(abs(math.log10(x / other_x)) > 0.05 or abs(math.log10(y / other_y)) > 0.5 for other_x, other_y in labelled)
-            if k in (0, 4, 7, 10, 50) and apart and not (kernel.startswith("lm_") and k == 4):
-                labelled.append((x, y))
-                chip.annotate(str(k), (x, y), (0, 5), textcoords="offset points", size=7, ha="center", color=colours[kernel])
-        for n in range(4, 15):
-            cycles, error = results.cycles.get((kernel, f"n_largest={n}")), results.error(kernel, f"n_largest={n}", ALL_SETS, "p999_um")
-            if cycles is not None and error is not None:
-                chip.plot(
-                    int(cycles["cycles_median"]),
-                    shown(error),
-                    "x",
-                    color=colours[kernel],
-                    ms=5,
-                    zorder=3,
-                    label="n largest, 4 to 14" if n == 4 else None,
-                )
+            if k in (0, 4, 7):
+                axes.annotate(str(k), (x, y), (0, 5), textcoords="offset points", size=7, ha="center", color=colour)
     for variant, marker, label in (("mask=random", "s", "one random sensor masked"), ("mask=peak", "D", "peak sensor masked")):
-        if ("fit", variant) in results.cycles:
-            chip.plot(
-                int(results.cycles["fit", variant]["cycles_median"]),
-                shown(results.error("fit", variant, ALL_SETS, "p999_um")),
-                marker,
-                mfc="white",
-                mec=colours["fit"],
-                ms=6,
-                label=label,
-                zorder=4,
-            )
-    front = pareto(every)
-    chip.step(
-        [p[0] for p in front],
-        [p[1] for p in front],
-        where="post",
-        color="#b4bac6",
-        lw=5,
-        alpha=0.6,
-        solid_capstyle="round",
-        label="Pareto front",
-        zorder=1,
-    )
-    chip.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
-    chip.set_ylabel("p99.9 distance to the least-squares optimum, um")
-    chip.set_title("on the chip", loc="left", size=10, color=FAINT)
-    chip.legend(loc="lower left", bbox_to_anchor=(0.1, 0), ncol=2, fontsize=7.5)
-    top = chip.secondary_xaxis("top", functions=(lambda c: c / CLOCK_Hz * 1e3, lambda ms: ms * CLOCK_Hz / 1e3))
+        point = int(results.cycles["fit", variant]["cycles_median"]), shown(results.error("fit", variant, ALL_SETS, "p999_um"))
+        axes.plot(*point, marker, mfc="white", mec=BLUE, ms=6, label=label, zorder=4)
+    front = pareto(point[:2] for point in every)
+    axes.step(*zip(*front), where="post", color="#b4bac6", lw=5, alpha=0.6, solid_capstyle="round", label="Pareto front", zorder=1)
+    axes.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
+    axes.set_ylabel("p99.9 distance to the least-squares optimum, um")
+    axes.set_title("on the chip", loc="left", size=10, color=FAINT)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.1, 0), ncol=2, fontsize=7.5)
+    top = axes.secondary_xaxis("top", functions=(lambda c: c / CLOCK_Hz * 1e3, lambda ms: ms * CLOCK_Hz / 1e3))
     top.set_xlabel("ms at 125 MHz", size=8, color=FAINT, loc="right")
     top.spines["top"].set_visible(False)
 
-    for kernel, row in results.host.items():
-        if kernel in ("grid", "ceres_new"):
-            continue  # as fit, and as ceres_reused
-        error = math.inf if row["p999_um"] is None else row["p999_um"]
-        colour = colours.get(kernel, INK)
-        host.errorbar(
-            row["us"],
-            shown(error),
-            xerr=[[row["us"] - row["us_p10"]], [row["us_p90"] - row["us"]]],
-            fmt="o",
-            ms=5,
-            color=colour,
-            elinewidth=0.8,
-            zorder=3,
-        )
-        name, side, up = host_labels[kernel]
-        at_us, outwards = {"right": (row["us_p90"], 4), "left": (row["us_p10"], -4)}.get(side, (row["us"], 0))
-        host.annotate(
-            name,
-            (at_us, shown(error)),
-            (outwards, up),
-            textcoords="offset points",
-            size=7.5,
-            va="center",
-            ha="left" if side.endswith("right") else "right",
-            color=colour,
-        )
-    host.set_xlabel("us of one fit on the host, median and 10..90 %, paired")
-    host.set_title("on this host, each from one start", loc="left", size=10, color=FAINT)
-    for axes in (chip, host):
+
+def plot_host(axes, results):
+    for kernel, (colour, _, (name, side, up)) in DRAWN.items():
+        row = results.host[kernel]
+        us, um = row["us"], shown(row["p999_um"])
+        spread = [[us - row["us_p10"]], [row["us_p90"] - us]]
+        axes.errorbar(us, um, xerr=spread, fmt="o", ms=5, color=colour, elinewidth=0.8, zorder=3)
+        at_us, outwards, align = (row["us_p90"], 4, "left") if side == "right" else (row["us_p10"], -4, "right")
+        axes.annotate(name, (at_us, um), (outwards, up), textcoords="offset points", size=7.5, va="center", ha=align, color=colour)
+    axes.set_xlabel("us of one fit on the host, median and 10..90 %, paired")
+    axes.set_title("on this host, each from one start", loc="left", size=10, color=FAINT)
+
+
+def plot(path, results, found):
+    figure, both = plt.subplots(1, 2, figsize=(13, 6.6), width_ratios=[1.5, 1], sharey=True)
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.8, bottom=0.09, wspace=0.06)
+    for axes, draw in zip(both, (plot_chip, plot_host)):
+        draw(axes, results)
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_ylim(low_um * 0.7, high_um * 1.5)
+        axes.set_ylim(LOW_um * 0.7, HIGH_um * 1.5)
         axes.grid()
     figure.text(0.06, 0.945, "The fit: error against run time", size=15, weight="bold")
-    figure.text(
-        0.06,
-        0.905,
-        f"{found['observable_presses']} observable presses of sets A to D (simulated), seed {found['seed']}; errors outside the "
-        f"axis are drawn on its edge; host: {found['processor']}",
-        size=8.5,
+    words = (
+        f"{found['observable_presses']} observable presses of sets A to D (simulated), seed {found['seed']}; errors outside the axis are drawn "
+        f"on its edge; host: {found['processor']}"
     )
+    figure.text(0.06, 0.905, words, size=8.5)
     save(figure, path)
-
-
-def whole(text):
-    value = int(text)
-    if value <= 0:
-        raise ValueError
-    return value
 
 
 def main(argv):
     parser = option_parser(__doc__)
     parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
-    parser.add_argument("--limit", type=whole, default=120000, help="presses, in all (default: %(default)s)")
-    parser.add_argument("--seed", type=whole, default=20221015)
+    parser.add_argument("--limit", type=positive, default=120000, help="presses, in all (default: %(default)s)")
+    parser.add_argument("--seed", type=positive, default=20221015)
     parser.add_argument("--budget", type=float, default=15.0, help="million emulated cycles for each variant (default: %(default)s)")
-    parser.add_argument("--passes", type=whole, default=3, help="of the timing on the host (default: %(default)s)")
-    parser.add_argument("--only-merge", action="store_true", help="measure nothing, take what is in the folder")
+    parser.add_argument("--passes", type=positive, default=3, help="of the timing on the host (default: %(default)s)")
     options = parser.parse_args(argv)
     out = output_folder(options)
-    if not options.only_merge:
-        measure(options, out)
-    try:
-        results = Results(out)
-        found = figures(results)
-    except (KeyError, OSError, TypeError) as error:
-        raise InputError(f"{out}: the results there are incomplete ({error!r}); run without --only-merge") from None
-    rows = table(results)
+    results = measure(options, out)
+    found = figures(results, options.seed)
+    rows = list(table(results))
     write_json(out / "fit.json", found)
     write_table_csv(out / "fit_table.csv", rows)
     write_table_md(out / "fit_table.md", rows, found)

@@ -115,11 +115,10 @@ def layer_pressure_Pa(measure, layer_mm, shapes, x_mm, y_mm, force_N):
     return pressure_Pa
 
 
-def gaussian_Pa(measure, x_mm, y_mm, sigma_mm, p0_Pa):
+def gaussian_Pa(sensor_x, sensor_y, x_mm, y_mm, sigma_mm, p0_Pa):
     """[press, sensor]"""
-    sensor_x, sensor_y, _ = measure.layout()
-    square = (sensor_x - np.asarray(x_mm)[:, None]) ** 2 + (sensor_y - np.asarray(y_mm)[:, None]) ** 2
-    return np.asarray(p0_Pa)[:, None] * np.exp(-0.5 * square / np.square(sigma_mm)[:, None])
+    square = (sensor_x - x_mm[:, None]) ** 2 + (sensor_y - y_mm[:, None]) ** 2
+    return p0_Pa[:, None] * np.exp(-0.5 * square / np.square(sigma_mm)[:, None])
 
 
 def draw(measure, set_, seed, count):
@@ -146,7 +145,7 @@ def redraw(measure, set_, random):
         if set_ in "AB":
             sigma_mm, p0_Pa = random.log_uniform(3, 20, of=left)[left], random.log_uniform(500, 100000, of=left)[left]
             force_N = 2 * np.pi * p0_Pa * sigma_mm * sigma_mm * 1e-6
-            pressure_Pa = gaussian_Pa(measure, x_mm, y_mm, sigma_mm, p0_Pa)
+            pressure_Pa = gaussian_Pa(*measure.layout()[:2], x_mm, y_mm, sigma_mm, p0_Pa)
         else:
             force_N, shapes = random.log_uniform(1, 25, of=left)[left], random.below(len(SHAPES), of=left)[left]
             pressure_Pa = layer_pressure_Pa(measure, LAYER_mm[set_], shapes, x_mm, y_mm, force_N)
@@ -159,12 +158,16 @@ def redraw(measure, set_, random):
 
 def usable_sensors(measure, set_, mask, seed, readings):
     """Bitmap [press]"""
-    usable = np.full(len(readings), ALL, np.uint32)
     if mask == "peak":
-        return usable & ~(np.uint32(1) << readings.argmax(axis=1).astype(np.uint32))
+        return ALL & ~(np.uint32(1) << readings.argmax(axis=1).astype(np.uint32))
     random = measure.random(seed, MASK_STREAM + SETS.index(set_), np.arange(len(readings)))
-    want = SENSORS - {"none": 0, "random": 1, "random2": 2, "random3": 3}[mask]
-    while (more := np.flatnonzero(sensors_in(usable) > want)).size:
+    return without(random, {"none": 0, "random": 1, "random2": 2, "random3": 3}[mask])
+
+
+def without(random, sensors):
+    """Bitmap for each state of the sensors that are left without this number of them."""
+    usable = np.full(len(random.states), ALL, np.uint32)
+    while (more := np.flatnonzero(sensors_in(usable) > SENSORS - sensors)).size:
         usable[more] &= ~(np.uint32(1) << random.below(SENSORS, of=more)[more].astype(np.uint32))
     return usable
 
@@ -180,13 +183,10 @@ class Compared(Measure):
         super().__init__(measure.build, "compared")
         self.array, (self.x_mm, self.y_mm, self.pitch_mm) = measure.array(), measure.layout()
 
-    def compare(self, kernel, iterations, noise_Pa, readings, usable, prior=(0.0, 0.0), guess=0, threads=2):
+    def compare(self, kernel, iterations, noise_Pa, readings, usable, firmware_guess=False, threads=2):
         """(compared_fit [press], microseconds for each)"""
-        settings = self.made("compared_settings", len(readings))
-        settings["iterations"], settings["noise_Pa"], settings["guess"] = iterations, noise_Pa, guess
-        settings["prior_sigma_mm"], settings["prior_width_mm"] = prior
         found, us = self.made("compared_fit", len(readings)), np.zeros(1)
-        self.call("compare", kernel, threads, self.array, settings, readings, usable, found, us)
+        self.call("compare", kernel, threads, iterations, int(firmware_guess), self.array, noise_Pa, readings, usable, found, us)
         return found, float(us[0])
 
     def optimum(self, readings, usable, noise_Pa, starts=None, all_starts=False):

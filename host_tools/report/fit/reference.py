@@ -1,12 +1,11 @@
 #!/usr/bin/python3
 """The least-squares optimum in double precision that the fingertip's fit is measured against.
 
-    reference.py presses [--set A|B|C|D] [--count N] [--seed S]    presses of a set: truth and readings
-    reference.py fit [FILE.csv] [--noise PA]                       the optimum of each row of readings
+    reference.py fit [FILE.csv] [--noise PA]    the optimum of each row of readings
 
-fit reads a recording with the raw stream, a scenario, or the output of the command presses; without a file, the standard input. A row keeps its first cell; distance_mm is
-from its x_mm, y_mm; a sensor with an empty cell is left out. Readings are above each sensor's zero (columns tare0_Pa ..., where there are any) and over the
-gains of a calibrated fingertip, as the fit gets them.
+FILE is a recording with the raw stream or a scenario; without it, the standard input. A row keeps its first cell; distance_mm is from its x_mm,
+y_mm; a sensor with an empty cell is left out. Readings are above each sensor's zero (columns tare0_Pa ..., where there are any) and over the gains of
+a calibrated fingertip, as the fit gets them.
 """
 
 import argparse
@@ -27,14 +26,6 @@ ABSOLUTE_Pa = 50e3  # no pad weighs on all of its sensors by this
 SENSORS_MIN = 4
 FOUND = (("best_x_mm", "x_mm"), ("best_y_mm", "y_mm"), ("best_p0_Pa", "p0_Pa"), ("best_sigma_mm", "sigma_mm"), ("best_force_N", "force_N"))
 ROWS_AT_ONCE = 2000
-
-
-def print_presses(measure, options):
-    made = presses.draw(measure, options.set, options.seed, options.count)
-    print("press,x_mm,y_mm,force_N,noise_Pa", *(f"s{k}_Pa" for k in range(presses.SENSORS)), sep=",")
-    for i, readings in enumerate(presses.q10(made.pressure_Pa) / 1024.0):
-        truth = (f"{values[i]:.9g}" for values in (made.x_mm, made.y_mm, made.force_N, made.noise_Pa))
-        print(i, *truth, *(f"{reading:.10g}" for reading in readings), sep=",")
 
 
 class Table:
@@ -138,18 +129,6 @@ def print_row(row, found):
     )
 
 
-def whole(text):
-    if not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f"needs a whole number, not '{text}'")
-    return int(text)
-
-
-def count(text):
-    if not 1 <= whole(text) <= 1_000_000:
-        raise argparse.ArgumentTypeError("from 1 to 1000000")
-    return int(text)
-
-
 def noise(text):
     if not 0.01 <= float(text) <= 10000:
         raise argparse.ArgumentTypeError("from 0.01 to 10000")
@@ -159,20 +138,13 @@ def noise(text):
 def main(argv):
     parser = argparse.ArgumentParser(prog="reference.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=ROOT / "build/host", metavar="DIR", help="build folder of the host tools (default: %(default)s)")
-    commands = parser.add_subparsers(required=True)
-    draw = commands.add_parser("presses", help="print presses of a set")
-    draw.add_argument("--set", choices=presses.SETS, default="A", help="A, B: Gaussians; C, D: on rubber of 12 and 6 mm")
-    draw.add_argument("--count", type=count, default=10)
-    draw.add_argument("--seed", type=whole, default=1)
-    draw.set_defaults(run=print_presses)
-    fit = commands.add_parser("fit", help="print the optimum of each row of readings")
-    fit.add_argument("file", nargs="?", default="-", metavar="FILE.csv", help="the readings; - is standard input, the default")
-    fit.add_argument(
+    parser.add_argument("command", choices=["fit"])
+    parser.add_argument("file", nargs="?", default="-", metavar="FILE.csv", help="the readings; - is standard input, the default")
+    parser.add_argument(
         "--noise", type=noise, default=5.0, metavar="PA", help="of a sensor, rms, without a column noise_Pa (default: %(default)s)"
     )
-    fit.set_defaults(run=print_optima)
     options = parser.parse_args(argv)
-    options.run(Measure(options.build), options)
+    print_optima(Measure(options.build), options)
     return 0
 
 

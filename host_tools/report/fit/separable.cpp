@@ -1,6 +1,5 @@
-#include "report/fit/separable.hpp"
-
 #include "common/contact_flags.h"
+#include "report/fit/compared.hpp"
 
 #include <algorithm>
 #include <array>
@@ -231,12 +230,11 @@ bool step(const Readings &p, bool last, State *state) {
 
 } // namespace
 
-KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t /*usable*/,
                        const KernelSettings &settings) {
-  KernelResult result{};
   const fit_grid_shape &grid = array.grid;
   if (grid.columns != COLUMNS || grid.rows != ROWS) {
-    return result;
+    return {};
   }
   std::int32_t largest = 0;
   int peak = 0;
@@ -246,8 +244,7 @@ KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q
     largest = std::max(largest, reading);
   }
   if (largest <= 0) {
-    result.flags = CONTACT_FLAG_LOW_SIGNAL;
-    return result;
+    return {};
   }
   Readings p;
   const double scale = 1.0 / largest;
@@ -264,15 +261,9 @@ KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q
 
   const auto pitch_mm = static_cast<double>(array.pitch_mm);
   const std::uint8_t origin = grid.sensor[-FIRST_COLUMN * ROWS - FIRST_ROW];
-  result.x_mm = pitch_mm * (state.x + static_cast<double>(array.x[origin]));
-  result.y_mm = pitch_mm * (state.y + static_cast<double>(array.y[origin]));
-  result.p0_Pa = state.p0 * largest / 1024.0;
-  const double variance_mm2 = pitch_mm * pitch_mm * 0.5 / state.height;
-  result.sigma_mm = std::sqrt(variance_mm2);
-  result.force_N = 2e-6 * M_PI * result.p0_Pa * variance_mm2;
-  result.used = usable;
-  result.flags = CONTACT_FLAG_FIT_VALID;
-  return result;
+  return {pitch_mm * (state.x + static_cast<double>(array.x[origin])),
+          pitch_mm * (state.y + static_cast<double>(array.y[origin])), state.p0 * largest / 1024.0,
+          pitch_mm * std::sqrt(0.5 / state.height), CONTACT_FLAG_FIT_VALID};
 }
 
 } // namespace fingertip::fitting

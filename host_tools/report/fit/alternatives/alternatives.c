@@ -15,7 +15,6 @@ typedef ALTERNATIVE_REAL real;
 #define LOG OF_REAL(log)
 #define SQRT OF_REAL(sqrt)
 
-#define TWO_PI R(6.283185307179586)
 #define GUESS_SHARE R(0.1) /* of the largest reading */
 #define GUESS_RIDGE R(1e-3)
 #define GUESS_SIGMA R(0.65)
@@ -103,7 +102,12 @@ static bool solve(struct normal *normal, real step[PARAMETERS]) {
   return true;
 }
 
-static void log_linear(const struct samples *samples, real theta[PARAMETERS]) {
+/* The largest reading, moved by a paraboloid through the logarithms of the large ones where they have one. */
+static void guess(const struct samples *samples, real theta[PARAMETERS]) {
+  theta[P0] = R(1);
+  theta[X] = samples->x[samples->peak];
+  theta[Y] = samples->y[samples->peak];
+  theta[SIGMA] = GUESS_SIGMA;
   struct normal normal;
   memset(&normal, 0, sizeof normal);
   for (int i = 0; i < PARAMETERS; i++) {
@@ -121,30 +125,9 @@ static void log_linear(const struct samples *samples, real theta[PARAMETERS]) {
   real c[PARAMETERS];
   if (solve(&normal, c) && c[3] < R(-0.02)) {
     real variance = R(-0.5) / c[3];
-    theta[P0] = R(1);
     theta[X] += smaller(larger(c[1] * variance, R(-1)), R(1));
     theta[Y] += smaller(larger(c[2] * variance, R(-1)), R(1));
     theta[SIGMA] = larger(SQRT(variance), R(0.25));
-  }
-}
-
-static void guess(const struct samples *samples, enum alternative_guess how, real theta[PARAMETERS]) {
-  theta[P0] = R(1);
-  theta[X] = samples->x[samples->peak];
-  theta[Y] = samples->y[samples->peak];
-  theta[SIGMA] = GUESS_SIGMA;
-  if (how == ALTERNATIVE_GUESS_LOG_LINEAR) {
-    log_linear(samples, theta);
-  } else if (how == ALTERNATIVE_GUESS_CENTROID) {
-    real sum = 0, sum_x = 0, sum_y = 0;
-    for (int n = 0; n < samples->count; n++) {
-      real p = larger(samples->p[n], R(0));
-      sum += p;
-      sum_x += p * samples->x[n];
-      sum_y += p * samples->y[n];
-    }
-    theta[X] = sum_x / sum;
-    theta[Y] = sum_y / sum;
   }
 }
 
@@ -175,31 +158,12 @@ static void linearise(const struct samples *samples, const real theta[PARAMETERS
   }
 }
 
-static struct NAMED(alternative_fit_)
-    in_units(const struct fit_array *array, const struct samples *samples, const real theta[PARAMETERS]) {
-  real pitch_mm = (real)array->pitch_mm;
-  struct NAMED(alternative_fit_) fit = {
-      .x_mm = theta[X] * pitch_mm,
-      .y_mm = theta[Y] * pitch_mm,
-      .p0_Pa = theta[P0] * samples->unit_Pa,
-      .sigma_mm = theta[SIGMA] * pitch_mm,
-  };
-  fit.force_N = TWO_PI * R(1e-6) * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
-  return fit;
-}
-
-struct NAMED(alternative_fit_) NAMED(alternative_naive_)(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                                                         uint32_t usable, const struct alternative_settings *settings) {
-  struct samples samples;
-  if (!normalise(array, pressure_Pa_q10, usable, &samples)) {
-    return (struct NAMED(alternative_fit_)){0};
-  }
-  real theta[PARAMETERS], step[PARAMETERS], exponential[FT_MAX_SENSORS];
+static void naive(const struct samples *samples, int iterations, real theta[PARAMETERS]) {
+  real step[PARAMETERS], exponential[FT_MAX_SENSORS];
   struct normal normal;
-  guess(&samples, settings->guess, theta);
-  for (int i = 0; i < settings->iterations; i++) {
-    evaluate(&samples, theta, exponential);
-    linearise(&samples, theta, exponential, &normal);
+  for (int i = 0; i < iterations; i++) {
+    evaluate(samples, theta, exponential);
+    linearise(samples, theta, exponential, &normal);
     if (!solve(&normal, step)) {
       break;
     }
@@ -207,45 +171,53 @@ struct NAMED(alternative_fit_) NAMED(alternative_naive_)(const struct fit_array 
       theta[j] += step[j];
     }
   }
-  return in_units(array, &samples, theta);
 }
 
-struct NAMED(alternative_fit_) NAMED(alternative_lm_)(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                                                      uint32_t usable, const struct alternative_settings *settings) {
-  struct samples samples;
-  if (!normalise(array, pressure_Pa_q10, usable, &samples)) {
-    return (struct NAMED(alternative_fit_)){0};
-  }
-  real theta[PARAMETERS], trial[PARAMETERS], step[PARAMETERS], exponential[FT_MAX_SENSORS];
+static void lm(const struct samples *samples, int iterations, real theta[PARAMETERS]) {
+  real trial[PARAMETERS], step[PARAMETERS], exponential[FT_MAX_SENSORS];
   struct normal normal, damped;
-  guess(&samples, settings->guess, theta);
-  real cost = evaluate(&samples, theta, exponential);
-  linearise(&samples, theta, exponential, &normal);
-  real lambda = R(1e-3);
-  for (int i = 0; i < settings->iterations; i++) {
+  real cost = evaluate(samples, theta, exponential);
+  linearise(samples, theta, exponential, &normal);
+  real lambda = R(1e-3), moved = R(1);
+  for (int i = 0; i < iterations && moved > SETTLED; i++) {
     damped = normal;
     for (int j = 0; j < PARAMETERS; j++) {
       damped.matrix[j][j] += lambda * damped.matrix[j][j] + R(1e-30);
     }
-    real moved = 0;
-    bool solved = solve(&damped, step);
-    for (int j = 0; j < PARAMETERS; j++) {
-      trial[j] = theta[j] + (solved ? step[j] : R(0));
-      real change = trial[j] - theta[j];
-      moved = larger(moved, change < R(0) ? -change : change);
+    if (!solve(&damped, step)) {
+      lambda *= R(10);
+      continue;
     }
-    real trial_cost = solved ? evaluate(&samples, trial, exponential) : cost;
-    if (solved && trial_cost < cost) {
-      memcpy(theta, trial, sizeof theta);
+    moved = 0;
+    for (int j = 0; j < PARAMETERS; j++) {
+      trial[j] = theta[j] + step[j];
+      moved = larger(moved, step[j] < R(0) ? -step[j] : step[j]);
+    }
+    real trial_cost = evaluate(samples, trial, exponential);
+    if (trial_cost < cost) {
+      memcpy(theta, trial, sizeof trial);
       cost = trial_cost;
-      linearise(&samples, theta, exponential, &normal);
+      linearise(samples, theta, exponential, &normal);
       lambda *= R(0.1);
     } else {
       lambda *= R(10);
     }
-    if (solved && moved <= SETTLED) {
-      break;
-    }
   }
-  return in_units(array, &samples, theta);
 }
+
+static struct alternative_fit fitted(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                                     int iterations,
+                                     void (*iterate)(const struct samples *samples, int iterations, real *theta)) {
+  struct samples samples;
+  real theta[PARAMETERS], pitch_mm = (real)array->pitch_mm;
+  if (!normalise(array, pressure_Pa_q10, usable, &samples)) {
+    return (struct alternative_fit){0};
+  }
+  guess(&samples, theta);
+  iterate(&samples, iterations, theta);
+  return (struct alternative_fit){(double)(theta[X] * pitch_mm), (double)(theta[Y] * pitch_mm),
+                                  (double)(theta[P0] * samples.unit_Pa), (double)(theta[SIGMA] * pitch_mm)};
+}
+
+ALTERNATIVE(NAMED(alternative_naive_)) { return fitted(array, pressure_Pa_q10, usable, iterations, naive); }
+ALTERNATIVE(NAMED(alternative_lm_)) { return fitted(array, pressure_Pa_q10, usable, iterations, lm); }

@@ -16,30 +16,15 @@
 
 #include "fit/fit.h"
 
-#include <stdint.h>
-
-enum alternative_guess {
-  ALTERNATIVE_GUESS_LOG_LINEAR, /* paraboloid through the logarithms of the large readings */
-  ALTERNATIVE_GUESS_MAXIMUM,    /* the strongest sensor, sigma 0.65 pitch */
-  ALTERNATIVE_GUESS_CENTROID,   /* centre of the positive readings, sigma 0.65 pitch */
+struct alternative_fit {
+  double x_mm, y_mm, p0_Pa, sigma_mm;
 };
-
-struct alternative_settings {
-  int iterations;
-  enum alternative_guess guess;
-};
-
-#define ALTERNATIVES_OF(real)                                                                                          \
-  struct alternative_fit_##real {                                                                                      \
-    real x_mm, y_mm, p0_Pa, sigma_mm, force_N;                                                                         \
-  };                                                                                                                   \
-  struct alternative_fit_##real alternative_naive_##real(const struct fit_array *array,                                \
-                                                         const int32_t *pressure_Pa_q10, uint32_t usable,              \
-                                                         const struct alternative_settings *settings);                 \
-  struct alternative_fit_##real alternative_lm_##real(const struct fit_array *array, const int32_t *pressure_Pa_q10,   \
-                                                      uint32_t usable, const struct alternative_settings *settings);
-
-ALTERNATIVES_OF(float)
-ALTERNATIVES_OF(double)
+#define ALTERNATIVE(name)                                                                                              \
+  struct alternative_fit name(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,          \
+                              int iterations)
+ALTERNATIVE(alternative_naive_float);
+ALTERNATIVE(alternative_naive_double);
+ALTERNATIVE(alternative_lm_float);
+ALTERNATIVE(alternative_lm_double);
 
 #endif

@@ -30,21 +30,7 @@ export const KERNELS = [
 ];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */
-const FIELDS = {
-  kernel: 0,
-  iterations: 1,
-  n_largest: 2,
-  guess: 3,
-  noise_Pa_q10: 4,
-  prior_sigma_mm: 5,
-  prior_width_mm: 6,
-  usable: 7,
-  own: 8,
-  readings: 9,
-  x_mm: 41,
-  y_mm: 42,
-};
-const GUESSES = ['log_linear', 'maximum', 'centroid'];
+const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, noise_Pa_q10: 3, usable: 4, own: 5, readings: 6, x_mm: 38, y_mm: 39 };
 
 /** One chip that runs fit_cycles.bin. */
 export class Bench {
@@ -82,32 +68,13 @@ export class Bench {
   }
 
   /** @returns {{cycles, x_mm, y_mm}} of one fit */
-  run({
-    kernel,
-    iterations = 0,
-    n_largest = 0,
-    guess = 'log_linear',
-    noise_Pa_q10 = 1,
-    prior_sigma_mm = 0,
-    prior_width_mm = 0,
-    usable = 0,
-    own = false,
-    readings = [],
-  }) {
+  run({ kernel, iterations = 0, n_largest = 0, noise_Pa_q10 = 1, usable = 0, own = false, readings = [] }) {
     const { chip } = this;
     const at = chip.core.registers[0] - 0x20000000;
     const view = new DataView(chip.sram.buffer, chip.sram.byteOffset + at);
-    const put = (field, value) => view.setInt32(4 * field, value, true);
-    put(FIELDS.kernel, KERNELS.indexOf(kernel));
-    put(FIELDS.iterations, iterations);
-    put(FIELDS.n_largest, n_largest);
-    put(FIELDS.guess, GUESSES.indexOf(guess));
-    put(FIELDS.noise_Pa_q10, noise_Pa_q10);
-    view.setFloat32(4 * FIELDS.prior_sigma_mm, prior_sigma_mm, true);
-    view.setFloat32(4 * FIELDS.prior_width_mm, prior_width_mm, true);
-    put(FIELDS.usable, usable);
-    put(FIELDS.own, own ? 1 : 0);
-    readings.forEach((value, k) => put(FIELDS.readings + k, value));
+    const values = { kernel: KERNELS.indexOf(kernel), iterations, n_largest, noise_Pa_q10, usable, own: own ? 1 : 0 };
+    for (const [field, value] of Object.entries(values)) view.setInt32(4 * FIELDS[field], value, true);
+    readings.forEach((value, k) => view.setInt32(4 * (FIELDS.readings + k), value, true));
     this.#untilNextJob();
     return {
       cycles: this.cycles - (this.overhead ?? 0),

@@ -15,9 +15,8 @@
 /* Words of 32 bits, in this order, as fit_on_chip.mjs writes and reads them. */
 static struct {
   uint32_t kernel; /* index into kernels */
-  uint32_t iterations, n_largest, guess;
+  uint32_t iterations, n_largest;
   int32_t noise_Pa_q10;
-  float prior_sigma_mm, prior_width_mm;
   uint32_t usable;
   uint32_t own; /* 1: the sensors have one (fit.h) */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS];
@@ -47,29 +46,30 @@ static struct fit_shapes_result shapes_result;
 
 static void nothing(void) {}
 
+static void answer(float x_mm, float y_mm) {
+  job.x_mm = x_mm;
+  job.y_mm = y_mm;
+}
+
 static void fit(void) {
   fit_gaussian(&layout, job.pressure_Pa_q10, job.usable, &chosen, &contact);
-  job.x_mm = contact.x_mm;
-  job.y_mm = contact.y_mm;
+  answer(contact.x_mm, contact.y_mm);
 }
 
 /* The kernels behind it, one by one. */
 static void grid(void) {
   fit_grid(&layout, job.pressure_Pa_q10, &chosen, &contact);
-  job.x_mm = contact.x_mm;
-  job.y_mm = contact.y_mm;
+  answer(contact.x_mm, contact.y_mm);
 }
 
 static void masked(void) {
   fit_grid_masked(&layout, job.pressure_Pa_q10, job.usable, &chosen, &contact);
-  job.x_mm = contact.x_mm;
-  job.y_mm = contact.y_mm;
+  answer(contact.x_mm, contact.y_mm);
 }
 
 static void general(void) {
   fit_general(&layout, job.pressure_Pa_q10, job.usable, &chosen, &contact);
-  job.x_mm = contact.x_mm;
-  job.y_mm = contact.y_mm;
+  answer(contact.x_mm, contact.y_mm);
 }
 
 /* Of 12 mm of rubber. */
@@ -83,74 +83,79 @@ static const struct pad_profile profile = {
     .tangential_scale = 1.0f,
 };
 
-/* On a pad with a dip, after `fit` of the same readings and the frames before, which are not
- * counted. */
-static void tangential(void) {
+static struct fit_settings with_dip(void) {
   struct fit_settings settings = chosen;
   settings.dip_share = 0.0125f;
   settings.dip_sd_mm = 14.0f;
+  return settings;
+}
+
+/* What follows needs `fit` of the same readings and the calls before, which are not counted. */
+static void begin_tangential(void) { tangential_state = (struct fit_tangential_state){0}; }
+static void tangential(void) {
+  const struct fit_settings settings = with_dip();
   fit_tangential_estimate(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state,
                           &tangential_result);
-  job.x_mm = tangential_result.x_mm;
-  job.y_mm = tangential_result.y_mm;
+  answer(tangential_result.x_mm, tangential_result.y_mm);
 }
 
-/* One part of a search for a tangential force, after `fit` of the same readings and the parts before,
- * which are not counted. */
+static void begin_doubt(void) { fit_doubt_begin(&doubt); }
 static void follow_doubt(void) { fit_doubt_follow(&doubt, &layout, job.pressure_Pa_q10, &chosen, &contact); }
-#define DOUBT_PART(part)                                                                                               \
-  static void doubt_##part(void) { follow_doubt(); }
-DOUBT_PART(0)
-DOUBT_PART(1)
-DOUBT_PART(2)
-DOUBT_PART(3)
-DOUBT_PART(4)
-DOUBT_PART(5)
-static void (*const doubt_parts[FIT_DOUBT_PARTS])(void) = {doubt_0, doubt_1, doubt_2, doubt_3, doubt_4, doubt_5};
 
-/* A touch that rests, after `fit` of the same readings. */
+/* A touch that rests. */
+static void begin_gains(void) {
+  fit_gains_begin(&gains, 0.1f);
+  gains.p0_Pa = contact.p0_Pa;
+}
 static void gains_of_touch(void) { fit_gains_learn(&gains, &layout, job.pressure_Pa_q10, &chosen, &contact); }
 
-/* The two parts of a contact's first frame, and the parts of one that ends with an answer, on a pad with a dip;
- * after `fit` of the same readings and what comes before, which is not counted. */
+static void begin_shapes(void) { shapes_state = (struct fit_shapes_state){0}; }
 static void shapes(void) {
-  struct fit_settings settings = chosen;
-  settings.dip_share = 0.0125f;
-  settings.dip_sd_mm = 14.0f;
+  const struct fit_settings settings = with_dip();
   fit_shapes_part(&layout, &shapes_pad, job.pressure_Pa_q10, &settings, &contact, &shapes_state, &shapes_result);
-  job.x_mm = shapes_result.x_mm[0];
-  job.y_mm = shapes_result.y_mm[0];
+  answer(shapes_result.x_mm[0], shapes_result.y_mm[0]);
 }
-#define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS)
-#define SHAPES_PART(part)                                                                                              \
-  static void shapes_##part(void) { shapes(); }
-SHAPES_PART(0)
-SHAPES_PART(1)
-SHAPES_PART(2)
-SHAPES_PART(first_0)
-SHAPES_PART(first_1)
-static void (*const shapes_parts[])(void) = {shapes_first_0, shapes_first_1, shapes_0, shapes_1, shapes_2};
-/* Parts before each. */
-static const int shapes_before[] = {0, 1, SHAPES_LATER, SHAPES_LATER + 1, SHAPES_LATER + 2};
+#define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS) /* parts before a frame that answers */
 
-#define ALTERNATIVE(name, solver, real)                                                                                \
+#define RUN_ALTERNATIVE(name)                                                                                          \
   static void name(void) {                                                                                             \
-    const struct alternative_settings options = {(int)job.iterations, (enum alternative_guess)job.guess};              \
-    struct alternative_fit_##real answer =                                                                             \
-        alternative_##solver##_##real(&layout, job.pressure_Pa_q10, job.usable, &options);                             \
-    job.x_mm = (float)answer.x_mm;                                                                                     \
-    job.y_mm = (float)answer.y_mm;                                                                                     \
+    const struct alternative_fit found =                                                                               \
+        alternative_##name(&layout, job.pressure_Pa_q10, job.usable, (int)job.iterations);                             \
+    answer((float)found.x_mm, (float)found.y_mm);                                                                      \
   }
-ALTERNATIVE(naive_float, naive, float)
-ALTERNATIVE(naive_double, naive, double)
-ALTERNATIVE(lm_float, lm, float)
-ALTERNATIVE(lm_double, lm, double)
+RUN_ALTERNATIVE(naive_float)
+RUN_ALTERNATIVE(naive_double)
+RUN_ALTERNATIVE(lm_float)
+RUN_ALTERNATIVE(lm_double)
 
-/* The order is that of KERNELS in fit_on_chip.mjs. */
-static void (*const kernels[])(void) = {nothing,        fit,      grid,      masked,     general,        naive_float,
-                                        naive_double,   lm_float, lm_double, tangential, doubt_0,        doubt_1,
-                                        doubt_2,        doubt_3,  doubt_4,   doubt_5,    gains_of_touch, shapes_first_0,
-                                        shapes_first_1, shapes_0, shapes_1,  shapes_2};
+/* The order is that of KERNELS in fit_on_chip.mjs. begin: after `fit`; calls: of run that are not counted. */
+static const struct {
+  void (*run)(void), (*begin)(void);
+  int calls;
+} kernels[] = {
+    {nothing, NULL, 0},
+    {fit, NULL, 0},
+    {grid, NULL, 0},
+    {masked, NULL, 0},
+    {general, NULL, 0},
+    {naive_float, NULL, 0},
+    {naive_double, NULL, 0},
+    {lm_float, NULL, 0},
+    {lm_double, NULL, 0},
+    {tangential, begin_tangential, FIT_TANGENTIAL_FRAMES - 1},
+    {follow_doubt, begin_doubt, 0},
+    {follow_doubt, begin_doubt, 1},
+    {follow_doubt, begin_doubt, 2},
+    {follow_doubt, begin_doubt, 3},
+    {follow_doubt, begin_doubt, 4},
+    {follow_doubt, begin_doubt, 5},
+    {gains_of_touch, begin_gains, 0},
+    {shapes, begin_shapes, 0}, /* a contact's first frame */
+    {shapes, begin_shapes, 1},
+    {shapes, begin_shapes, SHAPES_LATER},
+    {shapes, begin_shapes, SHAPES_LATER + 1},
+    {shapes, begin_shapes, SHAPES_LATER + 2},
+};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK ||
@@ -169,42 +174,17 @@ int main(void) {
     chosen.iterations = (uint8_t)job.iterations;
     chosen.n_largest = (uint8_t)job.n_largest;
     chosen.noise_Pa_q10 = job.noise_Pa_q10;
-    chosen.prior_sigma_mm = job.prior_sigma_mm;
-    chosen.prior_width_mm = job.prior_width_mm;
     chosen.own = job.own ? own : NULL;
-    void (*kernel)(void) = kernels[job.kernel];
-    if (kernel == tangential) {
+    void (*run)(void) = kernels[job.kernel].run;
+    if (kernels[job.kernel].begin) {
       fit();
-      tangential_state = (struct fit_tangential_state){0};
-      for (int frame = 1; frame < FIT_TANGENTIAL_FRAMES; frame++) {
-        tangential();
-      }
+      kernels[job.kernel].begin();
     }
-    for (unsigned part = 0; part < sizeof shapes_before / sizeof shapes_before[0]; part++) {
-      if (kernel == shapes_parts[part]) {
-        fit();
-        shapes_state = (struct fit_shapes_state){0};
-        for (int before = 0; before < shapes_before[part]; before++) {
-          shapes();
-        }
-      }
-    }
-    for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
-      if (kernel == doubt_parts[part]) {
-        fit();
-        fit_doubt_begin(&doubt);
-        for (int before = 0; before < part; before++) {
-          follow_doubt();
-        }
-      }
-    }
-    if (kernel == gains_of_touch) {
-      fit();
-      fit_gains_begin(&gains, 0.1f);
-      gains.p0_Pa = contact.p0_Pa;
+    for (int call = 0; call < kernels[job.kernel].calls; call++) {
+      run();
     }
     CALL_DEBUGGER(CALL_START);
-    kernel();
+    run();
     CALL_DEBUGGER(CALL_STOP);
   }
 }
