@@ -3,6 +3,7 @@
 #ifndef SUPPORT_UNIT_H
 #define SUPPORT_UNIT_H
 
+#include <stdio.h>
 #include <unity.h>
 
 struct unit_test {
@@ -21,5 +22,13 @@ void unit_add(struct unit_test *test);
     unit_add(&test);                                                                                                   \
   }                                                                                                                    \
   static void test_name(void)
+
+/* An assertion that fails with these words, as printf() has them. */
+#define CHECK(condition, ...)                                                                                          \
+  do {                                                                                                                 \
+    char words[200];                                                                                                   \
+    snprintf(words, sizeof words, __VA_ARGS__);                                                                        \
+    TEST_ASSERT_TRUE_MESSAGE(condition, words);                                                                        \
+  } while (0)
 
 #endif

@@ -23,8 +23,9 @@ ROOT = HERE.parents[2]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "python")]
 import errors  # noqa: E402
 import stiff  # noqa: E402
+import text  # noqa: E402
 from boards import TO_BUILD, fit_cycles_of  # noqa: E402
-from presentation import BLUE, FAINT, GOAL, INK, goal_table_md, judge, plt, save, table_md  # noqa: E402
+from presentation import BLUE, FAINT, GOAL, INK, judge, plt, save  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from measure import Measure  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, positive, run, write_json  # noqa: E402
@@ -133,6 +134,7 @@ def figures(results, seed):
         "shipped_p99_9_um_per_set": r.per_set("fit", BUILT, "p999_um"),
         "shipped_above_100um": r.sum("fit", BUILT, "above_100um"),
         "shipped_bad_unflagged_percent_per_set": {s: r.percent_of_all("fit", BUILT, s, "bad_unflagged") for s in SETS},
+        "shipped_bad_unflagged_percent_worst": max(r.percent_of_all("fit", BUILT, s, "bad_unflagged") for s in SETS),
         "masked_p99_9_um": r.worst("fit", "mask=random", "p999_um", SETS[:3]),
         "masked_p99_9_um_per_set": r.per_set("fit", "mask=random", "p999_um"),
         "masked_p99_um_d": r.error("fit", "mask=random", "D", "p99_um"),
@@ -200,42 +202,19 @@ def number(value, digits=2):
     return f"{value:.0e}" if value >= 1e6 else f"{value:.{digits}g}" if value < 100 else f"{value:.0f}"
 
 
-# Of fit_table.md: heading, and what of a row is below it.
-COLUMNS = {
-    "kernel": lambda row: row["kernel"],
-    "variant": lambda row: row["variant"],
-    "cycles": lambda row: row.get("cycles_median", ""),
-    "ms": lambda row: number(row.get("ms"), 3),
-    "host us": lambda row: number(row["host_us"], 3),
-    "p50": lambda row: number(row["p50_um"]),
-    "p99": lambda row: number(row.get("p99_um")),
-    "p99.9": lambda row: number(row["p999_um"]),
-    **{f"{s} p99.9": lambda row, s=s: number(row.get(f"p999_um_{s}")) for s in SETS},
-    "above 100 um": lambda row: f"{row['above_100um']} of {row['presses']}",
-    "C, D: p99 mm to the truth": lambda row: ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row),
-}
-
-
-def write_table_md(path, rows, found):
-    lines = [
-        "# Error of the fit against run time",
-        "",
-        "Written by `sh cmake/bootstrap.sh report`. Cycles: emulated Cortex-M0+, median; ms at 125 MHz. um: distance of the location from",
-        f"the reference optimum over the observable presses of sets A to D, seed {found['seed']}. host us: {found['processor']}.",
-        "",
-        f"How far from the optimum, p99.9 in the worst set: {number(found['p99_9_um'])} um with seven iterations (`{USUAL}`), "
-        f"{number(found['shipped_p99_9_um'])} um with the firmware's four (`{BUILT}`), where {found['shipped_above_100um']} presses are "
-        f"more than 100 um away. At most {max(found['shipped_bad_unflagged_percent_per_set'].values()):.2g} % of a set's presses are then "
-        "more than 1 mm from the truth without a warning.",
-        "",
-        "The presses have no dip, and the fit has none set: these figures are the distance of the arithmetic from the optimum of its own model. The parts",
-        "`truth`, `validation` and, on real rubber, `real` have the effect of a dip, and of a fit that knows it, on the distance from the truth.",
-        "",
-        *goal_table_md(found),
-        "",
-        *table_md(COLUMNS, [[cell(row) for cell in COLUMNS.values()] for row in rows]),
-    ]
-    write_text(path, "\n".join(lines) + "\n")
+def cells(row):
+    """Of fit_table.md."""
+    return {
+        "kernel": row["kernel"],
+        "variant": row["variant"],
+        "cycles": row.get("cycles_median", ""),
+        "ms": number(row.get("ms"), 3),
+        "host us": number(row["host_us"], 3),
+        **{name: number(row.get(key)) for name, key in (("p50", "p50_um"), ("p99", "p99_um"), ("p99.9", "p999_um"))},
+        **{f"{s} p99.9": number(row.get(f"p999_um_{s}")) for s in SETS},
+        "above 100 um": f"{row['above_100um']} of {row['presses']}",
+        "C, D: p99 mm to the truth": ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row),
+    }
 
 
 def pareto(points):
@@ -338,7 +317,8 @@ def main(argv):
     rows = list(table(results))
     write_json(out / "fit.json", found)
     write_table_csv(out / "fit_table.csv", rows)
-    write_table_md(out / "fit_table.md", rows, found)
+    template = (HERE / "text.md.in").read_text(encoding="utf-8")
+    write_text(out / "fit_table.md", text.filled(template, found | {"fits": [cells(row) for row in rows]}))
     plot(out / "fit_report.png", results, found)
     return finish(found, options, ("fit.json", "fit_table.md", "fit_report.png"))
 

@@ -1,7 +1,6 @@
 #include "fit_bench.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 const float x_mm[SENSORS] = {-9, -9, -9, -9, -9, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9};
@@ -16,14 +15,6 @@ const struct fit_settings patient = {.iterations = 20, .noise_Pa_q10 = 1};
 void setUp(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, PITCH_mm));
   memset(readings, 0, sizeof readings);
-}
-
-void tearDown(void) {}
-
-void say(const char *what, double value) {
-  char text[100];
-  snprintf(text, sizeof text, "%s %.4g", what, value);
-  TEST_MESSAGE(text);
 }
 
 int32_t to_q10(double pressure_Pa) {

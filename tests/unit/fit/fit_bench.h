@@ -6,8 +6,7 @@
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 #include "support/random.h"
-
-#include <unity.h>
+#include "support/unit.h"
 
 enum { SENSORS = 15 };
 #define ALL 0x7FFFu
@@ -26,7 +25,6 @@ extern const struct fit_settings patient;
 struct press {
   double x_mm, y_mm, p0_Pa, sigma_mm;
 };
-void say(const char *what, double value);
 int32_t to_q10(double pressure_Pa);
 double gaussian(const struct press *press, double x, double y);
 void read_press(const struct press *press, double noise_Pa, struct random *random);

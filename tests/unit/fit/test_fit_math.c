@@ -1,20 +1,10 @@
 #include "fit/fit_math.h"
 #include "support/random.h"
+#include "support/unit.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <unity.h>
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void say(const char *what, double value) {
-  char text[80];
-  snprintf(text, sizeof text, "%s %.3g", what, value);
-  TEST_MESSAGE(text);
-}
-
-static void test_mul_q30(void) {
+TEST(test_mul_q30) {
   static const int32_t corners[] = {0,      1,       -1,         65535,      65536,       -65535,
                                     -65536, 1 << 30, -(1 << 30), 1073741823, -1073741823, 1073676289};
   double worst = 0.0;
@@ -25,12 +15,11 @@ static void test_mul_q30(void) {
     double error = fabs((double)fit_mul_q30(a, b) - (double)a * (double)b / 1073741824.0);
     worst = error > worst ? error : worst;
   }
-  say("largest error of fit_mul_q30, units:", worst);
   TEST_ASSERT_TRUE(worst < 5.0);
 }
 
 /* Against the library, once for the z that the fixed point can hold and once for z itself. */
-static void test_exp2(void) {
+TEST(test_exp2) {
   double worst = 0.0;
   double worst_all = 0.0;
   for (uint32_t i = 0; i < 4000000; i++) {
@@ -42,13 +31,11 @@ static void test_exp2(void) {
     worst = error > worst ? error : worst;
     worst_all = error_all > worst_all ? error_all : worst_all;
   }
-  say("largest relative error of fit_exp2_negative, 2^-23:", worst * 0x1p23);
-  say("with the rounding of z, 2^-23:", worst_all * 0x1p23);
   TEST_ASSERT_TRUE(worst < 0x1p-23);
   TEST_ASSERT_TRUE(worst_all < 0x1p-23 + 0.6932 * 0x1p-24);
 }
 
-static void test_exp2_at_its_ends(void) {
+TEST(test_exp2_at_its_ends) {
   TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(0.0f));
   TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(-0.0f));
   TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(-5.0f));
@@ -67,7 +54,7 @@ static void log2_error(uint32_t value, double *worst) {
   *worst = error > *worst ? error : *worst;
 }
 
-static void test_log2(void) {
+TEST(test_log2) {
   double worst = 0.0;
   for (uint32_t value = 1; value < 3000000; value++) {
     log2_error(value, &worst);
@@ -79,14 +66,13 @@ static void test_log2(void) {
   log2_error(UINT32_MAX, &worst);
   log2_error(UINT32_C(0x80000000), &worst);
   log2_error(INT32_MAX, &worst);
-  say("largest error of fit_log2_q24:", worst);
   TEST_ASSERT_TRUE(worst < 2e-4);
   for (uint32_t bit = 0; bit < 32; bit++) {
     TEST_ASSERT_EQUAL_INT32((int32_t)(bit << 24), fit_log2_q24(UINT32_C(1) << bit));
   }
 }
 
-static void test_fixed_and_float(void) {
+TEST(test_fixed_and_float) {
   struct random random = {63};
   for (int i = 0; i < 100000; i++) {
     int q = 2 + (int)random_below(&random, 29);
@@ -109,14 +95,4 @@ static void test_fixed_and_float(void) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, fit_float(1, -200));
   TEST_ASSERT_EQUAL_FLOAT(1e9f, fit_float(1, 40));
   TEST_ASSERT_EQUAL_FLOAT(-1e9f, fit_float(-1, 40));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_mul_q30);
-  RUN_TEST(test_exp2);
-  RUN_TEST(test_exp2_at_its_ends);
-  RUN_TEST(test_log2);
-  RUN_TEST(test_fixed_and_float);
-  return UNITY_END();
 }

@@ -1,17 +1,16 @@
-/* A million inputs of any bits: every result is finite, consistent, and within its documented
- * range. Every input goes through fit_gaussian; one in four, through each kernel by name as well.
- * The number in a failure's message repeats the input. */
+/* A million inputs of any bits, fewer for the other size of grid: every result is finite, consistent, and within its
+ * documented range. Every input goes through fit_gaussian; one in four, through each kernel by name as well. The number
+ * in a failure's message repeats the input. */
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 #include "support/random.h"
-#include "unity.h"
+#include "support/unit.h"
 
 #include <math.h>
 #include <stdbool.h>
-#include <stdio.h>
 #include <string.h>
 
-#define INPUTS 1000000
+#define INPUTS (FIT_GRID_COLUMNS == 3 ? 1000000 : 200000)
 #define ARRAYS 12
 #define SEED UINT64_C(0x66696E676572)
 
@@ -28,10 +27,6 @@ struct input {
 };
 
 static struct fit_array arrays[ARRAYS];
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 static void make_array(struct fit_array *array, uint8_t count, const float *x_mm, const float *y_mm, float pitch_mm) {
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(array, count, x_mm, y_mm, pitch_mm));
@@ -61,7 +56,7 @@ static void make_arrays(struct random *random) {
   const uint8_t columns = FIT_GRID_COLUMNS, rows = FIT_GRID_ROWS;
   make_grid(&arrays[0], columns, rows, 9.0f, -9.0f, -18.0f);
   make_grid(&arrays[1], columns, rows, 0.01f, 0.0f, 0.0f);
-  make_grid(&arrays[2], columns, rows, 1600.0f, 3000.0f, -9000.0f);
+  make_grid(&arrays[2], columns, rows, 1300.0f, 3000.0f, -9000.0f);
   make_grid(&arrays[3], 4, 1, 6.0f, 0.0f, 0.0f);
   make_grid(&arrays[4], 6, 5, 4.0f, -10.0f, -8.0f);
   make_grid(&arrays[5], 1, 1, 9.0f, 0.0f, 0.0f);
@@ -212,8 +207,6 @@ static bool is_zero(const struct fit_result *result) {
   return memcmp(&zero, result, sizeof zero) == 0;
 }
 
-static bool within(float value, float low, float high) { return value >= low && value <= high; }
-
 /* What is wrong with it, or NULL. */
 static const char *complaint(const struct input *input, const struct fit_result *result) {
   const struct fit_array *array = input->array;
@@ -238,54 +231,47 @@ static const char *complaint(const struct input *input, const struct fit_result 
   if (result->used == 0 || (result->used & ~(input->usable & all))) {
     return "used";
   }
-  float x = result->x_mm / array->pitch_mm, y = result->y_mm / array->pitch_mm;
-  float x_slack = slack * (fabsf(array->x_min) + fabsf(array->x_max));
-  float y_slack = slack * (fabsf(array->y_min) + fabsf(array->y_max));
-  if (!within(x, array->x_min - x_slack, array->x_max + x_slack) ||
-      !within(y, array->y_min - y_slack, array->y_max + y_slack)) {
-    return "the location is outside its box";
-  }
-  if (!within(result->sigma_mm / array->pitch_mm, FIT_SIGMA_MIN * 0.999f, FIT_SIGMA_MAX * 1.001f)) {
-    return "sigma";
-  }
-  if (!within(result->p0_Pa, 1e-6f, 1e14f)) {
-    return "p0";
-  }
-  float force = 6.28318531e-6f * result->p0_Pa * result->sigma_mm * result->sigma_mm;
-  bool saturated = result->p0_Pa >= 1e9f || result->force_N >= 1e9f;
-  if (!saturated && !within(result->force_N, 0.999f * force, 1.001f * force)) {
-    return "the force is not 2 pi p0 sigma^2";
-  }
-  if (!within(result->residual_rms_Pa, 0.0f, 1e13f) || !within(result->location_sd_mm, 0.0f, huge) ||
-      !within(result->force_sd_N, 0.0f, huge)) {
-    return "residual or standard deviation";
-  }
-  if (!within(result->location_noise_mm, 0.0f, huge)) {
-    return "what the noise moves";
-  }
-  bool widths = result->flags & CONTACT_FLAG_WIDTHS_VALID;
-  float least = widths ? 0.2f * result->sigma_mm : 0.0f;
-  float most = widths ? 5.0f * result->sigma_mm : 0.0f;
-  if (!within(result->sigma_x_mm, least, most) || !within(result->sigma_y_mm, least, most) ||
-      !within(result->width_correlation, widths ? -1.0f : 0.0f, widths ? 1.0f : 0.0f)) {
-    return "widths";
+  const float pitch = array->pitch_mm, sigma_mm = result->sigma_mm;
+  const float x_slack = slack * (fabsf(array->x_min) + fabsf(array->x_max));
+  const float y_slack = slack * (fabsf(array->y_min) + fabsf(array->y_max));
+  const float force = 6.28318531e-6f * result->p0_Pa * sigma_mm * sigma_mm;
+  const bool saturated = result->p0_Pa >= 1e9f || result->force_N >= 1e9f;
+  const bool widths = result->flags & CONTACT_FLAG_WIDTHS_VALID;
+  const float least = widths ? 0.2f * sigma_mm : 0.0f, most = widths ? 5.0f * sigma_mm : 0.0f;
+  const struct {
+    const char *name;
+    float value, low, high;
+  } ranges[] = {
+      {"x is outside its box", result->x_mm / pitch, array->x_min - x_slack, array->x_max + x_slack},
+      {"y is outside its box", result->y_mm / pitch, array->y_min - y_slack, array->y_max + y_slack},
+      {"sigma", sigma_mm / pitch, FIT_SIGMA_MIN * 0.999f, FIT_SIGMA_MAX * 1.001f},
+      {"p0", result->p0_Pa, 1e-6f, 1e14f},
+      {"the force is not 2 pi p0 sigma^2", saturated ? force : result->force_N, 0.999f * force, 1.001f * force},
+      {"residual", result->residual_rms_Pa, 0.0f, 1e13f},
+      {"standard deviation", result->location_sd_mm, 0.0f, huge},
+      {"standard deviation of the force", result->force_sd_N, 0.0f, huge},
+      {"what the noise moves", result->location_noise_mm, 0.0f, huge},
+      {"width along x", result->sigma_x_mm, least, most},
+      {"width along y", result->sigma_y_mm, least, most},
+      {"correlation", result->width_correlation, widths ? -1.0f : 0.0f, widths ? 1.0f : 0.0f},
+  };
+  for (size_t i = 0; i < sizeof ranges / sizeof *ranges; i++) {
+    if (!(ranges[i].value >= ranges[i].low && ranges[i].value <= ranges[i].high)) {
+      return ranges[i].name;
+    }
   }
   return NULL;
 }
 
 static void judge(uint32_t number, const char *kernel, const struct input *input, const struct fit_result *result) {
   const char *wrong = complaint(input, result);
-  if (wrong) {
-    char text[200];
-    snprintf(text, sizeof text, "input %u, %s: %s; x %g y %g sigma %g p0 %g force %g rms %g sd %g %g flags %x",
-             (unsigned)number, kernel, wrong, (double)result->x_mm, (double)result->y_mm, (double)result->sigma_mm,
-             (double)result->p0_Pa, (double)result->force_N, (double)result->residual_rms_Pa,
-             (double)result->location_sd_mm, (double)result->force_sd_N, (unsigned)result->flags);
-    TEST_FAIL_MESSAGE(text);
-  }
+  CHECK(wrong == NULL, "input %u, %s: %s; x %g y %g sigma %g p0 %g force %g rms %g sd %g %g flags %x", (unsigned)number,
+        kernel, wrong ? wrong : "", (double)result->x_mm, (double)result->y_mm, (double)result->sigma_mm,
+        (double)result->p0_Pa, (double)result->force_N, (double)result->residual_rms_Pa, (double)result->location_sd_mm,
+        (double)result->force_sd_N, (unsigned)result->flags);
 }
 
-static void test_any_bits_give_finite_consistent_results(void) {
+TEST(test_any_bits_give_finite_consistent_results) {
   struct random random = {SEED};
   make_arrays(&random);
   uint32_t fits = 0, plain_grids = 0;
@@ -312,10 +298,4 @@ static void test_any_bits_give_finite_consistent_results(void) {
   }
   TEST_ASSERT_GREATER_THAN_UINT32(INPUTS / 2, fits);
   TEST_ASSERT_GREATER_THAN_UINT32(INPUTS / 8, plain_grids);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_any_bits_give_finite_consistent_results);
-  return UNITY_END();
 }

@@ -1,10 +1,9 @@
 #include "fit_bench.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-static void test_equal_readings_are_flat(void) {
+TEST(test_equal_readings_are_flat) {
   static const int32_t levels[] = {1024, 100 * 1024, 10000 * 1024, INT32_MAX};
   for (size_t i = 0; i < 4; i++) {
     for (int k = 0; k < SENSORS; k++) {
@@ -20,7 +19,7 @@ static void test_equal_readings_are_flat(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FLAT, result.flags);
 }
 
-static void test_nothing_positive_is_no_fit(void) {
+TEST(test_nothing_positive_is_no_fit) {
   static const int32_t levels[] = {0, -1, -1024, INT32_MIN};
   for (size_t i = 0; i < 4; i++) {
     for (int k = 0; k < SENSORS; k++) {
@@ -32,7 +31,7 @@ static void test_nothing_positive_is_no_fit(void) {
   }
 }
 
-static void test_one_hot(void) {
+TEST(test_one_hot) {
   for (int hot = 0; hot < SENSORS; hot++) {
     memset(readings, 0, sizeof readings);
     readings[hot] = 5000 * 1024;
@@ -47,7 +46,7 @@ static void test_one_hot(void) {
   }
 }
 
-static void test_low_signal_below_twenty_sigma(void) {
+TEST(test_low_signal_below_twenty_sigma) {
   struct press press = {0.0, 0.0, 101.0, 6.0};
   read_press(&press, 0.0, NULL); /* the centre sensor reads 101 Pa */
   fit_gaussian(&array, readings, ALL, &usual, &result);
@@ -58,42 +57,52 @@ static void test_low_signal_below_twenty_sigma(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FIT_VALID, result.flags);
 }
 
-/* Sensors whose gains are off: the predicted standard deviations are those of the errors, alike for
- * all kernels. */
-static void test_gains_spread_the_location_as_predicted(void) {
+/* Noise, or sensors whose gains are off: the predicted standard deviations are those of the errors, alike for all
+ * kernels. */
+TEST(test_errors_spread_the_result_as_predicted) {
   struct random random = {101};
-  for (int kernel = 0; kernel < 3; kernel++) {
-    struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 1024};
+  for (int i = 0; i < 6; i++) {
+    const int kernel = i % 3;
+    const double noise_Pa = i < 3 ? 1.0 : 20.0, gain_sd = i < 3 ? 0.02 : 0.0;
+    struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = (int32_t)(1024.0 * noise_Pa)};
     uint32_t used = kernel == 1 ? ALL & ~(UINT32_C(1) << 4) : ALL;
     double squares = 0.0, predicted = 0.0, force = 0.0, force_predicted = 0.0;
-    for (int i = 0; i < 4000; i++) {
+    for (int n = 0; n < 4000; n++) {
       struct press press = random_press(&random, 0.0);
       press.x_mm *= 0.7;
       press.y_mm *= 0.7;
       press.sigma_mm = 5.0 + 0.2 * press.sigma_mm;
       for (int k = 0; k < SENSORS; k++) {
-        double sd = k % 3 ? 0.02 : 0.0;
+        double sd = k % 3 ? gain_sd : 0.0;
         settings.gain_sd_q16[k] = (uint16_t)(65536.0 * sd);
-        readings[k] = to_q10((1.0 + sd * random_normal(&random)) * gaussian(&press, (double)x_mm[k], (double)y_mm[k]));
+        readings[k] = to_q10((1.0 + sd * random_normal(&random)) * gaussian(&press, (double)x_mm[k], (double)y_mm[k]) +
+                             (gain_sd > 0.0 ? 0.0 : noise_Pa * random_normal(&random)));
       }
-      if (kernel == 2) {
-        fit_general(&array, readings, used, &settings, &result);
-      } else {
-        fit_gaussian(&array, readings, used, &settings, &result);
-      }
+      (kernel == 2 ? fit_general : fit_gaussian)(&array, readings, used, &settings, &result);
       assert_finite_and_defined();
-      squares += pow(location_error_mm(&press), 2.0) / 4000.0;
-      predicted += pow((double)result.location_sd_mm, 2.0) / 4000.0;
-      force += pow((double)result.force_N / force_of(&press) - 1.0, 2.0) / 4000.0;
-      force_predicted += pow((double)(result.force_sd_N / result.force_N), 2.0) / 4000.0;
+      squares += pow(location_error_mm(&press), 2.0);
+      predicted += pow((double)result.location_sd_mm, 2.0);
+      force += pow((double)result.force_N / force_of(&press) - 1.0, 2.0);
+      force_predicted += pow((double)(result.force_sd_N / result.force_N), 2.0);
     }
-    TEST_ASSERT_FLOAT_WITHIN(0.08f, 1.0f, (float)sqrt(predicted / squares));
-    TEST_ASSERT_FLOAT_WITHIN(0.08f, 1.0f, (float)sqrt(force_predicted / force));
+    /* The larger of noise and residuals is taken, so a little above 1. */
+    const float within = gain_sd > 0.0 ? 0.08f : 0.2f;
+    TEST_ASSERT_FLOAT_WITHIN(within, 1.0f, (float)sqrt(predicted / squares));
+    TEST_ASSERT_FLOAT_WITHIN(within, 1.0f, (float)sqrt(force_predicted / force));
   }
 }
 
-/* An elliptic Gaussian at any angle. */
-static void test_widths_and_slant(void) {
+/* Readings of an elliptic Gaussian at this angle. */
+static void read_ellipse(double x, double y, double longer, double shorter, double angle) {
+  double c = cos(angle), s = sin(angle);
+  for (int k = 0; k < SENSORS; k++) {
+    double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y;
+    double u = (c * dx + s * dy) / longer, v = (c * dy - s * dx) / shorter;
+    readings[k] = to_q10(20000.0 * exp(-0.5 * (u * u + v * v)));
+  }
+}
+
+TEST(test_widths_and_slant) {
   struct random random = {102};
   struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 1024};
   for (int i = 0; i < 2000; i++) {
@@ -102,11 +111,7 @@ static void test_widths_and_slant(void) {
     double angle = random_between(&random, 0.0, 3.14159265);
     double shorter = random_between(&random, 5.5, 7.0), longer = ratio * shorter;
     double c = cos(angle), s = sin(angle);
-    for (int k = 0; k < SENSORS; k++) {
-      double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y;
-      double u = (c * dx + s * dy) / longer, v = (c * dy - s * dx) / shorter;
-      readings[k] = to_q10(20000.0 * exp(-0.5 * (u * u + v * v)));
-    }
+    read_ellipse(x, y, longer, shorter, angle);
     fit_gaussian(&array, readings, ALL, &settings, &result);
     assert_finite_and_defined();
     TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_WIDTHS_VALID, result.flags);
@@ -130,7 +135,7 @@ static void test_widths_and_slant(void) {
 }
 
 /* The profile's tail is not what the dip says: 1 % of the peak too much of it. */
-static void test_a_wrong_tail_is_no_elongation(void) {
+TEST(test_a_wrong_tail_is_no_elongation) {
   struct random random = {103};
   struct fit_settings settings = {.iterations = 4,
                                   .noise_Pa_q10 = 5 * 1024,
@@ -143,22 +148,15 @@ static void test_a_wrong_tail_is_no_elongation(void) {
   for (int i = 0; i < 1000; i++) {
     double x = random_between(&random, -9.0, 9.0), y = random_between(&random, -18.0, 18.0);
     double longer = i % 2 ? 2.0 * 5.5 : 5.5, angle = random_between(&random, 0.0, 3.14159265);
-    double c = cos(angle), s = sin(angle);
-    for (int k = 0; k < SENSORS; k++) {
-      double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y;
-      double u = (c * dx + s * dy) / longer, v = (c * dy - s * dx) / 5.5;
-      readings[k] = to_q10(20000.0 * exp(-0.5 * (u * u + v * v)));
-    }
+    read_ellipse(x, y, longer, 5.5, angle);
     fit_gaussian(&array, readings, ALL, &settings, &result);
     elongated[i % 2] += (result.flags & CONTACT_FLAG_ELONGATED) != 0;
   }
-  char text[60];
-  snprintf(text, sizeof text, "of 500: round %d, long %d", elongated[0], elongated[1]);
-  TEST_ASSERT_TRUE_MESSAGE(elongated[0] == 0, text);
-  TEST_ASSERT_TRUE_MESSAGE(elongated[1] > 400, text);
+  TEST_ASSERT_EQUAL_INT(0, elongated[0]);
+  TEST_ASSERT_GREATER_THAN_INT(400, elongated[1]);
 }
 
-static void test_the_limit_of_uncertain_is_a_setting(void) {
+TEST(test_the_limit_of_uncertain_is_a_setting) {
   struct press press = {2.0, 5.0, 5000.0, 6.0};
   read_press(&press, 0.0, NULL);
   struct fit_settings settings = usual;
@@ -168,11 +166,7 @@ static void test_the_limit_of_uncertain_is_a_setting(void) {
     for (int above = 0; above < 2; above++) {
       settings.location_sd_limit_mm = result.location_sd_mm * (above ? 0.99f : 1.01f);
       struct fit_result judged;
-      if (general) {
-        fit_general(&array, readings, ALL, &settings, &judged);
-      } else {
-        fit_gaussian(&array, readings, ALL, &settings, &judged);
-      }
+      (general ? fit_general : fit_gaussian)(&array, readings, ALL, &settings, &judged);
       TEST_ASSERT_EQUAL(above, (judged.flags & CONTACT_FLAG_UNCERTAIN) != 0);
     }
   }
@@ -188,7 +182,7 @@ static void test_the_limit_of_uncertain_is_a_setting(void) {
   }
 }
 
-static void test_two_contacts_are_not_the_model(void) {
+TEST(test_two_contacts_are_not_the_model) {
   struct press one = {0.0, -14.0, 5000.0, 5.0};
   struct press other = {0.0, 14.0, 5000.0, 5.0};
   for (int k = 0; k < SENSORS; k++) {
@@ -198,102 +192,4 @@ static void test_two_contacts_are_not_the_model(void) {
   fit_gaussian(&array, readings, ALL, &usual, &result);
   assert_finite_and_defined();
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_MODEL, result.flags);
-}
-
-/* What the last step moved is not settled, and the standard deviation contains it. */
-static void test_a_fit_that_still_moves_says_how_far(void) {
-  struct random random = {76};
-  int unsettled = 0;
-  for (int i = 0; i < 2000; i++) {
-    struct press press = random_press(&random, 2.0);
-    press.p0_Pa = 50000.0;
-    read_press(&press, 0.0, NULL);
-    struct fit_settings settings = {.iterations = 1, .noise_Pa_q10 = 1};
-    fit_general(&array, readings, ALL, &settings, &result);
-    for (settings.iterations = 2; settings.iterations <= 5; settings.iterations++) {
-      struct fit_result before = result;
-      fit_general(&array, readings, ALL, &settings, &result);
-      double moved_mm = hypot((double)(result.x_mm - before.x_mm), (double)(result.y_mm - before.y_mm));
-      if (before.used != ALL || result.used != ALL) {
-        continue; /* without a sensor it is another fit */
-      }
-      TEST_ASSERT_TRUE((double)result.location_sd_mm > 0.999 * moved_mm - 1e-4);
-      unsettled += moved_mm > 0.5 * (double)result.location_sd_mm;
-    }
-  }
-  TEST_ASSERT_GREATER_THAN_INT(50, unsettled); /* that nothing but the step told */
-}
-
-/* Share of presses farther off than 1 mm that carry no warning, and of those with a warning. */
-static void shares(double sigma_low_mm, double sigma_high_mm, double outside_mm, bool corner, uint64_t seed,
-                   double *unflagged, double *warned) {
-  struct fit_settings settings = usual;
-  settings.model_sd_q16 = 426; /* 0.65 %, as the firmware */
-  enum { PRESSES = 5000 };
-  struct random random = {seed};
-  int bad = 0;
-  int warnings = 0;
-  for (int i = 0; i < PRESSES; i++) {
-    struct press press = {random_between(&random, -9.0, 9.0), random_between(&random, -18.0, 18.0),
-                          exp(random_between(&random, log(500.0), log(100000.0))),
-                          random_between(&random, sigma_low_mm, sigma_high_mm)};
-    if (outside_mm > 0.0) {
-      press.x_mm = 9.0 + random_between(&random, 0.0, outside_mm);
-    }
-    if (corner) {
-      press.y_mm = 18.0 + random_between(&random, 0.0, outside_mm);
-    }
-    read_press(&press, 5.0, &random);
-    fit_gaussian(&array, readings, ALL, &settings, &result);
-    assert_finite_and_defined();
-    bool doubtful = result.flags & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL |
-                                    CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT);
-    warnings += doubtful;
-    bad += !doubtful && location_error_mm(&press) > 1.0;
-  }
-  *unflagged = (double)bad / PRESSES;
-  *warned = (double)warnings / PRESSES;
-}
-
-static void test_stiff_cases_are_flagged(void) {
-  static const struct {
-    const char *name;
-    double sigma_low_mm, sigma_high_mm, outside_mm;
-    bool corner;
-    double most_unflagged, most_warned;
-  } cases[] = {
-      {"inside, sigma 4 to 9 mm", 4.0, 9.0, 0.0, false, 0.0, 0.1},
-      {"sigma 15 to 30 mm", 15.0, 30.0, 0.0, false, 0.0, 0.1},
-      {"outside an edge by up to 9 mm", 5.0, 9.0, 9.0, false, 0.0055, 0.4},
-      {"outside a corner by up to 6 mm", 4.0, 9.0, 6.0, true, 0.0055, 1.0},
-      {"sigma 3 mm", 3.0, 3.0, 0.0, false, 0.0055, 1.0},
-      {"sigma 2 mm", 2.0, 2.0, 0.0, false, 0.0055, 1.0},
-  };
-  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-    double unflagged, warned;
-    shares(cases[i].sigma_low_mm, cases[i].sigma_high_mm, cases[i].outside_mm, cases[i].corner, 80 + i, &unflagged,
-           &warned);
-    char text[140];
-    snprintf(text, sizeof text, "%s: beyond 1 mm unflagged %.4f, with a warning %.3f", cases[i].name, unflagged,
-             warned);
-    TEST_MESSAGE(text);
-    TEST_ASSERT_TRUE_MESSAGE(unflagged <= cases[i].most_unflagged, cases[i].name);
-    TEST_ASSERT_TRUE_MESSAGE(warned <= cases[i].most_warned, cases[i].name);
-  }
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_equal_readings_are_flat);
-  RUN_TEST(test_nothing_positive_is_no_fit);
-  RUN_TEST(test_one_hot);
-  RUN_TEST(test_low_signal_below_twenty_sigma);
-  RUN_TEST(test_two_contacts_are_not_the_model);
-  RUN_TEST(test_a_fit_that_still_moves_says_how_far);
-  RUN_TEST(test_gains_spread_the_location_as_predicted);
-  RUN_TEST(test_widths_and_slant);
-  RUN_TEST(test_a_wrong_tail_is_no_elongation);
-  RUN_TEST(test_the_limit_of_uncertain_is_a_setting);
-  RUN_TEST(test_stiff_cases_are_flagged);
-  return UNITY_END();
 }

@@ -32,7 +32,7 @@ static void read_two(double share) {
   }
 }
 
-static void what_is_broken_stays_left_out(void) {
+TEST(what_is_broken_stays_left_out) {
   struct fit_result alone;
   memset(&watch, 0, sizeof watch);
   for (int frame = 0; frame <= FIT_WATCH_FRAMES; frame++) {
@@ -54,7 +54,7 @@ static void what_is_broken_stays_left_out(void) {
   TEST_ASSERT_EQUAL(FIT_WATCH_FRAMES + 1, frames);
 }
 
-static void a_rough_fit_begins_no_search_in_each_frame(void) {
+TEST(a_rough_fit_begins_no_search_in_each_frame) {
   memset(&watch, 0, sizeof watch);
   for (int frame = 0; frame <= FIT_WATCH_FRAMES; frame++) {
     read_two(1.0 + 0.001 * frame);
@@ -65,7 +65,7 @@ static void a_rough_fit_begins_no_search_in_each_frame(void) {
   TEST_ASSERT_EQUAL(FIT_WATCH_FRAMES, watch.frames);
 }
 
-static void a_sensor_that_breaks_after_a_search_is_soon_found(void) {
+TEST(a_sensor_that_breaks_after_a_search_is_soon_found) {
   memset(&watch, 0, sizeof watch);
   read_with(1500.0); /* rough, but no outlier that halves the residuals or stands alone */
   readings[3] += 1500 * 1024;
@@ -79,7 +79,7 @@ static void a_sensor_that_breaks_after_a_search_is_soon_found(void) {
 }
 
 /* And where another one is left out, one frame later. */
-static void residuals_that_grow_end_what_was_found(void) {
+TEST(residuals_that_grow_end_what_was_found) {
   memset(&watch, 0, sizeof watch);
   read_with(8000.0);
   TEST_ASSERT_EQUAL_HEX32(ALL & ~broken, used_of(ALL));
@@ -92,7 +92,7 @@ static void residuals_that_grow_end_what_was_found(void) {
   TEST_ASSERT_EQUAL_HEX32(ALL & ~(UINT32_C(1) << 3), used_of(ALL));
 }
 
-static void other_sensors_begin_a_search(void) {
+TEST(other_sensors_begin_a_search) {
   memset(&watch, 0, sizeof watch);
   read_with(8000.0);
   used_of(ALL);
@@ -100,14 +100,4 @@ static void other_sensors_begin_a_search(void) {
   const uint32_t fewer = ALL & ~UINT32_C(1);
   TEST_ASSERT_EQUAL_HEX32(fewer & ~broken, used_of(fewer));
   TEST_ASSERT_EQUAL(FIT_WATCH_FRAMES, watch.frames);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(what_is_broken_stays_left_out);
-  RUN_TEST(a_rough_fit_begins_no_search_in_each_frame);
-  RUN_TEST(a_sensor_that_breaks_after_a_search_is_soon_found);
-  RUN_TEST(residuals_that_grow_end_what_was_found);
-  RUN_TEST(other_sensors_begin_a_search);
-  return UNITY_END();
 }

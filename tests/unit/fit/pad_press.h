@@ -1,0 +1,60 @@
+/* What the sensors of the boards' array read under a contact on a pad, for the tests of what estimates by its profile.
+ */
+#ifndef PAD_PRESS_H
+#define PAD_PRESS_H
+
+#include "fit/fit.h"
+#include "support/grid.h"
+#include "support/pad.h"
+#include "support/random.h"
+#include "support/unit.h"
+
+#include <math.h>
+#include <string.h>
+
+struct contact {
+  double x_mm, y_mm, force_N, qx_N, qy_N, spread_mm2;
+};
+
+struct pad_press {
+  struct pad_profile profile;
+  double dip_share, dip_sd_mm; /* of the height in the contact's middle */
+  struct fit_own own[GRID_SENSORS];
+};
+
+/* As common/pad_profile.h has it. A sensor that measures all wider by a factor reads what is nearer by it. */
+static inline double pad_press_Pa(const struct pad_press *pad, const struct contact *contact, int sensor) {
+  const struct fit_own *own = &pad->own[sensor];
+  const double nearer = exp(-own->wider_q15 / 32768.0);
+  const double dx = nearer * (9.0 * (sensor / 5 - 1 + own->off_x_q15 / 32768.0) - contact->x_mm);
+  const double dy = nearer * (9.0 * (sensor % 5 - 2 + own->off_y_q15 / 32768.0) - contact->y_mm);
+  const double r2 = dx * dx + dy * dy;
+  double sum = 0.0, middle = 0.0;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    const double v = pow((double)pad->profile.normal[j].sd_mm, 2) + contact->spread_mm2;
+    const double height = contact->force_N * (double)pad->profile.normal[j].share / v;
+    sum += height * exp(-r2 / (2 * v));
+    middle += height;
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    const double v = pow((double)pad->profile.tangential[j].sd_mm, 2) + 1.3 * contact->spread_mm2;
+    sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)pad->profile.tangential[j].moment_mm / (v * v) *
+           exp(-r2 / (2 * v));
+  }
+  if (pad->dip_share > 0.0) {
+    sum -= pad->dip_share * middle * exp(-r2 / (2 * pad->dip_sd_mm * pad->dip_sd_mm));
+  }
+  return 1e6 * sum / 6.283185307179586;
+}
+
+/* Every sensor off its place and wider by at most these. */
+static inline void pad_press_draw_own(struct pad_press *pad, int32_t off_q15, int32_t wider_q15,
+                                      struct random *random) {
+  for (int k = 0; k < GRID_SENSORS; k++) {
+    pad->own[k] = (struct fit_own){(int32_t)random_between(random, -off_q15, off_q15),
+                                   (int32_t)random_between(random, -off_q15, off_q15),
+                                   (int32_t)random_between(random, -wider_q15, wider_q15)};
+  }
+}
+
+#endif
