@@ -145,7 +145,8 @@ void tearDown(void) { native_cdc_reset(); }
 
 static void complain(const char *what, uint32_t transfer) {
   const size_t length = strlen(problems);
-  snprintf(problems + length, sizeof problems - length, "transfer %u: %s; ", (unsigned)transfer, what);
+  snprintf(problems + length, sizeof problems - length, "fault %d at transfer %u: %s; ", (int)array.fault.kind,
+           (unsigned)transfer, what);
 }
 
 /* One run with the fault set in array.fault. */
@@ -224,32 +225,25 @@ static void test_without_a_fault(void) {
   TEST_ASSERT_FALSE(native_watchdog_expired());
 }
 
-static void test_nack(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_NACK}); }
-
-static void test_sensor_silent_for_a_while(void) {
-  for (uint32_t count = 2; count <= 40; count += 19) {
-    at_every_place((struct sim_fault){.kind = SIM_FAULT_DEAD, .count = count, .sensor = 7});
+static void test_one_fault_anywhere(void) {
+  static const struct sim_fault faults[] = {
+      {.kind = SIM_FAULT_NACK},
+      {.kind = SIM_FAULT_DEAD, .count = 2, .sensor = 7}, /* silent for a while */
+      {.kind = SIM_FAULT_DEAD, .count = 21, .sensor = 7},
+      {.kind = SIM_FAULT_DEAD, .count = 40, .sensor = 7},
+      {.kind = SIM_FAULT_TIMEOUT},
+      {.kind = SIM_FAULT_STUCK, .count = 3},
+      {.kind = SIM_FAULT_ZERO},
+      {.kind = SIM_FAULT_ONES},
+      /* First, middle and last bit of a PROM word; bits 23, 16 and 8 of a conversion result. */
+      {.kind = SIM_FAULT_FLIP, .mask = 0x800000},
+      {.kind = SIM_FAULT_FLIP, .mask = 0x010000},
+      {.kind = SIM_FAULT_FLIP, .mask = 0x000100},
+      {.kind = SIM_FAULT_POWER_CYCLE, .sensor = 7},
+  };
+  for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
+    at_every_place(faults[i]);
   }
-}
-
-static void test_timeout(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_TIMEOUT}); }
-
-static void test_stuck_bus(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_STUCK, .count = 3}); }
-
-static void test_zero_bytes(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_ZERO}); }
-
-static void test_bytes_of_ones(void) { at_every_place((struct sim_fault){.kind = SIM_FAULT_ONES}); }
-
-static void test_inverted_bits(void) {
-  /* First, middle and last bit of a PROM word; bits 23, 16 and 8 of a conversion result. */
-  const uint32_t masks[] = {0x800000, 0x010000, 0x000100};
-  for (unsigned i = 0; i < 3; i++) {
-    at_every_place((struct sim_fault){.kind = SIM_FAULT_FLIP, .mask = masks[i]});
-  }
-}
-
-static void test_power_cycle_of_a_sensor(void) {
-  at_every_place((struct sim_fault){.kind = SIM_FAULT_POWER_CYCLE, .sensor = 7});
 }
 
 /* The sensor goes on with another gain, and its reset cures it. What it says in between must be
@@ -343,14 +337,7 @@ static void test_a_sensor_dies(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_without_a_fault);
-  RUN_TEST(test_nack);
-  RUN_TEST(test_sensor_silent_for_a_while);
-  RUN_TEST(test_timeout);
-  RUN_TEST(test_stuck_bus);
-  RUN_TEST(test_zero_bytes);
-  RUN_TEST(test_bytes_of_ones);
-  RUN_TEST(test_inverted_bits);
-  RUN_TEST(test_power_cycle_of_a_sensor);
+  RUN_TEST(test_one_fault_anywhere);
   RUN_TEST(test_brown_out_of_a_sensor);
   RUN_TEST(test_wrong_bits_in_a_prom);
   RUN_TEST(test_scattered_nacks_cost_two_frames_each);

@@ -1,4 +1,4 @@
-"""Calibrating, from the twin's scenario to what the fingertip keeps: usage
+"""Calibrating the gains and the tangential force's scale, from the twin's scenario to what the fingertip keeps: usage
 test_calibrate.py FINGERTIP FAKE_DEVICE TIME_KEEPER TWIN PLAYER TABLES [unittest arguments]."""
 
 import os
@@ -10,57 +10,105 @@ import sys
 import tempfile
 import unittest
 
+import numpy as np
+
 TWIN, PLAYER, TABLES = sys.argv[4:7]
 import cli_case  # noqa: E402
+from fingertip import files  # noqa: E402
 from simulated_terminal import Terminal  # noqa: E402
 
 GAIN_TOLERANCE = 0.02
+FORCE_N, SHARE = 3.0, 0.3
+PULL_N = FORCE_N * SHARE
+GRASP, SLIP = "capabilities=15", "capabilities=7"
 
 
 def setUpModule():
-    """One recording of good placements for all tests, the way a user would make one."""
-    global folder, recording, gains, mean_gain
+    """One good recording of each kind for all tests, the way a user would make one."""
+    global folder, placed, pulled, serial, gains, mean_gain
     folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
     unittest.addModuleCleanup(folder.cleanup)
-    recording, scenario = make_recording("good", "placements", "--gain", "10", "--seed", "6")
+    placed, scenario = make_placements("good", "--gain", "10", "--seed", "6")
     errors = re.search(r"^# gain_errors_percent: (.*)$", pathlib.Path(scenario).read_text(encoding="utf-8"), re.M)
-    gains = [1 + float(word) / 100 for word in errors[1].split()]
-    mean_gain = sum(gains) / len(gains)
-    gains = [gain / mean_gain for gain in gains]
+    gains = np.array([1 + float(word) / 100 for word in errors[1].split()])
+    mean_gain = gains.mean()
+    gains /= mean_gain
+    pulled, _ = make_pulls("pulls", "--gain", "2", "--seed", "31")
+    serial = re.search(r"^# serial: (\S+)$", pathlib.Path(pulled).read_text(encoding="utf-8"), re.M)[1]
 
 
-def make_recording(name, kind, *options, raw=True, rate="40"):
+def make_recording(name, scenario_options, play_options):
     scenario, played = (os.path.join(folder.name, name + end) for end in (".csv", ".recording.csv"))
-    subprocess.run([TWIN, "scenario", kind, *options, "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
-    subprocess.run(
-        [PLAYER, "play", scenario, "-o", played, "--quiet", "--rate", rate, *(["--raw"] if raw else [])],
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+    quiet = {"check": True, "stdout": subprocess.DEVNULL}
+    subprocess.run([TWIN, "scenario", *scenario_options, "-o", scenario, "--cache", TABLES], **quiet)
+    subprocess.run([PLAYER, "play", scenario, "-o", played, "--quiet", *play_options], **quiet)
     return played, scenario
+
+
+def make_placements(name, *options, kind="placements", raw=("--raw",)):
+    return make_recording(name, [kind, *options], ["--rate", "40", *raw])
+
+
+def make_pulls(name, *options, pad=("--pad", "12"), kind="drag", seconds=100):
+    return make_recording(name, [kind, "--force", str(FORCE_N), "--seconds", str(seconds), *options], ["--rate", "50", *pad])
 
 
 def table(text):
     """Gains and their standard deviations by sensor."""
     rows = re.findall(r"^ +(\d+) +(\d\.\d{3}) +(\d+\.\d) ", text, re.M)
-    return [float(row[1]) for row in rows], [float(row[2]) / 100 for row in rows]
+    return np.array([float(row[1]) for row in rows]), np.array([float(row[2]) / 100 for row in rows])
+
+
+def scale_of_truth(recording, scenario):
+    """What the readings of every steady pull have to be multiplied by, from the scenario's own loads."""
+    recording, scenario = files.read_recording(recording), files.read_scenario(scenario)
+    rows = recording.flag(files.TANGENTIAL_VALID)
+    t_s, read = recording["t_us"][rows] / 1e6, np.column_stack((recording["qx_N"][rows], recording["qy_N"][rows]))
+    truth = np.column_stack([scenario.at(name, t_s) for name in ("Qx_N", "Qy_N")])
+    size, force = np.hypot(*truth.T), scenario.at("force_N", t_s)
+    ratios = []
+    for start, end in scenario.intervals("contact"):
+        inside = (t_s > start) & (t_s < end) & (force > 0.999 * FORCE_N)
+        pulled, rest = inside & (abs(size - PULL_N) < 1e-4), inside & (size < 1e-4)
+        rest &= t_s < t_s[pulled][0] if pulled.any() else False
+        if pulled.sum() > 50 and rest.sum() > 10:
+            along = truth[pulled].mean(axis=0) / PULL_N
+            ratios.append((read[pulled].mean(axis=0) - read[rest].mean(axis=0)) @ along / PULL_N)
+    return 1 / np.mean(ratios)
 
 
 class CalibrateTest(cli_case.CliTest):
     def calibrate(self, *arguments, **options):
         return self.run_cli("calibrate", *arguments, **options)
 
+    def drag(self, *arguments, pull=("--force", str(PULL_N)), **options):
+        return self.calibrate("--drag", *pull, *arguments, **options)
+
+    def refused(self, *arguments, drag=False, **options):
+        _, err = (self.drag if drag else self.calibrate)(*arguments, status=1, **options)
+        self.assertEqual(err.count("\n"), 1, err)
+        return err
+
+    def shown(self):
+        return self.calibrate("--show", "--port", self.port)[0]
+
+    def info(self, key):
+        """The lines of info whose keys begin so."""
+        return re.findall(rf"^{key}.*$", self.run_cli("info", "--port", self.port)[0], re.M)
+
     def assert_gains(self, text):
         found, sds = table(text)
-        self.assertEqual(len(found), len(gains))
-        for k, (gain, truth, sd) in enumerate(zip(found, gains, sds)):
-            self.assertAlmostEqual(gain / truth, 1, delta=GAIN_TOLERANCE, msg=f"sensor {k}")
-            self.assertLess(sd, 0.03)
+        np.testing.assert_allclose(found / gains, 1, atol=GAIN_TOLERANCE)
+        self.assertLess(sds.max(), 0.03)
+
+    def scale(self, text):
+        found = re.search(r"^tangential scale +\S+ sd \S+ before, (\S+) sd (\S+) now$", text, re.M)
+        return float(found[1]), float(found[2])
 
 
-class FromRecording(CalibrateTest):
+class Gains(CalibrateTest):
     def test_shows_and_writes_nothing_with_dry_run(self):
-        out, err = self.calibrate("--from", recording, "--dry-run", "--force", "3")
+        out, err = self.calibrate("--from", placed, "--dry-run", "--force", "3")
         self.assertEqual(err, "")
         self.assert_gains(out)
         before, after = re.search(r"location off by +([\d.]+) mm +([\d.]+) mm", out).groups()
@@ -69,30 +117,28 @@ class FromRecording(CalibrateTest):
         # The volume of the Gaussian is 9 % less than the force.
         self.assertAlmostEqual(float(scale) * mean_gain, 1.09, delta=0.02)
         self.assertLess(float(sd), 0.03)
-        out, _ = self.calibrate("--from", recording, "--dry-run", "--weight", "306")
+        out, _ = self.calibrate("--from", placed, "--dry-run", "--weight", "306")
         self.assertAlmostEqual(float(re.search(r"force scale +1\.000 +(\d\.\d+)", out)[1]), float(scale), delta=0.005)
-        out, _ = self.calibrate("--from", recording, "--dry-run")
+        out, _ = self.calibrate("--from", placed, "--dry-run")
         self.assertIn("force scale         unknown", out)
 
     def test_writes_into_the_fingertip_it_is_of(self):
-        serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
         with self.device(f"serial={serial}"):
-            out, _ = self.calibrate("--from", recording, "--yes", "--port", self.port)
+            out, _ = self.calibrate("--from", placed, "--yes", "--port", self.port)
             self.assertIn("calibrated: it applies from now on", out)
-            shown, _ = self.calibrate("--show", "--port", self.port)
+            shown = self.shown()
             self.assert_gains(shown)
             self.assertRegex(shown, r"^calibrated 20\d\d-\d\d-\d\d \d\d:\d\d UTC from \d\d placements, force scale 1.000 sd 0.100\n")
             self.assertEqual(self.calibrate("--erase", "--yes", "--port", self.port)[0], "erased: it is as if never calibrated\n")
-            self.assertEqual(self.calibrate("--show", "--port", self.port)[0], "not calibrated\n")
+            self.assertEqual(self.shown(), "not calibrated\n")
             self.assertEqual(self.calibrate("--erase", "--yes", "--port", self.port)[0], "not calibrated\n")
         with self.device("serial=0123456789ABCDEF"):
-            _, err = self.calibrate("--from", recording, "--yes", "--port", self.port, status=1)
+            _, err = self.calibrate("--from", placed, "--yes", "--port", self.port, status=1)
             self.assertIn("is of fingertip", err)
-            self.assertEqual(self.calibrate("--show", "--port", self.port)[0], "not calibrated\n")
+            self.assertEqual(self.shown(), "not calibrated\n")
 
     def test_finds_the_thickness_and_says_where_another_was_told(self):
-        serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
-        write = ("--from", recording, "--yes", "--port", self.port)
+        write = ("--from", placed, "--yes", "--port", self.port)
         with self.device(f"serial={serial}", "capabilities=15"):
             out, err = self.calibrate(*write)
             found, sd = (float(value) for value in re.search(r"(?m)^rubber ([\d.]+) mm, sd ([\d.]+)$", out).groups())
@@ -116,38 +162,25 @@ class FromRecording(CalibrateTest):
             self.assertNotIn("profile of a pad", out)
 
     def test_is_asked_before(self):
-        serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
         with self.device(f"serial={serial}"):
-            _, err = self.calibrate("--from", recording, "--port", self.port, status=1)
+            _, err = self.calibrate("--from", placed, "--port", self.port, status=1)
             self.assertEqual(err, "fingertip: not written; give --yes without a terminal\n")
-            self.assertEqual(self.calibrate("--show", "--port", self.port)[0], "not calibrated\n")
+            self.assertEqual(self.shown(), "not calibrated\n")
         with self.device("calibrated=1"):
             _, err = self.calibrate("--erase", "--port", self.port, status=1)
             self.assertEqual(err, "fingertip: not erased; give --yes without a terminal\n")
-            self.assertIn("from 30 placements", self.calibrate("--show", "--port", self.port)[0])
+            self.assertIn("from 30 placements", self.shown())
 
     def test_refuses_with_the_reason(self):
-        for name, options, reason in (
-            ("weights", ("placements", "--gain", "10", "--force", "2.5,3.5"), "use one and the same weight"),
-            ("cube", ("placements", "--indenter", "cube6", "--force", "12", "--layer", "12", "--seconds", "30"), "too few placements"),
-            ("hand", ("pokes", "--gain", "10"), "no placement was found"),
-            ("middle", ("placements", "--margin", "0", "--seconds", "100"), "are only known to 1."),
+        for played, reason in (
+            (make_placements("weights", "--gain", "10", "--force", "2.5,3.5"), "not calibrated: .*use one and the same weight"),
+            (make_placements("hand", "--gain", "10", kind="pokes"), "not calibrated: no placement was found"),
+            (make_placements("without", "--seconds", "10", raw=()), "has no pressures to calibrate from; record with a firmware"),
         ):
-            with self.subTest(name):
-                played, _ = make_recording(name, *options)
-                _, err = self.calibrate("--from", played, "--dry-run", status=1)
-                self.assertIn("fingertip: not calibrated: ", err)
-                self.assertIn(reason, err)
+            self.assertRegex(self.refused("--from", played[0], "--dry-run"), reason)
 
-    def test_a_recording_without_pressures_is_told(self):
-        played, _ = make_recording("without", "placements", "--seconds", "10", raw=False)
-        _, err = self.calibrate("--from", played, "--dry-run", status=1)
-        self.assertRegex(err, "has no pressures to calibrate from; record with a firmware that sends them")
-
-
-class Live(CalibrateTest):
     def test_takes_placements_until_it_is_good_and_writes(self):
-        with self.device(f"play={recording}"):
+        with self.device(f"play={placed}"):
             out, err = self.calibrate("--port", self.port, "--yes", "--force", "3")
             self.assertEqual(err, "")
             self.assertRegex(out, r"set the weight down on its round foot, best near x -?\d+ y -?\d+ mm\n")
@@ -159,41 +192,39 @@ class Live(CalibrateTest):
             self.assertNotIn("\x1b", out)
             self.assert_gains(out)
             self.assertTrue(out.endswith("calibrated: it applies from now on\n"))
-            shown, _ = self.calibrate("--show", "--port", self.port)
+            shown = self.shown()
             self.assert_gains(shown)
             self.assertAlmostEqual(float(re.search(r"force scale (\d\.\d+) sd 0\.01", shown)[1]) * mean_gain, 1.11, delta=0.02)
 
     def test_what_cannot_be_calibrated_is_told(self):
-        for options, reason in (
-            (("capabilities=3",), "sends no pressures; flash one of scene grasp"),
-            (("capabilities=4",), "computes no locations"),
-            (("absent=3",), "sensors do not answer: 3; mend their wiring"),
-            (("version=3",), "version"),
+        played, _ = make_placements("short", "--seconds", "20")
+        for option, reason in (
+            ("capabilities=3", "sends no pressures; flash one of scene grasp"),
+            ("capabilities=4", "computes no locations"),
+            ("absent=3", "sensors do not answer: 3; mend their wiring"),
+            ("version=3", "version"),
+            (f"play={played}", "sends no frames"),
         ):
-            with self.subTest(reason), self.device(*options):
+            with self.subTest(reason), self.device(option):
                 _, err = self.calibrate("--port", self.port, "--yes", status=1)
                 self.assertIn(reason, err)
-                self.assertEqual(err.count("\n"), 1)
-
-    def test_no_more_frames_is_no_calibration(self):
-        played, _ = make_recording("short", "placements", "--seconds", "20")
         with self.device(f"play={played}"):
-            _, err = self.calibrate("--port", self.port, "--yes", status=1)
-            self.assertIn("sends no frames", err)
-            self.assertEqual(self.calibrate("--show", "--port", self.port)[0], "not calibrated\n")
+            self.assertEqual(self.shown(), "not calibrated\n")
 
     def test_interrupted_leaves_it_as_it_was(self):
-        with self.device("calibrated=1"):
-            process = self.start("calibrate", "--port", self.port, "--yes")
-            self.assertIn("set the weight down", process.stdout.readline())
-            process.send_signal(signal.SIGINT)
-            _, err = process.communicate()
-            self.assertEqual((process.returncode, err), (1, "fingertip: interrupted; the fingertip is as it was\n"))
-            self.assertIn("from 30 placements", self.calibrate("--show", "--port", self.port)[0])
+        with self.device("calibrated=1", GRASP, "pad=1"):
+            for options, advice in ((), "set the weight down"), (("--drag", "--force", "1"), "set the object down"):
+                process = self.start("calibrate", *options, "--port", self.port, "--yes")
+                self.assertIn(advice, process.stdout.readline())
+                process.send_signal(signal.SIGINT)
+                _, err = process.communicate()
+                self.assertEqual((process.returncode, err), (1, "fingertip: interrupted; the fingertip is as it was\n"))
+            self.assertIn("from 30 placements", self.shown())
+            self.assertEqual(self.info("pad_tangential_scale +"), ["pad_tangential_scale    1"])
 
     def test_on_a_terminal_draws_the_pad_and_asks(self):
         for answer, written in ((b"n\n", False), (b"y\n", True)):
-            with self.subTest(answer), self.device(f"play={recording}"):
+            with self.subTest(answer), self.device(f"play={placed}"):
                 with Terminal(
                     self.world, [cli_case.FINGERTIP, "calibrate", "--port", self.port], {**self.environment, "TERM": "xterm-256color"}
                 ) as terminal:
@@ -206,7 +237,108 @@ class Live(CalibrateTest):
                 self.assertGreater(text.rfind("\x1b[?1049l"), text.rfind("\x1b[?1049h"))
                 self.assert_gains(text[text.rfind("\x1b[?1049l") :].replace("\r", ""))
                 self.assertEqual(status, 0 if written else 1)
-                self.assertEqual(self.calibrate("--show", "--port", self.port)[0].startswith("calibrated 20"), written)
+                self.assertEqual(self.shown().startswith("calibrated 20"), written)
+
+
+class Drags(CalibrateTest):
+    def test_finds_the_scale_within_its_sd(self):
+        for name, thickness, *options in (
+            ("equal gains", "12", "--gain", "0", "--seed", "32"),
+            ("unequal gains", "12", "--gain", "2", "--seed", "33"),
+            ("another thickness than it is told", "11", "--gain", "2", "--seed", "34"),
+        ):
+            with self.subTest(name):
+                played, scenario = make_pulls(name, *options, pad=("--pad", thickness))
+                out, err = self.drag("--from", played, "--dry-run")
+                self.assertEqual(err, "")
+                scale, sd = self.scale(out)
+                self.assertLess(sd, 0.03)
+                self.assertAlmostEqual(scale, scale_of_truth(played, scenario), delta=sd)
+
+    def test_what_was_said_to_pull_is_believed(self):
+        scale, _ = self.scale(self.drag("--from", pulled, "--dry-run")[0])
+        twice, _ = self.scale(self.drag("--from", pulled, "--dry-run", pull=("--force", str(2 * PULL_N)))[0])
+        self.assertAlmostEqual(twice, 2 * scale, delta=0.005)
+        grams = f"{PULL_N / 9.80665e-3:.3f}"
+        self.assertAlmostEqual(self.scale(self.drag("--from", pulled, "--dry-run", pull=("--weight", grams))[0])[0], scale, delta=0.002)
+
+    def test_writes_the_scale_and_nothing_else_of_the_pad(self):
+        with self.device(f"serial={serial}", GRASP):
+            self.run_cli("pad", "--thickness", "12", "--port", self.port)
+            before = self.info("pad_(?!tangential_scale)")
+            out, _ = self.drag("--from", pulled, "--yes", "--port", self.port)
+            self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
+            kept = [float(line.split()[1]) for line in self.info("pad_tangential_scale")]
+            np.testing.assert_allclose(kept, self.scale(out), atol=6e-4)
+            self.assertGreater(len(before), 5)
+            self.assertEqual(self.info("pad_(?!tangential_scale)"), before)
+
+    def test_only_into_the_fingertip_and_the_pad_that_it_is_of(self):
+        for options, thickness, more, reason in (
+            ((f"serial={serial}", GRASP), "15", ("--yes",), "is of a pad of 12 mm"),
+            ((GRASP,), "12", ("--yes",), "is of fingertip"),
+            ((f"serial={serial}", GRASP), None, ("--yes",), "no pad profile; fingertip pad --thickness MM first"),
+            ((f"serial={serial}", SLIP), None, ("--yes",), "reports no tangential force; flash one of scene grasp"),
+            ((f"serial={serial}", GRASP), "12", (), "not written; give --yes without a terminal"),
+        ):
+            with self.subTest(reason), self.device(*options):
+                if thickness:
+                    self.run_cli("pad", "--thickness", thickness, "--port", self.port)
+                before = self.info("pad_")
+                _, err = self.drag("--from", pulled, *more, "--port", self.port, status=1)
+                self.assertIn(reason, err)
+                self.assertEqual(self.info("pad_"), before)
+
+    def test_refuses_with_the_reason(self):
+        for played, pull, reason in (
+            (
+                make_pulls("weak", "--gain", "10", "--seed", "2", "--tangential", "0.05"),
+                "0.15",
+                r"0\.15 N is small beside .* possible error there, 0\.\d\d N: pull harder",
+            ),
+            (make_pulls("still", "--gain", "0", kind="placements"), str(PULL_N), "no pull was found"),
+            (make_pulls("without", "--gain", "0", seconds=30, pad=()), str(PULL_N), "no pad profile; fingertip pad --thickness MM first"),
+            ((pulled,), "3.8", "the readings are not those of 3.80 N"),
+        ):
+            self.assertRegex(self.refused("--from", played[0], "--dry-run", drag=True, pull=("--force", pull)), reason)
+
+    def test_takes_pulls_until_it_is_good_and_writes(self):
+        with self.device(f"play={pulled}", GRASP, "pad=1"):
+            out, err = self.drag("--port", self.port, "--yes")
+            self.assertEqual(err, "")
+            for advice in (
+                "set the object down, its string slack\n",
+                "release it, and leave it alone\n",
+                "pull: hang the weight on its string\n",
+                "hold on\n",
+                "taken: take it off the pad\n",
+                "; 7 of 8 pulls\n",
+            ):
+                self.assertIn(advice, out)
+            self.assertNotIn("\x1b", out)
+            self.assertIn("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n", out)
+            self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
+            scale, _ = self.scale(out)
+            self.assertAlmostEqual(scale, self.scale(self.drag("--from", pulled, "--dry-run")[0])[0], delta=0.02)
+            self.assertAlmostEqual(float(self.info("pad_tangential_scale +")[0].split()[1]), scale, delta=6e-4)
+
+    def test_after_the_force_nothing_is_left_to_do(self):
+        with self.device(f"play={pulled}", GRASP, "pad=1", "calibrated=1"):
+            out, _ = self.drag("--port", self.port, "--yes")
+            self.assertNotIn("do this again", out)
+
+    def test_what_cannot_be_calibrated_is_told(self):
+        for options, reason in (
+            ((SLIP,), "reports no tangential force"),
+            ((GRASP,), "no pad profile"),
+            ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3"),
+        ):
+            with self.subTest(reason), self.device(*options):
+                self.assertIn(reason, self.refused("--port", self.port, "--yes", drag=True))
+        with self.device(GRASP, "pad=1"):
+            self.run_cli("set", "rate=5", "--port", self.port)
+            few = "5.0 frames a second are too few to see a pull hold still; fingertip set rate=max"
+            self.assertIn(few, self.refused("--port", self.port, "--yes", drag=True))
 
 
 class Usage(CalibrateTest):
@@ -217,6 +349,8 @@ class Usage(CalibrateTest):
             (("--force", "0"), "0.1 to 50"),
             (("--force", "3", "--weight", "300"), "excludes"),
             (("--show", "--erase"), "excludes"),
+            (("--drag",), "--drag needs the pull"),
+            (("--drag", "--show"), "excludes"),
         ):
             self.assertIn(reason, self.error("calibrate", *arguments, status=2))
         self.assertIn("absent.csv", self.error("calibrate", "--from", os.path.join(self.folder, "absent.csv"), "--dry-run"))

@@ -19,68 +19,50 @@ class Usage(CliTest):
     def test_help_and_version(self):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
-        self.assertEqual(
-            sorted(commands),
-            sorted(
-                [
-                    "list",
-                    "info",
-                    "doctor",
-                    "monitor",
-                    "record",
-                    "replay",
-                    "convert",
-                    "grasp",
-                    "gripper",
-                    "tare",
-                    "calibrate",
-                    "pad",
-                    "set",
-                    "serve",
-                    "simulate",
-                    "validate",
-                    "web",
-                    "flash",
-                    "rule",
-                    "loader",
-                ]
-            ),
-        )
+        every = "list info doctor monitor record replay convert grasp gripper tare calibrate pad set serve simulate validate web flash rule loader"
+        self.assertEqual(sorted(commands), sorted(every.split()))
+        pages = {"": self.run_cli("--help")[0]}
         for command in set(commands) - {"simulate", "validate"}:  # whose programs are others: test_simulate.py, test_validate.py
-            self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
+            pages[command] = self.run_cli(command, "--help")[0]
+        for command, page in pages.items():
+            self.assertIn(f"Usage: fingertip {command}", page)
+            self.assertLessEqual(max(map(len, page.splitlines())), 80, command)
+            self.assertNotRegex(page, r"FLOAT|INT|TEXT| in \[", command)  # the library's own words
+        self.assertIn("slip_window=MS (5 to 1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none", " ".join(pages["set"].split()))
 
     def test_wrong_usage(self):
-        self.assertIn("see fingertip --help", self.error(status=2))
-        self.assertIn("see fingertip record --help", self.error("record", status=2))
-        self.error("monitor", "--bogus", status=2)
+        missing = "; give one of list, info, doctor, monitor, [a-z, ]*; see fingertip --help"
         for words, problem in (
-            ([], "a command is missing"),
-            (["touched"], '"touched" is no command'),
-            (["touched", "--port", "x"], "is no command"),
+            ("", f"a command is missing{missing}"),
+            ("touched --port x", f'"touched" is no command{missing}'),
+            ("recrod", '"recrod" is no command; is record meant[?] see fingertip --help'),
+            ("moniter", '"moniter" is no command; is monitor meant[?] see fingertip --help'),
+            ("inf", '"inf" is no command; is info meant[?] see fingertip --help'),
+            ("gripper1", '"gripper1" is no command; is gripper meant[?] see fingertip --help'),
+            ("seet", '"seet" is no command; is set meant[?] see fingertip --help'),
+            ("monitor --bogus", '"--bogus" is no option of it; see fingertip monitor --help'),
+            ("list --port a", '"--port" is no option of it; see fingertip list --help'),
+            ("list a b", '"a" is one word too many; see fingertip list --help'),
+            ("info --port a --port b", "--port is given twice; give it once; see fingertip info --help"),
+            ("record", r"FILE.csv[|]FILE.mcap[|]- is missing; see fingertip record --help"),
+            ("monitor --colour pink", '--colour "pink" is not possible; give auto, truecolour, 256 or plain; see fingertip monitor --help'),
+            ("monitor --colour 0", '--colour "0" is not possible; give auto, truecolour, 256 or plain; see fingertip monitor --help'),
+            ("info --transport bluetooth", '--transport "bluetooth" is not possible; give auto, socket, serial or usb; see .*'),
+            *((f"record x.csv --seconds={value}", ".*; give a number from 0.001.*") for value in ("nan", "-1", "0", "inf", "1x")),
+            *((f"replay x.csv --speed {value}", ".*; give 0.01 to 1000, or max;.*") for value in ("abc", "0", "nan", "-1", "1001")),
+            ("set --keep --forget", ".*excludes.*"),
+            ("set", "nothing to set; give .*"),
+            *((f"set {text}", ".*give .*") for text in ("prior=0", "limit=x", "prior=3:0")),
+            # ranges are found before a port is opened
+            *((f"set --port {self.port} rate={rate}", ".*0.1 to 2000 Hz, or max.*") for rate in ("0", "x")),
+            (f"set --port {self.port} rate", ".*0.1 to 2000 Hz.*"),
+            (f"set --port {self.port} osr=1000", ".*256, 512, 1024, 2048, 4096 or 8192.*"),
+            (f"set --port {self.port} slip_threshold=0", ".*0.01 to 50 mm.*"),
+            (f"set --port {self.port} slip_window=1001", ".*5 to 1000 ms.*"),
+            (f"set --port {self.port} colour=red", ".*rate=HZ[|]max.*"),
+            ("pad --erase --thickness 12", ".*excludes.*"),
         ):
-            self.assertRegex(self.error(*words, status=2), f"{problem}; give one of list, info, doctor, monitor, .*; see fingertip --help")
-        for word, meant in (("recrod", "record"), ("moniter", "monitor"), ("inf", "info"), ("gripper1", "gripper"), ("seet", "set")):
-            self.assertEqual(self.error(word, status=2), f'fingertip: "{word}" is no command; is {meant} meant? see fingertip --help\n')
-
-    def test_wrong_values_say_what_is_right(self):
-        for value in ("nan", "-1", "0", "inf", "1x"):
-            self.assertIn("give a number from 0.001", self.error("record", self.csv, f"--seconds={value}", status=2))
-        for value in ("pink", "0"):
-            err = self.error("monitor", "--colour", value, status=2)
-            self.assertEqual(
-                err, f'fingertip: --colour "{value}" is not possible; give auto, truecolour, 256 or plain; see fingertip monitor --help\n'
-            )
-        for value in ("abc", "0", "nan", "-1", "1001"):
-            self.assertIn("give 0.01 to 1000, or max", self.error("replay", self.csv, "--speed", value, status=2))
-
-    def test_what_the_parser_says_is_for_people(self):
-        self.assertEqual(
-            self.error("info", "--port", "a", "--port", "b", status=2),
-            "fingertip: --port is given twice; give it once; see fingertip info --help\n",
-        )
-        self.assertEqual(self.error("list", "--port", "a", status=2), 'fingertip: "--port" is no option of it; see fingertip list --help\n')
-        self.assertEqual(self.error("list", "a", "b", status=2), 'fingertip: "a" is one word too many; see fingertip list --help\n')
-        self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|FILE.mcap|- is missing; see fingertip record --help\n")
+            self.assertRegex(self.error(*words.split(), status=2), f"^fingertip: {problem}\n$")
 
     def test_output_that_cannot_be_written(self):
         for words in (["--help"], ["record", "--help"], ["--version"], ["rule"]):
@@ -91,18 +73,6 @@ class Usage(CliTest):
                 (process.returncode, err),
                 (1, "fingertip: cannot write to standard output: No space left on device; choose another place\n"),
             )
-
-    def test_help_fits_into_80_columns(self):
-        pages = {(): self.run_cli("--help")[0]}
-        for command in set(re.findall(r"^  (\w+) ", pages[()].split("Subcommands:")[1], re.M)) - {"simulate", "validate"}:
-            pages[command] = self.run_cli(command, "--help")[0]
-        for command, page in pages.items():
-            for line in page.splitlines():
-                self.assertLessEqual(len(line), 80, (command, line))
-            words = page.split()
-            self.assertIn("Usage:", words)
-            self.assertNotRegex(page, r"FLOAT|INT|TEXT| in \[", command)  # the library's own words
-        self.assertIn("slip_window=MS (5 to 1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none", " ".join(pages["set"].split()))
 
     def test_the_help_of_grasp_knows_what_its_errors_know(self):
         page = " ".join(self.run_cli("grasp", "--help")[0].split())
@@ -130,26 +100,12 @@ class Usage(CliTest):
         self.assertIn("no such port", self.error("info", "--port", self.port))
         self.assertIn("no serial port", self.error("info", "--port", "/dev/null"))
         self.environment["FINGERTIP_PORT"] = "/tmp/a:/tmp/b"
-        self.assertIn("several fingertips found", self.error("info"))
         self.environment["FINGERTIP_PORT"] = self.port + ":" + self.folder
         self.assertRegex(
             self.run_cli("list")[0], f"-\t-\t-\tport {self.port} \\(.*no such port; plug .*\\)\n-\t-\t-\tport {self.folder} \\(.*\\)\n"
         )
         self.assertIn("no fingertip 1234 here", self.error("info", "--device", "1234"))
         self.assertIn("choose the fingertip with --device", self.error("info", "--port", self.port, "--transport", "usb"))
-        self.assertIn("give auto, socket, serial or usb", self.error("info", "--transport", "bluetooth", status=2))
-
-    def test_ranges_are_found_before_a_port_is_opened(self):
-        for setting, allowed in [
-            ("rate=0", "0.1 to 2000 Hz, or max"),
-            ("rate=x", "0.1 to 2000 Hz, or max"),
-            ("osr=1000", "256, 512, 1024, 2048, 4096 or 8192"),
-            ("slip_threshold=0", "0.01 to 50 mm"),
-            ("slip_window=1001", "5 to 1000 ms"),
-            ("colour=red", "rate=HZ|max"),
-            ("rate", "0.1 to 2000 Hz"),
-        ]:
-            self.assertIn(allowed, self.error("set", "--port", self.port, setting, status=2))
 
 
 class Several(CliTest):
@@ -187,7 +143,10 @@ class Several(CliTest):
                 self.error("info"),
                 f"fingertip: several fingertips found: AAAA ({self.port}), BBBB ({self.other}); choose one with --device SERIAL\n",
             )
-            self.assertIn("is fingertip AAAA, not BBBB", self.error("info", "--port", self.port, "--device", "BBBB"))
+            self.assertEqual(
+                self.error("info", "--port", self.port, "--device", "BBBB"),
+                f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n",
+            )
 
     ALIGNMENT_SECONDS = int(os.environ.get("FINGERTIP_ALIGNMENT_SECONDS", "3"))
 
@@ -264,20 +223,6 @@ class Several(CliTest):
         self.run_cli("replay", self.csv, "--device", "BBBB", "--to-csv", converted)
         self.assertTrue(np.array_equal(files.read_recording(converted)["t_us"], two["t_us"]))
         self.assertEqual(files.read_recording(converted).metadata["serial"], "BBBB")
-
-    def test_one_of_two_goes_and_comes_back(self):
-        with self.device("serial=AAAA"), self.device("serial=BBBB", "vanish=100,500", port=self.other):
-            process = self.start("record", self.csv, "--all")
-            self.world.until(lambda: os.path.exists(self.csv) and any("1/event: back" in c for c in self.rows()[1]))
-            self.world.until(lambda: sum(row["device"] == "1" for row in self.rows()[0]) > 130)
-            process.send_signal(signal.SIGINT)
-            _, err = process.communicate()
-        self.assertEqual(process.returncode, 0, err)
-        self.assertIn(" of 2 fingertips, aligned to ", err)
-        one, two = (files.read_recording(self.csv, serial=serial) for serial in ("AAAA", "BBBB"))
-        self.assertEqual((len(one.events), len(two.events)), (0, 2))
-        self.assertTrue((np.diff(two.time_us) > 0).all())
-        self.assertTrue((np.diff(one["frame"]) == 1).all())
 
     def test_all_agree_on_what_came(self):
         """Recorder, replay, conversion, reader and plot of a joint recording whose fingertip was unplugged."""
@@ -359,16 +304,6 @@ class ErrorsPeopleMeet(CliTest):
         self.assertRegex(self.error("monitor", "--transport", "usb"), "^fingertip: no fingertip found by libusb; plug one in")
         self.assertFalse(os.path.exists(self.csv))
 
-    def test_two_and_none_chosen(self):
-        other = self.port + "2"
-        with self.device("serial=AAAA"), self.device("serial=BBBB", port=other):
-            self.environment["FINGERTIP_PORT"] = self.port + ":" + other
-            for command in (["info"], ["monitor"], ["record", self.csv], ["tare"]):
-                self.assertEqual(
-                    self.error(*command),
-                    f"fingertip: several fingertips found: AAAA ({self.port}), BBBB ({other}); choose one with --device SERIAL\n",
-                )
-
     def test_wrong_device(self):
         with self.device("mute=1"):
             _, err = self.run_cli("info", "--port", self.port, status=1)
@@ -376,11 +311,6 @@ class ErrorsPeopleMeet(CliTest):
                 err,
                 f"{self.port}: waiting for an answer\n"
                 f'fingertip: {self.port}: no answer to "info"; is it a fingertip? unplug it and plug it in again\n',
-            )
-        with self.device("serial=AAAA"):
-            self.assertEqual(
-                self.error("info", "--port", self.port, "--device", "BBBB"),
-                f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n",
             )
 
     def test_older_or_newer_protocol_version(self):
@@ -457,9 +387,6 @@ class Commands(CliTest):
             self.assertRegex(self.run_cli("info")[0], r"(?m)^stored +settings$")
             self.assertNotIn("kept", self.run_cli("set", "--forget", "prior=none")[0])
             self.assertIn(" kept\n", self.run_cli("set", "--keep")[0])
-        self.assertIn("excludes", self.error("set", "--keep", "--forget", status=2))
-        for words in ([], ["prior=0"], ["limit=x"], ["prior=3:0"]):
-            self.assertIn("give", self.error("set", *words, status=2))
 
     def test_info_shows_a_calibration(self):
         with self.device("calibrated=1"):
@@ -503,7 +430,6 @@ class Commands(CliTest):
                 self.assertIn("give --thickness MM of the pad's rubber, or calibrate first", self.error("pad", *untold, status=2))
             for wrong in (["--thickness", "21"], ["--thickness", "12", "--overhang", "200"]):
                 self.assertIn("out of range; give", self.error("pad", *wrong, status=2))
-        self.assertIn("excludes", self.error("pad", "--erase", "--thickness", "12", status=2))
         with self.device():
             self.assertIn("of scene slip, reports no tangential force; install one of scene grasp", self.error("pad", "--thickness", "12"))
         with self.device("capabilities=15", "refuse=1"):
@@ -552,14 +478,6 @@ class Commands(CliTest):
             process.send_signal(signal.SIGINT)
             out, err = process.communicate()
             self.assertEqual((process.returncode, out, err), (1, "", "fingertip: interrupted\n"))
-
-    def test_a_port_in_use_is_busy(self):
-        with self.device():
-            process = self.start("record", self.csv, "--port", self.port)
-            self.world.until(lambda: os.path.exists(self.csv))
-            self.assertIn("in use by another program", self.error("info", "--port", self.port))
-            process.send_signal(signal.SIGINT)
-            process.communicate()
 
 
 if __name__ == "__main__":

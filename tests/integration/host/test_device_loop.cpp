@@ -3,7 +3,6 @@
 #include "libfingertip/served_port.hpp"
 #include "support/host_packets.hpp"
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <gtest/gtest.h>
@@ -83,41 +82,6 @@ DeviceLoop::Options streaming() {
 }
 
 } // namespace
-
-TEST(DeviceLoop, FromTheFirstAnswerToTheEndNoPacketIsMissing) {
-  Answering fingertip;
-  DeviceFeed feed;
-  DeviceLoop loop(3, {"", fingertip.path(), false}, streaming(), feed);
-  std::vector<std::uint16_t> sequences;
-  bool ready = false, ended = false;
-  auto patience = host_now() + std::chrono::seconds(20);
-  while (!ended && host_now() < patience) {
-    for (const DeviceNews &news : feed.take(milliseconds(20))) {
-      EXPECT_EQ(news.device, 3u);
-      EXPECT_FALSE(ended) << "news after the last";
-      if (news.kind == Kind::packet) {
-        sequences.push_back(news.packet.sequence);
-      } else if (news.kind == Kind::ready) {
-        EXPECT_FALSE(ready);
-        ready = true;
-        EXPECT_EQ(news.packet.sequence, sequences.back()) << "the last packet before it";
-        EXPECT_EQ(news.health.sensors_present, 0x7FFFu);
-        loop.start();
-      }
-      ended = news.kind == Kind::ended;
-    }
-    if (sequences.size() > 500) {
-      loop.stop();
-    }
-  }
-  EXPECT_TRUE(ready);
-  EXPECT_TRUE(ended);
-  loop.rethrow();
-  for (std::size_t i = 1; i < sequences.size(); i++) {
-    ASSERT_EQ(sequences[i], static_cast<std::uint16_t>(sequences[i - 1] + 1));
-  }
-  EXPECT_EQ(loop.statistics().packets, sequences.size());
-}
 
 TEST(DeviceLoop, AFullFeedHoldsItBackAndDoesNotKeepItFromEnding) {
   Answering fingertip;

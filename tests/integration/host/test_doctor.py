@@ -45,34 +45,27 @@ class DoctorTest(CliTest):
         self.assertEqual(status, 1 if any(verdict == "bad" for verdict, _, _ in found) else 0)
         return found
 
-    def finding(self, check, *arguments, **options):
-        found = [(verdict, text) for verdict, name, text in self.findings(*arguments, **options) if name == check]
-        self.assertEqual(len(found), 1, found)
-        return found[0]
-
-    def test_another_protocol_version(self):
-        self.plug_in("version=3")
-        verdict, text = self.finding("protocol")
-        self.assertEqual(verdict, "bad")
-        self.assertIn("speaks protocol version 3, not 9; install this tool's firmware", text)
-
-    def test_another_firmware_version(self):
-        self.plug_in("firmware=0.0.9")
-        verdict, text = self.finding("firmware")
-        self.assertEqual(verdict, "warn")
+    def test_findings(self):
         version = self.run_cli("--version")[0].split()[1]
-        self.assertIn(f"0.0.9 (0123456789ab+), board pico_mux, scene slip; this tool is of version {version}", text)
-
-    def test_the_same_firmware_version(self):
-        version = self.run_cli("--version")[0].split()[1]
-        self.plug_in(f"firmware={version}")
-        self.assertEqual(self.finding("firmware")[0], "ok")
-
-    def test_no_answer(self):
-        self.plug_in("mute=1")
-        verdict, text = self.finding("protocol")
-        self.assertEqual(verdict, "bad")
-        self.assertIn('no answer to "info"', text)
+        for options, check, verdict, text in (
+            (["version=3"], "protocol", "bad", "speaks protocol version 3, not 9; install this tool's firmware"),
+            (["mute=1"], "protocol", "bad", 'no answer to "info"'),
+            (["firmware=0.0.9"], "firmware", "warn", rf"0.0.9 \(0123456789ab\+\), board pico_mux, scene slip; .* of version {version}"),
+            ([f"firmware={version}"], "firmware", "ok", version),
+            (["drop=20", "flip=30"], "packets", "warn", "[1-9][0-9]* lost, [1-9][0-9]* damaged"),
+            (["frames=20"], "port", "bad", "vanished while it was examined"),
+            ([], "restarts", "warn", "by the watchdog"),
+            (
+                [],
+                "crash",
+                "bad",
+                "a hard fault at 0x20001000, .* fitting, .*; before that: command stream 1.50 s, started 4 min; r0 0x00000001",
+            ),
+        ):
+            with self.subTest(options), self.device(*options):
+                found = [(one, words) for one, name, words in self.findings() if name == check]
+                self.assertEqual([one for one, _ in found], [verdict], found)
+                self.assertRegex(found[0][1], text)
 
     def test_no_port_and_no_rule(self):
         self.rule.unlink()
@@ -87,25 +80,6 @@ class DoctorTest(CliTest):
         self.assertEqual([line[:2] for line in self.findings(tool=tool, **user)], [("ok", "rule"), ("bad", "port")])
         self.rule.unlink()
         self.assertEqual([line[:2] for line in self.findings(tool=tool, **user)], [("bad", "rule"), ("bad", "port")])
-
-    def test_lost_and_damaged_packets(self):
-        self.plug_in("drop=20", "flip=30")
-        verdict, text = self.finding("packets")
-        self.assertEqual(verdict, "warn")
-        self.assertRegex(text, r"[1-9][0-9]* lost, [1-9][0-9]* damaged")
-
-    def test_what_vanishes_meanwhile(self):
-        self.plug_in("frames=20")
-        self.assertIn("vanished while it was examined", self.finding("port")[1])
-
-    def test_a_watchdog_reset_is_told(self):
-        self.plug_in()
-        self.assertEqual(self.finding("restarts")[0], "warn")
-        verdict, text = self.finding("crash")
-        self.assertEqual(verdict, "bad")
-        self.assertRegex(
-            text, "a hard fault at 0x20001000, .* fitting, .*; before that: command stream 1.50 s, started 4 min; r0 0x00000001"
-        )
 
     def test_an_elf_file_that_is_none_is_an_error(self):
         self.plug_in()

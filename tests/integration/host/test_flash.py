@@ -35,6 +35,9 @@ class Flash(CliTest):
         with open(os.path.join(self.volume, "INFO_UF2.TXT"), "w", encoding="ascii") as file:
             file.write(f"UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: {board}\n")
 
+    def assert_written(self):
+        self.assertEqual(pathlib.Path(self.volume, "fingertip.uf2").read_bytes(), pathlib.Path(self.image).read_bytes())
+
     def flash(self, *first, after=("board=pico_mux", "git=abcdef012345", "firmware=9.8.7"), status=0):
         """Runs flash against a device with these options, that ends in its loader, and comes back with those."""
         with self.device("loader=1", *first) as device:
@@ -45,8 +48,7 @@ class Flash(CliTest):
                 written = os.path.join(self.volume, "fingertip.uf2")
                 size = os.path.getsize(self.image)
                 self.world.until(lambda: os.path.exists(written) and os.path.getsize(written) == size)
-                with open(written, "rb") as new, open(self.image, "rb") as image:
-                    self.assertEqual(new.read(), image.read())
+                self.assert_written()
                 os.unlink(os.path.join(self.volume, "INFO_UF2.TXT"))
                 with self.device(*after):
                     out, err = process.communicate()
@@ -73,8 +75,7 @@ class Flash(CliTest):
         self.assertEqual(
             err, f"writing 9.8.7 abcdef012345 for pico_mux\nwritten, and it came back; its version was not read: {self.port}: {self.RULE}\n"
         )
-        with open(os.path.join(self.volume, "fingertip.uf2"), "rb") as written, open(self.image, "rb") as image:
-            self.assertEqual(written.read(), image.read())
+        self.assert_written()
 
     def test_another_version_came_back(self):
         self.assertIn(
@@ -106,33 +107,31 @@ class Flash(CliTest):
         self.assertFalse(os.path.exists(os.path.join(self.folder, "fingertip.uf2")))
 
     def test_damaged_and_foreign_images_are_refused(self):
-        with open(self.image, "rb") as file:
-            good = file.read()
-
-        def refused(message, content):
-            path = os.path.join(self.folder, "bad.uf2")
-            with open(path, "wb") as file:
-                file.write(content)
-            self.assertIn(message, self.error("flash", path))
+        good = pathlib.Path(self.image).read_bytes()
 
         def with_word(block, word, value):
             at = 512 * block + 4 * word
             return good[:at] + value.to_bytes(4, "little") + good[at + 4 :]
 
-        refused("no UF2 file", b"")
-        refused("no UF2 file", b"\x7fELF" + good)
-        refused("cut off", good[:-1])
-        refused("numbered", good[:-512])
-        refused("block 1: numbered 2", good[:512] + good[1024:1536] + good[512:1024] + good[1536:])
-        refused("block 1: no UF2 block", with_word(1, 1, 0))
-        refused("block 2: no UF2 block", with_word(2, 127, 0))
-        refused("for another chip (UF2 family 0xe48bff59)", with_word(0, 7, 0xE48BFF59))
-        refused("for another chip", with_word(0, 2, 0))
-        refused("not the next page", with_word(1, 3, 0x10000000))
-        refused("not the next page", with_word(0, 4, 476))
-        refused("the boot ROM would refuse", with_word(0, 10, 1))
-        refused("the CRC of the image differs", with_word(3, 30, 0x12345678))
-        refused("no Fingertip firmware", good.replace(b"fingertip-board", b"fingertip-bored"))
+        path = os.path.join(self.folder, "bad.uf2")
+        for message, content in (
+            ("no UF2 file", b""),
+            ("no UF2 file", b"\x7fELF" + good),
+            ("cut off", good[:-1]),
+            ("numbered", good[:-512]),
+            ("block 1: numbered 2", good[:512] + good[1024:1536] + good[512:1024] + good[1536:]),
+            ("block 1: no UF2 block", with_word(1, 1, 0)),
+            ("block 2: no UF2 block", with_word(2, 127, 0)),
+            ("for another chip (UF2 family 0xe48bff59)", with_word(0, 7, 0xE48BFF59)),
+            ("for another chip", with_word(0, 2, 0)),
+            ("not the next page", with_word(1, 3, 0x10000000)),
+            ("not the next page", with_word(0, 4, 476)),
+            ("the boot ROM would refuse", with_word(0, 10, 1)),
+            ("the CRC of the image differs", with_word(3, 30, 0x12345678)),
+            ("no Fingertip firmware", good.replace(b"fingertip-board", b"fingertip-bored")),
+        ):
+            pathlib.Path(path).write_bytes(content)
+            self.assertIn(message, self.error("flash", path))
         self.assertIn("No such file", self.error("flash", self.folder + "/none.uf2"))
 
 

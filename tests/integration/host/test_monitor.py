@@ -59,75 +59,34 @@ class Monitor(CliTest):
                 self.assertEqual(before, after)
 
     def test_shows_what_matters(self):
-        for size in ((80, 24), (120, 40), (200, 60)):
-            with self.device():
-                output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until=r"frames +\d\d", then=b"q", size=size)
-            for word in (
-                "FINGERTIP",
-                "E660583883265A2C",
-                "pico_mux",
-                "● live",
-                "force      5.00 N",
-                "CONTACT",
-                "SLIP",
-                "0.75 of 0.75 mm",
-                "frames/s",
-                "dropped",
-                "CRC errors",
-                "convert 2501",
-                "no fit  13",
-                "q quit  t tare",
-                "tared",
-                "kPa",
-                "force  5 N┤",
-                "x    15 mm┤",
-                "y    24 mm┤",
-                "slip  1 mm┤",
-                " 0 s",
-            ):
-                self.assertIn(word, self.shown)
-            for sensor in range(15):
-                self.assertRegex(self.shown, rf"[ ▀▄]{sensor}[ ?▀▄]")
-            self.assertIn("38;2;", output)
-
-    def test_other_sizes(self):
         with self.device():
-            self.on_terminal(
-                "monitor", "--port", self.port, until="window too small: 79x24, needs 80x24.*force +5.00", then=b"q", size=(79, 24)
-            )
+            self.on_terminal("monitor", "--port", self.port, until=r"frames +\d\d", then=b"q", size=(120, 40))
+        for word in ("E660583883265A2C", "● live", "force      5.00 N", "0.75 of 0.75 mm", "convert 2501", "no fit  13", "q quit  t tare"):
+            self.assertIn(word, self.shown)
 
-    def test_without_colour(self):
-        for environment in ((("NO_COLOR", "1"), *self.COLOURS), (("NO_COLOR", "yes"), ("TERM", "xterm-256color"))):
-            with self.device():
-                output, _, _, _ = self.on_terminal(
-                    "monitor", "--port", self.port, until=r"frames +\d\d", then=b"q", environment=environment
-                )
-            self.assertNotRegex(output, r"\x1b\[[0-9;]*[34]8;")
-            self.assertNotRegex(output, r"\x1b\[(\d+;)*([34][0-7]|9[0-7]|10[0-7])m")
-            self.assertIn("┼", "".join(self.seen))
-        for environment, arguments in (
-            ((("NO_COLOR", ""), *self.COLOURS), ()),
-            ((("NO_COLOR", "1"), *self.COLOURS), ("--colour", "truecolour")),
+    def test_colours_and_characters_are_those_of_the_terminal(self):
+        colour, codes = r"\x1b\[[0-9;]*[34]8;", r"\x1b\[(\d+;)*([34][0-7]|9[0-7]|10[0-7])m"
+        for environment, options, has, has_not in (
+            ((("NO_COLOR", "1"), *self.COLOURS), (), "┼", f"{colour}|{codes}"),
+            ((("NO_COLOR", "yes"), ("TERM", "xterm-256color")), (), "┼", f"{colour}|{codes}"),
+            ((("NO_COLOR", ""), *self.COLOURS), (), "38;2;", "38;5;"),
+            ((("NO_COLOR", "1"), *self.COLOURS), ("--colour", "truecolour"), "38;2;", "38;5;"),
+            ((("TERM", "xterm-256color"), ("COLORTERM", "")), (), "38;5;", "38;2;"),
+            ((("TERM", "xterm"), ("LC_ALL", "C")), (), " us ", "[^\0-\x7f]"),
+            ((("TERM", "xterm"), ("LC_ALL", "POSIX")), (), "CONTACT", "[^\0-\x7f]"),
+            ((("TERM", "xterm"), ("LC_ALL", "xx_XX.utf8")), (), "▀", "38;2;"),  # a locale that this system does not have
+            ((("TERM", "dumb"),), (), "FIT_VALID", "\x1b"),
         ):
-            with self.device():
-                output, _, _, _ = self.on_terminal(
-                    "monitor", "--port", self.port, *arguments, until=r"frames +\d\d", then=b"q", environment=environment
-                )
-            self.assertIn("38;2;", output)
+            with self.subTest(environment), self.device():
+                until, then = ("FIT_VALID", signal.SIGINT) if environment[0][1] == "dumb" else (r"frames +\d\d", b"q")
+                output, *_ = self.on_terminal("monitor", "--port", self.port, *options, until=until, then=then, environment=environment)
+                self.assertIn(has, output + "".join(self.seen))
+                self.assertNotRegex(output, has_not)
 
-    CONTACT, FIT_VALID, TARED, UNCERTAIN, FORCE_LOWER_BOUND, AT_BOUND = 1, 2, 32, 1 << 10, 1 << 13, 1 << 15
+    CONTACT, FIT_VALID, TARED, FORCE_LOWER_BOUND, AT_BOUND = 1, 2, 32, 1 << 13, 1 << 15
 
-    def test_what_carries_a_warning_looks_it(self):
+    def test_a_line_with_a_warning_says_so(self):
         good = self.CONTACT | self.FIT_VALID | self.TARED
-        with self.device(f"flags={good}"):
-            self.on_terminal("monitor", "--port", self.port, until="5.00 N", then=b"q")
-        self.assertNotIn("?N", "".join(self.seen))
-        with self.device(f"flags={good | self.UNCERTAIN | self.FORCE_LOWER_BOUND}"):
-            self.on_terminal("monitor", "--port", self.port, until="5.00", then=b"q")
-        self.assertIn("≥5.00?N", self.shown)
-        self.assertIn("UNCERTAIN, may be off by more than 0.60 mm", self.shown)
-        self.assertIn("FORCE_LOWER_BOUND, the force is at least this", self.shown)
-        self.assertNotIn("┼", "".join(self.seen))
         for flags, words in (
             (good | self.AT_BOUND | self.FORCE_LOWER_BOUND, r"doubtful:  x -?\d.* force at least 5\.00 N  CONTACT .*AT_BOUND"),
             (good, r"dropped 0  CRC errors 0  x "),
@@ -135,37 +94,14 @@ class Monitor(CliTest):
             with self.device("frames=300", f"flags={flags}"):
                 self.assertRegex(self.run_cli("monitor", "--port", self.port, "--until-gone")[0], words)
 
-    def test_without_a_zero_there_are_no_pressures(self):
-        with self.device("flags=0"):
-            self.on_terminal("monitor", "--port", self.port, until=r"taring.*frames +\d\d", then=b"q")
-        self.assertNotIn("101", self.shown)
-        self.assertIn("no zero yet", self.shown)
-
-    def test_what_is_gone_has_no_rate(self):
-        with self.device("frames=50"):
-            self.on_terminal("monitor", "--port", self.port, until="gone, plug it in again", then=b"q")
-        self.assertRegex(self.shown, "frames/s +- ")
-        self.assertNotIn("5.00 N", self.shown)
-
     def test_several_side_by_side(self):
         other = self.port + "2"
         self.environment["FINGERTIP_PORT"] = self.port + ":" + other
-        for size in ((80, 24), (200, 60)):
-            with self.device("serial=AAAA"), self.device("serial=BBBB", f"flags={self.CONTACT | self.TARED}", port=other):
-                output, status, _, _ = self.on_terminal(
-                    "monitor",
-                    "--all",
-                    "--record",
-                    self.csv,
-                    "--overwrite",
-                    size=size,
-                    until=r"5\.00 N.*frames/s +\d.*frames/s +\d",
-                    then=b"q",
-                )
-            self.assertEqual(status, 0, output[-500:])
-            self.assertRegex(self.shown, "AAAA pico_mux .*● live .*BBBB pico_mux .*● live")
-            self.assertRegex(self.shown, r"force +5\.00 N.* force +- N")
-            self.assertEqual(len(re.findall(r"force +\d N┤", self.shown)), 2)
+        with self.device("serial=AAAA"), self.device("serial=BBBB", f"flags={self.CONTACT | self.TARED}", port=other):
+            until = r"5\.00 N.*frames/s +\d.*frames/s +\d"
+            output, status, _, _ = self.on_terminal("monitor", "--all", "--record", self.csv, size=(200, 60), until=until, then=b"q")
+        self.assertEqual(status, 0, output[-500:])
+        self.assertRegex(self.shown, "AAAA pico_mux .*● live .*BBBB pico_mux .*● live")
         with self.device("serial=AAAA"), self.device("serial=BBBB", "refuse=1", port=other):
             self.on_terminal("monitor", "--device", "AAAA", "--device", "BBBB", until="live.*live", then=[b"t", b"y"], finally_="not tared")
         self.assertTrue(any("tare all, pads free? y/n" in line for line in self.seen))
@@ -177,81 +113,30 @@ class Monitor(CliTest):
 
     def test_replay_pauses_and_seeks(self):
         with self.device():
-            self.run_cli("record", self.csv, "--port", self.port, "--seconds", "2")
-        lines = pathlib.Path(self.csv).read_text(encoding="utf-8").splitlines(keepends=True)
-        first_us = next(int(line.split(",")[0]) for line in lines if line[0].isdigit())
-        with open(self.csv, "w", encoding="utf-8") as file:  # the same, twenty times as long
-            for line in lines:
-                if line[0].isdigit():
-                    t_us, others = line.split(",", 1)
-                    line = f"{first_us + 20 * (int(t_us) - first_us)},{others}"
-                file.write(line)
-        last_us = max(int(line.split(",")[0]) for line in lines if line[0].isdigit())
-        end_s = 20 * (last_us - first_us) / 1e6  # 40, or more of a machine that is busy
-        back = "|".join(f"{end_s - 5 + tenth / 10:.1f}" for tenth in range(-2, 3))
+            self.run_cli("record", self.csv, "--port", self.port, "--seconds", "12")
+        keys = [b" ", b"\x1b[C", b"\x1bOC", b"\x1b[H", b"\x1b[F", b"\x1b[D"]
         output, status, _, _ = self.on_terminal(
-            "replay",
-            self.csv,
-            until="space pause.* at 0",
-            then=[b" ", b"\x1b[C", b"\x1bOC", b"\x1b[D", b"\x1b[H", b"\x1b[F", b"\x1b[D"],
-            finally_=f"PAUSED at ({back})",
+            "replay", self.csv, until="space pause.* at 0", then=keys, finally_=r"PAUSED at (6\.9|7\.[01])"
         )
         self.assertEqual(status, 0, output[-300:])
         places = [float(at) for line in self.seen for at in re.findall(r"PAUSED at (\d+\.\d) s of", line)]
         begin = places[0]
-        self.assertLess(begin, 3)
-        for place in (begin + 5, begin + 10, 0.0):
+        self.assertLess(begin, 2)
+        for place in (begin + 5, begin + 10, 0.0, 12.0):
             self.assertTrue(any(abs(place - at) < 0.11 for at in places), (place, places))
-        self.assertTrue(any(abs(at - end_s) < 0.5 for at in places), places)
-        self.assertAlmostEqual(places[-1], max(places) - 5, delta=0.11)
         self.assert_restored(output)
-
-    def test_256_colours(self):
-        with self.device():
-            output, _, _, _ = self.on_terminal(
-                "monitor", "--port", self.port, until="live", then=b"q", environment=(("TERM", "xterm-256color"), ("COLORTERM", ""))
-            )
-        self.assertIn("38;5;", output)
-        self.assertNotIn("38;2;", output)
-
-    def test_a_terminal_without_utf_8_gets_ascii(self):
-        for language in ("C", "POSIX"):
-            with self.device():
-                output, _, _, _ = self.on_terminal(
-                    "monitor", "--port", self.port, until="live", then=b"q", environment=(("TERM", "xterm"), ("LC_ALL", language))
-                )
-            self.assertTrue(output.isascii(), re.sub("[ -~]", "", output)[:200])
-            self.assertIn("CONTACT", self.shown)
-            self.assertIn(" us ", self.shown)
-        # a locale that this system does not have is known by its name
-        with self.device():
-            output, _, _, _ = self.on_terminal(
-                "monitor", "--port", self.port, until="live", then=b"q", environment=(("TERM", "xterm"), ("LC_ALL", "xx_XX.utf8"))
-            )
-        self.assertIn("▀", output)
 
     def test_flags_move_nothing(self):
         def places(*options):
             with self.device(*options):
                 self.on_terminal("monitor", "--port", self.port, until=r"frames +\d\d", then=b"q")
             lines = self.shown.split("\n")
-            return lines, [
+            return [
                 next((i, line.index(word)) for i, line in enumerate(lines) if word in line)
                 for word in ("force", "slip ", "frames/s", "dropped", "one frame", "CPU", "q quit")
             ]
 
-        _, few_places = places("flags=0")
-        many, many_places = places(f"flags={0x7FFFF}")
-        self.assertEqual(few_places, many_places)
-        for name in ("UNCERTAIN", "FORCE_LOWER_BOUND", "AT_BOUND", "SENSOR_DOUBTFUL"):
-            self.assertTrue(any(name in line for line in many), (name, many))
-
-    def test_a_dumb_terminal_gets_lines(self):
-        with self.device():
-            output, _, _, _ = self.on_terminal(
-                "monitor", "--port", self.port, until="FIT_VALID", then=signal.SIGINT, environment=(("TERM", "dumb"),)
-            )
-        self.assertNotIn("\x1b", output)
+        self.assertEqual(places("flags=0"), places(f"flags={0x7FFFF}"))
 
     def test_a_stall_shows(self):
         with self.device("stall=50"):
@@ -302,36 +187,8 @@ class Monitor(CliTest):
             self.assertFalse(done)
 
     def test_nothing_but_a_person_tares(self):
-        for keys in (
-            [b"t", b"n"],
-            [b"ty"],
-            [b"tytytyty\n"],
-            [b"t", b"ty"],
-            [b"\x1b[200~t\x1b[201~", b"y"],
-            [b"\x1b[8;24;80t", b"y"],
-            [b"\x1b]11;rgb:t/t/t\x07", b"y"],
-        ):
+        for keys in ([b"t", b"n"], [b"ty"], [b"\x1b[200~t\x1b[201~", b"y"]):
             self.assertFalse(self.on_terminal_tare(keys, None)[0], keys)
-
-    def test_a_recording_that_cannot_be_gives_the_terminal_back(self):
-        pathlib.Path(self.csv).write_text(
-            "# fingertip-recording 1\n"
-            + self.header_without_sensors()
-            + "\n# event: then\n1000,1"
-            + (len(files.RECORDING_COLUMNS) - 8) * ","
-            + ",7,0,0,0,0,20.00\n",
-            encoding="utf-8",
-        )
-        output, status, before, after = self.on_terminal("replay", self.csv, until="never", then=b"q")
-        self.assertEqual(status, 1)
-        self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
-        self.assertIn("pressures in a recording without sensors", output[output.rfind("\x1b[?1049l") :])
-        if after:
-            self.assertEqual(before, after)
-
-    @staticmethod
-    def header_without_sensors():
-        return ",".join(files.RECORDING_COLUMNS)
 
     def test_lines_where_there_is_no_terminal(self):
         with self.device("frames=300"):

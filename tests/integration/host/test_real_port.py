@@ -5,7 +5,6 @@ usage: test_real_port.py FINGERTIP FAKE_DEVICE [unittest arguments]
 
 # real time: the kernel passes on the bytes of a pseudo-terminal, and locks it, in its own time
 import os
-import pathlib
 import re
 import shutil
 import signal
@@ -65,11 +64,7 @@ class Port(RealPort, CliTest):
                 f"fingertip: {self.port}: in use by another program; end that one first (`fingertip doctor` names it)\n",
             )
             _, out, _ = self.world.run([FINGERTIP, "doctor", "--seconds", "1", "--port", self.port], env=self.environment)
-            self.assertRegex(
-                out,
-                rf"port .* in use by fingertip \(process {process.pid}\)|in use by another program: fingertip \(process {process.pid}\)"
-                rf"|fingertip.*{process.pid}",
-            )
+            self.assertRegex(out, rf"fingertip.*{process.pid}")
             process.kill()
             process.communicate()
             self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^serial +E660583883265A2C$")
@@ -77,15 +72,6 @@ class Port(RealPort, CliTest):
     def test_permission(self):
         with self.device():
             self.assertEqual(self.without_permission("info", "--port", self.port), f"fingertip: {self.port}: {self.RULE}\n")
-
-    def test_a_port_that_goes_is_waited_for(self):
-        with self.device("vanish=100,700", "frames=150"):
-            process = self.start("record", self.csv, "--port", self.port)
-            self.world.until(lambda: os.path.exists(self.csv) and len(self.rows()[0]) >= 220)
-            process.send_signal(signal.SIGINT)
-            _, err = process.communicate()
-        self.assertEqual(process.returncode, 0, err)
-        self.assertIn("dropped_packets=0", self.rows()[1][-1])
 
 
 class Loader(RealPort, test_flash.Flash):
@@ -107,64 +93,6 @@ class Install(RealPort, CliTest):
 
     def commands(self):
         return re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
-
-    def test_the_build_installs_all_of_the_tool(self):
-        build = pathlib.Path(FINGERTIP).parents[2]
-        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
-        installed = {
-            os.path.relpath(os.path.join(folder, name), self.folder) for folder, _, names in os.walk(self.folder) for name in names
-        }
-        page = {path for path in installed if path.startswith("share/fingertip/web/")}
-        if page:  # only where it was built
-            self.assertIn("share/fingertip/web/index.html", page)
-        tables = {path for path in installed if re.fullmatch(r"share/fingertip/tables/sphere(15|18)-.*\.table", path)}
-        self.assertEqual(len(tables), 2)
-        package = {path for path in installed if path.startswith("share/fingertip/python/")}
-        sources = [path for path in (ROOT / "host_tools/python/fingertip").rglob("*.*") if path.suffix in (".py", ".json", ".msg")]
-        self.assertEqual(len(package), len(sources) + 1)
-        sheet = os.path.join(self.folder, "sheet.pdf")
-        subprocess.run([os.path.join(self.folder, "bin/fingertip"), "validate", "--template", sheet], check=True, capture_output=True)
-        self.assertTrue(os.path.exists(sheet))
-        self.assertEqual(
-            installed - page - tables - package,
-            {
-                "bin/fingertip",
-                "libexec/fingertip/fingertip-simulate",
-                "lib/udev/rules.d/60-fingertip.rules",
-                "share/man/man1/fingertip.1",
-                "share/bash-completion/completions/fingertip",
-                "share/zsh/site-functions/_fingertip",
-                "share/fish/vendor_completions.d/fingertip.fish",
-                "lib/systemd/user/fingertip.service",
-            },
-        )
-        self.assertEqual(
-            subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True).stdout,
-            self.run_cli("--version")[0],
-        )
-        with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
-            self.assertEqual(file.read(), self.run_cli("rule")[0])
-
-    def test_a_page_of_another_version_is_told(self):
-        build = pathlib.Path(FINGERTIP).parents[2]
-        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
-        page = pathlib.Path(self.folder) / "share/fingertip/web/index.html"
-        page.parent.mkdir(parents=True, exist_ok=True)
-        version = self.run_cli("--version")[0].split()[1]
-        for head, told in (
-            (f'<meta name="fingertip-version" content="{version}">', ""),
-            ('<meta name="fingertip-version" content="9.8.7">', "version 9.8.7"),
-            ("<meta>", "an unknown version"),
-        ):
-            page.write_text(f"<html><head>{head}</head></html>")
-            said = subprocess.run(
-                [os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True
-            ).stdout
-            self.assertEqual(
-                said.splitlines(),
-                [f"fingertip {version}"]
-                + [f"the page beside this tool is of {told}, the tool of version {version}; install both from one release"] * bool(told),
-            )
 
     def test_the_rule_is_for_our_ids(self):
         rule = self.run_cli("rule")[0]

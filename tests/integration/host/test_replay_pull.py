@@ -24,29 +24,8 @@ def setUpModule():
     unittest.addModuleCleanup(temporary.cleanup)
     folder = pathlib.Path(temporary.name)
     scenario = folder / "lift.csv"
-    subprocess.run(
-        [
-            TWIN,
-            "scenario",
-            "lift",
-            "--seconds",
-            "6",
-            "--force",
-            f"{FORCE_N}",
-            "--tangential",
-            f"{SHARE},0",
-            "--gain",
-            "0",
-            "--seed",
-            "5",
-            "-o",
-            scenario,
-            "--cache",
-            TABLES,
-        ],
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+    options = f"--seconds 6 --force {FORCE_N} --tangential {SHARE},0 --gain 0 --seed 5"
+    subprocess.run([TWIN, "scenario", "lift", *options.split(), "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
 
 
 class ReplayPull(unittest.TestCase):
@@ -72,44 +51,11 @@ class ReplayPull(unittest.TestCase):
         self.assertNotIn("since touch", text)
         self.assertNotIn("no pad profile", text)
 
-    def test_before_the_lift_there_is_no_arrow(self):
-        text = self.shown("--pad", "12", at_s=2.0)
-        self.assertLess(self.numbers(text)[2], 0.05)
-        self.assertNotIn("→", text)
-
-    def test_since_the_touch_is_said(self):
-        text = self.shown("--pad", "12", "--from-touch")
-        self.assertAlmostEqual(self.numbers(text)[0], SHARE * FORCE_N, delta=0.3)
-        self.assertIn("since touch", text)
-
-    def test_without_a_pad_it_is_said_once(self):
-        text = self.shown()
-        self.assertEqual(text.count("no pad profile: fingertip pad"), 1)
-        self.assertNotIn("Q/F", text)
-
     def test_a_picture_that_moves(self):
         self.shown()
         out = folder / "moving.png"
-        self.assertEqual(
-            picture.main(
-                [
-                    str(folder / ".csv"),
-                    "-o",
-                    str(out),
-                    "--at",
-                    "1",
-                    "--until",
-                    "4",
-                    "--every",
-                    "0.5",
-                    "--size",
-                    "100x30",
-                    "--tool",
-                    FINGERTIP,
-                ]
-            ),
-            0,
-        )
+        options = "--at 1 --until 4 --every 0.5 --size 100x30 --tool"
+        self.assertEqual(picture.main([str(folder / ".csv"), "-o", str(out), *options.split(), FINGERTIP]), 0)
         with Image.open(out) as moving:
             self.assertEqual((moving.n_frames, moving.size), (7, (100 * picture.WIDTH, 30 * picture.HEIGHT)))
             frames = []

@@ -71,30 +71,13 @@ class Sharing(ServeTest):
                 first, first_csv = self.recording("first.csv", "--raw-bytes", self.ftr)
                 second, second_csv = self.recording("second.csv")
                 monitor = self.start("monitor", "--until-gone")
-                together = [
-                    self.start(*command)
-                    for command in (
-                        ["tare"],
-                        ["set", "osr=256"],
-                        ["set", "rate=400"],
-                        ["info"],
-                        ["list"],
-                        ["set", "limit=0.5", "--keep"],
-                        ["info", "--device", SERIAL.lower()],
-                        ["set", "slip_threshold=0.25"],
-                    )
-                ]
-                for process in together:
+                commands = f"tare, set osr=256, set rate=400, info, list, set limit=0.5 --keep, info --device {SERIAL.lower()}"
+                commands += ", set slip_threshold=0.25"
+                for process in [self.start(*command.split()) for command in commands.split(", ")]:
                     self.finished(process)
                 out = self.run_cli("info")[0]
-                for said in (
-                    r"osr +256",
-                    r"rate_mHz +400000",
-                    r"location_limit_mm +0.5",
-                    r"slip_threshold_mm +0.25",
-                    f"port +{self.socket_of()}",
-                ):
-                    self.assertRegex(out, rf"(?m)^{said}$")
+                for said in ("osr 256", "rate_mHz 400000", "location_limit_mm 0.5", "slip_threshold_mm 0.25", f"port {self.socket_of()}"):
+                    self.assertIn(said, re.sub(" +", " ", out))
                 for process in (first, second, monitor):
                     self.finished(process)
         direct = self.path("direct.csv")
@@ -143,23 +126,6 @@ class Sharing(ServeTest):
             _, out, _ = self.world.run([FINGERTIP, "doctor", "--seconds", "1"], env=self.environment)
         self.assertRegex(out, rf"(?m)^ok +port +{self.socket_of()}, shared$")
         self.assertRegex(out, r"(?m)^ok +packets +\d+ packets, 0 lost, 0 damaged$")
-
-    def test_losses_of_the_line_are_everybodys(self):
-        with self.device("drop=20", "flip=25", "frames=400"), self.served():
-            (one, one_csv), (other, other_csv) = self.recording("one.csv"), self.recording("other.csv")
-            self.finished(one)
-            self.finished(other)
-        for path, early in ((one_csv, 0), (other_csv, 1)):  # the other came when the line streamed: losses before its first row are its too
-            rows, comments = self.rows(path)
-            begin = int(rows[0]["frame"])
-            self.assertTrue(early or begin == 1)
-            dropped = sum(2 for frame in range(begin, 400) if frame % 20 == 0)
-            damaged = sum(1 for frame in range(begin, 400) if frame % 25 == 0 and frame % 20 != 0)
-            end = {key: int(value) for key, value in re.findall(r"(\w+)=(\d+)", comments[-1])}
-            torn = end["crc_errors"] + end["format_errors"]  # the latter where the bit is one of the coding
-            self.assertIn(torn - damaged, range(1 + early), comments[-1])
-            self.assertIn(end["dropped_packets"] - torn - dropped, (0, 2)[: 1 + early], comments[-1])
-            self.assertEqual(end["out_of_order"], 0)
 
     def test_a_fingertip_that_goes_and_comes_back(self):
         with self.device("vanish=100,700"), self.served():
@@ -242,14 +208,6 @@ class Clients(ServeTest):
         self.assertEqual([int(row["frame"]) for row in rows], list(range(int(rows[0]["frame"]), int(rows[0]["frame"]) + len(rows))))
         self.assertIn(f"dropped_packets={lost} out_of_order=0 crc_errors=0 format_errors=0", self.rows(stopped_csv)[1][-1])
 
-    def test_a_client_that_dies_is_nobodys_problem(self):
-        with self.device("frames=300"), self.served():
-            (killed, _), (other, other_csv) = self.recording("killed.csv"), self.recording("other.csv")
-            killed.kill()
-            self.finished(other)
-        self.assertIn("dropped_packets=0", self.rows(other_csv)[1][-1])
-        self.assertEqual(self.rows(other_csv)[0][-1]["frame"], "300")
-
     def test_a_past_client_is_streamed_nothing(self):
         with self.device(), self.served() as server:
             killed, _ = self.recording("killed.csv")
@@ -271,16 +229,6 @@ class Clients(ServeTest):
             many.close()
             self.run_cli("info")
             recorder.send_signal(signal.SIGINT)
-            self.finished(recorder)
-        self.assertIn("dropped_packets=0", self.rows(path)[1][-1])
-
-    def test_noise_from_a_client_harms_nobody(self):
-        with self.device("frames=300"), self.served():
-            recorder, path = self.recording("r.csv")
-            with socket.socket(socket.AF_UNIX) as noisy:
-                noisy.connect(self.socket_of())
-                noisy.sendall(os.urandom(50000) + b"\0" + b"\x55" * 50000)
-            self.run_cli("info")
             self.finished(recorder)
         self.assertIn("dropped_packets=0", self.rows(path)[1][-1])
 

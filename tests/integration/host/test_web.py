@@ -87,19 +87,8 @@ class Web(unittest.TestCase):
 
     def test_nothing_else_is(self):
         with self.served() as (host, port, _):
-            for path in (
-                "/../secret",
-                "/%2e%2e/secret",
-                "/..%2fsecret",
-                "/assets/../../secret",
-                "//etc/passwd",
-                "/assets",
-                "/assets/",
-                "/index.html/",
-                "/%00",
-                "/index.html%00.js",
-                "/" + "a" * 3000,
-            ):
+            paths = "/../secret /%2e%2e/secret /..%2fsecret /assets/../../secret //etc/passwd /assets /assets/ /index.html/ /%00 /index.html%00.js"
+            for path in (*paths.split(), "/" + "a" * 3000):
                 status, headers, body = self.ask(host, port, path)
                 self.assertIn(status, (400, 404), path)
                 self.assertNotIn(b"secret", body)
@@ -122,16 +111,8 @@ class Web(unittest.TestCase):
 
     def test_a_name_that_leads_here_is_refused(self):
         with self.served() as (host, port, _):
-            for name in (
-                "evil.example",
-                f"evil.example:{port}",
-                f"localhost.evil.example:{port}",
-                f"127.0.0.1.evil.example:{port}",
-                "",
-                "[evil]",
-                "[",
-                "127.1",
-            ):
+            hosts = "evil.example", "localhost.evil.example", "127.0.0.1.evil.example"
+            for name in (*(f"{name}:{port}" for name in hosts), hosts[0], "", "[evil]", "[", "127.1"):
                 status, _, body = self.ask(host, port, Host=name)
                 self.assertIn(status, (400, 421), name)
                 self.assertNotIn(FILES["index.html"][1], body)
@@ -165,14 +146,9 @@ class Web(unittest.TestCase):
 
     def test_what_cannot_be_served_is_said(self):
         with self.served() as (_, port, _):
-            self.assertEqual(
-                self.refused("--port", str(port)),
-                (
-                    1,
-                    f"fingertip: port {port} of 127.0.0.1 is taken by another program; end that one, or choose another --port "
-                    "(a browser asks for fingertips again there)\n",
-                ),
-            )
+            taken = f"port {port} of 127.0.0.1 is taken by another program; end that one, or choose another --port"
+            again = "(a browser asks for fingertips again there)"
+            self.assertEqual(self.refused("--port", str(port)), (1, f"fingertip: {taken} {again}\n"))
         for address in ("192.0.2.1", "no.such.name.invalid", "1.2.3"):
             status, said = self.refused("--address", address, "--port", "0")
             self.assertEqual(status, 1, address)
@@ -184,6 +160,14 @@ class Web(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("the page is not built", said)
         self.assertIn("sh cmake/bootstrap.sh web", said)
+
+    def test_a_page_of_another_version_is_told(self):
+        mark = '<meta name="fingertip-version" content="{}">'
+        for head, of in ((mark.format(__version__), ""), (mark.format("9.8.7"), "version 9.8.7"), ("<meta>", "an unknown version")):
+            (self.page / "index.html").write_text(f"<html><head>{head}</head></html>")
+            said = subprocess.run([self.tool, "--version"], capture_output=True, text=True, check=True).stdout
+            note = f"the page beside this tool is of {of}, the tool of version {__version__}; install both from one release"
+            self.assertEqual(said.splitlines(), [f"fingertip {__version__}"] + [note] * bool(of))
 
     def test_the_desktops_browser_opens_it(self):
         opener = self.folder / "bin/xdg-open"

@@ -55,13 +55,9 @@ class Package(unittest.TestCase):
         for package in self.packages:
             self.assertEqual(run("dpkg-deb", "--field", package, "Version").strip(), version)
         held = run("dpkg-deb", "--contents", self.packages[0])
-        for path in (
-            "bin/fingertip",
-            "lib/udev/rules.d/60-fingertip.rules",
-            "lib/systemd/user/fingertip.service",
-            "share/man/man1/fingertip.1.gz",
-            "share/bash-completion/completions/fingertip",
-        ):
+        expected = """bin/fingertip lib/udev/rules.d/60-fingertip.rules lib/systemd/user/fingertip.service share/man/man1/fingertip.1.gz
+            share/bash-completion/completions/fingertip"""
+        for path in expected.split():
             self.assertIn(f"./usr/{path}\n", held)
         for path in (pathlib.Path(TOOLS.build) / "host_tools/web/page").rglob("*.*"):  # where it was built
             self.assertIn(f"./usr/share/fingertip/web/{path.relative_to(pathlib.Path(TOOLS.build) / 'host_tools/web/page')}\n", held)
@@ -85,24 +81,9 @@ class Package(unittest.TestCase):
         (scripts / "post_install_fingertip").write_text(USE.format(packages=packages))
         (scripts / "post_install_fingertip").chmod(0o755)
         mirror = run("apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages").splitlines()[0]
-        run(
-            "piuparts",
-            "-D",
-            system("ID"),
-            "-d",
-            system("VERSION_CODENAME"),
-            "-m",
-            f"{mirror} main",
-            "--no-eatmydata",
-            "--no-upgrade-test",
-            "--bindmount",
-            packages,
-            "--testdebs-repo",
-            packages,
-            "--scriptsdir",
-            scripts,
-            *self.packages,
-        )
+        options = ["-D", system("ID"), "-d", system("VERSION_CODENAME"), "-m", f"{mirror} main", "--no-eatmydata", "--no-upgrade-test"]
+        folders = ["--bindmount", packages, "--testdebs-repo", packages, "--scriptsdir", scripts]
+        run("piuparts", *options, *folders, *self.packages)
         self.assertEqual((packages / "version").read_text(), run(TOOLS.fingertip, "--version"))
         self.assertEqual((packages / "rule").read_text(), run(TOOLS.fingertip, "rule"))
         self.assertIn("libfingertip.so", (packages / "libraries").read_text())

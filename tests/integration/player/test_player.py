@@ -86,14 +86,8 @@ class Player(unittest.TestCase):
         """5 N on a pad of 12 mm that is pulled along by 1.5 N from 1.5 s on: the field of the layer as
         firmware/common/pad_profile.h describes it."""
         path = self.folder / "sheared.csv"
-        rows = [
-            "# fingertip-scenario 1",
-            "# name: sheared",
-            "# ambient_Pa: 101325",
-            "# temperature_degC: 25",
-            "# sensors: 15",
-            "t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip," + ",".join(f"s{k}_Pa" for k in range(15)),
-        ]
+        names = "t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip," + ",".join(f"s{k}_Pa" for k in range(15))
+        rows = ["# fingertip-scenario 1", "# name: sheared", "# ambient_Pa: 101325", "# temperature_degC: 25", "# sensors: 15", names]
         normal = ((0.0952, 0.2962), (0.8216, 0.4781))
         pulled = ((0.0936, 0.4045), (0.3359, 0.6659), (0.4635, 1.6992))
         for ms in range(2001):
@@ -141,25 +135,21 @@ class Player(unittest.TestCase):
     def test_bad_scenarios_are_refused_with_their_place(self):
         good = self.scenario.read_text().splitlines(keepends=True)
         rows = [i for i, line in enumerate(good) if line[0].isdigit()]
-        cases = {
-            "no scenario": (["t_s,contact\n"], ":1: not a scenario"),
-            "cut off": (good[: rows[3]] + [good[rows[3]][:20]], "ends within a line"),
-            "no number": (good[: rows[3]] + [good[rows[3]].replace(",", ",x", 1)], f":{rows[3] + 1}: column"),
-            "time goes back": (good[: rows[3]] + [good[rows[0]]], "does not increase"),
-            "no rows": (good[: rows[0]], "no rows"),
-            "too far": (good[: rows[3]] + [",".join(good[rows[3]].split(",")[:8] + ["2e7"] * 15) + "\n"], "at most 1e7"),
-            "no such air": (good[: rows[0] - 1] + ["# ambient_Pa: 1e300\n"] + good[rows[0] - 1 : rows[3]], "at most 1e7"),
-            "too hot": (good[: rows[0] - 1] + ["# temperature_degC: 1e300\n"] + good[rows[0] - 1 : rows[3]], "at most 1000 degC"),
-            "too hot in a row": (
-                [
-                    line.rstrip("\n") + (",temperature_degC\n" if line[0] == "t" else ",1e300\n" if line[0].isdigit() else "\n")
-                    for line in good[: rows[3]]
-                ],
-                "at most 1000 degC",
-            ),
-        }
-        for name, (lines, message) in cases.items():
-            with self.subTest(name):
+        head, third = good[: rows[0]], good[rows[3]]
+        begin, later = good[: rows[3]], good[rows[0] - 1 : rows[3]]
+        hot_rows = [line.rstrip("\n") + {"t": ",temperature_degC\n", "#": "\n"}.get(line[0], ",1e300\n") for line in begin]
+        for lines, message in (
+            (["t_s,contact\n"], ":1: not a scenario"),
+            ([*begin, third[:20]], "ends within a line"),
+            ([*begin, third.replace(",", ",x", 1)], f":{rows[3] + 1}: column"),
+            ([*begin, good[rows[0]]], "does not increase"),
+            (head, "no rows"),
+            ([*begin, ",".join(third.split(",")[:8] + ["2e7"] * 15) + "\n"], "at most 1e7"),
+            ([*head[:-1], "# ambient_Pa: 1e300\n", *later], "at most 1e7"),
+            ([*head[:-1], "# temperature_degC: 1e300\n", *later], "at most 1000 degC"),
+            (hot_rows, "at most 1000 degC"),
+        ):
+            with self.subTest(message):
                 path = self.folder / "bad.csv"
                 path.write_text("".join(lines))
                 self.assertIn(message, self.refused("play", path, "-o", self.folder / "never.csv"))
@@ -167,11 +157,13 @@ class Player(unittest.TestCase):
         self.assertIn("check the path", self.refused("play", self.folder / "missing.csv", "-o", self.folder / "never.csv"))
 
     def test_wrong_options(self):
-        out = ("-o", self.folder / "never.csv")
-        self.assertIn("256", self.refused("play", self.scenario, *out, "--osr", "300"))
-        self.assertIn("belong together", self.refused("play", self.scenario, *out, "--prior-sigma", "3"))
-        self.assertIn("5 to 20 mm", self.refused("play", self.scenario, *out, "--pad", "3"))
-        self.assertIn("belong together", self.refused("play", self.scenario, *out, "--slip-window", "50"))
+        for options, reason in (
+            ("--osr 300", "256"),
+            ("--prior-sigma 3", "belong together"),
+            ("--pad 3", "5 to 20 mm"),
+            ("--slip-window 50", "belong together"),
+        ):
+            self.assertIn(reason, self.refused("play", self.scenario, "-o", self.folder / "never.csv", *options.split()))
 
     def test_what_calibrates_nothing_is_refused(self):
         out = ("--force", "3", "-o", self.folder / "found.commands")
@@ -191,23 +183,9 @@ class Player(unittest.TestCase):
         words = [must(OPTIONS.command_frame, *command.split()).strip() for command in commands]
         script.write_text("0.5 dtr 1\n" + "".join(f"{0.52 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(words)))
         path = self.folder / name
-        must(
-            OPTIONS.node,
-            ROOT / "host_tools/simulation/emulator/main.mjs",
-            "--board",
-            "pico_mux",
-            "--image",
-            OPTIONS.image,
-            "--scenario",
-            self.scenario,
-            "--host-script",
-            script,
-            "--capture",
-            path,
-            "--seconds",
-            "1.6",
-            "--fast-enumeration",
-        )
+        emulate = [OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", OPTIONS.image]
+        options = ["--host-script", script, "--capture", path, "--seconds", "1.6", "--fast-enumeration"]
+        must(*emulate, "--scenario", self.scenario, *options)
         return path
 
     def test_the_chip_sends_what_this_machine_computes(self):

@@ -112,31 +112,28 @@ TEST(PullFinder, TheRiseIsNotInTheMean) {
   }
 }
 
-TEST(PullFinder, TakesNothingThatMoves) {
+TEST(PullFinder, TakesNothingThatMovesOrHasNoRest) {
   Bench slides;
   slides.touch().go(0.3, 0.9, 0).go(2.0, 0.9, 0, 8.0);
-  EXPECT_TRUE(slides.pulls().empty());
-  EXPECT_EQ(slides.state(), PullFinder::State::refused);
   EXPECT_EQ(slides.refusal(), PullFinder::Refusal::slid);
   Bench creeps; /* 0.6 mm in a second: not far, but not still */
   creeps.touch().go(0.3, 0.9, 0).go(2.0, 0.9, 0, 1.2);
-  EXPECT_TRUE(creeps.pulls().empty());
   Bench rises;
   rises.touch().go(6.0, 1.8, 0);
-  EXPECT_TRUE(rises.pulls().empty());
   Bench pressed;
   pressed.touch().go(0.3, 0.9, 0).go(3.0, 0.9, 0, 0, 2 * FORCE_N);
-  EXPECT_TRUE(pressed.pulls().empty());
   Bench brief;
   brief.touch().go(0.3, 0.9, 0).go(1.0, 0.9, 0).go(0.3, 0, 0).go(1.0, 0, 0);
-  EXPECT_TRUE(brief.pulls().empty());
   EXPECT_EQ(brief.state(), PullFinder::State::resting);
-}
-
-TEST(PullFinder, TakesNothingWithoutARest) {
-  Bench bench;
-  bench.go(0.1, 0.0, 0).go(0.4, 0.9, 0).go(3.0, 0.9, 0);
-  EXPECT_TRUE(bench.pulls().empty());
+  Bench restless;
+  restless.go(0.1, 0.0, 0).go(0.4, 0.9, 0).go(3.0, 0.9, 0);
+  Bench weak;
+  weak.sd_N = 0.3;
+  weak.touch().go(0.3, 0.9, 0).go(3.0, 0.9, 0);
+  EXPECT_EQ(weak.refusal(), PullFinder::Refusal::weak);
+  for (const Bench *bench : {&slides, &creeps, &rises, &pressed, &brief, &restless, &weak}) {
+    EXPECT_TRUE(bench->pulls().empty());
+  }
 }
 
 TEST(PullFinder, AWarningBreaksAPull) {
@@ -165,14 +162,6 @@ TEST(PullFinder, FramesThatAreMissingMakeNoMean) {
     }
     EXPECT_EQ(finder.state(), PullFinder::State::settling);
   }
-}
-
-TEST(PullFinder, RefusesALoadThatTheFingertipHardlyKnows) {
-  Bench bench;
-  bench.sd_N = 0.3;
-  bench.touch().go(0.3, 0.9, 0).go(3.0, 0.9, 0);
-  EXPECT_TRUE(bench.pulls().empty());
-  EXPECT_EQ(bench.refusal(), PullFinder::Refusal::weak);
 }
 
 TEST(PullJudgement, IsGoodWithEnoughPullsThatAgree) {

@@ -82,50 +82,218 @@ Finding only(const Facts &facts, Verdict verdict, const std::string &check) {
 
 bool contains(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
 
-void fail(Facts &facts, ErrorCode code, const std::string &text) {
-  facts.failure = Failure{code, text};
+void fail(Facts &facts, ErrorCode code) {
+  facts.failure = Failure{code, "/dev/ttyACM0: ..."};
   facts.info.reset();
   facts.before.reset();
   facts.after.reset();
   facts.rest.reset();
 }
 
+void set_rate(Facts &facts, double share) {
+  facts.rest->frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10 * share);
+}
+
+void scale_pressures(Facts &facts, double factor) {
+  for (SensorAtRest &sensor : facts.rest->sensors) {
+    sensor.mean_Pa *= factor;
+    sensor.saturated_share = factor > 10 ? 1 : 0;
+  }
+}
+
+void miss(Facts &facts, std::uint32_t sensors) { facts.after->sensors_present &= ~sensors; }
+
+void hold(Facts &facts) { facts.holders.seen.push_back({123, "screen"}); }
+
+void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) {
+  facts.rest->sensors[5].drift = Slope{Pa_per_s, sd_Pa_per_s};
+}
+
+/* The only finding, with these words and of the sensors of these bits, where this is changed of a good one. */
+struct Case {
+  Verdict verdict;
+  const char *check, *words;
+  std::uint32_t sensors;
+  void (*change)(Facts &facts);
+};
+
+constexpr Verdict warn = Verdict::warn, bad = Verdict::bad;
+
+const Case CASES[] = {
+    {warn, "rule", "no udev rule", 0, [](Facts &f) { f.rule.clear(); }},
+    {bad, "port", "plugdev", 0, [](Facts &f) { fail(f, ErrorCode::permission_denied); }},
+    {warn, "port", "screen (process 123)", 0, [](Facts &f) { hold(f); }},
+    {bad, "port", "screen (process 123)", 0,
+     [](Facts &f) {
+       hold(f);
+       fail(f, ErrorCode::port_in_use);
+     }},
+    {bad, "port", "sudo", 0,
+     [](Facts &f) {
+       f.holders.all_seen = false;
+       fail(f, ErrorCode::port_in_use);
+     }},
+    {bad, "port", "...", 0, [](Facts &f) { fail(f, ErrorCode::no_fingertip); }},
+    {bad, "protocol", "flash", 0, [](Facts &f) { fail(f, ErrorCode::other_version); }},
+    {bad, "protocol", "unplug", 0, [](Facts &f) { fail(f, ErrorCode::no_answer); }},
+    {bad, "port", "vanished", 0,
+     [](Facts &f) {
+       f.failure = Failure{ErrorCode::gone, "/dev/ttyACM0: vanished while it was examined"};
+       f.after.reset();
+       f.rest.reset();
+     }},
+    {warn, "firmware", "this tool is of version 1.20.4", 0, [](Facts &f) { f.tool_version[2] = 4; }},
+    {warn, "board", "unknown", 0, [](Facts &f) { set_board(f, "native"); }},
+    {bad, "sensors", "strip 1, channel 2 of multiplexer 0x71", 0x80,
+     [](Facts &f) {
+       miss(f, 1u << 7);
+       f.rest->sensors[7].valid_share = 0;
+     }},
+    {bad, "sensors", "GP7 (pin 10)", 0x80,
+     [](Facts &f) {
+       set_board(f, "pico_parallel");
+       set_rate(f, 1);
+       miss(f, 1u << 7);
+     }},
+    {bad, "sensors", "multiplexer 0x72 does not answer", 0x7c00, [](Facts &f) { miss(f, 0x7C00); }},
+    {bad, "sensors", "held low", 0x7c00,
+     [](Facts &f) {
+       miss(f, 0x7C00);
+       f.after->bus_timeouts = f.before->bus_timeouts = 3;
+     }},
+    {bad, "sensors", "SCL on GP5 (pin 7)", 0x7fff, [](Facts &f) { miss(f, 0x7FFF); }},
+    {warn, "sensors", "of the frames only", 0x4, [](Facts &f) { f.rest->sensors[2].valid_share = 0.95; }},
+    {warn, "sensors", "temperature", 0x4, [](Facts &f) { f.rest->sensors[2].doubtful_share = 0.2; }},
+    {warn, "sensors", "range", 0x4, [](Facts &f) { f.rest->sensors[2].saturated_share = 0.2; }},
+    {warn, "sensors", "-25 kPa apart", 0x4, [](Facts &f) { f.rest->sensors[2].mean_Pa -= 25000; }},
+    {bad, "sensors", "not those of the firmware", 0, [](Facts &f) { scale_pressures(f, 0.05); }},
+    {bad, "sensors", "not those of the firmware", 0, [](Facts &f) { scale_pressures(f, 20); }},
+    {bad, "prom", "check sum", 0x8,
+     [](Facts &f) {
+       f.after->sensors_prom_bad = 1u << 3;
+       f.rest->sensors[3].doubtful_share = 1;
+     }},
+    {warn, "noise", "8.2 Pa rms", 0x200, [](Facts &f) { f.rest->sensors[9].noise_Pa = 2.1 * 3.9; }},
+    {bad, "noise", "39.0 Pa rms", 0x200, [](Facts &f) { f.rest->sensors[9].noise_Pa = 39; }},
+    {warn, "noise", "39.0 Pa rms", 0x200,
+     [](Facts &f) {
+       f.rest->sensors[9].noise_Pa = 39;
+       f.info->osr = 256; /* 11 Pa are its noise */
+       set_rate(f, 1);
+     }},
+    {bad, "noise", "do not change", 0x200, [](Facts &f) { f.rest->sensors[9].noise_Pa = 0; }},
+    {warn, "noise", "--seconds", 0,
+     [](Facts &f) {
+       f.info->rate_mHz = 1000;
+       f.rest->frames_made = 10;
+       for (SensorAtRest &sensor : f.rest->sensors) {
+         sensor.readings = 11;
+         sensor.noise_Pa = 39;
+       }
+     }},
+    {warn, "noise", "scene", 0,
+     [](Facts &f) {
+       f.rest->sensors.clear();
+       f.info->capabilities &= ~static_cast<std::uint32_t>(WIRE_CAPABILITY_RAW_STREAM);
+     }},
+    {warn, "drift", "-3.0 Pa/s", 0x20, [](Facts &f) { drift(f, -3, 0.05); }},
+    {warn, "drift", "all sensors together", 0, [](Facts &f) { f.rest->common_drift->Pa_per_s = 3; }},
+    {warn, "zero", "something touches the pad", 0,
+     [](Facts &f) {
+       f.rest->frames_touched = 400;
+       drift(f, 300, 0.1);
+     }},
+    {warn, "zero", "not every sensor has one", 0, [](Facts &f) { f.rest->last_flags = 0; }},
+    {warn, "zero", "may be a zero that has moved", 0,
+     [](Facts &f) { f.rest->last_flags |= CONTACT_FLAG_ZERO_DOUBTFUL; }},
+    {warn, "rate", "expected", 0, [](Facts &f) { set_rate(f, 0.9); }},
+    {bad, "rate", "expected", 0, [](Facts &f) { set_rate(f, 0.5); }},
+    {warn, "bus", "2.0 NACKs/s", 0, [](Facts &f) { f.after->bus_nacks = 20; }},
+    {warn, "bus", "1 recovery", 0, [](Facts &f) { f.after->bus_recoveries = 1; }},
+    {warn, "packets", "cable", 0, [](Facts &f) { f.line.dropped_packets = 5; }},
+    {warn, "packets", "computer", 0, [](Facts &f) { f.line.dropped_packets = f.after->packets_dropped = 5; }},
+    {warn, "packets", "1 damaged", 0, [](Facts &f) { f.line.crc_errors = 1; }},
+    {warn, "sync", "600 edges at the sync pin in 10.0 s, 3 missing", 0,
+     [](Facts &f) {
+       f.info->sync = 1;
+       f.rest->edges = 600;
+       f.rest->edges_missing = 3;
+     }},
+    {warn, "sync", "0 edges at the sync pin in 10.0 s; join the pin", 0, [](Facts &f) { f.info->sync = 1; }},
+    {warn, "sync", "set sync=off", 0, [](Facts &f) { f.info->sync = 1; }},
+    {warn, "restarts", "1 reset by the watchdog", 0, [](Facts &f) { f.after->watchdog_resets = 1; }},
+    {bad, "restarts", "while it was examined", 0, [](Facts &f) { f.after->uptime_s = 3; }},
+    {warn, "processor", "99.0 % busy", 0, [](Facts &f) { f.after->cpu_busy_permille = 990; }},
+    {warn, "processor", "4 frames skipped", 0, [](Facts &f) { f.after->frames_skipped = 4; }},
+    {warn, "stack", "bytes never used", 0, [](Facts &f) { f.after->stack_free_bytes--; }},
+    {bad, "stack", "0 bytes never used", 0, [](Facts &f) { f.after->stack_free_bytes = 0; }},
+    {bad, "stored", "calibrate again", 0, [](Facts &f) { f.info->stored = WIRE_STORED_DAMAGED; }},
+};
+
+/* What makes no finding. */
+void (*const FINE[])(Facts &) = {
+    [](Facts &) {},
+    [](Facts &f) {
+      set_board(f, "pico_parallel");
+      set_rate(f, 1);
+    },
+    [](Facts &f) { f.rest->edges = 600; },
+    [](Facts &f) { f.info->sync = 2; }, /* pulses at each frame, which are no packets */
+    [](Facts &f) {
+      f.info->sync = 1;
+      f.rest->edges = 600;
+    },
+    [](Facts &f) { f.rest->sensors[2].valid_share = 0.991; },
+    [](Facts &f) { scale_pressures(f, 5); }, /* it is pressed */
+    [](Facts &f) { f.rest->sensors[9].noise_Pa = 1.9 * 3.9; },
+    [](Facts &f) { drift(f, -3, 1); }, /* not sure */
+    [](Facts &f) {
+      drift(f, -3, 0.05);
+      f.rest->seconds = 5; /* too short */
+      f.rest->frames_made /= 2;
+    },
+    [](Facts &f) { set_rate(f, 0.98); },
+    [](Facts &f) {
+      f.info->rate_mHz = 20000; /* as asked for */
+      f.rest->frames_made = 200;
+    },
+    [](Facts &f) { f.before->bus_nacks = f.after->bus_nacks = 100; }, /* long ago */
+};
+
 } // namespace
 
-TEST(Judge, EdgesOfASyncPinThatStampsThem) {
-  Facts facts = good();
-  facts.rest->edges = 600;
-  EXPECT_TRUE(wrong(facts).empty());
-  for (const Finding &finding : judge(facts)) {
-    EXPECT_NE(finding.check, "sync"); /* it is not set */
-  }
-  facts.info->sync = 2; /* pulses at each frame, which are no packets */
-  EXPECT_EQ(judge(facts).size(), judge(good()).size());
-  facts.info->sync = 1;
-  EXPECT_TRUE(wrong(facts).empty());
-  EXPECT_EQ(judge(facts).size(), judge(good()).size() + 1);
-  facts.rest->edges_missing = 3;
-  EXPECT_EQ(only(facts, Verdict::warn, "sync").text, "600 edges at the sync pin in 10.0 s, 3 missing");
-  facts.rest->edges = facts.rest->edges_missing = 0;
-  const Finding silent = only(facts, Verdict::warn, "sync");
-  EXPECT_EQ(silent.text, "0 edges at the sync pin in 10.0 s");
-  EXPECT_NE(silent.advice.find("set sync=off"), std::string::npos);
-}
-
-TEST(Judge, NothingIsWrongWithAGoodOne) {
-  for (const char *board : {"pico_mux", "pico_parallel"}) {
-    auto findings = wrong(good(board));
-    EXPECT_TRUE(findings.empty()) << findings[0].text;
-    EXPECT_EQ(worst_of(judge(good(board))), Verdict::ok);
-    EXPECT_GE(judge(good(board)).size(), 15u);
+TEST(Judge, EachFaultIsNamedWithWhatToDo) {
+  for (const Case &each : CASES) {
+    SCOPED_TRACE(each.words);
+    Facts facts = good();
+    each.change(facts);
+    const Finding finding = only(facts, each.verdict, each.check);
+    EXPECT_TRUE(contains(finding.text + "; " + finding.advice, each.words)) << finding.text << "; " << finding.advice;
+    std::uint32_t sensors = 0;
+    for (unsigned sensor : finding.sensors) {
+      sensors |= 1u << sensor;
+    }
+    EXPECT_EQ(sensors, each.sensors);
   }
 }
 
-TEST(Judge, MissingRule) {
+TEST(Judge, WhatIsNoFaultIsNotNamed) {
+  for (std::size_t i = 0; i < std::size(FINE); i++) {
+    Facts facts = good();
+    FINE[i](facts);
+    for (const Finding &finding : wrong(facts)) {
+      ADD_FAILURE() << i << ": " << finding.check << ": " << finding.text;
+    }
+    EXPECT_EQ(worst_of(judge(facts)), Verdict::ok);
+    EXPECT_EQ(judge(facts).size(), judge(good()).size() + (facts.info->sync == 1)) << i;
+  }
+  EXPECT_GE(judge(good()).size(), 15u);
+}
+
+TEST(Judge, WithoutTheRuleTwoThingsAreWrong) {
   Facts facts = good();
   facts.rule.clear();
-  only(facts, Verdict::warn, "rule");
-  fail(facts, ErrorCode::permission_denied, "/dev/ttyACM0: permission denied");
+  fail(facts, ErrorCode::permission_denied);
   auto findings = wrong(facts);
   ASSERT_EQ(findings.size(), 2u);
   EXPECT_EQ(findings[0].check, "rule");
@@ -133,206 +301,24 @@ TEST(Judge, MissingRule) {
   EXPECT_EQ(findings[1].check, "port");
 }
 
-TEST(Judge, PermissionDeniedDespiteTheRule) {
-  Facts facts = good();
-  fail(facts, ErrorCode::permission_denied, "/dev/ttyACM0: permission denied");
-  EXPECT_TRUE(contains(only(facts, Verdict::bad, "port").advice, "plugdev"));
-}
-
-TEST(Judge, PortInUseNamesItsHolder) {
-  Facts facts = good();
-  facts.holders.seen = {{123, "screen"}};
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "port").text, "screen (process 123)"));
-  fail(facts, ErrorCode::port_in_use, "/dev/ttyACM0: in use by another program");
-  EXPECT_TRUE(contains(only(facts, Verdict::bad, "port").text, "screen (process 123)"));
-  facts.holders = {{}, false};
-  EXPECT_TRUE(contains(only(facts, Verdict::bad, "port").advice, "sudo"));
-}
-
-TEST(Judge, NoFingertip) {
-  Facts facts;
-  facts.rule = "/etc/udev/rules.d/60-fingertip.rules";
-  fail(facts, ErrorCode::no_fingertip, "no fingertip found");
-  only(facts, Verdict::bad, "port");
-}
-
-TEST(Judge, OtherProtocolOrNoAnswer) {
-  for (ErrorCode code : {ErrorCode::other_version, ErrorCode::no_answer}) {
-    Facts facts = good();
-    fail(facts, code, "/dev/ttyACM0: ...");
-    only(facts, Verdict::bad, "protocol");
-  }
-}
-
-TEST(Judge, OtherFirmware) {
-  Facts facts = good();
-  facts.tool_version = {1, 20, 4};
-  auto finding = only(facts, Verdict::warn, "firmware");
-  EXPECT_TRUE(contains(finding.text, "1.20.3") && contains(finding.text, "1.20.4"));
-}
-
-TEST(Judge, UnknownBoardHasNoPins) {
-  Facts facts = good();
+TEST(Judge, SensorsAreNamedOneByOneWithoutMultiplexersOrABoard) {
+  Facts facts = good("pico_parallel");
+  miss(facts, 0x7C00);
+  EXPECT_EQ(wrong(facts).size(), 5u);
+  facts = good();
   set_board(facts, "native");
-  only(facts, Verdict::warn, "board");
-  facts.after->sensors_present &= ~(1u << 4);
+  miss(facts, 1u << 4);
   EXPECT_TRUE(contains(wrong(facts)[1].text, "sensor 4 does not answer"));
 }
 
-TEST(Judge, MissingSensorWithItsPlace) {
-  Facts facts = good();
-  facts.after->sensors_present &= ~(1u << 7);
-  facts.rest->sensors[7] = {};
-  auto finding = only(facts, Verdict::bad, "sensors");
-  EXPECT_EQ(finding.sensors, std::vector<unsigned>{7});
-  EXPECT_TRUE(contains(finding.text, "strip 1, channel 2 of multiplexer 0x71"));
-  facts = good("pico_parallel");
-  facts.after->sensors_present &= ~(1u << 7);
-  finding = only(facts, Verdict::bad, "sensors");
-  EXPECT_TRUE(contains(finding.text, "GP7 (pin 10)"));
-}
-
-TEST(Judge, StripsOfOneBoardFailAsAWhole) {
-  Facts facts = good();
-  facts.after->sensors_present &= ~0x7C00u;
-  auto finding = only(facts, Verdict::bad, "sensors");
-  EXPECT_TRUE(contains(finding.text, "multiplexer 0x72 does not answer"));
-  EXPECT_EQ(finding.sensors.size(), 5u);
-  facts.after->bus_timeouts = facts.before->bus_timeouts = 3;
-  EXPECT_TRUE(contains(only(facts, Verdict::bad, "sensors").text, "held low"));
-  facts = good("pico_parallel");
-  facts.after->sensors_present &= ~0x7C00u;
-  EXPECT_EQ(wrong(facts).size(), 5u);
-}
-
-TEST(Judge, NoSensorAnswers) {
-  Facts facts = good();
-  facts.after->sensors_present = 0;
-  auto finding = only(facts, Verdict::bad, "sensors");
-  EXPECT_EQ(finding.sensors.size(), SENSORS);
-  EXPECT_TRUE(contains(finding.advice, "SCL on GP5 (pin 7)"));
-}
-
-TEST(Judge, SensorThatAnswersNowAndThen) {
-  Facts facts = good();
-  facts.rest->sensors[2].valid_share = 0.991;
-  EXPECT_TRUE(wrong(facts).empty());
-  facts.rest->sensors[2].valid_share = 0.95;
-  EXPECT_EQ(only(facts, Verdict::warn, "sensors").sensors, std::vector<unsigned>{2});
-}
-
-TEST(Judge, DoubtfulSaturatedAndApart) {
-  Facts facts = good();
-  facts.rest->sensors[2].doubtful_share = 0.2;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "sensors").text, "temperature"));
-  facts = good();
-  facts.rest->sensors[2].saturated_share = 0.2;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "sensors").text, "range"));
-  facts = good();
-  facts.rest->sensors[2].mean_Pa -= 25000;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "sensors").text, "-25 kPa apart"));
-}
-
-TEST(Judge, SensorsOfAnotherType) {
-  for (double factor : {0.05, 20.0}) {
-    Facts facts = good();
-    for (SensorAtRest &sensor : facts.rest->sensors) {
-      sensor.mean_Pa *= factor;
-      sensor.saturated_share = factor > 1 ? 1 : 0;
-    }
-    EXPECT_TRUE(contains(only(facts, Verdict::bad, "sensors").text, "not those of the firmware"));
-  }
-  Facts pressed = good();
-  for (SensorAtRest &sensor : pressed.rest->sensors) {
-    sensor.mean_Pa *= 5;
-  }
-  EXPECT_TRUE(wrong(pressed).empty());
-}
-
-TEST(Judge, BadCalibrationMemory) {
-  Facts facts = good();
-  facts.after->sensors_prom_bad = 1u << 3;
-  facts.rest->sensors[3].doubtful_share = 1;
-  EXPECT_EQ(only(facts, Verdict::bad, "prom").sensors, std::vector<unsigned>{3});
-}
-
-TEST(Judge, Noise) {
-  Facts facts = good();
-  facts.rest->sensors[9].noise_Pa = 1.9 * 3.9;
-  EXPECT_TRUE(wrong(facts).empty());
-  facts.rest->sensors[9].noise_Pa = 2.1 * 3.9;
-  EXPECT_EQ(only(facts, Verdict::warn, "noise").sensors, std::vector<unsigned>{9});
-  facts.rest->sensors[9].noise_Pa = 39;
-  only(facts, Verdict::bad, "noise");
-  facts.info->osr = 256;
-  facts.rest->frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10);
-  only(facts, Verdict::warn, "noise"); /* 11 Pa are its noise */
-  facts = good();
-  facts.rest->sensors[9].noise_Pa = 0;
-  EXPECT_TRUE(contains(only(facts, Verdict::bad, "noise").text, "do not change"));
-}
-
-TEST(Judge, NoiseOfTooFewOrNoReadings) {
-  Facts facts = good();
-  facts.info->rate_mHz = 1000;
-  facts.rest->frames_made = 10;
-  for (auto &sensor : facts.rest->sensors) {
-    sensor.readings = 11;
-    sensor.noise_Pa = 39;
-  }
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "noise").advice, "--seconds"));
-  facts.rest->sensors.clear();
-  facts.info->capabilities &= ~static_cast<std::uint32_t>(WIRE_CAPABILITY_RAW_STREAM);
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "noise").advice, "scene"));
-}
-
-TEST(Judge, Drift) {
-  Facts facts = good();
-  facts.rest->sensors[5].drift = Slope{-3, 0.05};
-  EXPECT_EQ(only(facts, Verdict::warn, "drift").sensors, std::vector<unsigned>{5});
-  facts.rest->sensors[5].drift = Slope{-3, 1};
-  EXPECT_TRUE(wrong(facts).empty()) << "not sure";
-  facts.rest->sensors[5].drift = Slope{-3, 0.05};
-  facts.rest->seconds = 5;
-  facts.rest->frames_made /= 2;
-  EXPECT_TRUE(wrong(facts).empty()) << "too short";
-  facts = good();
-  facts.rest->common_drift = Slope{3, 0.05};
-  EXPECT_TRUE(only(facts, Verdict::warn, "drift").sensors.empty());
-}
-
-TEST(Judge, TouchedPadHasNoDrift) {
+TEST(Judge, NoiseIsNamedBeforeATouchThatItLooksLike) {
   Facts facts = good();
   facts.rest->frames_touched = 400;
-  facts.rest->sensors[5].drift = Slope{300, 0.1};
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "zero").text, "something touches the pad"));
   facts.rest->sensors[5].noise_Pa = 100;
   auto findings = wrong(facts);
   ASSERT_EQ(findings.size(), 2u);
   EXPECT_EQ(findings[0].check, "noise");
   EXPECT_FALSE(contains(findings[1].text, "something touches"));
-}
-
-TEST(Judge, ZeroThatIsMissingOrDoubtful) {
-  Facts facts = good();
-  facts.rest->last_flags = 0;
-  only(facts, Verdict::warn, "zero");
-  facts.rest->last_flags = CONTACT_FLAG_TARED | CONTACT_FLAG_ZERO_DOUBTFUL;
-  only(facts, Verdict::warn, "zero");
-}
-
-TEST(Judge, Rate) {
-  Facts facts = good();
-  std::uint32_t expected = facts.rest->frames_made;
-  facts.rest->frames_made = expected * 98 / 100;
-  EXPECT_TRUE(wrong(facts).empty());
-  facts.rest->frames_made = expected * 9 / 10;
-  only(facts, Verdict::warn, "rate");
-  facts.rest->frames_made = expected / 2;
-  only(facts, Verdict::bad, "rate");
-  facts.info->rate_mHz = 20000;
-  facts.rest->frames_made = 200;
-  EXPECT_TRUE(wrong(facts).empty()) << "what was asked for";
 }
 
 TEST(Judge, RatesAreThoseOfTheReleaseImages) {
@@ -360,37 +346,14 @@ TEST(Judge, NoFrames) {
   EXPECT_EQ(findings[1].check, "noise");
 }
 
-TEST(Judge, BusAtRest) {
-  Facts facts = good();
-  facts.before->bus_nacks = facts.after->bus_nacks = 100;
-  EXPECT_TRUE(wrong(facts).empty()) << "long ago";
-  facts.after->bus_nacks = 120;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "bus").text, "2.0 NACKs/s"));
-  facts.after->bus_recoveries = 1;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "bus").text, "1 recovery"));
-}
-
-TEST(Judge, Packets) {
-  Facts facts = good();
-  facts.line.dropped_packets = 5;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "packets").advice, "cable"));
-  facts.after->packets_dropped = 5;
-  EXPECT_TRUE(contains(only(facts, Verdict::warn, "packets").advice, "computer"));
-  facts = good();
-  facts.line.crc_errors = 1;
-  only(facts, Verdict::warn, "packets");
-}
-
-TEST(Judge, RestartsProcessorStackStored) {
+TEST(Judge, ACrashIsToldWithItsPlaceEventsAndRegisters) {
   Facts facts = good();
   facts.after->watchdog_resets = 1;
-  only(facts, Verdict::warn, "restarts");
   facts.crash = with_places(test::make_crash(0, 0).body.crash, std::nullopt);
   facts.crash->symbols_note = "x.elf is of other firmware: no names";
   auto findings = wrong(facts);
   ASSERT_EQ(findings.size(), 2u);
   EXPECT_EQ(findings[0].check, "restarts");
-  EXPECT_TRUE(contains(findings[0].text, "1 reset by the watchdog"));
   EXPECT_EQ(findings[1].check, "crash");
   EXPECT_EQ(findings[1].verdict, Verdict::bad);
   for (const char *part :
@@ -399,29 +362,4 @@ TEST(Judge, RestartsProcessorStackStored) {
   }
   facts.crash->record.kind = CRASH_START;
   EXPECT_EQ(wrong(facts)[1].verdict, Verdict::warn);
-  facts = good();
-  facts.after->uptime_s = 3;
-  only(facts, Verdict::bad, "restarts");
-  facts = good();
-  facts.after->cpu_busy_permille = 990;
-  only(facts, Verdict::warn, "processor");
-  facts = good();
-  facts.after->frames_skipped = 4;
-  only(facts, Verdict::warn, "processor");
-  facts = good();
-  facts.after->stack_free_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes - 1;
-  only(facts, Verdict::warn, "stack");
-  facts.after->stack_free_bytes = 0;
-  only(facts, Verdict::bad, "stack");
-  facts = good();
-  facts.info->stored = WIRE_STORED_DAMAGED;
-  only(facts, Verdict::bad, "stored");
-}
-
-TEST(Judge, VanishedMeanwhile) {
-  Facts facts = good();
-  facts.failure = Failure{ErrorCode::gone, "/dev/ttyACM0: vanished while it was examined"};
-  facts.after.reset();
-  facts.rest.reset();
-  only(facts, Verdict::bad, "port");
 }
