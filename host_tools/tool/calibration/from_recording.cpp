@@ -25,8 +25,8 @@ Recorded session_from(const std::string &path, const std::string &device,
     }
   }
   if (!recorded || !pressures) {
-    throw Error(printable(path) + ": has no pressures to calibrate from; record with a firmware "
-                                  "that sends them (fingertip info: raw)");
+    throw Error(printable(path) +
+                ": has no pressures to calibrate from; record with a firmware that sends them (fingertip info: raw)");
   }
   recorded->session.judge(true);
   return std::move(*recorded);

@@ -77,9 +77,9 @@ void check_firmware(const wire_info &info, const std::string &what) {
                 ") computes no locations, so there is nothing to calibrate; flash one of scene grasp");
   }
   if (!(info.capabilities & WIRE_CAPABILITY_RAW_STREAM)) {
-    throw Error(what + ": its firmware (scene " + text_field(info.scene) +
-                ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: "
-                "the calibration stays");
+    throw Error(
+        what + ": its firmware (scene " + text_field(info.scene) +
+        ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: the calibration stays");
   }
   if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * FRAME_RATE_MIN_Hz) {
     throw Error(what + ": " + fixed(info.rate_mHz / 1000.0, 1) +
@@ -186,8 +186,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
   calibration made = calibration_of(solution, scale, date_s);
   made.ambient_kPa = static_cast<std::uint8_t>(std::lround(std::min(1e-3 * ambient_Pa_, 255.0)));
   if (!calibration_is_valid(&made, static_cast<unsigned>(solution.gain.size()))) {
-    throw Error("a gain is out of range, which no sensor under rubber has: see that every sensor "
-                "is covered alike");
+    throw Error("a gain is out of range, which no sensor under rubber has: see that every sensor is covered alike");
   }
   return made;
 }

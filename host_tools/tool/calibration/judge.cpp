@@ -1,5 +1,7 @@
 #include "tool/calibration/judge.hpp"
 
+#include "libfingertip/text.hpp"
+
 extern "C" {
 #include "common/contact_flags.h"
 #include "fit/fit.h"
@@ -40,12 +42,6 @@ double rms(const std::vector<double> &values) {
   return values.empty() ? 0.0 : std::sqrt(sum / double(values.size()));
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /* Beyond what their uncertainty makes. */
 double rms_beyond(const std::vector<double> &values, const std::vector<double> &sds) {
   const double all = rms(values), chance = rms(sds);
@@ -82,11 +78,7 @@ double spread_of(const Solution &solution) {
   return rms_beyond(logs, solution.gain_sd);
 }
 
-std::string percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f %%", 100.0 * share);
-  return text;
-}
+std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
 
 std::string list_of(const std::vector<std::size_t> &sensors) {
   std::string text;
@@ -197,9 +189,8 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "good: every gain is known to " + percent(s.worst_shape_sd());
   case Reason::too_few:
     if (placements == 0) {
-      return "no placement was found: set a weight of about 3 N on a round foot down, let it rest "
-             "by "
-             "itself for a second, and lift it";
+      return "no placement was found: set a weight of about 3 N on a round foot down, let it rest by itself for a "
+             "second, and lift it";
     }
     return "too few placements (" + std::to_string(placements) + "): place the weight at more places all over the pad";
   case Reason::cluster:
@@ -231,15 +222,14 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "every other placement gives other gains, by " + percent(std::max(j.halves_shape, j.halves_gauge)) +
            ": something changed meanwhile; begin again";
   case Reason::useless:
-    return "the gains from half of the placements do not make the other half better, so the gains "
-           "are as good without: the sensors are alike, or something changed meanwhile";
+    return "the gains from half of the placements do not make the other half better, so the gains are as good without: "
+           "the sensors are alike, or something changed meanwhile";
   case Reason::layout:
-    return "the sensors seem to sit " + std::to_string(s.spread.position_mm).substr(0, 4) +
+    return "the sensors seem to sit " + fixed(s.spread.position_mm, 2) +
            " mm from where the firmware has them: see geometry.c";
   case Reason::silent:
     return "sensors " + list_of(j.silent) +
-           " gave no reading to rely on: fingertip info shows whether they answer and their PROM is "
-           "good";
+           " gave no reading to rely on: fingertip info shows whether they answer and their PROM is good";
   }
   return "";
 }

@@ -8,6 +8,18 @@ namespace fingertip::calibrating {
 
 using Eigen::VectorXd;
 
+namespace {
+
+double largest_Pa(const Placement &placement) {
+  double largest_Pa = 0.0;
+  for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
+    largest_Pa = placement.usable >> k & 1u ? std::max(largest_Pa, placement.reading_Pa[k]) : largest_Pa;
+  }
+  return largest_Pa;
+}
+
+} // namespace
+
 double huber(double square) {
   return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER;
 }
@@ -20,16 +32,9 @@ Model::Model(const Array &array, const std::vector<Placement> &placements, const
   for (const Placement &placement : placements) {
     first_s = std::min(first_s, placement.t_s);
     last_s = std::max(last_s, placement.t_s);
-    double peak = 0.0;
-    for (int k = 0; k < layout.sensors; k++) {
-      if (placement.usable >> k & 1u) {
-        peak = std::max(peak, placement.reading_Pa[std::size_t(k)]);
-      }
-    }
-    peaks.push_back(peak);
+    peaks.push_back(largest_Pa(placement));
   }
-  std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(peaks.size() / 2), peaks.end());
-  peak_Pa_ = std::max(peaks[peaks.size() / 2], 1.0);
+  peak_Pa_ = std::max(median(peaks), 1.0);
   const std::size_t strong = 9 * peaks.size() / 10;
   std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(strong), peaks.end());
   near_Pa_ = std::max(peaks[strong], 1.0);
@@ -52,12 +57,7 @@ Unknowns Model::first_guess() const {
   first.global = VectorXd::Zero(layout.size());
   std::vector<double> peaks, widths;
   for (const Placement &placement : placements_) {
-    double largest = 0.0;
-    for (int k = 0; k < layout.sensors; k++) {
-      if (placement.usable >> k & 1u) {
-        largest = std::max(largest, placement.reading_Pa[std::size_t(k)]);
-      }
-    }
+    const double largest = largest_Pa(placement);
     Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     double sum = 0.0, at_x = 0.0, at_y = 0.0;
@@ -94,10 +94,6 @@ Unknowns Model::first_guess() const {
     peaks.push_back(largest * std::exp(paraboloid[0] - bend * (x * x + y * y)));
     widths.push_back(array_.pitch_mm * std::sqrt(-0.5 / bend));
   }
-  const auto median = [](std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
-    return values[values.size() / 2];
-  };
   first.global[layout.log_peak()] = std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
   first.global[layout.log_width()] = std::log(median(widths));
   first.global[layout.mixing()] = assumed_.mixing;

@@ -46,4 +46,9 @@ private:
   std::vector<Eigen::MatrixXd> cross_; /* [placement] global by local */
 };
 
+/* Gives the model the spreads that the session shows, by expectation and maximisation, each held to what was
+ * assumed. covariance: the optimiser's, at its present point. Returns the largest relative change. */
+double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given,
+                     const Eigen::MatrixXd &covariance);
+
 } // namespace fingertip::calibrating

@@ -77,8 +77,7 @@ std::string PullSession::advice() const {
   case PullFinder::State::taken:
     return "taken: take it off the pad";
   case PullFinder::State::refused:
-    return finder_.refusal() == PullFinder::Refusal::slid ? "it slid: take it off, and press it "
-                                                            "down harder"
+    return finder_.refusal() == PullFinder::Refusal::slid ? "it slid: take it off, and press it down harder"
                                                           : weak_text() + "; take it off";
   case PullFinder::State::free:
     break;

@@ -1,8 +1,10 @@
 #include "tool/calibration/pulls.hpp"
 
 #include "libfingertip/text.hpp"
+#include "tool/calibration/solver.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace fingertip::calibrating {
@@ -50,13 +52,7 @@ std::size_t way_of(const Pull &pull) {
 
 constexpr const char *WAYS[] = {"+x", "+y", "-x", "-y"};
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-struct Spread {
+struct Readings {
   std::size_t count = 0;
   double sum = 0.0, squares = 0.0;
   void add(double value) {
@@ -180,11 +176,11 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
   for (const Pull &pull : pulls) {
     readings.push_back(size_of(pull) / known_N);
   }
-  const double median = median_of(readings);
-  Spread all;
-  std::array<Spread, 4> ways;
+  const double middle = median(readings);
+  Readings all;
+  std::array<Readings, 4> ways;
   for (std::size_t i = 0; i < pulls.size(); i++) {
-    if (std::abs(readings[i] / median - 1.0) <= PULL_STRAY_MAX) {
+    if (std::abs(readings[i] / middle - 1.0) <= PULL_STRAY_MAX) {
       all.add(readings[i]);
       ways[way_of(pulls[i])].add(readings[i]);
     }

@@ -1,6 +1,6 @@
 #include "tool/calibration/solver.hpp"
 
-#include "tool/calibration/learning.hpp"
+#include "tool/calibration/optimiser.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -166,6 +166,12 @@ double Solution::worst_shape_sd() const {
                           : *std::max_element(shape_sd.begin(), shape_sd.end());
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 RelaxationEffect relaxation_effect(double remembered_Pa, double sensed_Pa) {
   if (remembered_Pa <= 0.0) {
     return {remembered_Pa, 1.0, 0.0};
@@ -261,9 +267,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
   optimiser.descend();
   look();
   for (int round = 0; !keep_all && !from && round < DROP_ROUNDS && misfits.size() > PLACEMENTS_MIN; round++) {
-    const auto middle = misfits.begin() + std::ptrdiff_t(misfits.size() / 2);
-    std::nth_element(misfits.begin(), middle, misfits.end());
-    const double limit = DROP_MISFIT * std::max(*middle, 1.0);
+    const double limit = DROP_MISFIT * std::max(median(misfits), 1.0);
     bool dropped = false;
     for (std::size_t i = 0; i < placements.size(); i++) {
       if (optimiser.kept[i] && solution.placements[i].misfit > limit) {

@@ -61,6 +61,9 @@ struct Placement {
   double fading = 0.0;            /* share of them that the readings together lose in the half second */
 };
 
+/* The upper one of an even number; of none undefined. */
+double median(std::vector<double> values);
+
 /* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,
  * (exp(-age / 10 s) + 20 exp(-age / 1 s)) of its reading: two times and their proportion after two
  * seconds of rest, as in the holds of a real strip (twin/effects.hpp). The rest of them

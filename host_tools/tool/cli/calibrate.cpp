@@ -8,7 +8,6 @@
 #include "library/pad/thickness.hpp"
 #include "tool/calibration/from_recording.hpp"
 #include "tool/cli/calibrate_device.hpp"
-#include "tool/cli/calibrate_drag.hpp"
 #include "tool/cli/calibrate_view.hpp"
 #include "tool/cli/gains.hpp"
 
@@ -115,8 +114,7 @@ void use_thickness(CalibratedDevice &device, const calibration &made,
   const auto found = pad::thickness_of(made);
   if (for_profile) {
     device.write(pad::profile_of({for_profile->shown_mm()}, info));
-    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
-                "rubber ends\n",
+    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the rubber ends\n",
                 fixed(for_profile->mm, 1).c_str());
   } else if ((info.capabilities & WIRE_CAPABILITY_TANGENTIAL) && (info.stored & WIRE_STORED_PAD) && found) {
     const std::string other = pad::disagreement(*found, static_cast<double>(info.pad.thickness_mm));

@@ -19,12 +19,22 @@ struct CalibrateOptions {
   bool dry_run = false;          /* of a recording, write nothing */
   bool yes = false;              /* ask nothing */
   bool show = false, erase = false;
-  bool placements = false; /* of another program (calibrate_placements.hpp) */
+  bool placements = false; /* of another program */
   ColourMode colour = ColourMode::automatic;
 };
 
 /* Exit status. Throws Error: also where what was recorded does not make a calibration, with the
  * reason, and where the user ends it; then the fingertip is as it was. */
 int run_calibrate(const CalibrateOptions &options);
+/* Of these the one with --drag: the scale of the tangential force. */
+int calibrate_drag(const CalibrateOptions &options);
+
+/* fingertip calibrate --placements, for programs that find placements themselves, as the package's
+ * `validate` does. Reads JSON from standard input:
+ *   x_mm, y_mm      [sensor]     pitch_mm     force_N of the weight
+ *   placements      of each t_s, reading_Pa [sensor], usable (numbers of the sensors whose reading is
+ *                   a measurement), noise_Pa, fading (calibration/solver.hpp)
+ * Prints the solution as JSON; without "solved" the placements are too few. Throws Error. */
+int calibrate_placements();
 
 } // namespace fingertip

@@ -1,5 +1,3 @@
-#include "tool/cli/calibrate_drag.hpp"
-
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/recording.hpp"
@@ -62,9 +60,9 @@ PullSession pull_session_from(const CalibrateOptions &options, wire_info &info) 
     throw Error(printable(options.from) + ": holds no frames");
   }
   if (work->pulls().empty()) {
-    throw Error("not calibrated: " + (weak.empty() ? "no pull was found; leave the object alone for "
-                                                     "a second, then pull and hold for two"
-                                                   : weak));
+    throw Error(
+        "not calibrated: " +
+        (weak.empty() ? "no pull was found; leave the object alone for a second, then pull and hold for two" : weak));
   }
   work->judge(true);
   return std::move(*work);
@@ -86,8 +84,7 @@ void print_result(const PullSession &work, const pad_profile &before, const pad_
               fixed(static_cast<double>(after.tangential_scale), 3).c_str(),
               fixed(static_cast<double>(after.tangential_scale_sd), 3).c_str());
   if (!has_force_scale) {
-    std::printf("the force's scale is not calibrated, of which this is a multiple: once it is, do "
-                "this again\n");
+    std::printf("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n");
   }
   std::fflush(stdout);
 }

@@ -52,6 +52,13 @@ private:
   std::vector<Cell> cells_;
 };
 
+/* The last line of a screen. */
+struct Caption {
+  std::string keys;     /* what they do */
+  std::string note;     /* what else is going on, such as the recording */
+  std::string question; /* instead of both */
+};
+
 /* Characters of a text, each a column wide. */
 int columns_of(std::string_view text);
 /* Its first ones. */

@@ -1,5 +1,7 @@
 #include "tool/cli/chart.hpp"
 
+#include "tool/cli/model.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -12,15 +14,15 @@ namespace {
 constexpr int GUTTER = 11;
 /* Shown at the least; more where there is room for it. */
 constexpr double SPAN_s = 10;
+constexpr double INTERVAL_s = static_cast<double>(History<Model::Sample>::INTERVAL_us) / 1e6;
 constexpr int FEWEST_ROWS = 5, FEWEST_COLUMNS = 4;
 
 /* Times of an area's columns, two dots each. */
 class Times {
 public:
-  Times(double interval_s, int columns) : interval_s_(interval_s), dots_(2 * columns) {
-    step_ = std::max<std::int64_t>(1, std::llround(std::ceil(SPAN_s / (interval_s * dots_))));
-  }
-  double span_s() const { return static_cast<double>(step_) * dots_ * interval_s_; }
+  explicit Times(int columns)
+      : dots_(2 * columns), step_(std::max<std::int64_t>(1, std::llround(std::ceil(SPAN_s / (INTERVAL_s * dots_))))) {}
+  double span_s() const { return static_cast<double>(step_) * dots_ * INTERVAL_s; }
   int dots() const { return dots_; }
   /* The intervals of one dot, where this is the newest of all. */
   template <typename F> void each(std::int64_t newest, int dot, F &&visit) const {
@@ -35,7 +37,6 @@ public:
   }
 
 private:
-  double interval_s_;
   int dots_;
   std::int64_t step_;
 };
@@ -198,17 +199,16 @@ bool has_room_for_charts(const Area &area) {
   return area.width - GUTTER >= FEWEST_COLUMNS && area.height >= FEWEST_ROWS;
 }
 
-void each_shown(const Area &area, double interval_s, std::int64_t last,
-                const std::function<void(std::int64_t interval)> &visit) {
-  const Times times(interval_s, area.width - GUTTER);
+void each_shown(const Area &area, std::int64_t last, const std::function<void(std::int64_t interval)> &visit) {
+  const Times times(area.width - GUTTER);
   for (int dot = 0; dot < times.dots(); dot++) {
     times.each(last, dot, visit);
   }
 }
 
-void draw_charts(Canvas &canvas, const Area &area, double interval_s, const std::vector<Chart> &charts) {
+void draw_charts(Canvas &canvas, const Area &area, const std::vector<Chart> &charts) {
   int columns = area.width - GUTTER;
-  const Times times(interval_s, columns);
+  const Times times(columns);
   int rows = area.height - 1, count = static_cast<int>(charts.size());
   int top = area.top;
   for (int i = 0; i < count; i++) {

@@ -36,10 +36,9 @@ struct Chart {
 /* Whether there is room for any. */
 bool has_room_for_charts(const Area &area);
 /* Calls visit with every interval that will be shown of a curve whose newest is this. */
-void each_shown(const Area &area, double interval_s, std::int64_t last,
-                const std::function<void(std::int64_t interval)> &visit);
+void each_shown(const Area &area, std::int64_t last, const std::function<void(std::int64_t interval)> &visit);
 /* A row for each at the least and one for the time. */
-void draw_charts(Canvas &canvas, const Area &area, double interval_s, const std::vector<Chart> &charts);
+void draw_charts(Canvas &canvas, const Area &area, const std::vector<Chart> &charts);
 
 /* 1, 2 or 5 times a power of ten, not below the value. */
 float round_above(float value);

@@ -1,8 +1,7 @@
 #include "tool/cli/command_line.hpp"
 
 #include "libfingertip/text.hpp"
-#include "tool/cli/page.hpp"
-#include "tool/cli/usage.hpp"
+#include "tool/cli/installed_files.hpp"
 #include "tool/plain_help.hpp"
 
 #include <algorithm>
@@ -35,26 +34,19 @@ std::size_t letters_apart(const std::string &one, const std::string &other) {
   return row[other.size()];
 }
 
-Reach reach_from_text(const std::string &text) {
-  static const std::map<std::string, Reach> kinds = {
-      {"auto", Reach::automatic}, {"socket", Reach::socket}, {"serial", Reach::serial}, {"usb", Reach::usb}};
-  auto kind = kinds.find(text);
-  if (kind == kinds.end()) {
-    wrong_value("--transport", text, "auto, socket, serial or usb");
-  }
-  return kind->second;
-}
-
-ColourMode colour_from_text(const std::string &text) {
-  static const std::map<std::string, ColourMode> colours = {{"auto", ColourMode::automatic},
-                                                            {"truecolour", ColourMode::truecolour},
-                                                            {"256", ColourMode::palette_256},
-                                                            {"plain", ColourMode::plain}};
-  auto mode = colours.find(text);
-  if (mode == colours.end()) {
-    wrong_value("--colour", text, "auto, truecolour, 256 or plain");
-  }
-  return mode->second;
+template <typename Value>
+CLI::Option *with_choice(CLI::App *command, const std::string &option, const std::map<std::string, Value> &values,
+                         const std::string &allowed, Value &value, const std::string &help) {
+  return command->add_option_function<std::string>(
+      option,
+      [=, &value](const std::string &text) {
+        const auto found = values.find(text);
+        if (found == values.end()) {
+          wrong_value(option, text, allowed);
+        }
+        value = found->second;
+      },
+      help);
 }
 
 } // namespace
@@ -104,19 +96,19 @@ int CommandLine::run(int argc, char **argv) {
 }
 
 void with_transport(CLI::App *command, Reach &reach) {
-  command
-      ->add_option_function<std::string>(
-          "--transport", [&reach](const std::string &text) { reach = reach_from_text(text); },
-          "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: "
-          "the first of these that there is")
+  with_choice<Reach>(
+      command, "--transport",
+      {{"auto", Reach::automatic}, {"socket", Reach::socket}, {"serial", Reach::serial}, {"usb", Reach::usb}},
+      "auto, socket, serial or usb", reach,
+      "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: the first of these that "
+      "there is")
       ->type_name("KIND");
 }
 
 void with_port_only(CLI::App *command, Choice &choice) {
   command
       ->add_option("--port", choice.port,
-                   "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip "
-                   "plugged in")
+                   "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in")
       ->type_name("PATH");
   with_transport(command, choice.reach);
 }
@@ -127,12 +119,35 @@ void with_port(CLI::App *command, Choice &choice) {
   with_port_only(command, choice);
 }
 
+void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help) {
+  with_number(
+      command, "--seconds", 0.001, 1e9, "a number from 0.001 to 1e9", [&seconds](double value) { seconds = value; },
+      help)
+      ->type_name("S");
+}
+
 void with_colour(CLI::App *command, ColourMode &mode) {
-  command
-      ->add_option_function<std::string>(
-          "--colour", [&mode](const std::string &text) { mode = colour_from_text(text); },
-          "auto, truecolour, 256, or plain: a line a second")
+  with_choice<ColourMode>(command, "--colour",
+                          {{"auto", ColourMode::automatic},
+                           {"truecolour", ColourMode::truecolour},
+                           {"256", ColourMode::palette_256},
+                           {"plain", ColourMode::plain}},
+                          "auto, truecolour, 256 or plain", mode, "auto, truecolour, 256, or plain: a line a second")
       ->type_name("MODE");
+}
+
+CLI::Option *with_number(CLI::App *command, const std::string &option, double low, double high,
+                         const std::string &allowed, std::function<void(double)> set, const std::string &help) {
+  return command->add_option_function<std::string>(
+      option,
+      [=](const std::string &text) {
+        const auto value = to_double(text);
+        if (!value || *value < low || *value > high) {
+          wrong_value(option, text, allowed);
+        }
+        set(*value);
+      },
+      help);
 }
 
 void wrong_value(const std::string &option, const std::string &text, const std::string &allowed) {

@@ -2,14 +2,29 @@
 #pragma once
 
 #include "libfingertip/connection.hpp"
+#include "libfingertip/error.hpp"
 #include "tool/cli/terminal.hpp"
 
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
-#include <vector>
 
 namespace fingertip {
+
+/* What was typed and cannot be meant: exit status 2. */
+class WrongUsage : public Error {
+public:
+  using Error::Error;
+};
+
+/* Whatever the parser throws is wrong usage. */
+template <typename Parse> auto typed(Parse parse) {
+  try {
+    return parse();
+  } catch (const Error &error) {
+    throw WrongUsage(error.code(), error.what());
+  }
+}
 
 class CommandLine {
 public:
@@ -30,7 +45,13 @@ private:
 void with_transport(CLI::App *command, Reach &reach);
 void with_port_only(CLI::App *command, Choice &choice);
 void with_port(CLI::App *command, Choice &choice);
+/* --seconds, until the end. */
+void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help);
 void with_colour(CLI::App *command, ColourMode &mode);
+
+/* A number from low to high; allowed: how the error states them. */
+CLI::Option *with_number(CLI::App *command, const std::string &option, double low, double high,
+                         const std::string &allowed, std::function<void(double)> set, const std::string &help);
 
 /* Where an option's text is no value of it. */
 [[noreturn]] void wrong_value(const std::string &option, const std::string &text, const std::string &allowed);

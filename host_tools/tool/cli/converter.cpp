@@ -15,7 +15,6 @@ namespace fingertip {
 
 namespace {
 
-using Kind = PacketFile::Item::Kind;
 using Count = unsigned long long;
 
 bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
@@ -46,7 +45,7 @@ Contents contents_of(const Conversion &conversion) {
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   Contents contents;
   while (auto item = file.next()) {
-    if (item->kind != Kind::packet) {
+    if (item->kind != PacketFile::Item::Kind::packet) {
       continue;
     }
     const wire_packet &packet = item->packet;
@@ -67,9 +66,7 @@ Contents contents_of(const Conversion &conversion) {
 
 void report_cut_short(const std::string &path, bool is_cut_short) {
   if (is_cut_short) {
-    std::fprintf(stderr,
-                 "%s: no end line: the recording was cut short, its recorder killed or its disk "
-                 "full\n",
+    std::fprintf(stderr, "%s: no end line: the recording was cut short, its recorder killed or its disk full\n",
                  printable(path).c_str());
   }
 }
@@ -92,6 +89,12 @@ void convert_lines(const Conversion &conversion) {
   LineSource::Line line;
   std::uint64_t last = 0, count = 0;
   bool is_ended = false;
+  const auto report_damage = [&](const std::string &what, const std::string &place = "") {
+    if (!conversion.salvage) {
+      throw Error(ErrorCode::damaged_line, conversion.from + place + ": " + what);
+    }
+    std::fprintf(stderr, "%s: %s\n", printable(conversion.from).c_str(), what.c_str());
+  };
   for (;;) {
     try {
       if (!source->next(line)) {
@@ -105,23 +108,14 @@ void convert_lines(const Conversion &conversion) {
       continue;
     }
     if (line.number > last + 1) {
-      std::string lost = std::to_string(line.number - last - 1);
-      if (!conversion.salvage) {
-        throw Error(ErrorCode::damaged_line,
-                    conversion.from + ": " + lost + " lines are missing before line " + std::to_string(line.number));
-      }
-      std::fprintf(stderr, "%s: %s lines are lost before line %llu\n", printable(conversion.from).c_str(), lost.c_str(),
-                   static_cast<Count>(line.number));
+      report_damage(std::to_string(line.number - last - 1) + " lines are lost before line " +
+                    std::to_string(line.number));
     }
     last = line.number;
     count++;
     is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
     if (line.torn) {
-      if (!conversion.salvage) {
-        throw Error(ErrorCode::damaged_line,
-                    conversion.from + ":" + std::to_string(line.number) + ": the last line is torn");
-      }
-      std::fprintf(stderr, "%s: the last line is torn\n", printable(conversion.from).c_str());
+      report_damage("the last line is torn", ":" + std::to_string(line.number));
       sink->torn_line(line.text);
     } else {
       sink->line(line.text);
@@ -147,7 +141,7 @@ void convert_packets(const Conversion &conversion) {
                          metadata, contents.sensor_count.has_value(), OutputFile::Appears::when_finished);
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   while (auto item = file.next()) {
-    if (item->kind == Kind::packet) {
+    if (item->kind == PacketFile::Item::Kind::packet) {
       writer.packet(item->packet);
     } else {
       writer.event(item->event);
@@ -170,7 +164,7 @@ void convert_to_capture(const Conversion &conversion) {
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   std::uint64_t packets = 0;
   while (auto item = file.next()) {
-    if (item->kind == Kind::packet) {
+    if (item->kind == PacketFile::Item::Kind::packet) {
       const auto bytes = frame_bytes(item->packet);
       capture.append(bytes.data(), bytes.size());
       packets++;

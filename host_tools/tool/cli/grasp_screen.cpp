@@ -3,8 +3,6 @@
 #include "grasp/words.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "tool/cli/chart.hpp"
-#include "tool/cli/doubt.hpp"
-#include "tool/cli/monitor.hpp"
 #include "tool/cli/pad_picture.hpp"
 #include "tool/cli/traces.hpp"
 
@@ -15,8 +13,6 @@ namespace fingertip {
 
 namespace {
 
-constexpr double INTERVAL_s = GripModel::INTERVAL_us / 1e6;
-static_assert(GripModel::INTERVAL_us == Model::SAMPLE_INTERVAL_us, "curves of one chart");
 /* Three charts of two rows each, and the time. */
 constexpr int CHART_ROWS = 7;
 /* The share of all rows on a higher screen. */
@@ -71,12 +67,12 @@ Measured measured_by(const Model &model) {
   if (!(contact.flags & CONTACT_FLAG_FIT_VALID)) {
     return {contact.flags & CONTACT_FLAG_CONTACT ? std::nullopt : std::optional<float>(0)};
   }
-  return {contact.force_N, warnings_of(contact.flags) != 0, (contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND) != 0};
+  return {contact.force_N, is_doubtful(contact), (contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND) != 0};
 }
 
 /* Its width; the pad below its name and state. */
 int draw_fingertip(Canvas &canvas, const Area &area, const Model &model, std::size_t side) {
-  auto [state, colour] = state_of(model);
+  const auto [state, colour, calm] = state_of(model);
   int width = 0;
   if (model.info() && model.info()->sensor_count > 0) {
     width = draw_pad(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model).width;
@@ -86,7 +82,7 @@ int draw_fingertip(Canvas &canvas, const Area &area, const Model &model, std::si
   int column = canvas.text(area.left, area.top, SIDES[side], text_style(side == 0 ? LEFT : RIGHT, true)) + 1;
   canvas.text(column, area.top, "●", text_style(colour, true));
   column += 2;
-  bool fine = model.state() == Model::State::replay || (colour == GOOD);
+  bool fine = model.state() == Model::State::replay || colour == GOOD;
   canvas.text(column, area.top, first_columns(fine ? name : state, area.left + room - column),
               text_style(fine ? FAINT : colour));
   return room;
@@ -182,10 +178,10 @@ Curve grip_curve(const GripModel &grip, bool GripModel::Sample::*there, float Gr
                  Colour colour) {
   return {
       [&grip, there, value](std::int64_t interval) {
-        const GripModel::Sample &sample = grip.sample(interval);
+        const GripModel::Sample &sample = grip.samples()[interval];
         return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, false, sample.slipping};
       },
-      grip.last_interval(), true, colour};
+      grip.samples().last(), true, colour};
 }
 
 void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &fingertips, const GripModel &grip) {
@@ -198,19 +194,19 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
   for (std::size_t i = 0; i < fingertips.size() && i < 2; i++) {
     Curve curve = force_curve(fingertips[i]);
     curve.colour = i == 0 ? LEFT : RIGHT;
-    each_shown(area, INTERVAL_s, curve.last, [&](std::int64_t interval) {
+    each_shown(area, curve.last, [&](std::int64_t interval) {
       const ChartPoint point = curve.at(interval);
       force_N = point.value && !point.doubtful ? std::max(force_N, *point.value) : force_N;
     });
     forces.push_back(std::move(curve));
   }
-  each_shown(area, INTERVAL_s, grip.last_interval(), [&](std::int64_t interval) {
-    const Sample &sample = grip.sample(interval);
+  each_shown(area, grip.samples().last(), [&](std::int64_t interval) {
+    const Sample &sample = grip.samples()[interval];
     force_N = sample.controlled ? std::max(force_N, sample.wanted_N) : force_N;
     load_N = sample.loaded ? std::max(load_N, sample.load_N) : load_N;
     width_mm = sample.answered ? std::max(width_mm, sample.width_mm) : width_mm;
   });
-  draw_charts(canvas, area, INTERVAL_s,
+  draw_charts(canvas, area,
               {{"force", "N", 0, round_above(force_N), std::nullopt, std::move(forces)},
                {"load",
                 "N",
@@ -231,11 +227,7 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
 Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns,
                   int rows) {
   Canvas canvas(columns, rows);
-  if (columns < MONITOR_COLUMNS || rows < MONITOR_ROWS) {
-    canvas.text(0, 0,
-                "window too small: " + std::to_string(columns) + "x" + std::to_string(rows) + ", needs " +
-                    std::to_string(MONITOR_COLUMNS) + "x" + std::to_string(MONITOR_ROWS),
-                text_style(WARNING, true));
+  if (is_too_small(canvas)) {
     int row = 1;
     for (const std::string &line :
          flowed({state_text(grip.row() ? grip.row()->report.state : std::uint8_t{GRIP_IDLE}), grip_line(grip)}, "\n",

@@ -14,7 +14,6 @@
 #include "tool/advice.hpp"
 #include "tool/cli/gripper_options.hpp"
 #include "tool/cli/live_recording.hpp"
-#include "tool/cli/usage.hpp"
 #include "tool/cli/view.hpp"
 
 #include <algorithm>
@@ -47,12 +46,14 @@ std::optional<Way> way_of(const std::string &text, Reach reach) {
   return choose_way({is_port ? text : "", is_port ? "" : text, reach});
 }
 
+bool is_same(const Way &one, const Way &other) {
+  return one.serial.empty() || other.serial.empty() ? one.port == other.port : is_same_serial(one.serial, other.serial);
+}
+
 std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
-  std::optional<Way> left = way_of(options.left, options.reach);
-  std::optional<Way> right = way_of(options.right, options.reach);
+  const std::optional<Way> left = way_of(options.left, options.reach), right = way_of(options.right, options.reach);
   if (left && right) {
-    bool is_one = left->port.empty() ? is_same_serial(left->serial, right->serial) : left->port == right->port;
-    if (is_one) {
+    if (is_same(*left, *right)) {
       throw WrongUsage("--left and --right name the same fingertip; name two");
     }
     return {*left, *right};
@@ -61,21 +62,15 @@ std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
   std::string names;
   for (const Way &way : all_ways(options.reach)) {
     names += " " + (way.serial.empty() ? way.port : way.serial);
-    const auto &named = left ? left : right;
-    bool is_named = named && (way.serial.empty() ? way.port == named->port : is_same_serial(way.serial, named->serial));
-    if (!is_named) {
+    if (!(left && is_same(way, *left)) && !(right && is_same(way, *right))) {
       others.push_back(way);
     }
   }
-  std::size_t wanted = left || right ? 1 : 2;
-  if (others.size() != wanted) {
+  if (others.size() != (left || right ? 1 : 2)) {
     throw Error("a grasp takes two fingertips, and there are" + (names.empty() ? " none" : names) +
                 "; plug them in, or choose with --left and --right");
   }
-  if (!left && !right) {
-    return {others[0], others[1]};
-  }
-  return {left.value_or(others[0]), right.value_or(others[0])};
+  return {left.value_or(others.front()), right.value_or(others.back())};
 }
 
 class GraspSession {
@@ -145,8 +140,10 @@ private:
       LiveOptions live;
       live.recording = options_.recording;
       live.overwrite = options_.overwrite;
-      recording_ = make_recording(live, {ready.begin(), ready.end()}, {loop_.name(0), loop_.name(1)}, zero_us_, head);
-      keep([&] { recording_->comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns()); });
+      recording_.emplace(live, std::vector<DeviceNews>(ready.begin(), ready.end()), "", zero_us_, head);
+      keep([&] {
+        recording_->joint().comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns());
+      });
     }
     loop_.begin(
         std::move(gripper), [way] { return open_gripper(way); }, settings_);
@@ -159,8 +156,7 @@ private:
                   gripper.fault_text(status.fault) + "; --activate clears it, and moves it");
     }
     if (!status.active && !options_.activate) {
-      throw Error(port + ": the gripper is not active; take out what it holds, and let it move "
-                         "with --activate");
+      throw Error(port + ": the gripper is not active; take out what it holds, and let it move with --activate");
     }
   }
 
@@ -179,8 +175,8 @@ private:
 
   void event(const std::string &text) {
     keep([&] {
-      recording_->comment(GRIP_EVENT_KEY, static_cast<double>(steady_now_us()),
-                          fixed(static_cast<double>(steady_now_us() - zero_us_), 1) + "," + text);
+      recording_->joint().comment(GRIP_EVENT_KEY, static_cast<double>(steady_now_us()),
+                                  fixed(static_cast<double>(steady_now_us() - zero_us_), 1) + "," + text);
     });
   }
 
@@ -212,7 +208,7 @@ private:
         break;
       }
     }
-    keep([&] { recording_->settle(settled_us - SETTLE_us); });
+    keep([&] { recording_->joint().settle(settled_us - SETTLE_us); });
     return ended;
   }
 
@@ -226,7 +222,7 @@ private:
       keep([&] { recording_->packet(news); });
       break;
     case Kind::clock:
-      keep([&] { recording_->clock(news); });
+      keep([&] { recording_->joint().clock(news.device, news.estimate, news.jumps); });
       break;
     case Kind::gone:
     case Kind::back:
@@ -289,8 +285,8 @@ private:
     }
     grip_.take(row);
     keep([&] {
-      recording_->comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
-                          fixed(row.time_us, 1) + "," + grip_cells(row));
+      recording_->joint().comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
+                                  fixed(row.time_us, 1) + "," + grip_cells(row));
     });
   }
 
@@ -422,7 +418,7 @@ private:
     if (recording_) {
       std::fprintf(stderr, "%s: %llu frames of 2 fingertips, aligned to %s us or better\n",
                    printable(options_.recording).c_str(), static_cast<unsigned long long>(frames),
-                   fixed(recording_->alignment_us(), 0).c_str());
+                   fixed(recording_->joint().alignment_us(), 0).c_str());
     }
     const std::string cause = cause_of_fault();
     for (const std::string &text : {cause.empty() ? trouble_ : cause, lost_}) {
@@ -445,7 +441,7 @@ private:
   GripSettings settings_;
   std::vector<Model> models_;
   GripModel grip_;
-  std::unique_ptr<LiveRecording> recording_;
+  std::optional<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   GraspLoop loop_;
   std::optional<GraspNews> last_; /* of kind step, that was kept */

@@ -3,8 +3,6 @@
 #include "grasp/words.hpp"
 #include "libfingertip/text.hpp"
 
-#include <algorithm>
-
 namespace fingertip {
 
 namespace {
@@ -23,21 +21,8 @@ void GripModel::take(const GripRow &row) {
     state_since_us_ = row.time_us;
   }
   row_ = row;
-  auto interval = static_cast<std::int64_t>(std::max(row.time_us, 0.0) / static_cast<double>(INTERVAL_us));
-  if (samples_.empty() || interval < last_interval_) {
-    samples_.assign(1, {});
-  } else {
-    auto passed = std::min<std::int64_t>(interval - last_interval_, SAMPLES);
-    for (std::int64_t i = 0; i < passed; i++) {
-      samples_.emplace_back();
-    }
-  }
-  last_interval_ = interval;
-  while (samples_.size() > SAMPLES) {
-    samples_.pop_front();
-  }
   const GripReport &report = row.report;
-  Sample &last = samples_.back();
+  Sample &last = samples_.at(row.time_us);
   last.controlled = is_controlled(report.state);
   last.wanted_N = static_cast<float>(report.wanted_N);
   last.loaded = last.controlled && (report.load_N > 0);
@@ -55,13 +40,6 @@ void GripModel::take(const Metadata &head) {
       gripper_ = value;
     }
   }
-}
-
-const GripModel::Sample &GripModel::sample(std::int64_t interval) const {
-  static const Sample none{};
-  std::int64_t oldest = last_interval_ - static_cast<std::int64_t>(samples_.size()) + 1;
-  bool there = interval >= oldest && interval <= last_interval_;
-  return there ? samples_[static_cast<std::size_t>(interval - oldest)] : none;
 }
 
 std::string grip_line(const GripModel &grip) {

@@ -4,9 +4,8 @@
 
 #include "grasp/grip_row.hpp"
 #include "libfingertip/packet_fields.hpp"
+#include "tool/cli/model.hpp"
 
-#include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 
@@ -22,8 +21,6 @@ public:
     bool slipping = false;
     float wanted_N = 0, load_N = 0, width_mm = 0;
   };
-  static constexpr std::uint64_t INTERVAL_us = 50000;
-  static constexpr std::size_t SAMPLES = 800;
 
   void take(const GripRow &row);
   /* Takes gripper and cap from the recording's head. */
@@ -38,17 +35,14 @@ public:
   /* The last of before this grasp's newest state: for how long it has been. */
   double state_seconds() const { return row_ ? (row_->time_us - state_since_us_) / 1e6 : 0; }
 
-  /* The sample of an interval of time, 0 is the recording's first. */
-  const Sample &sample(std::int64_t interval) const;
-  std::int64_t last_interval() const { return last_interval_; }
+  const History<Sample> &samples() const { return samples_; } /* of the recording's time */
 
 private:
   std::string gripper_;
   float cap_N_ = 0;
   std::optional<GripRow> row_;
   double state_since_us_ = 0;
-  std::deque<Sample> samples_;
-  std::int64_t last_interval_ = 0;
+  History<Sample> samples_;
 };
 
 /* "left 4.02 N" and so on, for a line of text. */

@@ -3,7 +3,6 @@
 #include "grasp/gripper/serial_line.hpp"
 #include "libfingertip/share_socket.hpp"
 #include "tool/advice.hpp"
-#include "tool/cli/usage.hpp"
 
 namespace fingertip {
 

@@ -5,7 +5,6 @@
 #include "tool/cli/command_line.hpp"
 
 #include <memory>
-#include <string>
 
 namespace fingertip {
 

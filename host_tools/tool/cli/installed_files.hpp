@@ -16,6 +16,11 @@ std::optional<std::filesystem::path> find_installed(std::initializer_list<const 
 /* This program's own path. */
 std::filesystem::path this_program();
 
+/* The page that is installed with this program. Throws Error: it is not built. */
+std::filesystem::path page_folder();
+/* What to do where the page is of another version than the tool; "": both fit, or there is no page. */
+std::string page_note(const std::string &tool_version);
+
 /* Another program, a path or one of PATH, takes this one's place. Throws Error; missing: its text
  * where there is no such program, else what the system reports. */
 [[noreturn]] void become(const std::string &program, const std::vector<std::string> &arguments,

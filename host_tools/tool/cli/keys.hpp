@@ -3,7 +3,6 @@
 
 #include "libfingertip/clock.hpp"
 
-#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <optional>

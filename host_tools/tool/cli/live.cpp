@@ -8,8 +8,6 @@
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/joint_progress.hpp"
-#include "tool/cli/keys.hpp"
 #include "tool/cli/live_recording.hpp"
 #include "tool/cli/names_of_values.hpp"
 #include "tool/cli/view.hpp"
@@ -46,11 +44,9 @@ public:
     if (!options.recording.empty() && !to_standard_output_) {
       note_ = "recording to " + printable(options.recording);
     }
-    if (options.monitor || !several()) {
-      view_ = options.monitor       ? make_monitor_view(options.colour)
-              : to_standard_output_ ? make_state_view()
-                                    : make_progress_view();
-    }
+    view_ = options.monitor       ? make_monitor_view(options.colour)
+            : to_standard_output_ ? make_state_view()
+                                  : make_progress_view();
   }
 
   int run() {
@@ -66,7 +62,6 @@ public:
     }
     update_statistics();
     view_.reset();
-    progress_.reset();
     for (const auto &loop : loops_) {
       loop->rethrow();
     }
@@ -79,8 +74,7 @@ public:
     }
     for (std::size_t i = 0; i < models_.size(); i++) {
       if (models_[i].is_without_sensors()) {
-        throw Error(loops_[i]->name() + ": none of its sensors answers; see their wiring and "
-                                        "supply (fingertip info)");
+        throw Error(loops_[i]->name() + ": none of its sensors answers; see their wiring and supply (fingertip info)");
       }
     }
     return 0;
@@ -99,8 +93,8 @@ private:
     for (DeviceNews &news : feed_.take(POLL)) {
       take(news);
     }
-    if (recording_) {
-      recording_->settle(settled_us - SETTLE_us);
+    if (JointRecordingWriter *recording = joint_recording()) {
+      recording->settle(settled_us - SETTLE_us);
     }
   }
 
@@ -145,8 +139,8 @@ private:
       raw_bytes_->append(news.bytes.data(), news.bytes.size());
       break;
     case Kind::clock:
-      if (recording_) {
-        recording_->clock(news);
+      if (JointRecordingWriter *recording = joint_recording()) {
+        recording->clock(news.device, news.estimate, news.jumps);
       }
       break;
     case Kind::ended:
@@ -159,7 +153,6 @@ private:
   /* Every one of them has answered. */
   void begin() {
     std::vector<DeviceNews> ready;
-    std::vector<std::string> ports;
     for (std::size_t i = 0; i < loops_.size(); i++) {
       const char *serial = ready_[i]->packet.body.info.serial;
       for (const DeviceNews &other : ready) {
@@ -168,11 +161,10 @@ private:
         }
       }
       ready.push_back(*ready_[i]);
-      ports.push_back(loops_[i]->name());
     }
     zero_us_ = steady_now_us();
     if (!options_.recording.empty()) {
-      recording_ = make_recording(options_, ready, ports, zero_us_);
+      recording_.emplace(options_, ready, loops_[0]->name(), zero_us_);
       for (const auto &early : early_) {
         for (const DeviceNews &news : early) {
           recording_->packet(news);
@@ -184,10 +176,9 @@ private:
       models_[i].set_state(Model::State::live);
       loops_[i]->start();
     }
-    if (several() && recording_ && !view_) {
-      progress_ = std::make_unique<JointProgress>();
-    }
   }
+
+  JointRecordingWriter *joint_recording() { return recording_ && several() ? &recording_->joint() : nullptr; }
 
   void event(std::size_t device, const std::string &text) {
     if (recording_) {
@@ -227,13 +218,9 @@ private:
 
   void show() {
     update_statistics();
-    if (progress_) {
-      progress_->update(models_, seconds(), recording_->alignment_us());
+    if (options_.monitor || begun_ || !several()) {
+      view_->update(models_, caption());
     }
-    if (!view_) {
-      return;
-    }
-    view_->update(models_, caption());
     auto now = host_now();
     while (auto key = view_->key()) {
       take_key(*key, now);
@@ -304,7 +291,7 @@ private:
     return !several() || !model.info() ? "" : text_field(model.info()->serial) + ": ";
   }
 
-  Caption caption() const {
+  Caption caption() {
     Caption caption;
     caption.keys = "q quit  t tare";
     if (tare_.is_asked()) {
@@ -317,6 +304,9 @@ private:
     for (std::size_t i = 0; i < models_.size(); i++) {
       std::uint32_t missing = models_[i].missing_sensors();
       add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
+    }
+    if (const JointRecordingWriter *recording = joint_recording(); recording && !options_.monitor) {
+      add("aligned to " + fixed(recording->alignment_us(), 0) + " us");
     }
     add(note_);
     return caption;
@@ -350,7 +340,8 @@ private:
       std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(), summary_text(models_[0]).c_str());
       return;
     }
-    if (!recording_) {
+    const JointRecordingWriter *joint = joint_recording();
+    if (!joint) {
       for (std::size_t i = 0; i < models_.size(); i++) {
         std::printf("%s%s\n", name_of(i).c_str(), summary_text(models_[i]).c_str());
       }
@@ -359,18 +350,17 @@ private:
     std::uint64_t frames = 0;
     std::string edges;
     for (std::size_t i = 0; i < models_.size(); i++) {
-      frames += recording_->frames(i);
+      frames += joint->frames(i);
       edges += edges_text(models_[i]);
     }
-    const double edges_us = recording_->edges_alignment_us();
+    const double edges_us = joint->edges_alignment_us();
     const std::string by_edges = edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
-    std::fprintf(stderr,
-                 "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets "
-                 "dropped, %llu CRC errors%s\n",
-                 name.c_str(), static_cast<unsigned long long>(frames), models_.size(),
-                 fixed(recording_->alignment_us(), 0).c_str(), by_edges.c_str(),
-                 static_cast<unsigned long long>(sum.dropped_packets), static_cast<unsigned long long>(sum.crc_errors),
-                 edges.c_str());
+    std::fprintf(
+        stderr,
+        "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets dropped, %llu CRC errors%s\n",
+        name.c_str(), static_cast<unsigned long long>(frames), models_.size(), fixed(joint->alignment_us(), 0).c_str(),
+        by_edges.c_str(), static_cast<unsigned long long>(sum.dropped_packets),
+        static_cast<unsigned long long>(sum.crc_errors), edges.c_str());
   }
 
   const LiveOptions &options_;
@@ -380,9 +370,8 @@ private:
   std::vector<std::optional<DeviceNews>> ready_;
   std::vector<std::vector<DeviceNews>> early_; /* packets before all were ready */
   std::unique_ptr<OutputFile> raw_bytes_;
-  std::unique_ptr<LiveRecording> recording_;
+  std::optional<LiveRecording> recording_;
   std::unique_ptr<View> view_;
-  std::unique_ptr<JointProgress> progress_;
   std::string note_;
   std::string message_;
   KeyTime message_until_{};

@@ -4,7 +4,6 @@
 #include "libfingertip/connection.hpp"
 #include "tool/cli/terminal.hpp"
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>

@@ -3,7 +3,6 @@
 #include "libfingertip/session.hpp"
 #include "tool/advice.hpp"
 #include "tool/cli/commands/commands.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <cerrno>
 #include <cstdio>

@@ -1,10 +1,6 @@
 #include "tool/cli/model.hpp"
 
-#include "libfingertip/clock.hpp"
-#include "tool/cli/doubt.hpp"
 #include "tool/cli/names_of_values.hpp"
-
-#include <algorithm>
 
 namespace fingertip {
 
@@ -76,31 +72,18 @@ void Model::take_contact(const wire_contact &contact, std::uint64_t t_us) {
   note(CONTACT_FLAG_MOVING, last_moving_us_);
   if (!(contact.flags & CONTACT_FLAG_FIT_VALID)) {
     trail_.clear();
-  } else if (!warnings_of(contact.flags)) {
+  } else if (!is_doubtful(contact)) {
     trail_.push_back({t_us, contact.x_mm, contact.y_mm});
   }
   while (!trail_.empty() && t_us - trail_.front().t_us > TRAIL_SPAN_us) {
     trail_.pop_front();
   }
-  sample(contact, t_us);
+  sample(contact, samples_.at(static_cast<double>(t_us)));
 }
 
-void Model::sample(const wire_contact &contact, std::uint64_t t_us) {
-  std::uint64_t interval = t_us / SAMPLE_INTERVAL_us;
-  if (samples_.empty() || interval < last_interval_) {
-    samples_.assign(1, {});
-  } else {
-    for (std::uint64_t i = std::min<std::uint64_t>(interval - last_interval_, SAMPLES); i > 0; i--) {
-      samples_.emplace_back();
-    }
-  }
-  last_interval_ = interval;
-  while (samples_.size() > SAMPLES) {
-    samples_.pop_front();
-  }
-  Sample &last = samples_.back();
+void Model::sample(const wire_contact &contact, Sample &last) {
   if (contact.flags & CONTACT_FLAG_FIT_VALID) {
-    bool doubtful = warnings_of(contact.flags) != 0;
+    bool doubtful = is_doubtful(contact);
     if (!last.fitted || last.doubtful) {
       if (!doubtful) {
         last.force_N = 0;

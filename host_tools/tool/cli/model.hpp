@@ -4,8 +4,9 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/edge_counter.hpp"
+#include "libfingertip/names.hpp"
 
-#include <chrono>
+#include <algorithm>
 #include <deque>
 #include <optional>
 #include <string>
@@ -14,6 +15,44 @@ namespace fingertip {
 
 /* A longer time without a frame is shown as a stall. */
 inline constexpr double STALLED_s = 0.7;
+
+/* Whether a warning says that its numbers deserve less trust. */
+inline bool is_doubtful(const wire_contact &contact) { return (contact.flags & warning_flags()) != 0; }
+
+/* Samples of the last intervals of a time, for traces. */
+template <typename Sample> class History {
+public:
+  static constexpr std::int64_t INTERVAL_us = 50000, MOST = 800;
+
+  /* The newest sample, which is that of the interval with this time; time that goes back begins again. */
+  Sample &at(double time_us) {
+    const auto interval = static_cast<std::int64_t>(std::max(time_us, 0.0) / static_cast<double>(INTERVAL_us));
+    if (samples_.empty() || interval < last_) {
+      samples_.assign(1, {});
+    } else {
+      samples_.resize(samples_.size() + static_cast<std::size_t>(std::min(interval - last_, MOST)));
+    }
+    last_ = interval;
+    while (samples_.size() > MOST) {
+      samples_.pop_front();
+    }
+    return samples_.back();
+  }
+  const Sample &operator[](std::int64_t interval) const {
+    static const Sample none{};
+    const std::int64_t oldest = last_ - static_cast<std::int64_t>(samples_.size()) + 1;
+    return interval >= oldest && interval <= last_ && !samples_.empty()
+               ? samples_[static_cast<std::size_t>(interval - oldest)]
+               : none;
+  }
+  std::int64_t last() const { return last_; } /* the newest interval; 0 began with the time */
+  std::size_t size() const { return samples_.size(); }
+  void clear() { samples_.clear(); }
+
+private:
+  std::deque<Sample> samples_;
+  std::int64_t last_ = 0;
+};
 
 class Model {
 public:
@@ -36,8 +75,6 @@ public:
     float qx_N = 0, qy_N = 0; /* the last */
     bool sliding = false;
   };
-  static constexpr std::uint64_t SAMPLE_INTERVAL_us = 50000;
-  static constexpr std::size_t SAMPLES = 800;
 
   void take(const wire_packet &packet);
   void set_statistics(const LineStatistics &statistics) { statistics_ = statistics; }
@@ -80,14 +117,12 @@ public:
   bool is_tared() const;
   /* Those without a warning in the last second, oldest first; emptied where contact ends. */
   const std::deque<Location> &trail() const { return trail_; }
-  /* Oldest first; the last is the interval of this number since the device started. */
-  const std::deque<Sample> &samples() const { return samples_; }
-  std::uint64_t last_interval() const { return last_interval_; }
+  const History<Sample> &samples() const { return samples_; } /* of the device's time */
 
 private:
   void take_frame(std::uint64_t t_us);
   void take_contact(const wire_contact &contact, std::uint64_t t_us);
-  void sample(const wire_contact &contact, std::uint64_t t_us);
+  void sample(const wire_contact &contact, Sample &last);
   bool is_late(const std::optional<std::uint64_t> &at_us) const;
 
   State state_ = State::connecting;
@@ -107,8 +142,7 @@ private:
   std::optional<HostTime> last_arrival_;
   std::deque<std::uint64_t> recent_us_;
   std::deque<Location> trail_;
-  std::deque<Sample> samples_;
-  std::uint64_t last_interval_ = 0;
+  History<Sample> samples_;
 };
 
 } // namespace fingertip

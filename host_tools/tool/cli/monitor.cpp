@@ -1,8 +1,6 @@
 #include "tool/cli/monitor.hpp"
 
 #include "libfingertip/packet_fields.hpp"
-#include "tool/cli/doubt.hpp"
-#include "tool/cli/ink.hpp"
 #include "tool/cli/names_of_values.hpp"
 #include "tool/cli/pad_picture.hpp"
 #include "tool/cli/panel.hpp"
@@ -40,7 +38,7 @@ void draw_header(Canvas &canvas, const Area &area, const Model &model, bool alon
   } else {
     canvas.text(column, area.top, printable(model.source()), {FAINT, BAR, false});
   }
-  auto [state, colour] = state_of(model);
+  const auto [state, colour, fine] = state_of(model);
   std::string text = first_columns(" ● " + state, area.width - 1) + " ";
   canvas.text(area.left + area.width - columns_of(text), area.top, text, {colour, BAR, true});
 }
@@ -66,7 +64,7 @@ Numbers numbers_of(const Model &model) {
   }
   const wire_contact &contact = *model.contact();
   numbers.flags = contact.flags;
-  numbers.doubtful = warnings_of(contact.flags);
+  numbers.doubtful = is_doubtful(contact);
   if (contact.flags & CONTACT_FLAG_FIT_VALID) {
     bool least = contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND;
     numbers.force = (least ? "≥" : "") + number(contact.force_N, 2);
@@ -103,24 +101,45 @@ Numbers numbers_of(const Model &model) {
   return numbers;
 }
 
-Numbers numbers_of_warnings(std::uint32_t flags) {
-  Numbers numbers;
-  numbers.flags = warnings_of(flags);
-  return numbers;
+std::string in_words(std::uint32_t flag, float limit_mm) {
+  static constexpr std::pair<std::uint32_t, const char *> words[] = {
+      {CONTACT_FLAG_LOW_SIGNAL, "hardly above the noise"},
+      {CONTACT_FLAG_FLAT, "no peak, no location"},
+      {CONTACT_FLAG_UNCERTAIN, "may be off by more than "},
+      {CONTACT_FLAG_MODEL, "not one round contact"},
+      {CONTACT_FLAG_SATURATED, "a sensor is beyond its range"},
+      {CONTACT_FLAG_FORCE_LOWER_BOUND, "the force is at least this"},
+      {CONTACT_FLAG_SENSOR_MASKED, "a sensor is left out"},
+      {CONTACT_FLAG_AT_BOUND, "the fit stopped at its limit"},
+      {CONTACT_FLAG_ELONGATED, "the contact is not round"},
+      {CONTACT_FLAG_ZERO_DOUBTFUL, "the zero may have moved"},
+      {CONTACT_FLAG_SENSOR_DOUBTFUL, "a sensor is in doubt"}};
+  const std::string limit = limit_mm > 0 ? number(limit_mm, 2) + " mm" : "the limit";
+  for (auto [bit, text] : words) {
+    if (bit == flag) {
+      return text + (flag == CONTACT_FLAG_UNCERTAIN ? limit : "");
+    }
+  }
+  return "the numbers deserve less trust";
 }
 
 /* In words where there is room for them, else their names, else as many as fit. */
-void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const Numbers &numbers) {
-  std::uint32_t flags = numbers.flags;
+void draw_warnings(Canvas &canvas, const Area &area, const Model &model, std::uint32_t flags) {
   if (area.height < 1 || area.width < 1) {
     return;
   }
   if ((flags & CONTACT_FLAG_CONTACT) && !(flags & CONTACT_FLAG_FIT_VALID)) {
     canvas.text(area.left, area.top, first_columns("contact, no location", area.width), text_style(WARNING, true));
-    draw_warnings(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model, numbers_of_warnings(flags));
+    draw_warnings(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model, flags & warning_flags());
     return;
   }
-  auto words = warnings_in_words(flags, model.info() ? model.info()->location_limit_mm : 0);
+  std::vector<std::string> words, names;
+  for (const FlagName &flag : flag_names()) {
+    if (flag.warning && (flags & flag.bit)) {
+      names.emplace_back(flag.name);
+      words.push_back(names.back() + ", " + in_words(flag.bit, model.info() ? model.info()->location_limit_mm : 0));
+    }
+  }
   auto lines = flowed(words, "; ", area.width);
   auto fits = [&] {
     return static_cast<int>(lines.size()) <= area.height &&
@@ -128,7 +147,7 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const N
                        [&](const std::string &line) { return columns_of(line) <= area.width; });
   };
   if (!fits()) {
-    lines = flowed(warning_names(flags), " ", area.width);
+    lines = flowed(names, " ", area.width);
   }
   bool cut = static_cast<int>(lines.size()) > area.height;
   for (int i = 0; i < std::min(area.height, static_cast<int>(lines.size())); i++) {
@@ -160,9 +179,19 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     column = draw_lamp(canvas, column, row, moved, "MOVING", WARNING);
     return draw_lamp(canvas, column + 2, row, slid, "SLIDING", BAD);
   };
-  auto quantity = [&](int column, const char *label, const std::optional<std::string> &value, int width,
-                      const char *unit, bool may_doubt) {
-    return draw_quantity(canvas, column, row, {label, value, width, unit, may_doubt && doubtful});
+  struct Place {
+    int column;
+    const char *label;
+    std::optional<std::string> value;
+    int width;
+    const char *unit;
+    bool may_doubt = true;
+  };
+  auto quantities = [&](const std::vector<Place> &places) {
+    for (const auto &[column, label, value, width, unit, may_doubt] : places) {
+      draw_quantity(canvas, left + column, row, {label, value, width, unit, may_doubt && doubtful});
+    }
+    row++;
   };
   auto line = [&](const char *label, const std::optional<std::string> &text) {
     int column = canvas.text(left, row, label, text_style(FAINT));
@@ -170,20 +199,13 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     row++;
   };
   if (area.width < WIDE - 20) {
-    quantity(left, "force", numbers.force, 8, "N", true);
-    row++;
-    quantity(left, "   sd", numbers.force_sd, 8, "N", false);
-    row++;
-    quantity(left, "x    ", numbers.x, 8, "mm", true);
-    row++;
-    quantity(left, "y    ", numbers.y, 8, "mm", true);
-    row++;
-    quantity(left, "   sd", numbers.location_sd, 8, "mm", false);
-    row++;
-    quantity(left, "σ    ", numbers.sigma, 8, "mm", true);
-    row++;
-    quantity(left, "slip ", numbers.slip, 8, "mm", true);
-    row++;
+    quantities({{0, "force", numbers.force, 8, "N"}});
+    quantities({{0, "   sd", numbers.force_sd, 8, "N", false}});
+    quantities({{0, "x    ", numbers.x, 8, "mm"}});
+    quantities({{0, "y    ", numbers.y, 8, "mm"}});
+    quantities({{0, "   sd", numbers.location_sd, 8, "mm", false}});
+    quantities({{0, "σ    ", numbers.sigma, 8, "mm"}});
+    quantities({{0, "slip ", numbers.slip, 8, "mm"}});
     draw_lamp(canvas, draw_lamp(canvas, left, row, contact, "CONTACT", GOOD) + 2, row, slipped, "SLIP", BAD);
     row++;
     if (!model.estimates_tangential()) {
@@ -201,38 +223,26 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
       line("2 ", numbers.weaker);
       return row;
     }
-    quantity(left + 10, "", numbers.qy, 6, "N", true);
-    quantity(left, "q", numbers.qx, 6, "", true);
-    row++;
-    quantity(left, from_touch ? "ΔQ/F" : "Q/F ", numbers.ratio, 5, "", true);
-    quantity(left + 11, "sd", numbers.ratio_sd, 5, "", false);
-    return row + 1;
+    quantities({{10, "", numbers.qy, 6, "N"}, {0, "q", numbers.qx, 6, ""}});
+    quantities({{0, from_touch ? "ΔQ/F" : "Q/F ", numbers.ratio, 5, ""}, {11, "sd", numbers.ratio_sd, 5, "", false}});
+    return row;
   }
-  int second = left + 22;
-  quantity(left, "force", numbers.force, 9, "N", true);
-  quantity(second, "sd", numbers.force_sd, 6, "N", false);
-  row++;
-  quantity(left, "x", numbers.x, 7, "", true);
-  quantity(left + 11, "y", numbers.y, 7, "", true);
-  quantity(second, "sd", numbers.location_sd, 6, "mm", false);
-  row++;
-  quantity(left, "σ", numbers.sigma, 7, "", true);
-  quantity(left + 11, "peak", numbers.peak, 6, "kPa", true);
-  quantity(left + 28, "residual", numbers.residual, 5, "Pa", false);
-  row++;
+  constexpr int second = 22;
+  quantities({{0, "force", numbers.force, 9, "N"}, {second, "sd", numbers.force_sd, 6, "N", false}});
+  quantities(
+      {{0, "x", numbers.x, 7, ""}, {11, "y", numbers.y, 7, ""}, {second, "sd", numbers.location_sd, 6, "mm", false}});
+  quantities({{0, "σ", numbers.sigma, 7, ""},
+              {11, "peak", numbers.peak, 6, "kPa"},
+              {28, "residual", numbers.residual, 5, "Pa", false}});
   if (numbers.stronger) {
     line("1 ", numbers.stronger);
     line("2 ", numbers.weaker);
   } else if (model.has_pad()) {
-    quantity(left, "qx", numbers.qx, 6, "", true);
-    quantity(left + 11, "qy", numbers.qy, 6, "", true);
-    quantity(second, "sd", numbers.q_sd, 6, "N", false);
-    canvas.text(second + 13, row, from_touch ? "since touch" : "", text_style(WARNING));
-    row++;
-    quantity(left, "Q/F", numbers.ratio, 5, "", true);
-    quantity(left + 11, "sd", numbers.ratio_sd, 6, "", false);
-    lamps_of_motion(second + 4);
-    row++;
+    canvas.text(left + second + 13, row, from_touch ? "since touch" : "", text_style(WARNING));
+    quantities(
+        {{0, "qx", numbers.qx, 6, ""}, {11, "qy", numbers.qy, 6, ""}, {second, "sd", numbers.q_sd, 6, "N", false}});
+    lamps_of_motion(left + second + 4);
+    quantities({{0, "Q/F", numbers.ratio, 5, ""}, {11, "sd", numbers.ratio_sd, 6, "", false}});
     if (numbers.edge) {
       line("edge ", numbers.edge);
     }
@@ -244,7 +254,7 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
   }
   int column = draw_lamp(canvas, left, row, contact, "CONTACT", GOOD);
   column = draw_lamp(canvas, column + 2, row, slipped, "SLIP", BAD);
-  column = quantity(column + 1, "", numbers.slip, 5, of.c_str(), true);
+  column = draw_quantity(canvas, column + 1, row, {"", numbers.slip, 5, of.c_str(), doubtful});
   std::string zero = model.is_tared() ? "tared" : "no zero yet";
   canvas.text(column + 2, row, model.is_current() ? zero : "", text_style(model.is_tared() ? FAINT : WARNING));
   return row + 1;
@@ -348,24 +358,20 @@ void draw_fingertip(Canvas &canvas, const Area &area, const Model &model, bool a
   int row = draw_numbers(canvas, right, model, numbers);
   if (wide) {
     constexpr int warning_rows = 3; /* all names there are, where it is narrowest */
-    draw_warnings(canvas, {left, row, right.width - 1, warning_rows}, model, numbers);
+    draw_warnings(canvas, {left, row, right.width - 1, warning_rows}, model, numbers.flags);
     row += warning_rows;
     draw_traces(canvas, {left, row, right.width - 1, traces_end - row}, model);
   } else {
-    draw_warnings(canvas, {left, row, right.width - 1, below - row}, model, numbers);
+    draw_warnings(canvas, {left, row, right.width - 1, below - row}, model, numbers.flags);
     draw_traces(canvas, {area.left, std::max(below, row), area.width - 1, traces_end - std::max(below, row)}, model);
   }
 }
 
 void draw_small(Canvas &canvas, const std::vector<Model> &models, const Caption &caption) {
-  int row = 0;
-  canvas.text(0, row++,
-              "window too small: " + std::to_string(canvas.columns()) + "x" + std::to_string(canvas.rows()) +
-                  ", needs " + std::to_string(MONITOR_COLUMNS) + "x" + std::to_string(MONITOR_ROWS),
-              text_style(WARNING, true));
+  int row = 1;
   for (const Model &model : models) {
     Numbers numbers = numbers_of(model);
-    auto [state, colour] = state_of(model);
+    const auto [state, colour, fine] = state_of(model);
     canvas.text(0, row++, (model.info() ? text_field(model.info()->serial) + " " : "") + state, text_style(colour));
     int column = 0;
     for (const Quantity &quantity :
@@ -382,7 +388,7 @@ void draw_small(Canvas &canvas, const std::vector<Model> &models, const Caption 
 
 Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, int columns, int rows) {
   Canvas canvas(columns, rows);
-  if (columns < MONITOR_COLUMNS || rows < MONITOR_ROWS) {
+  if (is_too_small(canvas)) {
     draw_small(canvas, models, caption);
     return canvas;
   }

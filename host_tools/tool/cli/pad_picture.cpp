@@ -1,23 +1,15 @@
 #include "tool/cli/pad_picture.hpp"
 
-#include "tool/cli/doubt.hpp"
-
-#include <algorithm>
-#include <cmath>
 #include <vector>
 
 namespace fingertip {
 
 namespace {
 
-/* The rim of the pad beyond the outermost sensors, half a pitch of 9 mm and some. */
-constexpr float RIM_mm = 5.0f;
 /* Pressure of the brightest colour. The scale is the square root, so that a light touch shows. */
 constexpr float FULL_SCALE_Pa = 100000.0f;
 /* Steps of colour: fewer show bands, more send bytes for differences that no eye sees. */
 constexpr float HEAT_STEPS = 20;
-/* Sensors 9 mm apart measure nothing that is finer. */
-constexpr float FINEST_mm = 0.75f;
 /* A pressure that a reader should notice. */
 constexpr float NOTED_Pa = 500;
 /* Brightness of a doubtful fit, over that of a trusted one. */
@@ -46,36 +38,18 @@ bool is_bright(const std::optional<Colour> &colour) {
   return colour && colour->r * 3 + colour->g * 6 + colour->b > 1300;
 }
 
-/* In square pixels, two to a character cell. */
-class Picture {
+class Picture : public PadScale {
 public:
-  Picture(const wire_info &info, int columns_available, int rows_available) {
-    auto [x_low, x_high] = std::minmax_element(info.x_mm, info.x_mm + info.sensor_count);
-    auto [y_low, y_high] = std::minmax_element(info.y_mm, info.y_mm + info.sensor_count);
-    left_mm_ = *x_low - RIM_mm;
-    top_mm_ = *y_high + RIM_mm;
-    float width_mm = *x_high + RIM_mm - left_mm_;
-    float height_mm = top_mm_ - *y_low + RIM_mm;
-    pixel_mm_ = std::max({width_mm / static_cast<float>(std::max(columns_available, 4)),
-                          height_mm / static_cast<float>(2 * std::max(rows_available, 2)), FINEST_mm});
-    columns_ = static_cast<int>(std::lround(width_mm / pixel_mm_));
-    rows_ = static_cast<int>(std::lround(height_mm / pixel_mm_ / 2));
-    pixels_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) * 2, PAD);
-  }
+  Picture(const wire_info &info, int columns_available, int rows_available)
+      : PadScale(info.x_mm, info.y_mm, info.sensor_count, columns_available, rows_available),
+        pixels_(static_cast<std::size_t>(columns()) * static_cast<std::size_t>(rows()) * 2, PAD) {}
 
-  int columns() const { return columns_; }
-  int rows() const { return rows_; }
-  float x_mm(int column) const { return left_mm_ + (static_cast<float>(column) + 0.5f) * pixel_mm_; }
-  float y_mm(int pixel_row) const { return top_mm_ - (static_cast<float>(pixel_row) + 0.5f) * pixel_mm_; }
-  int column_of(float x_mm) const { return static_cast<int>(std::floor((x_mm - left_mm_) / pixel_mm_)); }
-  int pixel_row_of(float y_mm) const { return static_cast<int>(std::floor((top_mm_ - y_mm) / pixel_mm_)); }
-  float pixel_mm() const { return pixel_mm_; }
-  int cells_of(float mm) const { return static_cast<int>(mm / pixel_mm_); }
+  int cells_of(float mm) const { return static_cast<int>(mm / pixel_mm()); }
   Colour *pixel(int column, int pixel_row) {
-    if (column < 0 || column >= columns_ || pixel_row < 0 || pixel_row >= 2 * rows_) {
+    if (column < 0 || column >= columns() || pixel_row < 0 || pixel_row >= 2 * rows()) {
       return nullptr;
     }
-    return &pixels_[static_cast<std::size_t>(pixel_row) * static_cast<std::size_t>(columns_) +
+    return &pixels_[static_cast<std::size_t>(pixel_row) * static_cast<std::size_t>(columns()) +
                     static_cast<std::size_t>(column)];
   }
   void paint(int column, int pixel_row, Colour colour, float part) {
@@ -83,10 +57,17 @@ public:
       *at = mix(*at, colour, part);
     }
   }
+  /* Every pixel and its location. */
+  template <typename Paint> void each(Paint &&paint) {
+    for (int row = 0; row < 2 * rows(); row++) {
+      for (int column = 0; column < columns(); column++) {
+        Colour &at = *pixel(column, row);
+        at = paint(at, x_mm(column), y_mm(row));
+      }
+    }
+  }
 
 private:
-  float left_mm_, top_mm_, pixel_mm_;
-  int columns_, rows_;
   std::vector<Colour> pixels_;
 };
 
@@ -102,13 +83,10 @@ float fitted_Pa(const wire_contact &contact, float x_mm, float y_mm) {
 }
 
 void paint_fit(Picture &picture, const Model &model, const wire_contact &contact) {
-  bool doubtful = warnings_of(contact.flags);
-  for (int row = 0; row < 2 * picture.rows(); row++) {
-    for (int column = 0; column < picture.columns(); column++) {
-      Colour colour = heat(heat_part(fitted_Pa(contact, picture.x_mm(column), picture.y_mm(row))));
-      *picture.pixel(column, row) = doubtful ? mix(PAD, colour, DOUBTFUL_PART) : colour;
-    }
-  }
+  picture.each([&](Colour, float x_mm, float y_mm) {
+    Colour colour = heat(heat_part(fitted_Pa(contact, x_mm, y_mm)));
+    return is_doubtful(contact) ? mix(PAD, colour, DOUBTFUL_PART) : colour;
+  });
   if (!model.trail().empty()) {
     float newest_us = static_cast<float>(model.trail().back().t_us);
     for (const Model::Location &past : model.trail()) {
@@ -134,7 +112,7 @@ struct Arrow {
     along_y = has_direction ? contact.qy_N / size_N : 0;
     length_mm = has_direction ? ARROW_mm * contact.tangential_ratio : 0;
     sd_mm = ARROW_mm * contact.q_sd_N / contact.force_N;
-    bool doubtful = warnings_of(contact.flags);
+    bool doubtful = is_doubtful(contact);
     colour = doubtful ? WARNING : contact.flags & CONTACT_FLAG_SLIDING ? BAD : GOOD;
     part = doubtful ? DOUBTFUL_PART : 1;
   }
@@ -158,34 +136,22 @@ struct Arrow {
   }
 };
 
-std::optional<Arrow> arrow_of(const wire_contact &contact) {
-  bool there = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) && contact.force_N > 0;
-  return there ? std::optional<Arrow>(contact) : std::nullopt;
-}
-
 void paint_arrow(Picture &picture, const wire_contact &contact, const Arrow &arrow) {
-  for (int row = 0; row < 2 * picture.rows(); row++) {
-    for (int column = 0; column < picture.columns(); column++) {
-      picture.paint(
-          column, row, arrow.colour,
-          arrow.covers(picture.x_mm(column) - contact.x_mm, picture.y_mm(row) - contact.y_mm, picture.pixel_mm()));
-    }
-  }
+  picture.each([&](Colour before, float x_mm, float y_mm) {
+    return mix(before, arrow.colour, arrow.covers(x_mm - contact.x_mm, y_mm - contact.y_mm, picture.pixel_mm()));
+  });
 }
 
 /* A long contact, as long as it presses. */
 void paint_edge(Picture &picture, const wire_contact &contact) {
   float angle_rad = contact.edge_angle_deg * 0.017453293f;
   float along_x = std::cos(angle_rad), along_y = std::sin(angle_rad);
-  for (int row = 0; row < 2 * picture.rows(); row++) {
-    for (int column = 0; column < picture.columns(); column++) {
-      float dx = picture.x_mm(column) - contact.x_mm, dy = picture.y_mm(row) - contact.y_mm;
-      if (std::abs(dx * along_x + dy * along_y) <= 0.5f * contact.edge_length_mm &&
-          std::abs(dx * along_y - dy * along_x) <= 0.5f * picture.pixel_mm()) {
-        picture.paint(column, row, WHITE, UNSURE_PART);
-      }
-    }
-  }
+  picture.each([&](Colour before, float x_mm, float y_mm) {
+    float dx = x_mm - contact.x_mm, dy = y_mm - contact.y_mm;
+    bool inside = std::abs(dx * along_x + dy * along_y) <= 0.5f * contact.edge_length_mm &&
+                  std::abs(dx * along_y - dy * along_x) <= 0.5f * picture.pixel_mm();
+    return inside ? mix(before, WHITE, UNSURE_PART) : before;
+  });
 }
 
 /* The cells of a location's mark: a cross; of a doubtful one a ring that is open on all sides. Two
@@ -207,7 +173,7 @@ struct Mark {
         column = picture.column_of(x_mm), row = picture.pixel_row_of(y_mm) / 2;
         cells.insert(cells.end(), {{column - 1, row, "─"}, {column, row, "┼"}, {column + 1, row, "─"}});
       }
-    } else if (warnings_of(contact.flags)) {
+    } else if (is_doubtful(contact)) {
       colour = WARNING;
       cells = {{column - 2, row, "("}, {column + 2, row, ")"}, {column, row - 1, "╌"}, {column, row + 1, "╌"}};
     } else {
@@ -268,7 +234,7 @@ Reading reading_of(const Model &model, int k) {
 
 void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int k, int left, int top) {
   const wire_info &info = *model.info();
-  float pitch_mm = info.pitch_mm > 0 ? info.pitch_mm : 2 * RIM_mm;
+  float pitch_mm = info.pitch_mm > 0 ? info.pitch_mm : 10;
   int width = std::clamp(picture.cells_of(pitch_mm) - 1, 3, 5);
   bool has_room_for_fit = picture.cells_of(pitch_mm) >= 6; /* three rows */
   int column = left + picture.column_of(info.x_mm[k]) - width / 2;
@@ -281,17 +247,9 @@ void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int
     for (int i = 0; back && i < width; i++) {
       canvas.text(column + i, row + line, " ", {std::nullopt, back, false});
     }
-    if (!back && text.size() == 1 && text == "-") {
-      return;
-    }
     canvas.text(column + pad, row + line, text, {colour, back, bold});
   };
-  std::optional<Colour> tile;
-  if (reading.pressure_Pa) {
-    tile = heat(heat_part(*reading.pressure_Pa));
-  } else {
-    tile = PAD;
-  }
+  const Colour tile = reading.pressure_Pa ? heat(heat_part(*reading.pressure_Pa)) : PAD;
   bool bright = is_bright(tile);
   put(0, name, doubtful ? WARNING : bright ? BLACK : FAINT, doubtful, tile);
   put(1, reading.text, bright ? BLACK : reading.colour, true, tile);
@@ -362,15 +320,16 @@ Area draw_pad(Canvas &canvas, const Area &available, const Model &model) {
   Picture picture(*model.info(), available.width - 2, available.height - 2);
   Area area = {available.left, available.top, picture.columns() + 2, picture.rows() + 2};
   const wire_contact *fit = fit_of(model);
-  const std::optional<Arrow> arrow = fit ? arrow_of(*fit) : std::nullopt;
+  std::optional<Arrow> arrow;
   if (fit) {
     paint_fit(picture, model, *fit);
-  }
-  if (fit && (fit->flags & CONTACT_FLAG_EDGE)) {
-    paint_edge(picture, *fit);
-  }
-  if (arrow) {
-    paint_arrow(picture, *fit, *arrow);
+    if (fit->flags & CONTACT_FLAG_EDGE) {
+      paint_edge(picture, *fit);
+    }
+    if ((fit->flags & CONTACT_FLAG_TANGENTIAL_VALID) && fit->force_N > 0) {
+      arrow.emplace(*fit);
+      paint_arrow(picture, *fit, *arrow);
+    }
   }
   draw_frame(canvas, area, model);
   draw_picture(canvas, picture, area.left + 1, area.top + 1);

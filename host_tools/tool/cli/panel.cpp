@@ -11,7 +11,7 @@ std::string right_aligned(const std::string &text, int width) {
   return std::string(static_cast<std::size_t>(std::max(0, width - columns_of(text))), ' ') + text;
 }
 
-StateText state_of(const Model &model) {
+StateText state_of(const Model &model, bool how_long) {
   auto silence_s = model.seconds_since_frame();
   switch (model.state()) {
   case Model::State::connecting:
@@ -19,7 +19,7 @@ StateText state_of(const Model &model) {
   case Model::State::gone:
     return {GONE_ADVICE, BAD};
   case Model::State::replay:
-    return {"replay", ACCENT};
+    return {"replay", ACCENT, true};
   case Model::State::live:
     break;
   }
@@ -30,9 +30,9 @@ StateText state_of(const Model &model) {
     return {"no frames yet", BAD};
   }
   if (*silence_s > STALLED_s) {
-    return {"STALLED for " + fixed(*silence_s, 1) + " s", BAD};
+    return {how_long ? "STALLED for " + fixed(*silence_s, 1) + " s" : "STALLED", BAD};
   }
-  return model.is_tared() ? StateText{"live", GOOD} : StateText{"taring", WARNING};
+  return model.is_tared() ? StateText{"live", GOOD, true} : StateText{"taring", WARNING, true};
 }
 
 void draw_bar(Canvas &canvas, const Area &area) {
@@ -64,6 +64,19 @@ std::vector<std::string> flowed(const std::vector<std::string> &parts, const std
     }
   }
   return lines;
+}
+
+bool is_too_small(Canvas &canvas) {
+  constexpr int least_columns = 80, least_rows = 24;
+  const bool small = canvas.columns() < least_columns || canvas.rows() < least_rows;
+  auto size = [](int columns, int rows) { return std::to_string(columns) + "x" + std::to_string(rows); };
+  if (small) {
+    canvas.text(0, 0,
+                "window too small: " + size(canvas.columns(), canvas.rows()) + ", needs " +
+                    size(least_columns, least_rows),
+                text_style(WARNING, true));
+  }
+  return small;
 }
 
 void draw_caption(Canvas &canvas, const Caption &caption) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "tool/cli/canvas.hpp"
-#include "tool/cli/caption.hpp"
 #include "tool/cli/ink.hpp"
 #include "tool/cli/model.hpp"
 
@@ -15,10 +14,11 @@ namespace fingertip {
 struct StateText {
   std::string text;
   Colour colour;
+  bool fine = false; /* or it is replayed */
 };
 
-/* The state of a fingertip. */
-StateText state_of(const Model &model);
+/* The state of a fingertip; how_long: of a stall too. */
+StateText state_of(const Model &model, bool how_long = true);
 
 /* A number with its label and unit. */
 struct Quantity {
@@ -35,6 +35,8 @@ int draw_lamp(Canvas &canvas, int column, int row, bool on, const std::string &n
 void draw_bar(Canvas &canvas, const Area &area);
 /* In the last row. */
 void draw_caption(Canvas &canvas, const Caption &caption);
+/* Whether the screen is too small for a picture; then the first row reports it. */
+bool is_too_small(Canvas &canvas);
 
 /* Lines of at most this many columns out of parts that stay whole. */
 std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator, int columns);

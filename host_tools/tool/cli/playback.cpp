@@ -1,12 +1,11 @@
 #include "tool/cli/playback.hpp"
 
-#include "libfingertip/clock.hpp"
-#include "libfingertip/error.hpp"
 #include "libfingertip/recording_reader.hpp"
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace fingertip {
 
@@ -21,9 +20,26 @@ constexpr double END = std::numeric_limits<double>::infinity();
 
 bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
 
+std::optional<double> time_of(const PacketFile::Item &item, FrameClock &clock) {
+  if (item.kind != PacketFile::Item::Kind::packet || !is_frame(item.packet)) {
+    return std::nullopt;
+  }
+  return item.time_us ? item.time_us : clock.take(item.packet.t_us);
+}
+
+std::optional<double> time_of(const GripRow &row, FrameClock &) { return row.time_us; }
+
+void take(Model &model, const PacketFile::Item &item) {
+  if (item.kind == PacketFile::Item::Kind::packet) {
+    model.take(item.packet);
+  }
+}
+
+void take(GripModel &model, const GripRow &row) { model.take(row); }
+
 } // namespace
 
-double Track::Clock::take(std::uint64_t t_us) {
+double FrameClock::take(std::uint64_t t_us) {
   if (!begun || t_us < last_us) {
     before_us += begun ? static_cast<double>(last_us - zero_us) : 0;
     begun = true;
@@ -33,84 +49,35 @@ double Track::Clock::take(std::uint64_t t_us) {
   return before_us + static_cast<double>(t_us - zero_us);
 }
 
-Track::Track(const std::string &path, bool salvage, const std::string &device) : file_(path, salvage, device) {
-  read_next();
+template <typename Reader, typename Shown> void Track<Reader, Shown>::read_next() {
+  now_.next = file_.next();
+  now_.next_us = now_.next ? time_of(*now_.next, now_.clock).value_or(now_.next_us) : now_.next_us;
 }
 
-void Track::read_next() {
-  next_ = file_.next();
-  if (next_ && next_->kind == PacketFile::Item::Kind::packet && is_frame(next_->packet)) {
-    next_us_ = next_->time_us ? *next_->time_us : clock_.take(next_->packet.t_us);
-  }
-}
-
-bool Track::read_to(double time_us, int packets, Model &model) {
-  while (next_ && next_us_ <= time_us) {
-    if (packets-- <= 0) {
+template <typename Reader, typename Shown> bool Track<Reader, Shown>::read_to(double time_us, int items, Shown &shown) {
+  while (now_.next && now_.next_us <= time_us) {
+    if (items-- <= 0) {
       return false;
     }
-    if (marks_.empty() || next_us_ >= marks_.back().time_us + MARKS_us) {
-      marks_.push_back({next_us_, file_.place(), model, clock_, next_, next_us_, last_us_});
+    if (marks_.empty() || now_.next_us >= marks_.back().position.next_us + MARKS_us) {
+      marks_.push_back({now_, file_.place(), shown});
     }
-    last_us_ = next_us_;
-    if (next_->kind == PacketFile::Item::Kind::packet) {
-      model.take(next_->packet);
-    }
+    now_.last_us = now_.next_us;
+    take(shown, *now_.next);
     read_next();
-    model.set_statistics(file_.statistics());
   }
   return true;
 }
 
-void Track::go_back(double time_us, Model &model) {
-  if (time_us >= last_us_) {
+template <typename Reader, typename Shown> void Track<Reader, Shown>::go_back(double time_us, Shown &shown) {
+  if (time_us >= now_.last_us || marks_.empty()) {
     return;
   }
-  auto after = std::upper_bound(marks_.begin(), marks_.end(), time_us,
-                                [](double wanted, const Mark &mark) { return wanted < mark.time_us; });
-  if (marks_.empty()) {
-    return;
-  }
-  const Mark &mark = after == marks_.begin() ? marks_.front() : *(after - 1);
-  file_.go_to(mark.place);
-  model = mark.model;
-  clock_ = mark.clock;
-  next_ = mark.next;
-  next_us_ = mark.next_us;
-  last_us_ = mark.last_us;
-}
-
-std::optional<GripTrack> GripTrack::open(const std::string &path, bool salvage) {
-  GripTrack track{GripRowReader(path, salvage)};
-  track.next_ = track.reader_.next();
-  return track.next_ ? std::optional(std::move(track)) : std::nullopt;
-}
-
-bool GripTrack::read_to(double time_us, int rows, GripModel &model) {
-  while (next_ && next_->time_us <= time_us) {
-    if (rows-- <= 0) {
-      return false;
-    }
-    if (marks_.empty() || next_->time_us >= marks_.back().time_us + MARKS_us) {
-      marks_.push_back({next_->time_us, reader_.place(), model, next_, last_us_});
-    }
-    last_us_ = next_->time_us;
-    model.take(*next_);
-    next_ = reader_.next();
-  }
-  return true;
-}
-
-void GripTrack::go_back(double time_us, GripModel &model) {
-  if (time_us >= last_us_ || marks_.empty()) {
-    return;
-  }
-  auto mark =
-      std::find_if(marks_.rbegin(), marks_.rend() - 1, [&](const Mark &each) { return each.time_us <= time_us; });
-  reader_.go_to(mark->place);
-  model = mark->model;
-  next_ = mark->next;
-  last_us_ = mark->last_us;
+  const auto mark = std::find_if(marks_.rbegin(), marks_.rend() - 1,
+                                 [&](const Mark &each) { return each.position.next_us <= time_us; });
+  file_.go_to(mark->place);
+  shown = mark->shown;
+  now_ = mark->position;
 }
 
 Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed) : speed_(speed) {
@@ -118,16 +85,20 @@ Playback::Playback(const std::string &path, bool salvage, const std::string &dev
   if (device.empty()) {
     auto all = fingertips_in(path);
     devices = all.empty() ? devices : all;
-    grip_track_ = all.size() == 2 ? GripTrack::open(path, salvage) : std::nullopt;
+    if (all.size() == 2) {
+      grip_track_.emplace(GripRowReader(path, salvage));
+    }
   }
   for (const std::string &each : devices) {
-    tracks_.emplace_back(path, salvage, each);
+    tracks_.emplace_back(PacketFile(path, salvage, each));
     Model model;
     model.set_state(Model::State::replay);
     model.set_source(path);
     models_.push_back(model);
   }
-  if (grip_track_) {
+  if (grip_track_ && grip_track_->is_ended()) {
+    grip_track_.reset(); /* a file without a gripper */
+  } else if (grip_track_) {
     grip_.take(tracks_[0].file().recorder_metadata());
   }
 }
@@ -141,13 +112,14 @@ void Playback::step(HostTime now) {
   is_there_ = true;
   for (std::size_t i = 0; i < tracks_.size(); i++) {
     is_there_ = tracks_[i].read_to(time_us_, PACKETS_AT_ONCE, models_[i]) && is_there_;
+    models_[i].set_statistics(tracks_[i].file().statistics());
   }
   if (grip_track_) {
     is_there_ = grip_track_->read_to(time_us_, PACKETS_AT_ONCE, grip_) && is_there_;
   }
   if (is_there_ && std::isinf(time_us_)) {
     time_us_ = grip_track_ ? grip_track_->last_us() : 0;
-    for (const Track &track : tracks_) {
+    for (const FingertipTrack &track : tracks_) {
       time_us_ = std::max(time_us_, track.last_us());
     }
   }
@@ -156,7 +128,7 @@ void Playback::step(HostTime now) {
 HostTime Playback::next_step(HostTime now) const {
   constexpr std::chrono::milliseconds patience{20};
   double due_us = END;
-  for (const Track &track : tracks_) {
+  for (const FingertipTrack &track : tracks_) {
     due_us = track.is_ended() ? due_us : std::min(due_us, track.next_us());
   }
   if (grip_track_ && !grip_track_->is_ended()) {
@@ -173,8 +145,9 @@ HostTime Playback::next_step(HostTime now) const {
 }
 
 bool Playback::is_over() const {
-  return quit_ || (!paused_ && is_there_ && (!grip_track_ || grip_track_->is_ended()) &&
-                   std::all_of(tracks_.begin(), tracks_.end(), [](const Track &track) { return track.is_ended(); }));
+  return quit_ ||
+         (!paused_ && is_there_ && (!grip_track_ || grip_track_->is_ended()) &&
+          std::all_of(tracks_.begin(), tracks_.end(), [](const FingertipTrack &track) { return track.is_ended(); }));
 }
 
 void Playback::seek(double time_us) {
@@ -222,7 +195,7 @@ void Playback::key(Key key) {
 
 Caption Playback::caption(const std::string &name) const {
   double shown_us = 0;
-  for (const Track &track : tracks_) {
+  for (const FingertipTrack &track : tracks_) {
     shown_us = std::max(shown_us, track.last_us());
   }
   std::string note = is_there_ && paused_ ? "PAUSED at " : is_there_ ? "at " : "reading, at ";

@@ -6,89 +6,60 @@
 #include "libfingertip/packet_file.hpp"
 #include "tool/cli/grip_model.hpp"
 #include "tool/cli/keys.hpp"
-#include "tool/cli/model.hpp"
 #include "tool/cli/monitor.hpp"
 
-#include <chrono>
-#include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace fingertip {
 
-/* One fingertip of a file, up to a time that can be chosen: the model, which is always the same
- * one, is what was known then. */
-class Track {
+/* Time of frames: a device that restarted goes on where it was. */
+struct FrameClock {
+  bool begun = false;
+  std::uint64_t zero_us = 0, last_us = 0;
+  double before_us = 0;
+  double take(std::uint64_t t_us);
+};
+
+/* One fingertip or the gripper of a file, up to a time that can be chosen: what is shown, which is
+ * always the same object, is what was known then. What reads on throws Error as the reader does. */
+template <typename Reader, typename Shown> class Track {
 public:
-  /* Throws Error as PacketFile does; so does what reads on. */
-  Track(const std::string &path, bool salvage, const std::string &device);
+  explicit Track(Reader reader) : file_(std::move(reader)) { read_next(); }
 
-  const PacketFile &file() const { return file_; }
-  bool is_ended() const { return !next_; }
+  const Reader &file() const { return file_; }
+  bool is_ended() const { return !now_.next; }
   /* Time of the next frame, us from the file's beginning; of the last one if none follows. */
-  double next_us() const { return next_us_; }
-  double last_us() const { return last_us_; }
+  double next_us() const { return now_.next_us; }
+  double last_us() const { return now_.last_us; }
 
-  /* Takes at most this number of packets, up to this time; false if there are more. */
-  bool read_to(double time_us, int packets, Model &model);
+  /* Takes at most this number of packets or rows, up to this time; false if there are more. */
+  bool read_to(double time_us, int items, Shown &shown);
   /* Back to somewhere not after this time, from where it can be read. */
-  void go_back(double time_us, Model &model);
+  void go_back(double time_us, Shown &shown);
 
 private:
-  /* Time of frames: a device that restarted goes on where it was. */
-  struct Clock {
-    bool begun = false;
-    std::uint64_t zero_us = 0, last_us = 0;
-    double before_us = 0;
-    double take(std::uint64_t t_us);
+  struct Position {
+    FrameClock clock;
+    decltype(std::declval<Reader &>().next()) next;
+    double next_us = 0, last_us = 0;
   };
   struct Mark {
-    double time_us;
-    PacketFile::Place place;
-    Model model;
-    Clock clock;
-    std::optional<PacketFile::Item> next;
-    double next_us, last_us;
+    Position position;
+    typename Reader::Place place;
+    Shown shown;
   };
 
   void read_next();
 
-  PacketFile file_;
-  Clock clock_;
-  std::optional<PacketFile::Item> next_;
-  double next_us_ = 0, last_us_ = 0;
+  Reader file_;
+  Position now_;
   std::vector<Mark> marks_;
 };
-
-/* The same for the gripper of a file. */
-class GripTrack {
-public:
-  /* Nothing for a file without one. */
-  static std::optional<GripTrack> open(const std::string &path, bool salvage);
-
-  bool is_ended() const { return !next_; }
-  double next_us() const { return next_ ? next_->time_us : last_us_; }
-  double last_us() const { return last_us_; }
-  bool read_to(double time_us, int rows, GripModel &model);
-  void go_back(double time_us, GripModel &model);
-
-private:
-  struct Mark {
-    double time_us;
-    GripRowReader::Place place;
-    GripModel model;
-    std::optional<GripRow> next;
-    double last_us;
-  };
-
-  explicit GripTrack(GripRowReader reader) : reader_(std::move(reader)) {}
-
-  GripRowReader reader_;
-  std::optional<GripRow> next_;
-  double last_us_ = 0;
-  std::vector<Mark> marks_;
-};
+using FingertipTrack = Track<PacketFile, Model>;
+using GripTrack = Track<GripRowReader, GripModel>;
 
 class Playback {
 public:
@@ -104,7 +75,7 @@ public:
   bool is_over() const;
   void key(Key key);
 
-  const std::vector<Track> &tracks() const { return tracks_; }
+  const std::vector<FingertipTrack> &tracks() const { return tracks_; }
   const std::vector<Model> &models() const { return models_; }
   /* The model of a grasp that is shown whole. */
   const GripModel *grip() const { return grip_track_ ? &grip_ : nullptr; }
@@ -113,7 +84,7 @@ public:
 private:
   void seek(double time_us);
 
-  std::vector<Track> tracks_;
+  std::vector<FingertipTrack> tracks_;
   std::vector<Model> models_; /* of the tracks */
   std::optional<GripTrack> grip_track_;
   GripModel grip_;

@@ -5,7 +5,6 @@
 #include "tool/cli/painter.hpp"
 
 #include <optional>
-#include <string>
 #include <termios.h>
 
 namespace fingertip {

@@ -1,7 +1,5 @@
 #include "tool/cli/traces.hpp"
 
-#include "tool/cli/chart.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -10,7 +8,6 @@ namespace fingertip {
 
 namespace {
 
-constexpr double SAMPLE_INTERVAL_s = Model::SAMPLE_INTERVAL_us / 1e6;
 constexpr float AXIS_RIM_mm = 6.0f; /* beyond the outermost sensors, as the pad is drawn */
 
 /* A doubtful force above this is none: the pads are made for less. */
@@ -22,23 +19,15 @@ constexpr float LEAST_PULL_N = 0.5f;
 
 using Sample = Model::Sample;
 
-const Sample &sample_of(const Model &model, std::int64_t interval) {
-  static const Sample none{};
-  std::int64_t oldest =
-      static_cast<std::int64_t>(model.last_interval()) - static_cast<std::int64_t>(model.samples().size()) + 1;
-  bool there = interval >= oldest && interval <= static_cast<std::int64_t>(model.last_interval());
-  return there ? model.samples()[static_cast<std::size_t>(interval - oldest)] : none;
-}
-
 /* there: whether an interval has the value; alarm: where it is shown red; null: never. */
 Curve curve_of(const Model &model, bool Sample::*there, float Sample::*value, bool goes_both_ways,
                bool Sample::*alarm) {
   return {[&model, there, value, alarm](std::int64_t interval) {
-            const Sample &sample = sample_of(model, interval);
+            const Sample &sample = model.samples()[interval];
             return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, sample.doubtful,
                               alarm && sample.*alarm};
           },
-          static_cast<std::int64_t>(model.last_interval()), goes_both_ways};
+          model.samples().last(), goes_both_ways};
 }
 
 } // namespace
@@ -63,9 +52,8 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
     }
   }
   float doubtful_N = force_N;
-  const auto last = static_cast<std::int64_t>(model.last_interval());
-  each_shown(area, SAMPLE_INTERVAL_s, last, [&](std::int64_t interval) {
-    const Sample &sample = sample_of(model, interval);
+  each_shown(area, model.samples().last(), [&](std::int64_t interval) {
+    const Sample &sample = model.samples()[interval];
     if (sample.fitted && !sample.doubtful) {
       force_N = std::max(force_N, sample.force_N);
     } else if (sample.fitted && sample.force_N <= MOST_N) {
@@ -102,7 +90,7 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
                     round_above(slip_mm),
                     threshold_mm > 0 ? std::optional<float>(threshold_mm) : std::nullopt,
                     {curve_of(model, &Sample::slip_valid, &Sample::slip_mm, false, &Sample::slip)}});
-  draw_charts(canvas, area, SAMPLE_INTERVAL_s, charts);
+  draw_charts(canvas, area, charts);
 }
 
 } // namespace fingertip

@@ -14,7 +14,7 @@ namespace fingertip {
  * beyond the axis that the others need. */
 void draw_traces(Canvas &canvas, const Area &area, const Model &model);
 
-/* Curves of the model, which must outlive them; in intervals of Model::SAMPLE_INTERVAL_us. */
+/* Of the model, which must outlive it. */
 Curve force_curve(const Model &model);
 
 } // namespace fingertip

@@ -1,12 +1,9 @@
 #include "tool/cli/view.hpp"
 
 #include "grasp/words.hpp"
-#include "libfingertip/clock.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/advice.hpp"
-#include "tool/cli/doubt.hpp"
 #include "tool/cli/grasp_screen.hpp"
 
 #include <chrono>
@@ -49,31 +46,30 @@ private:
   std::string last_;
 };
 
-std::string state_text(const Model &model) {
-  auto silence_s = model.seconds_since_frame();
-  switch (model.state()) {
-  case Model::State::connecting:
-    return "waiting for an answer";
-  case Model::State::gone:
-    return GONE_ADVICE;
-  case Model::State::live:
-    return !silence_s                   ? "no frames yet"
-           : *silence_s > STALLED_s     ? "STALLED"
-           : model.is_without_sensors() ? "no sensor answers"
-                                        : "";
-  case Model::State::replay:
-    break;
-  }
-  return "";
+/* What is wrong; "" where all is well. */
+std::string trouble_of(const Model &model) {
+  const StateText state = state_of(model, false);
+  return state.fine ? "" : state.text;
 }
+
+std::string troubles_of(const std::vector<Model> &models) {
+  std::string troubles;
+  for (const Model &model : models) {
+    troubles += trouble_of(model) + "\n";
+  }
+  return troubles;
+}
+
+std::string name_of(const Model &model) { return model.info() ? text_field(model.info()->serial) : model.source(); }
+
+std::string with_gap(const std::string &text) { return text.empty() ? "" : "  " + text; }
 
 std::string status_line(const Model &model) {
   const LineStatistics &line = model.statistics();
   std::string text = fixed(model.seconds(), 1) + " s  " + std::to_string(model.frames()) + " frames  " +
                      (model.state() == Model::State::gone ? "" : fixed(model.frames_per_s(), 1) + "/s  ") + "dropped " +
                      std::to_string(line.dropped_packets) + "  CRC errors " + std::to_string(line.crc_errors);
-  std::string state = state_text(model);
-  return state.empty() ? text : text + "  " + state;
+  return text + with_gap(trouble_of(model));
 }
 
 class ScreenView : public View {
@@ -105,7 +101,7 @@ std::string contact_text(const Model &model) {
   std::string text;
   if (contact.flags & CONTACT_FLAG_FIT_VALID) {
     bool least = contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND;
-    text = std::string(warnings_of(contact.flags) ? "  doubtful:" : "") + "  x " +
+    text = std::string(is_doubtful(contact) ? "  doubtful:" : "") + "  x " +
            fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " + fixed(static_cast<double>(contact.y_mm), 2) +
            " mm  force " + (least ? "at least " : "") + fixed(static_cast<double>(contact.force_N), 2) + " N";
   }
@@ -115,18 +111,13 @@ std::string contact_text(const Model &model) {
 class LineView : public View {
 public:
   void update(const std::vector<Model> &models, const Caption &caption) override {
-    std::string states;
-    for (const Model &model : models) {
-      states += state_text(model) + "\n";
-    }
-    if (!interval_.is_due(change_.is_new(states))) {
+    if (!interval_.is_due(change_.is_new(troubles_of(models)))) {
       return;
     }
     for (const Model &model : models) {
-      std::string name =
-          models.size() < 2 ? "" : printable(model.info() ? text_field(model.info()->serial) : model.source()) + "  ";
-      std::printf("%s%s%s%s%s\n", name.c_str(), status_line(model).c_str(), contact_text(model).c_str(),
-                  caption.note.empty() ? "" : "  ", caption.note.c_str());
+      std::string name = models.size() < 2 ? "" : printable(name_of(model)) + "  ";
+      std::printf("%s%s%s%s\n", name.c_str(), status_line(model).c_str(), contact_text(model).c_str(),
+                  with_gap(caption.note).c_str());
     }
     std::fflush(stdout);
   }
@@ -150,7 +141,7 @@ public:
       return;
     }
     std::FILE *to = quiet_ ? stderr : stdout;
-    std::fprintf(to, "%s%s%s\n", grip_line(grip_).c_str(), caption.note.empty() ? "" : "  ", caption.note.c_str());
+    std::fprintf(to, "%s%s\n", grip_line(grip_).c_str(), with_gap(caption.note).c_str());
     std::fflush(to);
   }
 
@@ -169,13 +160,17 @@ public:
     }
   }
   void update(const std::vector<Model> &models, const Caption &caption) override {
-    const Model &model = models.front();
-    if (!interval_.is_due(change_.is_new(state_text(model)))) {
+    if (!interval_.is_due(change_.is_new(troubles_of(models)))) {
       return;
     }
     shown_ = true;
-    std::string text = status_line(model) + (caption.note.empty() ? "" : "  " + caption.note);
-    std::fprintf(stderr, in_place_ ? "\r\x1b[K%s" : "%s\n", text.c_str());
+    std::string text = models.size() == 1 ? status_line(models[0]) : fixed(models[0].seconds(), 1) + " s";
+    for (const Model &model : models) {
+      text += models.size() == 1 ? ""
+                                 : "  " + name_of(model) + " " + std::to_string(model.frames()) + " frames" +
+                                       with_gap(trouble_of(model));
+    }
+    std::fprintf(stderr, in_place_ ? "\r\x1b[K%s" : "%s\n", printable(text + with_gap(caption.note)).c_str());
     std::fflush(stderr);
   }
 
@@ -193,7 +188,7 @@ public:
     if (!interval_.is_due()) {
       return;
     }
-    std::string state = state_text(models.front());
+    std::string state = trouble_of(models.front());
     if (change_.is_new(state)) {
       std::fprintf(stderr, "%s\n", state.empty() ? "streaming" : state.c_str());
     }

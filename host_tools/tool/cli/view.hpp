@@ -2,13 +2,10 @@
 #pragma once
 
 #include "tool/cli/grip_model.hpp"
-#include "tool/cli/model.hpp"
 #include "tool/cli/monitor.hpp"
 #include "tool/cli/terminal.hpp"
 
-#include <chrono>
 #include <memory>
-#include <optional>
 #include <vector>
 
 namespace fingertip {
@@ -32,7 +29,7 @@ std::unique_ptr<View> make_monitor_view(ColourMode mode);
  * only on standard error. The model must outlive the view. */
 std::unique_ptr<View> make_grasp_view(ColourMode mode, const GripModel &grip);
 std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip);
-/* One line on standard error, renewed in place if that is a terminal. */
+/* One line on standard error for all of them, renewed in place if that is a terminal. */
 std::unique_ptr<View> make_progress_view();
 /* On standard error only what is wrong for a second or more, and that it has ended. */
 std::unique_ptr<View> make_state_view();

@@ -16,7 +16,10 @@ struct Crash {
 };
 
 /* symbols: of the firmware that crashed; none: addresses only. */
-Crash with_places(const crash_record &record, const std::optional<Symbols> &symbols);
+inline Crash with_places(const crash_record &record, const std::optional<Symbols> &symbols) {
+  const auto place = [&](std::uint32_t address) { return symbols ? symbols->place(address).value_or("") : ""; };
+  return {record, place(record.pc), place(record.lr & ~1u), ""};
+}
 
 /* "a hard fault at fit_frame+0x1a (0x20001234), ..., 3 min after its start" */
 std::string crash_text(const Crash &crash);

@@ -12,7 +12,6 @@ extern "C" {
 }
 
 #include <algorithm>
-#include <bitset>
 #include <cmath>
 
 namespace fingertip {
@@ -184,8 +183,8 @@ private:
     case ErrorCode::permission_denied:
       add(Verdict::bad, "port", failure.text,
           facts_.rule.empty() ? "install the udev rule, see above"
-                              : "plug it in again; where you are not logged in at the machine "
-                                "itself, your user must be in the group plugdev");
+                              : "plug it in again; where you are not logged in at the machine itself, your user must "
+                                "be in the group plugdev");
       break;
     case ErrorCode::other_version:
     case ErrorCode::no_answer:
@@ -260,8 +259,7 @@ private:
     std::string who = "strip " + std::to_string(strip) + ", " + list(sensors_in(sensors)) + ": ";
     if (facts_.after->bus_timeouts > 0) {
       add(Verdict::bad, "sensors", who + "a line behind multiplexer " + address + " is held low, it is kept shut",
-          "take the sensors of that strip off one by one, or measure its SDn and SCn: 3.3 V at "
-          "rest",
+          "take the sensors of that strip off one by one, or measure its SDn and SCn: 3.3 V at rest",
           sensors_in(sensors));
     } else {
       add(Verdict::bad, "sensors", who + "multiplexer " + address + " does not answer",
@@ -276,8 +274,8 @@ private:
       add(Verdict::bad, "sensors",
           "they read " + fixed(middle_Pa() / 1000, 0) +
               " kPa at rest, as sensors do that are not those of the firmware",
-          "install firmware that was built for them (cmake -DFINGERTIP_SENSOR=...), or the sensors "
-          "that this one is for");
+          "install firmware that was built for them (cmake -DFINGERTIP_SENSOR=...), or the sensors that this one is "
+          "for");
     } else if (facts_.rest) {
       for (unsigned k = 0; k < facts_.rest->sensors.size(); k++) {
         if (!(missing_ >> k & 1u)) {
@@ -301,8 +299,8 @@ private:
           "release the pad; if it stays, replace it", {k});
     } else if (sensor.doubtful_share > DOUBTFUL_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors",
-          named(k) + " differs from the others: its pressure at rest, or a temperature that "
-                     "fits neither its own before nor theirs",
+          named(k) + " differs from the others: its pressure at rest, or a temperature that fits neither its own "
+                     "before nor theirs",
           check_of(k) + "; if it stays, replace it", {k});
     }
     double apart_Pa = sensor.mean_Pa - middle_Pa();
@@ -334,8 +332,7 @@ private:
     for (unsigned k : bad) {
       bool used = !(missing_ >> k & 1u);
       add(Verdict::bad, "prom",
-          named(k) + (used ? " has a calibration memory (PROM) whose check sum is wrong: its "
-                             "pressures are doubtful"
+          named(k) + (used ? " has a calibration memory (PROM) whose check sum is wrong: its pressures are doubtful"
                            : " has a calibration memory (PROM) that is blank: it is not used"),
           "power it off and on; if it stays, replace the sensor", {k});
     }
@@ -375,8 +372,7 @@ private:
       add(Verdict::warn, "restarts",
           up + ", " + count(now.watchdog_resets, "reset") + " by the watchdog since power-on",
           facts_.crash ? "see the crash below"
-                       : "if it does so again, check its supply and report it with the firmware's "
-                         "version");
+                       : "if it does so again, check its supply and report it with the firmware's version");
     } else {
       add(Verdict::ok, "restarts", up + ", started by power or command");
     }
@@ -465,8 +461,8 @@ private:
       add(Verdict::ok, "sync", text);
     } else {
       add(Verdict::warn, "sync", text,
-          "join the pin and ground with the other side's, 3.3 V at most, and let that pulse; or "
-          "`fingertip set sync=off`");
+          "join the pin and ground with the other side's, 3.3 V at most, and let that pulse; or `fingertip set "
+          "sync=off`");
     }
   }
 
@@ -537,8 +533,7 @@ private:
           std::string(noisy ? "contact is reported in " : "something touches the pad in ") + percent(share) +
               " of the frames: drift was not measured",
           noisy ? "see to the noise first; else let go of the pad and run this again"
-                : "let go of the pad and run this again; where nothing touches it, `fingertip tare "
-                  "--force`");
+                : "let go of the pad and run this again; where nothing touches it, `fingertip tare --force`");
     } else if (!(rest.last_flags & CONTACT_FLAG_TARED)) {
       add(Verdict::warn, "zero", "not every sensor has one", "let go of the pad, then `fingertip tare`");
     } else if (rest.last_flags & CONTACT_FLAG_ZERO_DOUBTFUL) {

@@ -2,9 +2,7 @@
 
 #include "libfingertip/text.hpp"
 #include "tool/calibration/solver.hpp"
-#include "tool/cli/calibrate_placements.hpp"
 #include "tool/cli/commands/commands.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <memory>
 
@@ -12,13 +10,12 @@ namespace fingertip {
 
 namespace {
 
-double weight_N_from_text(const std::string &option, const std::string &text, double unit_N) {
-  constexpr double LIGHTEST_N = 0.1, HEAVIEST_N = 50;
-  auto weight = to_double(text);
-  if (!weight || *weight * unit_N < LIGHTEST_N || *weight * unit_N > HEAVIEST_N) {
-    wrong_value(option, text, fixed(LIGHTEST_N / unit_N, 1) + " to " + fixed(HEAVIEST_N / unit_N, 0));
-  }
-  return *weight * unit_N;
+CLI::Option *with_weight(CLI::App *command, const std::string &option, double unit_N, std::optional<double> &force_N,
+                         const std::string &help) {
+  const double lightest = 0.1 / unit_N, heaviest = 50 / unit_N;
+  return with_number(
+      command, option, lightest, heaviest, fixed(lightest, 1) + " to " + fixed(heaviest, 0),
+      [&force_N, unit_N](double weight) { force_N = weight * unit_N; }, help);
 }
 
 } // namespace
@@ -34,31 +31,19 @@ void add_calibrate(CommandLine &line) {
           return calibrate_placements();
         }
         if (options->drag && !options->force_N) {
-          throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or "
-                           "--force N");
+          throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or --force N");
         }
         return run_calibrate(*options);
       });
   with_port(command, options->choice);
-  CLI::Option *weight = command
-                            ->add_option_function<std::string>(
-                                "--weight",
-                                [options](const std::string &text) {
-                                  options->force_N = weight_N_from_text("--weight", text, calibrating::GRAVITY_N_PER_g);
-                                },
-                                "Mass of the weight: then forces are calibrated too")
+  CLI::Option *weight = with_weight(command, "--weight", calibrating::GRAVITY_N_PER_g, options->force_N,
+                                    "Mass of the weight: then forces are calibrated too")
                             ->type_name("GRAMS");
   CLI::Option *force =
-      command
-          ->add_option_function<std::string>(
-              "--force",
-              [options](const std::string &text) { options->force_N = weight_N_from_text("--force", text, 1.0); },
-              "The same in newtons")
-          ->excludes(weight)
-          ->type_name("N");
+      with_weight(command, "--force", 1.0, options->force_N, "The same in newtons")->excludes(weight)->type_name("N");
   CLI::Option *drag = command->add_flag("--drag", options->drag,
-                                        "Find the tangential force's scale: the weight hangs on a string that "
-                                        "pulls an object level along the pad, several times in each direction");
+                                        "Find the tangential force's scale: the weight hangs on a string that pulls an "
+                                        "object level along the pad, several times in each direction");
   CLI::Option *from =
       command->add_option("--from", options->from, "Use the placements of a recording with pressures, not live ones")
           ->type_name("FILE.csv");

@@ -3,7 +3,6 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/converter.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <fstream>
 #include <memory>

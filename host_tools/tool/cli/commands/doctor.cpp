@@ -167,26 +167,17 @@ int doctor(const DoctorOptions &options) {
 void add_doctor(CommandLine &line) {
   auto options = std::make_shared<DoctorOptions>();
   CLI::App *command = line.add("doctor",
-                               "Find what is wrong with a fingertip, its sensors and its port; nothing may touch "
-                               "the pad meanwhile. Exit status 1 if anything is bad",
+                               "Find what is wrong with a fingertip, its sensors and its port; nothing may touch the "
+                               "pad meanwhile. Exit status 1 if anything is bad",
                                [options] { return doctor(*options); });
   with_port(command, options->examination.choice);
-  command
-      ->add_option_function<std::string>(
-          "--seconds",
-          [options](const std::string &text) {
-            auto seconds = to_double(text);
-            if (!seconds || *seconds < 1 || *seconds > 600) {
-              wrong_value("--seconds", text, "1 to 600");
-            }
-            options->examination.seconds = *seconds;
-          },
-          "How long to measure noise, drift and rate; default 10")
+  with_number(
+      command, "--seconds", 1, 600, "1 to 600", [options](double value) { options->examination.seconds = value; },
+      "How long to measure noise, drift and rate; default 10")
       ->type_name("S");
   command
       ->add_option("--elf", options->examination.elf,
-                   "ELF file of the firmware, for the names in a crash; default "
-                   "build/BOARD/fingertip-BOARD.elf")
+                   "ELF file of the firmware, for the names in a crash; default build/BOARD/fingertip-BOARD.elf")
       ->type_name("FILE");
   command->add_flag("--json", options->json, "Print all of it as JSON");
   command

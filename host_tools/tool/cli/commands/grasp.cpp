@@ -1,10 +1,7 @@
 #include "grasp/settings.hpp"
-#include "libfingertip/text.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/grasp_session.hpp"
 #include "tool/cli/gripper_options.hpp"
-#include "tool/cli/recording_options.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <cmath>
 #include <cstdio>
@@ -19,8 +16,6 @@ std::string number(double value) {
   std::snprintf(text, sizeof text, value == std::floor(value) ? "%.0f" : "%.4g", value);
   return text;
 }
-
-std::string range_of(const GraspSetting &setting) { return number(setting.low) + " to " + number(setting.high); }
 
 /* The default for the usual gripper, and for a servo if it differs. */
 std::string default_of(const GraspSetting &setting, const GripSettings &usual, const GripSettings &servo) {
@@ -41,17 +36,9 @@ void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
       "--preset", [&breaking](const std::string &name) { breaking = typed([&] { return preset_values(name); }); },
       "Cap, start, floor and approach for what breaks: " + names);
   preset->type_name("NAME")->group("Limits");
-  command
-      ->add_option_function<std::string>(
-          "--breaks",
-          [&breaking](const std::string &text) {
-            const auto breaks_N = to_double(text);
-            if (!breaks_N || *breaks_N < 1.0 || *breaks_N > 100.0) {
-              wrong_value("--breaks", text, "N, 1 to 100");
-            }
-            breaking = breaking_values(*breaks_N);
-          },
-          "The same, for an object that this force breaks")
+  with_number(
+      command, "--breaks", 1, 100, "N, 1 to 100", [&breaking](double value) { breaking = breaking_values(value); },
+      "The same, for an object that this force breaks")
       ->type_name("N")
       ->excludes(preset)
       ->group("Limits");
@@ -62,19 +49,11 @@ void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
   const GripSettings usual = settings_for(models.front(), {});
   const GripSettings servo = settings_for(models.back(), {});
   for (const GraspSetting &setting : grasp_settings()) {
-    std::string option = std::string("--") + setting.name;
-    command
-        ->add_option_function<std::string>(
-            option,
-            [&limits, &setting, option](const std::string &text) {
-              auto value = to_double(text);
-              if (!value || *value < setting.low || *value > setting.high) {
-                const std::string unit = setting.unit;
-                wrong_value(option, text, unit + (unit.empty() ? "" : ", ") + range_of(setting));
-              }
-              limits[setting.name] = *value;
-            },
-            std::string(setting.help) + ": " + range_of(setting) + default_of(setting, usual, servo))
+    const std::string range = number(setting.low) + " to " + number(setting.high), unit = setting.unit;
+    with_number(
+        command, std::string("--") + setting.name, setting.low, setting.high, unit + (unit.empty() ? "" : ", ") + range,
+        [&limits, &setting](double value) { limits[setting.name] = value; },
+        std::string(setting.help) + ": " + range + default_of(setting, usual, servo))
         ->type_name(*setting.unit ? setting.unit : "X")
         ->group("Limits");
   }
@@ -104,14 +83,10 @@ void add_grasp(CommandLine &line) {
   with_gripper_line(command, options->gripper);
   with_presets(command, options->breaking);
   with_limits(command, options->limits);
-  command->footer("Keys, on a terminal: q end, holding; o open; h hold; g grasp.\n\n"
-                  "Exit status:\n"
-                  "  0  as asked, the gripper holding or open\n"
-                  "  1  an error, which is named\n"
-                  "  2  wrong usage\n"
-                  "  3  it closed, and nothing was there\n"
-                  "  4  the object fell\n"
-                  "  5  the gripper failed, was not active, or did not answer at the end");
+  command->footer(
+      "Keys, on a terminal: q end, holding; o open; h hold; g grasp.\n\nExit status:\n  0  as asked, the gripper "
+      "holding or open\n  1  an error, which is named\n  2  wrong usage\n  3  it closed, and nothing was there\n  4  "
+      "the object fell\n  5  the gripper failed, was not active, or did not answer at the end");
 }
 
 } // namespace fingertip

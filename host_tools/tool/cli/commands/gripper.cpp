@@ -7,7 +7,6 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/gripper_options.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -55,8 +54,8 @@ void advise_about_timer(const std::string &path) {
     std::error_code none;
     const std::string name = std::filesystem::canonical(path, none).filename().string();
     std::fprintf(stderr,
-                 "fingertip: the latency timer of %d ms allows %d exchanges a second; until it is "
-                 "plugged out: echo 1 | sudo tee /sys/bus/usb-serial/devices/%s/latency_timer\n",
+                 "fingertip: the latency timer of %d ms allows %d exchanges a second; until it is plugged out: echo 1 "
+                 "| sudo tee /sys/bus/usb-serial/devices/%s/latency_timer\n",
                  *timer_ms, 1000 / *timer_ms, printable(name).c_str());
   }
 }
@@ -178,8 +177,7 @@ int move(Gripper &gripper, const GripperOptions &options) {
   const GripperStatus begin = polled(gripper);
   if (!begin.active) {
     throw Error("the gripper is not active" + (begin.fault ? ", fault " + fault_of(gripper, begin) : std::string()) +
-                "; --activate does it, and a Robotiq opens and closes then: whatever it holds "
-                "falls");
+                "; --activate does it, and a Robotiq opens and closes then: whatever it holds falls");
   }
   const double way_mm = std::abs(width_mm - begin.width_mm);
   gripper.move({width_mm, speed_mm_s, options.force_N});
@@ -231,8 +229,8 @@ int gripper_command(GripperOptions options) {
 void add_gripper(CommandLine &line) {
   auto options = std::make_shared<GripperOptions>();
   CLI::App *command = line.add("gripper",
-                               "Try a gripper by hand: list models, show its state, open it, close it, move "
-                               "it to a width; waits and prints how it ended",
+                               "Try a gripper by hand: list models, show its state, open it, close it, move it to a "
+                               "width; waits and prints how it ended",
                                [options] { return gripper_command(*options); });
   command->add_option("ACTION", options->action, "list, info, move WIDTH, open or close")
       ->required()
@@ -255,12 +253,11 @@ void add_gripper(CommandLine &line) {
       ->type_name("MM/S");
   command
       ->add_option("--force", options->force_N,
-                   "Force at which it stops, by its maker's scale, which is not newtons; default: its "
-                   "least")
+                   "Force at which it stops, by its maker's scale, which is not newtons; default: its least")
       ->type_name("N");
-  command->add_flag("--activate", options->activate,
-                    "Activate it first, which clears its faults; a Robotiq opens and closes fully, "
-                    "and whatever it holds falls");
+  command->add_flag(
+      "--activate", options->activate,
+      "Activate it first, which clears its faults; a Robotiq opens and closes fully, and whatever it holds falls");
   with_gripper_line(command, options->way);
 }
 

@@ -57,8 +57,8 @@ int list(Reach reach) {
 void add_list(CommandLine &line) {
   auto choice = std::make_shared<Choice>();
   with_transport(line.add("list",
-                          "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial "
-                          "number, board, firmware, how it is reached",
+                          "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial number, board, "
+                          "firmware, how it is reached",
                           [choice] { return list(choice->reach); }),
                  choice->reach);
 }

@@ -8,7 +8,6 @@
 #include "library/pad/thickness.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/device.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <cstdio>
 #include <memory>
@@ -65,8 +64,8 @@ int pad_command(const PadOptions &options) {
     return erase_pad(session);
   }
   if (options.thickness_mm && *options.thickness_mm < pad::THINNEST_mm) {
-    throw WrongUsage("on less than 9 mm of rubber the tangential force is not accurate enough; "
-                     "--thickness goes from 9 to 20 mm");
+    throw WrongUsage(
+        "on less than 9 mm of rubber the tangential force is not accurate enough; --thickness goes from 9 to 20 mm");
   }
   const pad::Shape shape{thickness_mm(options, info), options.overhang_mm, options.from_touch};
   pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
@@ -82,14 +81,13 @@ int pad_command(const PadOptions &options) {
               profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?", ends ? " ends" : "",
               profile.from_touch ? " from_touch" : "", fixed(static_cast<double>(profile.force_ratio), 3).c_str());
   if (shape.overhang_mm == 0) {
-    std::fprintf(stderr, "fingertip: a pad without end, as there is no --overhang: where the rubber "
-                         "ends, location and tangential force are off\n");
+    std::fprintf(stderr, "fingertip: a pad without end, as there is no --overhang: where the rubber ends, location and "
+                         "tangential force are off\n");
   }
   if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
     std::fprintf(stderr,
-                 "fingertip: the rubber ends %s mm beyond the outer sensors, less than "
-                 "half its thickness, which spoils the zero of the tangential force; --from-touch "
-                 "reports the change instead\n",
+                 "fingertip: the rubber ends %s mm beyond the outer sensors, less than half its thickness, which "
+                 "spoils the zero of the tangential force; --from-touch reports the change instead\n",
                  shortest(profile.overhang_mm).c_str());
   }
   return 0;
@@ -103,21 +101,20 @@ void add_pad(CommandLine &line) {
       line.add("pad", "Set the pad's profile, for the tangential force (the fingertip keeps it without power)",
                [options] { return pad_command(*options); });
   with_port(command, options->choice);
-  CLI::Option *thickness = command
-                               ->add_option("--thickness", options->thickness_mm,
-                                            "Thickness of the rubber above the sensors, 9 to 20 mm."
-                                            " Default: as the calibration found it")
-                               ->type_name("MM");
-  CLI::Option *overhang = command
-                              ->add_option("--overhang", options->overhang_mm,
-                                           "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 "
-                                           "to 20 mm the effect of the ends is computed and subtracted. Default: a pad "
-                                           "without end")
-                              ->type_name("MM");
-  CLI::Option *from_touch =
-      command->add_flag("--from-touch", options->from_touch,
-                        "Report the change since the first 100 ms of each contact: for pads whose "
-                        "rubber ends within half its thickness of the outer sensors");
+  CLI::Option *thickness =
+      command
+          ->add_option("--thickness", options->thickness_mm,
+                       "Thickness of the rubber above the sensors, 9 to 20 mm. Default: as the calibration found it")
+          ->type_name("MM");
+  CLI::Option *overhang =
+      command
+          ->add_option("--overhang", options->overhang_mm,
+                       "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 to 20 mm the effect "
+                       "of the ends is computed and subtracted. Default: a pad without end")
+          ->type_name("MM");
+  CLI::Option *from_touch = command->add_flag("--from-touch", options->from_touch,
+                                              "Report the change since the first 100 ms of each contact: for pads "
+                                              "whose rubber ends within half its thickness of the outer sensors");
   command->add_flag("--erase", options->erase, "Erase the pad's profile: no tangential force")
       ->excludes(thickness)
       ->excludes(overhang)

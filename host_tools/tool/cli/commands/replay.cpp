@@ -52,7 +52,7 @@ int show(const ReplayOptions &options) {
   }
   view.reset();
   for (std::size_t i = 0; i < playback.tracks().size(); i++) {
-    const Track &track = playback.tracks()[i];
+    const FingertipTrack &track = playback.tracks()[i];
     const Model &model = playback.models()[i];
     if (model.frames() == 0 && track.is_ended()) {
       throw Error(options.file + ": no frames in it; give a recording or capture of a streaming fingertip");

@@ -1,10 +1,10 @@
-#include "tool/cli/rule.hpp"
-
 #include "tool/cli/commands/commands.hpp"
 
 #include <cstdio>
 
 namespace fingertip {
+
+extern const char *const UDEV_RULE; /* the text of 60-fingertip.rules */
 
 void add_rule(CommandLine &line) {
   line.add("rule", "Print the udev rule that lets users without privileges open fingertips", [] {

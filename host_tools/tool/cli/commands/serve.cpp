@@ -101,8 +101,7 @@ void add_serve(CommandLine &line) {
                                [options] { return serve(*options); });
   command
       ->add_option("--device", options->devices,
-                   "Serial number of a fingertip to share; default: all, also those plugged in "
-                   "later")
+                   "Serial number of a fingertip to share; default: all, also those plugged in later")
       ->take_all()
       ->expected(1)
       ->type_name("SERIAL");
@@ -113,8 +112,7 @@ void add_serve(CommandLine &line) {
           "Who may use them beside this user; default: this user's group")
       ->type_name("NAME");
   command->add_flag("--common", options->common,
-                    "Share in /run/fingertip, where all users look, instead of in this user's "
-                    "folder");
+                    "Share in /run/fingertip, where all users look, instead of in this user's folder");
 }
 
 } // namespace fingertip

@@ -1,7 +1,6 @@
 #include "libfingertip/command.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/device.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <cstdio>
 #include <memory>

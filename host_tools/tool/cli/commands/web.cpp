@@ -1,6 +1,6 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/commands/commands.hpp"
-#include "tool/cli/page.hpp"
+#include "tool/cli/installed_files.hpp"
 #include "web/server/page_server.hpp"
 
 #include <cstdio>
@@ -48,8 +48,8 @@ int web(const WebOptions &options) {
   std::fflush(stdout);
   if (!is_loopback(options.address)) {
     std::fprintf(stderr,
-                 "everyone who reaches %s may read the page; browsers of other machines give it no "
-                 "fingertips, only its simulated one\n",
+                 "everyone who reaches %s may read the page; browsers of other machines give it no fingertips, only "
+                 "its simulated one\n",
                  printable(options.address).c_str());
   }
   bool is_open = !options.no_browser && opens(server.url());
