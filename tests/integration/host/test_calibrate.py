@@ -175,7 +175,7 @@ class Gains(CalibrateTest):
         for played, reason in (
             (make_placements("weights", "--gain", "10", "--force", "2.5,3.5"), "not calibrated: .*use one and the same weight"),
             (make_placements("hand", "--gain", "10", kind="pokes"), "not calibrated: no placement was found"),
-            (make_placements("without", "--seconds", "10", raw=()), "has no pressures to calibrate from; record with a firmware"),
+            (make_placements("no pressures", "--seconds", "10", raw=()), "has no pressures to calibrate from; record with a firmware"),
         ):
             self.assertRegex(self.refused("--from", played[0], "--dry-run"), reason)
 
