@@ -16,12 +16,12 @@
 #include "native/native_port.h"
 #include "native/sim_array.h"
 #include "port/port.h"
+#include "support/unit.h"
 #include "wire/packet.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unity.h>
 
 enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
 
@@ -198,7 +198,7 @@ static void at_every_place(struct sim_fault fault) {
 }
 
 /* Learns where frames begin, and that without a fault nothing is wrong. */
-static void test_without_a_fault(void) {
+TEST(test_without_a_fault) {
   power_up();
   uint32_t transfers = 0;
   while (place.temperature == 0 && port_now_us() < 2000000u) {
@@ -225,7 +225,7 @@ static void test_without_a_fault(void) {
   TEST_ASSERT_FALSE(native_watchdog_expired());
 }
 
-static void test_one_fault_anywhere(void) {
+TEST(test_one_fault_anywhere) {
   static const struct sim_fault faults[] = {
       {.kind = SIM_FAULT_NACK},
       {.kind = SIM_FAULT_DEAD, .count = 2, .sensor = 7}, /* silent for a while */
@@ -249,7 +249,7 @@ static void test_one_fault_anywhere(void) {
 /* The sensor goes on with another gain, and its reset cures it. What it says in between must be
  * left out from the first frame on; only in the very first frame there is nothing to hold it
  * against. A pad that moves as a whole hides such a step in the pressure. */
-static void test_brown_out_of_a_sensor(void) {
+TEST(test_brown_out_of_a_sensor) {
   const struct sim_fault fault = {.kind = SIM_FAULT_BROWN_OUT, .sensor = 7};
   const uint32_t later = place.frame + 5 * (1 + SENSORS);
   rests = true;
@@ -261,7 +261,7 @@ static void test_brown_out_of_a_sensor(void) {
 
 /* One bit wrong in the PROM of one sensor: up to 200 kPa in every frame. Where it is used it is
  * flagged, and off by no more than moulding makes. */
-static void test_wrong_bits_in_a_prom(void) {
+TEST(test_wrong_bits_in_a_prom) {
   for (unsigned bit = 0; bit < 16; bit++) {
     for (unsigned word = 1; word < 7; word++) {
       power_up();
@@ -282,7 +282,7 @@ static void test_wrong_bits_in_a_prom(void) {
 /* NACKs of single reads at random, for 20 s each, by a bus that acknowledges a command as one and
  * does not ask again: two frames each, at most. While the first NACK cost a sensor its admission,
  * the same NACKs left 6.5, 28, 64, 87 and 95 % of the frames incomplete. */
-static void test_scattered_nacks_cost_two_frames_each(void) {
+TEST(test_scattered_nacks_cost_two_frames_each) {
   static const double nacks_per_s[] = {0.3, 1, 3, 10, 30};
   static const double incomplete_percent[] = {0.5, 1.2, 3, 11, 29};
   for (int i = 0; i < 5; i++) {
@@ -304,7 +304,7 @@ static void test_scattered_nacks_cost_two_frames_each(void) {
 
 /* One temperature in so many of every sensor has a wrong bit, for a minute. What goes out as good
  * is off by what 1 degC makes, at most; when two steps in a row were enough, by 73 kPa. */
-static void test_corrupted_temperatures(void) {
+TEST(test_corrupted_temperatures) {
   static const double shares[] = {0.01, 0.1, 0.3};
   rests = true;
   for (int i = 0; i < 3; i++) {
@@ -319,7 +319,7 @@ static void test_corrupted_temperatures(void) {
 }
 
 /* For good: the others stream on. */
-static void test_a_sensor_dies(void) {
+TEST(test_a_sensor_dies) {
   for (unsigned k = 0; k < SENSORS; k++) {
     for (uint32_t read = 0; read < 2; read++) {
       power_up();
@@ -332,16 +332,4 @@ static void test_a_sensor_dies(void) {
     }
   }
   TEST_ASSERT_EQUAL_STRING("", problems);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_without_a_fault);
-  RUN_TEST(test_one_fault_anywhere);
-  RUN_TEST(test_brown_out_of_a_sensor);
-  RUN_TEST(test_wrong_bits_in_a_prom);
-  RUN_TEST(test_scattered_nacks_cost_two_frames_each);
-  RUN_TEST(test_corrupted_temperatures);
-  RUN_TEST(test_a_sensor_dies);
-  return UNITY_END();
 }
