@@ -13,6 +13,7 @@ import argparse
 import concurrent.futures
 import configparser
 import hashlib
+import itertools
 import json
 import os
 import pathlib
@@ -30,6 +31,7 @@ SANITIZERS = ("ERROR: AddressSanitizer", "ERROR: LeakSanitizer", "runtime error:
 ROUND_s = 600
 # A target that takes longer for one input hangs; of tests no machine is too slow.
 HANGS_s = 300
+POOL, BATCH = 64, 500  # of the walk
 INTERRUPTED = 72  # exit status of libFuzzer
 TEST_SEED = 1
 
@@ -86,6 +88,39 @@ def bulk_seed(target, seeds, length):
     return (b"".join(seeds) * (length // max(1, sum(map(len, seeds))) + 1))[:length]
 
 
+def changed(data, pool, max_len, prng):
+    """At a few places."""
+    for _ in range(prng.randrange(1, 7)):
+        at, itself, donor = prng.randrange(len(data) + 1), prng.randrange(len(data) + 1), prng.choice(pool)
+        few = data[at : at + prng.randrange(1, 17)]
+        from_donor = donor[prng.randrange(len(donor) + 1) :][: prng.randrange(len(donor) + 1)]
+        new, taken = prng.choice(
+            (
+                (bytes(byte ^ 1 << prng.randrange(8) for byte in few[:1]), 1),
+                (bytes((byte + prng.randrange(-8, 9)) % 256 for byte in few[:1]), 1),  # a number that is a little more or less
+                (len(few) * prng.choice((b"\0", b"\1", b"\x7f", b"\x80", b"\xff")), len(few)),  # at an end of its range
+                (prng.randbytes(len(few)), len(few)),
+                (prng.randbytes(prng.randrange(1, 17)), 0),
+                (b"", len(few)),
+                (data[itself : itself + prng.randrange(len(data) + 1)], 0),
+                (from_donor, prng.choice((0, len(data)))),
+            )
+        )
+        data = (data[:at] + new + data[at + taken :])[:max_len]
+    return data
+
+
+def walk(seeds, runs, max_len, seed):
+    """Inputs that depend on the seed alone: each is one of a pool, changed. It or a given one takes the place of another one of the pool."""
+    prng = random.Random(seed)
+    seeds = [data[:max_len] for data in seeds]
+    pool = [seeds[i % len(seeds)] for i in range(POOL)]
+    for run in range(runs):
+        data = seeds[run] if run < len(seeds) else changed(prng.choice(pool), pool, max_len, prng)
+        yield data
+        pool[prng.randrange(POOL)] = data if prng.randrange(2) else prng.choice(seeds)
+
+
 class Target:
     def __init__(self, program):
         self.program, self.name = program, program.name[len("fuzz_") :]
@@ -98,50 +133,52 @@ class Target:
         seeds = [path.read_bytes() for path in sorted((HERE / "corpus" / self.name).glob("*"))] + list(vector_seeds(self.name))
         return seeds or [random.Random(seed).randbytes(64 << seed) for seed in range(4)]
 
-    def libfuzzer(self, max_len, seconds, seed, bulk, folder, new, given):
-        call = [
-            self.program,
-            f"-max_total_time={seconds}",
-            f"-seed={seed}",
-            f"-max_len={max_len}",
-            f"-timeout={HANGS_s}",
-            f"-artifact_prefix={folder}/",
-        ]
-        if "dict" in self.options:
-            call.append(f"-dict={self.options['dict']}")
-        if bulk:
-            call.append("-len_control=0")
-        return [*call, new, given]
+    def said(self, folder, *words):
+        """Exit status, and standard error."""
+        done = subprocess.run(
+            [str(part) for part in (self.program, f"-artifact_prefix={folder}/", f"-timeout={HANGS_s}", *words)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            env={**os.environ, "FINGERTIP_FUZZ_COUNT": f"{folder}/count", "UBSAN_OPTIONS": "print_stacktrace=1"},
+        )
+        return done.returncode, done.stderr.decode("utf-8", "replace")
+
+    def walk(self, folder, inputs):
+        """Until one ends the target."""
+        files = [folder / f"given/{i:03d}" for i in range(BATCH)]
+        while batch := list(itertools.islice(inputs, BATCH)):
+            for file, data in zip(files, batch):
+                file.write_bytes(data)
+            status, said = self.said(folder, *files[: len(batch)])
+            if status != 0:
+                break
+        return status, said
+
+    def libfuzzer(self, folder, seeds, max_len, seconds, seed, bulk, grown):
+        new = grown or folder / "new"
+        new.mkdir(parents=True, exist_ok=True)
+        for i, data in enumerate(seeds):
+            (folder / f"given/{i:03d}").write_bytes(data)
+        words = [f"-{name}={self.options[name]}" for name in ("dict",) if name in self.options] + ["-len_control=0"] * bulk
+        return self.said(folder, f"-max_total_time={seconds}", f"-seed={seed}", f"-max_len={max_len}", *words, new, folder / "given")
 
     def run(self, findings, seed, runs=None, seconds=None, grown=None, bulk=False):
-        """So many runs, the same each time (fuzz.c), or libFuzzer for so long. grown: a folder that keeps what is new, or None."""
+        """So many runs, the same each time, or libFuzzer for so long. grown: a folder that keeps what is new, or None."""
         with tempfile.TemporaryDirectory(prefix="fingertip-fuzz-") as folder:
             folder = pathlib.Path(folder)
-            given, new, count = folder / "given", grown or folder / "new", folder / "count"
-            given.mkdir()
-            new.mkdir(parents=True, exist_ok=True)
+            (folder / "given").mkdir()
             seeds = self.seeds()
             max_len = int(self.options["max_len"])
             if bulk and "bulk" in self.options:
                 max_len = int(self.options["bulk"])
                 seeds.append(bulk_seed(self.name, seeds, max_len // 2))
-            for i, data in enumerate(seeds):
-                (given / f"{i:03d}").write_bytes(data)
-            running = folder / "running"
-            call = (
-                [self.program, "walk", runs, max_len, seed, running, *sorted(given.iterdir())]
-                if runs is not None
-                else self.libfuzzer(max_len, seconds, seed, bulk, folder, new, given)
-            )
             begun_s = time.monotonic()
-            done = subprocess.run(
-                [str(part) for part in call],
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                env={**os.environ, "FINGERTIP_FUZZ_COUNT": str(count), "UBSAN_OPTIONS": "print_stacktrace=1"},
-            )
-            said = done.stderr.decode("utf-8", "replace")
-            done_runs, size, length = struct.unpack("<QQQ", count.read_bytes()) if count.exists() else (0, 0, 0)
+            if runs is not None:
+                status, said = self.walk(folder, walk(seeds, runs, max_len, seed))
+            else:
+                status, said = self.libfuzzer(folder, seeds, max_len, seconds, seed, bulk, grown)
+            count = folder / "count"
+            done_runs, size = struct.unpack("<QQ", count.read_bytes()) if count.exists() else (0, 0)
             covered = re.findall(r"cov: (\d+)", said)
             result = {
                 "target": self.name,
@@ -153,11 +190,9 @@ class Target:
                 "crashes": 0,
                 "sanitizer_findings": 0,
             }
-            if done.returncode not in (0, INTERRUPTED):
+            if status not in (0, INTERRUPTED):
                 kind = "sanitizer_findings" if any(word in said for word in SANITIZERS) else "crashes"
                 result[kind] = 1
-                if running.exists():
-                    (folder / "crash-walk").write_bytes(running.read_bytes()[:length])
                 self.tell_finding(findings, folder, said)
             return result
 

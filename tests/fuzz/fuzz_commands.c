@@ -1,8 +1,6 @@
 /* The firmware's command receiver, with the firmware around it: bytes and commands in, packets out.
  */
 #include "app/app.h"
-#include "common/bytes.h"
-#include "common/crc32.h"
 #include "config/geometry.h"
 #include "flash_record.h"
 #include "fuzz.h"
@@ -12,6 +10,7 @@
 #include "native/native_sync.h"
 #include "native/sim_array.h"
 #include "port/port.h"
+#include "unit/wire/wire_samples.h"
 
 static struct app app;
 static struct sim_array array;
@@ -113,23 +112,11 @@ static void send(const uint8_t *bytes, size_t length) {
   }
 }
 
-/* With a CRC that is right, and stuffed by the simplest of encoders. */
+/* With a CRC that is right. */
 static void send_packet(const uint8_t *packet, size_t length) {
   uint8_t whole[WIRE_MAX_PACKET_BYTES + 16], frame[2 * sizeof whole];
   memcpy(whole, packet, length);
-  bytes_put_u32(whole + length, crc32_iso_hdlc(whole, length));
-  length += WIRE_CRC_BYTES;
-  size_t code_at = 0, at = 1;
-  for (size_t i = 0; i < length; i++) {
-    if (whole[i] != 0) {
-      frame[at++] = whole[i];
-    }
-    if (whole[i] == 0 || at - code_at == 255) {
-      frame[code_at] = (uint8_t)(at - code_at);
-      code_at = at++;
-    }
-  }
-  frame[code_at] = (uint8_t)(at - code_at);
+  size_t at = seal(whole, length, frame);
   frame[at++] = 0;
   sent++;
   send(frame, at);

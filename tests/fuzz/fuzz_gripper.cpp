@@ -4,14 +4,10 @@
 #include "grasp/gripper/feetech_packet.hpp"
 #include "grasp/gripper/feetech_table.hpp"
 #include "grasp/gripper/gripper.hpp"
+#include "libfingertip/served_port.hpp"
 
 #include <atomic>
-#include <cmath>
-#include <fcntl.h>
-#include <poll.h>
-#include <termios.h>
 #include <thread>
-#include <unistd.h>
 
 using namespace fingertip;
 using Bytes = std::vector<std::uint8_t>;
@@ -32,23 +28,15 @@ Bytes with_crc(Bytes bytes) {
   return bytes;
 }
 
-// A pseudo-terminal whose other end answers as the input says, in another thread.
+// A port whose other end answers as the input says, in another thread.
 class Line {
 public:
-  Line() : master_(posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC)) {
-    FUZZ_CHECK(master_ >= 0 && grantpt(master_) == 0 && unlockpt(master_) == 0);
-    port_ = ptsname(master_);
-    held_open_ = open(port_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
-    termios settings;
-    FUZZ_CHECK(held_open_ >= 0 && tcgetattr(held_open_, &settings) == 0);
-    cfmakeraw(&settings);
-    FUZZ_CHECK(tcsetattr(held_open_, TCSANOW, &settings) == 0);
-  }
-  const std::string &port() const { return port_; }
+  const std::string &port() const { return port_.path(); }
 
   void begin(fuzz_input answers, bool modbus) {
-    tcflush(master_, TCIOFLUSH);
-    tcflush(held_open_, TCIOFLUSH);
+    std::uint8_t rest[256];
+    while (port_.read(rest, sizeof rest) > 0) { // of the run before
+    }
     answers_ = answers;
     modbus_ = modbus;
     stop_ = over_ = false;
@@ -63,18 +51,15 @@ public:
 private:
   void play() {
     while (!stop_) {
-      pollfd waiting = {master_, POLLIN, 0};
+      port_.wait(host_now() + std::chrono::milliseconds(1));
       std::uint8_t question[256];
-      if (poll(&waiting, 1, 1) != 1) {
-        continue;
-      }
-      const ssize_t length = read(master_, question, sizeof question);
-      if (length <= 0 || over_) {
+      const std::size_t length = port_.read(question, sizeof question);
+      if (length == 0 || over_) {
         continue;
       }
       const Bytes answer = answer_to(Bytes(question, question + length));
       over_ = fuzz_left(&answers_) == 0;
-      FUZZ_CHECK(write(master_, answer.data(), answer.size()) == static_cast<ssize_t>(answer.size()));
+      FUZZ_CHECK(port_.write(answer.data(), answer.size()) == answer.size());
     }
   }
 
@@ -127,8 +112,7 @@ private:
     return feetech::encoded({asked->id, fuzz_u8(&answers_), values});
   }
 
-  int master_, held_open_;
-  std::string port_;
+  ServedPort port_{""};
   fuzz_input answers_{};
   bool modbus_ = false;
   std::atomic<bool> stop_{false}, over_{false};

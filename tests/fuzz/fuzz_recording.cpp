@@ -1,9 +1,11 @@
-// Recordings of both formats, whole and damaged, with the gripper's rows; salvaged or not.
+// Recordings of both formats, CSV and MCAP, whole and damaged, with the gripper's rows; salvaged or not.
 #include "fuzz.h"
 #include "grasp/grip_row.hpp"
+#include "libfingertip/line_sink.hpp"
 #include "packet_file.hpp"
 
 #include <cmath>
+#include <filesystem>
 
 using namespace fingertip;
 
@@ -28,6 +30,52 @@ void read_rows(const std::string &path, bool salvage) {
   }
 }
 
+std::vector<std::string> lines_of(const std::string &path, bool salvage) {
+  std::vector<std::string> lines;
+  const auto source = open_lines(path);
+  LineSource::Line line;
+  for (;;) {
+    try {
+      if (!source->next(line)) {
+        return lines;
+      }
+      lines.push_back(line.text);
+    } catch (const Error &error) {
+      if (!salvage || error.code() != ErrorCode::damaged_line) {
+        throw;
+      }
+    }
+  }
+}
+
+// The sink writes a file of its own name: a folder of this process, in memory where there is one.
+std::string written(const std::vector<std::string> &lines) {
+  static const std::string path = (std::filesystem::exists("/dev/shm") ? "/dev/shm/" : "/tmp/") +
+                                  std::string("fuzz_mcap_") + std::to_string(getpid()) + ".mcap";
+  const auto sink = make_lines(path, true, OutputFile::Appears::at_once);
+  for (const std::string &line : lines) {
+    sink->line(line);
+  }
+  sink->finish();
+  return path;
+}
+
+// Whatever lines are in an MCAP file, another holds the same.
+void check_lines(const std::string &path, bool salvage) {
+  std::vector<std::string> lines;
+  std::string copy;
+  try {
+    lines = lines_of(path, salvage);
+    copy = written(lines);
+  } catch (const Error &) { // damaged, or no text
+    return;
+  }
+  if (!lines.empty()) {
+    FUZZ_CHECK(lines_of(copy, false) == lines);
+  }
+  std::filesystem::remove(copy);
+}
+
 } // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
@@ -42,5 +90,8 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
     fuzz::read_twice(file.path(), salvage, device, how >> 4);
   } catch (const Error &error) {
     FUZZ_CHECK(!salvage || error.code() != ErrorCode::damaged_line);
+  }
+  if (is_mcap(file.path())) {
+    check_lines(file.path(), salvage);
   }
 }

@@ -2,7 +2,7 @@
 
     build/venv/bin/python tests/fuzz/mcap_seeds.py build/host/host_tools/tool/cli/fingertip
 
-A seed is a byte of options (fuzz_mcap.cpp) and a file: one and two not packed, packed_one as the tool writes it, no_chunks. Each must fit into
+A seed is a byte of options (fuzz_recording.cpp) and a file: one and two not packed, packed_one as the tool writes it, no_chunks. Each must fit into
 the longest input of the target (CMakeLists.txt).
 """
 

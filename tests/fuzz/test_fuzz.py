@@ -14,18 +14,14 @@ import fuzz  # noqa: E402
 PROGRAM = """#!/usr/bin/python3
 import os, pathlib, struct, sys
 options = dict(word.split("=", 1) for word in sys.argv[1:] if "=" in word)
-folders = [pathlib.Path(word) for word in sys.argv[1:] if "=" not in word]
-walks = sys.argv[1] == "walk"
-files = list(map(pathlib.Path, sys.argv[6:])) if walks else list(folders[1].iterdir())
-pathlib.Path(os.environ["FINGERTIP_FUZZ_COUNT"]).write_bytes(struct.pack("<QQQ", 7, sum(len(file.read_bytes()) for file in files), 5))
-if not walks:
+given = [pathlib.Path(word) for word in sys.argv[1:] if "=" not in word]
+files = given if given[0].is_file() else list(given[1].iterdir())
+pathlib.Path(os.environ["FINGERTIP_FUZZ_COUNT"]).write_bytes(struct.pack("<QQ", 7, sum(len(file.read_bytes()) for file in files)))
+if files is not given:
     print("#7 DONE cov: 42 ft: 1", file=sys.stderr)
 """
 CRASHES = """
-if walks:
-    pathlib.Path(sys.argv[5]).write_bytes(b"wrong, and what an earlier one left")
-else:
-    pathlib.Path(options["-artifact_prefix"] + "crash-1234").write_bytes(b"wrong")
+pathlib.Path(options["-artifact_prefix"] + "crash-1234").write_bytes(b"wrong")
 print("%s", file=sys.stderr)
 sys.exit(77)
 """
@@ -58,7 +54,7 @@ class FuzzTest(unittest.TestCase):
     def test_all_targets_run_and_are_added_up(self):
         self.target("usb")
         self.target("wire")
-        done = self.fuzz("--runs", "7")
+        done = self.fuzz("--runs", "300")
         self.assertEqual(done.returncode, 0, done.stderr)
         found = self.found()
         self.assertEqual([row["target"] for row in found["fuzz_targets"]], ["usb", "wire"])
@@ -101,9 +97,18 @@ class FuzzTest(unittest.TestCase):
         self.assertEqual([row["edges"] for row in self.found()["fuzz_targets"]], [42])
 
     def test_hours_keep_what_is_new(self):
-        self.target("usb", '(folders[0] / "new").write_bytes(b"x")')
+        self.target("usb", '(given[0] / "new").write_bytes(b"x")')
         self.assertEqual(self.fuzz("--hours", "0.0005").returncode, 0)
         self.assertEqual((self.build / "corpus/usb/new").read_bytes(), b"x")
+
+    def test_a_walk_is_the_same_each_time(self):
+        seeds = [b"abc", b"", bytes(range(100))]
+        inputs = list(fuzz.walk(seeds, 1000, 50, 1))
+        self.assertEqual(inputs, list(fuzz.walk(seeds, 1000, 50, 1)))
+        self.assertNotEqual(inputs, list(fuzz.walk(seeds, 1000, 50, 2)))
+        self.assertEqual(inputs[:3], [data[:50] for data in seeds])
+        self.assertGreater(len(set(inputs)), 700)
+        self.assertEqual(max(map(len, inputs)), 50)
 
     def test_an_interrupted_target_is_no_finding(self):
         self.target("usb", f"sys.exit({fuzz.INTERRUPTED})")
