@@ -104,112 +104,50 @@ def without_columns(lines, names):
     return [",".join(cells[at] for at in kept) if len(cells := line.split(",")) == len(header) else line for line in lines]
 
 
+# Of a row, by their columns.
 CELLS = {
-    "nan": {"x_mm": "nan"},
-    "infinite": {"force_N": "inf"},
-    "empty_under_its_flag": {"x_mm": ""},
-    "too_large": {"force_N": "1e39"},
-    "vanishes": {"force_N": "1e-50"},
-    "zero_of_400_digits": {"force_N": "1e-400"},
-    "plus": {"x_mm": "+1"},
-    "blank": {"x_mm": " 1"},
-    "blank_behind": {"x_mm": "1 "},
-    "underscore": {"x_mm": "1_0"},
-    "hexadecimal": {"x_mm": "0x1p3"},
-    "no_digits": {"x_mm": "."},
-    "half_an_exponent": {"x_mm": "1e"},
-    "leading_point": {"x_mm": "-.5e-1"},
-    "trailing_point": {"x_mm": "1."},
-    "capital_exponent": {"x_mm": "1E-2"},
-    "smallest": {"x_mm": "1e-45"},
-    "largest": {"x_mm": "3.4028235e38"},
-    "beyond_largest": {"x_mm": "3.4028236e38"},
-    "word": {"x_mm": "one"},
-    "minus_zero": {"x_mm": "-0"},
-    "negative_flags": {"flags": "-1"},
-    "large_flags": {"flags": "4294967296"},
-    "broken_flags": {"flags": "2.0"},
-    "exponent_flags": {"flags": "1e3"},
-    "minus_zero_sequence": {"sequence": "-0"},
-    "large_sequence": {"sequence": "65536"},
-    "largest_sequence": {"sequence": "65535"},
-    "zeros_before": {"sequence": "007"},
-    "empty_sequence": {"sequence": ""},
-    "empty_stage": {"fit_us": ""},
-    "large_stage": {"fit_us": "65536"},
-    "negative_time": {"t_us": "-5"},
-    "minus_zero_time": {"t_us": "-0"},
-    "no_time": {"t_us": ""},
-    "large_time": {"t_us": "18446744073709551616"},
-    "late_time": {"t_us": "9007199254740992"},
-    "no_frame": {"frame": ""},
-    "large_frame": {"frame": "4294967296"},
-    "thousand_digits": {"frame": "9" * 5000},
-    "arabic": {"t_us": "\u0665"},
-    "pressure_beyond": {"s0_Pa": "3000000.0"},
-    "pressure_at_the_end": {"s0_Pa": "2097151.9990"},
-    "pressure_rounds_beyond": {"s0_Pa": "2097151.9996"},
-    "pressure_least": {"s0_Pa": "-2097152.0"},
-    "pressure_below": {"s0_Pa": "-2097152.001"},
-    "pressure_empty": {"s3_Pa": ""},
-    "pressure_exponent": {"tare2_Pa": "1e5"},
-    "pressure_huge": {"s0_Pa": "1e13"},
-    "pressure_half": {"s0_Pa": "0.00048828125"},
-    "pressure_nan": {"s1_Pa": "nan"},
-    "temperature_beyond": {"temperature_degC": "327.68"},
-    "temperature_most": {"temperature_degC": "327.674"},
-    "temperature_least": {"temperature_degC": "-327.68"},
-    "temperature_empty": {"temperature_degC": ""},
-    "zero_without_flag": {"flags": "0", "x_mm": "0"},
-    "value_without_flag": {"flags": "0", "x_mm": "3.5"},
-    "return_in_it": {"x_mm": "1\r"},
-    "zero_byte": {"x_mm": "1\0"},
+    "x_mm": ("nan", "", "+1", " 1", "1 ", "1_0", "0x1p3", ".", "1e", "-.5e-1", "1.", "1E-2", "1e-45", "3.4028235e38")
+    + ("3.4028236e38", "one", "-0", "1\r", "1\0"),
+    "force_N": ("inf", "1e39", "1e-50", "1e-400"),
+    "flags": ("-1", "4294967296", "2.0", "1e3"),
+    "sequence": ("-0", "65536", "65535", "007", ""),
+    "fit_us": ("", "65536"),
+    "t_us": ("-5", "-0", "", "18446744073709551616", "9007199254740992", "\u0665"),
+    "frame": ("", "4294967296", "9" * 5000),
+    "s0_Pa": ("3000000.0", "2097151.9990", "2097151.9996", "-2097152.0", "-2097152.001", "1e13", "0.00048828125"),
+    "s1_Pa": ("nan",),
+    "s3_Pa": ("",),
+    "tare2_Pa": ("1e5",),
+    "temperature_degC": ("327.68", "327.674", "-327.68", ""),
 }
+ACK = "ack sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4"
+# By their keys.
 COMMENTS = {
-    "unknown_key": "# weather: fine",
-    "no_key": "# just a comment",
-    "no_blank": "#note:x",
-    "colon_at_the_end": "# note:",
-    "empty_value": "# note: ",
-    "not_utf8": "# note: \udcff\udcfe",
-    "unknown_packet": "# packet: weather sequence=1 t_us=1",
-    "packet_without_fields": "# packet: health",
-    "packet_field_missing": "# packet: ack sequence=1 t_us=2 command=1 result=0 command_sequence=3",
-    "packet_more_fields": "# packet: ack sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4 colour=5",
-    "packet_twice_a_field": "# packet: ack sequence=1 sequence=9 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4",
-    "packet_large": "# packet: ack sequence=1 t_us=2 command=256 result=0 command_sequence=3 host_time_us=4",
-    "packet_negative": "# packet: ack sequence=1 t_us=2 command=-1 result=0 command_sequence=3 host_time_us=4",
-    "packet_word": "# packet: ack sequence=1 t_us=2 command=one result=0 command_sequence=3 host_time_us=4",
-    "packet_no_pair": "# packet: ack sequence",
-    "packet_two_blanks": "# packet: ack  sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4",
-    "event": "# event: back",
-    "event_not_utf8": "# event: \udcff",
-    "sensors_word": "# sensors: many",
-    "rate_word": "# rate_mHz: abc",
-    "rate_beyond": "# rate_mHz: 4294967296",
-    "osr_negative": "# osr: -5",
-    "many_x": "# x_mm: " + " ".join(["1"] * 33),
-    "x_word": "# x_mm: 1 b",
-    "x_two_blanks": "# x_mm: 1  2",
-    "x_none": "# x_mm: ",
-    "gain_nan": "# gains: nan",
-    "off_beyond": "# off_x_um: 1 -32769",
-    "off_part": "# wider_q15: 1.5",
-    "off_least": "# off_y_um: -32768 32767",
-    "pad_word": "# pad_thickness_mm: thick",
-    "pad_list": "# pad_shares: 1 2 3",
-    "pad_touch": "# pad_from_touch: 256",
-    "date": "# calibration_date_s: x",
-    "firmware_two": "# firmware: 1.2",
-    "firmware_large": "# firmware: 1.2.256",
-    "serial_umlaut": "# serial: \u00e4",
-    "serial_long": "# serial: 0123456789abcdefg",
-    "end_word": "# end: reason",
-    "end_blank": "# end: frames=1 ",
-    "end_number": "# end: reason=x frames=many",
-    "slash": "# 0/note: x",
-    "prior_beyond": "# prior_sigma_mm: 1e39",
+    "weather": ("fine",),
+    "note": ("", "\udcff\udcfe"),
+    "packet": ("weather sequence=1 t_us=1", "health", "ack sequence", ACK.rpartition(" ")[0], ACK + " colour=5")
+    + tuple(ACK.replace("command=1", f"command={word}") for word in ("256", "-1", "one"))
+    + (ACK.replace(" t_us", " sequence=9 t_us"), ACK.replace("ack", "ack ")),
+    "event": ("back", "\udcff"),
+    "sensors": ("many",),
+    "rate_mHz": ("abc", "4294967296"),
+    "osr": ("-5",),
+    "x_mm": (" ".join(["1"] * 33), "1 b", "1  2", ""),
+    "gains": ("nan",),
+    "off_x_um": ("1 -32769",),
+    "wider_q15": ("1.5",),
+    "off_y_um": ("-32768 32767",),
+    "pad_thickness_mm": ("thick",),
+    "pad_shares": ("1 2 3",),
+    "pad_from_touch": ("256",),
+    "calibration_date_s": ("x",),
+    "firmware": ("1.2", "1.2.256"),
+    "serial": ("\u00e4", "\x1b", "\x7f", "0123456789abcdefg"),
+    "end": ("reason", "frames=1 ", "reason=x frames=many"),
+    "0/note": ("x",),
+    "prior_sigma_mm": ("1e39",),
 }
+LINES = ("# just a comment", "#note:x", "# note:", *(f"# {key}: {value}" for key, values in COMMENTS.items() for value in values))
 
 
 def csv_cases(corpus, name, text, devices):
@@ -224,7 +162,8 @@ def csv_cases(corpus, name, text, devices):
     add("crcrlf", text.replace(b"\n", b"\r\r\n"))
     add("no_end_line", lines[:-1])
     add("no_line_end", text[:-1])
-    add("torn_row", text_of(lines[: row + 1])[:-20])
+    for cut in (1, 20, len(lines[row])):
+        add(f"torn_row_{cut}", text_of(lines[: row + 1])[:-cut])
     add("torn_blank", text + b"  ")
     add("blank_lines", [*lines[:row], "", " \t", *lines[row:]])
     add("blank_line_first", ["", *lines])
@@ -251,10 +190,10 @@ def csv_cases(corpus, name, text, devices):
     add("column_missing", without_columns(lines, ["q_sd_N"]))
     add("earlier", without_columns(lines, LATER_COLUMNS))
     add("before_shapes", without_columns(lines, SHAPE_COLUMNS))
-    add(
-        "earlier_flags",
-        without_columns([without_flags(lines[header], line) if line[:1].isdigit() else line for line in lines], LATER_COLUMNS),
-    )
+    flagless = [without_flags(lines[header], line) if line[:1].isdigit() else line for line in lines]
+    add("earlier_flags", without_columns(flagless, LATER_COLUMNS))
+    add("before_shapes_flags", without_columns(flagless, SHAPE_COLUMNS))
+    add("sensors_0", without_columns(lines, [f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(15)]))
     add("sensors_14", without_columns(lines, ["s14_Pa", "tare14_Pa", "s0_Pa", "tare0_Pa"]))
     add("row_longer", [*lines[:row], lines[row] + ",", *lines[row + 1 :]])
     add("row_shorter", [*lines[:row], lines[row].rsplit(",", 1)[0], *lines[row + 1 :]])
@@ -263,13 +202,15 @@ def csv_cases(corpus, name, text, devices):
     add("no_contact", with_cells(lines, **dict.fromkeys(names[first:last], "")))
     add("no_raw", with_cells(lines, **dict.fromkeys(names[last:], "")))
     add("no_packet", with_cells(lines, **dict.fromkeys(names[first:], "")))
-    for what, cells in CELLS.items():
-        if set(cells) <= set(names):
-            add(f"cell_{what}", with_cells(lines, **cells))
-    for what, comment in COMMENTS.items():
+    for column, values in CELLS.items():
+        for number, value in enumerate(values if column in names else ()):
+            add(f"cell_{column}_{number}", with_cells(lines, **{column: value}))
+    for value in ("0", "3.5"):
+        add(f"cell_without_flag_{value}", with_cells(lines, flags="0", x_mm=value))
+    for number, comment in enumerate(LINES):
         own = comment.replace("# ", "# 0/", 1) if devices != ("",) else comment
-        add(f"comment_{what}", [*lines[:row], own, *lines[row:]])
-        add(f"head_{what}", [*lines[:header], own, *lines[header:]])
+        add(f"comment_{number}", [*lines[:row], own, *lines[row:]])
+        add(f"head_{number}", [*lines[:header], own, *lines[header:]])
     prng = random.Random(name)
     for chance in range(CHANCES):
         add(
@@ -279,10 +220,11 @@ def csv_cases(corpus, name, text, devices):
 
 
 def without_flags(header, row):
-    """Those that tell of the tangential load and the velocity are off."""
+    """Those of the later columns are off."""
     cells = dict(zip(header.split(","), row.split(",")))
     if cells["flags"]:
-        cells["flags"] = str(int(cells["flags"]) & ~(Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID))
+        later = Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID | Flag.SHAPE_VALID | Flag.TWO_CONTACTS | Flag.EDGE
+        cells["flags"] = str(int(cells["flags"]) & ~later)
     return ",".join(cells.values())
 
 
@@ -616,71 +558,15 @@ def stream_cases(corpus):
     add("noise", bytes(prng.randrange(256) for _ in range(4000)))
 
 
-SETTINGS = (
-    "osr=256",
-    "osr=300",
-    "osr=8192",
-    "osr=16384",
-    "osr=128",
-    "osr=0",
-    "osr=-256",
-    "osr=256.0",
-    "osr=many",
-    "osr=",
-    "osr=0256",
-    "rate=max",
-    "rate=0.1",
-    "rate=0.09",
-    "rate=2000",
-    "rate=2000.1",
-    "rate=0",
-    "rate=-1",
-    "rate=nan",
-    "rate=inf",
-    "rate=fast",
-    "rate=12.3456",
-    "rate=1e2",
-    "slip_threshold=0.01",
-    "slip_threshold=0.009",
-    "slip_threshold=50",
-    "slip_threshold=50.1",
-    "slip_threshold=nan",
-    "slip_threshold=x",
-    "slip_window=5",
-    "slip_window=4",
-    "slip_window=1000",
-    "slip_window=1001",
-    "slip_window=7.5",
-    "slip_window=x",
-    "prior=none",
-    "prior=0",
-    "prior=0.5",
-    "prior=0.4",
-    "prior=100",
-    "prior=101",
-    "prior=3:0.5",
-    "prior=3:0",
-    "prior=3:100",
-    "prior=3:101",
-    "prior=3:x",
-    "prior=x",
-    "prior=nan",
-    "sync=off",
-    "sync=in",
-    "sync=frame",
-    "sync=second",
-    "sync=out",
-    "sync=In",
-    "sync=1",
-    "sync=0",
-    "sync=",
-    "limit=0.01",
-    "limit=0.001",
-    "limit=100",
-    "limit=101",
-    "limit=nan",
-    "limit=x",
-)
+SETTINGS = {
+    "osr": "256 257 300 512 1024 2048 4096 8192 16384 65792 128 0 -256 256.0 many 0256",
+    "rate": "max 0.1 0.09 0.099 2000 2000.1 0 -1 nan inf fast none 20Hz 12.3456 1.005 1e2 1e99",
+    "slip_threshold": "0.01 0.009 50 50.1 0 -1 nan x",
+    "slip_window": "0 5 4 1000 1001 65541 -5 7.5 99999999999999999999 x",
+    "prior": "none 0 0:0 0.5 0.4 100 101 3.1:0.5 100:0.01 3:0 3:100 3:101 3:x 3:nan :0.5 -3 inf x nan",
+    "sync": "off in frame second out In infinity 1 0",
+    "limit": "0.01 0.001 0.6 100 101 0 none nan x",
+}
 
 
 def fuzz_seed(path):
@@ -712,6 +598,7 @@ def make(folder, convert):
     for path in sorted((ROOT / "tests/fuzz/corpus/mcap").iterdir()):
         corpus.recording(f"fuzz_{path.name}", fuzz_seed(path), "mcap", ("", "AAAA", "BBBB"))
     stream_cases(corpus)
-    for text in SETTINGS:
-        corpus.setting(text)
+    for name, values in SETTINGS.items():
+        for value in ("", *values.split()):
+            corpus.setting(f"{name}={value}")
     return corpus.jobs

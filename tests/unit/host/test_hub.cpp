@@ -3,6 +3,7 @@
 #include "library/share/hub.hpp"
 #include "support/host_packets.hpp"
 
+#include <algorithm>
 #include <gtest/gtest.h>
 
 using namespace fingertip;
@@ -20,14 +21,9 @@ protected:
     std::uint16_t sequence = 100;
     std::vector<wire_packet> heard;
 
-    std::vector<wire_packet> heard_of(std::uint8_t type) const {
-      std::vector<wire_packet> some;
-      for (const wire_packet &packet : heard) {
-        if (packet.type == type) {
-          some.push_back(packet);
-        }
-      }
-      return some;
+    std::size_t count_of(std::uint8_t type) const {
+      return static_cast<std::size_t>(
+          std::count_if(heard.begin(), heard.end(), [&](const wire_packet &packet) { return packet.type == type; }));
     }
   };
 
@@ -54,6 +50,18 @@ protected:
       }
     }
     return all;
+  }
+  /* The only one. */
+  wire_packet command_on_line(wire_type type) {
+    auto all = commands();
+    EXPECT_EQ(all.size(), 1u);
+    EXPECT_EQ(all.at(0).type, type);
+    return all.at(0);
+  }
+  wire_packet streams_on_line(int streams) {
+    const wire_packet asked = command_on_line(WIRE_CMD_STREAM);
+    EXPECT_EQ(asked.body.cmd_stream.streams, streams);
+    return asked;
   }
   void say(wire_packet packet) {
     packet.sequence = line_sequence++;
@@ -163,37 +171,29 @@ TEST_F(HubTest, TheLineStreamsWhatAnyWantsAndEachGetsItsOwn) {
   greet();
   Program one = join(), other = join(), idle = join();
   command(one, command_stream(WIRE_STREAM_CONTACT));
-  auto asked = commands();
-  ASSERT_EQ(asked.size(), 1u);
-  EXPECT_EQ(asked[0].body.cmd_stream.streams, WIRE_STREAM_CONTACT);
-  answer(asked[0]);
+  answer(streams_on_line(WIRE_STREAM_CONTACT));
   command(other, command_stream(WIRE_STREAM_RAW | WIRE_STREAM_HEALTH));
-  asked = commands();
-  ASSERT_EQ(asked.size(), 1u);
-  EXPECT_EQ(asked[0].body.cmd_stream.streams, WIRE_STREAM_ALL);
-  answer(asked[0]);
+  answer(streams_on_line(WIRE_STREAM_ALL));
   frame(1);
   say(test::make_health(0, 1));
   for (Program *each : {&one, &other, &idle}) {
     read(*each);
     EXPECT_EQ(each->decoder.statistics().dropped_packets, 0u);
   }
-  EXPECT_EQ(one.heard_of(WIRE_CONTACT).size(), 1u);
+  EXPECT_EQ(one.count_of(WIRE_CONTACT), 1u);
   EXPECT_EQ(one.heard.size(), 2u) << "with the acknowledgement";
-  EXPECT_EQ(other.heard_of(WIRE_RAW).size(), 1u);
-  EXPECT_EQ(other.heard_of(WIRE_HEALTH).size(), 1u);
+  EXPECT_EQ(other.count_of(WIRE_RAW), 1u);
+  EXPECT_EQ(other.count_of(WIRE_HEALTH), 1u);
   EXPECT_EQ(other.heard.size(), 3u);
   EXPECT_TRUE(idle.heard.empty());
 
   command(one, command_stream(0));
-  asked = commands();
-  ASSERT_EQ(asked.size(), 1u);
-  EXPECT_EQ(asked[0].body.cmd_stream.streams, WIRE_STREAM_RAW | WIRE_STREAM_HEALTH);
+  const wire_packet asked = streams_on_line(WIRE_STREAM_RAW | WIRE_STREAM_HEALTH);
   frame(2);
-  answer(asked[0]);
+  answer(asked);
   say(test::make_contact(0, 3, 3));
   read(one);
-  EXPECT_EQ(one.heard_of(WIRE_CONTACT).size(), 2u) << "until it was acknowledged";
+  EXPECT_EQ(one.count_of(WIRE_CONTACT), 2u) << "until it was acknowledged";
 }
 
 TEST_F(HubTest, WhoeverLeavesWantsNothing) {
@@ -226,14 +226,10 @@ TEST_F(HubTest, WishesThatCrossOneAnotherAllComeTrue) {
     answer(each);
   }
   hub.tick(now);
-  auto asked = commands();
-  ASSERT_EQ(asked.size(), 1u) << "the second still held what the first gave up";
-  EXPECT_EQ(asked[0].body.cmd_stream.streams, WIRE_STREAM_HEALTH);
-
+  streams_on_line(WIRE_STREAM_HEALTH); /* the second still held what the first gave up */
   command(one, command_stream(WIRE_STREAM_CONTACT));
   command(other, command_stream(WIRE_STREAM_RAW));
-  asked = commands();
-  EXPECT_EQ(asked[1].body.cmd_stream.streams & BOTH, BOTH);
+  EXPECT_EQ(commands().at(1).body.cmd_stream.streams & BOTH, BOTH);
 }
 
 TEST_F(HubTest, ARefusedWishIsItsOwnersAlone) {
@@ -251,7 +247,7 @@ TEST_F(HubTest, ARefusedWishIsItsOwnersAlone) {
   read(other);
   ASSERT_EQ(one.heard.size(), 1u);
   EXPECT_EQ(one.heard[0].body.ack.result, WIRE_RESULT_OUT_OF_RANGE);
-  EXPECT_EQ(other.heard_of(WIRE_CONTACT).size(), 1u);
+  EXPECT_EQ(other.count_of(WIRE_CONTACT), 1u);
 }
 
 TEST_F(HubTest, LossesOfTheLineAreEverybodys) {
@@ -302,47 +298,34 @@ TEST_F(HubTest, ARestartLooksAsItDoesOnTheLine) {
 
 TEST_F(HubTest, ASlowClientLosesItsOwnPacketsCountedAndNobodyElses) {
   greet();
-  Program slow = join(), quick = join();
-  stream(slow, BOTH);
-  stream(quick, BOTH);
-  for (std::uint32_t i = 0; i < 1000; i++) {
-    frame(i);
+  for (std::size_t bytes : {0u, 97u}) { /* it reads with each frame */
+    Program slow = join(), quick = join();
+    stream(slow, BOTH);
+    stream(quick, BOTH);
+    for (std::uint32_t i = 0; i < 2000; i++) {
+      frame(i);
+      read(quick);
+      read(slow, bytes);
+    }
+    std::size_t length = 0;
+    hub.waiting(slow.client, &length);
+    EXPECT_LE(length, 20000u);
+    EXPECT_GT(length, 19000u);
+    read(slow);
+    frame(2000);
+    read(slow);
     read(quick);
+    EXPECT_EQ(quick.heard.size(), 4002u);
+    EXPECT_EQ(quick.decoder.statistics().dropped_packets, 0u);
+    EXPECT_EQ(hub.lost(quick.client), 0u);
+    EXPECT_GT(hub.lost(slow.client), 1000u);
+    EXPECT_EQ(slow.decoder.statistics().dropped_packets, hub.lost(slow.client));
+    EXPECT_EQ(slow.heard.size() + hub.lost(slow.client), 4002u);
+    EXPECT_EQ(slow.heard.back().body.raw.frame, 2000u);
+    EXPECT_EQ(slow.decoder.statistics().crc_errors + slow.decoder.statistics().format_errors, 0u) << "whole packets";
+    hub.leave(slow.client);
+    hub.leave(quick.client);
   }
-  std::size_t length = 0;
-  hub.waiting(slow.client, &length);
-  EXPECT_LE(length, 20000u);
-  EXPECT_GT(length, 19000u);
-  read(slow);
-  frame(1000);
-  read(slow);
-  read(quick);
-  EXPECT_EQ(quick.heard.size(), 2002u);
-  EXPECT_EQ(quick.decoder.statistics().dropped_packets, 0u);
-  EXPECT_EQ(hub.lost(quick.client), 0u);
-  EXPECT_GT(hub.lost(slow.client), 1000u);
-  EXPECT_EQ(slow.decoder.statistics().dropped_packets, hub.lost(slow.client));
-  EXPECT_EQ(slow.heard.size() + hub.lost(slow.client), 2002u);
-  EXPECT_EQ(slow.heard.back().body.raw.frame, 1000u);
-  EXPECT_EQ(slow.decoder.statistics().crc_errors, 0u) << "whole packets";
-}
-
-TEST_F(HubTest, AClientThatReadsALittleGetsWholePackets) {
-  greet();
-  Program slow = join();
-  stream(slow, BOTH);
-  for (std::uint32_t i = 0; i < 2000; i++) {
-    frame(i);
-    read(slow, 97);
-  }
-  read(slow);
-  frame(2000);
-  read(slow);
-  EXPECT_GT(hub.lost(slow.client), 1000u);
-  EXPECT_EQ(slow.decoder.statistics().dropped_packets, hub.lost(slow.client));
-  EXPECT_EQ(slow.heard.size() + hub.lost(slow.client), 4002u);
-  EXPECT_EQ(slow.decoder.statistics().crc_errors, 0u);
-  EXPECT_EQ(slow.decoder.statistics().format_errors, 0u);
 }
 
 TEST_F(HubTest, AStoppedClientBeginsAnewBeforeItsNumbersLie) {
@@ -368,33 +351,30 @@ TEST_F(HubTest, HealthOfTheStreamIsNoAnswer) {
   }
   read(asking);
   read(streaming);
-  EXPECT_EQ(asking.heard_of(WIRE_HEALTH).size(), 1u);
-  EXPECT_EQ(streaming.heard_of(WIRE_HEALTH).size(), 1u) << "the other was not for it";
+  EXPECT_EQ(asking.count_of(WIRE_HEALTH), 1u);
+  EXPECT_EQ(streaming.count_of(WIRE_HEALTH), 1u) << "the other was not for it";
 
   /* The answer got lost: what comes next may be the stream's. */
   command(asking, command_health());
-  auto asked = commands();
-  ASSERT_EQ(asked.size(), 1u);
-  say(test::make_ack(0, 1, WIRE_CMD_HEALTH, WIRE_RESULT_DONE, asked[0].sequence, 0));
+  say(test::make_ack(0, 1, WIRE_CMD_HEALTH, WIRE_RESULT_DONE, command_on_line(WIRE_CMD_HEALTH).sequence, 0));
   line_sequence++;
   say(test::make_health(0, 1));
   read(streaming);
-  EXPECT_EQ(streaming.heard_of(WIRE_HEALTH).size(), 2u);
+  EXPECT_EQ(streaming.count_of(WIRE_HEALTH), 2u);
 }
 
 TEST_F(HubTest, ALostAnswerIsNotTakenForTheNext) {
   greet();
   Program one = join(), other = join();
   command(one, command_info());
-  auto asked = commands();
-  say(test::make_ack(0, 1, WIRE_CMD_INFO, WIRE_RESULT_DONE, asked.at(0).sequence, 0));
+  say(test::make_ack(0, 1, WIRE_CMD_INFO, WIRE_RESULT_DONE, command_on_line(WIRE_CMD_INFO).sequence, 0));
   line_sequence++; /* its info */
   command(other, command_info());
   answer(commands().at(0));
   read(one);
   read(other);
-  EXPECT_TRUE(one.heard_of(WIRE_INFO).empty());
-  EXPECT_EQ(other.heard_of(WIRE_INFO).size(), 1u);
+  EXPECT_EQ(one.count_of(WIRE_INFO), 0u);
+  EXPECT_EQ(other.count_of(WIRE_INFO), 1u);
 }
 
 TEST_F(HubTest, TypesOfALaterFirmwareGoThrough) {
@@ -446,16 +426,11 @@ TEST_F(HubTest, AnotherVersionIsAskedAndHeardAsItIs) {
   command(one, command_loader());
   EXPECT_TRUE(hub.take_loader_wish());
   EXPECT_FALSE(hub.take_loader_wish());
-}
-
-TEST_F(HubTest, AFingertipThatSpeaksIsAskedIntoItsLoaderByTheCommand) {
+  commands();
   greet();
-  Program one = join();
   command(one, command_loader());
-  auto asked = commands();
-  ASSERT_EQ(asked.size(), 1u);
-  EXPECT_EQ(asked[0].body.cmd_loader.magic, WIRE_LOADER_MAGIC);
-  EXPECT_FALSE(hub.take_loader_wish());
+  EXPECT_EQ(command_on_line(WIRE_CMD_LOADER).body.cmd_loader.magic, WIRE_LOADER_MAGIC);
+  EXPECT_FALSE(hub.take_loader_wish()) << "one that speaks this version";
 }
 
 TEST_F(HubTest, DamageOfAClientDoesNotReachTheLine) {
@@ -488,12 +463,12 @@ TEST_F(HubTest, ALineThatDoesNotAnswerIsNotFlooded) {
   now += seconds(2);
   answer(asked[1]);
   read(one);
-  EXPECT_EQ(one.heard_of(WIRE_ACK).size(), 2u) << "late is not lost";
+  EXPECT_EQ(one.count_of(WIRE_ACK), 2u) << "late is not lost";
   now += seconds(20);
   hub.tick(now);
   answer(asked[2]);
   read(one);
-  EXPECT_EQ(one.heard_of(WIRE_ACK).size(), 2u) << "but once it is forgotten";
+  EXPECT_EQ(one.count_of(WIRE_ACK), 2u) << "but once it is forgotten";
 }
 
 TEST_F(HubTest, AJoinInTheMiddleOfAFrameIsNoDamage) {

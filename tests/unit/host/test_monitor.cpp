@@ -1,4 +1,5 @@
 /* What the monitor draws, and how much of it goes to the terminal. */
+#include "libfingertip/names.hpp"
 #include "support/host_packets.hpp"
 #include "support/pad.h"
 #include "tool/cli/monitor.hpp"
@@ -73,6 +74,14 @@ void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_m
     raw.body.raw.pressure_Pa_q10[k] = 101325 * 1024 + static_cast<std::int32_t>(Pa * 1024);
   }
   model.take(raw);
+}
+
+/* After two seconds of one contact, 50 frames a second. */
+Model touched(Model model, float x_mm, float y_mm, std::uint32_t flags = GOOD, const Pull &pull = {}) {
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, x_mm, y_mm, 5, flags, pull);
+  }
+  return model;
 }
 
 std::string text_of(const Canvas &canvas) {
@@ -159,10 +168,13 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
   Canvas good = one(model);
   EXPECT_TRUE(shows(good, "5.00 N")) << text_of(good);
   EXPECT_TRUE(shows(good, "┼"));
+  Model all = model_with_info();
+  take_frame(all, 1000000, 1, 1, 2, 5, 0x7FFFF);
   for (std::uint32_t flag :
        {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT, CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_MODEL, CONTACT_FLAG_SATURATED,
         CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED,
         CONTACT_FLAG_ZERO_DOUBTFUL, CONTACT_FLAG_SENSOR_DOUBTFUL}) {
+    EXPECT_TRUE(shows(one(all), flags_text(flag))) << text_of(one(all));
     take_frame(model, 2000000, 2, 4.5f, 4.5f, 5, GOOD | flag);
     Canvas doubtful = one(model);
     EXPECT_TRUE(shows(doubtful, "5.00?N")) << text_of(doubtful);
@@ -181,20 +193,8 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
   EXPECT_FALSE(shows(unfitted, "+4.50"));
 }
 
-TEST(Monitor, EveryWarningAtOnceIsNamed) {
-  Model model = model_with_info();
-  take_frame(model, 1000000, 1, 1, 2, 5, 0x7FFFF);
-  for (const char *name : {"LOW_SIGNAL", "FLAT", "UNCERTAIN", "MODEL", "SATURATED", "FORCE_LOWER_BOUND",
-                           "SENSOR_MASKED", "AT_BOUND", "ELONGATED", "ZERO_DOUBTFUL", "SENSOR_DOUBTFUL"}) {
-    EXPECT_TRUE(shows(one(model), name)) << text_of(one(model));
-  }
-}
-
 TEST(Monitor, AForceAtLiftOffDoesNotScaleTheTrace) {
-  Model model = model_with_info();
-  for (std::uint32_t frame = 0; frame < 100; frame++) {
-    take_frame(model, 1000000 + 20000 * frame, frame, 1, 2, 4, GOOD);
-  }
+  Model model = touched(model_with_info(), 1, 2);
   Canvas before = one(model);
   take_frame(model, 3050000, 100, -40, 2, 76254, GOOD | CONTACT_FLAG_AT_BOUND);
   Canvas after = one(model);
@@ -204,10 +204,7 @@ TEST(Monitor, AForceAtLiftOffDoesNotScaleTheTrace) {
 }
 
 TEST(Monitor, TracesHaveAxesAndSensorsNumbersAndBothPressures) {
-  Model model = model_with_info();
-  for (std::uint32_t frame = 0; frame < 100; frame++) {
-    take_frame(model, 1000000 + 20000 * frame, frame, 0, 0, 5, GOOD);
-  }
+  Model model = touched(model_with_info(), 0, 0);
   Canvas canvas = one(model, 120, 40);
   for (const char *text : {"force  5 N┤", "x    15 mm┤", "-15┤", "y    24 mm┤", "-24┤", "slip  1 mm┤", "0 s", "-5",
                            "no., measured, fitted"}) {
@@ -237,10 +234,7 @@ TEST(Monitor, WhileTaringThereAreNoPressures) {
 }
 
 TEST(Monitor, WhatIsGoneHasNoRateAndNoNumbers) {
-  Model model = model_with_info();
-  for (std::uint32_t frame = 0; frame < 100; frame++) {
-    take_frame(model, 1000000 + 20000 * frame, frame, 4.5f, 4.5f, 5, GOOD);
-  }
+  Model model = touched(model_with_info(), 4.5f, 4.5f);
   EXPECT_TRUE(shows(one(model), "frames/s   50.0"));
   model.set_state(Model::State::gone);
   Canvas gone = one(model);
@@ -283,32 +277,40 @@ TEST(Monitor, EachCounterIsColouredByItself) {
 }
 
 TEST(Monitor, EverySizeIsLaidOut) {
-  Model model = model_with_info();
-  for (std::uint32_t frame = 0; frame < 100; frame++) {
-    take_frame(model, 1000000 + 20000 * frame, frame, 4.5f, 4.5f, 5, GOOD);
-  }
-  for (int columns = 80; columns <= 200; columns += 3) {
-    for (int rows = 24; rows <= 60; rows++) {
-      Canvas canvas = one(model, columns, rows);
-      for (const char *text :
-           {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s", "no fit", "NACKs", "convert", "force  ",
-            "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}) {
-        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n" << text_of(canvas);
+  const Model plain = touched(model_with_info(), 4.5f, 4.5f);
+  const Model pulled = touched(model_of_grasp(true), 4.5f, 4.5f, PULLED, {-1.5f, 0.2f});
+  const std::pair<const Model &, std::vector<const char *>> cases[] = {
+      {plain,
+       {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s", "no fit", "NACKs", "convert", "force  ",
+        "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}},
+      {pulled,
+       {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING", "CONTACT", "force  5 N┤", "2 N┤", "slip  1 mm┤",
+        "0 s", "NACKs"}}};
+  for (const auto &[model, texts] : cases) {
+    for (int columns = 80; columns <= 200; columns += 3) {
+      for (int rows = 24; rows <= 60; rows++) {
+        Canvas canvas = one(model, columns, rows);
+        for (const char *text : texts) {
+          ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n" << text_of(canvas);
+        }
       }
     }
   }
   for (auto [columns, rows] : {std::pair{79, 24}, {80, 23}, {40, 10}, {10, 3}, {1, 1}}) {
-    Canvas canvas = one(model, columns, rows);
+    Canvas canvas = one(plain, columns, rows);
     EXPECT_TRUE(columns < 40 || shows(canvas, "window too small")) << text_of(canvas);
     EXPECT_TRUE(columns < 40 || shows(canvas, "5.00 N")) << text_of(canvas);
+  }
+  for (auto [columns, rows] : {std::pair{80, 24}, {80, 46}, {200, 60}}) {
+    Canvas canvas = draw_monitor({pulled, pulled}, {"keys", "note", ""}, columns, rows);
+    for (const char *text : {"-1.50", "+0.20", "Q/F ", "○ SLIDING", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s"}) {
+      EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
+    }
   }
 }
 
 TEST(Monitor, APullIsAnArrowAndNumbersAndTraces) {
-  Model model = model_of_grasp(true);
-  for (std::uint32_t frame = 0; frame < 100; frame++) {
-    take_frame(model, 1000000 + 20000 * frame, frame, -4.5f, -4.5f, 5, PULLED, {1.5f, 0, 0.05f});
-  }
+  Model model = touched(model_of_grasp(true), -4.5f, -4.5f, PULLED, {1.5f, 0, 0.05f});
   Canvas canvas = one(model, 120, 40);
   for (const char *text : {"qx  +1.50", "qy  +0.00", "sd  0.050 N", "Q/F 0.300", "sd  0.010", "○ MOVING", "○ SLIDING",
                            "qx     2 N┤", "qy     2 N┤", "force  5 N┤", "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤"}) {
@@ -436,28 +438,6 @@ TEST(Monitor, ALoadSinceTheTouchIsMarked) {
   EXPECT_TRUE(shows(draw_monitor({model, model}, {"keys", "note", ""}, 80, 24), "ΔQ/F"));
 }
 
-TEST(Monitor, EverySizeOfAPullIsLaidOut) {
-  Model model = model_of_grasp(true);
-  for (std::uint32_t frame = 0; frame < 100; frame++) {
-    take_frame(model, 1000000 + 20000 * frame, frame, 4.5f, 4.5f, 5, PULLED, {-1.5f, 0.2f});
-  }
-  for (int columns = 80; columns <= 200; columns += 3) {
-    for (int rows = 24; rows <= 60; rows++) {
-      Canvas canvas = one(model, columns, rows);
-      for (const char *text : {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING", "CONTACT", "force  5 N┤",
-                               "2 N┤", "slip  1 mm┤", "0 s", "NACKs"}) {
-        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n" << text_of(canvas);
-      }
-    }
-  }
-  for (auto [columns, rows] : {std::pair{80, 24}, {80, 46}, {200, 60}}) {
-    Canvas canvas = draw_monitor({model, model}, {"keys", "note", ""}, columns, rows);
-    for (const char *text : {"-1.50", "+0.20", "Q/F ", "○ SLIDING", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s"}) {
-      EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
-    }
-  }
-}
-
 TEST(Monitor, SeveralStandSideBySide) {
   std::vector<Model> models;
   for (int i = 0; i < 12; i++) {
@@ -465,10 +445,7 @@ TEST(Monitor, SeveralStandSideBySide) {
     wire_packet info = test::make_info(0, 0);
     info.body.info.serial[0] = static_cast<char>('A' + i);
     model.take(info);
-    for (std::uint32_t frame = 0; frame < 100; frame++) {
-      take_frame(model, 1000000 + 20000 * frame, frame, static_cast<float>(i), 2, 5, GOOD);
-    }
-    models.push_back(model);
+    models.push_back(touched(model, static_cast<float>(i), 2));
   }
   auto serial = [](int i) { return std::string(1, static_cast<char>('A' + i)) + "660583883265A2C"; };
   for (auto [columns, rows, shown] : {std::tuple{80, 24, 2}, {120, 24, 3}, {80, 46, 4}, {200, 60, 10}}) {

@@ -2,11 +2,13 @@
 #include "libfingertip/output_file.hpp"
 #include "support/host_packets.hpp"
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
 #include <optional>
 #include <sstream>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 using namespace fingertip;
@@ -105,4 +107,27 @@ TEST(OutputFile, OneFileByTwoNames) {
   EXPECT_TRUE(is_same_file("new", "./new"));
   EXPECT_FALSE(is_same_file(folder / "a", folder / "b"));
   EXPECT_FALSE(is_same_file(folder / "b", folder / "c"));
+}
+
+/* A limit on the size of files stands in for a full disk: write stops within an append. */
+TEST(OutputFile, AFullDiskIsAnErrorAndLeavesWholeAppends) {
+  test::TemporaryFolder folder;
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small = {5000, before.rlim_max};
+  OutputFile file(folder / "a", false, OutputFile::Appears::at_once);
+  const std::string line(300, 'x');
+  ErrorCode code = ErrorCode::other;
+  setrlimit(RLIMIT_FSIZE, &small);
+  for (int i = 0; i < 100 && code == ErrorCode::other; i++) {
+    try {
+      file.append(line.data(), line.size());
+    } catch (const Error &error) {
+      code = error.code();
+    }
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(code, ErrorCode::write_cut);
+  EXPECT_EQ(fs::file_size(folder / "a"), 4800u);
 }
