@@ -59,9 +59,6 @@ export class Machine {
     this.seed = seed;
     this.clock_ppm = clock_ppm;
     this.allowWatchdog = allowWatchdog;
-    this.revision = revision;
-    this.uptime_us = uptime_us;
-    this.rosc_hz = rosc_hz;
     this.serial = Uint8Array.from(serial.match(/../g).map((h) => parseInt(h, 16)));
     this.time = new SimulatedTime();
     this.scope = this.time.scope();
@@ -89,33 +86,31 @@ export class Machine {
         faults: () => this.faults,
       });
     this.trouble = new Trouble();
+    const { memory, trouble } = this;
+    this.chipOptions = { serial: this.serial, seed, clock_ppm, revision, uptime_us, rosc_hz, memory, trouble };
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
     this.sync = new SyncPin({ gpio: Board.syncPin, scope: this.scope, report: this.report, ...sync });
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, companion, onPacket: onUsbPacket });
     this.client = makeClient({ host: this.host, report: this.report, onData });
     const onBoard = (type) => [type, (target, active) => this.board.faultActions[type](target, active)];
+    const troubled =
+      (name, then = () => {}) =>
+      (_, active) => {
+        this.trouble[name] = active;
+        then();
+      };
     this.faults = new Faults(faults, this.scope, {
       ...Object.fromEntries(Object.keys(this.board.faultActions).map(onBoard)),
       power_cut: (_, active) => (active ? this.#powerDown() : this.#guard(() => this.#powerBack())),
       chip_reset: (_, active) => (active ? this.#holdChip() : this.#guard(() => this.#releaseChip())),
-      crystal_dead: (_, active) => {
-        this.trouble.crystalDead = active;
-        this.chip.xosc.count();
-      },
-      crystal_weak: (_, active) => {
-        this.trouble.crystalWeak = active;
-      },
-      pll_late: (_, active) => {
-        this.trouble.pllLate = active;
+      crystal_dead: troubled('crystalDead', () => this.chip.xosc.count()),
+      crystal_weak: troubled('crystalWeak'),
+      pll_late: troubled('pllLate', () => {
         for (const pll of [this.chip.pllSys, this.chip.pllUsb]) pll.lock();
-      },
-      usb_busy_hub: (_, active) => {
-        this.trouble.busyHub = active;
-      },
-      usb_late_resume: (_, active) => {
-        this.trouble.lateResume = active;
-      },
+      }),
+      usb_busy_hub: troubled('busyHub'),
+      usb_late_resume: troubled('lateResume'),
       usb_deaf: (_, active) => this.#hang('deaf', active),
       usb_dead: (_, active) => this.#hang('dead', active),
       sram_upset: ({ address, bytes }) => this.chip.sram.set(bytes, address - RAM_BASE),
@@ -133,17 +128,7 @@ export class Machine {
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, {
-      serial: this.serial,
-      seed: this.seed,
-      clock_ppm: this.clock_ppm,
-      revision: this.revision,
-      uptime_us: this.uptime_us,
-      rosc_hz: this.rosc_hz,
-      memory: this.memory,
-      trouble: this.trouble,
-      kept,
-    });
+    this.chip = new Chip(this.time, this.report, { ...this.chipOptions, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.sync.attachChip(this.chip);

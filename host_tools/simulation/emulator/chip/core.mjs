@@ -198,11 +198,22 @@ export class StrictCore extends CortexM0Core {
 
   /** An instruction that is not one of `execute`'s, or whose access is not one to SRAM, by rp2040js, whose SEV does nothing. */
   executeOther(op) {
-    this.at = this.signed[15];
+    const r = this.signed;
+    if (op >>> 12 === 6) {
+      // LDR and STR with an offset, the most frequent: without a second decoding
+      const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
+      const cycles = 1 + this.cyclesIO(address, !(op & 0x800));
+      if (op & 0x800) r[op & 7] = this.readUint32(address);
+      else this.writeUint32(address, r[op & 7]);
+      r[15] += 2;
+      this.cycles += cycles;
+      return;
+    }
+    this.at = r[15];
     try {
       super.executeInstruction();
     } catch (error) {
-      if (error instanceof MemoryFault) this.signed[15] = this.at; // which the fault reports
+      if (error instanceof MemoryFault) r[15] = this.at; // which the fault reports
       throw error;
     } finally {
       this.at = null;

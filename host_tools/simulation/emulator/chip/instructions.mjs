@@ -126,10 +126,8 @@ export function execute(core, stop, time) {
             const value = s === 15 ? pc + 4 : r[s];
             if (kind === 3) {
               // BX; an exception return and BLX are others'
-              if (op & 0x87 || !(value & 1) || value >>> 28 === 15) {
-                isOthers = true;
-                break;
-              }
+              isOthers = (op & 0x87) !== 0 || !(value & 1) || value >>> 28 === 15;
+              if (isOthers) break;
               pc = value & ~1;
               cycles += 2;
               continue;
@@ -144,10 +142,8 @@ export function execute(core, stop, time) {
               negative = result;
               zero = result;
             } else if (d === 15) {
-              if (kind !== 2) {
-                isOthers = true;
-                break;
-              }
+              isOthers = kind !== 2;
+              if (isOthers) break;
               pc = value & ~1;
               cycles += 2;
               continue;
@@ -219,10 +215,8 @@ export function execute(core, stop, time) {
         case 9: {
           // LDR literal
           const at = ((pc + 4) & ~3) + ((op & 0xff) << 2) - RAM_BASE;
-          if (at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           r[(op >>> 8) & 7] = ram32[at >>> 2];
           cycles += 1;
           break;
@@ -233,10 +227,8 @@ export function execute(core, stop, time) {
           const at = (r[(op >>> 3) & 7] + r[(op >>> 6) & 7] - RAM_BASE) >>> 0;
           const t = op & 7;
           const kind = (op >>> 9) & 7;
-          if (at >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes || (kind < 3 && at < readOnlyBytes)) {
-            isOthers = true;
-            break;
-          }
+          isOthers = at >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes || (kind < 3 && at < readOnlyBytes);
+          if (isOthers) break;
           switch (kind) {
             case 0:
               if (at & 3) isOthers = true;
@@ -275,10 +267,8 @@ export function execute(core, stop, time) {
           // STR immediate, or relative to sp
           const isSp = op >>> 15;
           const at = ((isSp ? r[13] + ((op & 0xff) << 2) : r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) - RAM_BASE) | 0;
-          if (((at >>> 2) | (at << 30)) >>> 0 >= WORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = ((at >>> 2) | (at << 30)) >>> 0 >= WORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           ram32[at >>> 2] = r[(isSp ? op >>> 8 : op) & 7];
           cycles += 1;
           break;
@@ -288,50 +278,40 @@ export function execute(core, stop, time) {
           // LDR immediate, or relative to sp
           const isSp = op >>> 15;
           const at = ((isSp ? r[13] + ((op & 0xff) << 2) : r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) - RAM_BASE) | 0;
-          if (((at >>> 2) | (at << 30)) >>> 0 >= WORDS || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = ((at >>> 2) | (at << 30)) >>> 0 >= WORDS || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           r[(isSp ? op >>> 8 : op) & 7] = ram32[at >>> 2];
           cycles += 1;
           break;
         }
         case 14: {
           const at = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f) - RAM_BASE) | 0;
-          if (at >>> 0 >= RAM_BYTES || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = at >>> 0 >= RAM_BYTES || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           ram8[at] = r[op & 7];
           cycles += 1;
           break;
         }
         case 15: {
           const at = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f) - RAM_BASE) | 0;
-          if (at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           r[op & 7] = ram8[at];
           cycles += 1;
           break;
         }
         case 16: {
           const at = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e) - RAM_BASE) | 0;
-          if (((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = ((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           ram16[at >>> 1] = r[op & 7];
           cycles += 1;
           break;
         }
         case 17: {
           const at = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e) - RAM_BASE) | 0;
-          if (((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || (at - guardFrom) >>> 0 < guardBytes) {
-            isOthers = true;
-            break;
-          }
+          isOthers = ((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || (at - guardFrom) >>> 0 < guardBytes;
+          if (isOthers) break;
           r[op & 7] = ram16[at >>> 1];
           cycles += 1;
           break;
@@ -356,10 +336,12 @@ export function execute(core, stop, time) {
             const top = (r[13] - 4 * count) | 0;
             const at = (top - RAM_BASE) | 0;
             // All of it in SRAM, above what is not to be written and on one side of the guard.
-            if (at & 3 || at < readOnlyBytes || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes)) {
-              isOthers = true;
-              break;
-            }
+            isOthers =
+              (at & 3) !== 0 ||
+              at < readOnlyBytes ||
+              at + 4 * count > RAM_BYTES ||
+              (at + 4 * count > guardFrom && at < guardFrom + guardBytes);
+            if (isOthers) break;
             let word = at >>> 2;
             for (let rest = op & 0xff; rest; rest &= rest - 1) ram32[word++] = r[31 - Math.clz32(rest & -rest)];
             if (op & 0x100) ram32[word] = r[14];
@@ -369,10 +351,9 @@ export function execute(core, stop, time) {
             // POP
             const at = (r[13] - RAM_BASE) | 0;
             const count = bitCount(op & 0x1ff);
-            if (at & 3 || at < 0 || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes)) {
-              isOthers = true;
-              break;
-            }
+            isOthers =
+              (at & 3) !== 0 || at < 0 || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes);
+            if (isOthers) break;
             let word = at >>> 2;
             if (op & 0x100) {
               const target = ram32[word + count - 1];
@@ -398,10 +379,12 @@ export function execute(core, stop, time) {
           const n = (op >>> 8) & 7;
           const count = bitCount(op & 0xff);
           const at = (r[n] - RAM_BASE) | 0;
-          if (at & 3 || at < readOnlyBytes || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes)) {
-            isOthers = true;
-            break;
-          }
+          isOthers =
+            (at & 3) !== 0 ||
+            at < readOnlyBytes ||
+            at + 4 * count > RAM_BYTES ||
+            (at + 4 * count > guardFrom && at < guardFrom + guardBytes);
+          if (isOthers) break;
           let word = at >>> 2;
           for (let rest = op & 0xff; rest; rest &= rest - 1) ram32[word++] = r[31 - Math.clz32(rest & -rest)];
           r[n] += 4 * count;
@@ -413,10 +396,8 @@ export function execute(core, stop, time) {
           const n = (op >>> 8) & 7;
           const count = bitCount(op & 0xff);
           const at = (r[n] - RAM_BASE) | 0;
-          if (at & 3 || at < 0 || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes)) {
-            isOthers = true;
-            break;
-          }
+          isOthers = (at & 3) !== 0 || at < 0 || at + 4 * count > RAM_BYTES || (at + 4 * count > guardFrom && at < guardFrom + guardBytes);
+          if (isOthers) break;
           let word = at >>> 2;
           r[n] += 4 * count;
           for (let rest = op & 0xff; rest; rest &= rest - 1) r[31 - Math.clz32(rest & -rest)] = ram32[word++];
@@ -472,10 +453,8 @@ export function execute(core, stop, time) {
             core.keep(pc, before + cycles, negative, zero, carry, overflow);
             low = core.fetch(pc + 2);
           }
-          if ((low & 0xd000) !== 0xd000) {
-            isOthers = true;
-            break;
-          }
+          isOthers = (low & 0xd000) !== 0xd000;
+          if (isOthers) break;
           const sign = (op << 21) >> 31;
           const i1 = ~((low >>> 13) ^ sign) & 1;
           const i2 = ~((low >>> 11) ^ sign) & 1;

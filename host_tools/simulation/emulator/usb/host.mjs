@@ -82,17 +82,8 @@ export class UsbHost {
     this.offered_ns = new Map();
     this.onConfigured = () => {};
     this.onDisconnected = () => {};
-    this.statistics = {
-      in_bytes: 0,
-      out_bytes: 0,
-      in_packets: 0,
-      out_packets: 0,
-      naks: 0,
-      stalls: 0,
-      resets: 0,
-      enumerations: 0,
-      detaches: 0,
-    };
+    const packets = { in_bytes: 0, out_bytes: 0, in_packets: 0, out_packets: 0, naks: 0, stalls: 0 };
+    this.statistics = { ...packets, resets: 0, enumerations: 0, detaches: 0 };
     this.block = null;
     this.plugged = true;
     this.frame = 0;
@@ -184,7 +175,7 @@ export class UsbHost {
       pipe.parked_ns = null;
       pipe.retry_ns = 0;
     }
-    for (const t of transfers) t.done('cancelled', concat(t.got ?? []));
+    for (const t of transfers) t.done('cancelled', Buffer.concat(t.got ?? []));
   }
 
   *#readdress(done, reset_ns) {
@@ -234,7 +225,7 @@ export class UsbHost {
     this.#enumeration = null;
     if (this.running) this.block.endTransaction();
     this.#detach();
-    for (const t of transfers) t.done('gone', new Uint8Array(0));
+    for (const t of transfers) t.done('gone', Buffer.alloc(0));
     if (had) this.onDisconnected();
   }
 
@@ -395,19 +386,9 @@ export class UsbHost {
 
   control(packet, data, done) {
     const length = packet[6] | (packet[7] << 8);
-    const transfer = {
-      pipe: this.controlPipe,
-      packet,
-      stage: 'setup',
-      isIn: (packet[0] & 0x80) !== 0,
-      length,
-      data: data ?? new Uint8Array(0),
-      at: 0,
-      got: [],
-      done,
-      started_ns: null,
-    };
-    return this.#submit(transfer);
+    const isIn = (packet[0] & 0x80) !== 0;
+    const progress = { stage: 'setup', at: 0, got: [], started_ns: null };
+    return this.#submit({ pipe: this.controlPipe, packet, isIn, length, data: data ?? new Uint8Array(0), done, ...progress });
   }
 
   bulkIn(address, length, done) {
@@ -437,7 +418,7 @@ export class UsbHost {
     if (index < 0) return;
     queue.splice(index, 1);
     if (transfer.pipe === this.controlPipe && index === 0) this.controlAlarm.cancel();
-    transfer.done('cancelled', concat(transfer.got ?? []));
+    transfer.done('cancelled', Buffer.concat(transfer.got ?? []));
   }
 
   #pipe(address) {
@@ -613,14 +594,8 @@ export class UsbHost {
     pipe.toggle ^= 1;
     this.statistics.in_packets += 1;
     if (pipe.endpoint) this.statistics.in_bytes += data.length;
-    this.onPacket({
-      t_ns: this.scope.nanos,
-      endpoint: pipe.endpoint,
-      isIn: true,
-      setup: false,
-      data,
-      offered_ns: this.offered_ns.get(pipe.endpoint),
-    });
+    const { endpoint } = pipe;
+    this.onPacket({ t_ns: this.scope.nanos, endpoint, isIn: true, setup: false, data, offered_ns: this.offered_ns.get(endpoint) });
     if (interrupt) {
       interrupt.onData(data);
       return;
@@ -633,10 +608,12 @@ export class UsbHost {
     transfer.got.push(data);
     const total = transfer.got.reduce((n, d) => n + d.length, 0);
     if (total > transfer.length) this.#fail(`${pipe.name}: ${total} bytes where ${transfer.length} were asked for`);
-    if (data.length < pipe.maxPacket || total === transfer.length) {
-      if (pipe === this.controlPipe) transfer.stage = 'status';
-      else this.#finish(pipe, transfer, 'ok');
-    }
+    if (data.length < pipe.maxPacket || total === transfer.length) this.#dataDone(pipe, transfer);
+  }
+
+  #dataDone(pipe, transfer) {
+    if (pipe === this.controlPipe) transfer.stage = 'status';
+    else this.#finish(pipe, transfer, 'ok');
   }
 
   #outDone(t) {
@@ -656,27 +633,14 @@ export class UsbHost {
       return;
     }
     transfer.at += data.length;
-    if (transfer.at >= transfer.data.length) {
-      if (pipe === this.controlPipe) transfer.stage = 'status';
-      else this.#finish(pipe, transfer, 'ok');
-    }
+    if (transfer.at >= transfer.data.length) this.#dataDone(pipe, transfer);
   }
 
   #finish(pipe, transfer, status) {
     if (pipe === this.controlPipe) this.controlAlarm.cancel();
     pipe.queue.shift();
-    transfer.done(status, concat(transfer.got ?? []));
+    transfer.done(status, Buffer.concat(transfer.got ?? []));
   }
 }
 
-export function concat(parts) {
-  const all = new Uint8Array(parts.reduce((n, p) => n + p.length, 0));
-  let at = 0;
-  for (const p of parts) {
-    all.set(p, at);
-    at += p.length;
-  }
-  return all;
-}
-
-const hex = (bytes) => [...bytes].map((b) => b.toString(16).padStart(2, '0')).join('');
+const hex = (bytes) => Buffer.from(bytes).toString('hex');

@@ -56,22 +56,37 @@ const ENDPOINTS = 32;
 const VERSION_BYTES = 64;
 const READER_GRACE_MS = 2000;
 const LARGEST_MESSAGE = 1 << 20;
-const REQUEST = { get_configuration: 8, get_interface: 10, set_interface: 11, clear_feature: 1 };
+const CLEAR_FEATURE = 1;
 
 const endpointIndex = (address) => ((address & 0x80) >> 3) | (address & 15);
 
 class ProtocolError extends Error {}
 
-// Bytes of a message of each type before its data.
-const LEAST_BYTES = new Map([
-  [TYPE.control, 10],
-  [TYPE.bulk, 10],
-  [TYPE.set_configuration, 1],
-  [TYPE.set_alt_setting, 2],
-  [TYPE.get_alt_setting, 1],
-  [TYPE.start_interrupt, 1],
-  [TYPE.stop_interrupt, 1],
-]);
+/** Requests that the protocol has messages for: the bytes they need, the request, and the answer but for its status. */
+const STANDARD = {
+  [TYPE.set_configuration]: {
+    least: 1,
+    setup: ([value]) => setupPacket(0x00, 9, value, 0, 0),
+    answer: ([value]) => [TYPE.configuration_status, value],
+  },
+  [TYPE.get_configuration]: {
+    least: 0,
+    setup: () => setupPacket(0x80, 8, 0, 0, 1),
+    answer: (_, data) => [TYPE.configuration_status, data[0] ?? 0],
+  },
+  [TYPE.set_alt_setting]: {
+    least: 2,
+    setup: ([number, setting]) => setupPacket(0x01, 11, setting, number, 0),
+    answer: ([number, setting]) => [TYPE.alt_setting_status, number, setting],
+  },
+  [TYPE.get_alt_setting]: {
+    least: 1,
+    setup: ([number]) => setupPacket(0x81, 10, 0, number, 1),
+    answer: ([number], data) => [TYPE.alt_setting_status, number, data[0] ?? 0],
+  },
+};
+/** Bytes of the other messages before their data. */
+const LEAST_BYTES = { [TYPE.control]: 10, [TYPE.bulk]: 10, [TYPE.start_interrupt]: 1, [TYPE.stop_interrupt]: 1 };
 
 /** A message with the short header of a hello or the long one of everything after. */
 export function encodeMessage(type, id, payload = Buffer.alloc(0)) {
@@ -94,10 +109,7 @@ export function encodeInterfaceInfo({ interfaces }) {
   const payload = Buffer.alloc(4 + 4 * ENDPOINTS);
   payload.writeUInt32LE(interfaces.length, 0);
   interfaces.forEach((it, i) => {
-    payload[4 + i] = it.number;
-    payload[4 + ENDPOINTS + i] = it.class;
-    payload[4 + 2 * ENDPOINTS + i] = it.subclass;
-    payload[4 + 3 * ENDPOINTS + i] = it.protocol;
+    [it.number, it.class, it.subclass, it.protocol].forEach((value, row) => payload.writeUInt8(value, 4 + row * ENDPOINTS + i));
   });
   return encodeMessage(TYPE.interface_info, 0, payload);
 }
@@ -336,39 +348,23 @@ export class UsbRedirServer {
       return;
     }
     if (type === TYPE.filter_filter || type === TYPE.device_disconnect_ack || !this.connected) return;
-    if (payload.length < (LEAST_BYTES.get(type) ?? 0)) throw new ProtocolError(`message of type ${type} and ${payload.length} bytes`);
+    const standard = STANDARD[type];
+    if (payload.length < (standard?.least ?? LEAST_BYTES[type] ?? 0))
+      throw new ProtocolError(`message of type ${type} and ${payload.length} bytes`);
     const untouched = this.untouchedSinceReset;
     this.untouchedSinceReset = false;
+    if (standard) {
+      this.#queueStandard(type, id, payload);
+      return;
+    }
     switch (type) {
       case TYPE.reset:
         // QEMU's xHCI asks twice where a port has one reset.
         this.untouchedSinceReset = true;
-        if (!untouched) this.#reset();
+        if (!untouched) this.#queue({ start: (done) => this.host.resetDevice(done) });
         return;
       case TYPE.control:
         this.#queueControl(id, payload);
-        return;
-      case TYPE.set_configuration:
-        this.#queueStandard(id, setupPacket(0x00, 9, payload[0], 0, 0), (code) => {
-          if (code === STATUS.ok) this.host.restartToggles();
-          this.#send(TYPE.configuration_status, id, Buffer.of(code, payload[0]));
-        });
-        return;
-      case TYPE.get_configuration:
-        this.#queueStandard(id, setupPacket(0x80, REQUEST.get_configuration, 0, 0, 1), (code, data) => {
-          this.#send(TYPE.configuration_status, id, Buffer.of(code, data[0] ?? 0));
-        });
-        return;
-      case TYPE.set_alt_setting:
-        this.#queueStandard(id, setupPacket(0x01, REQUEST.set_interface, payload[1], payload[0], 0), (code) => {
-          if (code === STATUS.ok) this.host.restartToggles(this.#endpointsOf(payload[0]));
-          this.#send(TYPE.alt_setting_status, id, Buffer.of(code, payload[0], payload[1]));
-        });
-        return;
-      case TYPE.get_alt_setting:
-        this.#queueStandard(id, setupPacket(0x81, REQUEST.get_interface, 0, payload[0], 1), (code, data) => {
-          this.#send(TYPE.alt_setting_status, id, Buffer.of(code, payload[0], data[0] ?? 0));
-        });
         return;
       case TYPE.bulk:
         this.#bulk(id, payload);
@@ -420,12 +416,14 @@ export class UsbRedirServer {
     });
   }
 
-  #reset() {
-    this.#queue({ start: (done) => this.host.resetDevice(done) });
-  }
-
-  #queueStandard(id, setup, answer) {
-    this.#queueTransfer(id, setup, null, answer);
+  #queueStandard(type, id, payload) {
+    const { setup, answer } = STANDARD[type];
+    this.#queueTransfer(id, setup(payload), null, (code, data) => {
+      if (code === STATUS.ok && type === TYPE.set_configuration) this.host.restartToggles();
+      if (code === STATUS.ok && type === TYPE.set_alt_setting) this.host.restartToggles(this.#endpointsOf(payload[0]));
+      const [status, ...rest] = answer(payload, data);
+      this.#send(status, id, Buffer.of(code, ...rest));
+    });
   }
 
   #queueTransfer(id, setup, data, answer) {
@@ -454,7 +452,7 @@ export class UsbRedirServer {
       setupPacket(requestType, request, value, index, length),
       isIn ? null : Buffer.from(payload.subarray(10)),
       (code, got = Buffer.alloc(0)) => {
-        const clearsHalt = requestType === 0x02 && request === REQUEST.clear_feature && value === 0;
+        const clearsHalt = requestType === 0x02 && request === CLEAR_FEATURE && value === 0;
         if (code === STATUS.ok && clearsHalt && this.#endpoint(index)) this.host.restartToggles([index]);
         const answer = Buffer.from(payload.subarray(0, 10));
         const data = isIn && code === STATUS.ok ? got : Buffer.alloc(0);
