@@ -34,7 +34,19 @@ if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
   message(FATAL_ERROR "FINGERTIP_SCENE=${FINGERTIP_SCENE} is unknown; choose one of: ${FINGERTIP_SCENES}")
 endif()
 
-# Capabilities: what is off is not compiled (firmware/config/capabilities.h).
+# Capabilities: what is off is not compiled. It leaves no symbol, no variable and no field of a packet. The firmware's
+# sources have each as FT_WITH_..., 0 or 1.
+#   FIT               location, force, and the contact packets
+#   FULL_GRID         the kernel for full rectangles: faster, and with separate widths and ELONGATED (fit.h); without
+#                     it, that for missing sensors fits all frames
+#   OUTLIERS          a search for a sensor whose reading does not belong to the others'; FIT_GENERAL has it always
+#   TANGENTIAL_DOUBT  what a tangential force that is not estimated does to the standard deviation of the location
+#                     (fit_doubt.h), and learning from touches how far gains are apart (fit_gains.h)
+#   SLIP              slip, and the command that sets it
+#   TANGENTIAL        tangential force, and the commands that bring and erase the pad's profile
+#   SHAPES            contact shapes: two contacts, edges (fit_shapes.h)
+#   RAW_STREAM        the raw packets
+#   SYNC              the sync pin, its packets, and the command that sets it
 set(FINGERTIP_CAPABILITIES FIT FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL SHAPES RAW_STREAM SYNC)
 set(capabilities_of_raw RAW_STREAM)
 set(capabilities_of_press FIT)

@@ -24,25 +24,8 @@ RANGE_kPa = 100  # above the ambient: to the sensor's extended range, 2 bar (fir
 
 def width(twin, cache, thick_mm, shore_a):
     """(sigma_mm, force_N at which the peak leaves the sensors' range)"""
-    out = subprocess.run(
-        [
-            twin,
-            "width",
-            "--indenter",
-            "sphere15",
-            "--layer",
-            str(thick_mm),
-            "--shore",
-            str(shore_a),
-            "--force",
-            str(FORCE_N),
-            "--cache",
-            cache,
-        ],
-        check=True,
-        stdout=subprocess.PIPE,
-        text=True,
-    ).stdout
+    options = f"width --indenter sphere15 --layer {thick_mm} --shore {shore_a} --force {FORCE_N}".split()
+    out = subprocess.run([twin, *options, "--cache", cache], check=True, stdout=subprocess.PIPE, text=True).stdout
     found = {name: float(value) for name, value in (word.split("=") for word in out.split())}
     return found["sigma_mm"], FORCE_N * RANGE_kPa / found["peak_kPa"]
 

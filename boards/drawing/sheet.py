@@ -54,18 +54,12 @@ def ruler(x, y):
     ]
 
 
+def svg(title, size, lines):
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img" aria-label="{title}">'
+    return "\n".join([head, f"  <title>{title}</title>", *lines, "</svg>"]) + "\n"
+
+
 def sheet(title, left, top, width, height, lines):
-    return (
-        "\n".join(
-            [
-                f'<svg xmlns="http://www.w3.org/2000/svg" width="{number(width)}mm" height="{number(height)}mm" '
-                f'viewBox="{number(left)} {number(top)} {number(width)} {number(height)}" role="img" aria-label="{title}">',
-                f"  <title>{title}</title>",
-                f"  <style>{STYLE}</style>",
-                f'  <rect x="{number(left)}" y="{number(top)}" width="{number(width)}" height="{number(height)}" style="fill: #fff; stroke: none"/>',
-                *lines,
-                "</svg>",
-            ]
-        )
-        + "\n"
-    )
+    x, y, w, h = map(number, (left, top, width, height))
+    back = f'  <rect x="{x}" y="{y}" width="{w}" height="{h}" style="fill: #fff; stroke: none"/>'
+    return svg(title, f'width="{w}mm" height="{h}mm" viewBox="{x} {y} {w} {h}"', [f"  <style>{STYLE}</style>", back, *lines])

@@ -38,27 +38,10 @@ class Trace:
         image, base = image_of(boards, board), pathlib.Path(folder) / board
         if not image.is_file():
             raise InputError(f"{image}: is not there; {TO_BUILD}")
-        run(
-            "node",
-            ROOT / "host_tools/simulation/emulator/main.mjs",
-            "--board",
-            board,
-            "--image",
-            image,
-            "--scenario",
-            scenario(folder, "rest", 1, board),
-            "--fast-enumeration",
-            "--seconds",
-            SECONDS + 0.001,
-            "--vcd",
-            f"{base}.vcd",
-            "--vcd-to",
-            SECONDS,
-            "--bus-log",
-            f"{base}.csv",
-            "--report",
-            f"{base}.json",
-        )
+        options = {"board": board, "image": image, "scenario": scenario(folder, "rest", 1, board), "seconds": SECONDS + 0.001}
+        options |= {"vcd": f"{base}.vcd", "vcd-to": SECONDS, "bus-log": f"{base}.csv", "report": f"{base}.json"}
+        words = [word for name, value in options.items() for word in (f"--{name}", value)]
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--fast-enumeration", *words)
         self.board = board
         last = DESCRIPTORS[board]["wiring"]["sensor_count"] - 1
         data = [f"SDA{k}" for k in (0, last // 2, last)] if DESCRIPTORS[board]["bus"] == "parallel" else ["SDA"]

@@ -4,6 +4,7 @@ import dataclasses
 import math
 
 import pico
+import sheet
 
 SYNC = "the [sync pin](../../host_tools/README.md#a-clock-that-cameras-share), 3.3 V; leave it open if there is no camera"
 MUX_CHANNELS, MUX_ADDRESS = 8, 0x70  # of a TCA9548A; the address with A2, A1, A0 low
@@ -183,21 +184,9 @@ def gpio(y, number, right, label=""):
 
 
 def picture(board, width, height, lines):
-    title = f"Wiring of board {board.name}"
-    return (
-        "\n".join(
-            [
-                f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" aria-label="{title}">',
-                f"  <title>{title}</title>",
-                f"  <defs>{PULL_UP}</defs>",
-                f"  <style>{STYLE}</style>",
-                f'  <rect width="{width}" height="{height}" fill="#fff"/>',
-                *lines,
-                "</svg>",
-            ]
-        )
-        + "\n"
-    )
+    head = [f"  <defs>{PULL_UP}</defs>", f"  <style>{STYLE}</style>", f'  <rect width="{width}" height="{height}" fill="#fff"/>']
+    size = f'viewBox="0 0 {width} {height}" width="{width}" height="{height}"'
+    return sheet.svg(f"Wiring of board {board.name}", size, head + lines)
 
 
 def supply(x, y):

@@ -38,8 +38,6 @@ static struct {
   bool (*serve)(void *context);
   void *context;
   unsigned starts;
-  void (*begin)(bool (*serve)(void *context), void *context);
-  void (*end)(void);
 } worker = {.due_us = UINT64_MAX};
 
 static _Noreturn void stop(const char *why) {
@@ -137,21 +135,13 @@ void port_set_event_handler(void (*handler)(void *context), void *context) {
 
 void port_alarm_at_us(uint64_t t_us) { native.alarm_us = t_us; }
 
-static void serve_all(void) {
-  if (worker.end) {
-    worker.end();
-    return;
-  }
-  while (worker.serve(worker.context)) {
-  }
-}
-
 void port_sleep(void) {
   const uint64_t next_us = next_event_us();
   if (worker.due_us <= next_us) {
     pass_time_to(worker.due_us);
     worker.due_us = UINT64_MAX;
-    serve_all();
+    while (worker.serve(worker.context)) {
+    }
     return;
   }
   if (next_us == UINT64_MAX) {
@@ -171,11 +161,6 @@ void native_set_worker(bool exists, uint64_t takes_us) {
 
 unsigned native_worker_starts(void) { return worker.starts; }
 
-void native_set_worker_thread(void (*begin)(bool (*serve)(void *context), void *context), void (*end)(void)) {
-  worker.begin = begin;
-  worker.end = end;
-}
-
 bool port_worker_start(bool (*serve)(void *context), void *context) {
   port_worker_stop();
   worker.serve = serve;
@@ -187,17 +172,9 @@ bool port_worker_start(bool (*serve)(void *context), void *context) {
 void port_worker_wake(void) {
   const uint64_t takes_us = worker.takes_us;
   worker.due_us = takes_us == UINT64_MAX ? UINT64_MAX : native.now_us + takes_us;
-  if (worker.begin && takes_us != UINT64_MAX) {
-    worker.begin(worker.serve, worker.context);
-  }
 }
 
-void port_worker_stop(void) {
-  worker.due_us = UINT64_MAX;
-  if (worker.end) {
-    worker.end();
-  }
-}
+void port_worker_stop(void) { worker.due_us = UINT64_MAX; }
 
 void port_save_power(bool saving) { (void)saving; }
 

@@ -39,11 +39,6 @@ void native_set_worker(bool exists, uint64_t takes_us);
 /* How often it was started since the start. */
 unsigned native_worker_starts(void);
 
-/* By whom it serves, instead of by the main loop's thread when its time is up: begin, when it is
- * woken, has serve called until that returns false, and end, when its time is up or it is stopped,
- * returns when that is so. Kept over starts. At first, and by NULL: the main loop's thread. */
-void native_set_worker_thread(void (*begin)(bool (*serve)(void *context), void *context), void (*end)(void));
-
 enum native_end {
   NATIVE_TIME_UP,
   NATIVE_LOADER, /* the program left by port_reboot_to_loader() */

@@ -2,7 +2,6 @@
 
 #include "port/port.h"
 #include "rp2040/clocks_regs.h"
-#include "rp2040/pll.h"
 #include "rp2040/resets.h"
 #include "rp2040/watchdog_regs.h"
 

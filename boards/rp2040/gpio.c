@@ -35,6 +35,4 @@ void gpio_write(unsigned pin, bool high) { REG32(high ? SIO_GPIO_OUT_SET : SIO_G
 
 void gpio_drive(unsigned pin, bool enabled) { REG32(enabled ? SIO_GPIO_OE_SET : SIO_GPIO_OE_CLR) = UINT32_C(1) << pin; }
 
-uint32_t gpio_read_all(void) { return REG32(SIO_GPIO_IN); }
-
-bool gpio_read(unsigned pin) { return (gpio_read_all() >> pin & 1u) != 0; }
+bool gpio_read(unsigned pin) { return (REG32(SIO_GPIO_IN) >> pin & 1u) != 0; }

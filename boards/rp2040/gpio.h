@@ -5,7 +5,6 @@
 #define RP2040_GPIO_H
 
 #include <stdbool.h>
-#include <stdint.h>
 
 /* FUNCSEL values, datasheet table 279 */
 enum gpio_function {
@@ -32,8 +31,5 @@ void gpio_drive(unsigned pin, bool enabled);
 
 /* The level on the pad, whatever its function. */
 bool gpio_read(unsigned pin);
-
-/* Of all pins at one moment: bitmap of those that are high. */
-uint32_t gpio_read_all(void);
 
 #endif

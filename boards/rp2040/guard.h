@@ -9,4 +9,7 @@
  * DMA is not held back. */
 void guard_memory(const uint32_t *stack_guard, uint32_t log2_bytes);
 
+/* Holds nothing back any more. */
+void guard_end(void);
+
 #endif

@@ -17,7 +17,6 @@
 #define IC_DATA_CMD REG32(I2C0_BASE + 0x10u)
 #define IC_DATA_CMD_READ (1u << 8)
 #define IC_DATA_CMD_STOP (1u << 9)
-#define IC_DATA_CMD_RESTART (1u << 10)
 
 #define IC_FS_SCL_HCNT REG32(I2C0_BASE + 0x1cu) /* written only while disabled */
 #define IC_FS_SCL_LCNT REG32(I2C0_BASE + 0x20u) /* written only while disabled */

@@ -8,7 +8,6 @@ enum rp2040_irq {
   RP2040_IRQ_TIMER_2 = 2,
   RP2040_IRQ_TIMER_3 = 3,
   RP2040_IRQ_USBCTRL = 5,
-  RP2040_IRQ_PIO0_0 = 7,
   RP2040_IRQ_DMA_0 = 11,
   RP2040_IRQ_I2C0 = 23,
   RP2040_IRQ_USB_SERVICE = 26, /* wired to no block: for software */

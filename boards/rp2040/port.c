@@ -5,7 +5,6 @@
 #include "rp2040/flash.h"
 #include "rp2040/guard.h"
 #include "rp2040/interrupts.h"
-#include "rp2040/mpu_regs.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/sio_regs.h"
@@ -27,12 +26,6 @@ static struct {
 } alarm;
 
 static char serial_number[2 * FLASH_ID_BYTES + 1];
-
-/* The boot ROM's tables begin at address 0. */
-static void open_memory(void) {
-  MPU_CTRL = 0;
-  __asm volatile("dsb\n isb" ::: "memory");
-}
 
 uint64_t port_now_us(void) {
   uint32_t high = TIMER_TIMERAWH;
@@ -125,7 +118,7 @@ _Noreturn void port_reboot_to_loader(void) {
 
   port_worker_stop();
   disable_interrupts();
-  open_memory();
+  guard_end(); /* the boot ROM's tables begin at address 0 */
   WATCHDOG_SCRATCH0 = 0;
   extern const uint16_t __rom_function_table, __rom_function_lookup;
   const uint16_t *table = (const uint16_t *)(uintptr_t)__rom_function_table;

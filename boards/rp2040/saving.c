@@ -1,7 +1,6 @@
 #include "port/port.h"
 #include "rp2040/clocks_regs.h"
 #include "rp2040/pico.h"
-#include "rp2040/pll.h"
 #include "rp2040/resets.h"
 
 /* At 12 MHz or more a poll takes 5 us at most; a PLL locks within 50 us. */

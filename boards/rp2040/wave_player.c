@@ -81,8 +81,6 @@ unsigned wave_player_sampled(void) { return cells - 2 * DMA_TRANS_COUNT(CHANNEL_
 
 bool wave_player_has_ended(void) { return (DMA_CTRL_TRIG(CHANNEL_SAMPLES) & DMA_CTRL_BUSY) == 0; }
 
-uint16_t wave_player_levels(void) { return (uint16_t)gpio_read_all(); }
-
 void dma0_irq_handler(void) {
   DMA_INTS0 = 1u << CHANNEL_SAMPLES;
   rp2040_event();

@@ -48,9 +48,6 @@ bool wave_player_has_ended(void);
 /* How many of this wave's cells have their samples in memory. */
 unsigned wave_player_sampled(void);
 
-/* The levels now: bitmap of the lines that are high. */
-uint16_t wave_player_levels(void);
-
 /* Interrupt vector of the DMA controller. */
 void dma0_irq_handler(void);
 

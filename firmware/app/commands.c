@@ -3,7 +3,6 @@
 #include "app/app.h"
 #include "app/status.h"
 #include "common/contact_flags.h"
-#include "config/capabilities.h"
 #include "config/defaults.h"
 #include "port/port.h"
 #include "usb/cdc.h"

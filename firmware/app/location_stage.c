@@ -1,7 +1,6 @@
 #include "app/location_stage.h"
 
 #include "common/contact_flags.h"
-#include "config/capabilities.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
 #include "port/port.h"

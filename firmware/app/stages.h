@@ -24,7 +24,6 @@
 #include "app/sync.h"
 #include "app/tangential_stage.h"
 #include "condition/plausibility.h"
-#include "config/capabilities.h"
 #include "store/store.h"
 
 struct stages {

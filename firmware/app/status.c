@@ -1,7 +1,6 @@
 #include "app/status.h"
 
 #include "config/build_info.h"
-#include "config/capabilities.h"
 #include "config/geometry.h"
 #include "port/port.h"
 

@@ -17,11 +17,6 @@ static inline void bytes_put_u32(uint8_t *to, uint32_t value) {
   to[3] = (uint8_t)(value >> 24);
 }
 
-static inline void bytes_put_u64(uint8_t *to, uint64_t value) {
-  bytes_put_u32(to, (uint32_t)value);
-  bytes_put_u32(to + 4, (uint32_t)(value >> 32));
-}
-
 static inline uint16_t bytes_get_u16(const uint8_t *from) { return (uint16_t)(from[0] | (uint16_t)from[1] << 8); }
 
 static inline uint32_t bytes_get_u32(const uint8_t *from) {

@@ -186,15 +186,49 @@ void condition_follow(struct condition *condition, const struct frame *frame, co
   }
 }
 
+static uint32_t older(uint32_t age_ms, int32_t ms) { return age_ms < AGE_MAX_ms ? age_ms + (uint32_t)ms : age_ms; }
+
 /* Moves all ages on. */
 static void begin_frame(struct condition *condition, const struct frame *frame) {
   const uint32_t now_ms = (uint32_t)(frame->t_us >> 10), gap_ms = now_ms - condition->now_ms;
   const int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
   const int32_t most_ms = frame->sensor_count * UPDATE_ms, due_ms = condition->due_ms + step_ms * frame->sensor_count;
   condition->now_ms = now_ms;
-  condition->tared_ms += condition->tared_ms < AGE_MAX_ms ? (uint32_t)step_ms : 0;
+  condition->tared_ms = older(condition->tared_ms, step_ms);
   condition->due_ms = due_ms < most_ms ? due_ms : most_ms;
-  gate_age(&condition->gate, step_ms, frame->noise_Pa_q10);
+  struct gate *gate = &condition->gate;
+  gate->pressed_ms = older(gate->pressed_ms, step_ms);
+  gate->released_ms = older(gate->released_ms, step_ms);
+  gate->open_Pa_q10 = Pa_q10(GATE_OPEN_Pa) + GATE_OPEN_SIGMA * frame->noise_Pa_q10;
+  gate->close_Pa_q10 = Pa_q10(GATE_CLOSE_Pa) + GATE_CLOSE_SIGMA * frame->noise_Pa_q10;
+}
+
+/* The strongest decides, except where its own margin is larger than that of others. */
+static bool is_over(const struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
+                    uint8_t strongest, int32_t limit) {
+  const int32_t *margin = condition->margin_Pa_q10;
+  if (frame->saturated != 0 || conditioned->peak_Pa_q10 > limit + margin[strongest]) {
+    return true;
+  }
+  bool over = false;
+  for (uint8_t k = 0; conditioned->peak_Pa_q10 > limit && k < frame->sensor_count; k++) {
+    over = over || conditioned->pressure_Pa_q10[k] > limit + margin[k];
+  }
+  return over;
+}
+
+/* Returns whether a contact begins or ends with this frame. */
+static bool move_gate(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
+                      uint8_t strongest) {
+  struct gate *gate = &condition->gate;
+  const bool over =
+      is_over(condition, frame, conditioned, strongest, gate->pressed ? gate->close_Pa_q10 : gate->open_Pa_q10);
+  if (over == gate->pressed) {
+    return false;
+  }
+  gate->pressed = over;
+  *(over ? &gate->pressed_ms : &gate->released_ms) = 0;
+  return true;
 }
 
 /* Whether the zero follows this contact as if nothing touched. */
@@ -231,15 +265,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   }
   const uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
 
-  const struct gate_view view = {
-      .strongest = strongest,
-      .peak_Pa_q10 = conditioned->peak_Pa_q10,
-      .pressure_Pa_q10 = conditioned->pressure_Pa_q10,
-      .margin_Pa_q10 = condition->margin_Pa_q10,
-      .count = count,
-      .saturated = saturated,
-  };
-  const bool changes = gate_update(&condition->gate, &view);
+  const bool changes = move_gate(condition, frame, conditioned, strongest);
   const bool pressed = condition->gate.pressed;
   if (changes && pressed) {
     begin_contact(condition, conditioned, count);

@@ -1,8 +1,8 @@
 /* From absolute readings to pressure on the pad. Everything here works in seconds and pascals, at any rate from 0.1 Hz
  * to 1400 Hz and at any oversampling. ZERO.md has the picture, constants.h the figures.
  *
- * A frame's pressures are its readings less the zero of each sensor. From them the gate (gate.h) decides whether
- * anything touches. Every UPDATE_ms each sensor is updated (update.h): one pass over all that is remembered of it. Its
+ * A frame's pressures are its readings less the zero of each sensor. From them the gate decides whether anything
+ * touches. Every UPDATE_ms each sensor is updated (update.h): one pass over all that is remembered of it. Its
  * zero has two parts.
  *
  * Level: what the sensor reads when nothing touches.
@@ -49,11 +49,19 @@
 
 #include "condition/calm.h"
 #include "condition/constants.h"
-#include "condition/gate.h"
 #include "frame/frame.h"
 
 #include <stdbool.h>
 #include <stdint.h>
+
+/* Whether anything touches the pad. The gate opens above GATE_OPEN_Pa + GATE_OPEN_SIGMA standard deviations of the
+ * noise, and closes below GATE_CLOSE_Pa + GATE_CLOSE_SIGMA. A sensor's margin comes on top of both. The pascals are for
+ * zeros that move without a touch. */
+struct gate {
+  bool pressed;                      /* a contact that is no remainder */
+  uint32_t pressed_ms, released_ms;  /* since it began, and since it ended; at most a day */
+  int32_t open_Pa_q10, close_Pa_q10; /* without the margins */
+};
 
 /* All that is remembered of one sensor. */
 struct condition_sensor {

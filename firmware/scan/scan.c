@@ -349,16 +349,8 @@ static void fail_operation(struct scan *scan, enum ft_status why, uint64_t now_u
 }
 
 static bool state_has_operation(enum scan_state state) {
-  switch (state) {
-  case SCAN_RESET:
-  case SCAN_READ_PROM:
-  case SCAN_CONVERT:
-  case SCAN_READ_ADC:
-  case SCAN_RECOVER:
-    return true;
-  default:
-    return false;
-  }
+  return state == SCAN_RESET || state == SCAN_READ_PROM || state == SCAN_CONVERT || state == SCAN_READ_ADC ||
+         state == SCAN_RECOVER;
 }
 
 /* Starts what the state asks for, if it asks for anything. */

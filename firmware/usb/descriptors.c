@@ -13,107 +13,31 @@ enum string_index { STRING_LANGUAGES, STRING_MANUFACTURER, STRING_PRODUCT, STRIN
 
 #define U16(value) (uint8_t)((value)&0xff), (uint8_t)((value) >> 8)
 
+/* USB 2.0; class, subclass and protocol of the interface association; vendor, product and version come from the
+ * identity; one configuration. */
 static const uint8_t device_descriptor[] = {
-    18,
-    DESCRIPTOR_DEVICE,
-    U16(0x0200), /* USB 2.0 */
-    0xef,        /* class, subclass, protocol: by interface association */
-    0x02,
-    0x01,
-    USB_MAX_PACKET_BYTES,
-    U16(0), /* vendor, product and version: from the identity */
-    U16(0),
-    U16(0),
-    STRING_MANUFACTURER,
-    STRING_PRODUCT,
-    STRING_SERIAL,
-    1, /* configurations */
-};
+    18,     DESCRIPTOR_DEVICE,   U16(0x0200),    0xef,          0x02, 0x01, USB_MAX_PACKET_BYTES, U16(0), U16(0),
+    U16(0), STRING_MANUFACTURER, STRING_PRODUCT, STRING_SERIAL, 1};
 _Static_assert(sizeof device_descriptor == 18, "USB 2.0 table 9-8");
 
 enum { CONFIGURATION_BYTES = 75 };
+/* One row for each descriptor: its length, its type, its fields (descriptors.h has interfaces and endpoints). */
 static const uint8_t configuration_descriptor[] = {
-    9,
-    DESCRIPTOR_CONFIGURATION,
-    U16(CONFIGURATION_BYTES),
-    CDC_INTERFACES,
-    1,    /* value */
-    0,    /* no string */
-    0x80, /* powered by the bus, no remote wake-up */
-    50,   /* 100 mA */
-
-    8, /* interface association */
-    0x0b,
-    CDC_INTERFACE_CONTROL,
-    CDC_INTERFACES,
-    0x02, /* communications, abstract control model, no specific protocol */
-    0x02,
-    0x00,
-    0,
-
-    9, /* interface */
-    0x04,
-    CDC_INTERFACE_CONTROL,
-    0,
-    1, /* endpoints */
-    0x02,
-    0x02,
-    0x00,
-    0,
-
-    5, /* header: CDC 1.20 */
-    0x24,
-    0x00,
-    U16(0x0120),
-
-    5, /* call management: none */
-    0x24,
-    0x01,
-    0x00,
-    CDC_INTERFACE_DATA,
-
-    4, /* abstract control management: line coding, control lines, break */
-    0x24,
-    0x02,
-    0x06,
-
-    5, /* union */
-    0x24,
-    0x06,
-    CDC_INTERFACE_CONTROL,
-    CDC_INTERFACE_DATA,
-
-    7, /* endpoint */
-    0x05,
-    CDC_ENDPOINT_NOTIFY,
-    USB_ENDPOINT_INTERRUPT,
-    U16(16),
-    16, /* ms */
-
-    9, /* interface */
-    0x04,
-    CDC_INTERFACE_DATA,
-    0,
-    2, /* endpoints */
-    0x0a,
-    0x00,
-    0x00,
-    0,
-
-    7, /* endpoint */
-    0x05,
-    CDC_ENDPOINT_OUT,
-    USB_ENDPOINT_BULK,
-    U16(USB_MAX_PACKET_BYTES),
-    0,
-
-    7, /* endpoint */
-    0x05,
-    CDC_ENDPOINT_IN,
-    USB_ENDPOINT_BULK,
-    U16(USB_MAX_PACKET_BYTES),
-    0,
+    9, 2,    75,   0,    2,  1,  0,  0x80, 50, /* configuration 1: powered by the bus, no remote wake-up, 100 mA */
+    8, 0x0B, 0,    2,    2,  2,  0,  0,        /* interface association: communications, abstract control model */
+    9, 4,    0,    0,    1,  2,  2,  0,    0,  /* control interface with one endpoint */
+    5, 0x24, 0,    0x20, 1,                    /* header: CDC 1.20 */
+    5, 0x24, 1,    0,    1,                    /* call management: none */
+    4, 0x24, 2,    6,                          /* abstract control management: line coding, control lines, break */
+    5, 0x24, 6,    0,    1,                    /* union */
+    7, 5,    0x81, 3,    16, 0,  16,           /* notifications: interrupt, each 16 ms */
+    9, 4,    1,    0,    2,  10, 0,  0,    0,  /* data interface with two endpoints */
+    7, 5,    0x02, 2,    64, 0,  0,            /* bulk, from the host */
+    7, 5,    0x82, 2,    64, 0,  0,            /* bulk, to the host */
 };
+_Static_assert(CDC_ENDPOINT_NOTIFY == 0x81 && CDC_ENDPOINT_OUT == 0x02 && CDC_ENDPOINT_IN == 0x82 &&
+                   CDC_INTERFACES == 2 && CDC_INTERFACE_CONTROL == 0 && USB_MAX_PACKET_BYTES == 64,
+               "the table has them as numbers");
 _Static_assert(sizeof configuration_descriptor == CONFIGURATION_BYTES, "wTotalLength");
 _Static_assert(sizeof configuration_descriptor <= DESCRIPTOR_MAX_BYTES, "buffer of an answer");
 

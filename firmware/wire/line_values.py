@@ -1,21 +1,21 @@
 """Packets as numbers by their names, as line.py writes them for the library's C interface and for the page."""
 
+import dataclasses
+
 BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "text": 1}
 
 
+@dataclasses.dataclass
 class Value:
     """A field as programs in other languages have it: its name, and where the C struct holds it."""
 
-    def __init__(self, name, kind, member, count=1, per_sensor=False, stride=0, text=""):
-        self.name, self.kind, self.member, self.count, self.per_sensor, self.stride, self.text = (
-            name,
-            kind,
-            member,
-            count,
-            per_sensor,
-            stride,
-            text,
-        )
+    name: str
+    kind: str
+    member: str
+    count: int = 1
+    per_sensor: bool = False
+    stride: str = ""
+    text: str = ""
 
 
 def values_of(body, line, where, part=""):

@@ -177,19 +177,6 @@ TEST(test_a_tare_under_a_press_is_mended_for_all_sensors) {
   }
 }
 
-/* One whose PROM has a wrong CRC is used, and doubtful for good: its zero drifts like the others'.
- */
-TEST(test_zero_follows_the_drift_of_a_doubtful_sensor) {
-  for (size_t i = 0; i < PERIODS; i++) {
-    begin(periods_us[i]);
-    frame.doubtful = 1u << 3;
-    run_s(60);
-    watch_s(900, 0.22f, 0x1249);
-    TEST_ASSERT_EQUAL_FLOAT(0, contact_s);
-    TEST_ASSERT_INT32_WITHIN(5 * Pa, 0, conditioned.pressure_Pa_q10[3]);
-  }
-}
-
 /* 0.005 N/s above one sensor and between four, and a fifth of it: what it lost is about 0.02 N.
  * Below 3.9 kPa it cannot be told from the drift of some sensors. */
 TEST(test_no_slow_force_is_taken_for_a_drift) {

@@ -107,14 +107,6 @@ TEST(test_osr_table) {
   }
 }
 
-TEST(test_other_osrs_are_unknown) {
-  int known = 0;
-  for (uint32_t osr = 0; osr <= UINT16_MAX; osr++) {
-    known += ms58xx_find_osr((uint16_t)osr) != NULL;
-  }
-  TEST_ASSERT_EQUAL_INT(6, known);
-}
-
 TEST(test_crc_of_an520) {
   static const uint8_t bytes[16] = {0x31, 0x32, 0x33, 0x34, 0x35, 0x36, 0x37, 0x38,
                                     0x39, 0x40, 0x41, 0x42, 0x43, 0x44, 0x45, 0x00};

@@ -312,13 +312,6 @@ TEST(test_recovery_frees_sda_within_nine_clocks) {
   }
 }
 
-/* SDA may be high because a sensor is sending a one: it needs its clocks all the same. */
-TEST(test_recovery_of_a_free_bus_clocks_too) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
-  TEST_ASSERT_EQUAL_UINT(9, fake.clocks);
-  TEST_ASSERT_EQUAL_UINT(1, fake.stops);
-}
-
 /* Frames and recoveries as scan makes them; returns how many of the frames failed. */
 static int run_for(uint64_t duration_us, uint32_t *sensors) {
   int failed = 0;
@@ -428,19 +421,18 @@ TEST(test_recovery_abandons_whatever_is_under_way) {
 
 TEST(test_start_resets_every_multiplexer) { TEST_ASSERT_EQUAL_HEX8((1u << BOARD_MUX_COUNT) - 1u, fake.driven); }
 
-TEST(test_recovery_lets_every_multiplexer_go) {
+/* SDA may be high because a sensor is sending a one: it needs its clocks all the same. Half periods of 5 us: nine
+ * clocks of two, and six of the STOP and the resets. */
+TEST(test_recovery_of_a_free_bus) {
   expect_good_frame();
-  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
-  const unsigned before = fake.transactions;
-  expect_good_frame();
-  TEST_ASSERT_EQUAL_UINT(FRAME_TRANSACTIONS, fake.transactions - before);
-}
-
-/* Half periods of 5 us: nine clocks of two, and six of the STOP and the resets. */
-TEST(test_time_of_a_recovery) {
   const uint64_t begun_us = fake.now_us;
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
   TEST_ASSERT_EQUAL_UINT64(RECOVERY_us, fake.now_us - begun_us);
+  TEST_ASSERT_EQUAL_UINT(9, fake.clocks);
+  TEST_ASSERT_EQUAL_UINT(1, fake.stops);
+  const unsigned before = fake.transactions;
+  expect_good_frame();
+  TEST_ASSERT_EQUAL_UINT(FRAME_TRANSACTIONS, fake.transactions - before);
 }
 
 TEST(test_a_failure_leaves_the_result_alone) {

@@ -266,5 +266,3 @@ bool wave_player_has_ended(void) {
   }
   return !wave.active;
 }
-
-uint16_t wave_player_levels(void) { return levels(); }

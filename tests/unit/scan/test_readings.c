@@ -78,18 +78,6 @@ static void expect(uint32_t valid, uint32_t left_out) {
   TEST_ASSERT_EQUAL_UINT32(left_out, readings.left_out);
 }
 
-TEST(test_the_scales_of_this_test) {
-  start();
-  const double before_Pa = frame.pressure_Pa_q10[ONE] / 1024.0;
-  step_by(ONE, 1000);
-  take_pressures(ALL);
-  TEST_ASSERT_DOUBLE_WITHIN(20, before_Pa + 1000, frame.pressure_Pa_q10[ONE] / 1024.0);
-  const int16_t before_cC = (int16_t)readings.thermal[ONE].first_order_cC;
-  warm_by(ONE, 0.5);
-  take_temperature();
-  TEST_ASSERT_INT_WITHIN(1, before_cC + 50, readings.thermal[ONE].first_order_cC);
-}
-
 TEST(test_a_step_of_one_sensor_alone_is_left_out_of_its_frame) {
   static const double steps_Pa[] = {9e3, -9e3, 60e3, -60e3, 150e3};
   for (int i = 0; i < 5; i++) {

@@ -260,36 +260,6 @@ TEST(power_may_be_lost_with_the_largest_array) {
   lose_power_at_any_step(UPDATES / 4, (struct store_content){0});
 }
 
-/* The same of changes one after another without a restart between, over both sectors and back. */
-TEST(power_may_be_lost_amid_many_changes) {
-  struct store_content before = {0};
-  for (int update = 0; update < 5 * STORE_SLOTS; update++) {
-    const struct native_flash start = native_flash;
-    const struct store then = store;
-    struct change change;
-    do {
-      change = some_change();
-      store = then;
-    } while (put(&change) != FT_PENDING);
-    struct store_content after = changed(&before, &change);
-    for (uint64_t step = 0;; step++) {
-      native_flash = start;
-      native_flash_power_up();
-      store = then;
-      native_flash_cut_after(step);
-      TEST_ASSERT_EQUAL(FT_PENDING, put(&change));
-      finish();
-      if (!native_flash_is_dead()) {
-        break;
-      }
-      restart();
-      TEST_ASSERT_TRUE_MESSAGE(is(&before) || is(&after), "lost or mixed");
-    }
-    TEST_ASSERT_TRUE(is(&after));
-    before = after;
-  }
-}
-
 /* A supply that comes and goes: each mending is cut short in its turn, many times in a row, so that
  * whole sectors fill with records that were never sealed. */
 TEST(power_may_come_and_go) {

@@ -36,12 +36,13 @@ static struct endpoint *find(uint8_t endpoint) {
   return &fake.endpoints[endpoint & 15][endpoint >> 7];
 }
 
-static void enter_interrupt(void) {
-  TEST_ASSERT_FALSE(fake.in_interrupt);
-  fake.in_interrupt = true;
-}
-
-static void leave_interrupt(void) { fake.in_interrupt = false; }
+#define IN_INTERRUPT(call)                                                                                             \
+  do {                                                                                                                 \
+    TEST_ASSERT_FALSE(fake.in_interrupt);                                                                              \
+    fake.in_interrupt = true;                                                                                          \
+    call;                                                                                                              \
+    fake.in_interrupt = false;                                                                                         \
+  } while (0)
 
 static void assert_device_context(void) {
   TEST_ASSERT_TRUE_MESSAGE(fake.in_interrupt, "called outside the interrupt context");
@@ -67,11 +68,7 @@ void port_alive(enum port_part part) {
 
 unsigned fake_signs_of_life(void) { return fake.signs_of_life; }
 
-void fake_service(void) {
-  enter_interrupt();
-  usb_device_on_service();
-  leave_interrupt();
-}
+void fake_service(void) { IN_INTERRUPT(usb_device_on_service()); }
 
 void usb_controller_set_address(uint8_t address) {
   assert_device_context();
@@ -166,9 +163,7 @@ void fake_run_interrupts(void) {
   fake.interrupts_held = false;
   if (fake.service_requested) {
     fake.service_requested = false;
-    enter_interrupt();
-    usb_device_on_service();
-    leave_interrupt();
+    IN_INTERRUPT(usb_device_on_service());
   }
 }
 
@@ -177,27 +172,17 @@ void fake_take_at_next_withdrawal(void) { fake.take_at_next_withdrawal = true; }
 bool fake_accepts(uint8_t endpoint) { return find(endpoint)->held; }
 
 void host_bus_reset(void) {
-  enter_interrupt();
   fake.address = 0;
   fake.host_address = 0;
-  usb_controller_close_all();
+  IN_INTERRUPT(usb_controller_close_all());
   find(0)->held = false;
   find(USB_ENDPOINT_IN)->held = false;
-  usb_device_on_bus_reset();
-  leave_interrupt();
+  IN_INTERRUPT(usb_device_on_bus_reset());
 }
 
-void host_suspend(void) {
-  enter_interrupt();
-  usb_device_on_suspend();
-  leave_interrupt();
-}
+void host_suspend(void) { IN_INTERRUPT(usb_device_on_suspend()); }
 
-void host_resume(void) {
-  enter_interrupt();
-  usb_device_on_resume();
-  leave_interrupt();
-}
+void host_resume(void) { IN_INTERRUPT(usb_device_on_resume()); }
 
 /* What it answers instead of a packet, or 0: then the buffer is the device's again. */
 static int exchange(struct endpoint *e) {
@@ -223,9 +208,7 @@ int host_in(uint8_t endpoint, uint8_t packet[64]) {
   size_t length = e->length;
   if (length)
     memcpy(packet, e->packet, length);
-  enter_interrupt();
-  usb_device_on_sent(endpoint);
-  leave_interrupt();
+  IN_INTERRUPT(usb_device_on_sent(endpoint));
   return (int)length;
 }
 
@@ -233,9 +216,7 @@ int host_out(uint8_t endpoint, const void *bytes, size_t length) {
   int refused = exchange(find(endpoint));
   if (refused)
     return refused;
-  enter_interrupt();
-  usb_device_on_received(endpoint, bytes, length);
-  leave_interrupt();
+  IN_INTERRUPT(usb_device_on_received(endpoint, bytes, length));
   return 0;
 }
 
@@ -253,9 +234,7 @@ void host_setup(uint8_t type, uint8_t request, uint16_t value, uint16_t index, u
     e->stalled = e->held = false;
     e->data1 = e->host_data1 = true;
   }
-  enter_interrupt();
-  usb_device_on_setup(packet);
-  leave_interrupt();
+  IN_INTERRUPT(usb_device_on_setup(packet));
 }
 
 int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length, uint8_t *answer) {

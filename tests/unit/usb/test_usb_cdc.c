@@ -90,33 +90,6 @@ TEST(test_write_takes_all_or_nothing) {
   TEST_ASSERT_EQUAL('!', got[QUEUE_BYTES + 64]);
 }
 
-/* Random writes and reads: the stream that comes out is the stream that went in. */
-TEST(test_stream_keeps_order_and_loses_nothing) {
-  open_port();
-  uint32_t random = 1;
-  uint32_t written = 0;
-  uint32_t read = 0;
-  for (int step = 0; step < 20000; step++) {
-    random = random * 1664525u + 1013904223u;
-    size_t length = random >> 20 & 255;
-    uint8_t block[255];
-    for (size_t i = 0; i < length; i++)
-      block[i] = (uint8_t)((written + i) * 2654435761u >> 24);
-    if (cdc_write(block, length) == FT_OK)
-      written += (uint32_t)length;
-    for (uint32_t packets = random >> 29; packets > 0; packets--) {
-      int n = host_in(0x82, packet);
-      for (int i = 0; i < n; i++)
-        TEST_ASSERT_EQUAL_HEX8((uint8_t)((read + (uint32_t)i) * 2654435761u >> 24), packet[i]);
-      read += n > 0 ? (uint32_t)n : 0;
-    }
-  }
-  TEST_ASSERT_GREATER_THAN(100 * QUEUE_BYTES, read);
-  for (int n; (n = host_in(0x82, packet)) >= 0;)
-    read += (uint32_t)n;
-  TEST_ASSERT_EQUAL(written, read);
-}
-
 TEST(test_closed_port_swallows_writes) {
   fake_hold_interrupts();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES));
