@@ -4,6 +4,7 @@ import contextlib
 import os
 import pathlib
 import shutil
+import signal
 import sys
 import tempfile
 import unittest
@@ -48,6 +49,13 @@ class CliTest(unittest.TestCase):
         process = self.start(*arguments, **options)
         out, err = process.communicate()
         self.assertEqual(process.returncode, status, (arguments, out, err))
+        return out, err
+
+    def interrupt(self, process, status=0):
+        """Ends it as Ctrl-C does; what it printed."""
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate()
+        self.assertEqual(process.returncode, status, err)
         return out, err
 
     def error(self, *arguments, status=1):

@@ -126,8 +126,7 @@ class Several(CliTest):
             first, second = self.run_cli("list")[0].splitlines()
             self.assertRegex(first, r"^-\t-\t-\t.*in use by another program")
             self.assertTrue(second.startswith("BBBB"))
-            process.send_signal(signal.SIGINT)
-            process.communicate()
+            self.interrupt(process)
 
     def test_the_serial_number_chooses(self):
         with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
@@ -166,9 +165,7 @@ class Several(CliTest):
             for _ in range(4):
                 process.hold_up(0.6)
                 self.world.sleep(0.7)
-            process.send_signal(signal.SIGINT)
-            _, err = process.communicate()
-        self.assertEqual(process.returncode, 0, err)
+            _, err = self.interrupt(process)
         self.assertGreater(len(self.rows()[0]), 500)
         self.assert_in_order()
 
@@ -230,9 +227,7 @@ class Several(CliTest):
             process = self.start("record", self.csv, "--all")
             self.world.until(lambda: os.path.exists(self.csv) and any("1/event: back" in c for c in self.rows()[1]))
             self.world.until(lambda: sum(row["device"] == "1" for row in self.rows()[0]) > 150)
-            process.send_signal(signal.SIGINT)
-            _, err = process.communicate()
-        self.assertEqual(process.returncode, 0, err)
+            _, err = self.interrupt(process)
         self.assertIn(" 0 packets dropped, 0 CRC errors", err)
         text = pathlib.Path(self.csv).read_text(encoding="utf-8")
         cut = os.path.join(self.folder, "cut.csv")  # its recorder killed: only the lines themselves tell
@@ -293,8 +288,7 @@ class ErrorsPeopleMeet(CliTest):
                     self.error(*command, "--port", self.port),
                     f"fingertip: {self.port}: in use by another program; end that one first (`fingertip doctor` names it)\n",
                 )
-            process.send_signal(signal.SIGINT)
-            process.communicate()
+            self.interrupt(process)
 
     def test_no_device(self):
         if self.start("list").wait() == 0:
@@ -339,9 +333,7 @@ class ErrorsPeopleMeet(CliTest):
                 device.terminate()
                 while "gone, plug it in again" not in (line := stream.readline()):
                     self.assertIn("frames", line)
-                process.send_signal(signal.SIGINT)
-                process.communicate()
-            self.assertEqual(process.returncode, 0)
+                self.interrupt(process)
 
     def test_disk_full(self):
         with self.device():

@@ -9,7 +9,6 @@ import sys
 import unittest
 
 from cli_case import CliTest, FINGERTIP
-from fingertip import files
 from simulated_terminal import Ended, Terminal
 
 
@@ -153,8 +152,7 @@ class Monitor(CliTest):
                 if first_s is None and re.search(" [1-9][0-9]* frames ", line):
                     first_s = self.world.now_s
             shown_s = self.world.now_s - first_s
-            process.send_signal(signal.SIGINT)
-            process.communicate()
+            self.interrupt(process)
         self.assertLess(shown_s, 0.25 + 1.0)  # fifty frames take a quarter of a second
 
     def test_an_error_restores_the_terminal(self):

@@ -7,7 +7,6 @@ usage: test_real_port.py FINGERTIP FAKE_DEVICE [unittest arguments]
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import unittest

@@ -7,7 +7,6 @@ import signal
 import sys
 import unittest
 
-import numpy as np
 
 from cli_case import CliTest
 from fingertip import files
@@ -41,8 +40,7 @@ class Recording(CliTest):
             with self.device("drop=20", "vanish=60,700"):
                 process = self.start("record", self.csv, "--port", self.port, "--overwrite")
                 self.world.sleep(3)
-                process.send_signal(signal.SIGINT)
-                process.communicate()
+                self.interrupt(process)
             self.world.close()
             self.world = self.make_world()
             return pathlib.Path(self.csv).read_bytes()
@@ -80,9 +78,7 @@ class Recording(CliTest):
             process = self.start("record", self.csv, "--port", self.port)
             self.world.until(lambda: os.path.exists(self.csv) and any("back" in c for c in self.rows()[1]))
             self.world.until(lambda: len(self.rows()[0]) >= 220)
-            process.send_signal(signal.SIGINT)
-            _, err = process.communicate()
-        self.assertEqual(process.returncode, 0, err)
+            _, err = self.interrupt(process)
         rows, comments = self.rows()
         self.assertTrue(any(c.startswith("# event: gone") for c in comments))
         self.assertIn("dropped_packets=0", comments[-1])
@@ -106,8 +102,7 @@ class Recording(CliTest):
         with self.device("mute=1", f"heard={heard}"):
             process = self.start("record", self.ftr, "--raw-bytes", self.csv, "--port", self.port, "--overwrite")
             self.world.until(lambda: os.path.exists(heard))
-            process.send_signal(signal.SIGINT)
-            process.communicate()
+            self.interrupt(process, status=1)
         self.assertEqual(pathlib.Path(self.csv).read_text(), "precious")
 
     def test_one_file_cannot_be_two(self):
@@ -136,9 +131,7 @@ class LiveData(CliTest):
             process = self.start("record", "-", "--port", self.port, cwd=self.folder)
             for frame in range(1, 51):
                 self.assertEqual(int(self.read_row(process)[1]), frame)
-            process.send_signal(signal.SIGINT)
-            rest, err = process.communicate()
-        self.assertEqual(process.returncode, 0, err)
+            rest, err = self.interrupt(process)
         self.assertIn("# end: reason=interrupted frames=50 ", rest)
         self.assertRegex(err.splitlines()[-1], r"^50 frames in .* 0 packets dropped")
         self.assertEqual(os.listdir(self.folder), [])
@@ -181,8 +174,7 @@ class LiveData(CliTest):
             self.assertEqual(process.stderr.readline(), "gone, plug it in again\n")
             while (line := process.stderr.readline()) != "streaming\n":
                 self.assertIn(line, ["waiting for an answer\n", "STALLED\n"])
-            process.send_signal(signal.SIGINT)
-            process.communicate()
+            self.interrupt(process)
         self.assertRegex(pathlib.Path(self.csv).read_text(encoding="utf-8"), "(?m)^# event: gone .*\n(#.*\n)*# event: back ")
 
     def test_what_cannot_go_there(self):

@@ -134,8 +134,7 @@ class Sharing(ServeTest):
             self.assertRegex(self.said(), rf"(?s){SERIAL}: gone.*{SERIAL}: shared as")
             self.world.until(lambda: len(self.rows()[0]) >= 220)
             self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket_of()}$")
-            waiting.send_signal(signal.SIGINT)
-            self.finished(waiting)
+            self.interrupt(waiting)
         rows, comments = self.rows()
         frames = [int(row["frame"]) for row in rows]
         restart = frames.index(1, 1)
@@ -181,8 +180,7 @@ class Flash(ServeTest):
                 out, err = flash.communicate()
                 self.assertEqual(out, f"fingertip {SERIAL}: firmware 9.8.7 abcdef012345, board pico_mux\n", err)
                 self.world.until(lambda: any("event: back" in comment for comment in self.rows()[1]))
-                recorder.send_signal(signal.SIGINT)
-                self.finished(recorder)
+                self.interrupt(recorder)
 
 
 class Clients(ServeTest):
@@ -197,8 +195,7 @@ class Clients(ServeTest):
             last = self.rows(other_csv)[0][-1]["frame"]
             self.world.until(lambda: int(self.rows(stopped_csv)[0][-1]["frame"]) > int(last) + 200)
             for process in (stopped, other):
-                process.send_signal(signal.SIGINT)
-                self.finished(process)
+                self.interrupt(process)
             self.world.until(lambda: " lost " in self.said())
         lost = int(re.search(rf"{SERIAL}: pid {stopped.pid}, simulated_finge lost (\d+) packets", self.said())[1])
         self.assertGreater(lost, 500)
@@ -228,8 +225,7 @@ class Clients(ServeTest):
             self.assertIn(", simulated_finge is one too many, after 60", self.said())
             many.close()
             self.run_cli("info")
-            recorder.send_signal(signal.SIGINT)
-            self.finished(recorder)
+            self.interrupt(recorder)
         self.assertIn("dropped_packets=0", self.rows(path)[1][-1])
 
 

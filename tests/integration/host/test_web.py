@@ -1,27 +1,33 @@
-"""`fingertip web`, with a page of its own, as a browser and as an attacker would ask.
+"""`fingertip web`, with a page of its own, as a browser and as an attacker would ask, and what it passes on of `fingertip simulate`.
 
-usage: test_web.py --fingertip TOOL
+usage: test_web.py FINGERTIP SIMULATE [unittest arguments]
+
+real time: a simulation, a server and clients on the kernel's sockets. Waits are for what they say.
 """
 
-import argparse
 import contextlib
 import http.client
+import json
 import os
 import pathlib
-import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
+FINGERTIP, SIMULATE = (os.path.abspath(path) for path in sys.argv[1:3])
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
+from fingertip import wire  # noqa: E402
+from fingertip.line import AskInfo  # noqa: E402
 from fingertip.version import __version__  # noqa: E402
 
-TOOLS = argparse.Namespace()
 PATIENCE_s = 300
+LEFT, RIGHT = "00000000000CE110", "00000000000CE111"
+ONE, OTHER = "0123456789abcdef", "fedcba9876543210"
 FILES = {
     "index.html": ("text/html; charset=utf-8", f'<meta name="fingertip-version" content="{__version__}">'.encode()),
     "app.js": ("text/javascript; charset=utf-8", b"0;"),
@@ -31,75 +37,80 @@ FILES = {
 }
 
 
-class Web(unittest.TestCase):
+class WebCase(unittest.TestCase):
     def setUp(self):
         holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
         self.addCleanup(holder.cleanup)
         self.folder = pathlib.Path(holder.name)
-        (self.folder / "bin").mkdir()
-        self.tool = self.folder / "bin/fingertip"
-        shutil.copy(TOOLS.fingertip, self.tool)
-        self.page = self.folder / "share/fingertip/web"
+        self.tool, simulate = (self.folder / path for path in ("root/bin/fingertip", "root/libexec/fingertip/fingertip-simulate"))
+        self.page = self.folder / "root/share/fingertip/web"
+        for folder in (self.tool, simulate, *(self.page / name for name in FILES)):
+            folder.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(FINGERTIP, self.tool)
+        simulate.symlink_to(SIMULATE)
         for name, (_, content) in FILES.items():
-            (self.page / name).parent.mkdir(parents=True, exist_ok=True)
             (self.page / name).write_bytes(content)
-        (self.folder / "share/fingertip/secret").write_text("secret")
+        (self.page.parent / "secret").write_text("secret")
+        self.environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        self.environment["XDG_RUNTIME_DIR"] = holder.name
 
     @contextlib.contextmanager
-    def served(self, *options, **environment):
-        """Host and port of a server, and its process."""
-        without = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-        process = subprocess.Popen(
-            [self.tool, "web", "--port", "0", *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**without, **environment},
-        )
+    def run_tool(self, *words, **environment):
+        """Yields the process and its first line; self.said is what it said on standard error."""
+        environment = {**self.environment, **environment}
+        process = subprocess.Popen([self.tool, *words], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
-            url = process.stdout.readline().strip()
-            self.assertTrue(url, process.stderr.read() if process.poll() is not None else "")
-            host, port = re.fullmatch(r"http://(.+):(\d+)/", url).groups()
-            yield host.strip("[]"), int(port), process
+            line = process.stdout.readline().strip()
+            self.assertTrue(line, process.stderr.read() if process.poll() is not None else "")
+            yield process, line
         finally:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
             self.said = process.communicate(timeout=PATIENCE_s)[1]
         self.assertEqual(process.returncode, 0, self.said)
 
-    def ask(self, host, port, path="/", method="GET", **headers):
-        connection = http.client.HTTPConnection(host, port, timeout=PATIENCE_s)
+    @contextlib.contextmanager
+    def served(self, *options, **environment):
+        with self.run_tool("web", "--port", "0", *options, **environment) as (process, url):
+            self.host, port = url.removeprefix("http://").rstrip("/").rsplit(":", 1)
+            self.host, self.port = self.host.strip("[]"), int(port)
+            yield process
+
+    def ask(self, path="/", method="GET", content=None, **headers):
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
         try:
-            connection.request(method, path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+            connection.request(method, path, content, {name.replace("_", "-"): value for name, value in headers.items()})
             answer = connection.getresponse()
             return answer.status, dict(answer.getheaders()), answer.read()
         finally:
             connection.close()
 
+
+class Web(WebCase):
     def test_the_page_is_served_as_it_is(self):
-        with self.served() as (host, port, _):
-            self.assertEqual(host, "127.0.0.1")
+        with self.served():
+            self.assertEqual(self.host, "127.0.0.1")
             for name, (kind, content) in {"": FILES["index.html"], **FILES}.items():
-                status, headers, body = self.ask(host, port, f"/{name}")
+                status, headers, body = self.ask(f"/{name}")
                 self.assertEqual((status, headers["Content-Type"], body), (200, kind, content), name)
-                status, headers, body = self.ask(host, port, f"/{name}?any", method="HEAD")
+                status, headers, body = self.ask(f"/{name}?any", method="HEAD")
                 self.assertEqual((status, headers["Content-Length"], body), (200, str(len(content)), b""), name)
 
     def test_nothing_else_is(self):
-        with self.served() as (host, port, _):
+        with self.served():
             paths = "/../secret /%2e%2e/secret /..%2fsecret /assets/../../secret //etc/passwd /assets /assets/ /index.html/ /%00 /index.html%00.js"
             for path in (*paths.split(), "/" + "a" * 3000):
-                status, headers, body = self.ask(host, port, path)
+                status, headers, body = self.ask(path)
                 self.assertIn(status, (400, 404), path)
                 self.assertNotIn(b"secret", body)
                 self.assertIn("default-src 'none'", headers["Content-Security-Policy"])
             for method in ("POST", "PUT", "DELETE", "OPTIONS", "PATCH"):
-                self.assertEqual(self.ask(host, port, "/", method=method)[0], 405, method)
+                self.assertEqual(self.ask("/", method=method)[0], 405, method)
 
     def test_the_policy_allows_nothing_from_elsewhere(self):
-        with self.served() as (host, port, _):
+        with self.served():
             for path in ("/", "/assets/simulated.wasm", "/none"):
-                headers = self.ask(host, port, path)[1]
+                headers = self.ask(path)[1]
                 policy = dict(part.split(maxsplit=1) for part in headers["Content-Security-Policy"].split("; "))
                 self.assertEqual(policy["default-src"], "'none'")
                 self.assertEqual(policy["script-src"], "'self' 'wasm-unsafe-eval'")
@@ -110,24 +121,24 @@ class Web(unittest.TestCase):
                 self.assertEqual(headers["Cross-Origin-Embedder-Policy"], "require-corp")
 
     def test_a_name_that_leads_here_is_refused(self):
-        with self.served() as (host, port, _):
+        with self.served():
             hosts = "evil.example", "localhost.evil.example", "127.0.0.1.evil.example"
-            for name in (*(f"{name}:{port}" for name in hosts), hosts[0], "", "[evil]", "[", "127.1"):
-                status, _, body = self.ask(host, port, Host=name)
+            for name in (*(f"{name}:{self.port}" for name in hosts), hosts[0], "", "[evil]", "[", "127.1"):
+                status, _, body = self.ask(Host=name)
                 self.assertIn(status, (400, 421), name)
                 self.assertNotIn(FILES["index.html"][1], body)
-            for name in (f"localhost:{port}", "localhost", f"127.0.0.1:{port}", f"[::1]:{port}"):
-                self.assertEqual(self.ask(host, port, Host=name)[0], 200, name)
+            for name in (f"localhost:{self.port}", "localhost", f"127.0.0.1:{self.port}", f"[::1]:{self.port}"):
+                self.assertEqual(self.ask(Host=name)[0], 200, name)
 
     def test_only_this_machine_reaches_it_unless_told(self):
-        with self.served() as (_, port, process):
+        with self.served() as process:
             listening = subprocess.run(["cat", f"/proc/{process.pid}/net/tcp"], capture_output=True, text=True, timeout=PATIENCE_s).stdout
-            self.assertRegex(listening, rf"0100007F:{port:04X} 00000000:0000 0A")
+            self.assertRegex(listening, rf"0100007F:{self.port:04X} 00000000:0000 0A")
         with self.served("--address", "0.0.0.0"):
             pass
         self.assertIn("everyone who reaches 0.0.0.0", self.said)
-        with self.served("--address", "127.0.0.2") as (host, port, _):
-            self.assertEqual(self.ask(host, port)[0], 200)
+        with self.served("--address", "127.0.0.2"):
+            self.assertEqual(self.ask()[0], 200)
         self.assertNotIn("anyone", self.said)
 
     def test_over_ipv6(self):
@@ -136,8 +147,8 @@ class Web(unittest.TestCase):
                 pass
         except OSError as error:
             self.skipTest(f"no IPv6 here ({error})")
-        with self.served("--address", "::1") as (host, port, _):
-            self.assertEqual(self.ask(host, port)[0], 200)
+        with self.served("--address", "::1"):
+            self.assertEqual(self.ask()[0], 200)
 
     def refused(self, *options):
         done = subprocess.run([self.tool, "web", *options], capture_output=True, text=True, timeout=PATIENCE_s)
@@ -145,10 +156,10 @@ class Web(unittest.TestCase):
         return done.returncode, done.stderr
 
     def test_what_cannot_be_served_is_said(self):
-        with self.served() as (_, port, _):
-            taken = f"port {port} of 127.0.0.1 is taken by another program; end that one, or choose another --port"
+        with self.served():
+            taken = f"port {self.port} of 127.0.0.1 is taken by another program; end that one, or choose another --port"
             again = "(a browser asks for fingertips again there)"
-            self.assertEqual(self.refused("--port", str(port)), (1, f"fingertip: {taken} {again}\n"))
+            self.assertEqual(self.refused("--port", str(self.port)), (1, f"fingertip: {taken} {again}\n"))
         for address in ("192.0.2.1", "no.such.name.invalid", "1.2.3"):
             status, said = self.refused("--address", address, "--port", "0")
             self.assertEqual(status, 1, address)
@@ -170,14 +181,14 @@ class Web(unittest.TestCase):
             self.assertEqual(said.splitlines(), [f"fingertip {__version__}"] + [note] * bool(of))
 
     def test_the_desktops_browser_opens_it(self):
-        opener = self.folder / "bin/xdg-open"
+        opener = self.tool.parent / "xdg-open"
         opened = self.folder / "opened"
         os.mkfifo(opened)
         opener.write_text(f'#!/bin/sh\nprintf "%s" "$1" > {opened}\n')
         opener.chmod(0o755)
         path = f"{opener.parent}:{os.environ['PATH']}"
-        with self.served(DISPLAY=":0", PATH=path) as (_, port, _):
-            self.assertEqual(opened.read_text(), f"http://127.0.0.1:{port}/")
+        with self.served(DISPLAY=":0", PATH=path):
+            self.assertEqual(opened.read_text(), f"http://127.0.0.1:{self.port}/")
         self.assertIn("opening it in the browser; Ctrl-C ends", self.said)
         for options, environment in ((["--no-browser"], {"DISPLAY": ":0"}), ([], {})):
             with self.served(*options, PATH=path, **environment):
@@ -185,15 +196,176 @@ class Web(unittest.TestCase):
             self.assertIn("open it in Chromium, Chrome or Edge", self.said)
 
     def test_a_connection_that_stays_does_not_keep_it_from_ending(self):
-        with self.served() as (host, port, process):
-            with socket.create_connection((host, port)) as silent:
+        with self.served() as process:
+            with socket.create_connection((self.host, self.port)) as silent:
                 process.send_signal(signal.SIGINT)
                 process.wait(PATIENCE_s)
                 silent.close()
 
 
+class SimulationsCase(WebCase):
+    def told(self, path, body=None, **headers):
+        """Status and text; a POST if there is a body."""
+        status, _, text = self.ask(path, "GET" if body is None else "POST", body, **headers)
+        return status, text.decode()
+
+    @contextlib.contextmanager
+    def line(self, client=ONE, serial=LEFT):
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
+        try:
+            connection.request("GET", f"/simulated/line?serial={serial}&client={client}")
+            answer = connection.getresponse()
+            self.assertEqual(answer.status, 200, answer.read() if answer.status != 200 else "")
+            yield answer
+        finally:
+            connection.close()
+
+    def hand(self, command="", client=ONE):
+        """What is true then, once anything is known."""
+        while True:
+            status, body = self.told(f"/simulated/hand?client={client}", command)
+            self.assertEqual(status, 200, body)
+            if body != "{}":
+                return json.loads(body)
+
+    def until(self, condition):
+        end_s = time.monotonic() + PATIENCE_s
+        while not condition():
+            self.assertLess(time.monotonic(), end_s)
+
+
+class Hand(SimulationsCase):
+    def test_it_presses_and_the_truth_follows(self):
+        with self.served():
+            self.assertEqual(self.told("/simulated"), (200, "[]"))
+            with self.run_tool("simulate", "--mouse", "--fingertips", "2"):
+                self.assertEqual(json.loads(self.told("/simulated")[1]), [{"serial": LEFT, "hand": True}, {"serial": RIGHT, "hand": True}])
+                with self.line(), self.line(OTHER, RIGHT):
+                    self.hand("press 3 -5.5 2")
+                    self.until(lambda: self.hand()["force_N"] > 1.99)
+                    truth = self.hand()
+                    self.assertEqual((truth["x_mm"], truth["y_mm"]), (3, -5.5))
+                    self.assertEqual(self.hand(client=OTHER)["force_N"], 0)
+                    self.hand("press 3 -5.5 2000", OTHER)
+                    self.until(lambda: self.hand(client=OTHER)["force_N"] > 49.9)  # and no more
+                    self.assertLessEqual(self.hand(client=OTHER)["force_N"], 50)
+                    self.hand("lift")
+                    self.until(lambda: self.hand()["force_N"] == 0)
+
+    def test_one_that_leaves_lifts(self):
+        with self.served(), self.run_tool("simulate", "--mouse"), self.line(OTHER):
+            with self.line():
+                self.hand("press 0 0 3")
+                self.until(lambda: self.hand(client=OTHER)["force_N"] > 2.9)
+            self.until(lambda: self.hand(client=OTHER)["force_N"] == 0)
+            self.assertEqual(self.told(f"/simulated/hand?client={ONE}", "lift")[0], 404)
+
+    def test_what_it_cannot_do_is_said(self):
+        with self.served(), self.run_tool("simulate", "--mouse"), self.line():
+            for words in ("press 1 2", "press 1 2 x", "press 1 2 3 4", "push 1 2 3", "lift left", "press 1 2 3\nlift", "press nan 0 1"):
+                status, said = self.told(f"/simulated/hand?client={ONE}", words)
+                self.assertEqual((status, said), (400, "give press X_mm Y_mm FORCE_N, lift, or nothing\n"), words)
+
+    def test_a_simulation_without_a_hand(self):
+        with self.served(), self.run_tool("simulate"), self.line():
+            self.assertEqual(json.loads(self.told("/simulated")[1]), [{"serial": LEFT, "hand": False}])
+            self.until(lambda: self.hand()["force_N"] > 2)  # its weight
+            self.hand("press 0 0 1")
+            self.until(
+                lambda: (
+                    (409, "no hand presses here; start fingertip simulate --mouse\n") == self.told(f"/simulated/hand?client={ONE}", "lift")
+                )
+            )
+
+
+class Lift(SimulationsCase):
+    def test_the_truth_has_the_pull(self):
+        """An object's weight, which both carry, is along y."""
+        with self.served(), self.run_tool("simulate", "--lift", "--mass", "0.2"):
+            with (
+                subprocess.Popen(
+                    [self.tool, "grasp", "--gripper", "2f85", "--gripper-port", "sim:gripper"],
+                    env=self.environment,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                ) as grasp,
+                self.line(),
+                self.line(OTHER, RIGHT),
+            ):
+                try:
+                    self.until(lambda: self.hand()["qy_N"] > 0.9 * 0.1 * 9.81)
+                    truth = self.hand()
+                    self.assertAlmostEqual(truth["qy_N"], 0.1 * 9.81, delta=0.1 * 9.81)  # it swings at first
+                    self.assertGreater(truth["force_N"], truth["qy_N"])
+                    self.assertGreater(self.hand(client=OTHER)["force_N"], 0)
+                finally:
+                    grasp.kill()
+
+
+class Line(SimulationsCase):
+    def test_it_is_a_line_to_the_fingertip(self):
+        with self.served(), self.run_tool("simulate"):
+            with self.line() as line:
+                status, said = self.told(f"/simulated/line?client={ONE}", wire.encode(wire.Packet(7, 0, AskInfo())))
+                self.assertEqual((status, said), (200, ""))
+                came = b""
+                while b"native" not in came:  # the name of its board
+                    came += line.read1()
+
+    def test_it_ends_with_the_simulation(self):
+        with self.served():
+            with self.run_tool("simulate"):
+                connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
+                connection.request("GET", f"/simulated/line?serial={LEFT}&client={ONE}")
+                answer = connection.getresponse()
+            answer.read()  # to its end
+            connection.close()
+            self.assertEqual(self.told("/simulated"), (200, "[]"))
+
+
+class Strangers(SimulationsCase):
+    def test_only_the_page_may_ask(self):
+        with self.served(), self.run_tool("simulate", "--mouse"), self.line():
+            here = f"http://{self.host}:{self.port}"
+            for headers in (
+                {"Origin": "http://evil.example"},
+                {"Origin": "null"},
+                {"Sec_Fetch_Site": "cross-site"},
+                {"Sec_Fetch_Site": "same-site"},
+                {"Origin": f"http://{self.host}:{self.port + 1}"},
+            ):
+                for path, body in (
+                    ("/simulated", None),
+                    (f"/simulated/line?serial={LEFT}&client={OTHER}", None),
+                    (f"/simulated/hand?client={ONE}", "press 0 0 9"),
+                    (f"/simulated/line?client={ONE}", "x"),
+                ):
+                    self.assertEqual(self.told(path, body, **headers)[0], 403, (path, headers))
+            self.assertEqual(self.told("/simulated", Host="evil.example")[0], 421)
+            self.assertEqual(self.told("/simulated", Origin=here, Sec_Fetch_Site="same-origin")[0], 200)
+            self.assertEqual(self.hand()["force_N"], 0)
+
+    def test_what_is_wrong_is_said(self):
+        with self.served(), self.run_tool("simulate"), self.line():
+            for path, body, status, words in (
+                (f"/simulated/line?serial={RIGHT}&client={OTHER}", None, 404, "start fingertip simulate"),
+                (f"/simulated/line?serial={LEFT}&client=../..", None, 400, "hexadecimal"),
+                (f"/simulated/line?serial={LEFT}", None, 400, "hexadecimal"),
+                (f"/simulated/line?serial={LEFT}&client={ONE}", None, 409, "a line already"),
+                (f"/simulated/hand?client={OTHER}", "lift", 404, "open one first"),
+                (f"/simulated/line?client={OTHER}", "x", 404, "open one first"),
+                (f"/simulated/line?client={ONE}", "x" * 5000, 400, "more than"),
+                ("/simulated/more", None, 404, ""),
+            ):
+                found, said = self.told(path, body)
+                self.assertEqual(found, status, (path, said))
+                self.assertIn(words, said)
+            self.assertEqual(self.told(f"/simulated/line?client={ONE}", "x" * 100000)[0], 413)
+
+    def test_a_server_for_other_machines_passes_nothing_on(self):
+        with self.served("--address", "0.0.0.0"), self.run_tool("simulate", "--mouse"):
+            self.assertEqual(self.told("/simulated")[0], 404)
+
+
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--fingertip", required=True)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)
