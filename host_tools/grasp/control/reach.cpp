@@ -35,7 +35,7 @@ constexpr double OFF = 0.65, KEEPS = 0.25;
 constexpr int DETOURS_MOST = 4;
 // Distance from the cap in standard deviations of a fingertip's force; the deviation is limited to
 // these shares of the force, because UNCERTAIN contacts report far more than the true error. Chosen
-// with cylinders of fingertip_grasp_trials, seed 1.
+// with simulated cylinders, whose forces are reported with the largest errors.
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
 
 // Upper limit of the larger of both true forces.

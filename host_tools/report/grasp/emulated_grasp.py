@@ -67,7 +67,7 @@ def measure(build, boards, tables):
 
 def text(found):
     """Lines of Markdown."""
-    felt, slip = found["felt"], found["slip"]
+    slip = found["slip"]
     lines = [
         "Both fingertips are emulated boards with the release image, pad and calibration stored; cell, gripper and controller go on in lock step with them,",
         f"in slices of {found['slice_us'] / 1e3:g} ms of emulated time. Lifted: {found['mass_kg']:g} kg, {found['face']}, friction {found['friction']:g}, {found['gripper']}; "
@@ -78,12 +78,5 @@ def text(found):
     if slip:
         lines += table_md(["since all of both contacts slid", "ms"], [[what, text_of(slip[name], 4)] for name, what in COURSE.items()]) + [
             ""
-        ]
-    if felt["reaction_least_median_most_ms"]:
-        least, median, most = felt["reaction_least_median_most_ms"]
-        lines += [
-            f"The same grasp {felt['grasps']} times with the fingertips as all of the rest of this report has them: {text_of(least, 3)} to {text_of(most, 3)} ms, "
-            f"median {text_of(median, 3)}.",
-            "",
         ]
     return lines

@@ -1,9 +1,11 @@
-#include "grasp/fault_trials.hpp"
+#include "report/grasp/fault_trials.hpp"
 
 #include "grasp/settings.hpp"
+#include "grasp/words.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "simulation/cell/kind_trial.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <set>
 
 namespace fingertip::grasp {
@@ -12,18 +14,20 @@ using namespace cell;
 
 namespace {
 
-using Kind = Fault::Kind;
+using FaultKind = Fault::Kind;
 
-constexpr double LAYER_mm = 12.0, UNLIMITED = std::numeric_limits<double>::infinity();
+constexpr double UNLIMITED = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t SEED = 1001;
+// Opening by less is still holding: a first grip comes down to what the load needs, of the cup by 1.5 mm.
+constexpr double OPENS_mm = 1.6;
 
 struct Thing {
-  const char *name, *face;
-  double mass_kg, friction, stiffness_N_mm, crushes_N, cap_N;
+  const char *name;
+  double mass_kg, friction, at_1_mm_N, exponent, crushes_N, cap_N;
 };
-constexpr Thing THINGS[] = {{"paper cup", "sphere18", 0.05, 0.6, 5.0, 5.0, 4.0},
-                            {"lime", "lime", 0.1, 0.5, UNLIMITED, UNLIMITED, 8.0},
-                            {"ball", "sphere24", 0.25, 0.5, UNLIMITED, UNLIMITED, 10.0}};
+constexpr Thing THINGS[] = {{"paper cup", 0.05, 0.6, 2.5, 1.3, 5.0, 4.0},
+                            {"lime", 0.1, 0.5, 3.5, 1.6, UNLIMITED, 8.0},
+                            {"ball", 0.25, 0.5, 3.0, 1.6, UNLIMITED, 10.0}};
 
 enum Fingers { NONE = 0, LEFT = 1, BOTH = 3 };
 constexpr std::uint32_t LEFT_STALE = GRIP_FINGER_0_STALE, STALE = GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE;
@@ -33,33 +37,33 @@ constexpr std::uint32_t OVER = GRIP_FINGER_0_OVER | GRIP_FINGER_1_OVER;
 
 struct Happening {
   const char *name;
-  Kind kind;
+  FaultKind kind;
   Fingers fingers = NONE;
-  std::uint32_t all_of = 0, any_of = 0;
+  std::uint32_t all_of = 0;
   double lasts_s = UNLIMITED;
 };
 constexpr Happening HAPPENINGS[] = {
-    {"nothing", Kind::none},
-    {"one fingertip gone", Kind::gone, LEFT, LEFT_STALE},
-    {"both fingertips gone", Kind::gone, BOTH, STALE},
-    {"both gone for 0.5 s", Kind::gone, BOTH, STALE, 0, 0.5},
-    {"one frozen", Kind::frozen, LEFT, GRIP_FINGER_0_FROZEN},
-    {"both frozen", Kind::frozen, BOTH, FROZEN},
-    {"one lies, UNCERTAIN", Kind::uncertain, LEFT, GRIP_FINGER_0_FORCE_ONLY},
-    {"both lie, UNCERTAIN", Kind::uncertain, BOTH, FORCE_ONLY},
-    {"one SATURATED", Kind::saturated, LEFT, GRIP_FINGER_0_OVER},
-    {"both SATURATED", Kind::saturated, BOTH, OVER},
-    {"gripper silent", Kind::silent, NONE, GRIP_GRIPPER_SILENT},
-    {"silent for 1 s", Kind::silent, NONE, GRIP_GRIPPER_SILENT, 0, 1.0},
-    {"fault 9", Kind::fault, NONE, GRIP_GRIPPER_FAULT},
-    {"power lost", Kind::power, NONE, GRIP_GRIPPER_INACTIVE},
-    {"garbage", Kind::garbage, NONE, GRIP_GRIPPER_SILENT},
-    {"no answers", Kind::unanswered, NONE, GRIP_GRIPPER_SILENT},
-    {"no answers for 0.3 s", Kind::unanswered, NONE, 0, 0, 0.3},
-    {"half is garbage", Kind::noisy},
-    {"answers 30 ms late", Kind::late},
-    {"latency timer, 16 ms", Kind::latency_timer},
-    {"object gone", Kind::taken},
+    {"nothing", FaultKind::none},
+    {"one fingertip gone", FaultKind::gone, LEFT, LEFT_STALE},
+    {"both fingertips gone", FaultKind::gone, BOTH, STALE},
+    {"both gone for 0.5 s", FaultKind::gone, BOTH, STALE, 0.5},
+    {"one frozen", FaultKind::frozen, LEFT, GRIP_FINGER_0_FROZEN},
+    {"both frozen", FaultKind::frozen, BOTH, FROZEN},
+    {"one lies, UNCERTAIN", FaultKind::uncertain, LEFT, GRIP_FINGER_0_FORCE_ONLY},
+    {"both lie, UNCERTAIN", FaultKind::uncertain, BOTH, FORCE_ONLY},
+    {"one SATURATED", FaultKind::saturated, LEFT, GRIP_FINGER_0_OVER},
+    {"both SATURATED", FaultKind::saturated, BOTH, OVER},
+    {"gripper silent", FaultKind::silent, NONE, GRIP_GRIPPER_SILENT},
+    {"silent for 1 s", FaultKind::silent, NONE, GRIP_GRIPPER_SILENT, 1.0},
+    {"fault 9", FaultKind::fault, NONE, GRIP_GRIPPER_FAULT},
+    {"power lost", FaultKind::power, NONE, GRIP_GRIPPER_INACTIVE},
+    {"garbage", FaultKind::garbage, NONE, GRIP_GRIPPER_SILENT},
+    {"no answers", FaultKind::unanswered, NONE, GRIP_GRIPPER_SILENT},
+    {"no answers for 0.3 s", FaultKind::unanswered, NONE, 0, 0.3},
+    {"half is garbage", FaultKind::noisy},
+    {"answers 30 ms late", FaultKind::late},
+    {"latency timer, 16 ms", FaultKind::latency_timer},
+    {"object gone", FaultKind::taken},
 };
 
 struct When {
@@ -72,27 +76,38 @@ constexpr When STATES[] = {{"activate", GRIP_ACTIVATING, 0.3, 7.0}, {"approach",
                            {"holding", GRIP_HOLDING, 0.8, 2.0},     {"slipping", GRIP_SLIPPING, 0.0, 2.0},
                            {"still", GRIP_STILL, 0.05, 2.0},        {"release", GRIP_RELEASE, 0.02, 2.0}};
 
-Trial trial_of(const Thing &thing, const std::string &gripper, const When &when, const Happening &happening,
-               std::uint64_t n) {
-  Trial trial;
+struct FaultTrial {
+  const Thing &thing;
+  const When &when;
+  const Happening &happening;
+  KindTrial trial;
+  // What must be reported, of GripTrouble: each of these, one of those; and where it must end.
+  std::uint32_t all_of = 0, any_of = 0;
+  std::vector<std::uint8_t> ends_in = {}; // empty: anywhere
+  bool is_untold = false;
+};
+
+KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &when, const Happening &happening,
+                   std::uint64_t n) {
+  KindTrial trial;
   trial.gripper = gripper_mechanics(gripper);
-  Scene &scene = trial.scene;
-  scene.face = thing.face;
-  scene.object.mass_kg = thing.mass_kg;
-  scene.object.friction = thing.friction;
-  scene.object.stiffness_N_mm = thing.stiffness_N_mm;
-  scene.object.crushes_N = thing.crushes_N;
-  scene.opens_mm = 2.0;
-  scene.lift_mm = 5.0;
-  scene.lift_s = 0.3;
-  scene.ends_s = 60.0;
   trial.seed = SEED + n;
-  for (std::size_t f = 0; f < 2; f++) {
-    trial.rubber[f].gain.fill(f == 0 ? 0.95 : 1.0);
+  KindOfGrasp &grasp = trial.grasp;
+  grasp.mass_kg = thing.mass_kg;
+  grasp.exponent = thing.exponent;
+  grasp.crushes_N = thing.crushes_N;
+  for (KindOfPad &pad : grasp.pads) {
+    pad.friction = thing.friction;
+    pad.at_1_mm_N = thing.at_1_mm_N;
   }
+  grasp.pads[0].gain = 0.95;
+  grasp.opens_mm = 2.0;
+  grasp.lift_mm = 5.0;
+  grasp.lift_s = 0.3;
+  grasp.ends_s = 60.0;
   trial.activates = when.state == GRIP_ACTIVATING;
   if (trial.activates) {
-    scene.object.width_mm = trial.gripper.traits.stroke_mm - scene.opens_mm;
+    grasp.width_mm = trial.gripper.traits.stroke_mm - grasp.opens_mm;
   }
   if (when.state == GRIP_SLIPPING) {
     trial.slick_after_s = 0.6;
@@ -114,28 +129,28 @@ Trial trial_of(const Thing &thing, const std::string &gripper, const When &when,
 }
 
 // What must be reported, where that depends on the state.
-void expect(FaultTrial &one, const When &when, const Happening &happening) {
+void expect(FaultTrial &one) {
+  const When &when = one.when;
+  const Happening &happening = one.happening;
   one.all_of = happening.all_of;
-  one.any_of = happening.any_of;
   const bool untouched = when.state == GRIP_ACTIVATING || when.state == GRIP_APPROACH;
-  if (happening.kind == Kind::frozen && untouched) {
+  if (happening.kind == FaultKind::frozen && untouched) {
     one.is_untold = happening.fingers == BOTH;
     one.all_of = 0;
     one.any_of = one.is_untold ? 0 : GRIP_FINGER_0_FROZEN | GRIP_FINGERS_DIFFER;
   }
-  one.gripper_fault = happening.kind == Kind::fault ? 9 : 0;
-  if (happening.kind == Kind::fault || happening.kind == Kind::power) {
+  if (happening.kind == FaultKind::fault || happening.kind == FaultKind::power) {
     one.ends_in = {GRIP_FAULT};
-  } else if (happening.kind == Kind::taken && when.state == GRIP_RELEASE) {
+  } else if (happening.kind == FaultKind::taken && when.state == GRIP_RELEASE) {
     one.ends_in = {GRIP_RELEASE, GRIP_OPEN}; // as it was asked to
-  } else if (happening.kind == Kind::taken) {
+  } else if (happening.kind == FaultKind::taken) {
     one.ends_in = {untouched ? std::uint8_t{GRIP_MISSED} : std::uint8_t{GRIP_DROPPED}};
   }
-  if (when.state == GRIP_ACTIVATING && happening.kind == Kind::power) {
+  if (when.state == GRIP_ACTIVATING && happening.kind == FaultKind::power) {
     one.ends_in.clear(); // it reports that it is not active when it should be, and waits for it
   }
   // As long as it takes to close, or to give up.
-  if (untouched && (happening.kind == Kind::taken || happening.kind == Kind::power)) {
+  if (untouched && (happening.kind == FaultKind::taken || happening.kind == FaultKind::power)) {
     one.trial.fault->watched_s = 17.0;
   }
 }
@@ -152,49 +167,52 @@ std::vector<std::string> one_of_each_driver() {
   return models;
 }
 
+nlohmann::ordered_json row_of(const FaultTrial &one) {
+  const GripperTraits &traits = one.trial.gripper.traits;
+  const double cap_N = one.thing.cap_N;
+  CoreController controller(settings_for(traits, {{"cap", cap_N}}), traits);
+  const KindOutcome outcome = run_kind(one.trial, controller);
+  const Failed &failed = outcome.failed;
+  const bool ends =
+      one.ends_in.empty() || std::find(one.ends_in.begin(), one.ends_in.end(), failed.state) != one.ends_in.end();
+  const bool reports = (failed.trouble & one.all_of) == one.all_of &&
+                       (one.any_of == 0 || (failed.trouble & one.any_of) != 0) &&
+                       failed.gripper_fault == (one.happening.kind == FaultKind::fault ? 9 : 0);
+  return {{"fault", one.happening.name},
+          {"state", one.when.name},
+          {"gripper", traits.model},
+          {"object", one.thing.name},
+          {"begun", failed.begun},
+          {"untold", one.is_untold},
+          {"said", trouble_names(failed.trouble)},
+          {"ends", state_name(failed.state)},
+          {"opened_mm", failed.opened_mm},
+          {"peak_N", outcome.peak_N},
+          {"cap_N", cap_N},
+          {"crushed", outcome.crushed},
+          {"opened", one.when.state != GRIP_RELEASE && failed.opened_mm > OPENS_mm},
+          {"beyond_cap", outcome.peak_N > cap_N},
+          {"unsaid", !ends || !reports}};
+}
+
 } // namespace
 
-std::vector<FaultTrial> fault_trials() {
+nlohmann::ordered_json fault_rows(std::uint64_t jobs) {
   std::vector<FaultTrial> all;
   for (const std::string &gripper : one_of_each_driver()) {
     for (const Thing &thing : THINGS) {
       for (const When &when : STATES) {
         for (const Happening &happening : HAPPENINGS) {
-          FaultTrial one;
-          one.fault = happening.name;
-          one.state = when.name;
-          one.gripper = gripper;
-          one.object = thing.name;
-          one.trial = trial_of(thing, gripper, when, happening, all.size());
-          one.cap_N = thing.cap_N;
-          expect(one, when, happening);
-          one.opens_mm = when.state == GRIP_RELEASE ? UNLIMITED : OPENS_mm;
-          all.push_back(one);
+          all.push_back({thing, when, happening, trial_of(thing, gripper, when, happening, all.size())});
+          expect(all.back());
         }
       }
     }
   }
-  return all;
-}
-
-FaultRunner::FaultRunner(const std::string &cache) {
-  for (const Thing &thing : THINGS) {
-    faces_.emplace(thing.face, Face(thing.face, LAYER_mm, cache));
-  }
-}
-
-FaultOutcome FaultRunner::run(const FaultTrial &one) const {
-  const GripperTraits &traits = one.trial.gripper.traits;
-  CoreController controller(settings_for(traits, {{"cap", one.cap_N}}), traits);
-  FaultOutcome done{};
-  done.outcome = run_trial(one.trial, faces_.at(one.trial.scene.face), controller);
-  const Failed &failed = done.outcome.failed;
-  done.opened = failed.opened_mm > one.opens_mm;
-  done.beyond_cap = done.outcome.peak_N > one.cap_N;
-  const auto ends = std::find(one.ends_in.begin(), one.ends_in.end(), failed.state);
-  done.unsaid = (!one.ends_in.empty() && ends == one.ends_in.end()) || failed.gripper_fault != one.gripper_fault ||
-                (failed.trouble & one.all_of) != one.all_of || (one.any_of != 0 && (failed.trouble & one.any_of) == 0);
-  return done;
+  std::vector<nlohmann::ordered_json> rows(all.size());
+  twin::in_parallel(
+      all.size(), [&](std::size_t i) { rows[i] = row_of(all[i]); }, jobs);
+  return rows;
 }
 
 } // namespace fingertip::grasp

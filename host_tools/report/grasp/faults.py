@@ -1,28 +1,17 @@
-"""Every fault in every state of a grasp: what fingertip_grasp_faults found, for grasp.json and grasp.md."""
+"""Every fault in every state of a grasp: what fingertip_grasp_kinds --faults found, for grasp.json and grasp.md."""
 
-import json
-import pathlib
-
+import kinds
 from fingertip.files import InputError
-from reporting import run
 from presentation import table_md
 
 GOALS = (("faults_opened", "<=", 0), ("faults_beyond_cap", "<=", 0), ("faults_unsaid", "<=", 0), ("cups_crushed", "<=", 0))
 ABOUT = """Each fault begins in each state of a grasp of each object (a paper cup that 5 N crush, a lime, a ball; caps of 4, 8 and 10 N), on a 2F-85 and
-on the servo; 0.8 s later the hand lifts, if it has not yet, then the mass doubles. Opened: by more than 1 mm without being asked to; less a grip takes back that was raised too far.
+on the servo; 0.8 s later the hand lifts, if it has not yet, then the mass doubles. Opened: by more than 1.6 mm without being asked to; less a grip takes back that was raised too far.
 Beyond the cap: a true force above it. A row is the worst of both grippers and all objects; said: what was reported of any of them."""
 # No controller can distinguish this: fingertips whose readings froze before anything touched them feel what fingertips in air do.
 UNTOLD = """Not counted: both fingertips whose readings freeze before they touch. They report what they would report in air, so the gripper closes until its own limit
 of force stops it, at the least it can be set to: a 2F-85 to 20 N."""
 COLUMNS = ("fault", "state", "said", "ends", "opened, mm", "greatest force, N", "of the cap", "crushed")
-
-
-def rows_of(build, cache, options=()):
-    """One for each grasp."""
-    program = pathlib.Path(build) / "host_tools/report/grasp/fingertip_grasp_faults"
-    if not program.is_file():
-        raise InputError(f"{program} is not there; build it: cmake --build --preset host")
-    return json.loads(run(program, "--cache", cache, *options))["rows"]
 
 
 def joined(rows, key):
@@ -51,8 +40,8 @@ def table_of(rows):
     ]
 
 
-def measure(build, cache):
-    rows = rows_of(build, cache)
+def measure(build):
+    rows = kinds.found_by(build, "--faults")["rows"]
     never = [row for row in rows if not row["begun"]]
     if never:
         raise InputError(f"{never[0]['fault']} never began in {never[0]['state']}: the grasp came not so far")

@@ -5,72 +5,16 @@ import bisect
 import emulated_grasp
 import faults
 import kinds
-from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, table_md, text_of
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, text_of
 from fingertip.files import write_text
 from kinds import GRIPPERS
 
-# key: what its column is called
-COLUMNS = {
-    "gripper": "gripper",
-    "about": "what",
-    "object": "object",
-    "friction": "friction",
-    "mass": "mass",
-    "disturbance": "disturbance",
-    "grasps": "grasps",
-    "drops_percent": "dropped, %",
-    "margin_p50": "grip over least grip: p50",
-    "margin_p5": "p5",
-    "margin_p95": "p95",
-    "force_told_p50": "reported over true force",
-    "force_taken_p50": "taken for over true",
-    "slips": "slips",
-    "unanswered": "never answered",
-    "reaction_p50_ms": "slip to 5 % more grip, ms: p50",
-    "reaction_p95_ms": "p95 ",
-    "reaction_after_lift_p50_ms": "after the lift: p50",
-    "slid_p95_mm": "slid, mm: p95",
-    "disturbance_slip_p95_mm": "by disturbances: p95",
-    "peak_p95_N": "largest grip, N: p95",
-}
-STILL = {
-    "gripper": "gripper",
-    "about": "what",
-    "set_force": "set force",
-    "grasps": "grasps",
-    "settle_p50_s": "settles within, s: p50",
-    "settle_p95_s": "p95",
-    "never_settled_percent": "never, %",
-    "rms_p50_percent": "rms error, %: p50",
-    "rms_of_steps_p50_percent": "of it by rounding to the gripper's steps",
-    "limit_cycles": "limit cycles",
-}
-ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller is the tool's own,
-the fingertips' code the firmware's. Nothing was checked on hardware.
-
-In the twin's cell, each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 is on a table; the gripper closes, holds, lifts it within 0.1 to 1 s; then come up to
-two of: 30 to 150 % more mass is poured in, the hand jerks by 2 to 9 m/s2, a knock of 0.03 to 0.12 m/s, friction falls by 20 to 45 %. What would take more than
-15 N to hold at its worst is not drawn. The rubber relaxes by 9 to 26 % in 8 s, each fingertip's force is off by 5 % (sd), gains are those after a
-calibration. This rubber has no dip, though cast rubber has one: what a dip does to the load that a fingertip estimates is in the part `shear` (`dip_*`), to
-location and force in `truth` and `validation`. The kinds below are judged without readings: there a fingertip reports force and load with an error that is drawn.
-Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
-what a turning object takes of the friction. Reported force: the mean of what both fingertips report; taken for: what the controller reckons with,
-of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
-0.5 s, by what the fingertips report. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
-FIRM = """Set forces of 8 N and more. The oracle knows the true force, how it follows the width and how the rubber is going to relax. Of the positions that
-the gripper can reach it takes the one whose mean squared error over the rest of the hold is least, and it moves no more often than ours may. It plans no
-second move, so it shows what is possible, and is no least bound. Ours does not know how the rubber is going to relax."""
-PARTS = {"by_object": "By object", "by_friction": "By friction", "by_mass": "By mass", "by_disturbance": "By disturbance"}
-
-
-def rows_md(rows, columns):
-    used = [key for key in columns if any(key in row for row in rows)]
-    return table_md([columns[key].strip() for key in used], [[text_of(row.get(key), 3) for key in used] for row in rows])
+ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller is the tool's own.
+Nothing was checked on hardware. An object is on a table; the gripper closes, holds, lifts it; then it is disturbed. What a dip of cast rubber does
+to the load that a fingertip estimates is in the part `shear` (`dip_*`), to location and force in `truth` and `validation`."""
 
 
 def write(found, path):
-    moving = [row for row in found["rows"] if "drops_percent" in row]
-    still = [row for row in found["rows"] if "settle_p50_s" in row]
     lines = [
         "# Grasps",
         "",
@@ -80,41 +24,11 @@ def write(found, path):
         "",
         *goal_table_md(found),
         "",
-        "## By kind",
-        "",
-        *kinds.text(found),
-        "## In the twin's cell, by gripper, mode and rate",
-        "",
-        *rows_md(moving, COLUMNS),
-        "",
-        "## Set forces",
-        "",
-        *rows_md(still, STILL),
-        "",
     ]
-    if "by_set" in found:
-        lines += [*firm_of(found), "", "Of those held for 12 s, by the set force:", "", *rows_md(found["by_set"], STILL), ""]
-    for name, title in PARTS.items():
-        if name in found:
-            lines += [f"## {title}", "", "Round objects, 410 frames a second.", "", *rows_md(found[name], COLUMNS), ""]
-    lines += ["## Faults", "", *faults.text(found)]
+    lines += [*kinds.text(found), "## Faults", "", *faults.text(found)]
     if "emulated_grasp" in found:
         lines += ["## With the release image", "", *emulated_grasp.text(found["emulated_grasp"])]
     write_text(path, "\n".join(lines))
-
-
-def firm_of(found):
-    """What is asked of set forces of 8 N and more, what is possible, and what ours does."""
-    rows = [
-        [
-            gripper,
-            found["goals"][f"hold_rms_percent_{called}"]["goal"],
-            text_of(found.get(f"hold_rms_possible_percent_{called}"), 3),
-            text_of(found[f"hold_rms_percent_{called}"], 3),
-        ]
-        for gripper, (called, _) in GRIPPERS.items()
-    ]
-    return [*FIRM.split("\n"), "", *table_md(("gripper", "rms error asked, %", "possible: the oracle's", "ours"), rows)]
 
 
 def tidy(axes, title, label):
@@ -128,9 +42,7 @@ def draw_distribution(axes, found, key, title, label, most):
     for one in found["distributions"]:
         values = one[key]
         shares = [100 * i / (len(values) - 1) for i in range(len(values))] if len(values) > 1 else []
-        axes.plot(
-            [most * 2 if value is None else value for value in values], shares, color=GRIPPERS[one["gripper"]][1], label=one["gripper"]
-        )
+        axes.plot(values, shares, color=GRIPPERS[one["gripper"]][1], label=one["gripper"])
     axes.set_xlim(0, most)
     axes.set_ylim(0, 100)
     axes.legend(fontsize=8, loc="lower right")
@@ -139,14 +51,15 @@ def draw_distribution(axes, found, key, title, label, most):
 
 
 def draw_drops(axes, found):
-    rows = [row for row in found["rows"] if "drops_percent" in row]
-    sets = list(dict.fromkeys(row["set"] for row in rows))
+    rows = {}
+    for row in found["kinds"]:
+        name = row["row"] + ("" if row["controller"] == "ours" else f", {row['controller']}")
+        rows.setdefault(name, {})[row["gripper"]] = row["drops_percent"]
     for i, (gripper, (_, colour)) in enumerate(GRIPPERS.items()):
-        values = {row["set"]: row["drops_percent"] for row in rows if row["gripper"] == gripper}
-        places = [place + 0.26 * (i - 1) for place in range(len(sets))]
-        bars = axes.barh(places, [values.get(name) or 0 for name in sets], 0.25, color=colour, label=gripper)
-        axes.bar_label(bars, [text_of(values.get(name), 2) for name in sets], size=6, padding=2)
-    axes.set_yticks(range(len(sets)), [next(row["about"] for row in rows if row["set"] == name) for name in sets], size=7)
+        places = [place + 0.26 * (i - 1) for place in range(len(rows))]
+        bars = axes.barh(places, [values[gripper] for values in rows.values()], 0.25, color=colour, label=gripper)
+        axes.bar_label(bars, [text_of(values[gripper], 2) for values in rows.values()], size=6, padding=2)
+    axes.set_yticks(range(len(rows)), list(rows), size=7)
     axes.invert_yaxis()
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
     tidy(axes, "Dropped", "% of grasps")
@@ -201,7 +114,7 @@ def draw_caught(axes, series, shots):
     t_ms = [1e3 * (at - begin) for at in series["lift_s"]]
     for key, colour, label in (
         ("force_N", BLUE, "grip"),
-        ("felt_N", FAINT, "as measured"),
+        ("sensed_N", FAINT, "as measured"),
         ("least_N", GOAL, "least that holds"),
         ("load_N", ORANGE, "load of a fingertip"),
     ):
@@ -236,13 +149,11 @@ def draw(found, path):
             draw_film(axes, series, caught["begin_s"] + offset_s + shot)
         draw_caught(course.subplots(), series, shots)
         film.suptitle(
-            f"A slip that is caught: {caught['face']}, {caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, "
-            f"{' and '.join(caught['disturbances'])} (blue: grip; orange: load)",
+            f"A slip that is caught: {caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, "
+            f"{' and '.join(caught['events'])} (blue: grip; orange: load)",
             x=0.01,
             ha="left",
             size=10,
         )
-    figure.suptitle(
-        "Grasps: simulated cell, the tool's own controller, the firmware's own fingertips", x=0.01, ha="left", size=12, weight="bold"
-    )
+    figure.suptitle("Grasps: simulated, the tool's own controller", x=0.01, ha="left", size=12, weight="bold")
     save(figure, path)

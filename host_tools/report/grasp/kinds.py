@@ -1,20 +1,33 @@
-"""Grasps of all kinds (host_tools/simulation/cell/kinds.hpp): what fingertip_grasp_kinds found, for grasp.json and grasp.md."""
+#!/usr/bin/python3
+"""Grasps of all kinds (host_tools/simulation/cell/kinds.hpp): runs fingertip_grasp_kinds and sums up what it found.
 
+kinds.py --build build/host --kind usual,rough --set margin=1.4       # one set of them, to tune the controller by
+"""
+
+import argparse
 import json
 import pathlib
+import sys
 
-from presentation import BLUE, GOAL, ORANGE, table_md, text_of
-from fingertip.files import InputError
-from reporting import run
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from fingertip.files import InputError, run_tool  # noqa: E402
+from presentation import BLUE, GOAL, ORANGE, table_md, text_of  # noqa: E402
+from reporting import run  # noqa: E402
 
 # model: what the figures call it, its colour
 GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}
 CALLED = {model: called for model, (called, _) in GRIPPERS.items()}
+COARSE = next(iter(GRIPPERS))  # has the coarsest steps
+# figure: its limits, by gripper
 BY_GRIPPER = {
     "drops_percent": (1, 1.5, 0.5),
     "peak_over_need_p50": (2.2, 2.0, 1.8),
     "margin_median": (2.2, None, 1.7),
     "reaction_ms": (41, None, None),
+    # Of a set force of 8 to 15 N.
+    "settle_s": (1.2, 1.2, 1.2),
+    "hold_rms_percent": (5, 5, 5),
 }
 GOALS = tuple(
     (f"{name}_{called}", "<=", limit)
@@ -31,6 +44,7 @@ GOALS = tuple(
     ("first_grip_over_2x_percent", "<=", 0.5),
     ("late_40ms_drops_percent", "<=", 3),
     ("step_us", "<=", 20),
+    ("limit_cycles", "<=", 0),
 )
 CONTROLLERS = {
     "ours": "ours",
@@ -39,19 +53,37 @@ CONTROLLERS = {
     "paper": "eq. (5) and (6) at 6 N",
     "oracle": "oracle",
 }
+MIXED = ("--kind", "usual,rough")
 # row: its options, whether it is judged; the others' controllers are beside it
 ROWS = {
-    "usual and rough": (("--kind", "usual,rough"), True),
+    "usual and rough": (MIXED, True),
     "slick": (("--kind", "slick"), True),
     "fragile": (("--kind", "fragile"), True),
-    "usual and rough, 40 ms later": (("--kind", "usual,rough", "--later", "40"), False),
+    "usual and rough, 40 ms later": ((*MIXED, "--later", "40"), False),
+    "usual and rough, half of the load reported": ((*MIXED, "--load", "0.5"), False),
+    "usual and rough, no load reported": ((*MIXED, "--load", "0"), False),
+    "usual and rough, 20 frames a second": ((*MIXED, "--rate", "20"), False),
+    "usual and rough, 100 frames a second": ((*MIXED, "--rate", "100"), False),
+    "usual and rough, 1308 frames a second": ((*MIXED, "--rate", "1308"), False),
     "usual": (("--kind", "usual"), False),
     "rough": (("--kind", "rough"), False),
     "gentle": (("--kind", "gentle"), False),
 }
+STILL = ("--kind", "gentle", "--still")
+# row of a set force: its options, its controller
+SETS = {
+    "12 s": ((*STILL, "12"), "ours"),
+    "60 s": ((*STILL, "60"), "ours"),
+    "12 s, eq. (5) and (6)": ((*STILL, "12"), "paper"),
+    "12 s, oracle": ((*STILL, "12"), "oracle"),
+}
+CYCLES = 4  # turns of the commanded width in the last half of a hold
 GRASPS, GRASPS_MORE = 1500, 300
 USUAL, USUAL_MORE = 300, 100
-ABOUT = """Another world than the one above, written so that it disagrees with the controller: pads F ~ d^1.3 to d^1.9 whose stiffness differs by up to 20 %, 6 to
+FIRM_N = 8.0
+NEED_LEAST_N = 1.5  # of a catch that counts
+FIRST_MUCH = 2.0
+ABOUT = """A world that was written to disagree with the controller: pads F ~ d^1.3 to d^1.9 whose stiffness differs by up to 20 %, 6 to
 30 % relaxation, friction that falls by up to 29 % when sliding begins and differs by side, objects off the centre that are free along the grip's axis, minimum-jerk
 lifts, knocks, pushes, vibration, pouring, carrying and slickness, frames that come late, with jitter or not at all, errors of force and load. The ranges
 of each kind are in `host_tools/simulation/cell/kinds.cpp`. Only SLIDING is computed by the firmware's own code. No grasp needs more than 16 N.
@@ -71,24 +103,106 @@ COLUMNS = {
     "margin_p95": "p95",
     "catches": "catches",
     "peak_over_need_p50": "peak over need: p50",
-    "peak_over_need_p95": "p95 ",
+    "peak_over_need_p95": "p95",
     "slid_p50_mm": "slid, mm: p50",
-    "slid_p95_mm": "p95  ",
+    "slid_p95_mm": "p95",
     "reaction_p50_ms": "reaction, ms: p50",
     "hunting_percent": "hunting, %",
     "crushed_percent": "crushed, %",
     "over_cap": "over the cap",
     "first_grip_over_2x_percent": "first grip over 2x, %",
 }
+ABOUT_SETS = """A set force of 2 to 15 N on an object that stays on the table. Settled: within 10 % for 0.5 s, by what the fingertips report. The rms error counts
+from there on. A limit cycle: the commanded width turns four times or more in the last half of a hold. Firm: of set forces of 8 N and more. The oracle knows the true force, how it follows the width and how the rubber is going to relax. Of the positions that
+the gripper can reach it takes the one whose mean squared error over the rest of the hold is least, and it moves no more often than ours may. It plans no
+second move, so it shows what is possible, and is no least bound. Ours does not know how the rubber is going to relax."""
+SET_COLUMNS = {
+    "row": "held for",
+    "gripper": "gripper",
+    "grasps": "grasps",
+    "settle_p50_s": "settles within, s: p50",
+    "settle_p95_s": "p95",
+    "never_settled_percent": "never, %",
+    "rms_p50_percent": "rms error, %: p50",
+    "firm_settle_p50_s": "firm: settles within, s: p50",
+    "firm_rms_p50_percent": "rms error, %: p50",
+    "limit_cycles": "limit cycles",
+}
 
 
-def row_of(program, name, gripper, controller, count, seed):
-    text = run(program, "--gripper", gripper, "--controller", controller, "--seed", seed, "--count", count, *ROWS[name][0])
+def program(build):
+    path = pathlib.Path(build) / "host_tools/report/grasp/fingertip_grasp_kinds"
+    if not path.is_file():
+        raise InputError(f"{path} is not there; build it: cmake --build --preset host")
+    return path
+
+
+def found_by(build, *more):
+    text = run(program(build), *more)
     try:
-        found = json.loads(text)
+        return json.loads(text)
     except ValueError as error:
         raise InputError(f"fingertip_grasp_kinds wrote no JSON ({error})") from None
-    return {"row": name, **{key: value for key, value in found.items() if key not in ("kind", "seed")}}
+
+
+def quantile(values, share):
+    """Of values and of what never came, which is None; None where it is that."""
+    values = sorted(float("inf") if value is None else value for value in values)
+    value = values[int(share * (len(values) - 1))] if values else float("inf")
+    return None if value == float("inf") else round(value, 3)
+
+
+def percent(part, whole):
+    return round(100 * part / whole, 3) if whole else None
+
+
+def summary(each):
+    held = [one for one in each if not one["dropped"] and not one["never_held"]]
+    need = [
+        slide["peak_N"] / slide["least_N"]
+        for one in each
+        if not one["dropped"]
+        for slide in one["catches"]
+        if slide["least_N"] >= NEED_LEAST_N
+    ]
+    return {
+        "grasps": len(each),
+        "drops_percent": percent(sum(one["dropped"] or one["never_held"] for one in each), len(each)),
+        "margin_p50": quantile([one["margin"] for one in held], 0.5),
+        "margin_p95": quantile([one["margin"] for one in held], 0.95),
+        "catches": len(need),
+        "peak_over_need_p50": quantile(need, 0.5),
+        "peak_over_need_p95": quantile(need, 0.95),
+        "slid_p50_mm": quantile([one["slid_mm"] for one in held], 0.5),
+        "slid_p95_mm": quantile([one["slid_mm"] for one in held], 0.95),
+        "reaction_p50_ms": quantile(reactions(each), 0.5),
+        "hunting_percent": percent(sum(one["hunts"] for one in each), len(held)),
+        "crushed_percent": percent(sum(one["crushed"] for one in each), len(each)),
+        "over_cap": sum(one["peak_N"] > one["cap_N"] for one in each),
+        "first_grip_over_2x_percent": percent(sum(one["first_N"] > FIRST_MUCH * one["start_N"] for one in each), len(each)),
+        "step_us": quantile([one["step_us"] for one in each], 0.5),
+    }
+
+
+def reactions(each):
+    return [slide["reaction_ms"] for one in each for slide in one["catches"] if slide["reaction_ms"] is not None]
+
+
+def summary_of_sets(each):
+    def settled(of):
+        return [one["rms_percent"] for one in of if one["settle_s"] is not None]
+
+    firm = [one for one in each if one["set_N"] >= FIRM_N]
+    return {
+        "grasps": len(each),
+        "settle_p50_s": quantile([one["settle_s"] for one in each], 0.5),
+        "settle_p95_s": quantile([one["settle_s"] for one in each], 0.95),
+        "never_settled_percent": percent(sum(one["settle_s"] is None for one in each), len(each)),
+        "rms_p50_percent": quantile(settled(each), 0.5),
+        "firm_settle_p50_s": quantile([one["settle_s"] for one in firm], 0.5),
+        "firm_rms_p50_percent": quantile(settled(firm), 0.5),
+        "limit_cycles": sum(one["reversals"] >= CYCLES for one in each),
+    }
 
 
 def worst(rows, key, name=None):
@@ -96,7 +210,7 @@ def worst(rows, key, name=None):
     return max(values) if values else None
 
 
-def figures(rows):
+def figures(rows, sets):
     """What is judged, of all rows of ours."""
     found = {}
     for row in rows:
@@ -109,6 +223,12 @@ def figures(rows):
                 ("reaction_ms", "reaction_p50_ms"),
             ):
                 found[f"{name}_{called}"] = row[key]
+    for row in sets:
+        called = CALLED[row["gripper"]]
+        if row["row"] == "12 s":
+            found |= {f"settle_s_{called}": row["firm_settle_p50_s"], f"hold_rms_percent_{called}": row["firm_rms_p50_percent"]}
+        elif row["row"] == "12 s, oracle":
+            found[f"hold_rms_possible_percent_{called}"] = row["firm_rms_p50_percent"]
     return found | {
         "slick_drops_percent_worst": worst(rows, "drops_percent", "slick"),
         "peak_over_need_p95_worst": worst(rows, "peak_over_need_p95", "usual and rough"),
@@ -119,24 +239,87 @@ def figures(rows):
         "first_grip_over_2x_percent": worst(rows, "first_grip_over_2x_percent", "usual and rough"),
         "late_40ms_drops_percent": worst(rows, "drops_percent", "usual and rough, 40 ms later"),
         "step_us": worst(rows, "step_us"),
+        "limit_cycles": sum(row["limit_cycles"] for row in sets if row["row"] in ("60 s", "12 s, eq. (5) and (6)")),
     }
 
 
+def caught(each):
+    """Number of a grasp and when its slide began: of all slides of 1 mm or more after the lift that were answered within 0.1 s, the one of
+    the median way."""
+    slides = sorted(
+        (slide["way_mm"], one["n"], slide["begin_s"])
+        for one in each
+        if not one["dropped"]
+        for slide in one["catches"]
+        if slide["way_mm"] >= 1 and slide["begin_s"] > one["lift_s"] and (slide["reaction_ms"] or 100) < 100
+    )
+    _, number, begin_s = slides[len(slides) // 2] if slides else (0, None, None)
+    return number, begin_s
+
+
 def measure(options, steps):
-    program = pathlib.Path(options.build) / "host_tools/report/grasp/fingertip_grasp_kinds"
-    if not program.is_file():
-        raise InputError(f"{program} is not there; build it: cmake --build --preset host")
     judged, more = (options.grasps, options.grasps) if options.grasps else (USUAL, USUAL_MORE) if options.usual else (GRASPS, GRASPS_MORE)
-    rows = []
-    for name, (_, is_judged) in ROWS.items():
-        for gripper in CALLED:
+    found = {"kinds": [], "sets": [], "distributions": []}
+    for name, (arguments, is_judged) in ROWS.items():
+        for gripper in GRIPPERS:
             for controller in CONTROLLERS if is_judged else ("ours",):
                 count = judged if name == "usual and rough" or controller == "ours" and is_judged else more
-                rows.append(row_of(program, name, gripper, controller, count, options.seed))
-            steps.report(f"{gripper}, {name}: {rows[-1]['grasps']} grasps")
-    return {"kinds": rows, **figures(rows)}
+                call = (*arguments, "--gripper", gripper, "--controller", controller, "--seed", options.seed)
+                each = found_by(options.build, *call, "--count", count)["each"]
+                found["kinds"].append({"row": name, "gripper": gripper, "controller": controller, **summary(each)})
+                if name == "usual and rough" and controller == "ours":
+                    held = [one for one in each if not one["dropped"]]
+                    found["distributions"].append(
+                        {
+                            "gripper": gripper,
+                            "margin": sorted(one["margin"] for one in held),
+                            "slid_mm": sorted(one["slid_mm"] for one in held),
+                            "reaction_ms": sorted(reactions(each)),
+                        }
+                    )
+                    number, begin_s = caught(each)
+                    if "caught" not in found and number is not None:
+                        found["caught"] = {"gripper": gripper, "begin_s": begin_s, **found_by(options.build, *call, "--trace", number)}
+            steps.report(f"{gripper}, {name}: {found['kinds'][-1]['grasps']} grasps")
+    for name, (arguments, controller) in SETS.items():
+        for gripper in GRIPPERS if controller != "oracle" else (COARSE,):
+            count = max(1, more // 5) if name == "60 s" else more
+            call = (*arguments, "--gripper", gripper, "--controller", controller, "--seed", options.seed, "--count", count)
+            found["sets"].append({"row": name, "gripper": gripper, **summary_of_sets(found_by(options.build, *call)["each"])})
+            steps.report(f"{gripper}, a set force for {name}: {count} grasps")
+    return found | figures(found["kinds"], found["sets"])
+
+
+def rows_md(rows, columns):
+    return table_md(list(columns.values()), [[text_of(row.get(key), 3) for key in columns] for row in rows])
 
 
 def text(found):
-    cells = [[CONTROLLERS[row[key]] if key == "controller" else text_of(row.get(key), 3) for key in COLUMNS] for row in found["kinds"]]
-    return [*ABOUT.split("\n"), "", *table_md([name.strip() for name in COLUMNS.values()], cells), ""]
+    rows = [{**row, "controller": CONTROLLERS[row["controller"]]} for row in found["kinds"]]
+    return [
+        "## By kind",
+        "",
+        *ABOUT.split("\n"),
+        "",
+        *rows_md(rows, COLUMNS),
+        "",
+        "## Set forces",
+        "",
+        *ABOUT_SETS.split("\n"),
+        "",
+        *rows_md(found["sets"], SET_COLUMNS),
+        "",
+    ]
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", required=True, metavar="DIR")
+    options, more = parser.parse_known_args(argv)
+    each = found_by(options.build, *more)["each"]
+    print(json.dumps((summary_of_sets if "settle_s" in each[0] else summary)(each), indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("kinds.py", main))

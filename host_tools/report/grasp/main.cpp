@@ -1,120 +1,276 @@
-// fingertip_grasp_trials: many grasps in the simulated cell (host_tools/simulation/cell), one set of them.
-//
-// One JSON object on the standard output: what was asked for, then how the grasps went, all of it
-// and by object, friction and disturbance. All simulated.
-#include "grasp/summary.hpp"
+// fingertip_grasp_kinds: many grasps in simulated time (host_tools/simulation/cell/kind_trial.hpp). It prints
+// one JSON object: what was asked for, and each grasp. kinds.py sums them up.
+#include "grasp/settings.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
-#include "report/grasp/options.hpp"
+#include "report/grasp/fault_trials.hpp"
+#include "report/grasp/oracle.hpp"
+#include "report/grasp/textbook.hpp"
 
+#include <CLI/CLI.hpp>
 #include <chrono>
-#include <cstdio>
-#include <exception>
 #include <iostream>
-#include <nlohmann/json.hpp>
-#include <stdexcept>
+#include <memory>
 
+namespace fingertip::grasp {
 namespace {
 
-using namespace fingertip;
-using namespace fingertip::grasp;
+using namespace cell;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] = "usage: fingertip_grasp_trials [options]\n"
-                        "  --gripper NAME    a model that `fingertip gripper list` names (usual: the first), or ideal\n"
-                        "  --mode NAME       hold (usual), fixed; on the table, no lift: still, still-fixed,\n"
-                        "                    still-oracle: knows the true force, stiffness and relaxation\n"
-                        "  --objects NAME    round (usual: balls and cylinders), balls, cylinders, faces, flats; or\n"
-                        "                    faces of the twin, split by commas\n"
-                        "  --rate HZ         frames of a fingertip a second, 410; above 600 at OSR 256, else 1024\n"
-                        "  --effect SHARE    of a tangential force's field that reaches the readings, 1\n"
-                        "  --still S         length of a still grasp, 12\n"
-                        "  --set NAME=VALUE  of the controller's settings, split by commas: margin=1.4\n"
-                        "  --seed S          another set of scenes, pads and noise; 1 to 999 are there to choose\n"
-                        "                    constants by, the report judges by others; 1\n"
-                        "  --count N         grasps, 100\n"
-                        "  --first N         number of the first, 0\n"
-                        "  --jobs N          threads, 2\n"
-                        "  --each            adds a line for each grasp\n"
-                        "  --trace N         instead: all that is known of that grasp, every 2 ms\n"
-                        "  --cache DIR       folder of the contact tables\n";
+enum Stream : std::uint64_t { NOISE = 881, SET };
+
+constexpr double FIXED_N = 15.0, PAPER_N = 6.0;
+constexpr double SET_LEAST_N = 2.0, SET_MOST_N = 15.0; // of a still grasp
+constexpr double SENSORS_NOISE = 0.05;
 
 struct Options {
-  SetOptions set;
-  std::string rate = "410", effect = "1", still = "12", trace;
-  std::uint64_t count = 100, first = 0, jobs = 2;
-  bool each = false;
+  std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings;
+  double later_ms = 0.0, rate_Hz = 410.0, load_share = 1.0, still_s = 0.0;
+  std::uint64_t seed = 1, count = 100, jobs = 2;
+  std::optional<std::uint64_t> trace;
+  bool faults = false;
 };
 
-double number_of(const std::string &name, const std::string &text) {
-  const auto value = to_double(text);
-  if (!value) {
-    throw std::runtime_error(name + " needs a number, not \"" + printable(text) + "\"");
-  }
-  return *value;
-}
-
-int measure(const Options &options) {
-  using Clock = std::chrono::steady_clock;
-  const auto began = Clock::now();
-  const Set set(options.set);
-  ordered_json out;
-  if (!options.trace.empty()) {
-    std::cout << trace_of(set, static_cast<std::uint64_t>(number_of("--trace", options.trace))) << '\n';
-    return std::cout.flush() ? 0 : 1;
-  }
-  const auto ready = Clock::now();
-  const std::vector<Done> done = run_all(set, options.first, options.count, options.jobs);
-  const std::chrono::duration<double> prepared = ready - began, ran = Clock::now() - ready;
-  out["gripper"] = options.set.gripper;
-  out["mode"] = options.set.mode;
-  out["objects"] = options.set.objects;
-  out["rate_Hz"] = options.set.rate_Hz;
-  out["effect"] = options.set.effect;
-  out["seed"] = options.set.seed;
-  out["set"] = options.set.settings;
-  out.update(summary_of(done, set.is_still()));
-  if (options.each) {
-    for (std::size_t i = 0; i < done.size(); i++) {
-      out["each"].push_back(line_of(options.first + i, done[i]));
+// Of name=value, split by commas, as grasp_settings() has them.
+std::map<std::string, double> settings_of(const std::string &changes) {
+  std::map<std::string, double> values;
+  for (const std::string_view one : split(changes, ',')) {
+    if (one.empty()) {
+      continue;
     }
+    const std::size_t equals = one.find('=');
+    const std::string name(one.substr(0, equals));
+    const auto value = equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
+    const auto &all = grasp_settings();
+    if (std::none_of(all.begin(), all.end(), [&](const GraspSetting &each) { return name == each.name; })) {
+      throw std::runtime_error("the controller has no setting \"" + name + "\"");
+    }
+    if (!value) {
+      throw std::runtime_error("the setting " + name + " has no number");
+    }
+    values[name] = *value;
   }
-  out["prepared_s"] = prepared.count();
-  out["ran_s"] = ran.count();
-  std::cout << out.dump(1) << '\n';
-  return std::cout.flush() ? 0 : 1;
+  return values;
 }
 
-} // namespace
+KindTrial trial_of(const Options &options, std::uint64_t n) {
+  const auto kinds = split(options.kind, ',');
+  KindTrial trial;
+  trial.grasp = draw_grasp(kind_of(std::string(kinds[n % kinds.size()])), options.seed, n / kinds.size());
+  trial.gripper = gripper_mechanics(options.gripper);
+  trial.seed = Random(options.seed, NOISE, n).next();
+  trial.later_s = 1e-3 * options.later_ms;
+  trial.rate_Hz = options.rate_Hz;
+  trial.load_share = options.load_share;
+  if (options.still_s > 0.0) {
+    trial.still_s = options.still_s;
+    trial.set_N = Random(options.seed, SET, n).log_uniform(SET_LEAST_N, SET_MOST_N);
+    trial.set_of_smaller = options.controller != "paper";
+    trial.grasp.table_friction = 0.0; // both pads press alike
+    trial.noise = SENSORS_NOISE;
+  }
+  return trial;
+}
 
-int main(int argc, char **argv) {
+GripSettings settings_with(const Options &options, const KindTrial &trial) {
+  std::map<std::string, double> values;
+  if (trial.grasp.kind == Kind::fragile) {
+    values = preset_values(trial.grasp.object);
+  }
+  const bool still = trial.still_s > 0.0;
+  if (options.controller == "fixed" || options.controller == "paper") {
+    values["fixed"] = still ? trial.set_N : options.controller == "fixed" ? FIXED_N : PAPER_N;
+    values.erase("cap");
+  }
+  for (const auto &[name, value] : settings_of(options.settings)) {
+    values[name] = value;
+  }
+  GripSettings settings = settings_for(trial.gripper.traits, values);
+  if (still) {
+    settings.start_N = settings.floor_N = settings.blind_N = trial.set_N;
+  }
+  return settings;
+}
+
+struct Done {
+  KindTrial trial;
+  KindOutcome outcome;
+  GripSettings settings;
+  double step_us; // of the controller, the mean
+};
+
+// Counts what a step takes.
+class Timed : public Controller {
+public:
+  explicit Timed(Controller &inner) : inner_(inner) {}
+  void take_touch(std::size_t finger, const GripTouch &touch) override { inner_.take_touch(finger, touch); }
+  void take_status(const GripperStatus &status) override { inner_.take_status(status); }
+  GripReport step(double now_s, GripCommand &command) override {
+    using Clock = std::chrono::steady_clock;
+    const auto began = Clock::now();
+    const GripReport report = inner_.step(now_s, command);
+    seconds_ += std::chrono::duration<double>(Clock::now() - began).count();
+    steps_++;
+    return report;
+  }
+  double mean_us() const { return steps_ > 0 ? 1e6 * seconds_ / steps_ : 0.0; }
+
+private:
+  Controller &inner_;
+  double seconds_ = 0.0, steps_ = 0.0;
+};
+
+Done run_one(const Options &options, std::uint64_t n, const std::function<void(const KindMoment &)> &trace = {}) {
+  Done done{trial_of(options, n), {}, {}, 0.0};
+  done.settings = settings_with(options, done.trial);
+  const GripperTraits &traits = done.trial.gripper.traits;
+  std::unique_ptr<Controller> controller;
+  std::function<void(const KindMoment &)> seen = trace;
+  if (options.controller == "oracle") {
+    std::unique_ptr<Knowing> oracle;
+    if (done.trial.still_s > 0.0) {
+      oracle = std::make_unique<StillOracle>(done.trial);
+    } else {
+      oracle = std::make_unique<Oracle>(done.trial, done.settings);
+    }
+    seen = [&trace, &knowing = *oracle](const KindMoment &moment) {
+      knowing.see(moment);
+      trace ? trace(moment) : void();
+    };
+    controller = std::move(oracle);
+  } else if (options.controller == "textbook") {
+    controller = std::make_unique<Textbook>(traits);
+  } else {
+    controller = std::make_unique<CoreController>(done.settings, traits);
+  }
+  Timed timed(*controller);
+  done.outcome = run_kind(done.trial, timed, seen);
+  done.step_us = timed.mean_us();
+  return done;
+}
+
+ordered_json line_of(std::uint64_t n, const Done &one) {
+  const KindOfGrasp &grasp = one.trial.grasp;
+  const KindOutcome &o = one.outcome;
+  ordered_json line{{"n", n},
+                    {"mass_kg", grasp.mass_kg},
+                    {"friction", grasp.pads[0].friction},
+                    {"lift_s", grasp.lift_s},
+                    {"dropped", o.dropped},
+                    {"never_held", o.never_held},
+                    {"crushed", o.crushed},
+                    {"hunts", o.hunts},
+                    {"margin", o.margin},
+                    {"slid_mm", o.slid_mm},
+                    {"first_N", o.first_N},
+                    {"peak_N", o.peak_N},
+                    {"start_N", one.settings.start_N},
+                    {"cap_N", one.settings.cap_N},
+                    {"step_us", one.step_us},
+                    {"events", ordered_json::array()},
+                    {"catches", ordered_json::array()}};
+  for (const Event &event : grasp.events) {
+    line["events"].push_back(name_of(event.kind));
+  }
+  for (const Slip &slip : o.catches) {
+    line["catches"].push_back({{"begin_s", slip.begin_s},
+                               {"way_mm", slip.way_mm},
+                               {"peak_N", slip.peak_N},
+                               {"least_N", slip.least_N},
+                               {"reaction_ms", slip.reaction_s ? ordered_json(1e3 * *slip.reaction_s) : nullptr}});
+  }
+  if (one.trial.still_s > 0.0) {
+    line["set_N"] = one.trial.set_N;
+    line["settle_s"] = o.settle_s ? ordered_json(*o.settle_s) : nullptr;
+    line["rms_percent"] = 100.0 * o.rms;
+    line["reversals"] = o.reversals;
+  }
+  return line;
+}
+
+// All that is known of one grasp, every 2 ms.
+ordered_json traced(const Options &options, std::uint64_t n) {
+  ordered_json series;
+  const Done done = run_one(options, n, [&](const KindMoment &m) {
+    const std::pair<const char *, double> values[] = {
+        {"t_s", m.t_s},           {"lift_s", std::max(m.lift_s, -1.0)},
+        {"width_mm", m.width_mm}, {"force_N", 0.5 * (m.left_N + m.right_N)},
+        {"least_N", m.least_N},   {"load_N", m.load_N},
+        {"way_mm", m.way_mm},     {"slid_mm", m.slid_mm},
+        {"slips", m.slips},       {"sensed_N", m.report.force_N}};
+    for (const auto &[name, value] : values) {
+      series[name].push_back(value);
+    }
+  });
+  ordered_json out = line_of(n, done);
+  out["series"] = series;
+  return out;
+}
+
+ordered_json measured(const Options &options) {
+  if (options.trace) {
+    return traced(options, *options.trace);
+  }
+  if (options.faults) {
+    return {{"rows", fault_rows(options.jobs)}};
+  }
+  std::vector<Done> done(options.count);
+  twin::in_parallel(
+      options.count, [&](std::size_t i) { done[i] = run_one(options, i); }, options.jobs);
+  ordered_json out{{"gripper", options.gripper}, {"controller", options.controller}};
+  for (std::size_t i = 0; i < done.size(); i++) {
+    out["each"].push_back(line_of(i, done[i]));
+  }
+  return out;
+}
+
+int run(int argc, char **argv) {
+  CLI::App app("Grasps in simulated time, as JSON on the standard output.", "fingertip_grasp_kinds");
+  Options options;
+  app.add_option("--kind", options.kind, "gentle, usual, rough, slick, fragile; several, split by commas, by turns")
+      ->capture_default_str();
+  app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")->capture_default_str();
+  app.add_option("--controller", options.controller,
+                 "textbook; fixed: 15 N; paper: eq. (5) and (6) at 6 N; oracle: knows the true load, friction, "
+                 "stiffness and relaxation")
+      ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper", "oracle"}))
+      ->capture_default_str();
+  app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
+  app.add_option("--later", options.later_ms, "All frames come later")->check(CLI::NonNegativeNumber)->type_name("MS");
+  app.add_option("--rate", options.rate_Hz, "Frames of a fingertip")
+      ->check(CLI::Range(1.0, 1600.0))
+      ->type_name("HZ")
+      ->capture_default_str();
+  app.add_option("--load", options.load_share, "Share of the load that frames report; 0: they report none")
+      ->check(CLI::Range(0.0, 1.0))
+      ->type_name("SHARE")
+      ->capture_default_str();
+  app.add_option("--still", options.still_s,
+                 "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("S");
+  app.add_option("--seed", options.seed,
+                 "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
+      ->capture_default_str();
+  app.add_option("--count", options.count, "Grasps")->check(CLI::Range(1, 1000000))->capture_default_str();
+  app.add_option("--jobs", options.jobs, "Threads")->check(CLI::Range(1, 64))->capture_default_str();
+  app.add_option("--trace", options.trace, "Instead: all that is known of this grasp, every 2 ms")->type_name("N");
+  app.add_flag("--faults", options.faults, "Instead: every fault in every state of a grasp");
   try {
-    Options options;
-    options.set.cache = FINGERTIP_TABLES_DIR;
-    reference::parse_options(argc, argv,
-                             {{"--gripper", &options.set.gripper},
-                              {"--mode", &options.set.mode},
-                              {"--objects", &options.set.objects},
-                              {"--rate", &options.rate},
-                              {"--effect", &options.effect},
-                              {"--still", &options.still},
-                              {"--set", &options.set.settings},
-                              {"--trace", &options.trace},
-                              {"--cache", &options.set.cache},
-                              {"--seed", nullptr, &options.set.seed},
-                              {"--count", nullptr, &options.count},
-                              {"--first", nullptr, &options.first},
-                              {"--jobs", nullptr, &options.jobs},
-                              {"--each", nullptr, nullptr, &options.each}},
-                             HELP);
-    if (options.count == 0 || options.jobs == 0 || options.jobs > 64) {
-      throw std::runtime_error("--count needs 1 or more, --jobs 1 to 64");
-    }
-    options.set.rate_Hz = number_of("--rate", options.rate);
-    options.set.effect = number_of("--effect", options.effect);
-    options.set.still_s = number_of("--still", options.still);
-    return measure(options);
+    app.parse(argc, argv);
+    std::cout << measured(options).dump() << '\n';
+    return std::cout.flush() ? 0 : 1;
+  } catch (const CLI::CallForHelp &help) {
+    return app.exit(help);
   } catch (const std::exception &error) {
-    std::fprintf(stderr, "fingertip_grasp_trials: %s\n", error.what());
+    std::fprintf(stderr, "fingertip_grasp_kinds: %s\n", error.what());
     return 1;
   }
 }
+
+} // namespace
+} // namespace fingertip::grasp
+
+int main(int argc, char **argv) { return fingertip::grasp::run(argc, argv); }

@@ -1,4 +1,4 @@
-#include "grasp/textbook.hpp"
+#include "report/grasp/textbook.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

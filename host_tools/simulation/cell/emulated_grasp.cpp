@@ -47,18 +47,9 @@ CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
   return rubber;
 }
 
-Rubber rubber_after(const CalibratedRubber &rubber) {
-  Rubber left;
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    left.gain[k] = rubber.gain[k] / static_cast<double>(rubber.stored.sensors[k].gain);
-    left.gain_sd[k] = static_cast<double>(rubber.stored.sensors[k].gain_sd);
-  }
-  return left;
-}
-
 EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
-    : trial_(trial), face_(face), cell_(face, trial.scene.object, trial.scene.grasp),
-      gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm, Random(trial.seed, LINE, 0)),
+    : trial_(trial), face_(face), cell_(face, trial.object, trial.grasp),
+      gripper_(trial.gripper, trial.object.width_mm + trial.course.opens_mm, Random(trial.seed, LINE, 0)),
       fingers_{EmulatedFingertip(profile, trial.rubber[0].stored), EmulatedFingertip(profile, trial.rubber[1].stored)},
       holds_s_(NEVER_s), lift_s_(NEVER_s), touched_s_(NEVER_s) {
   gripper_.press(cell_);
@@ -126,13 +117,14 @@ void EmulatedGrasp::advance(double to_s) {
   if (seconds <= 0.0) {
     return;
   }
-  if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.scene.waits_s) {
+  if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.course.waits_s) {
     lift_s_ = t_s_;
   }
   const bool lifts = lift_s_ < NEVER_s;
   const double width_mm = gripper_.motion().width_mm();
   gripper_.motion().step(seconds);
-  Drive drive = trial_.scene.drive(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
+  const KindOfGrasp::Inputs inputs = trial_.course.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
+  Drive drive = drive_of(inputs, trial_.grasp.down_rad);
   drive.width_mm = gripper_.motion().width_mm();
   cell_.run(seconds, drive);
   t_s_ = to_s;
@@ -145,11 +137,11 @@ void EmulatedGrasp::advance(double to_s) {
     touched_s_ = std::min(touched_s_, t_s_);
   }
   if (lifts) {
-    slips_.look(t_s_, cell_);
+    slips_.sample(t_s_, cell_.slips(), force_N, cell_.slid_mm());
   }
   const Vector way = cell_.way_mm();
   dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !drive.table && force_N < LOST_N);
-  over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.scene.ends_s);
+  over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.course.ends_s);
   if (over_) {
     slips_.end();
   }
@@ -160,7 +152,7 @@ std::vector<std::uint8_t> EmulatedGrasp::to_send(std::size_t finger) {
 }
 
 Pressures EmulatedGrasp::sensed_Pa(std::size_t finger) const {
-  Pressures sensed_Pa = face_.base_Pa(cell_.touch(finger), trial_.tangential);
+  Pressures sensed_Pa = face_.base_Pa(cell_.touch(finger));
   for (std::size_t k = 0; k < SENSORS; k++) {
     sensed_Pa[k] *= trial_.rubber[finger].gain[k];
   }

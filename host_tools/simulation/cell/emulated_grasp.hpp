@@ -3,11 +3,14 @@
 // bytes are handed over (host_tools/simulation/emulator/lockstep.mjs).
 //
 // The controller takes what came in a slice at its end, so up to a slice late; all else is at its
-// own time. The object is held as trial.hpp has it, and slips count as there.
+// own time.
 #pragma once
 
+#include "simulation/cell/controller.hpp"
 #include "simulation/cell/emulated_fingertip.hpp"
-#include "simulation/cell/trial.hpp"
+#include "simulation/cell/gripper_line.hpp"
+#include "simulation/cell/kinds.hpp"
+#include "simulation/cell/slips.hpp"
 
 #include <deque>
 #include <memory>
@@ -23,13 +26,12 @@ struct CalibratedRubber {
 };
 // Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
 CalibratedRubber draw_rubber(const pad_profile &profile, Random &random);
-// The gains that are left after it, for SimulatedFingertip.
-Rubber rubber_after(const CalibratedRubber &rubber);
 
 struct EmulatedTrial {
-  Scene scene;
+  Object object;
+  Grasp grasp;
+  KindOfGrasp course; // the lift and the events
   GripperMechanics gripper;
-  double tangential = 1.0; // share of a tangential force's field that reaches the readings
   std::array<CalibratedRubber, 2> rubber;
   std::uint64_t seed = 0; // of the gripper's first exchange
 };

@@ -6,7 +6,6 @@
 #include "simulation/cell/emulated_grasp.hpp"
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <stdexcept>
@@ -19,9 +18,9 @@ using namespace fingertip;
 using namespace fingertip::cell;
 using nlohmann::ordered_json;
 
+constexpr const char *FACE = "sphere15";
 constexpr double LAYER_mm = 12.0;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
-constexpr int SENSED_TRIALS = 21;
 enum Stream : std::uint64_t { PAD = 842 };
 
 struct Options {
@@ -31,24 +30,30 @@ struct Options {
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
-Scene scene_of(const Options &options) {
-  Scene scene;
-  scene.face = "sphere15";
-  scene.object.width_mm = 40.0;
-  scene.object.mass_kg = 0.3;
-  scene.object.friction = options.friction;
-  scene.object.uneven_friction = 0.03;
-  scene.object.com_mm = {3.0, 1.0};
-  scene.grasp.place_mm = {0.8, -1.5};
-  scene.grasp.angle_rad = 0.3;
-  scene.grasp.down_rad = 0.4;
-  scene.opens_mm = 1.0;
-  scene.waits_s = 0.05;
-  scene.lift_mm = 4.0;
-  scene.lift_s = 0.5;
-  scene.disturbances = {{Disturbance::Kind::slick, scene.lift_s + 0.1, 0.03, options.friction_falls, 0.0}};
-  scene.ends_s = scene.lift_s + 0.4;
-  return scene;
+EmulatedTrial trial_of(const Options &options, const pad_profile &profile) {
+  EmulatedTrial trial;
+  trial.object.width_mm = 40.0;
+  trial.object.mass_kg = trial.course.mass_kg = 0.3;
+  trial.object.friction = options.friction;
+  trial.object.uneven_friction = 0.03;
+  trial.object.com_mm = {3.0, 1.0};
+  trial.grasp.place_mm = {0.8, -1.5};
+  trial.grasp.angle_rad = 0.3;
+  trial.grasp.down_rad = 0.4;
+  KindOfGrasp &course = trial.course;
+  course.opens_mm = 1.0;
+  course.waits_s = 0.05;
+  course.lift_mm = 4.0;
+  course.lift_s = 0.5;
+  course.events = {{Event::Kind::slick, course.lift_s + 0.1, 0.03, options.friction_falls}};
+  course.ends_s = course.lift_s + 0.4;
+  trial.gripper = gripper_mechanics(options.gripper);
+  trial.seed = options.seed;
+  for (std::size_t f = 0; f < trial.rubber.size(); f++) {
+    Random random(options.seed, PAD, f);
+    trial.rubber[f] = draw_rubber(profile, random);
+  }
+  return trial;
 }
 
 // Reads from the standard input; false: it has ended.
@@ -73,53 +78,10 @@ void put_u32(std::size_t value) {
   put(&word, sizeof word);
 }
 
-// The same with the cell's own model of fingertips, at other moments of sensors and line.
-ordered_json simulated(const EmulatedTrial &emulated, const Face &face) {
-  std::vector<double> reactions_ms, slid_mm;
-  const GripperTraits &traits = emulated.gripper.traits;
-  const GripSettings settings = default_settings(traits);
-  int drops = 0;
-  for (int n = 0; n < SENSED_TRIALS; n++) {
-    Trial trial;
-    trial.scene = emulated.scene;
-    trial.gripper = emulated.gripper;
-    trial.sensing.tangential = emulated.tangential;
-    trial.seed = emulated.seed + static_cast<std::uint64_t>(n);
-    for (std::size_t f = 0; f < trial.rubber.size(); f++) {
-      trial.rubber[f] = rubber_after(emulated.rubber[f]);
-    }
-    CoreController controller(settings, traits);
-    const Outcome outcome = run_trial(trial, face, controller);
-    drops += !outcome.held;
-    slid_mm.push_back(outcome.slid_mm);
-    if (!outcome.slips.empty() && outcome.slips.front().reaction_s) {
-      reactions_ms.push_back(1e3 * *outcome.slips.front().reaction_s);
-    }
-  }
-  const auto spread = [](std::vector<double> &values) {
-    std::sort(values.begin(), values.end());
-    return values.empty() ? ordered_json(nullptr)
-                          : ordered_json{values.front(), values[values.size() / 2], values.back()};
-  };
-  ordered_json out;
-  out["grasps"] = SENSED_TRIALS;
-  out["dropped"] = drops;
-  out["reaction_least_median_most_ms"] = spread(reactions_ms);
-  out["slid_least_median_most_mm"] = spread(slid_mm);
-  return out;
-}
-
 int serve(const Options &options) {
-  const Face face(scene_of(options).face, LAYER_mm, options.cache);
+  const Face face(FACE, LAYER_mm, options.cache);
   const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
-  EmulatedTrial trial;
-  trial.scene = scene_of(options);
-  trial.gripper = gripper_mechanics(options.gripper);
-  trial.seed = options.seed;
-  for (std::size_t f = 0; f < trial.rubber.size(); f++) {
-    Random random(options.seed, PAD, f);
-    trial.rubber[f] = draw_rubber(profile, random);
-  }
+  const EmulatedTrial trial = trial_of(options, profile);
   EmulatedGrasp grasp(trial, face, profile);
   std::vector<std::uint8_t> bytes;
   while (!grasp.over()) {
@@ -150,12 +112,11 @@ int serve(const Options &options) {
   }
   ordered_json out;
   out["gripper"] = options.gripper;
-  out["face"] = trial.scene.face;
-  out["mass_kg"] = trial.scene.object.mass_kg;
-  out["friction"] = trial.scene.object.friction;
+  out["face"] = FACE;
+  out["mass_kg"] = trial.object.mass_kg;
+  out["friction"] = trial.object.friction;
   out["friction_falls"] = options.friction_falls;
   out.update(grasp.summary());
-  out["felt"] = simulated(trial, face);
   const std::string text = out.dump();
   put(text.data(), text.size());
   return std::fflush(stdout) == 0 ? 0 : 1;

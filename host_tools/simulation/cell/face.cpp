@@ -102,21 +102,21 @@ double Face::at(const std::vector<float> &values, double force_N) {
   return (1.0 - t) * static_cast<double>(values[i]) + t * static_cast<double>(values[i + 1]);
 }
 
-Pressures Face::base_Pa(const twin::Touch &touch, double tangential) const {
+Pressures Face::base_Pa(const twin::Touch &touch) const {
   Pressures base_Pa{};
   const double carried_N = touch.force_N - touch.stuck_N;
   if (!(touch.force_N > 0.0)) {
     return base_Pa;
   }
   for (std::size_t k = 0; k < plate_.size(); k++) {
-    base_Pa[k] = touch.force_N * plate_[k][NORMAL] +
-                 tangential * (touch.pull_x_N * plate_[k][ALONG_X] + touch.pull_y_N * plate_[k][ALONG_Y]);
+    base_Pa[k] =
+        touch.force_N * plate_[k][NORMAL] + touch.pull_x_N * plate_[k][ALONG_X] + touch.pull_y_N * plate_[k][ALONG_Y];
   }
   if (!plate_.empty()) {
     return base_Pa;
   }
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
-  const double share = carried_N > 0.0 ? tangential / carried_N : 0.0;
+  const double share = carried_N > 0.0 ? 1.0 / carried_N : 0.0;
   const float along_x = static_cast<float>(share * (c * touch.pull_x_N + s * touch.pull_y_N));
   const float along_y = static_cast<float>(share * (c * touch.pull_y_N - s * touch.pull_x_N));
   const Between pressed = between_forces(touch.force_N), stuck = between_forces(touch.stuck_N);

@@ -34,8 +34,7 @@ public:
   // 0..FORCE_MAX_N; beyond, as there.
   double indentation_mm(double force_N) const { return at(indentation_mm_, force_N); }
   double radius_mm(double force_N) const { return at(radius_mm_, force_N); } // of contact
-  // tangential: share of the tangential force's field that is applied.
-  Pressures base_Pa(const twin::Touch &touch, double tangential) const;
+  Pressures base_Pa(const twin::Touch &touch) const;
 
 private:
   static constexpr int STRIDE = 2; // of the twin's nodes

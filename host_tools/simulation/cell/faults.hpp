@@ -1,9 +1,10 @@
 // The faults of a trial: of fingertips, the gripper, its line, the object.
 #pragma once
 
-#include "simulation/cell/gripper_line.hpp"
-#include "simulation/cell/simulated_fingertip.hpp"
+#include "grasp/control/grip.hpp"
+#include "libfingertip/random.hpp"
 
+#include <array>
 #include <limits>
 #include <optional>
 
@@ -28,8 +29,8 @@ struct Fault {
   };
   Kind kind = Kind::none;
   std::array<bool, 2> fingers{}; // of which fingertips
-  // The fault begins after_s after the controller first reported this state.
-  std::uint8_t state = GRIP_HOLDING;
+  // The fault begins after_s after the controller first reported this state; GRIP_STATES: never.
+  std::uint8_t state = GRIP_STATES;
   double after_s = 0.0, lasts_s = std::numeric_limits<double>::infinity(), watched_s = 2.0;
 };
 
@@ -39,14 +40,12 @@ public:
 
   // After each step of the controller.
   void watch(double t_s, std::uint8_t state);
-  const Fault &fault() const { return fault_; }
   bool has_begun(double t_s) const { return t_s >= begins_s_; }
   double begins_s() const { return begins_s_; } // infinity: not known yet
   bool is(Fault::Kind kind, double t_s) const { return fault_.kind == kind && lasts(t_s); }
 
   // The frame that arrives, if any.
-  std::optional<SimulatedFingertip::Frame> frame(std::size_t finger, const SimulatedFingertip::Frame &measured,
-                                                 double t_s);
+  std::optional<GripTouch> frame(std::size_t finger, GripTouch measured);
   struct Line {
     bool commands = true, answers = true; // come through
     double late_s = 0.0;                  // the answer, and what is asked next

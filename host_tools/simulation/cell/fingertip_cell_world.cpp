@@ -10,37 +10,37 @@
 namespace fingertip::cell {
 namespace {
 
-using Disturbs = Disturbance::Kind;
-
 constexpr double STEP_s = 2.5e-4;                    // between two samples of the gripper
 constexpr double STEADY = 0.1, STEADY_LEAST_N = 0.2; // a force that changes by this share at most is steady
 constexpr double LOST_N = 0.01;
 constexpr double JOINED_s = 0.03; // what goes on after less rest is one slip
 
 struct Known {
-  Disturbs kind;
+  Event::Kind kind;
   double low, high, seconds;
 };
-// Ranges keep the physics within its steps; lengths are of scene.hpp's.
-constexpr Known KNOWN[] = {{Disturbs::pour, 0.0, 5.0, 1.0},
-                           {Disturbs::jerk, 0.0, 20.0, 0.3},
-                           {Disturbs::knock, 0.0, 0.5, 0.02},
-                           {Disturbs::slick, 0.0, 0.95, 0.5}};
+// Ranges keep the physics within its steps.
+constexpr Known KNOWN[] = {{Event::Kind::pour, 0.0, 5.0, 1.0},
+                           {Event::Kind::jerk, 0.0, 20.0, 0.3},
+                           {Event::Kind::knock, 0.0, 0.5, 0.02},
+                           {Event::Kind::slick, 0.0, 0.95, 0.5}};
 
-const Known &known(Disturbs kind) {
-  return *std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
+Event event_of(Event::Kind kind, double begin_s, double amount) {
+  const auto known =
+      std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
+  return {kind, begin_s, known->seconds, amount};
 }
 
-Scene scene_of(const World::Options &options) {
-  Scene scene;
-  scene.object = options.object;
-  scene.grasp = options.grasp;
-  scene.lift_mm = options.lift_mm;
-  scene.lift_s = options.lift_s;
+KindOfGrasp course_of(const World::Options &options) {
+  KindOfGrasp course = options.course;
+  const Object &object = options.object;
+  course.mass_kg = object.mass_kg;
+  course.pads[0].friction = object.friction * (1.0 + object.uneven_friction);
+  course.pads[1].friction = object.friction * (1.0 - object.uneven_friction);
   for (const Planned &one : options.planned) {
-    scene.disturbances.push_back({one.kind, scene.lift_s + one.after_s, known(one.kind).seconds, one.amount, 0.0});
+    course.events.push_back(event_of(one.kind, course.lift_s + one.after_s, one.amount));
   }
-  return scene;
+  return course;
 }
 
 } // namespace
@@ -69,24 +69,22 @@ bool is_disturbance(const std::string &name) {
   return std::any_of(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return name == name_of(one.kind); });
 }
 
-void World::be_of_kind(Options &options, const KindOfGrasp &kind) {
-  const double left = kind.pads[0].friction, right = kind.pads[1].friction;
+void World::be_of_kind(Options &options, const KindOfGrasp &grasp) {
+  const double left = grasp.pads[0].friction, right = grasp.pads[1].friction;
   Object &object = options.object;
-  object.width_mm = kind.width_mm;
-  object.mass_kg = kind.mass_kg;
+  object.width_mm = grasp.width_mm;
+  object.mass_kg = grasp.mass_kg;
   object.friction = 0.5 * (left + right);
   object.uneven_friction = (left - right) / (left + right);
-  object.kinetic_share = kind.kinetic_share;
-  object.crushes_N = kind.crushes_N;
-  options.grasp.relaxation = 0.5 * (kind.pads[0].relaxation + kind.pads[1].relaxation);
-  options.lift_mm = kind.lift_mm;
-  options.lift_s = kind.lift_s;
-  options.kind = kind;
-  options.kind->lift_mm = 0.0; // the scene lifts
+  object.kinetic_share = grasp.kinetic_share;
+  object.crushes_N = grasp.crushes_N;
+  options.grasp.relaxation = 0.5 * (grasp.pads[0].relaxation + grasp.pads[1].relaxation);
+  options.course = grasp;
+  options.kind = grasp.kind;
 }
 
 World::World(const Options &options, const Face &face, GripperMotion &motion)
-    : scene_(scene_of(options)), options_(options), face_(face), motion_(motion),
+    : options_(options), course_(course_of(options)), face_(face), motion_(motion),
       cell_(face, options.object, options.grasp) {
   motion.blocked_at = [this](double width_mm, double force_N) {
     return is_there_ && force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
@@ -102,49 +100,20 @@ bool World::lift() {
   return true;
 }
 
-bool World::disturb(Disturbs kind, double amount) {
-  if (since_lift_s() < scene_.lift_s || !is_there_) {
+bool World::disturb(Event::Kind kind, double amount) {
+  if (since_lift_s() < course_.lift_s || !is_there_) {
     return false;
   }
-  scene_.disturbances.push_back({kind, since_lift_s(), known(kind).seconds, amount, 0.0});
+  course_.events.push_back(event_of(kind, since_lift_s(), amount));
   return true;
-}
-
-Drive World::drive(double since_s) const {
-  Drive drive = scene_.drive(since_s);
-  if (options_.kind && since_s >= 0.0) {
-    const KindOfGrasp::Inputs inputs = options_.kind->inputs(since_s);
-    // The kind's y is upwards.
-    const Vector up{-std::cos(scene_.grasp.down_rad), -std::sin(scene_.grasp.down_rad)};
-    const Vector side{-up.y, up.x};
-    const auto add = [&](Vector &to, const Vector &what) {
-      to.x += what.x * side.x + what.y * up.x;
-      to.y += what.x * side.y + what.y * up.y;
-    };
-    add(drive.hand_m_s2, inputs.hand_m_s2);
-    add(drive.knock_N, inputs.push_N);
-    drive.mass_kg += inputs.mass_kg - options_.kind->mass_kg;
-    drive.friction_share *= inputs.friction_share;
-  }
-  return drive;
-}
-
-double World::need_N(double since_s) const {
-  if (!options_.kind) {
-    return scene_.least_N(since_s);
-  }
-  const Drive now = drive(since_s);
-  const double down_rad = scene_.grasp.down_rad;
-  const double x_N = now.mass_kg * (GRAVITY_m_s2 * std::cos(down_rad) - now.hand_m_s2.x);
-  const double y_N = now.mass_kg * (GRAVITY_m_s2 * std::sin(down_rad) - now.hand_m_s2.y);
-  return std::hypot(x_N + now.knock_N.x, y_N + now.knock_N.y) / (2.0 * scene_.object.friction * now.friction_share);
 }
 
 void World::advance(double seconds) {
   for (double left_s = seconds; left_s > 0.0; left_s -= STEP_s) {
     const double step_s = std::min(STEP_s, left_s);
     motion_.step(step_s);
-    Drive now = drive(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0);
+    const KindOfGrasp::Inputs inputs = course_.inputs(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0);
+    Drive now = drive_of(inputs, options_.grasp.down_rad);
     now.width_mm = motion_.width_mm();
     if (is_there_) {
       cell_.run(step_s, now);
@@ -158,7 +127,7 @@ void World::advance(double seconds) {
 void World::watch_force() {
   const double force_N = is_there_ ? cell_.force_N() : 0.0;
   peak_N_ = std::max(peak_N_, force_N);
-  if (force_N > scene_.object.crushes_N && !is_crushed_) {
+  if (force_N > options_.object.crushes_N && !is_crushed_) {
     is_crushed_ = true;
     events_.push_back("crushed");
   }
@@ -177,20 +146,11 @@ void World::watch_object() {
   if (!is_there_) {
     return;
   }
-  begun_.resize(scene_.disturbances.size());
+  begun_.resize(course_.events.size());
   for (std::size_t i = 0; i < begun_.size(); i++) {
-    if (!begun_[i] && since_s >= scene_.disturbances[i].begin_s) {
+    if (!begun_[i] && since_s >= course_.events[i].begin_s) {
       begun_[i] = true;
-      events_.push_back(name_of(scene_.disturbances[i].kind));
-    }
-  }
-  const std::size_t events = options_.kind ? options_.kind->events.size() : 0;
-  kind_begun_.resize(events);
-  for (std::size_t i = 0; i < events; i++) {
-    const Event &event = options_.kind->events[i];
-    if (!kind_begun_[i] && since_s >= event.begin_s) {
-      kind_begun_[i] = true;
-      events_.push_back(name_of(event.kind));
+      events_.push_back(name_of(course_.events[i].kind));
     }
   }
   const double slid_mm = cell_.slid_mm() - slid_before_mm_;
@@ -208,7 +168,7 @@ void World::watch_object() {
     slid_before_mm_ = cell_.slid_mm();
   }
   const Vector way = cell_.way_mm();
-  const bool in_the_air = lift_s_ && since_s >= scene_.lift_s;
+  const bool in_the_air = lift_s_ && since_s >= course_.lift_s;
   if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.force_N() < LOST_N)) {
     is_dropped_ = true;
     is_there_ = false;
@@ -217,7 +177,7 @@ void World::watch_object() {
 }
 
 Pressures World::pressures_Pa(std::size_t finger) const {
-  return is_there_ ? face_.base_Pa(cell_.touch(finger), 1.0) : Pressures{};
+  return is_there_ ? face_.base_Pa(cell_.touch(finger)) : Pressures{};
 }
 
 const char *World::columns() {
@@ -232,12 +192,12 @@ std::string World::cells() const {
     load_N += is_there_ ? 0.5 * std::hypot(touch.pull_x_N, touch.pull_y_N) : 0.0;
   }
   const double since_s = since_lift_s();
-  const double least_N = is_there_ && since_s >= scene_.lift_s ? need_N(since_s) : 0.0;
+  const double least_N = is_there_ && since_s >= course_.lift_s ? need_N(since_s) : 0.0;
   const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
   std::string text = fixed(time_s_, 5);
   for (const double value :
        {motion_.width_mm(), is_there_ ? cell_.force_N() : 0.0, peak_N_, load_N, least_N, cell_.slid_mm(),
-        cell_.way_mm().dot(cell_.down()), friction, scene_.drive(since_s).lifted_mm}) {
+        cell_.way_mm().dot(cell_.down()), friction, course_.inputs(since_s).lifted_mm}) {
     text += "," + fixed(value, 4);
   }
   for (const bool value : {is_there_ && cell_.slips(), is_there_, is_dropped_, is_crushed_}) {

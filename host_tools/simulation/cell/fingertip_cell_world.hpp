@@ -1,15 +1,14 @@
 // The cell's world as time passes, its truth, and what can be done to it by name.
 //
 // The object is on the table between the fingers. Once the grip's force has been steady for a while,
-// or by a command, the hand lifts it; disturbances (scene.hpp) come then, planned or by
-// a command, and what happens in a grasp of a kind (kinds.hpp). What slides by less than SLIP_mm at
-// a time has not slipped. An object that slid DROP_mm, or that nothing presses any more, is gone.
+// or by a command, the hand lifts it; then come the events of the grasp (kinds.hpp), and those that
+// are planned or commanded. What slides by less than SLIP_mm at a time has not slipped. An object that
+// slid DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
 #include "simulation/cell/gripper_motion.hpp"
 #include "simulation/cell/kinds.hpp"
-#include "simulation/cell/scene.hpp"
-#include "simulation/cell/trial.hpp"
+#include "simulation/cell/slips.hpp"
 
 #include <optional>
 #include <string>
@@ -20,7 +19,7 @@ namespace fingertip::cell {
 // "slick:0.35" or "slick:0.35@1.5": of what size, how long after the lift's end. Throws Error,
 // bad_value.
 struct Planned {
-  Disturbance::Kind kind;
+  Event::Kind kind;
   double amount, after_s;
 };
 Planned planned(const std::string &text);
@@ -31,16 +30,16 @@ public:
   struct Options {
     Object object;
     Grasp grasp;
-    double lift_mm = 10.0, lift_s = 0.5;
+    KindOfGrasp course;                       // the lift and the events
     std::optional<double> lift_after_s = 1.0; // none: only by a command
     std::vector<Planned> planned;
-    std::optional<KindOfGrasp> kind; // of_kind fills in the rest
+    std::optional<Kind> kind; // whose course it is
   };
 
-  // Takes object, lift and events from the kind; lift_after_s stays. Left out is what
-  // is no part of this world: the rubber's law, a place off the gripper's middle, errors and delays
-  // of frames, a fingertip that goes silent.
-  static void be_of_kind(Options &options, const KindOfGrasp &kind);
+  // Takes object, lift and events from the grasp; lift_after_s stays. Left out is what is no part of this
+  // world: the rubber's law, a place off the gripper's middle, errors and delays of frames, a fingertip
+  // that goes silent.
+  static void be_of_kind(Options &options, const KindOfGrasp &grasp);
 
   // Both outlive it. From now on the object is between the fingers of motion.
   World(const Options &options, const Face &face, GripperMotion &motion);
@@ -51,7 +50,7 @@ public:
   // False: it has been.
   bool lift();
   // Now; false: before the lift, or the object is gone.
-  bool disturb(Disturbance::Kind kind, double amount);
+  bool disturb(Event::Kind kind, double amount);
   void take_away() { is_there_ = false; }
 
   Pressures pressures_Pa(std::size_t finger) const;
@@ -59,8 +58,7 @@ public:
   twin::Touch touch(std::size_t finger) const { return is_there_ ? cell_.touch(finger) : twin::Touch{}; }
 
   // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
-  // With a kind, all inputs are considered; without, knocks are left out.
-  double need_N(double since_lift_s) const;
+  double need_N(double since_lift_s) const { return course_.least_N(since_lift_s); }
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
   // The columns of the truth, in order.
@@ -72,13 +70,12 @@ public:
 private:
   static constexpr double TOUCHED_N = 0.05;
 
-  Drive drive(double since_lift_s) const;
   double since_lift_s() const { return lift_s_ ? time_s_ - *lift_s_ : -1.0; }
   void watch_force();
   void watch_object();
 
-  Scene scene_;
   Options options_;
+  KindOfGrasp course_;
   const Face &face_;
   GripperMotion &motion_;
   Cell cell_;
@@ -86,8 +83,8 @@ private:
   struct Steady {
     double since_s, force_N;
   };
-  std::optional<Steady> steady_;         // the force
-  std::vector<bool> begun_, kind_begun_; // of the scene's disturbances and of the kind's events
+  std::optional<Steady> steady_; // the force
+  std::vector<bool> begun_;      // of the events
   bool is_there_ = true, is_dropped_ = false, is_crushed_ = false, slips_ = false;
   double time_s_ = 0.0, peak_N_ = 0.0, slid_before_mm_ = 0.0, slipped_s_ = 0.0;
   std::optional<double> lift_s_;

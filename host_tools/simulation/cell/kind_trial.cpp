@@ -4,9 +4,6 @@
 #include "simulation/cell/arrivals.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/pinch.hpp"
-#include "simulation/cell/simulated_fingertip.hpp"
-#include "simulation/cell/slips.hpp"
-#include "simulation/cell/trial.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -19,14 +16,20 @@ extern "C" {
 namespace fingertip::cell {
 namespace {
 
-enum Stream : std::uint64_t { TIP = 871, LINE };
+enum Stream : std::uint64_t { TIP = 871, LINE, FAULT };
 
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
-constexpr double RATE_Hz = 410.0, CONVERSION_s = 2.3e-3;
+// A frame takes its conversion, of which the middle is its time; then it is read, fitted and sent. The
+// stages of the emulated chip at 410 Hz add up to some 1.6 ms after the conversion.
+constexpr double CONVERSION_s = 2.3e-3, PROCESSING_s = 1.6e-3;
 constexpr double FORCE_NOISE = 0.004, FORCE_NOISE_N = 0.01, LOAD_NOISE_N = 0.015, PLACE_NOISE_mm = 0.012;
 constexpr double GATE_N = 0.05; // less is no contact
 constexpr double STEPS_s = 0.01, PATIENCE_s = 12.0, SAMPLED_s = 2e-3;
-constexpr double JOINED_s = 0.03, MORE_FORCE = 1.05, AFTER_s = 1.0;
+constexpr double NEAR = 0.1, SETTLED_s = 0.5; // of a set force
+constexpr double APART_mm = 1e3, FREE_mm = 0.5, TOUCHED_N = 0.05, LOST_N = 0.01;
+constexpr double BEGINS_s = 12.0; // a fault, at the latest
+constexpr double LIFTS_AFTER_s = 0.8, POURS_AFTER_s = 1.2, POURS_s = 0.4;
+constexpr double SLICK_s = 0.05, SLICK_SHARE = 0.9;
 constexpr double SWINGS_mm = 0.05; // a width that turns by less makes no difference
 constexpr double HUNTS_s = 0.5;
 
@@ -35,25 +38,28 @@ std::uint64_t in_us(double s) { return static_cast<std::uint64_t>(std::llround(1
 // The reports of one fingertip.
 class Tip {
 public:
-  Tip(const KindOfPad &pad, double mirror, Random random)
-      : pad_(pad), mirror_(mirror), random_(random), next_s_(random_.uniform(0.0, 1.0 / RATE_Hz)) {
+  Tip(const KindTrial &trial, std::size_t finger)
+      : pad_(trial.grasp.pads[finger]), mirror_(finger == 0 ? 1.0 : -1.0), load_share_(trial.load_share),
+        noise_(trial.noise), period_s_(1.0 / trial.rate_Hz), random_(trial.seed, TIP, finger),
+        next_s_(random_.uniform(0.0, period_s_)) {
     settings_.force_scale = settings_.tangential_scale = 1.0F;
   }
   double next_s() const { return next_s_; }
-  void skip() { next_s_ += 1.0 / RATE_Hz; }
+  void skip() { next_s_ += period_s_; }
   bool is_lost(double share) { return random_.uniform(0.0, 1.0) < share; }
   // From next_s on its way.
   double known_s(double jitter_s, double later_s) {
-    known_s_ = std::max(known_s_, next_s_ + 0.5 * CONVERSION_s + PROCESSING_s + pad_.delay_s + later_s +
-                                      jitter_s * std::abs(random_.normal()));
+    known_s_ =
+        std::max(known_s_, next_s_ + 0.5 * std::min(CONVERSION_s, period_s_) + std::min(PROCESSING_s, period_s_) +
+                               pad_.delay_s + later_s + jitter_s * std::abs(random_.normal()));
     return known_s_;
   }
 
   GripTouch measure(double force_N, const Vector &load_N, const Vector &way_mm) {
     GripTouch touch{};
     touch.t_s = next_s_;
-    const double sensed_N =
-        pad_.gain * force_N * (1.0 + FORCE_NOISE * random_.normal()) + FORCE_NOISE_N * random_.normal();
+    const double sensed_N = pad_.gain * force_N * (1.0 + noise_ * FORCE_NOISE * random_.normal()) +
+                            noise_ * FORCE_NOISE_N * random_.normal();
     contact_input input{};
     input.t_us = in_us(next_s_);
     input.contact = sensed_N > GATE_N;
@@ -65,18 +71,20 @@ public:
     ::motion moved{};
     if (input.contact) {
       const double share = 1.0 / std::max(force_N, GATE_N);
-      const auto noise = [&](double sd) { return sd * random_.normal(); };
+      const auto noise = [&](double sd) { return noise_ * sd * random_.normal(); };
       found.valid = true;
       found.force_N = static_cast<float>(sensed_N);
-      found.qx_N = static_cast<float>(mirror_ * (pad_.gain * load_N.x + pad_.ratio.x * sensed_N) + noise(LOAD_NOISE_N));
-      found.qy_N = static_cast<float>(pad_.gain * load_N.y + pad_.ratio.y * sensed_N + noise(LOAD_NOISE_N));
+      const double load_gain = load_share_ * pad_.gain;
+      found.qx_N = static_cast<float>(mirror_ * (load_gain * load_N.x + pad_.ratio.x * sensed_N) + noise(LOAD_NOISE_N));
+      found.qy_N = static_cast<float>(load_gain * load_N.y + pad_.ratio.y * sensed_N + noise(LOAD_NOISE_N));
       found.x_mm = static_cast<float>(mirror_ * (way_mm.x + pad_.crosstalk * load_N.x * share) + noise(PLACE_NOISE_mm));
       found.y_mm = static_cast<float>(way_mm.y + pad_.crosstalk * load_N.y * share + noise(PLACE_NOISE_mm));
       found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);
       found.location_sd_mm = 0.1F;
       input.tangential = &found;
       result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                     CONTACT_FLAG_TARED | CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_TANGENTIAL_VALID;
+                     CONTACT_FLAG_TARED | CONTACT_FLAG_CALIBRATED |
+                     (load_share_ > 0.0 ? std::uint32_t{CONTACT_FLAG_TANGENTIAL_VALID} : 0u);
     }
     motion_update(&history_, &settings_, &input, &result, &moved);
     touch.flags = result.flags;
@@ -89,76 +97,71 @@ public:
       touch.qx_N = static_cast<double>(found.qx_N);
       touch.qy_N = static_cast<double>(found.qy_N);
       touch.q_sd_N = 0.05 * sensed_N;
-      touch.speed_mm_s = speed_of(moved);
+      touch.speed_mm_s = static_cast<double>(std::hypot(moved.vx_mm_s, moved.vy_mm_s));
     }
     return touch;
   }
 
 private:
   KindOfPad pad_;
-  double mirror_;
+  double mirror_, load_share_, noise_, period_s_;
   Random random_;
   tangential_settings settings_{};
   motion_history history_{};
   double next_s_, known_s_ = 0.0;
 };
 
-// Slides and what came of them.
-class CatchBook {
+// A force that is to be held.
+class SetPoint {
 public:
-  void look(double t_s, const Pinch &pinch, double least_N) {
-    if (pinch.slips()) {
-      if (t_s - last_s_ > JOINED_s) {
-        end();
-        now_ = Catch{t_s, 0.0, {}, 0.0, 0.0};
-        begin_N_ = pinch.mean_N();
-        begin_mm_ = pinch.slid_mm();
-      }
-      last_s_ = t_s;
-    }
-    if (now_ && t_s - last_s_ <= JOINED_s) {
-      now_->way_mm = pinch.slid_mm() - begin_mm_;
-      if (!now_->reaction_s && pinch.mean_N() >= MORE_FORCE * begin_N_) {
-        now_->reaction_s = t_s - now_->begin_s;
+  explicit SetPoint(const KindTrial &trial) : trial_(trial) {}
+  void sample(double t_s, double sensed_N, double width_mm, double touched_s) {
+    const double off = sensed_N / trial_.set_N - 1.0;
+    if (!settle_s_) {
+      near_s_ = std::abs(off) > NEAR ? NEVER_s : std::min(near_s_, t_s);
+      if (t_s - near_s_ >= SETTLED_s) {
+        settle_s_ = near_s_ - touched_s;
       }
     }
-    if (now_ && t_s - last_s_ > JOINED_s) {
-      end();
+    if (settle_s_) {
+      squares_ += off * off;
+      samples_++;
     }
-    const auto follow = [&](Catch &one) {
-      one.peak_N = std::max(one.peak_N, pinch.mean_N());
-      one.least_N = std::max(one.least_N, least_N);
-    };
-    if (now_) {
-      follow(*now_);
-    }
-    if (!catches.empty() && t_s - ended_s_ < AFTER_s) {
-      follow(catches.back());
+    if (t_s - touched_s < 0.5 * trial_.still_s) {
+      width_mm_ = width_mm;
+    } else if (std::abs(width_mm - width_mm_) > SWINGS_mm) {
+      const int direction = width_mm > width_mm_ ? 1 : -1;
+      reversals_ += direction_ == -direction;
+      direction_ = direction;
+      width_mm_ = width_mm;
     }
   }
-  std::vector<Catch> catches;
+  void fill(KindOutcome &outcome) const {
+    outcome.settle_s = settle_s_;
+    outcome.rms = samples_ > 0 ? std::sqrt(squares_ / samples_) : 0.0;
+    outcome.reversals = reversals_;
+  }
 
 private:
-  void end() {
-    if (now_ && now_->way_mm >= SLIP_mm) {
-      catches.push_back(*now_);
-      ended_s_ = last_s_;
-    }
-    now_.reset();
-  }
-  std::optional<Catch> now_;
-  double begin_N_ = 0.0, begin_mm_ = 0.0, last_s_ = -NEVER_s, ended_s_ = -NEVER_s;
+  const KindTrial &trial_;
+  double near_s_ = NEVER_s, width_mm_ = 0.0, squares_ = 0.0;
+  std::optional<double> settle_s_;
+  int samples_ = 0, direction_ = 0, reversals_ = 0;
 };
 
 class KindRun {
 public:
   KindRun(const KindTrial &trial, Controller &controller, const std::function<void(const KindMoment &)> &trace)
-      : grasp_(trial.grasp), later_s_(trial.later_s), controller_(controller), trace_(trace), pinch_(grasp_),
-        gripper_(slowed(trial), grasp_.width_mm + grasp_.opens_mm, Random(trial.seed, LINE, 0)),
-        tips_{Tip(grasp_.pads[0], 1.0, Random(trial.seed, TIP, 0)),
-              Tip(grasp_.pads[1], -1.0, Random(trial.seed, TIP, 1))} {
+      : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), pinch_(grasp_),
+        gripper_(slowed(trial), trial.activates ? trial.gripper.traits.stroke_mm : grasp_.width_mm + grasp_.opens_mm,
+                 Random(trial.seed, LINE, 0)),
+        tips_{Tip(trial, 0), Tip(trial, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)),
+        set_point_(trial), is_between_(!trial.activates) {
+    if (trial.activates) {
+      gripper_.motion().power_off();
+    }
     gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
-      return force_N > 0.0 && pinch_.force_at_N(width_mm) >= force_N;
+      return is_between_ && force_N > 0.0 && pinch_.force_at_N(width_mm) >= force_N;
     };
   }
 
@@ -166,17 +169,15 @@ public:
     while (!over_) {
       t_s_ += Pinch::STEP_s;
       gripper_.motion().step(Pinch::STEP_s);
-      const KindOfGrasp::Inputs inputs = grasp_.inputs(since_lift_s());
-      pinch_.step(Pinch::STEP_s, gripper_.motion().width_mm(), inputs);
-      look();
+      pinch_.step(Pinch::STEP_s, is_between_ ? width_mm() : APART_mm, inputs());
+      observe();
       deliver();
       if (t_s_ - stepped_s_ >= STEPS_s) {
         step_controller();
       }
       measure();
       if (gripper_.next_s() <= t_s_) {
-        const GripperLine::Answer answer = gripper_.exchange(command_);
-        arrivals_.status(answer.known_s, answer.status);
+        exchange();
       }
       if (t_s_ >= sample_s_) {
         sample();
@@ -193,6 +194,24 @@ private:
   }
 
   double since_lift_s() const { return t_s_ - lift_s_; }
+  double width_mm() const { return gripper_.motion().width_mm(); }
+
+  // Those of the grasp, and what the trial adds.
+  KindOfGrasp::Inputs inputs() {
+    KindOfGrasp::Inputs inputs = grasp_.inputs(since_lift_s());
+    if (trial_.slick_after_s && since_lift_s() >= *trial_.slick_after_s) {
+      if (slick_s_ == NEVER_s) {
+        slick_s_ = t_s_;
+        slick_share_ = std::min(1.0, SLICK_SHARE * least_N_ / std::max(pinch_.mean_N(), LOST_N));
+      }
+      inputs.friction_share *= 1.0 - std::min(1.0, (t_s_ - slick_s_) / SLICK_s) * (1.0 - slick_share_);
+    }
+    if (trial_.fault && lift_s_ < NEVER_s) {
+      const double poured = (t_s_ - faults_.begins_s() - POURS_AFTER_s) / POURS_s;
+      inputs.mass_kg += grasp_.mass_kg * std::clamp(poured, 0.0, 1.0);
+    }
+    return inputs;
+  }
 
   void measure() {
     for (std::size_t i = 0; i < tips_.size(); i++) {
@@ -200,10 +219,10 @@ private:
       if (tip.next_s() > t_s_) {
         continue;
       }
-      const GripTouch touch = tip.measure(pinch_.force_N(i), pinch_.load_N(i), pinch_.way_mm());
+      const auto touch = faults_.frame(i, tip.measure(pinch_.force_N(i), pinch_.load_N(i), pinch_.way_mm()));
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
-      if (!tip.is_lost(grasp_.lost_share) && !gone) {
-        arrivals_.touch(tip.known_s(grasp_.jitter_s, later_s_), i, touch);
+      if (!tip.is_lost(grasp_.lost_share) && !gone && touch) {
+        arrivals_.touch(tip.known_s(grasp_.jitter_s, trial_.later_s), i, *touch);
       }
       tip.skip();
     }
@@ -211,34 +230,102 @@ private:
 
   void deliver() {
     arrivals_.deliver(
-        t_s_, controller_, [this](std::size_t, const GripTouch &) { step_controller(); },
+        t_s_, controller_,
+        [this](std::size_t finger, const GripTouch &touch) {
+          sensed_N_[finger] = touch.force_N;
+          step_controller();
+        },
         [this] { step_controller(); });
+  }
+
+  void exchange() {
+    const Faults::Line line = faults_.line(t_s_);
+    const bool waits = t_s_ < answered_s_;
+    GripperLine::Answer answer = gripper_.exchange(line.commands && !waits ? command_ : gripper_.sent());
+    if (waits || !line.answers) {
+      return;
+    }
+    if (line.late_s > 0.0) {
+      answer.known_s = answered_s_ = answer.known_s + line.late_s;
+      answer.status.host_us += std::llround(0.5e6 * line.late_s); // the exchange's middle
+    }
+    answer.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : answer.status.fault;
+    arrivals_.status(answer.known_s, answer.status);
   }
 
   void step_controller() {
     report_ = controller_.step(t_s_, command_);
     stepped_s_ = t_s_;
+    faults_.watch(t_s_, report_.state);
+    if (faults_.has_begun(t_s_)) {
+      outcome_.failed.trouble |= report_.trouble;
+      outcome_.failed.state = report_.state;
+      outcome_.failed.gripper_fault = report_.gripper_fault;
+    }
+    if (trial_.asked && !has_asked_ && t_s_ >= held_s_ + trial_.asked_after_s) {
+      has_asked_ = true;
+      controller_.ask(*trial_.asked);
+    }
     const bool holds = report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING;
-    if (holds && lift_s_ == NEVER_s) {
-      outcome_.held_s = t_s_;
-      lift_s_ = t_s_ + grasp_.waits_s;
+    if (holds && held_s_ == NEVER_s) {
+      held_s_ = t_s_;
+      if (trial_.still_s == 0.0) {
+        lift_s_ = std::min(lift_s_, t_s_ + grasp_.waits_s);
+      }
     }
   }
 
-  void look() {
+  // Of a fault, when it begins and from then on.
+  void fail() {
+    if (!faults_.has_begun(t_s_)) {
+      over_ = t_s_ >= BEGINS_s;
+      return;
+    }
+    Failed &failed = outcome_.failed;
+    if (!failed.begun) {
+      failed.begun = true;
+      began_mm_ = width_mm();
+      if (is_between_) {
+        lift_s_ = std::min(lift_s_, t_s_ + LIFTS_AFTER_s);
+      }
+      if (faults_.is(Fault::Kind::power, t_s_)) {
+        gripper_.motion().power_off();
+      } else if (faults_.is(Fault::Kind::fault, t_s_)) {
+        gripper_.motion().stop();
+      }
+      is_taken_ = is_taken_ || faults_.is(Fault::Kind::taken, t_s_);
+    }
+    is_taken_ = is_taken_ || outcome_.dropped;
+    is_between_ = is_between_ && !is_taken_;
+    if (is_between_) {
+      failed.opened_mm = std::max(failed.opened_mm, width_mm() - began_mm_);
+    }
+    over_ = t_s_ >= faults_.begins_s() + trial_.fault->watched_s;
+  }
+
+  void observe() {
     const double since_s = since_lift_s(), force_N = pinch_.mean_N();
     const bool lifts = since_s >= 0.0;
     outcome_.peak_N = std::max({outcome_.peak_N, pinch_.force_N(0), pinch_.force_N(1)});
+    touched_s_ = force_N > TOUCHED_N ? std::min(touched_s_, t_s_) : touched_s_;
+    if (!is_between_ && !is_taken_) {
+      is_between_ = gripper_.motion().active() && width_mm() > grasp_.width_mm + FREE_mm;
+    }
     if (!lifts) {
       outcome_.first_N = std::max(outcome_.first_N, force_N);
-      outcome_.never_held = t_s_ > PATIENCE_s && lift_s_ == NEVER_s;
+      outcome_.never_held = t_s_ > PATIENCE_s && lift_s_ == NEVER_s && trial_.still_s == 0.0;
     } else {
       least_N_ = grasp_.least_N(since_s);
-      book_.look(since_s, pinch_, since_s >= grasp_.lift_s ? least_N_ : 0.0);
+      slips_.sample(since_s, pinch_.slips(), force_N, pinch_.slid_mm(), since_s >= grasp_.lift_s ? least_N_ : 0.0);
       const Vector way = pinch_.way_mm();
       outcome_.dropped = pinch_.slid_mm() >= DROP_mm || std::hypot(way.x, way.y) >= DROP_mm;
     }
-    over_ = outcome_.dropped || outcome_.never_held || (lifts && since_s >= grasp_.ends_s);
+    const bool waited =
+        trial_.still_s > 0.0 && (t_s_ >= touched_s_ + trial_.still_s || t_s_ > trial_.still_s + PATIENCE_s);
+    over_ = outcome_.dropped || outcome_.never_held || waited || (lifts && since_s >= grasp_.ends_s);
+    if (trial_.fault) {
+      fail();
+    }
   }
 
   void sample() {
@@ -248,6 +335,10 @@ private:
       margins_.push_back(pinch_.mean_N() / least_N_);
     }
     const double sent_mm = gripper_.sent().width_mm;
+    if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
+      const auto [low_N, high_N] = std::minmax(sensed_N_[0], sensed_N_[1]);
+      set_point_.sample(t_s_, trial_.set_of_smaller ? low_N : 0.5 * (low_N + high_N), sent_mm, touched_s_);
+    }
     if (since_s < grasp_.steady_s) {
       turned_mm_ = sent_mm;
     } else if (direction_ * (sent_mm - turned_mm_) >= 0.0 && direction_ != 0) {
@@ -259,16 +350,16 @@ private:
     }
     if (trace_) {
       const Vector one = pinch_.load_N(0), other = pinch_.load_N(1);
-      trace_({t_s_, since_s, gripper_.motion().width_mm(), sent_mm, pinch_.force_N(0), pinch_.force_N(1),
-              since_s >= 0.0 ? least_N_ : 0.0, 0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)),
-              pinch_.slid_mm(), pinch_.slips(), report_});
+      trace_({t_s_, since_s, width_mm(), pinch_.force_N(0), pinch_.force_N(1), since_s >= 0.0 ? least_N_ : 0.0,
+              0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)), -pinch_.way_mm().y, pinch_.slid_mm(),
+              pinch_.slips(), report_});
     }
   }
 
   KindOutcome outcome() {
     outcome_.slid_mm = pinch_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
-    outcome_.catches = book_.catches;
+    outcome_.catches = slips_.slips;
     outcome_.reversals_s = reversals_ / (grasp_.ends_s - grasp_.steady_s);
     outcome_.hunts = !outcome_.dropped && outcome_.reversals_s >= HUNTS_s;
     if (!margins_.empty()) {
@@ -276,25 +367,32 @@ private:
       std::nth_element(margins_.begin(), middle, margins_.end());
       outcome_.margin = *middle;
     }
+    if (trial_.still_s > 0.0) {
+      set_point_.fill(outcome_);
+    }
     return outcome_;
   }
 
+  const KindTrial &trial_;
   const KindOfGrasp &grasp_;
-  double later_s_;
   Controller &controller_;
   const std::function<void(const KindMoment &)> &trace_;
   Pinch pinch_;
   GripperLine gripper_;
   std::array<Tip, 2> tips_;
   Arrivals arrivals_;
+  Faults faults_;
+  SetPoint set_point_;
   GripCommand command_{};
   GripReport report_{};
   KindOutcome outcome_;
-  CatchBook book_;
+  Slips slips_;
   std::vector<double> margins_;
-  bool over_ = false;
-  double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, lift_s_ = NEVER_s;
-  double least_N_ = 0.0, turned_mm_ = 0.0;
+  std::array<double, 2> sensed_N_{};
+  bool over_ = false, is_between_, is_taken_ = false, has_asked_ = false;
+  double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, answered_s_ = 0.0, touched_s_ = NEVER_s;
+  double held_s_ = NEVER_s, lift_s_ = NEVER_s, slick_s_ = NEVER_s, slick_share_ = 1.0;
+  double least_N_ = 0.0, turned_mm_ = 0.0, began_mm_ = 0.0;
   int reversals_ = 0, direction_ = 0;
 };
 

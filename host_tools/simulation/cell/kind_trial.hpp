@@ -1,15 +1,18 @@
-// One grasp of a kind (kinds.hpp), closed loop, in simulated time: the pinch (pinch.hpp), what two
-// fingertips report of it, a controller, and a gripper's mechanics.
+// One grasp (kinds.hpp), closed loop, in simulated time: the pinch (pinch.hpp), what two fingertips
+// report of it, a controller, and a gripper's mechanics.
 //
 // A simplified fingertip reports the truth with the kind's errors and noise. The firmware's own
-// motion.c decides from that whether it slides. Frames come 410 times a second.
+// motion.c decides from that whether it slides.
 //
-// Deterministic: the same grasp, seed and controller give the same bits.
+// The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
+// every 10 ms. Deterministic: the same grasp, seed and controller give the same bits.
 #pragma once
 
 #include "simulation/cell/controller.hpp"
+#include "simulation/cell/faults.hpp"
 #include "simulation/cell/gripper_motion.hpp"
 #include "simulation/cell/kinds.hpp"
+#include "simulation/cell/slips.hpp"
 
 #include <functional>
 #include <optional>
@@ -17,35 +20,59 @@
 
 namespace fingertip::cell {
 
-// A slide of 0.3 mm or more that ended before the object was lost.
-struct Catch {
-  double begin_s; // since the lift began
-  double way_mm;
-  std::optional<double> reaction_s; // until the grip was 5 % stronger
-  double peak_N, least_N;           // from its beginning to 1 s after its end, the largest of each
+struct KindTrial {
+  KindOfGrasp grasp;
+  GripperMechanics gripper;
+  std::uint64_t seed = 0;
+  double later_s = 0.0;    // additional delay of all frames
+  double rate_Hz = 410.0;  // of frames
+  double load_share = 1.0; // share of the load that frames report; 0: they report none
+  double noise = 1.0;      // of frames; the sensors alone make a twentieth of it
+
+  // Instead of a lift: the object stays on the table for still_s, and the grip's force should be set_N,
+  // by the mean of both reports or by the smaller one.
+  double still_s = 0.0, set_N = 0.0;
+  bool set_of_smaller = false;
+
+  // The gripper is not active at first and open; the object comes between its fingers only once it is.
+  bool activates = false;
+  // A request, asked_after_s after the first HOLDING.
+  std::optional<GripRequest> asked;
+  double asked_after_s = 0.0;
+  // This time after the lift began friction falls a tenth below the value that holds the object.
+  std::optional<double> slick_after_s;
+  // The trial ends when the fault has been watched. Where nothing is lifted by then, the hand lifts 0.8 s
+  // after it began; after 1.2 s as much mass again is poured in: any controller would then like more force.
+  std::optional<Fault> fault;
+};
+
+// Since a fault began.
+struct Failed {
+  bool begun = false;
+  double opened_mm = 0.0;    // the fingers wider than when it began, at most, with the object between them
+  std::uint32_t trouble = 0; // all that was ever on
+  std::uint8_t state = 0;    // at the end
+  std::uint8_t gripper_fault = 0;
 };
 
 struct KindOutcome {
   bool dropped = false, never_held = false, crushed = false, hunts = false;
   double slid_mm = 0.0, peak_N = 0.0;
-  double first_N = 0.0;     // the largest force before the lift
-  double margin = 0.0;      // median of force over least force, from the lift's end on
-  double reversals_s = 0.0; // of the commanded width, a second, while nothing happens any more
-  double held_s = 0.0;      // from the beginning to HOLDING
-  std::vector<Catch> catches;
+  double first_N = 0.0;      // the largest force before the lift
+  double margin = 0.0;       // median of force over least force, from the lift's end on
+  double reversals_s = 0.0;  // of the commanded width, a second, while nothing happens any more
+  std::vector<Slip> catches; // slides that ended before the object was lost
+  // Only of a still trial.
+  std::optional<double> settle_s; // from the touch until the force stays within 10 % for 0.5 s
+  double rms = 0.0;               // of the error from there on, share of the set force
+  int reversals = 0;              // of the commanded width over the last half of the time
+  Failed failed;
 };
 
 struct KindMoment {
-  double t_s, lift_s, width_mm, sent_mm, left_N, right_N, least_N, load_N, slid_mm;
+  double t_s, lift_s, width_mm, left_N, right_N, least_N, load_N, way_mm, slid_mm; // lift_s: below 0 before it
   bool slips;
   GripReport report;
-};
-
-struct KindTrial {
-  KindOfGrasp grasp;
-  GripperMechanics gripper;
-  std::uint64_t seed = 0;
-  double later_s = 0.0; // additional delay of all frames
 };
 
 // trace: called every 2 ms.

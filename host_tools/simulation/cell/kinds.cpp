@@ -83,6 +83,9 @@ Event draw_event(Random &random, const Ranges &ranges, double begin_s, bool calm
   case Event::Kind::slick:
     event.amount = strength * random.uniform(0.2, 0.5);
     event.seconds = random.uniform(0.05, 0.4);
+    break;
+  case Event::Kind::jerk:
+    break;
   }
   return event;
 }
@@ -92,7 +95,6 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
   KindOfGrasp grasp{};
   grasp.kind = kind;
   grasp.mass_kg = ranges.mass_kg.low > 0.0 ? random.log_uniform(ranges.mass_kg.low, ranges.mass_kg.high) : 0.0;
-  grasp.crushes_N = std::numeric_limits<double>::infinity();
   if (kind == Kind::fragile) {
     const Fragile &fragile = FRAGILE[random.next() % std::size(FRAGILE)];
     grasp.object = fragile.name;
@@ -157,7 +159,7 @@ const char *name_of(Kind kind) {
 }
 
 const char *name_of(Event::Kind kind) {
-  constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick"};
+  constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick", "jerk"};
   return NAMES[static_cast<int>(kind)];
 }
 
@@ -200,6 +202,9 @@ KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
       break;
     case Event::Kind::slick:
       inputs.friction_share *= 1.0 - event.amount * way_of(share);
+      break;
+    case Event::Kind::jerk:
+      hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * share) : 0.0;
     }
     inputs.hand_m_s2.x += hand_m_s2 * way.x;
     inputs.hand_m_s2.y += hand_m_s2 * way.y;
@@ -214,6 +219,30 @@ double KindOfGrasp::least_N(double t_s) const {
   const double x_N = now.push_N.x - now.mass_kg * now.hand_m_s2.x;
   const double y_N = now.push_N.y - now.mass_kg * (GRAVITY_m_s2 + now.hand_m_s2.y);
   return std::hypot(x_N, y_N) / (now.friction_share * (pads[0].friction + pads[1].friction));
+}
+
+double KindOfGrasp::elastic_N(double at_mm) const {
+  // One force on two springs: their ways add up.
+  const double power = 1.0 / exponent;
+  const double at_1_mm_N =
+      std::pow(std::pow(pads[0].at_1_mm_N, -power) + std::pow(pads[1].at_1_mm_N, -power), -exponent);
+  return at_1_mm_N * std::pow(std::max(width_mm - at_mm, 0.0), exponent);
+}
+
+Drive drive_of(const KindOfGrasp::Inputs &inputs, double down_rad) {
+  const Vector up{-std::cos(down_rad), -std::sin(down_rad)}, side{-up.y, up.x};
+  const auto in_hand = [&](const Vector &of) {
+    return Vector{of.x * side.x + of.y * up.x, of.x * side.y + of.y * up.y};
+  };
+  Drive drive;
+  drive.hand_m_s2 = in_hand(inputs.hand_m_s2);
+  drive.knock_N = in_hand(inputs.push_N);
+  drive.lifted_mm = inputs.lifted_mm;
+  drive.lift_mm_s = inputs.lift_mm_s;
+  drive.table = inputs.table;
+  drive.mass_kg = inputs.mass_kg;
+  drive.friction_share = inputs.friction_share;
+  return drive;
 }
 
 KindOfGrasp draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n) {

@@ -29,46 +29,48 @@ struct Event {
     pour,    // mass that comes, of the object's own
     carry,   // the hand's largest acceleration, m/s2, on a way of minimum jerk
     slick,   // share of friction that goes
+    jerk,    // the hand's acceleration, m/s2, one period of a sine; no kind draws it
   };
   Kind kind;
   double begin_s, seconds, amount;
-  double angle_rad; // from upwards
-  double rate_Hz;
+  double angle_rad = 0.0; // from upwards
+  double rate_Hz = 0.0;
 };
 const char *name_of(Event::Kind kind);
 
 struct KindOfPad {
-  double at_1_mm_N;  // force at 1 mm of indentation
-  double relaxation; // share of the force lost in 8 s
-  double friction;   // static
-  double gain;       // of the force that it reports, over the true one
-  Vector ratio;      // error of tangential over normal force
-  double crosstalk;  // mm that a load as large as the force moves the reported location
-  double delay_s;    // of its frames, beyond SimulatedFingertip's
+  double at_1_mm_N = 3.0;    // force at 1 mm of indentation
+  double relaxation = 0.175; // share of the force lost in 8 s
+  double friction = 0.5;     // static
+  double gain = 1.0;         // of the force that it reports, over the true one
+  Vector ratio;              // error of tangential over normal force
+  double crosstalk = 0.0;    // mm that a load as large as the force moves the reported location
+  double delay_s = 0.0;      // of its frames, beyond the conversion, the processing and the line
 };
 
 struct KindOfGrasp {
-  Kind kind;
+  Kind kind = Kind::gentle;
   std::string object; // of kind fragile
   std::array<KindOfPad, 2> pads;
-  double exponent;                  // of force over indentation
-  double shear_N_mm;                // tangential stiffness of a pad at 4 N
-  double rubber_N_s_mm;             // damping of it, with the loss at the contact's edge
-  double kinetic_share;             // of static friction, at speed
-  double stribeck_mm_s;             // at which friction has fallen by 63 % of the way there
-  double width_mm, mass_kg, off_mm; // off_mm: from the middle between the fingers
-  double table_friction;
-  double crushes_N;
-  double opens_mm;
-  double waits_s;         // from HOLDING to the lift
-  double lift_mm, lift_s; // minimum jerk
+  double exponent = 1.6;        // of force over indentation
+  double shear_N_mm = 3.5;      // tangential stiffness of a pad at 4 N
+  double rubber_N_s_mm = 0.008; // damping of it, with the loss at the contact's edge
+  double kinetic_share = 0.8;   // of static friction, at speed
+  double stribeck_mm_s = 3.0;   // at which friction has fallen by 63 % of the way there
+  double width_mm = 40.0, mass_kg = 0.3;
+  double off_mm = 0.0; // from the middle between the fingers
+  double table_friction = 0.4;
+  double crushes_N = std::numeric_limits<double>::infinity();
+  double opens_mm = 4.0;               // how much wider than the object the gripper is at first
+  double waits_s = 0.2;                // from HOLDING to the lift
+  double lift_mm = 10.0, lift_s = 0.5; // minimum jerk; then the table is gone
   std::vector<Event> events;
-  double steady_s, ends_s; // nothing happens any more from steady_s on
-  double jitter_s;         // of frames
-  double lost_share;       // of frames
-  int gone;                // this fingertip goes silent, -1: none
-  double gone_s;           // since the lift began
-  double poll_factor;      // how much slower the gripper's line is than its traits
+  double steady_s = 0.0, ends_s = 0.0; // nothing happens any more from steady_s on
+  double jitter_s = 2e-4;              // of frames
+  double lost_share = 0.0;             // of frames
+  int gone = -1;                       // this fingertip goes silent, -1: none
+  double gone_s = 0.0;                 // since the lift began
+  double poll_factor = 1.0;            // how much slower the gripper's line is than its traits
 
   struct Inputs { // external inputs
     double lifted_mm = 0.0, lift_mm_s = 0.0;
@@ -80,7 +82,12 @@ struct KindOfGrasp {
   Inputs inputs(double since_lift_s) const;
   // Grip of one fingertip that holds what is carried then, by static friction.
   double least_N(double since_lift_s) const;
+  // Force of both pads, in a row and not relaxed, with the fingers at this width.
+  double elastic_N(double width_mm) const;
 };
+
+// The inputs in the frame of a cell's hand (cell.hpp); the gripper's width is not among them.
+Drive drive_of(const KindOfGrasp::Inputs &inputs, double down_rad);
 
 // No grasp needs more than this at its worst, by kinetic friction.
 constexpr double NEEDS_MOST_N = 16.0;

@@ -155,7 +155,7 @@ private:
     std::ostringstream text;
     text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model
          << "\n# face: " << options_.face
-         << "\n# kind: " << (options_.world.kind ? name_of(options_.world.kind->kind) : "none")
+         << "\n# kind: " << (options_.world.kind ? name_of(*options_.world.kind) : "none")
          << "\n# width_mm: " << object.width_mm << "\n# mass_kg: " << object.mass_kg
          << "\n# friction: " << object.friction << "\n# crushes_N: " << object.crushes_N
          << "\n# seed: " << options_.seed << "\n";

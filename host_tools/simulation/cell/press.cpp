@@ -98,7 +98,7 @@ public:
 
 private:
   void feel(double time_s) {
-    const Pressures pressures = touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
+    const Pressures pressures = touch_.force_N > 0.0 ? face_.base_Pa(touch_) : Pressures{};
     std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
     rubber_.report(time_s, base_Pa_, sensed_Pa_);
   }

@@ -193,8 +193,8 @@ int main(int argc, char **argv) {
                         ->check(CLI::Range(0.1, 1e6)));
   lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0,
               "How much wider than the object the gripper is at first");
-  lift_number("--height", options.lift.world.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
-  lift_number("--lift-time", options.lift.world.lift_s, "S", 0.05, 60.0, "And how long that takes");
+  lift_number("--height", options.lift.world.course.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
+  lift_number("--lift-time", options.lift.world.course.lift_s, "S", 0.05, 60.0, "And how long that takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
     if (i != stiffness) { // no kind sets it
       kind->excludes(of_lift[i]);

@@ -1,7 +1,5 @@
-// Slips of what a grip holds, and how soon the grip answered.
+// Slides of what a grip holds, and how the grip answered.
 #pragma once
-
-#include "simulation/cell/cell.hpp"
 
 #include <limits>
 #include <optional>
@@ -9,27 +7,29 @@
 
 namespace fingertip::cell {
 
-constexpr double SLIP_mm = 0.3;
+constexpr double SLIP_mm = 0.3;  // a slide by less is none
+constexpr double DROP_mm = 22.0; // what slid by so much is dropped
 
 // All of both contacts slid, by SLIP_mm or more in all.
 struct Slip {
-  double begin_s, way_mm;           // begin_s: by the clock of look()
-  std::optional<double> reaction_s; // until the grip was 5 % stronger; none: never
+  double begin_s, way_mm;           // begin_s: by the clock of sample()
+  std::optional<double> reaction_s; // until the grip was 5 % stronger, at the latest when it ended; none: never
+  double peak_N, least_N;           // from its beginning to 1 s after its end, the largest of each
 };
 
 class Slips {
 public:
-  // At least once a millisecond, the cell at this time. What goes on after less rest than 30 ms is
-  // one slip.
-  void look(double t_s, const Cell &cell);
-  // Now no slip goes on.
+  // At least once a millisecond: whether it slides, the grip, how far it slid in all, and the grip that just
+  // holds. A slide that goes on after less rest than 30 ms is one slip.
+  void sample(double t_s, bool slides, double force_N, double slid_mm, double least_N = 0.0);
+  // No slip goes on from now on.
   void end();
   std::vector<Slip> slips;
 
 private:
+  static constexpr double NEVER_s = std::numeric_limits<double>::infinity();
   std::optional<Slip> slip_;
-  double begin_N_ = 0.0, begin_mm_ = 0.0;
-  double last_s_ = -std::numeric_limits<double>::infinity();
+  double begin_N_ = 0.0, begin_mm_ = 0.0, last_s_ = -NEVER_s, ended_s_ = -NEVER_s;
 };
 
 } // namespace fingertip::cell

@@ -291,7 +291,7 @@ class Again(CellTest):
 class Faults:
     """While a paper cup is squeezed, or carried: whatever fails, it is not crushed, and the grip does not open by itself.
 
-    One of each kind of process, line and signal: every fault in every state is test_grasp_faults.py's, in simulated time."""
+    One of each kind of process, line and signal: every fault in every state is test_grasp_kinds.py's, in simulated time."""
 
     CAP_N = 4.0
     # Of 50 g, which gives way by 0.2 mm a newton.

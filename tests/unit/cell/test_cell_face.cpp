@@ -34,8 +34,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
       const double direction = random.uniform(-M_PI, M_PI);
       touch.pull_x_N = pull_N * std::cos(direction);
       touch.pull_y_N = pull_N * std::sin(direction);
-      const double share = random.uniform(0.0, 1.0);
-      const Pressures sensed_Pa = face.base_Pa(touch, share);
+      const Pressures sensed_Pa = face.base_Pa(touch);
       const double peak_Pa = table.base_pressure_Pa(touch.force_N, 0.0, 0.0);
       const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
       const twin::TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
@@ -44,14 +43,14 @@ TEST(Face, FeelsWhatTheTwinDoes) {
         const double dx = static_cast<double>(geometry.x_mm[k]) - touch.x_mm;
         const double dy = static_cast<double>(geometry.y_mm[k]) - touch.y_mm;
         const double along_x = c * dx + s * dy, along_y = c * dy - s * dx;
-        const double expected_Pa = table.base_pressure_Pa(touch.force_N, along_x, along_y) +
-                                   share * traction.base_pressure_Pa(load, along_x, along_y);
+        const double expected_Pa =
+            table.base_pressure_Pa(touch.force_N, along_x, along_y) + traction.base_pressure_Pa(load, along_x, along_y);
         ASSERT_NEAR(sensed_Pa[k], expected_Pa, 0.002 * peak_Pa) << name << " " << i;
       }
       EXPECT_NEAR(face.indentation_mm(touch.force_N), table.indentation_mm(touch.force_N), 1e-3);
       EXPECT_NEAR(face.radius_mm(touch.force_N), table.contact_radius_mm(touch.force_N), 0.03);
     }
-    EXPECT_EQ(face.base_Pa({}, 1.0), Pressures{});
+    EXPECT_EQ(face.base_Pa({}), Pressures{});
   }
 }
 
@@ -91,12 +90,12 @@ TEST(Plate, HidesSlidingFromTheBase) {
   const Face face("plate", 12.0, FINGERTIP_TEST_TABLES);
   twin::Touch touch;
   touch.force_N = 5.0;
-  const Pressures here = face.base_Pa(touch, 1.0);
+  const Pressures here = face.base_Pa(touch);
   touch.x_mm = 6.0;
   touch.angle_rad = 0.3;
-  EXPECT_EQ(face.base_Pa(touch, 1.0), here);
+  EXPECT_EQ(face.base_Pa(touch), here);
   touch.pull_x_N = 2.0;
-  const Pressures pulled = face.base_Pa(touch, 1.0);
+  const Pressures pulled = face.base_Pa(touch);
   double most_Pa = 0.0;
   for (std::size_t k = 0; k < SENSORS; k++) {
     most_Pa = std::max(most_Pa, std::abs(pulled[k] - here[k]));

@@ -1,7 +1,7 @@
-"""Every fault in every state of a grasp, in simulated time: the grip never opens by itself, never exceeds its cap, always says what happened, and no
-paper cup is crushed.
+"""Grasps in simulated time. Few of the kinds: the same seed, the same answer; more grip, fewer drops. And every fault in every state of a grasp: the
+grip never opens by itself, never exceeds its cap, always says what happened, and no paper cup is crushed.
 
-usage: test_grasp_faults.py FINGERTIP_GRASP_FAULTS TABLES [unittest arguments]
+usage: test_grasp_kinds.py FINGERTIP_GRASP_KINDS [unittest arguments]
 """
 
 import json
@@ -13,23 +13,82 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/grasp"), str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import faults  # noqa: E402
+import kinds  # noqa: E402
 
 STATES = {"activate", "approach", "squeeze", "ready", "holding", "slipping", "still", "release"}
 LEAST_LIMIT_N = {"2f85": 20.0, "sts3215": 0.0}  # that can be set
 
 
 def run(*options):
-    return subprocess.run([PROGRAM, "--cache", TABLES, *options], capture_output=True, text=True, check=False)
+    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+
+
+def each(*options):
+    """Without what no seed decides."""
+    found = json.loads(run("--gripper", "ideal", *options).stdout)["each"]
+    return [{**one, "step_us": 0} for one in found]
 
 
 def name(row):
     return ", ".join(row[key] for key in ("fault", "state", "gripper", "object")) + f": {row['said'] or 'nothing'}; {row['ends']}"
 
 
+class Kinds(unittest.TestCase):
+    def test_the_same_seed_gives_the_same_however_many_threads(self):
+        first = each("--count", "6")
+        self.assertEqual(first, each("--count", "6", "--jobs", "1"))
+        self.assertNotEqual(first, each("--count", "6", "--seed", "2"))
+
+    def test_what_hardly_grips_drops(self):
+        weak, firm = (
+            kinds.summary(each("--controller", "fixed", "--set", f"fixed={set_N}", "--count", "12", "--kind", "usual"))
+            for set_N in (0.4, 17)
+        )
+        self.assertGreaterEqual(weak["drops_percent"], 80)
+        self.assertLessEqual(firm["drops_percent"], 10)
+
+    def test_a_set_force_settles(self):
+        found = kinds.summary_of_sets(each("--kind", "gentle", "--still", "6", "--count", "4"))
+        self.assertEqual((found["grasps"], found["never_settled_percent"]), (4, 0))
+
+    def test_what_the_grippers_steps_allow_is_better_than_ours(self):
+        rms = [
+            kinds.summary_of_sets(
+                json.loads(run("--kind", "gentle", "--still", "12", "--controller", controller, "--count", "24", "--seed", "3").stdout)[
+                    "each"
+                ]
+            )["firm_rms_p50_percent"]
+            for controller in ("oracle", "ours")
+        ]
+        self.assertLess(rms[0], 0.8 * rms[1])
+
+    def test_a_trace_has_a_value_for_each_moment(self):
+        found = json.loads(run("--trace", "2").stdout)
+        lengths = {len(values) for values in found["series"].values()}
+        self.assertEqual(len(lengths), 1)
+        self.assertGreater(lengths.pop(), 500)
+
+    def test_wrong_usage_is_one_line(self):
+        for options in (
+            ("--count", "0"),
+            ("--gripper", "banana"),
+            ("--kind", "bananas"),
+            ("--controller", "firm"),
+            ("--rate", "x"),
+            ("--rate", "0"),
+            ("--set", "grip=1"),
+            ("--set", "fixed"),
+            ("--jobs", "0"),
+            ("--what", "1"),
+        ):
+            done = run(*options)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), options)
+
+
 class Faults(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        done = run()
+        done = run("--faults")
         if done.returncode != 0:
             raise AssertionError(done.stderr)
         cls.rows = json.loads(done.stdout)["rows"]
@@ -82,12 +141,7 @@ class Faults(unittest.TestCase):
         self.assertEqual(max(row["peak_N"] for row in table), max(row["peak_N"] for row in self.rows))
         self.assertIn("both fingertips gone", "\n".join(faults.text({"faults": table})))
 
-    def test_wrong_usage_is_one_line(self):
-        for options in (("--state", "asleep"), ("--fault", "earthquake"), ("--jobs", "0"), ("--what", "1")):
-            done = run(*options)
-            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), options)
-
 
 if __name__ == "__main__":
-    PROGRAM, TABLES = sys.argv.pop(1), sys.argv.pop(1)
+    PROGRAM = sys.argv.pop(1)
     unittest.main()
