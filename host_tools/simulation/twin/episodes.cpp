@@ -41,4 +41,24 @@ Track track_at(Place place) {
   return track;
 }
 
+double touch_and_hold(Episode &episode, Track &track, double force_N, double hold_s, double ramp_s) {
+  track.force_N.ease(ramp_s, force_N);
+  phase(episode, "touch", track.force_N.end_s());
+  track.force_N.hold(hold_s);
+  phase(episode, "hold", track.force_N.end_s());
+  return track.force_N.end_s();
+}
+
+void release(Episode &episode, Track &track, double ramp_s) {
+  track.force_N.ease(ramp_s, 0.0);
+  phase(episode, "release", track.force_N.end_s());
+  episode.tracks.push_back(track);
+}
+
+void rest_and_release(Episode &episode, Track &track, double rest_s) {
+  track.force_N.hold(rest_s);
+  phase(episode, "after", track.force_N.end_s());
+  release(episode, track);
+}
+
 } // namespace fingertip::twin

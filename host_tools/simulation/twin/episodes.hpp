@@ -72,6 +72,13 @@ void phase(Episode &episode, const std::string &name, double end_s, bool slip = 
 
 Track track_at(Place place);
 
+// What most episodes have in common: the phases touch and hold, whose end is returned; after; release, which puts
+// the track into the episode. A press rises and falls within TOUCHES_s, from rest to rest.
+constexpr double TOUCHES_s = 0.3;
+double touch_and_hold(Episode &episode, Track &track, double force_N, double hold_s, double ramp_s = TOUCHES_s);
+void release(Episode &episode, Track &track, double ramp_s = TOUCHES_s);
+void rest_and_release(Episode &episode, Track &track, double rest_s);
+
 // The functions below make the nth episode of a kind.
 Episode lift(const Stage &stage, std::size_t n);
 Episode drag(const Stage &stage, std::size_t n);

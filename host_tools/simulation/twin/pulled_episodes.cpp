@@ -70,11 +70,7 @@ Episode lift(const Stage &stage, std::size_t n) {
   aim(track, chosen.angle_rad);
   track.pull.friction = Profile(chosen.friction);
   track.pull.travel_mm = stage.options.dead_travel_mm;
-  track.force_N.ease(0.3, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.5, 0.7));
-  const double begin_s = track.force_N.end_s();
-  phase(episode, "hold", begin_s);
+  const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
   Profile &load_N = track.pull.load_N;
   load_N.hold(begin_s);
   load_N.ease(lift_s, chosen.share * force_N);
@@ -83,11 +79,7 @@ Episode lift(const Stage &stage, std::size_t n) {
   phase(episode, "carry", load_N.end_s());
   load_N.ease(lift_s, 0.0);
   phase(episode, "lower", load_N.end_s());
-  track.force_N.hold(load_N.end_s() - begin_s + 0.3);
-  phase(episode, "after", track.force_N.end_s());
-  track.force_N.ease(0.3, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  rest_and_release(episode, track, load_N.end_s() - begin_s + 0.3);
   return episode;
 }
 
@@ -108,11 +100,7 @@ Episode drag(const Stage &stage, std::size_t n) {
   track.pull.friction = Profile(chosen.friction);
   track.pull.travel_mm = stage.options.dead_travel_mm;
   place_way(track, WAY_mm + track.pull.travel_mm, stage, random);
-  track.force_N.ease(0.3, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.9, 1.1));
-  const double begin_s = track.force_N.end_s();
-  phase(episode, "hold", begin_s);
+  const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.9, 1.1));
   Profile &load_N = track.pull.load_N;
   load_N.hold(begin_s);
   load_N.ease(LOADS_s, chosen.share * force_N);
@@ -127,11 +115,7 @@ Episode drag(const Stage &stage, std::size_t n) {
   phase(episode, "slip", load_N.end_s(), true);
   load_N.ease(LOADS_s, 0.0);
   phase(episode, "unload", load_N.end_s());
-  track.force_N.hold(load_N.end_s() - begin_s + 0.5);
-  phase(episode, "after", track.force_N.end_s());
-  track.force_N.ease(0.3, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  rest_and_release(episode, track, load_N.end_s() - begin_s + 0.5);
   return episode;
 }
 
@@ -369,21 +353,15 @@ Episode slide(const Stage &stage, std::size_t n) {
   }
   aim(track, angle_rad);
   place_way(track, course.farthest_mm, stage, random);
-  track.force_N.ease(0.3, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.5, 0.7));
-  const double begin_s = track.force_N.end_s();
-  phase(episode, "hold", begin_s);
+  const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
   track.force_N.trace(course.force_N, 1e-5);
   track.pusher_mm.hold(begin_s).trace(course.way_mm, 1e-4);
   track.pull.load_N.hold(begin_s).trace(course.pull_N, 1e-5);
   track.pull.friction = Profile(script.friction);
   track.pull.friction.hold(begin_s).trace(course.friction, 1e-5);
   slide_phases(episode, course.phases, begin_s);
-  track.force_N.ease(0.3, 0.0);
-  track.pull.load_N.ease(0.3, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  track.pull.load_N.ease(TOUCHES_s, 0.0);
+  release(episode, track);
   return episode;
 }
 
@@ -413,11 +391,7 @@ Episode screw(const Stage &stage, std::size_t n) {
   track.pull.friction = Profile(chosen.friction);
   track.pull.travel_mm = stage.options.dead_travel_mm;
   track.angle_rad = Profile(random.uniform(-45.0, 45.0) * DEGREE);
-  track.force_N.ease(0.3, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.5, 0.7));
-  const double begin_s = track.force_N.end_s();
-  phase(episode, "hold", begin_s);
+  const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
   Profile &loaded_N = track.pull.load_N;
   loaded_N.hold(begin_s);
   if (load_N > 0.0) {
@@ -459,11 +433,7 @@ Episode screw(const Stage &stage, std::size_t n) {
     loaded_N.ease(LOADS_s, 0.0);
     phase(episode, "lower", loaded_N.end_s());
   }
-  track.force_N.hold(loaded_N.end_s() - begin_s + 0.3);
-  phase(episode, "after", track.force_N.end_s());
-  track.force_N.ease(0.3, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  rest_and_release(episode, track, loaded_N.end_s() - begin_s + 0.3);
   return episode;
 }
 

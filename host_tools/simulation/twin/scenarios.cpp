@@ -30,13 +30,8 @@ Episode press(const std::string &name, Place place, double force_N, double ramp_
   Episode episode;
   episode.press = name;
   Track track = track_at(place);
-  track.force_N.ease(ramp_s, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(hold_s);
-  phase(episode, "hold", track.force_N.end_s());
-  track.force_N.ease(ramp_s, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  touch_and_hold(episode, track, force_N, hold_s, ramp_s);
+  release(episode, track, ramp_s);
   return episode;
 }
 
@@ -156,11 +151,7 @@ Episode slip(const Stage &stage, std::size_t n) {
   track.angle_rad = Profile(random.uniform(-15.0, 15.0) * DEGREE);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
 
-  track.force_N.ease(0.3, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.8, 1.2));
-  const double push_s = track.force_N.end_s();
-  phase(episode, "hold", push_s);
+  const double push_s = touch_and_hold(episode, track, force_N, random.uniform(0.8, 1.2));
   track.pusher_mm.hold(push_s);
   track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), episode.speed_mm_s, SPEED_UP_s);
   const double stop_s = track.pusher_mm.end_s();
@@ -168,11 +159,7 @@ Episode slip(const Stage &stage, std::size_t n) {
     phase(episode, "dead_travel", time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s), true);
   }
   phase(episode, "slip", stop_s, true);
-  track.force_N.hold(stop_s - push_s + 0.5);
-  phase(episode, "after", track.force_N.end_s());
-  track.force_N.ease(0.3, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  rest_and_release(episode, track, stop_s - push_s + 0.5);
   return episode;
 }
 
@@ -184,21 +171,14 @@ Episode twist(const Stage &stage, std::size_t n) {
   Track track = track_at(stage.random_place(random));
   const double from = random.uniform(-45.0, 45.0) * DEGREE;
   track.angle_rad = Profile(from);
-  track.force_N.ease(0.3, stage.forces.pick(n, random.uniform(0.0, 1.0)));
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.5, 0.7));
-  const double begin_s = track.force_N.end_s();
-  phase(episode, "hold", begin_s);
+  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
   track.angle_rad.hold(begin_s);
   const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
   track.angle_rad.travel(TURN_deg * DEGREE, rate, SPEED_UP_s);
   const double end_s = track.angle_rad.end_s();
   phase(episode, "twist", end_s);
-  track.force_N.hold(end_s - begin_s + 0.5);
-  phase(episode, "after", track.force_N.end_s());
-  track.force_N.ease(0.3, 0.0);
-  phase(episode, "release", track.force_N.end_s());
-  episode.tracks.push_back(track);
+  rest_and_release(episode, track, end_s - begin_s + 0.5);
   return episode;
 }
 
@@ -226,11 +206,7 @@ Episode rolloff(const Stage &stage, std::size_t n) {
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
   track.edge_x_mm = half_width_mm(stage.options);
   track.radius_mm = stage.table.contact_radius_mm(force_N);
-  track.force_N.ease(0.3, force_N);
-  phase(episode, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.4, 0.6));
-  phase(episode, "hold", track.force_N.end_s());
-  track.pusher_mm.hold(track.force_N.end_s());
+  track.pusher_mm.hold(touch_and_hold(episode, track, force_N, random.uniform(0.4, 0.6)));
   track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, episode.speed_mm_s, SPEED_UP_s);
   track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
   phase(episode, "roll", track.force_N.end_s());
