@@ -5,9 +5,7 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
-#include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
-#include "library/pad/table_file.hpp"
 #include "library/pad/thickness.hpp"
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/repeat.h"
@@ -38,11 +36,10 @@ constexpr std::uint32_t CALIBRATED_s = 1767225600; // 2026-01-01: the same bytes
 struct PlayOptions {
   std::string scenario, recording, raw_bytes, commands, first, serial = "0000000000000001";
   std::string osr = "1024", rate = "max", slip_threshold, slip_window;
-  double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
+  double noise = 1.0, seconds = 0.0;
   std::uint64_t seed = 1;
   float prior_sigma_mm = 0.0F, prior_width_mm = 0.0F;
   std::optional<double> pad_mm;
-  double overhang_mm = 0.0;
   bool from_touch = false;
   bool raw = false, replace = false, quiet = false;
 };
@@ -145,10 +142,7 @@ int play(const PlayOptions &options) {
   }
   std::optional<pad_profile> pad;
   if (options.pad_mm) {
-    pad = pad::profile_over_own_sensors({*options.pad_mm, options.overhang_mm, options.from_touch});
-    if (options.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm && options.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm) {
-      pad->edges = pad::edges_of(*pad, pad::own_sensors(), twin::default_cache_directory());
-    }
+    pad = pad::profile_over_own_sensors({*options.pad_mm, 0.0, options.from_touch});
   }
   const std::vector<wire_packet> first =
       options.first.empty() ? std::vector<wire_packet>() : commands_in(options.first);
@@ -163,7 +157,7 @@ int play(const PlayOptions &options) {
   native_fingertip_settings settings{};
   settings.seed = options.seed;
   settings.noise = options.noise;
-  settings.prom_spread = 0.01 * options.prom_spread;
+  settings.prom_spread = 0.03;
   settings.prior_sigma_mm = options.prior_sigma_mm;
   settings.prior_width_mm = options.prior_width_mm;
   settings.world = {&scenario, pressure_Pa, temperature_degC};
@@ -400,18 +394,12 @@ int run(int argc, char **argv) {
   CLI::Option *pad =
       player->add_option("--pad", play_options.pad_mm, "Thickness of the pad: the firmware estimates tangential force")
           ->type_name("MM");
-  player->add_option("--overhang", play_options.overhang_mm, "Of the pad")->type_name("MM")->needs(pad);
   player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
   player->add_option("--first", play_options.first, "Commands that it is sent first, of fingertip_player calibrate")
       ->type_name("FILE");
   player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
       ->check(CLI::Range(0.0, 1000.0))
       ->type_name("FACTOR");
-  player
-      ->add_option("--prom-spread", play_options.prom_spread,
-                   "Calibration words differ from part to part by up to this; default 3")
-      ->check(CLI::Range(0.0, 10.0))
-      ->type_name("PERCENT");
   player->add_option("--serial", play_options.serial, "Serial number of the fingertip")
       ->check([](const std::string &text) {
         const bool is_one = text.size() == 16 && text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
