@@ -1,53 +1,15 @@
 #include "grasp/gripper/feetech.hpp"
 #include "grasp/gripper/feetech_packet.hpp"
 #include "grasp/gripper/feetech_table.hpp"
-#include "libfingertip/random.hpp"
-#include "support/gripper_lines.hpp"
+#include "models.hpp"
 
 #include <cmath>
-#include <gtest/gtest.h>
 #include <numbers>
 
 using namespace fingertip;
+using namespace fingertip::test;
 
-namespace {
-
-GripperServer::Options options() {
-  GripperServer::Options options;
-  options.model = "sts3215";
-  return options;
-}
-
-std::unique_ptr<Gripper> opened(const std::string &port) { return open_gripper({.model = "sts3215", .port = port}); }
-
-std::unique_ptr<Gripper> activated(const std::string &port) {
-  std::unique_ptr<Gripper> gripper = opened(port);
-  gripper->activate();
-  EXPECT_TRUE(gripper->poll().active);
-  return gripper;
-}
-
-GripperStatus moved(Served &simulated, Gripper &gripper, const GripperMove &move) {
-  GripperStatus status = gripper.move(move);
-  for (int i = 0; i < 100 && status.moving; i++) {
-    simulated.pass(0.3);
-    status = gripper.poll();
-  }
-  EXPECT_FALSE(status.moving);
-  return status;
-}
-
-template <typename Act> ErrorCode code_of(Act act) {
-  try {
-    act();
-  } catch (const Error &error) {
-    return error.code();
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return ErrorCode::other;
-}
-
-} // namespace
+constexpr const char *MODEL = "sts3215";
 
 /* Examples of Feetech's protocol manual for SCS and STS servos: pings servo 1, reads two bytes from
  * 56 of it, writes position 2048, time 0 and speed 1000; the answer is a read's. */
@@ -99,8 +61,8 @@ TEST(Jaw, IsAChord) {
 }
 
 TEST(Feetech, MovesItsJawOnceActivated) {
-  Served simulated(options());
-  std::unique_ptr<Gripper> gripper = opened(simulated.port());
+  Served simulated(served(MODEL));
+  std::unique_ptr<Gripper> gripper = opened(MODEL, simulated.port());
   const GripperTraits &traits = gripper->traits();
   EXPECT_NEAR(traits.step_mm, 0.153, 0.001);
   EXPECT_FALSE(gripper->move({.width_mm = 10, .speed_mm_s = 100}).active);
@@ -118,8 +80,8 @@ TEST(Feetech, MovesItsJawOnceActivated) {
 }
 
 TEST(Feetech, KnowsAnObjectByWhereItStops) {
-  Served simulated(options());
-  std::unique_ptr<Gripper> gripper = activated(simulated.port());
+  Served simulated(served(MODEL));
+  std::unique_ptr<Gripper> gripper = activated(MODEL, simulated);
   simulated.with([](GripperServer &, GripperMotion &motion) {
     motion.blocked_at = [](double width_mm, double force_N) {
       return force_N > 0 && width_mm < 40 && (40 - width_mm) * 2 >= force_N;
@@ -131,52 +93,15 @@ TEST(Feetech, KnowsAnObjectByWhereItStops) {
   EXPECT_NEAR(simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }), 36, 0.05);
 }
 
-TEST(Feetech, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
-  Served simulated(options());
-  std::unique_ptr<Gripper> gripper = activated(simulated.port());
-  const struct {
-    LineFault fault;
-    ErrorCode code;
-  } CASES[] = {{LineFault::silent, ErrorCode::gripper_silent},
-               {LineFault::garbage, ErrorCode::gripper_garbled},
-               {LineFault::damaged, ErrorCode::gripper_garbled},
-               {LineFault::other_slave, ErrorCode::gripper_garbled}};
-  for (const auto &one : CASES) {
-    for (const bool polls : {true, false}) {
-      LineTrouble trouble;
-      trouble.fault = one.fault;
-      trouble.answers = 1;
-      simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
-      EXPECT_EQ(code_of([&] { polls ? gripper->poll() : gripper->move({.width_mm = 50, .speed_mm_s = 100}); }),
-                one.code)
-          << static_cast<int>(one.fault) << polls;
-      EXPECT_TRUE(gripper->poll().active);
-    }
-  }
-}
-
 TEST(Feetech, FaultsAreBits) {
-  Served simulated(options());
-  std::unique_ptr<Gripper> gripper = activated(simulated.port());
+  Served simulated(served(MODEL));
+  std::unique_ptr<Gripper> gripper = activated(MODEL, simulated);
   simulated.with([](GripperServer &server, GripperMotion &) { server.fail(feetech::OVERLOAD | feetech::TEMPERATURE); });
   const GripperStatus status = gripper->poll();
   EXPECT_EQ(status.fault, feetech::OVERLOAD | feetech::TEMPERATURE);
   EXPECT_EQ(gripper->fault_text(status.fault), "too hot, overloaded");
   EXPECT_EQ(gripper->fault_text(0), "");
   EXPECT_EQ(gripper->fault_text(0x80), "a fault that its memory table does not have");
-}
-
-TEST(Feetech, IsNotActivatedByAMoveAfterItsPowerWasLost) {
-  Served simulated(options());
-  std::unique_ptr<Gripper> gripper = activated(simulated.port());
-  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 400});
-  simulated.with([](GripperServer &server, GripperMotion &) { server.power(false); });
-  EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
-  simulated.with([](GripperServer &server, GripperMotion &) { server.power(true); });
-  for (int i = 0; i < 3; i++) {
-    EXPECT_FALSE(gripper->move({.width_mm = 85, .speed_mm_s = 150}).active);
-  }
-  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.1);
 }
 
 namespace {
@@ -222,7 +147,7 @@ TEST(FeetechFrames, TheirOwnEchoIsIgnored) {
   };
   Tape tape({exchange(ASK_TABLE, table()), exchange(ASK_STATUS, status(2304)), exchange(ASK_STATUS, status(2304))});
   {
-    std::unique_ptr<Gripper> gripper = opened(tape.port());
+    std::unique_ptr<Gripper> gripper = opened(MODEL, tape.port());
     EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 16), 1e-9);
     EXPECT_NE(gripper->line().find("servo model 777"), std::string::npos);
   }
@@ -236,60 +161,17 @@ TEST(FeetechFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
              {text(ASK_MODEL), text(status(2304)) + " " + text({6, 0, {0x09, 0x03}})},
              {text(ASK_STATUS), text(status(2176))}});
   {
-    std::unique_ptr<Gripper> gripper = opened(tape.port());
+    std::unique_ptr<Gripper> gripper = opened(MODEL, tape.port());
     EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
     EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 32), 1e-9);
   }
   EXPECT_EQ(tape.complaint(), "");
 }
 
-/* An exchange waits for 50 ms; half of the answers are up to 150 ms late while it closes and opens.
- * Where the question to be sure was asked again before its own answer had come, one status in
- * thirty was an older one. */
-TEST(Feetech, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
-  constexpr double NEAR_mm = 0.4; // a step, and how far it moves within a poll's own time
-  Served simulated(options());
-  std::unique_ptr<Gripper> gripper = activated(simulated.port());
-  const auto width_mm = [&] {
-    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.reported_width_mm(); });
-  };
-  Random random(7, 0, 0);
-  int answers = 0;
-  for (int i = 0; i < 2000; i++) {
-    simulated.with([&](GripperServer &server, GripperMotion &) {
-      LineTrouble trouble;
-      trouble.late_s = std::max(0.0, random.uniform(-0.15, 0.15));
-      server.trouble(trouble);
-    });
-    const double before_mm = width_mm();
-    try {
-      if (i % 100 == 0) {
-        gripper->move({.width_mm = i % 200 == 0 ? 0.0 : 90.0, .speed_mm_s = 20});
-      } else {
-        const double told_mm = gripper->poll().width_mm, now_mm = width_mm();
-        EXPECT_LE(told_mm, std::max(before_mm, now_mm) + NEAR_mm) << i;
-        EXPECT_GE(told_mm, std::min(before_mm, now_mm) - NEAR_mm) << i;
-        answers++;
-      }
-    } catch (const Error &) { // none in time
-    }
-  }
-  EXPECT_GT(answers, 500);
-}
-
-TEST(Feetech, SaysWhenItsPortIsGone) {
-  auto simulated = std::make_unique<Served>(options());
-  std::unique_ptr<Gripper> gripper = opened(simulated->port());
-  simulated.reset();
-  for (int i = 0; i < 3; i++) {
-    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gone);
-  }
-}
-
 TEST(Feetech, RefusesWhatCannotBe) {
-  Served simulated(options());
+  Served simulated(served(MODEL));
   const auto code = [&](GripperWay way) {
-    way.model = "sts3215";
+    way.model = MODEL;
     way.port = simulated.port();
     return code_of([&] { open_gripper(way); });
   };

@@ -1,70 +1,12 @@
 #include "grasp/gripper/robotiq.hpp"
 #include "grasp/gripper/robotiq_registers.hpp"
-#include "libfingertip/random.hpp"
-#include "support/gripper_lines.hpp"
+#include "models.hpp"
 
 #include <cmath>
-#include <gtest/gtest.h>
 
 using namespace fingertip;
+using namespace fingertip::test;
 using namespace std::chrono_literals;
-
-namespace {
-
-GripperServer::Options served(const char *model, std::vector<int> functions = {3, 4, 16, 23}) {
-  GripperServer::Options options;
-  options.model = model;
-  options.functions = functions;
-  return options;
-}
-
-std::unique_ptr<Gripper> opened(const std::string &model, const std::string &port) {
-  return open_gripper({.model = model, .port = port});
-}
-
-/* Less than a second passes from one poll to the next: it would be a fault. */
-template <typename Until> GripperStatus wait_for(Served &simulated, Gripper &gripper, Until until) {
-  for (int i = 0; i < 100; i++) {
-    const GripperStatus status = gripper.poll();
-    if (until(status)) {
-      return status;
-    }
-    simulated.pass(0.3);
-  }
-  ADD_FAILURE() << "it never came";
-  return {};
-}
-
-bool rests(const GripperStatus &status) { return !status.moving; }
-
-bool is_active(const GripperStatus &status) { return status.active; }
-
-std::unique_ptr<Gripper> activated(const std::string &model, Served &simulated) {
-  std::unique_ptr<Gripper> gripper = opened(model, simulated.port());
-  gripper->activate();
-  wait_for(simulated, *gripper, is_active);
-  return gripper;
-}
-
-GripperStatus moved(Served &simulated, Gripper &gripper, const GripperMove &move) {
-  const GripperStatus first = gripper.move(move);
-  EXPECT_TRUE(first.active);
-  EXPECT_FALSE(first.moving && first.object);
-  return wait_for(simulated, gripper, rests);
-}
-
-template <typename Act> ErrorCode code_of(Act act) {
-  try {
-    act();
-  } catch (const Error &error) {
-    EXPECT_NE(std::string(error.what()), "");
-    return error.code();
-  }
-  ADD_FAILURE() << "nothing was thrown";
-  return ErrorCode::other;
-}
-
-} // namespace
 
 /* Requests and answers are printed in Robotiq's "2F-85 & 2F-140 Instruction Manual" and "Hand-E
  * Gripper Instruction Manual", section Modbus RTU example; those with function 3 in the "2-Finger
@@ -195,34 +137,6 @@ TEST(Robotiq, FindsTheFunctionsThatItAnswers) {
   }
 }
 
-TEST(Robotiq, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
-  Served simulated(served("2f85"));
-  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
-  const GripperMove move = {.width_mm = 85, .speed_mm_s = 150};
-  gripper->move(move);
-  gripper->move(move); // function 23
-  const struct {
-    LineFault fault;
-    ErrorCode code;
-  } CASES[] = {{LineFault::silent, ErrorCode::gripper_silent},
-               {LineFault::garbage, ErrorCode::gripper_garbled},
-               {LineFault::damaged, ErrorCode::gripper_garbled},
-               {LineFault::other_slave, ErrorCode::gripper_garbled},
-               {LineFault::refused, ErrorCode::gripper_refused}};
-  for (const auto &one : CASES) {
-    for (const bool polls : {true, false}) {
-      LineTrouble trouble;
-      trouble.fault = one.fault;
-      trouble.answers = 1;
-      simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
-      EXPECT_EQ(code_of([&] { polls ? gripper->poll() : gripper->move(move); }), one.code)
-          << static_cast<int>(one.fault) << polls;
-      EXPECT_TRUE(gripper->poll().active);
-    }
-  }
-  EXPECT_NE(gripper->line().find("function 23"), std::string::npos);
-}
-
 /* An answer that comes when the next question has been asked says what was, not what is. */
 TEST(RobotiqFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
   const std::string stale = with_crc("09 04 06 F9 00 00 00 40 00"), fresh = with_crc("09 04 06 F9 00 00 00 80 00"),
@@ -253,22 +167,10 @@ TEST(Robotiq, TellsASecondOfSilenceOnce) {
   EXPECT_EQ(status.fault, 0);
 }
 
-TEST(Robotiq, IsNotActivatedByAMoveAfterItsPowerWasLost) {
+/* Nor in the very exchange after which it knows. */
+TEST(Robotiq, IsNotActivatedByTheMoveAfterItsPowerWasLost) {
   Served simulated(served("2f85"));
   std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
-  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 150});
-  simulated.with([](GripperServer &server, GripperMotion &) { server.power(false); });
-  EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
-  simulated.with([](GripperServer &server, GripperMotion &) { server.power(true); });
-  for (int i = 0; i < 20; i++) {
-    EXPECT_FALSE(gripper->move({.width_mm = 85, .speed_mm_s = 150}).active);
-  }
-  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.19);
-  simulated.with([](GripperServer &, GripperMotion &motion) { EXPECT_FALSE(motion.activating()); });
-
-  /* Nor in the very exchange after which it knows. */
-  gripper->activate();
-  wait_for(simulated, *gripper, is_active);
   moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 150});
   simulated.with([](GripperServer &server, GripperMotion &) {
     server.power(false);
@@ -313,50 +215,6 @@ TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
   wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.fault == 0x0F; });
   EXPECT_EQ(gripper->poll().width_mm, 85.0);
   EXPECT_FALSE(gripper->poll().active);
-}
-
-/* An exchange waits for 50 ms; half of the answers are up to 150 ms late while it closes and opens.
- * Where the question to be sure was asked again before its own answer had come, one status in
- * thirty was an older one. */
-TEST(Robotiq, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
-  constexpr double NEAR_mm = 0.4; // a step, and how far it moves within a poll's own time
-  Served simulated(served("2f85"));
-  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
-  const auto width_mm = [&] {
-    return simulated.with([](GripperServer &, GripperMotion &motion) { return motion.reported_width_mm(); });
-  };
-  Random random(7, 0, 0);
-  int answers = 0;
-  for (int i = 0; i < 2000; i++) {
-    simulated.with([&](GripperServer &server, GripperMotion &) {
-      LineTrouble trouble;
-      trouble.late_s = std::max(0.0, random.uniform(-0.15, 0.15));
-      server.trouble(trouble);
-    });
-    const double before_mm = width_mm();
-    try {
-      if (i % 100 == 0) {
-        gripper->move({.width_mm = i % 200 == 0 ? 0.0 : 85.0, .speed_mm_s = 20});
-      } else {
-        const double told_mm = gripper->poll().width_mm, now_mm = width_mm();
-        EXPECT_LE(told_mm, std::max(before_mm, now_mm) + NEAR_mm) << i;
-        EXPECT_GE(told_mm, std::min(before_mm, now_mm) - NEAR_mm) << i;
-        answers++;
-      }
-    } catch (const Error &) { // none in time
-    }
-  }
-  EXPECT_GT(answers, 500);
-}
-
-TEST(Robotiq, SaysWhenItsPortIsGone) {
-  auto simulated = std::make_unique<Served>(served("2f85"));
-  std::unique_ptr<Gripper> gripper = opened("2f85", simulated->port());
-  simulated.reset();
-  for (int i = 0; i < 3; i++) {
-    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gone);
-  }
-  EXPECT_EQ(code_of([&] { gripper->move({}); }), ErrorCode::gone);
 }
 
 TEST(Robotiq, RefusesWhatCannotBe) {
