@@ -20,7 +20,7 @@ protected:
 
   test::Feel feel() {
     test::Feel feel;
-    feel.force_N = static_cast<float>(std::max(0.0, STIFFNESS_N_mm * (object_mm_ - state_->width_mm()) / 2));
+    feel.force_N = static_cast<float>(std::max(0.0, STIFFNESS_N_mm * (OBJECT_mm - state_->width_mm()) / 2));
     feel.qy_N = load_N_;
     return feel;
   }
@@ -34,18 +34,14 @@ protected:
     EXPECT_EQ(met[0].packet.body.info.serial[0], 'A');
     EXPECT_EQ(met[1].packet.body.info.serial[0], 'B');
     auto gripper = open()();
-    settings_ = settings_for(gripper->traits(), {{"cap", 10}, {"travel-cap", 20}});
-    loop_->begin(std::move(gripper), open(), settings_);
+    const GripSettings settings = settings_for(gripper->traits(), {{"cap", 10}, {"travel-cap", 20}});
+    loop_->begin(std::move(gripper), open(), settings);
   }
   /* Takes news until it is so. */
   bool until(const std::function<bool(const GraspNews &)> &is_so) {
     const HostTime patience = host_now() + std::chrono::seconds(60);
     while (host_now() < patience) {
       for (GraspNews &news : loop_->take(milliseconds(20))) {
-        if (news.kind == Kind::step) {
-          highest_N_ = std::max(highest_N_, feel().force_N);
-          steps_++;
-        }
         frames_ += news.kind == Kind::device && news.device->kind == DeviceNews::Kind::packet &&
                    news.device->packet.type == WIRE_CONTACT;
         last_ = news.kind == Kind::step ? news : last_;
@@ -59,11 +55,6 @@ protected:
   }
   bool until_state(std::uint8_t state) {
     return until([state](const GraspNews &news) { return news.kind == Kind::step && news.report.state == state; });
-  }
-  bool until_trouble(std::uint32_t bit, bool on) {
-    return until([bit, on](const GraspNews &news) {
-      return news.kind == Kind::step && ((news.report.trouble & bit) != 0) == on;
-    });
   }
   bool until_frames(int more) {
     const int goal = frames_ + more;
@@ -83,38 +74,15 @@ protected:
 
   test::TemporaryFolder folder_;
   std::shared_ptr<test::FakeGripperState> state_ = std::make_shared<test::FakeGripperState>();
-  std::atomic<double> object_mm_{OBJECT_mm};
   std::atomic<float> load_N_{0};
   test::SoftFingertip left_{folder_ / "left", "AAAA", 200, [this] { return feel(); }};
   test::SoftFingertip right_{folder_ / "right", "BBBB", 200, [this] { return feel(); }};
   std::unique_ptr<GraspLoop> loop_;
-  GripSettings settings_{};
   GraspNews last_{Kind::step};
-  float highest_N_ = 0;
-  int steps_ = 0, frames_ = 0;
+  int frames_ = 0;
 };
 
 } // namespace
-
-TEST_F(GraspLoopTest, NothingMovesBeforeItIsRequestedThenTheObjectIsHeldAsItsLoadNeeds) {
-  begin();
-  until_frames(100);
-  EXPECT_TRUE(state_->moves().empty());
-  EXPECT_EQ(last_.report.state, GRIP_IDLE);
-  ASSERT_TRUE(grasp());
-  const auto force_N = [this] { return feel().force_N; };
-  until([&](const GraspNews &) { return std::abs(force_N() - static_cast<float>(settings_.start_N)) < 0.4f; });
-  load_N_ = 3.0f;
-  const float needed_N = static_cast<float>(3.0 * settings_.margin / settings_.friction);
-  until([&](const GraspNews &news) { return force_N() > 0.95f * needed_N && news.report.load_N > 2.7; });
-  EXPECT_LT(force_N(), 2.0f * needed_N);
-  EXPECT_EQ(state_->activations, 0);
-  end();
-  EXPECT_EQ(last_.report.state, GRIP_STILL);
-  EXPECT_EQ(last_.command.motion, GRIP_STAY);
-  EXPECT_GT(feel().force_N, 0.9f * needed_N) << "opened at its end";
-  EXPECT_LT(highest_N_, 10.0f);
-}
 
 TEST_F(GraspLoopTest, InterruptsHoldAndThenOpenWithoutAnybodyTakingNews) {
   std::atomic<unsigned> interrupts{0};
@@ -135,32 +103,6 @@ TEST_F(GraspLoopTest, InterruptsHoldAndThenOpenWithoutAnybodyTakingNews) {
   end();
 }
 
-TEST_F(GraspLoopTest, FingertipsThatGoNeverOpenNorTightenItAndComeBack) {
-  begin();
-  ASSERT_TRUE(grasp());
-  load_N_ = 0.5f;
-  until_frames(100);
-  left_.unplug();
-  ASSERT_TRUE(until_trouble(GRIP_FINGER_0_STALE, true));
-  EXPECT_GT(feel().force_N, 1.0f);
-  right_.unplug();
-  ASSERT_TRUE(until_trouble(GRIP_FINGER_1_STALE, true));
-  const double width_mm = state_->width_mm();
-  load_N_ = 5.0f;
-  const int goal = steps_ + 200; /* at least a second: every 5 ms without a frame */
-  until([&](const GraspNews &) { return steps_ >= goal; });
-  EXPECT_NEAR(state_->width_mm(), width_mm, 0.06);
-  load_N_ = 0.5f;
-  left_.plug_in();
-  right_.plug_in();
-  ASSERT_TRUE(until([](const GraspNews &news) {
-    return news.kind == Kind::step && (news.report.trouble & (GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE)) == 0;
-  }));
-  EXPECT_TRUE(last_.report.state == GRIP_HOLDING || last_.report.state == GRIP_SLIPPING);
-  end();
-  EXPECT_GT(feel().force_N, 1.0f);
-}
-
 TEST_F(GraspLoopTest, ASlowGripperDelaysNoFrame) {
   state_->delay_ms = 400;
   begin();
@@ -169,58 +111,6 @@ TEST_F(GraspLoopTest, ASlowGripperDelaysNoFrame) {
   const int before = state_->exchanges, frames = frames_;
   until([&](const GraspNews &) { return state_->exchanges >= before + 4; });
   EXPECT_GT(frames_ - frames, 50 * 2);
-  end();
-}
-
-TEST_F(GraspLoopTest, ASilentGripperIsToldAndTakenUpAgain) {
-  begin();
-  ASSERT_TRUE(grasp());
-  state_->silent = true;
-  ASSERT_TRUE(
-      until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text == "fake: no answer"; }));
-  ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, true));
-  EXPECT_EQ(last_.command.motion, GRIP_STAY);
-  state_->silent = false;
-  ASSERT_TRUE(until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text.empty(); }));
-  ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, false));
-  EXPECT_EQ(last_.report.state, GRIP_HOLDING);
-  end();
-}
-
-TEST_F(GraspLoopTest, AFaultEndsItWhereItIsAndIsNotActivatedAway) {
-  begin();
-  ASSERT_TRUE(grasp());
-  const double width_mm = state_->width_mm();
-  state_->fault = 9;
-  state_->active = false;
-  ASSERT_TRUE(until([](const GraspNews &news) { return news.kind == Kind::fault; }));
-  EXPECT_EQ(last_.report.state, GRIP_FAULT);
-  EXPECT_EQ(last_.report.gripper_fault, 9);
-  EXPECT_FALSE(loop_->request(GRIP_REQUEST_RELEASE));
-  EXPECT_FALSE(loop_->request(GRIP_REQUEST_GRASP));
-  state_->fault = 0;
-  until_frames(50);
-  EXPECT_EQ(last_.report.gripper_fault, 9) << "what led there";
-  EXPECT_NEAR(state_->width_mm(), width_mm, 0.5);
-  EXPECT_EQ(state_->activations, 0);
-  end();
-}
-
-TEST_F(GraspLoopTest, ActivatesOnlyWhereItMay) {
-  state_->active = false;
-  begin();
-  until_frames(10);
-  EXPECT_TRUE(loop_->request(GRIP_REQUEST_GRASP));
-  until_frames(200);
-  EXPECT_EQ(state_->activations, 0);
-  EXPECT_EQ(last_.command.motion, GRIP_STAY);
-  end();
-  loop_.reset();
-  GraspLoop::Options options;
-  options.activate = true;
-  begin(options);
-  ASSERT_TRUE(grasp());
-  EXPECT_EQ(state_->activations, 1);
   end();
 }
 
