@@ -369,6 +369,14 @@ class Usage(TwinTest):
         }.items():
             self.assertIn(what, self.scenario_error(*arguments))
             self.assertEqual(os.listdir(self.folder), [])
+        for words in (
+            *("taps --seconds 2", "taps --seconds 1e9", "taps --seconds nan", "taps --force 0", "taps --force 1..51", "taps --force 9..2"),
+            *("taps --force 5,", "taps --margin -1", "slip --speed 0", "taps --tangential -0.1", "taps --tangential 0.3,0,0"),
+            *("lift --friction nan", "lift --tangential 0.4..0.1", "lift --tangential 0.1..", "lift --friction 0.3..0.5 --tangential 0.4"),
+            *("slide --mass 0..1", "slide --kinetic 1.1", "slide --dead-travel 0", "slip --second cube6", "slip --dead-travel 11"),
+            "taps --overhang 20.1",
+        ):
+            self.assertIn("; ", self.scenario_error(*words.split()), words)
         self.assertIn("/no/such/place.csv: No such file or directory", self.error("scenario", "taps", "-o", "/no/such/place.csv"))
         for arguments in (
             ("scenario",),

@@ -1,5 +1,3 @@
-#include "libfingertip/error.hpp"
-#include "libfingertip/random.hpp"
 #include "scenes.hpp"
 
 extern "C" {
@@ -259,64 +257,6 @@ TEST(Scenarios, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
   }
   const Scenario other = scenario_of("taps", [](ScenarioOptions &o) { o.seed = 2; });
   EXPECT_FALSE(brief.episodes[0].tracks[0].at(0.2) == other.episodes[0].tracks[0].at(0.2));
-}
-
-TEST(Scenarios, WrongOptionsAreToldInOneLine) {
-  const auto message = [](const std::string &kind, const std::function<void(ScenarioOptions &)> &change) {
-    try {
-      scenario_of(kind, change);
-    } catch (const Error &error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  for (const std::string &text : {message("glide", {}),
-                                  message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
-                                  message("taps", [](ScenarioOptions &o) { o.seconds = 1e9; }),
-                                  message("taps", [](ScenarioOptions &o) { o.seconds = NAN; }),
-                                  message("taps", [](ScenarioOptions &o) { o.forces = "0"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.forces = "1..51"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.forces = "9..2"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.forces = "5,"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.margin_mm = -1; }),
-                                  message("taps", [](ScenarioOptions &o) { o.speeds_mm_s = {20}; }),
-                                  message("slip", [](ScenarioOptions &o) { o.speeds_mm_s = {0}; }),
-                                  message("slip", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.tangential = "0.51"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.tangential = "-0.1"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,"; }),
-                                  message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,0,0"; }),
-                                  message("lift", [](ScenarioOptions &o) { o.friction = "0.2"; }),
-                                  message("lift", [](ScenarioOptions &o) { o.friction = "nan"; }),
-                                  message("lift", [](ScenarioOptions &o) { o.tangential = "0.1..0.6"; }),
-                                  message("lift", [](ScenarioOptions &o) { o.tangential = "0.4..0.1"; }),
-                                  message("lift", [](ScenarioOptions &o) { o.tangential = "0.1.."; }),
-                                  message("lift",
-                                          [](ScenarioOptions &o) {
-                                            o.friction = "0.3..0.5";
-                                            o.tangential = "0.4";
-                                          }),
-                                  message("lift", [](ScenarioOptions &o) { o.mass_kg = "0.2"; }),
-                                  message("slide", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
-                                  message("slide", [](ScenarioOptions &o) { o.mass_kg = "5"; }),
-                                  message("slide", [](ScenarioOptions &o) { o.mass_kg = "0..1"; }),
-                                  message("slide", [](ScenarioOptions &o) { o.kinetic_share = 1.1; }),
-                                  message("slide", [](ScenarioOptions &o) { o.dead_travel_mm = 0; }),
-                                  message("slide", [](ScenarioOptions &o) { o.speeds_mm_s = {500}; }),
-                                  message("slip", [](ScenarioOptions &o) { o.second_indenter = "cube6"; }),
-                                  message("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 11; })}) {
-    EXPECT_NE(text.find("; "), std::string::npos) << text;
-    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
-  }
-}
-
-TEST(Scenarios, PadsEndWithinWhatTheBlockIsHeldTo) {
-  for (const auto &[overhang_mm, layer_mm] : {std::pair{2.9, 12.0}, {20.1, 12.0}, {9.0, 3.5}}) {
-    ScenarioOptions options;
-    options.overhang_mm = overhang_mm;
-    options.layer_mm = layer_mm;
-    EXPECT_THROW(complete(options), Error) << overhang_mm << " " << layer_mm;
-  }
 }
 
 } // namespace
