@@ -252,10 +252,6 @@ int play(const PlayOptions &options) {
   return 0;
 }
 
-struct RepeatOptions {
-  std::string capture;
-};
-
 // What a capture has, and how much of it this code gives again.
 struct Repeated {
   std::uint64_t frames = 0, in_contact = 0, held = 0, equal = 0;
@@ -339,13 +335,13 @@ private:
   Repeated result_;
 };
 
-int repeat_capture(const RepeatOptions &options) {
+int repeat_capture(const std::string &capture) {
   Decoder decoder;
   Repeater repeater;
-  feed_file(options.capture, decoder, [&](const wire_packet &packet) { repeater.packet(packet); });
+  feed_file(capture, decoder, [&](const wire_packet &packet) { repeater.packet(packet); });
   const Repeated &r = repeater.result();
   if (decoder.statistics().dropped_packets > 0 || decoder.statistics().crc_errors > 0) {
-    throw Error(options.capture + ": packets are missing (" + decoder.statistics().text() +
+    throw Error(capture + ": packets are missing (" + decoder.statistics().text() +
                 "); what follows them cannot be repeated");
   }
   if (repeater.lonely_frame()) {
@@ -353,15 +349,15 @@ int repeat_capture(const RepeatOptions &options) {
                 " has no contact packet; stream both contact and raw");
   }
   if (r.frames == 0) {
-    throw Error(options.capture + (repeater.tared() ? ": no frame after the tare"
-                                                    : ": no tare; have one within the capture, "
-                                                      "before anything touches the pad"));
+    throw Error(capture + (repeater.tared() ? ": no frame after the tare"
+                                            : ": no tare; have one within the capture, "
+                                              "before anything touches the pad"));
   }
   std::printf("{\"frames\": %llu, \"in_contact\": %llu, \"held\": %llu, \"equal\": %llu}\n",
               static_cast<unsigned long long>(r.frames), static_cast<unsigned long long>(r.in_contact),
               static_cast<unsigned long long>(r.held), static_cast<unsigned long long>(r.equal));
   if (r.equal != r.frames) {
-    throw Error(options.capture + ": " + std::to_string(r.frames - r.equal) + " contact packets differ, the first " +
+    throw Error(capture + ": " + std::to_string(r.frames - r.equal) + " contact packets differ, the first " +
                 r.first_difference);
   }
   return 0;
@@ -371,82 +367,64 @@ int run(int argc, char **argv) {
   CLI::App app("The fingertip without a chip: the firmware's own code, compiled for this machine");
   app.require_subcommand(1);
   app.get_formatter()->column_width(28);
-  PlayOptions play_options;
+  const auto option = [](CLI::App *command, const char *name, auto &value, const char *type, const char *help) {
+    return command->add_option(name, value, help)->type_name(type);
+  };
+  PlayOptions given;
   CLI::App *player =
       app.add_subcommand("play", "Apply a scenario to simulated sensors and record the firmware's packets");
-  player->add_option("scenario", play_options.scenario, "CSV file, from twin or fingertip-scenario")
-      ->required()
-      ->type_name("FILE.csv");
-  player->add_option("-o,--output", play_options.recording, "Recording, as of fingertip record")
-      ->required()
-      ->type_name("FILE.csv");
-  player->add_flag("--overwrite", play_options.replace, "Replace a recording that exists");
-  player->add_option("--osr", play_options.osr, "Oversampling, 256 to 8192; default 1024")->type_name("N");
-  player->add_option("--rate", play_options.rate, "Frames a second, or max (default)")->type_name("HZ");
-  player->add_option("--slip-threshold", play_options.slip_threshold, "Slip distance")->type_name("MM");
-  player->add_option("--slip-window", play_options.slip_window, "Its window")->type_name("MS");
-  player->add_option("--prior-sigma", play_options.prior_sigma_mm, "Prior on sigma")
-      ->check(CLI::Range(0.1, 100.0))
-      ->type_name("MM");
-  player->add_option("--prior-width", play_options.prior_width_mm, "Its standard deviation")
-      ->check(CLI::Range(0.001, 100.0))
-      ->type_name("MM");
+  option(player, "scenario", given.scenario, "FILE.csv", "CSV file, from twin or fingertip-scenario")->required();
+  option(player, "-o,--output", given.recording, "FILE.csv", "Recording, as of fingertip record")->required();
+  player->add_flag("--overwrite", given.replace, "Replace a recording that exists");
+  option(player, "--osr", given.osr, "N", "Oversampling, 256 to 8192; default 1024");
+  option(player, "--rate", given.rate, "HZ", "Frames a second, or max (default)");
+  option(player, "--slip-threshold", given.slip_threshold, "MM", "Slip distance");
+  option(player, "--slip-window", given.slip_window, "MS", "Its window");
+  option(player, "--prior-sigma", given.prior_sigma_mm, "MM", "Prior on sigma")->check(CLI::Range(0.1, 100.0));
+  option(player, "--prior-width", given.prior_width_mm, "MM", "Its standard deviation")
+      ->check(CLI::Range(0.001, 100.0));
   CLI::Option *pad =
-      player->add_option("--pad", play_options.pad_mm, "Thickness of the pad: the firmware estimates tangential force")
-          ->type_name("MM");
-  player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
-  player->add_option("--first", play_options.first, "Commands that it is sent first, of fingertip_player calibrate")
-      ->type_name("FILE");
-  player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
-      ->check(CLI::Range(0.0, 1000.0))
-      ->type_name("FACTOR");
-  player->add_option("--serial", play_options.serial, "Serial number of the fingertip")
+      option(player, "--pad", given.pad_mm, "MM", "Thickness of the pad: the firmware estimates tangential force");
+  player->add_flag("--from-touch", given.from_touch, "As of fingertip pad")->needs(pad);
+  option(player, "--first", given.first, "FILE", "Commands that it is sent first, of fingertip_player calibrate");
+  option(player, "--noise", given.noise, "FACTOR", "Times the datasheet's; default 1")->check(CLI::Range(0.0, 1000.0));
+  option(player, "--serial", given.serial, "HEX16", "Serial number of the fingertip")
       ->check([](const std::string &text) {
         const bool is_one = text.size() == 16 && text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
         return is_one ? std::string() : "give 16 hexadecimal digits, as 000000000000B0BB";
       })
-      ->type_name("HEX16")
       ->capture_default_str();
-  player->add_option("--seed", play_options.seed, "Of noise and calibration; default 1")->type_name("N");
-  player->add_option("--seconds", play_options.seconds, "Default: to the scenario's end")
-      ->check(CLI::Range(0.1, SECONDS_MAX))
-      ->type_name("S");
-  player->add_flag("--raw", play_options.raw, "Record the pressures too");
-  player->add_option("--raw-bytes", play_options.raw_bytes, "Keep the bytes of the line too, as of fingertip record")
-      ->type_name("FILE.ftr");
-  player->add_option("--commands", play_options.commands, "And those that it was sent, before 0 s")->type_name("FILE");
-  player->add_flag("--quiet", play_options.quiet, "No progress");
+  option(player, "--seed", given.seed, "N", "Of noise and calibration; default 1");
+  option(player, "--seconds", given.seconds, "S", "Default: to the scenario's end")
+      ->check(CLI::Range(0.1, SECONDS_MAX));
+  player->add_flag("--raw", given.raw, "Record the pressures too");
+  option(player, "--raw-bytes", given.raw_bytes, "FILE.ftr", "Keep the bytes of the line too, as of fingertip record");
+  option(player, "--commands", given.commands, "FILE", "And those that it was sent, before 0 s");
+  player->add_flag("--quiet", given.quiet, "No progress");
 
-  CalibrateOptions calibrate_options;
+  CalibrateOptions calibrated;
   CLI::App *calibrater =
       app.add_subcommand("calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
                                       "commands that bring what it found: play --first");
-  calibrater->add_option("placements", calibrate_options.placements, "Recording of them, with --raw")
-      ->required()
-      ->type_name("FILE.csv");
-  calibrater->add_option("--force", calibrate_options.force_N, "That weight, N")
-      ->required()
-      ->check(CLI::Range(0.1, 100.0))
-      ->type_name("N");
-  calibrater->add_option("-o,--output", calibrate_options.commands, "The commands")->required()->type_name("FILE");
-  calibrater->add_flag("--overwrite", calibrate_options.replace, "Replace a file that exists");
+  option(calibrater, "placements", calibrated.placements, "FILE.csv", "Recording of them, with --raw")->required();
+  option(calibrater, "--force", calibrated.force_N, "N", "That weight, N")->required()->check(CLI::Range(0.1, 100.0));
+  option(calibrater, "-o,--output", calibrated.commands, "FILE", "The commands")->required();
+  calibrater->add_flag("--overwrite", calibrated.replace, "Replace a file that exists");
 
-  RepeatOptions repeat_options;
+  std::string capture;
   CLI::App *repeater =
       app.add_subcommand("repeat", "Compute the contact packets of a capture once more from its pressures, and compare "
                                    "them byte by byte, stage times apart");
-  repeater
-      ->add_option("capture", repeat_options.capture,
-                   "Bytes of the line (fingertip record --raw-bytes, or the emulator's --capture) "
-                   "with contact and raw packets, an info packet and a tare")
-      ->required()
-      ->type_name("FILE");
+  option(repeater, "capture", capture, "FILE",
+         "Bytes of the line (fingertip record --raw-bytes, or the emulator's --capture) with contact and raw packets, "
+         "an info packet and a tare")
+      ->required();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError &error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  return *player ? play(play_options) : *calibrater ? calibrate(calibrate_options) : repeat_capture(repeat_options);
+  return *player ? play(given) : *calibrater ? calibrate(calibrated) : repeat_capture(capture);
 }
 
 } // namespace

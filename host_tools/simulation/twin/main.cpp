@@ -221,109 +221,78 @@ int run(int argc, char **argv) {
     }
     return printable("twin: " + std::string(error.what()) + "; see " + command + " --help") + "\n";
   });
+  const auto option = [](CLI::App *command, const char *name, auto &value, const char *type, const char *help) {
+    return command->add_option(name, value, help)->type_name(type);
+  };
   const auto with_cache = [&](CLI::App *command) {
-    command
-        ->add_option("--cache", options.cache,
-                     "Folder of the contact tables; default: ~/.cache/fingertip/contact-tables")
-        ->type_name("DIR");
+    option(command, "--cache", options.cache, "DIR",
+           "Folder of the contact tables; default: ~/.cache/fingertip/contact-tables");
   };
 
   app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] { action = list; });
 
   CLI::App *build = app.add_subcommand("tables", "Compute the contact tables that are not cached");
-  build->add_option("--indenter", options.indenters, "Only of these; default: all")
-      ->delimiter(',')
-      ->type_name("NAME,...");
-  build->add_option("--layer", options.layers_mm, "On layers of these thicknesses; default: 12,6")
+  option(build, "--indenter", options.indenters, "NAME,...", "Only of these; default: all")->delimiter(',');
+  option(build, "--layer", options.layers_mm, "MM,...", "On layers of these thicknesses; default: 12,6")
       ->delimiter(',')
       ->default_val(std::vector<double>{12.0, 6.0})
-      ->default_str("")
-      ->type_name("MM,...");
+      ->default_str("");
   with_cache(build);
   build->callback([&] { action = [&] { return tables(options); }; });
 
+  ScenarioOptions &s = options.scenario;
   const auto with_contact = [&](CLI::App *command) {
-    command
-        ->add_option("--indenter", options.scenario.indenter,
-                     "Contact shape; default sphere6, for placements and drags sphere15")
-        ->type_name("NAME");
-    command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")->type_name("MM");
+    option(command, "--indenter", s.indenter, "NAME",
+           "Contact shape; default sphere6, for placements and drags sphere15");
+    option(command, "--layer", s.layer_mm, "MM", "Thickness of the rubber; default 12");
   };
 
-  CLI::App *fit = app.add_subcommand("width", "Width of the Gaussian that fits the pressure under "
-                                              "a force best, its share of the force, and "
-                                              "its peak");
+  CLI::App *fit = app.add_subcommand("width", "Width of the Gaussian that fits the pressure under a force best, its "
+                                              "share of the force, and its peak");
   with_contact(fit);
-  fit->add_option("--force", options.width_force_N, "Normal force")
+  option(fit, "--force", options.width_force_N, "N", "Normal force")
       ->check(CLI::Range(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))
-      ->type_name("N")
       ->capture_default_str();
-  fit->add_option("--shore", options.shore_a, "Hardness of the rubber, Shore A; default 15")
-      ->check(CLI::Range(SHORE_MIN, SHORE_MAX))
-      ->type_name("A");
+  option(fit, "--shore", options.shore_a, "A", "Hardness of the rubber, Shore A; default 15")
+      ->check(CLI::Range(SHORE_MIN, SHORE_MAX));
   with_cache(fit);
   fit->callback([&] { action = [&] { return width(options); }; });
 
   CLI::App *write = app.add_subcommand("scenario", "Write a scenario, and its events beside it: FILE.truth.csv");
-  ScenarioOptions &s = options.scenario;
-  write->add_option("kind", s.kind, "What happens: see twin list")->required()->type_name("KIND");
-  write->add_option("-o,--output", options.output, "The scenario to write")->required()->type_name("FILE.csv");
+  option(write, "kind", s.kind, "KIND", "What happens: see twin list")->required();
+  option(write, "-o,--output", options.output, "FILE.csv", "The scenario to write")->required();
   with_contact(write);
-  write->add_option("--overhang", s.overhang_mm, "The pad ends so far beyond its outer sensors; default: never")
-      ->type_name("MM");
-  write
-      ->add_option("--second", s.second_indenter,
-                   "Contact shape of the second contact, in scenarios of two; default: the same")
-      ->type_name("NAME");
-  write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")->type_name("PERCENT");
-  write
-      ->add_option("--effects", options.effects,
-                   "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
-      ->type_name("NAME[=VALUE],...");
-  write
-      ->add_option_function<std::string>(
-          "--seed", [&](const std::string &text) { s.seed = seed_from_text("--seed", text); },
-          "Of places, forces and times; default 1")
-      ->type_name("N");
-  write
-      ->add_option_function<std::string>(
-          "--pad", [&](const std::string &text) { s.pad_seed = seed_from_text("--pad", text); },
-          "Seed of the pad's errors; default: --seed")
-      ->type_name("N");
-  write->add_option("--seconds", s.seconds, "Length; default: see twin list")->type_name("S");
-  write
-      ->add_option("--force", s.forces,
-                   "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "
-                   "twin list")
-      ->type_name("N");
-  write
-      ->add_option("--tangential", s.tangential,
-                   "Pulled along the rubber by this share of the force, as 0.3 or any of 0.1..0.4; "
-                   "without an angle in any direction. In lifts the weight, in drags what hangs on "
-                   "the string, default 0.3; else 0")
-      ->type_name("SHARE[,DEG]");
-  write
-      ->add_option("--friction", s.friction,
-                   "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides "
-                   "0.3..0.8")
-      ->type_name("MU");
-  write->add_option("--kinetic", s.kinetic_share, "Kinetic friction per static, in slides; 0.8")->type_name("SHARE");
-  write->add_option("--mass", s.mass_kg, "Of the object, in slides; default 0.1..0.5")->type_name("KG");
-  write->add_option("--speed", s.speeds_mm_s, "In turn, of slip, rolloff, drag, the hand in slides")
-      ->delimiter(',')
-      ->type_name("MM_PER_S,...");
-  write
-      ->add_option("--dead-travel", s.dead_travel_mm,
-                   "Way of the pusher, or of the pulled object, before it slips; default 1")
-      ->type_name("MM");
-  write->add_option("--creep", s.creep_share, "Share of the dead travel by which the contact moves along; default 0.5")
-      ->type_name("SHARE");
-  write->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")->type_name("MM");
-  write
-      ->add_option("--margin", s.margin_mm,
-                   "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5")
-      ->type_name("MM");
-  write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
+  option(write, "--overhang", s.overhang_mm, "MM", "The pad ends so far beyond its outer sensors; default: never");
+  option(write, "--second", s.second_indenter, "NAME",
+         "Contact shape of the second contact, in scenarios of two; default: the same");
+  option(write, "--gain", options.gain, "PERCENT", "Short for the effect gain; 0: none");
+  option(write, "--effects", options.effects, "NAME[=VALUE],...",
+         "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all");
+  const auto seed = [&](const char *name, auto &value, const char *help) {
+    const auto set = [&value, name](const std::string &text) { value = seed_from_text(name, text); };
+    write->add_option_function<std::string>(name, set, help)->type_name("N");
+  };
+  seed("--seed", s.seed, "Of places, forces and times; default 1");
+  seed("--pad", s.pad_seed, "Seed of the pad's errors; default: --seed");
+  option(write, "--seconds", s.seconds, "S", "Length; default: see twin list");
+  option(write, "--force", s.forces, "N", "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see twin list");
+  option(write, "--tangential", s.tangential, "SHARE[,DEG]",
+         "Pulled along the rubber by this share of the force, as 0.3 or any of 0.1..0.4; without an angle in any "
+         "direction. In lifts the weight, in drags what hangs on the string, default 0.3; else 0");
+  option(write, "--friction", s.friction, "MU",
+         "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides 0.3..0.8");
+  option(write, "--kinetic", s.kinetic_share, "SHARE", "Kinetic friction per static, in slides; 0.8");
+  option(write, "--mass", s.mass_kg, "KG", "Of the object, in slides; default 0.1..0.5");
+  option(write, "--speed", s.speeds_mm_s, "MM_PER_S,...", "In turn, of slip, rolloff, drag, the hand in slides")
+      ->delimiter(',');
+  option(write, "--dead-travel", s.dead_travel_mm, "MM",
+         "Way of the pusher, or of the pulled object, before it slips; default 1");
+  option(write, "--creep", s.creep_share, "SHARE",
+         "Share of the dead travel by which the contact moves along; default 0.5");
+  option(write, "--stick-slip", s.stick_slip_mm, "MM", "Slip in jumps of this size; default 0: steady");
+  option(write, "--margin", s.margin_mm, "MM",
+         "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5");
+  option(write, "--quiet", s.quiet_s, "S", "Time between contacts; default 1.2");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
   with_cache(write);
   write->callback([&] { action = [&] { return scenario(options); }; });
