@@ -7,7 +7,6 @@ RECORDING.csv: of fingertip grasp; TRUTH.csv: of fingertip simulate --lift.
 """
 
 import argparse
-import io
 import pathlib
 import sys
 
@@ -18,8 +17,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
-from fingertip.files import InputError, check_output, read_grip, read_lines, run_tool, write_bytes  # noqa: E402
-from fingertip.plot import FAINT, INK, MEASURED, SLIPPING, TRUTH, set_style, spans  # noqa: E402
+from fingertip.files import InputError, check_output, read_grip, read_lines, run_tool  # noqa: E402
+from fingertip.plot import FAINT, INK, MEASURED, SLIPPING, TRUTH, set_style, spans, write_figure  # noqa: E402
 
 SLIP_mm, JOINED_s, MORE_FORCE = 0.3, 0.03, 1.05  # as the cell counts slips, and what is a reaction
 HAPPENINGS = ("lift", "pour", "jerk", "knock", "slick", "push", "vibrate", "carry")
@@ -80,31 +79,16 @@ def draw(grip, t_s, truth, truth_s, slips, happened):
             panel.axvspan(begin, end, color=SLIPPING, alpha=0.15, lw=0, zorder=0)
             if reaction:
                 panel.axvline(reaction, color=SLIPPING, lw=1, ls=":", zorder=1)
-    force.plot(
-        truth_s,
-        np.where(truth["least_N"] > 0, truth["least_N"], np.nan),
-        color=SLIPPING,
-        lw=1,
-        ls="--",
-        label="need: the least that holds it",
-    )
+    need_N = np.where(truth["least_N"] > 0, truth["least_N"], np.nan)
+    force.plot(truth_s, need_N, color=SLIPPING, lw=1, ls="--", label="need: the least that holds it")
     force.plot(t_s, grip["force_N"], color=MEASURED, lw=1.1, label="measured", zorder=2)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.3, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
     width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
     for at_s, what in happened:
         force.axvline(at_s, color=FAINT, lw=0.8, zorder=0)
-        force.annotate(
-            what,
-            (at_s, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 1),
-            textcoords="offset points",
-            size=8,
-            color=FAINT,
-            ha="center",
-            va="bottom",
-        )
+        above = {"xycoords": ("data", "axes fraction"), "xytext": (0, 1), "textcoords": "offset points", "ha": "center", "va": "bottom"}
+        force.annotate(what, (at_s, 1.0), size=8, color=FAINT, **above)
     slid.set_ylim(bottom=min(0, truth["slid_mm"].min()) - 0.05, top=max(1.0, 1.1 * truth["slid_mm"].max()))
     force.legend(loc="upper left", fontsize=8, frameon=False)
     width.legend(loc="upper right", fontsize=8, frameon=False)
@@ -143,9 +127,7 @@ def main(argv):
         result = f"never slipped; {peak}"
     figure.text(0.065, 0.955, "A grasp in the simulated cell" + (f", of kind {kind}" if kind != "none" else ""), size=15, weight="bold")
     figure.text(0.065, 0.927, f"{result}  ·  simulated rubber, object and gripper; the firmware itself on the host", size=9, color=FAINT)
-    picture = io.BytesIO()
-    figure.savefig(picture, dpi=100, format="png")
-    write_bytes(options.output, picture.getvalue())
+    write_figure(figure, options.output, 100)
     print(f"the grasp: {result}")
     return 0
 

@@ -1,8 +1,7 @@
 #!/usr/bin/python3
-"""Draws the monitor's screen while it replays a recording: as an SVG, or as a PNG that moves (APNG).
+"""Draws the monitor's screen while it replays a recording as a PNG, with --until as one that moves (APNG).
 
-    picture.py RECORDING.csv -o FILE.svg [--device SERIAL] [--at S] [--size COLUMNSxROWS] [--tool PATH]
-    picture.py RECORDING.csv -o FILE.png --until S [--every S] ...
+    picture.py RECORDING.csv -o FILE.png [--device SERIAL] [--at S] [--until S [--every S]] [--size COLUMNSxROWS] [--tool PATH]
 
 The picture in the README of the project is that of the first touch of the calibrated fingertip in the demo. The replay shows its S in the last line:
 
@@ -14,13 +13,13 @@ That of a lift in host_tools/README.md is of the firmware on the host:
     cd build/host/host_tools
     simulation/twin/twin scenario lift --seconds 20 --force 6 --tangential 0.35,-40 --gain 2 --seed 5 -o lift_scenario.csv
     simulation/player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
-    /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.svg
+    /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.png
 """
 
 import argparse
 import copy
 import fcntl
-import html
+import io
 import os
 import pathlib
 import pty
@@ -31,12 +30,13 @@ import sys
 import termios
 import time
 
+import matplotlib
 import pyte
+from PIL import Image, ImageDraw, ImageFont
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-import moving  # noqa: E402
-from fingertip.files import InputError, check_output, run_tool, write_bytes, write_text  # noqa: E402
+from fingertip.files import InputError, check_output, run_tool, write_bytes  # noqa: E402
 
 PATIENCE_s = 120
 SPEED = 8  # times the recorded one, to save time
@@ -44,7 +44,13 @@ STEPS_PER_s = 12  # of a monitor that replays, at least: so it shows each step o
 SLOWEST = 1 / 16  # times the recorded speed: a busy machine shows fewer steps a second
 TENTH_s = 0.1  # resolution of the time in the monitor's last line
 NEAR_s = 0.5  # of one screen to the time that was asked for
-WIDTH, HEIGHT, BACKGROUND, FOREGROUND = moving.WIDTH, moving.HEIGHT, moving.BACKGROUND, moving.FOREGROUND
+LAST_s = 1.5  # the last screen stays longer by this
+WIDTH, HEIGHT = 8, 16  # of a cell
+BACKGROUND, FOREGROUND = "#0c0d16", "#dededf"
+COLOURS = 64  # of all screens together
+BRAILLE = 0x2800
+PLACES = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]  # of a braille character's dots, by bit
+FONTS = pathlib.Path(matplotlib.get_data_path()) / "fonts/ttf"
 
 
 def screens_at(command, columns, rows, times_s):
@@ -94,70 +100,47 @@ def replayed(replay, columns, rows, times_s, near_s, speed):
     raise InputError(f"this machine is too busy to show each time within {near_s:g} s")
 
 
-def screen_at(replay, columns, rows, at_s):
-    return replayed(replay, columns, rows, [at_s], NEAR_s, SPEED)[0]
+def image(screen, fonts):
+    picture = Image.new("RGB", (screen.columns * WIDTH, screen.lines * HEIGHT), BACKGROUND)
+    draw = ImageDraw.Draw(picture)
+    for row in range(screen.lines):
+        for column in range(screen.columns):
+            cell = screen.buffer[row][column]
+            x, y, ink = column * WIDTH, row * HEIGHT, FOREGROUND if cell.fg == "default" else f"#{cell.fg}"
+            if cell.bg != "default":
+                draw.rectangle((x, y, x + WIDTH - 1, y + HEIGHT - 1), fill=f"#{cell.bg}")
+            dots = ord(cell.data[0]) - BRAILLE if cell.data else -1
+            if cell.data in ("\u2580", "\u2584"):  # half blocks
+                top = y + (HEIGHT // 2 if cell.data == "\u2584" else 0)
+                draw.rectangle((x, top, x + WIDTH - 1, top + HEIGHT // 2 - 1), fill=ink)
+            elif 0 <= dots < 256:
+                for i, j in (place for bit, place in enumerate(PLACES) if dots >> bit & 1):
+                    draw.rectangle((x + 1 + 4 * i, y + 1 + 4 * j, x + 2 + 4 * i, y + 2 + 4 * j), fill=ink)
+            elif cell.data.strip():
+                draw.text((x, y), cell.data, font=fonts[cell.bold], fill=ink)
+    return picture
 
 
-def shapes(column, row, cell):
-    """A cell's character where it is better drawn than written."""
-    x, y, ink = column * WIDTH, row * HEIGHT, moving.colour(cell.fg, FOREGROUND)
-    if cell.data in "▀▄":
-        return [f'<rect x="{x}" y="{y + (HEIGHT // 2 if cell.data == "▄" else 0)}" width="{WIDTH}" height="{HEIGHT // 2}" fill="{ink}"/>']
-    dots = moving.dots(cell)
-    return dots if dots is None else [f'<circle cx="{x + i}" cy="{y + j}" r="1.4" fill="{ink}"/>' for i, j in dots]
-
-
-def svg(screen):
-    columns, rows = screen.columns, screen.lines
-    out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {columns * WIDTH + 16} {rows * HEIGHT + 16}">',
-        f'<rect width="100%" height="100%" rx="8" fill="{BACKGROUND}"/>',
-        '<g transform="translate(8 8)" shape-rendering="crispEdges" font-family="DejaVu Sans Mono, Menlo, Consolas, monospace" font-size="13">',
-    ]
-    marks, texts = [], []
-    for row in range(rows):
-        cells = [screen.buffer[row][column] for column in range(columns)]
-        start = 0
-        while start < columns:  # backgrounds, as long as they stay the same
-            end = start
-            while end < columns and cells[end].bg == cells[start].bg:
-                end += 1
-            if cells[start].bg != "default":
-                out.append(
-                    f'<rect x="{start * WIDTH}" y="{row * HEIGHT}" width="{(end - start) * WIDTH}" height="{HEIGHT}" '
-                    f'fill="{moving.colour(cells[start].bg, BACKGROUND)}"/>'
-                )
-            start = end
-        column = 0
-        while column < columns:
-            cell = cells[column]
-            drawn = shapes(column, row, cell)
-            if drawn is not None or cell.data in " ":
-                marks += drawn or []
-                column += 1
-                continue
-            end = column  # a word of one style
-            while (
-                end < columns
-                and cells[end].data != " "
-                and shapes(end, row, cells[end]) is None
-                and (cells[end].fg, cells[end].bold) == (cell.fg, cell.bold)
-            ):
-                end += 1
-            word = "".join(each.data for each in cells[column:end])
-            weight = ' font-weight="bold"' if cell.bold else ""
-            texts.append(
-                f'<text x="{column * WIDTH}" y="{row * HEIGHT + 12}" textLength="{(end - column) * WIDTH}" '
-                f'fill="{moving.colour(cell.fg, FOREGROUND)}"{weight}>{html.escape(word)}</text>'
-            )
-            column = end
-    return "\n".join([*out, *marks, '<g shape-rendering="auto">', *texts, "</g></g>", "</svg>"]) + "\n"
+def png(screens, every_s):
+    """The bytes of a PNG; of several screens it repeats them for ever."""
+    fonts = {bold: ImageFont.truetype(str(FONTS / f"DejaVuSansMono{'-Bold' if bold else ''}.ttf"), 13) for bold in (False, True)}
+    pictures = [image(screen, fonts) for screen in screens]
+    together = Image.new("RGB", (pictures[0].width, sum(picture.height for picture in pictures)))
+    for i, picture in enumerate(pictures):
+        together.paste(picture, (0, i * picture.height))
+    palette = together.quantize(COLOURS, dither=Image.Dither.NONE)
+    first, *others = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    durations_ms = [round(1000 * every_s)] * len(others) + [round(1000 * (every_s + LAST_s))]
+    moving = {"save_all": True, "append_images": others, "duration": durations_ms, "loop": 0} if others else {}
+    out = io.BytesIO()
+    first.save(out, format="PNG", optimize=True, **moving)
+    return out.getvalue()
 
 
 def main(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", metavar="RECORDING.csv")
-    parser.add_argument("-o", "--output", required=True, metavar="FILE")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
     parser.add_argument("--at", type=float, default=0.0, metavar="S", help="time in the recording")
     parser.add_argument("--until", type=float, metavar="S", help="and where a picture that moves ends")
@@ -168,21 +151,17 @@ def main(argv):
     size = re.fullmatch(r"(\d+)x(\d+)", options.size)
     if not size:
         raise InputError(f"--size {options.size}: give COLUMNSxROWS, as 110x32")
-    moves = options.until is not None
-    if not options.output.endswith(".png" if moves else ".svg"):
-        raise InputError(f"{options.output}: give a name that ends in .svg; with --until one that ends in .png")
-    if moves and not (options.every >= TENTH_s and options.until > options.at):
+    if not options.output.endswith(".png"):
+        raise InputError(f"{options.output}: give a name that ends in .png")
+    if options.until is not None and not (options.every >= TENTH_s and options.until > options.at):
         raise InputError("--until has to be later than --at, and --every at least 0.1")
     check_output(options.output, options.recording)
     replay = [options.tool, "replay", os.path.relpath(options.recording), *(["--device", options.device] if options.device else [])]
-    columns, rows = int(size[1]), int(size[2])
-    if moves:
+    times_s, near_s, speed = [options.at], NEAR_s, SPEED
+    if options.until is not None:
         times_s = [options.at + i * options.every for i in range(1 + int((options.until - options.at) / options.every))]
-        write_bytes(
-            options.output, moving.png(replayed(replay, columns, rows, times_s, options.every, options.every * STEPS_PER_s), options.every)
-        )
-    else:
-        write_text(options.output, svg(screen_at(replay, columns, rows, options.at)))
+        near_s, speed = options.every, options.every * STEPS_PER_s
+    write_bytes(options.output, png(replayed(replay, int(size[1]), int(size[2]), times_s, near_s, speed), options.every))
     return 0
 
 
