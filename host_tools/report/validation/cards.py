@@ -154,25 +154,6 @@ def measure(build, steps, pads):
     }
 
 
-def text(found):
-    """Paragraphs of the report."""
-    return (
-        "## The report card",
-        f"`fingertip validate` makes the card of {found['validate_healthy_pads']} healthy and {found['validate_faulty_pads']} faulty simulated pads, half of "
-        "them calibrated before. Sensors' gains, places, widths, relaxation, after-effects, drift and dip are as recordings of real pads have them. The hand "
-        "misses the marks by 0.3 mm each way, and the print is shifted and turned on the pad. The bounds of the findings were chosen on other seeds.",
-        "`validate_location_error_percent_off`: how far the card's error of the location is from the true one, median over the healthy pads. "
-        f"`validate_gain_sd_honest`: {WITHIN_1[0]} to {WITHIN_1[1]} % of the gains' errors are within one standard deviation, and {WITHIN_2[0]} % or more "
-        "within two. `validate_finds`: of the seven faults, those that the card finds on every pad that has them, with the right sensors. "
-        "`validate_false_findings`: findings of faults that a pad does not have, on all pads. No real pad was validated.",
-        f"Pulls are of {found['validate_pull_pads']} pads whose sensors differ only in their gains, and of as many with all the errors of real pads. Each is "
-        "calibrated and knows its profile. On the first, `validate_pull_off_percent` is how far the tangential force that the card finds differs from the "
-        "thread's. `validate_pull_location_off_mm` is how far the movement of the location differs from that of the ball, which is `validate_pull_way_mm`. "
-        "Both are medians. On the second, the firmware estimates the tangential force of `validate_pull_like_real_estimated_percent` of the pulls. The "
-        "pulley has no friction here.",
-    )
-
-
 def table(build):
     """(low, middle, high) of each figure of healthy pads, as the card compares them."""
     made = {}

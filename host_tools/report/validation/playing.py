@@ -1,16 +1,16 @@
-"""Scenarios written by twin, played with fingertip_player through the firmware's own code, and read. For validation.py.
+"""Scenarios of the twin, played with fingertip_player through the firmware's own code, and read. For validation.py.
 
 A calibrated pad is calibrated as a user does it: a weight is set down on it, `fingertip calibrate` judges the recording, and
 the player is sent what it finds. A session that is refused is followed by another, with other places. A pad on which all are
 refused has no calibrated rows.
 """
+
 import concurrent.futures
 import csv
 import dataclasses
 import json
 import pathlib
 import subprocess
-import sys
 import time
 
 import numpy as np
@@ -30,24 +30,9 @@ WEIGHT_N, SESSION_s, SESSION_RATE_Hz, SESSIONS_MAX = 3, 200, 50, 5  # of a calib
 OTHER_PLACES = 1000  # added to a seed: the same pad, other places
 
 
-class Progress:
-    def __init__(self, total):
-        self.start_s = time.monotonic()
-        self.total, self.done = total, 0
-
-    def step(self, what):
-        self.done += 1
-        elapsed_s = time.monotonic() - self.start_s
-        text = f"{elapsed_s:5.0f} s  scenario {self.done} of {self.total}: {what}"
-        if sys.stdout.isatty():
-            print(f"\r{text:<78}", end="\n" if self.done == self.total else "", flush=True)
-        elif self.done % 10 == 0 or self.done == self.total:
-            print(text, flush=True)
-
-
 @dataclasses.dataclass(frozen=True)
 class Scenario:
-    what: str  # what it is played for
+    what: str  # its purpose
     kind: str
     indenter: str
     case: object = 0  # what is varied: the gain spread in percent, or something else
@@ -63,12 +48,9 @@ class Scenario:
     raw: bool = False
     options: tuple = ()  # more of twin scenario
 
-    def __str__(self):
-        return f"{self.what}, {self.indenter}, {self.case}" + (f", pad {self.pad}" if self.pad > 1 else "")
-
-
-def session_of(scenario):
-    return scenario.layer_mm, scenario.calibrated, scenario.pad
+    @property
+    def session(self):
+        return self.layer_mm, self.calibrated, self.pad
 
 
 class Played:
@@ -81,10 +63,8 @@ class Played:
         rows = read.has_contact
         self.time_s = read["t_us"][rows] * 1e-6
         self.flags = read["flags"][rows].astype(np.int64)
-        at = [np.interp(self.time_s, table[:, 0], table[:, i]) for i in range(1, 6)]
-        self.touched = at[0] > 1 - 1e-9
-        self.x_mm, self.y_mm, self.force_N = at[1:4]
-        self.slips = at[4] > 0.5
+        touched, self.x_mm, self.y_mm, self.force_N, slips = (np.interp(self.time_s, table[:, 0], table[:, i]) for i in range(1, 6))
+        self.touched, self.slips = touched > 1 - 1e-9, slips > 0.5
         self.estimated = {name: read[name][rows] for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")}
         if read.sensors_Pa.shape[1]:
             self.above_Pa = (read.sensors_Pa - read.tare_Pa)[rows]
@@ -112,7 +92,7 @@ class Workshop:
         self.indenters = set(options.indenters.split(",")) if options.indenters else None
         self.pads = options.pads
         self.scenarios, self.played, self.gaussians = [], {}, []
-        self.sessions, self.refused = {}, 0  # (layer, effects, pad): what a session that was accepted found, commands for the player
+        self.sessions, self.refused = {}, 0  # Scenario.session: the commands for the player that an accepted session found
 
     def add(self, what, kind, indenter, **more):
         """Nothing if its indenter is not among those asked for."""
@@ -121,12 +101,9 @@ class Workshop:
 
     def add_on_pads(self, what, kind, indenter, seconds, effects, **more):
         """Unequal sensors are drawn again for each pad, the presses too: one pad's luck is not what the spread costs."""
-        pads = self.pads_with(effects)
+        pads = self.pads if any(name in effects for name in ("gain", "all", "widths", "places")) else 1
         for pad in range(1, pads + 1):
             self.add(what, kind, indenter, seconds=seconds / pads, pad=pad, effects=effects, **more)
-
-    def pads_with(self, effects):
-        return self.pads if any(name in effects for name in ("gain", "all", "widths", "places")) else 1
 
     def build_tables(self):
         """And the Gaussian that comes closest to each pressure on the base."""
@@ -135,29 +112,34 @@ class Workshop:
         print(f"        contact tables: {len(pairs)} (the first time some five minutes)", flush=True)
         for layer_mm in sorted({layer for _, layer in pairs}):
             names = ",".join(sorted({name for name, layer in feet.union(pairs) if layer == layer_mm}))
-            done = subprocess.run([str(self.twin), "tables", "--indenter", names, "--layer", str(layer_mm), "--cache", str(self.tables)],
-                                  stdout=subprocess.DEVNULL)
-            if done.returncode != 0:
-                raise InputError("twin tables failed; see above")
+            run(self.twin, "tables", "--indenter", names, "--layer", layer_mm, "--cache", self.tables)
         for indenter, layer_mm in pairs:
             text = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)
-            self.gaussians.append({"indenter": indenter, "layer_mm": layer_mm} | {
-                name: float(value) for name, value in (word.split("=") for word in text.split())})
+            widths = {name: float(value) for name, value in (word.split("=") for word in text.split())}
+            self.gaussians.append({"indenter": indenter, "layer_mm": layer_mm} | widths)
 
     @property
     def prior_sigma_mm(self):
         """Of the stiff layer: the mean over the indenters there, for a prior does not know which it will be."""
         return float(np.mean([g["sigma_mm"] for g in self.gaussians if g["layer_mm"] == STIFF_LAYER_mm]))
 
+    def write(self, path, kind, effects, seed, seconds, *more):
+        options = ("--effects", effects or "none", "--seed", seed, "--seconds", seconds, "--cache", self.tables, "-o", path, "--overwrite")
+        run(self.twin, "scenario", kind, *options, *more)
+
+    def play(self, path, recording, seed, rate, *more):
+        run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", rate, "--seed", seed, *more)
+
     def calibrate(self, layer_mm, effects, pad):
         """The first session on this pad that is accepted, or None, and how many were refused."""
         path = self.work / f"session-{layer_mm}-{effects}-{pad}.csv"
         recording, commands, seed = path.with_suffix(".recording.csv"), path.with_suffix(".commands"), self.seed + pad - 1
         for refused in range(SESSIONS_MAX):
-            run(self.twin, "scenario", "placements", "--layer", layer_mm, "--effects", effects or "none", "--seed", seed + OTHER_PLACES * refused,
-                "--pad", seed, "--force", WEIGHT_N, "--seconds", SESSION_s, "--cache", self.tables, "-o", path, "--overwrite")
-            run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", SESSION_RATE_Hz, "--raw", "--seed", seed)
-            judged = subprocess.run([str(self.player), "calibrate", recording, "--force", str(WEIGHT_N), "-o", commands], capture_output=True, text=True)
+            more = ("--layer", layer_mm, "--pad", seed, "--force", WEIGHT_N)
+            self.write(path, "placements", effects, seed + OTHER_PLACES * refused, SESSION_s, *more)
+            self.play(path, recording, seed, SESSION_RATE_Hz, "--raw")
+            command = [str(self.player), "calibrate", recording, "--force", str(WEIGHT_N), "-o", commands]
+            judged = subprocess.run(command, capture_output=True, text=True)
             if judged.returncode == 0:
                 return commands, refused
             if "not calibrated: " not in judged.stderr:
@@ -165,53 +147,52 @@ class Workshop:
         return None, SESSIONS_MAX
 
     def play_one(self, scenario):
-        name = f"scenario{self.scenarios.index(scenario)}"
-        path, recording = self.work / f"{name}.csv", self.work / f"{name}.recording.csv"
-        seed = self.seed + scenario.pad - 1
-        run(self.twin, "scenario", scenario.kind, "--indenter", scenario.indenter, "--layer", scenario.layer_mm, "--effects", scenario.effects or "none",
-            "--seed", seed, "--seconds", min(scenario.seconds, max(SECONDS_MIN, scenario.seconds * self.scale)), "--cache", self.tables,
-            "-o", path, "--overwrite", *(() if scenario.margin_mm is None else ("--margin", scenario.margin_mm)), *scenario.options)
-        run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", scenario.rate, "--noise", scenario.noise,
-            "--seed", seed, *(("--raw",) if scenario.raw else ()),
-            *(("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()),
-            *(() if scenario.calibrated is None else ("--first", self.sessions[session_of(scenario)])))
-        played = Played(path, recording, path.with_suffix(".truth.csv"))
-        for file in (path, path.with_suffix(".truth.csv"), recording):
+        path = self.work / f"scenario{self.scenarios.index(scenario)}.csv"
+        recording, truth, seed = path.with_suffix(".recording.csv"), path.with_suffix(".truth.csv"), self.seed + scenario.pad - 1
+        seconds = min(scenario.seconds, max(SECONDS_MIN, scenario.seconds * self.scale))
+        margin = () if scenario.margin_mm is None else ("--margin", scenario.margin_mm)
+        pressed = ("--indenter", scenario.indenter, "--layer", scenario.layer_mm, *margin, *scenario.options)
+        self.write(path, scenario.kind, scenario.effects, seed, seconds, *pressed)
+        prior = ("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()
+        first = () if scenario.calibrated is None else ("--first", self.sessions[scenario.session])
+        self.play(path, recording, seed, scenario.rate, "--noise", scenario.noise, *["--raw"] * scenario.raw, *prior, *first)
+        played = Played(path, recording, truth)
+        for file in (path, truth, recording):
             file.unlink()
         return played
 
-    def play_all(self):
-        wanted = list(dict.fromkeys(session_of(scenario) for scenario in self.scenarios if scenario.calibrated is not None))
+    def play_all(self, steps):
+        """Seconds that the scenarios took."""
+        wanted = list(dict.fromkeys(scenario.session for scenario in self.scenarios if scenario.calibrated is not None))
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
-            print(f"        calibrations: {len(wanted)} pads", flush=True)
             for session, (commands, refused) in zip(wanted, pool.map(lambda session: self.calibrate(*session), wanted)):
                 self.sessions[session] = commands
                 self.refused += refused
-            self.scenarios = [one for one in self.scenarios if one.calibrated is None or self.sessions[session_of(one)]]
-            progress = Progress(len(self.scenarios))
-            running = {pool.submit(self.play_one, scenario): scenario for scenario in self.scenarios}
-            for done in concurrent.futures.as_completed(running):
-                self.played[running[done]] = done.result()
-                progress.step(running[done])
-        return time.monotonic() - progress.start_s
+            steps.report(f"{len(wanted)} pads calibrated")
+            start_s = time.monotonic()
+            self.scenarios = [one for one in self.scenarios if one.calibrated is None or self.sessions[one.session]]
+            for number, (scenario, played) in enumerate(zip(self.scenarios, pool.map(self.play_one, self.scenarios)), 1):
+                self.played[scenario] = played
+                if number % 10 == 0 or number == len(self.scenarios):
+                    steps.report(f"scenario {number} of {len(self.scenarios)}")
+        return time.monotonic() - start_s
 
     def emulate(self, effects, seconds):
         """Runs a scenario on the image of the emulated chip, and computes its contact packets here from its pressures."""
         if not self.image.exists():
             raise InputError(f"{self.image} is not there; {TO_BUILD}")
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
-        run(self.twin, "scenario", "taps", "--indenter", "sphere6", "--layer", 12, "--effects", effects, "--seconds", seconds, "--seed",
-            self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
+        self.write(scenario, "taps", effects, self.seed, seconds, "--indenter", "sphere6", "--layer", 12)
         commands = [run(self.command_frame, *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
         script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
-        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", MULTIPLEXED, "--image", self.image, "--scenario", scenario,
-            "--host-script", script, "--capture", capture, "--fast-enumeration")
+        chip = (ROOT / "host_tools/simulation/emulator/main.mjs", "--board", MULTIPLEXED, "--image", self.image, "--fast-enumeration")
+        run("node", *chip, "--scenario", scenario, "--host-script", script, "--capture", capture)
         return json.loads(run(self.player, "repeat", capture))
 
     def select(self, what, **wanted):
         """What was played for it, those scenarios only that have these members."""
-        return [self.played[scenario] for scenario in self.scenarios
-                if scenario.what == what and all(getattr(scenario, name) == value for name, value in wanted.items())]
+        chosen = [one for one in self.scenarios if one.what == what and all(getattr(one, name) == value for name, value in wanted.items())]
+        return [self.played[scenario] for scenario in chosen]
 
     def first(self, what, **wanted):
         return next(iter(self.select(what, **wanted)), None)

@@ -9,7 +9,7 @@ simulation: they show how far the method and this code carry on a pad that is as
 pad costs, not how good a fingertip is.
 
     validation.json   all that was measured; "goals": the figures by which this is judged
-    validation.md     the same as text, with pictures (validation_report.py)
+    validation.md     the same as text (text.md.in), with pictures (validation_report.py)
 
 A sample is a frame in contact that was fitted. Localisation errors are of samples of at least 1 N. Contact tables are
 cached beside the results.
@@ -23,12 +23,13 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import cards  # noqa: E402
+import text  # noqa: E402
 from fingertip.files import SLIP, InputError, run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
 from presentation import judge  # noqa: E402
 from playing import PAPER_RATE_Hz, PRIOR_WIDTH_mm, STIFF_LAYER_mm, Workshop  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
-from validation_report import draw, write_report  # noqa: E402
+from validation_report import draw  # noqa: E402
 
 # A saturated or missing sensor is left out: that alone makes no location worse.
 LOCATION_WARNINGS = int(Flag.LOW_SIGNAL | Flag.FLAT | Flag.UNCERTAIN | Flag.MODEL | Flag.AT_BOUND)
@@ -46,7 +47,6 @@ EVERY_EFFECT = "every effect"
 # Beyond the paper's grid of 9 mm by 27 mm: none; up to the outer sensors; up to half a millimetre from the pad's long edge.
 STIFF_MARGINS_mm = (0, 4.5, 10)
 
-BUDGET_GAINS = (2, 5, 10, 15)
 PRIORS = {False: (False, True), True: (False,)}  # a calibration finds the width itself
 SLIP_DIPS = ("dip", "dip calibrated")
 SLIP_DIP = "dip"  # of equal sensors: the paper's slips are judged without a spread of gains too
@@ -56,7 +56,7 @@ ALL = "all,branch=9"
 BUDGET = (
     ("nothing but the model", "", 0),
     ("noise, OSR 1024", "", 1),
-    *((f"gain spread {gain} %", f"gain={gain}", 0) for gain in BUDGET_GAINS),
+    *((f"gain spread {gain} %", f"gain={gain}", 0) for gain in (2, 5, 10, 15)),
     ("drift 170 Pa in 16 min", "drift", 0),
     ("relaxation 17.5 % in a hold", "relaxation", 0),
     ("hysteresis 3 %", "hysteresis", 0),
@@ -71,6 +71,14 @@ BUDGET = (
     ("clip at the ADC's 5 bar", "clip=5", 0),
     ("all of them, gain spread 10 %", ALL, 1),
 )
+
+# Of the paper: median and standard deviation of the localisation error, mm (table II); median by the number of sensors near (section IV.B);
+# RMSE in N and MAPE in percent (section IV.C); success of the slip detection per step, percent (tables III and IV).
+PAPER_LOCATION_mm = {("grid", "sphere6"): (0.55, 0.84), ("grid", "sphere15"): (0.48, 0.33), ("taps", "sphere6"): (0.52, 1.42)}
+PAPER_LOCATION_mm |= {("taps", "sphere15"): (0.53, 0.26), ("taps", "cylinder6"): (0.55, 0.70), ("taps", "cube6"): (0.85, 0.98)}
+PAPER_NEAR_mm = {"1": 0.54, "2": 0.48, "4": 0.59}
+PAPER_FORCE = {"taps": (0.54, 4.5), "pokes": (1.49, 10.2), "high": (4.67, 15.7)}
+PAPER_SLIP = dict(zip(OBJECTS, (82.3, 82.7, 82.6, 78.3, 79.7))) | dict(zip(SOLIDS, (80.5, 85.4, 82.0, 78.9, 77.5, 81.1, 84.0, 76.9, 77.6)))
 
 GOALS = (
     ("samples", ">=", 40000),
@@ -97,11 +105,6 @@ def calibrated_with(case):
 
 def key_of(case):
     return case.replace(" ", "_")
-
-
-def gain_of(effects):
-    """Percent; of what BUDGET names."""
-    return int(effects.removeprefix("gain=")) if effects.startswith("gain=") else 10 if effects == ALL else 0
 
 
 def plan(shop):
@@ -161,13 +164,8 @@ class Samples:
         return (self.flags & LOCATION_WARNINGS) != 0
 
     def location(self):
-        return {
-            "median_mm": float(np.median(self.error_mm)),
-            "sd_mm": float(np.std(self.error_mm)),
-            "p95_mm": float(np.quantile(self.error_mm, 0.95)),
-            "p99_mm": float(np.quantile(self.error_mm, 0.99)),
-            "max_mm": float(np.max(self.error_mm)),
-        }
+        at = {"median_mm": np.median, "sd_mm": np.std, "p95_mm": lambda e: np.quantile(e, 0.95), "p99_mm": lambda e: np.quantile(e, 0.99)}
+        return {name: float(of(self.error_mm)) for name, of in (at | {"max_mm": np.max}).items()}
 
     def trust(self):
         return {
@@ -217,28 +215,16 @@ def slip_steps(scenarios):
             begin, end = float(moving[0]["t_begin_s"]), float(moving[-1]["t_end_s"])
             near = (played.time_s >= begin - SLIP_MARGIN_s) & (played.time_s <= end + SLIP_MARGIN_s) & played.touched
             found = played.time_s[reported & (played.time_s >= begin) & (played.time_s <= end + 0.1)]
-            rows.append(
-                (
-                    float(moving[0]["speed_mm_s"]),
-                    near.sum(),
-                    (reported == played.slips)[near].sum(),
-                    found[0] - begin if len(found) else np.nan,
-                )
-            )
+            right = (reported == played.slips)[near].sum()
+            rows.append((float(moving[0]["speed_mm_s"]), near.sum(), right, found[0] - begin if len(found) else np.nan))
     return np.array(rows).reshape(-1, 4)
 
 
 def slip_success(contacts):
     found_s = contacts[np.isfinite(contacts[:, 3]), 3]
-    steps = int(contacts[:, 1].sum())
-    return {
-        "steps": steps,
-        "success_percent": float(100 * contacts[:, 2].sum() / steps) if steps else None,
-        "contacts": len(contacts),
-        "contacts_not_found": len(contacts) - len(found_s),
-        "latency_median_ms": float(1e3 * np.median(found_s)) if len(found_s) else None,
-        "latency_p95_ms": float(1e3 * np.quantile(found_s, 0.95)) if len(found_s) else None,
-    }
+    latency = {f"latency_p{share}_ms": float(1e3 * np.quantile(found_s, share / 100)) if len(found_s) else None for share in (50, 95)}
+    steps = contacts[:, 1].sum()
+    return {"percent": float(100 * contacts[:, 2].sum() / steps) if steps else None, **latency, "not_found": len(contacts) - len(found_s)}
 
 
 def measure_location(shop):
@@ -247,16 +233,18 @@ def measure_location(shop):
         for indenter in INDENTERS:
             for case in (*CASES, EVERY_EFFECT):
                 if scenarios := shop.select(kind, indenter=indenter, case=case):
-                    rows.append({"kind": kind, "indenter": indenter, "case": case, **Samples(scenarios).location()})
+                    paper = "{} / {}".format(*PAPER_LOCATION_mm.get((kind, indenter), ("", "")))
+                    rows.append({"kind": kind, "indenter": indenter, "case": case, "paper": paper, **Samples(scenarios).location()})
     near_mm = {}
     for played in shop.select("grid", case="gain10"):
         for phase in played.phases:
             inside = played.located & (played.time_s >= float(phase["t_begin_s"])) & (played.time_s < float(phase["t_end_s"]))
             near_mm.setdefault(phase["sensors_near"], []).append(played.error_mm[inside])
+    near = [(n, float(np.median(np.concatenate(parts)))) for n, parts in sorted(near_mm.items())]
     return {
         "location": rows,
         "taps_trust": [{"case": case, **Samples(shop.select("taps", case=case)).trust()} for case in CASES],
-        "grid_median_mm_by_sensors_near": {n: float(np.median(np.concatenate(parts))) for n, parts in sorted(near_mm.items())},
+        "grid_by_sensors_near": [{"sensors_near": n, "paper": PAPER_NEAR_mm.get(n, ""), "median_mm": median_mm} for n, median_mm in near],
     }
 
 
@@ -267,7 +255,9 @@ def measure_force(shop, scales):
         for case in CASES:
             if scenarios := shop.select(kind, case=case):
                 samples = Samples(scenarios)
-                rows.append({"kind": kind, "case": case, "raw": samples.force(), "scaled": samples.force(scales.get(case, 1.0))})
+                paper = dict(zip(("rmse_N", "mape_percent"), PAPER_FORCE[kind]))
+                row = {"kind": kind, "case": case, "paper": paper, "raw": samples.force()}
+                rows.append(row | {"scaled": samples.force(scales.get(case, 1.0))})
     every = Samples([p for kind in ("grid", "taps", "pokes", "high", "high biased") for p in shop.select(kind)])
     return {"force": rows, "force_r": every.force()["r"], "gaussians": shop.gaussians}
 
@@ -279,16 +269,7 @@ def measure_stiff(shop):
             for prior in PRIORS[case in CALIBRATED]:
                 wanted = {"margin_mm": margin_mm, "case": case, "prior": prior}
                 samples = Samples(shop.select("stiff", **wanted))
-                rows.append(
-                    {
-                        "margin_mm": margin_mm,
-                        "case": case,
-                        "prior": prior,
-                        **samples.location(),
-                        **samples.trust(),
-                        "force": scaled_force(pads_of(shop, "stiff", **wanted)),
-                    }
-                )
+                rows.append(wanted | samples.location() | samples.trust() | {"force": scaled_force(pads_of(shop, "stiff", **wanted))})
     return {"stiff": rows, "prior_sigma_mm": shop.prior_sigma_mm, "prior_width_mm": PRIOR_WIDTH_mm}
 
 
@@ -296,68 +277,40 @@ def measure_slip(shop):
     rows = []
     for indenter in (*OBJECTS, *SOLIDS):
         if shop.select("slip", indenter=indenter):
+            found = {case: shop.select("slip", indenter=indenter, case=case) for case in ("steady", "stick-slip", *SLIP_DIPS)}
             rows.append(
-                {
-                    "indenter": indenter,
-                    **{
-                        case: slip_success(slip_steps(shop.select("slip", indenter=indenter, case=case)))
-                        for case in ("steady", "stick-slip", *SLIP_DIPS)
-                    },
-                }
+                {"indenter": indenter, "paper percent": PAPER_SLIP[indenter]}
+                | {case: slip_success(slip_steps(played)) for case, played in found.items()}
             )
     steady, fast = slip_steps(shop.select("slip", case="steady")), slip_steps(shop.select("slip fast"))
     dips = {case: slip_steps(shop.select("slip", case=case)) for case in SLIP_DIPS}
-    speeds = [
-        {
-            "speed_mm_s": speed,
-            "paper_rate": slip_success(steady[steady[:, 0] == speed]),
-            "every_frame": slip_success(fast[fast[:, 0] == speed]),
-            **{case: slip_success(contacts[contacts[:, 0] == speed]) for case, contacts in dips.items()},
-        }
-        for speed in sorted(set(steady[:, 0]))
-    ]
-    dead = [
-        {"dead_travel_mm": scenario.case, **slip_success(slip_steps([shop.played[scenario]]))}
-        for scenario in shop.scenarios
-        if scenario.what == "dead travel"
-    ]
-    every = slip_success(steady)
+    speeds = []
+    for speed in sorted(set(steady[:, 0])):
+        columns = {"paper_rate": steady, "every_frame": fast} | dips
+        speeds.append({"speed_mm_s": speed} | {name: slip_success(found[found[:, 0] == speed]) for name, found in columns.items()})
+    dead = [scenario for scenario in shop.scenarios if scenario.what == "dead travel"]
     return {
-        "slip_success_percent": every["success_percent"],
-        **{f"slip_success_{key_of(case)}_percent": slip_success(contacts)["success_percent"] for case, contacts in dips.items()},
-        "slip_steps": every["steps"],
+        "slip_success_percent": slip_success(steady)["percent"],
+        **{f"slip_success_{key_of(case)}_percent": slip_success(contacts)["percent"] for case, contacts in dips.items()},
+        "slip_steps": int(steady[:, 1].sum()),
         "slip_by_object": rows,
         "slip_by_speed": speeds,
-        "slip_by_dead_travel": dead,
+        "slip_by_dead_travel": [{"dead_travel_mm": one.case} | slip_success(slip_steps([shop.played[one]])) for one in dead],
     }
 
 
 def measure_budget(shop):
     rows = []
-    for what, effects, _ in BUDGET:
+    for what, _, _ in BUDGET:
         if pads := pads_of(shop, "budget", case=what):
-            rows.append(
-                {
-                    "effect": what,
-                    "gain": gain_of(effects),
-                    "pads": len(pads),
-                    **Samples(shop.select("budget", case=what)).location(),
-                    "force": scaled_force(pads),
-                }
-            )
+            location = Samples(shop.select("budget", case=what)).location()
+            rows.append({"effect": what, "pads": len(pads)} | location | {"force": scaled_force(pads)})
     other = []
-    for scenario in shop.scenarios:
-        if scenario.what == "other":
-            played = shop.played[scenario]
-            samples = Samples([played])
-            other.append(
-                {
-                    "scenario": scenario.kind + (", dip" if scenario.effects else ""),
-                    **samples.trust(),
-                    **samples.location(),
-                    "slip_percent": float(100 * np.mean((played.flags[played.touched] & SLIP) != 0)),
-                }
-            )
+    for scenario in (one for one in shop.scenarios if one.what == "other"):
+        played = shop.played[scenario]
+        samples, slips = Samples([played]), (played.flags[played.touched] & SLIP) != 0
+        row = {"scenario": scenario.kind + (", dip" if scenario.effects else "")} | samples.trust() | samples.location()
+        other.append(row | {"slip_percent": float(100 * np.mean(slips))})
     return {"budget": rows, "other": other}
 
 
@@ -449,18 +402,18 @@ def main(argv):
     parser.add_argument("--indenters", metavar="NAME,...", help="only scenarios with these; sphere6 must be among them")
     parser.add_argument("--emulated-seconds", type=float, default=12, metavar="S", help="of the image on the emulated chip; default 12")
     parser.add_argument(
-        "--cards", type=int, default=20, metavar="N", help="report cards of this many simulated pads of each kind at most; 0: none"
+        "--cards", type=int, default=20, metavar="N", help="report cards of at most N pads of each kind; default 20; 0: none"
     )
     options = parser.parse_args(argv)
-    if not 1 <= options.pads <= 100:
-        raise InputError(f"--pads {options.pads} is out of range; give 1 to 100")
-    if not 0.01 <= options.scale <= 100:
-        raise InputError(f"--scale {options.scale:g} is out of range; give 0.01 to 100")
+    for name, value, least in (("pads", options.pads, 1), ("scale", options.scale, 0.01)):
+        if not least <= value <= 100:
+            raise InputError(f"--{name} {value:g} is out of range; give {least:g} to 100")
     out = output_folder(options)
     shop = Workshop(options, out)
     plan(shop)
     shop.build_tables()
-    seconds = shop.play_all()
+    steps = Steps()
+    seconds = shop.play_all(steps)
     print("        the image on the emulated chip", flush=True)
     emulated = shop.emulate(ALL, options.emulated_seconds)
     for file in shop.work.iterdir():
@@ -469,11 +422,11 @@ def main(argv):
     found = {figure: None for figure, _, _ in cards.GOALS}
     if options.cards:
         print("        report cards of simulated pads", flush=True)
-        found = cards.measure(pathlib.Path(options.build).resolve(), Steps(), options.cards)
+        found = cards.measure(pathlib.Path(options.build).resolve(), steps, options.cards)
     found = judge(measure(shop, seconds, emulated) | found, GOALS)
     write_json(out / "validation.json", found)
     pictures = draw(curves(shop), out)
-    write_report(found, out / "validation.md")
+    text.write(found, "validation", out)
     return finish(found, options, ("validation.json", "validation.md", *pictures))
 
 

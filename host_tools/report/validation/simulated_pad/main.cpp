@@ -204,14 +204,6 @@ int run(int argc, char **argv) {
       ->check(CLI::Range(0.0, 10.0))
       ->type_name("MM")
       ->capture_default_str();
-  app.add_option("--hand", options.pad.hand_sd_mm, "How far the hand misses the marks, sd each way")
-      ->check(CLI::Range(0.0, 3.0))
-      ->type_name("MM")
-      ->capture_default_str();
-  app.add_option("--weight-g", options.pad.weight_g, "That is stated")
-      ->check(CLI::Range(50.0, 2000.0))
-      ->type_name("GRAMS")
-      ->capture_default_str();
   app.add_option("--cache", options.pad.cache, "Of contact tables")->type_name("FOLDER");
   app.add_flag("--overwrite", options.overwrite, "Replace files that exist");
   try {
