@@ -7,86 +7,37 @@ with Fingertip() as fingertip:
             print(frame.x_mm, frame.y_mm, frame.force_N)
 """
 
-from .aio import AsyncFingertip
-from .clock import ClockEstimate, host_now_us
-from .device import Fingertip, list_fingertips
-from .discovery import Found
+from .aio import AsyncFingertip as AsyncFingertip
+from .clock import ClockEstimate as ClockEstimate, host_now_us as host_now_us
+from .device import Fingertip as Fingertip, list_fingertips as list_fingertips
+from .discovery import Found as Found
 from .errors import (
-    BadValueError,
-    FingertipError,
-    GoneError,
-    InputError,
-    NoAnswerError,
-    NoFingertipError,
-    NoFrameError,
-    NoSuchPortError,
-    NotAPortError,
-    NotNowError,
-    NotSharedError,
-    OtherFingertipError,
-    OtherVersionError,
-    PermissionDeniedError,
-    PortError,
-    PortInUseError,
-    RefusedError,
-    RefusedValueError,
-    SeveralFingertipsError,
-    UnknownCommandError,
+    BadValueError as BadValueError,
+    FingertipError as FingertipError,
+    GoneError as GoneError,
+    InputError as InputError,
+    NoAnswerError as NoAnswerError,
+    NoFingertipError as NoFingertipError,
+    NoFrameError as NoFrameError,
+    NoSuchPortError as NoSuchPortError,
+    NotAPortError as NotAPortError,
+    NotNowError as NotNowError,
+    NotSharedError as NotSharedError,
+    OtherFingertipError as OtherFingertipError,
+    OtherVersionError as OtherVersionError,
+    PermissionDeniedError as PermissionDeniedError,
+    PortError as PortError,
+    PortInUseError as PortInUseError,
+    RefusedError as RefusedError,
+    RefusedValueError as RefusedValueError,
+    SeveralFingertipsError as SeveralFingertipsError,
+    UnknownCommandError as UnknownCommandError,
 )
-from .files import Recording, read_recording
-from .frames import Block, Edge, Frame
-from .group import Fingertips
-from .line import WARNINGS, Capability, Flag, Result, Stored, Streams
-from .recording import JointRecordingWriter, RecordingWriter
-from .version import __version__
-from .wire import Calibration, Crash, Health, Info, LineStatistics, PadProfile
-
-__all__ = [
-    "WARNINGS",
-    "__version__",
-    "AsyncFingertip",
-    "BadValueError",
-    "Block",
-    "Calibration",
-    "Capability",
-    "ClockEstimate",
-    "Crash",
-    "Edge",
-    "Fingertip",
-    "FingertipError",
-    "Fingertips",
-    "Flag",
-    "Found",
-    "Frame",
-    "GoneError",
-    "Health",
-    "host_now_us",
-    "Info",
-    "InputError",
-    "JointRecordingWriter",
-    "LineStatistics",
-    "list_fingertips",
-    "NoAnswerError",
-    "NoFingertipError",
-    "NoFrameError",
-    "NoSuchPortError",
-    "NotAPortError",
-    "NotNowError",
-    "NotSharedError",
-    "OtherFingertipError",
-    "OtherVersionError",
-    "PadProfile",
-    "PermissionDeniedError",
-    "PortError",
-    "PortInUseError",
-    "read_recording",
-    "Recording",
-    "RecordingWriter",
-    "RefusedError",
-    "RefusedValueError",
-    "Result",
-    "SeveralFingertipsError",
-    "Stored",
-    "Streams",
-    "UnknownCommandError",
-]
+from .files import Recording as Recording, read_recording as read_recording
+from .frames import Block as Block, Edge as Edge, Frame as Frame
+from .group import Fingertips as Fingertips
+from .line import WARNINGS as WARNINGS, Capability as Capability, Flag as Flag, Result as Result, Stored as Stored, Streams as Streams
+from .recording import JointRecordingWriter as JointRecordingWriter, RecordingWriter as RecordingWriter
+from .version import __version__ as __version__
+from .wire import Calibration as Calibration, Crash as Crash, Health as Health, Info as Info
+from .wire import LineStatistics as LineStatistics, PadProfile as PadProfile

@@ -3,16 +3,14 @@
 import asyncio
 import contextlib
 import functools
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any
 
 from .device import Fingertip
 from .errors import GoneError, NoFrameError
 from .frames import Block, Frame
 from .wire import Health, Info
-
-Value = TypeVar("Value")
 
 
 class AsyncFingertip:
@@ -66,25 +64,18 @@ class AsyncFingertip:
                     if not self.sync.is_returning:
                         raise NoFrameError(f"{self.sync.description}: no frame in {patience_s:g} s") from None
 
-    async def _call(self, method: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
-        return await asyncio.to_thread(functools.partial(method, *arguments, **options))
-
     async def tare(self, force: bool = False) -> None:
-        """As Fingertip.tare."""
-        await self._call(self.sync.tare, force)
+        """This and the following as Fingertip has them."""
+        await asyncio.to_thread(self.sync.tare, force)
 
     async def set(self, **settings: Any) -> Info:
-        """As Fingertip.set."""
-        return await self._call(self.sync.set, **settings)
+        return await asyncio.to_thread(self.sync.set, **settings)
 
     async def read_info(self) -> Info:
-        """As Fingertip.read_info."""
-        return await self._call(self.sync.read_info)
+        return await asyncio.to_thread(self.sync.read_info)
 
     async def read_health(self) -> Health:
-        """As Fingertip.read_health."""
-        return await self._call(self.sync.read_health)
+        return await asyncio.to_thread(self.sync.read_health)
 
     async def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
-        """As Fingertip.read_block."""
-        return await self._call(self.sync.read_block, frames, seconds)
+        return await asyncio.to_thread(self.sync.read_block, frames, seconds)

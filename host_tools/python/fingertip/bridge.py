@@ -13,14 +13,13 @@ import json
 import os
 import pathlib
 import platform
-import signal
 import sys
 
 from . import discovery, host_time, wire
 from .device import Fingertip
 from .errors import FingertipError, InputError
-from .files import printable, run_tool
-from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, host_clock, open_session, settings_of, zenoh_module
+from .files import check_range, printable, run_tool
+from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, host_clock, open_session, settings_of, until_ended, zenoh_module
 
 LOOK_s = 1.0  # for fingertips that came
 STATUS_s = 0.5
@@ -28,11 +27,6 @@ CHRONY_s = 5.0
 LIVE_s = 0.5  # what waited longer for the network is not published, but kept for who asks
 KEPT_LINES = 8
 NAMES = {wire.Contact: "contact", wire.Raw: "raw", wire.Health: "health", wire.Info: "info"}
-
-
-def _offset_ns():
-    """What the clock of Fingertip.clock is behind the time of day."""
-    return host_time.wall_ns() - host_time.now_ns()
 
 
 def _boot():
@@ -65,20 +59,11 @@ class _Published:
         self._token = None
         self._root = f"{ROOT}/{tip.serial}"
         drop = {"congestion_control": self._zenoh.CongestionControl.DROP, "express": True}
-        self._publishers = {
-            name: session.declare_publisher(f"{self._root}/{name}", **drop) for name in (*NAMES.values(), "other", "status")
-        }
+        names = (*NAMES.values(), "other", "status")
+        self._publishers = {name: session.declare_publisher(f"{self._root}/{name}", **drop) for name in names}
         self._pool = concurrent.futures.ThreadPoolExecutor(3, thread_name_prefix="answer")
-        self._queryables = [
-            session.declare_queryable(f"{self._root}/{name}", self._when_asked(answer))
-            for name, answer in (
-                ("tare", self._tare),
-                ("set", self._set),
-                ("info", self._info),
-                ("status", self._answer_status),
-                ("again", self._again),
-            )
-        ]
+        answers = {"tare": self._tare, "set": self._set, "info": self._info, "status": self._answer_status, "again": self._again}
+        self._queryables = [session.declare_queryable(f"{self._root}/{name}", self._when_asked(answer)) for name, answer in answers.items()]
         self._begin_line()
         self._thread = host_time.thread(self._publish, name="publish", daemon=True)
         self._thread.start()
@@ -105,17 +90,16 @@ class _Published:
             ahead = 0
         self._expected = packet.sequence + 1 & 0xFFFF
         self._number += ahead + 1
-        self._early.append(
-            (NAMES.get(type(packet.body), "other"), packet.t_us, bytes(frame), self._line, self._number, host_time.wall_ns())
-        )
+        name = NAMES.get(type(packet.body), "other")
+        self._early.append((name, packet.t_us, bytes(frame), self._line, self._number, host_time.wall_ns()))
         clock = self.tip.clock
         if clock.host_us != clock.host_us:
             return  # until the clocks were compared
-        offset_ns, shared = _offset_ns(), int(self.tip.description.endswith(".sock"))
+        behind_ns = host_time.wall_ns() - host_time.now_ns()  # the clock of Fingertip.clock, the time of day
+        shared = int(self.tip.description.endswith(".sock"))
         for name, t_us, data, line, number, taken_ns in self._early:
-            stamp = Stamp(
-                line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared
-            ).packed()
+            measured_ns = round(clock.host_at(t_us) * 1000) + behind_ns
+            stamp = Stamp(line, number, taken_ns, measured_ns, clock.uncertainty_us, clock.drift_ppm, shared).packed()
             self._kept[line, number] = (name, data, stamp)
             self._queue.append((name, data, stamp, line, number, host_time.now_s()))
             self._note(1, line, number)
@@ -154,19 +138,10 @@ class _Published:
     def _status(self, column):
         """column: 1, packets that were read; 2, those that were published."""
         clock, line = self._clock_of_host(), self.tip.statistics
-        return json.dumps(
-            {
-                "host": platform.node(),
-                "boot": _boot(),
-                "port": self.tip.description,
-                "there": not self.tip.is_returning,
-                "now_ns": host_time.wall_ns(),
-                "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
-                "lines": [(each[0], each[column]) for each in list(self._lines)],
-                "unpublished": self.skipped,
-                "line": {name: getattr(line, name) for name in line.COUNTS},
-            }
-        )
+        status = {"host": platform.node(), "boot": _boot(), "port": self.tip.description, "there": not self.tip.is_returning}
+        status |= {"now_ns": host_time.wall_ns(), "unpublished": self.skipped, "line": {name: getattr(line, name) for name in line.COUNTS}}
+        status["clock"] = {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text}
+        return json.dumps(status | {"lines": [(each[0], each[column]) for each in list(self._lines)]})
 
     # Answers
 
@@ -264,13 +239,8 @@ class Bridge:
 
     def _open(self, way, found):
         try:
-            tip = Fingertip(
-                found.port or None,
-                serial=None if found.port else found.serial,
-                reconnect=True,
-                latency_ms=self._latency_ms,
-                buffer_frames=1,
-            )
+            serial = None if found.port else found.serial
+            tip = Fingertip(found.port or None, serial=serial, reconnect=True, latency_ms=self._latency_ms, buffer_frames=1)
         except FingertipError as error:
             if self._complaints.get(way) != str(error):
                 self._complaints[way] = str(error)
@@ -289,30 +259,19 @@ class Bridge:
 
 def main(argv):
     parser = argparse.ArgumentParser(prog="fingertip-bridge", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--port", action="append", default=[], metavar="PORT", help="this serial port; several times for several; without, all"
+    add, keep = (
+        parser.add_argument,
+        "packets of each fingertip that are kept for recorders that missed them, some 0.4 kB each; default 100000",
     )
-    parser.add_argument(
-        "--keep",
-        type=int,
-        default=100_000,
-        metavar="N",
-        help="packets of each fingertip that are kept for recorders that missed them, "
-        "some 0.4 kB each; default 100000: 38 s at the highest rate",
-    )
-    parser.add_argument(
-        "--latency-ms", type=float, default=1.0, metavar="MS", help="how long bytes may wait to be read together; default 1"
-    )
+    add("--port", action="append", default=[], metavar="PORT", help="this serial port; several times for several; without, all")
+    add("--keep", type=int, default=100_000, metavar="N", help=keep + ": 38 s at the highest rate")
+    add("--latency-ms", type=float, default=1.0, metavar="MS", help="how long bytes may wait to be read together; default 1")
     parser.add_argument("--router", action="store_true", help="be a router too, for others to --connect to; with --listen")
     add_session_options(parser)
     options = parser.parse_args(argv)
-    if not 1 <= options.keep <= 10_000_000:
-        raise InputError(f"--keep {options.keep} is out of range; give 1 to 10000000")
-    if not 0 <= options.latency_ms <= 1000:
-        raise InputError(f"--latency-ms {options.latency_ms:g} is out of range; give 0 to 1000")
-    ended = host_time.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+    check_range("keep", options.keep, 1, 10_000_000)
+    check_range("latency-ms", options.latency_ms, 0, 1000)
+    ended = until_ended()
 
     def report(text):
         print(f"fingertip-bridge: {printable(text)}", file=sys.stderr, flush=True)

@@ -10,11 +10,14 @@ The host's clock is time.perf_counter(), in microseconds: on Linux CLOCK_MONOTON
 
 import collections
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
+
+import numpy as np
 
 from . import host_time
 
+host_now_us = host_time.now_us
 WINDOW_us = 30e6
 EXCHANGES = 512
 # Crystals are good to 100 ppm with all their errors, at both ends.
@@ -23,10 +26,6 @@ SLOPE_LIMIT = 200e-6
 DRIFT_COST_us = 1.5e6
 # (2/3)^40 of SLOPE_LIMIT, over WINDOW_us: nanoseconds.
 STEPS = 40
-
-
-def host_now_us() -> int:
-    return host_time.now_us()
 
 
 class ClockExchange(NamedTuple):
@@ -74,28 +73,6 @@ def _edge(inside: float, outside: float, value: Callable[[float], float]) -> flo
     return inside
 
 
-Line = tuple[float, float]  # host_us, ago_us: host_us + ago_us (1 + slope) at a slope
-
-
-def _lowest_lines(lines: Sequence[Line]) -> list[Line]:
-    """Those that are the lowest at some slope. lines: by falling ago_us."""
-    kept: list[Line] = []
-    for host, ago in lines:
-        if kept and kept[-1][1] == ago:
-            if kept[-1][0] <= host:
-                continue
-            kept.pop()
-        while len(kept) >= 2:
-            (h0, a0), (h1, a1) = kept[-2], kept[-1]
-            # the last one is nowhere below both of its neighbours
-            if (host - h0) * (a0 - a1) <= (h1 - h0) * (a0 - ago):
-                kept.pop()
-            else:
-                break
-        kept.append((host, ago))
-    return kept
-
-
 class ClockFit:
     def __init__(self) -> None:
         self._exchanges: collections.deque[ClockExchange] = collections.deque()
@@ -122,20 +99,14 @@ class ClockFit:
 
     def _fit(self) -> ClockEstimate | None:
         last = self._exchanges[-1]
-        upper_lines = _lowest_lines([(each.received_us - last.sent_us, last.device_us - each.device_us) for each in self._exchanges])
-        lower_lines = [
-            (-host, -ago)
-            for host, ago in _lowest_lines(
-                [(last.sent_us - each.sent_us, each.device_us - last.device_us) for each in reversed(self._exchanges)]
-            )
-        ]
+        sent, received, device = np.array(self._exchanges, dtype=np.int64).T - np.array([[last.sent_us], [last.sent_us], [last.device_us]])
 
         # Limits at the time of the last exchange of a line of this slope, relative to its sending.
         def upper(slope: float) -> float:
-            return min(host + ago * (1 + slope) for host, ago in upper_lines)
+            return float((received - device * (1 + slope)).min())
 
         def lower(slope: float) -> float:
-            return max(host + ago * (1 + slope) for host, ago in lower_lines)
+            return float((sent - device * (1 + slope)).max())
 
         def gap(slope: float) -> float:
             return upper(slope) - lower(slope)

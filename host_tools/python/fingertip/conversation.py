@@ -1,28 +1,22 @@
 """The packets that a program and a fingertip exchange on one line, from its opening to its end."""
 
 import threading
+from typing import TypeVar
 
 from . import host_time, wire
 from .clock import NO_CLOCK, ClockExchange, ClockFit, host_now_us
-from .errors import (
-    FingertipError,
-    GoneError,
-    NoAnswerError,
-    NotNowError,
-    OtherVersionError,
-    RefusedError,
-    RefusedValueError,
-    UnknownCommandError,
-)
+from .errors import FingertipError, GoneError, NoAnswerError, NotNowError, OtherVersionError
+from .errors import RefusedError, RefusedValueError, UnknownCommandError
 from .line import Result
 from .transport import Transport
-from .wire import Acknowledgement, Body, Info, LineStatistics, Packet
+from .wire import Acknowledgement, Body, Crash, Health, Info, LineStatistics, Packet
 
 ATTEMPTS = 3
 ANSWER_TIMEOUT_s = 1.0
 POLL_s = 0.05
 NEWER_VERSIONS = 2  # a fingertip does not answer a version that it does not speak: it is asked in these too
 
+Answer = TypeVar("Answer", Info, Health, Crash)
 REFUSALS: dict[int, tuple[type[RefusedError], str]] = {
     Result.UNKNOWN_COMMAND: (UnknownCommandError, "its firmware does not know it"),
     Result.OUT_OF_RANGE: (RefusedValueError, "out of range"),
@@ -108,9 +102,9 @@ class Conversation:
             self._clock_fit.add(ClockExchange(ack.host_time_us, now_us, t_us))
             self.estimate = self._clock_fit.estimate or NO_CLOCK
 
-    def ask_info(self) -> Info:
-        answer = self.exchange(wire.AskInfo(), Info)
-        assert isinstance(answer, Info)
+    def ask(self, body: Body, answer_type: type[Answer]) -> Answer:
+        answer = self.exchange(body, answer_type)
+        assert isinstance(answer, answer_type)
         return answer
 
     def exchange(self, body: Body, answer_type: type[Body] | None = None) -> Body | None:

@@ -99,32 +99,24 @@ class Fingertip(Settable):
         """With the wanted one; each is asked who it is."""
         others: list[str] = []
         for way in ways:
+            opened = False
             try:
                 self._line = Conversation(open_way(way.port, way.share_socket))
-            except FingertipError as error:
-                if len(ways) == 1:
-                    raise
-                others.append(str(error))
-                continue
-            self._thread = host_time.thread(self._read_on, name="fingertip", daemon=True)
-            self._thread.start()
-            try:
-                info = self._line.ask_info()
-            except FingertipError as error:
-                self._stop()
-                if len(ways) == 1:
-                    raise
-                others.append(str(error))
-                continue
-            except BaseException:
-                self._stop()
-                raise
-            if self._serial is None or info.serial.lower() == self._serial.lower():
-                return self._line, info
-            self._stop()
-            if len(ways) == 1:
+                opened = True
+                self._thread = host_time.thread(self._read_on, name="fingertip", daemon=True)
+                self._thread.start()
+                info = self._line.ask(wire.AskInfo(), Info)
+                if self._serial is None or info.serial.lower() == self._serial.lower():
+                    return self._line, info
+                others.append(info.serial)
                 raise OtherFingertipError(f"{self.description}: is fingertip {info.serial}, not {self._serial}")
-            others.append(info.serial)
+            except BaseException as error:
+                if opened:
+                    self._stop()
+                if len(ways) == 1 or not isinstance(error, FingertipError):
+                    raise
+                if not isinstance(error, OtherFingertipError):
+                    others.append(str(error))
         raise NoFingertipError(f"no fingertip {self._serial} here, there are: " + ", ".join(others))
 
     def _stop(self) -> None:
@@ -135,10 +127,8 @@ class Fingertip(Settable):
 
     def _start_streams(self, streams: Streams | None) -> None:
         possible = Streams.HEALTH
-        if self._info.capabilities & Capability.FIT:
-            possible |= Streams.CONTACT
-        if self._info.capabilities & Capability.RAW_STREAM:
-            possible |= Streams.RAW
+        for capability, stream in ((Capability.FIT, Streams.CONTACT), (Capability.RAW_STREAM, Streams.RAW)):
+            possible |= stream if self._info.capabilities & capability else 0
         if streams is not None and streams & ~possible:
             raise BadValueError(f"streams {streams!r}: firmware of scene {self._info.scene} has {possible!r}")
         for _ in range(FIRST_EXCHANGES):
@@ -159,7 +149,7 @@ class Fingertip(Settable):
             if self._line.error is None:
                 self._line.send(wire.SetStreams(0))
         self._stop()
-        self._finish_recording("closed")
+        self._to_recorder(lambda recorder: recorder.close("closed"))
         self._notify()
 
     # What it is
@@ -218,10 +208,7 @@ class Fingertip(Settable):
 
     def __iter__(self) -> Iterator[Frame]:
         """Every frame, in order, beginning with the oldest that was not taken. Ends when it is closed; raises GoneError, NoFrameError."""
-        while True:
-            frame = self._take_frame()
-            if frame is None:
-                return
+        while (frame := self._take_frame()) is not None:
             yield frame
 
     @property
@@ -248,10 +235,8 @@ class Fingertip(Settable):
 
     def _take_frame(self) -> Frame | None:
         """Nothing: it is closed."""
-        try:
+        with contextlib.suppress(IndexError):
             return self._queue.popleft()
-        except IndexError:
-            pass
         self._wait(lambda: bool(self._queue), None)
         return self._queue.popleft() if self._queue else None
 
@@ -290,10 +275,7 @@ class Fingertip(Settable):
         elif seconds is not None:
             _in_range("seconds", seconds, (1e-6, 86400), "s")
         taken: list[Frame] = []
-        while frames is None or len(taken) < frames:
-            frame = self._take_frame()
-            if frame is None:
-                break
+        while (frames is None or len(taken) < frames) and (frame := self._take_frame()) is not None:
             taken.append(frame)
             if seconds is not None and (frame.t_us - taken[0].t_us >= seconds * 1e6 or frame.run != taken[0].run):
                 break
@@ -351,19 +333,16 @@ class Fingertip(Settable):
 
     def read_info(self) -> Info:
         """Who it is and how it is set, as of now."""
-        self._info = self._line.ask_info()
+        self._info = self._line.ask(wire.AskInfo(), Info)
         return self._info
 
     def read_health(self) -> Health:
         """Its counters, as of now."""
-        answer = self._line.exchange(wire.AskHealth(), Health)
-        assert isinstance(answer, Health)
-        return answer
+        return self._line.ask(wire.AskHealth(), Health)
 
     def read_crash(self) -> Crash | None:
         """How its firmware last came to an end since power-on; nothing: it did not. Firmware of before raises UnknownCommandError."""
-        answer = self._line.exchange(wire.AskCrash(), Crash)
-        assert isinstance(answer, Crash)
+        answer = self._line.ask(wire.AskCrash(), Crash)
         return answer if answer.kind else None
 
     # Recording
@@ -378,14 +357,8 @@ class Fingertip(Settable):
         """
         if self._recorder:
             raise BadValueError("it is being recorded already")
-        writer = RecordingWriter(
-            path,
-            self._info,
-            replace=replace,
-            raw_expected=bool(self._streams & Streams.RAW),
-            extra={"port": self.description},
-            count=lambda: self.detach(writer) - first,
-        )
+        raw, port = bool(self._streams & Streams.RAW), {"port": self.description}
+        writer = RecordingWriter(path, self._info, replace=replace, raw_expected=raw, extra=port, count=lambda: self.detach(writer) - first)
         first = self.attach(writer)
         return writer
 
@@ -404,12 +377,13 @@ class Fingertip(Settable):
                 self._recorder = None
             return self.statistics
 
-    def _finish_recording(self, reason: str) -> None:
+    def _to_recorder(self, pass_on: Callable[[Recorder], None]) -> None:
         recorder = self._recorder
         if recorder:
             try:
-                recorder.close(reason)
-            except InputError as error:
+                pass_on(recorder)
+            except InputError as error:  # the disk is full: the recording ends, the frames go on
+                self._recorder = None
                 recorder.fail(error)
 
     # The reading thread
@@ -439,7 +413,7 @@ class Fingertip(Settable):
                 self._finish_pending()
                 self._notify()
                 if self._line.error:
-                    self._finish_recording("gone")
+                    self._to_recorder(lambda recorder: recorder.close("gone"))
                     return
 
     def _finish_pending(self) -> None:
@@ -452,7 +426,7 @@ class Fingertip(Settable):
         self._line.is_interrupted = True
         self._finish_pending()
         self._latest = None
-        self._note("gone")
+        self._to_recorder(lambda recorder: recorder.event("gone"))
         self._notify()
         self._line.transport.close()
         while not self._line.is_closed:
@@ -482,7 +456,7 @@ class Fingertip(Settable):
                 next_s = host_time.now_s() + ANSWER_TIMEOUT_s
                 self._line.send(wire.AskInfo())
             for packet in self._line.read(0.0):
-                self._record(packet)
+                self._to_recorder(lambda recorder, packet=packet: recorder.packet(packet))  # type: ignore[misc]
                 if isinstance(packet.body, Info):
                     found = packet.body
                 elif isinstance(packet.body, Acknowledgement):
@@ -496,25 +470,7 @@ class Fingertip(Settable):
         self._run += 1
         self._line.is_interrupted = False
         self._next_exchange_us = 0
-        self._note("back")
-
-    def _record(self, packet: wire.Packet) -> None:
-        recorder = self._recorder
-        if recorder:
-            try:
-                recorder.packet(packet)
-            except InputError as error:  # the disk is full: the recording ends, the frames go on
-                self._recorder = None
-                recorder.fail(error)
-
-    def _note(self, event: str) -> None:
-        recorder = self._recorder
-        if recorder:
-            try:
-                recorder.event(event)
-            except InputError as error:
-                self._recorder = None
-                recorder.fail(error)
+        self._to_recorder(lambda recorder: recorder.event("back"))
 
     def _take(self, packets: list[wire.Packet]) -> None:
         frames: list[Frame] = []
@@ -522,24 +478,23 @@ class Fingertip(Settable):
         for packet in packets:
             sequence, t_us, body = packet
             if self._recorder:
-                self._record(packet)
+                self._to_recorder(lambda recorder, packet=packet: recorder.packet(packet))  # type: ignore[misc]
             if isinstance(body, (Raw, Contact)) and not wanted:
                 continue  # asked for by somebody before
             if isinstance(body, Raw):
                 pending = self._pending
                 if pending and pending[2].frame == body.frame and pending[1] == t_us:
                     self._pending = None
-                    frames.append(Frame(self._info.serial, self._run, t_us, pending[2], body, pending[0], sequence, self._line.estimate))
+                    self._add(frames, t_us, pending[2], body, pending[0], sequence)
                 else:
                     self._flush(frames)
-                    frames.append(Frame(self._info.serial, self._run, t_us, None, body, -1, sequence, self._line.estimate))
+                    self._add(frames, t_us, None, body, -1, sequence)
             elif isinstance(body, Contact):
-                if self._pending:
-                    self._flush(frames)
+                self._flush(frames)
                 if both:
                     self._pending = (sequence, t_us, body)
                 else:
-                    frames.append(Frame(self._info.serial, self._run, t_us, body, None, sequence, -1, self._line.estimate))
+                    self._add(frames, t_us, body, None, sequence, -1)
             elif isinstance(body, SyncEdge):
                 news = True
                 self._edges.append(Edge(t_us, body.number, body.level, self._line.estimate.host_at(t_us)))
@@ -557,7 +512,10 @@ class Fingertip(Settable):
         if self._pending:
             sequence, t_us, contact = self._pending
             self._pending = None
-            frames.append(Frame(self._info.serial, self._run, t_us, contact, None, sequence, -1, self._line.estimate))
+            self._add(frames, t_us, contact, None, sequence, -1)
+
+    def _add(self, frames: list[Frame], t_us: int, contact: Contact | None, raw: Raw | None, sequence: int, raw_sequence: int) -> None:
+        frames.append(Frame(self._info.serial, self._run, t_us, contact, raw, sequence, raw_sequence, self._line.estimate))
 
     def _keep(self, frames: list[Frame]) -> None:
         if frames:

@@ -35,25 +35,8 @@ import sys
 
 import numpy as np
 
-from .files import (
-    CONTACT,
-    FIT_VALID,
-    SLIP,
-    SLIP_VALID,
-    STAGES,
-    TANGENTIAL_FROM_TOUCH,
-    TANGENTIAL_VALID,
-    InputError,
-    check_output,
-    printable,
-    read_recording,
-    read_run,
-    read_scenario,
-    recorded_devices,
-    restart_rows,
-    run_tool,
-    write_text,
-)
+from .files import CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError
+from .files import check_output, printable, read_recording, read_run, read_scenario, recorded_devices, restart_rows, run_tool, write_text
 
 FORCE_MIN_N = 0.2
 SLIP_MIN_s = 0.05
@@ -61,6 +44,7 @@ SLIP_LATE_s = 0.1
 DEFAULT_SLIP_WINDOW_ms = 100
 SATURATED_us = 65535
 RATIO_MIN = 0.1
+ENDED = ("dropped_packets", "crc_errors", "format_errors")
 
 
 class Comparison:
@@ -130,9 +114,7 @@ class Comparison:
             "slip_false": int(outside.sum()),
             "total_us_median": float(np.median(total)),
             "stages_sum_wrong": int((unsaturated & (stages.sum(axis=1) != total)).sum()),
-            **{
-                key: int(recording.end[key]) if key in recording.end else None for key in ("dropped_packets", "crc_errors", "format_errors")
-            },
+            **{key: int(recording.end[key]) if key in recording.end else None for key in ENDED},
             "emulator_warnings": len(run.get("warnings", [])),
         }
 
@@ -148,14 +130,9 @@ class Comparison:
         aimed = np.hypot(*truth) > RATIO_MIN
         turned = np.arctan2(*found[::-1, aimed]) - np.arctan2(*truth[::-1, aimed])
         turned_deg = np.degrees(np.abs(np.angle(np.exp(1j * turned))))
-        from_touch = recording.flag(TANGENTIAL_FROM_TOUCH)[rows] & pulled
-        values = (
-            int(pulled.sum()),
-            float(np.median(error)),
-            float(np.percentile(error, 95)),
-            float(np.percentile(turned_deg, 90)) if aimed.any() else None,
-            int(from_touch.sum()),
-        )
+        from_touch = int((recording.flag(TANGENTIAL_FROM_TOUCH)[rows] & pulled).sum())
+        p50, p95 = (float(np.percentile(error, share)) for share in (50, 95))
+        values = (int(pulled.sum()), p50, p95, float(np.percentile(turned_deg, 90)) if aimed.any() else None, from_touch)
         return {f"tangential_{key}": value for key, value in zip(keys, values)}
 
 

@@ -7,19 +7,10 @@ Scenario (CSV, UTF-8): what the sensors feel.
 One row each millisecond, t_s strictly increasing from 0 = power-on; linear between rows. s<k>_Pa is the pressure
 above ambient on sensor k. contact .. slip are the truth, and so is the tangential force Qx_N, Qy_N; without, there is none.
 
-Recording (CSV, UTF-8): the packets of a fingertip, written by `fingertip record`; one row per frame.
-    # fingertip-recording 1
-    # key: value              serial, board, scene, firmware, git, rate_mHz, osr, slip_window_ms, x_mm, ...; of a calibrated
-                              fingertip (stored, bit 0) gains, force_scale, ...: the pressures are as measured all the same
-    t_us,frame,...            device time; see RECORDING_COLUMNS, then s<k>_Pa (absolute) and tare<k>_Pa
-    # packet: ... | # event: ...     between the rows
-    # end: key=value ...      counts of the whole recording; absent if the recorder was killed
-Cells of a packet that did not come are empty, and those of a quantity whose flag is off (no fit, no x); NaN here.
-
-Of several fingertips on one clock, format 2, written by `fingertip record --device A --device B`: see
-host_tools/library/libfingertip/RECORDING.md. Read as the recording of one of them, with time_us, the recorder's clock.
-
-Of a grasp also the gripper's and the controller's rows, "# grip: ..." between the others: see host_tools/grasp/grip_row.hpp, read_grip.
+Recording (CSV or MCAP): the packets of one fingertip or of several, one row per frame: see
+host_tools/library/libfingertip/RECORDING.md. Cells of a packet that did not come are empty, and those of a quantity whose flag is off (no
+fit, no x); NaN here. Of several it is read as the recording of one of them, with time_us, the recorder's clock. Of a grasp it also
+has the gripper's and the controller's rows, "# grip: ...": see host_tools/grasp/grip_row.hpp, read_grip.
 
 Run report (JSON): what the emulator measured; used are device_time_zero_s and warnings.
 
@@ -60,21 +51,9 @@ TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "sli
 OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in any order
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS)
 
-CONTACT, FIT_VALID, SLIP_VALID, SLIP, TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING, WARNINGS = map(
-    int,
-    (
-        Flag.CONTACT,
-        Flag.FIT_VALID,
-        Flag.SLIP_VALID,
-        Flag.SLIP,
-        Flag.TANGENTIAL_VALID,
-        Flag.TANGENTIAL_FROM_TOUCH,
-        Flag.VELOCITY_VALID,
-        Flag.MOVING,
-        Flag.SLIDING,
-        line.WARNINGS,
-    ),
-)
+CONTACT, FIT_VALID, SLIP_VALID, SLIP = map(int, (Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP))
+TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH = int(Flag.TANGENTIAL_VALID), int(Flag.TANGENTIAL_FROM_TOUCH)
+MOVING, SLIDING, WARNINGS = map(int, (Flag.MOVING, Flag.SLIDING, line.WARNINGS))
 
 
 def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
@@ -84,6 +63,12 @@ def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
     except InputError as error:
         print(f"{name}: {printable(str(error))}", file=sys.stderr)
         return 1
+
+
+def check_range(name: str, value: float, low: float, high: float) -> None:
+    """Of an option of a command."""
+    if not low <= value <= high:  # false for NaN
+        raise InputError(f"--{name} {value:g} is out of range; give {low:g} to {high:g}")
 
 
 def printable(text: str) -> str:
@@ -239,39 +224,22 @@ def write_scenario(path: Path, metadata: Mapping[str, Any], columns: Mapping[str
 
 class Recording:
     """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid has those that are
-    measurements), events and event_lines, their numbers in the file, end; packets, those that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file;
-    time_us[n] on the recorder's clock, None in a recording of one."""
+    measurements), events and event_lines, their numbers in the file, end; packets, those that are no frame: (type, {field: text});
+    line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one."""
 
-    def __init__(
-        self,
-        path: Path,
-        metadata: dict[str, str],
-        names: list[str],
-        table: Array,
-        line_numbers: Any,
-        sensors: int,
-        events: list[str],
-        event_lines: list[int],
-        packets: list[tuple[str, dict[str, str]]],
-        end: dict[str, str],
-        skipped_lines: int,
-        time_us: Array | None = None,
-    ) -> None:
-        self.path = path
-        self.time_us = time_us
-        self.line_numbers = np.array(line_numbers)
-        self.metadata = metadata
+    def __init__(self, reading: "_Reading", names: list[str], skipped_lines: int) -> None:
+        self.path, self.metadata, self.packets, self.end = reading.path, reading.metadata, reading.packets, reading.end
+        self.events, self.event_lines, self.skipped_lines = reading.events, reading.event_lines, skipped_lines
+        self.time_us = np.array(reading.times_us) if reading.is_joint else None
+        self.line_numbers = np.array(reading.line_numbers)
+        table = (np.frombuffer(reading.table) if reading.table else np.empty(0)).reshape(-1, len(names))
+        sensors = reading.sensors
         first = len(names) - 2 * sensors
         self.columns = {name: table[:, i] for i, name in enumerate(names[:first])}
         missing = set(LATER_COLUMNS).difference(self.columns)
         self.columns |= {name: np.full(len(table), math.nan) for name in missing}
         self.sensors_Pa = table[:, first : first + sensors]
         self.tare_Pa = table[:, first + sensors : first + 2 * sensors]
-        self.events = events
-        self.event_lines = event_lines
-        self.packets = packets
-        self.end = end
-        self.skipped_lines = skipped_lines
 
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
@@ -282,21 +250,20 @@ class Recording:
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row for each frame: all columns, the sensors as s0_Pa, ... and tare0_Pa, ... Needs pandas."""
-        columns: dict[str, Any] = dict(self.columns)
-        if self.time_us is not None:
-            columns = {"time_us": self.time_us, **columns}
-        for kind, values in (("s", self.sensors_Pa), ("tare", self.tare_Pa)):
-            columns |= {f"{kind}{k}_Pa": values[:, k] for k in range(values.shape[1])}
-        return frame_of(columns)
+        time_us = {} if self.time_us is None else {"time_us": self.time_us}
+        return frame_of(time_us | self.columns, self.sensors_Pa, self.tare_Pa)
+
+    def _packets(self, wanted: str) -> list[dict[str, int]]:
+        return [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == wanted]
 
     def health(self) -> list[dict[str, int]]:
         """Counters and state as of each health packet: {field: number}."""
-        return [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == "health"]
+        return self._packets("health")
 
     @property
     def sync_edges(self) -> list[Edge]:
         """Those at the sync pin, in their order."""
-        found = [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == "sync"]
+        found = self._packets("sync")
         t_us = np.array([fields["t_us"] for fields in found], dtype=float)
         times_us = np.full(len(found), math.nan) if self.time_us is None or not len(self.time_us) else self._place(t_us)
         return [Edge(fields["t_us"], fields["number"], fields["level"], float(time_us)) for fields, time_us in zip(found, times_us)]
@@ -569,40 +536,11 @@ def read_recording(
     reading.take_rows(wrong)
     if reading.rows is None:
         raise InputError(f"{path}: no header line; record again")
-    names = [reading.rows.names[i] for i in reading.wanted]
-    table = np.frombuffer(reading.table) if reading.table else np.empty(0)
-    return Recording(
-        path,
-        reading.metadata,
-        names,
-        table.reshape(-1, len(names)),
-        reading.line_numbers,
-        reading.sensors,
-        reading.events,
-        reading.event_lines,
-        reading.packets,
-        reading.end,
-        skipped,
-        np.array(reading.times_us) if reading.is_joint else None,
-    )
+    return Recording(reading, [reading.rows.names[i] for i in reading.wanted], skipped)
 
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names
-GRIP_STATES = (
-    "idle",
-    "activating",
-    "approach",
-    "squeeze",
-    "ready",
-    "holding",
-    "slipping",
-    "still",
-    "release",
-    "open",
-    "dropped",
-    "missed",
-    "fault",
-)
+GRIP_STATES = "idle activating approach squeeze ready holding slipping still release open dropped missed fault".split()
 GRIP_ROW, GRIP_EVENT = "# grip: ", "# grip_event: "
 
 

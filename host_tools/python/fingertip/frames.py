@@ -136,12 +136,9 @@ class Block(BlockQuantities):
 
     def __init__(self, frames: Sequence[Frame]) -> None:
         self._names: list[str] = []
-        self._set("frame", np.array([each.frame for each in frames], dtype=np.int64))
-        self._set("run", np.array([each.run for each in frames], dtype=np.int64))
-        self._set("t_us", np.array([each.t_us for each in frames], dtype=np.int64))
-        self._set("host_us", np.array([each.host_us for each in frames], dtype=np.float64))
-        self._set("has_contact", np.array([each.has_contact for each in frames], dtype=np.bool_))
-        self._set("has_raw", np.array([each.has_raw for each in frames], dtype=np.bool_))
+        kinds: dict[str, Any] = {**dict.fromkeys(("frame", "run", "t_us"), np.int64), "host_us": np.float64}
+        for name, kind in (kinds | dict.fromkeys(("has_contact", "has_raw"), np.bool_)).items():
+            self._set(name, np.array([getattr(each, name) for each in frames], dtype=kind))
         contacts = np.array([each.contact for each in frames], dtype=np.float64).reshape(-1, len(Contact._fields))
         for i, (name, wire) in enumerate(layout_of(Contact)[1:], 1):
             self._set(name, contacts[:, i] if wire.code == "f" else contacts[:, i].astype(np.int64))
@@ -183,16 +180,15 @@ class Block(BlockQuantities):
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row for each frame, the sensors as s0_Pa, ... and tare0_Pa, ... Needs pandas."""
-        columns: dict[str, Any] = {name: self[name] for name in self._names}
-        for kind, values in (("s", self.sensors_Pa), ("tare", self.tare_Pa)):
-            columns |= {f"{kind}{k}_Pa": values[:, k] for k in range(values.shape[1])}
-        return frame_of(columns)
+        return frame_of({name: self[name] for name in self._names}, self.sensors_Pa, self.tare_Pa)
 
 
-def frame_of(columns: dict[str, Any]) -> "pandas.DataFrame":
+def frame_of(columns: dict[str, Any], sensors_Pa: FloatArray, tare_Pa: FloatArray) -> "pandas.DataFrame":
     """Raises ImportError with what to install."""
     try:
         import pandas
     except ImportError:
         raise ImportError("pandas is not installed: pip install pandas") from None
+    for kind, values in (("s", sensors_Pa), ("tare", tare_Pa)):
+        columns |= {f"{kind}{k}_Pa": values[:, k] for k in range(values.shape[1])}
     return pandas.DataFrame(columns)

@@ -102,13 +102,9 @@ class Fingertips:
         def count() -> list[LineStatistics]:
             return [tip.detach(side) - before for tip, side, before in zip(fingertips, sides, first)]
 
-        writer = JointRecordingWriter(
-            path,
-            [tip.info for tip in fingertips],
-            replace=replace,
-            count=count,
-            raw_expected=all(tip.info.capabilities & Capability.RAW_STREAM for tip in fingertips),
-        )
+        infos = [tip.info for tip in fingertips]
+        raw = all(info.capabilities & Capability.RAW_STREAM for info in infos)
+        writer = JointRecordingWriter(path, infos, replace=replace, count=count, raw_expected=raw)
         try:
             for number, tip in enumerate(fingertips):
                 sides.append(_Side(writer, number, tip))

@@ -37,45 +37,20 @@ class HostTime:
         return threading.Thread(target=target, **options)
 
 
-_host = HostTime()
+_real = HostTime()
+now_ns, wall_ns, sleep, readable = _real.now_ns, _real.wall_ns, _real.sleep, _real.readable
+condition, event, thread = _real.condition, _real.event, _real.thread
 
 
 def use(host: HostTime) -> None:
-    global _host
-    _host = host
-
-
-def now_ns() -> int:
-    return _host.now_ns()
+    global now_ns, wall_ns, sleep, readable, condition, event, thread
+    now_ns, wall_ns, sleep, readable = host.now_ns, host.wall_ns, host.sleep, host.readable
+    condition, event, thread = host.condition, host.event, host.thread
 
 
 def now_us() -> int:
-    return _host.now_ns() // 1000
+    return now_ns() // 1000
 
 
 def now_s() -> float:
-    return _host.now_ns() / 1e9
-
-
-def wall_ns() -> int:
-    return _host.wall_ns()
-
-
-def sleep(seconds: float) -> None:
-    _host.sleep(seconds)
-
-
-def readable(descriptor: int, seconds: float) -> bool:
-    return _host.readable(descriptor, seconds)
-
-
-def condition() -> threading.Condition:
-    return _host.condition()
-
-
-def event() -> threading.Event:
-    return _host.event()
-
-
-def thread(target: Callable[..., None], **options: Any) -> threading.Thread:
-    return _host.thread(target, **options)
+    return now_ns() / 1e9

@@ -18,20 +18,9 @@ from .errors import InputError
 from .frames import Q10
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
 from .lines import LineFile, shortest
-from .messages import (
-    CONTACT_TYPE,
-    DIAGNOSTICS_TYPE,
-    LINE_TYPE,
-    PLACE_TYPE,
-    PRESSURES_TYPE,
-    TYPES,
-    WRENCH_TYPE,
-    FrameMessages,
-    diagnostics,
-    health_status,
-    name_in_ros,
-    stamp,
-)
+from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, TYPES, FrameMessages
+from .messages import diagnostics, health_status, name_in_ros, stamp
+from .recorded import LISTS
 from .ros_messages import decode, encode, schema_of
 
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
@@ -40,7 +29,8 @@ CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
 CHUNK_MOST_bytes = 1 << 26  # of one that is read
 
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
-_QUANTITIES = [name for name in (*CONTACT_COLUMNS, *LATER_COLUMNS) if name not in _COUNTS]
+_CONTACT_NAMES = (*CONTACT_COLUMNS, *LATER_COLUMNS)
+_QUANTITIES = [name for name in _CONTACT_NAMES if name not in _COUNTS]
 _FIRST_RAW = 2 + len(CONTACT_COLUMNS) + len(LATER_COLUMNS)
 _FIRST_SENSOR = _FIRST_RAW + len(RAW_COLUMNS)
 _CELLS = [(name, at) for at, name in enumerate((*CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS), 2)]
@@ -126,24 +116,11 @@ class _Device:
     def calibration(self) -> str:
         """What there is of gains, force scale and pad, as JSON; nothing without."""
         found = [
-            f'"{key}": ' + (f"[{', '.join(value.split())}]" if key in _LISTS else value)
+            f'"{key}": ' + (f"[{', '.join(value.split())}]" if key in LISTS else value)
             for key, value in self.keys.items()
             if key.startswith(("calibration_", "force_scale", "pad_")) or key in SENSOR_LISTS
         ]
         return "{" + ", ".join([f'"serial": "{self.serial}"', *found]) + "}" if found else ""
-
-
-_LISTS = {
-    *SENSOR_LISTS,
-    "pad_shares",
-    "pad_sds_mm",
-    "pad_moments_mm",
-    "pad_moment_sds_mm",
-    *(
-        f"pad_edge_{name}"
-        for name in ("ratio_x", "ratio_y", "gain_x", "gain_y", "place_x_mm", "place_y_mm", "pull_x_mm", "pull_y_mm", "force")
-    ),
-}
 
 
 class McapLines:
@@ -216,15 +193,7 @@ class McapLines:
         }
         for device in self._devices:
             root = f"/fingertip/{name_in_ros(device.serial)}/"
-            device.channels = self._channels | {
-                name: self._channel(root + topic, name)
-                for name, topic in (
-                    (CONTACT_TYPE, "contact"),
-                    (WRENCH_TYPE, "wrench"),
-                    (PLACE_TYPE, "place"),
-                    (PRESSURES_TYPE, "pressures"),
-                )
-            }
+            device.channels = self._channels | {name: self._channel(root + topic, name) for topic, name in FRAME_TOPICS.items()}
         for text in head:
             self._put_line(text)
         self._writer.flush()
@@ -296,27 +265,14 @@ def contact_of(cells: list[str]) -> dict[str, Any]:
 
 def _cells_of(row: dict[str, Any], names: list[str]) -> str:
     """The columns of these names, out of a fingertip_msgs/Contact."""
-    sensors = {f"s{k}_Pa": value for k, value in enumerate(row["pressure_pa"])} | {
-        f"tare{k}_Pa": value for k, value in enumerate(row["tare_pa"])
-    }
-    cells = []
-    for name in names:
-        own = row.get(name.lower())
-        if name in sensors:
-            cells.append(f"{sensors[name]:.4f}")
-        elif (
-            own is None
-            or (name in RAW_COLUMNS and not row["has_raw"])
-            or ((name in CONTACT_COLUMNS or name in LATER_COLUMNS) and not row["has_contact"])
-        ):
-            cells.append("")
-        elif name == "temperature_degC":
-            cells.append(f"{own:.2f}")
-        elif name == "time_us":
-            cells.append(f"{own:.1f}")
-        else:
-            cells.append(shortest(own) if name in _QUANTITIES else str(own))
-    return ",".join(cells)
+    cells = {name: (shortest(row[name.lower()]) if name in _QUANTITIES else str(row[name.lower()])) for name in _CONTACT_NAMES}
+    cells |= {name: str(row[name.lower()]) for name in ("t_us", "frame", "device", *RAW_COLUMNS)}
+    cells |= {"temperature_degC": f"{row['temperature_degc']:.2f}", "time_us": f"{row['time_us']:.1f}"}
+    absent = [*(() if row["has_contact"] else _CONTACT_NAMES), *(() if row["has_raw"] else RAW_COLUMNS)]
+    cells |= dict.fromkeys(absent, "")
+    for kind, values in (("s", row["pressure_pa"]), ("tare", row["tare_pa"])):
+        cells |= {f"{kind}{k}_Pa": f"{value:.4f}" for k, value in enumerate(values)}
+    return ",".join(cells.get(name, "") for name in names)
 
 
 class Damaged(InputError):

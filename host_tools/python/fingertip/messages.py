@@ -22,6 +22,7 @@ CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TY
     "diagnostic_msgs/DiagnosticArray",
 )
 TYPES = (CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE)
+FRAME_TOPICS = {"contact": CONTACT_TYPE, "wrench": WRENCH_TYPE, "place": PLACE_TYPE, "pressures": PRESSURES_TYPE}
 _JUDGED = int(Flag.FIT_VALID | WARNINGS)
 _TANGENTIAL = int(Flag.TANGENTIAL_VALID | Flag.TANGENTIAL_FROM_TOUCH)
 _NOTHING = int(Flag.CONTACT | Flag.TARED | WARNINGS)
@@ -63,13 +64,8 @@ def health_status(serial: str, sensors: int, fields: dict[str, str]) -> dict[str
     doubtful = " ".join(str(k) for k in range(sensors) if bad >> k & 1)
     found = (f"sensors missing: {missing}" * bool(missing), f"damaged PROM of sensors: {doubtful}" * bool(doubtful))
     troubles = [text for text in found if text]
-    return {
-        "level": 1 if troubles else 0,
-        "name": f"fingertip {serial}",
-        "message": "; ".join(troubles) or "all sensors are there",
-        "hardware_id": serial,
-        "values": [{"key": key, "value": value} for key, value in fields.items()],
-    }
+    status = {"level": 1 if troubles else 0, "name": f"fingertip {serial}", "message": "; ".join(troubles) or "all sensors are there"}
+    return status | {"hardware_id": serial, "values": [{"key": key, "value": value} for key, value in fields.items()]}
 
 
 def warning_status(serial: str, warnings: int) -> dict[str, Any]:
@@ -107,17 +103,8 @@ class FrameMessages:
         points = np.zeros((sensors, 4), np.float32)
         points[:, 0], points[:, 1] = (np.array(values[:sensors]) / 1000 for values in (x_mm, y_mm))
         fields = [{"name": each, "offset": 4 * i, "datatype": 7, "count": 1} for i, each in enumerate(("x", "y", "z", "pressure_pa"))]
-        cloud = {
-            "header": {"stamp": stamp(0), "frame_id": self.frame_id},
-            "height": 1,
-            "width": sensors,
-            "fields": fields,
-            "is_bigendian": False,
-            "point_step": 16,
-            "row_step": 16 * sensors,
-            "data": points.tobytes(),
-            "is_dense": False,
-        }
+        cloud = {"header": {"stamp": stamp(0), "frame_id": self.frame_id}, "height": 1, "width": sensors, "fields": fields}
+        cloud |= {"is_bigendian": False, "point_step": 16, "row_step": 16 * sensors, "data": points.tobytes(), "is_dense": False}
         self._cloud, self._cloud_head = points, encode(PRESSURES_TYPE, cloud)[12 : -points.nbytes - 1]
 
     def of(self, time_ns: int, row: dict[str, Any]) -> Iterator[tuple[str, bytes]]:

@@ -1,15 +1,8 @@
 """What fingertip-bridge and fingertip-recorder exchange on Zenoh (zenoh.io), and how they open a session.
 
-    fingertip/SERIAL/contact, raw, health, info   the packet's frame as it was on the line, without its closing zero: wire.decode
-                                                  reads it; firmware/wire/PROTOCOL.md is its format. The attachment is a Stamp.
-    fingertip/SERIAL/other                        the other packets: acknowledgements, crashes
-    fingertip/SERIAL/status                       JSON, twice a second, and asked: host, its clock by its own time daemon, lines with the number of
-                                                  the last packet that was published, or asked, that was read, and what the line counts
-    fingertip/SERIAL/tare, set, info              to be asked; tare?force=1 and set?osr=256;rate_Hz=0 take the arguments of Fingertip.tare
-                                                  and Fingertip.set. The answer is an info packet, or an error with its reason
-    fingertip/SERIAL/again?line=L;first=A;last=B  to be asked: these packets once more, as far as they are kept, and then JSON: oldest, the
-                                                  first number that is kept
-    fingertip/SERIAL/alive                        liveliness token, while the fingertip is there
+README.md of the package lists the keys. A packet's frame is published as it was on the line, without its closing zero: wire.decode reads it.
+fingertip/SERIAL/again?line=L;first=A;last=B gives these packets once more, as far as they are kept, and then JSON: oldest, the first
+number that is kept. status has each line with the number of the last packet that was published or, when asked, read.
 
 A live subscriber may miss packets: they are sent with congestion control "drop", and what the network does not take in time is left out.
 All packets of a fingertip, of whatever key, are numbered in one row, so that a recorder sees what it misses; it asks for that again, which
@@ -23,13 +16,17 @@ Needs the package eclipse-zenoh.
 
 import argparse
 import json
+import math
 import re
 import shutil
+import signal
 import struct
 import subprocess
+import threading
 import types
 from typing import Any, NamedTuple
 
+from . import host_time
 from .errors import BadValueError, InputError
 from .line import SETTINGS
 
@@ -82,9 +79,9 @@ def judge_tracking(text: str) -> HostClock:
     try:
         offset_s, delay_s, dispersion_s, leap = float(cells[4]), float(cells[10]), float(cells[11]), cells[13]
     except (IndexError, ValueError):
-        return HostClock(False, float("inf"), "clock not disciplined: chronyc printed something else than expected")
+        return HostClock(False, math.inf, "clock not disciplined: chronyc printed something else than expected")
     if leap == "Not synchronised" or int(cells[2]) == 0:
-        return HostClock(False, float("inf"), "clock not disciplined: chrony is not synchronised")
+        return HostClock(False, math.inf, "clock not disciplined: chrony is not synchronised")
     bound_us = 1e6 * (abs(offset_s) + dispersion_s + delay_s / 2)
     return HostClock(True, bound_us, f"chrony, stratum {cells[2]}, source {cells[1] or cells[0]}")
 
@@ -92,15 +89,16 @@ def judge_tracking(text: str) -> HostClock:
 def host_clock() -> HostClock:
     """This host's, now. Takes some ms."""
     chronyc = shutil.which("chronyc")
-    if not chronyc:
-        return HostClock(False, float("inf"), "clock not disciplined: no chrony here")
-    try:
-        done = subprocess.run([chronyc, "-c", "tracking"], capture_output=True, text=True, timeout=CHRONYC_TIMEOUT_s, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return HostClock(False, float("inf"), "clock not disciplined: chronyc does not answer")
-    if done.returncode != 0:
-        return HostClock(False, float("inf"), "clock not disciplined: chrony does not run")
-    return judge_tracking(done.stdout)
+    why = "no chrony here"
+    if chronyc:
+        try:
+            done = subprocess.run([chronyc, "-c", "tracking"], capture_output=True, text=True, timeout=CHRONYC_TIMEOUT_s, check=False)
+            if done.returncode == 0:
+                return judge_tracking(done.stdout)
+            why = "chrony does not run"
+        except (OSError, subprocess.TimeoutExpired):
+            why = "chronyc does not answer"
+    return HostClock(False, math.inf, f"clock not disciplined: {why}")
 
 
 def zenoh_module() -> types.ModuleType:
@@ -112,17 +110,20 @@ def zenoh_module() -> types.ModuleType:
 
 
 def add_session_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--connect",
-        action="append",
-        default=[],
-        metavar="ENDPOINT",
-        help="a router, as tcp/192.168.1.2:7447; it is waited for. Without, others are found by multicast",
-    )
-    parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT", help="where others reach this, as tcp/0.0.0.0:7447")
-    parser.add_argument(
-        "--config", metavar="FILE.json5", help="Zenoh's own configuration, with TLS and access control; the options above add to it"
-    )
+    connect = "a router, as tcp/192.168.1.2:7447; it is waited for. Without, others are found by multicast"
+    listen = "where others reach this, as tcp/0.0.0.0:7447"
+    parser.add_argument("--connect", action="append", default=[], metavar="ENDPOINT", help=connect)
+    parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT", help=listen)
+    config = "Zenoh's own configuration, with TLS and access control; the options above add to it"
+    parser.add_argument("--config", metavar="FILE.json5", help=config)
+
+
+def until_ended() -> threading.Event:
+    """Is set by SIGINT and SIGTERM."""
+    ended = host_time.event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    return ended
 
 
 def open_session(options: argparse.Namespace, router: bool = False) -> Any:

@@ -20,36 +20,14 @@ import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
 from .evaluate import Comparison, add_recording_options, check_time, load_recording
-from .files import (
-    FIT_VALID,
-    MOVING,
-    SLIDING,
-    SLIP,
-    STAGES,
-    TANGENTIAL_FROM_TOUCH,
-    TANGENTIAL_VALID,
-    WARNINGS,
-    InputError,
-    check_output,
-    read_grip,
-    read_run,
-    read_scenario,
-    recorded_devices,
-    restart_rows,
-    run_tool,
-    write_bytes,
-)
+from .files import FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError
+from .files import check_output, read_grip, read_run, read_scenario, recorded_devices, restart_rows, run_tool, write_bytes
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
 ALONG_Y = "#0d9488"
 TIME_COLOURS = "winter"  # from blue to green: far from DOUBTFUL and SLIPPING
-ABOVE = {
-    "loc": "lower right",
-    "bbox_to_anchor": (1, 1),
-    "borderaxespad": 0.2,
-    "fontsize": 8,
-    "frameon": False,
-}  # a legend that covers no curve
+# A legend that covers no curve.
+ABOVE = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.2, "fontsize": 8, "frameon": False}
 RIM_mm = 6.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
@@ -108,15 +86,8 @@ def draw_pad(axes, recording, t_s, x, y, good, doubtful, truth):
         axes.set_xlim(corner[0] - 1, corner[0] + size[0] + 1)
         axes.set_ylim(corner[1] - 1, corner[1] + size[1] + 1)
     if truth is not None:
-        on = truth.truth["contact"] > 0.5
-        axes.plot(
-            np.where(on, truth.truth["x_mm"], np.nan),
-            np.where(on, truth.truth["y_mm"], np.nan),
-            color=TRUTH,
-            lw=5,
-            solid_capstyle="round",
-            zorder=2,
-        )
+        true_x, true_y = (np.where(truth.truth["contact"] > 0.5, truth.truth[name], np.nan) for name in ("x_mm", "y_mm"))
+        axes.plot(true_x, true_y, color=TRUTH, lw=5, solid_capstyle="round", zorder=2)
     axes.scatter(x[doubtful], y[doubtful], s=9, fc="none", ec=DOUBTFUL, lw=0.5, zorder=3)
     points = axes.scatter(x[good], y[good], c=t_s[good], s=9, cmap=TIME_COLOURS, lw=0, zorder=3)
     bar = plt.colorbar(points, ax=axes, orientation="horizontal", pad=0.07, fraction=0.03, aspect=40)
@@ -128,10 +99,22 @@ def draw_pad(axes, recording, t_s, x, y, good, doubtful, truth):
     axes.set_title("contact on the pad", loc="left", size=10)
 
 
-def runs(t_s, on):
-    """(start, end) of consecutive frames that are on."""
+def spans(t_s, on):
+    """(start, end) of consecutive rows that are on, each to the next row."""
+    ends = np.append(t_s[1:], t_s[-1])
     edges = np.diff(np.concatenate(([0], on.astype(int), [0])))
-    return list(zip(t_s[np.flatnonzero(edges == 1)], t_s[np.flatnonzero(edges == -1) - 1]))
+    return [(t_s[a], ends[b]) for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1)]
+
+
+def draw_doubtful(panel, t_s, curves, doubtful, scales=False):
+    """What carries a warning is shown, but no axis is made for it, unless there is nothing else."""
+    low, high = panel.get_ylim()
+    for i, values in enumerate(curves):
+        label = "doubtful" if doubtful.any() and i == 0 else None
+        panel.scatter(t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, label=label, zorder=2)
+    if not scales:
+        panel.set_ylim(low, high)
+    panel.grid(color="#e6e8ee", lw=0.6)
 
 
 def draw_marks(panel, marks):
@@ -139,15 +122,9 @@ def draw_marks(panel, marks):
     low, high = panel.get_ylim()
     step = 0.06 * (high - low)
     for i, (t_s, on, colour, label) in enumerate(marks):
-        for j, (start, end) in enumerate(runs(t_s, on)):
-            panel.plot(
-                [start, max(end, start + 1e-3)],
-                [low - (i + 1) * step] * 2,
-                color=colour,
-                lw=4,
-                solid_capstyle="butt",
-                label=label if j == 0 else None,
-            )
+        for j, (start, end) in enumerate(spans(t_s, on)):
+            reach, height = [start, max(end, start + 1e-3)], [low - (i + 1) * step] * 2
+            panel.plot(reach, height, color=colour, lw=4, solid_capstyle="butt", label=None if j else label)
     panel.set_ylim(low - (len(marks) + 0.7) * step, high)
 
 
@@ -172,23 +149,9 @@ def draw_pull(axes, recording, rows, t_s, restarts_s, force, good, doubtful, tru
     drawn = gaps_as_nan(t_s, ratio, good)
     ratios.fill_between(t_s, np.maximum(drawn - spread, 0), drawn + spread, color=MEASURED, alpha=0.15, lw=0, zorder=1.5)
     for panel, curves in ((loads, (qx, qy)), (ratios, (ratio,))):
-        low, high = panel.get_ylim()
-        for i, values in enumerate(curves):
-            panel.scatter(
-                t_s[doubtful],
-                values[doubtful],
-                s=7,
-                fc="none",
-                ec=DOUBTFUL,
-                lw=0.5,
-                label="doubtful" if doubtful.any() and i == 0 else None,
-                zorder=2,
-            )
-        if good.any() or truth is not None:
-            panel.set_ylim(low, high)
+        draw_doubtful(panel, t_s, curves, doubtful, scales=not good.any() and truth is None)
         for at_s in restarts_s:
             panel.axvline(at_s, color=FAINT, lw=1, ls=":")
-        panel.grid(color="#e6e8ee", lw=0.6)
     since = " since touch" if recording.flag(TANGENTIAL_FROM_TOUCH)[rows][there].any() else ""
     loads.set_ylabel(f"Q{since}, N")
     ratios.set_ylabel(f"Q/F{since}")
@@ -202,7 +165,7 @@ class Beside:
     """Another fingertip of the recording, compared with the same truth."""
 
     def __init__(self, options, truth):
-        recording = load_recording(argparse.Namespace(**{**vars(options), "device": options.beside}), columns=COMPARED_COLUMNS)
+        recording = of_device(options, options.beside, COMPARED_COLUMNS)
         check_time(recording)
         self.serial, self.comparison = options.beside, Comparison(recording, truth, read_run(options.beside_run))
         rows = recording.has_contact
@@ -222,26 +185,12 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth, b
             for start, end in truth.intervals("slip"):
                 panel.axvspan(start, end, color=SLIPPING, alpha=0.10, lw=0, zorder=0)
         if beside:
-            panel.plot(
-                beside.t_s,
-                gaps_as_nan(beside.t_s, beside.values[name], beside.good),
-                color=ALONG_Y,
-                lw=1.1,
-                ls="--",
-                label=beside.serial,
-                zorder=1.5,
-            )
+            values_beside = gaps_as_nan(beside.t_s, beside.values[name], beside.good)
+            panel.plot(beside.t_s, values_beside, color=ALONG_Y, lw=1.1, ls="--", label=beside.serial, zorder=1.5)
         panel.plot(t_s, gaps_as_nan(t_s, values, good), color=MEASURED, lw=1.1, label="measured", zorder=2)
-        # What carries a warning is shown, but no axis is made for it.
-        low, high = panel.get_ylim()
-        panel.scatter(
-            t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, label="doubtful" if doubtful.any() else None, zorder=2
-        )
-        if good.any() or truth is not None:
-            panel.set_ylim(low, high)
+        draw_doubtful(panel, t_s, [values], doubtful, scales=not good.any() and truth is None)
         panel.set_xlim(t_s[0], t_s[-1])
         panel.set_ylabel(label)
-        panel.grid(color="#e6e8ee", lw=0.6)
     draw_marks(axes[-1], [(t_s, slip, SLIPPING, "slip found")])
     axes[-1].legend(ncol=5, **ABOVE)
     axes[0].set_title("over time" + (" (shaded: true slip)" if truth is not None else ""), loc="left", size=10)
@@ -270,13 +219,6 @@ def draw_errors(axes, comparison, beside):
         panel.set_ylabel("frames")
 
 
-def spans(t_s, on):
-    """(start, end) of consecutive rows that are on, each to the next row."""
-    ends = np.append(t_s[1:], t_s[-1])
-    edges = np.diff(np.concatenate(([0], on.astype(int), [0])))
-    return [(t_s[a], ends[b]) for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1)]
-
-
 def draw_grasp(path, grip, fingertips):
     """Draws into this file. Returns a line about it."""
     set_style()
@@ -293,9 +235,7 @@ def draw_grasp(path, grip, fingertips):
         doubtful = flags & recording.flag(WARNINGS)[rows]
         values = recording["force_N"][rows]
         force.plot(measured_s, gaps_as_nan(measured_s, values, flags & ~doubtful), color=colour, lw=1.1, label=label, zorder=2)
-        low, high = force.get_ylim()
-        force.scatter(measured_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, zorder=2)
-        force.set_ylim(low, high)
+        draw_doubtful(force, measured_s, [values], doubtful)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.4, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
     width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
@@ -334,26 +274,24 @@ def draw_grasp(path, grip, fingertips):
         text for text in (*(f.metadata.get("serial", "") for f in fingertips), fingertips[0].metadata.get("grasp_gripper", "")) if text
     )
     figure.text(0.055, 0.925, f"{identity}  ·  {summary}", size=9, color=FAINT)
-    picture = io.BytesIO()
-    figure.savefig(picture, dpi=110, format="png")
-    write_bytes(path, picture.getvalue())
+    write_figure(figure, path)
     return summary
 
 
 def set_style():
-    plt.rcParams.update(
-        {
-            "font.size": 9,
-            "axes.edgecolor": TRUTH,
-            "axes.labelcolor": INK,
-            "xtick.color": FAINT,
-            "ytick.color": FAINT,
-            "text.color": INK,
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "axes.titlecolor": FAINT,
-        }
-    )
+    colours = {"axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT, "text.color": INK}
+    plt.rcParams.update(colours | {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
+
+
+def write_figure(figure, path, dpi=110):
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=dpi, format="png")
+    write_bytes(path, picture.getvalue())
+
+
+def of_device(options, device, columns):
+    """The recording of this fingertip among several."""
+    return load_recording(argparse.Namespace(**{**vars(options), "device": device}), columns=columns)
 
 
 def compared_in_words(summary):
@@ -403,10 +341,7 @@ def main(argv):
     if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
         grip = read_grip(options.recording, options.salvage)
         if grip:
-            fingertips = [
-                load_recording(argparse.Namespace(**{**vars(options), "device": serial}), columns=GRASP_COLUMNS)
-                for serial in recorded_devices(options.recording)
-            ]
+            fingertips = [of_device(options, serial, GRASP_COLUMNS) for serial in recorded_devices(options.recording)]
             print(f"{options.output}: {draw_grasp(options.output, grip, fingertips)}")
             return 0
     run = read_run(options.run)
@@ -431,17 +366,8 @@ def main(argv):
     height = 9.2 + 3.6 * pulled
     from_top = lambda of_usual: 1 - (1 - of_usual) * 9.2 / height
     figure = plt.figure(figsize=(14, height))
-    grid = figure.add_gridspec(
-        over_time + bool(comparison),
-        3,
-        width_ratios=[1.25, 1, 1],
-        hspace=0.38,
-        wspace=0.27,
-        left=0.055,
-        right=0.985,
-        top=from_top(0.85 if beside else 0.87),
-        bottom=0.06 * 9.2 / height,
-    )
+    edges = {"left": 0.055, "right": 0.985, "top": from_top(0.85 if beside else 0.87), "bottom": 0.06 * 9.2 / height}
+    grid = figure.add_gridspec(over_time + bool(comparison), 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27, **edges)
     draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, good, doubtful, truth)
     first = figure.add_subplot(grid[0, 1:])
     panels = [first, *(figure.add_subplot(grid[i, 1:], sharex=first) for i in range(1, over_time))]
@@ -458,9 +384,7 @@ def main(argv):
     figure.text(0.055, from_top(0.955), title, size=17, weight="bold")
     for i, line in enumerate(lines):
         figure.text(0.055, from_top(0.93 - 0.022 * i), line, size=9, color=INK if i else FAINT)
-    picture = io.BytesIO()
-    figure.savefig(picture, dpi=110, format="png")
-    write_bytes(options.output, picture.getvalue())
+    write_figure(figure, options.output)
     print(f"{options.output}: {lines[1]}")
     return 0
 

@@ -10,23 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .frames import Q10
-from .line import (
-    CONTACT_COLUMNS,
-    LATER_COLUMNS,
-    RAW_COLUMNS,
-    SENSOR_LISTS,
-    SENSORS_MAX,
-    SHAPE_COLUMNS,
-    TANGENTIAL_COLUMNS,
-    Acknowledgement,
-    Calibration,
-    Contact,
-    Health,
-    Info,
-    PadProfile,
-    SyncEdge,
-    Wire,
-)
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS
+from .line import Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire
 from .wire import layout_of
 
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
@@ -42,7 +27,7 @@ _PAD_LISTS = {
     "pad_moment_sds_mm": 3,
     **{f"pad_{name}": 3 for name in PadProfile._fields if name.startswith("edge_")},
 }
-_LISTS = {**dict.fromkeys(("x_mm", "y_mm", *SENSOR_LISTS), SENSORS_MAX), **_PAD_LISTS}
+LISTS = {**dict.fromkeys(("x_mm", "y_mm", *SENSOR_LISTS), SENSORS_MAX), **_PAD_LISTS}
 _SCALARS = {
     prefix + name: wire.code
     for body, prefix in ((Info, ""), (Calibration, ""), (PadProfile, "pad_"))
@@ -93,9 +78,9 @@ def judge_key(key: str, value: str) -> None:
             raise ValueError(f'firmware is "{value}"')
         for part in value.split("."):
             whole(key, part, "B")
-    elif key in _LISTS:
+    elif key in LISTS:
         words = value.split(" ") if value else []
-        if len(words) > _LISTS[key]:
+        if len(words) > LISTS[key]:
             raise ValueError(f"{key} has too many values")
         for word in words:
             if SENSOR_LISTS.get(key) == "h":
@@ -142,15 +127,8 @@ class Rows:
         self._first_raw = 2 + len(CONTACT_COLUMNS) + len(there)
         first_sensor = self._first_raw + len(RAW_COLUMNS)
         self.sensors = max(0, (header.count(",") + 1 - first_sensor) // 2)
-        self.names = [
-            "t_us",
-            "frame",
-            *CONTACT_COLUMNS,
-            *there,
-            *RAW_COLUMNS,
-            *(f"s{k}_Pa" for k in range(self.sensors)),
-            *(f"tare{k}_Pa" for k in range(self.sensors)),
-        ]
+        pressures = (f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(self.sensors))
+        self.names = ["t_us", "frame", *CONTACT_COLUMNS, *there, *RAW_COLUMNS, *pressures]
         if header != ",".join(self.names) or self.sensors > SENSORS_MAX:
             raise ValueError("wrong header")
         wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}

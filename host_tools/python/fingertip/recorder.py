@@ -10,15 +10,14 @@ import itertools
 import json
 import math
 import queue
-import signal
 import sys
 from typing import NamedTuple
 
 from . import host_time, wire
 from .clock import ClockEstimate
 from .errors import InputError, PacketError
-from .files import check_output, printable, run_tool
-from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session, parts_of, zenoh_module
+from .files import check_output, check_range, printable, run_tool
+from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session, parts_of, until_ended, zenoh_module
 from .line import Capability
 from .recording import JointRecordingWriter
 
@@ -220,6 +219,12 @@ class _Source:
         self.unread_frames = 0
         self.recovered = 0
 
+    def figures(self):
+        """unheard: it did not report at the end what it had sent."""
+        names = ("sent", "recorded", "lost", "lost_between_lines", "unread_frames", "restarts")
+        counts = {name: getattr(self.account, name) for name in names}
+        return counts | {"recovered": self.recovered, "asked": self.asked, "unheard": self.must_answer}
+
 
 class Recording:
     """session: of Zenoh. Everything but what asks runs in the thread that calls run."""
@@ -236,33 +241,26 @@ class Recording:
         self.damaged = 0
         self.behind = self._reported_behind = False  # too much for this computer
         self.unrecorded = set()  # came later
-        self.unheard = []  # did not report at the end what they had sent
-        self._writer = JointRecordingWriter(
-            path,
-            infos,
-            replace=replace,
-            extra=extra,
-            count=self._counts,
-            raw_expected=all(info.capabilities & Capability.RAW_STREAM for info in infos),
-        )
+        raw = all(info.capabilities & Capability.RAW_STREAM for info in infos)
+        self._writer = JointRecordingWriter(path, infos, replace=replace, extra=extra, count=self._counts, raw_expected=raw)
         self._subscriber = session.declare_subscriber(f"{ROOT}/*/*", self._hear)
         self._threads = [host_time.thread(self._ask_on, args=(source,), daemon=True) for source in self.sources.values()]
         for thread in self._threads:
             thread.start()
 
     def _counts(self):
-        counts = []
-        for source in self.sources.values():
-            line = wire.LineStatistics()
+        counts = [wire.LineStatistics() for _ in self.sources]
+        for line, source in zip(counts, self.sources.values()):
             line.packets, line.dropped_packets = source.account.recorded, source.account.lost
-            counts.append(line)
         return counts
 
     def _hear(self, sample):
         if self._arrived.qsize() >= WAITING_MOST:
             self.behind = True
             return
-        serial, name = parts_of(str(sample.key_expr))
+        self._put(sample, *parts_of(str(sample.key_expr)))
+
+    def _put(self, sample, serial, name):
         attachment = sample.attachment
         self._arrived.put((serial, name, sample.payload.to_bytes(), attachment.to_bytes() if attachment else b""))
 
@@ -285,10 +283,8 @@ class Recording:
 
     def _ask(self, source, selector, name):
         for reply in self._session.get(selector, timeout=ASK_TIMEOUT_s, consolidation=self._zenoh.ConsolidationMode.NONE):
-            sample = reply.ok
-            if sample:
-                attachment = sample.attachment
-                self._arrived.put((source.serial, name, sample.payload.to_bytes(), attachment.to_bytes() if attachment else b""))
+            if reply.ok:
+                self._put(reply.ok, source.serial, name)
 
     # The main thread
 
@@ -306,13 +302,12 @@ class Recording:
             self._work(0.1)
             if not any(source.must_answer or not source.account.is_complete for source in self.sources.values()):
                 break
-        self.unheard = [source.serial for source in self.sources.values() if source.must_answer]
         self._ended.set()
         for source in self.sources.values():
             source.account.give_up()
             self._write(source)
-            self._event(source, self._summary(source))
-        self._writer.close("unheard" if self.unheard else "closed")
+            self._event(source, "network: " + text_of(source.figures()))
+        self._writer.close("unheard" if any(source.must_answer for source in self.sources.values()) else "closed")
 
     def _work(self, wait_s):
         """What has come, and what to ask for."""
@@ -362,7 +357,7 @@ class Recording:
                 source.account.answered(int(reported["line"]), min(int(reported["last"]), int(reported["first"]) + AGAIN_MOST - 1))
                 return
             stamp = Stamp.of(attachment)
-            packet = wire.decode_stream_packet(data) or wire.decode(data)
+            packet = wire.decode(data)
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError, InputError, PacketError):
             self.damaged += 1
             return
@@ -392,30 +387,12 @@ class Recording:
                 source.clock = clock = ClockEstimate(t_us, host_us, stamp.drift_ppm, stamp.uncertainty_us)
             self._writer.packet(source.number, packet, clock, source.account.restarts)
 
-    @staticmethod
-    def _summary(source):
-        account = source.account
-        return (
-            f"network: sent={account.sent} recorded={account.recorded} lost={account.lost} "
-            f"unread_frames={account.unread_frames} came_again={source.recovered} restarts={account.restarts} "
-            f"unheard={int(source.must_answer)}"
-        )
-
     def figures(self):
-        return {
-            source.serial: {
-                "sent": source.account.sent,
-                "recorded": source.account.recorded,
-                "lost": source.account.lost,
-                "lost_between_lines": source.account.lost_between_lines,
-                "unread_frames": source.account.unread_frames,
-                "recovered": source.recovered,
-                "asked": source.asked,
-                "restarts": source.account.restarts,
-                "unheard": source.serial in self.unheard,
-            }
-            for source in self.sources.values()
-        }
+        return {serial: source.figures() for serial, source in self.sources.items()}
+
+
+def text_of(figures):
+    return " ".join(f"{name}={int(value)}" for name, value in figures.items())
 
 
 def ask(session, key, timeout_s=ASK_TIMEOUT_s):
@@ -461,8 +438,8 @@ class _HostClock(NamedTuple):
     disciplined: bool
     bound_us: float
     text: str
-    ahead_us: float
     within_us: float
+    ahead_us: float
 
     def note(self):
         bound = f"{self.bound_us:.0f} us" if self.disciplined else "unknown"
@@ -475,19 +452,12 @@ def _clock_of(session, serial):
         answer = ask(session, f"{ROOT}/{serial}/status").get(serial)
         if answer is None:
             raise InputError(f"{serial}: its bridge does not report how its clock is kept")
+        data, sent_ns, answered_ns = answer
         try:
-            status = json.loads(answer[0])
-            best = min(best, ((answer[2] - answer[1]) / 2000, (status["now_ns"] - (answer[1] + answer[2]) / 2) / 1000))
-            clock = status["clock"]
-            found = _HostClock(
-                str(status["host"]),
-                str(status["boot"]),
-                bool(clock["disciplined"]),
-                float(clock["bound_us"] or 0),
-                str(clock["text"]),
-                best[1],
-                best[0],
-            )
+            status = json.loads(data)
+            clock, host, boot = status["clock"], str(status["host"]), str(status["boot"])
+            best = min(best, ((answered_ns - sent_ns) / 2000, (status["now_ns"] - (sent_ns + answered_ns) / 2) / 1000))
+            found = _HostClock(host, boot, bool(clock["disciplined"]), float(clock["bound_us"] or 0), str(clock["text"]), *best)
         except (ValueError, KeyError, TypeError):
             raise InputError(f"{serial}: its bridge reports its clock in a way that is not known here; it is of another version") from None
     return found
@@ -503,56 +473,40 @@ def judge_clocks(session, serials, bound_us, may_be_undisciplined):
             raise InputError(f"{clock.host} ({serial}): {clock.text}; let chrony keep the clock, or give --undisciplined")
     for one, other in itertools.combinations(serials, 2):
         a, b = clocks[one], clocks[other]
-        if a.boot == b.boot:
-            continue
-        if a.disciplined and b.disciplined and a.bound_us + b.bound_us > bound_us:
-            raise InputError(
-                f"the clocks of {one} and {other} may be {a.bound_us + b.bound_us:.0f} us apart by chrony's estimate, more than "
-                f"--clock-bound-us {bound_us:g}"
-            )
-        surely_us = abs(a.ahead_us - b.ahead_us) - a.within_us - b.within_us
-        if surely_us > bound_us:
-            raise InputError(
-                f"the clocks of {one} and {other} are at least {surely_us:.0f} us apart, more than --clock-bound-us {bound_us:g}"
-            )
+        surely_us, perhaps_us = abs(a.ahead_us - b.ahead_us) - a.within_us - b.within_us, a.bound_us + b.bound_us
+        apart = ""
+        if a.boot != b.boot and a.disciplined and b.disciplined and perhaps_us > bound_us:
+            apart = f"may be {perhaps_us:.0f} us apart by chrony's estimate"
+        elif a.boot != b.boot and surely_us > bound_us:
+            apart = f"are at least {surely_us:.0f} us apart"
+        if apart:
+            raise InputError(f"the clocks of {one} and {other} {apart}, more than --clock-bound-us {bound_us:g}")
     return {serial: clock.note() for serial, clock in clocks.items()}
 
 
 def main(argv):
     parser = argparse.ArgumentParser(prog="fingertip-recorder", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file", metavar="FILE.mcap|FILE.csv")
-    parser.add_argument(
-        "--serial", action="append", default=[], metavar="SERIAL", help="this fingertip; several times for several; without, all"
-    )
-    parser.add_argument("--expect", type=int, default=1, metavar="N", help="wait until this number is there")
-    parser.add_argument("--wait", type=float, default=10.0, metavar="S", help="for fingertips, at most; default 10")
-    parser.add_argument("--seconds", type=float, default=math.inf, metavar="S")
-    parser.add_argument("--patience", type=float, default=30.0, metavar="S", help="at the end, for hosts that are cut off; default 30")
-    parser.add_argument(
-        "--clock-bound-us",
-        type=float,
-        default=5000.0,
-        metavar="US",
-        help="no recording if two hosts' clocks are, or by chrony's own estimate may be, further apart; default 5000",
-    )
-    parser.add_argument("--undisciplined", action="store_true", help="take hosts whose clock nothing keeps, too")
-    parser.add_argument("--replace", action="store_true", help="over a file that exists")
-    parser.add_argument("--json", action="store_true", help="the counts as JSON on stdout")
+    add = parser.add_argument
+    add("file", metavar="FILE.mcap|FILE.csv")
+    add("--serial", action="append", default=[], metavar="SERIAL", help="this fingertip; several times for several; without, all")
+    add("--expect", type=int, default=1, metavar="N", help="wait until this number is there")
+    add("--wait", type=float, default=10.0, metavar="S", help="for fingertips, at most; default 10")
+    add("--seconds", type=float, default=math.inf, metavar="S")
+    add("--patience", type=float, default=30.0, metavar="S", help="at the end, for hosts that are cut off; default 30")
+    bound = "no recording if two hosts' clocks are, or by chrony's own estimate may be, further apart; default 5000"
+    add("--clock-bound-us", type=float, default=5000.0, metavar="US", help=bound)
+    add("--undisciplined", action="store_true", help="take hosts whose clock nothing keeps, too")
+    add("--replace", action="store_true", help="over a file that exists")
+    add("--json", action="store_true", help="the counts as JSON on stdout")
     add_session_options(parser)
     options = parser.parse_args(argv)
-    for name, low, high in (
-        ("expect", 1, 1000),
-        ("wait", 0, 86400),
-        ("seconds", 0, math.inf),
-        ("patience", 0, 86400),
-        ("clock_bound_us", 0, 1e9),
-    ):
-        if not low <= getattr(options, name) <= high:
-            raise InputError(f"--{name.replace('_', '-')} {getattr(options, name):g} is out of range; give {low} to {high:g}")
+    check_range("expect", options.expect, 1, 1000)
+    for name in ("wait", "patience"):
+        check_range(name, getattr(options, name), 0, 86400)
+    check_range("seconds", options.seconds, 0, math.inf)
+    check_range("clock-bound-us", options.clock_bound_us, 0, 1e9)
     check_output(options.file)
-    ended = host_time.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
+    ended = until_ended()
 
     def report(text):
         print(f"fingertip-recorder: {printable(text)}", file=sys.stderr, flush=True)
@@ -566,7 +520,7 @@ def main(argv):
         recording.run(options.seconds, ended, options.patience)
     figures = recording.figures()
     for serial, each in figures.items():
-        report(f"{serial}: " + " ".join(f"{name}={value}" for name, value in each.items()))
+        report(f"{serial}: {text_of(each)}")
     if recording.damaged:
         report(f"{recording.damaged} messages were damaged, and count as lost")
     if options.json:

@@ -8,7 +8,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from .clock import ClockEstimate, host_now_us
 from .errors import InputError
@@ -16,10 +16,11 @@ from .frames import Q10
 from .line import CONTACT_COLUMNS, INFO_KEYS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
 from .lines import LineFile, shortest
 from .mcap_recording import McapLines
-from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge
+from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge, layout_of
 
 LATE_us = 250_000  # rows wait for this time for those of others
 CLOCK_LINES_us = 1e6
+_KINDS: dict[type, str] = {SyncEdge: "sync", Health: "health", Info: "info", Acknowledgement: "ack"}
 _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *LATER_COLUMNS) if name not in ("sequence", "flags")]
 
 
@@ -39,40 +40,21 @@ def _list(values: Iterable[float]) -> str:
 
 
 def _calibration_metadata(calibration: Calibration) -> dict[str, str]:
+    scalars = (name for name, wire in layout_of(Calibration) if wire.times == 1)
     return {
-        "calibration_date_s": str(calibration.date_s),
-        "calibration_placements": str(calibration.placements),
-        "force_scale": _number(calibration.force_scale),
-        "force_scale_sd": _number(calibration.force_scale_sd),
-        **{
-            f"calibration_{name}": str(getattr(calibration, name))
-            for name in ("sigma_um", "sigma_sd_um", "dip_share_q16", "dip_sd_um", "ambient_kPa")
-        },
+        **{("" if name.startswith("force_scale") else "calibration_") + name: _number(getattr(calibration, name)) for name in scalars},
         **{name: _list(getattr(calibration, name)) for name in SENSOR_LISTS},
     }
 
 
 def _pad_metadata(pad: PadProfile) -> dict[str, str]:
-    scalars = (
-        "thickness_mm",
-        "overhang_mm",
-        "spread_mm2",
-        "spread_sd_mm2",
-        "force_ratio",
-        "tangential_scale",
-        "tangential_scale_sd",
-        "from_touch",
-    )
-    pairs = {
-        "pad_shares": pad.normal[0::2],
-        "pad_sds_mm": pad.normal[1::2],
-        "pad_moments_mm": pad.tangential[0::2],
-        "pad_moment_sds_mm": pad.tangential[1::2],
-    }
-    edges = {f"pad_{name}": getattr(pad, name) for name in pad._fields if name.startswith("edge_")}
+    scalars = (name for name, wire in layout_of(PadProfile) if wire.times == 1)
+    terms = {"shares": pad.normal[0::2], "sds_mm": pad.normal[1::2]}
+    terms |= {"moments_mm": pad.tangential[0::2], "moment_sds_mm": pad.tangential[1::2]}
+    edges = {name: getattr(pad, name) for name in pad._fields if name.startswith("edge_")}
     return {
         **{f"pad_{name}": _number(getattr(pad, name)) for name in scalars},
-        **{name: _list(values) for name, values in (pairs | edges).items()},
+        **{f"pad_{name}": _list(values) for name, values in (terms | edges).items()},
     }
 
 
@@ -100,17 +82,8 @@ def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | Mca
 
 
 def _header(sensors: int) -> str:
-    return ",".join(
-        [
-            "t_us",
-            "frame",
-            *CONTACT_COLUMNS,
-            *LATER_COLUMNS,
-            *RAW_COLUMNS,
-            *(f"s{k}_Pa" for k in range(sensors)),
-            *(f"tare{k}_Pa" for k in range(sensors)),
-        ]
-    )
+    pressures = (f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(sensors))
+    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS, *pressures])
 
 
 def _own_keys(extra: Mapping[str, str | None] | None) -> dict[str, str]:
@@ -153,10 +126,6 @@ class _PacketLines:
                 self._comment(key, value)
         self._metadata = now
 
-    def _packet_line(self, kind: str, packet: Packet, fields: Mapping[str, Any]) -> None:
-        pairs = {"sequence": packet.sequence, "t_us": packet.t_us, **fields}
-        self._comment("packet", kind + "".join(f" {name}={_cell(value)}" for name, value in pairs.items()))
-
     def packet(self, packet: Packet) -> None:
         body = packet.body
         if isinstance(body, Contact):
@@ -175,17 +144,15 @@ class _PacketLines:
             else:
                 self.write_pending()
                 self._row(None, packet)
-        elif isinstance(body, SyncEdge):
+        elif type(body) in _KINDS:
             self.write_pending()
-            self._take_edge(body)
-            self._packet_line("sync", packet, body._asdict())
-        elif isinstance(body, (Health, Info, Acknowledgement)):
-            self.write_pending()
-            if isinstance(body, Info):
+            if isinstance(body, SyncEdge):
+                self._take_edge(body)
+            elif isinstance(body, Info):
                 self.info(body)
-                self._packet_line("info", packet, {})
-            else:
-                self._packet_line("ack" if isinstance(body, Acknowledgement) else "health", packet, body._asdict())
+            fields = {} if isinstance(body, Info) else body._asdict()
+            pairs = {"sequence": packet.sequence, "t_us": packet.t_us, **fields}
+            self._comment("packet", _KINDS[type(body)] + "".join(f" {name}={_cell(value)}" for name, value in pairs.items()))
 
     def _take_edge(self, edge: SyncEdge) -> None:
         ahead = 1 if self._last_edge is None else edge.number - self._last_edge & 0xFFFFFFFF
@@ -218,15 +185,8 @@ class _PacketLines:
         if raw and isinstance(raw.body, Raw):
             read = raw.body
             frame = read.frame
-            cells += [
-                str(raw.sequence),
-                str(read.flags),
-                str(read.valid),
-                str(read.saturated),
-                str(read.doubtful),
-                f"{read.temperature_cC / 100:.2f}",
-            ]
-            cells += [f"{value / Q10:.4f}" for value in (*read.readings[0::2], *read.readings[1::2])]
+            cells += [str(value) for value in (raw.sequence, read.flags, read.valid, read.saturated, read.doubtful)]
+            cells += [f"{read.temperature_cC / 100:.2f}", *(f"{value / Q10:.4f}" for value in (*read.readings[0::2], *read.readings[1::2]))]
         else:
             cells += self._no_raw
         self._write_row(t_us, f"{t_us},{frame}," + ",".join(cells))
@@ -248,6 +208,9 @@ class Recorder(Protocol):
     def fail(self, error: InputError) -> None: ...
 
     def close(self, reason: str = "closed") -> None: ...
+
+
+Writer = TypeVar("Writer", bound="_Writer")
 
 
 class _Writer:
@@ -287,6 +250,9 @@ class _Writer:
     def _end(self, reason: str) -> None:
         raise NotImplementedError
 
+    def __enter__(self: Writer) -> Writer:
+        return self
+
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
@@ -323,9 +289,6 @@ class RecordingWriter(_Writer):
             self.abandon()
             raise
 
-    def __enter__(self) -> "RecordingWriter":
-        return self
-
     def _comment(self, key: str, value: str) -> None:
         self._file.line(f"# {key}: {value}")
 
@@ -350,9 +313,13 @@ class RecordingWriter(_Writer):
     def _end(self, reason: str) -> None:
         self._lines.write_pending()
         lines = self._lines
-        self._file.line(
-            f"# end: reason={reason} frames={lines.frames} seconds={lines.seconds:.6f}{lines.edges_text()} {self._count().text()}"
+        self._comment(
+            "end", f"reason={reason} frames={lines.frames} seconds={lines.seconds:.6f}{lines.edges_text()} {self._count().text()}"
         )
+
+
+def _bounds_text(clock: ClockEstimate) -> str:
+    return f"drift_ppm={clock.drift_ppm:.3f} uncertainty_us={clock.uncertainty_us:.1f}"
 
 
 class _Member:
@@ -410,9 +377,6 @@ class JointRecordingWriter(_Writer):
 
     _head_written = False
 
-    def __enter__(self) -> "JointRecordingWriter":
-        return self
-
     def _member(self, number: int, info: Info, raw_expected: bool) -> _Member:
         def comment(key: str, value: str) -> None:
             text = f"# {number}/{key}: {value}"
@@ -462,12 +426,8 @@ class JointRecordingWriter(_Writer):
         self._alignment_us = max(self._alignment_us, sum(bounds[:2]))
         if clock.host_us - member.clock_written_us >= CLOCK_LINES_us:
             member.clock_written_us = clock.host_us
-            self._wait(
-                member,
-                clock.host_us,
-                f"# {member.number}/clock: t_us={clock.device_us} time_us={self._time(clock.host_us)} "
-                f"drift_ppm={clock.drift_ppm:.3f} uncertainty_us={clock.uncertainty_us:.1f}",
-            )
+            now = f"t_us={clock.device_us} time_us={self._time(clock.host_us)}"
+            self._wait(member, clock.host_us, f"# {member.number}/clock: {now} {_bounds_text(clock)}")
 
     def event(self, number: int, text: str) -> None:
         with self._lock:
@@ -484,12 +444,10 @@ class JointRecordingWriter(_Writer):
         total = LineStatistics()
         for member, statistics in zip(self._members, counts):
             total += statistics
-            clock = f" drift_ppm={member.clock.drift_ppm:.3f} uncertainty_us={member.clock.uncertainty_us:.1f}" if member.clock else ""
-            self._file.line(
-                f"# {member.number}/end: frames={member.lines.frames} jumps={member.jumps}{clock}{member.lines.edges_text()} {statistics.text()}"
-            )
+            clock = f" {_bounds_text(member.clock)}" if member.clock else ""
+            text = f"frames={member.lines.frames} jumps={member.jumps}{clock}{member.lines.edges_text()} {statistics.text()}"
+            self._file.line(f"# {member.number}/end: {text}")
         frames = sum(member.lines.frames for member in self._members)
         seconds = (self._last_us - self._host_zero_us) / 1e6 if frames else 0
-        self._file.line(
-            f"# end: reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}"
-        )
+        text = f"reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}"
+        self._file.line(f"# end: {text}")

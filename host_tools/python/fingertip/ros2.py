@@ -1,12 +1,5 @@
 """Fingertips as topics of ROS 2, from a computer without ROS: DDS by cyclonedds, the messages of MCAP recordings (messages.py).
 
-    from fingertip import Fingertip
-    from fingertip.ros2 import Publisher
-    with Fingertip() as fingertip, Publisher() as publisher:
-        publisher.add(fingertip)
-        for frame in fingertip:
-            publisher.frame(frame)
-
     fingertip-ros2 [--device SERIAL ...] [--port PORT ...] [--domain N] [--seconds S]
 
 Header stamps are the computer's clock (system time) at the middle of the sensors' conversion. QoS: reliable, volatile, the last 1000
@@ -18,7 +11,6 @@ Fast DDS and rosbags; not run against ROS 2.
 import argparse
 import math
 import os
-import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -31,17 +23,8 @@ from .errors import BadValueError, FingertipError, InputError
 from .files import run_tool
 from .frames import Q10, Frame
 from .group import Fingertips
-from .messages import (
-    CONTACT_TYPE,
-    DIAGNOSTICS_TYPE,
-    PLACE_TYPE,
-    PRESSURES_TYPE,
-    WRENCH_TYPE,
-    FrameMessages,
-    diagnostics,
-    health_status,
-    name_in_ros,
-)
+from .messages import DIAGNOSTICS_TYPE, FRAME_TOPICS, FrameMessages, diagnostics, health_status, name_in_ros
+from .network import until_ended
 from .wire import Contact, Health
 
 if TYPE_CHECKING:
@@ -49,7 +32,6 @@ if TYPE_CHECKING:
 
 DOMAIN_MAX = 232  # whose ports are below 65536
 POLL_s = 0.1
-FRAME_TOPICS = {"contact": CONTACT_TYPE, "wrench": WRENCH_TYPE, "place": PLACE_TYPE, "pressures": PRESSURES_TYPE}
 _CONTACT_FIELDS = tuple(name.lower() for name in Contact._fields)
 
 
@@ -63,26 +45,13 @@ def domain_of_environment() -> int:
 
 def contact_of_frame(frame: Frame) -> dict[str, Any]:
     """fingertip_msgs/Contact, without its header: of no recording, hence of no line."""
-    raw = frame.raw
-    return {
-        **dict(zip(_CONTACT_FIELDS, frame.contact)),
-        "line": 0,
-        "device": 0,
-        "time_us": math.nan,
-        "t_us": frame.t_us,
-        "frame": frame.frame,
-        "has_contact": frame.has_contact,
-        "sequence": frame.sequence if frame.has_contact else 0,
-        "has_raw": frame.has_raw,
-        "raw_sequence": frame.raw_sequence if frame.has_raw else 0,
-        "raw_flags": raw.flags,
-        "valid": raw.valid,
-        "saturated": raw.saturated,
-        "doubtful": raw.doubtful,
-        "temperature_degc": raw.temperature_cC / 100 if frame.has_raw else math.nan,
-        "pressure_pa": [value / Q10 for value in raw.readings[0::2]],
-        "tare_pa": [value / Q10 for value in raw.readings[1::2]],
-    }
+    raw, row = frame.raw, dict(zip(_CONTACT_FIELDS, frame.contact))
+    row |= {"line": 0, "device": 0, "time_us": math.nan, "t_us": frame.t_us, "frame": frame.frame}
+    row |= {"has_contact": frame.has_contact, "sequence": max(frame.sequence, 0), "has_raw": frame.has_raw}
+    row |= {"raw_sequence": max(frame.raw_sequence, 0), "raw_flags": raw.flags, "valid": raw.valid, "saturated": raw.saturated}
+    row |= {"doubtful": raw.doubtful, "temperature_degc": raw.temperature_cC / 100 if frame.has_raw else math.nan}
+    pressures, tares = ([value / Q10 for value in raw.readings[at::2]] for at in (0, 1))
+    return row | {"pressure_pa": pressures, "tare_pa": tares}
 
 
 def _system_minus_host_ns() -> int:
@@ -123,9 +92,8 @@ class Publisher:
     def __init__(self, domain: int | None = None) -> None:
         from . import dds  # whose error names what to install
 
-        loopback_only = (
-            os.environ.get("ROS_LOCALHOST_ONLY", "") == "1" or os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
-        )
+        localhost = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+        loopback_only = localhost or os.environ.get("ROS_LOCALHOST_ONLY", "") == "1"
         self.domain = domain_of_environment() if domain is None else domain
         if not 0 <= self.domain <= DOMAIN_MAX:
             raise BadValueError(f"domain {self.domain} is out of range; give 0 to {DOMAIN_MAX}")
@@ -242,9 +210,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--domain", type=int, metavar="N", help="0 to 232; as ROS_DOMAIN_ID has it, if not given")
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="how long; until Ctrl-C, if not given")
     options = parser.parse_args(argv)
-    stop = host_time.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = until_ended()
     try:
         with Publisher(options.domain) as publisher:
             fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
@@ -257,8 +223,6 @@ def main(argv: list[str]) -> int:
             for serial, tip in fingertips.by_serial.items():
                 print(f"{serial}: {publisher.frames[serial]} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
             print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
-    except InputError:
-        raise
     except FingertipError as error:
         raise InputError(str(error)) from None
     return 0

@@ -7,21 +7,8 @@ import struct
 from typing import Any
 
 CDR_LITTLE_ENDIAN = b"\0\1\0\0"
-PRIMITIVES = {
-    "bool": "?",
-    "byte": "B",
-    "char": "B",
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-    "float32": "f",
-    "float64": "d",
-}
+PRIMITIVES = {"bool": "?", "byte": "B", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"}
+PRIMITIVES |= {"int64": "q", "uint64": "Q", "float32": "f", "float64": "d"}
 _FIELD = re.compile(r"^([A-Za-z0-9_/]+)(\[\])?\s+([a-z0-9_]+)\s*(?:#.*)?$")
 
 

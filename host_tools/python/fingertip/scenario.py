@@ -16,19 +16,11 @@ import argparse
 
 import numpy as np
 
-from .files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, check_output, run_tool, write_scenario
+from .files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, check_output, check_range, run_tool, write_scenario
 
 STEP_s = 1e-3
 SIGMA_mm = 5.7
 QUIET_s = 0.5  # without contact, for the tare
-
-DESCRIPTIONS = {
-    "ideal": "ideal Gaussian presses at random places, forces log-uniform from 0.5 to 20 N",
-    "demo": "three taps, slips at 40 and 80 mm/s, a figure-eight stroke",
-    "slip20": "presses that slip along y at 20, 50, 100, 150 and 200 mm/s",
-    "wander": "one contact of 5 N that moves around the centre at 5 mm/s",
-}
-SECONDS = {"ideal": 20.0, "demo": 10.0, "slip20": 12.0, "wander": 10.0}
 
 
 def smooth_step(t, start, length):
@@ -149,24 +141,32 @@ def wander(seconds, random):
     return motion
 
 
+# name: what makes it, its usual length, what it is
+SCENARIOS = {
+    "ideal": (ideal, 20.0, "ideal Gaussian presses at random places, forces log-uniform from 0.5 to 20 N"),
+    "demo": (demo, 10.0, "three taps, slips at 40 and 80 mm/s, a figure-eight stroke"),
+    "slip20": (slip20, 12.0, "presses that slip along y at 20, 50, 100, 150 and 200 mm/s"),
+    "wander": (wander, 10.0, "one contact of 5 N that moves around the centre at 5 mm/s"),
+}
+
+
 def main(argv):
     parser = argparse.ArgumentParser(prog="fingertip-scenario", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("name", choices=sorted(DESCRIPTIONS), metavar="NAME", help=", ".join(sorted(DESCRIPTIONS)))
+    parser.add_argument("name", choices=sorted(SCENARIOS), metavar="NAME", help=", ".join(sorted(SCENARIOS)))
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
     parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random places and forces; default 1")
     options = parser.parse_args(argv)
-    seconds = SECONDS[options.name] if options.seconds is None else options.seconds
-    if not 1 <= seconds <= 3600:
-        raise InputError(f"--seconds {seconds:g} is out of range; give 1 to 3600")
+    make, usual, description = SCENARIOS[options.name]
+    seconds = usual if options.seconds is None else options.seconds
+    check_range("seconds", seconds, 1, 3600)
     if options.seed < 0:
         raise InputError(f"--seed {options.seed} is out of range; give 0 or more")
     check_output(options.output)
-    make = {"ideal": ideal, "demo": demo, "slip20": slip20, "wander": wander}[options.name]
     motion = make(seconds, np.random.default_rng(options.seed))
     metadata = {
         "name": options.name,
-        "description": DESCRIPTIONS[options.name],
+        "description": description,
         "seed": options.seed,
         "ambient_Pa": 101325,
         "temperature_degC": 25,

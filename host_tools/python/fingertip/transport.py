@@ -98,6 +98,7 @@ class SerialTransport:
 class SocketTransport:
     """A Unix socket of `fingertip serve`; other programs have theirs at the same time."""
 
+    _GONE = "its server ended it"
     _socket: socket.socket
 
     def __init__(self, path: str) -> None:
@@ -119,7 +120,7 @@ class SocketTransport:
         try:
             return _read_descriptor(self._socket.fileno(), wait_s, settle_s)
         except OSError:
-            raise GoneError(f"{self.description}: its server ended it") from None
+            raise GoneError(f"{self.description}: {self._GONE}") from None
 
     def write(self, data: bytes) -> None:
         try:
@@ -134,6 +135,8 @@ class SocketTransport:
 class SimulatedTransport(SocketTransport):
     """A simulated port, which is a socket: its name in the abstract namespace is this end's, and keeps out others."""
 
+    _GONE = "vanished"
+
     def __init__(self, path: str) -> None:
         self.description = path
         if sys.platform == "win32":
@@ -146,12 +149,6 @@ class SimulatedTransport(SocketTransport):
             self._socket.close()
             raise _port_error(path, OSError(errno.EBUSY, "") if error.errno == errno.EADDRINUSE else error) from None
         self._socket.settimeout(WRITE_TIMEOUT_s)
-
-    def read(self, wait_s: float, settle_s: float) -> bytes:
-        try:
-            return _read_descriptor(self._socket.fileno(), wait_s, settle_s)
-        except OSError:
-            raise GoneError(f"{self.description}: vanished") from None
 
 
 def _is_socket(path: str) -> bool:

@@ -1,13 +1,14 @@
 """Makes a pad's report card in ten minutes, with one weight and a printed template: `fingertip validate`, which starts this."""
 
 import argparse
+import contextlib
 import json
 import math
 import os
 import sys
 
 from .errors import FingertipError, InputError
-from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, printable
+from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, check_output, printable, write_text
 from .validation.assess import Card
 from .validation.card import card_html, card_json
 from .validation.live import validate_live
@@ -18,8 +19,6 @@ from .version import __version__
 
 NAME = "fingertip validate"
 SKIN_mm = 12.0
-COLOURS = ("auto", "truecolour", "256", "plain")
-_UNITS = {"GRAMS": "grams", "MM": "mm"}
 _LIVE = ("weight", "skin", "pull", "thread_height", "record", "serial")  # of these none with --from, and with --template nothing at all
 
 
@@ -29,102 +28,71 @@ class WrongUsage(Exception):
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise WrongUsage(f"{message}; see {NAME} --help")
+        raise WrongUsage(f"{printable(message).removeprefix('argument ')}; see {NAME} --help")
 
 
-class _Number(argparse.Action):
-    """In a range, which its help names."""
+def _number(low, high, unit):
+    """The type of an option in a range, and how its help ends."""
 
-    def __init__(self, *names, low, high, metavar, help, **more):
-        self.low, self.high = low, high
-        super().__init__(*names, metavar=metavar, help=f"{help} ({low} to {high} {_UNITS[metavar]})", **more)
+    def number(text):
+        with contextlib.suppress(ValueError):
+            if low <= float(text) <= high:
+                return float(text)
+        raise argparse.ArgumentTypeError(f'takes {low} to {high} {unit}, not "{text}"')
 
-    def __call__(self, parser, options, text, option=None):
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not self.low <= value <= self.high:
-            parser.error(f'{option} takes {self.low} to {self.high} {_UNITS[self.metavar]}, not "{printable(text)}"')
-        setattr(options, self.dest, value)
+    return number, f" ({low} to {high} {unit})"
 
 
 def _parser():
     parser = _Parser(prog=NAME, description=__doc__.split(":")[0] + ".", allow_abbrev=False, usage=f"{NAME} [OPTIONS]")
     parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, max_help_position=28, width=80)
-    add = parser.add_argument
+
+    def add(*names, help, number=(str, ""), **more):
+        parser.add_argument(*names, help=help + number[1], **({"type": number[0]} if number[1] else {}), **more)
+
+    kinds, colours = ("auto", "socket", "serial"), ("auto", "truecolour", "256", "plain")
+    transport = "socket (of fingertip serve, which reaches one by libusb too), serial, or auto: the first of these that there is"
+    template = "Only write the template to print at 1:1, with the marks to press (not with other options than --overwrite)"
+    pull = "Also measure pulls: mass on a level thread, over a pulley, that pulls the weight; a third of --weight"
+    height = f"Height of that thread above the rubber; default {HEIGHT_mm:g}; only with --pull"
+    record = (
+        "The recording that is kept, to send or to make the card from again: it has what was measured, and no name, port or serial number"
+    )
+    excluded = ", ".join(map(_option, _LIVE))
+    grams = {"metavar": "GRAMS"}
     add("--device", metavar="SERIAL", help="Serial number of the fingertip; default: the only one there is")
     add("--port", metavar="PATH", help="Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in")
-    add(
-        "--transport",
-        metavar="KIND",
-        choices=("auto", "socket", "serial"),
-        default="auto",
-        help="socket (of fingertip serve, which reaches one by libusb too), serial, or auto: the first of these that there is",
-    )
-    add(
-        "--template",
-        metavar="SHEET.pdf|SHEET.svg",
-        help="Only write the template to print at 1:1, with the marks to press (not with other options than --overwrite)",
-    )
-    add("--weight", action=_Number, low=50, high=2000, metavar="GRAMS", help="Mass of the weight")
-    add("--skin", action=_Number, low=4, high=30, metavar="MM", help=f"Rubber above the sensors, as it was cast; default {SKIN_mm:g}")
-    add(
-        "--pull",
-        action=_Number,
-        low=10,
-        high=1000,
-        metavar="GRAMS",
-        help="Also measure pulls: mass on a level thread, over a pulley, that pulls the weight; a third of --weight",
-    )
-    add(
-        "--thread-height",
-        action=_Number,
-        low=0,
-        high=10,
-        metavar="MM",
-        help=f"Height of that thread above the rubber; default {HEIGHT_mm:g}; only with --pull",
-    )
-    add(
-        "--record",
-        metavar="FILE.csv",
-        help="The recording that is kept, to send or to make the card from again: it has what was measured, and no name, port or serial number",
-    )
+    add("--transport", metavar="KIND", choices=kinds, default="auto", help=transport)
+    add("--template", metavar="SHEET.pdf|SHEET.svg", help=template)
+    add("--weight", number=_number(50, 2000, "grams"), help="Mass of the weight", **grams)
+    add("--skin", number=_number(4, 30, "mm"), metavar="MM", help=f"Rubber above the sensors, as it was cast; default {SKIN_mm:g}")
+    add("--pull", number=_number(10, 1000, "grams"), help=pull, **grams)
+    add("--thread-height", number=_number(0, 10, "mm"), metavar="MM", help=height)
+    add("--record", metavar="FILE.csv", help=record)
     add("--serial", action="store_true", default=None, help="Keep the serial number in the recording")
-    add(
-        "--from",
-        dest="recording",
-        metavar="FILE.csv",
-        help="Make the card from a recording that validate kept (not with "
-        + ", ".join(f"--{name.replace('_', '-')}" for name in _LIVE)
-        + ")",
-    )
+    add("--from", dest="recording", metavar="FILE.csv", help=f"Make the card from a recording that validate kept (not with {excluded})")
     add("-o", "--output", metavar="CARD.html", help="The card, a page with pictures")
     add("--figures", metavar="FILE.json", help="The card's figures, for programs")
     add("--overwrite", action="store_true", help="Replace files that exist")
-    add("--colour", metavar="MODE", default="auto", help="auto, truecolour, 256, or plain: a line a second")
+    add("--colour", metavar="MODE", choices=colours, default="auto", help="auto, truecolour, 256, or plain: a line a second")
     return parser
 
 
+def _option(name):
+    return "--" + name.replace("_", "-")
+
+
 def _options(argv):
-    options, rest = _parser().parse_known_args(argv)
-    if rest:
-        what = "is no option of it" if rest[0].startswith("-") else "is one word too many"
-        raise WrongUsage(f'"{printable(rest[0])}" {what}; see {NAME} --help')
-    given = [f"--{name.replace('_', '-')}" for name in _LIVE if getattr(options, name) is not None]
-    given += [
-        name for name, value in (("--from", options.recording), ("--output", options.output), ("--figures", options.figures)) if value
-    ]
-    for first, others in (
-        ("--template", given),
-        ("--from", [name for name in given if name.removeprefix("--").replace("-", "_") in _LIVE]),
-    ):
-        if (options.template if first == "--template" else options.recording) and others:
-            raise WrongUsage(f"{first} excludes {others[0]}; see {NAME} --help")
+    parser = _parser()
+    options = parser.parse_args(argv)
+    live = [_option(name) for name in _LIVE if getattr(options, name) is not None]
+    card = [name for name, value in (("--from", options.recording), ("--output", options.output), ("--figures", options.figures)) if value]
+    if options.template and live + card:
+        parser.error(f"--template excludes {(live + card)[0]}")
+    if options.recording and live:
+        parser.error(f"--from excludes {live[0]}")
     if options.thread_height is not None and options.pull is None:
-        raise WrongUsage(f"--thread-height requires --pull; see {NAME} --help")
-    if options.colour not in COLOURS:
-        raise WrongUsage(f'--colour "{printable(options.colour)}" is not possible; give auto, truecolour, 256 or plain; see {NAME} --help')
+        parser.error("--thread-height requires --pull")
     _check(options)
     options.skin = SKIN_mm if options.skin is None else options.skin
     options.thread_height = HEIGHT_mm if options.thread_height is None else options.thread_height
@@ -153,21 +121,13 @@ def _check_output(path, overwrite):
     """Before any work. Raises InputError."""
     if os.path.exists(path) and not overwrite:
         raise InputError(f"{path}: exists; give --overwrite or another name")
-    folder = os.path.dirname(path) or "."
-    if not os.path.isdir(folder):
-        raise InputError(f"{path}: No such file or directory; choose another place")
-    if os.path.isdir(path) or not os.access(path if os.path.exists(path) else folder, os.W_OK):
-        raise InputError(f"{path}: it may not be written; choose another place")
+    check_output(path)
 
 
 def _write(path, text):
     """Whole or not at all."""
-    try:
-        with open(f"{path}.part", "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(f"{path}.part", path)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; choose another place") from None
+    write_text(f"{path}.part", text)
+    os.replace(f"{path}.part", path)
 
 
 def _print(card):

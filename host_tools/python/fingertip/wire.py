@@ -10,90 +10,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from .errors import CrcError, FormatError, PacketError, PacketVersionError, UnknownTypeError
-from .line import (
-    CONTACT,
-    LOADER_MAGIC,
-    MAX_FRAME_BYTES,
-    NESTED,
-    RAW,
-    SENSORS_MAX,
-    TYPES,
-    VERSION,
-    Acknowledgement,
-    AskCrash,
-    AskHealth,
-    AskInfo,
-    Body,
-    Calibration,
-    Contact,
-    Crash,
-    EraseCalibration,
-    ErasePad,
-    Health,
-    Info,
-    Keep,
-    Loader,
-    PadProfile,
-    Raw,
-    SetLocationLimit,
-    SetOsr,
-    SetPrior,
-    SetRate,
-    SetSlip,
-    SetStreams,
-    SetSync,
-    StoreCalibration,
-    StorePad,
-    SyncEdge,
-    Tare,
-    Wire,
-)
-
-__all__ = [
-    "CONTACT",
-    "LOADER_MAGIC",
-    "MAX_FRAME_BYTES",
-    "RAW",
-    "SENSORS_MAX",
-    "TYPES",
-    "VERSION",
-    "Acknowledgement",
-    "AskCrash",
-    "AskHealth",
-    "AskInfo",
-    "Body",
-    "Calibration",
-    "Contact",
-    "Crash",
-    "Decoder",
-    "EraseCalibration",
-    "ErasePad",
-    "Health",
-    "Info",
-    "Keep",
-    "LineStatistics",
-    "Loader",
-    "Packet",
-    "PadProfile",
-    "Raw",
-    "SetLocationLimit",
-    "SetOsr",
-    "SetPrior",
-    "SetRate",
-    "SetSlip",
-    "SetStreams",
-    "SetSync",
-    "StoreCalibration",
-    "StorePad",
-    "SyncEdge",
-    "Tare",
-    "cobs_decode",
-    "cobs_encode",
-    "decode",
-    "decode_stream_packet",
-    "encode",
-    "layout_of",
-]
+from .line import *  # the packets, which belong to this module for its users
 
 _HEADER = struct.Struct("<BBHQ")
 _CRC = _FLAGS = struct.Struct("<I")
@@ -112,17 +29,11 @@ class Packet(NamedTuple):
 
 
 Layout = tuple[tuple[str, Wire], ...]
-_layouts: dict[Any, Layout] = {}
 
 
+@functools.cache
 def layout_of(body: Any) -> Layout:
     """The fields of a body, its type, in their order on the line."""
-    if body not in _layouts:
-        _layouts[body] = _layout_of(body)
-    return _layouts[body]
-
-
-def _layout_of(body: Any) -> Layout:
     hints = typing.get_type_hints(body, include_extras=True)
     return tuple((name, next(each for each in typing.get_args(hints[name])[1:] if isinstance(each, Wire))) for name in body._fields)
 
@@ -138,7 +49,7 @@ def _is_left_out(wire: Wire, values: dict[str, Any]) -> bool:
     return wire.when is not None and not values[wire.when[0]] & wire.when[1]
 
 
-def _get(body: type[Any], data: bytes, at: int, sensors: int) -> tuple[Any, int]:
+def _get(body: Any, data: bytes, at: int, sensors: int) -> tuple[Any, int]:
     """A body that begins at this offset, and where it ends. Raises struct.error where the bytes end before."""
     values: dict[str, Any] = {}
     for name, wire in layout_of(body):
@@ -167,7 +78,7 @@ def _get(body: type[Any], data: bytes, at: int, sensors: int) -> tuple[Any, int]
 def _put(body: Any, sensors: int) -> bytes:
     data = b""
     values: dict[str, Any] = body._asdict()
-    for name, wire in layout_of(type(body)):
+    for name, wire in layout_of(body.__class__):
         value = values[name]
         if _is_left_out(wire, values):
             continue
@@ -212,21 +123,24 @@ def cobs_encode(packet: bytes) -> bytes:
     return bytes(coded)
 
 
-def cobs_decode(frame: bytes) -> bytes:
+def cobs_decode(frame: bytes) -> bytearray:
     """A frame without its delimiter. Raises FormatError for bytes that no encoder produces."""
     if 0 in frame:
         raise FormatError("a zero in a frame")
-    packet = bytearray()
-    at, end = 0, len(frame)
-    while at < end:
-        code = frame[at]
-        if at + code > end:
-            raise FormatError("a frame that ends within a run")
-        packet += frame[at + 1 : at + code]
+    data = bytearray(frame)
+    at, end, full_runs = 0, len(data), []
+    while at < end:  # in place: all codes but the first become the zeros that they replace
+        code = data[at]
+        data[at] = 0
         at += code
-        if code != _LONGEST_RUN and at < end:
-            packet.append(0)
-    return bytes(packet)
+        if code == _LONGEST_RUN:
+            full_runs.append(at)
+    if at > end:
+        raise FormatError("a frame that ends within a run")
+    for after in reversed(full_runs):  # which is no zero
+        del data[after : after + 1]
+    del data[:1]
+    return data
 
 
 def encode(packet: Packet, version: int = VERSION) -> bytes:
@@ -237,32 +151,6 @@ def encode(packet: Packet, version: int = VERSION) -> bytes:
         raise FormatError(f"sequence {packet.sequence} or time {packet.t_us} us") from None
     data = head + _put(packet.body, 0)
     return cobs_encode(data + _CRC.pack(zlib.crc32(data))) + b"\0"
-
-
-def decode(frame: bytes) -> Packet:
-    """A frame without its delimiter. Raises CrcError, FormatError, PacketVersionError or UnknownTypeError."""
-    if len(frame) > MAX_FRAME_BYTES:
-        raise FormatError("a frame that is too long")
-    data = cobs_decode(frame)
-    if len(data) < _HEADER.size + _CRC.size:
-        raise FormatError("a frame that is too short")
-    if zlib.crc32(data) != _CRC_RESIDUE:
-        raise CrcError("the CRC is wrong")
-    version, number, sequence, t_us = _HEADER.unpack_from(data)
-    if version != VERSION:
-        raise PacketVersionError(version)
-    body = TYPES.get(number)
-    if body is None:
-        raise UnknownTypeError(number, sequence)
-    end = len(data) - _CRC.size
-    try:
-        found, at = _get(body, data[:end], _HEADER.size, 0)
-    except struct.error:
-        at = -1
-        found = None
-    if at != end or found is None:
-        raise FormatError("a body of another length")
-    return Packet(sequence, t_us, found)
 
 
 class _FixedLayout(NamedTuple):
@@ -302,49 +190,46 @@ _contact_layouts = _ContactLayouts()
 _raw_layouts = _RawLayouts()
 _ABSENT = (math.nan, 0)
 _new = tuple.__new__  # of a NamedTuple, without its detours
-_FLAGS_AT = 1 + _HEADER.size + 4
-_SENSORS_AT = 1 + _HEADER.size + 22
+_FLAGS_AT, _SENSORS_AT = _HEADER.size + 4, _HEADER.size + 22
 _FIRST_READING = 4 + len(Raw._fields) - 1
 
 
-def decode_stream_packet(frame: bytes) -> Packet | None:
-    """As decode, in a few microseconds, for a contact or a raw packet; nothing for whatever is not one, or has runs of 254 bytes."""
-    data = bytearray(frame)
-    at, end = 0, len(data)
-    if _LONGEST_RUN in frame:  # perhaps as a code
-        while at < end:
-            if data[at] == _LONGEST_RUN:
-                return None
-            at += data[at]
-        at = 0
-    while at < end:  # in place: all codes but the first become the zeros that they replace
-        code = data[at]
-        data[at] = 0
-        at += code
-    if at != end or end < 1 + _HEADER.size + _CRC.size or zlib.crc32(memoryview(data)[1:]) != _CRC_RESIDUE or data[1] != VERSION:
-        return None
-    length = end - 1 - _CRC.size
-    number = data[2]
-    if number == CONTACT and length >= _HEADER.size + 22:
-        mask = _FLAGS.unpack_from(data, _FLAGS_AT)[0] & _ContactLayouts.MASK
-        unpacker, order, floats = _contact_layouts[mask]
-        if unpacker.size != length:
-            return None
-        values = unpacker.unpack_from(data, 1)
-        # not finite if one of them is not: binary32 does not overflow in binary64
-        if not math.isfinite(sum(values[floats:])):
-            return None
-        return _new(Packet, (values[2], values[3], _new(Contact, order(values + _ABSENT))))
-    if number == RAW and length >= _HEADER.size + 23:
-        sensors = data[_SENSORS_AT]
-        if not 1 <= sensors <= SENSORS_MAX:
-            return None
-        unpacker = _raw_layouts[sensors]
-        if unpacker.size != length:
-            return None
-        values = unpacker.unpack_from(data, 1)
-        return _new(Packet, (values[2], values[3], _new(Raw, (*values[4:_FIRST_READING], values[_FIRST_READING:]))))
-    return None
+def decode(frame: bytes) -> Packet:
+    """A frame without its delimiter. Raises CrcError, FormatError, PacketVersionError or UnknownTypeError."""
+    if len(frame) > MAX_FRAME_BYTES:
+        raise FormatError("a frame that is too long")
+    data = cobs_decode(frame)
+    length = len(data) - _CRC.size
+    if length < _HEADER.size:
+        raise FormatError("a frame that is too short")
+    if zlib.crc32(data) != _CRC_RESIDUE:
+        raise CrcError("the CRC is wrong")
+    version, number, sequence, t_us = _HEADER.unpack_from(data)
+    if version != VERSION:
+        raise PacketVersionError(version)
+    # Of the packets of a stream all fields at once: in a few microseconds.
+    if number == CONTACT and length >= _FLAGS_AT + 4:
+        unpacker, order, floats = _contact_layouts[_FLAGS.unpack_from(data, _FLAGS_AT)[0] & _ContactLayouts.MASK]
+        if unpacker.size == length:
+            values = unpacker.unpack_from(data)
+            if math.isfinite(sum(values[floats:])):  # or one of them is not: binary32 does not overflow in binary64
+                return _new(Packet, (sequence, t_us, _new(Contact, order(values + _ABSENT))))
+    if number == RAW and length > _SENSORS_AT and 1 <= data[_SENSORS_AT] <= SENSORS_MAX:
+        unpacker = _raw_layouts[data[_SENSORS_AT]]
+        if unpacker.size == length:
+            values = unpacker.unpack_from(data)
+            return _new(Packet, (sequence, t_us, _new(Raw, (*values[4:_FIRST_READING], values[_FIRST_READING:]))))
+    body = TYPES.get(number)
+    if body is None:
+        raise UnknownTypeError(number, sequence)
+    try:
+        found, at = _get(body, bytes(data[:length]), _HEADER.size, 0)
+    except struct.error:
+        at = -1
+        found = None
+    if at != length or found is None:
+        raise FormatError("a body of another length")
+    return Packet(sequence, t_us, found)
 
 
 class LineStatistics:
@@ -414,9 +299,7 @@ class Decoder:
         packets: list[Packet] = []
         for frame in frames:
             if frame:
-                packet = decode_stream_packet(frame) if len(frame) <= MAX_FRAME_BYTES else None
-                if packet is None:
-                    packet = self._judge(frame)
+                packet = self._judge(frame)
                 if packet is not None:
                     statistics.packets += 1
                     if packet[0] != self._expected:

@@ -119,12 +119,12 @@ class Plugin(unittest.TestCase):
         self.assertRegex(self.metadata, r"(?m)^Name: lerobot_robot_fingertip$")
         self.assertRegex(self.metadata, rf"(?m)^Version: {fingertip.__version__}$")
         self.assertEqual(self.make().robot.id, "black")
-        with self.assertRaisesRegex(ValueError, "no robot; give"):
-            self.config(robot={})
-        with self.assertRaisesRegex(ValueError, "no fingertips; give"):
-            self.config(fingertips={})
-        with self.assertRaisesRegex(ValueError, "sensors 33 is out of range"):
-            self.config(sensors=33)
+        for wrong, said in (
+            ({"robot": {}}, "no robot; give"),
+            ({"fingertips": {}}, "no fingertips; give"),
+            ({"sensors": 33}, "33 is out of"),
+        ):
+            self.assertRaisesRegex(ValueError, said, self.config, **wrong)
         with self.assertRaisesRegex(ValueError, "the robot has clash.contact.pos itself"):
             robot = self.make(fingertips={"clash": ""})
             with mock.patch.object(type(robot.robot), "observation_features", {"clash.contact.pos": float}):

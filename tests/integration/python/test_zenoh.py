@@ -167,20 +167,6 @@ class Accounts(unittest.TestCase):
         self.assertEqual(recording.damaged, 2 * len(damaged))
 
 
-class Frames(unittest.TestCase):
-    def test_each_packet_is_told_with_its_frame_and_interruptions_too(self):
-        packets = [a_packet(number, 1000 * number, number) for number in range(5)] + [wire.Packet(5, 0, wire.Tare(1))]
-        frames = [wire.encode(packet) for packet in packets]
-        told = []
-        decoder = wire.Decoder()
-        decoder.listener = lambda packet, frame: told.append((packet, bytes(frame)))
-        decoder.feed(b"".join(frames[:3]) + b"damage\0" + frames[3][:7])
-        decoder.restart()
-        decoder.feed(b"".join(frames[4:]))
-        expected = [(packet, frame[:-1]) for packet, frame in zip(packets, frames)]
-        self.assertEqual(told, [*expected[:3], (None, b""), *expected[4:]])
-
-
 class Clocks(unittest.TestCase):
     TRACKING = "C0A80101,ntp.example,3,1700000000.1,-0.000020000,0.000001,0.00002,-8.1,0.0,0.02,0.002000000,0.000500000,64.0,{}\n"
 
@@ -201,13 +187,8 @@ class Clocks(unittest.TestCase):
             boot, bound, ahead_us = hosts[int(serial)]
             clock = {"disciplined": bound is not None, "bound_us": bound, "text": "clock not disciplined" if bound is None else "chrony"}
             now_ns = 10**18 + round(ahead_us * 1000)
-            return {
-                serial: (
-                    json.dumps({"host": f"host{serial}", "boot": boot, "clock": clock, "now_ns": now_ns}).encode(),
-                    10**18 - 200_000,
-                    10**18 + 200_000,
-                )
-            }
+            status = {"host": f"host{serial}", "boot": boot, "clock": clock, "now_ns": now_ns}
+            return {serial: (json.dumps(status).encode(), 10**18 - 200_000, 10**18 + 200_000)}
 
         with mock.patch.object(recorder, "ask", ask):
             return recorder.judge_clocks(None, [str(number) for number in range(len(hosts))], bound_us, may_be_undisciplined)

@@ -4,12 +4,10 @@
 
    Says "matched TOPIC" once a writer of that topic and type was found, and "gone TOPIC". Ends with
    its standard input. Then, for topic k from 0, FOLDER/k.bin holds each message as it came: its
-   length in four bytes, little endian, and its CDR bytes; and FOLDER/wrench.csv what Fast CDR reads
-   in each WrenchStamped: sec,nanosec,frame_id,force,torque. */
+   length in four bytes, little endian, and its CDR bytes. */
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
-#include <fastcdr/Cdr.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -21,9 +19,7 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fstream>
-#include <iomanip>
 #include <iostream>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -36,7 +32,6 @@ namespace {
 
 constexpr uint32_t LARGEST_bytes = 8192;
 constexpr char LOOPBACK[] = "127.0.0.1";
-const std::string WRENCH = "geometry_msgs::msg::dds_::WrenchStamped_";
 
 using Bytes = std::vector<char>;
 
@@ -63,28 +58,10 @@ public:
   bool getKey(void *, rtps::InstanceHandle_t *, bool) override { return false; }
 };
 
-std::string wrench_row(Bytes message) {
-  eprosima::fastcdr::FastBuffer buffer(message.data(), message.size());
-  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
-  int32_t sec = 0;
-  uint32_t nanosec = 0;
-  std::string frame_id;
-  cdr.read_encapsulation();
-  cdr >> sec >> nanosec >> frame_id;
-  std::ostringstream row;
-  row << std::setprecision(std::numeric_limits<double>::max_digits10) << sec << ',' << nanosec << ',' << frame_id;
-  for (int i = 0; i < 6; ++i) {
-    double value = 0;
-    cdr >> value;
-    row << ',' << value;
-  }
-  return row.str();
-}
-
 class Ear : public DataReaderListener {
 public:
-  Ear(std::string topic, const std::string &folder, size_t number, std::ofstream *wrenches)
-      : topic_(std::move(topic)), file_(folder + "/" + std::to_string(number) + ".bin"), wrenches_(wrenches) {}
+  Ear(std::string topic, const std::string &folder, size_t number)
+      : topic_(std::move(topic)), file_(folder + "/" + std::to_string(number) + ".bin") {}
 
   void on_subscription_matched(DataReader *, const SubscriptionMatchedStatus &status) override {
     const std::lock_guard lock(shared_);
@@ -101,16 +78,13 @@ public:
       for (int shift = 0; shift < 32; shift += 8)
         file_.put(static_cast<char>(length >> shift));
       file_.write(message.data(), length).flush();
-      const std::lock_guard lock(shared_);
-      if (wrenches_)
-        *wrenches_ << wrench_row(message) << '\n';
     }
   }
 
 private:
-  static inline std::mutex shared_; // standard output and the wrenches
+  static inline std::mutex shared_; // standard output
   std::string topic_;
-  std::ofstream file_, *wrenches_;
+  std::ofstream file_;
 };
 
 DomainParticipantQos loopback_only() {
@@ -139,14 +113,13 @@ int listen(int domain, const std::string &folder, const std::vector<std::string>
   qos.resource_limits().max_samples = 0;
   qos.resource_limits().max_instances = 0;
   qos.resource_limits().max_samples_per_instance = 0;
-  std::ofstream wrenches(folder + "/wrench.csv");
   std::deque<Ear> ears;
   for (const std::string &each : wanted) {
     const std::string name = each.substr(0, each.find('='));
     const std::string type = each.substr(each.find('=') + 1);
     TypeSupport(new Undecoded(type)).register_type(participant);
     Topic *topic = participant->create_topic(name, type, TOPIC_QOS_DEFAULT);
-    ears.emplace_back(name, folder, ears.size(), type == WRENCH ? &wrenches : nullptr);
+    ears.emplace_back(name, folder, ears.size());
     if (!topic || !subscriber->create_datareader(topic, qos, &ears.back())) {
       std::cerr << "no reader of " << each << '\n';
       return 1;

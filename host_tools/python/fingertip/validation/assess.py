@@ -90,22 +90,9 @@ def solve_gains(array, placements, force_N):
     tool = os.environ.get("FINGERTIP_TOOL") or shutil.which("fingertip")
     if not tool:
         raise InputError("the command fingertip solves the gains, and is not installed; install it, or name it in FINGERTIP_TOOL")
-    asked = {
-        "x_mm": list(array.x_mm),
-        "y_mm": list(array.y_mm),
-        "pitch_mm": array.pitch_mm,
-        "force_N": force_N,
-        "placements": [
-            {
-                "t_s": one.t_s,
-                "usable": np.flatnonzero(one.usable).tolist(),
-                "reading_Pa": list(one.reading_Pa),
-                "noise_Pa": one.noise_Pa,
-                "fading": one.fading,
-            }
-            for one in placements
-        ],
-    }
+    asked = {"x_mm": list(array.x_mm), "y_mm": list(array.y_mm), "pitch_mm": array.pitch_mm, "force_N": force_N}
+    own = ({"usable": np.flatnonzero(one.usable).tolist(), "reading_Pa": list(one.reading_Pa)} for one in placements)
+    asked["placements"] = [one._asdict() | lists for one, lists in zip(placements, own)]
     done = subprocess.run([tool, "calibrate", "--placements"], input=json.dumps(asked), capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise InputError(done.stderr.strip().removeprefix("fingertip: ") or f"{tool}: failed; see that it is of this version")

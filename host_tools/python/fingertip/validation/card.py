@@ -227,20 +227,11 @@ def card_json(card):
             {"mark": press.mark, **{name: getattr(estimate, name) for name in ("frames", "x_mm", "y_mm", "force_N", "warned")}}
             | {"off_mm": -1.0 if error is None else float(np.hypot(*error)), "pressed_x_mm": at[0], "pressed_y_mm": at[1]}
         )
-    pulls = [
-        {
-            "toward_deg": one.toward_deg,
-            "rest_x_mm": one.rest.x_mm,
-            "rest_y_mm": one.rest.y_mm,
-            "x_mm": one.pull.x_mm,
-            "y_mm": one.pull.y_mm,
-            "force_N": one.pull.force_N,
-            "frames": one.pull.pull_frames,
-            "qx_N": one.pull.qx_N - one.rest.qx_N,
-            "qy_N": one.pull.qy_N - one.rest.qy_N,
-        }
-        for one in card.measured.pulls
-    ]
+    pulls = []
+    for toward_deg, _, _, rest, pull in card.measured.pulls:
+        then = {"x_mm": pull.x_mm, "y_mm": pull.y_mm, "force_N": pull.force_N, "frames": pull.pull_frames}
+        then |= {"qx_N": pull.qx_N - rest.qx_N, "qy_N": pull.qy_N - rest.qy_N}
+        pulls.append({"toward_deg": toward_deg, "rest_x_mm": rest.x_mm, "rest_y_mm": rest.y_mm} | then)
     return {
         "verdict": card.verdict,
         "figures": {figure.key: round(figure.value, figure.digits + 2) for figure in card.figures},

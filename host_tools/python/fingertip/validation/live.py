@@ -90,9 +90,8 @@ def check_firmware(info, name):
     """Raises InputError where it cannot be validated."""
     for capability, lacks in ((Capability.FIT, "computes no locations"), (Capability.RAW_STREAM, "sends no pressures")):
         if not info.capabilities & capability:
-            raise InputError(
-                f"{name}: its firmware (scene {info.scene}) {lacks}, so there is nothing to validate; flash one of scene grasp"
-            )
+            why = f"its firmware (scene {info.scene}) {lacks}, so there is nothing to validate; flash one of scene grasp"
+            raise InputError(f"{name}: {why}")
     if info.rate_mHz and info.rate_mHz < 1000 * FRAME_RATE_MIN_Hz:
         raise InputError(f"{name}: {info.rate_mHz / 1000:.1f} frames a second are too few to see a weight settle; fingertip set rate=max")
 
