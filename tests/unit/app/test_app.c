@@ -110,51 +110,47 @@ TEST(info_tells_what_this_is) {
 
 TEST(settings_are_checked_and_kept) {
   connect_for(300);
-  static const struct {
-    uint32_t rate_mHz;
-    uint8_t result;
-  } rates[] = {{0, 0}, {100, 0}, {2000000, 0}, {99, WIRE_RESULT_OUT_OF_RANGE}, {2000001, 2}, {20000, 0}};
-  for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(rates[i].result, ask(COMMAND(RATE, rate, rates[i].rate_mHz)));
+  const struct {
+    struct wire_packet command;
+    bool good;
+  } cases[] = {{COMMAND(RATE, rate, 0), true},
+               {COMMAND(RATE, rate, 100), true},
+               {COMMAND(RATE, rate, 2000000), true},
+               {COMMAND(RATE, rate, 99), false},
+               {COMMAND(RATE, rate, 2000001), false},
+               {COMMAND(RATE, rate, 20000), true},
+               {COMMAND(OSR, osr, 1000), false},
+               {COMMAND(OSR, osr, 256), true},
+               {COMMAND(SLIP, slip, 0.009f, 100), false},
+               {COMMAND(SLIP, slip, 51.0f, 100), false},
+               {COMMAND(SLIP, slip, 1.0f, 4), false},
+               {COMMAND(SLIP, slip, 1.0f, 1001), false},
+               {COMMAND(SLIP, slip, -1.0f, 100), false},
+               {COMMAND(SLIP, slip, 0.5f, 200), true},
+               {COMMAND(STREAM, stream, 8), false},
+               {COMMAND(PRIOR, prior, 0.0f, 0.5f), false},
+               {COMMAND(PRIOR, prior, 3.0f, 0.0f), false},
+               {COMMAND(PRIOR, prior, 0.4f, 0.5f), false},
+               {COMMAND(PRIOR, prior, 101.0f, 0.5f), false},
+               {COMMAND(PRIOR, prior, 3.0f, 101.0f), false},
+               {COMMAND(PRIOR, prior, 3.0f, 0.009f), false},
+               {COMMAND(PRIOR, prior, 0.0f, 0.0f), true},
+               {COMMAND(PRIOR, prior, 3.1f, 0.5f), true},
+               {COMMAND(LOCATION_LIMIT, location_limit, 0.009f), false},
+               {COMMAND(LOCATION_LIMIT, location_limit, 100.1f), false},
+               {COMMAND(LOCATION_LIMIT, location_limit, -1.0f), false},
+               {COMMAND(LOCATION_LIMIT, location_limit, 0.8f), true}};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    TEST_ASSERT_EQUAL_UINT8(cases[i].good ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE, ask(cases[i].command));
   }
-  TEST_ASSERT_EQUAL_UINT32(20000, get_info().rate_mHz);
-
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(OSR, osr, 1000)));
-  obey(COMMAND(OSR, osr, 256));
-  TEST_ASSERT_EQUAL_UINT16(256, get_info().osr);
-
-  static const struct {
-    float threshold_mm;
-    uint16_t window_ms;
-    uint8_t result;
-  } slips[] = {{0.009f, 100, 2}, {51.0f, 100, 2}, {1.0f, 4, 2}, {1.0f, 1001, 2}, {-1.0f, 100, 2}, {0.5f, 200, 0}};
-  for (size_t i = 0; i < sizeof slips / sizeof slips[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(slips[i].result, ask(COMMAND(SLIP, slip, slips[i].threshold_mm, slips[i].window_ms)));
-  }
-  TEST_ASSERT_EQUAL_UINT16(200, get_info().slip_window_ms);
-  TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().slip_threshold_mm);
-
-  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(STREAM, stream, 8)));
-}
-
-TEST(priors_and_limits_are_checked) {
-  connect_for(300);
-  static const struct {
-    float sigma_mm, width_mm;
-    uint8_t result;
-  } priors[] = {{0.0f, 0.5f, 2},   {3.0f, 0.0f, 2},   {0.4f, 0.5f, 2}, {101.0f, 0.5f, 2},
-                {3.0f, 101.0f, 2}, {3.0f, 0.009f, 2}, {0.0f, 0.0f, 0}, {3.1f, 0.5f, 0}};
-  for (size_t i = 0; i < sizeof priors / sizeof priors[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(priors[i].result, ask(COMMAND(PRIOR, prior, priors[i].sigma_mm, priors[i].width_mm)));
-  }
-  TEST_ASSERT_EQUAL_FLOAT(3.1f, get_info().prior_sigma_mm);
-  TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().prior_width_mm);
-  static const float limits[] = {0.009f, 100.1f, -1.0f, 0.8f};
-  for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(i < 3 ? WIRE_RESULT_OUT_OF_RANGE : WIRE_RESULT_DONE,
-                            ask(COMMAND(LOCATION_LIMIT, location_limit, limits[i])));
-  }
-  TEST_ASSERT_EQUAL_FLOAT(0.8f, get_info().location_limit_mm);
+  const struct wire_info info = get_info();
+  TEST_ASSERT_EQUAL_UINT32(20000, info.rate_mHz);
+  TEST_ASSERT_EQUAL_UINT16(256, info.osr);
+  TEST_ASSERT_EQUAL_UINT16(200, info.slip_window_ms);
+  TEST_ASSERT_EQUAL_FLOAT(0.5f, info.slip_threshold_mm);
+  TEST_ASSERT_EQUAL_FLOAT(3.1f, info.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.5f, info.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.8f, info.location_limit_mm);
 }
 
 TEST(a_tare_takes_the_present_as_zero) {

@@ -125,15 +125,3 @@ TEST(it_is_off_while_the_bus_sleeps) {
   TEST_ASSERT_EQUAL(PORT_SYNC_SECOND, native_sync_mode());
   TEST_ASSERT_EQUAL_UINT8(PORT_SYNC_SECOND, get_info().sync);
 }
-
-TEST(it_is_kept_like_other_settings) {
-  set(PORT_SYNC_FRAME);
-  obey(COMMAND(KEEP, keep, 1));
-  rig_power_up();
-  TEST_ASSERT_EQUAL(PORT_SYNC_FRAME, native_sync_mode());
-  connect_for(300);
-  TEST_ASSERT_EQUAL_UINT8(PORT_SYNC_FRAME, get_info().sync);
-  obey(COMMAND(KEEP, keep, 0));
-  rig_power_up();
-  TEST_ASSERT_EQUAL(PORT_SYNC_OFF, native_sync_mode());
-}

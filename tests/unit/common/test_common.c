@@ -45,28 +45,20 @@ TEST(test_crc_equals_bitwise_at_every_length_and_alignment) {
 
 TEST(test_bytes_are_little_endian) {
   const uint8_t expected[8] = {0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11};
-  uint8_t bytes[8] = {0};
-  TEST_ASSERT_EQUAL_HEX64(UINT64_C(0x1122334455667788), bytes_get_u64(expected));
-  bytes_put_u32(bytes, 0x55667788);
-  TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, 4);
-  TEST_ASSERT_EQUAL_HEX8(0, bytes[4]);
-  memset(bytes, 0, sizeof bytes);
-  bytes_put_u16(bytes, 0x7788);
-  TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, 2);
-  TEST_ASSERT_EQUAL_HEX8(0, bytes[2]);
-}
-
-TEST(test_bytes_round_trip_at_every_alignment) {
-  static const uint64_t values[] = {0,      1,       0x7F,       0x80,       0xFF,       0x100,     0x7FFF,    0x8000,
-                                    0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, INT64_MAX, UINT64_MAX};
-  uint8_t bytes[16];
-  for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
-    for (size_t at = 0; at < 8; at++) {
-      bytes_put_u32(bytes + at, (uint32_t)values[i]);
-      TEST_ASSERT_EQUAL_HEX32((uint32_t)values[i], bytes_get_u32(bytes + at));
-      bytes_put_u16(bytes + at, (uint16_t)values[i]);
-      TEST_ASSERT_EQUAL_HEX16((uint16_t)values[i], bytes_get_u16(bytes + at));
-    }
+  for (size_t at = 0; at < 8; at++) {
+    uint8_t bytes[16] = {0};
+    memcpy(bytes + at, expected, sizeof expected);
+    TEST_ASSERT_EQUAL_HEX64(UINT64_C(0x1122334455667788), bytes_get_u64(bytes + at));
+    memset(bytes, 0, sizeof bytes);
+    bytes_put_u32(bytes + at, 0x55667788);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes + at, 4);
+    TEST_ASSERT_EQUAL_HEX8(0, bytes[at + 4]);
+    TEST_ASSERT_EQUAL_HEX32(0x55667788, bytes_get_u32(bytes + at));
+    memset(bytes, 0, sizeof bytes);
+    bytes_put_u16(bytes + at, 0x7788);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes + at, 2);
+    TEST_ASSERT_EQUAL_HEX8(0, bytes[at + 2]);
+    TEST_ASSERT_EQUAL_HEX16(0x7788, bytes_get_u16(bytes + at));
   }
 }
 

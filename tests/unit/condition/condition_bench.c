@@ -27,6 +27,12 @@ void run_s(float seconds) { run(frames_in(seconds)); }
 
 float contact_s, unflagged_s;
 
+static void watch_frame(void) {
+  run(1);
+  contact_s += conditioned.contact ? 1e-6f * (float)period_us : 0;
+  unflagged_s += conditioned.contact && !conditioned.zero_doubtful ? 1e-6f * (float)period_us : 0;
+}
+
 void watch_s(float seconds, float slope_Pa_s, uint32_t sensors) {
   contact_s = unflagged_s = 0;
   double moved = 0;
@@ -37,9 +43,7 @@ void watch_s(float seconds, float slope_Pa_s, uint32_t sensors) {
     for (int k = 0; k < SENSORS; k++) {
       frame.pressure_Pa_q10[k] += sensors >> k & 1u ? step : 0;
     }
-    run(1);
-    contact_s += conditioned.contact ? 1e-6f * (float)period_us : 0;
-    unflagged_s += conditioned.contact && !conditioned.zero_doubtful ? 1e-6f * (float)period_us : 0;
+    watch_frame();
   }
 }
 
@@ -83,8 +87,6 @@ void release(float share, float time_constant_s, float seconds) {
   for (int i = frames_in(seconds); i > 0; i--) {
     press((int32_t)(left * 20000.0f) * Pa);
     left *= decay > 0 ? decay : 0;
-    run(1);
-    contact_s += conditioned.contact ? 1e-6f * (float)period_us : 0;
-    unflagged_s += conditioned.contact && !conditioned.zero_doubtful ? 1e-6f * (float)period_us : 0;
+    watch_frame();
   }
 }

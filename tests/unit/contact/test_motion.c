@@ -106,44 +106,34 @@ TEST(noise_alone_never_speaks) {
   }
 }
 
-TEST(creeping_along_with_a_load_is_no_slide) {
-  rest(0.4f);
-  /* 0.4 in 0.1 s, 5 mm for each unit; and back. */
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING, go(0.1f, 20.0f, 0, 4.0f));
-  TEST_ASSERT_EQUAL_HEX32(0, go(0.5f, 0, 0, 0) & CONTACT_FLAG_SLIDING);
-  TEST_ASSERT_EQUAL_HEX32(0, go(0.1f, -20.0f, 0, -4.0f) & CONTACT_FLAG_SLIDING);
-}
-
-TEST(the_scale_of_the_pad_is_in_the_load) {
-  settings.tangential_scale = 0.4f; /* the load is less than it seems */
-  rest(0.4f);
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.1f, 20.0f, 0, 4.0f) & CONTACT_FLAG_SLIDING);
-}
-
-TEST(moving_on_under_a_steady_load_is_a_slide) {
-  found.qx_N = 2.0f;
-  rest(0.4f);
-  TEST_ASSERT_EQUAL_HEX32(0, go(0.007f, 20.0f, 0, 0) & CONTACT_FLAG_SLIDING);
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.02f, 20.0f, 0, 0) & CONTACT_FLAG_SLIDING);
-}
-
-TEST(a_falling_friction_shows_a_slide_sooner) {
-  found.qx_N = 2.0f;
-  rest(0.4f);
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.013f, 10.0f, 0, -4.0f) & CONTACT_FLAG_SLIDING);
-}
-
-TEST(the_lift_that_comes_before_does_not_hide_a_slide) {
-  rest(0.4f);
-  TEST_ASSERT_EQUAL_HEX32(0, go(0.06f, 40.0f, 0, 8.0f) & CONTACT_FLAG_SLIDING);
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SLIDING, go(0.02f, 20.0f, 0, 0) & CONTACT_FLAG_SLIDING);
-}
-
-TEST(a_slow_slide_is_found_by_and_by) {
-  found.qx_N = 2.0f;
-  rest(0.4f);
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, go(0.08f, 2.0f, 0, 0));
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SLIDING, go(0.2f, 2.0f, 0, 0));
+/* 5 mm of creep go with each unit of Q / F. */
+TEST(a_slide_is_what_the_load_does_not_explain) {
+  static const struct {
+    float qx_N, scale;
+    struct {
+      float seconds, vx_mm_s, load_per_s;
+      uint32_t slides;
+    } phases[3];
+  } cases[] = {
+      {0, 1.0f, {{0.1f, 20.0f, 4.0f, 0}, {0.5f, 0, 0, 0}, {0.1f, -20.0f, -4.0f, 0}}}, /* creeping, and back */
+      {0, 0.4f, {{0.1f, 20.0f, 4.0f, 1}}},                         /* the load is less than it seems */
+      {2.0f, 1.0f, {{0.007f, 20.0f, 0, 0}, {0.02f, 20.0f, 0, 1}}}, /* moving on under a steady load */
+      {2.0f, 1.0f, {{0.013f, 10.0f, -4.0f, 1}}},                   /* sooner as friction falls */
+      {0, 1.0f, {{0.06f, 40.0f, 8.0f, 0}, {0.02f, 20.0f, 0, 1}}},  /* after a lift */
+      {2.0f, 1.0f, {{0.08f, 2.0f, 0, 0}, {0.2f, 2.0f, 0, 1}}},     /* slowly */
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    setUp();
+    found.qx_N = cases[i].qx_N;
+    settings.tangential_scale = cases[i].scale;
+    rest(0.4f);
+    for (size_t k = 0; k < 3; k++) {
+      const uint32_t said =
+          go(cases[i].phases[k].seconds, cases[i].phases[k].vx_mm_s, 0, cases[i].phases[k].load_per_s);
+      TEST_ASSERT_EQUAL(cases[i].phases[k].slides, (said & CONTACT_FLAG_SLIDING) != 0);
+      TEST_ASSERT_TRUE(i + k > 0 || said == (CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING));
+    }
+  }
 }
 
 TEST(a_slide_ends_soon_and_once) {

@@ -1,6 +1,7 @@
 #include "fake_i2c.h"
 #include "pico_mux/mux_bus.h"
-#include "support/unit.h"
+#define NOW_us fake.now_us
+#include "support/bus_bench.h"
 
 #include <string.h>
 
@@ -15,9 +16,6 @@ enum { RECOVERY_us = 24 * 5 };
 enum { FRAME_TRANSACTIONS = COMMAND_TRANSACTIONS + READ_TRANSACTIONS };
 
 static struct mux_bus mux_bus;
-static struct array_bus bus;
-static struct array_bus_result result;
-static unsigned polls;
 
 void setUp(void) {
   fake_i2c_power_up();
@@ -38,46 +36,14 @@ static void next_case(void) {
 
 static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* Time passes until this wake-up or an event, whichever comes first. */
 static void sleep_until(uint64_t wake_us) {
   const unsigned events = fake.events;
-  TEST_ASSERT_TRUE_MESSAGE(wake_us > fake.now_us, "asks to be woken in the past");
   while (fake.events == events && fake.now_us < wake_us) {
     fake.now_us = earlier(wake_us, fake_i2c_next_event_us());
     if (fake.now_us == fake_i2c_next_event_us()) {
       fake_i2c_interrupt();
     }
   }
-}
-
-/* Polls as the event handler does: at every event and alarm. No operation takes 20 ms. */
-static enum ft_status finish(void) {
-  const uint64_t give_up_us = fake.now_us + 20000;
-  for (;;) {
-    uint64_t wake_us = 0;
-    polls++;
-    const enum ft_status status = bus.poll(bus.context, fake.now_us, &result, &wake_us);
-    if (status != FT_PENDING) {
-      return status;
-    }
-    sleep_until(wake_us);
-    TEST_ASSERT_TRUE_MESSAGE(fake.now_us < give_up_us, "the operation does not end");
-  }
-}
-
-static enum ft_status command(uint8_t byte) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, byte, fake.now_us));
-  return finish();
-}
-
-static enum ft_status read_back(uint8_t byte, uint8_t count) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, byte, count, fake.now_us));
-  return finish();
-}
-
-static enum ft_status recover(void) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_recovery(bus.context, fake.now_us));
-  return finish();
 }
 
 static void wait_for_conversion(void) {
@@ -167,18 +133,6 @@ TEST(test_reads_of_every_length_without_a_command) {
 TEST(test_a_controller_that_is_slow_to_become_idle_is_asked_again) {
   fake.busy_polls = 3;
   expect_good_frame();
-}
-
-TEST(test_arguments_and_order_of_calls) {
-  uint64_t wake_us;
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, 0, &result, &wake_us));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 0, 0));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 4, 0));
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, CONVERT, 0));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_command(bus.context, CONVERT, 0));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_read(bus.context, READ_ADC, 3, 0));
-  TEST_ASSERT_EQUAL_INT(FT_OK, finish());
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, fake.now_us, &result, &wake_us));
 }
 
 TEST(test_a_missing_multiplexer_costs_its_own_sensors_only) {

@@ -1,5 +1,4 @@
 #include "native/sim_array.h"
-#include "support/unit.h"
 
 #include <math.h>
 #include <string.h>
@@ -8,37 +7,13 @@ enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
 enum { RESET = 0x1E, CONVERT = 0x40, CONVERT_us = 600, READ_ADC = 0x00, READ_C1 = 0xA2 };
 
 static struct sim_array array;
-static const struct array_bus *bus;
-static struct array_bus_result result;
 static uint64_t now_us;
+#define NOW_us now_us
+#include "support/bus_bench.h"
 
-static enum ft_status finish(void) {
-  for (;;) {
-    uint64_t wake_us = 0;
-    const enum ft_status status = bus->poll(bus->context, now_us, &result, &wake_us);
-    if (status != FT_PENDING) {
-      return status;
-    }
-    const uint64_t event_us = sim_array_next_event_us(&array);
-    const uint64_t next_us = event_us < wake_us ? event_us : wake_us;
-    TEST_ASSERT_TRUE(next_us > now_us);
-    now_us = next_us;
-  }
-}
-
-static enum ft_status command(uint8_t byte) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_command(bus->context, byte, now_us));
-  return finish();
-}
-
-static enum ft_status read_back(uint8_t byte, uint8_t count) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_read(bus->context, byte, count, now_us));
-  return finish();
-}
-
-static enum ft_status recover(void) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_recovery(bus->context, now_us));
-  return finish();
+static void sleep_until(uint64_t wake_us) {
+  const uint64_t event_us = sim_array_next_event_us(&array);
+  now_us = event_us < wake_us ? event_us : wake_us;
 }
 
 static uint32_t code(unsigned k) {
@@ -52,8 +27,7 @@ static enum ft_status frame(void) {
     return status;
   }
   now_us += CONVERT_us;
-  status = read_back(READ_ADC, 3);
-  return status;
+  return read_back(READ_ADC, 3);
 }
 
 static void expect_good_frame(void) {
@@ -66,7 +40,7 @@ static void expect_good_frame(void) {
 
 void setUp(void) {
   sim_array_init(&array, SENSORS, 1);
-  bus = sim_array_bus(&array);
+  bus = *sim_array_bus(&array);
   now_us = 0;
   for (unsigned k = 0; k < SENSORS; k++) {
     array.d1[k] = 1000000 + k;
@@ -214,7 +188,7 @@ TEST(test_a_stuck_bus_needs_several_recoveries) {
 /* What a sensor converts when the chip is reset it has at the same moment as without. */
 TEST(test_a_restart_of_the_bus_leaves_the_sensors_at_work) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_read(bus->context, READ_C1, 2, now_us));
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_C1, 2, now_us));
   const uint64_t elapsed_us = now_us;
   sim_array_restart_bus(&array, elapsed_us);
   now_us = CONVERT_us;
@@ -223,14 +197,4 @@ TEST(test_a_restart_of_the_bus_leaves_the_sensors_at_work) {
   TEST_ASSERT_EQUAL_UINT32(0, array.early_reads);
   TEST_ASSERT_NOT_EQUAL_UINT32(0, code(3));
   expect_good_frame();
-}
-
-TEST(test_arguments_and_order_of_calls) {
-  uint64_t wake_us;
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus->poll(bus->context, now_us, &result, &wake_us));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus->start_read(bus->context, READ_ADC, 0, now_us));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus->start_read(bus->context, READ_ADC, 4, now_us));
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_command(bus->context, CONVERT, now_us));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus->start_command(bus->context, CONVERT, now_us));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus->start_read(bus->context, READ_ADC, 3, now_us));
 }

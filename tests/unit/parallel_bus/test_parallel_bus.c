@@ -1,6 +1,7 @@
 #include "fake_lines.h"
 #include "pico_parallel/parallel_bus.h"
-#include "support/unit.h"
+#define NOW_us fake.now_us
+#include "support/bus_bench.h"
 
 #include <string.h>
 
@@ -9,10 +10,6 @@
 #define READ_ADC 0x00
 
 static struct parallel_bus parallel_bus;
-static struct array_bus bus;
-static struct array_bus_result result;
-
-static enum ft_status command(uint8_t byte);
 
 static void power_up(void) {
   fake_lines_power_up();
@@ -37,36 +34,9 @@ static void next_case(void) {
   setUp();
 }
 
-/* Polls as the event handler does: at every event and alarm. No operation takes 1 ms. */
-static enum ft_status finish(void) {
-  const uint64_t give_up_us = fake.now_us + 1000;
-  for (;;) {
-    uint64_t wake_us = 0;
-    const enum ft_status status = bus.poll(bus.context, fake.now_us, &result, &wake_us);
-    if (status != FT_PENDING) {
-      return status;
-    }
-    const uint64_t event_us = fake_lines_next_event_us();
-    const uint64_t next_us = event_us < wake_us ? event_us : wake_us;
-    TEST_ASSERT_TRUE_MESSAGE(next_us > fake.now_us, "asks to be woken in the past");
-    fake.now_us = next_us;
-    TEST_ASSERT_TRUE_MESSAGE(fake.now_us < give_up_us, "the operation does not end");
-  }
-}
-
-static enum ft_status command(uint8_t byte) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, byte, fake.now_us));
-  return finish();
-}
-
-static enum ft_status read_back(uint8_t byte, uint8_t count) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, byte, count, fake.now_us));
-  return finish();
-}
-
-static enum ft_status recover(void) {
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_recovery(bus.context, fake.now_us));
-  return finish();
+static void sleep_until(uint64_t wake_us) {
+  const uint64_t event_us = fake_lines_next_event_us();
+  fake.now_us = event_us < wake_us ? event_us : wake_us;
 }
 
 static void expect_bytes_of(uint32_t sensors, uint8_t byte, uint8_t count) {
@@ -135,18 +105,6 @@ TEST(test_time_on_the_bus) {
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
   TEST_ASSERT_EQUAL_UINT64(50 + 146 + 5 * FT_READ_STOPS, fake.now_us);
   TEST_ASSERT_EQUAL_UINT(1 + FT_READ_STOPS, fake.stops_of_first);
-}
-
-TEST(test_arguments_and_order_of_calls) {
-  uint64_t wake_us;
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, 0, &result, &wake_us));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 0, 0));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 4, 0));
-  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, CONVERT, 0));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_command(bus.context, CONVERT, 0));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_read(bus.context, READ_ADC, 3, 0));
-  TEST_ASSERT_EQUAL_INT(FT_OK, finish());
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, fake.now_us, &result, &wake_us));
 }
 
 TEST(test_a_chip_that_does_not_start) {

@@ -101,63 +101,6 @@ TEST(test_round_trip_of_every_type) {
   }
 }
 
-TEST(test_quantities_travel_under_their_flags) {
-  static const struct {
-    uint32_t flag;
-    size_t length;
-  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},    {CONTACT_FLAG_UNCERTAINTY_VALID, 8}, {CONTACT_FLAG_SLIP_VALID, 4},
-               {CONTACT_FLAG_WIDTHS_VALID, 12}, {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
-               {CONTACT_FLAG_SHAPE_VALID, 4},   {CONTACT_FLAG_TWO_CONTACTS, 40},     {CONTACT_FLAG_EDGE, 12}};
-  enum { PARTS = sizeof parts / sizeof parts[0] };
-  for (unsigned present = 0; present < 1u << PARTS; present++) {
-    struct sampler sampler = {SAMPLE_GREATEST, {12}};
-    struct wire_packet packet;
-    sample_packet(&sampler, WIRE_CONTACT, &packet);
-    packet.body.contact.flags = 0;
-    size_t expected = 22;
-    for (unsigned i = 0; i < PARTS; i++) {
-      if (present >> i & 1) {
-        packet.body.contact.flags |= parts[i].flag;
-        expected += parts[i].length;
-      }
-    }
-    uint8_t frame[WIRE_MAX_FRAME_BYTES], bytes[WIRE_MAX_PACKET_BYTES];
-    size_t length = 0;
-    TEST_ASSERT_EQUAL_INT(FT_OK, encode(&packet, frame, &length));
-    TEST_ASSERT_EQUAL_size_t(12 + expected, unseal(frame, length - 1, bytes));
-    struct wire_packet decoded;
-    TEST_ASSERT_EQUAL_INT(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &decoded));
-    const struct wire_contact *contact = &decoded.body.contact;
-    float fit = present & 1 ? FLT_MAX : 0, sd = present & 2 ? FLT_MAX : 0;
-    TEST_ASSERT_EQUAL_HEX32(present & 1 ? UINT32_MAX : 0, contact->sensors_used);
-    TEST_ASSERT_EQUAL_FLOAT(fit, contact->x_mm);
-    TEST_ASSERT_EQUAL_FLOAT(fit, contact->residual_rms_Pa);
-    TEST_ASSERT_EQUAL_FLOAT(sd, contact->location_sd_mm);
-    TEST_ASSERT_EQUAL_FLOAT(sd, contact->force_sd_N);
-    TEST_ASSERT_EQUAL_FLOAT(present & 4 ? FLT_MAX : 0, contact->slip_mm);
-    float widths = present & 8 ? FLT_MAX : 0;
-    TEST_ASSERT_EQUAL_FLOAT(widths, contact->sigma_x_mm);
-    TEST_ASSERT_EQUAL_FLOAT(widths, contact->sigma_y_mm);
-    TEST_ASSERT_EQUAL_FLOAT(widths, contact->width_correlation);
-    float tangential = present & 16 ? FLT_MAX : 0, velocity = present & 32 ? FLT_MAX : 0;
-    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->qx_N);
-    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->qy_N);
-    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->q_sd_N);
-    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->tangential_ratio);
-    TEST_ASSERT_EQUAL_FLOAT(velocity, contact->vx_mm_s);
-    TEST_ASSERT_EQUAL_FLOAT(velocity, contact->vy_mm_s);
-    float two = present & 128 ? FLT_MAX : 0, edge = present & 256 ? FLT_MAX : 0;
-    TEST_ASSERT_EQUAL_FLOAT(present & 64 ? FLT_MAX : 0, contact->shape_age_ms);
-    TEST_ASSERT_EQUAL_FLOAT(two, contact->x1_mm);
-    TEST_ASSERT_EQUAL_FLOAT(two, contact->force1_sd_N);
-    TEST_ASSERT_EQUAL_FLOAT(two, contact->y2_mm);
-    TEST_ASSERT_EQUAL_FLOAT(two, contact->force2_sd_N);
-    TEST_ASSERT_EQUAL_FLOAT(edge, contact->edge_angle_deg);
-    TEST_ASSERT_EQUAL_FLOAT(edge, contact->edge_length_mm);
-    TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, contact->stages.total_us);
-  }
-}
-
 /* What a device decodes: its commands, and nothing that itself sends. */
 TEST(test_sets_of_commands) {
   static const struct wire_layout *const
