@@ -2,7 +2,7 @@
  * and shows all fingertips of a file: such jobs are left out, or one is picked. */
 import { readFileSync } from 'node:fs';
 import { basename } from 'node:path';
-import { core, loadCore } from '../../host_tools/web/src/core';
+import * as core from '../../host_tools/web/src/core';
 import { PacketType, type Command, type DevicePacket, type Info } from '../../host_tools/web/src/line/line_facts';
 import { ReadError, readItems } from '../../host_tools/web/src/recording/replay_line';
 import { commandsFor } from '../../host_tools/web/src/steps/settings';
@@ -21,7 +21,7 @@ const KINDS: Record<number, string> = { [-3]: 'no recording', [-4]: 'other forma
 
 /** The lines that a recording has of a packet, and the head before it: what the page would write. */
 function written(packet: DevicePacket, info: Info): [string[], string[]] {
-  const writer = core.newWriter('csv', info, []);
+  const writer = new core.Writer('csv', info, []);
   const text = (): string => {
     let all = '';
     for (let bytes; (bytes = writer.take()); ) {
@@ -118,7 +118,7 @@ function isRounded(packet: DevicePacket): boolean {
 /** null: not compared. */
 function stream(job: Job): Answer | null {
   const packets: unknown[] = [];
-  const decoder = core.newDecoder();
+  const decoder = new core.Decoder();
   let rounded = false;
   decoder.feed(readFileSync(job.input), (packet) => {
     rounded ||= isRounded(packet);
@@ -161,7 +161,7 @@ function setting(job: Job): Answer {
   }
 }
 
-await loadCore(readFileSync(process.env['FINGERTIP_CORE'] ?? ''));
+await core.loadCore(readFileSync(process.env['FINGERTIP_CORE'] ?? ''));
 
 /** What the page has no way to ask; and a packet that names no fingertip, which is the first one's for a reader of all. */
 const LEFT_OUT = /^fuzz|^two_comment_packet_of_all/;

@@ -22,7 +22,7 @@ def compared(line, other):
 
 
 def play(build, scenario, folder, *options, pad=False):
-    """Both: packets, differences, and {"seconds", "cpu_s", "bytes"} of WebAssembly."""
+    """Both: packets, differences, and {"seconds", "cpu_s"} of WebAssembly."""
     native, wasm, commands = folder / "native.ftr", folder / "wasm.ftr", folder / "commands"
     player, web = build / "host_tools/simulation/player/fingertip_player", build / "host_tools/web/wasm"
     output = ("-o", folder / "native.csv", "--raw-bytes", native, "--commands", commands, "--overwrite", "--quiet")

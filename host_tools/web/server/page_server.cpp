@@ -44,15 +44,8 @@ enum { MISDIRECTED_REQUEST = 421, FORBIDDEN = 403, METHOD_NOT_ALLOWED = 405, NOT
 
 std::string type_of(const fs::path &file) {
   static const std::map<std::string, std::string> types{
-      {".html", "text/html; charset=utf-8"},
-      {".js", "text/javascript; charset=utf-8"},
-      {".css", "text/css; charset=utf-8"},
-      {".json", "application/json"},
-      {".wasm", "application/wasm"},
-      {".webmanifest", "application/manifest+json"},
-      {".svg", "image/svg+xml"},
-      {".png", "image/png"},
-      {".woff2", "font/woff2"},
+      {".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
+      {".css", "text/css; charset=utf-8"},   {".wasm", "application/wasm"},
       {".txt", "text/plain; charset=utf-8"},
   };
   auto found = types.find(file.extension().string());

@@ -10,9 +10,8 @@
 import { loadCore } from './core';
 import type { Fingertip } from './model/fingertip';
 import { App } from './steps/app';
-import { wordsOf } from './steps/dialog';
 import { fingertipControls, pageControls } from './steps/toolbar';
-import { element } from './view/elements';
+import { element, wordsOf } from './view/elements';
 import { keepFocus } from './view/focus';
 import { mountView } from './view/view';
 

@@ -11,7 +11,7 @@ namespace fingertip::web {
 
 constexpr double PAD_mm = 12.0; // of silicone without ends
 
-// The indenters that the page has (src/simulated/objects.ts has the same).
+// The indenters that the page has (src/simulated/simulated_fingertip.ts has the same).
 const std::vector<std::string> &object_names();
 
 // Solves what is not in the cache, a second each.

@@ -35,7 +35,7 @@ packets = 0;
 const before = process.cpuUsage();
 const whole_s = Number(seconds);
 for (let s = 0; s < whole_s; s += 0.02) {
-  firmware.press({ x_mm: 6 * Math.sin(s), y_mm: 12 * Math.cos(0.7 * s), force_N: 5 + 3 * Math.sin(2 * s) });
+  firmware.act('press', 6 * Math.sin(s), 12 * Math.cos(0.7 * s), 5 + 3 * Math.sin(2 * s));
   run(0.02);
 }
 const { user, system } = process.cpuUsage(before);
@@ -44,6 +44,6 @@ console.log(
     start_ms,
     frames_per_s: packets / whole_s,
     cpu_percent: (1e-4 * (user + system)) / whole_s,
-    memory_MB: 1e-6 * firmware.wasm.exports.memory.buffer.byteLength,
+    memory_MB: 1e-6 * firmware.wasm.size_bytes(),
   }),
 );

@@ -1,5 +1,6 @@
 // The simulated fingertip's firmware for the page: simulation/player/native_fingertip.h, one a module. Times
-// are in microseconds since power-up; the pressures are those of the scenario or of the page's pad.
+// are in microseconds since power-up. The pressures are those of a scenario or of the page's pad. The page
+// passes arrays by malloc and free.
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/samples.hpp"
 #include "web/wasm/world.hpp"
@@ -13,10 +14,10 @@ extern "C" {
 }
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #define EXPORT(name) extern "C" __attribute__((export_name(#name)))
@@ -24,39 +25,33 @@ extern "C" {
 namespace fingertip::web {
 namespace {
 
-// What the page fills in beforehand.
+constexpr double NOISE = 1.0, PROM_SPREAD = 0.03; // of native_fingertip_settings
+
 class Rows : public Samples {
 public:
-  void resize(unsigned rows, double ambient_Pa) {
+  Rows() = default;
+  Rows(unsigned rows, double ambient_Pa, const double *times_s, const float *pressures_Pa,
+       const float *temperatures_degC) {
     sensors_ = geometry.sensor_count;
     ambient_Pa_ = ambient_Pa;
-    times_s_.assign(rows, 0.0);
-    pressures_Pa_.assign(std::size_t(rows) * sensors_, 0.0F);
-    temperatures_degC_.assign(rows, 25.0F);
+    times_s_.assign(times_s, times_s + rows);
+    pressures_Pa_.assign(pressures_Pa, pressures_Pa + std::size_t(rows) * sensors_);
+    temperatures_degC_.assign(temperatures_degC, temperatures_degC + rows);
   }
-  double *times_s() { return times_s_.data(); }
-  float *pressures_Pa() { return pressures_Pa_.data(); }
-  float *temperatures_degC() { return temperatures_degC_.data(); }
 };
 
-Rows rows;
-
-double pressure_of_rows_Pa(void *, unsigned sensor, std::uint64_t t_us) { return rows.pressure_Pa(sensor, t_us); }
-double temperature_of_rows_degC(void *, unsigned, std::uint64_t t_us) { return rows.temperature_degC(t_us); }
-
-std::vector<std::uint8_t> file;
-std::string errors;
+std::optional<Rows> rows;
 std::unique_ptr<World> world;
 std::vector<std::uint8_t> pad_command;
+std::optional<pad_profile> profile;
 // The fields of World's Truth; contact and slips are 0 or 1.
 double truth[8];
-
-double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) { return world->pressure_Pa(sensor, t_us); }
-
 std::uint8_t line[NATIVE_CDC_TRANSMIT_BYTES];
 std::uint8_t kept[NATIVE_FLASH_BYTES];
-std::optional<pad_profile> profile;
-char serial[17] = "0000000000000001";
+
+double pressure_of_rows_Pa(void *, unsigned sensor, std::uint64_t t_us) { return rows->pressure_Pa(sensor, t_us); }
+double temperature_of_rows_degC(void *, unsigned, std::uint64_t t_us) { return rows->temperature_degC(t_us); }
+double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) { return world->pressure_Pa(sensor, t_us); }
 
 } // namespace
 } // namespace fingertip::web
@@ -65,44 +60,40 @@ using namespace fingertip;
 using namespace fingertip::web;
 
 EXPORT(sensor_count) unsigned sensor_count() { return geometry.sensor_count; }
-EXPORT(sensor_x_mm) float sensor_x_mm(unsigned sensor) { return geometry.x_mm[sensor]; }
-EXPORT(sensor_y_mm) float sensor_y_mm(unsigned sensor) { return geometry.y_mm[sensor]; }
 
-// Makes room for a scenario of count rows; fill them in by the next three.
-EXPORT(rows_begin) void rows_begin(unsigned count, double ambient_Pa) { rows.resize(count, ambient_Pa); }
-EXPORT(rows_times) double *rows_times() { return rows.times_s(); }
-EXPORT(rows_pressures) float *rows_pressures() { return rows.pressures_Pa(); }
-EXPORT(rows_temperatures) float *rows_temperatures() { return rows.temperatures_degC(); }
+// A scenario: times [rows], pressures above ambient [rows][sensors], temperatures [rows].
+EXPORT(rows_begin)
+void rows_begin(unsigned count, double ambient_Pa, const double *times_s, const float *pressures_Pa,
+                const float *temperatures_degC) {
+  rows.emplace(count, ambient_Pa, times_s, pressures_Pa, temperatures_degC);
+}
 
-// [16] hexadecimal digits, to be set before power-up.
-EXPORT(serial_number) char *serial_number() { return serial; }
-// Room for the file of objects and for the errors of the pad as text (twin::parse_effects), to be
-// filled in; then the world is made of both.
-EXPORT(objects_begin) std::uint8_t *objects_begin(unsigned bytes) {
-  file.assign(bytes, 0);
-  return file.data();
-}
-EXPORT(errors_begin) char *errors_begin(unsigned bytes) {
-  errors.assign(bytes, ' ');
-  return errors.data();
-}
-EXPORT(world_begin) void world_begin(double seed) {
-  ObjectsFile read = read_objects(file.data(), file.size());
+// The pad: the file of objects, and its errors as text (twin::parse_effects).
+EXPORT(world_begin)
+void world_begin(const std::uint8_t *file, unsigned bytes, const char *errors, double seed) {
+  ObjectsFile read = read_objects(file, bytes);
   pad_command = std::move(read.pad_command);
   world =
       std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors), static_cast<std::uint64_t>(seed));
-  file = {};
 }
 // The command that sets the firmware's pad profile.
 EXPORT(pad_command_at) const std::uint8_t *pad_command_at() { return pad_command.data(); }
 EXPORT(pad_command_bytes) unsigned pad_command_bytes() { return static_cast<unsigned>(pad_command.size()); }
+// Sets that profile from power-up on, without storing it.
+EXPORT(pad_use) void pad_use() {
+  std::vector<std::uint8_t> frame(pad_command.begin(), pad_command.end() - 1); // decoding overwrites it
+  wire_packet packet;
+  (void)wire_decode(wire_commands, frame.data(), frame.size(), &packet);
+  profile = packet.body.cmd_pad.profile;
+}
 EXPORT(world_choose) void world_choose(unsigned object) { world->choose(object); }
 EXPORT(world_press) void world_press(double x_mm, double y_mm, double force_N) { world->press(x_mm, y_mm, force_N); }
 EXPORT(world_hold)
-void world_hold(double x_mm, double y_mm, double force_N, double load_N, double angle_rad) {
-  world->hold(x_mm, y_mm, force_N, load_N, angle_rad);
+void world_hold(double x_mm, double y_mm, double force_N, double load_N, double angle_deg) {
+  world->hold(x_mm, y_mm, force_N, load_N, angle_deg * std::acos(-1.0) / 180.0);
 }
-EXPORT(world_drop) void world_drop(double x_mm, double y_mm, double mass_kg) { world->drop(x_mm, y_mm, mass_kg); }
+EXPORT(world_drop)
+void world_drop(double x_mm, double y_mm, double mass_g) { world->drop(x_mm, y_mm, 1e-3 * mass_g); }
 EXPORT(world_lift) void world_lift() { world->lift(); }
 EXPORT(world_friction) void world_friction(double friction) { world->set_friction(friction); }
 EXPORT(world_truth) const double *world_truth() {
@@ -113,35 +104,26 @@ EXPORT(world_truth) const double *world_truth() {
   return truth;
 }
 
-// What it keeps without power: to be filled in before power-up where keeps is 1, read at any time.
-EXPORT(flash_to_start_with) std::uint8_t *flash_to_start_with() { return kept; }
+// What it keeps without power.
 EXPORT(flash_now) std::uint8_t *flash_now() { return native_flash.bytes; }
 EXPORT(flash_bytes) unsigned flash_bytes() { return NATIVE_FLASH_BYTES; }
 
-// Sets the pad profile from the start on, without storing it, from the command of length bytes in
-// line_bytes. 1: it is no such command.
-EXPORT(pad_of_command) int pad_of_command(unsigned length) {
-  wire_packet packet;
-  if (length < 1 || wire_decode(wire_commands, line, length - 1, &packet) != FT_OK || packet.type != WIRE_CMD_PAD) {
-    return 1;
-  }
-  profile = packet.body.cmd_pad.profile;
-  return 0;
-}
-
-// Power-up at time 0. of_rows: by the scenario, else by the pad. A module powers up once.
-EXPORT(power_up)
-void power_up(double seed, double noise, double prom_spread, int parallel_bus, int of_rows, int keeps) {
+// Power-up at time 0, once a module: with a scenario by it, else by the pad. serial: 16 hexadecimal digits.
+// flash: what it kept, of flash_now, or null.
+EXPORT(power_up) void power_up(const char *serial, double seed, int parallel_bus, const std::uint8_t *flash) {
   native_set_serial_number(serial);
   native_fingertip_settings settings{};
   settings.seed = static_cast<std::uint64_t>(seed);
-  settings.noise = noise;
-  settings.prom_spread = prom_spread;
+  settings.noise = NOISE;
+  settings.prom_spread = PROM_SPREAD;
   settings.parallel_bus = parallel_bus != 0;
-  settings.flash = keeps ? kept : nullptr;
+  if (flash) {
+    std::copy_n(flash, sizeof kept, kept);
+    settings.flash = kept;
+  }
   settings.pad = profile ? &*profile : nullptr;
-  settings.world = of_rows ? sim_world{nullptr, pressure_of_rows_Pa, temperature_of_rows_degC}
-                           : sim_world{nullptr, pressure_of_world_Pa, nullptr};
+  settings.world = rows ? sim_world{nullptr, pressure_of_rows_Pa, temperature_of_rows_degC}
+                        : sim_world{nullptr, pressure_of_world_Pa, nullptr};
   (void)native_fingertip_start(&settings); // this scene refuses nothing
 }
 // Imports fingertip.leave where the firmware ends itself.
@@ -149,9 +131,8 @@ EXPORT(run_until) void run_until(double t_us) { (void)native_fingertip_run_until
 
 EXPORT(line_open) void line_open() { native_cdc_open(); }
 EXPORT(line_close) void line_close() { native_cdc_close(); }
-// Where bytes for the next two are: as many as they may be.
+// Where bytes for the next two are; the firmware takes line_takes at once.
 EXPORT(line_bytes) std::uint8_t *line_bytes() { return line; }
-EXPORT(line_capacity) unsigned line_capacity() { return sizeof line; }
 EXPORT(line_takes) unsigned line_takes() { return NATIVE_CDC_RECEIVE_BYTES; }
 // 1: the firmware holds the host off, none was taken.
 EXPORT(line_take) int line_take(unsigned length) { return native_cdc_send(line, length) != FT_OK; }

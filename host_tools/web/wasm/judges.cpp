@@ -5,10 +5,11 @@
 #include "tool/calibration/gain_session.hpp"
 #include "tool/calibration/pull_session.hpp"
 #include "tool/doctor/judge.hpp"
-#include "web/wasm/json.hpp"
 
-#include <map>
+#include <cerrno> // which nlohmann/json.hpp uses
+#include <cmath>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -18,9 +19,8 @@ namespace fingertip::web {
 namespace {
 
 using calibrating::GainSession;
-using calibrating::PlacementFinder;
-using calibrating::PullFinder;
 using calibrating::PullSession;
+using nlohmann::json;
 
 std::vector<std::uint8_t> given;
 std::string answer;
@@ -44,55 +44,15 @@ wire_packet packet_of(wire_type type) {
   return decoded;
 }
 
-std::string given_text() { return {given.begin(), given.end()}; }
-
-const char *name_of(calibrating::Judgement::State state) {
-  using State = calibrating::Judgement::State;
+template <typename State> const char *name_of(State state) {
   return state == State::more ? "more" : state == State::good ? "good" : "refused";
 }
-const char *name_of(calibrating::PullJudgement::State state) {
-  using State = calibrating::PullJudgement::State;
-  return state == State::more ? "more" : state == State::good ? "good" : "refused";
-}
-const char *name_of(PlacementFinder::State state) {
-  using State = PlacementFinder::State;
-  return state == State::resting    ? "resting"
-         : state == State::settling ? "settling"
-         : state == State::taken    ? "taken"
-                                    : "refused";
-}
-const char *name_of(PullFinder::State state) {
-  using State = PullFinder::State;
-  return state == State::free       ? "free"
-         : state == State::settling ? "settling"
-         : state == State::resting  ? "resting"
-         : state == State::pulled   ? "pulled"
-         : state == State::taken    ? "taken"
-                                    : "refused";
+
+json scatter_of(const calibrating::Scatter &scatter) {
+  return {{"location_mm", scatter.location_mm}, {"force", scatter.force}};
 }
 
-// What may end an examination by a page.
-ErrorCode code_of(const std::string &name) {
-  static const std::map<std::string, ErrorCode> codes{
-      {"no_port", ErrorCode::no_port},
-      {"port_in_use", ErrorCode::port_in_use},
-      {"cannot_open", ErrorCode::cannot_open},
-      {"not_a_fingertip", ErrorCode::not_a_fingertip},
-      {"gone", ErrorCode::gone},
-      {"no_answer", ErrorCode::no_answer},
-      {"other_version", ErrorCode::other_version},
-  };
-  const auto found = codes.find(name);
-  return found == codes.end() ? ErrorCode::other : found->second;
-}
-
-void answer_with(const Json &json) { answer = json.text(); }
-
-void add_scatter(Json &json, const char *name, const calibrating::Scatter &scatter) {
-  json.name(name).begin();
-  json.field("location_mm", scatter.location_mm).field("force", scatter.force);
-  json.end();
-}
+void answer_with(const json &values) { answer = values.dump(); }
 
 } // namespace
 } // namespace fingertip::web
@@ -124,33 +84,20 @@ EXPORT(gains_take) int gains_take(GainSession *session) {
 }
 EXPORT(gains_take_back) void gains_take_back(GainSession *session) { session->take_back(); }
 EXPORT(gains_status) void gains_status(const GainSession *session) {
+  using Finder = calibrating::PlacementFinder::State;
   const calibrating::Judgement &judgement = session->judgement();
-  const calibrating::Solution &solution = judgement.solution;
-  const bool any = !session->placements().empty();
-  Json json;
-  json.begin();
-  json.field("state", std::string_view(name_of(judgement.state)));
-  json.field("reason", std::string_view(calibrating::name_of(judgement.reason)));
-  json.field("text", std::string_view(any ? judgement.text : ""));
-  json.field("advice", std::string_view(session->advice()));
-  json.field("progress", std::string_view(session->progress()));
-  json.field("finder", std::string_view(name_of(session->finder().state())));
-  json.name("above_Pa").list(session->finder().above_Pa());
-  json.name("placements").begin_list();
-  for (const calibrating::Fitted &fitted : solution.placements) {
-    json.begin().field("x_mm", fitted.x_mm).field("y_mm", fitted.y_mm).field("kept", fitted.kept);
-    json.end();
+  const Finder finder = session->finder().state();
+  json placements = json::array();
+  for (const calibrating::Fitted &fitted : judgement.solution.placements) {
+    placements.push_back({{"x_mm", fitted.x_mm}, {"y_mm", fitted.y_mm}, {"kept", fitted.kept}});
   }
-  json.end_list().name("wanted");
-  if (session->wanted()) {
-    json.begin().field("x_mm", session->wanted()->x_mm).field("y_mm", session->wanted()->y_mm);
-    json.end();
-  } else {
-    json.null();
-  }
-  json.name("unsure").list(judgement.unsure).name("silent").list(judgement.silent);
-  json.name("gain").list(solution.gain).name("gain_sd").list(solution.gain_sd);
-  answer_with(json.end());
+  answer_with({{"state", name_of(judgement.state)},
+               {"text", session->placements().empty() ? "" : judgement.text},
+               {"advice", session->advice()},
+               {"progress", session->progress()},
+               {"settling", finder == Finder::settling},
+               {"taken", finder == Finder::taken},
+               {"placements", placements}});
 }
 // force_N: NaN where it is not known.
 EXPORT(gains_result)
@@ -160,32 +107,30 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   }
   const calibration made = session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N),
                                          static_cast<std::uint32_t>(date_s));
-  std::vector<float> gain, gain_sd;
-  std::vector<int> off_x_um, off_y_um, wider_q15;
-  for (std::size_t k = 0; k < session->array().sensors(); k++) {
-    gain.push_back(made.sensors[k].gain);
-    gain_sd.push_back(made.sensors[k].gain_sd);
-    off_x_um.push_back(made.sensors[k].off_x_um);
-    off_y_um.push_back(made.sensors[k].off_y_um);
-    wider_q15.push_back(made.sensors[k].wider_q15);
-  }
-  Json json;
-  json.begin().name("calibration").begin();
-  json.field("date_s", static_cast<double>(made.date_s));
-  json.field("placements", static_cast<double>(made.placements));
-  json.field("force_scale", static_cast<double>(made.force_scale));
-  json.field("force_scale_sd", static_cast<double>(made.force_scale_sd));
-  json.field("sigma_um", static_cast<double>(made.sigma_um));
-  json.field("sigma_sd_um", static_cast<double>(made.sigma_sd_um));
-  json.field("dip_share_q16", static_cast<double>(made.dip_share_q16));
-  json.field("dip_sd_um", static_cast<double>(made.dip_sd_um));
-  json.field("ambient_kPa", static_cast<double>(made.ambient_kPa));
-  json.name("gain").list(gain).name("gain_sd").list(gain_sd);
-  json.name("off_x_um").list(off_x_um).name("off_y_um").list(off_y_um);
-  json.name("wider_q15").list(wider_q15).end();
-  add_scatter(json, "before", session->scatter(false));
-  add_scatter(json, "after", session->scatter(true));
-  answer_with(json.end());
+  const auto of_sensors = [&](auto member) {
+    json values = json::array();
+    for (std::size_t k = 0; k < session->array().sensors(); k++) {
+      values.push_back(made.sensors[k].*member);
+    }
+    return values;
+  };
+  answer_with({{"calibration",
+                {{"calibration_date_s", made.date_s},
+                 {"calibration_placements", made.placements},
+                 {"force_scale", made.force_scale},
+                 {"force_scale_sd", made.force_scale_sd},
+                 {"calibration_sigma_um", made.sigma_um},
+                 {"calibration_sigma_sd_um", made.sigma_sd_um},
+                 {"calibration_dip_share_q16", made.dip_share_q16},
+                 {"calibration_dip_sd_um", made.dip_sd_um},
+                 {"calibration_ambient_kPa", made.ambient_kPa},
+                 {"gain", of_sensors(&sensor_calibration::gain)},
+                 {"gain_sd", of_sensors(&sensor_calibration::gain_sd)},
+                 {"off_x_um", of_sensors(&sensor_calibration::off_x_um)},
+                 {"off_y_um", of_sensors(&sensor_calibration::off_y_um)},
+                 {"wider_q15", of_sensors(&sensor_calibration::wider_q15)}}},
+               {"before", scatter_of(session->scatter(false))},
+               {"after", scatter_of(session->scatter(true))}});
 }
 
 EXPORT(pulls_begin) PullSession *pulls_begin(double known_N) {
@@ -203,19 +148,10 @@ EXPORT(pulls_take) int pulls_take(PullSession *session) {
   return 1;
 }
 EXPORT(pulls_status) void pulls_status(const PullSession *session) {
-  Json json;
-  json.begin();
-  json.field("state", std::string_view(name_of(session->judgement().state)));
-  json.field("text", std::string_view(session->judgement().text));
-  json.field("advice", std::string_view(session->advice()));
-  json.field("finder", std::string_view(name_of(session->finder().state())));
-  json.field("last", std::string_view(session->pulls().empty() ? "" : session->last_pull_text()));
-  json.name("pulls").begin_list();
-  for (const calibrating::Pull &pull : session->pulls()) {
-    json.begin().field("x_mm", pull.x_mm).field("y_mm", pull.y_mm);
-    json.field("qx_N", pull.qx_N).field("qy_N", pull.qy_N).end();
-  }
-  answer_with(json.end_list().end());
+  answer_with({{"state", name_of(session->judgement().state)},
+               {"text", session->judgement().text},
+               {"advice", session->advice()},
+               {"last", session->pulls().empty() ? "" : session->last_pull_text()}});
 }
 // What the page gave last is the fingertip's info.
 EXPORT(pulls_result) void pulls_result(const PullSession *session) {
@@ -223,11 +159,7 @@ EXPORT(pulls_result) void pulls_result(const PullSession *session) {
     throw Error("not calibrated: " + session->judgement().text);
   }
   const pad_profile made = session->scaled(packet_of(WIRE_INFO).body.info.pad);
-  Json json;
-  json.begin();
-  json.field("tangential_scale", static_cast<double>(made.tangential_scale));
-  json.field("tangential_scale_sd", static_cast<double>(made.tangential_scale_sd));
-  answer_with(json.end());
+  answer_with({{"tangential_scale", made.tangential_scale}, {"tangential_scale_sd", made.tangential_scale_sd}});
 }
 
 namespace {
@@ -245,7 +177,7 @@ EXPORT(doctor_begin) Examined *doctor_begin(unsigned major, unsigned minor, unsi
   auto examined = std::make_unique<Examined>();
   examined->facts.knows_computer = false;
   examined->facts.tool_version = {major, minor, patch};
-  examined->facts.port = given_text();
+  examined->facts.port.assign(given.begin(), given.end());
   return examined.release();
 }
 EXPORT(doctor_free) void doctor_free(Examined *examined) { delete examined; }
@@ -278,26 +210,16 @@ void doctor_line(Examined *examined, double bytes, double packets, double droppe
   line.crc_errors = static_cast<std::uint64_t>(crc_errors);
   line.format_errors = static_cast<std::uint64_t>(format_errors);
 }
-// What the page gave is the code's name, a new line, and the text.
-EXPORT(doctor_failure) void doctor_failure(Examined *examined) {
-  const std::string all = given_text();
-  const std::size_t line = all.find('\n');
-  examined->facts.failure =
-      Failure{code_of(all.substr(0, line)), line == std::string::npos ? "" : all.substr(line + 1)};
-}
 EXPORT(doctor_status) void doctor_status(Examined *examined) {
   if (examined->measured) {
     examined->facts.rest = examined->rest.result();
   }
-  Json json;
-  json.begin_list();
+  json findings = json::array();
   for (const Finding &finding : judge(examined->facts)) {
-    json.begin();
-    json.field("verdict", std::string_view(verdict_text(finding.verdict)));
-    json.field("check", std::string_view(finding.check));
-    json.field("text", std::string_view(finding.text));
-    json.field("advice", std::string_view(finding.advice));
-    json.name("sensors").list(finding.sensors).end();
+    findings.push_back({{"verdict", verdict_text(finding.verdict)},
+                        {"check", finding.check},
+                        {"text", finding.text},
+                        {"advice", finding.advice}});
   }
-  answer_with(json.end_list());
+  answer_with(findings);
 }

@@ -5,18 +5,24 @@ export class WasmError extends Error {}
 
 /** The firmware ended itself, for its loader or in a panic; the module cannot be run again. */
 export class FirmwareLeft extends Error {
+  static LOADER = 1; // enum native_end
+
   constructor(how) {
-    super(how === FirmwareLeft.LOADER ? 'left for its loader' : 'ended itself');
+    super('the firmware ended itself');
     this.how = how;
   }
 }
-FirmwareLeft.LOADER = 1; // enum native_end
 
-/** An instance of a compiled module: its exports, ready to be called. unpack: what core.wasm wants. */
+/**
+ * An instance of a compiled module: its exports, ready to be called. unpack: what core.wasm wants.
+ * @param {WebAssembly.Module} module
+ * @param {((packed: Uint8Array, size: number) => Uint8Array) | null} unpack
+ */
 export async function start(module, unpack = null) {
   let exports;
   let written = '';
   const memory = () => new DataView(exports.memory.buffer);
+  /** @param {number} at */
   const textAt = (at) => {
     const bytes = new Uint8Array(exports.memory.buffer, at);
     return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
@@ -59,7 +65,12 @@ export async function start(module, unpack = null) {
   const instance = await WebAssembly.instantiate(module, imports);
   exports = instance.exports;
   exports._initialize();
-  /** Calls name; after an error the stack is as it was. */
+  /**
+   * Calls name; after an error the stack is as it was.
+   * @param {string} name
+   * @param {...(number | bigint)} values
+   * @returns {number}
+   */
   const call = (name, ...values) => {
     const stack = exports.__stack_pointer.value;
     try {
@@ -72,13 +83,33 @@ export async function start(module, unpack = null) {
       throw error instanceof WebAssembly.RuntimeError && written ? new WasmError(written) : error;
     }
   };
-  return {
-    exports,
-    call,
-    /** Views of the memory; a call may move it, so they are good until the next one. */
-    bytes: (at, length) => new Uint8Array(exports.memory.buffer, at, length),
-    floats: (at, length) => new Float32Array(exports.memory.buffer, at, length),
-    words: (at, length) => new Uint32Array(exports.memory.buffer, at, length),
-    doubles: (at, length) => new Float64Array(exports.memory.buffer, at, length),
+  const viewed = (Array) => (at, length) => new Array(exports.memory.buffer, at, length);
+  /** Views of the memory; a call may move it, so they are good until the next one. */
+  /** @type {(at: number, length: number) => Uint8Array<ArrayBuffer>} */
+  const bytes = viewed(Uint8Array);
+  /** @type {(at: number, length: number) => Uint32Array} */
+  const words = viewed(Uint32Array);
+  /** @type {(at: number, length: number) => Float64Array} */
+  const doubles = viewed(Float64Array);
+  /**
+   * What the function returns that is called with the addresses of copies of these, which then go; a text gets its final zero, null is 0.
+   * @param {(ArrayBufferView | string | null)[]} parts
+   * @param {(...at: number[]) => number} use
+   */
+  const lend = (parts, use) => {
+    const lent = parts.map((part) => {
+      const view = typeof part === 'string' ? new TextEncoder().encode(`${part}\0`) : part;
+      const at = view ? call('malloc', view.byteLength) : 0;
+      if (view) {
+        bytes(at, view.byteLength).set(new Uint8Array(view.buffer, view.byteOffset, view.byteLength));
+      }
+      return at;
+    });
+    try {
+      return use(...lent);
+    } finally {
+      lent.forEach((at) => call('free', at));
+    }
   };
+  return { call, bytes, words, doubles, lend, textAt, size_bytes: () => exports.memory.buffer.byteLength };
 }

@@ -2,45 +2,25 @@
 // line.
 // usage: node play.mjs simulated.wasm SCENARIO.csv COMMANDS OUTPUT.ftr [objects.bin]
 // COMMANDS: those of fingertip_player --commands. With a file of objects its pad is used, 12 mm without
-// ends, as by fingertip_player --pad 12. Prints {"seconds", "cpu_s", "bytes"}.
+// ends, as by fingertip_player --pad 12. Prints {"seconds", "cpu_s"}.
 import fs from 'node:fs';
-import { Firmware } from './firmware.mjs';
+import { Firmware, joined } from './firmware.mjs';
 
 const SLICE_us = 5000; // as of fingertip_player
 const TRUTHS = 7; // columns before the sensors, after t_s
 
 /** Rows of a file that fingertip_player has taken: of a right form. */
 function rowsOf(path, sensors) {
-  const lines = fs.readFileSync(path, 'utf8').split('\n');
-  const metadata = new Map();
-  let header = null;
-  const times_s = [];
-  const pressures_Pa = [];
-  const temperatures_degC = [];
-  for (const raw of lines) {
-    const line = raw.trim();
-    if (line.startsWith('#')) {
-      const colon = line.indexOf(':');
-      if (colon > 0 && !header) {
-        metadata.set(line.slice(1, colon).trim(), line.slice(colon + 1).trim());
-      }
-    } else if (line && !header) {
-      header = line.split(',').map((name) => name.trim());
-    } else if (line) {
-      const cells = line.split(',').map(Number);
-      times_s.push(cells[0]);
-      for (let k = 0; k < sensors; k++) {
-        pressures_Pa.push(cells[1 + TRUTHS + k]);
-      }
-      const at = header.indexOf('temperature_degC');
-      temperatures_degC.push(at < 0 ? Number(metadata.get('temperature_degC') ?? 25) : cells[at]);
-    }
-  }
+  const text = fs.readFileSync(path, 'utf8');
+  const metadata = (name, unless) => Number(new RegExp(`^# *${name} *: *(.*)$`, 'm').exec(text)?.[1] ?? unless);
+  const temperature_degC = metadata('temperature_degC', 25);
+  const temperature_at = /^t_s.*$/m.exec(text)[0].trim().split(',').indexOf('temperature_degC');
+  const table = text.match(/^[0-9.].*$/gm).map((line) => line.split(',').map(Number));
   return {
-    ambient_Pa: Number(metadata.get('ambient_Pa') ?? 101325),
-    times_s,
-    pressures_Pa,
-    temperatures_degC,
+    ambient_Pa: metadata('ambient_Pa', 101325),
+    times_s: table.map(([t_s]) => t_s),
+    pressures_Pa: table.flatMap((cells) => cells.slice(1 + TRUTHS, 1 + TRUTHS + sensors)),
+    temperatures_degC: table.map((cells) => cells[temperature_at] ?? temperature_degC),
   };
 }
 
@@ -51,7 +31,7 @@ const seconds = rows.times_s.at(-1);
 firmware.setRows(rows);
 if (objects) {
   firmware.setWorld({ objects: fs.readFileSync(objects) });
-  firmware.usePad(firmware.padCommand());
+  firmware.usePad();
 }
 firmware.powerUp({});
 firmware.open();
@@ -59,19 +39,14 @@ const sent = fs.readFileSync(commands);
 if (firmware.send(sent) !== sent.length) {
   throw new Error('the firmware does not take its commands');
 }
-const file = fs.openSync(output, 'w');
+const received = [];
 const end_us = Math.floor(1e6 * seconds);
 const begin = process.cpuUsage();
-let bytes = 0;
-for (let t_us = SLICE_us; ; t_us += SLICE_us) {
-  firmware.runUntil(Math.min(t_us, end_us));
-  const received = firmware.receive();
-  fs.writeSync(file, received);
-  bytes += received.length;
-  if (t_us >= end_us) {
-    break;
-  }
+for (let t_us = 0; t_us < end_us; ) {
+  t_us = Math.min(t_us + SLICE_us, end_us);
+  firmware.runUntil(t_us);
+  received.push(firmware.receive());
 }
-fs.closeSync(file);
 const { user, system } = process.cpuUsage(begin);
-console.log(JSON.stringify({ seconds, cpu_s: 1e-6 * (user + system), bytes }));
+fs.writeFileSync(output, joined(received));
+console.log(JSON.stringify({ seconds, cpu_s: 1e-6 * (user + system) }));

@@ -1,5 +1,5 @@
 // The simulated fingertip in real time, whatever the clock: what the page's worker does.
-import { Firmware } from './firmware.mjs';
+import { Firmware, joined } from './firmware.mjs';
 import { FirmwareLeft } from './module.mjs';
 
 const SLICE_us = 5000; // small enough that the line's queue, 4096 bytes, never fills up
@@ -9,38 +9,35 @@ const BEHIND_ms = 1000; // more than it catches up with: the computer slept
 /** Time in which the firmware starts, and stores its pad where it does not know it. */
 const START_us = 300e3;
 const STORE_us = 1000e3;
+const LASTING = ['choose', 'friction'];
 
 export class RealTime {
   /**
-   * module: of simulated.wasm. objects: bytes of the file of objects. options: serial, seed, noise,
-   * errors (twin --effects), parallelBus. clock: milliseconds that go on.
-   * Calls on.bytes(bytes), on.truth(truth) and on.left(why): the firmware is gone until it is opened
-   * again.
+   * module: of simulated.wasm. objects: bytes of the file of objects. clock: milliseconds that go on. on_bytes: called with what the
+   * line brings, and Firmware.truth() then. on_left: called with the reason where the firmware is gone until it is opened again.
+   * @param {{
+   *   module: WebAssembly.Module,
+   *   objects: Uint8Array,
+   *   options: { serial?: string, seed?: number, errors?: string, parallelBus?: boolean },
+   *   clock: () => number,
+   *   on_bytes: (bytes: Uint8Array<ArrayBuffer>, truth: ReturnType<Firmware['truth']>) => void,
+   *   on_left: (why: string) => void,
+   * }} parts
    */
-  constructor({ module, objects, options, on, clock }) {
-    Object.assign(this, { module, objects, options, on, clock });
+  constructor(parts) {
+    Object.assign(this, parts);
     this.firmware = null;
     this.kept = null;
     this.unsent = new Uint8Array(0);
     this.isOpen = false;
-    this.object = 0;
-    this.friction = null;
-    /** Time in which it could not keep up, for those who ask. */
-    this.skipped_ms = 0;
+    this.lasting = new Map(); // acts that outlast a restart
   }
 
   async plugIn() {
     const firmware = await Firmware.of(this.module);
-    firmware.setWorld({
-      objects: this.objects,
-      errors: this.options.errors,
-      seed: this.options.seed,
-    });
+    firmware.setWorld({ objects: this.objects, ...this.options });
     firmware.powerUp({ ...this.options, kept: this.kept });
-    firmware.choose(this.object);
-    if (this.friction !== null) {
-      firmware.setFriction(this.friction);
-    }
+    this.lasting.forEach((values, name) => firmware.act(name, ...values));
     this.t_us = 0;
     this.runFor(firmware, START_us);
     if (!this.kept) {
@@ -78,35 +75,17 @@ export class RealTime {
     this.unsent = new Uint8Array(0);
   }
 
+  /** @param {Uint8Array} bytes */
   send(bytes) {
-    const all = new Uint8Array(this.unsent.length + bytes.length);
-    all.set(this.unsent);
-    all.set(bytes, this.unsent.length);
-    this.unsent = all;
+    this.unsent = joined([this.unsent, bytes]);
   }
 
-  /** press, hold, drop, lift as of Firmware; choose and setFriction outlast a restart. */
+  /** As Firmware.act. */
   act(name, ...values) {
-    if (name === 'choose') {
-      this.object = values[0];
-    } else if (name === 'setFriction') {
-      this.friction = values[0];
+    if (LASTING.includes(name)) {
+      this.lasting.set(name, values);
     }
-    this.firmware?.[name](...values);
-  }
-
-  unplug() {
-    this.gone('unplugged');
-  }
-
-  gone(why) {
-    if (this.firmware) {
-      this.kept = this.firmware.kept();
-      this.firmware = null;
-      this.isOpen = false;
-      this.unsent = new Uint8Array(0);
-      this.on.left(why);
-    }
+    this.firmware?.act(name, ...values);
   }
 
   /** To be called every few milliseconds. */
@@ -118,10 +97,10 @@ export class RealTime {
     const behind_ms = begin_ms - this.begin_ms - 1e-3 * this.t_us;
     if (behind_ms > BEHIND_ms) {
       this.begin_ms += behind_ms;
-      this.skipped_ms += behind_ms;
     }
     const parts = [];
     const due_us = 1e3 * (begin_ms - this.begin_ms);
+    let left = null;
     try {
       while (this.t_us + SLICE_us <= due_us && this.clock() - begin_ms < BUSY_ms) {
         if (this.unsent.length > 0) {
@@ -135,27 +114,17 @@ export class RealTime {
       if (!(error instanceof FirmwareLeft)) {
         throw error;
       }
-      this.pass(parts);
-      this.gone(
-        error.how === FirmwareLeft.LOADER
-          ? 'it went to its loader; connect again, and it restarts'
-          : 'its firmware ended itself; connect again, and it restarts',
-      );
-      return;
+      left = error.how === FirmwareLeft.LOADER ? 'it went to its loader' : 'its firmware ended itself';
     }
-    this.pass(parts);
-    this.on.truth(this.firmware.truth());
-  }
-
-  pass(parts) {
-    const bytes = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
-    let at = 0;
-    for (const part of parts) {
-      bytes.set(part, at);
-      at += part.length;
-    }
+    const bytes = joined(parts);
     if (this.isOpen && bytes.length > 0) {
-      this.on.bytes(bytes);
+      this.on_bytes(bytes, this.firmware.truth());
+    }
+    if (left) {
+      this.kept = this.firmware.kept();
+      this.firmware = null;
+      this.close();
+      this.on_left(`${left}; connect again, and it restarts`);
     }
   }
 }

@@ -1,7 +1,7 @@
 /** The page's library, loaded before the tests that import this. */
 import { readFileSync } from 'node:fs';
-import { loadCore } from '../../../host_tools/web/src/core';
+import * as core from '../../../host_tools/web/src/core';
 
-await loadCore(readFileSync(process.env['FINGERTIP_CORE'] ?? ''));
+await core.loadCore(readFileSync(process.env['FINGERTIP_CORE'] ?? ''));
 
-export { core } from '../../../host_tools/web/src/core';
+export { core };

@@ -3,7 +3,7 @@
  * The view reads. Listeners are called on rare changes alone (state, info, health), not on packets:
  * draw on requestAnimationFrame from `contact`, `raw` and `history`.
  */
-import { core, type LineCounts } from '../core';
+import * as core from '../core';
 import type { Line } from '../line/line';
 import {
   Capability,
@@ -22,7 +22,7 @@ import {
   type Raw,
 } from '../line/line_facts';
 import { History } from './history';
-import { PATIENCE } from './patience';
+import { PATIENCE, pause } from './patience';
 
 /** opening: until its info came. live: it streams. silent: nothing for a while, though the line is
  * open. closed: by the page, or it left; `why` has the reason. */
@@ -41,17 +41,14 @@ export class CommandError extends Error {
 /** Another fingertip answered than the one that was expected back. */
 export class OtherFingertip extends Error {}
 
-/** Takes every packet as it comes; frame(): its COBS bytes without the delimiter. Contact
- * and raw packets are overwritten by the next. */
-export type PacketTap = (packet: DevicePacket, frame: () => Uint8Array<ArrayBuffer>) => void;
+/** Takes every packet as it comes. Contact and raw packets are overwritten by the next. */
+export type PacketTap = (packet: DevicePacket) => unknown;
 
 const SILENT_ms = 1500;
 const CLOCK_EVERY_ms = 1000;
 /** Versions of the protocol that ever were. */
 const OLDEST_VERSION = 1;
 
-/** Packets of the streams. All others are rare. */
-const STREAMED: ReadonlySet<number> = new Set([PacketType.CONTACT, PacketType.RAW]);
 /** Commands that write flash, so that their answer may take long. */
 const STORING: ReadonlySet<number> = new Set([
   PacketType.CMD_CALIBRATE,
@@ -83,7 +80,7 @@ export class Fingertip {
   health: Health | null = null;
   /** How its firmware last ended; null until asked for (askCrash). */
   crash: Crash | null = null;
-  readonly clock = core.newClockFit();
+  readonly clock = new core.ClockFit();
   /** null until its info came. */
   history: History | null = null;
   /** Packets of either kind since it was opened. */
@@ -94,11 +91,10 @@ export class Fingertip {
   /** A replay: it takes no commands. */
   readonly is_replay: boolean;
 
-  private readonly decoder = core.newDecoder();
+  private readonly decoder = new core.Decoder();
   private readonly listeners = new Set<() => void>();
   private readonly taps = new Set<PacketTap>();
   private readonly waiting: Waiting[] = [];
-  private readonly awaited = new Map<number, ((packet: DevicePacket) => void)[]>();
   private sequence = 0;
   private other_serial = '';
   private timer: ReturnType<typeof setInterval> | null = null;
@@ -126,7 +122,7 @@ export class Fingertip {
     return this.decoder.raw;
   }
 
-  get counts(): LineCounts {
+  get counts(): core.LineCounts {
     return this.decoder.counts;
   }
 
@@ -246,29 +242,20 @@ export class Fingertip {
 
   /** The command, then the packet that follows its acknowledgement. */
   private async ask(command: Question, answer: number): Promise<DevicePacket> {
-    let take: (packet: DevicePacket) => void = () => undefined;
+    let take!: (packet: DevicePacket) => void;
     const came = new Promise<DevicePacket>((done) => (take = done));
-    const queue = this.awaited.get(answer) ?? [];
-    this.awaited.set(answer, [...queue, take]);
+    const end = this.tap((packet) => packet.type === answer && take(packet));
     try {
       for (let tries = PATIENCE.tries; tries > 0; tries--) {
         await this.command({ type: command });
-        let timer;
-        const late = new Promise<null>((done) => {
-          timer = setTimeout(() => done(null), PATIENCE.answer_ms);
-        });
-        const packet = await Promise.race([came, late]);
-        clearTimeout(timer);
+        const packet = await Promise.race([came, pause(PATIENCE.answer_ms)]);
         if (packet) {
           return packet;
         }
       }
       throw new CommandError(`${core.commandName(command)}: no answer came; try again`, null);
     } finally {
-      this.awaited.set(
-        answer,
-        (this.awaited.get(answer) ?? []).filter((each) => each !== take),
-      );
+      end();
     }
   }
 
@@ -310,7 +297,7 @@ export class Fingertip {
     }
     const until_ms = performance.now() + PATIENCE.version_ms;
     while (this.decoder.other_version === 0 && (this.state as FingertipState) !== 'closed' && performance.now() < until_ms) {
-      await new Promise((done) => setTimeout(done, 20));
+      await pause(20);
     }
     return this.decoder.other_version;
   }
@@ -420,25 +407,17 @@ export class Fingertip {
         break;
     }
     for (const tap of this.taps) {
-      tap(packet, () => core.encode(packet).slice(0, -1));
+      tap(packet);
     }
-    if (!STREAMED.has(packet.type)) {
-      const awaited = this.awaited.get(packet.type)?.shift();
-      awaited?.(packet);
-      if (packet.type !== PacketType.ACK) {
-        this.changed();
-      }
+    if (packet.type === PacketType.INFO || packet.type === PacketType.HEALTH || packet.type === PacketType.CRASH) {
+      this.changed();
     }
   };
 
   private acknowledge(ack: Ack): void {
     const waiting = this.waiting.find((each) => each.command === ack.command && each.sequence === ack.command_sequence);
     if (waiting && waiting.sent_us === ack.host_time_us) {
-      this.clock.add({
-        sent_us: waiting.sent_us,
-        received_us: this.heard_ms * 1000,
-        device_us: ack.t_us,
-      });
+      this.clock.add(waiting.sent_us, this.heard_ms * 1000, ack.t_us);
       waiting.done(ack);
     }
   }

@@ -10,11 +10,6 @@ import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, ty
 /** Rows: 3.3 minutes at 1308 frames a second, some 45 MB with 15 sensors. */
 export const HISTORY_ROWS = 1 << 18;
 
-/** Which flag a quantity needs. */
-export function flagOf(field: ContactField): number {
-  return CONTACT_FLAG[field];
-}
-
 /** The readings of one frame; bitmaps by sensor. pressure_Pa [sensor]: above the tare, over the gain, as the fit
  * gets it; NaN where the reading is no measurement. */
 export interface Readings {
@@ -68,7 +63,7 @@ export class History {
     this.pressure_Pa = new Float32Array(capacity * sensor_count);
     this.fields = CONTACT_FIELDS.map((field) => ({
       field,
-      flag: flagOf(field),
+      flag: CONTACT_FLAG[field],
       column: new Float32Array(capacity),
     }));
     this.columns = Object.fromEntries(this.fields.map(({ field, column }) => [field, column])) as Record<ContactField, Float32Array>;
@@ -105,16 +100,13 @@ export class History {
 
   /** A view of a row's readings, overwritten with it; null where no raw packet came. */
   readingsAt(row: number): Readings | null {
+    if (row < this.oldest || row >= this.next) {
+      return null;
+    }
     const slot = row % this.capacity;
     const pressure_Pa = this.pressure_Pa.subarray(slot * this.sensor_count, (slot + 1) * this.sensor_count);
-    return row < this.oldest || row >= this.next || pressure_Pa.every(Number.isNaN)
-      ? null
-      : {
-          valid: this.valid[slot],
-          saturated: this.saturated[slot],
-          doubtful: this.doubtful[slot],
-          pressure_Pa,
-        };
+    const [valid, saturated, doubtful] = [this.valid[slot], this.saturated[slot], this.doubtful[slot]];
+    return pressure_Pa.every(Number.isNaN) ? null : { valid, saturated, doubtful, pressure_Pa };
   }
 
   addContact(contact: Contact): void {
@@ -132,12 +124,14 @@ export class History {
     if (this.next !== known) {
       this.flags[slot] = raw.flags;
     }
-    this.valid[slot] = raw.valid;
-    this.saturated[slot] = raw.saturated;
-    this.doubtful[slot] = raw.doubtful;
+    const held = (raw.flags & Flag.HELD) !== 0; // its readings are those of the frame before
+    const before = (slot + this.capacity - 1) % this.capacity;
+    this.valid[slot] = held ? this.valid[before] : raw.valid;
+    this.saturated[slot] = held ? this.saturated[before] : raw.saturated;
+    this.doubtful[slot] = held ? this.doubtful[before] : raw.doubtful;
     const count = Math.min(this.sensor_count, raw.sensor_count);
     const at = slot * this.sensor_count;
-    const measured = raw.flags & Flag.HELD ? ~0 : raw.valid;
+    const measured = held ? ~0 : raw.valid;
     for (let k = 0; k < count; k++) {
       const above_Pa = (raw.pressure_Pa_q10[k] - raw.baseline_Pa_q10[k]) / 1024;
       this.pressure_Pa[at + k] = (measured >>> k) & 1 ? above_Pa / (k < this.gain.length ? this.gain[k] : 1) : NaN;

@@ -25,3 +25,5 @@ declare global {
 }
 
 export const PATIENCE = { ...USUAL, ...globalThis.fingertipPatience };
+
+export const pause = (ms: number): Promise<void> => new Promise((done) => setTimeout(done, ms));

@@ -78,18 +78,24 @@ export function download(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
-/** Asks where, if the browser lets a page write files; needs a click. null: nothing was chosen. */
-export async function chooseOutput(name: string, media_type: string): Promise<Output | null> {
-  if (!('showSaveFilePicker' in window)) {
-    return new DownloadOutput(name, media_type);
-  }
+/** Asks where to write; needs a click. null: nothing was chosen. instead: what to do where the browser refuses. */
+export async function chooseFile(name: string, instead: string): Promise<{ name: string; stream: FileSystemWritableFileStream } | null> {
   try {
     const handle = await window.showSaveFilePicker({ suggestedName: name });
-    return new FileOutput(handle.name, await handle.createWritable());
+    return { name: handle.name, stream: await handle.createWritable() };
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') {
       return null;
     }
-    throw new Error(`the browser does not let this page write there (${String(error)}): choose another folder`);
+    throw new Error(`the browser does not let this page write there (${String(error)}): ${instead}`);
   }
+}
+
+/** A file of the user's choice, if the browser lets a page write files. null: nothing was chosen. */
+export async function chooseOutput(name: string, media_type: string): Promise<Output | null> {
+  if (!('showSaveFilePicker' in window)) {
+    return new DownloadOutput(name, media_type);
+  }
+  const file = await chooseFile(name, 'choose another folder');
+  return file && new FileOutput(file.name, file.stream);
 }

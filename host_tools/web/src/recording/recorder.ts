@@ -1,5 +1,5 @@
 /** Records one fingertip from now on, over its going and coming back. */
-import { core, type LineCounts, type Writer } from '../core';
+import { Writer, countsSince, type LineCounts } from '../core';
 import { PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import type { Output } from './output';
@@ -47,7 +47,7 @@ export class Recorder {
       this.guard(() => {
         if (!this.writer && packet.type === PacketType.INFO) {
           this.before = { ...fingertip.counts, packets: fingertip.counts.packets - 1 };
-          this.writer = core.newWriter(kind, packet, [
+          this.writer = new Writer(kind, packet, [
             ['recorded_by', `fingertip page ${version}`],
             ['started_utc', utcNow()],
             ['port', fingertip.line.label],
@@ -77,11 +77,7 @@ export class Recorder {
   async finish(reason = 'stopped'): Promise<void> {
     this.end_tap();
     this.end_listen();
-    const counts = { ...this.fingertip.counts };
-    for (const key of Object.keys(counts) as (keyof LineCounts)[]) {
-      counts[key] -= this.before[key];
-    }
-    this.writer?.finish(reason, counts);
+    this.writer?.finish(reason, countsSince(this.before, this.fingertip.counts));
     this.write();
     await this.output.finish();
   }

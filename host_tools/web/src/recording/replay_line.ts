@@ -3,9 +3,10 @@
  * has a line; all share the reading and the clock.
  */
 import { Decompress } from 'fzstd';
-import { CoreError, core, setUnpack, type Reader } from '../core';
+import { CoreError, Reader, encode, setUnpack } from '../core';
 import type { Line } from '../line/line';
 import { PacketType, type DevicePacket } from '../line/line_facts';
+import { pause } from '../model/patience';
 
 /** No more than size bytes, whatever the file holds; fewer where it holds fewer. */
 setUnpack((packed, size) => {
@@ -48,7 +49,7 @@ const ADVICE: Record<number, string> = {
 
 /** All that is in a file: a recording (.csv, .mcap), or bytes of a line (.ftr). Throws ReadError. */
 export async function* readItems(file: File): AsyncGenerator<Item, void, undefined> {
-  const reader = core.newReader(file.name, file.size);
+  const reader = new Reader(file.name, file.size);
   const chunks = file.stream().getReader();
   let packets = 0;
   try {
@@ -192,7 +193,7 @@ export class Replay {
 
   private async run(): Promise<void> {
     while (!this.stopped) {
-      await new Promise((done) => setTimeout(done, TICK_ms));
+      await pause(TICK_ms);
       await this.advance();
     }
   }
@@ -247,7 +248,7 @@ export class Replay {
     if (line && packet.type === PacketType.INFO) {
       line.serial = packet.serial;
     }
-    line?.take(core.encode(packet));
+    line?.take(encode(packet));
   }
 
   private end(problem: string): void {

@@ -3,16 +3,7 @@
  * web`, passes on (host_tools/web/server/simulations.hpp). Simulated figures, all of them.
  */
 import type { Line } from '../line/line';
-
-/** The truth of `fingertip simulate`, some 30 ms old. */
-export interface ServedTruth {
-  contact: boolean;
-  x_mm: number;
-  y_mm: number;
-  force_N: number;
-  qx_N: number;
-  qy_N: number;
-}
+import { NO_TRUTH, type Hand } from '../view/shown';
 
 export interface Served {
   serial: string;
@@ -20,7 +11,6 @@ export interface Served {
   hand: boolean;
 }
 
-const NOTHING: ServedTruth = { contact: false, x_mm: 0, y_mm: 0, force_N: 0, qx_N: 0, qy_N: 0 };
 const ASK_ms = 33;
 
 const at = (path: string, query: Record<string, string> = {}): string => {
@@ -38,9 +28,10 @@ export async function findServed(): Promise<Served[] | null> {
 
 export class ServedFingertip implements Line {
   readonly label: string;
-  truth: ServedTruth = NOTHING;
-  /** A ball of 15 mm, on rubber of 12 mm: where it is, and how hard; null lifts. */
-  readonly press: ((hand: { x_mm: number; y_mm: number; force_N: number } | null) => void) | undefined;
+  /** Some 30 ms old. */
+  truth = NO_TRUTH;
+  /** A ball of 15 mm, on rubber of 12 mm. */
+  readonly press: Hand['press'] | undefined;
 
   private readonly client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join('');
   private readonly aborter = new AbortController();
@@ -51,11 +42,12 @@ export class ServedFingertip implements Line {
   constructor(readonly served: Served) {
     this.label = `simulated ${served.serial.slice(-4)}`;
     this.press = served.hand
-      ? (hand) => {
-          this.command = hand ? ['press', ...[hand.x_mm, hand.y_mm, hand.force_N].map((value) => value.toFixed(3))].join(' ') : 'lift';
-          void this.ask();
-        }
+      ? ({ x_mm, y_mm, force_N }) => this.ask(`press ${[x_mm, y_mm, force_N].map((value) => value.toFixed(3)).join(' ')}`)
       : undefined;
+  }
+
+  lift(): void {
+    void this.ask('lift');
   }
 
   async open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
@@ -64,7 +56,7 @@ export class ServedFingertip implements Line {
     if (!answer.ok || !answer.body) {
       throw new Error(`the simulated fingertip cannot be reached: ${(await answer.text()).trim()}`);
     }
-    this.timer = setInterval(() => void this.ask(), ASK_ms);
+    this.timer = setInterval(() => void this.ask(''), ASK_ms);
     void this.read(answer.body.getReader(), receive, closed);
   }
 
@@ -108,26 +100,27 @@ export class ServedFingertip implements Line {
   }
 
   /** What the hand does, and what is true; one request at a time, so a slow server gets the newest. */
-  private async ask(): Promise<void> {
+  private async ask(command: string): Promise<void> {
+    this.command = command || this.command;
     if (this.asking) {
       return;
     }
     this.asking = true;
-    const command = this.command;
+    const sent = this.command;
     this.command = '';
     try {
-      const answer = await this.post('simulated/hand', command);
+      const answer = await this.post('simulated/hand', sent);
       if (answer.ok && this.timer !== null) {
-        const truth = (await answer.json()) as Partial<ServedTruth>;
+        const truth = (await answer.json()) as Partial<typeof NO_TRUTH>;
         const { force_N = 0 } = truth;
-        this.truth = { ...NOTHING, ...truth, contact: force_N > 0 };
+        this.truth = { ...NO_TRUTH, ...truth, contact: force_N > 0 };
       }
     } catch {
       // The line reports that the server has ended.
     }
     this.asking = false;
     if (this.command !== '' && this.timer !== null) {
-      void this.ask();
+      void this.ask('');
     }
   }
 
@@ -136,6 +129,6 @@ export class ServedFingertip implements Line {
       clearInterval(this.timer);
     }
     this.timer = null;
-    this.truth = NOTHING;
+    this.truth = NO_TRUTH;
   }
 }

@@ -1,9 +1,23 @@
 /** Runs a simulated fingertip beside the page. */
 import { RealTime } from '../../wasm/real_time.mjs';
-import type { FromWorker, ToWorker } from './messages';
+import type { ShownTruth } from '../view/shown';
+
+export type ToWorker =
+  /** Of the first, the addresses of simulated.wasm and of the file of objects, and RealTime's options. */
+  | { kind: 'open'; wasm: string; objects: string; options: ConstructorParameters<typeof RealTime>[0]['options'] }
+  | { kind: 'close' }
+  | { kind: 'send'; bytes: Uint8Array }
+  /** As of RealTime. */
+  | { kind: 'act'; name: string; values: number[] };
+
+export type FromWorker =
+  | { kind: 'opened' }
+  | { kind: 'failed'; why: string }
+  /** at_ms: since the Unix epoch. */
+  | { kind: 'bytes'; bytes: Uint8Array; at_ms: number; truth: ShownTruth }
+  | { kind: 'left'; why: string };
 
 const TICK_ms = 4;
-const TRUTH_ms = 16;
 
 let fingertip: Promise<RealTime> | null = null;
 
@@ -19,28 +33,14 @@ async function fetched(url: string): Promise<ArrayBuffer> {
   return response.arrayBuffer();
 }
 
-async function start(message: ToWorker & { kind: 'start' }): Promise<RealTime> {
-  const [wasm, objects] = await Promise.all([fetched(message.wasm), fetched(message.objects)]);
-  let truth_sent_ms = 0;
+async function start({ wasm, objects, options }: ToWorker & { kind: 'open' }): Promise<RealTime> {
   const made = new RealTime({
-    module: await WebAssembly.compile(wasm),
-    objects: new Uint8Array(objects),
-    options: message.options,
+    module: await WebAssembly.compile(await fetched(wasm)),
+    objects: new Uint8Array(await fetched(objects)),
+    options,
     clock: () => performance.now(),
-    on: {
-      bytes(bytes) {
-        const at_ms = performance.timeOrigin + performance.now();
-        post({ kind: 'bytes', bytes, at_ms }, [bytes.buffer as ArrayBuffer]);
-      },
-      truth(truth) {
-        const now_ms = performance.now();
-        if (now_ms - truth_sent_ms >= TRUTH_ms) {
-          truth_sent_ms = now_ms;
-          post({ kind: 'truth', truth });
-        }
-      },
-      left: (why) => post({ kind: 'left', why }),
-    },
+    on_bytes: (bytes, truth) => post({ kind: 'bytes', bytes, at_ms: performance.timeOrigin + performance.now(), truth }, [bytes.buffer]),
+    on_left: (why) => post({ kind: 'left', why }),
   });
   const tick = () => {
     try {
@@ -55,15 +55,10 @@ async function start(message: ToWorker & { kind: 'start' }): Promise<RealTime> {
 }
 
 async function take(message: ToWorker): Promise<void> {
-  if (message.kind === 'start') {
-    fingertip = start(message);
-    // Sent to the page that opens it.
-    fingertip.catch(() => {});
-    return;
-  }
   if (message.kind === 'open') {
     try {
-      await (await fingertip)?.open();
+      fingertip ??= start(message);
+      await (await fingertip).open();
       post({ kind: 'opened' });
     } catch (error) {
       post({ kind: 'failed', why: error instanceof Error ? error.message : String(error) });
@@ -71,22 +66,12 @@ async function take(message: ToWorker): Promise<void> {
     return;
   }
   const running = await fingertip?.catch(() => null);
-  if (!running) {
-    return;
-  }
-  switch (message.kind) {
-    case 'close':
-      running.close();
-      break;
-    case 'unplug':
-      running.unplug();
-      break;
-    case 'send':
-      running.send(message.bytes);
-      break;
-    case 'act':
-      running.act(message.name, ...message.values);
-      break;
+  if (message.kind === 'close') {
+    running?.close();
+  } else if (message.kind === 'send') {
+    running?.send(message.bytes);
+  } else {
+    running?.act(message.name, ...message.values);
   }
 }
 

@@ -8,7 +8,7 @@ import type { Replay } from '../recording/replay_line';
 import { ServedFingertip, findServed } from '../simulated/served_fingertip';
 import { SimulatedFingertip } from '../simulated/simulated_fingertip';
 import { version } from '../../package.json';
-import { wordsOf } from './dialog';
+import { wordsOf } from '../view/elements';
 
 export const PAGE_VERSION = version;
 
@@ -82,7 +82,7 @@ export class App {
 
   simulate(): void {
     const serial = `51${String(++this.simulated).padStart(14, '0')}`;
-    const fingertip = new Fingertip(new SimulatedFingertip({ serial, seed: this.simulated }));
+    const fingertip = new Fingertip(new SimulatedFingertip(serial, this.simulated));
     this.bench.add(fingertip);
     fingertip.open().catch((error: unknown) => this.notice(wordsOf(error), 'bad'));
   }

@@ -1,90 +1,68 @@
-/** Dialogs as plain DOM: what the steps of the page have in common. Their appearance: src/styles. */
-
-type Attributes = Record<string, string | boolean>;
-
-export function make<Name extends keyof HTMLElementTagNameMap>(
-  name: Name,
-  attributes: Attributes = {},
-  ...children: (Node | string)[]
-): HTMLElementTagNameMap[Name] {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) {
-    if (value !== false) {
-      made.setAttribute(key, value === true ? '' : value);
-    }
-  }
-  made.append(...children);
-  return made;
-}
-
-export function makeButton(label: string, press: () => void, main = false): HTMLButtonElement {
-  const button = make('button', { type: 'button', class: main ? 'main' : '' }, label);
-  button.addEventListener('click', press);
-  return button;
-}
-
-/** The text of an error, for people. */
-export function wordsOf(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
-}
+/** Dialogs: what the steps of the page have in common. */
+import { MAIN, button, element, paragraph, wordsOf, write } from '../view/elements';
 
 let dialogs = 0;
 
 /** A dialog with a title, a message, an error, and a row of choices. */
 export class Dialog {
   readonly element: HTMLDialogElement;
-  readonly content = make('div');
+  readonly content = element('div');
   /** Spoken as it changes. */
-  readonly message = make('p', { role: 'status' });
-  private readonly problem = make('p', { class: 'error', role: 'alert', hidden: true });
-  private readonly choices = make('menu', { class: 'choices' });
-  private closed = false;
+  private readonly message = element('p', { role: 'status' });
+  private readonly problem = element('p', { class: 'error', role: 'alert', hidden: true });
+  private readonly choices = element('menu', { class: 'choices' });
+  is_closed = false;
 
-  /** onClose: once, however it was closed. */
-  constructor(title: string, onClose: () => void = () => undefined) {
+  constructor(title: string, ...content: (Node | string)[]) {
     const id = `step-${++dialogs}`;
-    this.element = make(
+    const heading = element('h2', { id }, title);
+    this.element = element(
       'dialog',
       { class: 'step', 'aria-labelledby': id },
-      make('h2', { id }, title),
+      heading,
       this.content,
       this.message,
       this.problem,
       this.choices,
     );
     this.element.addEventListener('close', () => {
-      this.closed = true;
+      this.is_closed = true;
       this.element.remove();
-      onClose();
     });
+    this.show(...content);
     document.body.append(this.element);
     this.choose();
     this.element.showModal();
   }
 
-  get is_closed(): boolean {
-    return this.closed;
+  /** Instead of what it has; a text becomes a paragraph. */
+  show(...content: (Node | string)[]): void {
+    this.content.replaceChildren(...content.map((each) => (typeof each === 'string' ? paragraph(each) : each)));
   }
 
   /** The buttons, before the one that closes. */
   choose(buttons: HTMLButtonElement[] = [], close = 'Cancel'): void {
-    this.choices.replaceChildren(...[...buttons, makeButton(close, () => this.close())].map((button) => make('li', {}, button)));
+    this.choices.replaceChildren(...[...buttons, button(close, () => this.close())].map((each) => element('li', {}, each)));
+  }
+
+  /** The button of an answer that takes time. */
+  doing(label: string, work: () => Promise<void>, attributes = {}): HTMLButtonElement {
+    return button(label, () => void this.run(work), attributes);
+  }
+
+  /** Asks whether what was found is to be stored in the fingertip; store throws where it was not. */
+  offer(store: () => Promise<void>): void {
+    this.setMessage('Store it in the fingertip?');
+    const stored = async (): Promise<void> => {
+      await store();
+      this.setMessage('Stored: it applies from now on, and without power.');
+      this.choose([], 'Close');
+    };
+    this.choose([this.doing('Store', stored, MAIN)]);
   }
 
   setMessage(text: string): void {
-    if (this.message.textContent !== text) {
-      this.message.textContent = text;
-    }
-  }
-
-  fail(error: unknown): void {
-    this.problem.textContent = wordsOf(error);
-    this.problem.hidden = false;
-  }
-
-  clearError(): void {
-    this.problem.hidden = true;
-    this.problem.textContent = '';
+    write(this.message, text);
   }
 
   close(): void {
@@ -93,13 +71,14 @@ export class Dialog {
 
   /** Runs what a button starts: the buttons rest meanwhile, and its error is shown. */
   async run(work: () => Promise<void>): Promise<void> {
-    this.clearError();
+    this.problem.hidden = true;
     const buttons = [...this.choices.querySelectorAll('button')].filter((each) => !each.disabled);
     buttons.forEach((each) => (each.disabled = true));
     try {
       await work();
     } catch (error) {
-      this.fail(error);
+      this.problem.textContent = wordsOf(error);
+      this.problem.hidden = false;
     } finally {
       buttons.forEach((each) => (each.disabled = false));
     }
@@ -110,10 +89,20 @@ export class Dialog {
 export function field(label: string, input: HTMLElement, hint = ''): HTMLElement {
   const id = `field-${++dialogs}`;
   input.id = id;
-  const parts: HTMLElement[] = [make('label', { for: id }, label), input];
+  const parts: HTMLElement[] = [element('label', { for: id }, label), input];
   if (hint) {
     input.setAttribute('aria-describedby', `${id}-hint`);
-    parts.push(make('small', { id: `${id}-hint` }, hint));
+    parts.push(element('small', { id: `${id}-hint` }, hint));
   }
-  return make('p', { class: 'field' }, ...parts);
+  return element('p', { class: 'field' }, ...parts);
+}
+
+/** A form whose Enter key does this. */
+export function form(submit: () => void, ...content: HTMLElement[]): HTMLFormElement {
+  const made = element('form', {}, ...content);
+  made.addEventListener('submit', (event) => {
+    event.preventDefault();
+    submit();
+  });
+  return made;
 }

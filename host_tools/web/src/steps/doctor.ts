@@ -1,115 +1,80 @@
 /** Doctor: the tool's own checks and sentences (host_tools/tool/doctor), over ten seconds at rest. */
+import { countsSince, frameOf } from '../core';
 import { PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { PATIENCE } from '../model/patience';
-import { loadJudges, type Finding } from '../judges/judges';
+import { PATIENCE, pause } from '../model/patience';
+import { MAIN, element } from '../view/elements';
 import { PAGE_VERSION } from './app';
-import { Dialog, make, makeButton } from './dialog';
+import { Dialog } from './dialog';
+import { loadJudges } from './judges';
 
 const SECONDS = 10;
 const VERDICTS = { ok: 'fine', warn: 'look', bad: 'wrong' };
 
 export function examine(fingertip: Fingertip): void {
-  let stopped = false;
-  const dialog = new Dialog(`Doctor: ${fingertip.name}`, () => (stopped = true));
-  const bar = make('progress', { max: String(SECONDS), 'aria-label': 'Measuring' });
-  bar.hidden = true;
-  const list = make('ul', { class: 'findings' });
-  dialog.content.append(
-    make('p', {}, `Nothing may touch the pad for ${SECONDS} seconds. What it finds is listed with what to do.`),
-    bar,
-    list,
-  );
-  const begin = (): Promise<void> =>
-    dialog.run(async () => {
-      list.replaceChildren();
-      bar.hidden = false;
-      bar.value = 0;
-      dialog.setMessage('Measuring …');
-      try {
-        const findings = await findingsOf(
-          fingertip,
-          (seconds) => (bar.value = seconds),
-          () => stopped,
-        );
-        list.replaceChildren(...findings.map(item));
-        const wrong = findings.filter((finding) => finding.verdict !== 'ok').length;
-        dialog.setMessage(wrong === 0 ? 'All is well.' : `${wrong} of ${findings.length} checks found something.`);
-      } finally {
-        bar.hidden = true;
+  const bar = element('progress', { max: SECONDS, 'aria-label': 'Measuring', hidden: true });
+  const list = element('ul', { class: 'findings' });
+  const advice = `Nothing may touch the pad for ${SECONDS} seconds. What it finds is listed with what to do.`;
+  const dialog = new Dialog(`Doctor: ${fingertip.name}`, advice, bar, list);
+  const begin = async (): Promise<void> => {
+    list.replaceChildren();
+    bar.hidden = false;
+    bar.value = 0;
+    dialog.setMessage('Measuring …');
+    try {
+      const findings = await findingsOf(fingertip, dialog, bar);
+      for (const { verdict, check, text, advice } of findings) {
+        const title = element('strong', {}, `${VERDICTS[verdict]}: ${check}`);
+        list.append(element('li', { class: verdict }, title, ` ${text}${advice ? `; ${advice}` : ''}`));
       }
-    });
-  dialog.choose([makeButton('Examine', () => void begin(), true)], 'Close');
+      const wrong = findings.filter((finding) => finding.verdict !== 'ok').length;
+      dialog.setMessage(wrong === 0 ? 'All is well.' : `${wrong} of ${findings.length} checks found something.`);
+    } finally {
+      bar.hidden = true;
+    }
+  };
+  dialog.choose([dialog.doing('Examine', begin, MAIN)], 'Close');
 }
 
-function item(finding: Finding): HTMLElement {
-  return make(
-    'li',
-    { class: finding.verdict },
-    make('strong', {}, `${VERDICTS[finding.verdict]}: ${finding.check}`),
-    ` ${finding.text}${finding.advice ? `; ${finding.advice}` : ''}`,
-  );
-}
-
-async function findingsOf(fingertip: Fingertip, progress: (seconds: number) => void, stopped: () => boolean): Promise<Finding[]> {
+async function findingsOf(fingertip: Fingertip, dialog: Dialog, bar: HTMLProgressElement) {
   const judges = await loadJudges();
-  const tool_version = PAGE_VERSION.split('.').map(Number) as [number, number, number];
+  const tool_version = PAGE_VERSION.split('.').map(Number);
   const examination = judges.examination({ port: fingertip.line.label, tool_version });
-  const frames = new Map<number, Uint8Array>();
   let measuring = false;
   let last_ms = performance.now();
-  const end = fingertip.tap((packet, frame) => {
+  const end = fingertip.tap((packet) => {
     if (packet.type === PacketType.CONTACT || packet.type === PacketType.RAW) {
       last_ms = performance.now();
       if (measuring) {
-        examination.take(frame());
+        examination.give('take', frameOf(packet));
       }
-    } else {
-      frames.set(packet.type, frame());
     }
   });
-  const frameOf = (type: number): Uint8Array => {
-    const frame = frames.get(type);
-    if (!frame) {
-      throw new Error('the fingertip gave no answer; unplug it and plug it in again');
-    }
-    return frame;
-  };
   const askCrash = async (): Promise<void> => {
-    if (await fingertip.askCrash()) {
-      examination.crash(frameOf(PacketType.CRASH));
+    const crash = await fingertip.askCrash();
+    if (crash) {
+      examination.give('crash', frameOf(crash));
     }
   };
   try {
-    await fingertip.askInfo();
-    examination.info(frameOf(PacketType.INFO));
-    await fingertip.askHealth();
-    examination.before(frameOf(PacketType.HEALTH));
+    examination.give('info', frameOf(await fingertip.askInfo()));
+    examination.give('before', frameOf(await fingertip.askHealth()));
     await askCrash();
-    const before = { ...fingertip.counts };
+    const before = fingertip.counts;
     measuring = true;
     while (examination.seconds() < SECONDS && performance.now() - last_ms < PATIENCE.slow_frame_ms) {
-      await new Promise((done) => setTimeout(done, 100));
-      if (stopped()) {
+      await pause(100);
+      if (dialog.is_closed) {
         return [];
       }
       if (fingertip.state === 'closed') {
         throw new Error(`it vanished while it was examined: ${fingertip.why}`);
       }
-      progress(examination.seconds());
+      bar.value = examination.seconds();
     }
     measuring = false;
-    const { counts } = fingertip;
-    examination.line({
-      bytes: counts.bytes - before.bytes,
-      packets: counts.packets - before.packets,
-      dropped_packets: counts.dropped_packets - before.dropped_packets,
-      out_of_order: counts.out_of_order - before.out_of_order,
-      crc_errors: counts.crc_errors - before.crc_errors,
-      format_errors: counts.format_errors - before.format_errors,
-    });
-    await fingertip.askHealth();
-    examination.after(frameOf(PacketType.HEALTH));
+    examination.line(countsSince(before, fingertip.counts));
+    examination.give('after', frameOf(await fingertip.askHealth()));
     await askCrash();
     return examination.findings();
   } finally {

@@ -1,12 +1,13 @@
 /** Flash: reboots the fingertip to the boot ROM's loader, and writes the image through the file
  * picker onto the drive that appears. */
-import { CoreError, core } from '../core';
+import { CoreError, firmwareOf } from '../core';
 import { LOADER_MAGIC, PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { PATIENCE } from '../model/patience';
-import { download } from '../recording/output';
+import { PATIENCE, pause } from '../model/patience';
+import { chooseFile, download } from '../recording/output';
+import { MAIN, element } from '../view/elements';
 import type { App } from './app';
-import { Dialog, field, make, makeButton } from './dialog';
+import { Dialog, field } from './dialog';
 
 interface Image {
   name: string;
@@ -19,7 +20,7 @@ interface Image {
 async function imageOf(file: File): Promise<Image> {
   const bytes = new Uint8Array(await file.arrayBuffer());
   try {
-    return { name: file.name, bytes, ...core.firmwareOf(file.name, bytes) };
+    return { name: file.name, bytes, ...firmwareOf(file.name, bytes) };
   } catch (error) {
     throw error instanceof CoreError ? new Error(`${error.message}: choose fingertip-BOARD.uf2 of the build`) : error;
   }
@@ -35,38 +36,33 @@ const STEPS = [
 ];
 
 export function flash(app: App, fingertip: Fingertip): void {
-  const dialog = new Dialog(`Flash ${fingertip.name}`);
-  const items = STEPS.map((text) => make('li', {}, text));
-  const input = make('input', { type: 'file', accept: '.uf2' });
-  dialog.content.append(make('ol', { class: 'steps' }, ...items), field('Image', input));
+  const items = STEPS.map((text) => element('li', {}, text));
+  const input = element('input', { type: 'file', accept: '.uf2' });
+  const dialog = new Dialog(`Flash ${fingertip.name}`, element('ol', { class: 'steps' }, ...items), field('Image', input));
   let image: Image | null = null;
-  const at = (step: number): void =>
-    items.forEach((item, i) => (i === step ? item.setAttribute('aria-current', 'step') : item.removeAttribute('aria-current')));
-  const reboot = makeButton('Reboot to the loader', () => void dialog.run(toLoader), true);
-  const save = makeButton('Save onto the drive', () => void dialog.run(toDrive), true);
+  const reboot = dialog.doing('Reboot to the loader', toLoader, MAIN);
+  const save = dialog.doing('Save onto the drive', toDrive, MAIN);
   const show = (step: number): void => {
-    at(step);
+    items.forEach((item, i) => (i === step ? item.setAttribute('aria-current', 'step') : item.removeAttribute('aria-current')));
     dialog.choose(step === 1 ? [reboot] : step === 2 ? [save] : [], step === 3 ? 'Close' : 'Cancel');
   };
   show(0);
 
-  input.addEventListener(
-    'change',
-    () =>
-      void dialog.run(async () => {
-        const file = input.files?.[0];
-        if (!file) {
-          return;
-        }
-        image = await imageOf(file);
-        const board = fingertip.info?.board;
-        if (board && board !== image.board) {
-          throw new Error(`${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`);
-        }
-        dialog.setMessage(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
-        show(1);
-      }),
-  );
+  input.addEventListener('change', () => void dialog.run(choose));
+
+  async function choose(): Promise<void> {
+    const file = input.files?.[0];
+    if (!file) {
+      return;
+    }
+    image = await imageOf(file);
+    const board = fingertip.info?.board;
+    if (board && board !== image.board) {
+      throw new Error(`${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`);
+    }
+    dialog.setMessage(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
+    show(1);
+  }
 
   async function toLoader(): Promise<void> {
     const port = app.portOf(fingertip);
@@ -89,19 +85,13 @@ export function flash(app: App, fingertip: Fingertip): void {
     }
     const { name, bytes } = image;
     if ('showSaveFilePicker' in window) {
-      let handle: FileSystemFileHandle;
-      try {
-        handle = await window.showSaveFilePicker({ suggestedName: name });
-      } catch (error) {
-        if (error instanceof DOMException && error.name === 'AbortError') {
-          return;
-        }
-        throw new Error(`the browser does not let this page write there (${String(error)}): copy ${name} onto the drive by hand`);
+      const file = await chooseFile(name, `copy ${name} onto the drive by hand`);
+      if (!file) {
+        return;
       }
-      const file = await handle.createWritable();
-      await file.write(bytes);
+      await file.stream.write(bytes);
       // The loader restarts as soon as it has all of it, and its drive is gone before the file ends.
-      await file.close().catch(() => undefined);
+      await file.stream.close().catch(() => undefined);
       dialog.setMessage('Written. Waiting for it to come back …');
     } else {
       download(new Blob([bytes]), name);
@@ -114,7 +104,7 @@ export function flash(app: App, fingertip: Fingertip): void {
   async function comesBack(wanted: Image): Promise<void> {
     const until_ms = performance.now() + PATIENCE.back_ms;
     while (performance.now() < until_ms && !dialog.is_closed) {
-      await new Promise((done) => setTimeout(done, 200));
+      await pause(200);
       const { info, state } = fingertip;
       if (state === 'live' && info) {
         const version = info.firmware_version.join('.');

@@ -1,8 +1,9 @@
 /** Record: asks for the kind of file, then for its place. */
 import type { Fingertip } from '../model/fingertip';
 import type { RecordingKind } from '../recording/recorder';
+import { MAIN, element } from '../view/elements';
 import type { App } from './app';
-import { Dialog, make, makeButton } from './dialog';
+import { Dialog, form } from './dialog';
 
 const KINDS: [RecordingKind, string, string][] = [
   ['csv', 'CSV', 'for people, pandas and spreadsheets'],
@@ -10,43 +11,22 @@ const KINDS: [RecordingKind, string, string][] = [
 ];
 
 export function record(app: App, fingertip: Fingertip): void {
-  const dialog = new Dialog(`Record ${fingertip.name}`);
-  const form = make('form', {});
-  const group = make('fieldset', {}, make('legend', {}, 'Kind of file'));
-  for (const [kind, label, hint] of KINDS) {
-    const id = `kind-${kind}`;
-    group.append(
-      make(
-        'p',
-        {},
-        make('input', { type: 'radio', name: 'kind', id, value: kind, checked: kind === 'csv' }),
-        ' ',
-        make('label', { for: id }, label),
-        ` ${hint}`,
-      ),
-    );
+  const group = element('fieldset', {}, element('legend', {}, 'Kind of file'));
+  for (const [value, label, hint] of KINDS) {
+    const id = `kind-${value}`;
+    const radio = element('input', { type: 'radio', name: 'kind', id, value, checked: value === 'csv' });
+    group.append(element('p', {}, radio, ' ', element('label', { for: id }, label), ` ${hint}`));
   }
-  form.append(group);
-  dialog.content.append(
-    form,
-    make(
-      'p',
-      {},
-      'showSaveFilePicker' in window
-        ? 'It is written while it is recorded.'
-        : 'This browser keeps it in memory until "Stop", then downloads it.',
-    ),
-  );
-  const start = (): Promise<void> =>
-    dialog.run(async () => {
-      const kind = new FormData(form).get('kind') as RecordingKind;
-      if (await app.record(fingertip, kind)) {
-        dialog.close();
-      }
-    });
-  form.addEventListener('submit', (event) => {
-    event.preventDefault();
-    void start();
-  });
-  dialog.choose([makeButton('Start recording', () => void start(), true)]);
+  const start = async (): Promise<void> => {
+    if (await app.record(fingertip, new FormData(kinds).get('kind') as RecordingKind)) {
+      dialog.close();
+    }
+  };
+  const kinds = form(() => void dialog.run(start), group);
+  const where =
+    'showSaveFilePicker' in window
+      ? 'It is written while it is recorded.'
+      : 'This browser keeps it in memory until "Stop", then downloads it.';
+  const dialog = new Dialog(`Record ${fingertip.name}`, kinds, where);
+  dialog.choose([dialog.doing('Start recording', start, MAIN)]);
 }

@@ -1,8 +1,9 @@
 /** Settings: until power-off, or kept for good. */
-import { core } from '../core';
+import { shortest } from '../core';
 import { PacketType, SETTINGS, Stored, type Command, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { Dialog, field, make, makeButton } from './dialog';
+import { MAIN, element, paragraph } from '../view/elements';
+import { Dialog, field, form } from './dialog';
 
 type Setting = (typeof SETTINGS)[number];
 type Name = Setting['name'];
@@ -22,7 +23,7 @@ function textOf(setting: Setting, info: Info): string {
     : setting.values
         .map((value, i) => {
           const number = numbers[i]! / value.per;
-          return value.whole ? wordOf(value, number) : core.shortest(number);
+          return value.whole ? wordOf(value, number) : shortest(number);
         })
         .join(':');
 }
@@ -80,8 +81,7 @@ export function settings(fingertip: Fingertip): void {
   if (!info) {
     return;
   }
-  const dialog = new Dialog(`Settings of ${fingertip.name}`);
-  const form = make('form', {});
+  const fields: HTMLElement[] = [];
   const inputs = new Map<Name, HTMLInputElement | HTMLSelectElement>();
   for (const setting of SETTINGS) {
     const { name, capability, label, hint } = setting;
@@ -90,17 +90,17 @@ export function settings(fingertip: Fingertip): void {
     }
     const [value] = setting.values;
     const input = value.choices
-      ? make(
+      ? element(
           'select',
           { name },
-          ...(setting.zeros === null ? [] : [make('option', {}, setting.zeros)]),
-          ...value.choices.map((each) => make('option', {}, wordOf(value, each))),
+          ...(setting.zeros === null ? [] : [element('option', {}, setting.zeros)]),
+          ...value.choices.map((each) => element('option', {}, wordOf(value, each))),
         )
-      : make('input', { name, autocomplete: 'off' });
+      : element('input', { name, autocomplete: 'off' });
     inputs.set(name, input);
-    form.append(field(label, input, hint));
+    fields.push(field(label, input, hint));
   }
-  const kept = make('p', {});
+  const kept = paragraph();
   const show = (now: Info): void => {
     for (const setting of SETTINGS) {
       const input = inputs.get(setting.name);
@@ -112,38 +112,27 @@ export function settings(fingertip: Fingertip): void {
       now.stored & Stored.SETTINGS ? 'It starts with settings that are kept.' : "It starts with the firmware's own settings.";
   };
   show(info);
-  dialog.content.append(form, kept);
 
-  const send = (commands: Command[], message: string): Promise<void> =>
-    dialog.run(async () => {
-      for (const command of commands) {
-        await fingertip.command(command);
-      }
-      show(await fingertip.askInfo());
-      dialog.setMessage(message);
-    });
-  const typed = (): Partial<Record<Name, string>> => Object.fromEntries([...inputs].map(([name, input]) => [name, input.value]));
-  const apply = (keep: boolean): Promise<void> =>
-    dialog.run(async () => {
-      const commands = commandsFor(fingertip.info ?? info, typed());
-      await send(
-        keep ? [...commands, { type: PacketType.CMD_KEEP, keep: 1 }] : commands,
-        keep ? 'Set, and kept for good.' : 'Set, until power-off.',
-      );
-    });
-  form.addEventListener('submit', (event) => {
-    event.preventDefault();
-    void apply(false);
-  });
+  const send = async (commands: Command[], message: string): Promise<void> => {
+    for (const command of commands) {
+      await fingertip.command(command);
+    }
+    show(await fingertip.askInfo());
+    dialog.setMessage(message);
+  };
+  const changed = (): Command[] =>
+    commandsFor(fingertip.info ?? info, Object.fromEntries([...inputs].map(([name, input]) => [name, input.value])));
+  const apply = (): Promise<void> => send(changed(), 'Set, until power-off.');
+  const keep = (): Promise<void> => send([...changed(), { type: PacketType.CMD_KEEP, keep: 1 }], 'Set, and kept for good.');
+  const forget = (): Promise<void> =>
+    send([{ type: PacketType.CMD_KEEP, keep: 0 }], "Forgotten: from the next start on it has the firmware's own settings.");
+  const dialog = new Dialog(
+    `Settings of ${fingertip.name}`,
+    form(() => void dialog.run(apply), ...fields),
+    kept,
+  );
   dialog.choose(
-    [
-      makeButton('Apply', () => void apply(false), true),
-      makeButton('Apply and keep', () => void apply(true)),
-      makeButton(
-        'Forget what is kept',
-        () => void send([{ type: PacketType.CMD_KEEP, keep: 0 }], "Forgotten: from the next start on it has the firmware's own settings."),
-      ),
-    ],
+    [dialog.doing('Apply', apply, MAIN), dialog.doing('Apply and keep', keep), dialog.doing('Forget what is kept', forget)],
     'Close',
   );
 }

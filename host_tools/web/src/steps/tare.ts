@@ -1,9 +1,10 @@
 /** Tare: measures the zero of every sensor. Refused in contact, and then explained. */
-import { Flag, Result, Stored } from '../line/line_facts';
+import { Flag, PacketType, Result, Stored } from '../line/line_facts';
 import { CommandError, type Fingertip } from '../model/fingertip';
-import { PATIENCE } from '../model/patience';
+import { PATIENCE, pause } from '../model/patience';
 import type { App } from './app';
-import { Dialog, make, makeButton, wordsOf } from './dialog';
+import { MAIN, button, wordsOf } from '../view/elements';
+import { Dialog } from './dialog';
 
 export async function tare(app: App, fingertip: Fingertip, force = false): Promise<void> {
   try {
@@ -20,47 +21,37 @@ export async function tare(app: App, fingertip: Fingertip, force = false): Promi
 }
 
 /** The frames between begin and end of a tare have no flag. */
-function tared(fingertip: Fingertip): Promise<void> {
-  return new Promise((done, failed) => {
-    const end = fingertip.tap((packet) => {
-      if ((packet.type === 1 || packet.type === 2) && packet.flags & Flag.TARED) {
-        stop();
-        done();
-      }
-    });
-    const timer = setTimeout(() => {
-      stop();
-      failed(new Error('no frame came back tared; see "Doctor"'));
-    }, PATIENCE.tared_ms);
-    const stop = (): void => {
-      clearTimeout(timer);
-      end();
-    };
+async function tared(fingertip: Fingertip): Promise<void> {
+  const { CONTACT, RAW } = PacketType;
+  let is_tared = false;
+  const end = fingertip.tap((packet) => {
+    is_tared ||= (packet.type === CONTACT || packet.type === RAW) && (packet.flags & Flag.TARED) !== 0;
   });
+  for (const until_ms = performance.now() + PATIENCE.tared_ms; !is_tared && performance.now() < until_ms; ) {
+    await pause(20);
+  }
+  end();
+  if (!is_tared) {
+    throw new Error('no frame came back tared; see "Doctor"');
+  }
 }
 
 function explain(app: App, fingertip: Fingertip): void {
   const { contact, contacts, info } = fingertip;
   const touched = contacts > 0 && contact.flags & Flag.CONTACT;
   const force = touched && contact.flags & Flag.FIT_VALID ? ` of ${contact.force_N.toFixed(2)} N` : '';
-  const dialog = new Dialog('Not tared');
-  dialog.content.append(
-    make(
-      'p',
-      {},
-      touched
-        ? `It reports a contact${force}: it would become the zero. Let go of the pad and try again.`
-        : info && info.stored & Stored.WRITING
-          ? 'It writes into its flash: wait a moment and try again.'
-          : 'No sensor answers: see "Doctor".',
-    ),
+  const dialog = new Dialog(
+    'Not tared',
+    touched
+      ? `It reports a contact${force}: it would become the zero. Let go of the pad and try again.`
+      : info && info.stored & Stored.WRITING
+        ? 'It writes into its flash: wait a moment and try again.'
+        : 'No sensor answers: see "Doctor".',
+    ...(touched ? ['Where nothing touches the pad and the contact is none, tare anyway.'] : []),
   );
-  if (touched) {
-    dialog.content.append(make('p', {}, 'Where nothing touches the pad and the contact is none, tare anyway.'));
-  }
-  const again = (force_it: boolean): void => {
+  const again = (force_it: boolean) => () => {
     dialog.close();
     void tare(app, fingertip, force_it);
   };
-  dialog.choose([makeButton('Try again', () => again(false), true), ...(touched ? [makeButton('Tare anyway', () => again(true))] : [])]);
+  dialog.choose([button('Try again', again(false), MAIN), ...(touched ? [button('Tare anyway', again(true))] : [])]);
 }

@@ -1,9 +1,9 @@
 /** The buttons of the page and of each fingertip. */
 import { Capability } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
+import { MAIN, button, element, wordsOf } from '../view/elements';
 import type { App } from './app';
 import { calibrate } from './calibrate';
-import { make, makeButton, wordsOf } from './dialog';
 import { examine } from './doctor';
 import { flash } from './flash';
 import { record } from './record';
@@ -12,12 +12,7 @@ import { tare } from './tare';
 
 /** "Connect", "Simulate", "Replay a file"; files may also be dropped on the page. */
 export function pageControls(app: App): HTMLElement {
-  const input = make('input', {
-    type: 'file',
-    accept: '.csv,.mcap,.ftr',
-    hidden: true,
-    'aria-label': 'Recording to replay',
-  });
+  const input = element('input', { type: 'file', accept: '.csv,.mcap,.ftr', hidden: true, 'aria-label': 'Recording to replay' });
   const replay = (file: File | undefined): void => {
     if (file) {
       app.replay(file).catch((error: unknown) => app.notice(wordsOf(error), 'bad'));
@@ -32,38 +27,46 @@ export function pageControls(app: App): HTMLElement {
     event.preventDefault();
     replay(event.dataTransfer?.files[0]);
   });
-  return make(
+  return element(
     'div',
     { class: 'controls', role: 'group', 'aria-label': 'Page' },
-    makeButton('Connect', () => void app.connect(), true),
-    makeButton('Simulate', () => app.simulate()),
-    makeButton('Replay a file', () => input.click()),
+    button('Connect', () => void app.connect(), MAIN),
+    button('Simulate', () => app.simulate()),
+    button('Replay a file', () => input.click()),
     input,
   );
 }
 
 /** What can be done with one fingertip; follows its state. */
 export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
-  const controls = make('div', {
-    class: 'controls',
-    role: 'group',
-    'aria-label': `Fingertip ${fingertip.name}`,
-  });
-  const tare_button = makeButton('Tare', () => void tare(app, fingertip));
-  const set_button = makeButton('Set', () => settings(fingertip));
-  const calibrate_button = makeButton('Calibrate', () => calibrate(fingertip));
-  const record_button = makeButton('Record', () => record(app, fingertip));
-  const stop_button = makeButton('Stop', () => void app.stopRecording(fingertip));
-  const doctor_button = makeButton('Doctor', () => examine(fingertip));
-  const flash_button = makeButton('Flash', () => flash(app, fingertip));
-  const pause_button = makeButton('Pause', () => {
+  const tare_button = button('Tare', () => void tare(app, fingertip));
+  const set_button = button('Set', () => settings(fingertip));
+  const calibrate_button = button('Calibrate', () => calibrate(fingertip));
+  const record_button = button('Record', () => record(app, fingertip));
+  const stop_button = button('Stop', () => void app.stopRecording(fingertip));
+  const doctor_button = button('Doctor', () => examine(fingertip));
+  const flash_button = button('Flash', () => flash(app, fingertip));
+  const pause_button = button('Pause', () => {
     const replay = app.replays.get(fingertip);
     if (replay) {
       app.pauseReplay(replay, !replay.paused);
     }
   });
-  const leave_button = makeButton('Disconnect', () => void app.disconnect(fingertip));
+  const leave_button = button('Disconnect', () => void app.disconnect(fingertip));
 
+  const controls = element(
+    'div',
+    { class: 'controls', role: 'group' },
+    tare_button,
+    set_button,
+    calibrate_button,
+    record_button,
+    stop_button,
+    pause_button,
+    doctor_button,
+    flash_button,
+    leave_button,
+  );
   const show = (): void => {
     const { info, state, is_replay } = fingertip;
     const live = (state === 'live' || state === 'silent') && !is_replay && info !== null;
@@ -84,17 +87,6 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
     pause_button.textContent = replay?.paused ? 'Go on' : 'Pause';
     leave_button.textContent = is_replay ? 'Close' : 'Disconnect';
   };
-  controls.append(
-    tare_button,
-    set_button,
-    calibrate_button,
-    record_button,
-    stop_button,
-    pause_button,
-    doctor_button,
-    flash_button,
-    leave_button,
-  );
   const ends = [fingertip.listen(show), app.listen(show)];
   ends.push(
     app.bench.listen(() => {

@@ -5,25 +5,16 @@ import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { History } from '../model/history';
 
-export type ColumnName = 'force_N' | 'x_mm' | 'y_mm' | 'slip_mm' | 'qx_N' | 'qy_N';
-
-/** sd: the standard deviation beside it; valid: the flags without which it is no value. */
-interface Column {
-  readonly name: ColumnName;
-  readonly sd: 'force_sd_N' | 'location_sd_mm' | 'q_sd_N' | null;
-  readonly valid: number;
-  /** Flag without which sd is none. */
-  readonly sdValid: number;
-}
-
-export const COLUMNS: readonly Column[] = [
-  { name: 'force_N', sd: 'force_sd_N', valid: Flag.FIT_VALID, sdValid: Flag.UNCERTAINTY_VALID },
-  { name: 'x_mm', sd: 'location_sd_mm', valid: Flag.FIT_VALID, sdValid: Flag.UNCERTAINTY_VALID },
-  { name: 'y_mm', sd: 'location_sd_mm', valid: Flag.FIT_VALID, sdValid: Flag.UNCERTAINTY_VALID },
-  { name: 'slip_mm', sd: null, valid: Flag.SLIP_VALID, sdValid: 0 },
-  { name: 'qx_N', sd: 'q_sd_N', valid: Flag.TANGENTIAL_VALID, sdValid: Flag.TANGENTIAL_VALID },
-  { name: 'qy_N', sd: 'q_sd_N', valid: Flag.TANGENTIAL_VALID, sdValid: Flag.TANGENTIAL_VALID },
-];
+/** A column of the history, its standard deviation, the flags without which it is no value, and the one without which that is none. */
+const COLUMNS = [
+  ['force_N', 'force_sd_N', Flag.FIT_VALID, Flag.UNCERTAINTY_VALID],
+  ['x_mm', 'location_sd_mm', Flag.FIT_VALID, Flag.UNCERTAINTY_VALID],
+  ['y_mm', 'location_sd_mm', Flag.FIT_VALID, Flag.UNCERTAINTY_VALID],
+  ['slip_mm', null, Flag.SLIP_VALID, 0],
+  ['qx_N', 'q_sd_N', Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_VALID],
+  ['qy_N', 'q_sd_N', Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_VALID],
+] as const;
+export type ColumnName = (typeof COLUMNS)[number][0];
 
 export enum Trust {
   none = 0,
@@ -64,8 +55,8 @@ export class Buckets {
     this.frames = new Uint32Array(size);
     this.lost = new Uint32Array(size);
     this.tracks = new Map(
-      COLUMNS.map((column) => [
-        column.name,
+      COLUMNS.map(([name]) => [
+        name,
         {
           trust: new Uint8Array(size),
           low: new Float32Array(size),
@@ -108,9 +99,9 @@ export class Buckets {
 
   private take(history: History, number: number): void {
     const row = history.slot(number);
-    const b = Math.floor((history.t_s[row] ?? 0) / this.width_s);
+    const b = Math.floor(history.t_s[row] / this.width_s);
     const slot = b % this.size;
-    const flags = history.flags[row] ?? 0;
+    const flags = history.flags[row];
     if (this.number[slot] !== b) {
       this.number[slot] = b;
       this.flags[slot] = this.frames[slot] = this.lost[slot] = 0;
@@ -119,19 +110,18 @@ export class Buckets {
       }
       this.newest = Math.max(this.newest, b);
     }
-    this.flags[slot] = (this.flags[slot] ?? 0) | flags;
-    this.frames[slot] = (this.frames[slot] ?? 0) + 1;
-    this.lost[slot] = (this.lost[slot] ?? 0) + lostBefore(history, number);
+    this.flags[slot] |= flags;
+    this.frames[slot]++;
+    this.lost[slot] += history.lost[row];
     const trust = flags & WARNING_FLAGS ? Trust.doubtful : Trust.good;
-    for (const column of COLUMNS) {
-      const track = this.tracks.get(column.name);
-      if (!track || (flags & column.valid) !== column.valid || trust < (track.trust[slot] ?? 0)) {
+    for (const [name, sdName, valid, sdValid] of COLUMNS) {
+      const track = this.tracks.get(name)!;
+      if ((flags & valid) !== valid || trust < track.trust[slot]) {
         continue;
       }
-      const value = history.columns[column.name][row] ?? 0;
-      const hasSd = column.sd !== null && (flags & column.sdValid) !== 0;
-      const sd = hasSd && column.sd ? (history.columns[column.sd][row] ?? NaN) : NaN;
-      if (trust > (track.trust[slot] ?? 0)) {
+      const value = history.columns[name][row];
+      const sd = sdName !== null && flags & sdValid ? history.columns[sdName][row] : NaN;
+      if (trust > track.trust[slot]) {
         track.trust[slot] = trust;
         track.low[slot] = track.high[slot] = value;
         track.rises[slot] = 1;
@@ -139,44 +129,31 @@ export class Buckets {
         track.sdHigh[slot] = value + sd;
         continue;
       }
-      if (value < (track.low[slot] ?? 0)) {
+      if (value < track.low[slot]) {
         track.low[slot] = value;
         track.rises[slot] = 0;
-      } else if (value > (track.high[slot] ?? 0)) {
+      } else if (value > track.high[slot]) {
         track.high[slot] = value;
         track.rises[slot] = 1;
       }
-      track.sdLow[slot] = lower(track.sdLow[slot] ?? NaN, value - sd);
-      track.sdHigh[slot] = -lower(-(track.sdHigh[slot] ?? NaN), -(value + sd));
+      track.sdLow[slot] = lower(track.sdLow[slot], value - sd);
+      track.sdHigh[slot] = -lower(-track.sdHigh[slot], -(value + sd));
     }
   }
 }
 
-/** A jump of more is a fingertip that restarted. */
-const MOST_LOST = 1 << 24;
-
-/** Frames that are missing right before a row. */
-export function lostBefore(history: History, row: number): number {
-  if (row <= history.begin) {
-    return 0;
-  }
-  const frame = history.frame[history.slot(row)] ?? 0;
-  const before = history.frame[history.slot(row - 1)] ?? 0;
-  const lost = (frame - before - 1) >>> 0;
-  return lost < MOST_LOST ? lost : 0;
-}
-
-/** An interval of 1, 2 or 5 times a power of ten for a span on a number of pixels, so that it seldom
- * changes; and no shorter than 1 ms. */
+/** A round interval for a span on a number of pixels, so that it seldom changes; and no shorter than 1 ms. */
 export function intervalOf(span_s: number, pixels: number): number {
-  const least = Math.max(span_s / Math.max(pixels, 1), 0.001);
-  const decade = 10 ** Math.floor(Math.log10(least) + 1e-9);
-  for (const step of [1, 2, 5]) {
-    if (step * decade >= least * (1 - 1e-9)) {
-      return step * decade;
-    }
+  return roundAbove(Math.max(span_s / Math.max(pixels, 1), 0.001));
+}
+
+/** 1, 2 or 5 times a power of ten, not below value. */
+export function roundAbove(value: number): number {
+  if (!(value > 0)) {
+    return 1;
   }
-  return 10 * decade;
+  const decade = 10 ** Math.floor(Math.log10(value) + 1e-9);
+  return decade * ([1, 2, 5].find((step) => step * decade >= value * (1 - 1e-9)) ?? 10);
 }
 
 function lower(a: number, b: number): number {

@@ -1,7 +1,6 @@
 /** The camera above the pad. Millimetres; x across the pad, y along it, z out of the rubber,
- * its surface at 0. Matrices by columns, as WebGL takes them. */
+ * its surface at 0. */
 
-export type Matrix = Float32Array;
 export type Point = readonly [number, number, number];
 
 /** turn_deg about z, tilt_deg from the horizon: 90 is from above, with y up. */
@@ -25,7 +24,6 @@ const RIM = 0.94;
 const radians = (degrees: number) => (degrees * Math.PI) / 180;
 
 export interface Camera {
-  readonly matrix: Matrix;
   readonly eye: Point;
   readonly right: Point;
   readonly up: Point;
@@ -54,42 +52,14 @@ export function cameraOf(look: Look, aspect: number, box: Box): Camera {
     }
   }
   const eye: Point = [back[0] * distance_mm, back[1] * distance_mm, back[2] * distance_mm + middle_mm];
-  const near = 0.2 * distance_mm;
-  const far = 3 * distance_mm;
-  const scale = 1 / Math.tan(HALF_VIEW_rad);
-  const project = new Float32Array(16);
-  project[0] = scale / aspect;
-  project[5] = scale;
-  project[10] = (far + near) / (near - far);
-  project[11] = -1;
-  project[14] = (2 * far * near) / (near - far);
-  const view = new Float32Array([
-    right[0],
-    up[0],
-    back[0],
-    0,
-    right[1],
-    up[1],
-    back[1],
-    0,
-    right[2],
-    up[2],
-    back[2],
-    0,
-    -dot(right, eye),
-    -dot(up, eye),
-    -dot(back, eye),
-    1,
-  ]);
-  return { matrix: product(project, view), eye, right, up, back, aspect };
+  return { eye, right, up, back, aspect };
 }
 
 /** Where a point is seen: -1 to 1, to the right and up. */
-export function seen(camera: Camera, point: Point): { right: number; up: number } {
-  const m = camera.matrix;
-  const row = (i: number) => (m[i] ?? 0) * point[0] + (m[i + 4] ?? 0) * point[1] + (m[i + 8] ?? 0) * point[2] + (m[i + 12] ?? 0);
-  const w = row(3);
-  return { right: row(0) / w, up: row(1) / w };
+export function seen({ eye, right, up, back, aspect }: Camera, point: Point): { right: number; up: number } {
+  const from: Point = [point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]];
+  const high = -dot(from, back) * Math.tan(HALF_VIEW_rad);
+  return { right: dot(from, right) / (high * aspect), up: dot(from, up) / high };
 }
 
 /** The point of the rubber's surface, or of a plane at another height, that is seen there; null
@@ -109,18 +79,4 @@ export function picked(camera: Camera, right: number, up: number, height_mm = 0)
 
 function dot(a: Point, b: Point): number {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-function product(a: Matrix, b: Matrix): Matrix {
-  const c = new Float32Array(16);
-  for (let column = 0; column < 4; column++) {
-    for (let row = 0; row < 4; row++) {
-      let sum = 0;
-      for (let i = 0; i < 4; i++) {
-        sum += (a[4 * i + row] ?? 0) * (b[4 * column + i] ?? 0);
-      }
-      c[4 * column + row] = sum;
-    }
-  }
-  return c;
 }

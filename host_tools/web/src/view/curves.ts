@@ -13,16 +13,14 @@ export interface Curves {
 export interface Chart {
   t_s: number[];
   curves: Map<ColumnName, Curves>;
-  /** The range of the values without a warning, with their band; of those with one if there are no
-   * others. */
-  reach: Map<ColumnName, { low: number; high: number } | null>;
+  /** The largest of the values without a warning, to either side; of those with one if there are no others; 0: there is none. */
+  most: Map<ColumnName, number>;
 }
 
 /** Broken where frames were lost and where for longer than break_s no frame came. */
 export function chartOf(buckets: Buckets, columns: readonly ColumnName[], first: number, last: number, break_s: number): Chart {
   const width_s = buckets.width_s;
   const slots: number[] = [];
-  const breaks: boolean[] = [];
   const t_s: number[] = [];
   let before = -1;
   for (let b = first; b <= last; b++) {
@@ -30,66 +28,55 @@ export function chartOf(buckets: Buckets, columns: readonly ColumnName[], first:
     if (slot < 0) {
       continue;
     }
-    const broken = before >= 0 && ((buckets.lost[slot] ?? 0) > 0 || (b - before) * width_s > break_s + width_s);
+    const broken = before >= 0 && (buckets.lost[slot] > 0 || (b - before) * width_s > break_s + width_s);
     if (broken) {
       t_s.push(b * width_s);
       slots.push(-1);
-      breaks.push(true);
     }
     t_s.push((b + 0.25) * width_s, (b + 0.75) * width_s);
     slots.push(slot, slot);
-    breaks.push(false, false);
     before = b;
   }
-  const chart: Chart = { t_s, curves: new Map(), reach: new Map() };
+  const chart: Chart = { t_s, curves: new Map(), most: new Map() };
   for (const name of columns) {
-    const track = buckets.tracks.get(name);
-    if (!track) {
-      continue;
-    }
-    const length = t_s.length;
-    const good: (number | null)[] = new Array<number | null>(length).fill(null);
-    const doubtful: (number | null)[] = new Array<number | null>(length).fill(null);
-    const sdLow: (number | null)[] = new Array<number | null>(length).fill(null);
-    const sdHigh: (number | null)[] = new Array<number | null>(length).fill(null);
-    const sure = { low: Infinity, high: -Infinity };
-    const unsure = { low: Infinity, high: -Infinity };
+    const track = buckets.tracks.get(name)!;
+    const { length } = t_s;
+    const [good, doubtful, sdLow, sdHigh] = [0, 1, 2, 3].map(() => new Array<number | null>(length).fill(null));
+    const most = { [Trust.none]: 0, [Trust.doubtful]: 0, [Trust.good]: 0 };
+    let trusted = Trust.none;
     let second = false;
     let trustBefore = Trust.none;
     for (let i = 0; i < length; i++) {
-      const slot = slots[i] ?? -1;
+      const slot = slots[i];
       if (slot < 0) {
         trustBefore = Trust.none;
         second = false;
         continue;
       }
-      const trust: Trust = track.trust[slot] ?? Trust.none;
-      const low = track.low[slot] ?? 0;
-      const high = track.high[slot] ?? 0;
+      const trust: Trust = track.trust[slot];
+      const low = track.low[slot];
+      const high = track.high[slot];
       const value = second === (track.rises[slot] === 1) ? high : low;
       if (trust !== Trust.none) {
         (trust === Trust.good ? good : doubtful)[i] = value;
         /* Where one ends and the other begins the dashes reach over. */
         if (trustBefore === Trust.good && trust === Trust.doubtful) {
-          doubtful[i - 1] = good[i - 1] ?? null;
+          doubtful[i - 1] = good[i - 1];
         } else if (trustBefore === Trust.doubtful && trust === Trust.good) {
           doubtful[i] = value;
         }
-        const reach = trust === Trust.good ? sure : unsure;
-        const from = track.sdLow[slot] ?? NaN;
-        const to = track.sdHigh[slot] ?? NaN;
-        reach.low = Math.min(reach.low, low);
-        reach.high = Math.max(reach.high, high);
-        if (!Number.isNaN(from)) {
-          sdLow[i] = from;
-          sdHigh[i] = to;
+        trusted = Math.max(trusted, trust);
+        most[trust] = Math.max(most[trust], -low, high);
+        if (!Number.isNaN(track.sdLow[slot])) {
+          sdLow[i] = track.sdLow[slot];
+          sdHigh[i] = track.sdHigh[slot];
         }
       }
       trustBefore = trust;
       second = !second;
     }
     chart.curves.set(name, { good, doubtful, sdLow, sdHigh });
-    chart.reach.set(name, sure.high >= sure.low ? sure : unsure.high >= unsure.low ? unsure : null);
+    chart.most.set(name, most[trusted]);
   }
   return chart;
 }
@@ -109,7 +96,7 @@ export function spansOf(buckets: Buckets, bit: number | 'lost', first: number, l
     if (slot < 0) {
       continue;
     }
-    const is = bit === 'lost' ? (buckets.lost[slot] ?? 0) > 0 : ((buckets.flags[slot] ?? 0) & bit) !== 0;
+    const is = bit === 'lost' ? buckets.lost[slot] > 0 : (buckets.flags[slot] & bit) !== 0;
     if (!is) {
       continue;
     }
@@ -122,20 +109,6 @@ export function spansOf(buckets: Buckets, bit: number | 'lost', first: number, l
     }
   }
   return spans;
-}
-
-/** 1, 2 or 5 times a power of ten, not below value. */
-export function roundAbove(value: number): number {
-  if (!(value > 0)) {
-    return 1;
-  }
-  const decade = 10 ** Math.floor(Math.log10(value) + 1e-9);
-  for (const step of [1, 2, 5]) {
-    if (step * decade >= value * (1 - 1e-6)) {
-      return step * decade;
-    }
-  }
-  return 10 * decade;
 }
 
 /** "5.5 s", from a minute on "1:05.5": of a time that is not negative. */

@@ -26,6 +26,18 @@ export function button(label: string, press: () => void, attributes: Attributes 
   return made;
 }
 
+export function paragraph(text = ''): HTMLParagraphElement {
+  return element('p', {}, text);
+}
+
+/** The button that is most likely wanted. */
+export const MAIN = { class: 'main' };
+
+/** The text of an error, for people. */
+export function wordsOf(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
 /** Writes only what differs: a text that is set again is laid out and read again. */
 export function write(node: Node, text: string): void {
   if (node.textContent !== text) {

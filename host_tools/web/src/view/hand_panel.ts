@@ -35,7 +35,7 @@ export class HandPanel implements Touch {
     this.holdButton = button('Hold in a grip', () => this.toggle('hold'), { 'aria-pressed': 'false' });
     const lift = button('Lift', () => {
       this.end();
-      hand.press(null);
+      hand.lift();
     });
     this.element = element(
       'section',
@@ -72,7 +72,7 @@ export class HandPanel implements Touch {
     if (this.doing === 'pointer') {
       this.doing = 'nothing';
       this.sent = '';
-      this.hand.press(null);
+      this.hand.lift();
     }
   }
 
@@ -145,7 +145,7 @@ export class HandPanel implements Touch {
     const off = this.doing === doing;
     this.end();
     if (off) {
-      this.hand.press(null);
+      this.hand.lift();
     } else {
       this.doing = doing;
       this.since_ms = performance.now();

@@ -40,11 +40,8 @@ export class HealthPanel {
     facts.forEach((fact, i) => {
       const value = this.values[i];
       if (value) {
-        const level = fact.level ?? 'plain';
         write(value, fact.value);
-        if (value.className !== level) {
-          value.className = level;
-        }
+        value.className = fact.level;
       }
     });
   }

@@ -1,12 +1,12 @@
 /** Lines of the health panel out of what a fingertip and its line count. */
 import { Flag, Stored } from '../line/line_facts';
-import { core } from '../core';
+import { capabilitiesText, storedText } from '../core';
 import type { Level, Shown } from './shown';
 
 export interface Fact {
   readonly name: string;
   readonly value: string;
-  readonly level?: Level;
+  readonly level: Level;
 }
 
 export interface FactGroup {
@@ -21,140 +21,114 @@ const LITTLE_STACK_bytes = 512;
 /** The largest value of the packet: no chip's stack, so firmware on a host, where neither load nor stack is measured. */
 const HOST_STACK_bytes = 65535;
 
-export function factsOf(shown: Shown): FactGroup[] {
-  const { fingertip } = shown;
-  const { info, health, counts, crash, raw, raws } = fingertip;
-  const groups: FactGroup[] = [];
-  const line: Fact[] = [
-    { name: 'frames', value: `${shown.frames_per_s.toFixed(0)} /s` },
-    counted('lost', counts.dropped_packets),
-    counted('damaged', counts.crc_errors + counts.format_errors),
-    { name: 'received', value: bytesText(counts.bytes) },
-  ];
-  if (fingertip.contacts > 0) {
-    line.push({ name: 'latency', value: `${(fingertip.contact.total_us / 1000).toFixed(2)} ms` });
-  }
-  groups.push({ title: 'Line', facts: line });
-  if (info) {
-    const count = info.sensor_count;
-    const sensors: Fact[] = [];
-    if (raws > 0) {
-      const readings = shown.readings;
-      const answering = health ? bits(health.sensors_present) : count;
-      sensors.push({
-        name: 'answer',
-        value: `${answering} of ${count}`,
-        level: answering < count ? 'bad' : 'good',
-      });
-      const doubtful = named(readings?.doubtful ?? 0, count);
-      sensors.push({
-        name: 'in doubt',
-        value: doubtful || 'none',
-        level: doubtful ? 'warning' : 'plain',
-      });
-      if (readings && readings.valid !== 2 ** count - 1) {
-        const out = named(~readings.valid, count);
-        sensors.push({ name: 'without reading', value: out, level: 'bad' });
-      }
-      sensors.push({
-        name: 'temperature',
-        value: raw.temperature_cC ? `${(raw.temperature_cC / 100).toFixed(1)} °C` : '–',
-      });
-    }
-    if (health) {
-      sensors.push(counted('implausible', health.implausible_readings));
-      if (health.sensors_prom_bad) {
-        sensors.push({ name: 'bad PROM', value: named(health.sensors_prom_bad, count), level: 'bad' });
-      }
-    }
-    groups.push({ title: 'Sensors', facts: sensors });
-  }
-  if (health) {
-    groups.push({
-      title: 'Bus',
-      facts: [
-        counted('not acknowledged', health.bus_nacks),
-        counted('timeouts', health.bus_timeouts),
-        counted('recovered', health.bus_recoveries),
-        counted('zero readings', health.zero_readings),
-      ],
-    });
-    const on_host = health.stack_free_bytes === HOST_STACK_bytes;
-    const busy: Fact = {
-      name: 'busy',
-      value: `${(health.cpu_busy_permille / 10).toFixed(0)} %`,
-      level: health.cpu_busy_permille > BUSY_permille ? 'warning' : 'plain',
-    };
-    const stack: Fact = {
-      name: 'stack free',
-      value: `${health.stack_free_bytes} B`,
-      level: health.stack_free_bytes < LITTLE_STACK_bytes ? 'bad' : 'plain',
-    };
-    groups.push({
-      title: 'Processor',
-      facts: [
-        ...(on_host ? [] : [busy]),
-        counted('frames skipped', health.frames_skipped),
-        counted('incomplete', health.frames_incomplete),
-        counted('packets dropped', health.packets_dropped),
-        ...(on_host ? [] : [stack]),
-        { name: 'running for', value: duration(health.uptime_s) },
-        counted('watchdog resets', health.watchdog_resets),
-      ],
-    });
-  }
-  if (info) {
-    const firmware: Fact[] = [
-      { name: 'version', value: `${info.firmware_version.join('.')} ${info.git_hash}` },
-      { name: 'board', value: info.board },
-      { name: 'scene', value: info.scene },
-      { name: 'serial', value: info.serial },
-      { name: 'oversampling', value: String(info.osr) },
-      { name: 'can', value: core.capabilitiesText(info.capabilities).replaceAll(',', ', ') },
-      {
-        name: 'keeps',
-        value: core.storedText(info.stored).replaceAll(',', ', '),
-        level: info.stored & Stored.DAMAGED ? 'bad' : 'plain',
-      },
-    ];
-    if (info.stored & Stored.CALIBRATION) {
-      const date = new Date(info.calibration_date_s * 1000).toISOString().slice(0, 10);
-      firmware.push({ name: 'calibrated', value: date });
-    } else if (fingertip.contacts > 0 && !(fingertip.contact.flags & Flag.CALIBRATED)) {
-      firmware.push({ name: 'calibrated', value: 'no' });
-    }
-    if (crash) {
-      firmware.push({
-        name: 'last crash',
-        value: ENDS[crash.kind] ?? `kind ${crash.kind}`,
-        level: crash.kind === 0 ? 'plain' : 'bad',
-      });
-    }
-    groups.push({ title: 'Firmware', facts: firmware });
-  }
-  return groups;
+function fact(name: string, value: string, level: Level = 'plain'): Fact {
+  return { name, value, level };
 }
 
 function counted(name: string, count: number): Fact {
-  return { name, value: String(count), level: count > 0 ? 'warning' : 'plain' };
+  return fact(name, String(count), count > 0 ? 'warning' : 'plain');
 }
 
-function bits(map: number): number {
-  let count = 0;
-  for (let rest = map >>> 0; rest > 0; rest >>>= 1) {
-    count += rest & 1;
+export function factsOf(shown: Shown): FactGroup[] {
+  const { info, health } = shown.fingertip;
+  return [
+    { title: 'Line', facts: lineFacts(shown) },
+    ...(info ? [{ title: 'Sensors', facts: sensorFacts(shown, info.sensor_count) }] : []),
+    ...(health
+      ? [
+          {
+            title: 'Bus',
+            facts: [
+              counted('not acknowledged', health.bus_nacks),
+              counted('timeouts', health.bus_timeouts),
+              counted('recovered', health.bus_recoveries),
+              counted('zero readings', health.zero_readings),
+            ],
+          },
+          { title: 'Processor', facts: processorFacts(health) },
+        ]
+      : []),
+    ...(info ? [{ title: 'Firmware', facts: firmwareFacts(shown, info) }] : []),
+  ];
+}
+
+function lineFacts({ fingertip, frames_per_s }: Shown): Fact[] {
+  const { counts, contact, contacts } = fingertip;
+  return [
+    fact('frames', `${frames_per_s.toFixed(0)} /s`),
+    counted('lost', counts.dropped_packets),
+    counted('damaged', counts.crc_errors + counts.format_errors),
+    fact('received', counts.bytes < 1e6 ? `${(counts.bytes / 1e3).toFixed(0)} kB` : `${(counts.bytes / 1e6).toFixed(1)} MB`),
+    ...(contacts > 0 ? [fact('latency', `${(contact.total_us / 1000).toFixed(2)} ms`)] : []),
+  ];
+}
+
+function sensorFacts({ fingertip, readings }: Shown, count: number): Fact[] {
+  const { health, raw, raws } = fingertip;
+  const facts: Fact[] = [];
+  if (raws > 0) {
+    const answering = health ? sensorsOf(health.sensors_present, count).length : count;
+    const doubtful = sensorsOf(readings?.doubtful ?? 0, count).join(', ');
+    facts.push(fact('answer', `${answering} of ${count}`, answering < count ? 'bad' : 'good'));
+    facts.push(fact('in doubt', doubtful || 'none', doubtful ? 'warning' : 'plain'));
+    if (readings && readings.valid !== 2 ** count - 1) {
+      facts.push(fact('without reading', sensorsOf(~readings.valid, count).join(', '), 'bad'));
+    }
+    facts.push(fact('temperature', raw.temperature_cC ? `${(raw.temperature_cC / 100).toFixed(1)} °C` : '–'));
   }
-  return count;
+  if (health) {
+    facts.push(counted('implausible', health.implausible_readings));
+    if (health.sensors_prom_bad) {
+      facts.push(fact('bad PROM', sensorsOf(health.sensors_prom_bad, count).join(', '), 'bad'));
+    }
+  }
+  return facts;
 }
 
-/** "3, 7" */
-function named(map: number, count: number): string {
-  return Array.from({ length: count }, (_, k) => k)
-    .filter((k) => (map >>> k) & 1)
-    .join(', ');
+function processorFacts(health: NonNullable<Shown['fingertip']['health']>): Fact[] {
+  const { cpu_busy_permille, stack_free_bytes } = health;
+  const on_host = stack_free_bytes === HOST_STACK_bytes;
+  const busy = fact('busy', `${(cpu_busy_permille / 10).toFixed(0)} %`, cpu_busy_permille > BUSY_permille ? 'warning' : 'plain');
+  const stack = fact('stack free', `${stack_free_bytes} B`, stack_free_bytes < LITTLE_STACK_bytes ? 'bad' : 'plain');
+  return [
+    ...(on_host ? [] : [busy]),
+    counted('frames skipped', health.frames_skipped),
+    counted('incomplete', health.frames_incomplete),
+    counted('packets dropped', health.packets_dropped),
+    ...(on_host ? [] : [stack]),
+    fact('running for', duration(health.uptime_s)),
+    counted('watchdog resets', health.watchdog_resets),
+  ];
 }
 
-export function duration(seconds: number): string {
+function firmwareFacts({ fingertip }: Shown, info: NonNullable<Shown['fingertip']['info']>): Fact[] {
+  const { crash, contact, contacts } = fingertip;
+  const facts = [
+    fact('version', `${info.firmware_version.join('.')} ${info.git_hash}`),
+    fact('board', info.board),
+    fact('scene', info.scene),
+    fact('serial', info.serial),
+    fact('oversampling', String(info.osr)),
+    fact('can', capabilitiesText(info.capabilities).replaceAll(',', ', ')),
+    fact('keeps', storedText(info.stored).replaceAll(',', ', '), info.stored & Stored.DAMAGED ? 'bad' : 'plain'),
+  ];
+  if (info.stored & Stored.CALIBRATION) {
+    facts.push(fact('calibrated', new Date(info.calibration_date_s * 1000).toISOString().slice(0, 10)));
+  } else if (contacts > 0 && !(contact.flags & Flag.CALIBRATED)) {
+    facts.push(fact('calibrated', 'no'));
+  }
+  if (crash) {
+    facts.push(fact('last crash', ENDS[crash.kind] ?? `kind ${crash.kind}`, crash.kind === 0 ? 'plain' : 'bad'));
+  }
+  return facts;
+}
+
+/** The sensors in a bitmap. */
+export function sensorsOf(map: number, count: number): number[] {
+  return Array.from({ length: count }, (_, k) => k).filter((k) => (map >>> k) & 1);
+}
+
+function duration(seconds: number): string {
   const parts: [number, string][] = [
     [Math.floor(seconds / 86400), 'd'],
     [Math.floor(seconds / 3600) % 24, 'h'],
@@ -163,8 +137,4 @@ export function duration(seconds: number): string {
   ];
   const from = parts.findIndex(([count]) => count > 0);
   return (from < 0 ? parts.slice(3) : parts.slice(from, from + 2)).map(([count, unit]) => `${count} ${unit}`).join(' ');
-}
-
-function bytesText(bytes: number): string {
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 }

@@ -12,8 +12,8 @@ interface Number_ {
   /** Whether warnings make it doubtful. */
   readonly value: (contact: ShownContact) => string;
   readonly sd?: (contact: ShownContact) => string;
-  /** The true value of a simulated fingertip; undefined: not known. */
-  readonly truth?: (truth: ShownTruth) => string | undefined;
+  /** The true value of a simulated fingertip. */
+  readonly truth?: (truth: ShownTruth) => string;
   readonly tangential?: boolean;
   /** Shown only where it has a value. */
   readonly seldom?: boolean;
@@ -62,7 +62,7 @@ const NUMBERS: readonly Number_[] = [
     valid: Flag.TANGENTIAL_VALID,
     value: (contact) => `${fixed(contact.qx_N, 2)}, ${fixed(contact.qy_N, 2)}`,
     sd: (contact) => `± ${fixed(contact.q_sd_N, 2)}`,
-    truth: ({ qx_N, qy_N }) => (qx_N === undefined || qy_N === undefined ? undefined : `${fixed(qx_N, 2)}, ${fixed(qy_N, 2)}`),
+    truth: ({ qx_N, qy_N }) => `${fixed(qx_N, 2)}, ${fixed(qy_N, 2)}`,
     tangential: true,
   },
   {

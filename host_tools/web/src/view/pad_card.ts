@@ -8,7 +8,7 @@ import { fixed } from './numbers';
 import { sceneOf } from './pad_scene';
 import { PadView } from './pad_view';
 import type { Palette } from './palette';
-import type { Shown, ShownContact } from './shown';
+import { readingsNear, type Shown, type ShownContact } from './shown';
 
 export class PadCard {
   readonly element: HTMLElement;
@@ -47,11 +47,6 @@ export class PadCard {
     this.nameButton.setAttribute('aria-pressed', String(selected));
   }
 
-  dispose(): void {
-    this.view?.dispose();
-    this.element.remove();
-  }
-
   repaint(): void {
     this.view?.repaint();
   }
@@ -73,7 +68,7 @@ export class PadCard {
       const row = live ? history.end - 1 : Math.min(history.rowAt(end_s - behind_s), history.end - 1);
       const kept = row >= history.begin;
       this.contact = live ? shown.contact : kept ? contactAt(history, row) : null;
-      const readings = live ? shown.readings : kept ? shown.readingsAt(row) : null;
+      const readings = kept ? readingsNear(history, row) : null;
       if (!current) {
         this.contact = null;
       }
@@ -107,7 +102,7 @@ export class PadCard {
       return;
     }
     this.layoutSeen = layout;
-    this.view?.dispose();
+    this.view?.element.remove();
     const keys = hand
       ? 'Arrow keys turn it, Home shows it from above. Press on it with the pointer.'
       : 'Arrow keys turn it, Home shows it from above.';
@@ -117,11 +112,7 @@ export class PadCard {
     view.touch = this.hand;
     view.element.classList.toggle('touchable', hand !== null);
     view.onLook = () => this.above.setAttribute('aria-pressed', String(view.fromAbove));
-    this.above.hidden = !view.solid;
     this.empty.remove();
     this.frame.prepend(view.element);
-    if (!view.solid) {
-      this.frame.append(element('p', { class: 'plain' }, 'No WebGL here: drawn flat.'));
-    }
   }
 }

@@ -1,7 +1,8 @@
 /** What of a fingertip the pictures of its pad show, in mm and N, apart from how they draw it. */
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
-import type { ShownContact, ShownLayout, ShownReadings } from './shown';
+import type { Readings } from '../model/history';
+import type { ShownContact, ShownLayout } from './shown';
 
 /** Rim of the pad beyond the outermost sensors. */
 export const RIM_mm = 6;
@@ -70,7 +71,7 @@ export interface Scene {
 export function sceneOf(
   layout: ShownLayout,
   contact: ShownContact | null,
-  readings: ShownReadings | null,
+  readings: Readings | null,
   trail: readonly Place[],
   truth: Place | null,
   current: boolean,

@@ -1,10 +1,10 @@
 /** The picture of one fingertip's pad: what draws it, how it is turned, and the hand that presses on
  * a simulated one. Nothing happens here for a frame of data: it draws what is there when asked. */
 import { cameraOf, picked, seen, type Box, type Camera, type Look } from './camera';
-import { PadGl } from './pad_gl';
-import { PadPlan } from './pad_plan';
+import { PadPicture } from './pad_picture';
 import { HEIGHT_mm, THICKNESS_mm, padSize, type Scene } from './pad_scene';
-import { cssOf, heatCss, mix, type Palette } from './palette';
+import { cssOf, heatOf, heatPart, mix, type Palette } from './palette';
+import { element } from './elements';
 import type { ShownLayout } from './shown';
 
 const FROM_ABOVE: Look = { turn_deg: 0, tilt_deg: 90 };
@@ -21,18 +21,6 @@ const NUMBER_mm = 4;
 const LABEL_INTERVAL_ms = 125;
 /** A pressure that a reader should notice. */
 const NOTED_Pa = 500;
-const MOST_PIXELS = 2_000_000;
-const MOST_SOFTWARE_PIXELS = 500_000;
-/** Between pictures, in the mean: longer than this they get fewer pixels, below the other more. */
-const SLOW_ms = 36;
-const QUICK_ms = 25;
-const LOWER_AFTER_ms = 2000;
-const RAISE_AFTER_ms = 10_000;
-/** Without a picture for this time their rate is not shown. */
-const PAUSE_ms = 400;
-/** A picture that has not changed for this time is drawn once more, as sharp as can be. */
-const STILL_ms = 500;
-const LEAST_SHARPNESS = 0.6;
 
 /** What a pointer or keys on the rubber do; places in mm on its surface. */
 export interface Touch {
@@ -45,10 +33,9 @@ export interface Touch {
 
 export class PadView {
   readonly element: HTMLElement;
-  private readonly canvas = document.createElement('canvas');
-  private readonly labels = document.createElement('canvas');
-  private gl: PadGl | null = null;
-  private plan: PadPlan | null = null;
+  private readonly canvas = element('canvas', { class: 'pad-picture', 'aria-hidden': 'true' });
+  private readonly labels = element('canvas', { class: 'pad-labels', 'aria-hidden': 'true' });
+  private readonly picture = new PadPicture(this.canvas);
   private look: Look = { ...ASLANT };
   private camera: Camera | null = null;
   /** A user has turned it. */
@@ -60,11 +47,6 @@ export class PadView {
   private changed = true;
   private labelsDue = true;
   private labelled_ms = -Infinity;
-  private sharpness = 1;
-  private slow_ms = QUICK_ms;
-  private called_ms = -Infinity;
-  private drawn_ms = -Infinity;
-  private sharpened_ms = 0;
   private touching: number | null = null;
   private turning: { id: number; x: number; y: number } | null = null;
   /** Set for a fingertip on which a hand may press. */
@@ -79,35 +61,16 @@ export class PadView {
       low_mm: -THICKNESS_mm,
       high_mm: HEIGHT_mm * 0.6,
     };
-    this.element = document.createElement('div');
-    this.element.className = 'pad';
-    this.element.tabIndex = 0;
-    this.element.setAttribute('role', 'application');
-    this.element.setAttribute('aria-roledescription', 'picture of the pad');
-    this.element.setAttribute('aria-label', label);
-    this.element.append(this.canvas, this.labels);
-    this.canvas.className = 'pad-picture';
-    this.labels.className = 'pad-labels';
-    this.canvas.setAttribute('aria-hidden', 'true');
-    this.labels.setAttribute('aria-hidden', 'true');
-    try {
-      this.gl = new PadGl(this.canvas, this.size);
-    } catch {
-      this.plan = new PadPlan(this.canvas);
-      this.look = { ...FROM_ABOVE };
-    }
-    this.canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
-    this.canvas.addEventListener('webglcontextrestored', () => {
-      this.gl = new PadGl(this.canvas, this.size);
-      this.changed = true;
-    });
+    const attributes = {
+      class: 'pad',
+      tabindex: 0,
+      role: 'application',
+      'aria-roledescription': 'picture of the pad',
+      'aria-label': label,
+    };
+    this.element = element('div', attributes, this.canvas, this.labels);
     new ResizeObserver(() => this.fit()).observe(this.element);
     this.listen();
-  }
-
-  /** Whether it can be turned. */
-  get solid(): boolean {
-    return this.gl !== null;
   }
 
   get fromAbove(): boolean {
@@ -115,20 +78,12 @@ export class PadView {
   }
 
   setFromAbove(above: boolean): void {
-    if (this.solid) {
-      this.turnTo(above ? FROM_ABOVE : this.aslant);
-    }
+    this.turnTo(above ? FROM_ABOVE : this.aslant);
   }
 
   private get aslant(): Look {
     const { clientWidth, clientHeight } = this.element;
     return clientWidth > WIDE * clientHeight ? ASLANT_WIDE : ASLANT;
-  }
-
-  /** Gives back what the graphics processor keeps: a browser grants few pictures at a time. */
-  dispose(): void {
-    this.gl?.dispose();
-    this.element.remove();
   }
 
   show(scene: Scene): void {
@@ -143,14 +98,8 @@ export class PadView {
 
   /** Once a picture; true if there was something to draw. */
   draw(now_ms: number, palette: Palette): boolean {
-    const took_ms = now_ms - this.called_ms;
-    this.called_ms = now_ms;
     if (!this.scene) {
       return false;
-    }
-    if (!this.changed && this.sharpness < 1 && now_ms - this.drawn_ms > STILL_ms) {
-      this.sharpness = 1;
-      this.fit();
     }
     if (this.fitDue) {
       this.resize();
@@ -166,35 +115,8 @@ export class PadView {
     }
     this.changed = false;
     this.labelsDue = true;
-    this.drawn_ms = now_ms;
-    if (this.gl && !this.gl.lost) {
-      this.gl.draw(this.scene, this.camera, palette);
-    }
-    this.plan?.draw(this.scene, this.camera, palette);
-    this.adaptSharpness(now_ms, took_ms);
+    this.picture.draw(this.scene, this.camera, palette);
     return true;
-  }
-
-  /** Fewer pixels where pictures come slowly, whatever the reason: drawing is over before it is done. */
-  private adaptSharpness(now_ms: number, took_ms: number): void {
-    if (took_ms > PAUSE_ms) {
-      this.slow_ms = QUICK_ms;
-      this.sharpened_ms = now_ms;
-      return;
-    }
-    this.slow_ms += 0.05 * (took_ms - this.slow_ms);
-    const since_ms = now_ms - this.sharpened_ms;
-    const wanted =
-      this.slow_ms > SLOW_ms && since_ms > LOWER_AFTER_ms
-        ? Math.max(LEAST_SHARPNESS, this.sharpness * 0.8)
-        : this.slow_ms < QUICK_ms && since_ms > RAISE_AFTER_ms
-          ? Math.min(1, this.sharpness * 1.25)
-          : this.sharpness;
-    if (wanted !== this.sharpness) {
-      this.sharpness = wanted;
-      this.sharpened_ms = now_ms;
-      this.fit();
-    }
   }
 
   /** With the next picture: whatever sets a canvas' size empties it. */
@@ -210,14 +132,12 @@ export class PadView {
       return;
     }
     const dense = Math.min(devicePixelRatio, 2);
-    const most = this.gl?.software ? MOST_SOFTWARE_PIXELS : MOST_PIXELS;
-    const ratio = Math.min(dense, Math.sqrt(most / (width * height))) * this.sharpness;
-    this.canvas.width = Math.max(1, Math.round(width * ratio));
-    this.canvas.height = Math.max(1, Math.round(height * ratio));
-    this.labels.width = Math.round(width * dense);
-    this.labels.height = Math.round(height * dense);
+    for (const canvas of [this.canvas, this.labels]) {
+      canvas.width = Math.round(width * dense);
+      canvas.height = Math.round(height * dense);
+    }
     this.camera = null;
-    if (!this.turned && this.solid) {
+    if (!this.turned) {
       this.look = { ...this.aslant };
     }
   }
@@ -250,10 +170,8 @@ export class PadView {
       if (this.touch && onPad) {
         this.touching = event.pointerId;
         this.touch.down(at.x_mm, at.y_mm);
-      } else if (this.solid) {
-        this.turning = { id: event.pointerId, x: event.clientX, y: event.clientY };
       } else {
-        return;
+        this.turning = { id: event.pointerId, x: event.clientX, y: event.clientY };
       }
       element.setPointerCapture(event.pointerId);
       element.classList.toggle('pressing', this.touching !== null);
@@ -308,7 +226,7 @@ export class PadView {
         Home: this.fromAbove ? this.aslant : FROM_ABOVE,
       };
       const look = turns[event.key];
-      if (look && this.solid && !event.ctrlKey && !event.metaKey && !event.altKey) {
+      if (look && !event.ctrlKey && !event.metaKey && !event.altKey) {
         event.preventDefault();
         event.stopPropagation();
         this.turnTo(look);
@@ -359,7 +277,7 @@ export class PadView {
           ? (pressure_Pa / 1000).toFixed(pressure_Pa < 9950 ? 1 : 0)
           : null;
       if (value !== null) {
-        const part = scene.saturated[k] ? 1 : Math.sqrt(Math.min(1, (pressure_Pa ?? 0) / 100_000));
+        const part = scene.saturated[k] ? 1 : heatPart(pressure_Pa ?? 0);
         const [x, y] = at(x_mm, y_mm, part * HEIGHT_mm);
         pen.font = `600 ${px}px system-ui, sans-serif`;
         const behind = scene.fit && flat ? mix(halo, palette.of('surface'), 0.2) : halo;
@@ -402,7 +320,7 @@ export class PadView {
     const x = 12;
     const bottom = height - 16;
     for (let i = 0; i < long; i++) {
-      pen.fillStyle = heatCss(palette, 100_000 * (i / long) ** 2);
+      pen.fillStyle = cssOf(heatOf(palette, i / long));
       pen.fillRect(x, bottom - i - 1, 8, 1.5);
     }
     pen.font = '11px system-ui, sans-serif';

@@ -38,12 +38,11 @@ export function paletteOf(declared: (name: string) => string, dark: boolean): Pa
   };
 }
 
-export function heatCss(palette: Palette, pressure_Pa: number): string {
-  const at = heatPart(pressure_Pa) * (HEAT_STOPS - 1);
+/** part: of heatPart. */
+export function heatOf(palette: Palette, part: number): Colour {
+  const at = part * (HEAT_STOPS - 1);
   const below = Math.min(Math.floor(at), HEAT_STOPS - 2);
-  const low = palette.heat[below] ?? [0, 0, 0];
-  const high = palette.heat[below + 1] ?? low;
-  return cssOf(mix(low, high, at - below));
+  return mix(palette.heat[below], palette.heat[below + 1], at - below);
 }
 
 export function mix(a: Colour, b: Colour, part: number): Colour {

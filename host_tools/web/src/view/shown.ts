@@ -1,48 +1,54 @@
 /** What the view shows of a fingertip: its model in short names, words and bitmaps. Read when a
  * picture is drawn; nothing happens here for a packet. */
-import { Flag, Stored, type Contact, type ContactField } from '../line/line_facts';
+import { Flag, Stored, type Contact, type ContactField, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import type { History } from '../model/history';
+import type { History, Readings } from '../model/history';
 import { FINGERS } from './palette';
 
 /** The newest contact, or that of a moment in the past. A value whose flag is off is 0. */
 export type ShownContact = Pick<Contact, 'flags' | ContactField>;
 
-/** Bitmaps by sensor; pressure_Pa as the fit gets it: above the zero, over the gain. */
-export interface ShownReadings {
-  valid: number;
-  saturated: number;
-  doubtful: number;
-  readonly pressure_Pa: Float32Array;
-}
-
 /** Where the sensors are, origin in the middle of the pad, x across the strips, y along them. */
-export interface ShownLayout {
-  readonly x_mm: ArrayLike<number>;
-  readonly y_mm: ArrayLike<number>;
-}
+export type ShownLayout = Pick<Info, 'x_mm' | 'y_mm'>;
 
 /** Level: how much it matters, and so its colour. */
 export type Level = 'plain' | 'good' | 'warning' | 'bad';
 
-/** What is true of a simulated fingertip, some 30 ms old at most; the pull only where it is known. */
+/** What is true of a simulated fingertip, some 30 ms old at most. Without contact all is 0. */
 export interface ShownTruth {
   readonly contact: boolean;
   readonly x_mm: number;
   readonly y_mm: number;
   readonly force_N: number;
-  readonly qx_N?: number;
-  readonly qy_N?: number;
+  readonly qx_N: number;
+  readonly qy_N: number;
+}
+
+export const NO_TRUTH: ShownTruth = { contact: false, x_mm: 0, y_mm: 0, force_N: 0, qx_N: 0, qy_N: 0 };
+
+interface Press {
+  x_mm: number;
+  y_mm: number;
+  /** Down, 0..50. */
+  force_N: number;
 }
 
 /** The hand that presses on a simulated fingertip: SimulatedFingertip of src/simulated is one, and
  * ServedFingertip, whose hand can press only. */
 export interface Hand {
   readonly objects?: readonly { readonly name: string; readonly title: string }[];
-  press(hand: { x_mm: number; y_mm: number; force_N: number } | null): void;
+  /** Presses, and drags along as x_mm and y_mm change. */
+  press(hand: Press): void;
+  /** Ends whatever touches. */
+  lift(): void;
+  /** An object by its name; lifts the one that was there. */
   choose?(name: string): void;
+  /** Lets the object fall from 3 mm; it lies there until it is lifted or pressed. */
   drop?(x_mm: number, y_mm: number): void;
-  hold?(grip: { x_mm: number; y_mm: number; force_N: number; load_N: number; angle_deg: number } | null): void;
+  /** A grip presses the object while a load of 0..50 N, its weight, pulls it along the pad, angle_deg from x towards y. It stays where it
+   * was first held, until the load is more than friction holds; one that slid off stays lost until it is lifted. */
+  hold?(grip: Press & { load_N: number; angle_deg: number }): void;
+  /** Static friction, 0.1..1.5; 0.5 at first. Kinetic is 0.8 of it. */
   setFriction?(friction: number): void;
 }
 
@@ -50,14 +56,6 @@ export interface Hand {
 const STALLED_ms = 700;
 
 export class Shown {
-  private readonly kept: ShownReadings = {
-    valid: 0,
-    saturated: 0,
-    doubtful: 0,
-    pressure_Pa: new Float32Array(32),
-  };
-  private readKept = 0;
-
   constructor(
     readonly fingertip: Fingertip,
     private readonly place: number,
@@ -134,43 +132,9 @@ export class Shown {
     return this.fingertip.contacts > 0 ? this.fingertip.contact : null;
   }
 
-  /** Readings of the last frame that was not held: a held one is no measurement. */
-  get readings(): ShownReadings | null {
-    const { raw, raws } = this.fingertip;
-    if (raws === 0) {
-      return null;
-    }
-    if (raws !== this.readKept && !(raw.flags & Flag.HELD)) {
-      this.readKept = raws;
-      const { kept } = this;
-      kept.valid = raw.valid;
-      kept.saturated = raw.saturated;
-      kept.doubtful = raw.doubtful;
-      for (let k = 0; k < raw.sensor_count; k++) {
-        const above_Pa = ((raw.pressure_Pa_q10[k] ?? 0) - (raw.baseline_Pa_q10[k] ?? 0)) / 1024;
-        kept.pressure_Pa[k] = above_Pa / this.gain(k);
-      }
-    }
-    return this.kept;
-  }
-
-  /** Readings of a row that is kept; null if its raw packet is missing. */
-  readingsAt(row: number): ShownReadings | null {
-    const { history } = this;
-    if (!history) {
-      return null;
-    }
-    const count = history.sensor_count;
-    const from = history.slot(row) * count;
-    const pressure_Pa = history.pressure_Pa.slice(from, from + count);
-    let valid = 0;
-    pressure_Pa.forEach((above_Pa, k) => {
-      if (!Number.isNaN(above_Pa)) {
-        valid |= 1 << k;
-        pressure_Pa[k] = above_Pa / this.gain(k);
-      }
-    });
-    return valid === 0 ? null : { valid, saturated: 0, doubtful: 0, pressure_Pa };
+  /** Of the newest frame whose raw packet is there. */
+  get readings(): Readings | null {
+    return this.history && readingsNear(this.history, this.history.end - 1);
   }
 
   /** In words, and how much it matters. */
@@ -198,9 +162,9 @@ export class Shown {
     }
     return { words: 'live', level: 'good' };
   }
+}
 
-  private gain(k: number): number {
-    const { info } = this.fingertip;
-    return info && info.stored & Stored.CALIBRATION ? info.gain[k] || 1 : 1;
-  }
+/** Of a row, or of the one before: a contact packet comes before the raw packet of its frame. */
+export function readingsNear(history: History, row: number): Readings | null {
+  return history.readingsAt(row) ?? history.readingsAt(row - 1);
 }

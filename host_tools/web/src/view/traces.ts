@@ -2,8 +2,9 @@
 import { Flag } from '../line/line_facts';
 import { FLAGS } from '../model/flags';
 import uPlot from 'uplot';
-import { Buckets, intervalOf, type ColumnName } from './buckets';
-import { chartOf, clock, roundAbove, spansOf, type Chart } from './curves';
+import { Buckets, intervalOf, roundAbove, type ColumnName } from './buckets';
+import { chartOf, clock, spansOf, type Chart, type Span } from './curves';
+import { element } from './elements';
 import { FINGERS, cssOf, type Palette } from './palette';
 import type { History } from '../model/history';
 import type { Shown } from './shown';
@@ -30,35 +31,28 @@ interface Plot {
   readonly unit: string;
   readonly columns: readonly ColumnName[];
   readonly height: number;
-  readonly digits: number;
   readonly tangential?: boolean;
 }
 
 const PLOTS: readonly Plot[] = [
-  { title: 'Force', unit: 'N', columns: ['force_N'], height: 1.5, digits: 2 },
-  { title: 'Pull', unit: 'N', columns: ['qx_N', 'qy_N'], height: 1, digits: 2, tangential: true },
-  { title: 'Place', unit: 'mm', columns: ['x_mm', 'y_mm'], height: 1.2, digits: 2 },
-  { title: 'Slip', unit: 'mm', columns: ['slip_mm'], height: 1, digits: 3 },
+  { title: 'Force', unit: 'N', columns: ['force_N'], height: 1.5 },
+  { title: 'Pull', unit: 'N', columns: ['qx_N', 'qy_N'], height: 1, tangential: true },
+  { title: 'Place', unit: 'mm', columns: ['x_mm', 'y_mm'], height: 1.2 },
+  { title: 'Slip', unit: 'mm', columns: ['slip_mm'], height: 1 },
 ];
 
 interface Drawn {
   readonly plot: Plot;
-  readonly box: HTMLElement;
   readonly chart: uPlot;
   low: number;
   high: number;
   threshold: number | null;
 }
 
-export interface Span_s {
-  from_s: number;
-  to_s: number;
-}
-
 export class Traces {
-  readonly element = document.createElement('div');
+  readonly element = element('div', { class: 'traces' });
   private readonly buckets = new Buckets(2 * MOST_INTERVALS);
-  private readonly strip = document.createElement('canvas');
+  private readonly strip = element('canvas', { class: 'flags', role: 'img' });
   private drawn: Drawn[] = [];
   private palette: Palette | null = null;
   private tangential = false;
@@ -70,13 +64,8 @@ export class Traces {
   private rows = 2;
   /** Its size is another: draw it again, in a pause too. */
   onResize: (() => void) | null = null;
-  /** A place in time was pointed at; null: no longer. */
-  onPoint: ((t_s: number | null) => void) | null = null;
 
   constructor() {
-    this.element.className = 'traces';
-    this.strip.className = 'flags';
-    this.strip.setAttribute('role', 'img');
     new ResizeObserver(() => {
       const { clientWidth, clientHeight } = this.element;
       if (clientWidth !== this.width || clientHeight !== this.height) {
@@ -94,7 +83,7 @@ export class Traces {
   }
 
   /** zero_s: the time that the axis calls 0, as "now" or the end of the recording. */
-  draw(fingertip: Shown, history: History, span: Span_s): void {
+  draw(fingertip: Shown, history: History, span: Span): void {
     if (fingertip.tangential !== this.tangential || fingertip.finger !== this.finger) {
       this.tangential = fingertip.tangential;
       this.finger = fingertip.finger;
@@ -113,8 +102,8 @@ export class Traces {
     for (const drawn of this.drawn) {
       this.scale(drawn, chart, fingertip);
       const lists = drawn.plot.columns.flatMap((name) => {
-        const curves = chart.curves.get(name);
-        return curves ? [curves.sdHigh, curves.sdLow, curves.doubtful, curves.good] : [];
+        const curves = chart.curves.get(name)!;
+        return [curves.sdHigh, curves.sdLow, curves.doubtful, curves.good];
       });
       drawn.chart.batch(() => {
         drawn.chart.setData([chart.t_s, ...lists] as uPlot.AlignedData, false);
@@ -128,8 +117,7 @@ export class Traces {
   /** Axes that seldom jump: round limits, which shrink only when far too wide. */
   private scale(drawn: Drawn, chart: Chart, fingertip: Shown): void {
     const { plot } = drawn;
-    const reaches = plot.columns.map((name) => chart.reach.get(name) ?? null);
-    const most = Math.max(0, ...reaches.map((reach) => (reach ? Math.max(Math.abs(reach.low), Math.abs(reach.high)) : 0)));
+    const most = Math.max(0, ...plot.columns.map((name) => chart.most.get(name)!));
     drawn.threshold = null;
     if (plot.columns[0] === 'x_mm') {
       const layout = fingertip.layout;
@@ -164,25 +152,15 @@ export class Traces {
     }
     const plots = PLOTS.filter((plot) => !plot.tangential || this.tangential);
     for (const plot of plots) {
-      const box = document.createElement('div');
-      box.className = 'trace';
-      const title = document.createElement('div');
-      title.className = 'trace-title';
-      title.textContent = `${plot.title}, ${plot.unit}`;
+      const key = (name: string, i: number) => element('span', { class: 'key', 'data-finger': this.colour(i) }, name.replace(/_.*/, ''));
+      const title = element('div', { class: 'trace-title' }, `${plot.title}, ${plot.unit}`);
       if (plot.columns.length > 1) {
-        plot.columns.forEach((name, i) => {
-          const key = document.createElement('span');
-          key.className = 'key';
-          key.dataset['finger'] = String(this.colour(i));
-          key.textContent = name.replace(/_.*/, '');
-          title.append(key);
-        });
+        title.append(...plot.columns.map(key));
       }
-      box.append(title);
+      const box = element('div', { class: 'trace' }, title);
       this.element.append(box);
       const drawn: Drawn = {
         plot,
-        box,
         low: 0,
         high: 1,
         threshold: null,
@@ -213,10 +191,6 @@ export class Traces {
     };
     const last = plot === PLOTS[PLOTS.length - 1];
     const colours = plot.columns.map((_, i) => palette.css(`finger-${this.colour(i)}`));
-    const see = (css: string, part: number) =>
-      `${css}${Math.round(255 * part)
-        .toString(16)
-        .padStart(2, '0')}`;
     return {
       width: 300,
       height: 100,
@@ -245,13 +219,13 @@ export class Traces {
         ...colours.flatMap((colour): uPlot.Series[] => [
           { stroke: 'transparent', width: 0, points: { show: false } },
           { stroke: 'transparent', width: 0, points: { show: false } },
-          { stroke: see(colour, 0.75), width: 1, dash: [3, 3], points: { show: false } },
+          { stroke: `${colour}bf`, width: 1, dash: [3, 3], points: { show: false } },
           { stroke: colour, width: 1.4, points: { show: false } },
         ]),
       ],
       bands: colours.map((colour, i) => ({
         series: [1 + 4 * i, 2 + 4 * i] as [number, number],
-        fill: see(colour, 0.22),
+        fill: `${colour}38`,
       })),
       hooks: {
         drawAxes: [
@@ -269,12 +243,6 @@ export class Traces {
               pen.stroke();
               pen.restore();
             }
-          },
-        ],
-        setCursor: [
-          (chart) => {
-            const left = chart.cursor.left ?? -1;
-            this.onPoint?.(left >= 0 ? chart.posToVal(left, 'x') : null);
           },
         ],
       },
@@ -299,7 +267,7 @@ export class Traces {
   }
 
   /** Contact, slip, each warning that occurs, and what was lost, as spans with their names. */
-  private drawStrip(first: number, last: number, span: Span_s, break_s: number): void {
+  private drawStrip(first: number, last: number, span: Span, break_s: number): void {
     const palette = this.palette;
     const pen = this.strip.getContext('2d');
     if (!palette || !pen) {

@@ -136,7 +136,7 @@ export class View {
     const { fingertips } = this.bench;
     for (const [fingertip, card] of this.cards) {
       if (!fingertips.includes(fingertip)) {
-        card.dispose();
+        card.element.remove();
         for (const map of [this.cards, this.shown, this.doings, this.ends]) {
           map.delete(fingertip);
         }
