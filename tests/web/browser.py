@@ -22,25 +22,12 @@ PATIENCE_s = 1200
 BINARIES = ("/usr/lib/chromium/chromium",)
 POLICY_FOLDER = "/etc/chromium"
 # nothing of the browser's own on the network; WebGL in software, as where there is no graphics processor
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--remote-debugging-pipe",
-    "--no-first-run",
-    "--no-default-browser-check",
-    "--disable-extensions",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-default-apps",
-    "--disable-breakpad",
-    "--disable-dev-shm-usage",
-    "--mute-audio",
-    "--hide-scrollbars",
-    "--force-color-profile=srgb",
-    "--force-device-scale-factor=1",
-    "--enable-unsafe-swiftshader",
-)
+FLAGS = """
+--headless --no-sandbox --remote-debugging-pipe --no-first-run --no-default-browser-check
+--disable-extensions --disable-background-networking --disable-component-update --disable-sync --disable-default-apps
+--disable-breakpad --disable-dev-shm-usage --mute-audio --hide-scrollbars --force-color-profile=srgb
+--force-device-scale-factor=1 --enable-unsafe-swiftshader
+""".split()
 FAINT = """(() => {
   const paint = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
   const parts = colour => {
@@ -101,7 +88,7 @@ def unshare():
 class Browser:
     """With ports: a folder, and the library made of ports.c; without: without Web Serial's ports."""
 
-    def __init__(self, folder, library=None, policy=None, flags=()):
+    def __init__(self, folder, library=None, policy=None):
         binary = next(filter(os.path.exists, BINARIES), None)
         if binary is None:
             raise CannotRun("chromium is not installed")
@@ -124,21 +111,9 @@ class Browser:
         self._from_browser, to_test = os.pipe()
         environment |= {"FROM_TEST": str(from_test), "TO_TEST": str(to_test)}
         self._log = open(self.folder / "browser.log", "wb")
+        command = [*unshare(), "bash", "-c", START, "bash", self.folder / "policies", POLICY_FOLDER]
         self._process = subprocess.Popen(
-            [
-                *unshare(),
-                "bash",
-                "-c",
-                START,
-                "bash",
-                self.folder / "policies",
-                POLICY_FOLDER,
-                binary,
-                *FLAGS,
-                *flags,
-                f"--user-data-dir={self.folder / 'profile'}",
-                "about:blank",
-            ],
+            [*command, binary, *FLAGS, f"--user-data-dir={self.folder / 'profile'}", "about:blank"],
             env=environment,
             pass_fds=(from_test, to_test),
             stdin=subprocess.DEVNULL,
@@ -363,36 +338,16 @@ class Page:
         x, y = self._at
         held = kind == "mousePressed" or (kind == "mouseMoved" and self._held)
         self._held = kind != "mouseReleased" and held
-        self.call(
-            "Input.dispatchMouseEvent",
-            type=kind,
-            x=x,
-            y=y,
-            button="left" if kind != "mouseMoved" or held else "none",
-            buttons=int(held),
-            clickCount=1,
-        )
+        button = "left" if kind != "mouseMoved" or held else "none"
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(held), clickCount=1)
 
-    def key(self, key, code=None):
-        for kind in ("keyDown", "keyUp"):
-            self.call(
-                "Input.dispatchKeyEvent",
-                type=kind,
-                key=key,
-                code=code or key,
-                **({"text": key} if kind == "keyDown" and len(key) == 1 else {}),
-            )
+    def key(self, key, code=None, **more):
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=code or key, **(text | more))
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code or key)
 
     def enter(self):
-        for kind in ("keyDown", "keyUp"):
-            self.call(
-                "Input.dispatchKeyEvent",
-                type=kind,
-                key="Enter",
-                code="Enter",
-                windowsVirtualKeyCode=13,
-                **({"text": "\r"} if kind == "keyDown" else {}),
-            )
+        self.key("Enter", windowsVirtualKeyCode=13, text="\r")
 
     def type(self, role, name, text):
         """Into a field, instead of what it holds."""

@@ -46,75 +46,49 @@ class Bench(contextlib.ExitStack):
             time.sleep(0.02)
         return process
 
-    def emulated(self, browser, serial, scenario, *options, image=None):
+    def emulated(self, browser, serial, scenario, *options):
         """The release image of pico_parallel, powered on when its port is first opened."""
         port = browser.ports / f"{USB_ID}:{serial}"
-        return self._until_there(
-            self._start(
-                self._tools.node,
-                ROOT / "host_tools/simulation/emulator/main.mjs",
-                "--board",
-                "pico_parallel",
-                "--image",
-                image or self._tools.image,
-                "--scenario",
-                scenario,
-                "--serial",
-                serial,
-                "--pty",
-                port,
-                "--wait-open",
-                "--fast-enumeration",
-                *options,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            ),
-            port,
-        )
+        emulator = [
+            self._tools.node,
+            ROOT / "host_tools/simulation/emulator/main.mjs",
+            "--board",
+            "pico_parallel",
+            "--image",
+            self._tools.image,
+        ]
+        press = ["--scenario", scenario, "--serial", serial, "--pty", port, "--wait-open", "--fast-enumeration", *options]
+        return self._until_there(self._start(*emulator, *press, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL), port)
 
     def fake(self, browser, serial, *options, usb_id=USB_ID):
         """tests/support/fake_device.cpp, with its options."""
-        port = browser.ports / f"{usb_id}:{serial}"
+        port, device = browser.ports / f"{usb_id}:{serial}", self._tools.build / "tests/support/fake_device"
         return self._until_there(
-            self._start(
-                self._tools.build / "tests/support/fake_device",
-                port,
-                f"serial={serial}",
-                f"life={PATIENCE_s}",
-                *options,
-                stdout=subprocess.DEVNULL,
-            ),
-            port,
+            self._start(device, port, f"serial={serial}", f"life={PATIENCE_s}", *options, stdout=subprocess.DEVNULL), port
         )
 
-    def simulated(self, runtime, *options):
-        """`fingertip simulate`, which a page served with the same runtime folder finds."""
+    def _tool(self, runtime, *arguments):
+        """The tool's first line, once it is there; runtime: folder where programs find what is simulated."""
         process = self._start(
             self._tools.build / "host_tools/tool/cli/fingertip",
-            "simulate",
-            *options,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)},
-        )
-        if not process.stdout.readline().startswith("ready: "):
-            raise AssertionError("nothing is simulated")
-        return process
-
-    def served(self, runtime):
-        """The page, by `fingertip web`: its address without the last slash. runtime: folder where it finds what is simulated."""
-        process = self._start(
-            self._tools.build / "host_tools/tool/cli/fingertip",
-            "web",
-            "--port",
-            "0",
-            "--no-browser",
+            *arguments,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
             env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)},
         )
-        url = process.stdout.readline().strip()
+        return process, process.stdout.readline().strip()
+
+    def simulated(self, runtime, *options):
+        """`fingertip simulate`, which a page served with the same runtime folder finds."""
+        process, line = self._tool(runtime, "simulate", *options)
+        if not line.startswith("ready: "):
+            raise AssertionError("nothing is simulated")
+        return process
+
+    def served(self, runtime):
+        """The page, by `fingertip web`: its address without the last slash."""
+        _, url = self._tool(runtime, "web", "--port", "0", "--no-browser")
         if not re.fullmatch(r"http://127\.0\.0\.1:\d+/", url):
             raise AssertionError("the page is not served")
         return url.rstrip("/")

@@ -75,12 +75,6 @@ API struct udev_enumerate *udev_enumerate_new(struct udev *udev) {
   return calloc(1, sizeof(struct udev_enumerate));
 }
 
-API int udev_enumerate_add_match_subsystem(struct udev_enumerate *enumerate, const char *subsystem) {
-  (void)enumerate;
-  (void)subsystem;
-  return 0;
-}
-
 API int udev_enumerate_scan_devices(struct udev_enumerate *enumerate) {
   DIR *ports = opendir(folder());
   for (struct dirent *entry; ports && (entry = readdir(ports));) {
@@ -139,31 +133,19 @@ API const char *udev_device_get_property_value(struct udev_device *device, const
                                                : NULL;
 }
 
-/* What else a browser may ask: there is nothing. */
-API const char *udev_device_get_devtype(struct udev_device *device) { return (void)device, NULL; }
-API const char *udev_device_get_driver(struct udev_device *device) { return (void)device, NULL; }
-API struct udev_device *udev_device_get_parent(struct udev_device *device) { return (void)device, NULL; }
-API struct udev_list_entry *udev_device_get_properties_list_entry(struct udev_device *device) {
-  return (void)device, NULL;
-}
-
-API struct udev_device *udev_device_get_parent_with_subsystem_devtype(struct udev_device *device, const char *subsystem,
-                                                                      const char *devtype) {
-  return (void)device, (void)subsystem, (void)devtype, NULL;
-}
-
-API const char *udev_device_get_sysattr_value(struct udev_device *device, const char *name) {
-  return (void)device, (void)name, NULL;
-}
-
-API struct udev_device *udev_device_new_from_devnum(struct udev *udev, char type, unsigned long number) {
-  return (void)udev, (void)type, (void)number, NULL;
-}
-
-API struct udev_device *udev_device_new_from_subsystem_sysname(struct udev *udev, const char *subsystem,
-                                                               const char *name) {
-  return (void)udev, (void)subsystem, (void)name, NULL;
-}
+/* What else a browser may ask, with whatever arguments: there is nothing. */
+#define NOTHING(name)                                                                                                  \
+  API void *name(void) { return NULL; }
+NOTHING(udev_device_get_devtype)
+NOTHING(udev_device_get_driver)
+NOTHING(udev_device_get_parent)
+NOTHING(udev_device_get_properties_list_entry)
+NOTHING(udev_device_get_parent_with_subsystem_devtype)
+NOTHING(udev_device_get_sysattr_value)
+NOTHING(udev_device_new_from_devnum)
+NOTHING(udev_device_new_from_subsystem_sysname)
+NOTHING(udev_enumerate_add_match_subsystem)
+NOTHING(udev_monitor_filter_add_match_subsystem_devtype)
 
 API struct udev_monitor *udev_monitor_new_from_netlink(struct udev *udev, const char *name) {
   (void)udev;
@@ -171,11 +153,6 @@ API struct udev_monitor *udev_monitor_new_from_netlink(struct udev *udev, const 
   struct udev_monitor *monitor = calloc(1, sizeof *monitor);
   monitor->fd = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   return monitor;
-}
-
-API int udev_monitor_filter_add_match_subsystem_devtype(struct udev_monitor *monitor, const char *subsystem,
-                                                        const char *devtype) {
-  return (void)monitor, (void)subsystem, (void)devtype, 0;
 }
 
 API int udev_monitor_enable_receiving(struct udev_monitor *monitor) {

@@ -100,16 +100,8 @@ class PageTest(unittest.TestCase):
     def scenario(self, kind, *options):
         path = self.folder / f"{kind}.csv"
         if not path.exists():
-            run(
-                OPTIONS.build / "host_tools/simulation/twin/twin",
-                "scenario",
-                kind,
-                "-o",
-                path,
-                "--cache",
-                OPTIONS.build / "contact_tables",
-                *options,
-            )
+            twin = OPTIONS.build / "host_tools/simulation/twin/twin"
+            run(twin, "scenario", kind, "-o", path, "--cache", OPTIONS.build / "contact_tables", *options)
         return path
 
 
@@ -233,12 +225,9 @@ class Calibrate(PageTest):
         first = next(i for i, line in enumerate(once) if line.startswith("t_s,")) + 1
         rows = [line.split(",", 1) for line in once[first:]]
         often = self.folder / "placements_often.csv"
-        often.write_text(
-            "".join(
-                once[:first]
-                + [f"{float(t_s) + again * (float(rows[-1][0]) + 0.1):.6f},{rest}" for again in range(REPEATED) for t_s, rest in rows]
-            )
-        )
+        period_s = float(rows[-1][0]) + 0.1
+        repeated = [f"{float(t_s) + again * period_s:.6f},{rest}" for again in range(REPEATED) for t_s, rest in rows]
+        often.write_text("".join(once[:first] + repeated))
         return self.bench.emulated(
             self.browser, SERIALS[0], often, "--pace", "fast", "--seconds", 3600, "--flash", self.folder / "flash.bin", *options
         )
@@ -269,18 +258,8 @@ class Calibrate(PageTest):
         page.until("document.querySelector('dialog [role=status]').textContent.startsWith('Stored')")
         self.assertLess(after_mm, 0.15)
         found = np.array(page.run("Array.from(fingertip.fingertips[0].info.gain)"))
-        true = (
-            1
-            + np.array(
-                [
-                    float(each)
-                    for each in re.search("(?m)^# gain_errors_percent: (.*)$", self.scenario("placements", *self.PLACEMENTS).read_text())[
-                        1
-                    ].split()
-                ]
-            )
-            / 100
-        )
+        text = self.scenario("placements", *self.PLACEMENTS).read_text()
+        true = 1 + np.array(re.search("(?m)^# gain_errors_percent: (.*)$", text)[1].split(), float) / 100
         self.assertEqual(len(found), len(true))
         self.assertLess(np.std(found / true), 0.015)
         self.assertGreater(np.std(true), 0.1)
@@ -289,17 +268,8 @@ class Calibrate(PageTest):
     def test_the_doctor_examines(self):
         rest = self.folder / "rest.csv"
         row = ",".join("0" for _ in files.TRUTH_COLUMNS) + ",0" * 15
-        rest.write_text(
-            "\n".join(
-                [
-                    "# fingertip-scenario 1",
-                    ",".join(["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]),
-                    f"0,{row}",
-                    f"3600,{row}",
-                ]
-            )
-            + "\n"
-        )
+        head = ",".join(["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))])
+        rest.write_text(f"# fingertip-scenario 1\n{head}\n0,{row}\n3600,{row}\n")
         process = self.bench.emulated(self.browser, SERIALS[0], rest, "--pace", "fast")
         page = self.open()
         driven.connected(page, 1)
@@ -568,22 +538,7 @@ class Simulations(PageTest):
 class Everyone(PageTest):
     """Who does not see it, who sees little, who holds it in one hand."""
 
-    NAMED = {
-        "button",
-        "link",
-        "textbox",
-        "checkbox",
-        "radio",
-        "combobox",
-        "listbox",
-        "slider",
-        "spinbutton",
-        "tab",
-        "menuitem",
-        "searchbox",
-        "switch",
-        "dialog",
-    }
+    NAMED = set("button link textbox checkbox radio combobox listbox slider spinbutton tab menuitem searchbox switch dialog".split())
 
     def everything(self):
         """A page with a simulated fingertip on it."""

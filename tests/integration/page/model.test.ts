@@ -15,7 +15,6 @@ import {
 } from '../../../host_tools/web/src/line/line_facts';
 import { Bench } from '../../../host_tools/web/src/model/bench';
 import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
-import { FLAGS, WARNING_FLAGS } from '../../../host_tools/web/src/model/flags';
 import { PATIENCE } from '../../../host_tools/web/src/model/patience';
 import { History } from '../../../host_tools/web/src/model/history';
 import { commandsFor } from '../../../host_tools/web/src/steps/settings';
@@ -129,7 +128,7 @@ class SpokenLine implements Line {
     const name = asks[command];
     this.acknowledge(command, view, name ? Result.DONE : this.result);
     if (name && --this.loses < 0) {
-      const decoder = core.newDecoder();
+      const decoder = new core.Decoder();
       decoder.feed(Uint8Array.of(0), () => undefined);
       decoder.feed(vector(name).frame, (answer: DevicePacket) =>
         this.say({ ...answer, t_us: this.device_us, ...(this.serial && { serial: this.serial }) }),
@@ -156,8 +155,8 @@ test('it opens: info, streams, then live; frames reach model, history and taps',
   assert.equal(fingertip.name, 'E66058388347A12C');
   assert.equal(line.streams, Stream.CONTACT | Stream.RAW | Stream.HEALTH);
   assert.ok(fingertip.clock.estimate);
-  const seen: [number, number][] = [];
-  const end = fingertip.tap((packet, frame) => seen.push([packet.type, frame().length]));
+  const seen: number[] = [];
+  const end = fingertip.tap((packet) => seen.push(packet.type));
   const flags = Flag.CONTACT | Flag.FIT_VALID;
   line.say(contactOf(1, 6_000_000, { flags, force_N: 1.5 }));
   line.say(rawOf(1, 6_000_000, [875, 1125]));
@@ -165,11 +164,7 @@ test('it opens: info, streams, then live; frames reach model, history and taps',
   line.say(contactOf(2, 6_001_000, { flags: 0 }));
   end();
   line.say(contactOf(3, 6_002_000));
-  assert.deepEqual(
-    seen.map(([type]) => type),
-    [1, 2, 1],
-  );
-  assert.ok(seen.every(([, length]) => length > 30));
+  assert.deepEqual(seen, [1, 2, 1]);
   assert.equal(fingertip.lost, 4);
   assert.deepEqual([fingertip.contacts, fingertip.raws], [3, 1]);
   const { history } = fingertip;
@@ -291,37 +286,6 @@ test('history: a raw packet without its contact packet has a row of its own', ()
   assert.ok(Number.isNaN(history.columns.force_N[0]));
 });
 
-test('clocks: right within what it says, whatever the delays', () => {
-  const fit = core.newClockFit();
-  const drift = 60e-6;
-  let state = 7;
-  const random = (): number => (state = (state * 48271) % 2147483647) / 2147483647;
-  for (let i = 0; i < 60; i++) {
-    const host_us = 1e6 * i;
-    const there_us = 200 + (random() < 0.2 ? 90_000 * random() : 300 * random());
-    const back_us = 200 + (random() < 0.2 ? 90_000 * random() : 300 * random());
-    fit.add({
-      sent_us: host_us,
-      received_us: host_us + there_us + back_us,
-      device_us: (host_us + there_us) * (1 + drift) + 5e6,
-    });
-  }
-  const estimate = fit.estimate!;
-  const truth_us = (estimate.device_us - 5e6) / (1 + drift);
-  assert.ok(Math.abs(estimate.host_us - truth_us) <= estimate.uncertainty_us);
-  assert.ok(estimate.uncertainty_us < 500, `${estimate.uncertainty_us}`);
-  assert.ok(Math.abs(estimate.drift_ppm - 60) < 20, `${estimate.drift_ppm}`);
-  assert.equal(fit.jumps, 0);
-  fit.add({ sent_us: 61e6, received_us: 61e6 + 500, device_us: 61e6 + 9e6 });
-  assert.equal(fit.jumps, 1);
-});
-
-test('flags: every one has words; warnings are those of the tool', () => {
-  assert.equal(FLAGS.length, Object.keys(Flag).length);
-  assert.equal(WARNING_FLAGS, 705167104);
-  assert.equal(core.flagsText(Flag.CONTACT | Flag.UNCERTAIN | (1 << 30)), 'CONTACT UNCERTAIN bit30');
-});
-
 test('the bench tells who comes and goes', () => {
   const bench = new Bench();
   let told = 0;
@@ -337,7 +301,7 @@ test('the bench tells who comes and goes', () => {
 
 test('settings: commands for what differs, refusals with the range', () => {
   let info: Info | null = null;
-  const decoder = core.newDecoder();
+  const decoder = new core.Decoder();
   decoder.feed(Uint8Array.of(0), () => undefined);
   decoder.feed(vector('info_grasp').frame, (packet) => (info = packet as Info));
   const now = { rate: '20', osr: '1024', slip_threshold: '0.75', slip_window: '100', prior: '3.125:0.5', limit: '0.625' };

@@ -17,7 +17,7 @@ await build({
   root: here,
   configFile: false,
   logLevel: 'warn',
-  resolve: { alias: ['@mcap/core', 'fzstd'].map((find) => ({ find, replacement: join(page, 'node_modules', find) })) },
+  resolve: { alias: { fzstd: join(page, 'node_modules/fzstd') } },
   ssr: { noExternal: true },
   build: {
     ssr: true,

@@ -6,9 +6,9 @@ import { join } from 'node:path';
 import test from 'node:test';
 import { Flag, PacketType, type Contact } from '../../../host_tools/web/src/line/line_facts';
 import { History } from '../../../host_tools/web/src/model/history';
-import { Buckets, Trust, intervalOf } from '../../../host_tools/web/src/view/buckets';
+import { Buckets, Trust, intervalOf, roundAbove } from '../../../host_tools/web/src/view/buckets';
 import { cameraOf, picked, seen, type Box } from '../../../host_tools/web/src/view/camera';
-import { chartOf, clock, roundAbove, spansOf } from '../../../host_tools/web/src/view/curves';
+import { chartOf, clock, spansOf } from '../../../host_tools/web/src/view/curves';
 import { contactAt, trailAt } from '../../../host_tools/web/src/view/recorded_contact';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
@@ -33,11 +33,7 @@ function historyOf(count: number, contact: (i: number) => Partial<Contact> | nul
   return history;
 }
 
-function forceOf(buckets: Buckets) {
-  const track = buckets.tracks.get('force_N');
-  assert.ok(track);
-  return track;
-}
+const forceOf = (buckets: Buckets) => buckets.tracks.get('force_N')!;
 
 test('an interval keeps the lowest and the highest value, and which came first', () => {
   const history = historyOf(1000, (i) => ({ force_N: i === 503 ? 9 : i === 507 ? -1 : 2, force_sd_N: 0.5 }));
@@ -78,21 +74,6 @@ test('read in many small steps, or back and forth, intervals are those of one re
   }
 });
 
-test('what has left the intervals is read again when somebody goes back to it', () => {
-  const history = historyOf(3000, (i) => ({ force_N: i }));
-  const buckets = new Buckets(60);
-  for (let end_s = 0.5; end_s < 3; end_s += 0.1) {
-    buckets.read(history, 0.02, end_s - 0.5, end_s);
-  }
-  const { first, last } = buckets.read(history, 0.02, 0.2, 0.6);
-  const fresh = new Buckets(60);
-  fresh.read(history, 0.02, 0.2, 0.6);
-  for (let b = first; b <= last; b++) {
-    assert.ok(fresh.slot(b) >= 0);
-    assert.equal(forceOf(buckets).low[buckets.slot(b)], forceOf(fresh).low[fresh.slot(b)], `interval ${b}`);
-  }
-});
-
 test('a ring that is full gives the newest intervals alone', () => {
   const history = historyOf(5000, (i) => ({ force_N: i }), 1000);
   const buckets = new Buckets(4000);
@@ -106,12 +87,6 @@ test('a ring that is full gives the newest intervals alone', () => {
   assert.equal(there[0], 400);
   assert.equal(there.length, 100);
   assert.equal(forceOf(buckets).low[buckets.slot(400)], 4000);
-});
-
-test('no more intervals than there is room for: the newest', () => {
-  const history = historyOf(5000, () => ({ force_N: 1 }));
-  const { first, last } = new Buckets(100).read(history, 0.01, 0, 4.999);
-  assert.deepEqual([first, last], [400, 499]);
 });
 
 test('a fingertip that restarts goes on in time, and its frame numbers are no loss', () => {
@@ -180,10 +155,7 @@ test('solid where it can be trusted, dashed where not, and the two meet', () => 
   const history = historyOf(60, (i) => ({ force_N: i, flags: i >= 20 && i < 40 ? FITTED | Flag.FLAT : FITTED }));
   const buckets = new Buckets(10);
   const { first, last } = buckets.read(history, 0.01, 0, 0.059);
-  const { good, doubtful } = chartOf(buckets, ['force_N'], first, last, 0.25).curves.get('force_N') ?? {
-    good: [],
-    doubtful: [],
-  };
+  const { good, doubtful } = chartOf(buckets, ['force_N'], first, last, 0.25).curves.get('force_N')!;
   const both = good.flatMap((value, i) => (value !== null && doubtful[i] !== null ? [i] : []));
   assert.deepEqual(both, [3, 8]);
   good.forEach((value, i) => assert.ok(value !== null || doubtful[i] !== null, `point ${i}`));
@@ -280,6 +252,7 @@ for (const dark of [false, true]) {
     for (let finger = 0; finger < 8; finger++) {
       atLeast(`finger-${finger}`, 'surface', 3);
     }
+    assert.equal(contrast(parsed('#777777'), [1, 1, 1]).toFixed(2), '4.48'); // WCAG's
     /* The scale's order can be told without its hue. */
     const steps = Array.from({ length: HEAT_STOPS }, (_, i) => contrast(palette.of(`heat-${i}`), [0, 0, 0]));
     steps.forEach((step, i) => {
@@ -288,11 +261,6 @@ for (const dark of [false, true]) {
     });
   });
 }
-
-test('contrast is that of WCAG', () => {
-  assert.equal(contrast([0, 0, 0], [1, 1, 1]).toFixed(2), '21.00');
-  assert.equal(contrast(parsed('#777777'), [1, 1, 1]).toFixed(2), '4.48');
-});
 
 test('readers of the screen are told what begins, ends and changes, no faster than one can listen', () => {
   const speech = new Speech();

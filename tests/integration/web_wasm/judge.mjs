@@ -1,7 +1,7 @@
 // The page's judges on a capture of the line.
 // usage: node judge.mjs judges.wasm gains CAPTURE.ftr [FORCE_N]
 //        node judge.mjs judges.wasm pulls CAPTURE.ftr KNOWN_N
-//        node judge.mjs judges.wasm doctor CAPTURE.ftr [CODE TEXT]
+//        node judge.mjs judges.wasm doctor CAPTURE.ftr
 // Prints JSON. Packets before an info packet are left out. used: bytes of the capture that a session
 // took until it was done.
 import fs from 'node:fs';
@@ -14,25 +14,10 @@ function* frames() {
   const bytes = fs.readFileSync(capture);
   for (let begin = 0, end; (end = bytes.indexOf(0, begin)) >= 0; begin = end + 1) {
     const frame = bytes.subarray(begin, end);
-    // COBS: the type is the third byte, where none of the three is 0.
     if (frame.length > 16) {
-      yield { type: unstuffed(frame)[1], frame, end: end + 1 };
+      yield { type: frame[2], frame, end: end + 1 }; // behind the code of COBS and the version, which are not 0
     }
   }
-}
-
-function unstuffed(frame) {
-  const out = [];
-  for (let at = 0; at < frame.length; ) {
-    const code = frame[at++];
-    for (let i = 1; i < code && at < frame.length; i++) {
-      out.push(frame[at++]);
-    }
-    if (code < 255) {
-      out.push(0);
-    }
-  }
-  return out;
 }
 
 function gains(judges) {
@@ -85,21 +70,18 @@ function doctor(judges) {
   let health = null;
   for (const { type, frame } of frames()) {
     if (type === INFO) {
-      examination.info(frame);
+      examination.give('info', frame);
     } else if (type === HEALTH) {
       if (!health) {
-        examination.before(frame);
+        examination.give('before', frame);
       }
       health = frame;
     } else if (type === RAW || type === CONTACT) {
-      examination.take(frame);
+      examination.give('take', frame);
     }
   }
   if (health) {
-    examination.after(health);
-  }
-  if (more.length > 0) {
-    examination.failure(...more);
+    examination.give('after', health);
   }
   examination.line({
     bytes: fs.statSync(capture).size,

@@ -18,11 +18,11 @@ function made(options, bytes = file) {
     objects: bytes,
     options,
     clock: () => now_ms,
-    on: {
-      bytes: (received) => parts.push(received),
-      truth: (newest) => (truth = newest),
-      left: (why) => seen.left.push(why),
+    on_bytes: (received, newest) => {
+      parts.push(received);
+      truth = newest;
     },
+    on_left: (why) => seen.left.push(why),
   });
 }
 
@@ -42,18 +42,18 @@ run(0.1);
 await fingertip.open();
 fingertip.send(new Uint8Array(fs.readFileSync(commands)));
 run(1.5);
-fingertip.act('press', { x_mm: 2, y_mm: -3, force_N: 6 });
+fingertip.act('press', 2, -3, 6);
 run(1);
 note('press');
 for (let i = 0; i < 100; i++) {
-  fingertip.act('press', { x_mm: 2, y_mm: -3 + 0.04 * i, force_N: 6 });
+  fingertip.act('press', 2, -3 + 0.04 * i, 6);
   run(0.01, 10);
 }
 note('drag');
 fingertip.act('lift');
 run(1, 40);
 note('lift');
-fingertip.act('hold', { x_mm: 0, y_mm: 0, force_N: 6, load_N: 2, angle_deg: 90 });
+fingertip.act('hold', 0, 0, 6, 2, 90);
 run(1);
 note('hold');
 fingertip.act('lift');
@@ -69,7 +69,6 @@ const before_us = truth.t_us;
 now_ms += 60e3;
 run(0.2);
 seen.after_sleep_s = 1e-6 * (truth.t_us - before_us);
-seen.skipped_ms = fingertip.skipped_ms;
 
 fingertip.close();
 parts = [];
@@ -85,8 +84,6 @@ await fingertip.open();
 fingertip.send(new Uint8Array(fs.readFileSync(commands)));
 run(0.5);
 fs.writeFileSync(`${output}.again`, Buffer.concat(parts));
-fingertip.unplug();
-run(0.1);
 
 for (const [options, bytes] of [
   [{ errors: 'rust=3' }, file],

