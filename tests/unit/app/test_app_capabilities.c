@@ -32,19 +32,20 @@ TEST(it_refuses_streams_and_commands_that_it_lacks) {
     TEST_ASSERT_EQUAL_UINT8(known ? WIRE_RESULT_DONE : WIRE_RESULT_OUT_OF_RANGE, ask(COMMAND(STREAM, stream, streams)));
   }
   start_streams(0);
-  TEST_ASSERT_EQUAL_UINT8(FT_WITH_SLIP ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask(COMMAND(SLIP, slip, 0.5f, 200)));
-  TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask(COMMAND(PRIOR, prior, 3.1f, 0.5f)));
-  TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask(COMMAND(LOCATION_LIMIT, location_limit, 1)));
-  TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
-  TEST_ASSERT_EQUAL_UINT8(FT_WITH_SYNC ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                          ask(COMMAND(SYNC, sync, PORT_SYNC_IN)));
-  uint8_t of_tangential = FT_WITH_TANGENTIAL ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND;
-  TEST_ASSERT_EQUAL_UINT8(of_tangential, ask(COMMAND(PAD, pad, pad_of_12_mm())));
-  TEST_ASSERT_EQUAL_UINT8(of_tangential, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
+  const struct {
+    struct wire_packet command;
+    bool known;
+  } commands[] = {{COMMAND(SLIP, slip, 0.5f, 200), FT_WITH_SLIP},
+                  {COMMAND(PRIOR, prior, 3.1f, 0.5f), FT_WITH_FIT},
+                  {COMMAND(LOCATION_LIMIT, location_limit, 1), FT_WITH_FIT},
+                  {{.type = WIRE_CMD_ERASE_CALIBRATION}, FT_WITH_FIT},
+                  {COMMAND(SYNC, sync, PORT_SYNC_IN), FT_WITH_SYNC},
+                  {COMMAND(PAD, pad, pad_of_12_mm()), FT_WITH_TANGENTIAL},
+                  {{.type = WIRE_CMD_ERASE_PAD}, FT_WITH_TANGENTIAL}};
+  for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+    TEST_ASSERT_EQUAL_UINT8(commands[i].known ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+                            ask(commands[i].command));
+  }
 }
 
 TEST(it_streams_what_it_has) {

@@ -274,26 +274,34 @@ TEST(rubber_that_is_too_thin_has_no_shapes) {
 TEST(a_second_processor_gives_the_same_answers) {
   static struct wire_contact two[FRAMES_MAX];
   const struct pad_profile profile = pad_of_12_mm();
-  unsigned counts[2];
-  for (int processors = 1; processors <= 2; processors++) {
-    tearDown();
-    native_set_worker(processors == 2, TANGENTIAL_LATE_us / 4);
-    setUp();
-    put(1.0, 7.0, 3.0);
-    put(-2.0, -7.0, 6.0);
-    run_until(PRESS_us + 250000, &profile);
-    counts[processors - 1] = take_contacts(processors == 1 ? contacts : two);
+  for (int pulled = 0; pulled < 2; pulled++) {
+    unsigned counts[2];
+    const uint32_t takes_us = TANGENTIAL_LATE_us / (pulled ? 2 : 4);
+    for (int processors = 1; processors <= 2; processors++) {
+      tearDown();
+      native_set_worker(processors == 2, takes_us);
+      setUp();
+      put(1.0, 7.0, 3.0);
+      if (!pulled) {
+        put(-2.0, -7.0, 6.0);
+      }
+      load_qx_N = pulled * 1.2;
+      run_until(PRESS_us + 250000, &profile);
+      counts[processors - 1] = take_contacts(processors == 1 ? contacts : two);
+      TEST_ASSERT_EQUAL(processors == 2, app.stages.jobs.has_processor);
+    }
+    TEST_ASSERT_EQUAL(1, native_worker_starts());
+    TEST_ASSERT_EQUAL(counts[0], counts[1]);
+    for (unsigned i = 0; i < counts[0]; i++) {
+      TEST_ASSERT_TRUE(!pulled || two[i].stages.fit_us >= takes_us);
+      two[i].stages = contacts[i].stages;
+      TEST_ASSERT_EQUAL_MEMORY(&contacts[i], &two[i], sizeof two[i]);
+    }
+    TEST_ASSERT_BITS_HIGH(pulled ? CONTACT_FLAG_TANGENTIAL_VALID : CONTACT_FLAG_TWO_CONTACTS, two[counts[1] - 1].flags);
   }
-  TEST_ASSERT_TRUE(app.stages.jobs.has_processor);
-  TEST_ASSERT_EQUAL(counts[0], counts[1]);
-  for (unsigned i = 0; i < counts[0]; i++) {
-    two[i].stages = contacts[i].stages;
-    TEST_ASSERT_EQUAL_MEMORY(&contacts[i], &two[i], sizeof two[i]);
-  }
-  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TWO_CONTACTS, two[counts[1] - 1].flags);
 }
 
-TEST(without_a_second_processor_that_answers_there_are_no_shapes) {
+TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so) {
   tearDown();
   native_set_worker(true, UINT64_MAX);
   setUp();
@@ -301,6 +309,12 @@ TEST(without_a_second_processor_that_answers_there_are_no_shapes) {
   put(0.0, -8.0, 4.0);
   const unsigned count = press_for(150000);
   for (unsigned i = 0; i < count; i++) {
-    TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE, CONTACT_FLAG_TANGENTIAL_LATE, contacts[i].flags);
+    TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_LATE | CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_FIT_VALID,
+                     CONTACT_FLAG_TANGENTIAL_LATE | CONTACT_FLAG_FIT_VALID, contacts[i].flags);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, contacts[i].qx_N);
   }
+  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contacts[count - 1].x_mm);
+  uint8_t detail;
+  TEST_ASSERT_EQUAL(CRASH_EVENT_WORKER, native_last_event(&detail));
+  TEST_ASSERT_GREATER_THAN(count, native_worker_starts());
 }

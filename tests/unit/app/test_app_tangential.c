@@ -255,57 +255,6 @@ TEST(a_held_frame_repeats_the_load) {
   TEST_ASSERT_GREATER_THAN(0, held);
 }
 
-enum { CONTACTS = 300 };
-
-/* Contact packets of a press with a load, from power-on on. */
-static unsigned take_contacts(struct wire_contact contacts[CONTACTS]) {
-  struct wire_packet packet;
-  setUp();
-  load.qx_N = 1.2;
-  store_pad();
-  start_streams(WIRE_STREAM_CONTACT);
-  run_for((uint32_t)((1700000 - port_now_us()) / 1000));
-  unsigned count = 0;
-  while (next_packet(&packet) && count < CONTACTS) {
-    if (packet.type == WIRE_CONTACT && packet.t_us > press.from_us) {
-      contacts[count++] = packet.body.contact;
-    }
-  }
-  TEST_ASSERT_GREATER_THAN(10, count);
-  return count;
-}
-
-TEST(a_second_processor_gives_the_same_estimates) {
-  static struct wire_contact alone[CONTACTS], two[CONTACTS];
-  const unsigned count = take_contacts(alone);
-  TEST_ASSERT_FALSE(app.stages.jobs.has_processor);
-  native_set_worker(true, TANGENTIAL_LATE_us / 2);
-  TEST_ASSERT_EQUAL(count, take_contacts(two));
-  TEST_ASSERT_TRUE(app.stages.jobs.has_processor);
-  TEST_ASSERT_EQUAL(1, native_worker_starts());
-  for (unsigned i = 0; i < count; i++) {
-    TEST_ASSERT_GREATER_OR_EQUAL(TANGENTIAL_LATE_us / 2, two[i].stages.fit_us);
-    two[i].stages = alone[i].stages;
-    TEST_ASSERT_EQUAL_MEMORY(&alone[i], &two[i], sizeof two[i]);
-  }
-  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, two[count - 1].flags);
-}
-
-TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so) {
-  static struct wire_contact contacts[CONTACTS];
-  native_set_worker(true, UINT64_MAX);
-  const unsigned count = take_contacts(contacts);
-  for (unsigned i = 0; i < count; i++) {
-    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_LATE | CONTACT_FLAG_FIT_VALID, contacts[i].flags);
-    TEST_ASSERT_BITS_LOW(TANGENTIAL, contacts[i].flags);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, contacts[i].qx_N);
-  }
-  TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contacts[count - 1].x_mm);
-  uint8_t detail;
-  TEST_ASSERT_EQUAL(CRASH_EVENT_WORKER, native_last_event(&detail));
-  TEST_ASSERT_GREATER_THAN(count, native_worker_starts());
-}
-
 /* Frames of our own, so near to each other that none waits: the last one again, its pressures above
  * the zero in this share of it. */
 static void feed_fast(double share) {

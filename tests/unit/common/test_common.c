@@ -76,34 +76,49 @@ TEST(test_floats_travel_by_their_bits) {
   }
 }
 
+static struct calibration calibration;
+static struct pad_profile pad;
+
+static bool is_calibration(void) { return calibration_is_valid(&calibration, 15); }
+
+static bool is_pad(void) { return pad_profile_is_valid(&pad); }
+
+struct range {
+  float *value;
+  float least, greatest;
+};
+
+static void assert_ranges(const struct range *ranges, size_t count, bool (*is_valid)(void)) {
+  for (size_t i = 0; i < count; i++) {
+    const float was = *ranges[i].value;
+    const float values[] = {ranges[i].least,
+                            ranges[i].greatest,
+                            ranges[i].least - 1e-3f,
+                            ranges[i].greatest * 1.001f,
+                            -INFINITY,
+                            INFINITY,
+                            NAN};
+    for (size_t j = 0; j < sizeof values / sizeof values[0]; j++) {
+      *ranges[i].value = values[j];
+      TEST_ASSERT_EQUAL(j < 2, is_valid());
+    }
+    *ranges[i].value = was;
+  }
+}
+
 TEST(test_calibrations_are_in_their_ranges) {
-  struct calibration calibration = {.force_scale = 1.0f};
+  calibration = (struct calibration){.force_scale = 1.0f};
   for (int k = 0; k < FT_MAX_SENSORS; k++) {
     calibration.sensors[k].gain = 1.0f;
   }
   TEST_ASSERT_TRUE(calibration_is_valid(&calibration, FT_MAX_SENSORS));
-  const struct {
-    float *value;
-    float least, greatest;
-  } ranges[] = {
+  const struct range ranges[] = {
       {&calibration.force_scale, CALIBRATION_FORCE_SCALE_MIN, CALIBRATION_FORCE_SCALE_MAX},
       {&calibration.force_scale_sd, 0.0f, CALIBRATION_FORCE_SCALE_SD_MAX},
       {&calibration.sensors[0].gain, CALIBRATION_GAIN_MIN, CALIBRATION_GAIN_MAX},
       {&calibration.sensors[14].gain_sd, 0.0f, CALIBRATION_GAIN_SD_MAX},
   };
-  for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
-    const float was = *ranges[i].value;
-    *ranges[i].value = ranges[i].least;
-    TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
-    *ranges[i].value = ranges[i].greatest;
-    TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
-    const float bad[] = {ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, INFINITY, NAN};
-    for (size_t j = 0; j < sizeof bad / sizeof bad[0]; j++) {
-      *ranges[i].value = bad[j];
-      TEST_ASSERT_FALSE(calibration_is_valid(&calibration, 15));
-    }
-    *ranges[i].value = was;
-  }
+  assert_ranges(ranges, sizeof ranges / sizeof ranges[0], is_calibration);
   const struct {
     int16_t *value;
     int16_t greatest;
@@ -113,11 +128,11 @@ TEST(test_calibrations_are_in_their_ranges) {
   for (size_t i = 0; i < sizeof both_sides / sizeof both_sides[0]; i++) {
     for (int side = -1; side <= 1; side += 2) {
       *both_sides[i].value = (int16_t)(side * both_sides[i].greatest);
-      TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
+      TEST_ASSERT_TRUE(is_calibration());
       *both_sides[i].value = (int16_t)(side * (both_sides[i].greatest + 1));
-      TEST_ASSERT_FALSE(calibration_is_valid(&calibration, 15));
+      TEST_ASSERT_FALSE(is_calibration());
       *both_sides[i].value = side > 0 ? INT16_MAX : INT16_MIN;
-      TEST_ASSERT_FALSE(calibration_is_valid(&calibration, 15));
+      TEST_ASSERT_FALSE(is_calibration());
     }
     *both_sides[i].value = 0;
   }
@@ -132,29 +147,19 @@ TEST(test_calibrations_are_in_their_ranges) {
     calibration.sigma_sd_um = shapes[i].sigma_sd_um;
     calibration.dip_share_q16 = shapes[i].dip_share_q16;
     calibration.dip_sd_um = shapes[i].dip_sd_um;
-    TEST_ASSERT_EQUAL(shapes[i].valid, calibration_is_valid(&calibration, 15));
+    TEST_ASSERT_EQUAL(shapes[i].valid, is_calibration());
   }
   calibration.sensors[15] = (struct sensor_calibration){NAN, NAN, 2001, 2001, 9831}; /* of no sensor */
-  TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
-}
-
-/* What is behind the last coefficient is none. */
-TEST(test_a_pad_profile_ends_where_it_does) {
-  struct pad_profile pad;
-  const struct pad_profile good = pad_of_12_mm();
-  memset(&pad, 0xFF, sizeof pad);
-  memcpy(&pad, &good, offsetof(struct pad_profile, from_touch));
-  pad.from_touch = 1;
-  TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
+  TEST_ASSERT_TRUE(is_calibration());
 }
 
 TEST(test_pad_profiles_are_in_their_ranges) {
-  struct pad_profile pad = pad_of_12_mm();
-  TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
-  const struct {
-    float *value;
-    float least, greatest;
-  } ranges[] = {
+  const struct pad_profile good = pad_of_12_mm();
+  memset(&pad, 0xFF, sizeof pad); /* what is behind the last coefficient is none */
+  memcpy(&pad, &good, offsetof(struct pad_profile, from_touch));
+  pad.from_touch = 1;
+  TEST_ASSERT_TRUE(is_pad());
+  const struct range ranges[] = {
       {&pad.thickness_mm, PAD_THICKNESS_MIN_mm, PAD_THICKNESS_MAX_mm},
       {&pad.overhang_mm, 0.0f, PAD_OVERHANG_MAX_mm},
       {&pad.normal[0].share, PAD_SHARE_MIN, PAD_SHARE_MAX},
@@ -179,28 +184,15 @@ TEST(test_pad_profiles_are_in_their_ranges) {
     const float wrong[] = {-1.001f * PAD_EDGE_MAX, 1.001f * PAD_EDGE_MAX, NAN};
     for (size_t j = 0; j < 3; j++) {
       *value = wrong[j];
-      TEST_ASSERT_FALSE(pad_profile_is_valid(&pad));
+      TEST_ASSERT_FALSE(is_pad());
     }
     *value = i % 2 ? PAD_EDGE_MAX : -PAD_EDGE_MAX;
-    TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
+    TEST_ASSERT_TRUE(is_pad());
     *value = 0.0f;
   }
-  for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
-    const float was = *ranges[i].value;
-    const float good[] = {ranges[i].least, ranges[i].greatest};
-    const float bad[] = {ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, -INFINITY, INFINITY, NAN};
-    for (size_t j = 0; j < sizeof good / sizeof good[0]; j++) {
-      *ranges[i].value = good[j];
-      TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
-    }
-    for (size_t j = 0; j < sizeof bad / sizeof bad[0]; j++) {
-      *ranges[i].value = bad[j];
-      TEST_ASSERT_FALSE(pad_profile_is_valid(&pad));
-    }
-    *ranges[i].value = was;
-  }
+  assert_ranges(ranges, sizeof ranges / sizeof ranges[0], is_pad);
   for (int from_touch = 0; from_touch < 256; from_touch++) {
     pad.from_touch = (uint8_t)from_touch;
-    TEST_ASSERT_EQUAL(from_touch <= 1, pad_profile_is_valid(&pad));
+    TEST_ASSERT_EQUAL(from_touch <= 1, is_pad());
   }
 }

@@ -327,12 +327,8 @@ static struct fit_tangential frame(struct tangential_job *job, float x_mm, float
   for (int k = 0; k < SENSORS; k++) {
     at_x_mm[k] = 9.0f * (float)(k / 5 - 1);
     at_y_mm[k] = 9.0f * (float)(k % 5 - 2);
-    float dx = at_x_mm[k] - x_mm, dy = at_y_mm[k] - y_mm, sum = 0.0f;
-    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-      float v = profile.normal[j].sd_mm * profile.normal[j].sd_mm + profile.spread_mm2;
-      sum += profile.normal[j].share / v * expf(-(dx * dx + dy * dy) / (2.0f * v));
-    }
-    readings[k] = (int32_t)(4e8f * sum);
+    const double dx_mm = (double)(at_x_mm[k] - x_mm), dy_mm = (double)(at_y_mm[k] - y_mm);
+    readings[k] = (int32_t)(1024.0 * pad_pressure_Pa(&profile, 4.0, dx_mm, dy_mm, (struct pad_load){2.5, 0, 0}));
   }
   static struct fit_array array;
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, at_x_mm, at_y_mm, 9.0f));

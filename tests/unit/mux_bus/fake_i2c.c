@@ -59,9 +59,7 @@ uint64_t fake_i2c_next_event_us(void) {
 
 enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner new_owner) {
   owner = new_owner;
-  if (pins->sda != BOARD_PIN_SDA || pins->scl != BOARD_PIN_SCL) {
-    fake.misuses++;
-  }
+  fake.misuses += pins->sda != BOARD_PIN_SDA || pins->scl != BOARD_PIN_SCL;
   fake.open = true;
   fake.opened++;
   transaction.active = false;
@@ -76,9 +74,7 @@ void i2c_close_to_lines(const struct i2c_pins *pins) {
 }
 
 static enum ft_status start(uint8_t address, uint8_t byte, uint8_t byte_count) {
-  if (!fake.open || transaction.active) {
-    fake.misuses++;
-  }
+  fake.misuses += !fake.open || transaction.active;
   transaction.active = true;
   transaction.address = address;
   transaction.byte = byte;
@@ -144,9 +140,7 @@ static enum ft_status read_sensors(uint8_t *bytes) {
 }
 
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
-  if (!fake.open || !transaction.active) {
-    fake.misuses++;
-  }
+  fake.misuses += !fake.open || !transaction.active;
   if (transaction.busy_polls > 0 && --transaction.busy_polls > 0) {
     return FT_ERR_BUSY;
   }
@@ -171,18 +165,14 @@ bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) {
 
 void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line) {
   (void)pins;
-  if (fake.open) {
-    fake.misuses++;
-  }
+  fake.misuses += fake.open;
   low[line] = true;
 }
 
 void i2c_line_release(const struct i2c_pins *pins, enum i2c_line line) {
   const bool was_low = low[line];
   low[line] = false;
-  if (fake.open) {
-    fake.misuses++;
-  }
+  fake.misuses += fake.open;
   if (!was_low) {
     return;
   }
@@ -224,13 +214,9 @@ void gpio_drive(unsigned pin, bool enabled) {
 }
 
 void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
-  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || pull != GPIO_PULL_NONE) {
-    fake.misuses++;
-  }
+  fake.misuses += pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || pull != GPIO_PULL_NONE;
 }
 
 void gpio_set_function(unsigned pin, enum gpio_function function) {
-  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || function != GPIO_FUNCTION_SIO) {
-    fake.misuses++;
-  }
+  fake.misuses += pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || function != GPIO_FUNCTION_SIO;
 }

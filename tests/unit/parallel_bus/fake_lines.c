@@ -34,9 +34,10 @@ static int64_t scl_fell_ns, scl_rose_ns, sda_changed_ns[BOARD_SENSOR_COUNT];
 static int64_t sda_fell_ns;
 static int64_t sda_rose_ns[BOARD_SENSOR_COUNT]; /* with SCL high: the STOP */
 
-static void misused(const char *how) {
-  fake.misuses++;
-  fake.misuse = how;
+static bool misused_if(bool misused, const char *how) {
+  fake.misuses += misused;
+  fake.misuse = misused ? how : fake.misuse;
+  return misused;
 }
 
 void fake_lines_power_up(void) {
@@ -116,23 +117,15 @@ static void on_scl_fall(struct sensor *sensor, unsigned k) {
 
 static void check_scl_edge(bool rises) {
   if (rises) {
-    if (time_ns - scl_fell_ns < 1300 + FALL_ns) {
-      misused("tLOW");
-    }
+    misused_if(time_ns - scl_fell_ns < 1300 + FALL_ns, "tLOW");
     for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
-      if (time_ns - sda_changed_ns[k] < 100 + RISE_ns) {
-        misused("tSU;DAT");
-      }
+      misused_if(time_ns - sda_changed_ns[k] < 100 + RISE_ns, "tSU;DAT");
     }
     scl_rose_ns = time_ns;
     fake.clocks++;
   } else {
-    if (time_ns - scl_rose_ns < 600 + RISE_ns) {
-      misused("tHIGH");
-    }
-    if (time_ns - sda_fell_ns < 600 + FALL_ns) {
-      misused("tHD;STA");
-    }
+    misused_if(time_ns - scl_rose_ns < 600 + RISE_ns, "tHIGH");
+    misused_if(time_ns - sda_fell_ns < 600 + FALL_ns, "tHD;STA");
     scl_fell_ns = time_ns;
   }
 }
@@ -140,23 +133,17 @@ static void check_scl_edge(bool rises) {
 static void check_sda_edge(unsigned k, bool rises, bool scl) {
   sda_changed_ns[k] = time_ns;
   if (!scl) {
-    if (time_ns - scl_fell_ns < HOLD_ns) {
-      misused("tHD;DAT");
-    }
+    misused_if(time_ns - scl_fell_ns < HOLD_ns, "tHD;DAT");
     return;
   }
-  if (time_ns - scl_rose_ns < 600 + RISE_ns) {
-    misused(rises ? "tSU;STO" : "tSU;STA");
-  }
+  misused_if(time_ns - scl_rose_ns < 600 + RISE_ns, rises ? "tSU;STO" : "tSU;STA");
   *(rises ? &fake.stops : &fake.starts) |= (uint16_t)(1u << k);
   if (rises) {
     fake.stops_of_first += k == 0;
     sda_rose_ns[k] = time_ns;
   } else {
     sda_fell_ns = time_ns;
-    if (time_ns - sda_rose_ns[k] < 1300 + RISE_ns) {
-      misused("tBUF");
-    }
+    misused_if(time_ns - sda_rose_ns[k] < 1300 + RISE_ns, "tBUF");
   }
 }
 
@@ -187,9 +174,8 @@ static void take_step(uint16_t step) {
   const uint16_t after = levels();
   const bool scl = after >> BOARD_PIN_SCL & 1;
   const bool scl_changed = ((before ^ after) >> BOARD_PIN_SCL & 1) != 0;
-  if ((pulled_before ^ step) >> BOARD_PIN_SCL != 0 && ((pulled_before ^ step) & BOARD_SDA_LINES) != 0) {
-    misused("SCL and SDA at once");
-  }
+  misused_if((pulled_before ^ step) >> BOARD_PIN_SCL != 0 && ((pulled_before ^ step) & BOARD_SDA_LINES) != 0,
+             "SCL and SDA at once");
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     if (((pulled_before ^ step) >> k & 1) != 0) {
       check_sda_edge(k, (step >> k & 1) == 0, scl);
@@ -215,9 +201,9 @@ enum ft_status wave_player_open(void) {
 }
 
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
-  if (wave.active || cell_count == 0 || cell_count % 2 != 0 || cell_count > MAX_CELLS || (uintptr_t)steps % 4 != 0 ||
-      (uintptr_t)samples % 4 != 0) {
-    misused("wave_player_start");
+  if (misused_if(wave.active || cell_count == 0 || cell_count % 2 != 0 || cell_count > MAX_CELLS ||
+                     (uintptr_t)steps % 4 != 0 || (uintptr_t)samples % 4 != 0,
+                 "wave_player_start")) {
     return;
   }
   fake.waves++;
@@ -237,9 +223,7 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
       }
     }
   }
-  if (pulled != 0) {
-    misused("a line is left low");
-  }
+  misused_if(pulled != 0, "a line is left low");
   fake.slips = 0;
   wave.active = true;
   wave.samples = samples;

@@ -10,33 +10,27 @@ uint32_t fake_conversion_us(uint8_t command) {
   return longest_us[(command & 0x0F) / 2];
 }
 
-static void misused(struct fake_bus *fake, const char *how) {
-  fake->misuses++;
-  fake->misuse = how;
+static bool misused_if(struct fake_bus *fake, bool misused, const char *how) {
+  fake->misuses += misused;
+  fake->misuse = misused ? how : fake->misuse;
+  return misused;
 }
 
 static enum ft_status start(struct fake_bus *fake, enum fake_operation operation, uint8_t command, uint8_t byte_count,
                             uint64_t now_us) {
-  if (fake->running && operation != FAKE_RECOVERY) {
-    misused(fake, "two operations at once");
+  if (misused_if(fake, fake->running && operation != FAKE_RECOVERY, "two operations at once")) {
     return FT_ERR_BUSY;
   }
   if (fake->refuse_starts && operation != FAKE_RECOVERY) {
     return FT_ERR_BUSY;
   }
-  if (fake->logged == FAKE_LOG) {
-    misused(fake, "the log is full");
+  if (misused_if(fake, fake->logged == FAKE_LOG, "the log is full")) {
     return FT_ERR_SPACE;
   }
   static const uint32_t duration_us[] = {FAKE_COMMAND_us, FAKE_READ_us, FAKE_RECOVERY_us};
-  if (operation != FAKE_RECOVERY) {
-    if (now_us < fake->ready_us) {
-      misused(fake, "something was sent during a conversion");
-    }
-    if (now_us < fake->powered_us) {
-      misused(fake, "something was sent before the PROM was loaded");
-    }
-  }
+  const bool sends = operation != FAKE_RECOVERY;
+  misused_if(fake, sends && now_us < fake->ready_us, "something was sent during a conversion");
+  misused_if(fake, sends && now_us < fake->powered_us, "something was sent before the PROM was loaded");
   fake->log[fake->logged++] =
       (struct fake_entry){operation, command, byte_count, now_us, now_us + duration_us[operation], FT_PENDING};
   fake->running = true;
@@ -57,8 +51,7 @@ static enum ft_status start_recovery(void *context, uint64_t now_us) {
 
 static void answer_prom(struct fake_bus *fake, uint8_t command, struct array_bus_result *result) {
   int word = (command - MS58XX_CMD_READ_PROM) / 2;
-  if (word >= MS58XX_PROM_WORDS || command % 2) {
-    misused(fake, "a PROM word that does not exist");
+  if (misused_if(fake, word >= MS58XX_PROM_WORDS || command % 2, "a PROM word that does not exist")) {
     return;
   }
   for (uint8_t k = 0; k < fake->sensor_count; k++) {
@@ -91,8 +84,7 @@ static void answer_adc(struct fake_bus *fake, struct array_bus_result *result) {
 
 static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us) {
   struct fake_bus *fake = context;
-  if (!fake->running) {
-    misused(fake, "polled without an operation");
+  if (misused_if(fake, !fake->running, "polled without an operation")) {
     return FT_ERR_ARGUMENT;
   }
   struct fake_entry *entry = &fake->log[fake->logged - 1];
@@ -120,7 +112,7 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
     } else if (entry->command >= MS58XX_CMD_READ_PROM && entry->byte_count == 2) {
       answer_prom(fake, entry->command, result);
     } else {
-      misused(fake, "a reading that no sensor knows");
+      misused_if(fake, true, "a reading that no sensor knows");
     }
     for (uint8_t k = 0; k < fake->sensor_count; k++) {
       if (!(fake->answering >> k & 1u)) {
@@ -132,9 +124,8 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
     fake->converted = 0;
   } else {
     uint8_t kind = entry->command & 0xF0;
-    if ((kind != 0x40 && kind != 0x50) || entry->command & 1 || (entry->command & 0x0F) > 0x0A) {
-      misused(fake, "a command that no sensor knows");
-    }
+    misused_if(fake, (kind != 0x40 && kind != 0x50) || entry->command & 1 || (entry->command & 0x0F) > 0x0A,
+               "a command that no sensor knows");
     fake->converted = entry->command;
     fake->ready_us = now_us + fake_conversion_us(entry->command);
   }

@@ -2,18 +2,25 @@
 
 #include <string.h>
 
-TEST(test_zero_reading_voids_the_next_one_too) {
-  skip_frames(5);
-  fake.zero_next = DISTURBED_BIT; /* of the conversion that runs now */
-  skip_frames(1);
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  skip_frames(1);
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  skip_frames(1);
-  assert_good_frame(ALL);
-  TEST_ASSERT_EQUAL_UINT32(2, value_of(&scan.counters.zero_readings));
-  TEST_ASSERT_EQUAL_UINT32(2, value_of(&scan.counters.frames_incomplete));
-  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* no reason for a reset */
+/* A sensor that hears no command to read sends ones, and has its result still: the next one may be that. */
+TEST(test_zeros_and_ones_void_the_next_reading_too) {
+  for (int ones = 0; ones < 2; ones++) {
+    next_case(&usual);
+    skip_frames(5);
+    const uint32_t d1 = fake.d1[DISTURBED];
+    fake.zero_next = ones ? 0 : DISTURBED_BIT; /* of the conversion that runs now */
+    fake.d1[DISTURBED] = ones ? 0xFFFFFF : d1;
+    skip_frames(1);
+    assert_good_frame(ALL & ~DISTURBED_BIT);
+    fake.d1[DISTURBED] = d1;
+    skip_frames(1);
+    assert_good_frame(ALL & ~DISTURBED_BIT);
+    skip_frames(1);
+    assert_good_frame(ALL);
+    TEST_ASSERT_EQUAL_UINT32(ones ? 1 : 2, value_of(&scan.counters.zero_readings));
+    TEST_ASSERT_EQUAL_UINT32(2, value_of(&scan.counters.frames_incomplete));
+    TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* no reason for a reset */
+  }
 }
 
 /* A sensor that lost its reset answers 0 for ever: the second 0 in a row costs its admission, and
@@ -326,21 +333,6 @@ TEST(test_readings_that_break_off_are_invalid) {
   next_frame();
   TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
   TEST_ASSERT_EQUAL_HEX32(ALL, frame.saturated);
-}
-
-/* A sensor that hears no command to read sends ones, and has its result still: the next one may be
- * that. */
-TEST(test_ones_of_a_branch_void_the_next_reading_too) {
-  skip_frames(3);
-  uint32_t d1 = fake.d1[DISTURBED];
-  fake.d1[DISTURBED] = 0xFFFFFF;
-  next_frame();
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  fake.d1[DISTURBED] = d1;
-  next_frame();
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  next_frame();
-  assert_good_frame(ALL);
 }
 
 /* Events that come early or for nothing change nothing. */
