@@ -12,10 +12,7 @@ import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
-from emulated import scenario  # noqa: E402
-from fingertip import files  # noqa: E402
+from emulation import ROOT, Run, emulate, main, write_scenario
 
 TOOLS = argparse.Namespace()
 PATTERN, THIRD = "pico_mux", "pico_third"
@@ -56,58 +53,21 @@ class ThirdBoard(unittest.TestCase):
         descriptor["overhead_us"] = 1000
         (board / "board.json").write_text(json.dumps(descriptor))
         cls.build = cls.tree / "build" / THIRD
-        cls.configured = run(
-            "cmake",
-            "-G",
-            "Ninja",
-            "-S",
-            cls.tree,
-            "-B",
-            cls.build,
-            "-DCMAKE_BUILD_TYPE=Release",
-            f"-DCMAKE_TOOLCHAIN_FILE={cls.tree}/cmake/toolchain-arm-none-eabi.cmake",
-            f"-DFINGERTIP_BOARD={THIRD}",
-        )
-
-    def emulated(self, board, seconds=0.8):
-        """The image on this board: how it ended, and its capture."""
-        base = self.tree / "build" / board
-        script, capture = base.with_suffix(".script"), base.with_suffix(".ftr")
-        script.write_text(
-            "0.45 dtr 1\n"
-            + "".join(
-                f"{0.46 + 0.01 * i:.2f} {run(TOOLS.command_frame, *words).stdout}"
-                for i, words in enumerate((("info",), ("stream", "contact,raw,health")))
-            )
-        )
-        return run(
-            TOOLS.node,
-            self.tree / "host_tools/simulation/emulator/main.mjs",
-            "--board",
-            board,
-            "--image",
-            self.build / f"fingertip-{THIRD}.bin",
-            "--scenario",
-            scenario(self.tree / "build", "rest", 1),
-            "--seconds",
-            seconds,
-            "--host-script",
-            script,
-            "--capture",
-            capture,
-            check=False,
-        ), capture
+        toolchain = cls.tree / "cmake/toolchain-arm-none-eabi.cmake"
+        settings = ("-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", f"-DFINGERTIP_BOARD={THIRD}")
+        run("cmake", "-G", "Ninja", "-S", cls.tree, "-B", cls.build, *settings)
 
     def test_it_is_built_and_runs_on_its_own_pins(self):
         run("cmake", "--build", self.build, "--target", f"fingertip-{THIRD}")
-        done, capture = self.emulated(THIRD)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        run(TOOLS.fingertip, "replay", capture, "--to-csv", capture.with_suffix(".csv"))
-        told = files.read_recording(capture.with_suffix(".csv"))
-        self.assertEqual(told.metadata["board"], THIRD)
-        self.assertIn((1 << 15) - 1, told["valid"])
-        _, capture = self.emulated(PATTERN)  # whose pins are others, so that no sensor answers
-        self.assertIn("no frames in it", run(TOOLS.fingertip, "replay", capture, check=False).stderr)
+        emulator, image = self.tree / "host_tools/simulation/emulator/main.mjs", self.build / f"fingertip-{THIRD}.bin"
+        rest, commands = write_scenario(self.tree / "build/rest.csv"), [(0.46, "info"), (0.47, "stream", "contact,raw,health")]
+        done = Run(TOOLS, self.build, "third", THIRD, rest, 0.8, commands, emulator=emulator, image=image)
+        self.assertEqual(done.report["warnings"], [])
+        self.assertEqual(done.recording.metadata["board"], THIRD)
+        self.assertIn((1 << 15) - 1, done.recording["valid"])
+        capture = {"capture": self.build / "none.ftr", "host_script": done.path("script")}
+        emulate(TOOLS, emulator, board=PATTERN, image=image, scenario=rest, seconds=0.8, **capture)  # whose pins are others
+        self.assertIn("no frames in it", run(TOOLS.fingertip, "replay", capture["capture"], check=False).stderr)
 
     def test_the_host_builds_its_image_and_knows_its_pins(self):
         host = self.tree / "build/host"
@@ -145,8 +105,4 @@ class ThirdBoard(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for option in ("fingertip", "command_frame", "node"):
-        parser.add_argument(f"--{option}", required=True)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(TOOLS, "fingertip", "command_frame", "node")

@@ -10,13 +10,11 @@ import json
 import pathlib
 import re
 import subprocess
-import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
-from vcd import read_vcd  # noqa: E402
+from emulation import emulate, main, make_scenario
+from vcd import read_vcd
 
 TOOLS = argparse.Namespace()
 
@@ -32,36 +30,10 @@ RISE_ns = 300
 def run(folder, rise_ns):
     """Report, dump and log of a short run."""
     folder = pathlib.Path(folder)
-    scenario = folder / "scenario.csv"
-    subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(scenario), "--seconds", "1"], check=True
-    )
-    call = [
-        TOOLS.node,
-        str(ROOT / "host_tools/simulation/emulator/main.mjs"),
-        "--board",
-        TOOLS.board,
-        "--image",
-        TOOLS.image,
-        "--scenario",
-        str(scenario),
-        "--fast-enumeration",
-        "--seconds",
-        str(TO_S + 0.01),
-        "--vcd",
-        str(folder / "bus.vcd"),
-        "--vcd-from",
-        str(FROM_S),
-        "--vcd-to",
-        str(TO_S),
-        "--bus-log",
-        str(folder / "bus.csv"),
-        "--report",
-        str(folder / "run.json"),
-    ]
-    if rise_ns is not None:
-        call += ["--rise-ns", str(rise_ns)]
-    done = subprocess.run(call, capture_output=True, text=True)
+    scenario = make_scenario(folder / "scenario.csv", "ideal", 1)
+    logs = {"vcd": folder / "bus.vcd", "bus_log": folder / "bus.csv", "report": folder / "run.json"}
+    window = {"seconds": TO_S + 0.01, "vcd_from": FROM_S, "vcd_to": TO_S}
+    done = emulate(TOOLS, board=TOOLS.board, image=TOOLS.image, scenario=scenario, fast_enumeration=True, rise_ns=rise_ns, **window, **logs)
     report = json.loads((folder / "run.json").read_text())
     with open(folder / "bus.csv", newline="") as file:
         log = list(csv.DictReader(file))
@@ -203,8 +175,4 @@ class BusDump(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for argument in ("board", "image", "node", "sigrok"):
-        parser.add_argument(f"--{argument}", required=True)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(TOOLS, "board", "image", "node", "sigrok")

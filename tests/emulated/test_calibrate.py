@@ -10,16 +10,12 @@ import argparse
 import pathlib
 import re
 import subprocess
-import sys
 import tempfile
 import unittest
 
 import numpy as np
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-from fingertip import files  # noqa: E402
-from world import World  # noqa: E402
+from emulation import files, main, options
+from world import World
 
 OPTIONS = argparse.Namespace()
 PATIENCE_s = 600  # of the world's time
@@ -34,40 +30,14 @@ class Calibrate(unittest.TestCase):
         cls.addClassCleanup(temporary.cleanup)
         cls.folder = pathlib.Path(temporary.name)
         cls.scenario = cls.folder / "placements.csv"
-        subprocess.run(
-            [
-                OPTIONS.build / "host_tools/simulation/twin/twin",
-                "scenario",
-                "placements",
-                "-o",
-                cls.scenario,
-                "--gain",
-                "10",
-                "--seed",
-                "41",
-                "--pad",
-                "7",
-                "--cache",
-                OPTIONS.build / "contact_tables",
-            ],
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
+        twin = [f"{OPTIONS.build}/host_tools/simulation/twin/twin", "scenario", "placements", "-o", cls.scenario]
+        pad = options(gain=10, seed=41, pad=7, cache=f"{OPTIONS.build}/contact_tables")
+        subprocess.run([*twin, *pad], check=True, stdout=subprocess.DEVNULL)
 
-    def start(self, *options):
+    def start(self):
         """The image, powered on when its port is opened."""
-        return self.world.emulator(
-            self.port,
-            "--board",
-            "pico_parallel",
-            "--image",
-            OPTIONS.image,
-            "--scenario",
-            self.scenario,
-            "--flash",
-            self.folder / "flash.bin",
-            *options,
-        )
+        kept = {"flash": self.folder / "flash.bin"}
+        return self.world.emulator(self.port, *options(board="pico_parallel", image=OPTIONS.image, scenario=self.scenario, **kept))
 
     def end(self, process):
         """What the flash holds is written when the run ends."""
@@ -79,7 +49,7 @@ class Calibrate(unittest.TestCase):
         return self.world.tool(*arguments, "--port", self.port, limit_s=PATIENCE_s)
 
     def test_a_weight_finds_the_gains_and_they_act(self):
-        self.world = self.enterContext(World(OPTIONS.build / "tests/support", OPTIONS.node, self.folder))
+        self.world = self.enterContext(World(f"{OPTIONS.build}/tests/support", OPTIONS.node, self.folder))
         self.port = self.folder / "port"
         process = self.start()
         self.assertIn("kept", self.tool("set", "rate=50", "--keep"))
@@ -115,9 +85,4 @@ class Calibrate(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, type=pathlib.Path)
-    parser.add_argument("--image", required=True, type=pathlib.Path)
-    parser.add_argument("--node", required=True)
-    OPTIONS, rest = parser.parse_known_args()
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(OPTIONS, "build", "image", "node")

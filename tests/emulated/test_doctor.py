@@ -9,25 +9,15 @@ import json
 import os
 import pathlib
 import subprocess
-import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-from fingertip import files  # noqa: E402
-from world import World  # noqa: E402
+from emulation import main, options, write_scenario
+from world import World
 
 TOOLS = argparse.Namespace()
 BOARDS = ("pico_mux", "pico_parallel")
 SENSORS = 15
-
-
-def write_scenario(path, *rows):
-    names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(SENSORS))]
-    lines = [",".join(str(value) for value in (t_s, *[0] * len(files.TRUTH_COLUMNS), *pressures)) for t_s, *pressures in rows]
-    path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *lines]) + "\n")
-    return path
 
 
 class Doctor(unittest.TestCase):
@@ -36,7 +26,7 @@ class Doctor(unittest.TestCase):
         holder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(holder.cleanup)
         cls.folder = pathlib.Path(holder.name)
-        cls.at_rest = write_scenario(cls.folder / "rest.csv", [0, *[0] * SENSORS])
+        cls.at_rest = write_scenario(cls.folder / "rest.csv")
         # a system with the rule, and one without
         for name in ("with_rule", "without_rule"):
             rules = cls.folder / name / "etc/udev/rules.d"
@@ -44,7 +34,7 @@ class Doctor(unittest.TestCase):
             for shared in ("dev", "proc", "sys"):
                 (cls.folder / name / shared).symlink_to(f"/{shared}")
         (cls.folder / "with_rule/etc/udev/rules.d/60-fingertip.rules").write_text(
-            subprocess.run([TOOLS.support / "simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout
+            subprocess.run([f"{TOOLS.support}/simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout
         )
 
     def setUp(self):
@@ -56,22 +46,9 @@ class Doctor(unittest.TestCase):
         self.plugged_in += 1
         port, plan = self.folder / f"port-{self.plugged_in}", self.folder / "faults.json"
         plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
-        self.world.emulator(
-            port,
-            "--board",
-            board,
-            "--image",
-            pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin",
-            "--scenario",
-            scenario or self.at_rest,
-            "--sensor",
-            sensor,
-            "--faults",
-            plan,
-            "--seconds",
-            "3600",
-            "--fast-enumeration",
-        )
+        image = f"{TOOLS.boards}/{board}/fingertip-{board}.bin"
+        more = options(sensor=sensor, faults=plan, seconds=3600, fast_enumeration=True)
+        self.world.emulator(port, *options(board=board, image=image, scenario=scenario or self.at_rest), *more)
         return port
 
     def examine(self, port, *arguments, system="with_rule", seconds=1):
@@ -226,9 +203,4 @@ class Doctor(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--boards", required=True)
-    parser.add_argument("--support", required=True, type=pathlib.Path)
-    parser.add_argument("--node", required=True)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(TOOLS, "boards", "support", "node")

@@ -63,6 +63,14 @@ const garbage = [
   ...[1, 1000, 2 ** 31 - 1].map((value) => new Array(SENSORS).fill(value)),
 ];
 
+/** The least, the middle and the largest, which are printed. */
+function spread(t, name, values) {
+  const sorted = [...values].sort((a, b) => a - b);
+  const [min, median, max] = [sorted[0], sorted[sorted.length >> 1], sorted.at(-1)];
+  t.diagnostic(`${name}: ${min} ${median} ${max} cycles (min, median, max)`);
+  return { min, median, max };
+}
+
 const ALL = 2 ** SENSORS - 1;
 const cyclesOf = (readings, iterations = ITERATIONS, usable = ALL, kernel = 'grid', own = false) =>
   bench.run({ kernel, iterations, noise_Pa_q10: 4096, usable, own, readings }).cycles;
@@ -83,54 +91,51 @@ for (const [what, kernel, limit, usable] of [
   test(`${what}: no press and no garbage takes more than ${limit} cycles, nor much less`, (t) => {
     for (const [name, list] of Object.entries({ presses, garbage })) {
       const inputs = list.map((readings, i) => [readings, usable(readings, i)]).filter((input) => anyPositive(...input));
-      const cycles = inputs.map(([readings, mask]) => cyclesOf(readings, ITERATIONS, mask, kernel)).sort((a, b) => a - b);
-      const [min, median, max] = [cycles[0], cycles[cycles.length >> 1], cycles[cycles.length - 1]];
-      t.diagnostic(`${name}: ${min} ${median} ${max} cycles (min, median, max)`);
+      const { min, max } = spread(
+        t,
+        name,
+        inputs.map(([readings, mask]) => cyclesOf(readings, ITERATIONS, mask, kernel)),
+      );
       assert.ok(max <= limit, `${name}: ${max}`);
       assert.ok(max - min <= SPREAD_MAX * max, `${name}: ${min} to ${max}`);
     }
   });
 }
 
-/** Readings that rise along the pull. */
-const pulled = (readings, qx, qy) =>
-  readings.map((value, k) => Math.round(value * (1 + qx * (Math.floor(k / 5) - 1) + qy * ((k % 5) - 2))));
+/** A press of more than 10 ** `least` Pa inside the array, and one whose readings rise along a tangential force. */
+const inside = (least = 3) => press(between(-8, 8), between(-17, 17), 10 ** between(least, 5), between(5.5, 6.5), 2);
+function pulledInside() {
+  const readings = inside();
+  const [qx, qy] = [between(-0.1, 0.1), between(-0.1, 0.1)];
+  return readings.map((value, k) => Math.round(value * (1 + qx * (Math.floor(k / 5) - 1) + qy * ((k % 5) - 2))));
+}
 
 test(`the tangential estimate takes at most ${TANGENTIAL_CYCLES_MAX} cycles, nor much less where it ends with a result`, (t) => {
   const run = (readings, usable) =>
     bench.run({ kernel: 'tangential', iterations: ITERATIONS, noise_Pa_q10: 4096, usable, own: true, readings });
-  const list = Array.from({ length: 100 }, () =>
-    pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)),
-  );
-  const answers = list
+  const answers = Array.from({ length: 100 }, pulledInside)
     .map((readings, i) => run(readings, i % 4 ? ALL : maskFor(readings, i)))
     .filter((answer) => answer.x_mm !== 0 || answer.y_mm !== 0);
   assert.ok(answers.length > 60, `${answers.length} results`);
-  const cycles = answers.map((answer) => answer.cycles);
-  const [min, max] = [Math.min(...cycles), Math.max(...cycles)];
-  t.diagnostic(`${answers.length} results: ${min} to ${max} cycles`);
+  const { min, max } = spread(
+    t,
+    `${answers.length} results`,
+    answers.map((answer) => answer.cycles),
+  );
   assert.ok(max <= TANGENTIAL_CYCLES_MAX, `${max}`);
   assert.ok(max - min <= SPREAD_MAX * max, `${min} to ${max}`);
-  const worst = Math.max(...[...presses, ...garbage].map((readings, i) => run(readings, i % 2 ? ALL : maskFor(readings, i)).cycles));
-  t.diagnostic(`presses and garbage: at most ${worst} cycles`);
-  assert.ok(worst <= TANGENTIAL_CYCLES_MAX, `garbage: ${worst}`);
+  const others = [...presses, ...garbage].map((readings, i) => run(readings, i % 2 ? ALL : maskFor(readings, i)).cycles);
+  assert.ok(spread(t, 'presses and garbage', others).max <= TANGENTIAL_CYCLES_MAX);
 });
 
 test(`no part of the look for a load takes more than ${LOAD_PART_CYCLES_MAX} cycles, nor all more than ${LOAD_CYCLES_MAX}`, (t) => {
-  const inside = Array.from({ length: 60 }, () =>
-    pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)),
-  );
+  const pulled = Array.from({ length: 60 }, pulledInside);
   let sum = 0;
   for (let part = 0; part < LOAD_PARTS; part++) {
     let dearest = 0;
-    for (const [name, list] of Object.entries({ inside, presses, garbage })) {
-      const cycles = list
-        .map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `doubt_${part}`, true))
-        .sort((a, b) => a - b);
-      t.diagnostic(
-        `part ${part}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`,
-      );
-      dearest = Math.max(dearest, cycles[cycles.length - 1]);
+    for (const [name, list] of Object.entries({ pulled, presses, garbage })) {
+      const cycles = list.map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `doubt_${part}`, true));
+      dearest = Math.max(dearest, spread(t, `part ${part}, ${name}`, cycles).max);
     }
     assert.ok(dearest <= LOAD_PART_CYCLES_MAX, `part ${part}: ${dearest}`);
     sum += dearest;
@@ -139,33 +144,32 @@ test(`no part of the look for a load takes more than ${LOAD_PART_CYCLES_MAX} cyc
 });
 
 test(`what a touch tells of the gains takes at most ${GAINS_CYCLES_MAX} cycles`, (t) => {
-  const inside = Array.from({ length: 60 }, () => press(between(-8, 8), between(-17, 17), 10 ** between(4, 5), between(5.5, 6.5), 2));
-  for (const [name, list] of Object.entries({ inside, presses, garbage })) {
-    const cycles = list.map((readings) => cyclesOf(readings, ITERATIONS, ALL, 'gains_of_touch')).sort((a, b) => a - b);
-    t.diagnostic(`${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`);
-    assert.ok(cycles[cycles.length - 1] <= GAINS_CYCLES_MAX, `${name}: ${cycles[cycles.length - 1]}`);
-    assert.ok(name !== 'inside' || cycles[0] > 0.5 * GAINS_CYCLES_MAX, 'these count');
+  const firm = Array.from({ length: 60 }, () => inside(4));
+  for (const [name, list] of Object.entries({ firm, presses, garbage })) {
+    const { min, max } = spread(
+      t,
+      name,
+      list.map((readings) => cyclesOf(readings, ITERATIONS, ALL, 'gains_of_touch')),
+    );
+    assert.ok(max <= GAINS_CYCLES_MAX, `${name}: ${max}`);
+    assert.ok(name !== 'firm' || min > 0.5 * GAINS_CYCLES_MAX, 'these count');
   }
 });
 
 test(`no part of what presses takes more than ${SHAPES_PART_CYCLES_MAX} cycles`, (t) => {
-  const one = () => press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2);
   const pairs = Array.from({ length: 30 }, () => {
-    const other = one();
-    return one().map((value, k) => value + other[k]);
+    const other = inside();
+    return inside().map((value, k) => value + other[k]);
   });
-  const ones = Array.from({ length: 20 }, one);
+  const ones = Array.from({ length: 20 }, () => inside());
   const parts = Array.from({ length: SHAPES_PARTS }, (_, part) => `shapes_${part}`);
   for (const kernel of ['shapes_first_0', 'shapes_first_1', ...parts]) {
     for (const [name, list] of Object.entries({ ones, pairs, presses: presses.slice(0, 60), garbage: garbage.slice(0, 100) })) {
       const inputs = list.map((readings, i) => [readings, i % 4 ? ALL : maskFor(readings, i)]).filter((input) => anyPositive(...input));
-      const cycles = inputs
-        .map(([readings, usable]) => bench.run({ kernel, iterations: ITERATIONS, noise_Pa_q10: 4096, usable, own: true, readings }).cycles)
-        .sort((a, b) => a - b);
-      const max = cycles[cycles.length - 1];
-      t.diagnostic(`${kernel}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${max} cycles (min, median, max)`);
+      const cycles = inputs.map(([readings, usable]) => cyclesOf(readings, ITERATIONS, usable, kernel, true));
+      const { median, max } = spread(t, `${kernel}, ${name}`, cycles);
       assert.ok(max <= SHAPES_PART_CYCLES_MAX, `${kernel}, ${name}: ${max}`);
-      if (parts.includes(kernel) && name === 'pairs') assert.ok(cycles[cycles.length >> 1] > 20000, `${kernel} estimates nothing`);
+      if (parts.includes(kernel) && name === 'pairs') assert.ok(median > 20000, `${kernel} estimates nothing`);
     }
   }
 });
@@ -179,8 +183,7 @@ test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUT
   ]) {
     const group = cycles.filter((value) => value > least && value <= most);
     assert.ok(group.length > 10, `${what}: ${group.length}`);
-    const max = Math.max(...group);
-    t.diagnostic(`${what}: ${group.length} of ${cycles.length}, ${Math.min(...group)} to ${max} cycles`);
+    const { max } = spread(t, `${what}, ${group.length} of ${cycles.length}`, group);
     assert.ok(max <= (what === 'found' ? OUTLIER_CYCLES_MAX : SEARCH_CYCLES_MAX), `${what}: ${max}`);
   }
 });

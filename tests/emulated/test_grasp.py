@@ -5,12 +5,12 @@ usage: test_grasp.py --image F.bin --world FINGERTIP_CELL_EMULATED --tables FOLD
 """
 
 import argparse
-import pathlib
 import subprocess
 import sys
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from emulation import MAIN, ROOT, main
+
 sys.path.insert(0, str(ROOT / "host_tools/report/grasp"))
 import emulated_grasp  # noqa: E402
 
@@ -71,21 +71,8 @@ class Grasp(unittest.TestCase):
 
 class LockStep(unittest.TestCase):
     def refused(self, words, *program, options=()):
-        done = subprocess.run(
-            [
-                OPTIONS.node,
-                ROOT / "host_tools/simulation/emulator/lockstep.mjs",
-                "--image",
-                OPTIONS.image,
-                "--board",
-                emulated_grasp.BOARD,
-                *options,
-                "--",
-                *program,
-            ],
-            capture_output=True,
-            text=True,
-        )
+        lockstep = [OPTIONS.node, MAIN.with_name("lockstep.mjs"), "--image", OPTIONS.image, "--board", emulated_grasp.BOARD]
+        done = subprocess.run([*lockstep, *options, "--", *program], capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
         self.assertIn(words, done.stderr)
 
@@ -118,8 +105,4 @@ class LockStep(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for argument in ("image", "world", "tables", "node"):
-        parser.add_argument(f"--{argument}", required=True)
-    _, rest = parser.parse_known_args(namespace=OPTIONS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(OPTIONS, "image", "world", "tables", "node")

@@ -6,16 +6,13 @@ usage: test_scenes.py --scenes FOLDER --image FILE.bin --fingertip TOOL --comman
 """
 
 import argparse
-import pathlib
-import subprocess
-import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
-import emulated  # noqa: E402
-from fingertip import Flag, files  # noqa: E402
+import emulated
+from emulation import Run, main, make_scenario
+
+from fingertip import Flag, files
 
 TOOLS = argparse.Namespace()
 BOARD = "pico_parallel"
@@ -26,58 +23,18 @@ OF_FIT = {INFO: 13, HEALTH: 4}
 UNKNOWN_COMMAND, OUT_OF_RANGE = "1", "2"
 
 
-def encoded(*command):
-    return subprocess.run([TOOLS.command_frame, *command], capture_output=True, text=True, check=True).stdout.strip()
-
-
-class Run:
-    """A second in contact. extra: (s, command). acks: sequence number of the command -> result; body_bytes: packet type -> lengths of bodies."""
+class SceneRun(Run):
+    """A second in contact. extra: (s, command...). acks: sequence number of the command -> result; body_bytes: packet type -> lengths of bodies."""
 
     def __init__(self, folder, scene, stream, extra=()):
-        base = pathlib.Path(folder) / scene
-        path = lambda suffix: str(base.with_suffix("." + suffix))
-        subprocess.run(
-            [sys.executable, str(ROOT / "host_tools/python"), "scenario", "wander", "-o", path("scenario"), "--seconds", "3"], check=True
-        )
-        script = [
-            (0.45, "dtr 1"),
-            (0.46, encoded("--sequence", "1", "info")),
-            (0.47, encoded("--sequence", "2", "stream", "contact,raw,health")),
-            (0.48, encoded("--sequence", "3", "slip", "1", "100")),
-            (0.49, encoded("--sequence", "4", "stream", f"{stream},health")),
-            (1.7, encoded("--sequence", "5", "health")),
-            *extra,
-        ]
-        script.sort()
-        pathlib.Path(path("script")).write_text("".join(f"{t_s} {what}\n" for t_s, what in script))
-        image = TOOLS.image if scene == "grasp" else pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
-        done = subprocess.run(
-            [
-                TOOLS.node,
-                str(ROOT / "host_tools/simulation/emulator/main.mjs"),
-                "--board",
-                BOARD,
-                "--image",
-                image,
-                "--scenario",
-                path("scenario"),
-                "--host-script",
-                path("script"),
-                "--capture",
-                path("ftr"),
-                "--seconds",
-                "1.8",
-            ],
-            capture_output=True,
-            text=True,
-        )
-        if done.returncode != 0:
-            raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
-        subprocess.run([TOOLS.fingertip, "replay", path("ftr"), "--to-csv", path("csv")], check=True, capture_output=True)
-        self.recording = files.read_recording(path("csv"))
+        numbered = (("info",), ("stream", "contact,raw,health"), ("slip", "1", "100"), ("stream", f"{stream},health"))
+        commands = [(0.46 + 0.01 * i, "--sequence", str(1 + i), *command) for i, command in enumerate(numbered)]
+        commands += [(1.7, "--sequence", "5", "health"), *extra]
+        image = TOOLS.image if scene == "grasp" else f"{TOOLS.scenes}/{scene}/fingertip-{BOARD}.bin"
+        super().__init__(TOOLS, folder, scene, BOARD, make_scenario(f"{folder}/wander.csv", "wander", 3), 1.8, commands, image=image)
         self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
         self.body_bytes = {}
-        for frame in pathlib.Path(path("ftr")).read_bytes().split(b"\0"):
+        for frame in self.path("ftr").read_bytes().split(b"\0"):
             packet = emulated.unstuffed(frame)
             if packet:
                 self.body_bytes.setdefault(packet[1], set()).add(len(packet) - emulated.HEADER_BYTES - emulated.CRC_BYTES)
@@ -90,7 +47,7 @@ class Scenes(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
-        cls.raw, cls.press = Run(cls.folder.name, "raw", "raw"), Run(cls.folder.name, "press", "contact")
+        cls.raw, cls.press = SceneRun(cls.folder.name, "raw", "raw"), SceneRun(cls.folder.name, "press", "contact")
 
     def test_raw_streams_readings_and_nothing_of_a_fit(self):
         self.assertEqual(self.raw.recording.metadata["scene"], "raw")
@@ -113,8 +70,8 @@ class Scenes(unittest.TestCase):
 
     def at_the_fastest(self, scene):
         """With a pad's profile, if it takes one: the recording, and which of its rows are of the last 0.9 s."""
-        extra = [(0.455, encoded("--sequence", "6", "osr", "256")), (0.5, encoded("--sequence", "7", "pad", "12", "0"))]
-        run = Run(self.folder.name, scene, "contact", extra)
+        extra = [(0.455, "--sequence", "6", "osr", "256"), (0.5, "--sequence", "7", "pad", "12", "0")]
+        run = SceneRun(self.folder.name, scene, "contact", extra)
         self.assertEqual({name: run.acks[name] for name in ("6", "7")}, {"6": "0", "7": UNKNOWN_COMMAND if scene == "slip" else "0"})
         recording = run.recording
         self.assertEqual(recording.metadata["scene"], scene)
@@ -150,8 +107,4 @@ class Scenes(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for argument in ("scenes", "image", "fingertip", "command_frame", "node"):
-        parser.add_argument(f"--{argument}", required=True)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(TOOLS, "scenes", "image", "fingertip", "command_frame", "node")

@@ -8,7 +8,6 @@
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { MemoryFault } from '../../host_tools/simulation/emulator/chip/mpu.mjs';
 import { parseScenario } from '../../host_tools/simulation/emulator/scenario.mjs';
 import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { HEADER } from './harness/bench.mjs';
@@ -72,17 +71,6 @@ for (const name of BOARDS) {
   }
 }
 
-test('a bus that is asleep for long is no reason to attach again', () => {
-  const bench = new Bench('pico_mux');
-  bench.stream();
-  bench.machine.host.suspend();
-  bench.run(2500);
-  bench.machine.host.resume();
-  bench.run(40);
-  bench.stream();
-  assert.equal(bench.end().usb.enumerations, 1);
-});
-
 /** A start with this fault from power-on to `to_ms`: how often the watchdog must help, and by when the streams come. */
 function starts(what, faults, reboots, limit_ms) {
   for (const name of BOARDS) {
@@ -116,20 +104,6 @@ test('what a debugger left in the clock generators does not stay', () => {
   bench.stream();
   assert.deepEqual([clocks.refHz, clocks.sysHz, clocks.periHz, clocks.usbHz], [12e6, 125e6, 125e6, 48e6]);
   assert.equal(bench.end().reboots, 0);
-});
-
-test('a stack that grows out of its bank, and a null pointer, are faults; the image restarts', (t) => {
-  const bench = new Bench('pico_mux');
-  bench.stream();
-  const { chip } = bench.machine;
-  assert.throws(() => chip.busRead(0x14, 4), MemoryFault);
-  bench.until(() => chip.core.waiting, 10, 'sleep');
-  chip.core.registers[13] = 0x20041008;
-  const from_ms = bench.now_ms;
-  bench.until(() => bench.machine.reboots === 1, 10, 'reboot');
-  const back_ms = bench.stream() - from_ms;
-  t.diagnostic(`streams again after ${back_ms.toFixed(0)} ms`);
-  bench.end();
 });
 
 for (const name of BOARDS) {
@@ -271,5 +245,5 @@ test('what changed while the bus slept for long is no contact', () => {
   bench.stream();
   bench.run(300);
   assert.equal(bench.flags() & (CONTACT | TARED), TARED);
-  bench.end();
+  assert.equal(bench.end().usb.enumerations, 1, 'a bus that sleeps for long is no reason to attach again');
 });

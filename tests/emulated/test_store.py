@@ -1,149 +1,57 @@
-"""What the release image keeps in its flash: over restarts, new firmware and power cuts; and the nightly measurement of it in short.
+"""What the release image keeps in its flash over restarts; power cuts are test_power_cuts.mjs. And the nightly measurement of storing in short.
 
 usage: test_store.py --build BUILD --boards BOARDS --node NODE
 """
 
 import argparse
-import json
 import pathlib
-import subprocess
-import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / folder) for folder in ("host_tools/python", "host_tools/report/shared", "tests/emulated/storing")]
-from fingertip import files  # noqa: E402
-from storing import storing  # noqa: E402
+from emulation import Run, main, write_scenario
+from storing import storing
 
-OPTIONS = argparse.Namespace()
-CALIBRATION, SETTINGS, WRITING, DAMAGED = 1, 2, 4, 8
+TOOLS = argparse.Namespace()
+SETTINGS = 2
 KEEP = 0x8A
-
-
-def run(*call):
-    done = subprocess.run([str(part) for part in call], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
-    return done.stdout
+STATE = ((0.9, "info"), (0.91, "stream", "contact"))
 
 
 class Store(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(temporary.cleanup)
-        cls.folder = pathlib.Path(temporary.name)
-        cls.scenario = cls.folder / "rest.csv"
-        names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
-        cls.scenario.write_text(f"# fingertip-scenario 1\n{','.join(names)}\n0{',0' * (len(names) - 1)}\n")
-
     def setUp(self):
-        self.flash = self.folder / "flash.bin"
-        self.flash.unlink(missing_ok=True)
-
-    def life(self, *commands, seconds=1.0, faults=(), options=()):
-        """One run of the image with its flash; its last info packet, and its acknowledgements of keep."""
-        script, capture, table = (self.folder / name for name in ("host.txt", "capture.ftr", "capture.csv"))
-        faulty = self.folder / "faults.json"
-        lines = [
-            "0.45 dtr 1",
-            *(f"{t} {run(f'{OPTIONS.build}/tests/support/command_frame', *words.split()).strip()}" for t, words in commands),
-        ]
-        script.write_text("\n".join(lines) + "\n")
-        faulty.write_text(json.dumps(list(faults)))
-        run(
-            OPTIONS.node,
-            ROOT / "host_tools/simulation/emulator/main.mjs",
-            "--board",
-            "pico_mux",
-            "--image",
-            f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",
-            "--scenario",
-            self.scenario,
-            "--host-script",
-            script,
-            "--capture",
-            capture,
-            "--faults",
-            faulty,
-            "--seconds",
-            seconds,
-            "--flash",
-            self.flash,
-            "--fast-enumeration",
-            *options,
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.scenario = write_scenario(self.folder / "rest.csv")
+        TOOLS.image = f"{TOOLS.boards}/pico_mux/fingertip-pico_mux.bin"
+        TOOLS.fingertip, TOOLS.command_frame = (
+            f"{TOOLS.build}/{path}" for path in ("host_tools/tool/cli/fingertip", "tests/support/command_frame")
         )
-        run(self.tool, "replay", capture, "--to-csv", table, "--overwrite")
-        recording = files.read_recording(table)
-        results = [int(f["result"]) for kind, f in recording.packets if kind == "ack" and int(f["command"]) == KEEP]
-        metadata = {}
-        for line in table.read_text().splitlines():
-            key, separator, value = line.removeprefix("# ").partition(": ")
-            if line.startswith("# ") and separator:
-                metadata[key] = value
-        return metadata, results
 
-    @property
-    def tool(self):
-        return f"{OPTIONS.build}/host_tools/tool/cli/fingertip"
-
-    STATE = ((0.9, "info"), (0.91, "stream contact"))
+    def life(self, *commands, seconds=1.0, **options):
+        """One run of the image with its flash; its last info packet, and its acknowledgements of keep."""
+        kept = {"flash": self.folder / "flash.bin", "fast_enumeration": True}
+        run = Run(TOOLS, self.folder, "life", "pico_mux", self.scenario, seconds, commands, **kept, **options)
+        results = [int(f["result"]) for kind, f in run.recording.packets if kind == "ack" and int(f["command"]) == KEEP]
+        lines = [line.removeprefix("# ").partition(": ") for line in run.path("csv").read_text().splitlines() if line.startswith("# ")]
+        return {key: value for key, separator, value in lines if separator}, results
 
     def test_settings_are_kept_until_they_are_forgotten(self):
-        for slow in ((), ("--slow-flash",)):
+        stored = ("osr", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "stored")
+        for slow in (None, True):
             with self.subTest(slow=slow):
-                self.setUp()
-                info, results = self.life(
-                    (0.5, "osr 512"),
-                    (0.51, "prior 3.1:0.4"),
-                    (0.52, "limit 0.8"),
-                    (0.53, "keep"),
-                    (1.2, "info"),
-                    (1.21, "stream contact"),
-                    seconds=1.3,
-                    options=slow,
-                )
+                (self.folder / "flash.bin").unlink(missing_ok=True)
+                commands = (("osr", "512"), ("prior", "3.1:0.4"), ("limit", "0.8"), ("keep",))
+                told = [(0.5 + 0.01 * i, *command) for i, command in enumerate(commands)]
+                info, results = self.life(*told, (1.2, "info"), (1.21, "stream", "contact"), seconds=1.3, slow_flash=slow)
                 self.assertEqual((results, info["stored"]), ([0], str(SETTINGS)))
-                info, _ = self.life(*self.STATE)
-                self.assertEqual(
-                    (info["osr"], info["prior_sigma_mm"], info["prior_width_mm"], info["location_limit_mm"], info["stored"]),
-                    ("512", "3.1", "0.4", "0.8", str(SETTINGS)),
-                )
-                info, results = self.life((0.5, "forget"), *self.STATE)
+                info, _ = self.life(*STATE)
+                self.assertEqual([info[name] for name in stored], ["512", "3.1", "0.4", "0.8", str(SETTINGS)])
+                info, results = self.life((0.5, "forget"), *STATE)
                 self.assertEqual((results, info["osr"], info["stored"]), ([0], "512", "0"))
-                self.assertEqual(self.life(*self.STATE)[0]["osr"], "1024")
+                self.assertEqual(self.life(*STATE)[0]["osr"], "1024")
 
-    def test_power_lost_while_storing(self):
-        """At many moments of one update; both answers occur."""
-        found = set()
-        self.life((0.5, "osr 512"), (0.53, "keep"), *self.STATE)
-        kept = self.flash.read_bytes()
-        for cut_ms in (0.5, 3, 20, 46, 48, 60, 90, 150):
-            self.flash.write_bytes(kept)
-            at_s = 0.5315 + cut_ms / 1e3
-            self.life(
-                (0.5, "osr 256"),
-                (0.53, "keep"),
-                (1.2, "stream contact"),
-                seconds=1.3,
-                faults=[{"type": "power_cut", "from_s": at_s, "to_s": at_s + 0.01}],
-            )
-            info, _ = self.life(*self.STATE)
-            self.assertIn(info["osr"], ("256", "512"), cut_ms)
-            self.assertEqual(info["stored"], str(SETTINGS))
-            found.add(info["osr"])
-        self.assertEqual(found, {"256", "512"})
-
-    def test_the_power_is_cut_at_each_step(self):
-        """The nightly measurement, in short."""
-        found = storing(OPTIONS.build, OPTIONS.boards, updates=80, commands=3)
-        self.assertEqual((found["flash_lost"], found["flash_frames_skipped"]), (0, 0))
-        power = found["flash"]["power"]
-        self.assertEqual(power["updates"], 80)
-        self.assertGreater(power["cuts"], 50)
-        self.assertGreater(power["cuts_in_mending"], 5)
-        self.assertTrue(10 < power["brought"] < power["cuts"] - 10, power)
+    def test_frames_come_while_it_stores(self):
+        found = storing(TOOLS.build, TOOLS.boards, commands=3)
+        self.assertEqual(found["flash_frames_skipped"], 0)
         quiet, quickly, slowly = (found["flash"][name] for name in ("quiet", "storing", "storing_slowly"))
         self.assertEqual((quiet["stored"], quickly["stored"], slowly["stored"]), (0, 3, 3))
         # None is lost or skipped; the last may still be on its way at the end.
@@ -155,8 +63,4 @@ class Store(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for name in ("build", "boards", "node"):
-        parser.add_argument(f"--{name}", required=True)
-    OPTIONS, rest = parser.parse_known_args()
-    unittest.main(argv=[sys.argv[0], *rest])
+    main(TOOLS, "build", "boards", "node")

@@ -77,12 +77,6 @@ class Bench extends ImageBench {
       });
   }
 
-  frames() {
-    const rows = this.recording().filter((line) => !line.startsWith('#'));
-    const names = rows[0].split(',');
-    return rows.slice(1).map((row) => Object.fromEntries(row.split(',').map((cell, i) => [names[i], Number(cell)])));
-  }
-
   /** Each edge that was sent against the change of the pin that it is; the greatest error, us. */
   judge(edges, changes = this.changes) {
     let worst_us = 0;
@@ -127,10 +121,10 @@ for (const name of BOARDS) {
     const bench = new Bench(name, { next: spaced((made) => (made < edges_of_storm ? 500 : prng.range(30e6, 40e6))) });
     bench.begin('in');
     bench.run(QUIET_ms - bench.now_ms);
-    const before = bench.frames().length;
+    const before = bench.rows().length;
     const [from_ms, quiet_ms] = [bench.now_ms, 100];
     bench.run(storm_ms);
-    const during = bench.frames();
+    const during = bench.rows();
     bench.run(300);
     const edges = bench.edges();
     const late = edges.filter(({ number }) => number > edges_of_storm);
@@ -196,7 +190,7 @@ for (const name of BOARDS) {
     bench.begin('frame');
     bench.run(400);
     assert.deepEqual(bench.edges(), []);
-    const frames = bench.frames();
+    const frames = bench.rows();
     const pulses = bench.changes.flatMap(({ high, t_ns }, i, all) =>
       high && all[i + 1] ? [[bench.device_us(t_ns), bench.device_us(all[i + 1].t_ns)]] : [],
     );

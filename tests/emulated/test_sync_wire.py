@@ -9,11 +9,11 @@ error between rows of both is that of the alignment by edges, which begins some 
 import argparse
 import json
 import pathlib
-import sys
 import tempfile
 import unittest
 
-from two_clocks import CLOCKS_ppm, RATE_Hz, Emulator, record_all, recordings_in, worst_us, write_scenario
+from emulation import main, write_scenario
+from two_clocks import CLOCKS_ppm, RATE_Hz, Emulator, record_all, recordings_in, worst_us
 from world import World
 
 TOOLS = argparse.Namespace()
@@ -30,7 +30,7 @@ class OneWire(unittest.TestCase):
         holder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(holder.cleanup)
         folder = pathlib.Path(holder.name)
-        write_scenario(folder / "scenario.csv", (0, 1), (0, 0))
+        write_scenario(folder / "scenario.csv")
         cls.file = folder / "both.csv"
         with World(TOOLS.support, TOOLS.node, folder) as world:
             cls.emulators = [
@@ -88,9 +88,4 @@ class OneWire(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for name in ("image", "node", "report"):
-        parser.add_argument(f"--{name}", required=True)
-    parser.add_argument("--support", required=True, type=pathlib.Path)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(TOOLS, "image", "node", "report", "support")

@@ -23,19 +23,12 @@ function bench(name, crossing_us) {
   return made;
 }
 
-/** Time and number of every frame of a recording. */
-function frames(lines) {
-  const rows = lines.filter((l) => !l.startsWith('#')).map((l) => l.split(','));
-  const [t, frame] = ['t_us', 'frame'].map((name) => rows[0].indexOf(name));
-  return rows.slice(1).map((row) => [Number(row[t]), Number(row[frame])]);
-}
-
 for (const name of ['pico_mux', 'pico_parallel']) {
   for (const [what, crossing_us] of CROSSINGS) {
     test(`${name}: frames across ${what}`, (t) => {
       const device = bench(name, crossing_us);
       device.run(700);
-      const told = frames(device.recording());
+      const told = device.rows().map(({ t_us, frame }) => [t_us, frame]);
       assert.ok(told[0][0] < crossing_us && told.at(-1)[0] > crossing_us + 100e3, `${told[0]} ${told.at(-1)}`);
       const steps_us = told.slice(1).map(([t_us], i) => t_us - told[i][0]);
       const [least, most] = [Math.min(...steps_us), Math.max(...steps_us)];

@@ -8,13 +8,13 @@ triangles of pressure: their tops, found in the recording, show the same without
 
 import argparse
 import pathlib
-import sys
 import tempfile
 import unittest
 
 import numpy as np
 
-from two_clocks import CLOCKS_ppm, RATE_Hz, Emulator, record_all, recordings_in, worst_us, write_scenario
+from emulation import main, write_scenario
+from two_clocks import CLOCKS_ppm, RATE_Hz, Emulator, record_all, recordings_in, worst_us
 from world import World
 import figures
 
@@ -52,7 +52,7 @@ class TwoFingertips(unittest.TestCase):
         holder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(holder.cleanup)
         folder = pathlib.Path(holder.name)
-        write_scenario(folder / "scenario.csv", np.arange(0, SCENARIO_s, TRIANGLE_s / 2), [0, TOP_Pa] * 1000)
+        write_scenario(folder / "scenario.csv", *((t_s * TRIANGLE_s / 2, TOP_Pa * (t_s % 2)) for t_s in range(SCENARIO_s)))
         cls.file = folder / "both.csv"
         with World(TOOLS.support, TOOLS.node, folder) as world:
             cls.emulators = [Emulator(world, TOOLS.image, folder, serial, folder / "scenario.csv") for serial in CLOCKS_ppm]
@@ -122,9 +122,4 @@ def report(**numbers):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for name in ("image", "node", "report"):
-        parser.add_argument(f"--{name}", required=True)
-    parser.add_argument("--support", required=True, type=pathlib.Path)
-    _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(TOOLS, "image", "node", "report", "support")

@@ -1,35 +1,22 @@
 /**
  * The release image on the bus: closed in mid-packet; suspend, resume, and a reset instead of a resume.
  *
- * usage: test_usb_bus.mjs IMAGE.bin FINGERTIP
+ * usage: test_usb_bus.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME
  */
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { findBoard } from '../../host_tools/simulation/emulator/board/boards.mjs';
-import { Machine } from '../../host_tools/simulation/emulator/machine.mjs';
 import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
-import { steady } from './harness/bench.mjs';
+import { ImageBench } from './harness/image_bench.mjs';
 
-const [image, fingertip, command_frame] = process.argv.slice(2);
-const streams = Buffer.from(execFileSync(command_frame, ['stream', 'contact,raw'], { encoding: 'utf8' }).trim(), 'hex');
+const [images, fingertip, command_frame] = process.argv.slice(2);
 const LINE_CODING_115200 = '00c20100000008';
 
-const received = [];
 const arrivals_ns = [];
-const machine = new Machine({
-  image: readFileSync(image),
-  Board: findBoard('pico_mux'),
-  scenario: steady(),
-  fastEnumeration: true,
-  onData: (bytes) => received.push(Buffer.from(bytes)),
-  onUsbPacket: (p) => arrivals_ns.push(p.t_ns),
-});
+const bench = new ImageBench(images, { fingertip, command_frame }, 'pico_mux', { onUsbPacket: (p) => arrivals_ns.push(p.t_ns) });
+const { machine } = bench;
 const { host, client } = machine;
-const run = (seconds) => assert.ok(machine.run(machine.time.nanos + seconds * 1e9), `${machine.endReason} ${machine.result.warnings}`);
-const count = () => received.reduce((n, bytes) => n + bytes.length, 0);
+const streams = bench.encoded('stream', 'contact,raw');
+const run = (seconds) => bench.run(1000 * seconds);
+const count = () => bench.bytes;
 const control = (packet) => {
   let answer = null;
   host.control(packet, null, (status, data) => {
@@ -59,7 +46,6 @@ const streamFor = (seconds) => {
 
 run(0.4);
 assert.ok(host.configured);
-client.setDtr(true);
 streamFor(0.5);
 
 // DTR dropped while packets are on the bus, at sixty moments of the stream: the toggle stays in step.
@@ -125,15 +111,7 @@ streamFor(0.3);
 
 assert.deepEqual(machine.result.warnings, []);
 assert.equal(machine.result.reboots, 0);
-const folder = mkdtempSync(join(tmpdir(), 'suspend-'));
-try {
-  const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
-  writeFileSync(stream, Buffer.concat(received));
-  execFileSync(fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
-  const end = readFileSync(table, 'utf8').trim().split('\n').at(-1);
-  process.stdout.write(`${end}\n`);
-  const [, crc, format] = /crc_errors=(\d+) format_errors=(\d+)/.exec(end);
-  assert.ok(Number(crc) + Number(format) <= cuts, `${cuts} cuts, yet ${end}`);
-} finally {
-  rmSync(folder, { recursive: true });
-}
+const end = bench.recording().at(-1);
+process.stdout.write(`${end}\n`);
+const [, crc, format] = /crc_errors=(\d+) format_errors=(\d+)/.exec(end);
+assert.ok(Number(crc) + Number(format) <= cuts, `${cuts} cuts, yet ${end}`);

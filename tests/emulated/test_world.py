@@ -11,14 +11,12 @@ import pathlib
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools/python"))
-from fingertip import files  # noqa: E402
-from world import World  # noqa: E402
+from emulation import files, main, options, write_scenario
+from world import World
 
 OPTIONS = argparse.Namespace()
 BUSY_FOR_s, BUSY_EVERY_s = 0.05, 0.2
@@ -27,22 +25,11 @@ BUSY_FOR_s, BUSY_EVERY_s = 0.05, 0.2
 class Emulated(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
-        names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]
-        (self.folder / "rest.csv").write_text(f"# fingertip-scenario 1\n{','.join(names)}\n{','.join('0' for _ in names)}\n")
+        write_scenario(self.folder / "rest.csv")
 
-    def emulator(self, world, *options, **how):
-        return world.emulator(
-            self.folder / "port",
-            "--board",
-            "pico_mux",
-            "--image",
-            OPTIONS.image,
-            "--scenario",
-            self.folder / "rest.csv",
-            "--fast-enumeration",
-            *options,
-            **how,
-        )
+    def emulator(self, world, *more, **how):
+        shared = {"board": "pico_mux", "image": OPTIONS.image, "scenario": self.folder / "rest.csv", "fast_enumeration": True}
+        return world.emulator(self.folder / "port", *options(**shared), *more, **how)
 
     def recorded(self, disturb=lambda pid: None):
         """What two programs, one after the other, find at the port, when, and what became of the emulator."""
@@ -126,9 +113,4 @@ class Emulated(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--image", required=True)
-    parser.add_argument("--support", required=True, type=pathlib.Path)
-    parser.add_argument("--node", required=True)
-    _, rest = parser.parse_known_args(namespace=OPTIONS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    main(OPTIONS, "image", "support", "node")

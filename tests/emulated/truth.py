@@ -1,12 +1,7 @@
 """What a recording of an emulated run says, held against what its scenario made the sensors feel."""
 
-import pathlib
-import sys
-
 import numpy as np
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools" / "python"))
-from fingertip import files  # noqa: E402
+from emulation import files
 
 HELD = 1 << 6
 # A location without one of these is meant to be right: LOW_SIGNAL to SENSOR_DOUBTFUL but for SENSOR_MASKED, which only tells why.

@@ -5,53 +5,23 @@ Each emulator says when, on the tool's clock, it was powered on, and so when eve
 
 import json
 import os
-import pathlib
-import sys
 
 import numpy as np
+from emulation import options
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools" / "python"))
-from fingertip import files  # noqa: E402
+from fingertip import files
 
 CLOCKS_ppm = {"E660583883265A01": 25, "E660583883265A02": -25}
 RATE_Hz = 50
-SENSORS = 15
-
-
-def write_scenario(path, times_s, pressures_Pa):
-    """All sensors alike."""
-    names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(SENSORS))]
-    rows = [
-        f"{t_s:g},{','.join('0' * len(files.TRUTH_COLUMNS))},{','.join([str(p_Pa)] * SENSORS)}" for t_s, p_Pa in zip(times_s, pressures_Pa)
-    ]
-    path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
 
 
 class Emulator:
     def __init__(self, world, image, folder, serial, scenario, *more):
         self.port = folder / f"tty-{serial}"
         self.report_path = folder / f"{serial}.json"
-        self.process = world.emulator(
-            self.port,
-            "--image",
-            image,
-            "--board",
-            "pico_mux",
-            "--scenario",
-            scenario,
-            "--seconds",
-            "3600",
-            "--seed",
-            int(serial[-2:]),
-            "--serial",
-            serial,
-            "--clock-ppm",
-            CLOCKS_ppm[serial],
-            "--fast-enumeration",
-            *more,
-            "--report",
-            self.report_path,
-        )
+        own = options(seed=int(serial[-2:]), serial=serial, clock_ppm=CLOCKS_ppm[serial], report=self.report_path)
+        shared = options(image=image, board="pico_mux", scenario=scenario, seconds=3600, fast_enumeration=True)
+        self.process = world.emulator(self.port, *shared, *own, *more)
 
     def stop(self):
         self.process.terminate()

@@ -6,11 +6,9 @@ with World(OPTIONS.support, OPTIONS.node, folder) as world:
 """
 
 import pathlib
-import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/support"))
-from simulated_time import PATIENCE_s, SimulatedTime  # noqa: E402
+from emulation import MAIN
+from simulated_time import PATIENCE_s, SimulatedTime
 
 
 class World(SimulatedTime):
@@ -22,14 +20,7 @@ class World(SimulatedTime):
 
     def emulator(self, port, *options, wait_open=True):
         """One whose power comes when the port is first opened; a process, whose first line is the world's time then, us."""
-        call = (
-            self._support / "emulated_fingertip",
-            port,
-            *["--wait-open"] * wait_open,
-            self._node,
-            ROOT / "host_tools/simulation/emulator/main.mjs",
-            *options,
-        )
+        call = (self._support / "emulated_fingertip", port, *["--wait-open"] * wait_open, self._node, MAIN, *options)
         process = self.start([str(part) for part in call])
         if process.poll() is not None:
             raise AssertionError(f"the emulator did not start: {process.communicate()[1]}")

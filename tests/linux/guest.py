@@ -169,50 +169,15 @@ class Guest:
         listener.bind(str(port))
         listener.listen()
         self.errors = open(self.folder / "qemu.err", "w+")
+        # From no_timer_check on: a machine that is given no time for a second or two is not ill.
+        linux = "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check tsc=nowatchdog nowatchdog rcupdate.rcu_cpu_stall_suppress=1"
+        machine = "-M pc -accel tcg -m 256 -display none -monitor none -no-reboot -nic none -device qemu-xhci".split()
+        boot = ["-kernel", kernel / "vmlinux", "-initrd", initramfs, "-append", linux]
+        serial = ["-serial", f"file:{self.folder / 'console.log'}", "-serial", f"unix:{port},server=off"]
+        for number, path in enumerate(usbredir):
+            serial += ["-chardev", f"socket,id=usb{number},path={path},reconnect=1", "-device", f"usb-redir,chardev=usb{number}"]
         self.process = subprocess.Popen(
-            [
-                QEMU,
-                "-M",
-                "pc",
-                "-accel",
-                "tcg",
-                "-m",
-                "256",
-                "-display",
-                "none",
-                "-monitor",
-                "none",
-                "-no-reboot",
-                "-nic",
-                "none",
-                "-kernel",
-                kernel / "vmlinux",
-                "-initrd",
-                initramfs,
-                # From no_timer_check on: a machine that is given no time for a second or two is not ill.
-                "-append",
-                "console=ttyS0 quiet panic=-1 mitigations=off nokaslr no_timer_check "
-                "tsc=nowatchdog nowatchdog rcupdate.rcu_cpu_stall_suppress=1",
-                "-serial",
-                f"file:{self.folder / 'console.log'}",
-                "-serial",
-                f"unix:{port},server=off",
-                "-device",
-                "qemu-xhci",
-                *(
-                    option
-                    for number, path in enumerate(usbredir)
-                    for option in (
-                        "-chardev",
-                        f"socket,id=usb{number},path={path},reconnect=1",
-                        "-device",
-                        f"usb-redir,chardev=usb{number}",
-                    )
-                ),
-            ],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=self.errors,
+            [QEMU, *machine, *boot, *serial], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.errors
         )
         self.requests = 0
         self.received = b""

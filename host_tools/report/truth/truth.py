@@ -10,7 +10,7 @@
 Pads, presses and sensors are the twin's, the code that judges them is the firmware's own, compiled for the host; recordings of
 real strips are used where they are at hand (--recordings, or the environment's FINGERTIP_RECORDINGS) and their figures are null
 elsewhere. Constants were chosen with other seeds and other pads than those that judge here. Cycles are those of the fit report in
-the same folder, and what is kept without power is that of the nightly test reliability.storing.
+the same folder, and what is kept without power is that of the nightly tests reliability.power_cuts and reliability.storing.
 """
 
 import os
@@ -69,7 +69,7 @@ GOALS = (
     ("cold_cycles", "<=", 31000),
     ("masked_cycles", "<=", 62000),
 )
-# Of other reports in the same folder: the fit, and the nightly test reliability.storing.
+# Of other reports in the same folder: the fit, and the nightly tests reliability.power_cuts and reliability.storing.
 KEPT = {"fit.json": ("cold_cycles", "masked_cycles"), "reliability.json": ("flash_lost", "flash_frames_skipped")}
 
 

@@ -106,14 +106,17 @@ export class ImageBench {
     );
   }
 
-  /** The last frame of the recording that was measured, and came with both packets, by column. */
-  lastRow() {
+  /** Frames of the recording, by column; NaN where there is nothing. */
+  rows() {
     const [head, ...rows] = this.recording()
       .filter((l) => !l.startsWith('#'))
       .map((l) => l.split(','));
-    const flags = head.indexOf('raw_flags');
-    const values = rows.findLast((cells) => cells[flags] !== '' && !(Number(cells[flags]) & HELD));
-    return Object.fromEntries(head.map((name, i) => [name, Number(values[i])]));
+    return rows.map((cells) => Object.fromEntries(head.map((name, i) => [name, cells[i] === '' ? NaN : Number(cells[i])])));
+  }
+
+  /** The last one that was measured, and came with both packets. */
+  lastRow() {
+    return this.rows().findLast(({ raw_flags }) => !Number.isNaN(raw_flags) && !(raw_flags & HELD));
   }
 
   /** Flags of that frame. */

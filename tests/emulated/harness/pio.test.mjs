@@ -193,59 +193,6 @@ test('agrees in every cycle with a plain model of the datasheet: random programs
   assert.equal(executed.size, 8);
 });
 
-test('a divider with a fraction: periods of 2 and 3 cycles make 2.5', () => {
-  const b = bench([set(PINS, 1), set(PINS, 0)], { clkdiv: (2 << 16) | (128 << 8) });
-  b.run(14);
-  assert.deepEqual(
-    b.trace.map(([cycle]) => cycle),
-    [1, 3, 6, 8, 11, 13],
-  );
-});
-
-test('delays count in cycles of the machine; a stall comes before its delay', () => {
-  const b = bench([set(PINS, 1, 3), set(PINS, 0, 1), pull(1, 2)], { clkdiv: 5 << 16 });
-  b.run(100);
-  assert.deepEqual(b.trace, [
-    [1, 1],
-    [21, 0],
-  ]);
-  b.write(TXF0, 0);
-  b.run(60);
-  // In cycle 101 the pull; two cycles of delay.
-  assert.deepEqual(b.trace.slice(2), [
-    [116, 1],
-    [136, 0],
-  ]);
-});
-
-test('autopull: an empty OSR takes the word and outputs it a cycle later; later words follow without a gap', () => {
-  const b = bench([out(PINS, 8)], { shift: OUT_RIGHT | AUTOPULL | (8 << 25) });
-  b.run(10);
-  assert.equal(b.read(FDEBUG) >>> 24, 1, 'TXSTALL');
-  b.write(TXF0, 0x11);
-  b.write(TXF0, 0x22);
-  b.write(TXF0, 0x33);
-  b.run(10);
-  assert.deepEqual(b.trace, [
-    [12, 0x11],
-    [13, 0x22],
-    [14, 0x33],
-  ]);
-});
-
-test('side-set happens at once though the instruction stalls, and wins over OUT and SET', () => {
-  const b = bench([pull(1, 0b10000), set(PINS, 0b11, 0)], { pin: (16 << 20) | (5 << 26) | (1 << 29) });
-  b.run(3);
-  assert.deepEqual(b.trace, [[1, 1]]);
-  b.write(TXF0, 0);
-  b.run(3);
-  assert.deepEqual(b.trace, [
-    [1, 1],
-    [5, 2],
-    [6, 3],
-  ]);
-});
-
 test('inputs are two cycles late, unless bypassed', () => {
   for (const [bypass, late] of [
     [0, 3],

@@ -14,12 +14,6 @@ WORDS[0] |= crc4(EXAMPLE) << 12;
 export const [D1, D2] = [4958179, 6815414];
 export const [PRESSURE_mbar, TEMPERATURE_cC] = [3999.8, 1981];
 
-/** Rows of a recording, by column. */
-function rowsOf(lines) {
-  const table = lines.filter((line) => !line.startsWith('#')).map((line) => line.split(','));
-  return table.slice(1).map((values) => Object.fromEntries(values.map((value, i) => [table[0][i], value])));
-}
-
 /** What 0.3 s of it bring: the codes on the bus, the rows of the recording, and how many pressures and temperatures are not the example's. */
 export function streamExample(images, tools) {
   const { pressure_Pa, temperature_cdegC } = compensate(WORDS, D1, D2, findSensor(SENSOR));
@@ -42,7 +36,7 @@ export function streamExample(images, tools) {
   const codes = new Set(
     transfers.filter(({ read, bytes }) => read && bytes.length === 3).map(({ bytes }) => (bytes[0] << 16) | (bytes[1] << 8) | bytes[2]),
   );
-  const rows = rowsOf(bench.recording());
+  const rows = bench.rows();
   let wrong = 0;
   for (const row of rows) {
     wrong += Math.round(100 * row.temperature_degC) === TEMPERATURE_cC ? 0 : 1;

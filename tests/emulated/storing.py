@@ -9,7 +9,8 @@ import zlib
 
 import numpy as np
 from boards import PARALLEL as BOARD
-from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, scenario
+from emulation import MAIN, options
+from emulated import CONVERSION_us, MARGIN, Tools, contact_times_us, distribution, scenario
 from fingertip.files import InputError, read_recording
 from reporting import run
 
@@ -39,7 +40,7 @@ def calibrate_frame(number):
 class Run:
     """The release image, calibrated, in contact, while it obeys a number of commands that store."""
 
-    def __init__(self, tools, folder, name, path, commands, options=()):
+    def __init__(self, tools, folder, name, path, commands, more=()):
         base = pathlib.Path(folder) / name
         lines = [
             "0.45 dtr 1",
@@ -51,25 +52,8 @@ class Run:
         stores = [calibrate_frame(1 + i) if i % 3 else tools.encoded("keep") for i in range(commands)]
         lines += [f"{FROM_s + INTERVAL_s * i:.3f} {frame}" for i, frame in enumerate(stores)]
         base.with_suffix(".script").write_text("\n".join(lines) + "\n")
-        run(
-            "node",
-            ROOT / "host_tools/simulation/emulator/main.mjs",
-            "--board",
-            BOARD,
-            "--image",
-            tools.image(BOARD),
-            "--scenario",
-            path,
-            "--host-script",
-            base.with_suffix(".script"),
-            "--capture",
-            f"{base}.ftr",
-            "--usb-log",
-            f"{base}.usb",
-            "--report",
-            f"{base}.json",
-            *options,
-        )
+        files = {"host_script": base.with_suffix(".script"), "capture": f"{base}.ftr", "usb_log": f"{base}.usb", "report": f"{base}.json"}
+        run("node", MAIN, *options(board=BOARD, image=tools.image(BOARD), scenario=path, **files), *more)
         run(tools.fingertip, "replay", f"{base}.ftr", "--to-csv", f"{base}.csv")
         emulated = json.loads(pathlib.Path(f"{base}.json").read_text())
         recording = read_recording(f"{base}.csv")
@@ -99,43 +83,26 @@ def stream(tools, commands):
     return runs
 
 
-def power(image, updates, seed):
-    """Two processes with half of the updates each."""
-    halves = (updates - updates // 2, updates // 2)
-    program = pathlib.Path(__file__).with_name("store_power.mjs")
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(lambda i: json.loads(run("node", program, image, halves[i], 2 * seed + i)), range(2)))
-    return {name: sum(part[name] for part in found) for name in found[0]}
-
-
-def storing(build, boards, updates=10000, commands=20, seed=1):
+def storing(build, boards, commands=20):
     """Figures:
 
-    flash_lost            updates after which neither the old nor the new was there, or it did not stay, with the power cut at each step in turn
-                          (store_power.mjs); the unit test of the store cuts it at every step of ten thousand
     flash_frames_skipped  frames that the release image skipped or did not send while it stored calibrations and settings, at OSR 256 and full rate,
                           in contact on every frame
     flash                 what is behind them: latencies with and without storing among them. A command that brings a calibration takes the processor
                           0.1 ms, for which a frame may have to wait once; the writing does not
     """
-    tools = Tools(build, boards)
-    cut = power(tools.boards / BOARD / "store_power.bin", updates, seed)
-    runs = stream(tools, commands)
+    runs = stream(Tools(build, boards), commands)
     return {
-        "flash_lost": cut["lost"],
         "flash_frames_skipped": max(runs[name].skipped for name in ("storing", "storing_slowly")),
         "flash": {
-            "power": cut,
-            **{
-                name: {
-                    "frames": found.frames,
-                    "skipped": found.skipped,
-                    "stored": len(found.stored),
-                    "erases": found.erases,
-                    "programs": found.programs,
-                    "latency_us": found.latency_us,
-                }
-                for name, found in runs.items()
-            },
+            name: {
+                "frames": found.frames,
+                "skipped": found.skipped,
+                "stored": len(found.stored),
+                "erases": found.erases,
+                "programs": found.programs,
+                "latency_us": found.latency_us,
+            }
+            for name, found in runs.items()
         },
     }
