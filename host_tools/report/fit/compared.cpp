@@ -73,11 +73,7 @@ static void compare(std::string kernel, std::int64_t threads, std::int64_t itera
 }
 MEASURE_ENTRY(compare)
 
-struct reference_fit {
-  double p0_Pa, x_mm, y_mm, sigma_mm, cost, force_N, location_sd_mm, condition_number;
-  bool at_bound;
-  bool observable; // the readings determine the location, away from the limits
-};
+using reference_fit = reference::Fit;
 MEASURE_RECORD(reference_fit, FIELD(p0_Pa), FIELD(x_mm), FIELD(y_mm), FIELD(sigma_mm), FIELD(cost), FIELD(force_N),
                FIELD(location_sd_mm), FIELD(condition_number), FIELD(at_bound), FIELD(observable))
 
@@ -92,9 +88,9 @@ static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, do
   require(x_mm.size() == y_mm.size() && x_mm.size() == pressure_Pa.size(1), "another number of sensors");
   const reference::Array array{pitch_mm, {x_mm.data, x_mm.data + x_mm.size()}, {y_mm.data, y_mm.data + y_mm.size()}};
   fingertip::twin::in_parallel(results.size(), [&](std::size_t i) {
-    const std::vector<double> readings(pressure_Pa.row(i), pressure_Pa.row(i + 1));
+    const double *const readings = pressure_Pa.row(i);
     bool positive = false;
-    for (std::size_t k = 0; k < readings.size(); k++) {
+    for (std::size_t k = 0; k < x_mm.size(); k++) {
       positive = positive || ((usable[i] >> k & 1u) && readings[k] > 0.0);
     }
     if (!positive) {
@@ -102,17 +98,12 @@ static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, do
       results[i] = {0, 0, 0, 0, 0, 0, INFINITE, INFINITE, false, false};
       return;
     }
-    std::vector<reference::Parameters> guesses;
+    reference::Parameters start{};
     if (starts.size()) {
-      guesses.push_back({starts[i].p0_Pa, starts[i].x_mm, starts[i].y_mm, starts[i].sigma_mm});
+      start = {starts[i].p0_Pa, starts[i].x_mm, starts[i].y_mm, starts[i].sigma_mm};
     }
-    const reference::Fit best = reference::fit(array, readings, usable[i], noise_Pa[i], guesses,
-                                               all_starts ? reference::Starts::all : reference::Starts::rationed);
-    results[i] = {best.theta.p0_Pa,    best.theta.x_mm,
-                  best.theta.y_mm,     best.theta.sigma_mm,
-                  best.cost,           best.force_N,
-                  best.location_sd_mm, best.condition_number,
-                  best.at_bound,       reference::observable(best) && !best.at_bound};
+    results[i] =
+        reference::fit(array, readings, usable[i], noise_Pa[i], starts.size() ? &start : nullptr, all_starts != 0);
   });
 }
 MEASURE_ENTRY(optimum)

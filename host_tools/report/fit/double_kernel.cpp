@@ -32,37 +32,8 @@ constexpr double P0_MIN = 0.05;
 constexpr double P0_MAX = 1e6;
 constexpr double SIGMA_MIN = 0.158;
 constexpr double SIGMA_MAX = 5.0;
-constexpr double PIVOT_FLOOR = 1e-15; // the resolution of double
 
 double limited(double value, double low, double high) { return value > low ? std::min(value, high) : low; }
-
-// L D L^T with pivots raised to their floor.
-struct Factors {
-  Matrix4 lower = Matrix4::Identity();
-  Vector4 pivots;
-
-  explicit Factors(const Matrix4 &a) {
-    for (int i = 0; i < 4; i++) {
-      double pivot = a(i, i);
-      for (int j = 0; j < i; j++) {
-        double product = a(i, j);
-        for (int k = 0; k < j; k++) {
-          product -= lower(i, k) * pivots[k] * lower(j, k);
-        }
-        lower(i, j) = product / pivots[j];
-        pivot -= product * lower(i, j);
-      }
-      const double floor = a(i, i) * PIVOT_FLOOR + 1e-300;
-      pivots[i] = pivot > floor ? pivot : floor;
-    }
-  }
-
-  Vector4 solve(const Vector4 &right) const {
-    Vector4 v = lower.triangularView<Eigen::UnitLower>().solve(right);
-    v = v.cwiseQuotient(pivots).eval();
-    return lower.transpose().triangularView<Eigen::UnitUpper>().solve(v);
-  }
-};
 
 double best_amplitude(const Samples &samples, const Gaussian &theta) {
   double numerator = 0.0, denominator = 1e-30;
@@ -131,7 +102,7 @@ Gaussian first_guess(const Samples &samples, double noise_Pa) {
       normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p));
     }
   }
-  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
+  const Vector4 c = normal.matrix.ldlt().solve(normal.rhs);
   const double half_inverse = 0.5 / limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
   Gaussian theta{1.0, x_peak + limited(c[1] * half_inverse, -1.0, 1.0),
                  y_peak + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
@@ -165,7 +136,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
       normal.add(e * Vector4(1.0, x, y, r2), samples.p[k] - theta.p0 * e);
     }
     const double gain = theta.sigma * theta.sigma / theta.p0;
-    const Vector4 b = Factors(normal.matrix).solve(normal.rhs);
+    const Vector4 b = normal.matrix.ldlt().solve(normal.rhs);
     const double excess =
         gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT, std::abs(b[3]) / WIDEN_LIMIT});
     const double share = excess > 1.0 ? 1.0 / excess : 1.0;

@@ -17,9 +17,9 @@ BAD_mm = 1.0
 WARNINGS = np.uint32(Flag.UNCERTAIN | Flag.MODEL | Flag.FLAT | Flag.AT_BOUND | Flag.LOW_SIGNAL)
 VALID = np.uint32(Flag.FIT_VALID)
 
-# What a kernel can do beside fitting every sensor: fit without every sensor, fit the n largest readings, start where the firmware's starts, end early.
-SUBSET, LARGEST, FIRMWARE_GUESS, ENDS = "subset", "n_largest", "firmware guess", "ends early"
-FIRMWARE = {"fit": {SUBSET}, "grid": set(), "masked": {SUBSET}, "general": {SUBSET, LARGEST}}
+# What a kernel can do beside fitting every sensor: fit without every sensor, start where the firmware's starts, end early.
+SUBSET, FIRMWARE_GUESS, ENDS = "subset", "firmware guess", "ends early"
+FIRMWARE = {"fit": {SUBSET}, "grid": set(), "masked": {SUBSET}, "general": {SUBSET}}
 KERNELS = FIRMWARE | {
     "double": {SUBSET, FIRMWARE_GUESS},  # the general kernel's steps in double
     "separable": set(),  # the grid kernel's iteration in double, for the host
@@ -37,7 +37,6 @@ BLOCK = 400
 class Variant:
     name: str
     iterations: int = USUAL_ITERATIONS
-    n_largest: int = 0
     mask: str = "none"
     firmware_guess: bool = False
     needs: frozenset = frozenset()
@@ -46,7 +45,6 @@ class Variant:
 VARIANTS = (
     *(Variant(f"iterations={k}", k) for k in range(11)),
     *(Variant(f"iterations={k}", k, needs={ENDS}) for k in (20, 50)),
-    *(Variant(f"n_largest={n}", n_largest=n, needs={LARGEST}) for n in range(4, 16)),
     *(Variant(f"mask={mask}", mask=mask, needs={SUBSET}) for mask in MASKS[1:]),
     *(Variant(f"mask={mask} iterations={BUILT_ITERATIONS}", BUILT_ITERATIONS, mask=mask, needs={SUBSET}) for mask in MASKS[1:3]),
     *(Variant(f"mask={mask} guess=firmware", mask=mask, firmware_guess=True, needs={FIRMWARE_GUESS}) for mask in MASKS[1:3]),
@@ -71,8 +69,8 @@ class Bench:
     def fit(self, kernel, variant, readings, usable, noise_Pa, threads=2):
         """(results with x_mm, y_mm, flags, microseconds for each)"""
         if kernel in FIRMWARE:
-            fields = {"iterations": variant.iterations, "n_largest": variant.n_largest, "noise_Pa_q10": (1024 * noise_Pa).astype(np.int32)}
-            settings = self.measure.settings(len(readings), gain_sd=0.0, cut_noises=0, **fields)
+            settings = self.measure.settings(len(readings), gain_sd=0.0, cut_noises=0, iterations=variant.iterations)
+            settings["noise_Pa_q10"] = (1024 * noise_Pa).astype(np.int32)
             return self.measure.timed_fit(self.array, settings, readings, usable, kernel=kernel, threads=threads)
         return self.compared.compare(kernel, variant.iterations, noise_Pa, readings, usable, variant.firmware_guess, threads)
 
@@ -109,7 +107,7 @@ def row_of(kernel, variant, name, observable, of_sets):
         "observable": observable,
         "presses": len(um),
         "above_100um": int((um > 100).sum()),
-        **{f"{key}_um": quantile(errors, share) for key, share in (("p50", 0.5), ("p99", 0.99), ("p999", 0.999), ("worst", 1.0))},
+        **{f"{key}_um": quantile(errors, share) for key, share in (("p50", 0.5), ("p99", 0.99), ("p999", 0.999))},
         "truth_p99_mm": quantile(np.sort(truth_mm[valid]), 0.99),
         "bad_unflagged": float((valid & (wrong_mm > BAD_mm) & ~warned).sum() / count),
         "good_flagged": float((valid & (wrong_mm <= BAD_mm) & warned).sum() / count),
@@ -131,10 +129,9 @@ def rows(bench):
 
 def jobs(bench):
     """For on_chip/bench.mjs: the variants, and of each mask a thousandth of the presses."""
-    fields = ("iterations", "n_largest", "mask")
     return {
         "variants": [
-            {"kernel": kernel, "variant": variant.name, **{field: getattr(variant, field) for field in fields}}
+            {"kernel": kernel, "variant": variant.name, "iterations": variant.iterations, "mask": variant.mask}
             for kernel, variant in variants()
         ],
         "presses": {mask: [job for set_ in SETS for job in jobs_of(bench, set_, mask)] for mask in MASKS},
@@ -155,17 +152,14 @@ def jobs_of(bench, set_, mask):
 
 
 def mixed(bench, limit):
-    """The observable ones of the first presses, A B C A B D and again, so that each set keeps its share in every block: (readings, usable, noise_Pa, best)."""
-    of_sets = {set_: bench.presses(set_, limit=limit) for set_ in SETS}
-    at = dict.fromkeys(SETS, 0)
-    chosen = []
-    for set_ in "ABCABD" * (limit // 6):
-        these = of_sets[set_]
-        if at[set_] < len(these.readings) and these.observable[at[set_]]:
-            chosen.append((these.readings[at[set_]], these.usable[at[set_]], these.noise_Pa[at[set_]], these.best[at[set_]]))
-        at[set_] += 1
-    chosen = chosen[: len(chosen) // BLOCK * BLOCK]
-    return tuple(np.array(column) for column in zip(*chosen))
+    """Observable presses, each set's share spread evenly over them: (readings, usable, noise_Pa, best)."""
+    of_sets = [bench.presses(set_, limit=limit) for set_ in SETS]
+    at = np.concatenate([np.arange(these.observable.sum()) / these.observable.sum() for these in of_sets])
+    order = np.argsort(at, kind="stable")[: len(at) // BLOCK * BLOCK]
+    return tuple(
+        np.concatenate([getattr(these, name)[these.observable] for these in of_sets])[order]
+        for name in ("readings", "usable", "noise_Pa", "best")
+    )
 
 
 def timed(bench, limit, passes):

@@ -7,13 +7,14 @@ Measures the error against the reference (errors.py), cycles on the emulated chi
 that are hard, extreme, or none (stiff.py), and merges the results:
 
     fit.json        the figures by which the fit is judged, with their goals
-    fit_table.csv   every kernel and variant: cycles, milliseconds at 125 MHz, error; fit_table.md has the same
+    fit_table.md    every kernel and variant: cycles, milliseconds at 125 MHz, error
     fit_report.png  the Pareto front
 
 Errors are distances of the location from the reference optimum over the observable presses of the sets A to D.
 """
 
 import csv
+import functools
 import math
 import pathlib
 import sys
@@ -161,39 +162,6 @@ def figures(results, seed):
     return judge(found, GOALS)
 
 
-def table(results):
-    """One dict for each kernel and variant, and one for each library of the host."""
-    for kernel, variant in results.variants():
-        cycles = results.cycles.get((kernel, variant), {})
-        median = cycles.get("cycles_median", "")
-        yield {
-            "kernel": kernel,
-            "variant": variant,
-            **{f"cycles_{k}": cycles.get(f"cycles_{k}", "") for k in ("min", "median", "max")},
-            "ms": int(median) / CLOCK_Hz * 1e3 if median else None,
-            "host_us": results.host[kernel]["us"] if variant == USUAL and kernel in results.host else None,
-            **{key: results.error(kernel, variant, ALL_SETS, key) for key in ("presses", "above_100um")},
-            **{key: results.error(kernel, variant, ALL_SETS, key) for key in ("p50_um", "p99_um", "p999_um", "worst_um")},
-            **{f"{key}_{s}": results.error(kernel, variant, s, key) for key in ("p999_um", "truth_p99_mm") for s in SETS},
-        }
-    for kernel in errors.LIBRARIES:
-        host = results.host[kernel]
-        yield {
-            "kernel": kernel,
-            "variant": "host library",
-            "host_us": host["us"],
-            **{key: host[key] for key in ("presses", "above_100um", "p50_um", "p999_um")},
-        }
-
-
-def write_table_csv(path, rows):
-    names = list(rows[0])
-    lines = [
-        ",".join("" if row.get(n) is None else f"{row[n]:.6g}" if isinstance(row[n], float) else str(row[n]) for n in names) for row in rows
-    ]
-    write_text(path, "\n".join([",".join(names), *lines]) + "\n")
-
-
 def number(value, digits=2):
     if value is None:
         return ""
@@ -202,19 +170,32 @@ def number(value, digits=2):
     return f"{value:.0e}" if value >= 1e6 else f"{value:.{digits}g}" if value < 100 else f"{value:.0f}"
 
 
-def cells(row):
-    """Of fit_table.md."""
+def cells(kernel, variant, cycles, host, of):
+    """Of fit_table.md. of(set, key): figure of errors.row_of, or None."""
     return {
-        "kernel": row["kernel"],
-        "variant": row["variant"],
-        "cycles": row.get("cycles_median", ""),
-        "ms": number(row.get("ms"), 3),
-        "host us": number(row["host_us"], 3),
-        **{name: number(row.get(key)) for name, key in (("p50", "p50_um"), ("p99", "p99_um"), ("p99.9", "p999_um"))},
-        **{f"{s} p99.9": number(row.get(f"p999_um_{s}")) for s in SETS},
-        "above 100 um": f"{row['above_100um']} of {row['presses']}",
-        "C, D: p99 mm to the truth": ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row),
+        "kernel": kernel,
+        "variant": variant,
+        "cycles": cycles or "",
+        "ms": number(cycles and int(cycles) / CLOCK_Hz * 1e3, 3),
+        "host us": number(host and host["us"], 3),
+        **{name: number(of(ALL_SETS, key)) for name, key in (("p50", "p50_um"), ("p99", "p99_um"), ("p99.9", "p999_um"))},
+        **{f"{s} p99.9": number(of(s, "p999_um")) for s in SETS},
+        "above 100 um": f"{of(ALL_SETS, 'above_100um')} of {of(ALL_SETS, 'presses')}",
+        "C, D: p99 mm to the truth": ", ".join(number(of(s, "truth_p99_mm")) for s in "CD"),
     }
+
+
+def table(results):
+    """One row for each kernel and variant, and one for each library of the host."""
+    rows = []
+    for kernel, variant in results.variants():
+        cycles = results.cycles.get((kernel, variant), {}).get("cycles_median")
+        host = results.host.get(kernel) if variant == USUAL else None
+        rows.append(cells(kernel, variant, cycles, host, functools.partial(results.error, kernel, variant)))
+    for kernel in errors.LIBRARIES:
+        host = results.host[kernel]
+        rows.append(cells(kernel, "host library", None, host, lambda set_, key, host=host: host.get(key) if set_ == ALL_SETS else None))
+    return rows
 
 
 def pareto(points):
@@ -314,11 +295,9 @@ def main(argv):
     out = output_folder(options)
     results = measure(options, out)
     found = figures(results, options.seed)
-    rows = list(table(results))
     write_json(out / "fit.json", found)
-    write_table_csv(out / "fit_table.csv", rows)
     template = (HERE / "text.md.in").read_text(encoding="utf-8")
-    write_text(out / "fit_table.md", text.filled(template, found | {"fits": [cells(row) for row in rows]}))
+    write_text(out / "fit_table.md", text.filled(template, found | {"fits": table(results)}))
     plot(out / "fit_report.png", results, found)
     return finish(found, options, ("fit.json", "fit_table.md", "fit_report.png"))
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 namespace fingertip::fitting {
 namespace {
@@ -31,39 +30,6 @@ constexpr double GUESS_HEIGHT_MIN = 0.07, GUESS_HEIGHT_MAX = 3.8;
 constexpr double SETTLED = 3e-8;
 
 using Readings = double[COLUMNS][ROWS]; // in units of the largest
-
-// To 1e-11: an error of an exponential here moves location and width as little as itself, and
-// leaves the model a Gaussian. |x| below 700.
-inline double quick_exp(double x) {
-  constexpr double ROUND = 0x1.8p52; // adding it leaves the nearest whole number in the low bits
-  const double shifted = x * 1.4426950408889634 + ROUND;
-  const double n = shifted - ROUND;
-  const double r = x - n * 0.6931471805599453;
-  const double r2 = r * r, r4 = r2 * r2;
-  const double value = (1.0 + r) + r2 * (1.0 / 2 + r * (1.0 / 6)) +
-                       r4 * ((1.0 / 24 + r * (1.0 / 120)) + r2 * (1.0 / 720 + r * (1.0 / 5040)) +
-                             r4 * (1.0 / 40320 + r * (1.0 / 362880)));
-  std::int64_t bits;
-  std::memcpy(&bits, &shifted, sizeof bits);
-  bits = static_cast<std::int64_t>(static_cast<std::uint64_t>(bits + 1023) << 52);
-  double power;
-  std::memcpy(&power, &bits, sizeof power);
-  return value * power;
-}
-
-// To 2e-5, for 0.08 < x <= 1. The exponent is taken such that the mantissa lies in 2/3 .. 4/3; the
-// polynomial is least squares over Chebyshev nodes of that interval.
-inline float rough_log(float x) {
-  std::int32_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  const std::int32_t exponent = (bits - 0x3f2aaaab) >> 23;
-  bits -= static_cast<std::int32_t>(static_cast<std::uint32_t>(exponent) << 23);
-  float mantissa;
-  std::memcpy(&mantissa, &bits, sizeof mantissa);
-  const float f = mantissa - 1.0F;
-  const float series = 1.0000072F + f * (-0.49927367F + f * (0.33219161F + f * (-0.2753717F + f * 0.22646900F)));
-  return static_cast<float>(exponent) * 0.6931472F + f * series;
-}
 
 // Orthogonal polynomials on the nodes first, first + 1, .. under the weights g^2, times g.
 template <int N> struct Axis {
@@ -105,7 +71,7 @@ template <int N> struct Axis {
   // g = exp(-height ((k - at)^2 - at^2)), decay = exp(-height): 1 at the node k = 0, and each
   // further one by a product.
   void evaluate(int first, double at, double height, double decay) {
-    const double slope = quick_exp(2.0 * height * at);
+    const double slope = std::exp(2.0 * height * at);
     const double twice = decay * decay;
     g[-first] = 1.0;
     double ratio = decay * slope;
@@ -138,8 +104,7 @@ template <int N> struct Parabola {
     for (int i = 0; i < N; i++) {
       const double ratio = marginal[i] * scale;
       axis.g[i] = ratio >= GUESS_SHARE ? ratio : 0.0;
-      const auto counting = static_cast<float>(std::max(ratio, GUESS_SHARE));
-      weighted[i] = axis.g[i] * static_cast<double>(rough_log(counting));
+      weighted[i] = axis.g[i] * std::log(std::max(ratio, GUESS_SHARE));
     }
     axis.orthogonalise(first);
     double sum = 0.0;
@@ -179,7 +144,7 @@ State guess(const Readings &p, int peak_column, int peak_row) {
 bool step(const Readings &p, bool last, State *state) {
   Axis<COLUMNS> x;
   Axis<ROWS> y;
-  const double decay = quick_exp(-state->height);
+  const double decay = std::exp(-state->height);
   x.evaluate(FIRST_COLUMN, state->x, state->height, decay);
   y.evaluate(FIRST_ROW, state->y, state->height, decay);
   x.orthogonalise(FIRST_COLUMN);

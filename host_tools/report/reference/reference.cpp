@@ -34,6 +34,20 @@ struct Box {
   }
 };
 
+// The model of amplitude 1 at a sample, and the derivatives of the logarithm of the model.
+struct Model {
+  double e, x, y, s;
+
+  Model(const Sample &sample, const double *theta) {
+    const double iv = 1.0 / (theta[3] * theta[3]);
+    const double dx = sample.x - theta[1], dy = sample.y - theta[2], r2 = dx * dx + dy * dy;
+    e = std::exp(-0.5 * r2 * iv);
+    x = dx * iv;
+    y = dy * iv;
+    s = r2 * iv / theta[3];
+  }
+};
+
 class Residuals final : public ceres::CostFunction {
 public:
   explicit Residuals(const std::vector<Sample> &samples) : samples_(samples) {
@@ -42,20 +56,12 @@ public:
   }
 
   bool Evaluate(double const *const *parameters, double *residuals, double **jacobians) const override {
-    const double *theta = parameters[0];
-    const double inverse_variance = 1.0 / (theta[3] * theta[3]);
     for (std::size_t k = 0; k < samples_.size(); k++) {
-      const double dx = samples_[k].x - theta[1];
-      const double dy = samples_[k].y - theta[2];
-      const double r2 = dx * dx + dy * dy;
-      const double e = std::exp(-0.5 * r2 * inverse_variance);
-      residuals[k] = theta[0] * e - samples_[k].p;
+      const Model model(samples_[k], parameters[0]);
+      const double m = parameters[0][0] * model.e;
+      residuals[k] = m - samples_[k].p;
       if (jacobians && jacobians[0]) {
-        double *row = jacobians[0] + 4 * k;
-        row[0] = e;
-        row[1] = theta[0] * e * dx * inverse_variance;
-        row[2] = theta[0] * e * dy * inverse_variance;
-        row[3] = theta[0] * e * r2 * inverse_variance / theta[3];
+        Eigen::Map<Vector4>(jacobians[0] + 4 * k) << model.e, m * model.x, m * model.y, m * model.s;
       }
     }
     return true;
@@ -77,13 +83,9 @@ Quadratic expand(const std::vector<Sample> &samples, const Vector4 &theta) {
   const double iv = 1.0 / (theta[3] * theta[3]);
   const double is = 1.0 / theta[3];
   for (const Sample &sample : samples) {
-    const double dx = sample.x - theta[1];
-    const double dy = sample.y - theta[2];
-    const double r2 = dx * dx + dy * dy;
-    const double e = std::exp(-0.5 * r2 * iv);
+    const auto [e, gx, gy, gs] = Model(sample, theta.data());
     const double m = theta[0] * e;
     const double r = m - sample.p;
-    const double gx = dx * iv, gy = dy * iv, gs = r2 * iv * is; // d log m
     const Vector4 row(e, m * gx, m * gy, m * gs);
     q.cost += 0.5 * r * r;
     q.gradient += r * row;
@@ -100,12 +102,9 @@ Quadratic expand(const std::vector<Sample> &samples, const Vector4 &theta) {
 }
 
 double cost_at(const std::vector<Sample> &samples, const Vector4 &theta) {
-  const double iv = 1.0 / (theta[3] * theta[3]);
   double cost = 0.0;
   for (const Sample &sample : samples) {
-    const double dx = sample.x - theta[1];
-    const double dy = sample.y - theta[2];
-    const double r = theta[0] * std::exp(-0.5 * (dx * dx + dy * dy) * iv) - sample.p;
+    const double r = theta[0] * Model(sample, theta.data()).e - sample.p;
     cost += 0.5 * r * r;
   }
   return cost;
@@ -236,10 +235,8 @@ Box box_of(const Array &array) {
 
 } // namespace
 
-bool observable(const Fit &fit) { return fit.location_sd_mm < 0.5 && fit.condition_number < 1e12; }
-
-Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_t usable, double noise_Pa,
-        const std::vector<Parameters> &starts, Starts effort) {
+Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start,
+        bool all_starts) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < array.x_mm.size(); k++) {
     if (usable >> k & 1u) {
@@ -256,9 +253,9 @@ Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_
   const Box box = box_of(array);
   const Vector4 middle(1.0, samples[0].x, samples[0].y, 0.65);
   std::vector<Vector4> guesses{middle};
-  for (const Parameters &start : starts) {
-    guesses.emplace_back(start.p0_Pa / largest, start.x_mm / array.pitch_mm, start.y_mm / array.pitch_mm,
-                         start.sigma_mm / array.pitch_mm);
+  if (start) {
+    guesses.emplace_back(start->p0_Pa / largest, start->x_mm / array.pitch_mm, start->y_mm / array.pitch_mm,
+                         start->sigma_mm / array.pitch_mm);
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(4, samples.size()); i++) {
     for (double sigma : {0.35, 0.65, 1.5}) {
@@ -292,7 +289,7 @@ Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_
   offer(by_ceres(samples, box, best));
   const double independent = offer(by_ceres(samples, box, into_box(box, middle)));
   Shape shape = shape_at(samples, best);
-  if (effort == Starts::all) {
+  if (all_starts) {
     for (const Vector4 &guess : guesses) {
       offer(by_ceres(samples, box, into_box(box, guess)));
     }
@@ -307,14 +304,19 @@ Fit fit(const Array &array, const std::vector<double> &pressure_Pa, std::uint32_
   best = polish(samples, box, best);
   shape = shape_at(samples, best);
 
-  Fit result{};
-  result.theta = {best[0] * largest, best[1] * array.pitch_mm, best[2] * array.pitch_mm, best[3] * array.pitch_mm};
-  result.cost = cost_at(samples, best) * largest * largest;
-  result.force_N = 2.0 * M_PI * result.theta.p0_Pa * result.theta.sigma_mm * result.theta.sigma_mm * 1e-6;
-  result.location_sd_mm = noise_Pa / largest * array.pitch_mm * shape.radial;
-  result.condition_number = shape.condition_number;
-  result.at_bound = box.touches(best);
-  return result;
+  const double p0_Pa = best[0] * largest, sigma_mm = best[3] * array.pitch_mm;
+  const double sd_mm = noise_Pa / largest * array.pitch_mm * shape.radial;
+  const bool at_bound = box.touches(best);
+  return {p0_Pa,
+          best[1] * array.pitch_mm,
+          best[2] * array.pitch_mm,
+          sigma_mm,
+          cost_at(samples, best) * largest * largest,
+          2.0 * M_PI * p0_Pa * sigma_mm * sigma_mm * 1e-6,
+          sd_mm,
+          shape.condition_number,
+          at_bound,
+          sd_mm < 0.5 && shape.condition_number < 1e12 && !at_bound};
 }
 
 } // namespace fingertip::reference

@@ -90,11 +90,10 @@ class Report(unittest.TestCase):
 
     def test_table_and_plot(self):
         self.assertEqual((self.folder / "fit_report.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
-        with open(self.folder / "fit_table.csv", newline="") as file:
-            rows = list(csv.DictReader(file))
-        self.assertEqual({"fit", "general", "lm_double", "ceres_reused", "cminpack"} - {row["kernel"] for row in rows}, set())
-        columns = {line.count("|") for line in (self.folder / "fit_table.md").read_text().split("\n") if line.startswith("| fit |")}
-        self.assertEqual(columns, {15})
+        lines = (self.folder / "fit_table.md").read_text().split("\n")
+        for kernel in ("fit", "general", "lm_double", "ceres_reused", "cminpack"):
+            columns = {line.count("|") for line in lines if line.startswith(f"| {kernel} |")}
+            self.assertEqual(columns, {15}, kernel)
 
     def test_a_missing_image_is_one_line(self):
         done = report(self.folder / "other", self.folder)

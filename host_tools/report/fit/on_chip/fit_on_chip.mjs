@@ -4,33 +4,13 @@ import { SimulatedTime } from '../../../simulation/emulator/clock.mjs';
 import { Report } from '../../../simulation/emulator/report.mjs';
 
 /** In the order of `kernels` in main.c. */
-export const KERNELS = [
-  'nothing',
-  'fit',
-  'grid',
-  'masked',
-  'general',
-  'naive_float',
-  'naive_double',
-  'lm_float',
-  'lm_double',
-  'tangential',
-  'doubt_0',
-  'doubt_1',
-  'doubt_2',
-  'doubt_3',
-  'doubt_4',
-  'doubt_5',
-  'gains_of_touch',
-  'shapes_first_0',
-  'shapes_first_1',
-  'shapes_0',
-  'shapes_1',
-  'shapes_2',
-];
+export const KERNELS = (
+  'nothing fit grid masked general naive_float naive_double lm_float lm_double tangential ' +
+  'doubt_0 doubt_1 doubt_2 doubt_3 doubt_4 doubt_5 gains_of_touch shapes_first_0 shapes_first_1 shapes_0 shapes_1 shapes_2'
+).split(' ');
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */
-const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, noise_Pa_q10: 3, usable: 4, own: 5, readings: 6, x_mm: 38, y_mm: 39 };
+const FIELDS = { kernel: 0, iterations: 1, noise_Pa_q10: 2, usable: 3, own: 4, readings: 5, x_mm: 37, y_mm: 38 };
 
 /** One chip that runs fit_cycles.bin. */
 export class Bench {
@@ -68,11 +48,11 @@ export class Bench {
   }
 
   /** @returns {{cycles, x_mm, y_mm}} of one fit */
-  run({ kernel, iterations = 0, n_largest = 0, noise_Pa_q10 = 1, usable = 0, own = false, readings = [] }) {
+  run({ kernel, iterations = 0, noise_Pa_q10 = 1, usable = 0, own = false, readings = [] }) {
     const { chip } = this;
     const at = chip.core.registers[0] - 0x20000000;
     const view = new DataView(chip.sram.buffer, chip.sram.byteOffset + at);
-    const values = { kernel: KERNELS.indexOf(kernel), iterations, n_largest, noise_Pa_q10, usable, own: own ? 1 : 0 };
+    const values = { kernel: KERNELS.indexOf(kernel), iterations, noise_Pa_q10, usable, own: own ? 1 : 0 };
     for (const [field, value] of Object.entries(values)) view.setInt32(4 * FIELDS[field], value, true);
     readings.forEach((value, k) => view.setInt32(4 * (FIELDS.readings + k), value, true));
     this.#untilNextJob();

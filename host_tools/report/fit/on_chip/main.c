@@ -15,7 +15,7 @@
 /* Words of 32 bits, in this order, as fit_on_chip.mjs writes and reads them. */
 static struct {
   uint32_t kernel; /* index into kernels */
-  uint32_t iterations, n_largest;
+  uint32_t iterations;
   int32_t noise_Pa_q10;
   uint32_t usable;
   uint32_t own; /* 1: the sensors have one (fit.h) */
@@ -172,7 +172,6 @@ int main(void) {
       port_panic();
     }
     chosen.iterations = (uint8_t)job.iterations;
-    chosen.n_largest = (uint8_t)job.n_largest;
     chosen.noise_Pa_q10 = job.noise_Pa_q10;
     chosen.own = job.own ? own : NULL;
     void (*run)(void) = kernels[job.kernel].run;
