@@ -86,9 +86,8 @@ if(NOT has_FIT AND NOT has_RAW_STREAM)
   message(FATAL_ERROR "with FINGERTIP_FIT and FINGERTIP_RAW_STREAM off nothing would be streamed; switch one on")
 endif()
 
-# The general kernel fits what the fixed-point ones cannot take: layouts other than the full rectangle
-# that they are compiled for, and selections of the n largest readings. The host's tools compare with
-# it; an image of a full rectangle never calls it.
+# The general kernel fits layouts other than the full rectangle that the fixed-point ones are compiled
+# for. The host's tools compare with it; an image of a full rectangle never calls it.
 if(FINGERTIP_BOARD STREQUAL "native")
   set(general_by_default ON)
 else()

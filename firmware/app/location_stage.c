@@ -29,14 +29,12 @@
 #define FIT(array, pressure, usable, settings, watch, result)                                                          \
   fit_gaussian_grid_small(array, pressure, usable, settings, result)
 #endif
-_Static_assert(FT_WITH_FIT_GENERAL || DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERAL");
 
 void location_stage_start(struct location_stage *own) {
   if (INIT_ARRAY(&own->array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
     port_panic();
   }
   own->settings.iterations = DEFAULT_FIT_ITERATIONS;
-  own->settings.n_largest = DEFAULT_FIT_N_LARGEST;
   own->prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   own->prior_sd_mm = DEFAULT_PRIOR_WIDTH_mm;
   fit_set_errors(&own->settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);

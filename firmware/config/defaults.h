@@ -15,7 +15,6 @@
 #define DEFAULT_SLIP_THRESHOLD_mm 0.75f
 
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
-#define DEFAULT_FIT_N_LARGEST 0u /* all: each adds accuracy */
 
 /* A Gaussian is never negative, but rubber is: it bulges beside a contact, and sensors three to five
  * sigma away read -1 to -2 % of the peak (host_tools/report/real). Such a reading counts as zero

@@ -97,8 +97,7 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
 
 void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                          const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result) {
-  const bool selects = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if ((fit_is_rectangle(array) && !selects) || settings->noise_Pa_q10 < 1) {
+  if (fit_is_rectangle(array) || settings->noise_Pa_q10 < 1) {
     fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, watch, result);
   } else {
     fit_general(array, pressure_Pa_q10, usable & all_sensors(array), settings, result);

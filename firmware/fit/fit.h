@@ -47,7 +47,7 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
 
-/* The same without the general kernel, so that an image does not hold it: n_largest must be 0. */
+/* The same without the general kernel, so that an image does not hold it. */
 void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                        const struct fit_settings *settings, struct fit_result *result);
 

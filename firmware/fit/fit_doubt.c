@@ -11,11 +11,8 @@
 /* The model of the residual, lengths in sigma, parts of p0, d = (dx, dy) from the contact to the
  * sensor, g(v) = exp(-d' d / (2 v)):
  *   residual = g(1) (a + b dx + c dy + e d' d) + far g(FAR) + (qx dx + qy dy) g(PULL)
- * The first four are what a step of the fit would still take. `far` is what the rubber has around a
- * contact, heavier tails, a dip, or what a known dip is off by, and is 0 +- FAR_SD. The last two
- * are the trace of a load: of the terms of a layer's profile (common/pad_profile.h) the narrow ones
- * are such steps.
- */
+ * The first four are what a step of the fit would still take. `far` is 0 +- FAR_SD of p0: what the
+ * rubber has around a contact, or what a known dip is off by. The last two are the trace of a load. */
 enum { HEIGHT, ALONG_X, ALONG_Y, WIDTH, FAR, PULL_X, PULL_Y, UNKNOWNS };
 _Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 
@@ -319,7 +316,7 @@ void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, con
   default: {
     struct scaled ratio =
         scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))), fit_grid_scaled(RATIO_PER_TRACE));
-    load->ratio = fit_float(ratio.mantissa, ratio.exponent);
+    load->ratio = fit_scaled_float(ratio);
     load->known = true;
   }
   }

@@ -1,16 +1,14 @@
 /* What a tangential load that is not estimated does to the location.
  *
- * A load that pulls along the rubber moves the Gaussian by some 0.38 pitch for each unit of Q / F,
- * though nothing has moved. It leaves a trace in the residual: its pressure is broader than the
- * difference of two places of a contact. The look here finds how large that trace is, beyond what
- * noise, gains and model leave by chance. That much of a load is part of the location's error. A
- * press without a load has no such trace, so it is not doubted for what it might carry.
+ * A load moves the Gaussian by some 0.38 pitch for each unit of Q / F, and leaves a trace in the
+ * residual. The look finds how large that trace is, beyond what noise, gains and model leave by
+ * chance. That much of a load is part of the location's error (NUMERICS.md, "A load that is not
+ * known").
  *
  * A look is one least squares in fixed point, of the residual of a fit that is done: for every
- * kernel, any layout, any sensors missing. A load changes slowly. So a look is in parts, one a
- * frame, for the time after the frame's packet, and the frames that follow use what it finds. Until
- * a contact's first look has ended, and where there is none, the load is taken to be
- * FIT_DOUBT_USUAL. NUMERICS.md has the derivation and the price. */
+ * kernel, any layout, any sensors missing. It is in parts, one a frame, for the time after the
+ * frame's packet. Until a contact's first look has ended, and where there is none, the load is
+ * FIT_DOUBT_USUAL. */
 #ifndef FIT_FIT_DOUBT_H
 #define FIT_FIT_DOUBT_H
 

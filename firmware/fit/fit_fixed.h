@@ -5,12 +5,17 @@
 #ifndef FIT_FIT_FIXED_H
 #define FIT_FIT_FIXED_H
 
-#include "fit/fit_tables.h"
 #include "port/divide.h"
 
 #include <stdint.h>
 
 #define FIXED_INLINE static inline __attribute__((always_inline))
+
+/* 2^(-k/256) in Q30 and log2(1 + k/64) in Q15, rounded to nearest, and the number of bits of k; a
+ * unit test compares every entry with the C library. */
+extern const int32_t fit_exp2_table[256];
+extern const uint16_t fit_log2_table[65];
+extern const uint8_t fit_bits_table[256];
 
 /* a * b / 2^32 for |a|, |b| <= 2^30, error below 2 units: three 16-bit products. */
 FIXED_INLINE int32_t fixed_mul_q32(int32_t a, int32_t b) {

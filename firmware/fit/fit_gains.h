@@ -1,19 +1,13 @@
-/* How far the gains of a pad's sensors are apart, learnt from touches.
- *
- * Gains of a pad that was never calibrated are apart by some 10 to 22 %, and how far is not known.
- * Each touch shows a part of it: what four fitted parameters leave of the gains' errors is in the
- * residual. So
+/* How far the gains of a pad's sensors are apart, learnt from touches: of a pad that was never
+ * calibrated it is not known, and what four fitted parameters leave of their errors is in the residual
+ * of each touch. So
  *   gain_sd^2 = sum(R / M) / sum(0.58 (sigma / pitch)^3),
  * R and M the squares of the touch's residual, less those of the model's error, and of the fitted
- * Gaussian. The denominator is the share of independent relative errors that the fit leaves, the
- * mean over all places: within 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to
- * 1 pitch. Narrower contacts leave too little.
+ * Gaussian. The denominator is the share of independent relative errors that the fit leaves, within
+ * 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to 1 pitch. Gains on a tilt or a
+ * bowl leave nothing in the residual, so it is never below 0.08 (NUMERICS.md has what it is worth).
  *
- * Gains that lie on a tilt or a bowl over the pad move and widen the fit and leave nothing in the
- * residual. So it is never below 0.08, however well the readings fit.
- *
- * A touch counts once, when it rests. What was assumed counts as much as FIT_GAINS_TOUCHES of them.
- * NUMERICS.md has what it is worth. */
+ * A touch counts once, when it rests. What was assumed counts as much as FIT_GAINS_TOUCHES of them. */
 #ifndef FIT_FIT_GAINS_H
 #define FIT_FIT_GAINS_H
 

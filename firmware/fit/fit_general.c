@@ -15,14 +15,11 @@
  * more noise than shape into the logarithm. */
 #define GUESS_SHARE 0.01f
 #define GUESS_NOISES 5.0f
-/* Prior of the guess alone: a sigma that is narrow for the array. It decides where too few readings
- * are large, and weighs nothing elsewhere. */
+/* Prior of the guess alone, which decides where too few readings are large. */
 #define GUESS_PRIOR_WEIGHT 3e-3f
 #define GUESS_PRIOR_SIGMA 0.42f
 
-/* Longest step: in x and y in pitches, of sigma as a share of it. A longer one is shortened as a
- * whole. Where a stiff layer is pressed between the sensors of a corner, the cost is a bent valley
- * that leads far out of the array; a step limited along each parameter by itself leaves it. */
+/* Longest step, pitches and share of sigma. A longer one is shortened as a whole (NUMERICS.md, "Step"). */
 #define MOVE_LIMIT 0.65f
 #define WIDEN_LIMIT 0.5f
 /* Pitches by which an iterate may leave the box that the result is held to, for the same reason. */
@@ -266,26 +263,6 @@ static int32_t largest_reading(const struct fit_array *array, const int32_t *pre
     }
   }
   return largest;
-}
-
-/* Bitmap of the n largest readings in use; of equal ones, those of lower number. */
-static uint32_t n_largest_of(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                             uint8_t n) {
-  uint32_t chosen = 0;
-  for (uint8_t i = 0; i < n && usable; i++) {
-    uint32_t best = 0;
-    int32_t largest = INT32_MIN;
-    for (uint8_t k = 0; k < array->sensor_count; k++) {
-      uint32_t bit = UINT32_C(1) << k;
-      if ((usable & bit) && (best == 0 || pressure_Pa_q10[k] > largest)) {
-        largest = pressure_Pa_q10[k];
-        best = bit;
-      }
-    }
-    chosen |= best;
-    usable &= ~best;
-  }
-  return chosen;
 }
 
 /* The sensor whose reading does not belong to the others', or -1. theta and the factors are those
@@ -599,9 +576,6 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
     result->flags |= CONTACT_FLAG_LOW_SIGNAL;
     return false;
   }
-  if (settings->n_largest > 0) {
-    usable = n_largest_of(array, pressure_Pa_q10, usable, settings->n_largest);
-  }
   problem.scale = 1.0f / (float)problem.largest;
   problem.unknowns = array->is_line ? PARAMETERS - 1 : PARAMETERS;
   take_samples(pressure_Pa_q10, usable, &problem);
@@ -623,8 +597,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   if (!misfit || !rough || !(solution.moved * array->pitch_mm <= FIT_SETTLED_mm)) {
     return false;
   }
-  bool selected = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if (problem.samples.count > problem.unknowns + 1 && !selected) {
+  if (problem.samples.count > problem.unknowns + 1) {
     *outlier = outlier_of(&problem.samples, &problem.dip, &solution.before, &solution.normal, solution.squares,
                           problem.unknowns);
   }

@@ -2,19 +2,13 @@
  * its derivatives span
  *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
  * with p and q the polynomials of degree 1 and 2 that are orthogonal over the nodes under gx^2 and
- * gy^2. These four are orthogonal to each other: the normal matrix is diagonal, and where the data
- * hardly determine a direction, a small diagonal element shows it with its full relative precision
- * instead of as a difference of large ones. That is what lets 16-bit factors do.
- *
- * The amplitude is no unknown: each evaluation takes the best one for the shape (variable
- * projection). Whatever is rounded in the matrix, the step or the amplitude only turns or stretches
- * a step; where the fit ends is decided by the right-hand side, sums of the residual against the
- * basis. So the residual is computed to 2^-26 of the largest reading and then rounded relative to
- * its own size.
- */
+ * gy^2. So the normal matrix is diagonal, and a direction that the data hardly determine is a small
+ * element with its full relative precision: 16-bit factors do. The amplitude is the best one for the
+ * shape (variable projection). Rounding in matrix, step or amplitude only turns or stretches a step;
+ * where the fit ends is decided by the right-hand side. So the residual is computed to 2^-26 of the
+ * largest reading and then rounded relative to its own size. */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
-#include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 
@@ -27,9 +21,8 @@
  * 16 bits are dropped: with the former below 2^17 no sum leaves 32 bits. */
 #define RESIDUAL_SUM_BITS 17
 
-/* The first iterations only have to come near: they project the readings themselves, since the
- * basis is orthogonal to the model. Their rounding would let them wander along the valleys of badly
- * conditioned presses, so they are few, and the others work on the residual. */
+/* The first iterations project the readings themselves, since the basis is orthogonal to the model.
+ * Their rounding would let them wander along the valleys of badly conditioned presses, so they are few. */
 #define COARSE_ITERATIONS 3
 #define FINE_ITERATIONS 2
 
@@ -49,9 +42,6 @@
 #define LINEAR_SQUARE ((struct scaled){16056, -15})
 #define SHAPE_HEIGHT_MAX_Q26 160029133
 #define TAIL_ERROR ((struct scaled){31457, -21}) /* FIT_TAIL_ERROR */
-
-/* 1 / n of a constant. */
-#define RECIPROCAL(n) ((struct scaled){(n) >= 8 ? (1 << 18) / (n) : (1 << 15) / (n), (n) >= 8 ? -18 : -15})
 
 /* One factor of the separable Gaussian, and the polynomials that are orthogonal under its square.
  * p1 = k - mean and p2 = k^2 - k slope + constant, k the node number. */
@@ -78,21 +68,10 @@ struct moments {
 };
 
 FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t centre, int32_t height) {
-  int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
-  f->offset = centre - nearest * ONE_Q26;
-  /* The exponent relative to the nearest node, k (curvature k - slope) with k counted from there,
-   * by its differences: exactly a parabola, so the rounding of the two coefficients moves centre
-   * and width and cannot show in the residual. The 2 more than makes up for both roundings, so the
-   * exponent is never negative. */
-  int32_t slope = fixed_mul_q32(height, f->offset * 8); /* Q22 */
-  int32_t curvature = (height >> 4) + 2;
-  int32_t k = -origin - nearest;
-  uint32_t exponent = (uint32_t)k * (uint32_t)(curvature * k - slope);
-  uint32_t difference = (uint32_t)(curvature * (2 * k + 1) - slope);
+  struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, height, &f->offset);
   UNROLL for (int i = 0; i < nodes; i++) {
-    f->g[i] = exp2_negative(exponent);
-    exponent += difference;
-    difference += 2 * (uint32_t)curvature;
+    f->g[i] = exp2_negative(exponent.value);
+    fit_exponent_next(&exponent);
   }
 }
 
@@ -378,8 +357,8 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   struct scaled correlation = scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
   x = scaled_mul(x, scale);
   y = scaled_mul(y, scale);
-  result->sigma_x_mm = fit_float(x.mantissa, x.exponent);
-  result->sigma_y_mm = fit_float(y.mantissa, y.exponent);
+  result->sigma_x_mm = fit_scaled_float(x);
+  result->sigma_y_mm = fit_scaled_float(y);
   int32_t limited = fixed_clamp(fit_scaled_to_fixed(correlation, 15), -32767, 32767);
   result->width_correlation = fit_float(limited, -15);
   return true;

@@ -1,16 +1,11 @@
-/* The grid fit without some of its sensors. The polynomials that make the normal matrix of a full
- * rectangle diagonal do not stay orthogonal when nodes are missing, and correcting the full matrix
- * for them loses everything where the missing sensor held nearly all of it. So the columns are
- * formed at the sensors that are there, relative to the strongest of those, and made orthogonal
- * over them: each is the model times a polynomial, a part along x plus one along y, whose
+/* The grid fit without some of its sensors, where the polynomials of fit_grid.c are not orthogonal. The
+ * columns are formed at the sensors that are there, relative to the strongest of those, and made
+ * orthogonal over them: each is the model times a polynomial, a part along x plus one along y, whose
  * coefficients come from the iteration before and are nearly right already; an L D L^T of three
- * columns takes out what is left and mends the coefficients for the next. Rounding in any of it
- * turns a step a little; where the fit ends is decided by the residual against columns of 15 bits,
- * as in fit_grid.c.
- */
+ * columns takes out what is left and mends the coefficients for the next. Where the fit ends is
+ * decided by the residual against columns of 15 bits, as in fit_grid.c. */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
-#include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
 
 #include <string.h>
@@ -138,16 +133,18 @@ static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node, cons
   return size;
 }
 
-/* Column of the model times (along_x[i] + along_y[j]), less the dip times that of `dip`, if any. */
-static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x, const int32_t *along_y,
-                             int32_t q, const struct polynomial *dip, const struct ridge *ridge, int32_t *column_q) {
+/* Column of the model times (along_x[i] + along_y[j]), less the dip times that of `dip`, if any. along_y: NULL for
+ * none. */
+FIXED_INLINE int32_t fill_column(int32_t *column, const struct node *node, const int32_t *along_x,
+                                 const int32_t *along_y, int32_t q, const struct polynomial *dip,
+                                 const struct ridge *ridge, int32_t *column_q) {
   uint32_t size = 1;
   int32_t *to = column;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t x = along_x[i];
     UNROLL
     for (int j = 0; j < ROWS; j++) {
-      int32_t value = fixed_mul_16(x + along_y[j], node->mantissa) >> node->shift;
+      int32_t value = fixed_mul_16(along_y ? x + along_y[j] : x, node->mantissa) >> node->shift;
       *to = value;
       size |= fixed_size(value);
       to += STEP;
@@ -159,26 +156,13 @@ static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int
   }
   return normalise(column, size, COLUMN_BITS(dip), q - 1, ridge, column_q);
 }
-
-/* Column of the model times along_x[i]. */
+static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x, const int32_t *along_y,
+                             int32_t q, const struct polynomial *dip, const struct ridge *ridge, int32_t *column_q) {
+  return fill_column(column, node, along_x, along_y, q, dip, ridge, column_q);
+}
 static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x, const struct polynomial *dip,
                                      const struct ridge *ridge, int32_t *column_q) {
-  uint32_t size = 1;
-  int32_t *column = &node->p1;
-  for (int i = 0; i < COLUMNS; i++) {
-    int32_t x = along_x[i];
-    UNROLL
-    for (int j = 0; j < ROWS; j++) {
-      int32_t value = fixed_mul_16(x, node->mantissa) >> node->shift;
-      node->p1 = value;
-      size |= fixed_size(value);
-      node++;
-    }
-  }
-  if (dip) {
-    size = take_dip(column, node - NODES, dip, size);
-  }
-  return normalise(column, size, COLUMN_BITS(dip), LINEAR_Q - 1, ridge, column_q);
+  return fill_column(&node->p1, node, along_x, NULL, LINEAR_Q, dip, ridge, column_q);
 }
 
 /* value * coefficient / 2^12, |coefficient| < 2^15. */
@@ -190,8 +174,6 @@ FIXED_INLINE int32_t times_q12(int32_t value, int32_t coefficient) {
 FIXED_INLINE int32_t factor(int32_t product, int32_t norm) {
   return fixed_clamp(port_divide(product, norm >> 12), -INT16_MAX, INT16_MAX);
 }
-
-FIXED_INLINE int32_t times_factor(int32_t value, int32_t factor_q12) { return times_q12(value, factor_q12); }
 
 /* From Q12 in units of columns to LINEAR_Q. */
 FIXED_INLINE int32_t to_poly(int32_t factor_q12, int32_t finer, int32_t limit) {
@@ -302,7 +284,7 @@ static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, in
     column += STEP;
   }
   sum = MASS_SHIFT > NORM_SHIFT ? sum << (MASS_SHIFT - NORM_SHIFT) : sum;
-  *norm = remaining(*norm, times_factor(sum, share_q12));
+  *norm = remaining(*norm, times_q12(sum, share_q12));
   return to_poly(share_q12, 15 - q, LIFT_LIMIT);
 }
 
@@ -362,10 +344,10 @@ static NOINLINE void orthogonalise(struct columns *c) {
   }
   c->f21 = factor(g21, c->norm1);
   c->f31 = factor(g31, c->norm1);
-  c->norm2 = remaining(c->norm2, times_factor(g21, c->f21));
-  g32 -= times_factor(g31, c->f21);
+  c->norm2 = remaining(c->norm2, times_q12(g21, c->f21));
+  g32 -= times_q12(g31, c->f21);
   c->f32 = factor(g32, c->norm2);
-  c->norm3 = remaining(c->norm3, times_factor(g31, c->f31) + times_factor(g32, c->f32));
+  c->norm3 = remaining(c->norm3, times_q12(g31, c->f31) + times_q12(g32, c->f32));
 
   /* The coefficients with the precision that they are used with. */
   const int32_t used = -(1 << COEFFICIENT_SHIFT);
@@ -388,8 +370,8 @@ FIXED_INLINE struct scaled long_norm(int32_t norm, int32_t q) {
 /* The system from sums over the columns in Q q. */
 static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3, int32_t q,
                                struct fit_system *system) {
-  sum2 -= times_factor(sum1, c->f21);
-  sum3 -= times_factor(sum1, c->f31) + times_factor(sum2, c->f32);
+  sum2 -= times_q12(sum1, c->f21);
+  sum3 -= times_q12(sum1, c->f31) + times_q12(sum2, c->f32);
   system->b1 = (struct scaled){sum1, -q - c->q1};
   system->b2 = (struct scaled){sum2, -q - c->q2};
   system->b3 = (struct scaled){sum3, -q - c->q3};
@@ -454,21 +436,12 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
  * nearest node. Returns the offset of the centre from that node, Q26. */
 static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin, int32_t centre,
                                    int32_t height) {
-  int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
-  int32_t offset = centre - nearest * ONE_Q26;
-  /* The exponent, k (curvature k - slope) with k counted from the nearest node, is a parabola by
-   * its differences: the rounding of its coefficients moves centre and width and cannot show in the
-   * residual. The 2 more than makes up for it where the exponent is 0. */
-  int32_t slope = fixed_mul_q32(height, offset * 8); /* Q22 */
-  int32_t curvature = (height >> 4) + 2;
-  int32_t k = -origin - nearest;
-  uint32_t exponent = (uint32_t)k * (uint32_t)(curvature * k - slope);
-  uint32_t difference = (uint32_t)(curvature * (2 * k + 1) - slope);
+  int32_t offset;
+  struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, height, &offset);
   for (int i = 0; i < nodes; i++) {
-    shift[i] = (int32_t)(exponent >> 22);
-    mantissa[i] = exp2_negative(exponent & 0x3FFFFF);
-    exponent += difference;
-    difference += 2 * (uint32_t)curvature;
+    shift[i] = (int32_t)(exponent.value >> 22);
+    mantissa[i] = exp2_negative(exponent.value & 0x3FFFFF);
+    fit_exponent_next(&exponent);
   }
   return offset;
 }

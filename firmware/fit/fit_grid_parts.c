@@ -25,7 +25,7 @@ float fit_quadrature(float a, float b, float c, float d) {
   struct scaled first = scaled_mul(fit_grid_scaled(a), fit_grid_scaled(b));
   struct scaled second = scaled_mul(fit_grid_scaled(c), fit_grid_scaled(d));
   struct scaled root = fit_scaled_sqrt(scaled_add(scaled_mul(first, first), scaled_mul(second, second)));
-  return fit_float(root.mantissa, root.exponent);
+  return fit_scaled_float(root);
 }
 
 /* One Newton step of sigma = (log2(e) / 2) / (height sigma) from 11 bits: 22 of them, or 2e-7. */
@@ -83,6 +83,36 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
     readings->prior_weight = scaled_div(readings->prior_sd, width);
   }
   return true;
+}
+
+int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
+                   const struct readings *readings, int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12,
+                   struct fit_base *base) {
+  int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, noise_most);
+  int32_t of_one = fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * model_sd_q16) >> 8);
+  int sensors = 0;
+  int32_t squares_q12 = 0;
+  for (int k = 0; k < NODES; k++) {
+    uint8_t sensor = array->grid.sensor[k];
+    weight_q12[k] = 0;
+    if (used >> sensor & 1) {
+      int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * fixed_size(readings->q14[k]) >> 8);
+      int32_t weight = port_divide(of_one << 8, fixed_longer_leg(of_one, gain) >> 4);
+      weight_q12[k] = weight;
+      squares_q12 += (weight * weight) >> 12;
+      sensors++;
+    }
+  }
+  *base = (struct fit_base){noise, of_one, squares_q12};
+  return sensors;
+}
+
+int32_t fit_grid_sum_q20(const int32_t *q28) {
+  int32_t sum_q20 = 0;
+  for (int k = 0; k < NODES; k++) {
+    sum_q20 += q28[k] >> 8;
+  }
+  return sum_q20;
 }
 
 #define RISE_MAX_Q22 (20 << 22) /* what it is for is at its limit long before */

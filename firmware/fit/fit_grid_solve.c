@@ -1,13 +1,10 @@
 #include "fit/fit_grid_solve.h"
 
 #include "common/contact_flags.h"
-#include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 
-/* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole: along the
- * bent valleys of a stiff press its direction is what brings it on, and limiting each parameter by
- * itself loses it. */
+/* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole (NUMERICS.md, "Step"). */
 #define MOVE_INVERSE_Q6 107 /* 1 / 0.6 */
 #define RATIO_INVERSE_Q1 5  /* 1 / 0.4 */
 /* By how much an iterate may leave the box that the result is held to, for the same reason. */
@@ -275,7 +272,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   struct scaled form =
       scaled_mul(location_form(system, spread, &inverse3), scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
-  result->location_noise_mm = fit_float(sd.mantissa, sd.exponent);
+  result->location_noise_mm = fit_scaled_float(sd);
   struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
   struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
   struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
@@ -283,7 +280,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   apart = scaled_mul(apart, scaled_square(pitch));
   sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch)
                                      : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
-  result->location_sd_mm = fit_float(sd.mantissa, sd.exponent);
+  result->location_sd_mm = fit_scaled_float(sd);
   struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
   if (scaled_sub(sd, limit).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
@@ -292,7 +289,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   form = scaled_mul(force_form(spread, &inverse3), fit_grid_reciprocal(scaled_square(spread->amplitude)));
   sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), spread->force_variance));
   sd = scaled_mul(sd, force);
-  result->force_sd_N = fit_float(sd.mantissa, sd.exponent);
+  result->force_sd_N = fit_scaled_float(sd);
 
   if (scatter.other_model) {
     flags |= CONTACT_FLAG_MODEL;

@@ -1,5 +1,4 @@
-#include "fit/fit_grid_spread.h"
-
+#include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
 
 #define UNROLL _Pragma("GCC unroll 6") /* for loops over the nodes of an axis */

@@ -20,10 +20,8 @@
 #define FIT_LOW_SIGNAL_SIGMA 20 /* noise standard deviations in the largest reading */
 #define FIT_HUGE 1e9f           /* means: nothing is known */
 
-/* The sensors' own (struct fit_own) is taken from the readings before this number of the last
- * iterations, and the dip not later: by then the contact is known well enough, and the last step
- * shows whether the fit has settled. The own is of first order, so it changes no reading by more
- * than this share of the model. */
+/* The sensors' own is taken from the readings before this number of the last iterations, by which the contact is known,
+ * and the dip not later. It is of first order, so it changes no reading by more than this share of the model. */
 #define FIT_OWN_ITERATIONS 2
 #define FIT_OWN_SHARE_MAX 0.5f
 
@@ -33,23 +31,16 @@
 #define FIT_OUTLIER 15
 #define FIT_OUTLIER_GAIN 0.5f
 
-/* The errors of a reading in the standard deviations. Each is independent of the others:
+/* The errors of a reading in the standard deviations, independent of each other (NUMERICS.md, "Errors"):
  *   the noise;
  *   its gain's: gain_sd times the model there;
  *   the model's: model_sd times the largest reading, alike for every sensor;
  *   its shape's: one amplitude for all sensors,
- *   FIT_SHAPE_PER_MODEL model_sd (FIT_SHAPE_SIGMA / sigma)^2 amplitude e (r / sigma)^4;
- *   residuals above these.
- * A layer's pressure has heavier tails than a Gaussian, more so the thinner it is. So neither of
- * the model's two parts is enough. The first alone gives 0.5 mm where a press on a node of a thin
- * pad is good to 0.05 mm. The second alone gives nothing where all sensors are as far from the
- * contact. Residuals from FIT_MISFIT_BEGIN times the expected variance count more, up to
- * FIT_MISFIT_MOST times, as they must come from few readings or another model. For the force the
- * shape's part counts by FIT_FORCE_SHAPE. The rest of it is the same for every touch of a pad, and
- * belongs to the force scale. Where the pad's dip is known the shape's part counts by
- * FIT_SHAPE_KNOWN. The last step counts as an error of the location. Where the fit
- * stopped at a limit, FIT_BOUND_SD replaces all, since a linear estimate there means nothing.
- * Values from truth.py --parts fit --seed 1; NUMERICS.md has their coverage on others. */
+ *   FIT_SHAPE_PER_MODEL model_sd (FIT_SHAPE_SIGMA / sigma)^2 amplitude e (r / sigma)^4, for the force
+ *   FIT_FORCE_SHAPE of it, where the dip is known FIT_SHAPE_KNOWN of it;
+ *   residuals above these: from FIT_MISFIT_BEGIN times the expected variance on they count more, up
+ *   to FIT_MISFIT_MOST times.
+ * Where the fit stopped at a limit, FIT_BOUND_SD replaces all. Values: truth.py --parts fit --seed 1. */
 #define FIT_MISFIT_BEGIN 8
 #define FIT_MISFIT_MOST 8
 #define FIT_SHAPE_PER_MODEL 1.1f
@@ -58,17 +49,14 @@
 #define FIT_SHAPE_KNOWN 0.3f
 #define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */
 
-/* A contact is elongated if log(longer width / shorter) exceeds a limit: FIT_STRETCH_LEAST and
- * FIT_STRETCH_SURE standard deviations of the part from noise and gains, added in quadrature. The
- * cubes and spheres of a layer stay below FIT_STRETCH_LEAST. The fit reports the widths up to a
- * standard deviation of FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX). Below
- * FIT_SHAPE_LEAST pitches of sigma the layer's own profile appears elongated between the sensors.
- * Where the pad's dip is known, a tail that is off by FIT_TAIL_ERROR of the peak, as wide as the
- * dip, counts as one standard deviation more: without it a third of the round touches of simulated
- * pads appeared elongated, with a dip and without (chosen on twin seed 20000). If
- * the contact is elongated, the location's standard deviation contains the shift by separate
- * widths. Beyond a stretch of FIT_STRETCH_LINEAR that shift is many times the error, so only its
- * share counts that falls with the square of the stretch. */
+/* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, below which the
+ * cubes and spheres of a layer stay, and FIT_STRETCH_SURE standard deviations of the part from noise
+ * and gains, added in quadrature; where the dip is known, also a tail that is off by FIT_TAIL_ERROR
+ * of the peak, as wide as the dip. Widths are reported up to a standard deviation of
+ * FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX), and from a sigma of FIT_SHAPE_LEAST
+ * pitches, below which the layer's own profile appears elongated. If it is elongated, the location's
+ * standard deviation contains the shift by separate widths, beyond a stretch of FIT_STRETCH_LINEAR
+ * only the share of it that falls with the square of the stretch. */
 #define FIT_STRETCH_LEAST 0.1f
 #define FIT_TAIL_ERROR 0.015f
 #define FIT_STRETCH_SURE 2.5f

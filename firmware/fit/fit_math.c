@@ -6,14 +6,6 @@
 
 #include <string.h>
 
-/* 2^(-k/32), Q30. */
-static const int32_t exp2_table[32] = {
-    1073741824, 1050733751, 1028218693, 1006186087, 984625594, 963527098, 942880699, 922676710,
-    902905651,  883558244,  864625413,  846098274,  827968132, 810226483, 792865000, 775875538,
-    759250125,  742980960,  727060411,  711481005,  696235434, 681316545, 666717336, 652430958,
-    638450708,  624770026,  611382493,  598281827,  585461881, 572916640, 560640218, 548626854,
-};
-
 #define LN2_Q30 744261118
 #define ONE_THIRD_Q30 357913941
 
@@ -26,12 +18,12 @@ float fit_exp2_negative(float z) {
   }
   int32_t z_q24 = (int32_t)(z * 16777216.0f);
   int32_t whole = z_q24 >> 24;
-  int32_t head = exp2_table[(z_q24 >> 19) & 31];
+  int32_t head = fit_exp2_table[(z_q24 >> 16) & 0xF8];
   /* e^-t for the rest t < ln 2 / 32: third order leaves 1e-8. */
-  int32_t t = fit_mul_q30((z_q24 & 0x7FFFF) << 6, LN2_Q30);
-  int32_t t_squared_half = fit_mul_q30(t, t) >> 1;
-  int32_t t_cubed_sixth = fit_mul_q30(fit_mul_q30(t_squared_half, t), ONE_THIRD_Q30);
-  int32_t mantissa_q30 = head - fit_mul_q30(head, t - t_squared_half + t_cubed_sixth);
+  int32_t t = fixed_mul_q30((z_q24 & 0x7FFFF) << 6, LN2_Q30);
+  int32_t t_squared_half = fixed_mul_q30(t, t) >> 1;
+  int32_t t_cubed_sixth = fixed_mul_q30(fixed_mul_q30(t_squared_half, t), ONE_THIRD_Q30);
+  int32_t mantissa_q30 = head - fixed_mul_q30(head, t - t_squared_half + t_cubed_sixth);
 
   /* mantissa_q30 * 2^-30 lies in (1/2, 1]; its float's exponent takes the rest. */
   float result = (float)mantissa_q30;
@@ -48,10 +40,10 @@ int32_t fit_log2_q24(uint32_t value) {
   /* Least-squares polynomial of log2(1 + f) on Chebyshev nodes of [0, 1], coefficients Q28. */
   int32_t f_q30 = f_q28 << 2;
   int32_t sum = -22242749;
-  sum = fit_mul_q30(sum, f_q30) + 86403926;
-  sum = fit_mul_q30(sum, f_q30) - 181930323;
-  sum = fit_mul_q30(sum, f_q30) + 386181455;
-  sum = fit_mul_q30(sum, f_q30);
+  sum = fixed_mul_q30(sum, f_q30) + 86403926;
+  sum = fixed_mul_q30(sum, f_q30) - 181930323;
+  sum = fixed_mul_q30(sum, f_q30) + 386181455;
+  sum = fixed_mul_q30(sum, f_q30);
   return (whole << 24) + (sum >> 4);
 }
 

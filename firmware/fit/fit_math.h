@@ -6,16 +6,6 @@
 
 #include <stdint.h>
 
-/* a * b / 2^30 for |a|, |b| <= 2^30, error below 5 units: four 16-bit products, as the
- * Cortex-M0+ has no 32 x 32 to 64 bit multiplication. */
-static inline int32_t fit_mul_q30(int32_t a, int32_t b) {
-  int32_t a_high = a >> 16;
-  int32_t b_high = b >> 16;
-  int32_t a_low = a & 0xFFFF;
-  int32_t b_low = b & 0xFFFF;
-  return a_high * b_high * 4 + ((a_high * b_low + a_low * b_high) >> 14);
-}
-
 /* 2^-z for z >= 0, relative error below 2^-23 beside the rounding of z itself; 0 for z >= 100.
  * A z that is negative or NaN counts as 0. */
 float fit_exp2_negative(float z);

@@ -9,9 +9,8 @@
 /* Readings whose errors are more than 3 % of their unit determine no shape. */
 #define BASE_MAX_Q22 (1 << 17)
 #define LOG2E_HALF_FLOAT 0.72134752f
-/* Frames of a contact, counted from 1. The load joins its model once the line has settled: both at
- * once lose their way at the border. From the first that answers on, one frame answers where the
- * models are, and the next steps. */
+/* Frames of a contact, counted from 1. The load joins its model once the line has settled. From the first that answers
+ * on, one frame answers where the models are, and the next steps. */
 #define FIRST_WITH_LOAD 10
 #define FIRST_ANSWER FIT_SHAPES_FRAMES
 #define LAST_FRAME (FIRST_ANSWER + 1)
@@ -19,35 +18,6 @@
 #define CHI_SQUARE_MAX 100
 
 static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
-
-static NOINLINE bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
-                           const struct readings *readings, struct fit_shapes_pad *pad) {
-  struct fit_shapes_frame *frame = &pad->room.frame;
-  int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, 1 << 18);
-  frame->base_q22 = fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
-  int sensors = 0;
-  for (int k = 0; k < NODES; k++) {
-    uint8_t sensor = array->grid.sensor[k];
-    pad->room.weight_q12[k] = 0;
-    if (used >> sensor & 1) {
-      int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * fixed_size(readings->q14[k]) >> 8);
-      pad->room.weight_q12[k] = port_divide(frame->base_q22 << 8, fixed_longer_leg(frame->base_q22, gain) >> 4);
-      sensors++;
-    }
-  }
-  memcpy(frame->q28, readings->q28, sizeof frame->q28);
-  memcpy(frame->q14, readings->q14, sizeof frame->q14);
-  frame->shift = readings->shift;
-  return sensors >= FIT_SHAPES_SENSORS && frame->base_q22 <= BASE_MAX_Q22;
-}
-
-static int32_t sum_of(const struct fit_shapes_frame *frame) {
-  int32_t sum_q20 = 0;
-  for (int k = 0; k < NODES; k++) {
-    sum_q20 += frame->q28[k] >> 8;
-  }
-  return sum_q20;
-}
 
 static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
   return fixed_mul_q28(fixed_clamp(fit_fixed(mm, 20), -(1 << 29), 1 << 29), pad->per_pitch_q28);
@@ -75,8 +45,7 @@ static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fi
                    int32_t sum_q20) {
   int32_t x = place_q20(pad, fit->x_mm) - pad->origin_x_q20;
   int32_t y = place_q20(pad, fit->y_mm) - pad->origin_y_q20;
-  if (state->frames > 0 && (sum_q20 < 1 << 18 || state->sum_q20 < 1 << 18 || sum_q20 >> 2 >= state->sum_q20 ||
-                            state->sum_q20 >> 2 >= sum_q20)) {
+  if (state->frames > 0 && fit_is_another(sum_q20, state->sum_q20)) {
     state->frames = 0;
   }
   if (state->frames > 0) {
@@ -151,12 +120,20 @@ static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad, struct 
 /* What all parts of a frame need. */
 static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                  const struct fit_result *fit, struct fit_shapes_pad *pad) {
+  struct fit_shapes_frame *frame = &pad->room.frame;
   struct readings readings;
+  struct fit_base base;
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &readings) ||
-      !weigh(array, settings, fit->used, &readings, pad)) {
+      fit_grid_weigh(array, settings, fit->used, &readings, 1 << 18, MODEL_SD_Q16, pad->room.weight_q12, &base) <
+          FIT_SHAPES_SENSORS ||
+      base.base_q22 > BASE_MAX_Q22) {
     return false;
   }
+  frame->base_q22 = base.base_q22;
+  frame->shift = readings.shift;
+  memcpy(frame->q28, readings.q28, sizeof frame->q28);
+  memcpy(frame->q14, readings.q14, sizeof frame->q14);
   set_known(array, settings, pad);
   return true;
 }
@@ -170,7 +147,7 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
     return forget(state, result);
   }
   if (first) {
-    follow(pad, fit, state, sum_of(&pad->room.frame));
+    follow(pad, fit, state, fit_grid_sum_q20(pad->room.frame.q28));
   }
   if (state->frames == 0) {
     fit_shapes_begin(pad, fit, state->part, state);

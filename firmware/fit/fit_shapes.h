@@ -5,22 +5,16 @@
  *   round  one contact
  *   long   one contact along a straight line, under a tangential load
  *   two    two contacts with forces of their own
- * Each has an unknown spread, and a broad term that holds what the profile and the dip are off by.
- * Each takes one damped Gauss-Newton step a frame, from where the frame before ended. The first
- * frame of a contact chooses where they start. So the cost is fixed, and a contact at rest has its
- * answer after FIT_SHAPES_FRAMES frames, and then in every other one, which does not step.
- *
- * The answer compares chi^2, in standard deviations that contain noise, gains and the model's own
- * error. How large these errors really are is unknown, and the residuals show it. So a model with
- * more unknowns is chosen where it makes chi^2 + 14 less by a quarter. Two are two bodies: apart,
- * without overlap, on the array. A pair that resembles a long contact is called long, and a long
- * one hardly ever a pair. Beyond 2.75 pitches, where pairs across the array look like lines, a pair
- * counts as the likelier; so some longer edges are called two. What the other models make of the
- * place is part of location_sd_mm, by how likely they are.
+ * Each takes one damped Gauss-Newton step a frame, from where the frame before ended, so the cost is
+ * fixed. A contact at rest has its answer after FIT_SHAPES_FRAMES frames, and then in every other
+ * one, which does not step. A model with more unknowns is chosen where it makes
+ * chi^2 + FIT_SHAPES_ERRORS less by a quarter; NUMERICS.md ("Contact shape") has the models, the
+ * choice and its limits. What the other models make of the place is part of location_sd_mm, by how
+ * likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
- * missing. NUMERICS.md has the fit itself; host_tools/report/two judges this part. No recording of
- * a real pad under two contacts is public: all figures are simulated. */
+ * missing. No recording of a real pad under two contacts is public: all figures are simulated
+ * (host_tools/report/two). */
 #ifndef FIT_FIT_SHAPES_H
 #define FIT_FIT_SHAPES_H
 
@@ -40,9 +34,8 @@
 
 #define FIT_SHAPES_FRAMES 23
 
-/* Errors are some times what is stated of them. How many times is not known; that it is once counts
- * as this number of readings. With unknown errors the likelihood of a model falls as a power of
- * chi^2 + FIT_SHAPES_ERRORS. Where chi^2 is above it, the model itself may be wrong. */
+/* That the errors are what is stated of them counts as this number of readings. Where chi^2 is above it, the model
+ * itself may be wrong. */
 #define FIT_SHAPES_ERRORS 14
 
 enum fit_shape {

@@ -33,14 +33,12 @@ static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equ
   return fit_scaled_from(sum_q13, 2 * q - 30 - 13);
 }
 
-static float composed(struct scaled value) { return fit_float(value.mantissa, value.exponent); }
-
 static float mm(const struct fit_shapes_pad *pad, int32_t place_q20) {
   return fit_float(fixed_mul_q26(place_q20 * 8, pad->pitch_q22_mm), -19);
 }
 
 static float product_of(struct scaled a, struct scaled b) {
-  return composed(scaled_mul(fit_scaled_short(a), fit_scaled_short(b)));
+  return fit_scaled_float(scaled_mul(fit_scaled_short(a), fit_scaled_short(b)));
 }
 
 /* unit: N of amplitude 1. variance: of a reading of weight 1. */

@@ -1,5 +1,6 @@
 /* The rows of the least squares of a model: what it is off by at each sensor, and its derivatives.
  */
+#include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
 
@@ -21,9 +22,8 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   const float per = 1.0f / array->pitch_mm, per_square = per * per;
   const float widest = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm * per;
   const float narrowest = profile->normal[0].sd_mm * per;
-  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS || !pad_profile_is_valid(profile) ||
-      narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN || widest > 1.5f ||
-      profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
+  if (!fit_is_rectangle(array) || !pad_profile_is_valid(profile) || narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN ||
+      widest > 1.5f || profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
     return FT_ERR_ARGUMENT;
   }
   const float V = widest * widest;
@@ -110,23 +110,23 @@ void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *square
   }
 }
 
-void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
+FIXED_INLINE void set_bell(const struct squares *squares, int32_t k_q24, int32_t (*power)(uint32_t),
+                           struct bell *bell) {
   for (int i = 0; i < COLUMNS; i++) {
-    bell->x_q15[i] = exp2_negative((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
+    bell->x_q15[i] = power((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
   }
   for (int k = 0; k < ROWS; k++) {
-    bell->y_q15[k] = exp2_negative((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
+    bell->y_q15[k] = power((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
   }
+}
+
+void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
+  set_bell(squares, k_q24, exp2_negative, bell);
 }
 
 /* The same within 0.6 %, for what is little. */
 static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
-  for (int i = 0; i < COLUMNS; i++) {
-    bell->x_q15[i] = exp2_rough((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
-  }
-  for (int k = 0; k < ROWS; k++) {
-    bell->y_q15[k] = exp2_rough((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
-  }
+  set_bell(squares, k_q24, exp2_rough, bell);
 }
 
 /* Begins the rows: the readings, and the broad term about the middle, of a pair about both. */

@@ -6,9 +6,8 @@
 #define SPAN_MAX (3 << 20)
 #define BALANCE_MAX (15 << 16) /* 0.94 */
 #define MOVE_MAX (1 << 18)     /* a quarter of a pitch */
-/* Of the diagonal. What readings hardly determine moves slowly: with less, noise drives it far, where
- * the readings are no longer linear in it. The matrix that answers has hardly any, since it would
- * hide how little they determine from the standard deviations. */
+/* Of the diagonal. With less, noise drives what readings hardly determine far; with more, standard deviations are too
+ * small (NUMERICS.md, "Contact shape"). */
 #define STEP_DAMPING_SHIFT 6
 #define ANSWER_DAMPING_SHIFT 10
 

@@ -21,10 +21,8 @@
  * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
 #define THICKNESS_PER_UNIT 1.0455f
 
-/* Beyond this share of it the contact is too long to separate a tangential force from its shape: of lying cylinders
- * without load 15 % would claim one, 1 % do (report, elongated_false_percent). A pad that ends
- * nearer than three quarters of its thickness makes round contacts look long: there all are taken.
- */
+/* An elongation beyond this share of the widest term's variance is no report; all are taken where a pad ends nearer
+ * than NEAR_ENDS of its thickness, which makes round contacts look long (report shear, elongated_false_percent). */
 #define LONG_MOST_Q15 1507 /* 0.046 */
 #define LONG_MOST_NEAR_ENDS_Q15 8192
 #define NEAR_ENDS 0.75f
@@ -34,8 +32,7 @@
  */
 #define ELONGATED_LEAST 0.05f
 #define ELONGATED_SURE 2.5f
-/* The ends of a pad leave residuals: with 8 a quarter of the good touches 13 mm within them would
- * go. */
+/* Larger where the pad ends, which leaves residuals. */
 #define CHI_SQUARE_MAX 8
 #define CHI_SQUARE_MAX_WITH_ENDS 16
 #define CHI_SQUARE_MAX_NEAR_ENDS 60
@@ -43,19 +40,14 @@
 #define GAUSSIAN_VARIANCE_Q26 15300821 /* of the Gaussian that fits a point contact: 0.912 V0 */
 #define GAUSSIAN_FORCE 1.0753f         /* its 2 pi p0 sigma^2 over the force */
 
-/* The first step leaves what a layer is not a Gaussian; after one longer than 0.2 of the longest
- * the estimate is off its optimum by some 0.1 mm, after a jump of the Gaussian too. */
+/* Only a step of at most 0.2 of the longest is reported, since the estimate is off by some 0.1 mm after a longer one.
+ */
 #define STEPS_REPORTED 2
 #define LENGTH_REPORTED_Q14 3277
 #define JUMP_Q26 (ONE_Q26 / 2)
 /* The Gaussian's place jitters more than the estimate's in the corners. */
 #define MOVED_NOISES 4
-/* Sum of the readings, scaled so that the largest is 0.5 to 1. A smaller sum cannot come from a
- * contact. */
-#define SUM_LEAST_Q20 (1 << 18)
-/* After this number of frames in a row without a report it starts again: one more than a contact at rest
- * takes. Where another contact has come and gone it is found again within ten frames, without this
- * after hundreds. */
+/* Frames in a row without a report after which it starts again: one more than a contact at rest takes. */
 #define UNREPORTED_MOST 6
 
 #define DIP_SD_LEAST_Q13 (1 << 11) /* the narrowest that a term may be */
@@ -92,8 +84,8 @@ static bool is_carried(const struct fit_pad *pad, int from, int end, float t, bo
 
 enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, const struct pad_profile *profile) {
   float widest_mm = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
-  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS || !pad_profile_is_valid(profile) ||
-      2.0f * widest_mm > UNIT_MAX_mm || array->pitch_mm > PITCH_MAX * 2.0f * widest_mm) {
+  if (!fit_is_rectangle(array) || !pad_profile_is_valid(profile) || 2.0f * widest_mm > UNIT_MAX_mm ||
+      array->pitch_mm > PITCH_MAX * 2.0f * widest_mm) {
     return FT_ERR_ARGUMENT;
   }
   int32_t pitch_q12 = (int32_t)(array->pitch_mm / (2.0f * widest_mm) * 4096.0f + 0.5f);
@@ -141,32 +133,12 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
   return FT_OK;
 }
 
-/* What a reading's errors are, and the weights that follow. False: too few sensors. */
-NOINLINE static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
-                           struct problem *problem, struct fit_tangential_room *room) {
-  const struct readings *readings = &problem->readings;
-  int32_t noise = shifted(settings->noise_Pa_q10, readings->shift - 6);
-  noise = fixed_clamp(noise, 1, ONE_Q26 >> 5);
-  int32_t up = readings->shift > 0 ? readings->shift : 0, down = up - readings->shift;
-  int32_t largest_q28 = (readings->largest >> down) * (1 << up);
-  int32_t base = fixed_longer_leg(noise, ((largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
-  int sensors = 0;
-  int32_t squares_q12 = 0;
-  for (int k = 0; k < NODES; k++) {
-    uint8_t sensor = array->grid.sensor[k];
-    room->weight_q12[k] = 0;
-    if (used >> sensor & 1) {
-      uint32_t size = fixed_size(readings->q14[k]);
-      int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * size >> 8);
-      int32_t weight_q12 = port_divide(base << 8, fixed_longer_leg(base, gain) >> 4);
-      room->weight_q12[k] = weight_q12;
-      squares_q12 += (weight_q12 * weight_q12) >> 12;
-      sensors++;
-    }
-  }
-  problem->by_gains_q12 = sensors > 0 ? (1 << 12) - port_divide(squares_q12, sensors) : 0;
-  problem->base_q22 = base;
-  problem->noise_q22 = noise;
+/* False: too few sensors. */
+static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
+                  struct problem *problem, struct fit_tangential_room *room) {
+  int sensors = fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, MODEL_SD_Q16, room->weight_q12,
+                               &problem->base);
+  problem->by_gains_q12 = sensors > 0 ? (1 << 12) - port_divide(problem->base.squares_q12, sensors) : 0;
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
 
@@ -187,14 +159,6 @@ NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_re
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
 }
 
-static int32_t sum_of(const struct readings *readings) {
-  int32_t sum_q20 = 0;
-  for (int k = 0; k < NODES; k++) {
-    sum_q20 += readings->q28[k] >> 8;
-  }
-  return sum_q20;
-}
-
 /* Of 2^bits. */
 static int32_t to_multiple(int32_t value, int bits) { return rounded(value, bits) * (1 << bits); }
 
@@ -210,7 +174,7 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
   int32_t before = state->sum_q20;
   int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
   uint32_t moved_q26 = fixed_size(dx_q26) + fixed_size(dy_q26);
-  bool other = sum_q20 < SUM_LEAST_Q20 || before < SUM_LEAST_Q20 || sum_q20 >> 2 >= before || before >> 2 >= sum_q20;
+  bool other = fit_is_another(sum_q20, before);
   if (state->steps == 0 || other) {
     *at = *fit;
   } else {
@@ -286,8 +250,6 @@ static bool is_elongated(const struct fit_tangential_room *room, const struct ou
   return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
-static float composed(struct scaled value) { return fit_float(value.mantissa, value.exponent); }
-
 static struct scaled root_of_product(struct scaled a, struct scaled b) { return fit_scaled_sqrt(scaled_mul(a, b)); }
 
 /* What the stated variance is to be multiplied by. */
@@ -303,7 +265,7 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
                               const struct outcome *outcome, struct fit_tangential *result) {
   const struct fit_pad *pad = problem->pad;
   const struct fit_tangential_room *room = &pad->room;
-  struct scaled base = fit_scaled_from(problem->base_q22, -22);
+  struct scaled base = fit_scaled_from(problem->base.base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
   int32_t chi_square_q16 = fit_scaled_to_fixed(scaled_div(outcome->misfit, variance), 16);
   if (outcome->at_bound || chi_square_q16 > pad->chi_square_max << 16) {
@@ -344,12 +306,12 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   result->force_N = fit_float(product(at->amplitude_q24 * 16, unit_q30, 32), exponent + 4);
   result->qx_N = fit_float(product(at->pull_x_q24 * 32, unit_q30, 32), exponent + 3);
   result->qy_N = fit_float(product(at->pull_y_q24 * 32, unit_q30, 32), exponent + 3);
-  result->q_sd_N = composed(scaled_mul(unit, pull_sd));
-  result->location_sd_mm = composed(scaled_mul(length, root_of_product(place, variance)));
-  struct scaled noise = fit_scaled_from(problem->noise_q22, -22);
-  result->location_noise_mm = composed(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
+  result->q_sd_N = fit_scaled_float(scaled_mul(unit, pull_sd));
+  result->location_sd_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, variance)));
+  struct scaled noise = fit_scaled_from(problem->base.noise_q22, -22);
+  result->location_noise_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
   struct scaled height = variance_of(room, outcome, AMPLITUDE, 0, NULL);
-  result->force_sd_N = composed(scaled_mul(unit, root_of_product(height, variance)));
+  result->force_sd_N = fit_scaled_float(scaled_mul(unit, root_of_product(height, variance)));
   struct scaled moved = scaled_mul(length, amplitude);
   result->moved_q20_mm[0] = moved_q20(outcome, moved, 0, x_q8);
   result->moved_q20_mm[1] = moved_q20(outcome, moved, 1, y_q8);
@@ -394,10 +356,10 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
   set_from_fit(pad, fit, problem.readings.shift, &of_fit);
   begin(pad, state, &of_fit,
         product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30, 28),
-        sum_of(&problem.readings));
+        fit_grid_sum_q20(problem.readings.q28));
   int32_t long_sd_q26 = fixed_mul_q28(of_fit.amplitude_q24 * 4, pad->long_sd_q26) * 4;
-  problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
-  problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
+  problem.spread_prior_q26 = prior_row(problem.base.base_q22, pad->spread_sd_q26);
+  problem.long_prior_q26 = prior_row(problem.base.base_q22, long_sd_q26);
   fit_tangential_improve(&problem, &state->at, &pad->room, &outcome);
   if (state->steps < STEPS_REPORTED) {
     state->steps++;

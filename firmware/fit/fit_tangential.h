@@ -2,20 +2,15 @@
  * and relieves it behind. This pattern is broader than that of a shifted contact.
  *
  * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the
- * tangential force along x and y. Each frame takes one Gauss-Newton step. In a contact's first
- * frame it starts from the Gaussian fit. Later it starts where the previous frame ended, moved as
- * the Gaussian has moved and scaled by its force. The optimum is that of each frame's own readings.
- * Earlier frames enter by the square of a step only, and an estimate after a long step is not
- * reported. After some frames without a report the estimate starts from the Gaussian again, so that
- * it cannot stay where another start finds better.
+ * tangential force along x and y. Each frame takes one Gauss-Newton step: in a contact's first frame
+ * from the Gaussian fit, later from where the previous frame ended, moved as the Gaussian has moved
+ * and scaled by its force. An estimate after a long step is not reported. After some frames without
+ * a report the estimate starts from the Gaussian again.
  *
- * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull.
- * Elongation is in the model because a long contact resembles a pulled one to a fit without it. A
- * prior holds it near round. Where a calibration has found the dip around a contact
- * (fit_settings), the model has it too: without, a dip of 5 % reads as a pull of 0.4 of the force.
- * An estimate that is clearly long, or leaves a residual that the model does not explain, is not
- * reported. Readings count by their noise, gain error and model error. Fixed point, the same bits
- * on every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the
+ * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull; the
+ * dip that a calibration has found (fit_settings) is in the model too. A prior holds elongation near
+ * round. Readings count by their noise, gain error and model error. Fixed point, the same bits on
+ * every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the
  * limits.
  *
  * At most 41 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).

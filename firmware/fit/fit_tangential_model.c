@@ -46,13 +46,18 @@ struct parabola {
 
 #define Z_LEAST_Q22 16 /* rounding takes no exponent below zero */
 
+FIXED_INLINE void set_axis(int32_t bend, int32_t by_square, int32_t nodes, const struct parabola *axis,
+                           int32_t (*power)(uint32_t), int down, int32_t *value) {
+  uint32_t at_origin = (uint32_t)fixed_mul_q26(bend, axis->square_q26) + Z_LEAST_Q22;
+  int32_t slope = fixed_mul_q26(bend, axis->by_pitch_q26) * 2;
+  for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
+    value[k] = power(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope)) >> down;
+  }
+}
+
 NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32_t nodes, const struct parabola *axis,
                                       int32_t *value_q30) {
-  uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q26, axis->square_q26) + Z_LEAST_Q22;
-  int32_t slope = fixed_mul_q26(bend_q26, axis->by_pitch_q26) * 2;
-  for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
-    value_q30[k] = exp2_negative(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope));
-  }
+  set_axis(bend_q26, by_square, nodes, axis, exp2_negative, 0, value_q30);
 }
 
 #define LEAST_VARIANCE_Q26 (ONE_Q26 / 16)
@@ -140,14 +145,10 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
   } while (++node != end);
 }
 
-/* The dip's Gaussian along an axis within 0.3 %, as set_exponentials has the terms'. */
+/* The dip's Gaussian along an axis within 0.3 %. */
 NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes, const struct parabola *axis,
                                   int32_t *value_q15) {
-  uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q22, axis->square_q26) + Z_LEAST_Q22;
-  int32_t slope = fixed_mul_q26(bend_q22, axis->by_pitch_q26) * 2;
-  for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
-    value_q15[k] = exp2_rough(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope)) >> 15;
-  }
+  set_axis(bend_q22, by_square, nodes, axis, exp2_rough, 15, value_q15);
 }
 
 /* Takes the dip from the model: a share of the height in the contact's middle, in a Gaussian about

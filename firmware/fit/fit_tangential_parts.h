@@ -35,8 +35,7 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 struct problem {
   const struct fit_pad *pad;
   struct readings readings;
-  int32_t base_q22;     /* standard deviation of a reading of weight 1, of the unit of readings */
-  int32_t noise_q22;    /* the same */
+  struct fit_base base;
   int32_t by_gains_q12; /* share of the readings' variances that is their gains', mean */
   /* The dip: its depth in the height of the model's middle, 0: none; log2(e) / (2 sd^2). */
   int32_t dip_share_q16, dip_bend_q22;

@@ -49,9 +49,6 @@ struct fit_settings {
   uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 4 come as near to the truth as more
                            do, 7 bring 99.9 % of observable presses within 1 um of the optimum */
   int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa; below 1 there is no fit */
-  uint8_t n_largest;    /* fit the n largest readings only, of equal ones those of lower number, as
-                           the paper does; 0: all, which is more accurate. Fewer than a fit
-                           needs give none. Takes the general kernel. */
   /* Weak prior on sigma, for rubber so stiff that the array can hardly determine it: one more row
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
    * 0.001..10000 mm and sigma 0..10000 mm. */
@@ -94,14 +91,11 @@ struct fit_result {
                                    UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
 
-/* What frames that follow each other keep of the search for an outlier. A sensor that is broken
- * stays broken, and a pad that the model fits roughly does so in each frame. So what the search
- * found is kept for FIT_WATCH_FRAMES frames of the same sensors: an outlier is left out at once, and
- * where there was none, none is searched for. Before, only residuals that have grown by half of what
- * they were, relative to the force, begin another search, and not in the first FIT_WATCH_LEAST
- * frames. So at most one frame in FIT_WATCH_LEAST + 1 takes as long as a search, and where the
- * contact is the same one in FIT_WATCH_FRAMES + 1 (NUMERICS.md has the cycles). All zeros: nothing
- * found yet, as in the first frame of a contact. */
+/* What frames that follow each other keep of the search for an outlier, for FIT_WATCH_FRAMES frames
+ * of the same sensors: an outlier is left out at once, and where there was none, none is searched
+ * for. Before, only residuals that have grown by half of what they were, relative to the force,
+ * begin another search, and not in the first FIT_WATCH_LEAST frames (NUMERICS.md, "Outliers"). All
+ * zeros: nothing found yet. */
 #define FIT_WATCH_FRAMES 128
 #define FIT_WATCH_LEAST 8
 struct fit_watch {

@@ -21,7 +21,6 @@ bool repeat_begin(const struct wire_info *info) {
   app.commands.streams = WIRE_STREAM_CONTACT; /* it is not read, but the packet is made */
   app.found.frame.noise_Pa_q10 = osr->noise_Pa_q10;
   app.stages.location.settings.iterations = info->fit_iterations;
-  app.stages.location.settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app.stages.location.settings.prior_sigma_mm = info->prior_sigma_mm;
   app.stages.location.settings.prior_width_mm = info->prior_width_mm;
   app.stages.location.settings.location_sd_limit_mm = info->location_limit_mm;

@@ -149,9 +149,6 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   memset(&settings, 0, sizeof settings);
   settings.iterations = (uint8_t)(press % 4 ? 7 : draw_between(0, 12));
   settings.noise_Pa_q10 = draw_between(1, (on_a_pad ? 4 : 32) * 1024);
-  if (kernel == FIT_BITS_GENERAL && press % 5 == 0) {
-    settings.n_largest = (uint8_t)draw_between(1, array->sensor_count);
-  }
   if (press % 3 == 0) {
     settings.prior_sigma_mm = (float)draw_between(1, 256) / 16.0f;
     settings.prior_width_mm = (float)draw_between(1, 64) / 32.0f;

@@ -47,22 +47,9 @@ def in_emulator(kernel, presses, *core):
 
 
 def in_qemu(machine, image, kernel):
-    return output_of(
-        TOOLS.qemu,
-        "-M",
-        machine,
-        "-nographic",
-        "-monitor",
-        "none",
-        "-serial",
-        "none",
-        "-kernel",
-        image,
-        "-chardev",
-        "stdio,id=host",
-        "-semihosting-config",
-        f"enable=on,target=native,chardev=host,arg=fit,arg={KERNELS.index(kernel)}",
-    )
+    options = "-nographic -monitor none -serial none -chardev stdio,id=host".split()
+    semihosting = f"enable=on,target=native,chardev=host,arg=fit,arg={KERNELS.index(kernel)}"
+    return output_of(TOOLS.qemu, "-M", machine, *options, "-kernel", image, "-semihosting-config", semihosting)
 
 
 class SameBits(unittest.TestCase):

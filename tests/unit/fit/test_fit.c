@@ -7,17 +7,12 @@ TEST(test_without_noise_there_is_no_fit) {
   static const struct press press = {3.1, -5.2, 4000.0, 7.0};
   static const int32_t noises[] = {0, -1, INT32_MIN};
   read_press(&press, 0.0, NULL);
-  for (size_t i = 0; i < 3; i++) {
-    for (int largest = 0; largest < 6; largest += 5) {
-      for (uint32_t usable = ALL; usable >= ALL - 1; usable--) {
-        struct fit_settings settings = usual;
-        settings.noise_Pa_q10 = noises[i];
-        settings.n_largest = (uint8_t)largest;
-        fit_gaussian(&array, readings, usable, &settings, &result);
-        TEST_ASSERT_EQUAL_HEX32(0, result.flags);
-        TEST_ASSERT_EQUAL_HEX32(0, result.used);
-      }
-    }
+  for (int i = 0; i < 6; i++) {
+    struct fit_settings settings = usual;
+    settings.noise_Pa_q10 = noises[i / 2];
+    fit_gaussian(&array, readings, i % 2 ? ALL : ALL - 1, &settings, &result);
+    TEST_ASSERT_EQUAL_HEX32(0, result.flags);
+    TEST_ASSERT_EQUAL_HEX32(0, result.used);
   }
 }
 
@@ -111,50 +106,6 @@ TEST(test_scale_invariance) {
       fit_gaussian(&array, readings, ALL, &patient, &result);
       TEST_ASSERT_TRUE(location_error_mm(&press) < 10e-3); /* at 100 Pa the readings' own steps show */
     }
-  }
-}
-
-/* The same fit as if the others did not read, but those are no masked sensors. */
-TEST(test_n_largest) {
-  struct random random = {94};
-  for (int i = 0; i < 5000; i++) {
-    struct press press = random_press(&random, 6.0);
-    read_press(&press, 5.0, &random);
-    for (int k = 0; k < SENSORS && i % 2; k++) {
-      readings[k] = (readings[k] >> 20) - 1; /* many equal ones */
-    }
-    uint32_t usable = i % 3 ? ALL : random_u32(&random) & ALL;
-    struct fit_settings settings = usual;
-    settings.n_largest = (uint8_t)(1 + random_below(&random, 20));
-    uint32_t expected = 0;
-    int32_t largest = 0;
-    for (int k = 0; k < SENSORS; k++) {
-      int before = 0;
-      for (int j = 0; j < SENSORS; j++) {
-        bool ahead = readings[j] > readings[k] || (readings[j] == readings[k] && j < k);
-        before += (usable >> j & 1u) && ahead;
-      }
-      bool in_use = usable >> k & 1u;
-      expected |= in_use && before < settings.n_largest ? UINT32_C(1) << k : 0;
-      largest = in_use && readings[k] > largest ? readings[k] : largest;
-    }
-    struct fit_result masked;
-    fit_general(&array, readings, expected, &usual, &masked);
-    fit_general(&array, readings, usable, &settings, &result);
-    assert_finite_and_defined();
-    bool enough = largest > 0 && __builtin_popcount(expected) >= 4;
-    TEST_ASSERT_EQUAL_HEX32(enough ? expected : 0, result.used);
-    TEST_ASSERT_EQUAL(usable != ALL, (result.flags & CONTACT_FLAG_SENSOR_MASKED) != 0);
-    masked.flags = result.flags = (masked.flags ^ result.flags) & ~(uint32_t)CONTACT_FLAG_SENSOR_MASKED;
-    TEST_ASSERT_EQUAL_MEMORY(&masked, &result, sizeof masked);
-    TEST_ASSERT_EQUAL_HEX32(0, result.flags);
-
-    fit_general(&array, readings, ALL, &settings, &masked);
-    fit_gaussian(&array, readings, ALL, &settings, &result);
-    if (settings.n_largest >= SENSORS) {
-      fit_gaussian(&array, readings, ALL, &usual, &masked);
-    }
-    TEST_ASSERT_EQUAL_MEMORY(&masked, &result, sizeof masked);
   }
 }
 

@@ -3,7 +3,7 @@
  * firmware and once for another size. */
 #include "common/contact_flags.h"
 #include "fit/fit.h"
-#include "fit/fit_tables.h"
+#include "fit/fit_fixed.h"
 #include "support/random.h"
 #include "support/unit.h"
 

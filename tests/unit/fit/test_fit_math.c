@@ -1,3 +1,4 @@
+#include "fit/fit_fixed.h"
 #include "fit/fit_math.h"
 #include "support/random.h"
 #include "support/unit.h"
@@ -12,7 +13,7 @@ TEST(test_mul_q30) {
   for (int i = 0; i < 2000000; i++) {
     int32_t a = i < 144 ? corners[i / 12] : (int32_t)random_below(&random, 1u << 31) - (1 << 30);
     int32_t b = i < 144 ? corners[i % 12] : (int32_t)random_below(&random, 1u << 31) - (1 << 30);
-    double error = fabs((double)fit_mul_q30(a, b) - (double)a * (double)b / 1073741824.0);
+    double error = fabs((double)fixed_mul_q30(a, b) - (double)a * (double)b / 1073741824.0);
     worst = error > worst ? error : worst;
   }
   TEST_ASSERT_TRUE(worst < 5.0);

@@ -171,7 +171,6 @@ static struct input draw(uint32_t number) {
     settings->gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 16));
   }
   settings->model_sd_q16 = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
-  settings->n_largest = random_below(&random, 4) ? 0 : (uint8_t)random_u32(&random);
   settings->cut_noises = random_below(&random, 2) ? 0 : (uint8_t)random_u32(&random);
   if (random_below(&random, 4) == 0) {
     bool any = random_below(&random, 2);
@@ -215,9 +214,7 @@ static const char *complaint(const struct input *input, const struct fit_result 
   if (result->flags & ~(always | warnings)) {
     return "an undefined flag";
   }
-  const uint8_t n = input->settings.n_largest;
-  const bool selected = n > 0 && n < array->sensor_count;
-  const bool outlier = (result->flags & CONTACT_FLAG_FIT_VALID) && !selected && result->used != (input->usable & all);
+  const bool outlier = (result->flags & CONTACT_FLAG_FIT_VALID) && result->used != (input->usable & all);
   const bool masked = outlier || (input->usable & all) != all;
   if (!(result->flags & CONTACT_FLAG_SENSOR_MASKED) == masked) {
     return "SENSOR_MASKED";
