@@ -45,10 +45,8 @@ TEST(Face, FeelsWhatTheTwinDoes) {
         const double along_x = c * dx + s * dy, along_y = c * dy - s * dx;
         const double expected_Pa =
             table.base_pressure_Pa(touch.force_N, along_x, along_y) + traction.base_pressure_Pa(load, along_x, along_y);
-        ASSERT_NEAR(sensed_Pa[k], expected_Pa, 0.002 * peak_Pa) << name << " " << i;
+        ASSERT_NEAR(sensed_Pa[k], expected_Pa, 1e-9 * peak_Pa) << name << " " << i;
       }
-      EXPECT_NEAR(face.indentation_mm(touch.force_N), table.indentation_mm(touch.force_N), 1e-3);
-      EXPECT_NEAR(face.radius_mm(touch.force_N), table.contact_radius_mm(touch.force_N), 0.03);
     }
     EXPECT_EQ(face.base_Pa({}), Pressures{});
   }
