@@ -10,6 +10,7 @@
 #include <cmath>
 #include <modbus.h>
 #include <optional>
+#include <utility>
 
 namespace fingertip {
 
@@ -336,32 +337,24 @@ std::string RobotiqGripper::line() const {
 }
 
 std::string RobotiqGripper::fault_text(std::uint8_t fault) const {
-  switch (fault) {
-  case NO_FAULT:
-    return "";
-  case ACTION_DELAYED:
-    return "a move came before activation was complete";
-  case NOT_ACTIVATED:
-    return "a move came without activation";
-  case OVERHEATED:
-    return "too hot, it must cool down";
-  case NO_COMMUNICATION:
-    return "no command for a second";
-  case UNDERVOLTAGE:
-    return "its supply is too low; needs activation";
-  case RELEASING:
-    return "automatic release goes on";
-  case INTERNAL_FAULT:
-    return "internal fault; needs activation";
-  case ACTIVATION_FAULT:
-    return "activation failed, something was in its way; needs activation";
-  case OVERCURRENT:
-    return "too much current; needs activation";
-  case RELEASED:
-    return "automatic release is complete; needs activation";
-  default:
-    return "a fault that its manual does not have";
+  static const std::pair<Fault, const char *> TEXTS[] = {
+      {NO_FAULT, ""},
+      {ACTION_DELAYED, "a move came before activation was complete"},
+      {NOT_ACTIVATED, "a move came without activation"},
+      {OVERHEATED, "too hot, it must cool down"},
+      {NO_COMMUNICATION, "no command for a second"},
+      {UNDERVOLTAGE, "its supply is too low; needs activation"},
+      {RELEASING, "automatic release goes on"},
+      {INTERNAL_FAULT, "internal fault; needs activation"},
+      {ACTIVATION_FAULT, "activation failed, something was in its way; needs activation"},
+      {OVERCURRENT, "too much current; needs activation"},
+      {RELEASED, "automatic release is complete; needs activation"}};
+  for (const auto &[code, text] : TEXTS) {
+    if (code == fault) {
+      return text;
+    }
   }
+  return "a fault that its manual does not have";
 }
 
 } // namespace fingertip

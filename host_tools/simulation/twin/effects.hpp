@@ -1,46 +1,19 @@
 // What rubber and sensors do to the pressure on the base before a sensor reports it. Each effect is
 // switched on by its name and has one value; effects() is the list of them, with sources.
 //
-// Before there is a pressure p of one sensor; who computes the pressure on the base asks the pad:
-//   dip          of cast rubber around a contact: from p goes V of the pressure in its middle times
-//                exp(-r^2 / (2 (2.5 s)^2)), s the contact's width (ContactTable)
-//   widths       a contact is wider or narrower for each sensor, V (sd) of all distances
-//   places       each sensor sits V (sd) off its place, each way
-// In the order in which they act on the pressure p of one sensor:
-//   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is
-//                lower by 3 V p (1 - p / m): the loop is V of the area below the loading curve.
-//                Loading again leads straight back to m. Nothing remains at p = 0.
-//   relaxation   linear viscoelastic, a Prony series of two times: p less the sum of g_i z_i;
-//                z_i follows p with the time constant TIMES_s[i]. g are scaled so that a hold of
-//                8 s after a press of 1.3 s loses V of its peak, V drawn for each sensor. No
-//                reading leaves the range from 0 to p: rubber does not pull.
-//   aftereffect  plus a share of the peak that each sensor remembers and p has left: a (m - p).
-//                m is p while p rises above it, and otherwise returns to p with a time constant of
-//                0.5 to 10 s. So presses and holds are as they were, and after a release the
-//                reading is off by a of the peak. a is 0.1 to 2 V for two sensors of three
-//                and -0.25 to -2.25 V, an undershoot, for the third; both drawn for each sensor.
-//                p is the pressure on the base: relaxation makes nothing to be remembered.
-//   creep        plus V of what follows p with a time constant of CREEP_s: a sensor rises in a hold
-//                in addition to the others' loss, and is above its zero after a release
-//   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
-//   drift        p plus a ramp in time, drawn for each sensor: slope and sign
-//   branch       the sensors begin at V degC and warm up by WARMING_K_s to ROOM_degC. Where they
-//                cross 10.00 degC of the first order, the MS5840's compensation changes to other
-//                second-order terms that do not meet there: from then on readings are higher by
-//                some 51 Pa, and 66 Pa more for each bar above ambient. How much, and at which
-//                temperature, follows from the rule and coefficients drawn for each sensor.
-//                That a temperature is old when it is used costs some 25 Pa for each half second
-//                of its age. It is not in the pressure: the players' sensors and their firmware do
-//                it by themselves.
-//   bias         reads low above 1.2 bar absolute: by V at 2 bar, growing with the square
-//   clip         never above V absolute
-//   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with
-//                the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above, from
-//                ROOM_degC or on top of the temperature of `branch`
-//
-// Relaxation and hysteresis act on the reported pressure while the scenario's force is what it is:
-// as if the press were force-controlled and the sensor's share of the load went down. Where a robot
-// holds its position the force goes down as well, and less of the effect is an error.
+// README.md says what each does, in the order in which they act on the pressure p of one sensor, V its value. Formulas:
+//   dip          from p goes V of the pressure in the contact's middle times exp(-r^2 / (2 (2.5 s)^2)), s its width
+//   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is lower by 3 V p (1 - p /
+//   m):
+//                the loop is V of the area below the loading curve. Loading again leads straight back to m. Nothing
+//                remains at p = 0.
+//   relaxation   linear viscoelastic, a Prony series: p less the sum of g_i z_i; z_i follows p with the time constant
+//                TIMES_s[i]. No reading leaves the range from 0 to p: rubber does not pull.
+//   aftereffect  plus a share of the peak that each sensor remembers and p has left: a (m - p). m is p while p rises
+//                above it, and otherwise returns to p with its time constant. p is the pressure on the base: relaxation
+//                makes nothing to be remembered. a is 0.1 to 2 V, for one sensor of three -0.25 to -2.25 V.
+//   creep        plus V of what follows p with the time constant CREEP_s
+//   temperature  by V with the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
 #pragma once
 
 #include <array>

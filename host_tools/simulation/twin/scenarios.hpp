@@ -6,25 +6,7 @@
 // the 16 frames of the firmware's tare at 20 frames a second; the paper, too, sets its readings to
 // zero between contacts.
 //
-// Where things are: random places are uniform over the paper's grid, |x| <= 4.5 mm and |y| <=
-// 13.5 mm, and margin_mm around it, by default half a step of the grid, for placements a whole one,
-// to the outer sensors. Slips go along y through the middle of the pad, with x anywhere on the
-// grid.
-//
-// What the truth calls slip in the kind "slip" is what the paper calls it (section IV.D): the
-// pusher is in contact and moves. So the dead travel, in which nothing slides yet, counts as slip;
-// the events separate it. In "drag" and "slide" it is gross slip: all of the contact slides. A
-// twist, a screw and a contact that rolls are no slip.
-//
-// `tangential` adds a tangential force: in each contact, in one direction,
-// with that share of the normal force, rising and falling with it; in a lift with an object's
-// weight, which is that share of the force of the grip, in a drag with a known load, in a screw
-// with a constant one. In a slide what pulls follows from motion and friction (held_object.hpp).
-//
-// Left out: edges of the rubber, unless `overhang_mm` is set, friction where a
-// kinematic slip slides, which moves the middle of the pressure on the base by up to friction times
-// thickness ("drag" and "slide" have it),
-// influence of two contacts on each other's shape.
+// README.md says where things are, what the truth calls slip, what a tangential force is of, and what is left out.
 #pragma once
 
 #include "library/pad/block.hpp"
