@@ -255,14 +255,5 @@ TEST(TwinTable, ADamagedFileIsSolvedAnew) {
   EXPECT_EQ(again.base_pressure_Pa(3, 2, 1), good);
 }
 
-TEST(TwinIndenter, AnUnknownNameIsAnsweredWithThoseThatExist) {
-  try {
-    indenter("hammer");
-    FAIL();
-  } catch (const std::runtime_error &error) {
-    EXPECT_NE(std::string(error.what()).find("sphere6"), std::string::npos);
-  }
-}
-
 } // namespace
 } // namespace fingertip::twin

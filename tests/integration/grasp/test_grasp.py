@@ -4,6 +4,7 @@ usage: test_grasp.py FINGERTIP FAKE_CELL TIME_KEEPER [unittest arguments]
 """
 
 import contextlib
+import itertools
 import os
 import pathlib
 import resource
@@ -264,6 +265,11 @@ class Trouble(GraspTest):
         self.assertEqual(process.returncode, status, err)
         return out, err
 
+    def failed(self, process):
+        _, err = process.communicate()
+        self.assertEqual(process.returncode, FAULT, err)
+        return err
+
     def assert_stays(self, seconds=0.7):
         width = self.tell()[0]
         self.world.sleep(seconds)
@@ -384,8 +390,7 @@ class Trouble(GraspTest):
         with self.cell():
             process = self.hold()
             self.tell("fault 8")
-            out, err = process.communicate()
-            self.assertEqual(process.returncode, FAULT, err)
+            err = self.failed(process)
             self.assertIn("fault; the width stays", err)
             self.assertRegex(err, "(?m)^the gripper failed: fault 8, too hot, it must cool down; it is not active any more.*$")
             self.assertGreater(self.tell()[1], 0.8)
@@ -396,9 +401,7 @@ class Trouble(GraspTest):
             self.tell("fault 14")
             self.until_state(process, "fault")
             self.tell("fault 0")
-            out, err = process.communicate()
-            self.assertEqual(process.returncode, FAULT, err)
-            self.assertRegex(err, "(?m)^the gripper failed: fault 14, too much current; needs activation; ")
+            self.assertRegex(self.failed(process), "(?m)^the gripper failed: fault 14, too much current; needs activation; ")
         self.assertTrue(any("the gripper failed: fault 14, too much current" in text for _, text in files.read_grip_events(self.csv)))
         rows = self.rows()
         self.assertEqual(set(rows["fault"][rows["state"] == "fault"]), {14})
@@ -409,9 +412,7 @@ class Trouble(GraspTest):
             process = self.hold()
             self.tell("power 0")
             self.tell("power 1")
-            out, err = process.communicate()
-            self.assertEqual(process.returncode, FAULT, err)
-            self.assertRegex(err, "(?m)^the gripper failed: it is not active any more: it lost its power, or was reset$")
+            self.assertRegex(self.failed(process), "(?m)^the gripper failed: it is not active any more: it lost its power, or was reset$")
 
     def test_a_program_that_stands_for_two_seconds_goes_on(self):
         """A machine that stops one of them: the gripper reports a second without a command, and takes commands as before."""
@@ -470,14 +471,7 @@ class Recorded(GraspTest):
         rows = self.rows()
         # every state in its order, at least every 10 ms and a little
         states = [str(state) for i, state in enumerate(rows["state"]) if i == 0 or state != rows["state"][i - 1]]
-        for earlier, later in (
-            ("idle", "approach"),
-            ("approach", "squeeze"),
-            ("squeeze", "ready"),
-            ("ready", "holding"),
-            ("holding", "slipping"),
-            ("slipping", "still"),
-        ):
+        for earlier, later in itertools.pairwise("idle approach squeeze ready holding slipping still".split()):
             self.assertLess(states.index(earlier), len(states) - 1 - states[::-1].index(later), states)
         self.assertTrue((np.diff(rows["time_us"]) >= 0).all())
         self.assertLess(np.median(np.diff(rows["time_us"])), 10500)
@@ -509,26 +503,17 @@ class Recorded(GraspTest):
         self.assertTrue(plain[0].startswith("time_us,state,trouble,width_mm,"))
 
         picture = os.path.join(self.folder, "grasp.png")
-        done = subprocess.run(
-            [sys.executable, PYTHON_TOOLS, "plot", self.csv, "-o", picture],
-            capture_output=True,
-            text=True,
-            env=self.environment,
-            timeout=PLOT_PATIENCE_s,
-        )
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertRegex(done.stdout, r"grasp\.png: 1 slide, held by at most \d+\.\d N, at last still")
+
+        def plot(*options):
+            words = [sys.executable, PYTHON_TOOLS, "plot", self.csv, *options, "-o", picture]
+            done = subprocess.run(words, capture_output=True, text=True, env=self.environment, timeout=PLOT_PATIENCE_s)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return done.stdout
+
+        self.assertRegex(plot(), r"grasp\.png: 1 slide, held by at most \d+\.\d N, at last still")
         with open(picture, "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
-        done = subprocess.run(
-            [sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", "AAAA", "-o", picture],
-            capture_output=True,
-            text=True,
-            env=self.environment,
-            timeout=PLOT_PATIENCE_s,
-        )
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("frames in", done.stdout)
+        self.assertIn("frames in", plot("--device", "AAAA"))
 
         # what is damaged is named, and salvaged
         text = pathlib.Path(self.csv).read_text(encoding="utf-8")
@@ -559,11 +544,7 @@ class Live(GraspTest):
         for size in ((80, 24), (160, 50)):
             with self.cell():
                 status = self.on_terminal(
-                    *self.ARGUMENTS,
-                    f"{self.folder}/gripper",
-                    "-o",
-                    self.csv,
-                    "--overwrite",
+                    *(*self.ARGUMENTS, f"{self.folder}/gripper", "-o", self.csv, "--overwrite"),
                     size=size,
                     steps=[
                         (r"HOLDING.*wanted +\d\.\d\d N", lambda: self.tell("load 2")),
@@ -576,20 +557,8 @@ class Live(GraspTest):
                     ],
                 )
             self.assertEqual(status, 0)
-            for word in (
-                "left ● AAAA",
-                "right ● BBBB",
-                "width",
-                "cap  21.0 N",
-                "slides",
-                "friction",
-                "SLIP left",
-                "grasp  2f85",
-                "kPa",
-                "force ",
-                " N┤",
-                "0 s",
-            ):
+            words = "left ● AAAA/right ● BBBB/width/cap  21.0 N/slides/friction/SLIP left/grasp  2f85/kPa/force / N┤/0 s"
+            for word in words.split("/"):
                 self.assertIn(word, self.shown)
             after = self.output[self.output.rfind(b"\x1b[?1049l") + 8 :].decode()
             self.assertNotIn("\x1b", after)
@@ -620,10 +589,7 @@ class Live(GraspTest):
     def test_ctrl_c_on_a_terminal_and_a_window_that_is_too_small(self):
         with self.cell():
             status = self.on_terminal(
-                *self.ARGUMENTS,
-                f"{self.folder}/gripper",
-                "--open-width",
-                "45",
+                *(*self.ARGUMENTS, f"{self.folder}/gripper", "--open-width", "45"),
                 size=(79, 24),
                 steps=[(r"needs 80x24.*holding", b"\x03"), (r"Ctrl-C: the width stays", b"\x03")],
             )

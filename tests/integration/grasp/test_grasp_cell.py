@@ -59,19 +59,8 @@ class CellTest(unittest.TestCase):
     def cell(self, *options, model="2f85"):
         self.model = model
         process = self.world.start(
-            [
-                FINGERTIP_SIMULATE,
-                "--lift",
-                "--ports",
-                self.folder,
-                "--gripper",
-                model,
-                "--cache",
-                TABLES,
-                "--truth",
-                self.truth_csv,
-                *options,
-            ],
+            [FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", model]
+            + ["--cache", TABLES, "--truth", self.truth_csv, *options],
             stdin=subprocess.PIPE,
         )
         self.process = process
@@ -295,20 +284,7 @@ class Faults:
 
     CAP_N = 4.0
     # Of 50 g, which gives way by 0.2 mm a newton.
-    CUP = (
-        "--mass",
-        "0.05",
-        "--stiffness",
-        "5",
-        "--crushes",
-        str(OVER_CAP * CAP_N),
-        "--friction",
-        "0.6",
-        "--lift-time",
-        "0.3",
-        "--opens",
-        "2",
-    )
+    CUP = f"--mass 0.05 --stiffness 5 --crushes {OVER_CAP * CAP_N} --friction 0.6 --lift-time 0.3 --opens 2".split()
     RESTS_s = 0.6  # of the world, after what happened
 
     @contextlib.contextmanager

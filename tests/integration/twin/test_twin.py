@@ -58,45 +58,29 @@ class TwinTest(unittest.TestCase):
         self.assertEqual(lines[0], "# fingertip-truth 1")
         return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
+    def read_as_the_emulator_does(self, *times_s):
+        words = ["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times_s)]
+        return json.loads(subprocess.run(words, capture_output=True, text=True, check=True, timeout=PATIENCE_s).stdout)
+
+    def played(self, *options):
+        recording = str(self.folder / "recording.csv")
+        words = [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50", *options]
+        subprocess.run(words, check=True, timeout=PATIENCE_s)
+        return files.read_recording(recording)
+
 
 class Files(TwinTest):
     def test_every_kind_is_read_by_python_and_emulator_alike(self):
         names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
-        self.assertEqual(
-            sorted(names),
-            sorted(
-                [
-                    "grid",
-                    "taps",
-                    "high",
-                    "pokes",
-                    "cycle",
-                    "slip",
-                    "twist",
-                    "rolloff",
-                    "placements",
-                    "two",
-                    "lift",
-                    "drag",
-                    "slide",
-                    "screw",
-                ]
-            ),
-        )
+        known = "grid taps high pokes cycle slip twist rolloff placements two lift drag slide screw"
+        self.assertEqual(sorted(names), sorted(known.split()))
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
                 self.scenario(kind, "--seconds", str(seconds), "--effects", "all", "--overwrite")
                 scenario = files.read_scenario(self.csv)
                 times = [0, 1.8, 7.3, seconds]
-                done = subprocess.run(
-                    ["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times)],
-                    capture_output=True,
-                    text=True,
-                    check=True,
-                    timeout=PATIENCE_s,
-                )
-                emulator = json.loads(done.stdout)
+                emulator = self.read_as_the_emulator_does(*times)
                 self.assertEqual(emulator["end_s"], seconds)
                 self.assertEqual(emulator["rows"], len(scenario.t_s))
                 self.assertEqual(emulator["metadata"], scenario.metadata)
@@ -154,20 +138,9 @@ class Files(TwinTest):
         self.assertGreater(scenario.truth["Qy_N"].max(), 1.49)
         row = max(self.events(), key=lambda row: float(row["Qy_N"]))
         self.assertEqual((row["Qx_N"], row["Qy_N"]), ("0.00000", "1.50000"))
-        done = subprocess.run(
-            ["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, "1.8"],
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=PATIENCE_s,
-        )
-        for k, sensor in enumerate(json.loads(done.stdout)["at"][0]):
+        for k, sensor in enumerate(self.read_as_the_emulator_does(1.8)["at"][0]):
             self.assertAlmostEqual(sensor["pressure_Pa"] - 101325, files.np.interp(1.8, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
-        recording = str(self.folder / "recording.csv")
-        subprocess.run(
-            [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s
-        )
-        played = files.read_recording(recording)
+        played = self.played()
         t_s = played["t_us"] * 1e-6
         pressed = (scenario.at("force_N", t_s) > 4.9) & ~files.np.isnan(played["y_mm"])
         self.assertGreater(pressed.sum(), 100)
@@ -179,9 +152,8 @@ class Files(TwinTest):
             ("Qy_N", 'column 25 is "Qy_N"; after the sensors'),
         ):
             pathlib.Path(self.csv).write_text(text.replace("Qx_N", name, 1))
-            refused = subprocess.run(
-                [PLAYER, "play", self.csv, "-o", recording + "2", "--quiet"], capture_output=True, text=True, timeout=PATIENCE_s
-            )
+            words = [PLAYER, "play", self.csv, "-o", str(self.folder / "refused.csv"), "--quiet"]
+            refused = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_s)
             self.assertEqual(refused.returncode, 1)
             self.assertIn(what, refused.stderr)
             with self.assertRaisesRegex(files.InputError, "wrong header.*once each, any of Qx_N, Qy_N, temperature_degC"):
@@ -210,11 +182,7 @@ class Files(TwinTest):
                 self.assertAlmostEqual(scenario.t_s[sliding][0], float(told[0]["t_begin_s"]), delta=0.0021)
                 self.assertAlmostEqual(scenario.t_s[sliding][-1], float(told[-1]["t_end_s"]), delta=0.0021)
         self.assertGreater(slid, 4)
-        recording = str(self.folder / "recording.csv")
-        subprocess.run(
-            [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s
-        )
-        self.assertGreater(files.read_recording(recording).has_contact.sum(), 1000)
+        self.assertGreater(self.played().has_contact.sum(), 1000)
 
     def test_a_pad_that_ends_reads_more_near_its_edge(self):
         options = ("taps", "--force", "5", "--seconds", "20")
@@ -235,11 +203,7 @@ class Files(TwinTest):
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
         # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
         self.scenario("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
-        recording = str(self.folder / "recording.csv")
-        subprocess.run(
-            [PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s
-        )
-        scenario, played = files.read_scenario(self.csv), files.read_recording(recording)
+        scenario, played = files.read_scenario(self.csv), self.played("--raw")
         t_s, read_Pa = played["t_us"] * 1e-6, played.sensors_Pa - 101325
         crossing_s = 10 * (9.665 - 7)
         for k in range(15):
