@@ -15,6 +15,7 @@ import time
 
 import numpy as np
 from boards import MULTIPLEXED, TO_BUILD, image_of
+from fingertip import Streams, wire
 from fingertip.files import FIT_VALID, InputError, read_recording
 from reporting import run
 
@@ -45,7 +46,6 @@ class Scenario:
     calibrated: str = None  # with these effects, before; None: never
     noise: int = 1
     rate: object = PAPER_RATE_Hz
-    raw: bool = False
     options: tuple = ()  # more of twin scenario
 
     @property
@@ -66,8 +66,6 @@ class Played:
         touched, self.x_mm, self.y_mm, self.force_N, slips = (np.interp(self.time_s, table[:, 0], table[:, i]) for i in range(1, 6))
         self.touched, self.slips = touched > 1 - 1e-9, slips > 0.5
         self.estimated = {name: read[name][rows] for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")}
-        if read.sensors_Pa.shape[1]:
-            self.above_Pa = (read.sensors_Pa - read.tare_Pa)[rows]
         with open(truth, newline="", encoding="utf-8") as file:
             self.phases = list(csv.DictReader(line for line in file if not line.startswith("#")))
         self.sample = self.touched & ((self.flags & FIT_VALID) != 0)
@@ -81,8 +79,7 @@ class Workshop:
     def __init__(self, options, out):
         tools = pathlib.Path(options.build) / "host_tools"
         self.twin, self.player = tools / "simulation/twin/twin", tools / "simulation/player/fingertip_player"
-        self.command_frame = pathlib.Path(options.build) / "tests/support/command_frame"
-        for tool in (self.twin, self.player, self.command_frame):
+        for tool in (self.twin, self.player):
             if not tool.exists():
                 raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
         self.image, self.seed, self.scale = image_of(options.boards, MULTIPLEXED), options.seed, options.scale
@@ -155,7 +152,7 @@ class Workshop:
         self.write(path, scenario.kind, scenario.effects, seed, seconds, *pressed)
         prior = ("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()
         first = () if scenario.calibrated is None else ("--first", self.sessions[scenario.session])
-        self.play(path, recording, seed, scenario.rate, "--noise", scenario.noise, *["--raw"] * scenario.raw, *prior, *first)
+        self.play(path, recording, seed, scenario.rate, "--noise", scenario.noise, *prior, *first)
         played = Played(path, recording, truth)
         for file in (path, truth, recording):
             file.unlink()
@@ -183,8 +180,9 @@ class Workshop:
             raise InputError(f"{self.image} is not there; {TO_BUILD}")
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
         self.write(scenario, "taps", effects, self.seed, seconds, "--indenter", "sphere6", "--layer", 12)
-        commands = [run(self.command_frame, *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
-        script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
+        commands = wire.SetStreams(Streams.CONTACT | Streams.RAW), wire.AskInfo(), wire.Tare(0)
+        frames = [wire.encode(wire.Packet(0, 0, command)).hex() for command in commands]
+        script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {frame}\n" for i, frame in enumerate(frames)))
         chip = (ROOT / "host_tools/simulation/emulator/main.mjs", "--board", MULTIPLEXED, "--image", self.image, "--fast-enumeration")
         run("node", *chip, "--scenario", scenario, "--host-script", script, "--capture", capture)
         return json.loads(run(self.player, "repeat", capture))

@@ -9,7 +9,7 @@ simulation: they show how far the method and this code carry on a pad that is as
 pad costs, not how good a fingertip is.
 
     validation.json   all that was measured; "goals": the figures by which this is judged
-    validation.md     the same as text (text.md.in), with pictures (validation_report.py)
+    validation.md     the same as text (text.md.in), with a picture
 
 A sample is a frame in contact that was fitted. Localisation errors are of samples of at least 1 N. Contact tables are
 cached beside the results.
@@ -26,10 +26,9 @@ import cards  # noqa: E402
 import text  # noqa: E402
 from fingertip.files import SLIP, InputError, run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
-from presentation import judge  # noqa: E402
+from presentation import BLUE, FAINT, ORANGE, judge, plt, save  # noqa: E402
 from playing import PAPER_RATE_Hz, PRIOR_WIDTH_mm, STIFF_LAYER_mm, Workshop  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
-from validation_report import draw  # noqa: E402
 
 # A saturated or missing sensor is left out: that alone makes no location worse.
 LOCATION_WARNINGS = int(Flag.LOW_SIGNAL | Flag.FLAT | Flag.UNCERTAIN | Flag.MODEL | Flag.AT_BOUND)
@@ -127,7 +126,6 @@ def plan(shop):
         shop.add_on_pads("taps", "taps", indenter, 300, ALL, case=EVERY_EFFECT, margin_mm=0)
         shop.add("high biased", "high", indenter, effects="clip,bias")
     shop.add("cycle", "cycle", "sphere6", seconds=120, effects="relaxation,hysteresis")
-    shop.add("signals", "taps", "sphere6", seconds=12, effects="gain=10,dip,relaxation", rate="max", raw=True)
     for indenter in (*OBJECTS, *SOLIDS):
         shop.add("slip", "slip", indenter, case="steady")
         shop.add("slip", "slip", indenter, case="stick-slip", options=("--stick-slip", 2))
@@ -136,7 +134,6 @@ def plan(shop):
     for dead_travel_mm in (0, 0.5, 2):
         shop.add("dead travel", "slip", "sphere18", case=dead_travel_mm, options=("--dead-travel", dead_travel_mm))
     shop.add("slip fast", "slip", "sphere18", rate="max")
-    shop.add("reconstructed", "slip", "sphere18", seconds=12, options=("--speed", 20))
     for what, effects, noise in BUDGET:
         shop.add_on_pads("budget", "taps", "sphere6", 300, effects, case=what, noise=noise, margin_mm=0)
     for kind in ("twist", "rolloff", "two"):
@@ -355,7 +352,7 @@ def measure(shop, seconds, emulated):
 
 
 def curves(shop):
-    """What the pictures show, by picture; a part that was not played is not there."""
+    """What the picture shows; a part that was not played is not there."""
 
     def force_of(played, shown):
         return {"time_s": played.time_s[shown], "true_N": played.force_N[shown], "estimated_N": played.estimated["force_N"][shown]}
@@ -375,21 +372,34 @@ def curves(shop):
         begin = next(float(phase["t_begin_s"]) for phase in played.phases if phase["phase"] == "load")
         end = next(float(phase["t_end_s"]) for phase in played.phases if phase["phase"] == "unload")
         force["cycle"] = force_of(played, played.touched & (played.time_s >= begin) & (played.time_s <= end))
-    signals = slip = None
-    if played := shop.first("signals"):
-        signals = {"time_s": played.time_s, "true_N": played.force_N, "above_Pa": played.above_Pa}
-    if played := shop.first("reconstructed"):
-        first = next(phase for phase in played.phases if phase["phase"] == "slip")
-        inside = (played.time_s >= float(first["t_begin_s"])) & (played.time_s <= float(first["t_end_s"]))
-        moving = np.flatnonzero(played.slips & played.sample & inside)
-        if len(moving):
-            slip = {
-                "time_s": played.time_s[moving],
-                "true_x_mm": played.x_mm[moving],
-                "true_y_mm": played.y_mm[moving],
-                **{name: values[moving] for name, values in played.estimated.items()},
-            }
-    return {"force": force, "signals": signals, "slip": slip}
+    return force
+
+
+def draw(shown, path):
+    figure, axes = plt.subplots(2, 2, figsize=(11, 7.5), layout="constrained")
+    for axis, name, title in (
+        (axes[0, 0], "taps", "(a) taps, small sphere, dip, calibrated"),
+        (axes[0, 1], "object", "(b) ping-pong ball, dip, calibrated"),
+    ):
+        if name not in shown:
+            axis.set_axis_off()
+            continue
+        axis.plot(shown[name]["time_s"], shown[name]["true_N"], color=ORANGE, label="true")
+        axis.plot(shown[name]["time_s"], shown[name]["estimated_N"], ".-", color=BLUE, ms=3, lw=0.8, label="estimated")
+        axis.set(title=title, xlabel="time, s", ylabel="force, N")
+        axis.legend()
+    for name, colour, label in (("dip", ORANGE, "never calibrated"), ("dip calibrated", BLUE, "calibrated")):
+        axes[1, 0].plot(shown[name]["true_N"], shown[name]["estimated_N"], ",", color=colour, rasterized=True)
+        axes[1, 0].plot([], [], "o", ms=4, color=colour, label=label)
+    axes[1, 0].plot((0, 50), (0, 50), color=FAINT, lw=0.8)
+    axes[1, 0].legend()
+    axes[1, 0].set(title="(c) all samples, gain spread 10 %, dip", xlabel="true force, N", ylabel="estimated force, N")
+    if "cycle" in shown:
+        axes[1, 1].plot(shown["cycle"]["true_N"], shown["cycle"]["estimated_N"], color=BLUE)
+        axes[1, 1].plot((0, 20), (0, 20), color=FAINT, lw=0.8)
+        axes[1, 1].set(title="(d) slow load cycle, relaxation and hysteresis", xlabel="true force, N", ylabel="estimated force, N")
+    figure.suptitle("Simulated fingertip, as the paper's Fig. 7")
+    save(figure, path)
 
 
 def main(argv):
@@ -425,9 +435,9 @@ def main(argv):
         found = cards.measure(pathlib.Path(options.build).resolve(), steps, options.cards)
     found = judge(measure(shop, seconds, emulated) | found, GOALS)
     write_json(out / "validation.json", found)
-    pictures = draw(curves(shop), out)
+    draw(curves(shop), out / "validation_force.png")
     text.write(found, "validation", out)
-    return finish(found, options, ("validation.json", "validation.md", *pictures))
+    return finish(found, options, ("validation.json", "validation.md", "validation_force.png"))
 
 
 if __name__ == "__main__":

@@ -95,8 +95,7 @@ class Validation(unittest.TestCase):
 
     def test_pictures_and_text(self):
         text = (self.folder / "validation.md").read_text()
-        for picture in ("validation_force.png", "validation_signals.png", "validation_slip.png"):
-            self.assertIn(picture, text)
+        self.assertIn("validation_force.png", text)
         self.assertGreater((self.folder / "validation_force.png").stat().st_size, 10000)
         self.assertNotIn("nan", text)
         self.assertFalse((self.folder / "validation_work").exists())
