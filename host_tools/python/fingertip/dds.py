@@ -4,10 +4,10 @@ Needs the package cyclonedds.
 """
 
 import contextlib
+import functools
 import os
 from typing import Any
 
-from . import host_time
 from .errors import InputError
 from .ros_messages import fields_of
 
@@ -24,7 +24,6 @@ except ImportError:
 
 HISTORY = 1000  # messages that are kept for who has not acknowledged them: 0.8 s at the highest rate
 BLOCKING_ns = 5_000_000
-CLOSING_s = 1.0
 LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces><AllowMulticast>false</AllowMulticast></General>"
     "<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
@@ -40,55 +39,38 @@ QOS = cyclonedds.qos.Qos(
 _SEQUENCE: Any = idl.sequence
 
 
-def _type_of(name: str, known: dict[str, Any]) -> Any:
+@functools.cache
+def _type_of(name: str) -> Any:
     """What "geometry_msgs/WrenchStamped" is for cyclonedds, made of CDR bytes; ROS 2 calls it geometry_msgs::msg::dds_::WrenchStamped_."""
-    if name not in known:
-        package, kind = name.split("/")
-        fields = {}
-        for field, of, is_sequence in fields_of(name):
-            inner = _type_of(of, known) if "/" in of else {"string": str, "bool": bool}.get(of) or getattr(idl, of)
-            fields[field] = _SEQUENCE[inner] if is_sequence else inner
-        made: Any = cyclonedds.idl.make_idl_struct(kind + "_", f"{package}.msg.dds_.{kind}_", fields, dataclassify=False)
-        made.__init__ = lambda self, data: setattr(self, "data", data)
-        made.serialize = lambda self, **_: self.data
-        known[name] = made
-    return known[name]
+    package, kind = name.split("/")
+    fields = {}
+    for field, of, is_sequence in fields_of(name):
+        inner = _type_of(of) if "/" in of else {"string": str, "bool": bool}.get(of) or getattr(idl, of)
+        fields[field] = _SEQUENCE[inner] if is_sequence else inner
+    made: Any = cyclonedds.idl.make_idl_struct(kind + "_", f"{package}.msg.dds_.{kind}_", fields, dataclassify=False)
+    made.__init__ = lambda self, data: setattr(self, "data", data)
+    made.serialize = lambda self, **_: self.data
+    return made
 
 
-class Participant:
-    """Topics of one domain. domain: 0 to 232; loopback_only: nothing leaves the computer. Raises InputError."""
-
-    def __init__(self, domain: int, loopback_only: bool = False) -> None:
-        try:
-            own = os.environ.get("CYCLONEDDS_URI", "")
-            self._domain: Any = cyclonedds.domain.Domain(domain, f"{own},{LOOPBACK}" if own else LOOPBACK) if loopback_only else None
-            self._participant: Any = cyclonedds.domain.DomainParticipant(domain)
-        except cyclonedds.core.DDSException as error:
-            raise InputError(f"DDS domain {domain}: {error}; is there a network, and is CYCLONEDDS_URI right?") from None
-        self._types: dict[str, Any] = {}
-        self._topics: list[Topic] = []
-
-    def close(self) -> None:
-        """It and its topics vanish, once all is acknowledged, or a second later."""
-        end_s = host_time.now_s() + CLOSING_s
-        for topic in self._topics:
-            topic.close(max(0.0, end_s - host_time.now_s()))
-        self._participant = self._domain = None  # which cyclonedds deletes with its last reference
-
-    def topic(self, name: str, kind: str) -> "Topic":
-        """ "/fingertip/..." of messages "geometry_msgs/WrenchStamped"."""
-        self._topics.append(Topic(self._participant, name, _type_of(kind, self._types)))
-        return self._topics[-1]
+def participant_of(domain: int, loopback_only: bool) -> tuple[Any, ...]:
+    """domain: 0 to 232; loopback_only: nothing leaves the computer. cyclonedds deletes it with its last reference. Raises InputError."""
+    try:
+        own = os.environ.get("CYCLONEDDS_URI", "")
+        kept = (cyclonedds.domain.Domain(domain, f"{own},{LOOPBACK}" if own else LOOPBACK),) if loopback_only else ()
+        return (cyclonedds.domain.DomainParticipant(domain), *kept)
+    except cyclonedds.core.DDSException as error:
+        raise InputError(f"DDS domain {domain}: {error}; is there a network, and is CYCLONEDDS_URI right?") from None
 
 
 class Topic:
-    """sent: messages that went out; refused: those that a late reader had no room for."""
+    """A topic "/fingertip/..." of messages "geometry_msgs/WrenchStamped". sent: messages that went out; refused: those that a late reader had no room for."""
 
-    def __init__(self, participant: Any, name: str, kind: Any) -> None:
+    def __init__(self, participant: Any, name: str, kind: str) -> None:
         self.name = name
         self.sent = self.refused = 0
-        self._kind = kind
-        self._writer: Any = cyclonedds.pub.DataWriter(participant, cyclonedds.topic.Topic(participant, "rt" + name, kind), qos=QOS)
+        self._kind = _type_of(kind)
+        self._writer: Any = cyclonedds.pub.DataWriter(participant, cyclonedds.topic.Topic(participant, "rt" + name, self._kind), qos=QOS)
 
     def send(self, data: bytes, time_ns: int) -> None:
         """time_ns: since 1970, which DDS hands on as the source's time."""

@@ -16,7 +16,7 @@ from .line import Capability, Settable, Streams
 from .recording import Recorder, RecordingWriter
 from .settings import setting_commands
 from .transport import Transport, open_way
-from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw, SyncEdge
+from .wire import Acknowledgement, Contact, Crash, Health, Info, LineStatistics, Raw, SyncEdge
 
 EXCHANGE_INTERVAL_us = 500_000  # the two clocks are compared so often
 FIRST_EXCHANGES = 8

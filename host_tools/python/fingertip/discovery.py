@@ -76,11 +76,6 @@ def find_usb() -> list[Found]:
     )
 
 
-def find_in_environment() -> list[Found]:
-    """The paths in FINGERTIP_PORT, separated by colons, on Windows by semicolons."""
-    return [Found("", path) for path in os.environ.get("FINGERTIP_PORT", "").split(os.pathsep) if path]
-
-
 def _port_of(name: str) -> str:
     """The port that "sim:left" names: of a fingertip that `fingertip simulate` simulates; "sim:" is the first. Any other name is a port's own."""
     if not name.startswith(SIMULATED):
@@ -99,7 +94,8 @@ def _is_of(shared: Found, found: Found) -> bool:
 
 def find() -> list[Found]:
     """Every fingertip that can be opened: those that FINGERTIP_PORT names, if it names any; else those on USB and those shared."""
-    named, shared = find_in_environment(), find_shared()
+    # FINGERTIP_PORT: paths, separated by colons, on Windows by semicolons.
+    named, shared = [Found("", path) for path in os.environ.get("FINGERTIP_PORT", "").split(os.pathsep) if path], find_shared()
     ports = named or find_usb()
     found = [port._replace(share_socket=next((each.share_socket for each in shared if _is_of(each, port)), "")) for port in ports]
     if not named:

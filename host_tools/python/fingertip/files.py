@@ -31,7 +31,7 @@ import numpy.typing as npt
 from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
-from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
 from .recorded import Rows, counts_of, judge_key, packet_of
 

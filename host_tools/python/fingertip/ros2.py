@@ -28,10 +28,11 @@ from .network import until_ended
 from .wire import Contact, Health
 
 if TYPE_CHECKING:
-    from .dds import Participant, Topic
+    from .dds import Topic
 
 DOMAIN_MAX = 232  # whose ports are below 65536
 POLL_s = 0.1
+CLOSING_s = 1.0
 _CONTACT_FIELDS = tuple(name.lower() for name in Contact._fields)
 
 
@@ -72,14 +73,12 @@ def utc_ns(frame: Frame) -> int:
 class _Device:
     """One fingertip and its topics."""
 
-    def __init__(self, participant: "Participant", fingertip: Fingertip) -> None:
+    def __init__(self, topic: "Callable[[str, str], Topic]", fingertip: Fingertip) -> None:
         self.fingertip = fingertip
         name, info = name_in_ros(fingertip.serial), fingertip.info
         self.messages = FrameMessages(fingertip.serial)
         self.messages.place_sensors(info.x_mm, info.y_mm, info.sensors)
-        self.topics: "dict[str, Topic]" = {
-            kind: participant.topic(f"/fingertip/{name}/{topic}", kind) for topic, kind in FRAME_TOPICS.items()
-        }
+        self.topics = {kind: topic(f"/fingertip/{name}/{of}", kind) for of, kind in FRAME_TOPICS.items()}
         self.frames = 0
         self.health: Health | None = None
         self.is_gone = False
@@ -97,8 +96,8 @@ class Publisher:
         self.domain = domain_of_environment() if domain is None else domain
         if not 0 <= self.domain <= DOMAIN_MAX:
             raise BadValueError(f"domain {self.domain} is out of range; give 0 to {DOMAIN_MAX}")
-        self._participant = dds.Participant(self.domain, loopback_only)
-        self._diagnostics = self._participant.topic("/diagnostics", DIAGNOSTICS_TYPE)
+        self._participant = dds.participant_of(self.domain, loopback_only)
+        self._diagnostics = self._topic("/diagnostics", DIAGNOSTICS_TYPE)
         self._lock = threading.Lock()
         self._devices: dict[str, _Device] = {}
 
@@ -109,11 +108,19 @@ class Publisher:
         self.close()
 
     def close(self) -> None:
-        """The topics vanish. sent and refused stay."""
-        self._participant.close()
+        """The topics vanish, once all is acknowledged, or a second later. sent and refused stay."""
+        end_s = host_time.now_s() + CLOSING_s
+        for topic in self._topics():
+            topic.close(max(0.0, end_s - host_time.now_s()))
+        self._participant = ()
+
+    def _topic(self, name: str, kind: str) -> "Topic":
+        from .dds import Topic
+
+        return Topic(self._participant[0], name, kind)
 
     def add(self, fingertip: Fingertip) -> None:
-        self._devices[fingertip.serial] = _Device(self._participant, fingertip)
+        self._devices[fingertip.serial] = _Device(self._topic, fingertip)
 
     def frame(self, frame: Frame) -> None:
         """Sends it on the topics of its fingertip."""

@@ -38,11 +38,6 @@ def _wanted(setting: Setting, given: Given, now: Info) -> float:
     return value
 
 
-def _check(setting: Setting, value: float) -> None:
-    if not setting.least <= value <= setting.most or setting.choices and value not in setting.choices:  # NaN is in no range
-        raise BadValueError(f"{setting.argument} {value:g} is out of range; give {setting.give}")
-
-
 def setting_commands(given: Given, now: Info) -> list[Body]:
     """Of the arguments of Fingertip.set; None: not given. Raises BadValueError."""
     commands: list[Body] = []
@@ -53,8 +48,9 @@ def setting_commands(given: Given, now: Info) -> list[Body]:
         values = [_wanted(setting, given, now) for setting in settings]
         zeros = not any(values)
         for setting, value in zip(settings, values, strict=True):
-            if not (zeros and setting.zero):
-                _check(setting, value)
+            in_range = setting.least <= value <= setting.most and (not setting.choices or value in setting.choices)  # NaN is in no range
+            if not in_range and not (zeros and setting.zero):
+                raise BadValueError(f"{setting.argument} {value:g} is out of range; give {setting.give}")
         fields: dict[str, Any] = {
             setting.field: round(value * setting.per) if setting.whole else value for setting, value in zip(settings, values, strict=True)
         }

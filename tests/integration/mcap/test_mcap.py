@@ -7,7 +7,6 @@ import pathlib
 import random
 import resource
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -15,16 +14,14 @@ import time
 import unittest
 from unittest import mock
 
-import numpy as np
 
 FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests/support"))
 import bags  # noqa: E402  finds the package too
-from fingertip import InputError, JointRecordingWriter, RecordingWriter, files, read_recording  # noqa: E402
-from mcap.opcode import Opcode  # noqa: E402
+from fingertip import InputError, JointRecordingWriter, RecordingWriter, read_recording  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
-from mcap.writer import MCAP0_MAGIC, Writer  # noqa: E402
+from mcap.writer import Writer  # noqa: E402
 
 TWO = ROOT / "tests/fuzz/corpus/recording/two"
 
@@ -54,16 +51,6 @@ class TestMcap(unittest.TestCase):
         lines = done.stderr.splitlines()
         self.assertEqual(len(lines), 1, done.stderr)
         return lines[0]
-
-    def damaged(self, bag, name):
-        """A copy with a flipped byte in the middle of the second chunk, and the numbers of the lines in it."""
-        with open(bag, "rb") as file:
-            chunk = make_reader(file).get_summary().chunk_indexes[1]
-        data = bytearray(bag.read_bytes())
-        data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1
-        path = self.folder / name
-        path.write_bytes(data)
-        return path
 
     def test_three_readers_find_every_message_as_the_csv_file_has_it(self):
         for path in (self.csv, self.random_csv):
@@ -128,14 +115,6 @@ class TestMcap(unittest.TestCase):
         path.write_bytes(text + b"# note: \xff\n")
         self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
 
-    def test_the_package_reads_it_as_the_csv_file(self):
-        for path, device in ((self.csv, None), (self.random_csv, None), (self.several_csv, "BBBB")):
-            one, other = read_recording(path, serial=device), read_recording(self.convert(path, "read.mcap"), serial=device)
-            self.assertEqual((one.metadata, one.packets, one.events, one.end), (other.metadata, other.packets, other.events, other.end))
-            for name in one.columns:
-                np.testing.assert_array_equal(one[name], other[name])
-            np.testing.assert_array_equal(one.sensors_Pa, other.sensors_Pa)
-
     def test_several_fingertips_have_topics_of_their_own(self):
         infos = [next(bags.some_packets(seed, 0)).body for seed in (1, 2)]
         path = self.folder / "joint.mcap"
@@ -157,24 +136,14 @@ class TestMcap(unittest.TestCase):
         lines = self.csv.read_bytes().splitlines(keepends=True)[:-1]
         uncut.write_bytes(b"".join(lines))
         torn.write_bytes(b"".join(lines)[:-5])
-        for out in ("torn_out.csv", "torn_out.mcap"):
-            self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", self.refused("convert", torn, self.folder / out))
-            self.assertFalse((self.folder / out).exists())
-            self.assertEqual(
-                bags.call(FINGERTIP, "convert", torn, self.folder / out, "--salvage").stderr,
-                f"{torn}: the last line is torn\n{torn}: no end line: the recording was cut short, its recorder killed or its disk full\n",
-            )
-        self.assertEqual(
-            bags.call(FINGERTIP, "convert", uncut, self.folder / "unended_out.csv").stderr,
-            f"{uncut}: no end line: the recording was cut short, its recorder killed or its disk full\n",
-        )
-        self.assertEqual(bags.call(FINGERTIP, "convert", self.csv, self.folder / "ended_out.csv").stderr, "")
-
-    def test_cut_anywhere_a_chunk_is_lost(self):
-        bags.of_python(self.csv, self.folder / "cut_from_python.mcap")
-        for bag in (self.convert(self.csv, "cut_from.mcap"), self.folder / "cut_from_python.mcap"):
-            most, unread = bags.truncations(FINGERTIP, bag, self.csv, self.folder, 24, 3)
-            self.assertEqual((most, unread), (1, 0), bag.name)
+        short = "no end line: the recording was cut short, its recorder killed or its disk full"
+        for start, said in ((torn, f"{torn}: the last line is torn\n{torn}: {short}\n"), (uncut, f"{uncut}: {short}\n"), (self.csv, "")):
+            if start == torn:
+                refusal = self.refused("convert", torn, self.folder / "none.csv")
+                self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", refusal)
+                self.assertFalse((self.folder / "none.csv").exists())
+            for out in ("out.csv", "out.mcap"):
+                self.assertEqual(bags.call(FINGERTIP, "convert", start, self.folder / out, "--salvage", "--overwrite").stderr, said)
 
     def test_of_a_killed_recorder_every_written_chunk_is_read(self):
         port, bag = self.folder / "killed_port", self.folder / "killed.mcap"
@@ -197,24 +166,6 @@ class TestMcap(unittest.TestCase):
         self.assertGreater(len(rows), 0)
         self.assertEqual(sum(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag)), len(rows))
 
-    def test_a_damaged_chunk_is_named_and_the_others_are_read(self):
-        bags.of_python(self.csv, self.folder / "python.mcap")
-        for bag in (self.bag, self.folder / "python.mcap"):
-            with self.subTest(bag.name):
-                self.judge_damaged(self.damaged(bag, "damaged.mcap"))
-
-    def judge_damaged(self, path):
-        self.assertRegex(self.refused("convert", path, self.folder / "no.csv"), r"damaged.mcap: byte \d+: .*; use --salvage")
-        self.assertFalse((self.folder / "no.csv").exists())
-        out = self.folder / "saved.csv"
-        done = bags.call(FINGERTIP, "convert", path, out, "--salvage", "--overwrite")
-        self.assertRegex(done.stderr, r"lines are lost before line \d+|chunk")
-        saved, whole = out.read_bytes().splitlines(), self.csv.read_bytes().splitlines()
-        self.assertTrue(set(saved) < set(whole) and len(saved) >= 30)
-        with self.assertRaisesRegex(InputError, "use --salvage"):
-            read_recording(path)
-        self.assertEqual([line.encode() for _, line, _ in files._undamaged(path, True)], saved)
-
     def test_what_is_no_recording_is_said(self):
         other = self.folder / "other.mcap"
         writer = Writer(str(other))
@@ -235,12 +186,6 @@ class TestMcap(unittest.TestCase):
         head = self.folder / "head.mcap"
         head.write_bytes(self.bag.read_bytes()[:50])
         self.assertIn("breaks off before a recording begins", self.refused("replay", head))
-        with self.assertRaisesRegex(InputError, "no recording of a fingertip"):
-            read_recording(other)
-        huge = self.folder / "huge.mcap"  # a chunk that says it is 2^62 bytes
-        chunk = struct.pack("<QQQI", 0, 0, 1 << 62, 0) + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", 4) + bytes(4)
-        huge.write_bytes(MCAP0_MAGIC + struct.pack("<BQ", Opcode.CHUNK, 48) + chunk)
-        self.assertIn("a chunk of 4611686018427387904 bytes", self.refused("convert", huge, self.folder / "out.csv"))
         self.assertFalse((self.folder / "out.csv").exists())
 
     def test_a_full_disk_is_said_and_leaves_what_was_there(self):

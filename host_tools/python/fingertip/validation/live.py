@@ -107,10 +107,6 @@ def reading_of(frame):
     )
 
 
-def _interrupt(*_):
-    raise KeyboardInterrupt
-
-
 def _follow(device, walk, writer, colour):
     """Until the walk is done, or a key ends it."""
     last_s = host_time.now_s()
@@ -140,7 +136,7 @@ def validate_live(options):
     recorded until then is kept."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         with contextlib.suppress(ValueError):  # not the main thread
-            signal.signal(number, _interrupt)
+            signal.signal(number, signal.default_int_handler)
     share = {"auto": None, "socket": True, "serial": False}[options.transport]
     with Fingertip(options.port, serial=options.device, share=share, buffer_frames=1 << 20) as device:
         name, before_Hz = printable(device.description), device.info.rate_mHz / 1000

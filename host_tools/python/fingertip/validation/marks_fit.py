@@ -50,7 +50,7 @@ class MarksFit(NamedTuple):
     """By sensor: answers (measured in most presses), gain over the mean of those that respond, where it is found in the layout's axes, off_mm
     from its place there, whose place it has, residual_share (rms of what the picture leaves, of its readings that respond), scatter_share
     (sd of the same readings over the expected ones among the presses of one mark: without the error of the picture, and without what is not
-    known of the press) and responses (their number). By press: where it was, sd each way, its mark in the layout's axes."""
+    known of the press) and responses (their number). By press: where it was, its mark in the layout's axes."""
 
     answers: np.ndarray
     gain: np.ndarray
@@ -61,7 +61,6 @@ class MarksFit(NamedTuple):
     scatter_share: np.ndarray
     responses: np.ndarray
     press_mm: np.ndarray  # [press][axis]
-    press_sd_mm: np.ndarray
     mark_mm: np.ndarray
     hand_sd_mm: float
     width_mm: float
@@ -322,26 +321,10 @@ class _Fit:
             off_mm, limit_mm = np.diag(from_places), SWAPPED_PITCHES * self.array.pitch_mm
             elsewhere = answers & (gain >= NO_RESPONSE) & (off_mm > limit_mm) & (from_places.min(axis=1) < limit_mm)
             place = np.where(elsewhere, from_places.argmin(axis=1), place)
-        variances = np.diag(self.covariance)
-        return MarksFit(
-            answers,
-            gain,
-            sensor_mm,
-            off_mm,
-            place,
-            residual,
-            scatter,
-            responses,
-            press_mm,
-            np.sqrt(0.5 * (variances[self.at_press] + variances[self.at_press + 1])),
-            mark_mm,
-            self.hand_mm,
-            math.exp(self.value[_LOG_WIDTH]),
-            self.value[_SLOPE_X : _SLOPE_Y + 1],
-            np.sqrt(variances[_SLOPE_X : _SLOPE_Y + 1]),
-            shift,
-            turn,
-        )
+        by_sensor = (answers, gain, sensor_mm, off_mm, place, residual, scatter, responses)
+        width_mm, slopes = math.exp(self.value[_LOG_WIDTH]), slice(_SLOPE_X, _SLOPE_Y + 1)
+        tilt = self.value[slopes], np.sqrt(np.diag(self.covariance)[slopes])
+        return MarksFit(*by_sensor, press_mm, mark_mm, self.hand_mm, width_mm, *tilt, shift, turn)
 
 
 def fit_marks(array, presses, without=None):
