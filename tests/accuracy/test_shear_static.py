@@ -50,8 +50,8 @@ LIMITS = (
     ("learned_ratio_error_p50", 0.005, 0.02),
     ("learned_ratio_error_p95", 0.02, 0.06),
     ("learned_valid_percent", 88, 100),
-    ("told_wrong_said_percent", 90, 100),
-    ("told_right_said_percent", 0, 5),
+    ("wrong_thickness_warned_percent", 90, 100),
+    ("right_thickness_warned_percent", 0, 5),
 )
 
 

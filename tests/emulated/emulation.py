@@ -63,10 +63,17 @@ class Run:
 
     def __init__(self, tools, folder, name, board, scenario, seconds=None, commands=(), faults=(), emulator=MAIN, **more):
         self.base = pathlib.Path(folder) / name
-        lines = [f"{t_s} {words[0] if ' ' in words[0] else encoded(tools, *words)}\n" for t_s, *words in sorted([(0.45, "dtr 1"), *commands])]
+        lines = [
+            f"{t_s} {words[0] if ' ' in words[0] else encoded(tools, *words)}\n" for t_s, *words in sorted([(0.45, "dtr 1"), *commands])
+        ]
         self.path("script").write_text("".join(lines))
         self.path("faults").write_text(json.dumps(list(faults)))
-        paths = {"host_script": self.path("script"), "faults": self.path("faults"), "capture": self.path("ftr"), "report": self.path("json")}
+        paths = {
+            "host_script": self.path("script"),
+            "faults": self.path("faults"),
+            "capture": self.path("ftr"),
+            "report": self.path("json"),
+        }
         done = emulate(tools, emulator, board=board, scenario=scenario, seconds=seconds, **{"image": tools.image, **paths, **more})
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")

@@ -45,7 +45,7 @@ class Grasp(unittest.TestCase):
 
     def test_one_thing_comes_after_the_other(self):
         slip = self.slip
-        self.assertEqual(slip["told_by"], "SLIDING")
+        self.assertEqual(slip["reported_by"], "SLIDING")
         course = [0.0, *(slip[name] for name in emulated_grasp.COURSE)]
         self.assertEqual(course, sorted(course))
         self.assertLess(slip["sent_ms"], TOLD_ms)

@@ -36,7 +36,7 @@ def measure(build, boards, progress):
                 f"chip_latency_us_osr{osr}": float(measured.offered_us.max()),
                 f"chip_latency_median_us_osr{osr}": float(np.median(measured.offered_us)),
                 f"chip_fit_us_osr{osr}": measured.stages_us["fit_us"],
-                f"chip_told_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()),
+                f"chip_valid_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()),
                 f"chip_sleep_percent_osr{osr}": measured.sleep_percent,
             }
             progress(f"grasp on {BOARD}, OSR {osr}: {measured.fitted_per_s:.0f} frames/s")

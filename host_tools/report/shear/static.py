@@ -252,7 +252,7 @@ def learned(bench, out):
         out["learned_" + key] = row[key]
     out["learned_thickness_off_p95_percent"] = quantile(100.0 * np.abs(mm / LAYER_mm - 1.0), 0.95)
     both = np.concatenate([agrees((1.0 - wrong) * LAYER_mm), agrees((1.0 + wrong) * LAYER_mm)])
-    out["told_wrong_said_percent"], out["told_right_said_percent"] = percent(~both), percent(~agrees(LAYER_mm))
+    out["wrong_thickness_warned_percent"], out["right_thickness_warned_percent"] = percent(~both), percent(~agrees(LAYER_mm))
 
 
 def cast(bench, out):

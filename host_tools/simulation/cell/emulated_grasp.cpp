@@ -184,7 +184,7 @@ ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
   ordered_json out;
   out["begin_s"] = to_us(slip.begin_s);
   out["way_mm"] = slip.way_mm;
-  out["told_by"] = !first ? ordered_json(nullptr) : first->slides ? "SLIDING" : "load";
+  out["reported_by"] = !first ? ordered_json(nullptr) : first->slides ? "SLIDING" : "load";
   out["measured_ms"] = in_ms(first ? first->measured_s - slip.begin_s : NEVER_s);
   out["sent_ms"] = in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s);
   out["answered_ms"] = in_ms(closed(commanded_));
