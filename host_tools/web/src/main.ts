@@ -13,7 +13,7 @@ import { App } from './steps/app';
 import { fingertipControls, pageControls } from './steps/toolbar';
 import { element, wordsOf } from './view/elements';
 import { keepFocus } from './view/focus';
-import { mountView } from './view/view';
+import { View } from './view/view';
 
 interface Console {
   readonly fingertips: readonly Fingertip[];
@@ -35,7 +35,7 @@ async function fetchCore(): Promise<void> {
 
 function start(): void {
   const app = new App();
-  const view = mountView(document.body, app.bench, {
+  const view = new View(document.body, app, {
     page: pageControls(app),
     of: (fingertip) => fingertipControls(app, fingertip),
     connect: () => void app.connect(),
@@ -45,7 +45,7 @@ function start(): void {
   keepFocus();
   let ready_ms = 0;
   globalThis.fingertip = {
-    fingertips: app.bench.fingertips,
+    fingertips: app.fingertips,
     get pictures() {
       return view.pictures;
     },

@@ -9,16 +9,14 @@ import {
   Stream,
   WIRE_VERSION,
   type Contact,
-  type DevicePacket,
   type Info,
   type Raw,
 } from '../../../host_tools/web/src/line/line_facts';
-import { Bench } from '../../../host_tools/web/src/model/bench';
 import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
 import { PATIENCE } from '../../../host_tools/web/src/model/patience';
 import { History } from '../../../host_tools/web/src/model/history';
 import { commandsFor } from '../../../host_tools/web/src/steps/settings';
-import { core } from './library';
+import { core, decoded } from './library';
 import { cobsDecode, cobsEncode, crc32, vector } from './vectors';
 
 function contactOf(frame: number, t_us: number, more: Partial<Contact> = {}): Contact {
@@ -128,11 +126,7 @@ class SpokenLine implements Line {
     const name = asks[command];
     this.acknowledge(command, view, name ? Result.DONE : this.result);
     if (name && --this.loses < 0) {
-      const decoder = new core.Decoder();
-      decoder.feed(Uint8Array.of(0), () => undefined);
-      decoder.feed(vector(name).frame, (answer: DevicePacket) =>
-        this.say({ ...answer, t_us: this.device_us, ...(this.serial && { serial: this.serial }) }),
-      );
+      this.say({ ...decoded(vector(name).frame)!, t_us: this.device_us, ...(this.serial && { serial: this.serial }) });
     }
   }
 }
@@ -265,6 +259,7 @@ test('history: a ring with absolute numbers, times that never fall, frames that 
   assert.equal(history.lost[13 % 8], 0);
   assert.equal(history.columns.x_mm[19 % 8], 19);
   assert.deepEqual([...history.readingsAt(19)!.pressure_Pa], [19, -19]); // held: those of the frame before
+  assert.equal(history.readingsAt(19)!.valid, 3);
   assert.equal(history.readingsAt(3), null);
   assert.equal(history.rowAt(0.018), 15);
   assert.equal(history.rowAt(9), 20);
@@ -286,37 +281,21 @@ test('history: a raw packet without its contact packet has a row of its own', ()
   assert.ok(Number.isNaN(history.columns.force_N[0]));
 });
 
-test('the bench tells who comes and goes', () => {
-  const bench = new Bench();
-  let told = 0;
-  const end = bench.listen(() => told++);
-  const fingertip = new Fingertip(new SpokenLine());
-  bench.add(fingertip);
-  bench.remove(fingertip);
-  bench.remove(fingertip);
-  end();
-  bench.add(fingertip);
-  assert.equal(told, 2);
-});
-
 test('settings: commands for what differs, refusals with the range', () => {
-  let info: Info | null = null;
-  const decoder = new core.Decoder();
-  decoder.feed(Uint8Array.of(0), () => undefined);
-  decoder.feed(vector('info_grasp').frame, (packet) => (info = packet as Info));
+  const info = decoded(vector('info_grasp').frame) as Info;
   const now = { rate: '20', osr: '1024', slip_threshold: '0.75', slip_window: '100', prior: '3.125:0.5', limit: '0.625' };
-  assert.deepEqual(commandsFor(info!, now), []);
-  assert.deepEqual(commandsFor(info!, { rate: 'max', osr: '256', slip_window: '50', prior: '3.1', limit: '0.5' }), [
+  assert.deepEqual(commandsFor(info, now), []);
+  assert.deepEqual(commandsFor(info, { rate: 'max', osr: '256', slip_window: '50', prior: '3.1', limit: '0.5' }), [
     { type: PacketType.CMD_RATE, rate_mHz: 0 },
     { type: PacketType.CMD_OSR, osr: 256 },
     { type: PacketType.CMD_SLIP, threshold_mm: 0.75, window_ms: 50 },
     { type: PacketType.CMD_PRIOR, sigma_mm: 3.1, width_mm: 0.5 },
     { type: PacketType.CMD_LOCATION_LIMIT, limit_mm: 0.5 },
   ]);
-  assert.deepEqual(commandsFor(info!, { rate: '30.5' }), [{ type: PacketType.CMD_RATE, rate_mHz: 30500 }]);
-  assert.deepEqual(commandsFor(info!, { prior: 'none' }), [{ type: PacketType.CMD_PRIOR, sigma_mm: 0, width_mm: 0 }]);
-  assert.throws(() => commandsFor(info!, { osr: '300' }), /none of 256, 512/);
+  assert.deepEqual(commandsFor(info, { rate: '30.5' }), [{ type: PacketType.CMD_RATE, rate_mHz: 30500 }]);
+  assert.deepEqual(commandsFor(info, { prior: 'none' }), [{ type: PacketType.CMD_PRIOR, sigma_mm: 0, width_mm: 0 }]);
+  assert.throws(() => commandsFor(info, { osr: '300' }), /none of 256, 512/);
   for (const wrong of [{ rate: '0' }, { rate: 'fast' }, { slip_threshold: '51' }, { prior: '3:' }, { limit: '' }]) {
-    assert.throws(() => commandsFor(info!, wrong), /is not a number from/, JSON.stringify(wrong));
+    assert.throws(() => commandsFor(info, wrong), /is not a number from/, JSON.stringify(wrong));
   }
 });

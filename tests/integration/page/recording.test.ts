@@ -16,7 +16,7 @@ import {
   type Raw,
 } from '../../../host_tools/web/src/line/line_facts';
 import { ReadError, readItems } from '../../../host_tools/web/src/recording/replay_line';
-import { core } from './library';
+import { core, decoded } from './library';
 import { vector } from './vectors';
 
 const STAGES = ['convert_us', 'read_us', 'queue_us', 'condition_us', 'fit_us', 'contact_us', 'total_us'] as const;
@@ -45,17 +45,9 @@ function anyFloat(): number {
   return bits.getFloat32(0);
 }
 
-function infoOf(name: string): Info {
-  let info: Info | null = null;
-  const decoder = new core.Decoder();
-  decoder.feed(Uint8Array.of(0), () => undefined);
-  decoder.feed(vector(name).frame, (packet) => (info = packet as Info));
-  return info!;
-}
-
 /** What a fingertip may say, in the order in which it says it. */
 function session(): DevicePacket[] {
-  const info = infoOf('info_grasp');
+  const info = decoded(vector('info_grasp').frame) as Info;
   const packets: DevicePacket[] = [{ ...info, sequence: 0 }];
   let sequence = 1;
   const VALID = Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID | Flag.WIDTHS_VALID | Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID;
@@ -69,10 +61,8 @@ function session(): DevicePacket[] {
       if (flags & Flag.FIT_VALID) {
         contact.sensors_used = integer(2 ** 32);
       }
-      const decoder = new core.Decoder(); // leaves out what has no flag
       CONTACT_FIELDS.forEach((field) => (contact[field] = anyFloat()));
-      decoder.feed(Uint8Array.of(0), () => undefined);
-      decoder.feed(core.encode(contact), (packet) => packets.push({ ...packet } as Contact));
+      packets.push(decoded(core.encode(contact))!); // leaves out what has no flag
     }
     if (random() < 0.95) {
       const raw = core.blank(PacketType.RAW) as unknown as Raw;

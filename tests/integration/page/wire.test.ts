@@ -1,17 +1,9 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { CoreError } from '../../../host_tools/web/src/core';
-import { Flag, PacketType, type Contact, type DevicePacket } from '../../../host_tools/web/src/line/line_facts';
-import { core } from './library';
+import { Flag, PacketType, type Contact } from '../../../host_tools/web/src/line/line_facts';
+import { core, decoded } from './library';
 import { readVectors, vector } from './vectors';
-
-/** The packet of a frame, as a decoder hands it out. */
-function decoded(frame: Uint8Array): DevicePacket | null {
-  const decoder = new core.Decoder();
-  let found: DevicePacket | null = null;
-  decoder.feed(Uint8Array.of(0, ...frame), (packet) => (found = packet));
-  return found;
-}
 
 for (const each of readVectors()) {
   test(`${each.name}: frame, packet, fields and back, as the C codec has them`, () => {

@@ -1,7 +1,6 @@
 /** What the page does with fingertips: finds them, has them come back, records, replays. */
 import type { Line } from '../line/line';
 import { SerialLine, hasWebSerial, rememberedPorts, requestPort, whyNoWebSerial } from '../line/serial_line';
-import { Bench } from '../model/bench';
 import { Fingertip, OtherFingertip } from '../model/fingertip';
 import type { Recorder, RecordingKind } from '../recording/recorder';
 import type { Replay } from '../recording/replay_line';
@@ -26,7 +25,8 @@ const NONE_CHOSEN =
   'to use serial ports in the settings of the browser.';
 
 export class App {
-  readonly bench = new Bench();
+  /** In the order in which they came. */
+  readonly fingertips: Fingertip[] = [];
   readonly recorders = new Map<Fingertip, Recorder>();
   readonly replays = new Map<Fingertip, Replay>();
   /** Shows a message to the user, until it is closed; set by main. */
@@ -39,7 +39,7 @@ export class App {
   private finding: Promise<void> = Promise.resolve();
   private simulated = 0;
 
-  /** Called after a recording or a replay began, ended or paused. Returns what ends it. */
+  /** Called after a fingertip came or went, and after a recording or a replay began, ended or paused. Returns what ends it. */
   listen(listener: () => void): () => void {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);
@@ -83,7 +83,7 @@ export class App {
   simulate(): void {
     const serial = `51${String(++this.simulated).padStart(14, '0')}`;
     const fingertip = new Fingertip(new SimulatedFingertip(serial, this.simulated));
-    this.bench.add(fingertip);
+    this.add(fingertip);
     fingertip.open().catch((error: unknown) => this.notice(wordsOf(error), 'bad'));
   }
 
@@ -92,7 +92,7 @@ export class App {
     replay.onLine = (line: Line) => {
       const fingertip = new Fingertip(line, { is_replay: true });
       this.replays.set(fingertip, replay);
-      this.bench.add(fingertip);
+      this.add(fingertip);
       void fingertip.open();
     };
     replay.onEnd = (problem) => {
@@ -130,7 +130,8 @@ export class App {
       fingertip.line.dispose();
     }
     this.replays.delete(fingertip);
-    this.bench.remove(fingertip);
+    this.fingertips.splice(this.fingertips.indexOf(fingertip), 1);
+    this.changed();
   }
 
   /** False: nothing was chosen. Throws Error, a sentence. */
@@ -197,7 +198,7 @@ export class App {
   /** Opens a port as the fingertip that it was before, if any; else as a new one. */
   private async take(port: SerialPort): Promise<void> {
     const known = this.ports.get(port);
-    const others = this.bench.fingertips.filter((each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine);
+    const others = this.fingertips.filter((each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine);
     for (const fingertip of [...(known ? [known] : []), ...others]) {
       try {
         await fingertip.open(new SerialLine(port));
@@ -213,7 +214,7 @@ export class App {
     }
     const fingertip = new Fingertip(new SerialLine(port));
     this.ports.set(port, fingertip);
-    this.bench.add(fingertip);
+    this.add(fingertip);
     await fingertip.open().catch((error: unknown) => this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad'));
   }
 
@@ -234,7 +235,7 @@ export class App {
         if (known === undefined) {
           const fingertip = new Fingertip(new ServedFingertip(each));
           this.served.set(each.serial, fingertip);
-          this.bench.add(fingertip);
+          this.add(fingertip);
           await fingertip.open();
         } else if (known?.state === 'closed') {
           await known.open(new ServedFingertip(each));
@@ -244,6 +245,11 @@ export class App {
       // The server, or a simulation, has just ended: the next search shows it.
     }
     setTimeout(() => void this.lookForServed(), LOOK_ms);
+  }
+
+  private add(fingertip: Fingertip): void {
+    this.fingertips.push(fingertip);
+    this.changed();
   }
 
   private changed(): void {

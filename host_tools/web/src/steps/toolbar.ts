@@ -87,14 +87,15 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
     pause_button.textContent = replay?.paused ? 'Go on' : 'Pause';
     leave_button.textContent = is_replay ? 'Close' : 'Disconnect';
   };
-  const ends = [fingertip.listen(show), app.listen(show)];
-  ends.push(
-    app.bench.listen(() => {
-      if (!app.bench.fingertips.includes(fingertip)) {
-        ends.forEach((end) => end());
-      }
-    }),
-  );
+  const end_own = fingertip.listen(show);
+  const end = app.listen(() => {
+    if (app.fingertips.includes(fingertip)) {
+      show();
+    } else {
+      end_own();
+      end();
+    }
+  });
   show();
   return controls;
 }

@@ -4,7 +4,6 @@ import 'uplot/dist/uPlot.min.css';
 import '../styles/tokens.css';
 import '../styles/page.css';
 import '../styles/steps.css';
-import type { Bench } from '../model/bench';
 import type { Fingertip } from '../model/fingertip';
 import type { History } from '../model/history';
 import { button, element, write } from './elements';
@@ -28,8 +27,10 @@ export interface Controls {
   simulate(): void;
 }
 
-export function mountView(root: HTMLElement, bench: Bench, controls: Controls): View {
-  return new View(root, bench, controls);
+/** All fingertips of the page, and who listens to their coming and going. */
+interface Bench {
+  readonly fingertips: readonly Fingertip[];
+  listen(listener: () => void): unknown;
 }
 
 const TRACES_INTERVAL_ms = 33;
@@ -107,10 +108,6 @@ export class View {
     bench.listen(() => this.gather());
     this.gather();
     requestAnimationFrame((now_ms) => this.draw(now_ms));
-  }
-
-  get chosen(): Fingertip | null {
-    return this.selected;
   }
 
   choose(fingertip: Fingertip | null): void {
