@@ -203,7 +203,14 @@ void Simulations::serve(httplib::Server &server) {
   const std::string line = std::string(PATH) + "/line";
   server.Get(line,
              [this](const httplib::Request &request, httplib::Response &response) { open_line(request, response); });
-  server.Post(line, [this](const httplib::Request &request, httplib::Response &response) { send(request, response); });
+  server.Post(line, [this](const httplib::Request &request, httplib::Response &response) {
+    if (request.body.size() > MOST_COMMAND_BYTES) {
+      return refuse(response, BAD_REQUEST, "more than a fingertip takes at once");
+    }
+    if (const auto to = session(request, response); to && !to->send(request.body)) {
+      refuse(response, UNAVAILABLE, "the fingertip takes no more commands");
+    }
+  });
   server.Post(std::string(PATH) + "/hand",
               [this](const httplib::Request &request, httplib::Response &response) { hand(request, response); });
 }
@@ -253,15 +260,6 @@ std::shared_ptr<Simulations::Session> Simulations::session(const httplib::Reques
     return nullptr;
   }
   return found->second;
-}
-
-void Simulations::send(const httplib::Request &request, httplib::Response &response) {
-  if (request.body.size() > MOST_COMMAND_BYTES) {
-    return refuse(response, BAD_REQUEST, "more than a fingertip takes at once");
-  }
-  if (const auto to = session(request, response); to && !to->send(request.body)) {
-    refuse(response, UNAVAILABLE, "the fingertip takes no more commands");
-  }
 }
 
 void Simulations::hand(const httplib::Request &request, httplib::Response &response) {

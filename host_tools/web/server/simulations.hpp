@@ -1,18 +1,16 @@
 /* Lets the page reach the fingertips of `fingertip simulate`, which no browser finds: their ports
  * are pseudo-terminals. Simulated ones only; real ones stay the browser's own affair.
  *
- *   GET  /simulated                        [{"serial": ..., "hand": true}]; hand: one is obeyed
- * (--mouse) GET  /simulated/line?serial=&client=   the fingertip's packets, without end. client: 8
- * to 32 hexadecimal digits of the page's own, new for each POST /simulated/line?client= bytes for
- * the fingertip POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or
- * nothing; the answer is what is true: {"t_us", "x_mm", "y_mm", "force_N", "qx_N", "qy_N"}, or {}
- * before anything is known
+ *   GET  /simulated                        [{"serial": ..., "hand": true}]; hand: one is obeyed (--mouse)
+ *   GET  /simulated/line?serial=&client=   the fingertip's packets, without end
+ *   POST /simulated/line?client=           bytes for the fingertip
+ *   POST /simulated/hand?client=           "press X_mm Y_mm FORCE_N", "lift" or nothing; the answer is what is true:
+ *                                          {"t_us", "x_mm", "y_mm", "force_N", "qx_N", "qy_N"}, or {} before it is
+ * known
  *
- * Requests are those of the page itself: one that another site makes is refused with 403. A client
- * is gone when its line is, and what its hand pressed is lifted then. Errors are one sentence, of
- * status 4xx.
- *
- * A line takes a thread of the server's as long as it is open; MOST_LINES at a time. */
+ * client: 8 to 32 hexadecimal digits of the page's own, new for each line. A client is gone when its line is,
+ * and what its hand pressed is lifted then. A request that another site makes is refused with 403. Errors are one
+ * sentence, of status 4xx. A line takes a thread of the server's as long as it is open. */
 #pragma once
 
 #include <map>
@@ -45,7 +43,6 @@ private:
   class Session;
 
   void open_line(const httplib::Request &request, httplib::Response &response);
-  void send(const httplib::Request &request, httplib::Response &response);
   void hand(const httplib::Request &request, httplib::Response &response);
   std::shared_ptr<Session> session(const httplib::Request &request, httplib::Response &response);
 

@@ -42,22 +42,17 @@ bool is_a(const std::type_info *type, const std::type_info *wanted) {
   return true;
 }
 
-std::uint32_t read_uleb(const std::uint8_t *&at) {
+/* A number in LEB128. */
+std::int32_t read_leb(const std::uint8_t *&at, bool is_signed = false) {
   std::uint32_t value = 0;
-  for (unsigned shift = 0;; shift += 7) {
-    const std::uint8_t byte = *at++;
-    value |= std::uint32_t{byte & 0x7Fu} << shift;
-    if (!(byte & 0x80)) {
-      return value;
-    }
-  }
-}
-
-std::int32_t read_sleb(const std::uint8_t *&at) {
-  const std::uint8_t *begin = at;
-  const std::uint32_t value = read_uleb(at);
-  const unsigned bits = 7u * static_cast<unsigned>(at - begin);
-  const bool negative = (at[-1] & 0x40) != 0 && bits < 32;
+  unsigned bits = 0;
+  std::uint8_t byte;
+  do {
+    byte = *at++;
+    value |= std::uint32_t{byte & 0x7Fu} << bits;
+    bits += 7;
+  } while (byte & 0x80);
+  const bool negative = is_signed && (byte & 0x40) != 0 && bits < 32;
   return static_cast<std::int32_t>(negative ? value | ~0u << bits : value);
 }
 
@@ -90,20 +85,20 @@ int _Unwind_CallPersonality(void *exception) {
   pad.selector = 0;
   const std::uint8_t *at = pad.lsda + 1; // without an address of landing pads
   const bool has_types = *at++ != OMITTED;
-  const std::uint32_t types_after = has_types ? read_uleb(at) : 0;
+  const std::int32_t types_after = has_types ? read_leb(at) : 0;
   const std::uint8_t *types = at + types_after;
   at++; // how call sites are written
-  const std::uint32_t sites = read_uleb(at);
+  const std::int32_t sites = read_leb(at);
   const std::uint8_t *actions = at + sites;
-  std::uint32_t action = 0;
+  std::int32_t action = 0;
   for (std::uintptr_t i = 0; i <= pad.index; i++) {
-    read_uleb(at); // the landing pad itself
-    action = read_uleb(at);
+    read_leb(at); // the landing pad itself
+    action = read_leb(at);
   }
   for (at = actions + action - 1; action != 0;) {
-    const std::int32_t filter = read_sleb(at);
+    const std::int32_t filter = read_leb(at, true);
     const std::uint8_t *here = at;
-    const std::int32_t next = read_sleb(at);
+    const std::int32_t next = read_leb(at, true);
     if (filter > 0) {
       const std::type_info *wanted; // null: catch (...)
       std::memcpy(&wanted, types - filter * static_cast<int>(sizeof wanted), sizeof wanted);

@@ -7,9 +7,8 @@
 //   name       16 bytes, zero-padded: of simulation/twin/indenter.hpp
 //   radius     [force] floats, mm, of the contact
 //   indented   [force] floats, mm
-//   fields     3 times: under a force down, along x, along y: [force] of a float, the largest
-//   value,
-//              Pa / N, and [x][y] int16, parts of 32767 of it
+//   fields     3 times: under a force down, along x, along y: [force] of a float, the largest value, Pa / N, and
+//              [x][y] int16, parts of 32767 of it
 // with forces and symmetries as in simulation/twin/force_planes.hpp. The rest are the bytes of the
 // command that sets the fingertip's pad profile.
 #pragma once

@@ -15,10 +15,8 @@
 //   drop    from DROP_mm: m z'' = F - m g, F that of the table at its depth, times 1 + LOSS_s_mm z'
 //           while it goes deeper (Hunt and Crossley, J. Appl. Mech. 42, 1975). It bounces, and
 //           lies.
-//   hold    as press, but along the pad the object is free: m x'' = load - Q, where the load
-//   follows
-//           what is asked within LOAD_FOLLOWS_s. One that slid off stays lost until it is lifted,
-//           pressed or dropped
+//   hold    as press, but along the pad the object is free: m x'' = load - Q, where the load follows what is
+//           asked within LOAD_FOLLOWS_s. One that slid off stays lost until it is lifted, pressed or dropped.
 //
 // Time goes on in steps of STEP_s; between them readings are linear. Deterministic: the same calls
 // at the same times give the same bits. Some 25 us a millisecond while something touches.
@@ -55,7 +53,6 @@ public:
   // errors: of the pad, by name.
   World(std::vector<Object> objects, const twin::EffectValues &errors, std::uint64_t seed);
 
-  std::size_t objects() const { return objects_.size(); }
   // What touched is lifted. Out of range: nothing happens.
   void choose(std::size_t object);
   // Out of their ranges, all values count as at the end. Values that are not finite: as nothing

@@ -13,11 +13,11 @@ type Doing = 'nothing' | 'pointer' | 'press' | 'hold';
 
 export class HandPanel implements Touch {
   readonly element: HTMLElement;
-  private readonly force: { value: number; element: HTMLElement };
-  private readonly load: { value: number; element: HTMLElement };
-  private readonly angle: { value: number; element: HTMLElement };
-  private readonly x: { value: number; element: HTMLElement };
-  private readonly y: { value: number; element: HTMLElement };
+  private readonly force = this.slider('Force', 'N', 0.5, MOST_N, 0.5, 4);
+  private readonly x = this.slider('Across', 'mm', -13, 13, 0.5, 0);
+  private readonly y = this.slider('Along', 'mm', -22, 22, 0.5, 0);
+  private readonly load = this.slider('Load', 'N', 0, MOST_N, 0.1, 1);
+  private readonly angle = this.slider('Direction', '°', -180, 180, 5, -90);
   private readonly pressButton: HTMLButtonElement;
   private readonly holdButton: HTMLButtonElement;
   private doing: Doing = 'nothing';
@@ -25,12 +25,6 @@ export class HandPanel implements Touch {
   private sent = '';
 
   constructor(private readonly hand: Hand) {
-    const again = () => this.apply(performance.now());
-    this.force = slider('Force', 'N', { least: 0.5, most: MOST_N, step: 0.5, value: 4 }, again);
-    this.x = slider('Across', 'mm', { least: -13, most: 13, step: 0.5, value: 0 }, again);
-    this.y = slider('Along', 'mm', { least: -22, most: 22, step: 0.5, value: 0 }, again);
-    this.load = slider('Load', 'N', { least: 0, most: MOST_N, step: 0.1, value: 1 }, again);
-    this.angle = slider('Direction', '°', { least: -180, most: 180, step: 5, value: -90 }, again);
     this.pressButton = button('Press', () => this.toggle('press'), { 'aria-pressed': 'false' });
     this.holdButton = button('Hold in a grip', () => this.toggle('hold'), { 'aria-pressed': 'false' });
     const lift = button('Lift', () => {
@@ -54,6 +48,10 @@ export class HandPanel implements Touch {
         ...this.slipping(),
       ),
     );
+  }
+
+  private slider(name: string, unit: string, least: number, most: number, step: number, value: number) {
+    return slider(name, unit, { least, most, step, value }, () => this.apply(performance.now()));
   }
 
   down(x_mm: number, y_mm: number): void {
