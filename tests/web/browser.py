@@ -21,12 +21,12 @@ import time
 PATIENCE_s = 1200
 BINARIES = ("/usr/lib/chromium/chromium",)
 POLICY_FOLDER = "/etc/chromium"
-# nothing of the browser's own on the network; WebGL in software, as where there is no graphics processor
+# nothing of the browser's own on the network
 FLAGS = """
 --headless --no-sandbox --remote-debugging-pipe --no-first-run --no-default-browser-check
 --disable-extensions --disable-background-networking --disable-component-update --disable-sync --disable-default-apps
 --disable-breakpad --disable-dev-shm-usage --mute-audio --hide-scrollbars --force-color-profile=srgb
---force-device-scale-factor=1 --enable-unsafe-swiftshader
+--force-device-scale-factor=1
 """.split()
 FAINT = """(() => {
   const paint = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
