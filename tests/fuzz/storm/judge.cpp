@@ -224,16 +224,13 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
   const Row truth = world_.at(measured_us);
   const bool good =
       (flags & CONTACT_FLAG_TARED) && !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
-  if (good && good_in_a_row_++ == 0) {
-    good_since_us_ = t_us;
-  }
-  good_in_a_row_ = good ? good_in_a_row_ : 0;
+  good_in_a_row_ = good ? good_in_a_row_ + 1 : 0;
 
   if (flags & WARNINGS) {
     return;
   }
   if (flags & CONTACT_FLAG_FIT_VALID) {
-    figures_.unwarned++;
+    figures_.judged++;
     const double error_mm =
         std::hypot(static_cast<double>(contact.x_mm) - truth.x_mm, static_cast<double>(contact.y_mm) - truth.y_mm);
     const double force_N = truth.force_N();
@@ -254,7 +251,7 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
       }
     }
   } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
-    figures_.at_rest++;
+    figures_.judged++;
     if (measured_us >= SENSED_FOR_us && is_firm(measured_us - SENSED_FOR_us) && is_firm(measured_us)) {
       wrong(t_us, text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa", contact.frame,
                        flags, truth.peak_Pa));
@@ -276,7 +273,7 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
     if (!(trusted >> k & 1)) {
       continue;
     }
-    figures_.readings++;
+    figures_.judged++;
     const double off_Pa = std::fabs(raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, measured_us));
     if (off_Pa > READING_BOUND_Pa && t_us < readings_excused_until_us_) {
       figures_.excused++;
@@ -298,23 +295,25 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
     find("time", t_us, text("uptime %u s at %.3f s", health.uptime_s, uptime_s));
   }
   if (health_of_life_) {
-    const wire_health &before = *health_of_life_;
-    const std::uint32_t rises[] = {
-        health.frames - before.frames,
-        health.frames_incomplete - before.frames_incomplete,
-        health.frames_skipped - before.frames_skipped,
-        health.packets_sent - before.packets_sent,
-        health.packets_dropped - before.packets_dropped,
-        health.commands_done - before.commands_done,
-        health.commands_rejected - before.commands_rejected,
-        health.bus_nacks - before.bus_nacks,
-        health.bus_timeouts - before.bus_timeouts,
-        health.bus_recoveries - before.bus_recoveries,
-        health.zero_readings - before.zero_readings,
-        health.implausible_readings - before.implausible_readings,
+    constexpr std::uint32_t wire_health::*COUNTERS[] = {
+        &wire_health::frames,
+        &wire_health::frames_incomplete,
+        &wire_health::frames_skipped,
+        &wire_health::packets_sent,
+        &wire_health::packets_dropped,
+        &wire_health::commands_done,
+        &wire_health::commands_rejected,
+        &wire_health::bus_nacks,
+        &wire_health::bus_timeouts,
+        &wire_health::bus_recoveries,
+        &wire_health::zero_readings,
+        &wire_health::implausible_readings,
     };
-    if (std::any_of(std::begin(rises), std::end(rises), [](std::uint32_t rise) { return rise >= 0x80000000u; })) {
-      find("loss", t_us, "a counter of the health packet went back");
+    for (const auto counter : COUNTERS) {
+      if (health.*counter - (*health_of_life_).*counter >= 0x80000000u) {
+        find("loss", t_us, "a counter of the health packet went back");
+        break;
+      }
     }
   }
   health_of_life_ = health;

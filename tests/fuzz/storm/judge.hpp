@@ -34,7 +34,7 @@ namespace storm {
 constexpr double LOCATION_BOUND_mm = 1.2;
 constexpr double FORCE_BOUND_N = 0.1, FORCE_BOUND_SHARE = 0.15;
 constexpr double READING_BOUND_Pa = 1300;
-// So many good frames in a row are a recovery, which counts from the first of them.
+// So many good frames in a row are a recovery.
 constexpr unsigned GOOD_FRAMES = 5;
 
 struct Finding {
@@ -44,14 +44,12 @@ struct Finding {
 };
 
 struct Figures {
-  std::uint64_t frames = 0;   // contact packets
-  std::uint64_t unwarned = 0; // of them, with a fit and without a warning
-  std::uint64_t at_rest = 0;  // and those that state without a warning that nothing touches
-  std::uint64_t readings = 0; // valid and not doubtful, of tared frames without a warning
-  std::uint64_t missing = 0;  // packets
-  std::uint64_t skipped = 0;  // frames
-  std::uint64_t late = 0;     // frames that state that their tangential force was late
-  std::uint64_t excused = 0;  // wrong frames and readings after what nothing can detect
+  std::uint64_t frames = 0;  // contact packets
+  std::uint64_t judged = 0;  // frames and readings that say without a warning what is so
+  std::uint64_t missing = 0; // packets
+  std::uint64_t skipped = 0; // frames
+  std::uint64_t late = 0;    // frames that state that their tangential force was late
+  std::uint64_t excused = 0; // wrong frames and readings after what nothing can detect
 };
 
 class Judge {
@@ -81,7 +79,6 @@ public:
   // Counts good frames again.
   void expect_recovery() { good_in_a_row_ = 0; }
   bool has_recovered() const { return good_in_a_row_ >= GOOD_FRAMES; }
-  std::uint64_t good_since_us() const { return good_since_us_; }
   std::uint64_t last_frame_us() const { return last_frame_heard_us_; }
 
   // What happens meanwhile: part of each finding.
@@ -139,7 +136,7 @@ private:
   double allowed_sds_ = 0;
   std::uint64_t excused_until_us_ = 0, readings_excused_until_us_ = 0;
   unsigned good_in_a_row_ = 0;
-  std::uint64_t good_since_us_ = 0, last_frame_heard_us_ = 0;
+  std::uint64_t last_frame_heard_us_ = 0;
 };
 
 } // namespace storm

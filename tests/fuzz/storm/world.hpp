@@ -39,12 +39,10 @@ public:
   void keep_off(std::uint64_t from_us, std::uint64_t to_us);
 
   std::uint64_t fixed_us() const { return first_us_ + (rows_.size() - 1) * STEP_us; }
-  const Row &last() const { return rows_.back(); }
   // Since when nothing has touched, of what is fixed; UINT64_MAX: something does.
   std::uint64_t resting_since_us() const { return resting_since_us_; }
   Row at(std::uint64_t t_us) const; // of the last two minutes
   double pressure_Pa(unsigned sensor, std::uint64_t t_us) const;
-  double ambient_Pa(unsigned sensor) const { return ambient_Pa_[sensor]; } // with its moulding
   double temperature_degC(std::uint64_t t_us) const;
 
 private:
