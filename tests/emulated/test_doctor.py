@@ -17,7 +17,6 @@ from world import World
 
 TOOLS = argparse.Namespace()
 BOARDS = ("pico_mux", "pico_parallel")
-SENSORS = 15
 
 
 class Doctor(unittest.TestCase):
@@ -27,33 +26,33 @@ class Doctor(unittest.TestCase):
         cls.addClassCleanup(holder.cleanup)
         cls.folder = pathlib.Path(holder.name)
         cls.at_rest = write_scenario(cls.folder / "rest.csv")
-        # a system with the rule, and one without
-        for name in ("with_rule", "without_rule"):
-            rules = cls.folder / name / "etc/udev/rules.d"
-            rules.mkdir(parents=True)
-            for shared in ("dev", "proc", "sys"):
-                (cls.folder / name / shared).symlink_to(f"/{shared}")
-        (cls.folder / "with_rule/etc/udev/rules.d/60-fingertip.rules").write_text(
-            subprocess.run([f"{TOOLS.support}/simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout
-        )
+        # a system with the rule
+        rules = cls.folder / "with_rule/etc/udev/rules.d"
+        rules.mkdir(parents=True)
+        for shared in ("dev", "proc", "sys"):
+            (cls.folder / "with_rule" / shared).symlink_to(f"/{shared}")
+        rule = subprocess.run([f"{TOOLS.support}/simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout
+        (rules / "60-fingertip.rules").write_text(rule)
 
     def setUp(self):
         self.plugged_in = 0
         self.world = self.enterContext(World(TOOLS.support, TOOLS.node, self.folder))
 
-    def plug_in(self, board, faults=(), scenario=None, sensor="ms5840"):
+    def plug_in(self, board, faults=(), sensor="ms5840"):
         """An emulated fingertip; returns its port."""
         self.plugged_in += 1
         port, plan = self.folder / f"port-{self.plugged_in}", self.folder / "faults.json"
         plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
         image = f"{TOOLS.boards}/{board}/fingertip-{board}.bin"
         more = options(sensor=sensor, faults=plan, seconds=3600, fast_enumeration=True)
-        self.world.emulator(port, *options(board=board, image=image, scenario=scenario or self.at_rest), *more)
+        self.world.emulator(port, *options(board=board, image=image, scenario=self.at_rest), *more)
         return port
 
-    def examine(self, port, *arguments, system="with_rule", seconds=1):
+    def examine(self, port, *arguments, seconds=1):
         """The findings that are not well."""
-        doctor = self.world.start_tool("doctor", "--port", port, "--json", "--seconds", seconds, "--root", self.folder / system, *arguments)
+        doctor = self.world.start_tool(
+            "doctor", "--port", port, "--json", "--seconds", seconds, "--root", self.folder / "with_rule", *arguments
+        )
         out, err = doctor.communicate()
         self.assertEqual(err, "")
         self.result = json.loads(out)
@@ -125,13 +124,6 @@ class Doctor(unittest.TestCase):
         self.assertEqual(finding["sensors"], [{"sensor": 7, "strip": 1, "position": 2, "gpio": 7}])
         self.assertIn("GP7 (pin 10)", finding["text"])
 
-    def test_all_sensors_missing(self):
-        for board in BOARDS:
-            findings = self.examine(self.plug_in(board, [{"type": "sensor_dead", "sensor": k} for k in range(SENSORS)]))
-            finding = self.only(findings, "sensors", "bad")
-            self.assertIn("none of the 15 sensors answers", finding["text"])
-            self.assertIn({"pico_mux": "SCL on GP5 (pin 7)", "pico_parallel": "SCL on GP15 (pin 20)"}[board], finding["advice"])
-
     def test_a_dead_multiplexer(self):
         findings = self.examine(self.plug_in("pico_mux", [{"type": "mux_dead", "mux": 1}]))
         finding = self.only(findings, "sensors", "bad")
@@ -164,31 +156,6 @@ class Doctor(unittest.TestCase):
             noise_Pa = [sensor["noise_Pa"] for sensor in self.result["measured"]["sensors"]]
             self.assertAlmostEqual(noise_Pa[11], 39, delta=4)
             self.assertLess(max(noise_Pa[:11]), 4.5)
-
-    def test_a_drifting_sensor(self):
-        drift = write_scenario(self.folder / "drift.csv", [0, *[0] * SENSORS], [100, *[0] * 4, 300, *[0] * 10])
-        findings = self.examine(self.plug_in("pico_mux", scenario=drift), seconds=10)
-        finding = self.only(findings, "drift", "warn")
-        self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [4])
-        self.assertAlmostEqual(self.result["measured"]["sensors"][4]["drift_Pa_per_s"], 3, delta=1)
-
-    def test_something_touches(self):
-        press = write_scenario(
-            self.folder / "press.csv", [0, *[0] * SENSORS], [1, *[0] * SENSORS], [1.1, *[0] * 6, 3000, 9000, 3000, *[0] * 6]
-        )
-        findings = self.examine(self.plug_in("pico_mux", scenario=press), seconds=3)
-        self.assertIn("something touches the pad", self.only(findings, "zero", "warn")["text"])
-        self.assertEqual(len(findings), 1, findings)
-
-    def test_disturbed_transfers(self):
-        faults = [{"type": "sensor_nack", "sensor": i % SENSORS, "from_s": 0.05 * i} for i in range(1, 400)]
-        findings = self.examine(self.plug_in("pico_parallel", faults))
-        self.assertIn("NACKs/s", self.only(findings, "bus", "warn")["text"])
-
-    def test_a_missing_rule(self):
-        findings = self.examine(self.plug_in("pico_mux"), system="without_rule")
-        self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("rule", "warn")])
-        self.assertIn("fingertip rule | sudo tee", findings[0]["advice"])
 
     def test_a_port_in_use(self):
         """A terminal that this process holds."""

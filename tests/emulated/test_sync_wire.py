@@ -8,20 +8,67 @@ error between rows of both is that of the alignment by edges, which begins some 
 
 import argparse
 import json
+import os
 import pathlib
 import tempfile
 import unittest
 
-from emulation import main, write_scenario
-from two_clocks import CLOCKS_ppm, RATE_Hz, Emulator, record_all, recordings_in, worst_us
+import numpy as np
+
+from emulation import files, main, options, write_scenario
 from world import World
 
 TOOLS = argparse.Namespace()
+CLOCKS_ppm = {"E660583883265A01": 25, "E660583883265A02": -25}
+RATE_Hz = 50
 RECORDED_s = 16
 BY_USB_s = 6.5  # the first edges, and five seconds more
 STROBE_ms = 251.3337
-LIMIT_us = 2
+LIMIT_us, USB_LIMIT_us = 2, 200
 MEASURED = {}
+
+
+class Emulator:
+    def __init__(self, world, image, folder, serial, scenario, *more):
+        self.port = folder / f"tty-{serial}"
+        self.report_path = folder / f"{serial}.json"
+        own = options(seed=int(serial[-2:]), serial=serial, clock_ppm=CLOCKS_ppm[serial], report=self.report_path)
+        shared = options(image=image, board="pico_mux", scenario=scenario, seconds=3600, fast_enumeration=True)
+        self.process = world.emulator(self.port, *shared, *own, *more)
+
+    def stop(self):
+        self.process.terminate()
+        said, self.errors = self.process.communicate()
+        self.power_on_us = int(said)
+        self.report = json.loads(self.report_path.read_text())
+
+    def true_us(self, device_us):
+        """On the host's clock."""
+        return self.power_on_us + self.report["device_time_zero_s"] * 1e6 + device_us / (1 + self.report["clock_ppm"] * 1e-6)
+
+
+def record_all(world, emulators, path, seconds):
+    ports = ":".join(str(each.port) for each in emulators)
+    world.tool("record", path, "--all", "--seconds", seconds, env={**os.environ, "FINGERTIP_PORT": ports})
+
+
+def recordings_in(path):
+    return [files.read_recording(path, serial=serial) for serial in CLOCKS_ppm]
+
+
+def worst_us(emulators, recordings, from_s=-np.inf, to_s=np.inf):
+    """Of each row against the other's latest: how far apart the two are that truly are of one moment."""
+    host_zero_us = float(recordings[0].metadata["host_zero_us"])
+    rows = []
+    for number, (each, recording) in enumerate(zip(emulators, recordings)):
+        error_us = recording.time_us - (each.true_us(recording["t_us"]) - host_zero_us)
+        inside = (recording.time_us >= from_s * 1e6) & (recording.time_us < to_s * 1e6)
+        rows += [(time_us, number, error) for time_us, error in zip(recording.time_us[inside], error_us[inside])]
+    latest, worst = {}, 0.0
+    for _, number, error_us in sorted(rows):
+        latest[number] = error_us
+        worst = max(worst, abs(latest[number] - latest.get(1 - number, error_us)))
+    return worst
 
 
 class OneWire(unittest.TestCase):
@@ -85,6 +132,13 @@ class OneWire(unittest.TestCase):
         self.assertLessEqual(by_edges_us, bound_us)
         self.assertLessEqual(bound_us, 4)
         self.assertGreater(by_usb_us, by_edges_us)
+        self.assertLess(by_usb_us, USB_LIMIT_us)
+        self.assertLessEqual(by_usb_us, float(self.recordings[0].end["alignment_us"]))
+
+    def test_the_drift_of_each_clock_is_found(self):
+        ends = [line for line in self.file.read_text(encoding="utf-8").splitlines() if "/end:" in line]
+        for end, drift_ppm in zip(ends, CLOCKS_ppm.values(), strict=True):
+            self.assertLess(abs(float(dict(pair.split("=") for pair in end.split()[2:])["drift_ppm"]) - drift_ppm), 2)
 
 
 if __name__ == "__main__":

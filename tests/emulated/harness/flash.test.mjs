@@ -93,8 +93,19 @@ test('write enable shows in the status and is needed again each time', () => {
   assert.equal(driver.status, 3);
 });
 
-fails('page program without write enable', (d) => d.command(PROGRAM(AT, 0)), /page programmed without write enable/);
-fails('sector erase without write enable', (d) => d.command(ERASE(AT)), /sector erased without write enable/);
+/** Gives commands one after the other. */
+const commands =
+  (...all) =>
+  (d) => {
+    for (const bytes of all) d.command(bytes);
+  };
+const WRITE_ENABLE = [0x06];
+fails('page program without write enable', commands(PROGRAM(AT, 0)), /page programmed without write enable/);
+fails('sector erase without write enable', commands(ERASE(AT)), /sector erased without write enable/);
+fails('reading while busy', commands(WRITE_ENABLE, ERASE(AT), READ(AT)), /0x3 while the flash is busy/);
+fails('beyond the end of a page', commands(WRITE_ENABLE, PROGRAM(AT + 250, ...new Array(7).fill(0))), /passes the end of the page/);
+fails('page program without data', commands(WRITE_ENABLE, PROGRAM(AT)), /without data/);
+fails('an unknown command', commands([0xd8]), /0xd8 is not modelled/);
 fails(
   'a second program without write enable',
   (d) => {
@@ -104,36 +115,9 @@ fails(
   /without write enable/,
 );
 fails(
-  'reading while busy',
-  (d) => {
-    d.command([0x06]);
-    d.command(ERASE(AT));
-    d.bytes(AT, 1);
-  },
-  /0x3 while the flash is busy/,
-);
-fails(
-  'beyond the end of a page',
-  (d) => {
-    d.command([0x06]);
-    d.command(PROGRAM(AT + 250, ...new Array(7).fill(0)));
-  },
-  /passes the end of the page/,
-);
-fails(
-  'page program without data',
-  (d) => {
-    d.command([0x06]);
-    d.command(PROGRAM(AT));
-  },
-  /without data/,
-);
-fails('an unknown command', (d) => d.command([0xd8]), /0xd8 is not modelled/);
-fails(
   'execution in place while busy',
   (d) => {
-    d.command([0x06]);
-    d.command(ERASE(AT));
+    commands(WRITE_ENABLE, ERASE(AT))(d);
     d.write(0x18000008, 0);
     d.write(0x18000000, (31 << 16) | (3 << 8));
     d.write(0x18000008, 1);
