@@ -10,7 +10,6 @@ import { SyncPin } from './board/sync_pin.mjs';
 import { Chip, Stopped } from './chip/chip.mjs';
 import { RAM_BASE } from './chip/core.mjs';
 import { FlashMemory } from './chip/flash_memory.mjs';
-import { Trouble } from './chip/trouble.mjs';
 import { SimulatedTime } from './clock.mjs';
 import { Faults } from './faults.mjs';
 import { Report } from './report.mjs';
@@ -85,7 +84,7 @@ export class Machine {
         stimulus: (index, t_ns) => scenario.at_ns(index, t_ns),
         faults: () => this.faults,
       });
-    this.trouble = new Trouble();
+    this.trouble = {}; // outlives a reset and a power cut
     const { memory, trouble } = this;
     this.chipOptions = { serial: this.serial, seed, clock_ppm, revision, uptime_us, rosc_hz, memory, trouble };
     this.boardScope = this.time.scope();

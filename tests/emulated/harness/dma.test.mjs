@@ -81,20 +81,16 @@ test('memory to memory: one word a cycle after the first; TRANS_COUNT counts dow
   assert.equal(b.read(CH(3, WRITE)), B + 800);
 });
 
-test('bytes and halfwords, with and without swapping', () => {
-  for (const [size, bytes, swap] of [
-    [BYTES, 1, 0],
-    [HALVES, 2, 0],
-    [HALVES, 2, BSWAP],
-    [WORDS, 4, BSWAP],
+test('bytes and halfwords', () => {
+  for (const [size, bytes] of [
+    [BYTES, 1],
+    [HALVES, 2],
   ]) {
     const b = new Bench();
     b.fill(A, 12);
-    b.setUp(0, { count: 12 / bytes, ctrl: size | swap | INCR_READ | INCR_WRITE | paced(UNPACED) });
+    b.setUp(0, { count: 12 / bytes, ctrl: size | INCR_READ | INCR_WRITE | paced(UNPACED) });
     b.run(40);
-    const expected = b.bytes(A, 12);
-    if (swap) for (let i = 0; i < 12; i += bytes) expected.splice(i, bytes, ...expected.slice(i, i + bytes).reverse());
-    assert.deepEqual(b.bytes(B, 12), expected);
+    assert.deepEqual(b.bytes(B, 12), b.bytes(A, 12));
   }
 });
 
@@ -253,6 +249,7 @@ refuses('held in reset', /while DMA is held in reset/, (b) => b.write(INTE0, 1),
 refuses('request that is not modelled', /request 20 is not modelled/, (b) => b.setUp(0, { count: 1, ctrl: WORDS | paced(20) }));
 refuses('misaligned address', /not aligned to 4 bytes/, (b) => b.setUp(0, { from: A + 2, count: 1, ctrl: WORDS | paced(UNPACED) }));
 refuses('data size 3', /DATA_SIZE 3/, (b) => b.setUp(0, { count: 1, ctrl: 3 << 2 }));
+refuses('swapped bytes', /BSWAP and SNIFF_EN are not modelled/, (b) => b.setUp(0, { count: 1, ctrl: WORDS | BSWAP | paced(UNPACED) }));
 refuses('two channels on one request', /as busy channel 0 is/, (b) =>
   [0, 1].forEach((c) => b.setUp(c, { to: TXF0, count: 9, ctrl: WORDS | paced(TX0) })),
 );

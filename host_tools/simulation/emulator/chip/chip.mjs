@@ -32,7 +32,6 @@ import { StrictSio } from './sio.mjs';
 import { Ssi } from './ssi.mjs';
 import { SysClock } from './sys_clock.mjs';
 import { Timer, Watchdog } from './timer_watchdog.mjs';
-import { Trouble } from './trouble.mjs';
 import { UsbBlock } from './usb_block.mjs';
 
 const BOOT2_BYTES = 256;
@@ -103,7 +102,7 @@ export class Chip extends RP2040 {
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
    *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; rosc_hz: of the ring oscillator; uptime_us: what the timer begins with; memory: the FlashMemory, a new one by default; trouble: what goes wrong
-   *   in the chip; kept: { sram, usbDPRAM, watchdog }
+   *   in the chip, by the faults in force: crystalDead, crystalWeak, pllLate, busyHub, lateResume; kept: { sram, usbDPRAM, watchdog }
    *   of the life before a watchdog reboot
    */
   constructor(
@@ -117,7 +116,7 @@ export class Chip extends RP2040 {
       rosc_hz = ROSC_HZ,
       uptime_us = 0,
       memory = new FlashMemory({ time, serial, seed }),
-      trouble = new Trouble(),
+      trouble = {},
       kept = null,
     },
   ) {

@@ -2,14 +2,14 @@
  * DMA controller of the RP2040 (datasheet 2.5): twelve channels, paced by the requests of the PIO blocks or by none.
  *
  * Pacing is by credits: a channel may have as many transfers under way as its peripheral has room or data for. One
- * transfer is issued per cycle of clk_sys over all channels, round robin, HIGH_PRIORITY first. A read ends two cycles
+ * transfer is issued per cycle of clk_sys over all channels, round robin. A read ends two cycles
  * after its issue, the write two after the read; an APB peripheral takes two more. Competition with the processor for
  * one memory bank is not modelled. A channel is complete when its last write ends.
  *
  * Erratum RP2040-E13 is modelled: a transfer under way when its channel is aborted still ends, and then raises the
  * channel's interrupt; CHAN_ABORT reads 0 before that.
  *
- * Fails the run: other requests than those of the PIO, pacing timers, the sniffer (not modelled); an address or a
+ * Fails the run: other requests than those of the PIO, pacing timers, priorities, swapped bytes, the sniffer (not modelled); an address or a
  * count written while the channel is busy, misaligned addresses, two busy channels on one request.
  */
 import { FLASH_BASE, RAM_BASE, RAM_BYTES } from './core.mjs';
@@ -20,12 +20,12 @@ const PERMANENT = 0x3f;
 const PIO_REQUESTS = 16;
 
 const CTRL_EN = 1;
-const CTRL_HIGH_PRIORITY = 2;
 const CTRL_INCR_READ = 1 << 4;
 const CTRL_INCR_WRITE = 1 << 5;
 const CTRL_RING_SEL = 1 << 10;
 const CTRL_IRQ_QUIET = 1 << 21;
-const CTRL_BSWAP = 1 << 22;
+/** HIGH_PRIORITY, BSWAP, SNIFF_EN. */
+const CTRL_OTHERS = 2 | (1 << 22) | (1 << 23);
 const CTRL_BUSY = 1 << 24;
 const CTRL_WRITABLE = 0xffffff;
 
@@ -164,10 +164,7 @@ export class Dma extends RegisterBlock {
       const channel = this.channels[(this.lastIssued + i) % CHANNELS];
       if (!this.#mayIssue(channel)) continue;
       if (!chosen) chosen = channel;
-      else {
-        more = true;
-        if (channel.ctrl & CTRL_HIGH_PRIORITY && !(chosen.ctrl & CTRL_HIGH_PRIORITY)) chosen = channel;
-      }
+      else more = true;
     }
     if (!chosen) return;
     this.lastIssued = chosen.index;
@@ -202,7 +199,6 @@ export class Dma extends RegisterBlock {
       transfer.value = this.rp2040.busRead(from, bytes);
     }
     if (channel.treq & 4 || channel.treq === PERMANENT) channel.credit -= 1;
-    if (channel.ctrl & CTRL_BSWAP) transfer.value = swapBytes(transfer.value, bytes);
     const previous = this.writes.at(-1);
     transfer.edge = Math.max(edge + accessCycles(transfer.to), previous ? previous.edge + 1 : 0);
     this.writes.push(transfer);
@@ -318,6 +314,7 @@ export class Dma extends RegisterBlock {
     const what = ALIASES[word];
     if (what === 'C') {
       if (((value >>> 2) & 3) === 3) this.#fail(channel, 'DATA_SIZE 3 is reserved');
+      if (value & CTRL_OTHERS) this.#fail(channel, 'HIGH_PRIORITY, BSWAP and SNIFF_EN are not modelled');
       if (channel.busy && (value ^ channel.ctrl) & CTRL_WRITABLE & ~CTRL_EN)
         this.#fail(channel, 'CTRL changed while the channel is busy; only EN may');
       channel.ctrl = value & CTRL_WRITABLE;
@@ -335,10 +332,4 @@ export class Dma extends RegisterBlock {
       this.#interrupt();
     }
   }
-}
-
-function swapBytes(value, bytes) {
-  if (bytes === 1) return value;
-  if (bytes === 2) return ((value & 0xff) << 8) | ((value >>> 8) & 0xff);
-  return (value << 24) | ((value & 0xff00) << 8) | ((value >>> 8) & 0xff00) | (value >>> 24);
 }

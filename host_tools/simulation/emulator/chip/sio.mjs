@@ -12,23 +12,14 @@ const [VLD, RDY, WOF, ROE] = [1, 2, 4, 8];
 /** SIO_IRQ_PROC0; that of core 1 follows. */
 const FIFO_IRQ = 15;
 
-class Divider {
-  constructor() {
-    this.dividend = 0;
-    this.divisor = 0;
-    this.quotient = 0;
-    this.remainder = 0;
-    this.readyAt = 0;
-    this.dirty = 0;
-  }
-}
+const newDivider = () => ({ dividend: 0, divisor: 0, quotient: 0, remainder: 0, readyAt: 0, dirty: 0 });
 
 export class StrictSio extends RPSIO {
   constructor(chip) {
     super(chip);
     const Interpolator = this.interp0.constructor;
     this.own = [0, 1].map(() => ({
-      divider: new Divider(),
+      divider: newDivider(),
       interpolators: [new Interpolator(0), new Interpolator(1)],
       words: [],
       overflowed: false,
@@ -48,7 +39,7 @@ export class StrictSio extends RPSIO {
   /** What the boot ROM leaves: it reads its empty FIFO. */
   resetCore(id) {
     const own = this.own[id];
-    own.divider = new Divider();
+    own.divider = newDivider();
     own.words.length = 0;
     own.overflowed = false;
     own.underflowed = true;
@@ -121,22 +112,26 @@ export class StrictSio extends RPSIO {
     return value >>> 0;
   }
 
-  readUint32(offset) {
-    switch (offset) {
-      case 0x60:
-      case 0x68:
-        return this.divider.dividend >>> 0;
-      case 0x64:
-      case 0x6c:
-        return this.divider.divisor >>> 0;
-      case 0x70:
-        this.divider.dirty = 0;
-        return this.#result(this.divider.quotient);
-      case 0x74:
-        return this.#result(this.divider.remainder);
-      case 0x78:
-        return (this.rp2040.core.cycles >= this.divider.readyAt ? 1 : 0) | this.divider.dirty;
+  #readDivider(offset) {
+    const { divider } = this;
+    if (offset === 0x78) return (this.rp2040.core.cycles >= divider.readyAt ? 1 : 0) | divider.dirty;
+    if (offset === 0x74) return this.#result(divider.remainder);
+    if (offset === 0x70) {
+      divider.dirty = 0;
+      return this.#result(divider.quotient);
     }
+    return (offset & 4 ? divider.divisor : divider.dividend) >>> 0;
+  }
+
+  #writeDivider(offset, value) {
+    const { divider } = this;
+    divider[{ 0x60: 'dividend', 0x64: 'divisor', 0x68: 'dividend', 0x6c: 'divisor', 0x70: 'quotient', 0x74: 'remainder' }[offset]] = value;
+    if (offset < 0x70) this.#divide(offset >= 0x68);
+    else divider.dirty = 2;
+  }
+
+  readUint32(offset) {
+    if (offset >= 0x60 && offset <= 0x78) return this.#readDivider(offset);
     if (offset >= FIFO_ST && offset <= FIFO_RD) return this.#readFifo(offset);
     if (offset === 0) return this.id;
     if (offset > 0x17c) return this.rp2040.fail('SIO', `read of 0x${offset.toString(16)}`);
@@ -144,28 +139,13 @@ export class StrictSio extends RPSIO {
   }
 
   writeUint32(offset, value) {
-    switch (offset) {
-      case 0x60:
-      case 0x68:
-        this.divider.dividend = value;
-        return this.#divide(offset === 0x68);
-      case 0x64:
-      case 0x6c:
-        this.divider.divisor = value;
-        return this.#divide(offset === 0x6c);
-      case 0x70:
-        this.divider.quotient = value;
-        this.divider.dirty = 2;
-        return undefined;
-      case 0x74:
-        this.divider.remainder = value;
-        this.divider.dirty = 2;
-        return undefined;
+    if (offset >= 0x60 && offset <= 0x74) {
+      this.#writeDivider(offset, value);
+      return;
     }
-    if (offset >= FIFO_ST && offset <= FIFO_RD) return this.#writeFifo(offset, value);
-    if (offset === 0x78) return this.rp2040.fail('SIO', `write of 0x${offset.toString(16)}`);
-    super.writeUint32(offset, value);
+    if (offset === 0x78) this.rp2040.fail('SIO', `write of 0x${offset.toString(16)}`);
+    if (offset >= FIFO_ST && offset <= FIFO_RD) this.#writeFifo(offset, value);
+    else super.writeUint32(offset, value);
     if (offset >= 0x10 && offset < 0x30) this.rp2040.pins.drive();
-    return undefined;
   }
 }

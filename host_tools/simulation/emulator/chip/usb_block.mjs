@@ -15,7 +15,6 @@ const CLK_USB_HZ = 48e6;
 
 const BC_AVAILABLE = 1 << 10;
 const BC_STALL = 1 << 11;
-const BC_RESET_SELECT = 1 << 12;
 const BC_PID = 1 << 13;
 const BC_FULL = 1 << 15;
 const BC_LENGTH = 0x3ff;
@@ -23,7 +22,6 @@ const BC_LENGTH = 0x3ff;
 const EP_ENABLE = 0x80000000;
 const EP_DOUBLE = 1 << 30;
 const EP_INT_PER_BUFFER = 1 << 29;
-const EP_INT_PER_TWO = 1 << 28;
 
 const SIE_PULLUP_EN = 1 << 16;
 const SIE_EP0_INT_1BUF = 1 << 29;
@@ -94,8 +92,7 @@ export class UsbBlock extends RegisterBlock {
     this.phyDirect = 0;
     this.phyOverride = 0;
     this.phyTrim = 0;
-    this.select = new Uint8Array(32);
-    this.fieldsWritten_ns = new Float64Array(64).fill(-1e9);
+    this.fieldsWritten_ns = new Float64Array(32).fill(-1e9);
     this.quiet = true;
     this.#update();
     this.onPortChange();
@@ -246,13 +243,14 @@ export class UsbBlock extends RegisterBlock {
     if (word < 0x80) this.#checkEndpointControl(word, next);
     else this.#checkBufferControl(word, old, next);
     view.setUint32(word, next, true);
-    if (word >= 0x80 && next & ~old & (BC_AVAILABLE | BC_STALL | (BC_AVAILABLE << 16))) {
+    if (word >= 0x80 && next & ~old & (BC_AVAILABLE | BC_STALL)) {
       this.onArmed((word - 0x80) >> 3, (word & 4) === 0);
     }
   }
 
   #checkEndpointControl(word, value) {
     if (!(value & EP_ENABLE)) return;
+    if (value & EP_DOUBLE) this.rp2040.fail('USB', 'double buffering is not modelled');
     const name = `EP${word >> 3} ${word & 4 ? 'OUT' : 'IN'}`;
     if (value & 0x3f) this.rp2040.fail('USB', `${name}: buffer address 0x${(value & 0xffff).toString(16)} is not 64-byte aligned`);
     const base = value & 0xffc0;
@@ -268,31 +266,25 @@ export class UsbBlock extends RegisterBlock {
     const bit = 2 * endpoint + (isOut ? 1 : 0);
     const underWay = ((this.inFlight >>> bit) & 1) !== 0;
     const aborted = ((this.epAbortDone >>> bit) & 1) !== 0;
-    for (const half of [0, 1]) {
-      const was = (old >>> (16 * half)) & 0xffff;
-      const is = (next >>> (16 * half)) & 0xffff;
-      const fieldsChanged = ((was ^ is) & ~(BC_AVAILABLE | BC_STALL | (half ? BC_RESET_SELECT : 0))) !== 0;
-      const time = 2 * bit + half;
-      const mayTake = this.quiet || aborted || (this.isOld && !fieldsChanged);
-      if (this.isOld && underWay && fieldsChanged) chip.fail('USB', `${name}: written while its packet is on the bus`);
-      if (was & BC_AVAILABLE && (fieldsChanged || !(is & BC_AVAILABLE)) && !mayTake) {
-        chip.fail('USB', `${name}: written while the controller owns the buffer; abort the endpoint (EP_ABORT) first`);
+    if (next >>> 16) chip.fail('USB', `${name}: double buffering is not modelled`);
+    const was = old & 0xffff;
+    const fieldsChanged = ((was ^ next) & ~(BC_AVAILABLE | BC_STALL)) !== 0;
+    const mayTake = this.quiet || aborted || (this.isOld && !fieldsChanged);
+    if (this.isOld && underWay && fieldsChanged) chip.fail('USB', `${name}: written while its packet is on the bus`);
+    if (was & BC_AVAILABLE && (fieldsChanged || !(next & BC_AVAILABLE)) && !mayTake)
+      chip.fail('USB', `${name}: written while the controller owns the buffer; abort the endpoint (EP_ABORT) first`);
+    if (next & BC_AVAILABLE && !(was & BC_AVAILABLE)) {
+      if (fieldsChanged) chip.fail('USB', `${name}: AVAILABLE set in the same write as the other fields; write those first`);
+      const gap_ns = now - this.fieldsWritten_ns[bit];
+      if (gap_ns < 1e9 / chip.trueHz(CLK_USB_HZ)) {
+        const wanted = 'wait at least one cycle of clk_usb (21 ns)';
+        chip.fail('USB', `${name}: AVAILABLE set ${gap_ns.toFixed(0)} ns after the other fields; ${wanted}`);
       }
-      if (is & BC_AVAILABLE && !(was & BC_AVAILABLE)) {
-        if (fieldsChanged) chip.fail('USB', `${name}: AVAILABLE set in the same write as the other fields; write those first`);
-        const gap_ns = now - this.fieldsWritten_ns[time];
-        if (gap_ns < 1e9 / this.rp2040.trueHz(CLK_USB_HZ)) {
-          chip.fail(
-            'USB',
-            `${name}: AVAILABLE set ${gap_ns.toFixed(0)} ns after the other fields; wait at least one cycle of clk_usb (21 ns)`,
-          );
-        }
-        if ((is & BC_LENGTH) > 64) chip.fail('USB', `${name}: length ${is & BC_LENGTH} exceeds the 64-byte packet`);
-        if (!isOut && !(is & BC_FULL)) chip.fail('USB', `${name}: an IN buffer was made available without FULL`);
-        if (isOut && is & BC_FULL) chip.fail('USB', `${name}: an OUT buffer was made available with FULL set`);
-      }
-      if (fieldsChanged) this.fieldsWritten_ns[time] = now;
+      if ((next & BC_LENGTH) > 64) chip.fail('USB', `${name}: length ${next & BC_LENGTH} exceeds the 64-byte packet`);
+      if (!isOut && !(next & BC_FULL)) chip.fail('USB', `${name}: an IN buffer was made available without FULL`);
+      if (isOut && next & BC_FULL) chip.fail('USB', `${name}: an OUT buffer was made available with FULL set`);
     }
+    if (fieldsChanged) this.fieldsWritten_ns[bit] = now;
   }
 
   #control(endpoint, isIn) {
@@ -303,19 +295,14 @@ export class UsbBlock extends RegisterBlock {
   #buffer(endpoint, isIn) {
     const word = 0x80 + 8 * endpoint + (isIn ? 0 : 4);
     const bit = 2 * endpoint + (isIn ? 0 : 1);
-    let control = EP_ENABLE | EP_INT_PER_BUFFER;
-    let base = 0x100;
+    let control = EP_INT_PER_BUFFER;
+    let address = 0x100;
     if (endpoint !== 0) {
       control = this.#control(endpoint, isIn);
       if (!(control & EP_ENABLE)) return null;
-      base = control & 0xffc0;
+      address = control & 0xffc0;
     }
-    const view = this.rp2040.usbDPRAMView;
-    const value = view.getUint32(word, true);
-    const double = endpoint !== 0 && (control & EP_DOUBLE) !== 0;
-    if (value & BC_RESET_SELECT) this.select[bit] = 0;
-    const half = double ? this.select[bit] : 0;
-    return { word, bit, control, double, half, address: base + 64 * half, value: (value >>> (16 * half)) & 0xffff };
+    return { word, bit, control, address, value: this.rp2040.usbDPRAMView.getUint32(word, true) };
   }
 
   /** An IN packet lies ready for the next token. */
@@ -324,14 +311,9 @@ export class UsbBlock extends RegisterBlock {
   }
 
   #complete(buffer, endpoint, status) {
-    const view = this.rp2040.usbDPRAMView;
-    const old = view.getUint32(buffer.word, true);
-    const next = (old & ~(0xffff << (16 * buffer.half))) | (status << (16 * buffer.half));
-    view.setUint32(buffer.word, (next & ~BC_RESET_SELECT) >>> 0, true);
-    if (buffer.double) this.select[buffer.bit] ^= 1;
+    this.rp2040.usbDPRAMView.setUint32(buffer.word, status, true);
     const everyBuffer = endpoint === 0 ? this.sieCtrl & SIE_EP0_INT_1BUF : buffer.control & EP_INT_PER_BUFFER;
-    const everySecond = endpoint !== 0 && buffer.double && buffer.control & EP_INT_PER_TWO && buffer.half === 1;
-    if (everyBuffer || everySecond) this.buffStatus |= 1 << buffer.bit;
+    if (everyBuffer) this.buffStatus |= 1 << buffer.bit;
     this.sieStatus |= ST_TRANS_COMPLETE | ST_ACK_REC;
     this.#update();
   }
