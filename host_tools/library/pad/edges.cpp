@@ -46,47 +46,36 @@ double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, 
   return 1e6 * sum;
 }
 
-struct Prepared {
-  fit_array array;
-  struct fit_pad pad;
-};
-
-Prepared prepare(const pad_profile &profile, const wire_info &info) {
-  Prepared made{};
-  if (fit_array_init(&made.array, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
-      fit_pad_init(&made.pad, &made.array, &profile) != FT_OK) {
-    throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
-  }
-  return made;
-}
-
 class Estimate {
 public:
-  Estimate(const Prepared &prepared, const pad_profile &profile, const wire_info &info, const twin::BlockTable &block)
-      : profile_(profile), info_(info), block_(block), prepared_(prepared) {
+  Estimate(const pad_profile &profile, const wire_info &info) : profile_(profile), info_(info) {
+    if (fit_array_init(&array_, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
+        fit_pad_init(&pad_, &array_, &profile) != FT_OK) {
+      throw Error(ErrorCode::bad_value,
+                  "the fingertip's sensors are no rectangle that tangential force is estimated on");
+    }
     settings_.iterations = 4;
     settings_.noise_Pa_q10 = 1024;
     std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS, static_cast<std::uint16_t>(65536.0 * GAIN_SD));
   }
 
   // False: there is no estimate.
-  bool of_contact(Contact &contact) {
+  bool of_contact(Contact &contact, const twin::BlockTable &block) {
     std::array<std::int32_t, FT_MAX_SENSORS> readings{};
     const double radius_mm = std::sqrt(5.0 * of(profile_.spread_mm2)); // under Hertz's pressure
     for (std::size_t k = 0; k < info_.sensor_count; k++) {
       const double layer = FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm,
                                               of(info_.y_mm[k]) - contact.y_mm);
       const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N, radius_mm};
-      const double added = block_.added_Pa(k, load, contact.x_mm, contact.y_mm);
+      const double added = block.added_Pa(k, load, contact.x_mm, contact.y_mm);
       readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * (layer + added)));
     }
     fit_result fit;
     struct fit_tangential found;
     fit_tangential_state state{};
-    fit_gaussian_grid(&prepared_.array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count),
-                      &settings_, &fit);
+    fit_gaussian_grid(&array_, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count), &settings_, &fit);
     for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
-      fit_tangential_estimate(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit, &state, &found);
+      fit_tangential_estimate(&array_, &pad_, readings.data(), &settings_, &fit, &state, &found);
     }
     if (!found.valid) {
       return false;
@@ -102,8 +91,8 @@ public:
 private:
   const pad_profile &profile_;
   const wire_info &info_;
-  const twin::BlockTable &block_;
-  Prepared prepared_;
+  fit_array array_{};
+  struct fit_pad pad_ {};
   fit_settings settings_{};
 };
 
@@ -174,7 +163,7 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
                                       "beyond the outer sensors, not for " +
                                           shortest(profile.overhang_mm));
   }
-  const Prepared prepared = prepare(profile, info);
+  Estimate estimate(profile, info);
   const int count = info.sensor_count;
   const double half_x = outermost(info.x_mm, count), half_y = outermost(info.y_mm, count);
   std::vector<twin::Place> sensors;
@@ -183,7 +172,6 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
   }
   const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm, half_y + overhang_mm};
   const twin::BlockTable block = twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
-  Estimate estimate(prepared, profile, info, block);
   std::vector<Contact> contacts[3]; // without load, pulled along x, along y
   std::size_t places = 0;
   for (double x_mm = -half_x; x_mm <= half_x + 1e-9; x_mm += STEP_mm) {
@@ -191,7 +179,7 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
       places++;
       for (int load = 0; load < 3; load++) {
         Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-        if (estimate.of_contact(contact)) {
+        if (estimate.of_contact(contact, block)) {
           contacts[load].push_back(contact);
         }
       }

@@ -7,7 +7,7 @@
 //   T(H) = sum share_j exp(-(H sd_j)^2 / 2),    Q(H) / H = sum moment_j exp(-(H sd_j)^2 / 2)
 // They are fitted by least squares over the plane, that is of the error squared times H dH. By
 // Parseval's theorem that is the error of the pressure itself. With two terms for T and three for Q
-// the pressure's root mean square error is 1.8 and 1.2 % of its own, at every thickness (misfit).
+// the pressure's root mean square error is 1.8 and 1.2 % of its own, at every thickness.
 //
 // The layer is infinite. A pad that ends differs near its edges, and the profile does not contain
 // that. Silicone, nu = 0.49; the pad's stiffness does not matter.
@@ -37,11 +37,5 @@ wire_info own_sensors();
 // (pad/edges.hpp): less than half a thickness (blocks of 12 mm in the report's part shear, no real
 // pad).
 bool edges_spoil_the_zero(const Shape &shape);
-
-// Root mean square errors of the two sums over the plane, relative to that of T and of Q.
-struct Misfit {
-  double normal, tangential;
-};
-Misfit misfit(const pad_profile &profile);
 
 } // namespace fingertip::pad
