@@ -9,38 +9,23 @@ libFuzzer cannot see into Python: these are the seeds of `corpus`, damaged at ra
 import argparse
 import pathlib
 import random
+import re
 import sys
 import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "host_tools/demo")]
+sys.path[:0] = [str(HERE), str(ROOT / "host_tools/python"), str(ROOT / "host_tools/demo")]
+import fuzz  # noqa: E402
 from fingertip import files  # noqa: E402
 from grasp import read_truth  # noqa: E402
 
 TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"
 RUN = '{"device_time_zero_s": 0.25, "warnings": [], "cycles": 5}\n'
-WORDS = (
-    b"18446744073709551616",
-    b"-1",
-    b"1e400",
-    b"nan",
-    b"inf",
-    b"",
-    b"\n",
-    b"\r\n",
-    b",",
-    b"#",
-    b": ",
-    b"\x00",
+WORDS = (b"18446744073709551616", b"-1", b"1e400", b"nan", b"inf", b"0x10", b"1_000", b"", b"\n", b"\r\n", b",", b"#", b": ", b"\x00") + (
     b"\xff\xfe",
-    b"0x10",
-    b"1_000",
-    b"# end: ",
-    b"# packet: info",
-    b"# grip: ",
-    b"# devices: ",
     b"\xe2\x80\xa8",
+    *(f"# {key}: {value}".encode() for key, value in {"end": "", "packet": "info", "grip": "", "devices": ""}.items()),
 )
 
 
@@ -69,30 +54,14 @@ def check_run(path, _):
     assert isinstance(files.read_run(path), dict)
 
 
-def damaged(data, prng):
+def damaged(data, seeds, prng):
+    """Words in place of cells, lines, or what is between them; then maybe anything."""
     for _ in range(prng.randrange(1, 5)):
-        at = prng.randrange(len(data) + 1)
-        end = min(len(data), at + prng.choice((0, 1, 1, 4, 20, 200)))
-        lines = data.splitlines(keepends=True)
-        cells = data.split(b",")
-        kind = prng.randrange(6)
-        if kind == 0:
-            data = data[:at] + prng.choice(WORDS) + data[end:]
-        elif kind == 1:
-            data = data[:at] + bytes([prng.randrange(256)]) + data[at + 1 :]
-        elif kind == 2:
-            data = data[:at]
-        elif kind == 3 and lines:
-            line = prng.choice(lines)
-            lines.insert(prng.randrange(len(lines) + 1), line)
-            data = b"".join(lines)
-        elif kind == 4 and lines:
-            del lines[prng.randrange(len(lines))]
-            data = b"".join(lines)
-        else:
-            cells[prng.randrange(len(cells))] = prng.choice(WORDS)
-            data = b",".join(cells)
-    return data
+        parts = re.split(rb"([,\n])", data)
+        at = prng.randrange(len(parts))
+        parts[at : at + prng.choice((0, 1, 1, 20))] = prng.choice(([prng.choice(WORDS)], [prng.choice(parts)], []))
+        data = b"".join(parts)
+    return fuzz.changed(data, seeds, 1 << 16, prng) if prng.randrange(2) else data
 
 
 def main(argv):
@@ -108,13 +77,13 @@ def main(argv):
         + [(check_scenario, data) for data in scenarios]
         + [(check_truth, TRUTH.encode()), (check_run, RUN.encode())]
     )
-    prng = random.Random(options.seed)
+    prng, seeds = random.Random(options.seed), [seed for _, seed in jobs]
     read = 0
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         path = pathlib.Path(folder) / "file"
         for run in range(options.runs):
             check, seed = jobs[run % len(jobs)]
-            data = damaged(seed, prng)
+            data = damaged(seed, seeds, prng)
             path.write_bytes(data)
             try:
                 check(path, prng)

@@ -1,17 +1,16 @@
 /* The C interface of libfingertip as a C program uses it, in C11. */
 #include "libfingertip/fingertip.h"
+#include "support/unit.h"
 #include "unit/wire/wire_samples.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unity.h>
+
+#define OK(call) TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, call)
 
 enum { CONTACT = 0x01, RAW = 0x02, INFO = 0x03, HEALTH = 0x04, ACK = 0x05, CMD_TARE = 0x81 };
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /* Place of a field's first number. */
 static size_t at(uint8_t type, const char *name) {
@@ -44,6 +43,13 @@ static struct numbers contact_of(double frame, double t_us) {
   return numbers;
 }
 
+/* Its frame's length; 0: refused. */
+static size_t frame_of(uint8_t type, const struct numbers *numbers, uint8_t *frame) {
+  size_t length = 0;
+  fingertip_encode(type, numbers->of, fingertip_value_count(type), frame, FINGERTIP_FRAME_MOST, &length);
+  return length;
+}
+
 static struct numbers raw_of(double frame, double t_us) {
   struct numbers numbers = {{0}};
   set(&numbers, RAW, "frame", frame);
@@ -64,7 +70,7 @@ static struct numbers info_of(char serial) {
   return numbers;
 }
 
-static void every_packet_comes_back_as_its_numbers(void) {
+TEST(every_packet_comes_back_as_its_numbers) {
   struct fingertip_decoder *decoder = fingertip_decoder_new();
   double values[1 + FINGERTIP_VALUES_MOST];
   size_t filled = 0;
@@ -87,20 +93,17 @@ static void every_packet_comes_back_as_its_numbers(void) {
         length, fingertip_decoder_feed(decoder, frame, length, values, 1 + FINGERTIP_VALUES_MOST, &filled));
     TEST_ASSERT_EQUAL_size_t(1 + fingertip_value_count(*type), filled);
     TEST_ASSERT_TRUE(values[0] == *type);
-    TEST_ASSERT_EQUAL_INT(FINGERTIP_OK,
-                          fingertip_encode(*type, values + 1, filled - 1, again, FINGERTIP_FRAME_MOST, &length_again));
+    OK(fingertip_encode(*type, values + 1, filled - 1, again, FINGERTIP_FRAME_MOST, &length_again));
     TEST_ASSERT_EQUAL_size_t(length, length_again);
     TEST_ASSERT_EQUAL_MEMORY(frame, again, length);
   }
   fingertip_decoder_free(decoder);
 }
 
-static void numbers_stand_under_their_names(void) {
+TEST(numbers_stand_under_their_names) {
   struct numbers contact = contact_of(70000, 123456789012.0);
   uint8_t frame[FINGERTIP_FRAME_MOST];
-  size_t length = 0;
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), frame,
-                                                       sizeof frame, &length));
+  const size_t length = frame_of(CONTACT, &contact, frame);
   struct wire_packet packet;
   TEST_ASSERT_EQUAL_INT(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &packet));
   TEST_ASSERT_EQUAL_UINT32(70000, packet.body.contact.frame);
@@ -108,7 +111,7 @@ static void numbers_stand_under_their_names(void) {
   TEST_ASSERT_TRUE(packet.body.contact.x_mm == 1.5f);
   TEST_ASSERT_TRUE(packet.body.contact.force_N == 0.25f);
   struct fingertip_field field;
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_field_of(INFO, 6, &field));
+  OK(fingertip_field_of(INFO, 6, &field));
   TEST_ASSERT_EQUAL_STRING("board", field.name);
   TEST_ASSERT_EQUAL_UINT32(FINGERTIP_TEXT_LENGTH, field.count);
   TEST_ASSERT_TRUE(field.is_text);
@@ -116,26 +119,31 @@ static void numbers_stand_under_their_names(void) {
   TEST_ASSERT_EQUAL_size_t(0, fingertip_value_count(0x7F));
 }
 
-static void refuse(struct numbers numbers, uint8_t type, const char *name, double value) {
-  uint8_t frame[FINGERTIP_FRAME_MOST];
-  size_t length = 7;
-  set(&numbers, type, name, value);
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE,
-                        fingertip_encode(type, numbers.of, fingertip_value_count(type), frame, sizeof frame, &length));
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(fingertip_error(), name), fingertip_error());
-  TEST_ASSERT_EQUAL_size_t(7, length);
-}
-
-static void what_no_packet_may_hold_is_refused_by_its_name(void) {
-  refuse(contact_of(1, 1), CONTACT, "x_mm", NAN);
-  refuse(contact_of(1, 1), CONTACT, "x_mm", 1e39);
-  refuse(contact_of(1, 1), CONTACT, "frame", 4294967296.0);
-  refuse(contact_of(1, 1), CONTACT, "frame", -1);
-  refuse(contact_of(1, 1), CONTACT, "frame", 0.5);
-  refuse(contact_of(1, 1), CONTACT, "t_us", 18446744073709551616.0);
-  refuse(raw_of(1, 1), RAW, "pressure_Pa_q10", 2147483648.0);
-  refuse(raw_of(1, 1), RAW, "sensor_count", 33);
-  refuse(raw_of(1, 1), RAW, "sensor_count", 0);
+TEST(what_no_packet_may_hold_is_refused_by_its_name) {
+  const struct {
+    uint8_t type;
+    const char *name;
+    double value;
+  } wrong[] = {{CONTACT, "x_mm", NAN},
+               {CONTACT, "x_mm", 1e39},
+               {CONTACT, "frame", 4294967296.0},
+               {CONTACT, "frame", -1},
+               {CONTACT, "frame", 0.5},
+               {CONTACT, "t_us", 18446744073709551616.0},
+               {RAW, "pressure_Pa_q10", 2147483648.0},
+               {RAW, "sensor_count", 33},
+               {RAW, "sensor_count", 0}};
+  for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+    struct numbers numbers = wrong[i].type == CONTACT ? contact_of(1, 1) : raw_of(1, 1);
+    uint8_t unwritten[FINGERTIP_FRAME_MOST];
+    size_t before = 7;
+    set(&numbers, wrong[i].type, wrong[i].name, wrong[i].value);
+    TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE,
+                          fingertip_encode(wrong[i].type, numbers.of, fingertip_value_count(wrong[i].type), unwritten,
+                                           sizeof unwritten, &before));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(fingertip_error(), wrong[i].name), fingertip_error());
+    TEST_ASSERT_EQUAL_size_t(7, before);
+  }
   struct numbers info = info_of('A');
   info.of[at(INFO, "board")] = 7;
   uint8_t frame[FINGERTIP_FRAME_MOST];
@@ -149,16 +157,14 @@ static void what_no_packet_may_hold_is_refused_by_its_name(void) {
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, NULL, count, frame, sizeof frame, &length));
 }
 
-static void a_full_buffer_takes_no_more_bytes_than_it_has_packets_for(void) {
+TEST(a_full_buffer_takes_no_more_bytes_than_it_has_packets_for) {
   uint8_t line[40 * FINGERTIP_FRAME_MOST];
   size_t length = 0, packets = 0, taken = 0;
   line[length++] = 0;
   for (int i = 0; i < 40; i++) {
     struct numbers contact = contact_of(i, 1000 * i);
     contact.of[0] = i + (i > 20); /* one is lost */
-    size_t bytes = 0;
-    fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), line + length, FINGERTIP_FRAME_MOST, &bytes);
-    length += bytes;
+    length += frame_of(CONTACT, &contact, line + length);
   }
   line[length - 5] ^= 8;
   struct fingertip_decoder *decoder = fingertip_decoder_new();
@@ -204,8 +210,7 @@ static void take(struct fingertip_writer *writer) {
 }
 
 static void put(struct fingertip_writer *writer, size_t device, uint8_t type, struct numbers numbers, double host_us) {
-  TEST_ASSERT_EQUAL_INT(
-      FINGERTIP_OK, fingertip_writer_packet(writer, device, type, numbers.of, fingertip_value_count(type), host_us));
+  OK(fingertip_writer_packet(writer, device, type, numbers.of, fingertip_value_count(type), host_us));
   take(writer);
 }
 
@@ -219,7 +224,7 @@ static void write_one(enum fingertip_format format) {
     put(writer, 0, CONTACT, contact_of(i, 1000 * i), 0);
     put(writer, 0, RAW, raw_of(i, 1000 * i), 0);
   }
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_writer_event(writer, 0, "gone 2026-08-05T12:00:01.000Z"));
+  OK(fingertip_writer_event(writer, 0, "gone 2026-08-05T12:00:01.000Z"));
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_writer_event(writer, 1, "gone"));
   struct numbers three = raw_of(100, 100000);
   set(&three, RAW, "sensor_count", 3);
@@ -227,7 +232,7 @@ static void write_one(enum fingertip_format format) {
                         fingertip_writer_packet(writer, 0, RAW, three.of, fingertip_value_count(RAW), 0));
   double counts[FINGERTIP_COUNTS] = {0};
   counts[FINGERTIP_COUNT_PACKETS] = 200;
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_writer_finish(writer, "stopped", counts));
+  OK(fingertip_writer_finish(writer, "stopped", counts));
   TEST_ASSERT_EQUAL_UINT64(100, fingertip_writer_frames(writer));
   take(writer);
   fingertip_writer_free(writer);
@@ -268,7 +273,7 @@ static struct found found_in(size_t step, int salvage) {
     if (found.status == FINGERTIP_WAIT) {
       TEST_ASSERT_TRUE_MESSAGE(from < file.length, "waits at the end");
       const size_t more = file.length - from < step ? file.length - from : step;
-      TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_reader_feed(reader, file.bytes + from, more));
+      OK(fingertip_reader_feed(reader, file.bytes + from, more));
       from += more;
     }
   }
@@ -278,7 +283,7 @@ static struct found found_in(size_t step, int salvage) {
   return found;
 }
 
-static void a_recording_comes_back_however_it_is_cut(void) {
+TEST(a_recording_comes_back_however_it_is_cut) {
   for (int format = FINGERTIP_CSV; format <= FINGERTIP_MCAP; format++) {
     write_one((enum fingertip_format)format);
     for (size_t step = 1; step <= sizeof file.bytes; step *= 16) {
@@ -294,7 +299,7 @@ static void a_recording_comes_back_however_it_is_cut(void) {
   }
 }
 
-static void several_fingertips_share_a_recording_and_a_clock(void) {
+TEST(several_fingertips_share_a_recording_and_a_clock) {
   for (int format = FINGERTIP_CSV; format <= FINGERTIP_MCAP; format++) {
     file.length = 0;
     const size_t count = fingertip_value_count(INFO);
@@ -306,14 +311,14 @@ static void several_fingertips_share_a_recording_and_a_clock(void) {
     struct fingertip_writer *writer = fingertip_writer_new_joint((enum fingertip_format)format, infos, 2, 5000, "");
     TEST_ASSERT_NOT_NULL_MESSAGE(writer, fingertip_error());
     const double clock[4] = {0, 5000, 1.5, 20};
-    TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_writer_clock(writer, 0, clock, 0));
+    OK(fingertip_writer_clock(writer, 0, clock, 0));
     for (int i = 0; i < 20; i++) {
       put(writer, 0, CONTACT, contact_of(i, 1000 * i), 5000 + 1000 * i);
       put(writer, 0, RAW, raw_of(i, 1000 * i), 5000 + 1000 * i);
       put(writer, 1, RAW, raw_of(i, 777 + 1000 * i), 5500 + 1000 * i);
-      TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_writer_settle(writer, 5000 + 1000 * i));
+      OK(fingertip_writer_settle(writer, 5000 + 1000 * i));
     }
-    TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_writer_finish(writer, "stopped", NULL));
+    OK(fingertip_writer_finish(writer, "stopped", NULL));
     take(writer);
     fingertip_writer_free(writer);
     const struct found found = found_in(1000, 0);
@@ -329,7 +334,7 @@ static void several_fingertips_share_a_recording_and_a_clock(void) {
   }
 }
 
-static void damage_is_told_and_reading_goes_on_behind_it(void) {
+TEST(damage_is_told_and_reading_goes_on_behind_it) {
   write_one(FINGERTIP_CSV);
   char *row = strstr((char *)file.bytes, "\n50000,50,");
   TEST_ASSERT_NOT_NULL(row);
@@ -351,7 +356,7 @@ static void damage_is_told_and_reading_goes_on_behind_it(void) {
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_NOT_A_RECORDING, found.status);
 }
 
-static void what_is_no_recording_is_refused(void) {
+TEST(what_is_no_recording_is_refused) {
   const struct {
     const char *text;
     enum fingertip_status status;
@@ -370,16 +375,13 @@ static void what_is_no_recording_is_refused(void) {
   TEST_ASSERT_NULL(fingertip_writer_new(FINGERTIP_CSV, info.of, "no key"));
 }
 
-static void a_capture_of_the_line_is_read_too(void) {
+TEST(a_capture_of_the_line_is_read_too) {
   file.length = 0;
   file.bytes[file.length++] = 0;
   for (int i = 0; i < 300; i++) {
     struct numbers contact = contact_of(i, 1000 * i);
     contact.of[0] = i;
-    size_t length = 0;
-    fingertip_encode(CONTACT, contact.of, fingertip_value_count(CONTACT), file.bytes + file.length,
-                     FINGERTIP_FRAME_MOST, &length);
-    file.length += length;
+    file.length += frame_of(CONTACT, &contact, file.bytes + file.length);
   }
   file.bytes[5000] ^= 64;
   const struct found found = found_in(1000, 0);
@@ -389,7 +391,7 @@ static void a_capture_of_the_line_is_read_too(void) {
   TEST_ASSERT_TRUE(found.counts[FINGERTIP_COUNT_DROPPED] == 1);
 }
 
-static void a_clock_is_fitted(void) {
+TEST(a_clock_is_fitted) {
   struct fingertip_clock *clock = fingertip_clock_new();
   double estimate[4];
   TEST_ASSERT_EQUAL_INT(FINGERTIP_END, fingertip_clock_estimate(clock, estimate));
@@ -397,7 +399,7 @@ static void a_clock_is_fitted(void) {
     const double host_us = 1e6 * i;
     fingertip_clock_add(clock, host_us, host_us + 400, (host_us + 200) * (1 + 60e-6) + 5e6);
   }
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_clock_estimate(clock, estimate));
+  OK(fingertip_clock_estimate(clock, estimate));
   TEST_ASSERT_TRUE(fabs(estimate[1] - (estimate[0] - 5e6) / (1 + 60e-6)) <= estimate[3] + 1);
   TEST_ASSERT_TRUE(fabs(estimate[2] - 60) < 20);
   TEST_ASSERT_EQUAL_UINT(0, fingertip_clock_jumps(clock));
@@ -408,7 +410,7 @@ static void a_clock_is_fitted(void) {
   fingertip_clock_free(clock);
 }
 
-static void names_are_those_of_the_library(void) {
+TEST(names_are_those_of_the_library) {
   uint32_t bit = 0, warnings = 0;
   int is_warning = 0;
   size_t flags = 0;
@@ -439,23 +441,7 @@ static void names_are_those_of_the_library(void) {
   TEST_ASSERT_EQUAL_STRING("x.uf2: no UF2 file", fingertip_error());
   uint8_t frame[FINGERTIP_FRAME_MOST];
   size_t length = 0;
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_encode_info_of(4, frame, sizeof frame, &length));
+  OK(fingertip_encode_info_of(4, frame, sizeof frame, &length));
   struct wire_packet packet;
   TEST_ASSERT_EQUAL_INT(FT_ERR_VERSION, wire_decode(wire_all_layouts, frame, length - 1, &packet));
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(every_packet_comes_back_as_its_numbers);
-  RUN_TEST(numbers_stand_under_their_names);
-  RUN_TEST(what_no_packet_may_hold_is_refused_by_its_name);
-  RUN_TEST(a_full_buffer_takes_no_more_bytes_than_it_has_packets_for);
-  RUN_TEST(a_recording_comes_back_however_it_is_cut);
-  RUN_TEST(several_fingertips_share_a_recording_and_a_clock);
-  RUN_TEST(damage_is_told_and_reading_goes_on_behind_it);
-  RUN_TEST(what_is_no_recording_is_refused);
-  RUN_TEST(a_capture_of_the_line_is_read_too);
-  RUN_TEST(a_clock_is_fitted);
-  RUN_TEST(names_are_those_of_the_library);
-  return UNITY_END();
 }
