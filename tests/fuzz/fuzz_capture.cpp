@@ -26,7 +26,7 @@ void check_recording_of(const std::vector<fuzz::Item> &items, bool raw_expected)
     }
   }
   const std::string path = "/dev/shm/fingertip_fuzz_" + std::to_string(getpid()) + ".csv";
-  RecordingWriter writer(path, true, info, sensors, {}, raw_expected, OutputFile::Appears::at_once);
+  RecordingWriter writer(make_lines(path, true, OutputFile::Appears::at_once), info, sensors, {}, raw_expected);
   std::vector<fuzz::Item> written;
   for (const auto &item : items) {
     if (is_recorded(item.packet, sensors)) {
@@ -34,7 +34,7 @@ void check_recording_of(const std::vector<fuzz::Item> &items, bool raw_expected)
       written.push_back(item);
     }
   }
-  writer.finish({}, "end");
+  writer.finish({LineStatistics()}, "end");
   PacketFile recording(path, false);
   const auto read = fuzz::rest_of(recording);
   std::filesystem::remove(path);

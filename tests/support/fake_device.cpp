@@ -36,7 +36,7 @@
  *
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_reader.hpp"
 #include "libfingertip/served_port.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"

@@ -7,7 +7,6 @@
 #include "libfingertip/usb_transport.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <filesystem>
 
 namespace fingertip {
@@ -22,11 +21,18 @@ const Found *with_serial(const std::vector<Found> &found, const std::string &ser
   return at == found.end() ? nullptr : &*at;
 }
 
-std::string serial_of(const wire_info &info) { return std::string(info.serial, strnlen(info.serial, WIRE_TEXT_BYTES)); }
+/* Of the fingertip there. */
+std::string serial_of(const Way &way, const std::string &root) {
+  return text_field(ask(
+                        way, [] { return false; }, root)
+                        .serial);
+}
 
-bool never() { return false; }
-
-[[noreturn]] void no_way(const Found &found, Reach reach) {
+/* Throws Error where there is none. */
+Way sure_way_to(const Found &found, Reach reach) {
+  if (auto way = way_to(found, reach)) {
+    return *way;
+  }
   if (reach == Reach::socket) {
     throw Error(ErrorCode::not_shared, (found.serial.empty() ? found.port : found.serial) + ": no program shares it");
   }
@@ -41,7 +47,7 @@ std::string name_of(const Found &found, Reach reach, const std::string &root) {
   }
   try {
     if (auto way = way_to(found, reach)) {
-      return serial_of(ask(*way, never, root)) + " (" + found.port + ")";
+      return serial_of(*way, root) + " (" + found.port + ")";
     }
   } catch (const Error &) {
     /* the port has to do */
@@ -60,21 +66,13 @@ Way only_one(const std::vector<Found> &found, Reach reach, const std::string &ro
     }
     throw Error(ErrorCode::several_fingertips, "several fingertips found: " + names);
   }
-  auto way = way_to(found[0], reach);
-  if (!way) {
-    no_way(found[0], reach);
-  }
-  return *way;
+  return sure_way_to(found[0], reach);
 }
 
 Way with_wanted_serial(const Choice &choice, const std::string &root) {
   Finds finds = find_fingertips(root);
   if (const Found *found = with_serial(finds.here, choice.device)) {
-    auto way = way_to(*found, choice.reach);
-    if (!way) {
-      no_way(*found, choice.reach);
-    }
-    return *way;
+    return sure_way_to(*found, choice.reach);
   }
   std::string others;
   std::string unasked;
@@ -87,7 +85,7 @@ Way with_wanted_serial(const Choice &choice, const std::string &root) {
       continue;
     }
     try {
-      way->serial = serial_of(ask(*way, never, root));
+      way->serial = serial_of(*way, root);
     } catch (const Error &error) {
       unasked = std::string(error.what());
       continue;
@@ -161,16 +159,11 @@ Way choose_way(const Choice &wanted, const std::string &root) {
     if (choice.reach == Reach::usb) {
       throw Error(ErrorCode::wrong_choice, "a serial port is not reached by libusb");
     }
-    Found found = {"", "", stable_port(choice.port, root), {}};
     std::vector<Shared> shared = find_shared();
-    found.socket = take_socket(shared, "", choice.port);
-    auto possible = way_to(found, choice.reach);
-    if (!possible) {
-      no_way(found, choice.reach);
-    }
-    Way way = *possible;
+    const Found found = {"", "", stable_port(choice.port, root), {}, take_socket(shared, "", choice.port)};
+    Way way = sure_way_to(found, choice.reach);
     if (!choice.device.empty()) {
-      way.serial = serial_of(ask(way, never, root));
+      way.serial = serial_of(way, root);
       if (!is_same_serial(way.serial, choice.device)) {
         throw Error(ErrorCode::other_fingertip,
                     choice.port + ": is fingertip " + way.serial + ", not " + choice.device);
@@ -193,15 +186,11 @@ std::vector<Way> all_ways(Reach reach, const std::string &root) {
   std::vector<Way> ways;
   Finds finds = find_fingertips(root);
   for (const Found &found : finds.here) {
-    auto way = way_to(found, reach);
-    if (!way) {
-      no_way(found, reach);
-    }
-    ways.push_back(*way);
+    ways.push_back(sure_way_to(found, reach));
   }
   for (const Found &found : finds.in_environment) {
     if (auto way = way_to(found, reach)) {
-      way->serial = serial_of(ask(*way, never, root));
+      way->serial = serial_of(*way, root);
       ways.push_back(*way);
     }
   }

@@ -4,25 +4,31 @@
 
 namespace fingertip {
 
+namespace {
+
+constexpr std::pair<std::string_view, std::uint64_t LineStatistics::*> COUNTS[] = {
+    {"packets", &LineStatistics::packets},
+    {"dropped_packets", &LineStatistics::dropped_packets},
+    {"out_of_order", &LineStatistics::out_of_order},
+    {"crc_errors", &LineStatistics::crc_errors},
+    {"format_errors", &LineStatistics::format_errors},
+    {"version_errors", &LineStatistics::version_errors},
+    {"unknown_types", &LineStatistics::unknown_types}};
+
+} // namespace
+
 std::string LineStatistics::text() const {
-  auto pair = [](const char *key, std::uint64_t value) { return std::string(key) + "=" + std::to_string(value); };
-  return pair("packets", packets) + " " + pair("dropped_packets", dropped_packets) + " " +
-         pair("out_of_order", out_of_order) + " " + pair("crc_errors", crc_errors) + " " +
-         pair("format_errors", format_errors) + " " + pair("version_errors", version_errors) + " " +
-         pair("unknown_types", unknown_types);
+  std::string all;
+  for (const auto &[name, count] : COUNTS) {
+    all += (all.empty() ? "" : " ") + std::string(name) + "=" + std::to_string(this->*count);
+  }
+  return all;
 }
 
 bool LineStatistics::set(std::string_view key, std::uint64_t value) {
-  const std::pair<std::string_view, std::uint64_t &> fields[] = {{"packets", packets},
-                                                                 {"dropped_packets", dropped_packets},
-                                                                 {"out_of_order", out_of_order},
-                                                                 {"crc_errors", crc_errors},
-                                                                 {"format_errors", format_errors},
-                                                                 {"version_errors", version_errors},
-                                                                 {"unknown_types", unknown_types}};
-  for (const auto &[name, field] : fields) {
+  for (const auto &[name, count] : COUNTS) {
     if (name == key) {
-      field = value;
+      this->*count = value;
       return true;
     }
   }
@@ -31,13 +37,9 @@ bool LineStatistics::set(std::string_view key, std::uint64_t value) {
 
 LineStatistics &LineStatistics::operator+=(const LineStatistics &other) {
   bytes += other.bytes;
-  packets += other.packets;
-  dropped_packets += other.dropped_packets;
-  out_of_order += other.out_of_order;
-  crc_errors += other.crc_errors;
-  format_errors += other.format_errors;
-  version_errors += other.version_errors;
-  unknown_types += other.unknown_types;
+  for (const auto &[name, count] : COUNTS) {
+    this->*count += other.*count;
+  }
   return *this;
 }
 

@@ -3,6 +3,8 @@
 #include "libfingertip/clock.hpp"
 
 #include <cerrno>
+#include <cstring>
+#include <sys/socket.h>
 #include <unistd.h>
 
 namespace fingertip {
@@ -12,6 +14,33 @@ namespace {
 constexpr std::chrono::milliseconds WRITE_TIMEOUT{1000};
 
 } // namespace
+
+bool unix_address(const std::string &path, sockaddr_un *address) {
+  *address = {};
+  address->sun_family = AF_UNIX;
+  if (path.size() >= sizeof address->sun_path) {
+    errno = ENAMETOOLONG;
+    return false;
+  }
+  std::memcpy(address->sun_path, path.data(), path.size());
+  return true;
+}
+
+int connect_unix(const std::string &path, const std::string &own_name) {
+  sockaddr_un port, own;
+  if (!unix_address(path, &port) || !unix_address(std::string(1, '\0') + own_name, &own)) {
+    return -1;
+  }
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd >= 0 && (own_name.empty() || bind(fd, reinterpret_cast<const sockaddr *>(&own), sizeof own) == 0) &&
+      connect(fd, reinterpret_cast<const sockaddr *>(&port), sizeof port) == 0) {
+    return fd;
+  }
+  const int error = errno;
+  ::close(fd);
+  errno = error;
+  return -1;
+}
 
 DescriptorTransport::~DescriptorTransport() { close(); }
 

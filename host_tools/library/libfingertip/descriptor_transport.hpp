@@ -5,8 +5,15 @@
 
 #include <string>
 #include <sys/types.h>
+#include <sys/un.h>
 
 namespace fingertip {
+
+/* False: the path is too long for one. */
+bool unix_address(const std::string &path, sockaddr_un *address);
+/* A connection to a Unix socket, or -1 and errno. own_name: of this end in the abstract namespace, which keeps out
+ * others that give the same; "": none. */
+int connect_unix(const std::string &path, const std::string &own_name = "");
 
 class DescriptorTransport : public Transport {
 public:

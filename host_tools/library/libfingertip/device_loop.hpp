@@ -132,7 +132,6 @@ private:
   ClockFit fit_;
   std::uint8_t streams_ = 0; /* those wanted that its firmware has */
   std::optional<wire_info> info_;
-  wire_health health_{};
   HostTime asked_{}, last_frame_{};
   bool gone_ = false;            /* and not back yet */
   std::vector<DeviceNews> held_; /* until it is back */

@@ -14,6 +14,8 @@
 #include <cstring>
 #include <limits>
 #include <new>
+#include <type_traits>
+#include <utility>
 
 using namespace fingertip;
 
@@ -47,65 +49,52 @@ const Packet *find(std::uint8_t type) {
   return at == std::end(packets) ? nullptr : at;
 }
 
-template <typename Number> Number load(const std::uint8_t *from) {
-  Number number;
-  std::memcpy(&number, from, sizeof number);
-  return number;
-}
-
-double number_at(Kind kind, const std::uint8_t *from) {
+/* Calls with a number of the kind's type. */
+template <typename Visitor> void visit_kind(Kind kind, const Visitor &visit) {
   switch (kind) {
   case Kind::u16:
-    return load<std::uint16_t>(from);
+    return visit(std::uint16_t{});
   case Kind::i16:
-    return load<std::int16_t>(from);
+    return visit(std::int16_t{});
   case Kind::u32:
-    return load<std::uint32_t>(from);
+    return visit(std::uint32_t{});
   case Kind::i32:
-    return load<std::int32_t>(from);
+    return visit(std::int32_t{});
   case Kind::u64:
-    return static_cast<double>(load<std::uint64_t>(from));
+    return visit(std::uint64_t{});
   case Kind::f32:
-    return load<float>(from);
+    return visit(float{});
   default:
-    return *from;
+    return visit(std::uint8_t{});
   }
 }
 
-template <typename Integer> void store_integer(const Field &field, double value, std::uint8_t *to) {
-  /* The next number above the largest, which a double has exactly. */
-  const double above = std::ldexp(1.0, std::numeric_limits<Integer>::digits);
-  if (!(value >= static_cast<double>(std::numeric_limits<Integer>::min()) && value < above) ||
-      value != std::floor(value)) {
-    throw Error(ErrorCode::bad_value, std::string(field.name) + " is out of range");
-  }
-  const auto number = static_cast<Integer>(value);
-  std::memcpy(to, &number, sizeof number);
+double load(Kind kind, const std::uint8_t *from) {
+  double value = 0;
+  visit_kind(kind, [&](auto number) {
+    std::memcpy(&number, from, sizeof number);
+    value = static_cast<double>(number);
+  });
+  return value;
 }
 
 void store(const Field &field, double value, std::uint8_t *to) {
-  switch (field.kind) {
-  case Kind::u16:
-    return store_integer<std::uint16_t>(field, value, to);
-  case Kind::i16:
-    return store_integer<std::int16_t>(field, value, to);
-  case Kind::u32:
-    return store_integer<std::uint32_t>(field, value, to);
-  case Kind::i32:
-    return store_integer<std::int32_t>(field, value, to);
-  case Kind::u64:
-    return store_integer<std::uint64_t>(field, value, to);
-  case Kind::f32: {
-    const auto number = static_cast<float>(value);
-    if (!std::isfinite(number)) {
+  visit_kind(field.kind, [&](auto number) {
+    using Number = decltype(number);
+    if constexpr (std::is_integral_v<Number>) {
+      /* The next number above the largest, which a double has exactly. */
+      const double above = std::ldexp(1.0, std::numeric_limits<Number>::digits);
+      if (!(value >= static_cast<double>(std::numeric_limits<Number>::min()) && value < above) ||
+          value != std::floor(value)) {
+        throw Error(ErrorCode::bad_value, std::string(field.name) + " is out of range");
+      }
+    }
+    number = static_cast<Number>(value);
+    if (!std::isfinite(static_cast<double>(number))) {
       throw Error(ErrorCode::bad_value, std::string(field.name) + " is no finite number");
     }
     std::memcpy(to, &number, sizeof number);
-    return;
-  }
-  default:
-    return store_integer<std::uint8_t>(field, value, to);
-  }
+  });
 }
 
 } // namespace
@@ -149,7 +138,7 @@ void put(const wire_packet &packet, double *values) {
   for (std::size_t i = 0; known && i < known->count; i++) {
     const Field &field = known->fields[i];
     for (std::size_t k = 0; k < field.count; k++) {
-      *values++ = number_at(field.kind, bytes + field.offset + k * field.stride);
+      *values++ = load(field.kind, bytes + field.offset + k * field.stride);
     }
   }
 }
@@ -183,28 +172,20 @@ fingertip_status failed(fingertip_status status, const std::string &text) {
 }
 
 fingertip_status failed(const Error &error) {
-  switch (error.code()) {
-  case ErrorCode::wrong_choice:
-    return failed(FINGERTIP_ERR_ARGUMENT, error.what());
-  case ErrorCode::bad_value:
-    return failed(FINGERTIP_ERR_VALUE, error.what());
-  case ErrorCode::not_a_recording:
-    return failed(FINGERTIP_ERR_NOT_A_RECORDING, error.what());
-  case ErrorCode::other_format:
-    return failed(FINGERTIP_ERR_OTHER_FORMAT, error.what());
-  case ErrorCode::damaged_line:
-    return failed(FINGERTIP_ERR_DAMAGED_LINE, error.what());
-  case ErrorCode::damaged_head:
-    return failed(FINGERTIP_ERR_DAMAGED_HEAD, error.what());
-  case ErrorCode::other_sensor_count:
-    return failed(FINGERTIP_ERR_SENSORS, error.what());
-  case ErrorCode::not_firmware:
-  case ErrorCode::other_chip:
-  case ErrorCode::damaged_firmware:
-    return failed(FINGERTIP_ERR_FIRMWARE, error.what());
-  default:
-    return failed(FINGERTIP_ERR_OTHER, error.what());
-  }
+  constexpr std::pair<ErrorCode, fingertip_status> STATUSES[] = {
+      {ErrorCode::wrong_choice, FINGERTIP_ERR_ARGUMENT},
+      {ErrorCode::bad_value, FINGERTIP_ERR_VALUE},
+      {ErrorCode::not_a_recording, FINGERTIP_ERR_NOT_A_RECORDING},
+      {ErrorCode::other_format, FINGERTIP_ERR_OTHER_FORMAT},
+      {ErrorCode::damaged_line, FINGERTIP_ERR_DAMAGED_LINE},
+      {ErrorCode::damaged_head, FINGERTIP_ERR_DAMAGED_HEAD},
+      {ErrorCode::other_sensor_count, FINGERTIP_ERR_SENSORS},
+      {ErrorCode::not_firmware, FINGERTIP_ERR_FIRMWARE},
+      {ErrorCode::other_chip, FINGERTIP_ERR_FIRMWARE},
+      {ErrorCode::damaged_firmware, FINGERTIP_ERR_FIRMWARE}};
+  const auto at = std::find_if(std::begin(STATUSES), std::end(STATUSES),
+                               [&](const auto &each) { return each.first == error.code(); });
+  return failed(at == std::end(STATUSES) ? FINGERTIP_ERR_OTHER : at->second, error.what());
 }
 
 std::size_t put_text(const std::string &from, char *text, std::size_t size) {

@@ -1,11 +1,8 @@
 /* Recordings of fingertip.h: bytes that are fed instead of read, and taken instead of written. */
-#include "libfingertip/bytes.hpp"
 #include "libfingertip/fingertip_values.hpp"
-#include "libfingertip/joint_recording_writer.hpp"
 #include "libfingertip/line_sink.hpp"
 #include "libfingertip/line_source.hpp"
 #include "libfingertip/mcap_recording.hpp"
-#include "libfingertip/mcap_records.hpp"
 #include "libfingertip/recording_reader.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
@@ -238,8 +235,7 @@ std::optional<RecordingReader::Item> fingertip_reader::next() {
 
 struct fingertip_writer {
   std::string bytes; /* that wait to be taken */
-  std::optional<RecordingWriter> one;
-  std::optional<JointRecordingWriter> several;
+  std::optional<RecordingWriter> recording;
   std::size_t devices = 1;
 };
 
@@ -350,7 +346,7 @@ template <typename Body> fingertip_status written(fingertip_writer *writer, std:
 struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, const double *info, const char *comments) {
   return made(format, [&](fingertip_writer &writer, std::unique_ptr<LineSink> lines) {
     const wire_info own = infos_of(info, 1)[0];
-    writer.one.emplace(std::move(lines), &own, own.sensor_count, metadata_of(comments), sends_both(own));
+    writer.recording.emplace(std::move(lines), &own, own.sensor_count, metadata_of(comments), sends_both(own));
   });
 }
 
@@ -359,7 +355,7 @@ struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format
   return made(format, [&](fingertip_writer &writer, std::unique_ptr<LineSink> lines) {
     const auto all = infos_of(infos, devices);
     writer.devices = devices;
-    writer.several.emplace(std::move(lines), all, metadata_of(comments), host_zero_us, sends_both(all[0]));
+    writer.recording.emplace(std::move(lines), all, metadata_of(comments), host_zero_us, sends_both(all[0]));
   });
 }
 
@@ -369,41 +365,26 @@ enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, s
                                               const double *values, size_t count, double host_us) {
   return written(writer, device, [&] {
     const wire_packet packet = packet_of(type, values, values ? count : 0);
-    if (writer->one) {
-      writer->one->packet(packet);
-    } else {
-      writer->several->packet(device, packet, host_us);
-    }
+    writer->recording->packet(device, packet, host_us);
   });
 }
 
 enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device, const char *text) {
-  return written(writer, device, [&] {
-    const std::string line = printable(text ? text : "");
-    if (writer->one) {
-      writer->one->event(line);
-    } else {
-      writer->several->event(device, line);
-    }
-  });
+  return written(writer, device, [&] { writer->recording->event(device, printable(text ? text : "")); });
 }
 
 enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4],
                                              unsigned jumps) {
   return written(writer, device, [&] {
-    if (writer->several && estimate) {
+    if (estimate) {
       const ClockEstimate now = {static_cast<std::uint64_t>(estimate[0]), estimate[1], estimate[2], estimate[3]};
-      writer->several->clock(device, now, jumps);
+      writer->recording->clock(device, now, jumps);
     }
   });
 }
 
 enum fingertip_status fingertip_writer_settle(struct fingertip_writer *writer, double host_us) {
-  return written(writer, 0, [&] {
-    if (writer->several) {
-      writer->several->settle(host_us);
-    }
-  });
+  return written(writer, 0, [&] { writer->recording->settle(host_us); });
 }
 
 enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason,
@@ -413,18 +394,11 @@ enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, c
     for (std::size_t i = 0; counts && i < all.size(); i++) {
       all[i] = statistics_of(counts + i * FINGERTIP_COUNTS);
     }
-    const std::string why = printable(reason ? reason : "");
-    if (writer->one) {
-      writer->one->finish(all[0], why);
-    } else {
-      writer->several->finish(all, why);
-    }
+    writer->recording->finish(all, printable(reason ? reason : ""));
   });
 }
 
-uint64_t fingertip_writer_frames(const struct fingertip_writer *writer) {
-  return writer->one ? writer->one->frames() : writer->several->frames();
-}
+uint64_t fingertip_writer_frames(const struct fingertip_writer *writer) { return writer->recording->frames(); }
 
 size_t fingertip_writer_take(struct fingertip_writer *writer, uint8_t *bytes, size_t size) {
   const std::size_t taken = std::min(size, writer->bytes.size());

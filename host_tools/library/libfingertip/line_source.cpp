@@ -2,7 +2,6 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/mcap_recording.hpp"
-#include "libfingertip/mcap_records.hpp"
 
 #include <cerrno>
 #include <cstring>

@@ -228,12 +228,7 @@ void McapLineSink::begin() {
       device_key(*device, own, text);
     }
   }
-  std::string header = head.back().first;
-  bool is_joint_header = header.rfind(JOINT_COLUMNS, 0) == 0;
-  if (joint_ && is_joint_header) {
-    header = header.substr(std::string(JOINT_COLUMNS).size());
-  }
-  if (auto columns = columns_of(header); columns && is_joint_header == joint_) {
+  if (auto columns = columns_of(head.back().first, joint_)) {
     sensor_count_ = columns->sensor_count;
     sets_ = columns->sets;
     has_rows_ = true;
@@ -389,8 +384,7 @@ bool McapLineSource::next(Line &line) {
           joint_ = line.text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
         }
         if (!has_header_ && !line.text.empty() && line.text[0] != '#') {
-          bool joint_header = line.text.rfind(JOINT_COLUMNS, 0) == 0;
-          auto columns = columns_of(line.text.substr(joint_header ? std::string(JOINT_COLUMNS).size() : 0));
+          const auto columns = columns_of(line.text, joint_);
           sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
           sets_ = columns ? columns->sets : LATER_SETS;
           has_header_ = true;

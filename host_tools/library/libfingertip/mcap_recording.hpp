@@ -3,8 +3,7 @@
 
 #include "libfingertip/line_sink.hpp"
 #include "libfingertip/line_source.hpp"
-#include "libfingertip/mcap_reader.hpp"
-#include "libfingertip/mcap_writer.hpp"
+#include "libfingertip/mcap.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/ros_messages.hpp"
 

@@ -20,7 +20,7 @@ const std::vector<FlagName> &flag_names() {
 
 std::uint32_t warning_flags() {
   std::uint32_t warnings = 0;
-  for (const FlagName &flag : flag_names()) {
+  for (const words::Flag &flag : words::flags) {
     warnings |= flag.warning ? flag.bit : 0;
   }
   return warnings;

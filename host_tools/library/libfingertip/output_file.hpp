@@ -2,13 +2,24 @@
  * being read. They throw Error. */
 #pragma once
 
-#include "libfingertip/bytes.hpp"
-
 #include <cstddef>
 #include <cstdint>
 #include <string>
 
 namespace fingertip {
+
+/* Where the bytes of a recording go: a file, or a program's own memory. */
+class ByteSink {
+public:
+  virtual ~ByteSink() = default;
+
+  /* All of them or none, and then it throws Error. */
+  virtual void append(const void *bytes, std::size_t length) = 0;
+  /* Last of all. */
+  virtual void finish() = 0;
+  /* For messages. */
+  virtual const std::string &path() const = 0;
+};
 
 /* Throws unless an OutputFile can be made of these; touches nothing. */
 void check_output(const std::string &path, bool replace);

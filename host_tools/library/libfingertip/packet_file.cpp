@@ -29,33 +29,33 @@ std::optional<PacketFile::Item> PacketFile::next() { return reader_ ? next_of_re
 std::optional<PacketFile::Item> PacketFile::next_of_recording() {
   auto item = reader_->next();
   if (!item) {
-    ended_ = true;
-    statistics_ = reader_->end_statistics().value_or(statistics_);
+    state_.ended = true;
+    state_.statistics = reader_->end_statistics().value_or(state_.statistics);
   } else if (item->kind == Item::Kind::packet) {
-    statistics_.packets++;
-    sequence_.follow(item->packet.sequence, statistics_);
+    state_.statistics.packets++;
+    state_.sequence.follow(item->packet.sequence, state_.statistics);
   } else if (item->event.rfind(EVENT_GONE, 0) == 0) {
-    sequence_.restart();
+    state_.sequence.restart();
   }
   return item;
 }
 
 std::optional<PacketFile::Item> PacketFile::next_of_capture() {
   std::uint8_t bytes[4096];
-  while (decoded_.empty() && !ended_) {
+  while (state_.decoded.empty() && !state_.ended) {
     bytes_.read(reinterpret_cast<char *>(bytes), sizeof bytes);
     auto length = static_cast<std::size_t>(bytes_.gcount());
-    ended_ = length == 0;
-    decoder_.feed(bytes, length, [this](const wire_packet &packet) {
-      decoded_.push_back({Item::Kind::packet, packet, ""});
+    state_.ended = length == 0;
+    state_.decoder.feed(bytes, length, [this](const wire_packet &packet) {
+      state_.decoded.push_back({Item::Kind::packet, packet, ""});
     });
-    statistics_ = decoder_.statistics();
+    state_.statistics = state_.decoder.statistics();
   }
-  if (decoded_.empty()) {
+  if (state_.decoded.empty()) {
     return std::nullopt;
   }
-  Item item = std::move(decoded_.front());
-  decoded_.pop_front();
+  Item item = std::move(state_.decoded.front());
+  state_.decoded.pop_front();
   return item;
 }
 
@@ -67,11 +67,7 @@ PacketFile::Place PacketFile::place() {
     bytes_.clear(); /* of the end */
     place.offset = bytes_.tellg();
   }
-  place.decoder = decoder_;
-  place.decoded = decoded_;
-  place.sequence = sequence_;
-  place.statistics = statistics_;
-  place.ended = ended_;
+  place.state = state_;
   return place;
 }
 
@@ -82,11 +78,7 @@ void PacketFile::go_to(const Place &place) {
     bytes_.clear();
     bytes_.seekg(place.offset);
   }
-  decoder_ = place.decoder;
-  decoded_ = place.decoded;
-  sequence_ = place.sequence;
-  statistics_ = place.statistics;
-  ended_ = place.ended;
+  state_ = place.state;
 }
 
 } // namespace fingertip

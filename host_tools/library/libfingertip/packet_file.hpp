@@ -1,4 +1,4 @@
-/* The packets in a file: a recording (CSV, recording.hpp), or the bytes of the line as they came
+/* The packets in a file: a recording, or the bytes of the line as they came
  * (.ftr, also what the emulator captures). The first line shows that it is a recording. */
 #pragma once
 
@@ -31,23 +31,26 @@ public:
   std::optional<Item> next();
 
   /* The position of reading, to go back to. */
+  struct State {
+    SequenceFollower sequence;
+    Decoder decoder; /* of a capture */
+    std::deque<Item> decoded;
+    LineStatistics statistics;
+    bool ended = false;
+  };
   struct Place {
     std::optional<RecordingReader::Place> in_recording;
     std::streamoff offset = 0; /* in a capture */
-    Decoder decoder;
-    std::deque<Item> decoded;
-    SequenceFollower sequence;
-    LineStatistics statistics;
-    bool ended = false;
+    State state;
   };
   Place place();
   void go_to(const Place &place);
 
   /* The line's counters by the packets until now. At the end of a recording they are those of its
    * recorder, which saw the line itself. */
-  const LineStatistics &statistics() const { return statistics_; }
+  const LineStatistics &statistics() const { return state_.statistics; }
   /* At the end of the file: a recording without its end line. */
-  bool is_cut_short() const { return ended_ && reader_ && !reader_->has_end(); }
+  bool is_cut_short() const { return state_.ended && reader_ && !reader_->has_end(); }
   std::uint64_t skipped_lines() const { return reader_ ? reader_->skipped_lines() : 0; }
   /* The recorder's own keys, once the first item was read. */
   Metadata recorder_metadata() const { return reader_ ? reader_->recorder_metadata() : Metadata(); }
@@ -57,12 +60,8 @@ private:
   std::optional<Item> next_of_capture();
 
   std::unique_ptr<RecordingReader> reader_; /* of a recording */
-  SequenceFollower sequence_;
-  std::ifstream bytes_; /* of a capture */
-  Decoder decoder_;
-  std::deque<Item> decoded_;
-  LineStatistics statistics_;
-  bool ended_ = false;
+  std::ifstream bytes_;                     /* of a capture */
+  State state_;
 };
 
 } // namespace fingertip

@@ -228,12 +228,17 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, in
   return row;
 }
 
-/* The columns of a header, from t_us on. */
+/* The columns of a header; joint: of a recording of several. */
 struct Columns {
   std::uint8_t sensor_count;
   int sets; /* of those that came later */
 };
-inline std::optional<Columns> columns_of(const std::string &header) {
+inline std::optional<Columns> columns_of(std::string_view header, bool joint) {
+  const std::string_view before = joint ? JOINT_COLUMNS : "";
+  if (header.substr(0, before.size()) != before) {
+    return std::nullopt;
+  }
+  header.remove_prefix(before.size());
   auto columns = static_cast<std::size_t>(std::count(header.begin(), header.end(), ',')) + 1;
   for (int sets = LATER_SETS; sets >= 0; sets--) {
     std::size_t fixed_columns = 2 + contact_columns(sets) + RAW_COLUMNS;

@@ -56,7 +56,7 @@ void RecordingReader::begin() {
     bool damaged = error.code() == ErrorCode::damaged_line;
     throw Error(damaged ? ErrorCode::damaged_head : error.code(), error.what());
   }
-  line_number_ = 1;
+  state_.line_number = 1;
   joint_ = format_of(path_, first.text) == FORMAT_OF_SEVERAL;
   begun_ = true;
 }
@@ -69,16 +69,16 @@ std::optional<RecordingReader::Item> RecordingReader::next() {
   if (!begun_) {
     begin();
   }
-  while (items_.empty() && read_next()) {
+  while (state_.items.empty() && read_next()) {
   }
-  if (items_.empty()) {
-    if (!header_seen_) {
+  if (state_.items.empty()) {
+    if (!state_.header_seen) {
       throw Error(ErrorCode::damaged_head, path_ + ": no header line");
     }
     return std::nullopt;
   }
-  Item item = items_.front();
-  items_.pop_front();
+  Item item = state_.items.front();
+  state_.items.pop_front();
   return item;
 }
 
@@ -86,10 +86,10 @@ std::optional<RecordingReader::Item> RecordingReader::next() {
 bool RecordingReader::read_next() {
   LineSource::Line line;
   auto damaged = [&](const std::string &what, std::uint64_t lines) {
-    if (!salvage_ || !header_seen_) {
-      throw Error(header_seen_ ? ErrorCode::damaged_line : ErrorCode::damaged_head, what);
+    if (!salvage_ || !state_.header_seen) {
+      throw Error(state_.header_seen ? ErrorCode::damaged_line : ErrorCode::damaged_head, what);
     }
-    skipped_lines_ += lines;
+    state_.skipped_lines += lines;
   };
   try {
     if (!source_->next(line)) {
@@ -103,11 +103,11 @@ bool RecordingReader::read_next() {
     return true;
   }
   auto place = [&] { return path_ + ":" + std::to_string(line.number) + ": "; };
-  if (line.number > line_number_ + 1) {
-    std::uint64_t lost = line.number - line_number_ - 1;
+  if (line.number > state_.line_number + 1) {
+    std::uint64_t lost = line.number - state_.line_number - 1;
     damaged(place() + std::to_string(lost) + " lines are missing before it", lost);
   }
-  line_number_ = line.number;
+  state_.line_number = line.number;
   try {
     if (line.torn && !line.text.empty()) {
       throw Damage{"the last line is torn"};
@@ -128,7 +128,7 @@ void RecordingReader::read_line(const std::string &text) {
   }
   if (text[0] == '#') {
     read_comment(text);
-  } else if (header_seen_ && joint_) {
+  } else if (state_.header_seen && joint_) {
     std::size_t time = text.find(',');
     std::size_t rest = time == std::string::npos ? time : text.find(',', time + 1);
     if (rest == std::string::npos) {
@@ -141,30 +141,23 @@ void RecordingReader::read_line(const std::string &text) {
       }
       read_row(std::string_view(text).substr(rest + 1), *device, time_us);
     }
-  } else if (header_seen_) {
+  } else if (state_.header_seen) {
     read_row(text, 0);
   } else {
-    std::string text_of_one = text;
-    if (joint_) {
-      if (text.rfind(JOINT_COLUMNS, 0) != 0 || devices_ == 0) {
-        throw Damage{"unknown header"};
-      }
-      text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
-    }
-    auto columns = columns_of(text_of_one);
-    if (!columns) {
+    const auto columns = columns_of(text, joint_);
+    if (!columns || (joint_ && devices_.empty())) {
       throw Damage{"unknown header"};
     }
     sensor_count_ = columns->sensor_count;
     sets_ = columns->sets;
-    header_seen_ = true;
+    state_.header_seen = true;
   }
 }
 
 /* Nothing for one that is not wanted. Throws Damage for one that is not in the file. */
 std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number) const {
   auto device = to_u64(number);
-  if (!device || *device >= devices_ || std::to_string(*device) != number) {
+  if (!device || *device >= devices_.size() || std::to_string(*device) != number) {
     if (all_) {
       throw Damage{"there is no fingertip \"" + std::string(number) + "\""};
     }
@@ -199,7 +192,7 @@ void RecordingReader::read_comment(const std::string &text) {
   std::string value(text.substr(colon + 2));
   Item item{};
   item.device = device;
-  wire_info &info = infos_[device];
+  wire_info &info = state_.infos[device];
   if (key == "packet") {
     std::map<std::string, std::string, std::less<>> pairs;
     auto words = split(value, ' ');
@@ -238,16 +231,16 @@ void RecordingReader::read_comment(const std::string &text) {
     } else {
       throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
     }
-    items_.push_back(item);
+    state_.items.push_back(item);
   } else if (key == "event") {
     item.kind = Item::Kind::event;
     item.event = value;
-    items_.push_back(item);
+    state_.items.push_back(item);
   } else if (key == "end") {
     if (!joint_) {
       read_end(value);
     }
-    has_end_ = true;
+    state_.has_end = true;
   } else {
     read_info_field(info, key, value);
   }
@@ -287,15 +280,15 @@ void RecordingReader::read_info_field(wire_info &info, const std::string &key, c
       parse_cell(key, numbers[k], value_of(k));
     }
   };
-  if (key == "serial") {
-    copy_text(info.serial);
-  } else if (key == "board") {
-    copy_text(info.board);
-  } else if (key == "scene") {
-    copy_text(info.scene);
-  } else if (key == "git") {
-    copy_text(info.git_hash);
-  } else if (key == "firmware") {
+  const std::pair<const char *, char *> texts[] = {
+      {"serial", info.serial}, {"board", info.board}, {"scene", info.scene}, {"git", info.git_hash}};
+  for (const auto &[name, field] : texts) {
+    if (key == name) {
+      copy_text(field);
+      return;
+    }
+  }
+  if (key == "firmware") {
     auto parts = split(value, '.');
     if (parts.size() != 3) {
       throw Damage{"firmware is \"" + value + "\""};
@@ -331,22 +324,21 @@ void RecordingReader::read_info_field(wire_info &info, const std::string &key, c
     visit_info(visit, info);
     visit_calibration(visit, info.calibration);
     visit_pad(visit, info.pad);
-    if (!known && !header_seen_) {
+    if (!known && !state_.header_seen) {
       recorder_metadata_.emplace_back(key, value);
     }
   }
 }
 
 void RecordingReader::choose_device(const std::string &serials) {
-  auto all = split(trim(serials), ' ');
-  devices_ = all.size();
-  infos_.assign(devices_, wire_info{});
+  const auto all = split(trim(serials), ' ');
+  devices_.assign(all.begin(), all.end());
+  state_.infos.assign(all.size(), wire_info{});
   if (all_) {
     return;
   }
   for (std::size_t i = 0; i < all.size(); i++) {
-    std::string serial(trim(all[i]));
-    if (wanted_.empty() ? all.size() == 1 : is_same_serial(serial, wanted_)) {
+    if (wanted_.empty() ? all.size() == 1 : is_same_serial(devices_[i], wanted_)) {
       number_ = static_cast<std::uint32_t>(i);
       return;
     }
@@ -362,48 +354,26 @@ void RecordingReader::read_row(std::string_view text, std::uint32_t device, std:
   RowPackets row = parse_row(text, sensor_count_, sets_);
   for (const auto &packet : {row.contact, row.raw}) {
     if (packet) {
-      items_.push_back({Item::Kind::packet, *packet, "", time_us, device});
+      state_.items.push_back({Item::Kind::packet, *packet, "", time_us, device});
     }
   }
-}
-
-RecordingReader::Place RecordingReader::place() {
-  return {source_->place(), line_number_, skipped_lines_, header_seen_, has_end_, infos_, items_};
 }
 
 void RecordingReader::go_to(const Place &place) {
   source_->go_to(place.in_file);
-  line_number_ = place.line_number;
-  skipped_lines_ = place.skipped_lines;
-  header_seen_ = place.header_seen;
-  has_end_ = place.has_end;
-  infos_ = place.infos;
-  items_ = place.items;
+  state_ = place.state;
 }
 
 std::vector<std::string> fingertips_in(const std::string &path) {
-  std::vector<std::string> serials;
-  constexpr std::string_view key = "# devices: ";
   try {
-    auto lines = open_lines(path);
-    LineSource::Line line;
-    /* It is the second line; a capture of the line has no lines. */
-    for (int i = 0; i < 2 && lines->next(line); i++) {
-      bool ours = i == 0 ? line.text.rfind("# fingertip-recording", 0) == 0 : line.text.rfind(key, 0) == 0;
-      if (!ours) {
-        break;
-      }
-      for (std::string_view serial :
-           split(trim(std::string_view(line.text).substr(i == 1 ? key.size() : line.text.size())), ' ')) {
-        if (!serial.empty()) {
-          serials.emplace_back(serial);
-        }
-      }
-    }
+    RecordingReader reader(path, true, open_lines(path));
+    reader.next();
+    auto serials = reader.devices_;
+    serials.erase(std::remove(serials.begin(), serials.end(), ""), serials.end());
+    return serials;
   } catch (const Error &) {
-    serials.clear(); /* the reader will report it */
+    return {}; /* the reader will report it */
   }
-  return serials;
 }
 
 } // namespace fingertip

@@ -1,4 +1,4 @@
-/* Reads recordings, CSV or MCAP; recording.hpp has the format. */
+/* Reads recordings, CSV or MCAP; RECORDING.md has the formats. */
 #pragma once
 
 #include "libfingertip/decoder.hpp"
@@ -45,19 +45,22 @@ public:
   std::optional<Item> next();
 
   /* The position of reading, to go back to. */
-  struct Place {
-    LineSource::Place in_file;
+  struct State {
     std::uint64_t line_number = 0, skipped_lines = 0;
     bool header_seen = false, has_end = false;
-    std::vector<wire_info> infos;
+    std::vector<wire_info> infos{wire_info{}}; /* of each fingertip */
     std::deque<Item> items;
   };
-  Place place();
+  struct Place {
+    LineSource::Place in_file;
+    State state;
+  };
+  Place place() { return {source_->place(), state_}; }
   void go_to(const Place &place);
 
-  std::uint64_t skipped_lines() const { return skipped_lines_; }
+  std::uint64_t skipped_lines() const { return state_.skipped_lines; }
   /* Whether the end line was seen: without one the recording was cut short. */
-  bool has_end() const { return has_end_; }
+  bool has_end() const { return state_.has_end; }
   /* This fingertip's counts by its recorder, once the end was read. */
   const std::optional<LineStatistics> &end_statistics() const { return end_statistics_; }
   /* The recorder's own keys (recorded_by, started_utc, port, ...), once the first item was read. */
@@ -73,14 +76,12 @@ private:
   void read_end(std::string_view text);
   void read_info_field(wire_info &info, const std::string &key, const std::string &value);
   std::optional<std::uint32_t> device_of(std::string_view number) const;
+  friend std::vector<std::string> fingertips_in(const std::string &path);
 
   std::string path_;
   bool salvage_;
   std::unique_ptr<LineSource> source_;
-  std::uint64_t line_number_ = 0;
-  std::uint64_t skipped_lines_ = 0;
-  bool header_seen_ = false;
-  bool has_end_ = false;
+  State state_;
   std::optional<LineStatistics> end_statistics_;
   Metadata recorder_metadata_;
   std::uint8_t sensor_count_ = 0;
@@ -88,11 +89,9 @@ private:
   bool joint_ = false; /* of several fingertips */
   bool all_ = false;   /* of them are read */
   bool begun_ = false;
-  std::string wanted_;                        /* serial number */
-  std::optional<std::uint32_t> number_;       /* of the wanted one in a joint recording */
-  std::size_t devices_ = 0;                   /* in a joint recording */
-  std::vector<wire_info> infos_{wire_info{}}; /* of each fingertip */
-  std::deque<Item> items_;
+  std::string wanted_;                  /* serial number */
+  std::optional<std::uint32_t> number_; /* of the wanted one in a joint recording */
+  std::vector<std::string> devices_;    /* serial numbers, in a joint recording */
 };
 
 } // namespace fingertip

@@ -7,12 +7,16 @@
 #include "libfingertip/wire.hpp"
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace fingertip::ros {
+
+/* The definitions of messages by their names, "geometry_msgs/Wrench", as the files .msg have them. */
+const std::map<std::string, std::string> &definitions();
 
 /* The schema of a message such as "geometry_msgs/WrenchStamped", with all that it needs, in the
  * encoding ros2msg. */

@@ -11,7 +11,6 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
-#include <sys/un.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -44,40 +43,19 @@ bool is_pseudo_terminal(int fd) {
   return fstat(fd, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
 }
 
-/* A simulated port. Its name in the abstract namespace is this end's: that keeps out others. */
-int open_socket(const std::string &path, int *error) {
-  std::error_code none;
-  std::string real = std::filesystem::canonical(path, none).string();
-  sockaddr_un port = {}, own = {};
-  port.sun_family = own.sun_family = AF_UNIX;
-  if (real.size() + 1 >= sizeof port.sun_path) {
-    *error = ENAMETOOLONG;
-    return -1;
-  }
-  std::memcpy(port.sun_path, real.data(), real.size());
-  std::memcpy(own.sun_path + 1, real.data(), real.size());
-  int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd < 0 || bind(fd, reinterpret_cast<const sockaddr *>(&own), sizeof own) != 0 ||
-      connect(fd, reinterpret_cast<const sockaddr *>(&port), sizeof port) != 0) {
-    *error = errno == EADDRINUSE ? EBUSY : errno == ECONNREFUSED ? ENXIO : errno;
-    ::close(fd);
-    return -1;
-  }
-  return fd;
-}
-
-int open_port(const std::string &path, int *error) {
+/* Or -1 and errno. */
+int open_port(const std::string &path) {
   struct stat status;
-  if (stat(path.c_str(), &status) == 0 && S_ISSOCK(status.st_mode)) {
-    return open_socket(path, error);
+  if (stat(path.c_str(), &status) == 0 && S_ISSOCK(status.st_mode)) { /* simulated */
+    std::error_code none;
+    const std::string real = std::filesystem::canonical(path, none).string();
+    const int fd = connect_unix(real, real);
+    errno = errno == EADDRINUSE ? EBUSY : errno == ECONNREFUSED ? ENXIO : errno;
+    return fd;
   }
   int fd = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (fd < 0) {
-    *error = errno;
-    return -1;
-  }
   termios settings;
-  bool fine = tcgetattr(fd, &settings) == 0;
+  bool fine = fd >= 0 && tcgetattr(fd, &settings) == 0;
   if (fine) {
     cfmakeraw(&settings);
     settings.c_cflag |= CLOCAL | CREAD | HUPCL;
@@ -87,22 +65,23 @@ int open_port(const std::string &path, int *error) {
    * pseudo-terminal TIOCEXCL would outlive a killed program. */
   fine = fine && flock(fd, LOCK_EX | LOCK_NB) == 0 && tcsetattr(fd, TCSANOW, &settings) == 0 &&
          (is_pseudo_terminal(fd) || ioctl(fd, TIOCEXCL) == 0);
-  if (!fine) {
-    *error = errno;
+  if (!fine && fd >= 0) {
+    const int error = errno;
     ::close(fd);
-    return -1;
+    errno = error;
   }
-  return fd;
+  return fine ? fd : -1;
 }
+
+bool is_taken() { return errno == EBUSY || errno == EWOULDBLOCK; }
 
 } // namespace
 
 SerialTransport::SerialTransport(const std::string &path, std::function<std::string()> find_again)
     : DescriptorTransport(path), find_again_(std::move(find_again)) {
-  int error = 0;
-  fd_ = open_port(path_, &error);
+  fd_ = open_port(path_);
   if (fd_ < 0) {
-    throw open_error(path_, error);
+    throw open_error(path_, errno);
   }
 }
 
@@ -121,10 +100,9 @@ bool SerialTransport::reopen() {
     }
     path_ = path;
   }
-  int error = 0;
-  fd_ = open_port(path_, &error);
-  if (fd_ < 0 && (error == EBUSY || error == EWOULDBLOCK)) {
-    throw open_error(path_, error);
+  fd_ = open_port(path_);
+  if (fd_ < 0 && is_taken()) {
+    throw open_error(path_, errno);
   }
   return fd_ >= 0;
 }
@@ -140,12 +118,11 @@ bool SerialTransport::ask_loader() {
 }
 
 void SerialTransport::check_unused(const std::string &path) {
-  int error = 0;
-  int fd = open_port(path, &error);
+  const int fd = open_port(path);
   if (fd >= 0) {
     ::close(fd);
-  } else if (error == EBUSY || error == EWOULDBLOCK) {
-    throw open_error(path, error);
+  } else if (is_taken()) {
+    throw open_error(path, errno);
   }
 }
 

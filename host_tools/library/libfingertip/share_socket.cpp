@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 namespace fingertip {
@@ -23,26 +22,6 @@ namespace fs = std::filesystem;
 constexpr const char *SOCKET_END = ".sock";
 constexpr const char *PORT_END = ".port";
 constexpr const char *SIMULATED = "sim:";
-
-/* The connection, or -1 and why not. */
-int connect_to(const std::string &path, int *error) {
-  sockaddr_un address = {};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) {
-    *error = ENAMETOOLONG;
-    return -1;
-  }
-  std::memcpy(address.sun_path, path.data(), path.size());
-  int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd < 0 || connect(fd, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0) {
-    *error = errno;
-    if (fd >= 0) {
-      ::close(fd);
-    }
-    return -1;
-  }
-  return fd;
-}
 
 /* Where everybody may make folders. */
 std::string own_folder_in_tmp() { return "/tmp/fingertip-" + std::to_string(geteuid()); }
@@ -113,27 +92,26 @@ std::vector<Shared> find_shared() {
 }
 
 bool SocketTransport::is_served(const std::string &path) {
-  int error = 0;
-  int fd = connect_to(path, &error);
-  if (fd >= 0) {
-    ::close(fd);
+  const int fd = connect_unix(path);
+  if (fd < 0) {
+    return errno == EACCES || errno == EPERM || errno == EAGAIN;
   }
-  return fd >= 0 || error == EACCES || error == EPERM || error == EAGAIN;
+  ::close(fd);
+  return true;
 }
 
 SocketTransport::SocketTransport(const std::string &path) : DescriptorTransport(path) {
-  int error = 0;
-  fd_ = connect_to(path, &error);
+  fd_ = connect_unix(path);
   if (fd_ >= 0) {
     return;
   }
-  if (error == EACCES || error == EPERM) {
+  if (errno == EACCES || errno == EPERM) {
     throw Error(ErrorCode::share_denied, path + ": permission denied: it is its owner's and group's");
   }
-  if (error == ENOENT || error == ECONNREFUSED) {
+  if (errno == ENOENT || errno == ECONNREFUSED) {
     throw Error(ErrorCode::not_shared, path + ": no program shares a fingertip there");
   }
-  throw Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(error) + ")");
+  throw Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(errno) + ")");
 }
 
 ssize_t SocketTransport::put(const std::uint8_t *bytes, std::size_t length) {
@@ -142,8 +120,7 @@ ssize_t SocketTransport::put(const std::uint8_t *bytes, std::size_t length) {
 
 bool SocketTransport::reopen() {
   close();
-  int error = 0;
-  fd_ = connect_to(path_, &error);
+  fd_ = connect_unix(path_);
   return fd_ >= 0;
 }
 

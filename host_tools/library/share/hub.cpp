@@ -110,9 +110,9 @@ std::uint8_t Hub::wanted_by_others(Client client, Time now) const {
   return static_cast<std::uint8_t>(wanted);
 }
 
-bool Hub::is_asked(Client client, std::uint8_t type, Time now) const {
+bool Hub::is_asked(std::uint8_t type, Time now, std::optional<Client> client) const {
   return std::any_of(commands_.begin(), commands_.end(), [&](const Command &command) {
-    return command.type == type && command.client == client && now - command.sent < PATIENCE;
+    return command.type == type && command.client == client.value_or(command.client) && now - command.sent < PATIENCE;
   });
 }
 
@@ -126,14 +126,11 @@ void Hub::tick(Time now) {
   while (!commands_.empty() && now - commands_.front().sent > FORGOTTEN_AFTER) {
     commands_.pop_front();
   }
-  if (!info_ && !is_asked(OURSELVES, WIRE_CMD_INFO, now)) {
+  if (!info_ && !is_asked(WIRE_CMD_INFO, now, OURSELVES)) {
     ask(WIRE_CMD_INFO, now);
   }
-  bool any_on_its_way = std::any_of(commands_.begin(), commands_.end(), [&](const Command &command) {
-    return command.type == WIRE_CMD_STREAM && now - command.sent < PATIENCE;
-  });
   std::uint8_t wanted = wanted_by_others(OURSELVES, now);
-  if (!any_on_its_way && streams_ != wanted) {
+  if (!is_asked(WIRE_CMD_STREAM, now) && streams_ != wanted) {
     ask(WIRE_CMD_STREAM, now, wanted);
   }
 }

@@ -99,7 +99,7 @@ private:
   void give_all(const Bytes &frame);
   bool has_room(const ClientState &state, std::size_t length) const;
   std::uint8_t wanted_by_others(Client client, Time now) const;
-  bool is_asked(Client client, std::uint8_t type, Time now) const;
+  bool is_asked(std::uint8_t type, Time now, std::optional<Client> client = {}) const;
 
   std::size_t queue_bytes_;
   std::map<Client, ClientState> clients_;

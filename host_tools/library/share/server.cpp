@@ -101,14 +101,11 @@ public:
     if (SocketTransport::is_served(path_)) {
       throw Error(ErrorCode::shared_already, path_ + ": another program shares this fingertip");
     }
-    sockaddr_un address = {};
-    address.sun_family = AF_UNIX;
+    sockaddr_un address;
     std::string early = path_ + ".new"; /* until no other user can open it */
-    if (early.size() >= sizeof address.sun_path) {
-      errno = ENAMETOOLONG;
+    if (!unix_address(early, &address)) {
       throw cannot_share(path_);
     }
-    std::memcpy(address.sun_path, early.data(), early.size());
     fd_ = Descriptor(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     unlink(early.c_str());
     mode_t before = umask(0777);

@@ -3,7 +3,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/progress_bar.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/thickness.hpp"
@@ -205,12 +205,13 @@ int play(const PlayOptions &options) {
         throw Error(options.scenario + ": has " + std::to_string(scenario.sensors()) + " sensors; this firmware has " +
                     std::to_string(info.sensor_count));
       }
-      writer.emplace(options.recording, options.replace, &info, info.sensor_count,
+      writer.emplace(make_lines(options.recording, options.replace, OutputFile::Appears::when_finished), &info,
+                     info.sensor_count,
                      Metadata{{"recorded_by", "fingertip_player"},
                               {"simulated", "the firmware's code on simulated sensors"},
                               {"scenario", scenario.name()},
                               {"seed", std::to_string(options.seed)}},
-                     options.raw, OutputFile::Appears::when_finished);
+                     options.raw);
     }
     if (writer) {
       writer->packet(packet);
@@ -245,7 +246,7 @@ int play(const PlayOptions &options) {
   if (!writer) {
     throw Error(options.scenario + ": ends before the fingertip answers; make it longer than 0.1 s");
   }
-  writer->finish(decoder.statistics(), "seconds");
+  writer->finish({decoder.statistics()}, "seconds");
   if (raw_bytes) {
     raw_bytes->finish();
   }

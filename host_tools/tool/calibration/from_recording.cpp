@@ -1,7 +1,7 @@
 #include "tool/calibration/from_recording.hpp"
 
 #include "libfingertip/error.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_reader.hpp"
 #include "libfingertip/text.hpp"
 
 namespace fingertip::calibrating {

@@ -1,6 +1,6 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_reader.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/calibration/pull_session.hpp"
 #include "tool/cli/calibrate_device.hpp"

@@ -136,18 +136,19 @@ void convert_packets(const Conversion &conversion) {
       metadata.emplace_back(key, value);
     }
   }
-  RecordingWriter writer(conversion.to, conversion.overwrite, contents.info ? &*contents.info : nullptr,
+  RecordingWriter writer(make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished),
+                         contents.info ? &*contents.info : nullptr,
                          contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}),
-                         metadata, contents.sensor_count.has_value(), OutputFile::Appears::when_finished);
+                         metadata, contents.sensor_count.has_value());
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   while (auto item = file.next()) {
     if (item->kind == PacketFile::Item::Kind::packet) {
       writer.packet(item->packet);
     } else {
-      writer.event(item->event);
+      writer.event(0, item->event);
     }
   }
-  writer.finish(file.statistics(), "converted");
+  writer.finish({file.statistics()}, "converted");
   report_losses(conversion.from, file);
   if (contents.left_out > 0) {
     std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n",

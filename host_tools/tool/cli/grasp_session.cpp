@@ -142,7 +142,7 @@ private:
       live.overwrite = options_.overwrite;
       recording_.emplace(live, std::vector<DeviceNews>(ready.begin(), ready.end()), "", zero_us_, head);
       keep([&] {
-        recording_->joint().comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns());
+        recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns());
       });
     }
     loop_.begin(
@@ -175,8 +175,8 @@ private:
 
   void event(const std::string &text) {
     keep([&] {
-      recording_->joint().comment(GRIP_EVENT_KEY, static_cast<double>(steady_now_us()),
-                                  fixed(static_cast<double>(steady_now_us() - zero_us_), 1) + "," + text);
+      recording_->writer().comment(GRIP_EVENT_KEY, static_cast<double>(steady_now_us()),
+                                   fixed(static_cast<double>(steady_now_us() - zero_us_), 1) + "," + text);
     });
   }
 
@@ -208,7 +208,7 @@ private:
         break;
       }
     }
-    keep([&] { recording_->joint().settle(settled_us - SETTLE_us); });
+    keep([&] { recording_->writer().settle(settled_us - SETTLE_us); });
     return ended;
   }
 
@@ -222,7 +222,7 @@ private:
       keep([&] { recording_->packet(news); });
       break;
     case Kind::clock:
-      keep([&] { recording_->joint().clock(news.device, news.estimate, news.jumps); });
+      keep([&] { recording_->writer().clock(news.device, news.estimate, news.jumps); });
       break;
     case Kind::gone:
     case Kind::back:
@@ -285,8 +285,8 @@ private:
     }
     grip_.take(row);
     keep([&] {
-      recording_->joint().comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
-                                  fixed(row.time_us, 1) + "," + grip_cells(row));
+      recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
+                                   fixed(row.time_us, 1) + "," + grip_cells(row));
     });
   }
 
@@ -418,7 +418,7 @@ private:
     if (recording_) {
       std::fprintf(stderr, "%s: %llu frames of 2 fingertips, aligned to %s us or better\n",
                    printable(options_.recording).c_str(), static_cast<unsigned long long>(frames),
-                   fixed(recording_->joint().alignment_us(), 0).c_str());
+                   fixed(recording_->writer().alignment_us(), 0).c_str());
     }
     const std::string cause = cause_of_fault();
     for (const std::string &text : {cause.empty() ? trouble_ : cause, lost_}) {

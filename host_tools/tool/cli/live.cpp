@@ -93,7 +93,7 @@ private:
     for (DeviceNews &news : feed_.take(POLL)) {
       take(news);
     }
-    if (JointRecordingWriter *recording = joint_recording()) {
+    if (RecordingWriter *recording = joint_recording()) {
       recording->settle(settled_us - SETTLE_us);
     }
   }
@@ -139,7 +139,7 @@ private:
       raw_bytes_->append(news.bytes.data(), news.bytes.size());
       break;
     case Kind::clock:
-      if (JointRecordingWriter *recording = joint_recording()) {
+      if (RecordingWriter *recording = joint_recording()) {
         recording->clock(news.device, news.estimate, news.jumps);
       }
       break;
@@ -178,7 +178,7 @@ private:
     }
   }
 
-  JointRecordingWriter *joint_recording() { return recording_ && several() ? &recording_->joint() : nullptr; }
+  RecordingWriter *joint_recording() { return recording_ && several() ? &recording_->writer() : nullptr; }
 
   void event(std::size_t device, const std::string &text) {
     if (recording_) {
@@ -305,7 +305,7 @@ private:
       std::uint32_t missing = models_[i].missing_sensors();
       add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
     }
-    if (const JointRecordingWriter *recording = joint_recording(); recording && !options_.monitor) {
+    if (const RecordingWriter *recording = joint_recording(); recording && !options_.monitor) {
       add("aligned to " + fixed(recording->alignment_us(), 0) + " us");
     }
     add(note_);
@@ -340,7 +340,7 @@ private:
       std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(), summary_text(models_[0]).c_str());
       return;
     }
-    const JointRecordingWriter *joint = joint_recording();
+    const RecordingWriter *joint = joint_recording();
     if (!joint) {
       for (std::size_t i = 0; i < models_.size(); i++) {
         std::printf("%s%s\n", name_of(i).c_str(), summary_text(models_[i]).c_str());

@@ -15,6 +15,29 @@ bool raw_expected(const wire_info &info) {
   return (info.capabilities & can_both) == can_both;
 }
 
+RecordingWriter writer_of(const LiveOptions &options, const std::vector<DeviceNews> &ready, const std::string &port,
+                          std::int64_t host_zero_us, const Metadata &extra) {
+  Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
+  std::vector<wire_info> infos;
+  for (const DeviceNews &each : ready) {
+    infos.push_back(each.packet.body.info);
+  }
+  const bool both = raw_expected(infos[0]);
+  auto lines = make_lines(options.recording, options.overwrite,
+                          options.recording == STDOUT_NAME ? OutputFile::Appears::on_standard_output
+                                                           : OutputFile::Appears::at_once);
+  if (ready.size() > 1) {
+    head.insert(head.end(), extra.begin(), extra.end());
+    return RecordingWriter(std::move(lines), infos, head, host_zero_us, both);
+  }
+  head.emplace_back("port", port);
+  if (const auto &relation = ready[0].relation) {
+    head.emplace_back("started_device_us", std::to_string(steady_now_us() + relation->device_minus_host_us));
+    head.emplace_back("started_uncertainty_us", std::to_string(relation->uncertainty_us));
+  }
+  return RecordingWriter(std::move(lines), &infos[0], infos[0].sensor_count, head, both);
+}
+
 } // namespace
 
 std::string utc_now() {
@@ -32,30 +55,11 @@ std::string utc_now() {
 
 LiveRecording::LiveRecording(const LiveOptions &options, const std::vector<DeviceNews> &ready, const std::string &port,
                              std::int64_t host_zero_us, const Metadata &extra)
-    : to_standard_output_(options.recording == STDOUT_NAME) {
-  Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
-  std::vector<wire_info> infos;
-  for (const DeviceNews &each : ready) {
-    infos.push_back(each.packet.body.info);
+    : to_standard_output_(options.recording == STDOUT_NAME),
+      writer_(writer_of(options, ready, port, host_zero_us, extra)) {
+  for (std::size_t i = 0; i < ready.size(); i++) {
+    writer_.packet(i, ready[i].packet, static_cast<double>(host_zero_us));
   }
-  const bool both = raw_expected(infos[0]);
-  if (ready.size() > 1) {
-    head.insert(head.end(), extra.begin(), extra.end());
-    several_.emplace(options.recording, options.overwrite, infos, head, host_zero_us, both,
-                     OutputFile::Appears::at_once);
-    for (std::size_t i = 0; i < ready.size(); i++) {
-      several_->packet(i, ready[i].packet, static_cast<double>(host_zero_us));
-    }
-    return;
-  }
-  head.emplace_back("port", port);
-  if (const auto &relation = ready[0].relation) {
-    head.emplace_back("started_device_us", std::to_string(steady_now_us() + relation->device_minus_host_us));
-    head.emplace_back("started_uncertainty_us", std::to_string(relation->uncertainty_us));
-  }
-  one_.emplace(options.recording, options.overwrite, &infos[0], infos[0].sensor_count, head, both,
-               to_standard_output_ ? OutputFile::Appears::on_standard_output : OutputFile::Appears::at_once);
-  one_->packet(ready[0].packet);
 }
 
 /* A reader of standard output that is slow is waited for, unless the end is wanted. */
@@ -65,27 +69,20 @@ bool LiveRecording::can_write() {
 }
 
 void LiveRecording::packet(const DeviceNews &news) {
-  if (several_) {
-    several_->packet(news.device, news.packet, news.host_us);
-  } else if (can_write()) {
-    one_->packet(news.packet);
+  if (can_write()) {
+    writer_.packet(news.device, news.packet, news.host_us);
   }
 }
 
 void LiveRecording::event(std::size_t device, const std::string &text) {
-  const std::string line = text + " " + utc_now();
-  if (several_) {
-    several_->event(device, line);
-  } else if (can_write()) {
-    one_->event(line);
+  if (can_write()) {
+    writer_.event(device, text + " " + utc_now());
   }
 }
 
 void LiveRecording::finish(const std::vector<LineStatistics> &statistics, const std::string &reason) {
-  if (several_) {
-    several_->finish(statistics, reason);
-  } else if (can_write()) {
-    one_->finish(statistics[0], reason);
+  if (can_write()) {
+    writer_.finish(statistics, reason);
   }
 }
 

@@ -2,10 +2,9 @@
 #pragma once
 
 #include "libfingertip/device_loop.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_writer.hpp"
 #include "tool/cli/live.hpp"
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,17 +26,15 @@ public:
   void packet(const DeviceNews &news);
   void event(std::size_t device, const std::string &text);
   void finish(const std::vector<LineStatistics> &statistics, const std::string &reason);
-  std::uint64_t frames(std::size_t device) const { return several_ ? several_->frames(device) : one_->frames(); }
+  std::uint64_t frames(std::size_t device) const { return writer_.frames(device); }
 
-  /* The writer of several, which has more to it; not of one. */
-  JointRecordingWriter &joint() { return *several_; }
+  RecordingWriter &writer() { return writer_; }
 
 private:
   bool can_write();
 
   bool to_standard_output_, given_up_ = false;
-  std::optional<RecordingWriter> one_;
-  std::optional<JointRecordingWriter> several_;
+  RecordingWriter writer_;
 };
 
 } // namespace fingertip

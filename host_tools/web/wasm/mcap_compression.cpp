@@ -1,8 +1,6 @@
-// libfingertip/mcap_compression.hpp for the page: Debian has no zstd for WebAssembly, so it writes
+// libfingertip/mcap_compression.cpp for the page: Debian has no zstd for WebAssembly, so it writes
 // chunks as they are, and the page unpacks (import fingertip.unpack, of core.mjs).
-#include "libfingertip/mcap_compression.hpp"
-
-#include "libfingertip/mcap_reader.hpp"
+#include "libfingertip/mcap.hpp"
 
 #include <optional>
 
@@ -36,27 +34,11 @@ fingertip_unpack(const char *packed, std::size_t packed_bytes, char *to, std::si
 
 const char *const COMPRESSION = "";
 
-std::string compressed(const std::string &bytes) { return bytes; }
+std::string packed(const std::string &bytes) { return bytes; }
 
-std::string unpacked(std::string_view compression, std::string_view packed, std::uint64_t size) {
-  constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26;
-  if (compression.empty()) {
-    return std::string(packed);
-  }
-  if (compression != "zstd") {
-    throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");
-  }
-  if (size > CHUNK_MOST_bytes) {
-    throw Damage("a chunk of " + std::to_string(size) + " bytes");
-  }
-  if (declared_size(packed).value_or(size) != size) {
-    throw Damage("a chunk's length is wrong");
-  }
-  std::string bytes(static_cast<std::size_t>(size), '\0');
-  if (!fingertip_unpack(packed.data(), packed.size(), bytes.data(), bytes.size())) {
-    throw Damage("a chunk cannot be unpacked");
-  }
-  return bytes;
+bool unpack(std::string_view packed, std::string &to) {
+  return declared_size(packed).value_or(to.size()) == to.size() &&
+         fingertip_unpack(packed.data(), packed.size(), to.data(), to.size());
 }
 
 } // namespace fingertip::mcap

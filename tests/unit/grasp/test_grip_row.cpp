@@ -1,7 +1,7 @@
 #include "grasp/grip_row.hpp"
 #include "libfingertip/error.hpp"
-#include "libfingertip/joint_recording_writer.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_reader.hpp"
+#include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
 
@@ -163,8 +163,8 @@ TEST_F(GripRowFile, AJointRecordingWithThemIsReadAsOneWithoutByWhoeverDoesNotKno
   wire_info left = test::make_info(0, 0).body.info, right = left;
   std::memcpy(right.serial, "BBBB\0", 5);
   {
-    JointRecordingWriter writer(path_, true, {left, right}, {{"grasp_cap", "20 N"}}, 1000000, false,
-                                OutputFile::Appears::at_once);
+    RecordingWriter writer(make_lines(path_, true, OutputFile::Appears::at_once), {left, right},
+                           {{"grasp_cap", "20 N"}}, 1000000, false);
     writer.comment(GRIP_ROW_KEY, 1000000, "time_us," + grip_columns());
     for (std::uint32_t i = 0; i < 10; i++) {
       const double host_us = 1000100 + 1000.0 * i;

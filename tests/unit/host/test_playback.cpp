@@ -1,4 +1,4 @@
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_writer.hpp"
 #include "support/host_packets.hpp"
 #include "tool/cli/playback.hpp"
 
@@ -18,14 +18,14 @@ protected:
   void SetUp() override {
     path_ = testing::TempDir() + "playback-" + std::to_string(getpid()) + ".csv";
     wire_packet info = test::make_info(0, 0);
-    RecordingWriter writer(path_, true, &info.body.info, 15, {}, true, OutputFile::Appears::at_once);
+    RecordingWriter writer(make_lines(path_, true, OutputFile::Appears::at_once), &info.body.info, 15, {}, true);
     std::uint16_t sequence = 0;
     for (std::uint32_t frame = 0; frame < FRAMES; frame++) {
       std::uint64_t t_us = 5000 + std::uint64_t{20000} * (frame % (FRAMES / 2));
       writer.packet(test::make_contact(sequence++, t_us, frame));
       writer.packet(test::make_raw(sequence++, t_us, frame));
     }
-    writer.finish({}, "converted");
+    writer.finish({LineStatistics()}, "converted");
   }
   void TearDown() override { std::remove(path_.c_str()); }
 

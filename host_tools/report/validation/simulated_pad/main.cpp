@@ -3,7 +3,7 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_writer.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
 #include "library/pad/thickness.hpp"
@@ -76,13 +76,13 @@ public:
       run_to(t_us);
       const double t_s = 1e-6 * static_cast<double>(t_us);
       while (next < plan.size() && plan[next].first <= t_s && writer_) {
-        writer_->event(plan[next++].second);
+        writer_->event(0, plan[next++].second);
       }
       if (t_s >= end_s && next == plan.size()) {
         break;
       }
     }
-    writer_->finish(decoder_.statistics(), "done");
+    writer_->finish({decoder_.statistics()}, "done");
   }
 
 private:
@@ -141,12 +141,13 @@ private:
       throw Error("the firmware refused command " + std::to_string(packet.body.ack.command));
     }
     if (!writer_ && packet.type == WIRE_INFO) {
-      writer_.emplace(options_.recording, options_.overwrite, &packet.body.info, SENSORS,
+      writer_.emplace(make_lines(options_.recording, options_.overwrite, OutputFile::Appears::when_finished),
+                      &packet.body.info, SENSORS,
                       Metadata{{"recorded_by", "simulated_pad"},
                                {"simulated", "the firmware's code on simulated rubber"},
                                {"fault", options_.fault},
                                {"seed", std::to_string(options_.pad.seed)}},
-                      true, OutputFile::Appears::when_finished);
+                      true);
     }
     if (writer_) {
       writer_->packet(packet);

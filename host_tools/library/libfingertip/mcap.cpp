@@ -1,8 +1,6 @@
-#include "libfingertip/mcap_writer.hpp"
+#include "libfingertip/mcap.hpp"
 
 #include "libfingertip/little_endian.hpp"
-#include "libfingertip/mcap_compression.hpp"
-#include "libfingertip/mcap_records.hpp"
 
 #include <algorithm>
 
@@ -13,6 +11,24 @@ extern "C" {
 namespace fingertip::mcap {
 
 namespace {
+
+enum Opcode : std::uint8_t {
+  HEADER = 1,
+  FOOTER,
+  SCHEMA,
+  CHANNEL,
+  MESSAGE,
+  CHUNK,
+  MESSAGE_INDEX,
+  CHUNK_INDEX,
+  ATTACHMENT,
+  ATTACHMENT_INDEX,
+  STATISTICS,
+  METADATA,
+  METADATA_INDEX,
+  SUMMARY_OFFSET,
+  DATA_END,
+};
 
 constexpr std::size_t CHUNK_bytes = 1 << 20;
 constexpr std::uint64_t CHUNK_ns = 1'000'000'000;
@@ -46,11 +62,58 @@ std::string joined(const std::vector<std::string> &parts) {
   return all;
 }
 
-} // namespace
-
 std::uint32_t crc_of(std::string_view bytes) {
   return crc32_iso_hdlc(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
 }
+
+/* Largest chunk and record; they bound the memory that a false size costs. Others write chunks of up to some MB. */
+constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26, RECORD_MOST_bytes = CHUNK_MOST_bytes + (1 << 16);
+
+/* The fields of a record's content. */
+class Fields {
+public:
+  explicit Fields(std::string_view bytes) : bytes_(bytes) {}
+
+  template <typename Number> Number get() {
+    std::string_view bytes = take(sizeof(Number));
+    return number_at<Number>(bytes, 0);
+  }
+  template <typename Length = std::uint32_t> std::string_view text() {
+    auto length = get<Length>();
+    return take(length);
+  }
+  std::string_view rest() const { return bytes_; }
+
+private:
+  std::string_view take(std::uint64_t length) {
+    if (length > bytes_.size()) {
+      throw Damage("a record ends within a field");
+    }
+    std::string_view taken = bytes_.substr(0, length);
+    bytes_.remove_prefix(length);
+    return taken;
+  }
+  std::string_view bytes_;
+};
+
+std::string unpacked(std::string_view compression, std::string_view packed, std::uint64_t size) {
+  if (compression.empty()) {
+    return std::string(packed);
+  }
+  if (compression != "zstd") {
+    throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");
+  }
+  if (size > CHUNK_MOST_bytes) {
+    throw Damage("a chunk of " + std::to_string(size) + " bytes");
+  }
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  if (!unpack(packed, bytes)) {
+    throw Damage("a chunk cannot be unpacked");
+  }
+  return bytes;
+}
+
+} // namespace
 
 void Writer::Span::take(const Span &other) {
   first_ns = std::min(first_ns, other.first_ns);
@@ -158,14 +221,14 @@ void Writer::end_chunk() {
   if (records_.empty()) {
     return;
   }
-  std::string packed = compressed(records_);
+  const std::string chunk_bytes = packed(records_);
   std::string content;
   chunk_span_.put(content);
   put_number(content, std::uint64_t{records_.size()});
   put_number(content, crc_of(records_));
   put_text(content, COMPRESSION);
-  put_number(content, std::uint64_t{packed.size()});
-  content += packed;
+  put_number(content, std::uint64_t{chunk_bytes.size()});
+  content += chunk_bytes;
   const std::string chunk = record(CHUNK, content);
   std::string indexes, places;
   for (const auto &[channel, entries] : indexes_) {
@@ -188,7 +251,7 @@ void Writer::end_chunk() {
   put_text(index, places);
   put_number(index, std::uint64_t{indexes.size()});
   put_text(index, COMPRESSION);
-  put_number(index, std::uint64_t{packed.size()});
+  put_number(index, std::uint64_t{chunk_bytes.size()});
   put_number(index, std::uint64_t{records_.size()});
   chunks_.push_back(record(CHUNK_INDEX, index));
   span_.take(chunk_span_);
@@ -244,6 +307,130 @@ void Writer::finish() {
   put_number(end, start + summary.size());
   put_number(end, crc_of(end));
   append(data_end + end + std::string(MAGIC, sizeof MAGIC));
+}
+
+bool Reader::next(Message &message) {
+  while (at_message_ == messages_.size()) {
+    if (!read_record()) {
+      return false;
+    }
+  }
+  message = messages_[at_message_++];
+  return true;
+}
+
+/* False at the end. Changes nothing where the source throws. */
+bool Reader::read_record() {
+  messages_.clear();
+  at_message_ = 0;
+  record_ = next_;
+  if (ended_) {
+    return false;
+  }
+  const auto at = static_cast<std::uint64_t>(record_);
+  const std::uint64_t size = bytes_->size(), left = size > at ? size - at : 0;
+  char head[RECORD_HEAD_BYTES];
+  if (left < sizeof head || bytes_->read(at, head, sizeof head) < sizeof head) {
+    torn_ = left > 0; /* a killed writer leaves whole chunks */
+    ended_ = true;
+    return false;
+  }
+  auto opcode = static_cast<std::uint8_t>(head[0]);
+  auto length = number_at<std::uint64_t>({head, sizeof head}, 1);
+  if (length > left - sizeof head) {
+    torn_ = ended_ = true;
+    return false;
+  }
+  const auto next = record_ + static_cast<std::streamoff>(sizeof head + length);
+  if (opcode == DATA_END) {
+    next_ = next;
+    ended_ = true;
+    return false;
+  }
+  if (opcode != SCHEMA && opcode != CHANNEL && opcode != MESSAGE && opcode != CHUNK) {
+    next_ = next;
+    return true;
+  }
+  if (length > RECORD_MOST_bytes) {
+    next_ = next;
+    record_ = next;
+    throw Damage("byte " + std::to_string(at) + ": a record of " + std::to_string(length) + " bytes");
+  }
+  std::string content(length, '\0');
+  const bool whole = bytes_->read(at + sizeof head, content.data(), content.size()) == length;
+  next_ = next;
+  try {
+    if (!whole) {
+      throw Damage("it cannot be read");
+    }
+    judge(opcode, content, 0);
+  } catch (const Damage &damage) {
+    messages_.clear();
+    record_ = next_;
+    throw Damage("byte " + std::to_string(at) + ": " + damage.what());
+  }
+  return true;
+}
+
+void Reader::judge(std::uint8_t opcode, std::string_view content, int depth) {
+  Fields fields(content);
+  if (opcode == SCHEMA) {
+    auto id = fields.get<std::uint16_t>();
+    schemas_[id] = fields.text();
+  } else if (opcode == CHANNEL) {
+    auto id = fields.get<std::uint16_t>();
+    auto schema = fields.get<std::uint16_t>();
+    Channel channel;
+    channel.topic = fields.text();
+    fields.text(); /* encoding */
+    channel.type = schemas_[schema];
+    channels_[id] = channel;
+  } else if (opcode == MESSAGE) {
+    auto channel = channels_.find(fields.get<std::uint16_t>());
+    if (channel == channels_.end()) {
+      throw Damage("a message on an unknown channel");
+    }
+    fields.get<std::uint32_t>(); /* sequence */
+    fields.get<std::uint64_t>(); /* times */
+    fields.get<std::uint64_t>();
+    const Channel &found = channel->second;
+    messages_.push_back({found.topic, found.type, std::string(fields.rest())});
+  } else if (opcode == CHUNK && depth == 0) {
+    read_chunk(content);
+  }
+}
+
+void Reader::read_chunk(std::string_view content) {
+  Fields fields(content);
+  fields.get<std::uint64_t>(); /* times */
+  fields.get<std::uint64_t>();
+  auto size = fields.get<std::uint64_t>();
+  auto crc = fields.get<std::uint32_t>();
+  std::string_view compression = fields.text();
+  std::string_view packed = fields.text<std::uint64_t>();
+  const std::string records = unpacked(compression, packed, size);
+  if (records.size() != size || (crc != 0 && crc_of(records) != crc)) {
+    throw Damage("a chunk's CRC is wrong");
+  }
+  std::string_view rest = records;
+  while (!rest.empty()) {
+    Fields record(rest);
+    auto opcode = record.get<std::uint8_t>();
+    std::string_view inner = record.text<std::uint64_t>();
+    judge(opcode, inner, 1);
+    rest.remove_prefix(RECORD_HEAD_BYTES + inner.size());
+  }
+}
+
+void Reader::go_to(const Place &place) {
+  next_ = place.offset;
+  ended_ = torn_ = false;
+  messages_.clear();
+  at_message_ = 0;
+  if (place.message > 0) {
+    read_record();
+    at_message_ = std::min(place.message, messages_.size());
+  }
 }
 
 } // namespace fingertip::mcap

@@ -1,0 +1,138 @@
+/* MCAP files (mcap.dev/spec). The writer packs chunks by zstd, each with its index. It appends a chunk at once, so that
+ * a killed one leaves every chunk except the one under way. The reader gives messages in the order in which they were
+ * written, from the beginning and without the index, so that a file whose end is missing reads as far as it goes. */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <ios>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace fingertip {
+
+/* Where the bytes of a recording come from: a file, or a program's own memory. */
+class ByteSource {
+public:
+  virtual ~ByteSource() = default;
+
+  /* Fewer than length only where the bytes end, or cannot be read. */
+  virtual std::size_t read(std::uint64_t at, char *to, std::size_t length) = 0;
+  /* The total size. */
+  virtual std::uint64_t size() const = 0;
+};
+
+} // namespace fingertip
+
+namespace fingertip::mcap {
+
+inline constexpr char MAGIC[8] = {'\x89', 'M', 'C', 'A', 'P', '0', '\r', '\n'};
+inline constexpr std::size_t RECORD_HEAD_BYTES = 9; /* opcode and length */
+
+/* How chunks are packed: mcap_compression.cpp here, another file in the page. */
+extern const char *const COMPRESSION; /* of packed(), its name in the file */
+std::string packed(const std::string &bytes);
+/* By zstd; false unless exactly the bytes that `to` has room for come of it. */
+bool unpack(std::string_view packed, std::string &to);
+
+using Pairs = std::vector<std::pair<std::string, std::string>>;
+
+class Writer {
+public:
+  using Append = std::function<void(const std::string &bytes)>;
+
+  /* append may throw; what it threw for is not in the file. */
+  Writer(Append append, const std::string &profile, const std::string &library);
+
+  /* Their ids. */
+  std::uint16_t schema(const std::string &name, const std::string &encoding, const std::string &data);
+  std::uint16_t channel(const std::string &topic, std::uint16_t schema, const std::string &encoding,
+                        const Pairs &metadata);
+
+  /* Times are ns since 1970. */
+  void metadata(const std::string &name, const Pairs &pairs);
+  void attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type,
+                  const std::string &data);
+  /* Ends the chunk before it once that is a second long or a megabyte large. */
+  void message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
+  /* Content until now outlives the writer. */
+  void end_chunk();
+  /* Last of all. */
+  void finish();
+
+private:
+  struct Span {
+    std::uint64_t first_ns = UINT64_MAX, last_ns = 0;
+    void take(const Span &other);
+    void put(std::string &bytes) const;
+  };
+  using Index = std::vector<std::pair<std::uint64_t, std::uint64_t>>; /* time, offset in the chunk */
+
+  std::uint64_t append(const std::string &bytes);
+
+  Append append_;
+  std::uint64_t length_ = 0;
+  std::vector<std::string> schemas_, channels_, attachments_, metadata_, chunks_;
+  std::map<std::uint16_t, std::uint64_t> counts_; /* of messages, by channel */
+  Span span_;
+
+  std::string records_; /* of the chunk under way */
+  std::map<std::uint16_t, Index> indexes_;
+  Span chunk_span_;
+  std::uint64_t chunk_begin_ns_ = 0;
+};
+
+/* What is wrong, and where; reading goes on behind it. */
+struct Damage : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+class Reader {
+public:
+  struct Message {
+    std::string topic, type; /* the name of its schema */
+    std::string data;
+  };
+  struct Place {
+    std::streamoff offset = 0;
+    std::size_t message = 0; /* messages between the offset and the position */
+  };
+
+  explicit Reader(std::unique_ptr<ByteSource> bytes) : bytes_(std::move(bytes)) {}
+
+  /* False at the end. Throws Damage. */
+  bool next(Message &message);
+  /* At the end: whether the file breaks off. */
+  bool is_torn() const { return torn_; }
+
+  Place place() const { return {record_, at_message_}; }
+  void go_to(const Place &place);
+
+private:
+  struct Channel {
+    std::string topic, type;
+  };
+
+  /* The messages and the channels in the record. Throws Damage. */
+  void judge(std::uint8_t opcode, std::string_view content, int depth);
+  void read_chunk(std::string_view content);
+  bool read_record();
+
+  std::unique_ptr<ByteSource> bytes_;
+  std::streamoff record_ = sizeof MAGIC; /* the one whose messages wait */
+  std::streamoff next_ = sizeof MAGIC;
+  std::vector<Message> messages_;
+  std::size_t at_message_ = 0;
+  bool torn_ = false;
+  bool ended_ = false;
+  std::map<std::uint16_t, std::string> schemas_; /* their names */
+  std::map<std::uint16_t, Channel> channels_;
+};
+
+} // namespace fingertip::mcap
