@@ -24,8 +24,8 @@ protected:
   std::string root() const { return folder_.path(); }
 
   /* tty: empty where no driver serves it */
-  void plug_in(const std::string &place, const std::string &tty, const std::string &vendor,
-               const std::string &product_id, const std::string &serial, bool by_id) {
+  void plug_in(const std::string &place, const std::string &tty, const std::string &serial, bool by_id = false,
+               const std::string &vendor = "1209", const std::string &product_id = "0001") {
     fs::path usb = root() + "/sys/devices/usb1/" + place;
     fs::create_directories(usb / (place + ":1.0"));
     std::ofstream(usb / "idVendor") << vendor << "\n";
@@ -62,9 +62,9 @@ private:
 } // namespace
 
 TEST_F(FakeSystem, FindsOursAndNoOther) {
-  plug_in("1-1", "ttyACM0", "2341", "0043", "arduino", true);
-  plug_in("1-2", "ttyACM1", "1209", "0001", "E660583883265A2C", true);
-  plug_in("1-3", "ttyACM2", "1209", "0002", "other", false);
+  plug_in("1-1", "ttyACM0", "arduino", true, "2341", "0043");
+  plug_in("1-2", "ttyACM1", "E660583883265A2C", true);
+  plug_in("1-3", "ttyACM2", "other", false, "1209", "0002");
   auto found = find_usb(root());
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].port, root() + "/dev/serial/by-id/usb-Fingertip_E660583883265A2C-if00");
@@ -79,13 +79,8 @@ TEST_F(FakeSystem, FindsOursAndNoOther) {
   EXPECT_TRUE(way.found_by_usb);
 }
 
-TEST_F(FakeSystem, WithoutAStableNameTheDeviceItself) {
-  plug_in("1-1", "ttyACM4", "1209", "0001", "A", false);
-  EXPECT_EQ(port({}), root() + "/dev/ttyACM4");
-}
-
 TEST_F(FakeSystem, WithoutADriverLibusb) {
-  plug_in("1-1", "", "1209", "0001", "A", false);
+  plug_in("1-1", "", "A");
   EXPECT_EQ(port({}), "");
   EXPECT_EQ(choose_way({}, root()).serial, "A");
   EXPECT_NE(error({"", "", Reach::serial}).find("A: has no serial port"), std::string::npos);
@@ -93,7 +88,7 @@ TEST_F(FakeSystem, WithoutADriverLibusb) {
 }
 
 TEST_F(FakeSystem, TheWishedTransport) {
-  plug_in("1-1", "ttyACM0", "1209", "0001", "A", false);
+  plug_in("1-1", "ttyACM0", "A");
   EXPECT_EQ(port({"", "", Reach::serial}), root() + "/dev/ttyACM0");
   EXPECT_EQ(port({"", "", Reach::usb}), "");
   setenv("FINGERTIP_PORT", "/tmp/pty", 1);
@@ -104,8 +99,8 @@ TEST_F(FakeSystem, TheWishedTransport) {
 
 TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
   EXPECT_EQ(thrown({}).code(), ErrorCode::no_fingertip);
-  plug_in("1-2", "ttyACM0", "1209", "0001", "BBBB", false);
-  plug_in("1-1", "ttyACM1", "1209", "0001", "AAAA", false);
+  plug_in("1-2", "ttyACM0", "BBBB");
+  plug_in("1-1", "ttyACM1", "AAAA");
   EXPECT_EQ(error({}), "several fingertips found: AAAA, BBBB");
   EXPECT_EQ(thrown({}).code(), ErrorCode::several_fingertips);
   EXPECT_EQ(port({"", "bbbb", Reach::automatic}), root() + "/dev/ttyACM0");
@@ -117,7 +112,7 @@ TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
 }
 
 TEST_F(FakeSystem, TheEnvironmentGoesBeforeUsbAndTheArgumentBeforeBoth) {
-  plug_in("1-1", "ttyACM0", "1209", "0001", "A", false);
+  plug_in("1-1", "ttyACM0", "A");
   setenv("FINGERTIP_PORT", "/tmp/pty", 1);
   EXPECT_EQ(port({}), "/tmp/pty");
   EXPECT_EQ(port({"/tmp/other", "", Reach::automatic}), "/tmp/other");
