@@ -1,5 +1,5 @@
 """Publishes every fingertip of this computer on Zenoh, until it is ended: contact, raw, health and info packets as they were on the
-line, with this computer's clock. Keys: fingertip/network.py. A fingertip that is plugged in later is found, one that is unplugged is
+line, with this computer's clock. Keys: README.md of the package. A fingertip that is plugged in later is found, one that is unplugged is
 waited for. Nothing is encrypted and everybody in reach may tare and set, unless --config has it otherwise.
 
 In Python, because the package reconnects, finds and shares fingertips already, and Debian has no Zenoh for C++.
@@ -13,12 +13,11 @@ import json
 import os
 import pathlib
 import platform
-import sys
 
 from . import discovery, host_time, wire
 from .device import Fingertip
 from .errors import FingertipError, InputError
-from .files import check_range, printable, run_tool
+from .files import check_range, printable, reporter, run_tool
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, host_clock, open_session, settings_of, until_ended, zenoh_module
 
 LOOK_s = 1.0  # for fingertips that came
@@ -271,10 +270,7 @@ def main(argv):
     options = parser.parse_args(argv)
     check_range("keep", options.keep, 1, 10_000_000)
     check_range("latency-ms", options.latency_ms, 0, 1000)
-    ended = until_ended()
-
-    def report(text):
-        print(f"fingertip-bridge: {printable(text)}", file=sys.stderr, flush=True)
+    ended, report = until_ended(), reporter("fingertip-bridge")
 
     with open_session(options, options.router) as session:
         bridge = Bridge(session, options.port, options.keep, options.latency_ms, report)

@@ -71,6 +71,11 @@ def check_range(name: str, value: float, low: float, high: float) -> None:
         raise InputError(f"--{name} {value:g} is out of range; give {low:g} to {high:g}")
 
 
+def reporter(name: str) -> Callable[[str], None]:
+    """Of a command: a line on stderr."""
+    return lambda text: print(f"{name}: {printable(text)}", file=sys.stderr, flush=True)
+
+
 def printable(text: str) -> str:
     """In one line and harmless to a terminal: control characters and stray bytes as \\x1b."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

@@ -10,13 +10,12 @@ import itertools
 import json
 import math
 import queue
-import sys
 from typing import NamedTuple
 
 from . import host_time, wire
 from .clock import ClockEstimate
 from .errors import InputError, PacketError
-from .files import check_output, check_range, printable, run_tool
+from .files import check_output, check_range, reporter, run_tool
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session, parts_of, until_ended, zenoh_module
 from .line import Capability
 from .recording import JointRecordingWriter
@@ -506,10 +505,7 @@ def main(argv):
     check_range("seconds", options.seconds, 0, math.inf)
     check_range("clock-bound-us", options.clock_bound_us, 0, 1e9)
     check_output(options.file)
-    ended = until_ended()
-
-    def report(text):
-        print(f"fingertip-recorder: {printable(text)}", file=sys.stderr, flush=True)
+    ended, report = until_ended(), reporter("fingertip-recorder")
 
     with open_session(options) as session:
         infos = find(session, options.serial, options.expect, options.wait)
