@@ -9,8 +9,7 @@ extern "C" {
 
 namespace fingertip::cell {
 
-Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache)
-    : name_(name), layer_mm_(layer_mm) {
+Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache) {
   const twin::Layer layer = twin::silicone(layer_mm);
   if (name == "plate") {
     make_plate(layer);

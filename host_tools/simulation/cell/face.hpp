@@ -28,8 +28,6 @@ public:
   // that there is not.
   Face(const std::string &name, double layer_mm, const std::filesystem::path &cache);
 
-  const std::string &name() const { return name_; }
-  double layer_mm() const { return layer_mm_; }
   // 0..FORCE_MAX_N; beyond, as there.
   double indentation_mm(double force_N) const;
   double radius_mm(double force_N) const; // of contact
@@ -38,8 +36,6 @@ public:
 private:
   void make_plate(const twin::Layer &layer);
 
-  std::string name_;
-  double layer_mm_;
   std::optional<twin::ContactTable> table_; // or the plate
   std::optional<twin::TractionTable> traction_;
   std::optional<Plate> plate_;
