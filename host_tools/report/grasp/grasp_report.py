@@ -62,7 +62,8 @@ def draw_drops(axes, found):
     axes.set_yticks(range(len(rows)), list(rows), size=7)
     axes.invert_yaxis()
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
-    tidy(axes, "Dropped", "% of grasps")
+    counts = sorted({row["grasps"] for row in found["kinds"]})
+    tidy(axes, "Dropped", f"% of {' to '.join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))} grasps")
 
 
 def moment(series, t_s):
