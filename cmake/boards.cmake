@@ -22,9 +22,8 @@ function(board_write_header board)
     string(TOUPPER ${name} name)
     string(APPEND constants "  BOARD_${name} = ${value},\n")
   endforeach()
-  string(TOUPPER ${board}_BOARD_H guard)
   file(CONFIGURE OUTPUT ${FINGERTIP_BOARD_HEADERS}/${board}/board.h @ONLY CONTENT
-    "/* Written by cmake/boards.cmake from boards/${board}/board.json. */\n#ifndef ${guard}\n#define ${guard}\n\nenum {\n${constants}};\n\n#endif\n")
+    "/* Written by cmake/boards.cmake from boards/${board}/board.json. */\n#pragma once\n\nenum {\n${constants}};\n")
 endfunction()
 
 file(GLOB descriptors CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/boards/*/board.json)

@@ -1,8 +1,7 @@
 /* usb/cdc.h on the host: a byte stream in memory whose far end is the test. Linked in place of the
  * USB device.
  */
-#ifndef NATIVE_NATIVE_CDC_H
-#define NATIVE_NATIVE_CDC_H
+#pragma once
 
 #include "usb/cdc.h"
 
@@ -37,5 +36,3 @@ void native_cdc_request_loader(void);
 
 /* Takes what the host has received, at most capacity bytes; returns how many. */
 size_t native_cdc_receive(uint8_t *bytes, size_t capacity);
-
-#endif

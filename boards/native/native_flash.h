@@ -6,8 +6,7 @@
  * What a real flash would punish stops the test program: two operations at once, bytes beyond a
  * page.
  */
-#ifndef NATIVE_NATIVE_FLASH_H
-#define NATIVE_NATIVE_FLASH_H
+#pragma once
 
 #include "port/flash.h"
 
@@ -37,5 +36,3 @@ void native_flash_wear_out(void);
 
 /* Steps since reset. */
 uint64_t native_flash_steps(void);
-
-#endif

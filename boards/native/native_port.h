@@ -6,8 +6,7 @@
  * a message: a main loop that sleeps with no event to come, and a program that never lets time
  * pass.
  */
-#ifndef NATIVE_NATIVE_PORT_H
-#define NATIVE_NATIVE_PORT_H
+#pragma once
 
 #include "common/crash.h"
 
@@ -54,5 +53,3 @@ bool native_watchdog_expired(void);
 
 /* Events since start. */
 uint64_t native_event_count(void);
-
-#endif

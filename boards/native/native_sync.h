@@ -1,6 +1,5 @@
 /* port/sync.h on the host: edges come from the test, and pulses go nowhere. */
-#ifndef NATIVE_NATIVE_SYNC_H
-#define NATIVE_NATIVE_SYNC_H
+#pragma once
 
 #include "port/sync.h"
 
@@ -17,5 +16,3 @@ bool native_sync_level(void);
 
 /* Rises of it since start-up. */
 unsigned native_sync_pulses(void);
-
-#endif

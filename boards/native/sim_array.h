@@ -5,8 +5,7 @@
  * Transfers are counted from 1: each broadcast of a command is one, each read of one sensor is one.
  * After start_* advance time to the earlier of *wake_us and sim_array_next_event_us(), and poll.
  */
-#ifndef NATIVE_SIM_ARRAY_H
-#define NATIVE_SIM_ARRAY_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "native/sim_ms5840.h"
@@ -104,5 +103,3 @@ const struct array_bus *sim_array_bus(struct sim_array *array);
 
 /* When the bus next makes progress; UINT64_MAX if it does not. */
 uint64_t sim_array_next_event_us(const struct sim_array *array);
-
-#endif

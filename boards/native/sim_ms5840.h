@@ -8,8 +8,7 @@
  * result, and so does a second conversion command: the spoiled result is 1/8 too small, so that it
  * resembles a measurement. Word 7 of the PROM is not acknowledged.
  */
-#ifndef NATIVE_SIM_MS5840_H
-#define NATIVE_SIM_MS5840_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -81,5 +80,3 @@ uint32_t sim_ms5840_d1(const uint16_t *prom, double pressure_Pa, uint32_t d2);
 uint32_t sim_ms5840_conversion_us(unsigned osr);
 double sim_ms5840_noise_Pa(unsigned osr);
 double sim_ms5840_noise_degC(unsigned osr);
-
-#endif

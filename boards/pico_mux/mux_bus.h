@@ -18,8 +18,7 @@
  * row, for a line behind it is then held; it is opened again after 1 s, and after twice as long
  * each time, up to 16 s, that it still does.
  */
-#ifndef PICO_MUX_MUX_BUS_H
-#define PICO_MUX_MUX_BUS_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "pico_mux/board.h"
@@ -82,5 +81,3 @@ struct mux_bus {
 /* Resets the multiplexers and opens the controller. FT_ERR_TIMEOUT: a block of the chip does not
  * start. Fills *array_bus, which refers to *bus. */
 enum ft_status mux_bus_init(struct mux_bus *bus, struct array_bus *array_bus);
-
-#endif

@@ -8,8 +8,7 @@
  * a STOP it leaves the bus free for 1.4 us. Pure functions. Sources: UM10204; MS5840-02BA
  * datasheet.
  */
-#ifndef PICO_PARALLEL_I2C_WAVE_H
-#define PICO_PARALLEL_I2C_WAVE_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "pico_parallel/board.h"
@@ -70,5 +69,3 @@ struct i2c_reply {
 /* What all the other samples show, with the AND of what i2c_wave_byte() returned for byte_count
  * bytes; 0 and UINT16_MAX for a command. The bytes count for those that acknowledged. */
 struct i2c_reply i2c_wave_reply(const uint16_t *samples, uint8_t byte_count, uint16_t in_bytes);
-
-#endif

@@ -9,8 +9,7 @@
  * not help, ever more rarely. Clocks that do not follow are a failure of the whole bus: the
  * operation ends with FT_ERR_TIMEOUT and a recovery must free SCL.
  */
-#ifndef PICO_PARALLEL_PARALLEL_BUS_H
-#define PICO_PARALLEL_PARALLEL_BUS_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "pico_parallel/i2c_wave.h"
@@ -50,5 +49,3 @@ struct parallel_bus {
 /* Opens the lines. FT_ERR_TIMEOUT: a block of the chip does not start. Fills *array_bus, which
  * refers to *bus. */
 enum ft_status parallel_bus_init(struct parallel_bus *bus, struct array_bus *array_bus);
-
-#endif

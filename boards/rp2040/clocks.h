@@ -4,8 +4,7 @@
  * These functions run from flash, before the image is in SRAM: they use no variables and call
  * nothing outside clocks.c.
  */
-#ifndef RP2040_CLOCKS_H
-#define RP2040_CLOCKS_H
+#pragma once
 
 /* Brings every block but the flash interface into reset and starts watchdog and clocks. Each wait
  * is bounded; without a crystal there is no USB to report it, so a failure starts over. */
@@ -13,5 +12,3 @@ void clocks_start(void);
 
 /* Resets the whole chip but its oscillators, through the watchdog. */
 _Noreturn void clocks_reset_chip(void);
-
-#endif

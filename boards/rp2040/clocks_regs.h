@@ -1,7 +1,6 @@
 /* Oscillators, PLLs and clock generators: the registers and bits used here (RP2040 datasheet 2.15
  * clocks, 2.16 XOSC, 2.17 ROSC, 2.18 PLL). */
-#ifndef RP2040_CLOCKS_REGS_H
-#define RP2040_CLOCKS_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -71,5 +70,3 @@ static inline void pll_end(uint32_t base, uint32_t post_dividers) {
   REG32(base + PLL_PRIM) = post_dividers;
   REG32_CLEAR(base + PLL_PWR) = PLL_PWR_POSTDIVPD;
 }
-
-#endif

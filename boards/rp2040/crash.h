@@ -8,13 +8,10 @@
  * that interrupt cannot run either, the next start makes a record of what the parts noted on their
  * way; of registers it knows nothing.
  */
-#ifndef RP2040_CRASH_H
-#define RP2040_CRASH_H
+#pragma once
 
 /* First thing: finds out how the last life ended, and begins to follow this one. */
 void crash_start(void);
 
 /* Once the timer runs. */
 void crash_watch(void);
-
-#endif

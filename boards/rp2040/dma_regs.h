@@ -1,6 +1,5 @@
 /* The DMA controller (RP2040 datasheet 2.5). */
-#ifndef RP2040_DMA_REGS_H
-#define RP2040_DMA_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -27,5 +26,3 @@
 #define DMA_DREQ_PIO0_RX0 4u
 #define DMA_DREQ_PIO1_RX0 12u
 #define DMA_DREQ_NONE 63u
-
-#endif

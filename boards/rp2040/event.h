@@ -1,7 +1,6 @@
 /* The event interrupt of port.h. What leads to it has one priority, so its handlers never nest;
  * those of USB come above them, and share nothing with them. */
-#ifndef RP2040_EVENT_H
-#define RP2040_EVENT_H
+#pragma once
 
 /* Calls the handler that port_set_event_handler() installed. From an interrupt handler. */
 void rp2040_event(void);
@@ -11,5 +10,3 @@ void timer0_irq_handler(void);
 
 /* Prepares what port.h offers. Called once, before main. */
 void port_start(void);
-
-#endif

@@ -4,8 +4,7 @@
  * and what port/flash.h asks for needs no interrupt disabled and no wait: commands go out in
  * slices that fit into the FIFOs, and the chip is busy by itself.
  */
-#ifndef RP2040_FLASH_H
-#define RP2040_FLASH_H
+#pragma once
 
 #include "common/status.h"
 
@@ -28,5 +27,3 @@ enum ft_status flash_read_id(uint8_t id[FLASH_ID_BYTES]);
  * bootrom_main.c _flash_boot()). */
 #define FLASH_ERASE_MAX_us 400000u /* W25Q16JV datasheet 9.6 */
 bool flash_may_erase(void);
-
-#endif

@@ -1,8 +1,7 @@
 /* Pins of bank 0: function, pad and level (RP2040 datasheet 2.19 IO_BANK0 and PADS_BANK0, 2.3.1.2
  * SIO). IO_BANK0 and PADS_BANK0 must be out of reset.
  */
-#ifndef RP2040_GPIO_H
-#define RP2040_GPIO_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -31,5 +30,3 @@ void gpio_drive(unsigned pin, bool enabled);
 
 /* The level on the pad, whatever its function. */
 bool gpio_read(unsigned pin);
-
-#endif

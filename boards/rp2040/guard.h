@@ -1,6 +1,5 @@
 /* What the memory protection unit of the processor that calls this holds back. */
-#ifndef RP2040_GUARD_H
-#define RP2040_GUARD_H
+#pragma once
 
 #include <stdint.h>
 
@@ -11,5 +10,3 @@ void guard_memory(const uint32_t *stack_guard, uint32_t log2_bytes);
 
 /* Holds nothing back any more. */
 void guard_end(void);
-
-#endif

@@ -8,8 +8,7 @@
  *
  * Source: RP2040 datasheet 4.3; I2C-bus specification UM10204, fast mode.
  */
-#ifndef RP2040_I2C_H
-#define RP2040_I2C_H
+#pragma once
 
 #include "common/status.h"
 
@@ -64,5 +63,3 @@ bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line);
 
 /* Interrupt vector of I2C0. */
 void i2c0_irq_handler(void);
-
-#endif

@@ -1,6 +1,5 @@
 /* I2C0, a Synopsys DW_apb_i2c: the registers and bits used here (RP2040 datasheet 4.3.17). */
-#ifndef RP2040_I2C_REGS_H
-#define RP2040_I2C_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -46,5 +45,3 @@
 #define IC_ENABLE_STATUS_IC_EN (1u << 0) /* follows IC_ENABLE to 0 once the bus is idle */
 
 #define IC_FS_SPKLEN REG32(I2C0_BASE + 0xa0u) /* written only while disabled */
-
-#endif

@@ -1,6 +1,5 @@
 /* Sections that no interrupt cuts (ARMv6-M B1.4.3, PRIMASK). */
-#ifndef RP2040_INTERRUPTS_H
-#define RP2040_INTERRUPTS_H
+#pragma once
 
 #include <stdint.h>
 
@@ -12,5 +11,3 @@ static inline uint32_t disable_interrupts(void) {
 
 /* As they were before. */
 static inline void restore_interrupts(uint32_t primask) { __asm volatile("msr primask, %0" ::"r"(primask) : "memory"); }
-
-#endif

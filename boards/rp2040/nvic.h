@@ -1,6 +1,5 @@
 /* Interrupt numbers (RP2040 datasheet 2.3.2) and the interrupt controller of the core (2.4.8). */
-#ifndef RP2040_NVIC_H
-#define RP2040_NVIC_H
+#pragma once
 
 enum rp2040_irq {
   RP2040_IRQ_TIMER_0 = 0,
@@ -23,5 +22,3 @@ void rp2040_irq_disable(unsigned irq);
 
 /* Lets the line interrupt now, as if its block had asked for it. */
 void rp2040_irq_pend(unsigned irq);
-
-#endif

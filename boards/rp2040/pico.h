@@ -1,6 +1,5 @@
 /* What a Raspberry Pi Pico wires to its own chip (pico-sdk, boards/pico.h). */
-#ifndef RP2040_PICO_H
-#define RP2040_PICO_H
+#pragma once
 
 #include "common/status.h"
 
@@ -13,5 +12,3 @@ enum pico_supply {
 enum ft_status pico_start(void);
 
 void pico_set_supply(enum pico_supply supply);
-
-#endif

@@ -1,6 +1,5 @@
 /* PIO0 and PIO1 (RP2040 datasheet 3.7) and the encoding of its instructions (3.4). */
-#ifndef RP2040_PIO_REGS_H
-#define RP2040_PIO_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -43,5 +42,3 @@
 #define PIO_MOV_ISR_NOT_Y 0xa0cau
 #define PIO_SET_X(value) (0xe020u | (uint32_t)(value))
 #define PIO_SET_Y(value) (0xe040u | (uint32_t)(value))
-
-#endif

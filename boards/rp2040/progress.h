@@ -1,6 +1,5 @@
 /* Whether a part of the firmware has made no progress for too long. */
-#ifndef RP2040_PROGRESS_H
-#define RP2040_PROGRESS_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -10,5 +9,3 @@
 static inline bool is_overdue(uint32_t now_us, uint32_t progress_us, uint32_t limit_us) {
   return (int32_t)(now_us - progress_us) > (int32_t)limit_us;
 }
-
-#endif

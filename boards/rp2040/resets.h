@@ -1,8 +1,7 @@
 /* Subsystem resets (RP2040 datasheet 2.14). A block is unusable, and its registers must not be
  * touched, until it has been released.
  */
-#ifndef RP2040_RESETS_H
-#define RP2040_RESETS_H
+#pragma once
 
 #include "common/status.h"
 #include "rp2040/reg.h"
@@ -41,5 +40,3 @@ static inline enum ft_status resets_release(uint32_t blocks) {
   }
   return FT_ERR_TIMEOUT;
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* What both processors see of each other (RP2040 datasheet 2.3.1), and the reset of the second one
  * (2.13 power-on state machine). */
-#ifndef RP2040_SIO_REGS_H
-#define RP2040_SIO_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -14,5 +13,3 @@
 
 #define PSM_FRCE_OFF 0x40010004u
 #define PSM_PROC1 (1u << 16)
-
-#endif

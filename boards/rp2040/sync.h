@@ -10,12 +10,9 @@
  * The two channels write rings that wrap by themselves. A reader that is late finds by the
  * numbers what it has missed.
  */
-#ifndef RP2040_SYNC_H
-#define RP2040_SYNC_H
+#pragma once
 
 /* The board's. */
 extern const unsigned sync_pin;
 
 void timer3_irq_handler(void);
-
-#endif

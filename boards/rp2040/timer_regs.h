@@ -1,6 +1,5 @@
 /* The 64-bit microsecond counter and its alarms (RP2040 datasheet 4.6). */
-#ifndef RP2040_TIMER_REGS_H
-#define RP2040_TIMER_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -19,5 +18,3 @@
 #define TIMER_ALARM1_BIT (1u << 1)
 #define TIMER_ALARM2_BIT (1u << 2)
 #define TIMER_ALARM3_BIT (1u << 3)
-
-#endif

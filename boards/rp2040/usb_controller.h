@@ -1,6 +1,5 @@
 /* Interrupt vectors of the USB controller behind port/usb_controller.h. */
-#ifndef RP2040_USB_CONTROLLER_H
-#define RP2040_USB_CONTROLLER_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -16,5 +15,3 @@ void usb_service_irq_handler(void);
 
 /* TIMER alarm 1: the watch over the controller. */
 void timer1_irq_handler(void);
-
-#endif

@@ -1,7 +1,6 @@
 /* The USB controller as a device: the registers and bits used here (RP2040 datasheet 4.1.3 DPRAM,
  * 4.1.4 registers). `endpoint` is an endpoint address. */
-#ifndef RP2040_USB_REGS_H
-#define RP2040_USB_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -76,5 +75,3 @@
 #define USB_INT_DEV_SUSPEND (1u << 14)
 #define USB_INT_BUS_RESET (1u << 12)
 #define USB_INT_BUFF_STATUS (1u << 4)
-
-#endif

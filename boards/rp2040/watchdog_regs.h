@@ -1,7 +1,6 @@
 /* Watchdog with the tick generator, and what its reset reaches (RP2040 datasheet 4.7 watchdog, 2.13
  * power-on state machine). */
-#ifndef RP2040_WATCHDOG_REGS_H
-#define RP2040_WATCHDOG_REGS_H
+#pragma once
 
 #include "rp2040/reg.h"
 
@@ -25,5 +24,3 @@
 
 #define PSM_WDSEL REG32(0x40010008u)
 #define PSM_WDSEL_ALL_BUT_OSCILLATORS 0x1fffcu
-
-#endif

@@ -15,8 +15,7 @@
  * One context: the event handler, or main before there is one. Nothing here waits, but for blocks
  * to leave reset, which is bounded.
  */
-#ifndef RP2040_WAVE_PLAYER_H
-#define RP2040_WAVE_PLAYER_H
+#pragma once
 
 #include "common/status.h"
 
@@ -50,5 +49,3 @@ unsigned wave_player_sampled(void);
 
 /* Interrupt vector of the DMA controller. */
 void dma0_irq_handler(void);
-
-#endif

@@ -3,8 +3,7 @@
  *
  * One instance per image, static. The board's main installs an event handler (port.h) that calls app_on_event, calls
  * app_start once and then app_run for ever. */
-#ifndef APP_APP_H
-#define APP_APP_H
+#pragma once
 
 #include "app/commands.h"
 #include "app/findings.h"
@@ -66,5 +65,3 @@ void app_process_frame(struct app *app, uint64_t taken_us);
 
 /* One round of the main loop: does what is due, or sleeps until something happens. */
 void app_run(struct app *app);
-
-#endif

@@ -1,6 +1,5 @@
 /* The commands that the host sends, and what the fingertip keeps of them. */
-#ifndef APP_COMMANDS_H
-#define APP_COMMANDS_H
+#pragma once
 
 #include "wire/packet.h"
 
@@ -33,5 +32,3 @@ void commands_end_session(struct app *app);
 
 /* Plans to leave for the boot loader, after a time in which the acknowledgement gets out. */
 void commands_plan_loader(struct commands *commands, uint64_t now_us);
-
-#endif

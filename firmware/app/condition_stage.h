@@ -1,8 +1,7 @@
 /* Stage: pressure above the zero, and whether anything touches (condition/condition.h).
  * Reads findings.frame. Writes findings.conditioned. Asks the scan for a temperature where one may explain a reading.
  */
-#ifndef APP_CONDITION_STAGE_H
-#define APP_CONDITION_STAGE_H
+#pragma once
 
 #include "app/findings.h"
 #include "common/calibration.h"
@@ -26,5 +25,3 @@ void condition_stage_put(const struct condition_stage *own, const struct finding
 
 /* The gains of this calibration are in use from the next frame on; NULL: all sensors are alike. */
 void condition_stage_use_calibration(struct condition_stage *own, const struct calibration *calibration);
-
-#endif

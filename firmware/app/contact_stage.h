@@ -1,7 +1,6 @@
 /* Stage: the flags of the frame (contact/contact.h). Slip is found right after it, by contact_update.
  * Reads findings.frame, .conditioned and .fit. Writes findings.contact_input and, in a held frame, .contact. */
-#ifndef APP_CONTACT_STAGE_H
-#define APP_CONTACT_STAGE_H
+#pragma once
 
 #include "app/findings.h"
 #include "wire/packet.h"
@@ -14,5 +13,3 @@ void contact_stage_hold(struct findings *found);
 
 /* Fills in what this stage knows of a contact packet. */
 void contact_stage_put(const struct findings *found, struct wire_contact *packet);
-
-#endif

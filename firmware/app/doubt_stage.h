@@ -2,8 +2,7 @@
  * pad that was never calibrated (fit/fit_gains.h). Reads findings.frame, .conditioned and .tangential. Widens
  * findings.fit.location_sd_mm, adds a flag, and sets the gains' standard deviation in the settings of location_stage.
  */
-#ifndef APP_DOUBT_STAGE_H
-#define APP_DOUBT_STAGE_H
+#pragma once
 
 #include "app/findings.h"
 #include "app/location_stage.h"
@@ -24,5 +23,3 @@ void doubt_stage_follow(struct doubt_stage *own, struct location_stage *location
 
 /* Another calibration is in use, or none: the gains are forgotten. */
 void doubt_stage_forget_gains(struct doubt_stage *own);
-
-#endif

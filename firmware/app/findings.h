@@ -1,7 +1,6 @@
 /* What is known of the frame under way: the scan brings the readings, and each stage (stages.h) adds what it finds. A
  * stage reads what earlier stages have written. Of a held frame all but the frame and the times stays as it was. */
-#ifndef APP_FINDINGS_H
-#define APP_FINDINGS_H
+#pragma once
 
 #include "common/crash.h"
 #include "condition/condition.h"
@@ -35,5 +34,3 @@ struct findings {
   struct motion motion;                    /* motion_update */
   struct shapes_place location;            /* shapes_stage: the location to report */
 };
-
-#endif

@@ -1,8 +1,7 @@
 /* The jobs of the second processor. A stage that has one asks by worker/worker.h, and gets the answer in a later call
  * or a later frame. Jobs are done in the order of enum job. A build for one processor serves them itself, after the
  * frame's packets, or before them where a stage waits: the answers have the same bits. */
-#ifndef APP_JOBS_H
-#define APP_JOBS_H
+#pragma once
 
 #include "worker/worker.h"
 
@@ -44,5 +43,3 @@ static inline void jobs_serve_alone(struct jobs *jobs, enum job job) {
     worker_serve(&jobs->worker[job]);
   }
 }
-
-#endif

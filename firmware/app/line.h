@@ -1,6 +1,5 @@
 /* The line to the host: packets in and out, one at a time. */
-#ifndef APP_LINE_H
-#define APP_LINE_H
+#pragma once
 
 #include "common/status.h"
 #include "wire/packet.h"
@@ -18,5 +17,3 @@ struct line {
 /* Sends .packet.body, or drops it where the queue is full: a sequence number is used all the same, so that the host
  * sees the gap. */
 void line_send(struct line *line, const struct wire_layout *layout, uint64_t t_us);
-
-#endif

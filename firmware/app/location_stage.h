@@ -1,7 +1,6 @@
 /* Stage: location, force and width of the contact, by the fit of a Gaussian (fit/fit.h).
  * Reads findings.frame and .conditioned. Writes findings.fit and .force. Later stages read its array and settings. */
-#ifndef APP_LOCATION_STAGE_H
-#define APP_LOCATION_STAGE_H
+#pragma once
 
 #include "app/findings.h"
 #include "common/calibration.h"
@@ -45,5 +44,3 @@ void location_stage_use_profile(struct location_stage *own, bool has_profile);
  * pressure, which the zeros show, and that of the calibration. Some 20 us, once a second. */
 void location_stage_scale_force(const struct location_stage *own, const struct condition *condition, bool tared,
                                 struct contact_settings *contact);
-
-#endif

@@ -3,8 +3,7 @@
  * take away .tangential, and adds flags.
  *
  * The second processor fits it part by part (jobs.h), so what this stage reports is of an earlier frame. */
-#ifndef APP_SHAPES_STAGE_H
-#define APP_SHAPES_STAGE_H
+#pragma once
 
 #include "app/findings.h"
 #include "app/jobs.h"
@@ -42,5 +41,3 @@ void shapes_stage_use_profile(struct shapes_stage *own, const struct pad_profile
 
 /* jobs_cancel was called: the contact is forgotten. */
 void shapes_stage_forget(struct shapes_stage *own);
-
-#endif

@@ -10,8 +10,7 @@
  *   motion_update      velocity, slide
  *
  * Beside them the sync pin (sync.h) is a capability of some scenes. */
-#ifndef APP_STAGES_H
-#define APP_STAGES_H
+#pragma once
 
 #include "app/condition_stage.h"
 #include "app/contact_stage.h"
@@ -98,5 +97,3 @@ enum ft_status stages_obey(struct stages *stages, const struct wire_packet *comm
 /* Fills in what the stages know of these packets. */
 void stages_put_info(const struct stages *stages, struct wire_info *info);
 void stages_put_health(const struct stages *stages, struct wire_health *health);
-
-#endif

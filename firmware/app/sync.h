@@ -1,6 +1,5 @@
 /* The sync pin: its setting, and its edges as packets. With capability sync only. */
-#ifndef APP_SYNC_H
-#define APP_SYNC_H
+#pragma once
 
 #include "app/line.h"
 #include "port/sync.h"
@@ -39,5 +38,3 @@ static inline void sync_show_scan(const struct sync *sync, const struct scan *sc
     port_sync_write(scan_is_converting_frame(scan));
   }
 }
-
-#endif

@@ -5,8 +5,7 @@
  * The second processor estimates it (jobs.h). Frames that come faster than TANGENTIAL_BESIDE_us do not wait: each takes
  * the estimate of the frame before, moved and scaled as the Gaussian has changed since. Slower ones wait for their own.
  */
-#ifndef APP_TANGENTIAL_STAGE_H
-#define APP_TANGENTIAL_STAGE_H
+#pragma once
 
 #include "app/findings.h"
 #include "app/jobs.h"
@@ -60,5 +59,3 @@ void tangential_stage_use_scale(struct tangential_stage *own, const struct locat
 
 /* jobs_cancel was called: what was asked is forgotten. */
 void tangential_stage_forget(struct tangential_stage *own);
-
-#endif

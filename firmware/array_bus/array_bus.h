@@ -7,8 +7,7 @@
  * One operation runs at a time. start_* begins one and returns at once. poll advances it and
  * reports its end. No call ever waits. All calls come from the same context (the board's event
  * interrupt, or a test), never two at once. */
-#ifndef ARRAY_BUS_ARRAY_BUS_H
-#define ARRAY_BUS_ARRAY_BUS_H
+#pragma once
 
 #include "common/limits.h"
 #include "common/status.h"
@@ -57,5 +56,3 @@ struct array_bus {
    * first answer other than FT_PENDING; without one, poll answers FT_ERR_ARGUMENT. */
   enum ft_status (*poll)(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us);
 };
-
-#endif

@@ -5,8 +5,7 @@
  * moulded ones to some kPa. In four real strips under rubber one sensor was up to 8.2 times the
  * median difference off (JiannnH/MTL-BaroTactileSensor, 2023), and that is no fault. With fewer
  * than APART_VOTERS_MIN nothing is apart. */
-#ifndef COMMON_APART_H
-#define COMMON_APART_H
+#pragma once
 
 #include <stdint.h>
 
@@ -19,5 +18,3 @@ int32_t apart_median(int32_t values[], int count);
 /* value: [sensor], of a size below 1e8; which: bitmap of those that count, of sensor_count. Returns
  * the bitmap of those apart. Cost: up to 250 Cortex-M0+ cycles a sensor. */
 uint32_t apart_find(const int32_t value[], uint32_t which, uint8_t sensor_count, int32_t floor);
-
-#endif

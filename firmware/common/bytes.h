@@ -1,6 +1,5 @@
 /* Explicit little-endian access to byte buffers, for any alignment and any host byte order. */
-#ifndef COMMON_BYTES_H
-#define COMMON_BYTES_H
+#pragma once
 
 #include <stdint.h>
 #include <string.h>
@@ -39,5 +38,3 @@ static inline float bytes_to_f32(uint32_t bits) {
   memcpy(&value, &bits, sizeof value);
   return value;
 }
-
-#endif

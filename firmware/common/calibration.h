@@ -1,8 +1,7 @@
 /* A calibration of one pad, as `fingertip calibrate` finds it by pressing the pad with one weight,
  * and as the packets carry it and the fingertip keeps it.
  */
-#ifndef COMMON_CALIBRATION_H
-#define COMMON_CALIBRATION_H
+#pragma once
 
 #include "common/limits.h"
 
@@ -48,5 +47,3 @@ struct calibration {
 
 /* Every value of it, for the first sensor_count sensors, is finite and in its range. */
 bool calibration_is_valid(const struct calibration *calibration, unsigned sensor_count);
-
-#endif

@@ -5,8 +5,7 @@
  * A quantity may be used only under its VALID flag; where the flag is off its field is zero.
  * The warnings leave the numbers in place and state why they deserve less trust.
  */
-#ifndef COMMON_CONTACT_FLAGS_H
-#define COMMON_CONTACT_FLAGS_H
+#pragma once
 
 enum contact_flag {
   CONTACT_FLAG_CONTACT = 1 << 0, /* a sensor is pressed */
@@ -56,5 +55,3 @@ enum contact_flag {
   /* warning: the contact shape is neither one contact nor a long one nor two */
   CONTACT_FLAG_SHAPE_UNKNOWN = 1 << 29,
 };
-
-#endif

@@ -1,7 +1,6 @@
 /* How the firmware last ended: where it was, why, and what had happened before. The board keeps it
  * over the reset (port/port.h). The packets carry it to the host. */
-#ifndef COMMON_CRASH_H
-#define COMMON_CRASH_H
+#pragma once
 
 #include <stdint.h>
 
@@ -70,5 +69,3 @@ struct crash_record {
   uint32_t event_ages_1024us[CRASH_EVENTS]; /* how long before the end, in 1024 us; saturates */
   uint64_t t_us;                            /* of the end, since the start before it */
 };
-
-#endif

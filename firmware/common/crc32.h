@@ -2,8 +2,7 @@
  * Ethernet, zlib and PNG. Check value of "123456789": 0xCBF43926.
  * A table of a kilobyte: a byte costs six Cortex-M0+ cycles.
  */
-#ifndef COMMON_CRC32_H
-#define COMMON_CRC32_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -36,5 +35,3 @@ static inline __attribute__((always_inline)) uint32_t crc32_add_u16(uint32_t crc
 static inline __attribute__((always_inline)) uint32_t crc32_add_u32(uint32_t crc, uint32_t value) {
   return crc32_step(crc32_step(crc32_step(crc32_step(crc ^ value))));
 }
-
-#endif

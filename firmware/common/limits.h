@@ -1,6 +1,5 @@
 /* Sizes that several modules share. */
-#ifndef COMMON_LIMITS_H
-#define COMMON_LIMITS_H
+#pragma once
 
 /* Sensors of one array; a bitmap of sensors is a uint32_t, bit k = sensor k. */
 #define FT_MAX_SENSORS 32
@@ -9,5 +8,3 @@
  * at most. The checks of the images prove both by the call graph (tests/checks). */
 #define FT_STACK_RESERVED_bytes 4096
 #define FT_STACK_USED_MAX_bytes 2608
-
-#endif

@@ -8,8 +8,7 @@
  *   F sum_j share_j / (2 pi v_j) exp(-r^2 / 2 v_j),                   v_j = sd_j^2 + t2
  * A contact that pulls by Q along x adds
  *   Q sum_j moment_j x / (2 pi v_j^2) exp(-r^2 / 2 v_j),              v_j = sd_j^2 + 1.3 t2 */
-#ifndef COMMON_PAD_PROFILE_H
-#define COMMON_PAD_PROFILE_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -81,5 +80,3 @@ struct pad_profile {
 
 /* Every value of it is finite and in its range, and the terms are in order of width. */
 bool pad_profile_is_valid(const struct pad_profile *profile);
-
-#endif

@@ -1,8 +1,7 @@
 /* One status type for the whole firmware: zero or positive is progress, negative is failure.
  * Functions write their outputs only when they return FT_OK.
  */
-#ifndef COMMON_STATUS_H
-#define COMMON_STATUS_H
+#pragma once
 
 enum ft_status {
   FT_PENDING = 1,       /* started and not finished: ask again */
@@ -18,5 +17,3 @@ enum ft_status {
   FT_ERR_STUCK = -9,    /* the bus is held low and recovery did not free it */
   FT_ERR_TYPE = -10,    /* an undamaged packet of a type that this build does not know */
 };
-
-#endif

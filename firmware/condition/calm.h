@@ -1,7 +1,6 @@
 /* The drift of each sensor's level in a calm, in which nothing touches and every level keeps up: from snapshots of the
  * levels of all sensors. In a contact, where the level cannot follow, it goes on. */
-#ifndef CONDITION_CALM_H
-#define CONDITION_CALM_H
+#pragma once
 
 #include "condition/constants.h"
 
@@ -41,5 +40,3 @@ static inline int32_t calm_drift(struct drift *drift, int32_t ms) {
   drift->rest_q16 = (uint16_t)drift_q16;
   return drift_q16 >> 16;
 }
-
-#endif

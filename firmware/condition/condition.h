@@ -44,8 +44,7 @@
  * it
  * - a contact below an eighth of the strongest press in it: what may remain of that one
  * - no contact, but a zero that has taken more than opens the gate, or has not settled to that */
-#ifndef CONDITION_CONDITION_H
-#define CONDITION_CONDITION_H
+#pragma once
 
 #include "condition/calm.h"
 #include "condition/constants.h"
@@ -147,5 +146,3 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
 /* Updates the sensors that are due with the frame just processed. In a contact only the frames to come need it, so its
  * answer can be sent before. A second call does nothing. Cost: about 420 cycles a sensor, once in UPDATE_ms. */
 void condition_follow(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned);
-
-#endif

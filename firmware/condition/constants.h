@@ -1,8 +1,7 @@
 /* The constants of the condition: meaning, unit, source. "Strips": the recordings of real strips of barometers under
  * rubber, which host_tools/report/real judges. "Choice": any value near it gives the same. ZERO.md lists what half and
  * twice of them changes. */
-#ifndef CONDITION_CONSTANTS_H
-#define CONDITION_CONSTANTS_H
+#pragma once
 
 #include "condition/fixed.h"
 
@@ -89,5 +88,3 @@
 #define DRIFT_FASTEST_q12 1280  /* 0.31 Pa/s: at more the level is too slow to know the drift after a minute */
 #define DRIFT_SD_mPa_s 250      /* standard deviation of drifts; strips: 0.22 Pa/s at most */
 #define LEVEL_SD_mPa 1000       /* of a change of the level between two snapshots */
-
-#endif

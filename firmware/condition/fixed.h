@@ -1,7 +1,6 @@
 /* Fixed-point arithmetic of the condition. Pressures are in 1/1024 Pa (_q10), times in units of 1.024 ms (_ms), which a
  * shift makes of microseconds. A share is a factor below 1, in 1/65536. */
-#ifndef CONDITION_FIXED_H
-#define CONDITION_FIXED_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -35,5 +34,3 @@ int32_t in_step(int32_t each_second, int32_t ms);
 static inline void set_bit(uint32_t *bitmap, uint8_t k, bool set) {
   *bitmap = (*bitmap & ~(UINT32_C(1) << k)) | (uint32_t)set << k;
 }
-
-#endif

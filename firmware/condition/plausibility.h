@@ -4,8 +4,7 @@
  * hides that, but not the wrong sensitivity behind it. At rest all sensors of a pad measure the same air: one that
  * reads apart from the others (common/apart.h) is doubtful, from the first frame after a tare on and for as long as it
  * does so. So is one that was tared under a press. */
-#ifndef CONDITION_PLAUSIBILITY_H
-#define CONDITION_PLAUSIBILITY_H
+#pragma once
 
 #include "condition/condition.h"
 #include "frame/frame.h"
@@ -32,5 +31,3 @@ static inline bool plausibility_follow(struct plausibility *plausibility, const 
       conditioned->contact && (frame->saturated == 0 || conditioned->peak_Pa_q10 >= GATE_OPEN_Pa * 1024);
   return !touched && plausibility_compare(plausibility, frame, conditioned);
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* One pass over all that is remembered of one sensor: condition.h has the meaning of each part. For condition.c only.
  */
-#ifndef CONDITION_UPDATE_H
-#define CONDITION_UPDATE_H
+#pragma once
 
 #include "condition/condition.h"
 
@@ -17,5 +16,3 @@ void update_compare(struct condition *condition, uint8_t k, int32_t pressure_Pa_
 
 /* By how far a barometer may drift in a contact of this length. */
 int32_t update_drift_in(uint32_t pressed_ms);
-
-#endif

@@ -1,6 +1,5 @@
 /* The identity of this build, written by the build itself. */
-#ifndef CONFIG_BUILD_INFO_H
-#define CONFIG_BUILD_INFO_H
+#pragma once
 
 #include <stdint.h>
 
@@ -12,5 +11,3 @@ struct build_info {
 };
 
 extern const struct build_info build_info;
-
-#endif

@@ -1,6 +1,5 @@
 /* The settings a fingertip starts with. Commands change those that PROTOCOL.md lists. */
-#ifndef CONFIG_DEFAULTS_H
-#define CONFIG_DEFAULTS_H
+#pragma once
 
 #ifdef FINGERTIP_SCENE_PAPER
 #define DEFAULT_RATE_mHz 20000u /* the paper reads at 20 Hz */
@@ -51,5 +50,3 @@
 /* Error of the Gaussian for a layer of rubber, as a share of the largest reading. With it one
  * standard deviation covers 57 to 74 % of the errors on pads of 6 and 12 mm (report truth, part fit). */
 #define DEFAULT_MODEL_SD 0.0065f
-
-#endif

@@ -3,8 +3,7 @@
  * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along
  * them. Sensor k = 5 * strip + position along the strip, as the boards wire them.
  */
-#ifndef CONFIG_GEOMETRY_H
-#define CONFIG_GEOMETRY_H
+#pragma once
 
 #include "common/limits.h"
 
@@ -19,5 +18,3 @@ struct geometry {
 
 /* Three strips of five MS5840, pitch 9 mm (De Clercq et al., RA-L 2022, section III.A). */
 extern const struct geometry geometry;
-
-#endif

@@ -1,7 +1,6 @@
 /* What the fingertip reports about one frame: the flags of the fit, every other flag that applies,
  * and the slip. */
-#ifndef CONTACT_CONTACT_H
-#define CONTACT_CONTACT_H
+#pragma once
 
 #include "contact/slip.h"
 #include "fit/fit.h"
@@ -60,5 +59,3 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
 
 void contact_update(struct slip_history *history, const struct contact_settings *settings,
                     const struct contact_input *input, struct contact_result *result);
-
-#endif

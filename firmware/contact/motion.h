@@ -24,8 +24,7 @@
  * Sums are integers modulo 2^32. Their difference over a span is exact however long they have run.
  * The cost does not grow with the number of frames in a span. Main context only: it divides with
  * port/divide.h. */
-#ifndef CONTACT_MOTION_H
-#define CONTACT_MOTION_H
+#pragma once
 
 #include "contact/contact.h"
 #include "contact/tangential.h"
@@ -119,5 +118,3 @@ void motion_reset(struct motion_history *history);
  * and SLIDING to result->flags. */
 void motion_update(struct motion_history *history, const struct tangential_settings *settings,
                    const struct contact_input *input, struct contact_result *result, struct motion *motion);
-
-#endif

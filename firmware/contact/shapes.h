@@ -1,7 +1,6 @@
 /* What the fingertip reports about the contact shape: one contact, a long one, or two, as fit_shapes.h
  * distinguishes them, in the scales of the pad. */
-#ifndef CONTACT_SHAPES_H
-#define CONTACT_SHAPES_H
+#pragma once
 
 #include "contact/tangential.h"
 #include "fit/fit_shapes.h"
@@ -71,5 +70,3 @@ struct shapes_place shapes_locate(const struct shapes_report *report, const stru
 
 /* The flags that the report adds to those of a contact. */
 uint32_t shapes_flags(const struct shapes_report *report);
-
-#endif

@@ -10,8 +10,7 @@
  *
  * Positions are integers of 1/16 um, so the running sums are exact however long they run. The cost
  * does not grow with n. */
-#ifndef CONTACT_SLIP_H
-#define CONTACT_SLIP_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -36,5 +35,3 @@ void slip_reset(struct slip_history *history);
  * untouched, until the history spans the window. */
 bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm, uint32_t window_us,
                  float *distance_mm);
-
-#endif

@@ -1,8 +1,7 @@
 /* What the fingertip reports about the tangential force of one frame: the estimate of
  * fit_tangential.h in the scales of the pad. Where the pad's edges spoil the zero, it reports only
  * the change since the first touch. */
-#ifndef CONTACT_TANGENTIAL_H
-#define CONTACT_TANGENTIAL_H
+#pragma once
 
 #include "contact/contact.h"
 #include "fit/fit_tangential.h"
@@ -104,5 +103,3 @@ void tangential_reset(struct tangential_history *history);
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
                        const struct contact_input *input, struct contact_result *result, struct tangential_load *load);
-
-#endif

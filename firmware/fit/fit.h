@@ -11,8 +11,7 @@
  *
  * Sensors on a line do not show where a contact lies across it. The fit holds the location to the
  * line. p0 and force are those of a contact whose centre is there. */
-#ifndef FIT_FIT_H
-#define FIT_FIT_H
+#pragma once
 
 #include "common/status.h"
 #include "fit/fit_types.h"
@@ -83,5 +82,3 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
                      const struct fit_settings *settings, struct fit_result *result);
 void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                  const struct fit_settings *settings, struct fit_result *result);
-
-#endif

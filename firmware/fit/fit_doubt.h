@@ -9,8 +9,7 @@
  * kernel, any layout, any sensors missing. It is in parts, one a frame, for the time after the
  * frame's packet. Until a contact's first look has ended, and where there is none, the load is
  * FIT_DOUBT_USUAL. */
-#ifndef FIT_FIT_DOUBT_H
-#define FIT_FIT_DOUBT_H
+#pragma once
 
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
@@ -65,5 +64,3 @@ void fit_doubt_widen(const struct fit_doubt *load, const struct fit_array *array
  * later parts do not see them. A result that fit_doubt_widen leaves alone begins none. */
 void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
                       const struct fit_settings *settings, const struct fit_result *result);
-
-#endif

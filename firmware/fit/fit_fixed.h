@@ -2,8 +2,7 @@
  * divider. Qn means: the integer is the value times 2^n. Every function is exact to the bit on
  * every machine: it uses nothing but two's complement integers and arithmetic right shifts.
  */
-#ifndef FIT_FIT_FIXED_H
-#define FIT_FIT_FIXED_H
+#pragma once
 
 #include "port/divide.h"
 
@@ -252,5 +251,3 @@ FIXED_INLINE int32_t shifted(int32_t value, int32_t shift) {
   }
   return value >> (shift < -31 ? 31 : -shift);
 }
-
-#endif

@@ -8,8 +8,7 @@
  * bowl leave nothing in the residual, so it is never below 0.08 (NUMERICS.md has what it is worth).
  *
  * A touch counts once, when it rests. What was assumed counts as much as FIT_GAINS_TOUCHES of them. */
-#ifndef FIT_FIT_GAINS_H
-#define FIT_FIT_GAINS_H
+#pragma once
 
 #include "fit/fit.h"
 
@@ -38,5 +37,3 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, con
 
 /* 0.08 to 0.5. */
 float fit_gains_sd(const struct fit_gains *gains);
-
-#endif

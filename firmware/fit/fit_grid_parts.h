@@ -1,8 +1,7 @@
 /* Inside the fixed-point kernels alone: what they share. Pitches are the unit of length, readings
  * have the grid's order [column][row], node numbers count from node (COLUMNS / 2, ROWS / 2).
  */
-#ifndef FIT_FIT_GRID_PARTS_H
-#define FIT_FIT_GRID_PARTS_H
+#pragma once
 
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
@@ -169,5 +168,3 @@ FIXED_INLINE struct scaled fit_grid_scaled(float value) { return scaled_unpack(f
 
 /* sigma in Q26 pitches. */
 int32_t fit_grid_sigma(int32_t height);
-
-#endif

@@ -2,8 +2,7 @@
  * for, and what the last of them imply for the result. How a kernel comes by them is its own
  * affair.
  */
-#ifndef FIT_FIT_GRID_SOLVE_H
-#define FIT_FIT_GRID_SOLVE_H
+#pragma once
 
 #include "fit/fit_grid_parts.h"
 
@@ -153,5 +152,3 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
 /* The sensor whose reading does not belong to the others', or -1; result: the fit to them all. */
 int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                      const struct fit_settings *settings, const struct fit_result *result);
-
-#endif

@@ -1,7 +1,6 @@
 /* The errors that a result reports, and when it deserves a warning. They are alike in all kernels.
  */
-#ifndef FIT_FIT_LIMITS_H
-#define FIT_FIT_LIMITS_H
+#pragma once
 
 #include "common/bytes.h"
 #include "common/contact_flags.h"
@@ -144,5 +143,3 @@ static inline bool fit_outlier_gone(const struct fit_settings *settings, const s
   }
   return true;
 }
-
-#endif

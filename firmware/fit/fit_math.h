@@ -1,8 +1,7 @@
 /* Exponential and logarithm to base 2 in integers: five to ten times faster than the C library's
  * on a core without FPU, and the same bits on every machine.
  */
-#ifndef FIT_FIT_MATH_H
-#define FIT_FIT_MATH_H
+#pragma once
 
 #include <stdint.h>
 
@@ -19,5 +18,3 @@ float fit_float(int32_t mantissa, int32_t exponent);
 
 /* log2(value) in 1/2^24, error below 2e-4; value >= 1. */
 int32_t fit_log2_q24(uint32_t value);
-
-#endif

@@ -15,8 +15,7 @@
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
  * missing. No recording of a real pad under two contacts is public: all figures are simulated
  * (host_tools/report/two). */
-#ifndef FIT_FIT_SHAPES_H
-#define FIT_FIT_SHAPES_H
+#pragma once
 
 #include "common/pad_profile.h"
 #include "fit/fit.h"
@@ -140,5 +139,3 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
                                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                                          const struct fit_result *fit, struct fit_shapes_state *state,
                                          struct fit_shapes_result *result);
-
-#endif

@@ -10,8 +10,7 @@
  *   long   four, the nodes of Gauss's quadrature of a line from -span to span
  *   two    two, by +-span, of weight (1 +- balance) / 2
  * Forces are 2 pi V A and 2 pi V pull. */
-#ifndef FIT_FIT_SHAPES_PARTS_H
-#define FIT_FIT_SHAPES_PARTS_H
+#pragma once
 
 #include "fit/fit_grid_parts.h"
 #include "fit/fit_shapes.h"
@@ -88,5 +87,3 @@ void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct pr
 int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at);
 void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result);
-
-#endif

@@ -17,8 +17,7 @@
  *
  * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards
  * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet. */
-#ifndef FIT_FIT_TANGENTIAL_H
-#define FIT_FIT_TANGENTIAL_H
+#pragma once
 
 #include "common/pad_profile.h"
 #include "fit/fit.h"
@@ -112,5 +111,3 @@ struct fit_tangential {
 void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
                              const struct fit_settings *settings, const struct fit_result *fit,
                              struct fit_tangential_state *state, struct fit_tangential *result);
-
-#endif

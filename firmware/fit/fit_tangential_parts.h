@@ -10,8 +10,7 @@
  * shorter axis make of its pressure, to first order.
  * The order of the unknowns: those that the others determine least come last. The tangential force
  * follows from the remainder of their columns. */
-#ifndef FIT_FIT_TANGENTIAL_PARTS_H
-#define FIT_FIT_TANGENTIAL_PARTS_H
+#pragma once
 
 #include "fit/fit_grid_parts.h"
 #include "fit/fit_tangential.h"
@@ -107,5 +106,3 @@ void fit_tangential_linearise(const struct problem *problem, const struct fit_ta
 /* fit_tangential_step.c: one Gauss-Newton step from there. */
 void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at,
                             struct fit_tangential_room *room, struct outcome *outcome);
-
-#endif

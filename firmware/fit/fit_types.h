@@ -1,6 +1,5 @@
 /* The data of the fit: the array, its settings, its result, and what it keeps from frame to frame. */
-#ifndef FIT_FIT_TYPES_H
-#define FIT_FIT_TYPES_H
+#pragma once
 
 #include "common/limits.h"
 
@@ -105,5 +104,3 @@ struct fit_watch {
   float residual_rms_Pa, force_N;
   struct fit_result without; /* room of a search */
 };
-
-#endif

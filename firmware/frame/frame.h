@@ -1,6 +1,5 @@
 /* The one data type between the sensors and everything that interprets them. */
-#ifndef FRAME_FRAME_H
-#define FRAME_FRAME_H
+#pragma once
 
 #include "common/limits.h"
 
@@ -28,5 +27,3 @@ struct frame {
   uint32_t saturated;      /* bitmap: beyond the range in which the sensor reads true */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor]; 0 where not valid */
 };
-
-#endif

@@ -3,8 +3,7 @@
  *
  * Sources: the data sheets that sensors.h names; Application Note AN520 for the CRC-4.
  */
-#ifndef MS58XX_MS58XX_H
-#define MS58XX_MS58XX_H
+#pragma once
 
 #include "common/status.h"
 #include "ms58xx/sensors.h"
@@ -87,5 +86,3 @@ void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2, 
 /* d1: 24-bit code of a pressure conversion. Absolute pressure in 1/1024 Pa, saturated to int32;
  * shifted right by 10 it is the pressure in Pa. About 130 Cortex-M0+ cycles. */
 int32_t ms58xx_compensate_pressure(const struct ms58xx_thermal *thermal, uint32_t d1);
-
-#endif

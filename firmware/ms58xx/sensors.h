@@ -22,8 +22,7 @@
  * To add a sensor, add a section here, its name in cmake/options.cmake, and its data in
  * boards/native/sim_ms5840.c and in the emulator's board/ms5840.mjs. If its CRC is elsewhere
  * (MS5611: in an eighth word), change ms58xx_prom_crc4 too. */
-#ifndef MS58XX_SENSORS_H
-#define MS58XX_SENSORS_H
+#pragma once
 
 #define MS58XX_MS5840 1
 #define MS58XX_MS5837_30BA 2
@@ -79,6 +78,4 @@
 
 #else
 #error "MS58XX_SENSOR must be one of the sensors above; FINGERTIP_SENSOR sets it"
-#endif
-
 #endif

@@ -2,8 +2,7 @@
  * only (worker/worker.h): a divider that is a peripheral, as the RP2040's, one for each processor, is
  * not saved by interrupts.
  */
-#ifndef PORT_DIVIDE_H
-#define PORT_DIVIDE_H
+#pragma once
 
 #ifdef PORT_DIVIDE_HEADER
 #include PORT_DIVIDE_HEADER
@@ -15,6 +14,4 @@ static inline int32_t port_divide(int32_t numerator, int32_t denominator) {
   /* NOLINTNEXTLINE(clang-analyzer-core.DivideZero): see above */
   return numerator / denominator;
 }
-#endif
-
 #endif

@@ -7,8 +7,7 @@
  * that were to change undefined, and such that they need not read the same twice. Main context
  * only.
  */
-#ifndef PORT_FLASH_H
-#define PORT_FLASH_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -33,5 +32,3 @@ bool port_flash_poll(void);
 
 /* Bytes of no meaning if the flash does not answer. */
 void port_flash_read(uint32_t at, uint8_t *bytes, size_t length);
-
-#endif

@@ -1,8 +1,7 @@
 /* What exists exactly once per image and that the board provides at link time: time, the event
  * interrupt, sleep, watchdog, identity, and the way out to the boot loader.
  */
-#ifndef PORT_PORT_H
-#define PORT_PORT_H
+#pragma once
 
 #include "common/crash.h"
 
@@ -75,5 +74,3 @@ _Noreturn void port_reboot_to_loader(void);
 
 /* A failed assertion: leaves a record and resets the chip. Does not return. */
 _Noreturn void port_panic(void);
-
-#endif

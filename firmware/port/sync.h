@@ -1,8 +1,7 @@
 /* The pin by which a fingertip shares its clock with cameras and other fingertips. Provided by the
  * board at link time, in images with capability sync. Main context, unless stated otherwise.
  */
-#ifndef PORT_SYNC_H
-#define PORT_SYNC_H
+#pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -30,5 +29,3 @@ struct port_sync_edge {
  * what is older has left a gap in the numbers. Some 300 cycles, however fast edges come. */
 #define PORT_SYNC_KEPT 48u
 bool port_sync_take(struct port_sync_edge *edge);
-
-#endif

@@ -9,8 +9,7 @@
  * functions are called from the usb_device_on_ functions only, which the controller calls in
  * interrupt context, one at a time.
  */
-#ifndef PORT_USB_CONTROLLER_H
-#define PORT_USB_CONTROLLER_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -75,5 +74,3 @@ void usb_device_on_resume(void);
 /* The answer to usb_controller_request_service(); without a request too at least each 0.3 s, also
  * while the bus sleeps, is silent, or is not there. */
 void usb_device_on_service(void);
-
-#endif

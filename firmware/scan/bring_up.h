@@ -9,8 +9,7 @@
  * So it takes at most 5 % of the time. While it leaves a sensor out, or is for a suspect, the next
  * one comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission.
  * One whose CRC differs costs BRING_UP_RECHECKS, since the bus may have been disturbed. */
-#ifndef SCAN_BRING_UP_H
-#define SCAN_BRING_UP_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "common/limits.h"
@@ -63,5 +62,3 @@ static inline bool bring_up_wants_recheck(const struct bring_up *bring_up) {
 }
 
 struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us);
-
-#endif

@@ -28,8 +28,7 @@
  *
  * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
  * doubtful. It must first have read like the others at two temperatures in a row. */
-#ifndef SCAN_READINGS_H
-#define SCAN_READINGS_H
+#pragma once
 
 #include "common/limits.h"
 #include "frame/frame.h"
@@ -117,5 +116,3 @@ void readings_doubt(struct readings *readings, uint32_t apart);
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost:
  * some 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame);
-
-#endif

@@ -28,8 +28,7 @@
  * too, with the pressures of the one before, and marked as held. All ones are no reading. A
  * sensor's last temperature is forgotten when it is admitted again. Its next temperature is the
  * next conversion. */
-#ifndef SCAN_SCAN_H
-#define SCAN_SCAN_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "frame/frame.h"
@@ -207,5 +206,3 @@ static inline bool scan_is_well(const struct scan *scan, uint64_t now_us) {
  * FT_ERR_ARGUMENT. */
 enum ft_status scan_set_osr(struct scan *scan, uint16_t osr);
 void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz);
-
-#endif

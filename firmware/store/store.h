@@ -38,8 +38,7 @@
  * records were cut short.
  *
  * Main context only. Nothing waits: store_poll() takes a write one short step further. */
-#ifndef STORE_STORE_H
-#define STORE_STORE_H
+#pragma once
 
 #include "common/calibration.h"
 #include "common/pad_profile.h"
@@ -132,5 +131,3 @@ enum ft_status store_poll(struct store *store, uint64_t now_us);
 static inline bool store_is_writing(const struct store *store) {
   return store->step != STORE_IDLE || store->must_settle;
 }
-
-#endif

@@ -7,8 +7,7 @@
  * Interrupt context serves the controller; the functions below are for the main context. Between
  * the two are single-producer single-consumer rings, so nothing here locks or waits.
  */
-#ifndef USB_CDC_H
-#define USB_CDC_H
+#pragma once
 
 #include "common/status.h"
 
@@ -56,5 +55,3 @@ size_t cdc_read(uint8_t *bytes, size_t capacity);
 
 /* The host has set 1200 baud and closed the port, or opened it at 1200: it asks for the loader. */
 bool cdc_loader_requested(void);
-
-#endif

@@ -2,8 +2,7 @@
  *
  * One configuration, one CDC function of two interfaces, grouped by an interface association.
  */
-#ifndef USB_DESCRIPTORS_H
-#define USB_DESCRIPTORS_H
+#pragma once
 
 #include "usb/cdc.h"
 
@@ -26,5 +25,3 @@ enum {
 /* Writes the descriptor and returns its length; 0: the device has no such descriptor.
  * type_and_index is wValue of GET_DESCRIPTOR. */
 size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_index, uint8_t to[DESCRIPTOR_MAX_BYTES]);
-
-#endif

@@ -3,8 +3,7 @@
  *
  * All of it runs in the interrupt context of the controller, but for device_start().
  */
-#ifndef USB_DEVICE_H
-#define USB_DEVICE_H
+#pragma once
 
 #include "usb/cdc.h"
 #include "usb/descriptors.h"
@@ -51,5 +50,3 @@ void cdc_on_suspended(bool suspended);
 void cdc_on_sent(uint8_t endpoint);
 void cdc_on_received(uint8_t endpoint, const uint8_t *bytes, size_t length);
 void cdc_on_service(void);
-
-#endif

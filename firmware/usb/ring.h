@@ -2,8 +2,7 @@
  * side stores its own index and only reads the other's, so plain atomic loads and stores suffice.
  * Lengths and buffers that are multiples of 4 bytes are copied by words.
  */
-#ifndef USB_RING_H
-#define USB_RING_H
+#pragma once
 
 #include <stdatomic.h>
 #include <stddef.h>
@@ -54,5 +53,3 @@ static inline void ring_clear(struct ring *ring) {
   uint32_t put = atomic_load_explicit(&ring->put, memory_order_acquire);
   atomic_store_explicit(&ring->taken, put, memory_order_release);
 }
-
-#endif

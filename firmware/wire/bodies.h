@@ -2,8 +2,7 @@
  *
  * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.
  */
-#ifndef WIRE_BODIES_H
-#define WIRE_BODIES_H
+#pragma once
 
 #include "common/calibration.h"
 #include "common/crash.h"
@@ -436,5 +435,3 @@ extern const struct wire_layout cmd_sync_layout;
   &cmd_erase_pad_layout
 #define WIRE_COMMANDS_OF_SYNC \
   &cmd_sync_layout
-
-#endif

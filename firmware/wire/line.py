@@ -195,14 +195,13 @@ def contact_flags_h(line):
         " * A quantity may be used only under its VALID flag; where the flag is off its field is zero.",
         " * The warnings leave the numbers in place and state why they deserve less trust.",
         " */",
-        "#ifndef COMMON_CONTACT_FLAGS_H",
-        "#define COMMON_CONTACT_FLAGS_H",
+        "#pragma once",
         "",
         "enum contact_flag {",
     ]
     for flag in line.flags:
         lines += c_described(f"CONTACT_FLAG_{flag['name']} = 1 << {flag['bit']},", "warning: " * bool(flag.get("warning")) + flag["text"])
-    return [*lines, "};", "", "#endif"]
+    return [*lines, "};"]
 
 
 def c_number(value):
@@ -263,8 +262,7 @@ def bodies_h(line):
         " *",
         " * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.",
         " */",
-        "#ifndef WIRE_BODIES_H",
-        "#define WIRE_BODIES_H",
+        "#pragma once",
         "",
         '#include "common/calibration.h"',
         '#include "common/crash.h"',
@@ -329,7 +327,7 @@ def bodies_h(line):
             if body.capability == capability
         ]
         lines += [f"#define {macro} \\", *(f"  {entry}, \\" for entry in entries[:-1]), f"  {entries[-1]}"]
-    return [*lines, "", "#endif"]
+    return lines
 
 
 KINDS = {"u8": "BYTES", "text": "TEXTS", "n": "SENSOR_COUNT", "u16": "U16", "i16": "U16", "u32": "U32", "u64": "U64", "f32": "F32"}

@@ -10,8 +10,7 @@
  * one constant, its layout, for both directions. Code that encodes or decodes names its layouts, so an
  * image holds those of its own packets and commands only.
  */
-#ifndef WIRE_PACKET_H
-#define WIRE_PACKET_H
+#pragma once
 
 #include "common/status.h"
 #include "wire/bodies.h"
@@ -75,5 +74,3 @@ void wire_receiver_init(struct wire_receiver *receiver, const struct wire_layout
  * FT_ERR_SPACE for an overlong one. Empty frames (two delimiters in a row) are legal fill.
  */
 enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte, struct wire_packet *packet);
-
-#endif

@@ -11,8 +11,7 @@
  * on the job alone, so the answer has the same bits wherever it is done.
  *
  * Cost: some 20 Cortex-M0+ cycles a call. */
-#ifndef WORKER_WORKER_H
-#define WORKER_WORKER_H
+#pragma once
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -36,5 +35,3 @@ void worker_ask(struct worker *worker);
 
 /* Worker: answers what was asked, if there is something. Returns whether there was. */
 bool worker_serve(struct worker *worker);
-
-#endif

@@ -1,7 +1,6 @@
 /* Records in the flash as store.h says, with whatever payload: what a later firmware, or a bug,
  * may have left. */
-#ifndef FUZZ_FLASH_RECORD_H
-#define FUZZ_FLASH_RECORD_H
+#pragma once
 
 #include "common/bytes.h"
 #include "common/crc32.h"
@@ -45,5 +44,3 @@ static inline void fuzz_put_record(struct fuzz_input *input, uint32_t generation
     bytes_put_u32(at + slot_bytes - 4, fuzz_u32(input));
   }
 }
-
-#endif

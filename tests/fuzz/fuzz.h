@@ -2,8 +2,7 @@
  * that stops the program. Bytes and runs are counted by fuzz.c in the file that the environment's
  * FINGERTIP_FUZZ_COUNT names, also where a run ends the program.
  */
-#ifndef FUZZ_FUZZ_H
-#define FUZZ_FUZZ_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -61,5 +60,3 @@ static inline const uint8_t *fuzz_bytes(struct fuzz_input *input, size_t *length
   input->at += *length;
   return bytes;
 }
-
-#endif

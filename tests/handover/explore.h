@@ -11,8 +11,7 @@
  * acquire, atomic_signal_fence) is not shown. A second processor is an interrupt too: it comes in
  * whole steps. A test of two processors lets each in turn be the one that is interrupted.
  */
-#ifndef TESTS_HANDOVER_EXPLORE_H
-#define TESTS_HANDOVER_EXPLORE_H
+#pragma once
 
 #include <stdbool.h>
 
@@ -30,5 +29,3 @@ unsigned long explore(void (*run)(void), const struct explore_interrupt *interru
 /* Within run(): points count from here on, and no more. */
 void explore_begin(void);
 void explore_end(void);
-
-#endif

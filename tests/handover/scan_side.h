@@ -1,8 +1,7 @@
 /* A scan and what takes its frames, for the tests of hand-overs. Every frame is of one conversion:
  * codes, number and times; frames come in their order, and each is taken or counted as skipped; a
  * temperature is never overtaken by a frame after it: else the test fails. */
-#ifndef TESTS_HANDOVER_SCAN_SIDE_H
-#define TESTS_HANDOVER_SCAN_SIDE_H
+#pragma once
 
 /* After some frames; nothing waits. */
 void scan_start(void);
@@ -18,5 +17,3 @@ void scan_take_frame(void);
 
 /* At the end. */
 void scan_judge(void);
-
-#endif

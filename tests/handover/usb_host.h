@@ -1,8 +1,7 @@
 /* Both ends of a USB port for the tests of hand-overs. What a host gets is whole writes in their
  * order from some one on, cut off where the port was closed; what it sends arrives, each byte once
  * and in order: else the test fails. */
-#ifndef TESTS_HANDOVER_USB_HOST_H
-#define TESTS_HANDOVER_USB_HOST_H
+#pragma once
 
 #include <stddef.h>
 
@@ -22,5 +21,3 @@ size_t usb_read(void);
 void usb_take_all(void);
 void usb_judge_session(void);
 void usb_judge_reads(void);
-
-#endif

@@ -1,7 +1,6 @@
 /* Operations of an array bus, polled as the event handler does: at every event and alarm. Whoever includes it defines
  * NOW_us before. */
-#ifndef SUPPORT_BUS_BENCH_H
-#define SUPPORT_BUS_BENCH_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "support/unit.h"
@@ -55,5 +54,3 @@ TEST(test_arguments_and_order_of_calls) {
   TEST_ASSERT_EQUAL_INT(FT_OK, finish());
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, NOW_us, &result, &wake_us));
 }
-
-#endif

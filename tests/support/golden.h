@@ -1,6 +1,5 @@
 /* Results to the bit, in blocks, so that one that differs is known to be of few cases. */
-#ifndef TESTS_SUPPORT_GOLDEN_H
-#define TESTS_SUPPORT_GOLDEN_H
+#pragma once
 
 #include "common/crc32.h"
 #include "unity.h"
@@ -34,5 +33,3 @@ static inline void golden_assert(const char *what, uint32_t cases, const uint32_
     TEST_FAIL_MESSAGE(text);
   }
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* The array of the boards, for tests of the fit: three strips of five, 9 mm apart. */
-#ifndef SUPPORT_GRID_H
-#define SUPPORT_GRID_H
+#pragma once
 
 #include "fit/fit.h"
 #include "unity.h"
@@ -15,5 +14,3 @@ static inline void make_grid_of_15(struct fit_array *array) {
   }
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(array, GRID_SENSORS, x_mm, y_mm, 9.0f));
 }
-
-#endif

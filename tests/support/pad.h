@@ -1,6 +1,5 @@
 /* The profile of a pad of 12 mm of silicone, for tests of what carries and uses it. */
-#ifndef SUPPORT_PAD_H
-#define SUPPORT_PAD_H
+#pragma once
 
 #include "common/pad_profile.h"
 
@@ -50,5 +49,3 @@ static inline double pad_pressure_Pa(const struct pad_profile *pad, double sprea
   }
   return sum * 1e6;
 }
-
-#endif

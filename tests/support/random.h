@@ -1,7 +1,6 @@
 /* Repeatable random numbers for tests: xorshift64* (Vigna, 2016). The same seed gives the same
  * sequence everywhere, so that a failure can be repeated. */
-#ifndef SUPPORT_RANDOM_H
-#define SUPPORT_RANDOM_H
+#pragma once
 
 #include <math.h>
 #include <stdint.h>
@@ -34,5 +33,3 @@ static inline double random_normal(struct random *random) {
   double u = 1.0 - random_between(random, 0.0, 1.0);
   return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * random_between(random, 0.0, 1.0));
 }
-
-#endif

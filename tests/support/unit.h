@@ -1,7 +1,6 @@
 /* Tests of Unity that register themselves. unit.c has main, which runs them in the order of their file, and a setUp and
  * a tearDown for programs that define none. */
-#ifndef SUPPORT_UNIT_H
-#define SUPPORT_UNIT_H
+#pragma once
 
 #include <stdio.h>
 #include <unity.h>
@@ -30,5 +29,3 @@ void unit_add(struct unit_test *test);
     snprintf(words, sizeof words, __VA_ARGS__);                                                                        \
     TEST_ASSERT_TRUE_MESSAGE(condition, words);                                                                        \
   } while (0)
-
-#endif

@@ -2,8 +2,7 @@
  * 2.3.1.5). One per core and not saved by interrupts, so no handler may divide with it:
  * port/divide.h leaves it to the main context, and libgcc's own division does not use it.
  */
-#ifndef RP2040_DIVIDE_H
-#define RP2040_DIVIDE_H
+#pragma once
 
 #include <stdint.h>
 
@@ -18,5 +17,3 @@ static inline __attribute__((always_inline)) int32_t port_divide(int32_t numerat
         : "l"(numerator), "l"(denominator), "l"(sio));
   return quotient;
 }
-
-#endif

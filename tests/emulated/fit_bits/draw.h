@@ -1,6 +1,5 @@
 /* Numbers by chance, the same on every machine: xorshift64* (Vigna, 2016), integers alone. */
-#ifndef FIT_BITS_DRAW_H
-#define FIT_BITS_DRAW_H
+#pragma once
 
 #include <stdint.h>
 
@@ -20,5 +19,3 @@ static inline int32_t draw_between(int32_t low, int32_t high) {
   uint64_t span = (uint64_t)((int64_t)high - low) + 1;
   return (int32_t)(low + (int64_t)(span * draw() >> 32));
 }
-
-#endif

@@ -1,8 +1,7 @@
 /* Presses whose fits are compared bit by bit between machines. They are drawn from their number with integers alone, so
  * that every machine has the same.
  */
-#ifndef FIT_BITS_FIT_BITS_H
-#define FIT_BITS_FIT_BITS_H
+#pragma once
 
 #include <stdint.h>
 
@@ -26,5 +25,3 @@ uint32_t fit_bits_presses(enum fit_bits_kernel kernel);
 
 /* CRC-32 of every byte of the result. */
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press);
-
-#endif

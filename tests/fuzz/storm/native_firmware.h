@@ -1,6 +1,5 @@
 /* The firmware on boards/native, for C++, which its headers are not written for. */
-#ifndef STORM_NATIVE_FIRMWARE_H
-#define STORM_NATIVE_FIRMWARE_H
+#pragma once
 
 #include "native/native_port.h"
 #include "native/sim_array.h"
@@ -28,6 +27,4 @@ enum native_end storm_firmware_run_until(uint64_t t_us);
 
 #ifdef __cplusplus
 }
-#endif
-
 #endif

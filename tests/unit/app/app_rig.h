@@ -1,7 +1,6 @@
 /* The whole firmware on the host: simulated sensors below, a USB host above. For one test program.
  */
-#ifndef APP_RIG_H
-#define APP_RIG_H
+#pragma once
 
 #include "app/app.h"
 #include "config/geometry.h"
@@ -59,9 +58,9 @@ static inline void main_round(void *context) { app_run(context); }
 
 /* Power goes and comes back, when the clock shows this; what the flash holds stays, and so does the
  * world. */
-static inline void rig_power_up_at(uint64_t t_us) {
+static inline void rig_power_up_at(uint64_t t_us, bool watchdog_struck) {
   native_flash_power_up();
-  native_start(false);
+  native_start(watchdog_struck);
   native_set_time(t_us);
   native_cdc_reset();
   native_sync_reset();
@@ -75,7 +74,7 @@ static inline void rig_power_up_at(uint64_t t_us) {
   host_sequence = 0;
 }
 
-static inline void rig_power_up(void) { rig_power_up_at(0); }
+static inline void rig_power_up(void) { rig_power_up_at(0, false); }
 
 static inline void rig_start(void) {
   memset(&press, 0, sizeof press);
@@ -186,5 +185,3 @@ static inline struct wire_health get_health(void) {
   TEST_ASSERT_TRUE(next_of_type(WIRE_HEALTH, &packet));
   return packet.body.health;
 }
-
-#endif

@@ -163,11 +163,7 @@ TEST(a_tare_takes_the_present_as_zero) {
   press.force_N = 4.0;
   start_streams(WIRE_STREAM_CONTACT);
   run_for(100);
-  struct wire_packet packet;
-  struct wire_contact last = {0};
-  while (next_of_type(WIRE_CONTACT, &packet)) {
-    last = packet.body.contact;
-  }
+  const struct wire_contact last = newest_contact();
   TEST_ASSERT_TRUE(last.flags & CONTACT_FLAG_TARED);
   TEST_ASSERT_FLOAT_WITHIN(0.02f, 4.0f, last.force_N);
 }

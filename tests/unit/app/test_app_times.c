@@ -80,7 +80,7 @@ static void run(struct told *told, const struct start *start) {
   press.from_us = begun_us + PRESS_AFTER_us;
   world_field_Pa = field_Pa;
   native_flash_reset(1);
-  rig_power_up_at(start->t_us);
+  rig_power_up_at(start->t_us, false);
   count_on(start->count);
   connect_for(300);
   obey(COMMAND(PAD, pad, pad_of_12_mm()));

@@ -1,9 +1,8 @@
 /* The app of scene slip: commands and hosts that fail, health, crashes and what is told of them. */
 #include "app_rig.h"
-#include "common/bytes.h"
 #include "common/contact_flags.h"
-#include "common/crc32.h"
 #include "config/build_info.h"
+#include "unit/wire/wire_samples.h"
 
 void setUp(void) { rig_start(); }
 
@@ -15,22 +14,9 @@ TEST(damage_is_counted_and_unknown_commands_are_answered) {
   TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(echo, sizeof echo));
   run_for(50);
 
-  /* A command of a later version, type 0xF0 without a body; COBS by hand. */
-  uint8_t raw[16] = {WIRE_VERSION, 0xF0};
-  bytes_put_u32(raw + 12, crc32_iso_hdlc(raw, 12));
-  uint8_t coded[20];
-  size_t out = 1, code_at = 0;
-  for (int i = 0; i < 16; i++) {
-    if (raw[i]) {
-      coded[out++] = raw[i];
-    } else {
-      coded[code_at] = (uint8_t)(out - code_at);
-      code_at = out++;
-    }
-  }
-  coded[code_at] = (uint8_t)(out - code_at);
-  coded[out++] = 0;
-  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(coded, out));
+  /* A command of a later version, type 0xF0 without a body. */
+  uint8_t raw[16] = {WIRE_VERSION, 0xF0}, coded[20] = {0};
+  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(coded, seal(raw, 12, coded) + 1));
   run_for(50);
   struct wire_packet packet;
   TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
@@ -156,7 +142,6 @@ TEST(at_the_slowest_rate_the_watchdog_is_fed) {
   run_for(25000);
 }
 
-/* In the frame that is held for the temperature already, and until a temperature says otherwise. */
 /* Two supplies dip at once, so that neither steps alone: the temperatures tell it before the zeros
  * give in, half a second later. */
 TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in) {
@@ -179,6 +164,7 @@ TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in) {
   TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.found.frame.valid);
 }
 
+/* In the frame that is held for the temperature already, and until a temperature says otherwise. */
 TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful) {
   press.force_N = 5.0;
   press.from_us = 700000;
@@ -236,13 +222,7 @@ TEST(test_uptime_keeps_the_rest_of_each_second) {
 TEST(test_whether_the_watchdog_struck_is_told) {
   connect_for(300);
   TEST_ASSERT_EQUAL(0, get_health().watchdog_resets);
-  native_start(true);
-  native_set_event_source(next_event_us, &array);
-  port_set_event_handler(on_event, &app);
-  sim_array_init(&array, geometry.sensor_count, 1);
-  array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
-  native_cdc_reset();
-  app_start(&app, sim_array_bus(&array));
+  rig_power_up_at(0, true);
   connect_for(300);
   TEST_ASSERT_EQUAL(1, get_health().watchdog_resets);
 }

@@ -1,7 +1,6 @@
 /* Fifteen sensors under a pad, frame by frame, for the tests of condition/. setUp begins at 206
  * frames a second, untared. */
-#ifndef CONDITION_BENCH_H
-#define CONDITION_BENCH_H
+#pragma once
 
 #include "condition/condition.h"
 #include "support/random.h"
@@ -43,5 +42,3 @@ extern const uint32_t periods_us[PERIODS];
 
 /* After a release: `share` of the press stays, and comes back with a time constant. */
 void release(float share, float time_constant_s, float seconds);
-
-#endif

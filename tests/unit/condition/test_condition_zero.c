@@ -253,10 +253,7 @@ TEST(test_other_changes_are_learnt_as_no_drift) {
     run_s(3000);
     TEST_ASSERT_INT32_WITHIN(10 * Pa, began, condition.zero_Pa_q10[7]);
   }
-}
-
-TEST(test_a_slow_press_is_learnt_as_no_drift) {
-  begin_calm(4854);
+  begin_calm(4854); /* nor a slow press */
   watch_s(300, 12, 1u << 7);
   int32_t began = condition.zero_Pa_q10[7];
   run_s(3000);

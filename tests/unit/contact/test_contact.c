@@ -99,37 +99,29 @@ TEST(test_slip_flag_and_threshold) {
   TEST_ASSERT_FLOAT_WITHIN(1e-3f, 2.0f - 0.375f, result.slip_mm);
 }
 
-static void assert_history_begins_anew(void) {
-  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
-  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
-  setUp();
-}
-
 TEST(test_doubtful_locations_end_the_history) {
-  static const uint32_t spoilers[] = {CONTACT_FLAG_FLAT, CONTACT_FLAG_AT_BOUND};
-  for (size_t i = 0; i < 2; i++) {
+  static const struct {
+    uint32_t flags;
+    bool zero_doubtful, none;
+  } spoilers[] = {{GOOD_FIT | CONTACT_FLAG_FLAT, false, false},
+                  {GOOD_FIT | CONTACT_FLAG_AT_BOUND, false, false},
+                  {GOOD_FIT, true, false},
+                  {0, false, false},
+                  {GOOD_FIT, false, true}};
+  for (size_t i = 0; i < sizeof spoilers / sizeof spoilers[0]; i++) {
     fill_history();
-    fit.flags = GOOD_FIT | spoilers[i];
-    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
-    TEST_ASSERT_EQUAL_UINT16(0, history.count);
-    fit.flags = GOOD_FIT;
-    update();
-    assert_history_begins_anew();
+    fit.flags = spoilers[i].flags;
+    input.zero_doubtful = spoilers[i].zero_doubtful;
+    input.fit = spoilers[i].none ? NULL : &fit;
+    for (int n = 0; n < 3; n++) {
+      TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
+      TEST_ASSERT_EQUAL_UINT16(n, history.count);
+      TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
+      fit.flags = GOOD_FIT;
+      input.zero_doubtful = false;
+      input.fit = &fit;
+    }
   }
-  fill_history();
-  input.zero_doubtful = true;
-  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
-  TEST_ASSERT_EQUAL_UINT16(0, history.count);
-  setUp();
-  fill_history();
-  fit.flags = 0;
-  update();
-  TEST_ASSERT_EQUAL_UINT16(0, history.count);
-  setUp();
-  fill_history();
-  input.fit = NULL;
-  update();
-  TEST_ASSERT_EQUAL_UINT16(0, history.count);
 }
 
 TEST(test_a_location_that_noise_moves_ends_the_history) {

@@ -1,7 +1,6 @@
 /* Presses on the array of fifteen, and what a fit said of one, for the tests of fit/fit.h. setUp
  * clears the readings. */
-#ifndef FIT_BENCH_H
-#define FIT_BENCH_H
+#pragma once
 
 #include "common/contact_flags.h"
 #include "fit/fit.h"
@@ -32,5 +31,3 @@ double location_error_mm(const struct press *press);
 double force_of(const struct press *press);
 struct press random_press(struct random *random, double reach_mm);
 void assert_finite_and_defined(void);
-
-#endif

@@ -1,7 +1,6 @@
 /* What the sensors of the boards' array read under a contact on a pad, for the tests of what estimates by its profile.
  */
-#ifndef PAD_PRESS_H
-#define PAD_PRESS_H
+#pragma once
 
 #include "fit/fit.h"
 #include "support/grid.h"
@@ -56,5 +55,3 @@ static inline void pad_press_draw_own(struct pad_press *pad, int32_t off_q15, in
                                    (int32_t)random_between(random, -wider_q15, wider_q15)};
   }
 }
-
-#endif

@@ -5,8 +5,7 @@
  * A sensor answers a read with fake_byte() of the command it got last. If several answer at once
  * the bytes are wired-AND, as on the bus, and counted in `collisions`.
  */
-#ifndef FAKE_I2C_H
-#define FAKE_I2C_H
+#pragma once
 
 #include "pico_mux/mux_bus.h"
 
@@ -53,5 +52,3 @@ uint64_t fake_i2c_next_event_us(void);
 
 /* The interrupt of that end. */
 void fake_i2c_interrupt(void);
-
-#endif

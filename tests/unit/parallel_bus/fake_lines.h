@@ -4,8 +4,7 @@
  * Every edge is held against UM10204, fast mode, with a rise of 300 ns from 0.3 to 0.7 VDD, 426 ns
  * from the release on, and a fall of 180 ns; what breaks it is a misuse.
  */
-#ifndef FAKE_LINES_H
-#define FAKE_LINES_H
+#pragma once
 
 #include "pico_parallel/i2c_wave.h"
 
@@ -47,5 +46,3 @@ void fake_lose_its_place(unsigned sensor);
 
 /* When the wave under way ends; UINT64_MAX if none does. */
 uint64_t fake_lines_next_event_us(void);
-
-#endif

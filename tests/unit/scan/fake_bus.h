@@ -1,7 +1,6 @@
 /* An array_bus for the tests of scan: operations of a fixed duration on sensors that keep the
  * datasheet's times, a log of what was done, and faults on request. */
-#ifndef FAKE_BUS_H
-#define FAKE_BUS_H
+#pragma once
 
 #include "array_bus/array_bus.h"
 #include "ms58xx/ms58xx.h"
@@ -51,5 +50,3 @@ void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_
 
 /* Longest conversion by the datasheet, for a convert command of either kind. */
 uint32_t fake_conversion_us(uint8_t command);
-
-#endif

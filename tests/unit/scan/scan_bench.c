@@ -31,6 +31,10 @@ void next_case(const struct scan_settings *settings) {
   power_up(settings->sensor_count, settings);
 }
 
+void next_case_of(uint16_t osr, uint32_t rate_mHz) {
+  next_case(&(struct scan_settings){.sensor_count = SENSORS, .osr = osr, .rate_mHz = rate_mHz});
+}
+
 bool step(void) {
   uint64_t wake_us = now_us;
   for (int calls = 0; wake_us <= now_us; calls++) {

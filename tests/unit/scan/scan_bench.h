@@ -1,7 +1,6 @@
 /* A scan of fifteen fake sensors under usual settings, in simulated time, for the tests of scan/.
  * setUp powers it up; tearDown fails if the scan misused a sensor. */
-#ifndef SCAN_BENCH_H
-#define SCAN_BENCH_H
+#pragma once
 
 #include "fake_bus.h"
 #include "scan/scan.h"
@@ -26,6 +25,7 @@ extern struct random lateness;
 void power_up(uint8_t sensor_count, const struct scan_settings *settings);
 extern const struct scan_settings usual;
 void next_case(const struct scan_settings *settings);
+void next_case_of(uint16_t osr, uint32_t rate_mHz);
 
 /* One wake-up of the event context, then the main context. True: a frame was taken. A wake time in
  * the past would be an interrupt storm. */
@@ -45,5 +45,3 @@ void assert_good_frame(uint32_t valid);
 
 /* To the middle of the next conversion of the temperature. */
 void skip_to_temperature(void);
-
-#endif

@@ -215,11 +215,10 @@ TEST(test_a_press_of_one_alone_is_at_most_two_frames_late) {
 
 /* Always, and never without a step. */
 TEST(test_steps_alone_amid_the_noise) {
-  static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
   struct random random = {77};
   for (int i = 0; i < 6; i++) {
     next_case();
-    frame.noise_Pa_q10 = ms58xx_find_osr(osrs[i])->noise_Pa_q10;
+    frame.noise_Pa_q10 = ms58xx_find_osr((uint16_t)(256 << i))->noise_Pa_q10;
     const double noise_Pa = frame.noise_Pa_q10 / 1024.0;
     uint32_t rest[FT_MAX_SENSORS];
     memcpy(rest, d1, sizeof rest);

@@ -78,11 +78,8 @@ TEST(test_saturation_is_reported_at_the_end_of_the_range) {
 /* The fake counts as misuse what comes before the datasheet's longest times; here: not much later.
  */
 TEST(test_waits_at_every_osr) {
-  static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
-  for (size_t i = 0; i < 6; i++) {
-    struct scan_settings settings = usual;
-    settings.osr = osrs[i];
-    next_case(&settings);
+  for (int i = 0; i < 6; i++) {
+    next_case_of((uint16_t)(256 << i), 0);
     run_until(1200000);
     TEST_ASSERT_EQUAL_INT(3, count_entries((uint8_t)(0x50 + 2 * i), FAKE_COMMAND));
     for (int at = 0; at + 1 < fake.logged; at++) {
@@ -106,9 +103,7 @@ TEST(test_waits_at_every_osr) {
  * up. */
 TEST(test_twenty_hertz) {
   for (int late = 0; late < 2; late++) {
-    struct scan_settings settings = usual;
-    settings.rate_mHz = 20000;
-    next_case(&settings);
+    next_case_of(1024, 20000);
     lateness_us = late ? 300 : 0;
     skip_frames(2);
     const uint64_t first_us = late ? 0 : frame.t_begin_us, within_us = late ? 150 : 0;
@@ -122,16 +117,11 @@ TEST(test_twenty_hertz) {
 
 /* Beyond what the sensors can do the rate is theirs, and a pause is not made up for afterwards. */
 TEST(test_rate_beyond_the_sensors) {
-  struct scan_settings settings = usual;
-  settings.osr = 8192;
-  settings.rate_mHz = 2000000;
-  next_case(&settings);
+  next_case_of(8192, 2000000);
   run_until(1000000);
   TEST_ASSERT_INT_WITHIN(3, 45, frames); /* 21.05 ms each, some for the start and temperatures */
 
-  settings = usual;
-  settings.rate_mHz = 20000;
-  next_case(&settings);
+  next_case_of(1024, 20000);
   skip_frames(3);
   taking = false;
   run_until(now_us + 1000000);
@@ -147,9 +137,7 @@ TEST(test_rate_beyond_the_sensors) {
 
 /* One frame in ten seconds must not keep a new rate waiting for ten seconds. */
 TEST(test_rate_changes) {
-  struct scan_settings settings = usual;
-  settings.rate_mHz = 100;
-  next_case(&settings);
+  next_case_of(1024, 100);
   skip_frames(1);
   run_until(1000000);
   scan_set_rate_mHz(&scan, 20000);

@@ -1,6 +1,5 @@
 /* Bringing the device up as Linux does, for tests that need one. */
-#ifndef TESTS_USB_ENUMERATE_H
-#define TESTS_USB_ENUMERATE_H
+#pragma once
 
 #include <stdint.h>
 
@@ -16,5 +15,3 @@ void set_dtr(int on);
 void open_port(void);
 
 void set_baud(uint32_t baud);
-
-#endif

@@ -2,8 +2,7 @@
  * and host_ functions do single transactions the way a host does, PIDs included. Any breach of the
  * controller's contract fails the running test.
  */
-#ifndef TESTS_USB_FAKE_CONTROLLER_H
-#define TESTS_USB_FAKE_CONTROLLER_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -55,5 +54,3 @@ void host_reset_toggle(uint8_t endpoint);
 
 /* Whatever it does, the host has the device's toggles from now on: for hosts that keep no rule. */
 void host_follow_toggles(void);
-
-#endif

@@ -103,25 +103,26 @@ TEST(test_round_trip_of_every_type) {
 
 /* What a device decodes: its commands, and nothing that itself sends. */
 TEST(test_sets_of_commands) {
-  static const struct wire_layout *const
-      always[] = {WIRE_COMMANDS, NULL},
-      *const of_fit[] = {WIRE_COMMANDS_OF_FIT, NULL}, *const of_slip[] = {WIRE_COMMANDS_OF_SLIP, NULL},
-      *const of_tangential[] = {WIRE_COMMANDS_OF_TANGENTIAL, NULL}, *const of_sync[] = {WIRE_COMMANDS_OF_SYNC, NULL};
+  static const struct {
+    const struct wire_layout *layouts[20];
+    uint8_t types[8]; /* of a capability; none: those of no capability */
+  } sets[] = {{{WIRE_COMMANDS_OF_FIT},
+               {WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION, WIRE_CMD_PRIOR, WIRE_CMD_LOCATION_LIMIT}},
+              {{WIRE_COMMANDS_OF_SLIP}, {WIRE_CMD_SLIP}},
+              {{WIRE_COMMANDS_OF_TANGENTIAL}, {WIRE_CMD_PAD, WIRE_CMD_ERASE_PAD}},
+              {{WIRE_COMMANDS_OF_SYNC}, {WIRE_CMD_SYNC}},
+              {{WIRE_COMMANDS}, {0}}};
+  const struct wire_layout *const *of_fit = sets[0].layouts;
   for (size_t i = 0; i < WIRE_TYPES; i++) {
-    uint8_t type = wire_types[i];
-    bool command = type >= 0x80;
-    bool slip = type == WIRE_CMD_SLIP;
-    bool fit = type == WIRE_CMD_CALIBRATE || type == WIRE_CMD_ERASE_CALIBRATION || type == WIRE_CMD_PRIOR ||
-               type == WIRE_CMD_LOCATION_LIMIT;
-    bool tangential = type == WIRE_CMD_PAD || type == WIRE_CMD_ERASE_PAD;
-    bool sync = type == WIRE_CMD_SYNC;
+    const uint8_t type = wire_types[i];
+    bool left = type >= 0x80;
     TEST_ASSERT_NOT_NULL(wire_find_layout(wire_all_layouts, type));
-    TEST_ASSERT_EQUAL(command, wire_find_layout(wire_commands, type) != NULL);
-    TEST_ASSERT_EQUAL(fit, wire_find_layout(of_fit, type) != NULL);
-    TEST_ASSERT_EQUAL(slip, wire_find_layout(of_slip, type) != NULL);
-    TEST_ASSERT_EQUAL(tangential, wire_find_layout(of_tangential, type) != NULL);
-    TEST_ASSERT_EQUAL(sync, wire_find_layout(of_sync, type) != NULL);
-    TEST_ASSERT_EQUAL(command && !fit && !slip && !tangential && !sync, wire_find_layout(always, type) != NULL);
+    TEST_ASSERT_EQUAL(left, wire_find_layout(wire_commands, type) != NULL);
+    for (size_t k = 0; k < sizeof sets / sizeof sets[0]; k++) {
+      const bool in_set = sets[k].types[0] ? memchr(sets[k].types, type, sizeof sets[k].types) != NULL : left;
+      TEST_ASSERT_EQUAL(in_set, wire_find_layout(sets[k].layouts, type) != NULL);
+      left = left && !in_set;
+    }
   }
   struct sampler sampler = {SAMPLE_RANDOM, {12}};
   struct wire_packet packet, decoded;
@@ -180,31 +181,35 @@ TEST(test_infinity_and_nan_are_refused_both_ways) {
   TEST_ASSERT_GREATER_THAN_UINT(32 + 2 * (2 + 2 * FT_MAX_SENSORS + PAD_PROFILE_FLOATS), floats);
 }
 
+/* A packet that is 0 but for this byte at this place of its body. */
+static void assert_byte_guarded(bool legal, const struct wire_packet *packet, size_t offset, uint8_t value,
+                                size_t body) {
+  uint8_t frame[WIRE_MAX_FRAME_BYTES];
+  size_t length;
+  TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_ARGUMENT, encode(packet, frame, &length));
+  uint8_t bytes[WIRE_MAX_PACKET_BYTES + 2048] = {WIRE_VERSION, packet->type};
+  bytes[12 + 3] = packet->type == WIRE_INFO;
+  bytes[12 + offset] = value;
+  struct wire_packet decoded;
+  TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT, decode_sealed(bytes, 12 + body, &decoded));
+}
+
 TEST(test_sensor_counts_outside_their_range_are_refused_both_ways) {
-  static const struct {
-    uint8_t type;
+  struct wire_packet packet;
+  const struct {
+    uint8_t type, *sensor_count;
     size_t offset;
-  } cases[] = {{WIRE_RAW, 22}, {WIRE_INFO, 3}, {WIRE_CMD_CALIBRATE, 0}};
+  } cases[] = {{WIRE_RAW, &packet.body.raw.sensor_count, 22},
+               {WIRE_INFO, &packet.body.info.sensor_count, 3},
+               {WIRE_CMD_CALIBRATE, &packet.body.cmd_calibrate.sensor_count, 0}};
   for (int i = 0; i < 3; i++) {
     for (int count = 0; count < 256; count++) {
-      struct wire_packet packet;
       memset(&packet, 0, sizeof packet);
       packet.type = cases[i].type;
-      uint8_t *sensor_count = packet.type == WIRE_RAW    ? &packet.body.raw.sensor_count
-                              : packet.type == WIRE_INFO ? &packet.body.info.sensor_count
-                                                         : &packet.body.cmd_calibrate.sensor_count;
-      *sensor_count = (uint8_t)count;
-      bool legal = count >= 1 && count <= 32;
-      uint8_t frame[WIRE_MAX_FRAME_BYTES];
-      size_t length;
-      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_ARGUMENT, encode(&packet, frame, &length));
-      uint8_t bytes[WIRE_MAX_PACKET_BYTES + 2048] = {WIRE_VERSION, packet.type};
-      bytes[12 + cases[i].offset] = (uint8_t)count;
-      struct wire_packet decoded;
-      if (count > 40) {
-        *sensor_count = 32;
-      }
-      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT, decode_sealed(bytes, 12 + body_length(&packet), &decoded));
+      *cases[i].sensor_count = (uint8_t)(count > 40 ? 32 : count);
+      const size_t body = body_length(&packet);
+      *cases[i].sensor_count = (uint8_t)count;
+      assert_byte_guarded(count >= 1 && count <= 32, &packet, cases[i].offset, (uint8_t)count, body);
     }
   }
 }
@@ -213,22 +218,12 @@ TEST(test_text_is_printable) {
   static const size_t offsets[] = {8, 24, 40, 56};
   for (int text = 0; text < 4; text++) {
     for (int value = 0; value < 256; value++) {
-      struct wire_packet packet;
-      memset(&packet, 0, sizeof packet);
-      packet.type = WIRE_INFO;
-      packet.body.info.sensor_count = 1;
+      struct wire_packet packet = {.type = WIRE_INFO, .body.info.sensor_count = 1};
       char *texts[] = {packet.body.info.git_hash, packet.body.info.board, packet.body.info.scene,
                        packet.body.info.serial};
       texts[text][0] = (char)(uint8_t)value;
-      bool legal = value == 0 || (value >= 0x20 && value <= 0x7E);
-      uint8_t frame[WIRE_MAX_FRAME_BYTES];
-      size_t length;
-      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_ARGUMENT, encode(&packet, frame, &length));
-      uint8_t bytes[WIRE_MAX_PACKET_BYTES] = {WIRE_VERSION, WIRE_INFO};
-      bytes[12 + 3] = 1;
-      bytes[12 + offsets[text]] = (uint8_t)value;
-      struct wire_packet decoded;
-      TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT, decode_sealed(bytes, 12 + 93 + 8, &decoded));
+      const bool legal = value == 0 || (value >= 0x20 && value <= 0x7E);
+      assert_byte_guarded(legal, &packet, offsets[text], (uint8_t)value, 93 + 8);
     }
   }
 }

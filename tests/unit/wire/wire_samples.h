@@ -1,6 +1,5 @@
 /* Packets of every type for the tests, and a second COBS encoder, written from the paper. */
-#ifndef WIRE_SAMPLES_H
-#define WIRE_SAMPLES_H
+#pragma once
 
 #include "common/bytes.h"
 #include "common/contact_flags.h"
@@ -232,5 +231,3 @@ static inline size_t unseal(const uint8_t *frame, size_t length, uint8_t *bytes)
   }
   return out - WIRE_CRC_BYTES;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* A polling CDC ACM device for the test images: echoes bulk OUT, streams when STREAM is defined. Single buffers. */
-#ifndef CDC_H
-#define CDC_H
+#pragma once
 #include "rig.h"
 
 #define DPRAM(offset) REG(0x50100000 + (offset))
@@ -167,4 +166,3 @@ static inline void usb_poll(void) {
   }
 #endif
 }
-#endif

@@ -1,6 +1,5 @@
 /* What the test images share: registers by address, clock tree, timer, I2C. No .data; .bss is not cleared. */
-#ifndef RIG_H
-#define RIG_H
+#pragma once
 #include <stdint.h>
 
 #define REG(address) (*(volatile uint32_t *)(address))
@@ -126,4 +125,3 @@ void isr(void) { __asm volatile("bkpt 1"); }
 #endif
 __attribute__((section(".vectors"), used))
 const void *const vectors[48] = {(void *)0x20010000, (void *)reset_entry, [2 ... 47] = (void *)isr};
-#endif
