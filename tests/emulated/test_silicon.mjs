@@ -9,7 +9,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { parseScenario } from '../../host_tools/simulation/emulator/scenario.mjs';
-import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { HEADER } from './harness/bench.mjs';
 import { ImageBench } from './harness/image_bench.mjs';
 
@@ -118,29 +117,6 @@ for (const name of BOARDS) {
     bench.end();
   });
 }
-
-/** A host that gives a request up and begins the next in the same frame; the answer must be to the second. */
-test('a control transfer that the host abandons leaves nothing for the next', () => {
-  const bench = new Bench('pico_parallel');
-  bench.stream();
-  const { client, host, time } = bench.machine;
-  client.write(bench.encoded('osr', '256'));
-  let wrong = 0;
-  for (let i = 0; i < 600; i++) {
-    const abandoned = host.control(setupPacket(0x80, 6, 2 << 8, 0, 67), null, () => {});
-    assert.ok(bench.machine.run(time.nanos + 20e3 + i * 350), bench.machine.endReason);
-    host.cancel(abandoned);
-    let answer = null;
-    host.control(setupPacket(0x80, 8, 0, 0, 1), null, (status, data) => {
-      answer = `${status} ${Buffer.from(data).toString('hex')}`;
-    });
-    bench.until(() => answer, 5, 'answer');
-    wrong += answer !== 'ok 01';
-  }
-  assert.equal(wrong, 0);
-  bench.assertStreams(20);
-  bench.end();
-});
 
 test('sensors that acknowledge as soon as SCL falls cost no arbitration', () => {
   const bench = new Bench('pico_mux', { faults: [3, 7, 14].map((sensor) => ({ type: 'sensor_fast', sensor, from_s: 0 })) });
