@@ -74,7 +74,9 @@ class Run:
             "capture": self.path("ftr"),
             "report": self.path("json"),
         }
-        done = emulate(tools, emulator, board=board, scenario=scenario, seconds=seconds, **{"image": tools.image, **paths, **more})
+        done = emulate(
+            tools, emulator, board=board, scenario=scenario, seconds=seconds, **{"image": getattr(tools, "image", None), **paths, **more}
+        )
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         self.report = json.loads(self.path("json").read_text())

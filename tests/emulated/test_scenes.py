@@ -9,9 +9,8 @@ import argparse
 import tempfile
 import unittest
 
-import emulated
 from emulation import Run, main, make_scenario
-
+import emulated
 from fingertip import Flag, files
 
 TOOLS = argparse.Namespace()
