@@ -24,10 +24,7 @@ std::string wrapped(const std::string &line, std::size_t columns, std::size_t in
   std::string lines;
   while (text.size() > columns) {
     std::size_t at = text.rfind(' ', columns);
-    if (at == std::string::npos || at <= text.find_first_not_of(' ')) {
-      break;
-    }
-    if (at <= indent) {
+    if (at == std::string::npos || at <= text.find_first_not_of(' ') || at <= indent) {
       break;
     }
     lines += text.substr(0, at) + "\n";
@@ -151,28 +148,19 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
     const std::string first = text.substr(text.rfind(' ') + 1);
     return "\"" + first + (first[0] == '-' ? "\" is no option of it" : "\" is one word too many");
   }
-  if (kind == "ValidationError") {
-    std::vector<const CLI::App *> commands = {failed};
-    for (const CLI::App *command : failed->get_subcommands()) {
-      commands.push_back(command);
-    }
-    for (const CLI::App *command : commands) {
-      for (const CLI::Option *option : command->get_options()) {
-        const Values values = values_of(*option);
-        if (!values.allowed.empty() && text.rfind(option->get_name() + ": ", 0) == 0) {
-          return option->get_name() + " takes " + values.allowed + (values.unit.empty() ? "" : " " + values.unit) +
-                 ", not \"" + refused_value(text.substr(option->get_name().size() + 2)) + "\"";
-        }
-      }
-    }
+  std::vector<const CLI::Option *> options = failed->get_options();
+  for (const CLI::App *command : failed->get_subcommands()) {
+    const auto its = command->get_options();
+    options.insert(options.end(), its.begin(), its.end());
   }
-  if (kind == "RequiredError") {
-    for (const CLI::App *command : failed->get_subcommands()) {
-      for (const CLI::Option *option : command->get_options()) {
-        if (option->get_required() && text.rfind(option->get_name(), 0) == 0) {
-          return option->get_type_name() + " is missing";
-        }
-      }
+  for (const CLI::Option *option : options) {
+    const Values values = values_of(*option);
+    if (kind == "ValidationError" && !values.allowed.empty() && text.rfind(option->get_name() + ": ", 0) == 0) {
+      return option->get_name() + " takes " + values.allowed + (values.unit.empty() ? "" : " " + values.unit) +
+             ", not \"" + refused_value(text.substr(option->get_name().size() + 2)) + "\"";
+    }
+    if (kind == "RequiredError" && option->get_required() && text.rfind(option->get_name(), 0) == 0) {
+      return option->get_type_name() + " is missing";
     }
   }
   return text;

@@ -122,44 +122,36 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, dou
   const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
   const double by_square = core_by_square + strength * h * dip * dip_per;
   const double by_log_width = -2.0 * square * core_by_square;
-  const double by_dip_width = -2.0 * square * strength * h * dip * dip_per;
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
   Reading r;
   r.model = sensed - hidden.Pa + g[layout.offset(k)] + g[layout.drift(k)] * tau;
   const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
-  const int at[TOUCHED] = {k,
-                           layout.log_peak(),
-                           layout.log_width(),
-                           layout.mixing(),
-                           layout.dx(k),
-                           layout.dy(k),
-                           layout.offset(k),
-                           layout.drift(k),
-                           layout.memory(k),
-                           layout.ellipse(0),
-                           layout.ellipse(1),
-                           layout.dip(),
-                           layout.dip_width(),
-                           layout.own_width(k)};
-  const double by[TOUCHED] = {value,
-                              value,
-                              by_log_width,
-                              strength * (narrow - wide),
-                              by_u,
-                              by_v,
-                              1.0,
-                              tau,
-                              -hidden.by_remembered * earlier_Pa,
-                              by_q1,
-                              by_q2,
-                              -strength * dip,
-                              by_dip_width,
-                              by_log_width};
-  std::copy(at, at + TOUCHED, r.at);
-  std::copy(by, by + TOUCHED, r.by);
+  std::size_t terms = 0;
+  const auto add = [&](int at, double by) { r.terms[terms++] = {at, by}; };
+  add(k, value);
+  add(layout.log_peak(), value);
+  add(layout.log_width(), by_log_width);
+  add(layout.mixing(), strength * (narrow - wide));
+  add(layout.dx(k), by_u);
+  add(layout.dy(k), by_v);
+  add(layout.offset(k), 1.0);
+  add(layout.drift(k), tau);
+  add(layout.memory(k), -hidden.by_remembered * earlier_Pa);
+  add(layout.ellipse(0), by_q1);
+  add(layout.ellipse(1), by_q2);
+  add(layout.dip(), -strength * dip);
+  add(layout.dip_width(), -2.0 * square * strength * h * dip * dip_per);
+  add(layout.own_width(k), by_log_width);
   r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
   return r;
+}
+
+double Model::residual(const Unknowns &unknowns, std::size_t i, int k) const {
+  const Placement &placement = placements_[i];
+  const double earlier_Pa = placement.earlier_Pa[std::size_t(k)];
+  return placement.reading_Pa[std::size_t(k)] -
+         reading(unknowns.global, unknowns.locals[i], k, tau(placement), earlier_Pa).model;
 }
 
 double Model::expected_sd(const Placement &placement, double reading_Pa) const {

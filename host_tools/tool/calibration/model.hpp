@@ -7,6 +7,7 @@
 #include "tool/calibration/solver.hpp"
 
 #include <Eigen/Dense>
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -43,8 +44,11 @@ struct Unknowns {
 
 struct Reading {
   double model;
-  int at[TOUCHED];
-  double by[TOUCHED]; /* derivative by the global unknown `at` */
+  struct Term {
+    int at;
+    double by; /* derivative by the global unknown `at` */
+  };
+  std::array<Term, TOUCHED> terms;
   Local by_local;
 };
 
@@ -59,6 +63,8 @@ public:
   /* Each placement where the readings' logarithms have their peak, in pitches. */
   Unknowns first_guess() const;
   Reading reading(const Eigen::VectorXd &g, const Local &l, int k, double tau, double earlier_Pa) const;
+  /* A reading less that of the model, Pa. */
+  double residual(const Unknowns &unknowns, std::size_t i, int k) const;
   double tau(const Placement &placement) const { return (placement.t_s - middle_s_) / half_s_; }
   double expected_sd(const Placement &placement, double reading_Pa) const;
   double expected_sd(const Placement &placement, int k) const {

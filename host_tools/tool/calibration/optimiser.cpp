@@ -13,13 +13,21 @@ using Eigen::VectorXd;
 
 constexpr double COST_SETTLED = 1e-10; /* relative */
 
-/* This number of extra values holds a spread to the assumed one. With fewer the gains of good sessions are
- * better known, by 15 % with 1, and sooner thought so; but then 13 (with 2) and 37 % (with 1) of
- * the sessions whose zeros move pass as good, with 4 none (truth.py --parts calibration --seed 20000
- * --pads 30). Where sensors sit where they should and rubber does not relax, the spreads cannot be
- * seen to be nothing, so the sds are twice too large. */
+/* This number of extra values holds a spread to the assumed one. With 2 or 1 of them 13 or 37 % of the sessions
+ * whose zeros move pass as good, with 4 none (truth.py --parts calibration --seed 20000 --pads 30). */
 constexpr double SEEN_BEFORE = 4.0;
 constexpr double CAPPED = 4.0; /* sds: one odd placement is weak evidence on the others */
+
+/* A reading's part of the normal matrix: of the global unknowns, of these and the placement's own, and of its own. */
+void accumulate(const Reading &r, double weight, MatrixXd &global, MatrixXd &cross, LocalSquare &local) {
+  for (const auto &[a, by_a] : r.terms) {
+    for (const auto &[b, by_b] : r.terms) {
+      global(a, b) += weight * by_a * by_b;
+    }
+    cross.row(a) += weight * by_a * r.by_local.transpose();
+  }
+  local += weight * r.by_local * r.by_local.transpose();
+}
 
 } // namespace
 
@@ -73,14 +81,7 @@ MatrixXd Optimiser::information_at(double x_mm, double y_mm) const {
   for (int k = 0; k < model_.layout.sensors; k++) {
     const Reading r = model_.reading(at.global, local, k, 1.0, 0.0);
     const double expected = model_.expected_sd(quiet, r.model);
-    const double weight = 1.0 / (expected * expected);
-    for (int a = 0; a < TOUCHED; a++) {
-      for (int b = 0; b < TOUCHED; b++) {
-        own(r.at[a], r.at[b]) += weight * r.by[a] * r.by[b];
-      }
-      cross.row(r.at[a]) += weight * r.by[a] * r.by_local.transpose();
-    }
-    square += weight * r.by_local * r.by_local.transpose();
+    accumulate(r, 1.0 / (expected * expected), own, cross, square);
   }
   return own - cross * square.inverse() * cross.transpose();
 }
@@ -107,12 +108,9 @@ double Optimiser::cost(const Unknowns &unknowns) const {
   }
   const Local sd = model_.local_sd();
   for (std::size_t i = 0; i < placements_.size(); i++) {
-    const double t = model_.tau(placements_[i]);
     for (int k = 0; kept[i] && k < model_.layout.sensors; k++) {
       if (placements_[i].usable >> k & 1u) {
-        const double r = (placements_[i].reading_Pa[std::size_t(k)] -
-                          model_.reading(g, l[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]).model) /
-                         model_.expected_sd(placements_[i], k);
+        const double r = model_.residual(unknowns, i, k) / model_.expected_sd(placements_[i], k);
         sum += huber(r * r);
       }
     }
@@ -165,14 +163,10 @@ void Optimiser::assemble() {
 }
 
 void Optimiser::add(std::size_t i, const Reading &r, double square, double slope) {
-  for (int a = 0; a < TOUCHED; a++) {
-    gradient_[r.at[a]] += slope * r.by[a];
-    for (int b = 0; b < TOUCHED; b++) {
-      normal_(r.at[a], r.at[b]) += square * r.by[a] * r.by[b];
-    }
-    cross_[i].row(r.at[a]) += square * r.by[a] * r.by_local.transpose();
+  for (const auto &[unknown, by] : r.terms) {
+    gradient_[unknown] += slope * by;
   }
-  local_normal_[i] += square * r.by_local * r.by_local.transpose();
+  accumulate(r, square, normal_, cross_[i], local_normal_[i]);
   local_gradient_[i] += slope * r.by_local;
 }
 
@@ -252,12 +246,9 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
       squares[j] += std::min(locals[i][j] * locals[i][j], CAPPED * CAPPED * sd[j] * sd[j]) + own(j, j);
       known += std::max(1.0 - own(j, j) / (sd[j] * sd[j]), 0.0);
     }
-    const double t = model.tau(placements[i]);
     for (int k = 0; k < n; k++) {
       if (placements[i].usable >> k & 1u) {
-        const double left = (placements[i].reading_Pa[std::size_t(k)] -
-                             model.reading(global, locals[i], k, t, placements[i].earlier_Pa[std::size_t(k)]).model) /
-                            model.expected_sd(placements[i], k);
+        const double left = model.residual(optimiser.at, i, k) / model.expected_sd(placements[i], k);
         misfit += huber(left * left);
         readings += 1.0;
       }

@@ -234,9 +234,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
       double left_squares = 0.0, misfit = 0.0, count = 0.0;
       for (int k = 0; k < layout.sensors; k++) {
         if (placements[i].usable >> k & 1u) {
-          const double left =
-              placements[i].reading_Pa[std::size_t(k)] -
-              model.reading(global, local, k, model.tau(placements[i]), placements[i].earlier_Pa[std::size_t(k)]).model;
+          const double left = model.residual(optimiser.at, i, k);
           const double expected = model.expected_sd(placements[i], k);
           left_squares += left * left;
           misfit += left * left / (expected * expected);
@@ -246,14 +244,10 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
       for (int j = 2; j < LOCAL; j++) {
         misfit += local[j] * local[j] / (sd[j] * sd[j]);
       }
-      solution.placements[i] = {optimiser.kept[i],
-                                local[0],
-                                local[1],
-                                local[2],
-                                local[3],
-                                {local[4], local[5]},
-                                std::sqrt(left_squares / std::max(count, 1.0)) / peak_Pa,
-                                std::sqrt(misfit / std::max(count, 1.0))};
+      const double all = std::max(count, 1.0), rms_share = std::sqrt(left_squares / all) / peak_Pa;
+      solution.placements[i] = {
+          optimiser.kept[i],      local[0], local[1], local[2], local[3], {local[4], local[5]}, rms_share,
+          std::sqrt(misfit / all)};
       if (optimiser.kept[i]) {
         squares += left_squares;
         readings += count;

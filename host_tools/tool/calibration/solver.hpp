@@ -98,10 +98,8 @@ struct Assumptions {
   double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
   double dip = 0.05;                    /* of h: 0.05 on real pads, 0 on the twin's */
-  /* Sd of log B. It is this narrow because zeros and model errors look like another width where the
-   * readings contain little: with 0.05 and more, places and forces on the recording of
-   * host_tools/report/real that chooses are worse. Readings that determine it still move it: the
-   * dip of the twin's pads is 1.6 pitches wide, and is found within some per cent. */
+  /* Sd of log B. With 0.05 and more, places and forces on the recording of host_tools/report/real that chooses
+   * are worse: zeros and model errors look like another width where the readings contain little. */
   double dip_log_sd = 0.03;
   /* Sd of log A around the reading of a strong placement, which was near a sensor: without it a
    * narrow peak that is far from every sensor explains a few placements as well. */
@@ -185,11 +183,9 @@ Solution solve_from(const Array &array, const std::vector<Placement> &placements
 /* The log gains with their mean, tilt and bowl taken out. */
 std::vector<double> outside_gauge(const Array &array, const std::vector<double> &gain);
 
-/* How far inside the outer sensors a place is asked for. Right above them a foot may be where the
- * rubber ends, which no profile of one thickness explains. Pads that end 6 mm beyond got worse
- * by calibrations with such places, 4 of 60, and none does with these (report truth, part calibration, seed
- * 31000). Wide pads of 12 mm are located as well. The price is on 6 mm of rubber, where a sensor
- * measures only what is near: 8 % more location error. */
+/* How far inside the outer sensors a place is asked for: right above them a foot may be where the rubber ends. Of
+ * pads that end 6 mm beyond, calibrations with such places made 4 of 60 worse (report truth, part calibration, seed
+ * 31000). The price is 8 % more location error on 6 mm of rubber. */
 constexpr double INSET_PITCHES = 0.5;
 
 /* Where a placement more would lower the largest shape_sd most: a place on the array, in steps of

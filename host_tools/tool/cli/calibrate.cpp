@@ -9,7 +9,8 @@
 #include "tool/calibration/from_recording.hpp"
 #include "tool/cli/calibrate_device.hpp"
 #include "tool/cli/calibrate_view.hpp"
-#include "tool/cli/gains.hpp"
+#include "tool/cli/ink.hpp"
+#include "tool/cli/names_of_values.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -34,9 +35,8 @@ void print_result(const GainSession &work, const calibration &made, std::optiona
   std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm, after.location_mm);
   std::printf("force differs by    %6.1f %%  %6.1f %%    median\n", 100.0 * before.force, 100.0 * after.force);
   if (force_N) {
-    std::printf("force scale         %9s %9s    sd %s\n", "1.000",
-                fixed(static_cast<double>(made.force_scale), 3).c_str(),
-                fixed(static_cast<double>(made.force_scale_sd), 3).c_str());
+    std::printf("force scale         %9s %9s    sd %s\n", "1.000", number(made.force_scale, 3).c_str(),
+                number(made.force_scale_sd, 3).c_str());
   } else {
     std::printf("force scale         unknown: give the weight, to calibrate forces too\n");
   }
@@ -49,15 +49,10 @@ void print_result(const GainSession &work, const calibration &made, std::optiona
 
 void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
   std::unique_ptr<CalibrateView> view = make_calibrate_view(colour);
-  bool news = false;
   const auto take = [&](const wire_packet &packet) {
     if (work.judgement().state == Judgement::State::more && work.take(packet)) {
       work.judge(false);
-      news = true;
-    }
-    if (news) {
       view->update(work, true);
-      news = false;
     }
   };
   device.follow(WIRE_STREAM_RAW, WIRE_RAW, take, [&] {
@@ -87,8 +82,8 @@ int show(const CalibrateOptions &options) {
     return 0;
   }
   std::printf("calibrated %s from %u placements, force scale %s sd %s\n", date_text(info.calibration.date_s).c_str(),
-              info.calibration.placements, fixed(static_cast<double>(info.calibration.force_scale), 3).c_str(),
-              fixed(static_cast<double>(info.calibration.force_scale_sd), 3).c_str());
+              info.calibration.placements, number(info.calibration.force_scale, 3).c_str(),
+              number(info.calibration.force_scale_sd, 3).c_str());
   std::printf("%s\n", shape_text(info.calibration).c_str());
   print_gains(info.calibration, info.sensor_count);
   return 0;

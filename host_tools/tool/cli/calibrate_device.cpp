@@ -96,27 +96,24 @@ void CalibratedDevice::follow(std::uint8_t streams, std::uint8_t of_frames,
   session_.command(command_stream(0));
 }
 
-void CalibratedDevice::write(const calibration &made) {
+void CalibratedDevice::send(const wire_packet &command) {
   ending_ = true;
-  session_.command(command_calibrate(made, info_.sensor_count));
+  session_.command(command);
   info_ = session_.info().body.info;
+}
+
+void CalibratedDevice::write(const calibration &made) {
+  send(command_calibrate(made, info_.sensor_count));
   if (!(info_.stored & WIRE_STORED_CALIBRATION) || info_.calibration.date_s != made.date_s) {
     throw Error(name() + ": did not keep the calibration; see fingertip info");
   }
 }
 
 void CalibratedDevice::write(const pad_profile &pad) {
-  ending_ = true;
-  session_.command(command_pad(pad));
-  info_ = session_.info().body.info;
+  send(command_pad(pad));
   if (!(info_.stored & WIRE_STORED_PAD) || info_.pad.tangential_scale != pad.tangential_scale) {
     throw Error(name() + ": did not keep the pad's profile; see fingertip info");
   }
-}
-
-void CalibratedDevice::erase() {
-  ending_ = true;
-  session_.command(command_erase_calibration());
 }
 
 } // namespace fingertip

@@ -1,6 +1,7 @@
 /* The fingertip that is calibrated, and its user. */
 #pragma once
 
+#include "libfingertip/command.hpp"
 #include "libfingertip/session.hpp"
 #include "tool/cli/calibrate.hpp"
 
@@ -31,12 +32,14 @@ public:
   /* What is begun is done whole, whatever signals come. Throws Error where it was not kept. */
   void write(const calibration &made);
   void write(const pad_profile &pad);
-  void erase();
+  void erase() { send(command_erase_calibration()); }
 
   const wire_info &info() const { return info_; }
   std::string name() const { return transport_->description(); }
 
 private:
+  void send(const wire_packet &command);
+
   std::unique_ptr<Transport> transport_;
   bool ending_ = false;
   Session session_;

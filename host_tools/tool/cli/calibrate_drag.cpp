@@ -4,6 +4,7 @@
 #include "libfingertip/text.hpp"
 #include "tool/calibration/pull_session.hpp"
 #include "tool/cli/calibrate_device.hpp"
+#include "tool/cli/ink.hpp"
 
 #include <cstdio>
 
@@ -78,11 +79,9 @@ void check_same_pad(const pad_profile &recorded, const pad_profile &stored, cons
 
 void print_result(const PullSession &work, const pad_profile &before, const pad_profile &after, bool has_force_scale) {
   std::printf("%s, from %zu of %zu pulls\n", work.judgement().text.c_str(), work.judgement().kept, work.pulls().size());
-  std::printf("tangential scale    %s sd %s before, %s sd %s now\n",
-              fixed(static_cast<double>(before.tangential_scale), 3).c_str(),
-              fixed(static_cast<double>(before.tangential_scale_sd), 3).c_str(),
-              fixed(static_cast<double>(after.tangential_scale), 3).c_str(),
-              fixed(static_cast<double>(after.tangential_scale_sd), 3).c_str());
+  std::printf("tangential scale    %s sd %s before, %s sd %s now\n", number(before.tangential_scale, 3).c_str(),
+              number(before.tangential_scale_sd, 3).c_str(), number(after.tangential_scale, 3).c_str(),
+              number(after.tangential_scale_sd, 3).c_str());
   if (!has_force_scale) {
     std::printf("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n");
   }

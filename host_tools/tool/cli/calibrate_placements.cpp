@@ -88,20 +88,11 @@ nlohmann::json found_in(const Asked &asked) {
   return found;
 }
 
-std::string standard_input() {
-  std::string text;
-  char bytes[65536];
-  for (std::size_t count; (count = std::fread(bytes, 1, sizeof bytes, stdin)) > 0;) {
-    text.append(bytes, count);
-  }
-  return text;
-}
-
 } // namespace
 
 int calibrate_placements() {
   try {
-    std::printf("%s\n", found_in(asked_of(nlohmann::json::parse(standard_input()))).dump().c_str());
+    std::printf("%s\n", found_in(asked_of(nlohmann::json::parse(stdin))).dump().c_str());
   } catch (const nlohmann::json::exception &error) {
     throw Error("standard input: no placements (" + std::string(error.what()) + ")");
   }

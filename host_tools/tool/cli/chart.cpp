@@ -1,7 +1,5 @@
 #include "tool/cli/chart.hpp"
 
-#include "tool/cli/model.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -86,29 +84,6 @@ struct Dots {
   Colour colour = ACCENT;
 };
 
-class Field {
-public:
-  explicit Field(const Area &area)
-      : width_(area.width), height_(area.height),
-        cells_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
-
-  int rows() const { return 4 * height_; }
-  Dots &cell(int column, int row) {
-    return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)];
-  }
-  void set(int dot, int row, const ChartPoint &point, Colour colour) {
-    Dots &dots = cell(dot / 2, row / 4);
-    dots.bits |= braille_bit(dot % 2, row % 4);
-    dots.doubtful = dots.doubtful || point.doubtful;
-    dots.alarm = dots.alarm || point.alarm;
-    dots.colour = colour;
-  }
-
-private:
-  int width_, height_;
-  std::vector<Dots> cells_;
-};
-
 ChartPoint point_of(const Curve &curve, const Times &times, int dot) {
   ChartPoint point;
   times.each(curve.last, dot, [&](std::int64_t interval) {
@@ -126,10 +101,18 @@ ChartPoint point_of(const Curve &curve, const Times &times, int dot) {
 }
 
 void draw_curves(Canvas &canvas, const Area &area, const Chart &chart, const Times &times) {
-  Field field(area);
+  std::vector<Dots> cells(static_cast<std::size_t>(area.width) * static_cast<std::size_t>(area.height));
+  auto cell = [&](int column, int row) -> Dots & { return cells[static_cast<std::size_t>(row * area.width + column)]; };
+  auto set = [&](int dot, int row, const ChartPoint &point, Colour colour) {
+    Dots &dots = cell(dot / 2, row / 4);
+    dots.bits |= braille_bit(dot % 2, row % 4);
+    dots.doubtful = dots.doubtful || point.doubtful;
+    dots.alarm = dots.alarm || point.alarm;
+    dots.colour = colour;
+  };
   auto row_of = [&](float value) {
     float part = (chart.high - value) / (chart.high - chart.low);
-    return static_cast<int>(std::lround(part * static_cast<float>(field.rows() - 1)));
+    return static_cast<int>(std::lround(part * static_cast<float>(4 * area.height - 1)));
   };
   for (const Curve &curve : chart.curves) {
     int before = -1; /* row of the dot before; none */
@@ -139,25 +122,21 @@ void draw_curves(Canvas &canvas, const Area &area, const Chart &chart, const Tim
         before = -1;
         continue;
       }
-      int row = row_of(*point.value);
-      if (point.doubtful) {
-        before = -1;
-        if (dot % 2 == 0) {
-          field.set(dot, row, point, curve.colour);
-        }
-        continue;
+      const int row = row_of(*point.value);
+      if (!point.doubtful || dot % 2 == 0) {
+        set(dot, row, point, curve.colour);
       }
-      field.set(dot, row, point, curve.colour);
-      for (int between = before < 0 ? row : before; between != row; between += between < row ? 1 : -1) {
-        field.set(dot, between, point, curve.colour);
+      const int from = before < 0 || point.doubtful ? row : before;
+      for (int between = from; between != row; between += between < row ? 1 : -1) {
+        set(dot, between, point, curve.colour);
       }
-      before = row;
+      before = point.doubtful ? -1 : row;
     }
   }
   int line_row = chart.line ? row_of(*chart.line) / 4 : -1;
   for (int row = 0; row < area.height; row++) {
     for (int column = 0; column < area.width; column++) {
-      const Dots &dots = field.cell(column, row);
+      const Dots &dots = cell(column, row);
       if (dots.bits) {
         Colour colour = dots.doubtful ? WARNING : dots.alarm ? BAD : dots.colour;
         canvas.text(area.left + column, area.top + row, braille(dots.bits), text_style(colour));

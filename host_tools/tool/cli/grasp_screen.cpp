@@ -1,10 +1,9 @@
-#include "tool/cli/grasp_screen.hpp"
-
 #include "grasp/words.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "tool/cli/chart.hpp"
+#include "tool/cli/monitor.hpp"
 #include "tool/cli/pad_picture.hpp"
-#include "tool/cli/traces.hpp"
+#include "tool/cli/panel.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -355,21 +355,13 @@ private:
   }
 
   void take_key(Key key) {
-    switch (key) {
-    case 'q':
-      quit_ = true;
-      break;
-    case 'o':
+    quit_ = quit_ || key == 'q';
+    if (key == 'o') {
       wish(GRIP_REQUEST_RELEASE, "open");
-      break;
-    case 'h':
+    } else if (key == 'h') {
       wish(GRIP_REQUEST_HOLD, "hold");
-      break;
-    case 'g':
+    } else if (key == 'g') {
       wish(GRIP_REQUEST_GRASP, "grasp");
-      break;
-    default:
-      break;
     }
   }
 
@@ -453,7 +445,7 @@ private:
   unsigned reported_interrupts_ = 0;
   std::uint8_t state_at_end_ = GRIP_IDLE;
   std::string message_, trouble_, fault_, lost_, failure_;
-  KeyTime message_until_{};
+  HostTime message_until_{};
 };
 
 } // namespace

@@ -16,7 +16,7 @@ constexpr char FINAL_FIRST = '@', FINAL_LAST = '~';
 
 } // namespace
 
-void KeyParser::feed(const char *bytes, std::size_t length, KeyTime now) {
+void KeyParser::feed(const char *bytes, std::size_t length, HostTime now) {
   if (state_ != State::plain && now - last_ > SEQUENCE_GAP) {
     state_ = State::plain;
   }
@@ -91,18 +91,18 @@ std::optional<Key> KeyParser::next() {
   return key;
 }
 
-void Confirmation::ask(KeyTime now) {
+void Confirmation::ask(HostTime now) {
   asked_ = true;
   since_ = now;
 }
 
-bool Confirmation::answer(Key key, KeyTime now) {
+bool Confirmation::answer(Key key, HostTime now) {
   bool in_time = now - since_ >= READING && now - since_ <= PATIENCE;
   bool yes = asked_ && in_time && (key == 'y' || key == 'Y');
   asked_ = false;
   return yes;
 }
 
-void Confirmation::expire(KeyTime now) { asked_ = asked_ && now - since_ <= PATIENCE; }
+void Confirmation::expire(HostTime now) { asked_ = asked_ && now - since_ <= PATIENCE; }
 
 } // namespace fingertip

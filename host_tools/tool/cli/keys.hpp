@@ -10,8 +10,6 @@
 
 namespace fingertip {
 
-using KeyTime = HostTime;
-
 /* A character, or one of these. */
 using Key = int;
 enum : Key { KEY_LEFT = 256, KEY_RIGHT, KEY_UP, KEY_DOWN, KEY_HOME, KEY_END };
@@ -20,7 +18,7 @@ enum : Key { KEY_LEFT = 256, KEY_RIGHT, KEY_UP, KEY_DOWN, KEY_HOME, KEY_END };
  * terminal marks it (bracketed paste) are none. */
 class KeyParser {
 public:
-  void feed(const char *bytes, std::size_t length, KeyTime now);
+  void feed(const char *bytes, std::size_t length, HostTime now);
   std::optional<Key> next();
 
 private:
@@ -29,7 +27,7 @@ private:
   enum class State { plain, escape, control, single, text, text_escape };
 
   State state_ = State::plain;
-  KeyTime last_{};
+  HostTime last_{};
   std::string parameters_; /* of a control sequence */
   bool pasting_ = false;
   std::deque<Key> keys_;
@@ -39,16 +37,16 @@ private:
  * whatever is in it: there must be silence between the question and the answer. */
 class Confirmation {
 public:
-  void ask(KeyTime now);
+  void ask(HostTime now);
   bool is_asked() const { return asked_; }
   /* Every key while it is asked: true for y. Any other, or y too early, withdraws the question. */
-  bool answer(Key key, KeyTime now);
+  bool answer(Key key, HostTime now);
   /* Withdraws it where no answer comes. */
-  void expire(KeyTime now);
+  void expire(HostTime now);
 
 private:
   bool asked_ = false;
-  KeyTime since_{};
+  HostTime since_{};
 };
 
 } // namespace fingertip

@@ -232,7 +232,7 @@ private:
     }
   }
 
-  void take_key(Key key, KeyTime now) {
+  void take_key(Key key, HostTime now) {
     if (tare_.is_asked()) {
       if (tare_.answer(key, now)) {
         taring_.assign(loops_.size(), true);
@@ -374,7 +374,7 @@ private:
   std::unique_ptr<View> view_;
   std::string note_;
   std::string message_;
-  KeyTime message_until_{};
+  HostTime message_until_{};
   Confirmation tare_;
   std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
   std::vector<std::uint32_t> reported_missing_;

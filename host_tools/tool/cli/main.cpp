@@ -2,7 +2,7 @@
  * 2 wrong usage; of grasp also those of GraspEnd. */
 #include "libfingertip/session.hpp"
 #include "tool/advice.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 
 #include <cerrno>
 #include <cstdio>

@@ -1,10 +1,10 @@
 #include "tool/cli/monitor.hpp"
 
 #include "libfingertip/packet_fields.hpp"
+#include "tool/cli/chart.hpp"
 #include "tool/cli/names_of_values.hpp"
 #include "tool/cli/pad_picture.hpp"
 #include "tool/cli/panel.hpp"
-#include "tool/cli/traces.hpp"
 
 #include <algorithm>
 

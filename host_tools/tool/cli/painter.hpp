@@ -1,10 +1,6 @@
 /* Canvases to the bytes that show them on an ANSI terminal, of which only those are sent that
  * change it.
- *
- * Our own, because the pad needs two free colours to a cell: ncurses has the colours that TERM
- * names, 8 for xterm and 256 at most, whatever COLORTERM is, unless a "-direct" entry is
- * installed and asked for; and it neither brackets pastes nor separates a terminal's answers from keys.
- */
+ * ncurses has no two free colours to a cell, which the pad needs, and does not bracket pastes. */
 #pragma once
 
 #include "tool/cli/canvas.hpp"

@@ -162,34 +162,18 @@ void Playback::seek(double time_us) {
 }
 
 void Playback::key(Key key) {
-  switch (key) {
-  case 'q':
-    quit_ = true;
-    break;
-  case ' ':
-    paused_ = !paused_;
-    break;
-  case KEY_LEFT:
-    seek(time_us_ - SHORT_WAY_us);
-    break;
-  case KEY_RIGHT:
-    seek(time_us_ + SHORT_WAY_us);
-    break;
-  case KEY_DOWN:
-    seek(time_us_ - LONG_WAY_us);
-    break;
-  case KEY_UP:
-    seek(time_us_ + LONG_WAY_us);
-    break;
-  case KEY_HOME:
-    seek(0);
-    break;
-  case KEY_END:
-    paused_ = true; /* to show the end */
-    seek(END);
-    break;
-  default:
-    break;
+  const std::pair<Key, double> seeks[] = {{KEY_LEFT, time_us_ - SHORT_WAY_us},
+                                          {KEY_RIGHT, time_us_ + SHORT_WAY_us},
+                                          {KEY_DOWN, time_us_ - LONG_WAY_us},
+                                          {KEY_UP, time_us_ + LONG_WAY_us},
+                                          {KEY_HOME, 0},
+                                          {KEY_END, END}};
+  quit_ = quit_ || key == 'q';
+  paused_ = key == ' ' ? !paused_ : paused_ || key == KEY_END; /* to show the end */
+  for (const auto &[of, time_us] : seeks) {
+    if (key == of) {
+      seek(time_us);
+    }
   }
 }
 

@@ -4,7 +4,6 @@
 
 #include "libfingertip/clock.hpp"
 #include "libfingertip/packet_file.hpp"
-#include "tool/cli/grip_model.hpp"
 #include "tool/cli/keys.hpp"
 #include "tool/cli/monitor.hpp"
 

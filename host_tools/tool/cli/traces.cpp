@@ -1,4 +1,4 @@
-#include "tool/cli/traces.hpp"
+#include "tool/cli/chart.hpp"
 
 #include <algorithm>
 #include <cmath>

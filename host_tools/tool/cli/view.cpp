@@ -4,7 +4,7 @@
 #include "libfingertip/names.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/grasp_screen.hpp"
+#include "tool/cli/panel.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -101,9 +101,8 @@ std::string contact_text(const Model &model) {
   std::string text;
   if (contact.flags & CONTACT_FLAG_FIT_VALID) {
     bool least = contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND;
-    text = std::string(is_doubtful(contact) ? "  doubtful:" : "") + "  x " +
-           fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " + fixed(static_cast<double>(contact.y_mm), 2) +
-           " mm  force " + (least ? "at least " : "") + fixed(static_cast<double>(contact.force_N), 2) + " N";
+    text = std::string(is_doubtful(contact) ? "  doubtful:" : "") + "  x " + number(contact.x_mm, 2) + " mm  y " +
+           number(contact.y_mm, 2) + " mm  force " + (least ? "at least " : "") + number(contact.force_N, 2) + " N";
   }
   return text + "  " + flags_text(contact.flags);
 }

@@ -1,7 +1,6 @@
 /* Ways to show fingertips while they change. */
 #pragma once
 
-#include "tool/cli/grip_model.hpp"
 #include "tool/cli/monitor.hpp"
 #include "tool/cli/terminal.hpp"
 

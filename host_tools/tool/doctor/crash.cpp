@@ -92,30 +92,24 @@ std::string where_text(const crash_record &record) {
 }
 
 std::string event_text(unsigned code, unsigned detail) {
-  switch (code) {
-  case CRASH_EVENT_START:
-    return "started";
-  case CRASH_EVENT_COMMAND:
-    return "command " + command_name(static_cast<std::uint8_t>(detail));
-  case CRASH_EVENT_CLOSED:
-    return "port closed";
-  case CRASH_EVENT_ASLEEP:
-    return "bus asleep";
-  case CRASH_EVENT_AWAKE:
-    return "bus awake";
-  case CRASH_EVENT_STORED:
-    return detail == 0 ? "stored" : "could not store";
-  case CRASH_EVENT_SENSORS:
-    return "other sensors answer";
-  case CRASH_EVENT_BUS:
-    return "timeouts on the sensor bus (" + std::to_string(detail) + " in a second)";
-  case CRASH_EVENT_WORKER:
-    return "second processor started again";
-  case CRASH_EVENT_SKIPPED:
-    return "frames skipped (" + std::to_string(detail) + " in a second)";
-  default:
-    return "event " + std::to_string(code) + "." + std::to_string(detail);
+  const std::string in_a_second = " (" + std::to_string(detail) + " in a second)";
+  const std::pair<unsigned, std::string> texts[] = {
+      {CRASH_EVENT_START, "started"},
+      {CRASH_EVENT_COMMAND, "command " + command_name(static_cast<std::uint8_t>(detail))},
+      {CRASH_EVENT_CLOSED, "port closed"},
+      {CRASH_EVENT_ASLEEP, "bus asleep"},
+      {CRASH_EVENT_AWAKE, "bus awake"},
+      {CRASH_EVENT_STORED, detail == 0 ? "stored" : "could not store"},
+      {CRASH_EVENT_SENSORS, "other sensors answer"},
+      {CRASH_EVENT_BUS, "timeouts on the sensor bus" + in_a_second},
+      {CRASH_EVENT_WORKER, "second processor started again"},
+      {CRASH_EVENT_SKIPPED, "frames skipped" + in_a_second}};
+  for (const auto &[known, text] : texts) {
+    if (known == code) {
+      return text;
+    }
   }
+  return "event " + std::to_string(code) + "." + std::to_string(detail);
 }
 
 } // namespace
@@ -157,13 +151,17 @@ std::string events_text(const crash_record &record) {
   return text;
 }
 
+std::vector<std::pair<const char *, std::uint32_t>> registers_of(const crash_record &record) {
+  return {{"r0", record.r0}, {"r1", record.r1}, {"r2", record.r2},     {"r3", record.r3}, {"r12", record.r12},
+          {"lr", record.lr}, {"pc", record.pc}, {"xpsr", record.xpsr}, {"sp", record.sp}};
+}
+
 std::string registers_text(const crash_record &record) {
-  const std::pair<const char *, std::uint32_t> registers[] = {
-      {"r0", record.r0},   {"r1", record.r1}, {"r2", record.r2},     {"r3", record.r3},
-      {"r12", record.r12}, {"lr", record.lr}, {"xpsr", record.xpsr}, {"sp", record.sp}};
   std::string text;
-  for (auto [name, value] : registers) {
-    text += (text.empty() ? "" : " ") + std::string(name) + " " + hex_text(value);
+  for (auto [name, value] : registers_of(record)) {
+    if (name != std::string("pc")) {
+      text += (text.empty() ? "" : " ") + std::string(name) + " " + hex_text(value);
+    }
   }
   return record.sp == 0 ? "" : text;
 }

@@ -6,6 +6,8 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace fingertip {
 
@@ -27,7 +29,9 @@ std::string crash_text(const Crash &crash);
 std::string events_text(const crash_record &record);
 /* The age of an event at the end. */
 double event_age_s(const crash_record &record, unsigned event);
-/* "r0 0x00000001 r1 ..."; empty where none are known. */
+/* By name, as the exception left them. */
+std::vector<std::pair<const char *, std::uint32_t>> registers_of(const crash_record &record);
+/* "r0 0x00000001 r1 ...", without pc; empty where none are known. */
 std::string registers_text(const crash_record &record);
 
 } // namespace fingertip

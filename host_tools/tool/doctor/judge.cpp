@@ -143,10 +143,8 @@ private:
     if (facts_.rule.empty()) {
       add(denied ? Verdict::bad : Verdict::warn, "rule", "no udev rule lets users without privileges open fingertips",
           advice(ErrorCode::permission_denied));
-    } else if (denied) {
-      add(Verdict::ok, "rule", facts_.rule + "; it applies to devices that are plugged in from now on");
     } else {
-      add(Verdict::ok, "rule", facts_.rule);
+      add(Verdict::ok, "rule", facts_.rule + (denied ? "; it applies to devices that are plugged in from now on" : ""));
     }
   }
 
@@ -256,15 +254,14 @@ private:
   void missing_strip(unsigned strip, std::uint32_t sensors) {
     char address[8];
     std::snprintf(address, sizeof address, "0x%02x", *wiring_->place(strip * wiring_->sensors_of_strip).multiplexer);
-    std::string who = "strip " + std::to_string(strip) + ", " + list(sensors_in(sensors)) + ": ";
-    if (facts_.after->bus_timeouts > 0) {
-      add(Verdict::bad, "sensors", who + "a line behind multiplexer " + address + " is held low, it is kept shut",
-          "take the sensors of that strip off one by one, or measure its SDn and SCn: 3.3 V at rest",
-          sensors_in(sensors));
-    } else {
-      add(Verdict::bad, "sensors", who + "multiplexer " + address + " does not answer",
-          wiring_->check_multiplexer(strip), sensors_in(sensors));
-    }
+    const bool held = facts_.after->bus_timeouts > 0;
+    add(Verdict::bad, "sensors",
+        "strip " + std::to_string(strip) + ", " + list(sensors_in(sensors)) + ": " +
+            (held ? std::string("a line behind multiplexer ") + address + " is held low, it is kept shut"
+                  : std::string("multiplexer ") + address + " does not answer"),
+        held ? "take the sensors of that strip off one by one, or measure its SDn and SCn: 3.3 V at rest"
+             : wiring_->check_multiplexer(strip),
+        sensors_in(sensors));
   }
 
   void sensors() {
@@ -346,8 +343,7 @@ private:
   void bus() {
     const wire_health &now = *facts_.after;
     const wire_health &then = facts_.before ? *facts_.before : now;
-    std::uint32_t nacks = now.bus_nacks - then.bus_nacks;
-    std::uint32_t timeouts = now.bus_timeouts - then.bus_timeouts;
+    std::uint32_t nacks = now.bus_nacks - then.bus_nacks, timeouts = now.bus_timeouts - then.bus_timeouts;
     std::uint32_t recoveries = now.bus_recoveries - then.bus_recoveries;
     std::uint32_t odd = now.implausible_readings - then.implausible_readings + now.zero_readings - then.zero_readings;
     std::string text = fixed(nacks / seconds(), 1) + " NACKs/s, " + std::to_string(recoveries) +
@@ -356,10 +352,10 @@ private:
     if (nacks + timeouts + recoveries + odd == 0) {
       add(Verdict::ok, "bus",
           text + "; since its start " + count(now.bus_nacks, "NACK") + " and " + count(now.bus_timeouts, "timeout"));
-    } else if (missing_) {
-      add(Verdict::warn, "bus", text, "see to the missing sensors first");
     } else {
-      add(Verdict::warn, "bus", text, "check wires, pull-ups and supply; keep motor cables away from them");
+      add(Verdict::warn, "bus", text,
+          missing_ ? "see to the missing sensors first"
+                   : "check wires, pull-ups and supply; keep motor cables away from them");
     }
   }
 
@@ -441,14 +437,12 @@ private:
         facts_.before && facts_.after ? facts_.after->packets_dropped - facts_.before->packets_dropped : 0;
     std::string text = count(line.packets, "packet") + ", " + std::to_string(line.dropped_packets) + " lost, " +
                        std::to_string(damaged) + " damaged";
-    if (line.dropped_packets + damaged == 0) {
-      add(Verdict::ok, "packets", text);
-    } else if (dropped > 0) {
-      add(Verdict::warn, "packets", text + ", " + std::to_string(dropped) + " of them dropped by the fingertip",
-          "this computer or its hub does not take them fast enough");
-    } else {
-      add(Verdict::warn, "packets", text, "try another cable, and no hub");
-    }
+    const bool ok = line.dropped_packets + damaged == 0;
+    text += !ok && dropped > 0 ? ", " + std::to_string(dropped) + " of them dropped by the fingertip" : "";
+    add(ok ? Verdict::ok : Verdict::warn, "packets", text,
+        ok            ? ""
+        : dropped > 0 ? "this computer or its hub does not take them fast enough"
+                      : "try another cable, and no hub");
   }
 
   void sync() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace fingertip {
 
@@ -27,31 +28,27 @@ using Means = std::array<std::optional<double>, MEANS>;
 
 /* Least squares; nothing of fewer than three. */
 std::optional<Slope> slope(const Means &means, double seconds) {
-  double n = 0, t = 0, y = 0;
-  auto time_s = [&](unsigned i) { return (i + 0.5) * seconds / MEANS; };
+  std::vector<std::pair<double, double>> points; /* time and mean */
+  double t = 0, y = 0;
   for (unsigned i = 0; i < MEANS; i++) {
     if (means[i]) {
-      n++;
-      t += time_s(i);
-      y += *means[i];
+      points.emplace_back((i + 0.5) * seconds / MEANS, *means[i]);
+      t += points.back().first;
+      y += points.back().second;
     }
   }
+  const auto n = static_cast<double>(points.size());
   if (n < 3 || seconds <= 0) {
     return std::nullopt;
   }
-  double tt = 0, ty = 0;
-  for (unsigned i = 0; i < MEANS; i++) {
-    if (means[i]) {
-      tt += (time_s(i) - t / n) * (time_s(i) - t / n);
-      ty += (time_s(i) - t / n) * (*means[i] - y / n);
-    }
+  double tt = 0, ty = 0, squares = 0;
+  for (const auto &[at, mean] : points) {
+    tt += (at - t / n) * (at - t / n);
+    ty += (at - t / n) * (mean - y / n);
   }
-  double squares = 0;
-  for (unsigned i = 0; i < MEANS; i++) {
-    if (means[i]) {
-      double rest = *means[i] - y / n - ty / tt * (time_s(i) - t / n);
-      squares += rest * rest;
-    }
+  for (const auto &[at, mean] : points) {
+    const double rest = mean - y / n - ty / tt * (at - t / n);
+    squares += rest * rest;
   }
   return Slope{ty / tt, std::sqrt(squares / (n - 2) / tt)};
 }

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import pathlib
+import re
 import shutil
 import signal
 import sys
@@ -50,6 +51,10 @@ class CliTest(unittest.TestCase):
         out, err = process.communicate()
         self.assertEqual(process.returncode, status, (arguments, out, err))
         return out, err
+
+    def info(self, *arguments):
+        """What info prints, by key."""
+        return dict(re.findall(r"(?m)^(\S+) +(.*)$", self.run_cli("info", *arguments)[0]))
 
     def interrupt(self, process, status=0):
         """Ends it as Ctrl-C does; what it printed."""

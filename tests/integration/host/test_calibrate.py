@@ -92,7 +92,7 @@ class CalibrateTest(cli_case.CliTest):
     def shown(self):
         return self.calibrate("--show", "--port", self.port)[0]
 
-    def info(self, key):
+    def lines_of_info(self, key):
         """The lines of info whose keys begin so."""
         return re.findall(rf"^{key}.*$", self.run_cli("info", "--port", self.port)[0], re.M)
 
@@ -220,7 +220,7 @@ class Gains(CalibrateTest):
                 _, err = process.communicate()
                 self.assertEqual((process.returncode, err), (1, "fingertip: interrupted; the fingertip is as it was\n"))
             self.assertIn("from 30 placements", self.shown())
-            self.assertEqual(self.info("pad_tangential_scale +"), ["pad_tangential_scale    1"])
+            self.assertEqual(self.lines_of_info("pad_tangential_scale +"), ["pad_tangential_scale    1"])
 
     def test_on_a_terminal_draws_the_pad_and_asks(self):
         for answer, written in ((b"n\n", False), (b"y\n", True)):
@@ -265,13 +265,13 @@ class Drags(CalibrateTest):
     def test_writes_the_scale_and_nothing_else_of_the_pad(self):
         with self.device(f"serial={serial}", GRASP):
             self.run_cli("pad", "--thickness", "12", "--port", self.port)
-            before = self.info("pad_(?!tangential_scale)")
+            before = self.lines_of_info("pad_(?!tangential_scale)")
             out, _ = self.drag("--from", pulled, "--yes", "--port", self.port)
             self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
-            kept = [float(line.split()[1]) for line in self.info("pad_tangential_scale")]
+            kept = [float(line.split()[1]) for line in self.lines_of_info("pad_tangential_scale")]
             np.testing.assert_allclose(kept, self.scale(out), atol=6e-4)
             self.assertGreater(len(before), 5)
-            self.assertEqual(self.info("pad_(?!tangential_scale)"), before)
+            self.assertEqual(self.lines_of_info("pad_(?!tangential_scale)"), before)
 
     def test_only_into_the_fingertip_and_the_pad_that_it_is_of(self):
         for options, thickness, more, reason in (
@@ -284,10 +284,10 @@ class Drags(CalibrateTest):
             with self.subTest(reason), self.device(*options):
                 if thickness:
                     self.run_cli("pad", "--thickness", thickness, "--port", self.port)
-                before = self.info("pad_")
+                before = self.lines_of_info("pad_")
                 _, err = self.drag("--from", pulled, *more, "--port", self.port, status=1)
                 self.assertIn(reason, err)
-                self.assertEqual(self.info("pad_"), before)
+                self.assertEqual(self.lines_of_info("pad_"), before)
 
     def test_refuses_with_the_reason(self):
         for played, pull, reason in (
@@ -320,7 +320,7 @@ class Drags(CalibrateTest):
             self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
             scale, _ = self.scale(out)
             self.assertAlmostEqual(scale, self.scale(self.drag("--from", pulled, "--dry-run")[0])[0], delta=0.02)
-            self.assertAlmostEqual(float(self.info("pad_tangential_scale +")[0].split()[1]), scale, delta=6e-4)
+            self.assertAlmostEqual(float(self.lines_of_info("pad_tangential_scale +")[0].split()[1]), scale, delta=6e-4)
 
     def test_after_the_force_nothing_is_left_to_do(self):
         with self.device(f"play={pulled}", GRASP, "pad=1", "calibrated=1"):

@@ -3,11 +3,7 @@
 
 #include <cstdlib>
 #include <fcntl.h>
-#include <fstream>
 #include <gtest/gtest.h>
-#include <memory>
-#include <sys/stat.h>
-#include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
 #include <vector>
@@ -35,27 +31,9 @@ protected:
     unlink(link_.c_str());
     ASSERT_EQ(symlink(ptsname(master_), link_.c_str()), 0);
   }
-  std::string error() const {
-    try {
-      SerialTransport transport(link_);
-    } catch (const Error &error) {
-      return error.what();
-    }
-    return "";
-  }
-
   int master_ = -1;
   std::string link_ = "/tmp/fingertip-test-tty-" + std::to_string(getpid());
 };
-
-ErrorCode error_of(const std::string &path) {
-  try {
-    SerialTransport transport(path);
-  } catch (const Error &error) {
-    return error.code();
-  }
-  return ErrorCode::other;
-}
 
 } // namespace
 
@@ -96,23 +74,6 @@ TEST_F(Terminal, ReadWaitsNoLongerThanAsked) {
   EXPECT_LT(waited, PATIENCE);
 }
 
-TEST_F(Terminal, APortInUseIsBusyUntilItIsClosed) {
-  auto first = std::make_unique<SerialTransport>(link_);
-  EXPECT_NE(error().find("in use by another program"), std::string::npos) << error();
-  first.reset();
-  EXPECT_EQ(error(), "");
-}
-
-TEST_F(Terminal, AKilledProgramLeavesThePortFree) {
-  pid_t child = fork();
-  if (child == 0) {
-    SerialTransport transport(link_);
-    kill(getpid(), SIGKILL);
-  }
-  waitpid(child, nullptr, 0);
-  EXPECT_EQ(error(), "");
-}
-
 TEST_F(Terminal, GoneAndBack) {
   SerialTransport transport(link_);
   std::uint8_t bytes[8];
@@ -150,17 +111,4 @@ TEST_F(Terminal, AWriteThatNobodyTakesEnds) {
   SerialTransport transport(link_);
   std::vector<std::uint8_t> much(1 << 20, 0x55);
   EXPECT_FALSE(transport.write(much.data(), much.size()));
-}
-
-TEST(Serial, ErrorsAreTold) {
-  EXPECT_EQ(error_of("/nonexistent/tty"), ErrorCode::no_port);
-  EXPECT_EQ(error_of("/dev/null"), ErrorCode::not_a_port);
-  if (geteuid() == 0) {
-    GTEST_SKIP() << "root is allowed everything";
-  }
-  std::string path = "/tmp/fingertip-test-denied-" + std::to_string(getpid());
-  std::ofstream(path) << "";
-  ASSERT_EQ(chmod(path.c_str(), 0), 0);
-  EXPECT_EQ(error_of(path), ErrorCode::permission_denied);
-  unlink(path.c_str());
 }

@@ -1,13 +1,14 @@
 #include "support/host_packets.hpp"
 #include "tool/doctor/system.hpp"
 
-#include <algorithm>
+#include <csignal>
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
-#include <stdlib.h>
+#include <pty.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 namespace {
 
@@ -30,28 +31,14 @@ protected:
 /* A pseudo-terminal that another process has open. */
 class HeldPort {
 public:
-  HeldPort() : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
-    grantpt(master_);
-    unlockpt(master_);
-    path_ = ptsname(master_);
-    int ready[2];
-    if (pipe(ready) != 0) {
-      std::abort();
-    }
-    child_ = fork();
+  HeldPort() {
+    char path[64];
+    child_ = forkpty(&master_, path, nullptr, nullptr);
     if (child_ == 0) {
-      close(master_);
-      int port = open(path_.c_str(), O_RDWR | O_NOCTTY);
-      if (port < 0 || ::write(ready[1], "!", 1) != 1) {
-        _exit(1);
-      }
       pause();
       _exit(0);
     }
-    close(ready[1]);
-    char byte;
-    EXPECT_EQ(read(ready[0], &byte, 1), 1);
-    close(ready[0]);
+    path_ = path;
   }
   ~HeldPort() {
     release();
@@ -68,7 +55,7 @@ public:
   int process() const { return child_; }
 
 private:
-  int master_;
+  int master_ = -1;
   std::string path_;
   pid_t child_ = 0;
 };

@@ -7,15 +7,9 @@ using fingertip::Wiring;
 
 TEST(Wiring, PinsAreThoseOfTheBoardsReadme) {
   /* boards/pico_mux/README.md and boards/pico_parallel/README.md */
-  EXPECT_EQ(pin_text(0), "GP0 (pin 1)");
-  EXPECT_EQ(pin_text(1), "GP1 (pin 2)");
-  EXPECT_EQ(pin_text(2), "GP2 (pin 4)");
-  EXPECT_EQ(pin_text(5), "GP5 (pin 7)");
-  EXPECT_EQ(pin_text(6), "GP6 (pin 9)");
-  EXPECT_EQ(pin_text(8), "GP8 (pin 11)");
-  EXPECT_EQ(pin_text(10), "GP10 (pin 14)");
-  EXPECT_EQ(pin_text(14), "GP14 (pin 19)");
-  EXPECT_EQ(pin_text(15), "GP15 (pin 20)");
+  for (auto [gpio, pin] : {std::pair{0u, 1}, {1, 2}, {2, 4}, {5, 7}, {6, 9}, {8, 11}, {10, 14}, {14, 19}, {15, 20}}) {
+    EXPECT_EQ(pin_text(gpio), "GP" + std::to_string(gpio) + " (pin " + std::to_string(pin) + ")");
+  }
 }
 
 TEST(Wiring, SensorsOfPicoMuxAreBehindMultiplexers) {

@@ -2,7 +2,7 @@
 
 #include "libfingertip/text.hpp"
 #include "tool/calibration/solver.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 
 #include <memory>
 

@@ -1,19 +1,16 @@
 #include "libfingertip/line_sink.hpp"
 #include "libfingertip/line_source.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/converter.hpp"
 
+#include <filesystem>
 #include <fstream>
 #include <memory>
 
 namespace fingertip {
 
 namespace {
-
-bool ends_with(const std::string &text, const std::string &end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 /* Whether its content is a recording; the reader reports a file that is neither. */
 bool is_recording(const std::string &path) {
@@ -23,8 +20,9 @@ bool is_recording(const std::string &path) {
 }
 
 int convert(const Conversion &conversion) {
-  bool to_capture = ends_with(conversion.to, ".ftr");
-  if (!to_capture && !ends_with(conversion.to, ".csv") && !is_mcap_name(conversion.to)) {
+  const auto end = std::filesystem::path(conversion.to).extension();
+  const bool to_capture = end == ".ftr";
+  if (!to_capture && end != ".csv" && !is_mcap_name(conversion.to)) {
     throw WrongUsage("\"" + printable(conversion.to) +
                      "\" must end with .csv, .mcap or .ftr, which selects the format");
   }

@@ -1,7 +1,7 @@
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/terminal.hpp"
 #include "tool/doctor/gather.hpp"
 #include "tool/doctor/wiring.hpp"
@@ -21,15 +21,6 @@ struct DoctorOptions {
   Examination examination;
   bool json = false;
 };
-
-std::array<unsigned, 3> tool_version() {
-  std::array<unsigned, 3> version{};
-  std::size_t i = 0;
-  for (std::string_view part : split(FINGERTIP_VERSION, '.')) {
-    version.at(i++) = static_cast<unsigned>(to_u64(part).value());
-  }
-  return version;
-}
 
 bool wants_colour() {
   const char *none = std::getenv("NO_COLOR");
@@ -96,9 +87,9 @@ Json crash_json(const Crash &crash) {
                {"vector", record.vector}, {"activity", record.activity},
                {"stuck", record.stuck},   {"uptime_s", static_cast<double>(record.t_us) / 1e6},
                {"place", crash.place},    {"caller", crash.caller}};
-  json["registers"] = {{"r0", record.r0}, {"r1", record.r1},     {"r2", record.r2},
-                       {"r3", record.r3}, {"r12", record.r12},   {"lr", record.lr},
-                       {"pc", record.pc}, {"xpsr", record.xpsr}, {"sp", record.sp}};
+  for (const auto &[name, value] : registers_of(record)) {
+    json["registers"][name] = value;
+  }
   json["events"] = Json::array();
   for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
     json["events"].push_back(
@@ -152,7 +143,8 @@ int doctor(const DoctorOptions &options) {
     ProgressBar bar("measuring, touch nothing", ProgressBar::Lines::none);
     facts = gather(options.examination, stop_requested, [&](double share) { bar.show(share); });
   }
-  facts.tool_version = tool_version();
+  auto &[major, minor, patch] = facts.tool_version;
+  std::sscanf(FINGERTIP_VERSION, "%u.%u.%u", &major, &minor, &patch);
   std::vector<Finding> findings = judge(facts);
   if (options.json) {
     std::printf("%s\n", to_json(facts, findings).dump(2, ' ', false, Json::error_handler_t::replace).c_str());

@@ -6,18 +6,19 @@
 #include "libfingertip/text.hpp"
 #include "libfingertip/uf2.hpp"
 #include "tool/advice.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
+#include "tool/cli/names_of_values.hpp"
 #include "tool/cli/terminal.hpp"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <mntent.h>
 #include <optional>
 #include <string_view>
 #include <sys/mount.h>
@@ -73,25 +74,14 @@ std::optional<std::string> loader_board(const std::string &folder) {
 /* Mount points of FAT drives that are a loader of the RP2040. */
 std::vector<std::string> mounted_volumes() {
   std::vector<std::string> volumes;
-  std::ifstream mounts("/proc/self/mountinfo");
-  for (std::string line; std::getline(mounts, line);) {
-    if (line.find(" - vfat ") == std::string::npos) {
-      continue;
+  std::FILE *mounts = setmntent("/proc/self/mounts", "r");
+  while (const mntent *each = mounts ? getmntent(mounts) : nullptr) {
+    if (each->mnt_type == std::string("vfat") && loader_board(each->mnt_dir) == "RPI-RP2") {
+      volumes.emplace_back(each->mnt_dir);
     }
-    auto words = split(line, ' ');
-    std::string folder;
-    for (std::size_t i = 0; words.size() > 4 && i < words[4].size(); i++) {
-      /* blanks and the like are octal */
-      if (words[4][i] == '\\' && i + 3 < words[4].size()) {
-        folder += static_cast<char>(std::strtol(std::string(words[4].substr(i + 1, 3)).c_str(), nullptr, 8));
-        i += 3;
-      } else {
-        folder += words[4][i];
-      }
-    }
-    if (loader_board(folder) == "RPI-RP2") {
-      volumes.push_back(folder);
-    }
+  }
+  if (mounts) {
+    endmntent(mounts);
   }
   return volumes;
 }
@@ -277,11 +267,7 @@ int flash(const FlashOptions &options) {
     return 0;
   }
   const wire_info &info = *back;
-  Metadata pairs = info_metadata(info);
-  std::string version;
-  for (const auto &[key, value] : pairs) {
-    version += key == "firmware" ? value : "";
-  }
+  const std::string version = value_of(info_metadata(info), "firmware");
   if (version != image.version || text_field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
       text_field(info.board) != image.board) {
     throw Error("written, but fingertip " + text_field(info.serial) + " came back with firmware " + version + " " +

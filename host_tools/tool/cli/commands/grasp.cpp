@@ -1,5 +1,5 @@
 #include "grasp/settings.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/grasp_session.hpp"
 #include "tool/cli/gripper_options.hpp"
 
@@ -11,7 +11,7 @@ namespace fingertip {
 
 namespace {
 
-std::string number(double value) {
+std::string plain(double value) {
   char text[32];
   std::snprintf(text, sizeof text, value == std::floor(value) ? "%.0f" : "%.4g", value);
   return text;
@@ -23,14 +23,14 @@ std::string default_of(const GraspSetting &setting, const GripSettings &usual, c
     return "";
   }
   const double value = value_of(setting, usual), other = value_of(setting, servo);
-  return "; default " + number(value) + (value == other ? "" : ", of a servo " + number(other));
+  return "; default " + plain(value) + (value == other ? "" : ", of a servo " + plain(other));
 }
 
 /* What breaks: a preset by name, or the force that breaks it. Options of single limits override it. */
 void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
   std::string names;
   for (const GraspPreset &preset : grasp_presets()) {
-    names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" + number(preset.breaks_N) + " N)";
+    names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" + plain(preset.breaks_N) + " N)";
   }
   auto *preset = command->add_option_function<std::string>(
       "--preset", [&breaking](const std::string &name) { breaking = typed([&] { return preset_values(name); }); },
@@ -49,7 +49,7 @@ void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
   const GripSettings usual = settings_for(models.front(), {});
   const GripSettings servo = settings_for(models.back(), {});
   for (const GraspSetting &setting : grasp_settings()) {
-    const std::string range = number(setting.low) + " to " + number(setting.high), unit = setting.unit;
+    const std::string range = plain(setting.low) + " to " + plain(setting.high), unit = setting.unit;
     with_number(
         command, std::string("--") + setting.name, setting.low, setting.high, unit + (unit.empty() ? "" : ", ") + range,
         [&limits, &setting](double value) { limits[setting.name] = value; },

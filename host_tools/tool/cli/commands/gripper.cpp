@@ -5,7 +5,7 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/gripper_options.hpp"
 
 #include <algorithm>
@@ -16,6 +16,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 
 namespace fingertip {
 
@@ -198,6 +199,11 @@ int move(Gripper &gripper, const GripperOptions &options) {
 }
 
 int gripper_command(GripperOptions options) {
+  const std::set<std::string> actions = {"list", "info", "move", "open", "close"};
+  if (!actions.count(options.action)) {
+    throw WrongUsage("ACTION: there is no \"" + printable(options.action) +
+                     "\"; give list, info, move WIDTH, open or close; see fingertip gripper --help");
+  }
   if (options.action == "list") {
     return list_grippers();
   }
@@ -234,14 +240,6 @@ void add_gripper(CommandLine &line) {
                                [options] { return gripper_command(*options); });
   command->add_option("ACTION", options->action, "list, info, move WIDTH, open or close")
       ->required()
-      ->check([](const std::string &text) {
-        for (const char *action : {"list", "info", "move", "open", "close"}) {
-          if (text == action) {
-            return std::string();
-          }
-        }
-        return "there is no \"" + text + "\"; give list, info, move WIDTH, open or close";
-      })
       ->type_name("ACTION");
   command->add_option("WIDTH", options->width_mm, "For move: width between the pads, in mm")->type_name("MM");
   command->add_option("--model", options->way.model, "Model of the gripper: " + gripper_model_names())

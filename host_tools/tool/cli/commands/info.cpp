@@ -1,79 +1,55 @@
 #include "libfingertip/names.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/device.hpp"
-#include "tool/cli/gains.hpp"
 #include "tool/cli/names_of_values.hpp"
 
-#include <algorithm>
 #include <cstdio>
 #include <memory>
-#include <string_view>
+#include <set>
 
 namespace fingertip {
 
 namespace {
 
-void print_pairs(const Metadata &pairs) {
-  for (const auto &[key, value] : pairs) {
-    std::printf("%-24s%s\n", key.c_str(), value.c_str());
-  }
+/* Whether the firmware has what it belongs to, and no other table shows it. */
+bool is_shown(const std::string &key, std::uint32_t capabilities) {
+  static const std::set<std::string> of_sensors = {"gains", "gain_sds", "off_x_um", "off_y_um", "wider_q15"};
+  auto begins = [&](const char *with) { return key.rfind(with, 0) == 0; };
+  const bool of_fit = begins("fit_") || begins("prior_") || begins("location_");
+  return !of_sensors.count(key) && (!begins("slip_") || (capabilities & WIRE_CAPABILITY_SLIP)) &&
+         (!of_fit || (capabilities & WIRE_CAPABILITY_FIT));
 }
 
-/* What belongs to a capability that the firmware lacks. */
-void leave_out_missing(Metadata &pairs, std::uint32_t capabilities) {
-  auto is_missing = [&](const std::pair<std::string, std::string> &pair) {
-    bool of_slip = pair.first.rfind("slip_", 0) == 0;
-    bool of_fit =
-        pair.first.rfind("fit_", 0) == 0 || pair.first.rfind("prior_", 0) == 0 || pair.first.rfind("location_", 0) == 0;
-    return (of_slip && !(capabilities & WIRE_CAPABILITY_SLIP)) || (of_fit && !(capabilities & WIRE_CAPABILITY_FIT));
-  };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_missing), pairs.end());
-}
+void print(const std::string &key, const std::string &value) { std::printf("%-24s%s\n", key.c_str(), value.c_str()); }
 
 int info(const Choice &choice) {
   Device device(choice);
   wire_info info = device.session.info().body.info;
   wire_health health = device.session.health().body.health;
-  Metadata pairs = info_metadata(info);
-  /* print_gains has them. */
-  auto is_of_sensors = [](const std::pair<std::string, std::string> &pair) {
-    static constexpr std::string_view names[] = {"gains", "gain_sds", "off_x_um", "off_y_um", "wider_q15"};
-    return std::find(std::begin(names), std::end(names), pair.first) != std::end(names);
-  };
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_of_sensors), pairs.end());
-  pairs.insert(pairs.begin(), {"port", printable(device.transport->description())});
-  for (auto &[key, value] : pairs) {
-    if (key == "capabilities") {
-      value = capabilities_text(info.capabilities);
-    } else if (key == "streams") {
-      value = streams_text(info.streams);
-    } else if (key == "stored") {
-      value = stored_text(info.stored);
-    } else if (key == "calibration_date_s") {
-      value += " (" + date_text(info.calibration.date_s) + ")";
-    } else if (key == "rate_mHz" && info.rate_mHz == 0) {
-      value = rate_text(info.rate_mHz);
+  const Metadata pairs = info_metadata(info);
+  print("port", printable(device.transport->description()));
+  for (const auto &[key, value] : pairs) {
+    if (is_shown(key, info.capabilities)) {
+      print(key, key == "capabilities"                     ? capabilities_text(info.capabilities)
+                 : key == "streams"                        ? streams_text(info.streams)
+                 : key == "stored"                         ? stored_text(info.stored)
+                 : key == "calibration_date_s"             ? value + " (" + date_text(info.calibration.date_s) + ")"
+                 : key == "rate_mHz" && info.rate_mHz == 0 ? rate_text(info.rate_mHz)
+                                                           : value);
     }
   }
-  leave_out_missing(pairs, info.capabilities);
-  print_pairs(pairs);
   std::printf("\n");
-  Metadata counters;
   for (const auto &[key, value] : health_fields(health)) {
-    if (key == "capabilities") {
-      continue; // printed above
+    const std::string bad = sensors_text(health.sensors_prom_bad);
+    if (key != "capabilities" && is_shown(key, info.capabilities)) { /* the former is above */
+      print(key, key == "sensors_present"    ? present_text(value, info.sensor_count)
+                 : key == "sensors_prom_bad" ? (bad.empty() ? "none" : bad)
+                                             : std::to_string(value));
     }
-    std::string bad = sensors_text(health.sensors_prom_bad);
-    counters.emplace_back(key, key == "sensors_present"    ? present_text(value, info.sensor_count)
-                               : key == "sensors_prom_bad" ? (bad.empty() ? "none" : bad)
-                                                           : std::to_string(value));
   }
-  leave_out_missing(counters, info.capabilities);
-  print_pairs(counters);
-  const auto [key, firmware] =
-      *std::find_if(pairs.begin(), pairs.end(), [](const auto &pair) { return pair.first == "firmware"; });
+  const std::string firmware = value_of(pairs, "firmware");
   if (firmware != FINGERTIP_VERSION) {
     std::printf("\nits firmware is of version %s, this tool of version " FINGERTIP_VERSION
                 "; install this tool's with `fingertip flash`, or use the other's tool\n",

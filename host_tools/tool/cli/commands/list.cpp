@@ -1,9 +1,9 @@
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
+#include "tool/cli/names_of_values.hpp"
 
-#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -33,7 +33,7 @@ int list(Reach reach) {
     throw Error("no fingertip found; plug one in, or name its port in FINGERTIP_PORT");
   }
   for (const Found &found : all) {
-    Metadata info = {{"serial", found.serial}, {"board", ""}, {"scene", ""}, {"firmware", ""}};
+    Metadata info = {{"serial", found.serial}};
     std::string reached = reached_text(found);
     try {
       auto way = way_to(found, reach);
@@ -44,8 +44,8 @@ int list(Reach reach) {
       reached += " (" + error_text(error) + ")";
     }
     for (const char *key : {"serial", "board", "firmware"}) {
-      auto pair = std::find_if(info.begin(), info.end(), [&](auto &p) { return p.first == key; });
-      std::printf("%s\t", pair->second.empty() ? "-" : printable(pair->second).c_str());
+      const std::string value = value_of(info, key);
+      std::printf("%s\t", value.empty() ? "-" : printable(value).c_str());
     }
     std::printf("%s\n", printable(reached).c_str());
   }

@@ -1,7 +1,7 @@
 /* monitor and record. */
 #include "tool/cli/live.hpp"
 
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 
 #include <memory>
 

@@ -1,5 +1,5 @@
 #include "libfingertip/command.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/device.hpp"
 
 #include <cstdio>

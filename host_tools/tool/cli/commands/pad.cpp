@@ -6,8 +6,9 @@
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
 #include "library/pad/thickness.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/device.hpp"
+#include "tool/cli/ink.hpp"
 
 #include <cstdio>
 #include <memory>
@@ -79,7 +80,7 @@ int pad_command(const PadOptions &options) {
   session.command(command_pad(profile));
   std::printf("thickness=%s overhang=%s%s%s force_ratio=%s kept\n", shortest(profile.thickness_mm).c_str(),
               profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?", ends ? " ends" : "",
-              profile.from_touch ? " from_touch" : "", fixed(static_cast<double>(profile.force_ratio), 3).c_str());
+              profile.from_touch ? " from_touch" : "", number(profile.force_ratio, 3).c_str());
   if (shape.overhang_mm == 0) {
     std::fprintf(stderr, "fingertip: a pad without end, as there is no --overhang: where the rubber ends, location and "
                          "tangential force are off\n");

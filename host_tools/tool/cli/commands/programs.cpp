@@ -1,6 +1,6 @@
 /* Commands that are programs of their own, which take this one's place. */
 #include "libfingertip/error.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/installed_files.hpp"
 
 #include <cstdlib>

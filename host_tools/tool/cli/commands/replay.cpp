@@ -3,7 +3,7 @@
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/converter.hpp"
 #include "tool/cli/playback.hpp"
 #include "tool/cli/view.hpp"

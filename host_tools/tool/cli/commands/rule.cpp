@@ -1,4 +1,4 @@
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 
 #include <cstdio>
 

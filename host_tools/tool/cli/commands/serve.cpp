@@ -3,7 +3,7 @@
 #include "libfingertip/text.hpp"
 #include "library/share/server.hpp"
 #include "tool/advice.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -35,39 +35,30 @@ gid_t group_of(const std::string &name) {
   return found->gr_gid;
 }
 
-/* Serves fingertips that are plugged in later; an error that prevents this is printed once. */
-class Watch {
-public:
-  Watch(Server &server, Reach reach) : server_(server), reach_(reach) {}
-
-  void look() {
-    for (const Found &found : find_usb()) {
-      auto way = way_to(found, reach_);
-      if (!way || server_.has(*way)) {
-        continue;
-      }
-      try {
-        server_.add(*way);
-        errors_.erase(found.serial);
-      } catch (const Error &error) {
-        if (errors_[found.serial] != error.what()) {
-          errors_[found.serial] = error.what();
-          print_line(error_text(error));
-        }
+/* Serves fingertips that are plugged in later; an error that prevents this is printed once: errors has it by serial
+ * number. */
+void look(Server &server, Reach reach, std::map<std::string, std::string> &errors) {
+  for (const Found &found : find_usb()) {
+    auto way = way_to(found, reach);
+    if (!way || server.has(*way)) {
+      continue;
+    }
+    try {
+      server.add(*way);
+      errors.erase(found.serial);
+    } catch (const Error &error) {
+      if (errors[found.serial] != error.what()) {
+        errors[found.serial] = error.what();
+        print_line(error_text(error));
       }
     }
   }
-
-private:
-  Server &server_;
-  Reach reach_;
-  std::map<std::string, std::string> errors_;
-};
+}
 
 int serve(const ServeOptions &options) {
   Server server({options.common ? COMMON_SHARE_FOLDER : own_share_folder(), options.group}, print_line);
   bool all = options.devices.empty() && options.choice.port.empty();
-  Watch watch(server, options.choice.reach);
+  std::map<std::string, std::string> errors;
   if (all) {
     for (const Way &way : all_ways(options.choice.reach)) {
       server.add(way);
@@ -87,7 +78,7 @@ int serve(const ServeOptions &options) {
     server.step(DEVICE_LOOK_INTERVAL);
     if (all && host_now() - searched > DEVICE_LOOK_INTERVAL) {
       searched = host_now();
-      watch.look();
+      look(server, options.choice.reach, errors);
     }
   }
   return 0;

@@ -1,6 +1,6 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/device.hpp"
 
 #include <cstdio>

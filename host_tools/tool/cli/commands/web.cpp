@@ -1,5 +1,5 @@
 #include "libfingertip/text.hpp"
-#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/command_line.hpp"
 #include "tool/cli/installed_files.hpp"
 #include "web/server/page_server.hpp"
 
