@@ -143,13 +143,6 @@ class Frames(unittest.TestCase):
         _, loads = MEASURE.tangential(ARRAY, MEASURE.profile(12.0), MEASURE.settings(noise_Pa=2.0, cut_noises=0), readings)
         self.assertTrue(loads["valid"][:, -1].all())
         self.assertLess(abs(loads["qx_N"][:, -1] - touches["pull_x_N"]).max(), 0.2)
-        shapes = MEASURE.shapes(
-            ARRAY,
-            MEASURE.profile(12.0),
-            MEASURE.settings(noise_Pa=2.0, cut_noises=0),
-            np.ascontiguousarray(np.repeat(readings[:1], 5, axis=1)),
-        )
-        self.assertEqual(int(shapes["shape"][0]), 1)  # FIT_SHAPE_ROUND
 
 
 class Calibration(unittest.TestCase):

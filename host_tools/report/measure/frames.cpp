@@ -163,30 +163,3 @@ static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1>
   });
 }
 MEASURE_ENTRY(tangential)
-
-// Fit and shapes of contacts [contact][frame][sensor]. The result of a contact is that of its last frame that
-// has one: all zeros, FIT_SHAPE_UNDECIDED, where none has.
-static void shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pads,
-                   Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
-                   Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
-                   Batch<fit_shapes_result, 1> results) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
-  same_length(results, pressure_Pa_q10, usable);
-  length_or_one(results, all_settings, pads);
-  in_parallel(results.size(), [&](std::size_t contact) {
-    const fit_settings settings = settings_of(all_settings, own, contact);
-    const auto pad = std::make_unique<fit_shapes_pad>(*pads.row_or_all(contact));
-    fit_shapes_state state{};
-    results[contact] = {};
-    for (std::size_t i = 0; i < pressure_Pa_q10.size(1); i++) {
-      const std::int32_t *pressure = pressure_Pa_q10.row(contact) + i * pressure_Pa_q10.size(2);
-      fit_result fit;
-      fit_gaussian_grid(array, pressure, usable[contact], &settings, &fit);
-      fit_shapes_result found{};
-      if (fit_shapes(array, pad.get(), pressure, &settings, &fit, &state, &found)) {
-        results[contact] = found;
-      }
-    }
-  });
-}
-MEASURE_ENTRY(shapes)

@@ -218,15 +218,6 @@ class Measure(Library):
         self.call("tangential", array, pad, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, saturated, *found)
         return found
 
-    def shapes(self, array, profile, settings, pressure_Pa_q10, usable=None, *, own=None):
-        """fit_shapes_result [contact], the last of each, of readings [contact, frame, sensor]; profile: one for all."""
-        pad = self.made("fit_shapes_pad", 1)
-        self.call("shapes_pad", array, profile, pad)
-        usable = np.full(len(pressure_Pa_q10), (1 << pressure_Pa_q10.shape[2]) - 1, np.uint32) if usable is None else usable
-        found = self.made("fit_shapes_result", len(pressure_Pa_q10))
-        self.call("shapes", array, pad, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found)
-        return found
-
     def osr(self, osr):
         """(conversion_us, noise_Pa_q10) of a reading at this oversampling; the noise is rms."""
         found = np.zeros(1, np.int32), np.zeros(1, np.int32)
