@@ -10,7 +10,7 @@ namespace {
 /* What a terminal sends, in pieces with so much time between them. */
 std::string keys_of(const std::vector<std::string> &pieces, milliseconds gap = milliseconds(1)) {
   KeyParser parser;
-  KeyTime now{};
+  HostTime now{};
   std::string keys;
   for (const std::string &piece : pieces) {
     parser.feed(piece.data(), piece.size(), now += gap);
@@ -58,7 +58,7 @@ TEST(Keys, AnEscapeByItselfDoesNotTakeTheNextOne) { EXPECT_EQ(keys_of({"\x1b", "
 
 TEST(Confirmation, TakesTimeToRead) {
   Confirmation confirmation;
-  KeyTime now{};
+  HostTime now{};
   EXPECT_FALSE(confirmation.answer('y', now)) << "nothing was asked";
   confirmation.ask(now);
   EXPECT_TRUE(confirmation.answer('y', now + milliseconds(400)));
