@@ -22,22 +22,9 @@ export function build(source) {
     const gcc = (...args) => execFileSync('arm-none-eabi-gcc', [...CPU, ...args], { stdio: 'pipe' });
     const binary = (elf, bin) => execFileSync('arm-none-eabi-objcopy', ['-O', 'binary', path(elf), path(bin)]);
     gcc('-c', join(RIG, 'boot2.S'), '-o', path('boot2.o'));
-    gcc(
-      '-O2',
-      '-ffreestanding',
-      '-nostdlib',
-      '-fno-tree-loop-distribute-patterns',
-      '-Wall',
-      '-Werror',
-      '--param=min-pagesize=0',
-      '-fno-delete-null-pointer-checks',
-      `-I${RIG}`,
-      `-T${join(RIG, 'rig.ld')}`,
-      path('main.c'),
-      '-lgcc',
-      '-o',
-      path('main.elf'),
-    );
+    const strict = ['-Wall', '-Werror', '--param=min-pagesize=0', '-fno-delete-null-pointer-checks', '-fno-tree-loop-distribute-patterns'];
+    const bare = ['-O2', '-ffreestanding', '-nostdlib', ...strict, `-I${RIG}`, `-T${join(RIG, 'rig.ld')}`];
+    gcc(...bare, path('main.c'), '-lgcc', '-o', path('main.elf'));
     binary('boot2.o', 'boot2.bin');
     binary('main.elf', 'main.bin');
     const main = readFileSync(path('main.bin'));

@@ -65,19 +65,14 @@ test('a region of the MPU without access faults, and nothing beside it', () => {
   assert.equal(results[0], 3);
 });
 
-test('so does the null page, for loads too', () => {
-  const { results } = run(`void isr(void) { RESULT(0) = 7; done(); }
-    void main(void) { RESULT(0) = REG(0x10); ${DENY('0', 8)} RESULT(0) = REG(0x10); done(); }`);
-  assert.equal(results[0], 7);
-});
-
-for (const [what, base, log2, at] of [
-  ['in SRAM', '0x20020000', 12, '0x20020101'],
-  ['at 0', '0', 8, '0x11'],
+for (const [what, region, act] of [
+  ['the null page, for loads too', DENY('0', 8), 'RESULT(0) = REG(0x10);'],
+  ['a jump there, in SRAM', DENY('0x20020000', 12), '((void (*)(void))0x20020101)();'],
+  ['a jump there, at 0', DENY('0', 8), '((void (*)(void))0x11)();'],
 ]) {
-  test(`and so does a jump there, ${what}`, () => {
+  test(`so does ${what}`, () => {
     const { results } = run(`void isr(void) { RESULT(0) = 7; done(); }
-      void main(void) { RESULT(0) = 0; ${DENY(base, log2)} ((void (*)(void))${at})(); }`);
+      void main(void) { RESULT(0) = REG(0x10); ${region} ${act} done(); }`);
     assert.equal(results[0], 7);
   });
 }
@@ -134,13 +129,8 @@ test('a chip whose clocks are fast does everything sooner, by as much, and does 
   for (const machine of [exact, fast]) machine.run(1e9);
   assert.ok(Math.abs(fast.result.cycles - exact.result.cycles) < 100);
   assert.deepEqual([exact.result.clock_ppm, fast.result.clock_ppm], [0, 500]);
-  const lives_ns = [exact, fast].map((machine) => machine.time.nanos);
-  assert.ok(Math.abs(lives_ns[0] / lives_ns[1] - 1 - 500e-6) < 50e-6, `${lives_ns}`);
-  const passed_us = [exact, fast].map(({ chip }) => {
-    const { timer, clock } = chip;
-    return timer.count_us / ((clock.nanos - timer.zero_ns) / 1000);
-  });
-  assert.ok(Math.abs(passed_us[1] / passed_us[0] - 1 - 500e-6) < 50e-6, `${passed_us}`);
+  const rates = [exact, fast].map(({ time, chip: { timer, clock } }) => [1 / time.nanos, timer.count_us / (clock.nanos - timer.zero_ns)]);
+  for (const k of [0, 1]) assert.ok(Math.abs(rates[1][k] / rates[0][k] - 1 - 500e-6) < 50e-6, `${rates}`);
 });
 
 const CODE = 0x20001000;
@@ -280,12 +270,8 @@ test('the fast decoder follows the manual where rp2040js does not: ADCS, SBCS, s
     const registers = [...Array.from({ length: 13 }, someWord), STACK, 1];
     const flags = someFlags();
     const [a, b] = [registers[d], registers[m]];
-    const expected =
-      kind === 5
-        ? addWithCarry(a, b, flags[2] ? 1 : 0)
-        : kind === 6
-          ? addWithCarry(a, ~b, flags[2] ? 1 : 0)
-          : { ...shiftBits(KINDS[kind], a, b & 0xff, flags[2]), V: flags[3] };
+    const shifted = KINDS[kind] && { ...shiftBits(KINDS[kind], a, b & 0xff, flags[2]), V: flags[3] };
+    const expected = shifted ?? addWithCarry(a, kind === 5 ? b : ~b, flags[2] ? 1 : 0);
     const op = 0x4000 | (kind << 6) | (m << 3) | d;
     const which = `${op.toString(16)} on ${a.toString(16)}, ${b.toString(16)}, ${flags}`;
     assert.equal(fast.execute([op], registers, flags), 1, which);
@@ -296,10 +282,8 @@ test('the fast decoder follows the manual where rp2040js does not: ADCS, SBCS, s
   // STM r1!, {r1, r2}: the base is the lowest in the list, so its old value is stored.
   const registers = [0, 0x20002000, 7, ...new Array(10).fill(0), STACK, 1];
   assert.equal(fast.execute([0xc106], registers, someFlags()), 3);
-  assert.deepEqual(
-    [fast.memory.getUint32(0x2000, true), fast.memory.getUint32(0x2004, true), fast.core.registers[1]],
-    [0x20002000, 7, 0x20002008],
-  );
+  const stored = [0x2000, 0x2004].map((at) => fast.memory.getUint32(at, true));
+  assert.deepEqual([...stored, fast.core.registers[1]], [0x20002000, 7, 0x20002008]);
 });
 
 failsWith('read of an unmapped address', main('(void)REG(0x30000000);'), /read of 0x30000000, where nothing is/);
@@ -311,11 +295,8 @@ failsWith('undefined instruction', main('__asm volatile("udf #7");'), /undefined
 failsWith('peripheral held in reset', main('REG(0x40044000) = 0x65;'), /while I2C0 is held in reset/);
 failsWith('USB memory held in reset', main('REG(0x50100000) = 0;'), /while USBCTRL is held in reset/);
 failsWith('timer read without a tick', main('(void)now_us();'), /no tick runs/);
-failsWith(
-  'PLL before the crystal is stable',
-  main('unreset(1 << 12); REG(0x40028008) = 125; CLR(0x40028004) = 33;'),
-  /before the crystal oscillator was stable/,
-);
+const tooSoon = main('unreset(1 << 12); REG(0x40028008) = 125; CLR(0x40028004) = 33;');
+failsWith('PLL before the crystal is stable', tooSoon, /before the crystal oscillator was stable/);
 const restartPll = (reset) =>
   main(`start_clocks(); REG(0x4000803c) = 0; SET(0x40028004) = 45; ${reset} REG(0x40028008) = 125; REG(0x4002800c) = 6 << 16 | 2 << 12;
   CLR(0x40028004) = 33; while (!(REG(0x40028000) & 0x80000000)) { } CLR(0x40028004) = 8; done();`);
@@ -327,11 +308,8 @@ failsWith('clk_sys from a dead PLL', main('REG(0x4000803c) = 1;'), /clk_sys swit
 failsWith('wrong tick divider', main('start_clocks(); REG(0x4005802c) = 0x200 | 10;'), /must be 1 MHz/);
 failsWith('WFI with no interrupt enabled', main('__asm volatile("wfi");'), /firmware hung/);
 failsWith('asleep for ever', main('REG(0xe000e100) = 1; __asm volatile("wfi");'), /asleep for 2 s/, { seconds: 3 });
-failsWith(
-  'divider result read too early',
-  main('REG(0xd0000060) = 100; REG(0xd0000064) = 7; RESULT(0) = REG(0xd0000070);'),
-  /before its 8 cycles/,
-);
+const early = main('REG(0xd0000060) = 100; REG(0xd0000064) = 7; RESULT(0) = REG(0xd0000070);');
+failsWith('divider result read too early', early, /before its 8 cycles/);
 
 test('a corrupt second stage is not started', () => {
   const machine = makeMachine(main(''));
@@ -356,11 +334,8 @@ test('watchdog: unfed reboots the chip and is reported; scratch and reason survi
   assert.deepEqual(run(source, { allowWatchdog: true }).result.warnings, []);
 });
 
-failsWith(
-  'watchdog without PSM_WDSEL',
-  main('start_clocks(); REG(0x40058004) = 2000; SET(0x40058000) = 1 << 30; for (;;) { }'),
-  /PSM_WDSEL/,
-);
+const unfed = main('start_clocks(); REG(0x40058004) = 2000; SET(0x40058000) = 1 << 30; for (;;) { }');
+failsWith('watchdog without PSM_WDSEL', unfed, /PSM_WDSEL/);
 
 const READ_ID = (fill) => `
   __attribute__((noinline, section(".ramcode"))) static void read_id(void) {
@@ -386,8 +361,5 @@ test('the flash unique id is read over the SSI from SRAM and execute-in-place co
   assert.equal(Buffer.from(machine.chip.sram.subarray(0x30000, 0x30008)).toString('hex'), '0123456789abcdef');
 });
 
-failsWith(
-  'flash code while the SSI is reconfigured',
-  main('REG(0x18000008) = 0; RESULT(0) = 1;'),
-  /read of flash at .* while the SSI is disabled/,
-);
+const cut = main('REG(0x18000008) = 0; RESULT(0) = 1;');
+failsWith('flash code while the SSI is reconfigured', cut, /read of flash at .* while the SSI is disabled/);

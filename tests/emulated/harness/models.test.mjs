@@ -15,10 +15,12 @@ import { HEADER } from './bench.mjs';
 
 const QUIET = { normal: () => 0, range: (low, high) => (low + high) / 2, uniform: () => 0.5 };
 
+const at = (pressure_Pa) => () => ({ pressure_Pa, temperature_degC: 25 });
+
 function sensorBench(options = {}) {
   let now = 0;
   const report = new Report();
-  const stimulus = options.stimulus ?? (() => ({ pressure_Pa: 101325, temperature_degC: 25 }));
+  const stimulus = options.stimulus ?? at(101325);
   const sensor = new Ms5840({ index: 0, prng: QUIET, now_ns: () => now, report, stimulus, faults: options.faults });
   const bus = new I2cBus({ now_ns: () => now, rise_ns: 0, report });
   bus.targets = [sensor];
@@ -40,18 +42,8 @@ function sensorBench(options = {}) {
     const [a, b, c] = read(0x76, 3);
     return (a << 16) | (b << 8) | c;
   };
-  return {
-    sensor,
-    bus,
-    report,
-    write,
-    read,
-    adc,
-    wait: (ms) => {
-      now += ms * 1e6;
-    },
-    now: () => now,
-  };
+  const wait = (ms) => (now += ms * 1e6);
+  return { sensor, bus, report, write, read, adc, wait, now: () => now };
 }
 
 test('compensation matches the worked example of the MS5837-02BA datasheet, page 7', () => {
@@ -152,10 +144,8 @@ test('sensor: the early-read trap returns 0 and spoils the conversion', () => {
 });
 
 test('sensor: conversion time stays below the maximum, differs between parts, samples in the middle', () => {
-  const factors = Array.from(
-    { length: 50 },
-    (_, i) => new Ms5840({ index: i, prng: new Prng(i), now_ns: () => 0, report: new Report(), stimulus: () => ({}) }).timeFactor,
-  );
+  const part = (index) => new Ms5840({ index, prng: new Prng(index), now_ns: () => 0, report: new Report(), stimulus: at(0) });
+  const factors = Array.from({ length: 50 }, (_, index) => part(index).timeFactor);
   assert.ok(Math.max(...factors) < 1 && Math.min(...factors) > 0.92);
   assert.ok(Math.max(...factors) - Math.min(...factors) > 0.04);
   const asked = [];
@@ -172,14 +162,7 @@ test('sensor: conversion time stays below the maximum, differs between parts, sa
 test('sensor: noise has the rms of its oversampling and repeats with its seed', () => {
   const sample = (seed, faults) => {
     let now = 0;
-    const s = new Ms5840({
-      index: 0,
-      prng: new Prng(seed),
-      now_ns: () => now,
-      report: new Report(),
-      stimulus: () => ({ pressure_Pa: 1e5, temperature_degC: 25 }),
-      faults,
-    });
+    const s = new Ms5840({ index: 0, prng: new Prng(seed), now_ns: () => now, report: new Report(), stimulus: at(1e5), faults });
     s.wasReset = true;
     const d2 = codesFor(s.prom, 1e5, 25).d2;
     return Array.from({ length: 2000 }, () => {
@@ -206,13 +189,7 @@ test('sensor: noise has the rms of its oversampling and repeats with its seed', 
 function muxBench() {
   const b = sensorBench();
   const mux = new Tca9548a(0x70, 0);
-  const other = new Ms5840({
-    index: 1,
-    prng: QUIET,
-    now_ns: b.now,
-    report: b.report,
-    stimulus: () => ({ pressure_Pa: 101325, temperature_degC: 25 }),
-  });
+  const other = new Ms5840({ index: 1, prng: QUIET, now_ns: b.now, report: b.report, stimulus: at(101325) });
   mux.connect(0, b.sensor);
   mux.connect(1, other);
   b.bus.targets = [mux];
@@ -272,20 +249,6 @@ test('bus: two sensors answering one read are ANDed and reported', () => {
   b.write(0x76, 0xa2);
   assert.deepEqual(b.read(0x76, 2), [0x0f, 0x00]);
   assert.match(b.report.list[0].message, /2 sensors answered/);
-});
-
-test('bus: a sensor that holds SDA lets go after nine clocks, not eight', () => {
-  const b = muxBench();
-  b.write(0x70, 1);
-  b.sensor.hold();
-  const pulse = () => {
-    b.bus.drive(false, true);
-    b.bus.drive(false, false);
-  };
-  for (let i = 0; i < 8; i++) pulse();
-  assert.ok(b.bus.sdaLow);
-  pulse();
-  assert.ok(!b.bus.sdaLow);
 });
 
 const row = (t, p = 0) => `${t},0,0,0,0,0,0,0,${new Array(15).fill(p).join(',')}`;
