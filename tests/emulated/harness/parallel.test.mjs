@@ -169,9 +169,8 @@ test('a line is the AND of all who pull it, and rises late', () => {
 
 test('faults of single lines cost those sensors only', () => {
   const c = ready();
-  c.fault('line_stuck_low', 0);
-  c.fault('line_stuck_high', 5);
-  c.fault('sensor_missing', 7);
+  const faults = Object.entries({ line_stuck_low: 0, line_stuck_high: 5, sensor_missing: 7 });
+  for (const [type, k] of faults) c.fault(type, k);
   c.faulty.set(9, { dead: true });
   const { acknowledged, words } = c.read16(0xa2);
   const expected = proms(c);
@@ -180,9 +179,7 @@ test('faults of single lines cost those sensors only', () => {
     assert.equal(((acknowledged >> k) & 1) === 1, lost[k]?.[0] ?? true, `sensor ${k}`);
     assert.equal(word, lost[k]?.[1] ?? expected[k], `sensor ${k}`);
   });
-  c.fault('line_stuck_low', 0, false);
-  c.fault('line_stuck_high', 5, false);
-  c.fault('sensor_missing', 7, false);
+  for (const [type, k] of faults) c.fault(type, k, false);
   c.faulty.clear();
   c.stop();
   c.command(0x1e);
@@ -199,10 +196,7 @@ function isJudged(c, k) {
   assert.equal((c.command(0x1e) >> k) & 1, 1, 'it answers');
   c.slack_ns = -200;
   c.command(0x44);
-  assert.ok(
-    c.warnings.some((w) => w.startsWith(`SDA${k}: tHD_STA is 400 ns`)),
-    c.warnings.join('\n'),
-  );
+  assert.match(c.warnings.join('\n'), new RegExp(`^SDA${k}: tHD_STA is 400 ns`, 'm'));
 }
 
 test('a line that is no longer tied to VDD and falls in a bit of the controller is no START of its: excused up to the next', () => {
@@ -241,10 +235,8 @@ test('a sensor that comes back has no PROM before its reset', () => {
   c.wait_ns(1e5);
   c.fault('sensor_missing', 4, false);
   assert.equal(c.command(0x44), ALL);
-  assert.deepEqual(
-    c.read16(0xa2).words,
-    proms(c).map((word, k) => (k === 4 ? 0 : word)),
-  );
+  const but4 = proms(c).map((word, k) => (k === 4 ? 0 : word));
+  assert.deepEqual(c.read16(0xa2).words, but4);
   c.command(0x1e);
   c.wait_ns(3e6);
   assert.deepEqual(c.read16(0xa2).words, proms(c));
@@ -349,32 +341,21 @@ test('fails: a line driven high', () => {
 
 test('faults: those of lines need a board that has them', () => {
   const one = (type, extra = {}) => JSON.stringify([{ type, from_s: 1, ...extra }]);
+  const parsed = (board, type, extra) => parseFaults(one(type, extra), 'f', findBoard(board)).length;
   for (const type of ['line_stuck_high', 'sensor_missing', 'clock_glitch']) {
-    assert.equal(parseFaults(one(type, { sensor: 14 }), 'f', findBoard('pico_parallel')).length, 1);
-    assert.throws(
-      () => parseFaults(one(type, { sensor: 1 }), 'f', findBoard('pico_mux')),
-      /needs a board with a data line for each sensor/,
-    );
+    assert.equal(parsed('pico_parallel', type, { sensor: 14 }), 1);
+    assert.throws(() => parsed('pico_mux', type, { sensor: 1 }), /needs a board with a data line for each sensor/);
   }
-  assert.equal(parseFaults(one('scl_stuck_low'), 'f', findBoard('pico_parallel')).length, 1);
-  for (const board of ['pico_parallel', 'pico_mux'])
-    assert.equal(parseFaults(one('line_stuck_low', { sensor: 14 }), 'f', findBoard(board)).length, 1);
-  assert.throws(() => parseFaults(one('mux_stuck', { mux: 0 }), 'f', findBoard('pico_parallel')), /needs a board with multiplexers/);
+  assert.equal(parsed('pico_parallel', 'scl_stuck_low'), 1);
+  for (const board of ['pico_parallel', 'pico_mux']) assert.equal(parsed(board, 'line_stuck_low', { sensor: 14 }), 1);
+  assert.throws(() => parsed('pico_parallel', 'mux_stuck', { mux: 0 }), /needs a board with multiplexers/);
 });
 
 test('a dump holds the window asked for, the levels at its beginning, and its end', () => {
   let text = '';
   const file = { write: (bytes) => (text += bytes) };
-  const dump = new VcdDump({
-    file,
-    probes: [
-      ['SDA', 1],
-      ['SCL', 2],
-    ],
-    comment: 'c',
-    from_ns: 100,
-    to_ns: 200,
-  });
+  const probes = Object.entries({ SDA: 1, SCL: 2 });
+  const dump = new VcdDump({ file, probes, comment: 'c', from_ns: 100, to_ns: 200 });
   dump.change(3, 10);
   dump.change(1, 50.2);
   dump.change(0, 120.4);

@@ -7,23 +7,8 @@ const rotate = (v, n) => (n % 32 === 0 ? v | 0 : (v << (n % 32)) | (v >>> (32 - 
 
 class Machine {
   constructor(block, index, c) {
-    Object.assign(this, {
-      block,
-      index,
-      c,
-      pc: 0,
-      x: 0,
-      y: 0,
-      isr: 0,
-      osr: 0,
-      isrCount: 0,
-      osrCount: 32,
-      tx: [],
-      rx: [],
-      delay: 0,
-      due: 0,
-      raised: false,
-    });
+    const registers = { pc: 0, x: 0, y: 0, isr: 0, osr: 0, isrCount: 0, osrCount: 32, tx: [], rx: [] };
+    Object.assign(this, { block, index, c, ...registers, delay: 0, due: 0, raised: false });
   }
 
   cycle(n) {
@@ -75,22 +60,11 @@ class Machine {
     const [kind, arg, low] = [op >> 13, (op >> 5) & 7, op & 31];
     const bits = low || 32;
     if (kind === 0) {
-      let take;
-      if (arg === 0) take = true;
-      if (arg === 1) take = this.x === 0;
-      if (arg === 2) {
-        take = this.x !== 0;
-        this.x = (this.x - 1) | 0;
-      }
-      if (arg === 3) take = this.y === 0;
-      if (arg === 4) {
-        take = this.y !== 0;
-        this.y = (this.y - 1) | 0;
-      }
-      if (arg === 5) take = this.x !== this.y;
-      if (arg === 6) take = ((block.seen >>> c.jumpPin) & 1) === 1;
-      if (arg === 7) take = this.osrCount < c.pullThreshold;
-      if (take) this.next = low;
+      const pin = (block.seen >>> c.jumpPin) & 1;
+      const [{ x, y }, more] = [this, this.osrCount < c.pullThreshold];
+      if ([true, x === 0, x !== 0, y === 0, y !== 0, x !== y, pin === 1, more][arg]) this.next = low;
+      if (arg === 2) this.x = (x - 1) | 0;
+      if (arg === 4) this.y = (y - 1) | 0;
       return false;
     }
     if (kind === 1) {
