@@ -43,24 +43,7 @@ ON_CHIP = ["--target=thumbv6m-none-eabi", "-isystem", "/usr/lib/arm-none-eabi/in
 SLOW = "-clang-analyzer-*"
 # gcc and clang define what C leaves to them: a right shift of a negative number keeps its sign.
 CPPCHECK_OFF = ("shiftTooManyBitsSigned", "shiftNegativeLHS", "missingIncludeSystem", "unusedStructMember")
-MANDATORY = (
-    "9.1",
-    "12.5",
-    "13.6",
-    "17.3",
-    "17.4",
-    "17.6",
-    "19.1",
-    "21.13",
-    "21.17",
-    "21.18",
-    "21.19",
-    "21.20",
-    "22.2",
-    "22.4",
-    "22.5",
-    "22.6",
-)
+MANDATORY = "9.1 12.5 13.6 17.3 17.4 17.6 19.1 21.13 21.17 21.18 21.19 21.20 22.2 22.4 22.5 22.6".split()
 HEADERS = {"math", "stdatomic", "stdbool", "stddef", "stdint", "string"}
 NATIVE_HEADERS = HEADERS | {"setjmp", "stdio", "stdlib"}
 FORBIDDEN = (
@@ -91,12 +74,8 @@ def units(build):
         for entry in json.loads(path.read_text(encoding="utf-8")):
             source, words = pathlib.Path(entry["file"]), shlex.split(entry["command"])
             is_test = words[words.index("-o") + 1].startswith("tests/") if "-o" in words else True
-            if (
-                source.suffix == ".c"
-                and not is_test
-                and source.is_relative_to(ROOT)
-                and source.relative_to(ROOT).parts[0] in ("firmware", "boards")
-            ):
+            is_ours = source.is_relative_to(ROOT) and source.relative_to(ROOT).parts[0] in ("firmware", "boards")
+            if source.suffix == ".c" and is_ours and not is_test:
                 found.setdefault(source, (source, {**entry, "words": words}, name != "host"))
     return list(found.values())
 
@@ -106,23 +85,8 @@ def database(found, folder):
     entries = []
     for source, entry, on_chip in found:
         kept = [word for word in entry["words"] if word.startswith(("-I", "-D", "-std="))]
-        entries.append(
-            {
-                "directory": entry["directory"],
-                "file": str(source),
-                "arguments": [
-                    "clang",
-                    "-O1",
-                    "-Wall",
-                    "-Wextra",
-                    "-Wno-unknown-attributes",
-                    *(ON_CHIP if on_chip else []),
-                    *kept,
-                    "-c",
-                    str(source),
-                ],
-            }
-        )
+        flags = ["clang", "-O1", "-Wall", "-Wextra", "-Wno-unknown-attributes", *(ON_CHIP if on_chip else []), *kept]
+        entries.append({"directory": entry["directory"], "file": str(source), "arguments": [*flags, "-c", str(source)]})
     (folder / "compile_commands.json").write_text(json.dumps(entries), encoding="utf-8")
 
 
@@ -151,19 +115,10 @@ def analyse_paths(source, entry):
 def cppcheck(folder, addon=False):
     kept = folder / "misra"  # else the addon leaves files beside the sources
     kept.mkdir(exist_ok=True)
-    call = [
-        "cppcheck",
-        f"--project={folder}/compile_commands.json",
-        "--enable=warning,performance,portability",
-        "--inconclusive",
-        "--inline-suppr",
-        "--std=c11",
-        "--quiet",
-        "--template={file}:{line}: {severity}: {message} [{id}]",
-        f"-j{os.cpu_count() or 1}",
-        *(f"--suppress={name}" for name in CPPCHECK_OFF),
-        *(["--addon=misra", f"--cppcheck-build-dir={kept}"] if addon else []),
-    ]
+    looks = ["--enable=warning,performance,portability", "--inconclusive", "--inline-suppr", "--std=c11", "--quiet"]
+    looks += ["--template={file}:{line}: {severity}: {message} [{id}]", *(f"--suppress={name}" for name in CPPCHECK_OFF)]
+    looks += ["--addon=misra", f"--cppcheck-build-dir={kept}"] if addon else []
+    call = ["cppcheck", f"--project={folder}/compile_commands.json", f"-j{os.cpu_count() or 1}", *looks]
     lines = [line for line in run(call).stderr.splitlines() if re.search(r" \[[\w.-]+\]$", line)]
     if not addon:
         return lines

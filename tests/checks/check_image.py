@@ -18,17 +18,8 @@ from elf import Elf, fail
 FLASH = (0x10000000, 2 * 1024 * 1024)
 RAM = (0x20000000, 256 * 1024)
 SCRATCH_Y = (0x20041000, 4 * 1024)
-REGIONS = {
-    ".boot2": FLASH,
-    ".boot": FLASH,
-    ".vectors": RAM,
-    ".text": RAM,
-    ".rodata": RAM,
-    ".data": RAM,
-    ".bss": RAM,
-    ".noinit": RAM,
-    ".stack": SCRATCH_Y,
-}
+REGIONS = {".boot2": FLASH, ".boot": FLASH, ".stack": SCRATCH_Y}
+REGIONS |= dict.fromkeys((".vectors", ".text", ".rodata", ".data", ".bss", ".noinit"), RAM)
 BOOT_EXCEPTIONS = 16
 VECTORS = 48
 

@@ -48,12 +48,8 @@ def rules_for(path):
             (rf'#include\s+"({BOARDS}|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
         ]
     if top == "host_tools" and path.parts[1] not in MEASURING and path.name != "clock.cpp":
-        rules.append(
-            (
-                r"\b(steady|system|high_resolution)_clock::now\s*\(|this_thread::sleep|\bu?sleep\s*\(|\bpoll\([^)]*, -?[1-9]\d*\)",
-                "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them",
-            )
-        )
+        clocks = r"\b(steady|system|high_resolution)_clock::now\s*\(|this_thread::sleep|\bu?sleep\s*\(|\bpoll\([^)]*, -?[1-9]\d*\)"
+        rules.append((clocks, "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them"))
     if top == "host_tools" and path.parts[1] in PRODUCT:
         rules.append((r'#include\s+"(simulation|report)/', "the product does not reach into the simulation, nor into what measures it"))
     return [(re.compile(pattern), message) for pattern, message in rules]

@@ -166,9 +166,8 @@ def circle(needs):
 def python_needs(folder):
     needs = {}
     for path in sorted(folder.glob("*.py")):
-        imports = [
-            node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom) and node.level == 1
-        ]
+        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        imports = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.level == 1]
         needs[path.stem] = {name for node in imports for name in ([node.module] if node.module else [each.name for each in node.names])}
     return needs
 
@@ -188,15 +187,13 @@ def measure(root):
     line = tomllib.loads((root / "firmware/wire/line.toml").read_text(encoding="utf-8"))
     own_line = ("firmware/wire/",)
     boards = [path.parent.name for path in sorted(root.glob("boards/*/main.c")) if path.parent.name != "native"]
-    models = re.findall(
-        r'(?:\.model = |feetech_traits\()"(\w+)"', (root / "host_tools/grasp/gripper/models.cpp").read_text(encoding="utf-8")
-    )
+    text = (root / "host_tools/grasp/gripper/models.cpp").read_text(encoding="utf-8")
+    models = re.findall(r'(?:\.model = |feetech_traits\()"(\w+)"', text)
     if not boards or not models:
         raise SystemExit("house.py: found no board or no gripper; does it still look in the right place?")
-    listed = {
-        kind: [field["name"] for field in packet.get("fields", ()) if "_" in field["name"]] for kind, packet in line["packet"].items()
-    }
-    fields = {kind: listing(files, names, own_line) for kind, names in listed.items() if len(names) >= 5}
+    listed = [(kind, [field["name"] for field in packet.get("fields", ())]) for kind, packet in line["packet"].items()]
+    listed = [(kind, [name for name in names if "_" in name]) for kind, names in listed]
+    fields = {kind: listing(files, names, own_line) for kind, names in listed if len(names) >= 5}
     found = {
         "files_per_board": worst({board: naming(files, board, (f"boards/{board}/",)) for board in boards}),
         "files_per_gripper": worst({model: naming(files, model, ("host_tools/grasp/gripper/",)) for model in models}),
@@ -211,9 +208,8 @@ def measure(root):
     taking = {name: len(OUT_OF_BYTES.findall(text)) for name, text in files.items() if name.startswith(PAGE) and name not in codec}
     figures["page_codec_lines"] += sum(taking.values())
     codec += [name for name, lines in taking.items() if lines]
-    lengths = {
-        name: text.count("\n") for name, text in files.items() if pathlib.PurePath(name).suffix in SOURCES and not name.startswith(APART)
-    }
+    sources = {name: text for name, text in files.items() if pathlib.PurePath(name).suffix in SOURCES}
+    lengths = {name: text.count("\n") for name, text in sources.items() if not name.startswith(APART)}
     longest = max(lengths, key=lengths.get)
     figures["longest_file"] = lengths[longest]
     figures["readme_words"] = len(files.get("README.md", "").split())
@@ -222,18 +218,12 @@ def measure(root):
     figures["test_lines"] = sum(text.count("\n") for name, text in code.items() if name.startswith("tests/"))
     words = private_words(files)
     figures["private_words"] = sum(words.values())
-    functions = {
-        name: max((lines for _, lines in function_lines(text)), default=0)
-        for name, text in code.items()
-        if name.startswith(("firmware/", "boards/")) and name.endswith((".c", ".h"))
-    }
+    on_chip = {name: text for name, text in code.items() if name.startswith(("firmware/", "boards/")) and name.endswith((".c", ".h"))}
+    functions = {name: max((lines for _, lines in function_lines(text)), default=0) for name, text in on_chip.items()}
     slowest = max(functions, key=functions.get)
     figures["longest_function_lines"] = functions[slowest]
-    ifs = {
-        name: len(re.findall(r"^\s*#\s*if", text, re.M))
-        for name, text in code.items()
-        if name.startswith("firmware/app/") and name.endswith(".c") and name != STAGES
-    }
+    app = {name: text for name, text in code.items() if name.startswith("firmware/app/") and name.endswith(".c") and name != STAGES}
+    ifs = {name: len(re.findall(r"^\s*#\s*if", text, re.M)) for name, text in app.items()}
     most = max(ifs, key=ifs.get)
     figures["app_ifs"] = ifs[most]
     found |= {
@@ -244,16 +234,11 @@ def measure(root):
         "private_words": ("all", sorted(words, key=words.get, reverse=True)[:8]),
     }
     found |= {"page_codec_lines": ("all", codec), "longest_file": (longest, [longest]), "readme_words": ("all", ["README.md"])}
-    formatting = root / "build/report/formatting.json"
-    if formatting.exists():
-        unformatted = json.loads(formatting.read_text(encoding="utf-8"))["unformatted"]
-        figures["unformatted_files"] = len(unformatted)
-        found["unformatted_files"] = ("all", unformatted)
-    formats = root / "build/report/formats.json"
-    if formats.exists():
-        disagreements = json.loads(formats.read_text(encoding="utf-8"))["disagreements"]
-        figures["format_disagreements"] = len(disagreements)
-        found["format_disagreements"] = ("inputs", [each["input"] for each in disagreements])
+    for figure, name, key in (("unformatted_files", "formatting", "unformatted"), ("format_disagreements", "formats", "disagreements")):
+        report = root / f"build/report/{name}.json"
+        if report.exists():
+            listed = [each if isinstance(each, str) else each["input"] for each in json.loads(report.read_text(encoding="utf-8"))[key]]
+            figures[figure], found[figure] = len(listed), ("all", listed)
     return figures, {name: {"of": key, "files": where} for name, (key, where) in found.items()}
 
 
@@ -271,21 +256,16 @@ def main():
     figures, where = measure(root)
     for name, value in figures.items():
         goal, may = LIMITS.get(name, (None, None))
-        print(
-            f"{name:20s} {value:7d}" + ("" if goal is None else f"   goal {goal}" + ("" if value <= goal else f", may be {may} until then"))
-        )
+        said = "" if goal is None else f"   goal {goal}" + ("" if value <= goal else f", may be {may} until then")
+        print(f"{name:20s} {value:7d}{said}")
     if options.json:
         path = pathlib.Path(options.json)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(
-            json.dumps({**figures, "goals": {name: goal for name, (goal, _) in LIMITS.items()}, "where": where}, indent=1) + "\n",
-            encoding="utf-8",
-        )
+        goals = {name: goal for name, (goal, _) in LIMITS.items()}
+        path.write_text(json.dumps({**figures, "goals": goals, "where": where}, indent=1) + "\n", encoding="utf-8")
     for name, value, goal, may in judged(figures):
-        print(
-            f"house.py: {name} is {value}, more than {may} (goal {goal}): {where[name]['of']} in " + ", ".join(where[name]["files"]),
-            file=sys.stderr,
-        )
+        places = f"{where[name]['of']} in {', '.join(where[name]['files'])}"
+        print(f"house.py: {name} is {value}, more than {may} (goal {goal}): {places}", file=sys.stderr)
     return 1 if judged(figures) else 0
 
 

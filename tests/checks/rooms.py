@@ -15,12 +15,7 @@ import sys
 from house import circle, reached
 
 MARKS = "<!-- rooms: python3 tests/checks/rooms.py -->\n", "<!-- /rooms -->\n"
-WHOLE = (
-    "host_tools/report",
-    "boards",
-    "host_tools/library/libfingertip",
-    "host_tools/install",
-)  # drawn as one, with the folders below them
+WHOLE = "host_tools/report boards host_tools/library/libfingertip host_tools/install".split()  # drawn as one, with the folders below them
 LIBRARY = re.compile(r"\badd_library\(\s*(\w+)")
 TARGET = re.compile(r"\badd_(?:library|executable)\(")
 VARIABLE = re.compile(r"\bset\((\w+) (\$\{CMAKE_SOURCE_DIR\}/[\w/]+)\)")
@@ -47,9 +42,8 @@ def needs(lists):
             for variable, value in VARIABLE.findall(text):
                 text = text.replace(f"${{{variable}}}", value)
             named = {homes[word] for word in re.findall(r"\w+", text) if word in homes}
-            found.setdefault(folder_of(path), set()).update(
-                named, (folder_of(pathlib.PurePosixPath(source)) for source in SOURCE.findall(text))
-            )
+            named |= {folder_of(pathlib.PurePosixPath(source)) for source in SOURCE.findall(text)}
+            found.setdefault(folder_of(path), set()).update(named)
     return {folder: others - {folder} for folder, others in found.items()}
 
 
@@ -72,9 +66,8 @@ def main():
     options = parser.parse_args()
     root = pathlib.Path(options.root).resolve()
     paths = [path for top in ("firmware", "boards", "host_tools") for path in sorted((root / top).rglob("CMakeLists.txt"))]
-    found = needs(
-        {path.relative_to(root): path.read_text(encoding="utf-8") for path in paths if not {"node_modules", "example"} & set(path.parts)}
-    )
+    paths = [path for path in paths if not {"node_modules", "example"} & set(path.parts)]
+    found = needs({path.relative_to(root): path.read_text(encoding="utf-8") for path in paths})
     if circles := circle(found):
         sys.exit("rooms.py: these folders need themselves, by way of others: " + ", ".join(circles))
     page = root / "CONTRIBUTING.md"

@@ -60,9 +60,8 @@ def read_functions(elf):
 
 def disassemble(path, functions):
     try:
-        lines = subprocess.run(
-            ["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", path], check=True, capture_output=True, text=True
-        ).stdout.splitlines()
+        call = ["arm-none-eabi-objdump", "-d", "--no-show-raw-insn", path]
+        lines = subprocess.run(call, check=True, capture_output=True, text=True).stdout.splitlines()
     except (OSError, subprocess.CalledProcessError) as error:
         fail(f"arm-none-eabi-objdump {path}: {error}")
     starts = sorted(functions)
@@ -240,17 +239,8 @@ def main():
         print(f"interrupt {depth:5}  {chain_text(chain)} (priority {priority >> 6})")
     print(f"worst     {total:5}  of {reserved} reserved, exception frames of {frames_bytes} included")
     if args.json:
-        result = {
-            "worst_bytes": total,
-            "main_bytes": main_bytes,
-            "interrupt_bytes": handler_bytes,
-            "exception_frame_bytes": frames_bytes,
-            "reserved_bytes": reserved,
-            "main_chain": [f.name for f in main_chain],
-            "interrupt_chains": [[f.name for f in deepest[priority][1]] for priority in sorted(deepest)],
-        }
         with open(args.json, "w") as file:
-            json.dump(result, file, indent=2)
+            json.dump({"worst_bytes": total}, file)
             file.write("\n")
     if args.reserved is not None and reserved != args.reserved:
         fail(f"the image reserves {reserved} bytes of stack, not the {args.reserved} of firmware/common/limits.h")

@@ -22,13 +22,10 @@ SU_FOLDERS = [str(pathlib.Path(BUILD) / part) for part in ("firmware", "boards")
 
 class Checks(unittest.TestCase):
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = pathlib.Path(self.folder.name) / "image.elf"
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.path = self.folder / "image.elf"
         self.elf = Elf(IMAGE)
         self.data = bytearray(self.elf.data)
-
-    def tearDown(self):
-        self.folder.cleanup()
 
     def run_check(self, script, *options):
         self.path.write_bytes(self.data)
@@ -65,43 +62,26 @@ class Checks(unittest.TestCase):
         self.rename("wire_raw_layout", "layout")
         self.rename("wire_raw_runs", "runs")
         self.assert_fails("RAW_STREAM is on, but the image has no symbol of it", *scene, *everything)
-        self.assert_fails("no objects", "check_scene.py", "--build", self.folder.name, "--capabilities", "FIT")
+        self.assert_fails("no objects", "check_scene.py", "--build", self.folder, "--capabilities", "FIT")
 
     def test_flash_limit(self):
         self.assert_fails("60000 are allowed", "check_image.py", "--flash-limit", "60000")
 
-    def test_boot2_crc(self):
-        self.poke(".boot2", 20, b"\xff")
-        self.assert_fails("CRC", "check_image.py")
-
-    def test_stack_pointer(self):
-        self.poke(".boot", 0, (0x20000000).to_bytes(4, "little"))
-        self.assert_fails("stack pointer", "check_image.py")
-
-    def test_reset_vector_without_the_thumb_bit(self):
-        self.poke(".boot", 4, (0x10000140).to_bytes(4, "little"))
-        self.assert_fails("reset vector", "check_image.py")
-
-    def test_vector_outside_the_code(self):
-        self.poke(".vectors", 4 * 21, (0x20030001).to_bytes(4, "little"))
-        self.assert_fails("SRAM vector 21", "check_image.py")
+    def test_spoilt_words(self):
+        for section, offset, word, message in (
+            (".boot2", 20, 0xFFFFFFFF, "CRC"),
+            (".boot", 0, 0x20000000, "stack pointer"),
+            (".boot", 4, 0x10000140, "reset vector"),  # without the Thumb bit
+            (".vectors", 4 * 21, 0x20030001, "SRAM vector 21"),  # outside the code
+        ):
+            self.data = bytearray(self.elf.data)
+            self.poke(section, offset, word.to_bytes(4, "little"))
+            self.assert_fails(message, "check_image.py")
 
     def test_forbidden_symbols(self):
-        for name, reason in [
-            ("__aeabi_dadd", "double"),
-            ("__aeabi_f2d", "double"),
-            ("__muldf3", "double"),
-            ("sqrt", "double"),
-            ("malloc", "allocation"),
-            ("_sbrk", "allocation"),
-            ("_free_r", "allocation"),
-            ("printf", "stdio"),
-            ("sniprintf", "stdio"),
-            ("puts", "stdio"),
-            ("_write_r", "stdio"),
-            ("exit", "way out"),
-            ("longjmp", "way out"),
-        ]:
+        names = {"double": "__aeabi_dadd __aeabi_f2d __muldf3 sqrt", "allocation": "malloc _sbrk _free_r"}
+        names |= {"stdio": "printf sniprintf puts _write_r", "way out": "exit longjmp"}
+        for reason, name in ((reason, name) for reason, each in names.items() for name in each.split()):
             self.data = bytearray(self.elf.data)
             self.rename("usb_controller_request_service", name)
             self.assert_fails(reason, "check_image.py")
@@ -117,7 +97,7 @@ class Checks(unittest.TestCase):
         self.assert_fails("section .mydata is unknown", "check_image.py")
 
     def test_raw_image_of_another_build(self):
-        other = pathlib.Path(self.folder.name) / "other.bin"
+        other = self.folder / "other.bin"
         other.write_bytes(b"\0" * 1000)
         self.assert_fails("differs", "check_image.py", "--bin", str(other))
 
@@ -125,12 +105,13 @@ class Checks(unittest.TestCase):
         self.data = bytearray(b"MZ" * 100)
         self.assert_fails("not a 32-bit", "check_image.py")
 
-    def test_stack_limit(self):
-        self.assert_fails("more than the 100 allowed", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--limit", "100")
+    def assert_stack_fails(self, message, *options):
+        self.assert_fails(message, "stack_usage.py", "--su-dir", *SU_FOLDERS, *options)
 
-    def test_stack_of_functions(self):
-        self.assert_fails("the image has no function fit_nothing", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--of", "fit_nothing")
-        self.assert_fails("boot_main may need", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--limit", "16", "--of", "boot_main")
+    def test_stack_limit_and_functions(self):
+        self.assert_stack_fails("more than the 100 allowed", "--limit", "100")
+        self.assert_stack_fails("the image has no function fit_nothing", "--of", "fit_nothing")
+        self.assert_stack_fails("boot_main may need", "--limit", "16", "--of", "boot_main")
 
     def test_handlers_of_several_priorities_nest(self):
         worst = lambda: int(re.search(r"worst +(\d+)", self.run_check("stack_usage.py", "--su-dir", *SU_FOLDERS).stdout)[1])
@@ -140,22 +121,18 @@ class Checks(unittest.TestCase):
         self.assertLess(worst(), nested - 2 * 36)
 
     def test_frames_without_compiler_files(self):
-        self.assert_fails("-fstack-usage", "stack_usage.py", "--su-dir", self.folder.name)
+        self.assert_fails("-fstack-usage", "stack_usage.py", "--su-dir", self.folder)
 
     def test_frame_of_variable_size(self):
-        (pathlib.Path(self.folder.name) / "a.su").write_text("a.c:1:2:f\t8\tdynamic\n")
-        self.assert_fails("variable size", "stack_usage.py", "--su-dir", self.folder.name)
+        (self.folder / "a.su").write_text("a.c:1:2:f\t8\tdynamic\n")
+        self.assert_fails("variable size", "stack_usage.py", "--su-dir", self.folder)
 
-    def test_call_through_a_pointer_that_the_table_lacks(self):
-        table = pathlib.Path(self.folder.name) / "table"
-        table.write_text("# empty\n")
-        self.assert_fails("calls through a pointer", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--indirect", str(table))
-
-    def test_recursion(self):
-        table = pathlib.Path(self.folder.name) / "table"
-        good = (HERE / "indirect_calls.txt").read_text()
-        table.write_text(good.replace("boot_reset: ", "boot_reset: boot_reset "))
-        self.assert_fails("recursion: boot_reset -> boot_reset", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--indirect", str(table))
+    def test_calls_through_pointers(self):
+        table, good = self.folder / "table", (HERE / "indirect_calls.txt").read_text()
+        recursion = good.replace("boot_reset: ", "boot_reset: boot_reset ")
+        for text, message in (("# empty\n", "calls through a pointer"), (recursion, "recursion: boot_reset -> boot_reset")):
+            table.write_text(text)
+            self.assert_stack_fails(message, "--indirect", str(table))
 
 
 if __name__ == "__main__":

@@ -36,15 +36,8 @@ class Docs(unittest.TestCase):
         self.assertEqual(missing, [("mkdocs.yml", "README.md")])
 
     def test_linked_files_are_copied_and_folders_lead_to_their_readme(self):
-        missing, pages = self.gather(
-            {
-                "README.md": "[x](f/x.h) [f](f) [g](g)",
-                "f/x.h": "int x;",
-                "f/README.md": "",
-                "g/y.c": "",
-                "mkdocs.yml": "\nnav: README.md f/README.md",
-            }
-        )
+        files = {"README.md": "[x](f/x.h) [f](f) [g](g)", "f/x.h": "int x;", "f/README.md": "", "g/y.c": ""}
+        missing, pages = self.gather({**files, "mkdocs.yml": "\nnav: README.md f/README.md"})
         self.assertEqual(missing, [])
         self.assertEqual(pages, {"README.md": "[x](f/x.h) [f](f/README.md) g", "f/x.h": "int x;", "f/README.md": ""})
 

@@ -51,10 +51,8 @@ class Wiring(unittest.TestCase):
     def test_the_firmware_has_the_pins_that_are_drawn(self):
         for bus, (name, _) in BY_BUS.items():
             board = wired(bus)
-            told = {
-                key.lower(): int(value, 0)
-                for key, value in re.findall(r"BOARD_(\w+) = (\w+),", (HEADERS / name / "board.h").read_text(encoding="utf-8"))
-            }
+            found = re.findall(r"BOARD_(\w+) = (\w+),", (HEADERS / name / "board.h").read_text(encoding="utf-8"))
+            told = {key.lower(): int(value, 0) for key, value in found}
             self.assertEqual({key: value if isinstance(value, int) else int(value, 0) for key, value in board.wiring.items()}, told)
             pins = [gpio for gpio, _ in pins_drawn(board)]
             for key, gpio in told.items():
@@ -110,9 +108,8 @@ class Pad(unittest.TestCase):
         m = mould.measures(geometry.places())
         for x, y in m.screws:
             radius = mould.SCREW_mm / 2
-            self.assertTrue(
-                abs(x) - radius > m.flange[0] / 2 + mould.FRAME_PLAY_mm or abs(y) - radius > m.flange[1] / 2 + mould.FRAME_PLAY_mm
-            )
+            beside = [abs(at) - radius > flange / 2 + mould.FRAME_PLAY_mm for at, flange in zip((x, y), m.flange)]
+            self.assertTrue(any(beside))
             self.assertLess(abs(x) + radius, m.outside[0] / 2)
             self.assertLess(abs(y) + radius, m.outside[1] / 2)
 

@@ -79,28 +79,15 @@ class Generator(unittest.TestCase):
         status, output = self.run_it()
         self.assertEqual(status, 0)
         changed = {each.split(":")[0] for each in output.splitlines()}
-        self.assertEqual(
-            changed,
-            {
-                "firmware/wire/bodies.h",
-                "firmware/wire/layouts.inc",
-                "host_tools/library/libfingertip/line_fields.hpp",
-                "host_tools/library/libfingertip/line_values.hpp",
-                "host_tools/python/fingertip/line.py",
-                "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg",
-                "host_tools/web/src/line/line_facts.ts",
-                PAGE,
-            },
-        )
+        names = "bodies.h layouts.inc line_fields.hpp line_values.hpp line.py Contact.msg line_facts.ts PROTOCOL.md"
+        self.assertEqual({pathlib.Path(name).name for name in changed}, set(names.split()))
         texts = {name: (self.root / name).read_text(encoding="utf-8") for name in changed}
         self.assertIn("float torque_N_mm; /* about the normal of the pad */", texts["firmware/wire/bodies.h"])
         runs = re.findall(r"RUN\((.*)\)", texts["firmware/wire/layouts.inc"].split("wire_raw_runs")[0])
         at = runs.index("F32, 1, contact.torque_N_mm")
         self.assertEqual(runs[at - 1], "WHEN, 20, contact.flags")
-        self.assertIn(
-            "float32 torque_n_mm         # about the normal of the pad\n",
-            texts["host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg"],
-        )
+        message = texts["host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg"]
+        self.assertIn("float32 torque_n_mm         # about the normal of the pad\n", message)
         self.assertIn("  torque_N_mm: Flag.TANGENTIAL_VALID,", texts["host_tools/web/src/line/line_facts.ts"])
         self.assertIn("| f32 | torque_N_mm | about the normal of the pad | TANGENTIAL_VALID |", texts[PAGE])
 
@@ -110,11 +97,8 @@ class Generator(unittest.TestCase):
         self.change(toml, FIRST_COMMAND, NEW_COMMAND + FIRST_COMMAND)
         self.change(toml, "SLIP_WINDOW = {", 'HOLD = { unit = "ms", min = 7, max = 70, text = "hold" }\nSLIP_WINDOW = {')
         self.change(toml, '"osr", "temperature_interval_ms"', '"osr", "hold_ms", "temperature_interval_ms"')
-        self.change(
-            toml,
-            '  { name = "osr", type = "u16", text',
-            '  { name = "hold_ms", type = "u16", text = "hold" },\n  { name = "osr", type = "u16", text',
-        )
+        osr = '  { name = "osr", type = "u16", text'
+        self.change(toml, osr, '  { name = "hold_ms", type = "u16", text = "hold" },\n' + osr)
         self.assertEqual(self.run_it()[0], 0)
         texts = {name: (self.root / name).read_text(encoding="utf-8") for name in line.FILES}
         tool = texts["host_tools/library/libfingertip/line_settings.hpp"]
@@ -124,22 +108,18 @@ class Generator(unittest.TestCase):
         output = {}
         exec(texts["host_tools/python/fingertip/line.py"], output)
         setting = output["SETTINGS"][0]
-        self.assertEqual(
-            (setting.argument, setting.command, setting.least, setting.most, setting.whole), ("hold_ms", output["SetHold"], 7, 70, True)
-        )
+        self.assertEqual((setting.argument, setting.command), ("hold_ms", output["SetHold"]))
+        self.assertEqual((setting.least, setting.most, setting.whole), (7, 70, True))
         self.assertIn("hold_ms: int | None", texts["host_tools/python/fingertip/line.py"])
         self.assertIn("hold_ms", output["INFO_KEYS"])
         self.assertIn("        hold_ms: 7 to 70.\n", output["Settable"].set.__doc__)
-        self.assertIn(
-            "field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]",
-            texts["host_tools/web/src/line/line_facts.ts"],
-        )
+        page = "field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]"
+        self.assertIn(page, texts["host_tools/web/src/line/line_facts.ts"])
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):
         described = line.Line(ROOT / "firmware/wire/line.toml")
-        self.assertEqual(
-            described.longest_frame(), 12 + (136 + 22 * 32 + 177) + 4 + 4 + 2
-        )  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
+        # Info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says.
+        self.assertEqual(described.longest_frame(), 12 + (136 + 22 * 32 + 177) + 4 + 4 + 2)
         self.assertIn(f"longer than {described.longest_frame()} bytes is damage", (ROOT / PAGE).read_text(encoding="utf-8"))
 
     def test_what_is_there_twice_is_refused(self):

@@ -30,6 +30,22 @@ class Folder(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
+    def write(self, path, text, mode=0o644):
+        file = self.folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(textwrap.dedent(text))
+        file.chmod(mode)
+        return file
+
+    def programs(self, **bodies):
+        """Stand-ins, in the folder bin."""
+        for name, body in bodies.items():
+            self.write(f"bin/{name.replace('_', '-')}", f"#!/bin/sh\n{body}\n", 0o755)
+
+    def bootstrap(self, *job, path=os.environ["PATH"]):
+        call, environment = ["/bin/sh", self.folder / "cmake/bootstrap.sh", *job], {**os.environ, "PATH": f"{self.folder}/bin:{path}"}
+        return subprocess.run(call, capture_output=True, text=True, timeout=PATIENCE_s, env=environment)
+
     def path_without(self, *missing):
         """A PATH that leads to every program of this machine but those."""
         tools = self.folder / "path"
@@ -89,31 +105,17 @@ class FetchUnity(Folder):
         for tool in ("sha256sum", "apt-get", "awk", "sort", "tar", "xz"):
             with self.subTest(tool):
                 environment = {"PATH": self.path_without(tool)}
-                done = subprocess.run(
-                    [shell, ROOT / "cmake/fetch_unity.sh", self.folder / "unity"], capture_output=True, text=True, env=environment
-                )
+                call = [shell, ROOT / "cmake/fetch_unity.sh", self.folder / "unity"]
+                done = subprocess.run(call, capture_output=True, text=True, env=environment)
                 shutil.rmtree(environment["PATH"])
                 self.assertEqual(done.returncode, 1)
                 self.assertEqual(done.stderr, f"fetch_unity: {tool} is missing; install it and run again\n")
 
     def test_configuring_shows_the_line_and_points_at_it(self):
         environment = {**os.environ, "PATH": self.path_without("apt-get")}
-        done = subprocess.run(
-            [
-                "cmake",
-                "-G",
-                "Ninja",
-                "-S",
-                ROOT,
-                "-B",
-                self.folder / "build",
-                "-DFINGERTIP_IMAGES=",
-                f"-DFINGERTIP_UNITY_DIR={self.folder}/unity",
-            ],
-            capture_output=True,
-            text=True,
-            env=environment,
-        )
+        call = ["cmake", "-G", "Ninja", "-S", ROOT, "-B", self.folder / "build", "-DFINGERTIP_IMAGES="]
+        call += [f"-DFINGERTIP_UNITY_DIR={self.folder}/unity"]
+        done = subprocess.run(call, capture_output=True, text=True, env=environment)
         self.assertEqual(done.returncode, 1)
         told = done.stderr.find("fetch_unity: apt-get is missing")
         self.assertGreaterEqual(told, 0, done.stderr)
@@ -126,25 +128,13 @@ class Bootstrap(Folder):
 
     def up_to_npm(self, cmake="3.25.1", node="18.20.4", job=("demo",), path=os.environ["PATH"]):
         """node: its version; None: this machine has neither node nor npm."""
-        for folder in ("cmake", "host_tools/simulation/emulator", "bin"):
+        for folder in ("cmake", "host_tools/simulation/emulator"):
             (self.folder / folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
-        for name, body in (
-            ("apt-get", "exit 0"),
-            ("sudo", "exit 0"),
-            *(() if node is None else (("npm", "exit 33"), ("node", f"echo v{node}"))),
-            ("cmake", f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'"),
-        ):
-            program = self.folder / "bin" / name
-            program.write_text(f"#!/bin/sh\n{body}\n")
-            program.chmod(0o755)
-        return subprocess.run(
-            [shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job],
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE_s,
-            env={**os.environ, "PATH": f"{self.folder}/bin:{path}"},
-        )
+        self.programs(apt_get="exit 0", sudo="exit 0", cmake=f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'")
+        if node is not None:
+            self.programs(npm="exit 33", node=f"echo v{node}")
+        return self.bootstrap(*job, path=path)
 
     def test_only_who_fuzzes_or_builds_the_page_needs_clang(self):
         path = self.path_without("clang-14")
@@ -167,11 +157,8 @@ class Bootstrap(Folder):
             with self.subTest(tool, version=version):
                 done = self.up_to_npm(**{tool: version})
                 self.assertEqual(done.returncode, 1)
-                self.assertEqual(
-                    done.stderr,
-                    f"bootstrap: {tool} is {version or 'of unknown version'}, but {least} or newer is "
-                    "needed; use Debian 12, Ubuntu 24.04 or newer\n",
-                )
+                found = f"{tool} is {version or 'of unknown version'}, but {least} or newer is needed"
+                self.assertEqual(done.stderr, f"bootstrap: {found}; use Debian 12, Ubuntu 24.04 or newer\n")
 
     def test_what_is_new_enough_goes_on(self):
         for versions in ({}, {"cmake": "3.100.0-rc1", "node": "22.1.0"}, {"cmake": "4.0", "node": "18.0.0"}):
@@ -209,15 +196,10 @@ class Bootstrap(Folder):
         self.assertFalse((self.folder / "build/node").exists())
 
     def test_judges_that_cannot_be_fetched_end_it_before_the_tests(self):
-        for path, content in (
-            ("host_tools/simulation/emulator/package-lock.json", "{}"),
-            ("host_tools/simulation/emulator/node_modules/.installed-lock", "{}"),
-            ("tests/requirements.txt", "./absent\n"),
-            ("bin/ctest", "#!/bin/sh\necho tested\n"),
-        ):
-            (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (self.folder / path).write_text(content)
-        (self.folder / "bin/ctest").chmod(0o755)
+        for path in ("package-lock.json", "node_modules/.installed-lock"):
+            self.write(f"host_tools/simulation/emulator/{path}", "{}")
+        self.write("tests/requirements.txt", "./absent\n")
+        self.programs(ctest="echo tested")
         done = self.up_to_npm(job=("test",))
         self.assertEqual(done.returncode, 1)
         self.assertIn("absent", done.stderr)
@@ -228,37 +210,24 @@ class BootstrapReport(Folder):
     """bootstrap.sh report with a stand-in for each program that it calls."""
 
     def test_it_ends_with_the_place_of_the_page(self):
-        for folder in ("cmake", "host_tools/simulation/emulator/node_modules", "bin"):
+        for folder in ("cmake", "host_tools/simulation/emulator/node_modules"):
             (self.folder / folder).mkdir(parents=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
-        (self.folder / "host_tools/simulation/emulator/package-lock.json").write_text("{}")
+        self.write("host_tools/simulation/emulator/package-lock.json", "{}")
         for path in ("tests/requirements.txt", "build/venv/.installed-requirements"):
-            (self.folder / path).parent.mkdir(parents=True)
-            (self.folder / path).write_text("")
-        for name, body in (("apt-get", ""), ("sudo", ""), ("npm", ""), ("cmake", "echo cmake version 3.25.1"), ("node", "echo v18.0.0")):
-            program = self.folder / "bin" / name
-            program.write_text(f"#!/bin/sh\n{body}\n")
-            program.chmod(0o755)
+            self.write(path, "")
+        self.programs(apt_get="", sudo="", npm="", cmake="echo cmake version 3.25.1", node="echo v18.0.0")
         parts = ROOT / "host_tools/report"
         shutil.copytree(ROOT / "host_tools/python/fingertip", self.folder / "host_tools/python/fingertip")
         for path in (parts / "shared/parts.py", *parts.glob("*/part.json")):
-            copy = self.folder / path.relative_to(ROOT)
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(path, copy)
+            self.write(path.relative_to(ROOT), path.read_text(encoding="utf-8"))
         for path in parts.glob("*/part.json"):
             run = json.loads(path.read_text(encoding="utf-8")).get("run")
             if run:
-                (self.folder / path.relative_to(ROOT)).with_name(run["program"]).write_text(
-                    "import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n"
-                )
+                said = "sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv)"
+                self.write(path.relative_to(ROOT).with_name(run["program"]), f"import sys\nprint('ran', {said})\n")
         for job in ("report",), ("report", "all"):
-            done = subprocess.run(
-                ["sh", self.folder / "cmake/bootstrap.sh", *job],
-                capture_output=True,
-                text=True,
-                timeout=PATIENCE_s,
-                env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"},
-            )
+            done = self.bootstrap(*job)
             self.assertEqual(done.returncode, 0, done.stderr)
             lines = done.stdout.splitlines()
             self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
@@ -270,7 +239,7 @@ class BootstrapReport(Folder):
             place = os.path.relpath(picture, "host_tools/report")
             self.assertIn(f"({place})", (ROOT / "host_tools/report/README.md").read_text(encoding="utf-8"))
         for job in ("report", "shared"), ("report", "suite"), ("report", "real"), ("report", "fit", "."), ("report", "real", ".", "."):
-            done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s)
+            done = self.bootstrap(*job)
             self.assertEqual((done.returncode, done.stdout), (2, ""), job)
             self.assertTrue(done.stderr.startswith("usage: "), job)
 
@@ -290,25 +259,13 @@ class Demo(Folder):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
         for script in ("python/__main__.py", "demo/grasp.py"):
-            self.write(
-                f"host_tools/{script}",
-                """
-                import sys
-                open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
-                """,
-            )
+            self.write(f"host_tools/{script}", 'import sys\nopen(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")\n')
         self.write("host_tools/demo/errors.py", "print('errors')\n")
         self.write("host_tools/report/shared/boards.py", "print('board')\n")
         for program in ("twin/twin", "player/fingertip_player"):
-            self.write(f"build/host/host_tools/simulation/{program}", "#!/bin/sh\n").chmod(0o755)
+            self.write(f"build/host/host_tools/simulation/{program}", "#!/bin/sh\n", 0o755)
         self.cell(self.CELL)
         self.monitor('case $1 in set | calibrate) test -e "$3" || exit; [ $1 = set ] || echo "good: all" ;; esac')
-
-    def write(self, path, text):
-        file = self.folder / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(textwrap.dedent(text))
-        return file
 
     def emulator(self, body):
         self.write(
@@ -323,18 +280,15 @@ class Demo(Folder):
         )
 
     def monitor(self, body):
-        self.write(
-            "build/host/host_tools/tool/cli/fingertip",
-            f'#!/bin/sh\n[ "$1" != simulate ] || exec sh "$(dirname "$0")/simulate" "$4"\n{body}\n',
-        ).chmod(0o755)
+        simulate = '[ "$1" != simulate ] || exec sh "$(dirname "$0")/simulate" "$4"'
+        self.write("build/host/host_tools/tool/cli/fingertip", f"#!/bin/sh\n{simulate}\n{body}\n", 0o755)
 
     def cell(self, body):
         self.write("build/host/host_tools/tool/cli/simulate", f"{body}\n")
 
     def play(self, *options, **how):
-        return subprocess.run(
-            ["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=PATIENCE_s, **how
-        )
+        call = ["sh", self.folder / "host_tools/demo/demo.sh", *options]
+        return subprocess.run(call, capture_output=True, text=True, timeout=PATIENCE_s, **how)
 
     def assert_fails(self, message, log):
         done = self.play()
@@ -354,9 +308,8 @@ class Demo(Folder):
         self.assertIn("errors\n", done.stdout)
 
     def test_it_stays_until_somebody_has_seen_enough(self):
-        self.emulator(
-            "writeFileSync(link, ''); later(process.argv.includes('600') ? 40000 : 500, () => { writeFileSync(link + '.late', ''); });"
-        )
+        late_ms = "process.argv.includes('600') ? 40000 : 500"
+        self.emulator(f"writeFileSync(link, ''); later({late_ms}, () => {{ writeFileSync(link + '.late', ''); }});")
         done = self.play("--stay", input="\n")
         self.assertEqual(done.returncode, 0, done.stderr)
         for command in ("monitor", "info", "record - --seconds 5"):
@@ -365,22 +318,12 @@ class Demo(Folder):
         self.assertIn(f"export FINGERTIP_PORT={self.folder.resolve()}/build/demo/rubber.tty", done.stdout)
 
     def test_what_the_errors_are(self):
-        summary = {
-            "frames_per_s": 1308.4,
-            "localisation_median_mm": 0.426,
-            "localisation_p95_mm": 1.05,
-            "force_mape_percent": None,
-            "slip_found": 2,
-            "slip_missed": 1,
-            "slip_delay_ms": [78.4, 30.0],
-            "slip_false": 0,
-            "dropped_packets": 0,
-        }
+        summary = {"frames_per_s": 1308.4, "localisation_median_mm": 0.426, "localisation_p95_mm": 1.05, "force_mape_percent": None}
+        summary |= {"slip_found": 2, "slip_missed": 1, "slip_delay_ms": [78.4, 30.0], "slip_false": 0, "dropped_packets": 0}
         path = self.folder / "a.json"
         path.write_text(json.dumps(summary))
-        done = subprocess.run(
-            [sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"], capture_output=True, text=True
-        )
+        call = [sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"]
+        done = subprocess.run(call, capture_output=True, text=True)
         self.assertEqual(done.stderr, "")
         self.assertIn("what the fingertip measured, against the truth      rubber       ideal\n", done.stdout)
         self.assertRegex(done.stdout, r"location off by, median +0\.43 mm +0\.43 mm\n")
@@ -407,7 +350,7 @@ class Demo(Folder):
 
     def test_a_player_that_fails(self):
         self.emulator("")
-        self.write("build/host/host_tools/simulation/player/fingertip_player", "#!/bin/sh\necho no pad; exit 1\n").chmod(0o755)
+        self.write("build/host/host_tools/simulation/player/fingertip_player", "#!/bin/sh\necho no pad; exit 1\n", 0o755)
         self.assert_fails("the placements could not be played", "no pad")
 
     def test_a_cell_that_does_not_start(self):
