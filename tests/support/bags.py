@@ -14,6 +14,7 @@ import math
 import os
 import pathlib
 import random
+import re
 import struct
 import subprocess
 import sys
@@ -33,17 +34,10 @@ from mcap.reader import make_reader  # noqa: E402
 from mcap.records import Message  # noqa: E402
 from mcap.stream_reader import StreamReader  # noqa: E402
 from mcap_ros2.decoder import DecoderFactory  # noqa: E402
+from real_time import plugged_in  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
 PATIENCE_s = 60
-
-
-def wait_for(port):
-    end_s = time.monotonic() + PATIENCE_s
-    while not port.is_symlink():
-        if time.monotonic() > end_s:
-            raise InputError(f"no simulated fingertip within {PATIENCE_s} s")
-        time.sleep(0.02)
 
 
 RATE_Hz = 1300
@@ -62,13 +56,8 @@ def record(tool, fake_device, folder, seconds, **options):
     """The paths of a recording of a simulated fingertip by the tool, and of the bytes of its line."""
     port, bag, capture = (pathlib.Path(folder) / name for name in ("port", "told.mcap", "told.ftr"))
     options = {"rate": RATE_Hz, "life": 2 * PATIENCE_s, **options}
-    device = subprocess.Popen([fake_device, port, *(f"{key}={value}" for key, value in options.items())])
-    try:
-        wait_for(port)
+    with plugged_in(fake_device, port, *(f"{key}={value}" for key, value in options.items())):
         call(tool, "record", bag, "--port", port, "--seconds", seconds, "--raw-bytes", capture, "--overwrite")
-    finally:
-        device.kill()
-        device.wait()
     return bag, capture
 
 
@@ -80,59 +69,20 @@ def some_packets(seed, frames):
         return float(np.float32(prng.choice((0.0, -1e-9, 3.25, 1e6, prng.gauss(0, 10)))))
 
     xy_mm = tuple(float(value) for k in range(15) for value in (9 * (k // 5 - 1), 9 * (k % 5 - 2)))
-    calibration = wire.Calibration(
-        1700000000,
-        20,
-        1.5,
-        0.01,
-        5552,
-        60,
-        3277,
-        13954,
-        101,
-        tuple(1 + k / 100 for k in range(30)),
-        tuple(50 * k - 1000 for k in range(45)),
+    frame = re.sub("#.*", "", (ROOT / "tests/vectors/wire/info_grasp.txt").read_text(encoding="utf-8")).split("frame")[1]
+    info = wire.decode(bytes.fromhex(frame)[:-1]).body
+    calibration = info.calibration._replace(
+        gains_and_sds=tuple(1 + k / 100 for k in range(30)), places_and_widths=tuple(50 * k - 1000 for k in range(45))
     )
-    info = wire.Info(
-        (1, 2, 3),
-        15,
-        31,
-        "abc",
-        "board",
-        "grasp",
-        f"{seed:04d}ABCD",
-        400000,
-        399000,
-        256,
-        500,
-        3,
-        7,
-        100,
-        0.75,
-        9.0,
-        xy_mm,
-        3.1,
-        0.5,
-        0.6,
-        1,
-        1,
-        calibration,
-        None,
+    info = info._replace(
+        sensors=15, capabilities=31, serial=f"{seed:04d}ABCD", xy_mm=xy_mm, sync=1, stored=1, calibration=calibration, pad=None
     )
     yield wire.Packet(0, 1000, info)
     t_us = 2**33
     for frame in range(frames):
         t_us = 500 if frame == frames // 2 else t_us + prng.randrange(100, 40000)  # it restarts
-        flags = prng.choice(
-            (
-                TARED,
-                0,
-                CONTACT | TARED,
-                prng.getrandbits(25),
-                prng.getrandbits(25) & ~WARNINGS | TRUSTED,
-                TRUSTED | CONTACT | TARED | TANGENTIAL,
-            )
-        )
+        some, trusted = prng.getrandbits(25), prng.getrandbits(25) & ~WARNINGS | TRUSTED
+        flags = prng.choice((TARED, 0, CONTACT | TARED, some, trusted, TRUSTED | CONTACT | TARED | TANGENTIAL))
         values = {}
         for name, field in wire.layout_of(wire.Contact):
             there = not field.when or flags & field.when[1]
@@ -295,14 +245,8 @@ def differences(csv_path, bag):
     told = collections.Counter()
     for contact in expected.values():
         if contact["has_raw"]:
-            told[
-                json.dumps(
-                    [
-                        "NaN" if not contact["valid"] >> k & 1 else binary32(a - b)
-                        for k, (a, b) in enumerate(zip(contact["pressure_pa"], contact["tare_pa"]))
-                    ]
-                )
-            ] += 1
+            over = [binary32(a - b) for a, b in zip(contact["pressure_pa"], contact["tare_pa"])]
+            told[json.dumps([each if contact["valid"] >> k & 1 else "NaN" for k, each in enumerate(over)])] += 1
     found = collections.Counter(
         json.dumps([plain(float(values[3])) for values in np.frombuffer(bytes(message["data"]), "<f4").reshape(-1, 4)])
         for _, message in by_topic["pressures"]
@@ -388,7 +332,7 @@ def chunk_counts(record):
 LINE_CHANNELS = (1, 3)  # lines, and the one fingertip's contacts
 
 
-def main(tool, fake_device, seconds, count):
+def main(tool, fake_device, seconds, count, random_frames=3000):
     figures = {"mcap_messages": 0, "mcap_messages_differ": 0, "mcap_bags_differ": 0, "mcap_round_trips_differ": 0}
     with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
         folder = pathlib.Path(name)
@@ -397,7 +341,7 @@ def main(tool, fake_device, seconds, count):
         told = folder / "told.csv"
         call(tool, "convert", bag, told)
         random_csv = folder / "random.csv"
-        write_random(random_csv, 7, 3000)
+        write_random(random_csv, 7, random_frames)
         for number, path in enumerate((told, random_csv)):
             again, ours, python = (folder / f"{number}{end}" for end in (".csv", ".mcap", "_python.mcap"))
             begin_s = time.process_time()

@@ -26,31 +26,31 @@ namespace {
 
 using namespace fingertip;
 
-wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
-  auto thickness_mm = to_double(thickness), overhang_mm = to_double(overhang);
-  if (!thickness_mm || !overhang_mm) {
-    throw Error("\"" + thickness + "\" and \"" + overhang +
-                "\" must be numbers; give thickness and overhang of the rubber, mm");
+double number(const std::string &text) {
+  const auto value = to_double(text);
+  if (!value) {
+    throw Error("\"" + text + "\" must be a number");
   }
-  return command_pad(pad::profile_over_own_sensors({*thickness_mm, *overhang_mm, from_touch}));
+  return *value;
+}
+
+wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
+  return command_pad(pad::profile_over_own_sensors({number(thickness), number(overhang), from_touch}));
 }
 
 /* Of fifteen sensors that are alike. */
 wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
   constexpr std::uint8_t SENSORS = 15;
-  const auto sigma_mm = to_double(sigma), dip_percent = to_double(dip);
-  if (!sigma_mm || !dip_percent) {
-    throw Error("\"" + sigma + "\" and \"" + dip + "\" must be numbers; give a contact's width, mm, and its dip, %");
-  }
+  const double sigma_mm = number(sigma);
   calibration made{};
   made.date_s = 1785931200;
   made.placements = 20;
   made.force_scale = 1.0F;
   made.force_scale_sd = 0.01F;
-  made.sigma_um = static_cast<std::uint16_t>(std::lround(1e3 * *sigma_mm));
-  made.sigma_sd_um = static_cast<std::uint16_t>(std::lround(10.0 * *sigma_mm));
-  made.dip_share_q16 = static_cast<std::uint16_t>(std::lround(655.36 * *dip_percent));
-  made.dip_sd_um = static_cast<std::uint16_t>(made.dip_share_q16 ? std::lround(2500.0 * *sigma_mm) : 0);
+  made.sigma_um = static_cast<std::uint16_t>(std::lround(1e3 * sigma_mm));
+  made.sigma_sd_um = static_cast<std::uint16_t>(std::lround(10.0 * sigma_mm));
+  made.dip_share_q16 = static_cast<std::uint16_t>(std::lround(655.36 * number(dip)));
+  made.dip_sd_um = static_cast<std::uint16_t>(made.dip_share_q16 ? std::lround(2500.0 * sigma_mm) : 0);
   made.ambient_kPa = 101;
   std::fill(made.sensors, made.sensors + SENSORS, sensor_calibration{1.0F, 0.01F, 0, 0, 0});
   return command_calibrate(made, SENSORS);
@@ -68,43 +68,36 @@ wire_packet command_of(std::initializer_list<std::string> texts) {
 wire_packet packet_from_words(const std::vector<std::string> &words) {
   struct Form {
     std::size_t arguments;
-    std::string usage;
     std::function<wire_packet()> make;
   };
   auto word = [&](std::size_t i) { return words[i]; };
-  const std::map<std::string, Form> forms = {
-      {"stream", {1, "stream none|contact,raw,health", [&] { return command_stream(streams_from_text(word(1))); }}},
-      {"tare", {0, "tare", [] { return command_tare(); }}},
-      {"tare-force", {0, "tare-force", [] { return command_tare(true); }}},
-      {"rate", {1, "rate HZ|max", [&] { return command_of({"rate=" + word(1)}); }}},
-      {"osr", {1, "osr N", [&] { return command_of({"osr=" + word(1)}); }}},
+  std::map<std::string, Form> forms = {
+      {"stream", {1, [&] { return command_stream(streams_from_text(word(1))); }}},
+      {"tare", {0, [] { return command_tare(); }}},
+      {"tare-force", {0, [] { return command_tare(true); }}},
       {"slip",
-       {2, "slip THRESHOLD_MM WINDOW_MS",
+       {2,
         [&] {
           return command_of({"slip_threshold=" + word(1), "slip_window=" + word(2)});
         }}},
-      {"info", {0, "info", command_info}},
-      {"health", {0, "health", command_health}},
-      {"crash", {0, "crash", command_crash}},
-      {"loader", {0, "loader", command_loader}},
-      {"prior", {1, "prior SIGMA[:WIDTH]|none", [&] { return command_of({"prior=" + word(1)}); }}},
-      {"limit", {1, "limit MM", [&] { return command_of({"limit=" + word(1)}); }}},
-      {"sync", {1, "sync MODE|off", [&] { return command_of({"sync=" + word(1)}); }}},
-      {"keep", {0, "keep", [] { return command_keep(true); }}},
-      {"forget", {0, "forget", [] { return command_keep(false); }}},
-      {"calibrate", {2, "calibrate SIGMA_MM DIP_PERCENT", [&] { return calibration_of(word(1), word(2)); }}},
-      {"erase", {0, "erase", command_erase_calibration}},
-      {"pad", {2, "pad THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), false); }}},
-      {"pad-from-touch",
-       {2, "pad-from-touch THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), true); }}},
-      {"erase-pad", {0, "erase-pad", command_erase_pad}},
+      {"info", {0, command_info}},
+      {"health", {0, command_health}},
+      {"crash", {0, command_crash}},
+      {"loader", {0, command_loader}},
+      {"keep", {0, [] { return command_keep(true); }}},
+      {"forget", {0, [] { return command_keep(false); }}},
+      {"calibrate", {2, [&] { return calibration_of(word(1), word(2)); }}},
+      {"erase", {0, command_erase_calibration}},
+      {"pad", {2, [&] { return pad_of(word(1), word(2), false); }}},
+      {"pad-from-touch", {2, [&] { return pad_of(word(1), word(2), true); }}},
+      {"erase-pad", {0, command_erase_pad}},
   };
-  const auto form = forms.find(words.empty() ? "" : words[0]);
-  if (form == forms.end()) {
-    throw Error("such a command is unknown; the source lists them");
+  for (const char *setting : {"rate", "osr", "prior", "limit", "sync"}) {
+    forms[setting] = {1, [&, setting] { return command_of({std::string(setting) + "=" + word(1)}); }};
   }
-  if (words.size() != 1 + form->second.arguments) {
-    throw Error("wrong arguments; give: " + form->second.usage);
+  const auto form = forms.find(words.empty() ? "" : words[0]);
+  if (form == forms.end() || words.size() != 1 + form->second.arguments) {
+    throw Error("such a command is unknown; the source lists them with their arguments");
   }
   return form->second.make();
 }

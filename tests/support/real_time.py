@@ -4,12 +4,26 @@ Patience is a guard against hanging, not a limit: a busy machine takes as long a
 """
 
 # real time: programs on pseudo-terminals of this kernel
+import contextlib
 import os
+import pathlib
 import subprocess
 import time
 
 PATIENCE_s = 300
 LOOK_s = 0.01
+
+
+@contextlib.contextmanager
+def plugged_in(fake_device, port, *options):
+    """A fake device at this port, which is yielded once it is there."""
+    port, device = pathlib.Path(port), subprocess.Popen([fake_device, port, *options])
+    try:
+        RealTime().until(port.is_symlink)
+        yield port
+    finally:
+        device.kill()
+        device.wait()
 
 
 class RealTime:

@@ -26,18 +26,6 @@ def wait_for(what, condition):
         time.sleep(0.02)
 
 
-@contextlib.contextmanager
-def fake_device(program, folder, *options):
-    port = folder / "tty"
-    device = subprocess.Popen([program, port, *options])
-    try:
-        wait_for(port, port.is_symlink)
-        yield port
-    finally:
-        device.kill()
-        device.wait()
-
-
 def _dds_name(kind):
     package, name = kind.split("/")
     return f"{package}::msg::dds_::{name}_"

@@ -41,15 +41,9 @@ class Terminal:
         self._came, self._more = b"", threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        self.process = world.start(
-            arguments,
-            env=env,
-            stdin=self._slave,
-            stdout=self._slave,
-            stderr=self._slave,
-            start_new_session=True,
-            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
-        )
+        control = lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+        ends = dict.fromkeys(("stdin", "stdout", "stderr"), self._slave)
+        self.process = world.start(arguments, env=env, start_new_session=True, preexec_fn=control, **ends)
 
     def __enter__(self):
         return self
@@ -82,17 +76,8 @@ class Terminal:
                 self.seen += [line.rstrip() for line in self._screen.display if line.rstrip() not in self.seen]
         return self.shown
 
-    @property
-    def screen(self):
-        """pyte's, with colours."""
-        return self._screen
-
     def settings(self):
         return termios.tcgetattr(self._slave)
-
-    def resize(self, columns, rows):
-        fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-        self._screen.resize(rows, columns)
 
     def type(self, keys):
         if b"\x03" in keys:

@@ -48,6 +48,7 @@ public:
   wire_info &info() { return info_.body.info; }
   std::atomic<bool> frozen{false};  // frames, whose values never change
   std::atomic<bool> stalled{false}; // no frames, but answers
+  std::atomic<bool> refuses{false}; // to stream
 
   void unplug() {
     if (thread_.joinable()) {
@@ -96,10 +97,12 @@ private:
   }
 
   void obey(const wire_packet &command) {
-    if (command.type == WIRE_CMD_STREAM) {
+    const bool refused = refuses && command.type == WIRE_CMD_STREAM;
+    if (command.type == WIRE_CMD_STREAM && !refused) {
       streams_ = command.body.cmd_stream.streams;
     }
-    say(make_ack(0, now_us(), command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
+    const std::uint8_t result = refused ? WIRE_RESULT_NOT_NOW : WIRE_RESULT_DONE;
+    say(make_ack(0, now_us(), command.type, result, command.sequence, command.t_us));
     if (command.type == WIRE_CMD_INFO) {
       info_.t_us = now_us();
       say(info_);

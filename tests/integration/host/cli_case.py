@@ -19,9 +19,7 @@ from simulated_time import SimulatedTime  # noqa: E402
 
 class CliTest(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
+        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
         self.port = os.path.join(self.folder, "tty")
         self.csv = os.path.join(self.folder, "r.csv")
         self.ftr = os.path.join(self.folder, "r.ftr")

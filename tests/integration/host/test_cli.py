@@ -4,13 +4,12 @@ import os
 import pathlib
 import re
 import signal
-import subprocess
 import sys
 import unittest
 
 import numpy as np
 
-from cli_case import CliTest, PYTHON_TOOLS
+from cli_case import CliTest
 from fingertip import files
 import figures
 
@@ -52,14 +51,7 @@ class Usage(CliTest):
             *((f"replay x.csv --speed {value}", ".*; give 0.01 to 1000, or max;.*") for value in ("abc", "0", "nan", "-1", "1001")),
             ("set --keep --forget", ".*excludes.*"),
             ("set", "nothing to set; give .*"),
-            *((f"set {text}", ".*give .*") for text in ("prior=0", "limit=x", "prior=3:0")),
-            # ranges are found before a port is opened
-            *((f"set --port {self.port} rate={rate}", ".*0.1 to 2000 Hz, or max.*") for rate in ("0", "x")),
-            (f"set --port {self.port} rate", ".*0.1 to 2000 Hz.*"),
-            (f"set --port {self.port} osr=1000", ".*256, 512, 1024, 2048, 4096 or 8192.*"),
-            (f"set --port {self.port} slip_threshold=0", ".*0.01 to 50 mm.*"),
-            (f"set --port {self.port} slip_window=1001", ".*5 to 1000 ms.*"),
-            (f"set --port {self.port} colour=red", ".*rate=HZ[|]max.*"),
+            (f"set --port {self.port} rate=0", ".*0.1 to 2000 Hz, or max.*"),  # found before a port is opened
             ("pad --erase --thickness 12", ".*excludes.*"),
         ):
             self.assertRegex(self.error(*words.split(), status=2), f"^fingertip: {problem}\n$")
@@ -207,20 +199,11 @@ class Several(CliTest):
                 path, {"alignment_fake_devices_us": round(alignment_us, 1), "alignment_fake_devices_seconds": self.ALIGNMENT_SECONDS}
             )
         self.assert_in_order()
-        # replay and conversion take one of them
-        self.assertIn(
-            "holds several fingertips: AAAA BBBB; choose one with --device SERIAL",
-            self.run_cli("replay", self.csv, "--to-csv", self.csv + "2", status=1)[1],
-        )
-        self.assertIn("no fingertip CCCC in it", self.run_cli("replay", self.csv, "--device", "CCCC", status=1)[1])
-        self.assertIn(f" {len(errors[1])} frames in", self.run_cli("replay", self.csv, "--device", "BBBB", "--speed", "max")[0])
-        converted = os.path.join(self.folder, "c.csv")
-        self.run_cli("replay", self.csv, "--device", "BBBB", "--to-csv", converted)
-        self.assertTrue(np.array_equal(files.read_recording(converted)["t_us"], two["t_us"]))
-        self.assertEqual(files.read_recording(converted).metadata["serial"], "BBBB")
+        several = self.run_cli("replay", self.csv, "--to-csv", self.csv + "2", status=1)[1]
+        self.assertIn("holds several fingertips: AAAA BBBB; choose one with --device SERIAL", several)
 
     def test_all_agree_on_what_came(self):
-        """Recorder, replay, conversion, reader and plot of a joint recording whose fingertip was unplugged."""
+        """Recorder, replay, conversion and reader of a joint recording whose fingertip was unplugged."""
         with self.device("serial=AAAA", "health=7"), self.device("serial=BBBB", "health=5", "vanish=103,500", port=self.other):
             process = self.start("record", self.csv, "--all")
             self.world.until(lambda: os.path.exists(self.csv) and any("1/event: back" in c for c in self.rows()[1]))
@@ -249,13 +232,6 @@ class Several(CliTest):
                 if path == self.csv:
                     self.assertEqual(again.end["packets"], end[2])
                 self.assertIn(" 0 packets dropped", self.run_cli("replay", converted, "--speed", "max")[0])
-            drawn = subprocess.run(
-                [sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", serial, "-o", os.path.join(self.folder, f"{serial}.png")],
-                capture_output=True,
-                text=True,
-                check=True,
-            ).stdout
-            self.assertRegex(drawn, rf": {end[1]} frames in [\d.]+ s  ·  dropped packets: 0\n$")
 
     def test_errors_of_several(self):
         with self.device("serial=AAAA"), self.device("serial=AAAA", port=self.other):
@@ -271,22 +247,6 @@ class Several(CliTest):
 
 class ErrorsPeopleMeet(CliTest):
     """Each one line that says what to do, and exit status 1. Those of several fingertips on USB: tests/unit/host."""
-
-    def test_no_permission(self):
-        with self.device():
-            for command in (["info"], ["monitor"], ["record", self.csv]):
-                self.assertEqual(self.without_permission(*command, "--port", self.port), f"fingertip: {self.port}: {self.RULE}\n")
-
-    def test_port_busy(self):
-        with self.device():
-            process = self.start("record", self.csv, "--port", self.port)
-            self.world.until(lambda: os.path.exists(self.csv))
-            for command in (["info"], ["monitor"], ["record", self.ftr]):
-                self.assertEqual(
-                    self.error(*command, "--port", self.port),
-                    f"fingertip: {self.port}: in use by another program; end that one first (`fingertip doctor` names it)\n",
-                )
-            self.interrupt(process)
 
     def test_no_device(self):
         if self.start("list").wait() == 0:
@@ -309,11 +269,8 @@ class ErrorsPeopleMeet(CliTest):
         for version in (1, 8, 10):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
-                    self.assertEqual(
-                        self.error(*command, "--port", self.port),
-                        f"fingertip: {self.port}: speaks protocol version {version}, not 9; install "
-                        "this tool's firmware with `fingertip flash`, or use the other's tool\n",
-                    )
+                    why = f"speaks protocol version {version}, not 9; install this tool's firmware with `fingertip flash`, or use the other's tool"
+                    self.assertEqual(self.error(*command, "--port", self.port), f"fingertip: {self.port}: {why}\n")
 
     def test_cable_pulled(self):
         with self.device("pulled=1"):

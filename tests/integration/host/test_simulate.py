@@ -45,12 +45,8 @@ class Presses(SimulateTest):
             lines = [line for line in file if not line.startswith("#")]
         zero_us = int(files.read_recording(self.csv, serial=LEFT).metadata["host_zero_us"])
         for side, serial in (("left", LEFT), ("right", RIGHT)):
-            time_us, x_mm, y_mm, force_N = np.array(
-                [
-                    [float(row[name] or "nan") for name in ("time_us", f"{side}_x_mm", f"{side}_y_mm", f"{side}_force_N")]
-                    for row in csv.DictReader(lines)
-                ]
-            ).T
+            names = ("time_us", f"{side}_x_mm", f"{side}_y_mm", f"{side}_force_N")
+            time_us, x_mm, y_mm, force_N = np.array([[float(row[name] or "nan") for name in names] for row in csv.DictReader(lines)]).T
             felt = files.read_recording(self.csv, serial=serial)
             # of the time that it stood, and of the time that nothing touched, what lies 0.2 s within
             at = np.searchsorted(time_us, felt.time_us + zero_us).clip(100, len(time_us) - 101)

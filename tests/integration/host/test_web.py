@@ -39,9 +39,7 @@ FILES = {
 
 class WebCase(unittest.TestCase):
     def setUp(self):
-        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(holder.cleanup)
-        self.folder = pathlib.Path(holder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
         self.tool, simulate = (self.folder / path for path in ("root/bin/fingertip", "root/libexec/fingertip/fingertip-simulate"))
         self.page = self.folder / "root/share/fingertip/web"
         for folder in (self.tool, simulate, *(self.page / name for name in FILES)):
@@ -52,7 +50,7 @@ class WebCase(unittest.TestCase):
             (self.page / name).write_bytes(content)
         (self.page.parent / "secret").write_text("secret")
         self.environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-        self.environment["XDG_RUNTIME_DIR"] = holder.name
+        self.environment["XDG_RUNTIME_DIR"] = str(self.folder)
 
     @contextlib.contextmanager
     def run_tool(self, *words, **environment):
@@ -271,24 +269,17 @@ class Hand(SimulationsCase):
             self.assertEqual(json.loads(self.told("/simulated")[1]), [{"serial": LEFT, "hand": False}])
             self.until(lambda: self.hand()["force_N"] > 2)  # its weight
             self.hand("press 0 0 1")
-            self.until(
-                lambda: (
-                    (409, "no hand presses here; start fingertip simulate --mouse\n") == self.told(f"/simulated/hand?client={ONE}", "lift")
-                )
-            )
+            without = 409, "no hand presses here; start fingertip simulate --mouse\n"
+            self.until(lambda: self.told(f"/simulated/hand?client={ONE}", "lift") == without)
 
 
 class Lift(SimulationsCase):
     def test_the_truth_has_the_pull(self):
         """An object's weight, which both carry, is along y."""
+        words = [self.tool, *"grasp --gripper 2f85 --gripper-port sim:gripper".split()]
         with self.served(), self.run_tool("simulate", "--lift", "--mass", "0.2"):
             with (
-                subprocess.Popen(
-                    [self.tool, "grasp", "--gripper", "2f85", "--gripper-port", "sim:gripper"],
-                    env=self.environment,
-                    stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL,
-                ) as grasp,
+                subprocess.Popen(words, env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as grasp,
                 self.line(),
                 self.line(OTHER, RIGHT),
             ):

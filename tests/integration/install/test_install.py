@@ -1,6 +1,6 @@
 """What `cmake --install` gives: tool and library, from a prefix that was moved, used as a stranger would.
 
-usage: test_install.py --cmake CMAKE --build FOLDER --fake-device PROGRAM [--node NODE --image pico_mux.bin]
+usage: test_install.py --cmake CMAKE --build FOLDER --fake-device PROGRAM
 """
 
 # real time: installed programs on pseudo-terminals
@@ -11,10 +11,12 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from real_time import plugged_in  # noqa: E402
+
 EXAMPLE = ROOT / "host_tools/library/libfingertip/example"
 TOOLS = argparse.Namespace()
 PATIENCE_s = 300
@@ -27,13 +29,8 @@ FLAG_CONTACT, FLAG_FIT_VALID, FLAG_UNCERTAIN = 1 << 0, 1 << 1, 1 << 10
 
 
 def run(*command, **environment):
-    done = subprocess.run(
-        [str(part) for part in command],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_s,
-        env={**os.environ, **{name: str(value) for name, value in environment.items()}},
-    )
+    environment = {**os.environ, **{name: str(value) for name, value in environment.items()}}
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=PATIENCE_s, env=environment)
     if done.returncode:
         raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
     return done.stdout
@@ -42,9 +39,7 @@ def run(*command, **environment):
 class Install(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        cls.addClassCleanup(holder.cleanup)
-        cls.folder = pathlib.Path(holder.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
         first = cls.folder / "first"
         manifest = pathlib.Path(TOOLS.build) / "install_manifest.txt"  # by it a true installation is removed
         before = manifest.read_bytes() if manifest.exists() else None
@@ -140,19 +135,6 @@ class Install(unittest.TestCase):
         self.assertGreater(len(declared), 30)
         self.assertLessEqual(declared, ours)
 
-    def wait_for(self, path, process):
-        end_s = time.monotonic() + PATIENCE_s
-        while not os.path.lexists(path):
-            self.assertIsNone(process.poll())
-            self.assertLess(time.monotonic(), end_s)
-            time.sleep(0.02)
-
-    def start(self, *command):
-        process = subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
-        return process
-
     def follow(self, program, port):
         """The lines that the example prints before the fingertip vanishes."""
         return run(program, FINGERTIP_PORT=port, LD_LIBRARY_PATH=self.library.parent).splitlines()
@@ -160,7 +142,7 @@ class Install(unittest.TestCase):
     def test_the_example_prints_where_and_how_hard(self):
         for program in (self.by_cmake, self.by_pkg_config):
             port = self.folder / f"tty-{program.parent.name}"
-            self.wait_for(port, self.start(TOOLS.fake_device, port, "frames=40"))
+            self.enterContext(plugged_in(TOOLS.fake_device, port, "frames=40"))
             lines = self.follow(program, port)
             self.assertEqual(len(lines), 40)
             for line in lines:
@@ -171,43 +153,13 @@ class Install(unittest.TestCase):
     def test_the_example_heeds_flags(self):
         for flags, expected in ((FLAG_CONTACT, set()), (FLAG_CONTACT | FLAG_FIT_VALID | FLAG_UNCERTAIN, {"not to be trusted: UNCERTAIN"})):
             port = self.folder / f"tty-{flags}"
-            self.wait_for(port, self.start(TOOLS.fake_device, port, "frames=20", f"flags={flags}"))
+            self.enterContext(plugged_in(TOOLS.fake_device, port, "frames=20", f"flags={flags}"))
             self.assertEqual(set(self.follow(self.by_pkg_config, port)), expected)
-
-    def test_the_example_on_the_emulated_fingertip(self):
-        if not TOOLS.image:
-            self.skipTest("no image was built")
-        scenario = self.folder / "press.csv"
-        truth = "contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip"
-        sensors_mm = [(9 * (k // 5 - 1), 9 * (k % 5 - 2)) for k in range(15)]
-        p0_Pa, sigma_mm, at_mm = 20000, 7, (2, -3)
-        pressed = [p0_Pa * 2.718281828 ** (-((x - at_mm[0]) ** 2 + (y - at_mm[1]) ** 2) / 2 / sigma_mm**2) for x, y in sensors_mm]
-        rows = [(t_s, *[0] * 7, *(pressed if touched else [0] * 15)) for t_s, touched in ((0, 0), (0.5, 0), (0.6, 1), (3, 1))]
-        lines = [
-            "# fingertip-scenario 1",
-            f"t_s,{truth}," + ",".join(f"s{k}_Pa" for k in range(15)),
-            *(",".join(map(str, row)) for row in rows),
-        ]
-        scenario.write_text("\n".join(lines) + "\n")
-        port = self.folder / "tty-emulated"
-        emulate = [TOOLS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", TOOLS.image]
-        emulator = self.start(*emulate, "--scenario", scenario, "--seconds", "3", "--pty", port, "--wait-open", "--fast-enumeration")
-        self.wait_for(port, emulator)
-        lines = self.follow(self.by_cmake, port)
-        located = [tuple(map(float, found.groups())) for line in lines if (found := re.fullmatch(r"(\S+) mm (\S+) mm (\S+) N", line))]
-        self.assertGreater(len(located), 100)
-        force_N = 2 * 3.14159265 * p0_Pa * (sigma_mm * 1e-3) ** 2
-        for x_mm, y_mm, found_N in located[-50:]:
-            self.assertAlmostEqual(x_mm, at_mm[0], delta=0.1)
-            self.assertAlmostEqual(y_mm, at_mm[1], delta=0.1)
-            self.assertAlmostEqual(found_N, force_N, delta=0.05 * force_N)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     for name in ("cmake", "build", "fake-device"):
         parser.add_argument(f"--{name}", required=True)
-    for name in ("node", "image"):
-        parser.add_argument(f"--{name}")
     _, rest = parser.parse_known_args(namespace=TOOLS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

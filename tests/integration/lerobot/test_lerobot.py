@@ -25,10 +25,11 @@ FAKE_DEVICE = os.path.abspath(sys.argv[1])
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 REAL = importlib.util.find_spec("lerobot") is not None
-sys.path[:0] = [str(ROOT / "host_tools/python"), *([] if REAL else [str(HERE / "stand_in")])]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support"), *([] if REAL else [str(HERE / "stand_in")])]
 import fingertip  # noqa: E402
 from fingertip import Flag, Frame, wire  # noqa: E402
 from fingertip.clock import NO_CLOCK  # noqa: E402
+from real_time import plugged_in  # noqa: E402
 
 PATIENCE_s = 300
 SERIALS = {"left": "AAAAAAAAAAAAAAA1", "right": "AAAAAAAAAAAAAAA2"}
@@ -106,14 +107,7 @@ class Plugin(unittest.TestCase):
 
     def device(self, name, *options):
         port = self.folder / f"{len(list(self.folder.iterdir()))}-{name}"
-        device = subprocess.Popen([FAKE_DEVICE, port, f"serial={SERIALS[name]}", *options])
-        self.addCleanup(device.wait)
-        self.addCleanup(device.kill)
-        end_s = time.monotonic() + PATIENCE_s
-        while not port.is_symlink():
-            self.assertLess(time.monotonic(), end_s)
-            time.sleep(0.02)
-        return str(port)
+        return str(self.enterContext(plugged_in(FAKE_DEVICE, port, f"serial={SERIALS[name]}", *options)))
 
     def test_names(self):
         self.assertRegex(self.metadata, r"(?m)^Name: lerobot_robot_fingertip$")
@@ -219,13 +213,9 @@ class Plugin(unittest.TestCase):
 
         ports = {name: self.device(name, f"flags={int(TRUSTED)}") for name in SERIALS}
         fingertips = ", ".join(f"{name}: {port}" for name, port in ports.items())
-        words = [
-            "--robot.type=fingertip",
-            "--robot.id=black",
-            f"--robot.calibration_dir={self.folder}",
-            f"--robot.robot={{type: pretended, joints: 3, calibration_dir: {self.folder}}}",
-            f"--robot.fingertips={{{fingertips}}}",
-        ]
+        pretended = f"{{type: pretended, joints: 3, calibration_dir: {self.folder}}}"
+        own = dict(type="fingertip", id="black", calibration_dir=self.folder, robot=pretended, fingertips=f"{{{fingertips}}}")
+        words = [f"--robot.{name}={value}" for name, value in own.items()]
         robot = self.robots.make_robot_from_config(draccus.parse(Recording, args=words).robot)
         robot.connect()
         kinds = hw_to_dataset_features(robot.observation_features, "observation")

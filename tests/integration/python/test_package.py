@@ -16,7 +16,6 @@ import sys
 import tempfile
 import threading
 import unittest
-import zlib
 from unittest import mock
 
 import numpy as np
@@ -25,7 +24,6 @@ FINGERTIP, SIMULATED_FINGERTIP, SIMULATED_DEVICE, TIME_KEEPER = (os.path.abspath
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
 sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
-import bags  # noqa: E402
 import fingertip  # noqa: E402
 from fingertip import Fingertip, Fingertips, Flag, Streams, clock, device, errors, host_time, transport, wire  # noqa: E402
 from simulated_host_time import SimulatedHostTime  # noqa: E402
@@ -33,7 +31,6 @@ from simulated_time import SimulatedTime  # noqa: E402
 
 PATIENCE_s = 60
 SERIAL = "E660583883265A2C"  # of the fake device where none is said
-COUNTS = wire.LineStatistics.COUNTS
 
 
 def vectors():
@@ -46,28 +43,10 @@ def vectors():
     return found
 
 
-def some_line(seed):
-    """A fingertip's stream with everything in it: its packets."""
-    info, *frames = bags.some_packets(seed, 400)
-    for at in range(20, len(frames), 40):
-        frames.insert(at, wire.Packet(0, at, wire.Health(*range(at, at + 20))))
-        frames.insert(at, wire.Packet(0, at, wire.Acknowledgement(0x81, 0, 7, 2**40 + at)))
-    return [packet._replace(sequence=number & 0xFFFF) for number, packet in enumerate((info, *frames), 65500)]
-
-
-def same(a, b):
-    """Equal, where NaN equals NaN."""
-    return repr(a) == repr(b)
-
-
 class Folder(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        patch = mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.folder, "LC_ALL": "C.UTF-8"})
-        patch.start()
-        self.addCleanup(patch.stop)
+        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
+        self.enterContext(mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.folder, "LC_ALL": "C.UTF-8"}))
         os.environ.pop("FINGERTIP_PORT", None)
 
     def path(self, name):
@@ -76,13 +55,6 @@ class Folder(unittest.TestCase):
     def call(self, *words):
         done = subprocess.run([FINGERTIP, *words], capture_output=True, text=True, timeout=PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
-
-    def by_c(self, name, line):
-        """What the C codec and the C++ recorder make of these bytes."""
-        with open(self.path(name + ".ftr"), "wb") as file:
-            file.write(line)
-        self.call("replay", self.path(name + ".ftr"), "--to-csv", self.path(name + ".csv"))
-        return fingertip.read_recording(self.path(name + ".csv"))
 
 
 class Codec(Folder):
@@ -118,39 +90,6 @@ class Codec(Folder):
         )
         self.assertEqual((calibration.off_x_um, calibration.off_y_um, calibration.wider_q15), ((250, -2000), (-125, 2000), (1638, -9830)))
 
-    def test_the_same_as_c_both_ways(self):
-        sent = [wire.decode(wire.encode(packet)[:-1]) for packet in some_line(1)]  # its floats are binary32
-        line = b"\0" + b"".join(map(wire.encode, sent))
-        decoder = wire.Decoder()
-        got = [packet for at in range(0, len(line), 997) for packet in decoder.feed(line[at : at + 997])]
-        self.assertTrue(same(got, sent))
-        recording = self.by_c("line", line)
-        self.assertEqual({name: int(recording.end[name]) for name in COUNTS}, {name: getattr(decoder.statistics, name) for name in COUNTS})
-        contacts = [packet.body for packet in sent if isinstance(packet.body, wire.Contact)]
-        self.assertEqual(sum(recording.has_contact), len(contacts))
-        for name in set(wire.Contact._fields) - {"frame"}:
-            values = recording[name][recording.has_contact]
-            np.testing.assert_array_equal(np.float32(values), np.float32([getattr(body, name) for body in contacts]), err_msg=name)
-        # and what Python writes of it reads as what C++ writes, there and in C++
-        with fingertip.RecordingWriter(self.path("python.csv"), sent[0].body, count=lambda: decoder.statistics) as writer:
-            for packet in sent:
-                writer.packet(packet)
-        self.call("replay", self.path("python.csv"), "--to-csv", self.path("back.csv"))
-        again, back = (fingertip.read_recording(self.path(name)) for name in ("python.csv", "back.csv"))
-        self.assertEqual({name: again.end[name] for name in COUNTS}, {name: recording.end[name] for name in COUNTS})
-        self.assertEqual(again.packets, recording.packets)
-        for name, values in recording.columns.items():
-            np.testing.assert_array_equal(again[name], values, err_msg=name)
-            np.testing.assert_array_equal(back[name], values, err_msg=name)
-        np.testing.assert_array_equal(again.sensors_Pa, recording.sensors_Pa)
-        np.testing.assert_array_equal(again.tare_Pa, recording.tare_Pa)
-        own = {"recorded_by", "started_utc", "port"}
-        self.assertLessEqual({"serial", "board", "firmware", "git", "osr", "x_mm"}, set(recording.metadata))
-        for key in set(recording.metadata) & set(again.metadata) - own:
-            one, other = again.metadata[key], recording.metadata[key]
-            if one != other:
-                np.testing.assert_array_equal(*(np.float32(text.split()) for text in (one, other)), err_msg=key)
-
     def test_values_that_the_protocol_forbids(self):
         contact = wire.decode(vectors()["contact"]["frame"][:-1])
         for bad in (
@@ -162,20 +101,6 @@ class Codec(Folder):
         ):
             with self.assertRaises(errors.FormatError):
                 wire.encode(bad)
-        data = bytearray(vectors()["contact"]["packet"][:-4])
-        data[46:50] = b"\0\0\xc0\x7f"  # a NaN in a float
-        frame = wire.cobs_encode(bytes(data) + zlib.crc32(data).to_bytes(4, "little"))
-        self.assertRaises(errors.FormatError, wire.decode, frame)
-
-    def test_cobs(self):
-        prng = random.Random(3)
-        for length in (*range(1, 20), 253, 254, 255, 256, 507, 508, 509, 760):
-            for zeros in (0, 0.02, 0.5, 1):
-                packet = bytes(0 if prng.random() < zeros else prng.randrange(1, 256) for _ in range(length))
-                coded = wire.cobs_encode(packet)
-                self.assertNotIn(0, coded)
-                self.assertLessEqual(len(coded), length + 1 + length // 254)
-                self.assertEqual(wire.cobs_decode(coded), packet)
 
 
 class Clock(unittest.TestCase):
@@ -415,11 +340,8 @@ class Commands(DeviceTest):
             tip.tare()
             self.world.until(lambda: os.path.exists(self.path("tared")))  # the device answers before it tares
             info = tip.set(rate_Hz=400, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3, location_limit_mm=0.5, keep=True)
-            self.assertEqual(
-                (info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
-                (400000, 256, 0.25, 3.0, 0.5, 0.5),
-            )
-            self.assertEqual(info.slip_window_ms, 100)  # it travels with the threshold
+            told = dict(rate_mHz=400000, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3.0, prior_width_mm=0.5, location_limit_mm=0.5)
+            self.assertLessEqual((told | {"slip_window_ms": 100}).items(), info._asdict().items())  # it travels with the threshold
             self.assertTrue(info.stored & fingertip.Stored.SETTINGS)
             self.assertEqual(tip.set(prior_sigma_mm=0).prior_sigma_mm, 0)
             self.assertEqual(tip.read_health().stack_free_bytes, tip.health.stack_free_bytes)
@@ -430,12 +352,7 @@ class Commands(DeviceTest):
             sent = tip.read_info()
             for wrong, said in (
                 ({"osr": 300}, "256, 512"),
-                ({"rate_Hz": 3000}, "0.1 to 2000 Hz"),
-                ({"rate_Hz": math.nan}, "out of range"),
-                ({"slip_window_ms": 2}, "5 to 1000 ms"),
-                ({"prior_sigma_mm": 0.1}, "0.5 to 100 mm"),
                 ({"prior_width_mm": 1}, "needs"),
-                ({"location_limit_mm": 0}, "0.01 to 100 mm"),
                 ({}, "nothing to set"),
                 ({"osr": 512, "rate_Hz": -1}, "rate_Hz -1"),
             ):
@@ -540,26 +457,15 @@ class Together(DeviceTest):
         other = self.path("tty2")
         os.environ["FINGERTIP_PORT"] = f"{self.port}:{other}"
         with self.device("serial=AAAA"), self.device("serial=BBBB", "started=1000", "rate=150", port=other):
-            with Fingertips(timeout_s=PATIENCE_s) as both:
+            with Fingertips(timeout_s=PATIENCE_s) as both, both.record(self.path("j.csv")):
                 self.assertEqual(set(both.by_serial), {"AAAA", "BBBB"})
-                frames = [frame for frame, _ in zip(both, range(200))]
+                self.assertRaises(fingertip.BadValueError, both.by_serial["BBBB"].record, self.path("x.csv"))
+                frames = [frame for frame, _ in zip(both, range(250))]
                 self.assertEqual(set(both.latest()), {"AAAA", "BBBB"})
-                for serial in ("AAAA", "BBBB"):
-                    numbers = [frame.frame for frame in frames if frame.serial == serial]
-                    self.assertGreater(len(numbers), 40)
-                    np.testing.assert_array_equal(np.diff(numbers), 1)
-                self.assertGreater(min(frame.t_us for frame in frames if frame.serial == "BBBB"), 1e9)
-                host_us = [frame.host_us for frame in frames]
-                self.assertLess(max(host_us) - min(host_us), PATIENCE_s * 1e6)
             self.assertRaisesRegex(fingertip.BadValueError, "named twice", Fingertips, serials=["AAAA", "AAAA"], share=None)
-
-    def test_recorded_on_one_clock(self):
-        other = self.path("tty2")
-        with self.device("serial=AAAA"), self.device("serial=BBBB", "started=1000", "rate=150", port=other):
-            with Fingertips([self.port, other], timeout_s=PATIENCE_s) as both:
-                with both.record(self.path("j.csv")):
-                    self.assertRaises(fingertip.BadValueError, both.by_serial["BBBB"].record, self.path("x.csv"))
-                    frames = [frame for frame, _ in zip(both, range(250))]
+        self.assertGreater(min(frame.t_us for frame in frames if frame.serial == "BBBB"), 1e9)
+        host_us = [frame.host_us for frame in frames]
+        self.assertLess(max(host_us) - min(host_us), PATIENCE_s * 1e6)
         text = pathlib.Path(self.path("j.csv")).read_text(encoding="utf-8")
         self.assertRegex(text, r"(?m)^# 1/clock: t_us=\d{10} time_us=")
         with self.assertRaisesRegex(fingertip.InputError, 'holds several fingertips; choose one with serial="AAAA" or serial="BBBB"$'):
@@ -574,6 +480,7 @@ class Together(DeviceTest):
             np.testing.assert_array_equal(alone["x_mm"], recording["x_mm"])
             self.assertEqual(alone.packets, recording.packets)
             taken = {frame.frame: frame for frame in frames if frame.serial == serial}
+            np.testing.assert_array_equal(np.diff(list(taken)), 1)
             rows = [i for i, number in enumerate(recording["frame"]) if number in taken]
             self.assertGreater(len(rows), 40)
             zero_us = int(re.search(r"# host_zero_us: (\d+)", text).group(1))

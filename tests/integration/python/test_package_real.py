@@ -130,12 +130,8 @@ class Examples(DeviceTest):
 
     def setUp(self):
         super().setUp()
-        for patch in (
-            mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s}),
-            mock.patch.dict(os.environ, {"ROS_LOCALHOST_ONLY": "1"}),
-        ):
-            patch.start()
-            self.addCleanup(patch.stop)
+        self.enterContext(mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s}))
+        self.enterContext(mock.patch.dict(os.environ, {"ROS_LOCALHOST_ONLY": "1"}))
 
     def blocks(self, path, language="python"):
         return re.findall(rf"```{language}\n(.*?)```", (ROOT / path).read_text(encoding="utf-8"), re.S)

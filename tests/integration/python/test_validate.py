@@ -346,19 +346,9 @@ class FromARecording(ValidateTest):
     def test_faults_are_found_with_their_sensors(self):
         # dead: where the presses beside it are hardly known; loose: along an edge, at a corner, at a corner where the presses follow it; thin:
         # where presses follow a sensor that is not loose; drift: beside a sensor that is odd by the same each time
-        for fault, seed in (
-            ("dead_sensor", 32),
-            ("dead_sensor", 33),
-            ("dead_sensor", 953),
-            ("loose_sensor", 32),
-            ("loose_sensor", 38),
-            ("loose_sensor", 890),
-            ("tilted_skin", 32),
-            ("thin_skin", 852),
-            ("drift", 945),
-            ("wrong_weight", 32),
-            ("swapped_wires", 32),
-        ):
+        seeds = {"dead_sensor": (32, 33, 953), "loose_sensor": (32, 38, 890), "thin_skin": (852,), "drift": (945,)}
+        seeds |= dict.fromkeys(("tilted_skin", "wrong_weight", "swapped_wires"), (32,))
+        for fault, seed in ((fault, seed) for fault, some in seeds.items() for seed in some):
             with self.subTest(fault=fault, seed=seed):
                 truth = self.recorded("--fault", fault, "--seed", str(seed))
                 found, out = self.carded()

@@ -8,12 +8,14 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import time
 import unittest
 import zipfile
 
 FAKE_DEVICE = os.path.abspath(sys.argv[1])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from real_time import plugged_in  # noqa: E402
+
 PACKAGE = ROOT / "host_tools/python"
 PATIENCE_s = 300
 
@@ -28,9 +30,7 @@ def run(*call, **options):
 class Distribution(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = pathlib.Path(folder.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
         cls.source = cls.folder / "source"
         shutil.copytree(PACKAGE, cls.source, ignore=shutil.ignore_patterns("__pycache__"))
         cls.dist = cls.folder / "dist"
@@ -84,18 +84,10 @@ class Distribution(unittest.TestCase):
             [clean / "bin/fingertip-plot", "x.csv", "-o", "x.png"], capture_output=True, text=True, cwd=self.folder, timeout=PATIENCE_s
         )
         self.assertEqual((done.returncode, done.stderr), (1, "fingertip-plot: matplotlib is not installed: pip install matplotlib\n"))
-        port = self.folder / "tty"
-        fake = subprocess.Popen([FAKE_DEVICE, port])
-        try:
-            end_s = time.monotonic() + PATIENCE_s
-            while not port.is_symlink() and time.monotonic() < end_s:
-                time.sleep(0.01)
+        with plugged_in(FAKE_DEVICE, self.folder / "tty") as port:
             code = "import fingertip, sys\nwith fingertip.Fingertip(sys.argv[1]) as f: print(fingertip.__file__, len(f.read_block(20)))"
             where, count = run(clean / "bin/python", "-c", code, port, cwd=self.folder, env={"XDG_RUNTIME_DIR": str(self.folder)}).split()
             self.assertEqual((where.startswith(str(clean)), count), (True, "20"))
-        finally:
-            fake.kill()
-            fake.wait()
 
 
 class Types(unittest.TestCase):

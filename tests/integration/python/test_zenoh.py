@@ -217,10 +217,8 @@ class Clocks(unittest.TestCase):
 
 class OnZenoh(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.environment = {**os.environ, "XDG_RUNTIME_DIR": folder.name, "PATH": f"{self.folder}:{os.environ['PATH']}"}
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
+        self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder), "PATH": f"{self.folder}:{os.environ['PATH']}"}
         self.environment.pop("FINGERTIP_PORT", None)
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -368,9 +366,7 @@ class OnZenoh(unittest.TestCase):
             self.chrony(Clocks.TRACKING.format("Not synchronised"))
             self.bridge("--connect", self.endpoint, "--port", self.device("AAAA", f"tared={tared}"))
             self.wait_for(
-                lambda: [
-                    reply for reply in session.liveliness().get("fingertip/*/alive") if str(reply.ok.key_expr) == "fingertip/AAAA/alive"
-                ]
+                lambda: "fingertip/AAAA/alive" in [str(each.ok.key_expr) for each in session.liveliness().get("fingertip/*/alive")]
             )
             self.assertEqual(self.ask(session, "fingertip/AAAA/info").serial, "AAAA")
             self.assertEqual(self.ask(session, "fingertip/AAAA/set?osr=512;rate_Hz=50").osr, 512)

@@ -22,7 +22,8 @@ sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
 from fingertip import Fingertip, Flag, ros2  # noqa: E402
 from fingertip.mcap_recording import TYPES, contact_of  # noqa: E402
 from fingertip.ros_messages import decode  # noqa: E402
-from ros2_judges import DOMAIN, Ears, KINDS, LOCAL, PATIENCE_s, Rosbags, SERIAL, fake_device, wait_for  # noqa: E402
+from real_time import plugged_in  # noqa: E402
+from ros2_judges import DOMAIN, Ears, KINDS, LOCAL, PATIENCE_s, Rosbags, SERIAL, wait_for  # noqa: E402
 
 TOPIC = f"/fingertip/{SERIAL}/"
 FRAMES = 300
@@ -32,16 +33,12 @@ class Topics(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         """Some hundred frames are recorded, published and heard."""
-        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        cls.addClassCleanup(holder.cleanup)
-        cls.folder = pathlib.Path(holder.name)
-        environment = mock.patch.dict(os.environ, {**LOCAL, "XDG_RUNTIME_DIR": holder.name})
-        environment.start()
-        cls.addClassCleanup(environment.stop)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
+        cls.enterClassContext(mock.patch.dict(os.environ, {**LOCAL, "XDG_RUNTIME_DIR": str(cls.folder)}))
         cls.sent = []
         flags = int(Flag.CONTACT | Flag.FIT_VALID | Flag.TARED | Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID)
         options = ("rate=200", "health=50", f"flags={flags}", "absent=3")
-        with fake_device(FAKE_DEVICE, cls.folder, *options) as port, Fingertip(port) as fingertip:
+        with plugged_in(FAKE_DEVICE, cls.folder / "tty", *options) as port, Fingertip(port) as fingertip:
             with ros2.Publisher() as publisher:
                 ears = Ears(LISTENER, cls.folder)
                 cls.addClassCleanup(ears.process.kill)
@@ -112,10 +109,8 @@ class Topics(unittest.TestCase):
 
 class Command(unittest.TestCase):
     def setUp(self):
-        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(holder.cleanup)
-        self.folder = pathlib.Path(holder.name)
-        self.environment = {**os.environ, **LOCAL, "PYTHONPATH": str(PACKAGE), "XDG_RUNTIME_DIR": holder.name}
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
+        self.environment = {**os.environ, **LOCAL, "PYTHONPATH": str(PACKAGE), "XDG_RUNTIME_DIR": str(self.folder)}
 
     def ros2(self, *options, **more):
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
@@ -128,14 +123,14 @@ class Command(unittest.TestCase):
     def test_a_fingertip_that_goes_and_comes_back(self):
         ears = Ears(LISTENER, self.folder)
         self.addCleanup(ears.process.kill)
-        with fake_device(FAKE_DEVICE, self.folder) as port:
+        with plugged_in(FAKE_DEVICE, self.folder / "tty") as port:
             command = self.ros2("--port", port)
             self.assertEqual(command.stdout.readline(), f"domain {DOMAIN}: /fingertip/{SERIAL}\n")
             ears.wait_for("matched")
             wait_for("frames", lambda: all(ears.messages(topic) for topic in KINDS if topic != "/diagnostics"))
         port.unlink(missing_ok=True)
         wait_for("gone", lambda: b"gone" in ears.file_of("/diagnostics").read_bytes())
-        with fake_device(FAKE_DEVICE, self.folder):
+        with plugged_in(FAKE_DEVICE, self.folder / "tty"):
             wait_for("there again", lambda: b"there again" in ears.file_of("/diagnostics").read_bytes())
             command.send_signal(signal.SIGINT)
             out, error = command.communicate(timeout=PATIENCE_s)
@@ -148,7 +143,7 @@ class Command(unittest.TestCase):
         )
 
     def test_what_is_wrong_is_said(self):
-        with fake_device(FAKE_DEVICE, self.folder) as port:
+        with plugged_in(FAKE_DEVICE, self.folder / "tty") as port:
             for options, environment, said in (
                 (("--port", self.folder / "nothing"), {}, r"fingertip-ros2: .*nothing.*\n"),
                 (("--port", port), {"ROS_DOMAIN_ID": "-1"}, r"fingertip-ros2: ROS_DOMAIN_ID -1 is out of range; give 0 to 232\n"),
@@ -171,7 +166,10 @@ class Command(unittest.TestCase):
     def test_a_reader_that_stalls_delays_nobody(self):
         ears = Ears(LISTENER, self.folder)
         self.addCleanup(ears.process.kill)
-        with mock.patch.dict(os.environ, {**LOCAL, "XDG_RUNTIME_DIR": str(self.folder)}), fake_device(FAKE_DEVICE, self.folder) as port:
+        with (
+            mock.patch.dict(os.environ, {**LOCAL, "XDG_RUNTIME_DIR": str(self.folder)}),
+            plugged_in(FAKE_DEVICE, self.folder / "tty") as port,
+        ):
             with Fingertip(port) as fingertip, ros2.Publisher() as publisher:
                 publisher.add(fingertip)
                 ears.wait_until_they_hear(publisher)

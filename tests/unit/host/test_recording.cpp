@@ -102,24 +102,6 @@ TEST(Recording, APacketFileGivesTheSamePacketsAgainAndTheGapsCount) {
   }
 }
 
-TEST(Recording, ACaptureGivesThePacketsAndTheDamageOfItsBytes) {
-  const Recorded capture;
-  std::string bytes(1, '\0');
-  for (const auto &frame : frames_of(all_kinds())) {
-    bytes.append(frame.begin(), frame.end());
-  }
-  bytes[bytes.size() - 20] = static_cast<char>(bytes[bytes.size() - 20] ^ 0x40);
-  capture.write(bytes);
-  PacketFile file(capture.path, false);
-  std::size_t packets = 0;
-  while (file.next()) {
-    packets++;
-  }
-  EXPECT_EQ(packets, all_kinds().size() - 1);
-  EXPECT_EQ(file.statistics().crc_errors, 1u);
-  EXPECT_FALSE(file.is_cut_short());
-}
-
 TEST(Recording, OverAGonePortNothingIsMissing) {
   const Recorded recorded;
   {
