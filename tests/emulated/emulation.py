@@ -63,26 +63,17 @@ class Run:
 
     def __init__(self, tools, folder, name, board, scenario, seconds=None, commands=(), faults=(), emulator=MAIN, **more):
         self.base = pathlib.Path(folder) / name
-        lines = [
-            f"{t_s} {words[0] if ' ' in words[0] else encoded(tools, *words)}\n" for t_s, *words in sorted([(0.45, "dtr 1"), *commands])
-        ]
-        self.path("script").write_text("".join(lines))
+        said = [(t_s, words[0] if " " in words[0] else encoded(tools, *words)) for t_s, *words in sorted([(0.45, "dtr 1"), *commands])]
+        self.path("script").write_text("".join(f"{t_s} {line}\n" for t_s, line in said))
         self.path("faults").write_text(json.dumps(list(faults)))
-        paths = {
-            "host_script": self.path("script"),
-            "faults": self.path("faults"),
-            "capture": self.path("ftr"),
-            "report": self.path("json"),
-        }
-        done = emulate(
-            tools, emulator, board=board, scenario=scenario, seconds=seconds, **{"image": getattr(tools, "image", None), **paths, **more}
-        )
+        paths = {"faults": self.path("faults"), "capture": self.path("ftr"), "report": self.path("json")}
+        values = {"image": getattr(tools, "image", None), "host_script": self.path("script"), **paths, **more}
+        done = emulate(tools, emulator, board=board, scenario=scenario, seconds=seconds, **values)
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         self.report = json.loads(self.path("json").read_text())
-        subprocess.run(
-            [tools.fingertip, "replay", self.path("ftr"), "--to-csv", self.path("csv"), "--overwrite"], check=True, capture_output=True
-        )
+        replay = [tools.fingertip, "replay", self.path("ftr"), "--to-csv", self.path("csv"), "--overwrite"]
+        subprocess.run(replay, check=True, capture_output=True)
         self.recording = files.read_recording(self.path("csv"))
 
     def path(self, suffix):

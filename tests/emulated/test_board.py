@@ -75,16 +75,8 @@ class ThirdBoard(unittest.TestCase):
         self.assertIn(f"image_{THIRD}:", run("cmake", "--build", host, "--target", "help").stdout)
         source, program = host / "examiner.cpp", host / "examiner"
         source.write_text(EXAMINER)
-        run(
-            "g++",
-            "-std=c++17",
-            f"-I{self.tree}/host_tools",
-            f"-I{host}/boards",
-            source,
-            self.tree / "host_tools/tool/doctor/wiring.cpp",
-            "-o",
-            program,
-        )
+        folders = (f"-I{self.tree}/host_tools", f"-I{host}/boards")
+        run("g++", "-std=c++17", *folders, source, self.tree / "host_tools/tool/doctor/wiring.cpp", "-o", program)
         place, multiplexer, everything, overhead_us = run(program).stdout.splitlines()
         self.assertEqual(place, "strip 2, channel 3 of multiplexer 0x73")
         self.assertIn("RESET on GP20 (pin 26)", multiplexer)
@@ -93,15 +85,13 @@ class ThirdBoard(unittest.TestCase):
 
     def test_whoever_lists_boards_lists_it(self):
         boards = ["pico_mux", "pico_parallel", THIRD]
-        self.assertEqual(
-            run(sys.executable, self.tree / "host_tools/report/shared/boards.py").stdout.split(), ["pico_parallel", THIRD, "pico_mux"]
-        )
+        listed = run(sys.executable, self.tree / "host_tools/report/shared/boards.py").stdout.split()
+        self.assertEqual(listed, ["pico_parallel", THIRD, "pico_mux"])
         for program in ("main.mjs", "lockstep.mjs"):
             self.assertIn(" or ".join(boards), run(TOOLS.node, self.tree / "host_tools/simulation/emulator" / program, "--help").stdout)
-        refused = run(
-            "cmake", "-G", "Ninja", "-S", self.tree, "-B", self.tree / "build/toaster", "-DFINGERTIP_BOARD=toaster", check=False
-        ).stderr
-        self.assertIn(";".join(["native", *boards]), "".join(refused.split()))
+        where = ("-S", self.tree, "-B", self.tree / "build/toaster")
+        refused = run("cmake", "-G", "Ninja", *where, "-DFINGERTIP_BOARD=toaster", check=False)
+        self.assertIn(";".join(["native", *boards]), "".join(refused.stderr.split()))
 
 
 if __name__ == "__main__":

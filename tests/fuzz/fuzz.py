@@ -135,12 +135,9 @@ class Target:
 
     def said(self, folder, *words):
         """Exit status, and standard error."""
-        done = subprocess.run(
-            [str(part) for part in (self.program, f"-artifact_prefix={folder}/", f"-timeout={HANGS_s}", *words)],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "FINGERTIP_FUZZ_COUNT": f"{folder}/count", "UBSAN_OPTIONS": "print_stacktrace=1"},
-        )
+        call = (self.program, f"-artifact_prefix={folder}/", f"-timeout={HANGS_s}", *words)
+        environment = {**os.environ, "FINGERTIP_FUZZ_COUNT": f"{folder}/count", "UBSAN_OPTIONS": "print_stacktrace=1"}
+        done = subprocess.run([str(part) for part in call], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=environment)
         return done.returncode, done.stderr.decode("utf-8", "replace")
 
     def walk(self, folder, inputs):
@@ -180,16 +177,8 @@ class Target:
             count = folder / "count"
             done_runs, size = struct.unpack("<QQ", count.read_bytes()) if count.exists() else (0, 0)
             covered = re.findall(r"cov: (\d+)", said)
-            result = {
-                "target": self.name,
-                "seconds": round(time.monotonic() - begun_s, 1),
-                "runs": done_runs,
-                "bytes": size,
-                "edges": int(covered[-1]) if covered else 0,
-                "seed": seed,
-                "crashes": 0,
-                "sanitizer_findings": 0,
-            }
+            result = {"target": self.name, "seconds": round(time.monotonic() - begun_s, 1), "runs": done_runs, "bytes": size, "seed": seed}
+            result |= {"edges": int(covered[-1]) if covered else 0, "crashes": 0, "sanitizer_findings": 0}
             if status not in (0, INTERRUPTED):
                 kind = "sanitizer_findings" if any(word in said for word in SANITIZERS) else "crashes"
                 result[kind] = 1
@@ -199,9 +188,8 @@ class Target:
     def tell_finding(self, findings, folder, said):
         findings.mkdir(parents=True, exist_ok=True)
         lines = said.splitlines()
-        first = next(
-            (i for i, line in enumerate(lines) if any(word in line for word in (*SANITIZERS, "does not hold:", "ERROR: "))), len(lines) - 40
-        )
+        words = (*SANITIZERS, "does not hold:", "ERROR: ")
+        first = next((i for i, line in enumerate(lines) if any(word in line for word in words)), len(lines) - 40)
         print("\n".join(lines[max(0, first) : first + 60]), file=sys.stderr)
         inputs = [path for path in folder.iterdir() if path.is_file() and re.match(r"(crash|leak|oom|timeout)-", path.name)]
         for path in inputs:
@@ -233,11 +221,8 @@ def round_of(targets, jobs, one):
                 result = future.result()
                 found = result["crashes"] + result["sanitizer_findings"]
                 edges = f" {result['edges']:6d} edges" if result["edges"] else ""
-                print(
-                    f"{result['target']:10s} {result['runs']:10d} runs {result['bytes']:12d} bytes{edges} {result['seconds']:7.1f} s  "
-                    f"seed {result['seed']}{'  FOUND' if found else ''}",
-                    flush=True,
-                )
+                amount = f"{result['runs']:10d} runs {result['bytes']:12d} bytes{edges} {result['seconds']:7.1f} s"
+                print(f"{result['target']:10s} {amount}  seed {result['seed']}{'  FOUND' if found else ''}", flush=True)
                 yield result
         except BaseException:
             pool.shutdown(cancel_futures=True)
@@ -252,10 +237,8 @@ def summary(targets, results):
         for name in ("seconds", "runs", "bytes", "crashes", "sanitizer_findings"):
             row[name] = sum(result[name] for result in own)
         rows.append(row)
-    totals = {
-        f"fuzz_{name}" if name == "bytes" else name: sum(row[name] for row in rows) for name in ("bytes", "crashes", "sanitizer_findings")
-    }
-    return {**totals, "fuzz_targets": rows}
+    size, crashes, findings = (sum(row[name] for row in rows) for name in ("bytes", "crashes", "sanitizer_findings"))
+    return {"fuzz_bytes": size, "crashes": crashes, "sanitizer_findings": findings, "fuzz_targets": rows}
 
 
 def main(argv):
@@ -285,13 +268,9 @@ def main(argv):
             while (left_s := end_s - time.monotonic()) > (0 if not results else 10):
                 own_s = max(1, round(min(left_s, ROUND_s) * min(options.jobs, len(targets)) / len(targets)))
                 bulk = options.seconds is not None
-                results += round_of(
-                    targets,
-                    options.jobs,
-                    lambda target: target.run(
-                        findings, seed, seconds=own_s, grown=None if bulk else build / "corpus" / target.name, bulk=bulk
-                    ),
-                )
+                grown = {target: None if bulk else build / "corpus" / target.name for target in targets}
+                one = lambda target: target.run(findings, seed, seconds=own_s, grown=grown[target], bulk=bulk)
+                results += round_of(targets, options.jobs, one)
                 seed += 1
                 if bulk:
                     break

@@ -176,9 +176,8 @@ class Guest:
         serial = ["-serial", f"file:{self.folder / 'console.log'}", "-serial", f"unix:{port},server=off"]
         for number, path in enumerate(usbredir):
             serial += ["-chardev", f"socket,id=usb{number},path={path},reconnect=1", "-device", f"usb-redir,chardev=usb{number}"]
-        self.process = subprocess.Popen(
-            [QEMU, *machine, *boot, *serial], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.errors
-        )
+        silent = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": self.errors}
+        self.process = subprocess.Popen([QEMU, *machine, *boot, *serial], **silent)
         self.requests = 0
         self.received = b""
         try:

@@ -38,18 +38,8 @@ import guest as virtual  # noqa: E402
 
 TOOLS = argparse.Namespace()
 REPORT = {}
-REPORTED = (
-    "packets_serial",
-    "packets_libusb",
-    "packets_pico_parallel",
-    "lost",
-    "stalled_shown_s",
-    "kernel_warnings",
-    "controller_warnings",
-    "machine_warnings",
-    "detach_cycles",
-    "linux_test_s",
-)
+REPORTED = """packets_serial packets_libusb packets_pico_parallel lost stalled_shown_s kernel_warnings controller_warnings
+    machine_warnings detach_cycles linux_test_s""".split()
 SERIAL = "E660583883265A2C"
 OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
@@ -177,20 +167,17 @@ def until(condition, limit_s=PATIENCE_s):
 
 def write_press(path):
     """The same press from PRESSED_s on."""
-    press = [
-        20000 * math.exp(-((x_mm - 2) ** 2 + (y_mm - 3) ** 2) / (2 * 5.7**2)) for x_mm, y_mm in zip(files.SENSOR_X_mm, files.SENSOR_Y_mm)
-    ]
-    write_scenario(
-        path, *((t_s, *(round(scale * p_Pa, 3) for p_Pa in press)) for t_s, scale in ((0, 0), (PRESSED_s - 0.2, 0), (PRESSED_s, 1)))
-    )
+    away_mm = [math.hypot(x_mm - 2, y_mm - 3) for x_mm, y_mm in zip(files.SENSOR_X_mm, files.SENSOR_Y_mm)]
+    press = [20000 * math.exp(-(each**2) / (2 * 5.7**2)) for each in away_mm]
+    course = ((0, 0), (PRESSED_s - 0.2, 0), (PRESSED_s, 1))
+    write_scenario(path, *((t_s, *(round(scale * p_Pa, 3) for p_Pa in press)) for t_s, scale in course))
 
 
 def packaged_tool(folder):
     """fingertip as the Debian package holds it."""
     packed, unpacked = folder / "packages", folder / "unpacked"
-    subprocess.run(
-        [TOOLS.cpack, "--config", pathlib.Path(TOOLS.build) / "CPackConfig.cmake", "-B", packed], check=True, stdout=subprocess.DEVNULL
-    )
+    config = pathlib.Path(TOOLS.build) / "CPackConfig.cmake"
+    subprocess.run([TOOLS.cpack, "--config", config, "-B", packed], check=True, stdout=subprocess.DEVNULL)
     [package] = packed.glob("fingertip_*.deb")
     subprocess.run(["dpkg-deb", "--extract", package, unpacked], check=True)
     return unpacked / "usr/bin/fingertip"
@@ -250,10 +237,8 @@ class Linux(unittest.TestCase):
 
     def stream(self, transport, seconds=STREAM_s, wanted=PACKETS):
         """Records so many packets; check_bytes then sees that the tool got every byte that the device sent meanwhile."""
-        self.tool(
-            f"record /tmp/{transport}.csv --overwrite --raw-bytes /tmp/{transport}.ftr --transport {transport} --seconds {seconds}",
-            STREAM_LIMIT_s,
-        )
+        how = f"--overwrite --raw-bytes /tmp/{transport}.ftr --transport {transport} --seconds {seconds}"
+        self.tool(f"record /tmp/{transport}.csv {how}", STREAM_LIMIT_s)
         end = self.sh(f"tail -n 1 /tmp/{transport}.csv")
         self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
         received = self.guest.read_file(f"/tmp/{transport}.ftr")
@@ -345,9 +330,8 @@ class Linux(unittest.TestCase):
         requests = self.device.requests()
         setups = [setup for setup, _ in requests]
         self.assertIn("8006000600000a00", setups, "DEVICE_QUALIFIER was not asked for")
-        self.assertEqual(
-            [data for setup, data in requests if setup.startswith("80060006")][0], [], "a full-speed device has no DEVICE_QUALIFIER"
-        )
+        qualifier = next(data for setup, data in requests if setup.startswith("80060006"))
+        self.assertEqual(qualifier, [], "a full-speed device has no DEVICE_QUALIFIER")
         for string in (0, 1, 2, 3):
             asked = [data for setup, data in requests if re.match(f"8006{string:02}03(0000|0904)", setup)]
             self.assertTrue(asked and all(asked), f"string {string}")
@@ -366,11 +350,8 @@ class Linux(unittest.TestCase):
 
     def test_11_equal_sequences_and_none_lost(self):
         received = {transport: packets_of(stream)[0] for transport, stream in self.streams.items()}
-        REPORT.update(
-            packets_serial=len(received["serial"]),
-            packets_libusb=len(received["usb"]),
-            lost=sum(gaps(packets) for packets in received.values()),
-        )
+        REPORT.update(packets_serial=len(received["serial"]), packets_libusb=len(received["usb"]))
+        REPORT["lost"] = sum(map(gaps, received.values()))
         for packets in received.values():
             frames = [(kind, int.from_bytes(body[:4], "little")) for kind, _, body in packets if kind in (CONTACT, RAW)]
             first = frames[0][1]
@@ -539,14 +520,11 @@ class Linux(unittest.TestCase):
         listed = [line.split("\t") for line in self.tool("list").splitlines()]
         self.assertEqual({serial: board for serial, board, *_ in listed}, boards)
         self.assertEqual({re.search("ttyACM[01]", reached)[0] for *_, reached in listed}, {"ttyACM0", "ttyACM1"})
-        self.assertEqual(
-            self.guest.run("fingertip info"),
-            (1, f"fingertip: several fingertips found: {SERIAL}, {OTHER_SERIAL}; choose one with --device SERIAL\n"),
-        )
-        self.assertEqual(
-            self.guest.run("fingertip info --device 1234"),
-            (1, f"fingertip: no fingertip 1234 here, there are: {SERIAL} {OTHER_SERIAL}; plug it in, then see `fingertip list`\n"),
-        )
+        for words, said in (
+            ("", f"several fingertips found: {SERIAL}, {OTHER_SERIAL}; choose one with --device SERIAL"),
+            ("--device 1234", f"no fingertip 1234 here, there are: {SERIAL} {OTHER_SERIAL}; plug it in, then see `fingertip list`"),
+        ):
+            self.assertEqual(self.guest.run(f"fingertip info {words}"), (1, f"fingertip: {said}\n"))
         for serial, board in boards.items():
             for transport in ("serial", "usb"):
                 told = self.pairs(self.tool(f"info --device {serial} --transport {transport}"))

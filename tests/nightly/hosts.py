@@ -28,6 +28,8 @@ from fingertip import wire  # noqa: E402
 from fingertip.mcap_recording import McapLineReader  # noqa: E402
 from fingertip.network import Stamp, parts_of  # noqa: E402
 
+from nightly import busy_s, wait_for  # noqa: E402
+
 HOSTS, TIPS, RATE_Hz, FULL_RATE_Hz = 4, 4, 50, 1310
 UNPLUGGED = "F100"  # and back, after half of its frames
 PATIENCE_s = 90
@@ -42,20 +44,6 @@ def system(*words):
     done = subprocess.run(list(map(str, words)), check=False, capture_output=True, text=True)
     if done.returncode != 0:
         raise SystemExit(f"hosts.py: {' '.join(map(str, words))}: {done.stderr.strip()}")
-
-
-def busy_s(process):
-    """Processor time of all its threads."""
-    cells = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
-    return (int(cells[11]) + int(cells[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def wait_for(condition, what):
-    end_s = time.monotonic() + PATIENCE_s
-    while not condition():
-        if time.monotonic() > end_s:
-            raise SystemExit(f"hosts.py: waited {PATIENCE_s} s for {what}")
-        time.sleep(0.02)
 
 
 class Mirrors:
@@ -128,18 +116,20 @@ class Network:
         return self
 
     def _make(self):
-        system("ip", "netns", "add", self.name)
-        system("ip", "-n", self.name, "link", "set", "lo", "up")
-        system("ip", "-n", self.name, "link", "add", "name", "switch0", "type", "bridge")
-        system("ip", "-n", self.name, "addr", "add", "10.77.0.1/24", "dev", "switch0")
-        system("ip", "-n", self.name, "link", "set", "switch0", "up")
-        for k, space in enumerate(self.spaces):
+        def ip(*words, of=self.name):
+            system("ip", "-n", of, *words)
+
+        for space in (self.name, *self.spaces):
             system("ip", "netns", "add", space)
-            system("ip", "-n", space, "link", "set", "lo", "up")
-            system("ip", "-n", self.name, "link", "add", f"v{k}", "type", "veth", "peer", "name", "eth", "netns", space)
-            system("ip", "-n", space, "addr", "add", f"10.77.0.{10 + k}/24", "dev", "eth")
-            system("ip", "-n", space, "link", "set", "eth", "up")
-            system("ip", "-n", self.name, "link", "set", f"v{k}", "master", "switch0", "up")
+            ip("link", "set", "lo", "up", of=space)
+        ip("link", "add", "name", "switch0", "type", "bridge")
+        ip("addr", "add", "10.77.0.1/24", "dev", "switch0")
+        ip("link", "set", "switch0", "up")
+        for k, space in enumerate(self.spaces):
+            ip("link", "add", f"v{k}", "type", "veth", "peer", "name", "eth", "netns", space)
+            ip("addr", "add", f"10.77.0.{10 + k}/24", "dev", "eth", of=space)
+            ip("link", "set", "eth", "up", of=space)
+            ip("link", "set", f"v{k}", "master", "switch0", "up")
 
     def __exit__(self, *_):
         for space in (*self.spaces, self.name):
@@ -173,18 +163,8 @@ def cuts(fake_device, seconds):
         mirrors = {serial: folder / f"mirror{serial}" for serial in ports}
         for serial, port in ports.items():
             unplugged = [f"vanish={RATE_Hz * seconds // 2},1500"] if serial == UNPLUGGED else []
-            start(
-                [
-                    fake_device,
-                    port,
-                    f"serial={serial}",
-                    f"mirror={mirrors[serial]}",
-                    f"rate={RATE_Hz}",
-                    f"frames={RATE_Hz * seconds}",
-                    "life=600",
-                    *unplugged,
-                ]
-            )
+            truth_of = (f"serial={serial}", f"mirror={mirrors[serial]}")
+            start([fake_device, port, *truth_of, f"rate={RATE_Hz}", f"frames={RATE_Hz * seconds}", "life=600", *unplugged])
         wait_for(lambda: all(path.is_symlink() for path in (*ports.values(), *mirrors.values())), "the fingertips")
         truth = Mirrors(mirrors)
 
@@ -197,15 +177,11 @@ def cuts(fake_device, seconds):
 
         the_router, bridges = router(), [bridge(host) for host in range(HOSTS)]
         recording = folder / "all.mcap"
-        recorder = start(
-            command("recorder", recording, "--connect", endpoint, "--expect", HOSTS * TIPS, "--wait", 60, "--undisciplined", "--json"),
-            network.name,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        how = ("--expect", HOSTS * TIPS, "--wait", 60, "--undisciplined", "--json")
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        recorder = start(command("recorder", recording, "--connect", endpoint, *how), network.name, **pipes)
         wait_for(lambda: recording.exists() or recorder.poll() is not None, "the recorder")
-        begun_s, busy_before_s = time.monotonic(), busy_s(recorder)
+        begun_s, busy_before_s = time.monotonic(), busy_s(recorder.pid)
         time.sleep(3)
         the_router.kill()
         time.sleep(3)
@@ -223,7 +199,7 @@ def cuts(fake_device, seconds):
         network.link(3, "up")
         wait_for(lambda: truth.is_over, "the fingertips to end")
         time.sleep(1)
-        core_percent = round(100 * (busy_s(recorder) - busy_before_s) / (time.monotonic() - begun_s), 1)
+        core_percent = round(100 * (busy_s(recorder.pid) - busy_before_s) / (time.monotonic() - begun_s), 1)
         recorder.send_signal(signal.SIGINT)
         stdout, stderr = recorder.communicate(timeout=PATIENCE_s)
         if not stdout:
@@ -238,9 +214,8 @@ def cuts(fake_device, seconds):
             first = of_device.index(of_file[0])
             before += first
             sent += len(of_device) - first
-            strangers += (
-                len(set(of_file) - set(of_device)) + len(of_file) - len(set(of_file)) + abs(len(of_file) - told[serial]["recorded"])
-            )
+            strangers += len(set(of_file) - set(of_device)) + len(of_file) - len(set(of_file))
+            strangers += abs(len(of_file) - told[serial]["recorded"])
             uncounted += abs(len(of_device) - first - len(of_file) - told[serial]["lost"])
             by_host[int(serial[2])] += told[serial]["lost"]
         return {
@@ -274,9 +249,8 @@ def latency(fake_device, seconds):
         bridge = None
         try:
             wait_for(port.is_symlink, "the fingertip")
-            bridge = subprocess.Popen(
-                command("bridge", "--listen", endpoint, "--router", "--port", port), env=environment, stderr=subprocess.DEVNULL
-            )
+            words = command("bridge", "--listen", endpoint, "--router", "--port", port)
+            bridge = subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL)
             config = zenoh.Config()
             config.insert_json5("mode", '"client"')
             config.insert_json5("connect/endpoints", json.dumps([endpoint]))
@@ -294,15 +268,11 @@ def latency(fake_device, seconds):
             with zenoh.open(config) as session:
                 subscriber = session.declare_subscriber("fingertip/*/*", hear)
                 wait_for(lambda: len(late_ns) > 2 * FULL_RATE_Hz, "packets")
-                begun_s, busy_before_s, frames, number = time.perf_counter(), busy_s(bridge), taken["raw"], last[0]
+                begun_s, busy_before_s, frames, number = time.perf_counter(), busy_s(bridge.pid), taken["raw"], last[0]
                 late_ns.clear()
                 time.sleep(seconds)
-                wall_s, cpu_s, frames, number = (
-                    time.perf_counter() - begun_s,
-                    busy_s(bridge) - busy_before_s,
-                    taken["raw"] - frames,
-                    last[0] - number,
-                )
+                wall_s, cpu_s = time.perf_counter() - begun_s, busy_s(bridge.pid) - busy_before_s
+                frames, number = taken["raw"] - frames, last[0] - number
                 found = sorted(late_ns)
                 subscriber.undeclare()
         finally:

@@ -22,9 +22,8 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [
-    str(ROOT / folder) for folder in ("host_tools/report/shared", "host_tools/python", "tests/support", "tests/web", "tests/checks")
-]
+HOST = ROOT / "host_tools"
+sys.path[:0] = map(str, (HOST / "report/shared", HOST / "python", *(ROOT / "tests" / name for name in ("support", "web", "checks"))))
 import figures  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 
@@ -82,11 +81,9 @@ class Programs(contextlib.ExitStack):
         super().__init__()
         self.build = build
         self.folder = pathlib.Path(self.enter_context(tempfile.TemporaryDirectory(prefix="fingertip-")))
-        self.environment = {name: value for name, value in os.environ.items() if name != "FINGERTIP_PORT"} | {
-            "XDG_RUNTIME_DIR": str(self.folder)
-        }
-        self.enter_context(contextlib.ExitStack()).callback(os.environ.pop, "XDG_RUNTIME_DIR", None)
+        self.callback(os.environ.pop, "XDG_RUNTIME_DIR", None)
         os.environ["XDG_RUNTIME_DIR"] = str(self.folder)  # for the package in this process
+        self.environment = {name: value for name, value in os.environ.items() if name != "FINGERTIP_PORT"}
 
     def start(self, *call, **options):
         process = subprocess.Popen([str(part) for part in call], env=self.environment, **options)

@@ -130,14 +130,10 @@ def power_cuts(build):
     found = in_parallel({(board, kind): functools.partial(one, board, kind) for board in BOARDS for kind in CUTS})
     rows = [{"board": board, "cut": kind, **row} for (board, kind), row in found.items()]
     findings = [line for row in rows for line in row.pop("what")]
+    cuts, not_started, wrong = (sum(row[name] for row in rows) for name in ("cuts", "not_started", "wrong_values"))
     return {
-        "flash_lost": sum(row["wrong_values"] for row in rows),
-        "power_cuts": sum(row["cuts"] for row in rows),
-        "power_cuts_not_started": sum(row["not_started"] for row in rows),
-        "power_cuts_wrong_values": sum(row["wrong_values"] for row in rows),
-        "power_cut_step_us": STEP_us,
-        "power_cut_kinds": rows,
-        "power_cut_findings": findings,
+        **{"flash_lost": wrong, "power_cuts": cuts, "power_cuts_not_started": not_started, "power_cuts_wrong_values": wrong},
+        **{"power_cut_step_us": STEP_us, "power_cut_kinds": rows, "power_cut_findings": findings},
     }
 
 

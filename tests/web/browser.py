@@ -112,14 +112,9 @@ class Browser:
         environment |= {"FROM_TEST": str(from_test), "TO_TEST": str(to_test)}
         self._log = open(self.folder / "browser.log", "wb")
         command = [*unshare(), "bash", "-c", START, "bash", self.folder / "policies", POLICY_FOLDER]
-        self._process = subprocess.Popen(
-            [*command, binary, *FLAGS, f"--user-data-dir={self.folder / 'profile'}", "about:blank"],
-            env=environment,
-            pass_fds=(from_test, to_test),
-            stdin=subprocess.DEVNULL,
-            stdout=self._log,
-            stderr=self._log,
-        )
+        command += [binary, *FLAGS, f"--user-data-dir={self.folder / 'profile'}", "about:blank"]
+        streams = {"stdin": subprocess.DEVNULL, "stdout": self._log, "stderr": self._log}
+        self._process = subprocess.Popen(command, env=environment, pass_fds=(from_test, to_test), **streams)
         os.close(from_test)
         os.close(to_test)
         self._received = b""
@@ -254,9 +249,8 @@ class Page:
 
     def media(self, **features):
         """prefers_color_scheme="dark" and the like."""
-        self.call(
-            "Emulation.setEmulatedMedia", features=[{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
-        )
+        named = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
+        self.call("Emulation.setEmulatedMedia", features=named)
 
     def go(self, url):
         answer = self.call("Page.navigate", url=url)
@@ -371,11 +365,8 @@ class Page:
         origin = self.run("location.origin")
         asked = [each["request"]["url"] for each in self.of("Network.requestWillBeSent")]
         asked += [each["url"] for each in self.of("Network.webSocketCreated")]
-        broken = [
-            json.dumps(each["issue"]["details"])
-            for each in self.of("Audits.issueAdded")
-            if each["issue"]["code"] == "ContentSecurityPolicyIssue"
-        ]
+        issues = [each["issue"] for each in self.of("Audits.issueAdded")]
+        broken = [json.dumps(issue["details"]) for issue in issues if issue["code"] == "ContentSecurityPolicyIssue"]
         return [url for url in asked if not url.startswith((origin + "/", "data:", "blob:", "about:"))] + broken
 
     def of(self, *methods):

@@ -49,34 +49,22 @@ class Bench(contextlib.ExitStack):
     def emulated(self, browser, serial, scenario, *options):
         """The release image of pico_parallel, powered on when its port is first opened."""
         port = browser.ports / f"{USB_ID}:{serial}"
-        emulator = [
-            self._tools.node,
-            ROOT / "host_tools/simulation/emulator/main.mjs",
-            "--board",
-            "pico_parallel",
-            "--image",
-            self._tools.image,
-        ]
+        main, board = ROOT / "host_tools/simulation/emulator/main.mjs", ("--board", "pico_parallel")
+        emulator = [self._tools.node, main, *board, "--image", self._tools.image]
         press = ["--scenario", scenario, "--serial", serial, "--pty", port, "--wait-open", "--fast-enumeration", *options]
         return self._until_there(self._start(*emulator, *press, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL), port)
 
     def fake(self, browser, serial, *options, usb_id=USB_ID):
         """tests/support/fake_device.cpp, with its options."""
         port, device = browser.ports / f"{usb_id}:{serial}", self._tools.build / "tests/support/fake_device"
-        return self._until_there(
-            self._start(device, port, f"serial={serial}", f"life={PATIENCE_s}", *options, stdout=subprocess.DEVNULL), port
-        )
+        call = (device, port, f"serial={serial}", f"life={PATIENCE_s}", *options)
+        return self._until_there(self._start(*call, stdout=subprocess.DEVNULL), port)
 
     def _tool(self, runtime, *arguments):
         """The tool's first line, once it is there; runtime: folder where programs find what is simulated."""
-        process = self._start(
-            self._tools.build / "host_tools/tool/cli/fingertip",
-            *arguments,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            env={**os.environ, "XDG_RUNTIME_DIR": str(runtime)},
-        )
+        tool, environment = self._tools.build / "host_tools/tool/cli/fingertip", {**os.environ, "XDG_RUNTIME_DIR": str(runtime)}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+        process = self._start(tool, *arguments, **pipes, env=environment)
         return process, process.stdout.readline().strip()
 
     def simulated(self, runtime, *options):

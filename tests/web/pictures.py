@@ -6,9 +6,8 @@ import matplotlib.image
 import numpy as np
 
 BLUR_px = 3  # of half the size
-TO_XYZ = np.array(
-    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
-)  # sRGB, IEC 61966-2-1
+# sRGB, IEC 61966-2-1
+TO_XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
 WHITE = TO_XYZ.sum(axis=1)
 
 

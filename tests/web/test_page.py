@@ -76,9 +76,8 @@ class PageTest(unittest.TestCase):
 
     def open(self, before="", patience=PATIENT, **options):
         """patience: the page's, model/patience.ts."""
-        page = self.browser.page(
-            self.url + "/", before=f"globalThis.fingertipPatience = {json.dumps(patience)}; {NO_SAVE_DIALOG}{before}", **options
-        )
+        before = f"globalThis.fingertipPatience = {json.dumps(patience)}; {NO_SAVE_DIALOG}{before}"
+        page = self.browser.page(self.url + "/", before=before, **options)
         self.addCleanup(page.close)
         self.addCleanup(self.nothing_else_happened, page)
         driven.ready_s(page)
@@ -87,15 +86,12 @@ class PageTest(unittest.TestCase):
     def nothing_else_happened(self, page):
         """Whatever was done: no request to elsewhere, nothing that its policy refused, no error that was not caught."""
         self.assertEqual(page.foreign(), [])
-        self.assertEqual(
-            [each["exceptionDetails"].get("exception", {}).get("description") for each in page.of("Runtime.exceptionThrown")], []
-        )
+        self.assertEqual([each["exceptionDetails"] for each in page.of("Runtime.exceptionThrown")], [])
 
     def alert(self, page, pattern):
         """What the page says and leaves standing."""
-        return page.until(
-            f"[...document.querySelectorAll('[role=alert]')].map(each => each.textContent).find(text => {pattern}.test(text))"
-        )
+        alerts = "[...document.querySelectorAll('[role=alert]')].map(each => each.textContent)"
+        return page.until(f"{alerts}.find(text => {pattern}.test(text))")
 
     def scenario(self, kind, *options):
         path = self.folder / f"{kind}.csv"
@@ -219,7 +215,7 @@ class Calibrate(PageTest):
 
     PLACEMENTS = ("--gain", 10, "--seed", 41, "--pad", 7)
 
-    def start(self, *options):
+    def start(self):
         """Its placements come again and again: how many pass before the page asks for them depends on this machine."""
         once = self.scenario("placements", *self.PLACEMENTS).read_text().splitlines(keepends=True)
         first = next(i for i, line in enumerate(once) if line.startswith("t_s,")) + 1
@@ -228,9 +224,8 @@ class Calibrate(PageTest):
         period_s = float(rows[-1][0]) + 0.1
         repeated = [f"{float(t_s) + again * period_s:.6f},{rest}" for again in range(REPEATED) for t_s, rest in rows]
         often.write_text("".join(once[:first] + repeated))
-        return self.bench.emulated(
-            self.browser, SERIALS[0], often, "--pace", "fast", "--seconds", 3600, "--flash", self.folder / "flash.bin", *options
-        )
+        long = ("--pace", "fast", "--seconds", 3600, "--flash", self.folder / "flash.bin")
+        return self.bench.emulated(self.browser, SERIALS[0], often, *long)
 
     def test_a_weight_finds_the_gains(self):
         process = self.start()
@@ -251,9 +246,8 @@ class Calibrate(PageTest):
         page.type("textbox", "Weight, g", f"{1000 * FORCE_N / 9.80665:.6g}")
         page.click("button", "Begin")
         page.find("button", "Store")
-        after_mm = page.run(
-            "Number(document.querySelector('dialog table').textContent.match(/location off by[ 0-9.]*? mm *([0-9.]+) mm/)?.[1] ?? NaN)"
-        )
+        table = "document.querySelector('dialog table').textContent"
+        after_mm = page.run(f"Number({table}.match(/location off by[ 0-9.]*? mm *([0-9.]+) mm/)?.[1] ?? NaN)")
         page.click("button", "Store")
         page.until("document.querySelector('dialog [role=status]').textContent.startsWith('Stored')")
         self.assertLess(after_mm, 0.15)
@@ -339,9 +333,8 @@ class BadInput(PageTest):
         page.give("input[type=file]", two)
         page.until("fingertip.fingertips.length === 2 && fingertip.fingertips.every(each => each.state === 'closed')")
         page.shown()
-        names = page.until(
-            "(names => names.every(name => /fingertip/.test(name)) && names)([...document.querySelectorAll('.pad-card .name')].map(each => each.textContent))"
-        )
+        named = "[...document.querySelectorAll('.pad-card .name')].map(each => each.textContent)"
+        names = page.until(f"(names => names.every(name => /fingertip/.test(name)) && names)({named})")
         self.assertEqual(names, ["two.csv: fingertip E110", "two.csv: fingertip E111"])
         self.assertEqual(page.run("document.querySelector('.moment').textContent"), "newest")
         self.assertEqual([page.has("button", name) for name in ("Look back", "Go live")], [True, False])
@@ -394,10 +387,8 @@ class Looks(PageTest):
         page = self.open(before=TEN_TIMES, width=1120, height=760)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")
-        page.call(
-            "DOM.focus",
-            nodeId=page.call("DOM.querySelector", nodeId=page.call("DOM.getDocument")["root"]["nodeId"], selector="main")["nodeId"],
-        )
+        root = page.call("DOM.getDocument")["root"]["nodeId"]
+        page.call("DOM.focus", nodeId=page.call("DOM.querySelector", nodeId=root, selector="main")["nodeId"])
         page.key(" ", "Space")
         for _ in range(steps):
             page.key("ArrowLeft")
@@ -418,15 +409,11 @@ class Looks(PageTest):
     def apart(self, page, found):
         """From the picture in light colours: of all that is shown, or of the traces alone, which are thin lines in a part of it."""
         reference = pictures.read(str(REFERENCES / "light.png"))
-        left, top, right, bottom = (
-            int(edge / 2)
-            for edge in page.run(
-                "(({left, top, right, bottom}) => [left, top, right, bottom])(document.querySelector('.traces').getBoundingClientRect())"
-            )
-        )
-        return max(
-            pictures.difference(found, reference), pictures.difference(found[top:bottom, left:right], reference[top:bottom, left:right])
-        )
+        box = "document.querySelector('.traces').getBoundingClientRect()"
+        edges = page.run(f"(({{left, top, right, bottom}}) => [left, top, right, bottom])({box})")
+        left, top, right, bottom = (int(edge / 2) for edge in edges)
+        traces = [picture[top:bottom, left:right] for picture in (found, reference)]
+        return max(pictures.difference(found, reference), pictures.difference(*traces))
 
     def test_it_looks_as_it_did(self):
         page = self.paused()
@@ -436,9 +423,8 @@ class Looks(PageTest):
             if OPTIONS.pictures:
                 pictures.write(reference, found)
                 continue
-            self.assertLess(
-                self.apart(page, found) if name == "light" else pictures.difference(found, pictures.read(str(reference))), self.LIMIT, name
-            )
+            apart = self.apart(page, found) if name == "light" else pictures.difference(found, pictures.read(str(reference)))
+            self.assertLess(apart, self.LIMIT, name)
         if OPTIONS.pictures:
             return
         # and what is missing is noticed
@@ -467,9 +453,8 @@ class Looks(PageTest):
         page = self.paused()
         for width in (700, 1120):
             page.size(width, 760)
-            page.until(
-                "document.querySelector('.traces').clientWidth === document.querySelector('canvas.flags').getBoundingClientRect().width"
-            )
+            flags_px = "document.querySelector('canvas.flags').getBoundingClientRect().width"
+            page.until(f"document.querySelector('.traces').clientWidth === {flags_px}")
 
 
 class Simulations(PageTest):
@@ -481,11 +466,8 @@ class Simulations(PageTest):
     def numbers(self, page):
         """{title: text} of the numbers, once they are written."""
         page.shown()
-        return dict(
-            page.run(
-                "[...document.querySelectorAll('.number:not([hidden])')].map(each => [each.querySelector('dt').textContent, each.querySelector('dd').textContent])"
-            )
-        )
+        pair = "each => ['dt', 'dd'].map(name => each.querySelector(name).textContent)"
+        return dict(page.run(f"[...document.querySelectorAll('.number:not([hidden])')].map({pair})"))
 
     def test_the_pointer_presses_the_pad(self):
         page = self.open()
@@ -495,9 +477,8 @@ class Simulations(PageTest):
         self.assertFalse(page.has("combobox", "Object"))  # the ball is the only one
         page.click("button", "From above")
         page.shown()
-        x, y, width, height = page.run(
-            "(({x, y, width, height}) => [x, y, width, height])(document.querySelector('.pad').getBoundingClientRect())"
-        )
+        box = "document.querySelector('.pad').getBoundingClientRect()"
+        x, y, width, height = page.run(f"(({{x, y, width, height}}) => [x, y, width, height])({box})")
         page.press_at(x + width / 2, y + height / 2)
         page.until(f"{self.FIRST}.contact.force_N > 2")
         page.until(f"{self.FIRST}.line.truth.force_N > 2")
@@ -505,9 +486,8 @@ class Simulations(PageTest):
         true = page.run(f"(({{x_mm, y_mm}}) => [x_mm, y_mm])({self.FIRST}.line.truth)")
         self.assertLess(np.hypot(*true), 2)  # the middle of the picture is that of the pad
         self.assertLess(np.hypot(*np.subtract(felt, true)), 2.5)  # never calibrated
-        page.until(
-            "[...document.querySelectorAll('.truth')].filter(each => /^true /.test(each.textContent)).length === 3"
-        )  # force, place, pull
+        # Of force, place and pull.
+        page.until("[...document.querySelectorAll('.truth')].filter(each => /^true /.test(each.textContent)).length === 3")
         self.assertRegex(self.numbers(page)["Force"], r"^\d+\.\d\d.* N .*true \d+\.\d\d$")
         page.drag_to(x + width / 2, y + height / 2 - height / 8)
         page.until(f"{self.FIRST}.line.truth.y_mm > {true[1] + 2} && {self.FIRST}.contact.y_mm > {felt[1] + 1}")
@@ -637,10 +617,8 @@ class Everyone(PageTest):
         page = self.everything()
         page.until("fingertip.fingertips[0].health")
         page.until("[...document.querySelectorAll('.facts dt')].some(each => each.textContent === 'running for')")
-        self.assertEqual(
-            page.run("[...document.querySelectorAll('.facts dt')].map(each => each.textContent).filter(each => /busy|stack/.test(each))"),
-            [],
-        )
+        facts = "[...document.querySelectorAll('.facts dt')].map(each => each.textContent)"
+        self.assertEqual(page.run(f"{facts}.filter(each => /busy|stack/.test(each))"), [])
 
     def test_the_focus_stays_where_something_was_pressed(self):
         """Though its control is hidden, disabled or gone."""

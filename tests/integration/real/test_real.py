@@ -1,5 +1,6 @@
 """real.py on recordings made here, of which the truth is known; the real ones are of others."""
 
+import cmath
 import hashlib
 import json
 import math
@@ -27,17 +28,12 @@ def write_grid(path, gains=(1.0,) * 8):
     lines = ["x_pos,y_pos," + ",".join(f"s{k}" for k in range(8))]
     for row in range(29):
         for column in range(16):
-            at = (column - 7.5, row - 14.0)
-            stage = (math.cos(TURN) * at[0] - math.sin(TURN) * at[1] + 14.0, math.sin(TURN) * at[0] + math.cos(TURN) * at[1] + 16.0)
-            stage = (round(stage[0], 6), float(row))  # rows differ by the stage's y
-            at = (
-                math.cos(TURN) * (stage[0] - 14.0) + math.sin(TURN) * (stage[1] - 16.0),
-                -math.sin(TURN) * (stage[0] - 14.0) + math.cos(TURN) * (stage[1] - 16.0),
-            )
-            readings = [
-                gain * PEAK_PA * math.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * WIDTH_MM**2)) for gain, (x, y) in zip(gains, layout)
-            ]
-            lines.append(",".join(f"{value:.9e}" for value in (*stage, *(reading / grids.PA_PER_PSI for reading in readings))))
+            turn = cmath.rect(1, TURN)
+            stage = complex(round((turn * complex(column - 7.5, row - 14)).real + 14, 6), row)  # rows differ by the stage's y
+            at = (stage - complex(14, 16)) / turn
+            shares = [gain * math.exp(-(abs(complex(x, y) - at) ** 2) / (2 * WIDTH_MM**2)) for gain, (x, y) in zip(gains, layout)]
+            values = (stage.real, stage.imag, *(share * PEAK_PA / grids.PA_PER_PSI for share in shares))
+            lines.append(",".join(f"{value:.9e}" for value in values))
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -60,27 +56,11 @@ class Real(unittest.TestCase):
     def checksum(self):
         return hashlib.sha256(self.grid.read_bytes()).hexdigest()
 
-    def run_tool(self, *options):
+    def run_tool(self):
         path = self.folder / "sources.json"
         path.write_text(json.dumps(self.sources))
-        return subprocess.run(
-            [
-                sys.executable,
-                str(ROOT / "host_tools/report/real/real.py"),
-                "--build",
-                str(BUILD),
-                "-o",
-                str(self.folder / "out"),
-                "--pads",
-                "1",
-                "--sources",
-                str(path),
-                str(self.folder / "data"),
-                *options,
-            ],
-            capture_output=True,
-            text=True,
-        )
+        words = [sys.executable, ROOT / "host_tools/report/real/real.py", "--build", BUILD, "-o", self.folder / "out", "--pads", "1"]
+        return subprocess.run([*words, "--sources", path, self.folder / "data"], capture_output=True, text=True)
 
     def test_the_layout_is_found_turned(self):
         grid = grids.Grid(self.grid, PITCH_MM)

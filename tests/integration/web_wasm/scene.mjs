@@ -13,17 +13,11 @@ let parts = [];
 let truth = null;
 
 function made(options, bytes = file) {
-  return new RealTime({
-    module,
-    objects: bytes,
-    options,
-    clock: () => now_ms,
-    on_bytes: (received, newest) => {
-      parts.push(received);
-      truth = newest;
-    },
-    on_left: (why) => seen.left.push(why),
-  });
+  const on_bytes = (received, newest) => {
+    parts.push(received);
+    truth = newest;
+  };
+  return new RealTime({ module, objects: bytes, options, clock: () => now_ms, on_bytes, on_left: (why) => seen.left.push(why) });
 }
 
 const fingertip = made({ errors: 'none', parallelBus: true, serial: '00000000C0FFEE00' });

@@ -97,9 +97,8 @@ class Simulated(WebWasm):
         commands = cls().commands("commands", "osr 256", "rate max", "stream contact,raw,health", "info")
         cls().commands("commands.loader", "loader")
         cls.capture = cls.folder / "scene.ftr"
-        cls.seen = json.loads(
-            must(OPTIONS.node, HERE / "scene.mjs", cls.web / "simulated.wasm", cls.web / "objects.bin", commands, cls.capture)
-        )
+        call = (OPTIONS.node, HERE / "scene.mjs", cls.web / "simulated.wasm", cls.web / "objects.bin", commands, cls.capture)
+        cls.seen = json.loads(must(*call))
         cls.truth = {truth["name"]: truth for truth in cls.seen["truths"]}
         cls.told = must(cls.build / "host_tools/tool/cli/fingertip", "convert", cls.capture, cls.folder / "scene.csv")
         cls.rows, cls.head = cls.recording(cls.folder / "scene.csv")
