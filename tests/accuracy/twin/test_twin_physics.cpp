@@ -1,4 +1,3 @@
-#include "axisymmetric_fem.hpp"
 #include "layer_collocation.hpp"
 #include "simulation/twin/best_gaussian.hpp"
 
@@ -159,44 +158,6 @@ TEST(TwinContact, TheImagesOfThePeriodicGridAreFarAway) {
     const double peak = close.base_Pa[at(near_grid, 0, 0)];
     for (int i = 0; i <= 90; i += 9) {
       EXPECT_NEAR(close.base_Pa[at(near_grid, i, 0)], far.base_Pa[at(far_grid, i, 0)], 2e-4 * peak);
-    }
-  }
-}
-
-// The pressure that one solution finds under a sphere, given to the other: the base feels the same,
-// and the surface takes the sphere's shape.
-TEST(TwinContact, FiniteElementsAgree) {
-  for (double thickness_mm : {12.0, 6.0}) {
-    const Layer layer = silicone(thickness_mm);
-    const Indenter &sphere = indenter("sphere15");
-    const Grid grid{640, 0.15};
-    ContactSolver solver(sphere, layer, grid);
-    const Contact contact = solver.solve(5.0);
-
-    std::vector<double> edges;
-    for (double r = 0.0; r < 5.0 * thickness_mm + 10.0; r += std::max(0.15, 0.05 * (r - 4.0))) {
-      edges.push_back(r);
-    }
-    const int columns = static_cast<int>(edges.size()) - 1;
-    AxisymmetricFem fem(edges, thickness_mm, 24, layer.youngs_modulus_Pa, layer.poisson);
-    const auto along_x = [&](const std::vector<double> &field, double r) {
-      const int i = static_cast<int>(r / grid.step_mm);
-      const double t = r / grid.step_mm - i;
-      return (1.0 - t) * field[at(grid, i, 0)] + t * field[at(grid, i + 1, 0)];
-    };
-    fem.load([&](double r) { return r < 20.0 ? along_x(contact.pressure_Pa, r) : 0.0; });
-
-    const double peak = contact.base_Pa[at(grid, 0, 0)];
-    for (int c = 0; c < columns && fem.middle_mm(c) < 30.0; c++) {
-      const double first = along_x(contact.base_Pa, fem.middle_mm(c));
-      EXPECT_NEAR(fem.base_pressure_Pa(c), first, std::max(0.02 * std::abs(first), 0.002 * peak))
-          << "r " << fem.middle_mm(c) << " mm, layer " << thickness_mm << " mm";
-    }
-    for (int c = 0; c < columns; c++) {
-      if (along_x(contact.pressure_Pa, edges[std::size_t(c)]) > 0.1 * contact.pressure_Pa[at(grid, 0, 0)]) {
-        const double height = sphere.profile_mm(edges[std::size_t(c)], 0.0);
-        EXPECT_NEAR(fem.surface_mm(c) + height, contact.indentation_mm, 0.02 * contact.indentation_mm);
-      }
     }
   }
 }
