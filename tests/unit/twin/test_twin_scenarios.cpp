@@ -1,9 +1,5 @@
 #include "scenes.hpp"
 
-extern "C" {
-#include "config/geometry.h"
-}
-
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -106,11 +102,7 @@ TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
   std::set<double> speeds;
   for (const Episode &episode : scenario.episodes) {
     speeds.insert(episode.speed_mm_s);
-    const auto phase = [&](const std::string &name) {
-      return *std::find_if(episode.phases.begin(), episode.phases.end(),
-                           [&](const Phase &one) { return one.name == name; });
-    };
-    const Phase dead = phase("dead_travel"), slip = phase("slip");
+    const Phase &dead = phase_of(episode, "dead_travel"), &slip = phase_of(episode, "slip");
     const auto y = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s).y_mm; };
     EXPECT_NEAR(std::abs(y(dead.end_s) - y(dead.begin_s)), 1.0, 0.21);
     EXPECT_NEAR(std::abs(y(slip.end_s) - y(dead.begin_s)), 24.0, 1e-6);
@@ -120,6 +112,14 @@ TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
                 0.006 * episode.speed_mm_s);
   }
   EXPECT_EQ(speeds, (std::set<double>{20, 50, 100, 150, 200}));
+}
+
+TEST(Scenarios, TwistsAreQuarterTurns) {
+  for (const Episode &episode : scenario_of("twist").episodes) {
+    const Phase &twist = phase_of(episode, "twist");
+    const auto angle = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s).angle_rad; };
+    EXPECT_NEAR(std::abs(angle(twist.end_s) - angle(twist.begin_s)), M_PI / 2, 1e-9);
+  }
 }
 
 TEST(Scenarios, GridIsThePapers) {
@@ -192,14 +192,13 @@ TEST(Scenarios, LiftsTakeAWeightOverWhileTheGripStays) {
   std::set<long> times_ms;
   std::set<int> quadrants;
   for (const Episode &episode : scenario.episodes) {
-    std::map<std::string, Phase> phases;
     for (const Phase &one : episode.phases) {
       EXPECT_FALSE(one.slip);
-      phases[one.name] = one;
     }
     const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
     const auto pull_N = [&](double t_s) { return std::hypot(at(t_s).pull_x_N, at(t_s).pull_y_N); };
-    const Phase &lift = phases.at("lift"), &carry = phases.at("carry"), &lower = phases.at("lower");
+    const Phase &lift = phase_of(episode, "lift"), &carry = phase_of(episode, "carry"),
+                &lower = phase_of(episode, "lower");
     times_ms.insert(std::lround(1e3 * (lift.end_s - lift.begin_s)));
     EXPECT_NEAR(lower.end_s - lower.begin_s, lift.end_s - lift.begin_s, 1e-9);
     const Touch held = at(lift.begin_s), carried = at(carry.begin_s);
