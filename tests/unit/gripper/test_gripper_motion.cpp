@@ -82,15 +82,6 @@ TEST(GripperMotion, SpeedsStayWithinItsLimits) {
   EXPECT_NEAR(motion.width_mm(), 85 - 20 - 0.025 * 20 + 15, 0.05);
 }
 
-TEST(GripperMotion, StopsAtSteps) {
-  GripperMotion motion = activated("2f85");
-  motion.move({.width_mm = 40.1, .speed_mm_s = 150});
-  run(motion, 1.0);
-  const double steps = motion.width_mm() / motion.mechanics().traits.step_mm;
-  EXPECT_NEAR(steps, std::round(steps), 1e-6);
-  EXPECT_NEAR(motion.width_mm(), 40.1, 0.19);
-}
-
 TEST(GripperMotion, IgnoresMovesShorterThanItsDeadband) {
   GripperMotion motion = activated("2f85");
   const double one_mm = motion.mechanics().traits.step_mm;
@@ -179,18 +170,6 @@ TEST(GripperMotion, ActivationDropsWhatIsHeld) {
   motion.activate();
   run(motion, motion.mechanics().activation_s / 3 - 0.01);
   EXPECT_EQ(motion.width_mm(), 85.0);
-}
-
-TEST(GripperMotion, WithoutPowerTheFingersStay) {
-  GripperMotion motion = activated("2f85");
-  motion.move({.width_mm = 0, .speed_mm_s = 100});
-  run(motion, 0.2);
-  const double stands_mm = motion.width_mm();
-  motion.power_off();
-  motion.move({.width_mm = 0, .speed_mm_s = 100});
-  run(motion, 1.0);
-  EXPECT_EQ(motion.width_mm(), stands_mm);
-  EXPECT_FALSE(motion.status().active);
 }
 
 TEST(GripperMotion, TheSameCommandAgainIsNone) {

@@ -167,19 +167,6 @@ TEST(Robotiq, TellsASecondOfSilenceOnce) {
   EXPECT_EQ(status.fault, 0);
 }
 
-/* Nor in the very exchange after which it knows. */
-TEST(Robotiq, IsNotActivatedByTheMoveAfterItsPowerWasLost) {
-  Served simulated(served("2f85"));
-  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
-  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 150});
-  simulated.with([](GripperServer &server, GripperMotion &) {
-    server.power(false);
-    server.power(true);
-  });
-  EXPECT_FALSE(gripper->move({.width_mm = 85, .speed_mm_s = 150}).moving);
-  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.19);
-}
-
 TEST(Robotiq, OnlyActivateClearsAFault) {
   Served simulated(served("2f85"));
   std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
