@@ -101,12 +101,8 @@ class Usage(GraspTest):
     def test_limits_are_checked_before_a_port_is_opened(self):
         for arguments, words in (
             (("--cap", "0.1"), '--cap "0.1" is not possible; give N, 0.5 to 100'),
-            (("--approach", "9"), "mm/s, 0.5 to 8"),
             (("--margin", "x"), "give 1 to 5"),
-            (("--fixed", "nan"), "N, 0.1 to 100"),
             (("--preset", "anvil"), "no preset anvil; there are egg, strawberry, cup"),
-            (("--preset", "crisp"), "the least move of a 2f85, 0.75 mm, may press with"),
-            (("--fixed", "6", "--cap", "5"), "--fixed is not possible; it is above --cap"),
             (("--open-width", "90"), "2f85 opens to 85.0 mm"),
         ):
             _, err = self.run_grasp(*arguments, status=2)
@@ -236,17 +232,6 @@ class Course(GraspTest):
             self.assertGreater(len(recording["t_us"]), 50)
             self.assertEqual(recording.end, {})
 
-    def test_a_kill_while_it_closes_stops_it(self):
-        with self.cell("object=0"):
-            process = self.start()
-            self.until_state(process, "approach")
-            self.world.until(lambda: self.tell()[0] < 75)
-            process.kill()
-            process.wait()
-            width = self.tell()[0]
-            self.world.sleep(1)
-            self.assertGreater(self.tell()[0], width - 3)
-
 
 class Trouble(GraspTest):
     """Nothing of this opens the gripper or tightens it."""
@@ -295,17 +280,6 @@ class Trouble(GraspTest):
             self.world.until(lambda: len(files.read_recording(self.csv, serial="AAAA").events) == 2, step_s=0.5)  # went, came back
             self.finish(process)
 
-    def test_a_fingertip_is_unplugged_while_it_closes(self):
-        with self.cell("object=20"):
-            process = self.start()
-            self.until_state(process, "approach")
-            self.tell("unplug left")
-            self.tell("unplug right")
-            self.told(process, "right: no frames")
-            self.assert_stays()
-            self.assertGreater(self.tell()[0], 21)
-            self.finish(process)
-
     def test_a_fingertip_is_unplugged_while_it_opens(self):
         with self.cell():
             process = self.hold()
@@ -317,33 +291,6 @@ class Trouble(GraspTest):
             process.communicate()
             self.assertGreater(self.tell()[0], 83)
 
-    def test_a_frozen_fingertip_is_told(self):
-        with self.cell():
-            process = self.hold()
-            self.tell("freeze left 1")
-            self.told(process, "left: its values never change")
-            self.finish(process)
-
-    def test_beyond_its_range_it_is_not_tightened(self):
-        with self.cell():
-            process = self.hold()
-            self.tell("over 1")
-            self.told(process, "beyond its range")
-            self.world.sleep(0.5)  # what is under way
-            before = self.tell("load 6")[1]
-            self.world.sleep(0.5)
-            self.assertLessEqual(self.tell()[1], before + 0.4)
-            self.finish(process)
-
-    def test_never_beyond_the_cap(self):
-        with self.cell():
-            process = self.hold("--cap", "5")
-            self.tell("load 9")
-            self.told(process, "more force than the cap")
-            self.assertLess(self.tell()[1], 5.6)
-            self.finish(process)
-            self.assertLess(self.rows()["force_N"].max(), 5.6)
-
     def test_an_object_that_falls_is_dropped(self):
         with self.cell():
             process = self.hold()
@@ -351,32 +298,6 @@ class Trouble(GraspTest):
             out, err = process.communicate()
             self.assertEqual(process.returncode, DROPPED, err)
             self.assertIn("nothing is between the fingertips any more", err)
-
-    def test_a_slide_is_answered_with_more_force(self):
-        with self.cell():
-            process = self.hold()
-            before = self.tell()[1]
-            self.tell("slide 1")
-            self.world.until(lambda: self.tell()[1] > 1.1 * before)
-            self.tell("slide 0")
-            self.finish(process)
-        rows = self.rows()
-        self.assertEqual(rows["slides"].max(), 1)
-        self.assertIn("slipping", set(rows["state"]))
-
-    def test_a_silent_gripper_is_waited_for(self):
-        with self.cell():
-            process = self.hold()
-            for fault in ("silent", "garbage"):
-                self.tell(f"line {fault}")
-                self.told(process, "the gripper does not answer")
-                self.tell("load 5")
-                self.assert_stays()
-                self.tell("load 1")
-                self.tell("line none")
-                while "the gripper does not answer" in process.readline():
-                    pass
-            self.finish(process)
 
     def test_a_gripper_unplugged_to_the_end_is_a_fault(self):
         with self.cell():
@@ -386,22 +307,16 @@ class Trouble(GraspTest):
             _, err = self.finish(process, FAULT)
             self.assertRegex(err, "the gripper does not answer: .*gripper: (gone|no such port)")
 
-    def test_a_fault_of_the_gripper_ends_it(self):
-        with self.cell():
-            process = self.hold()
-            self.tell("fault 8")
-            err = self.failed(process)
-            self.assertIn("fault; the width stays", err)
-            self.assertRegex(err, "(?m)^the gripper failed: fault 8, too hot, it must cool down; it is not active any more.*$")
-            self.assertGreater(self.tell()[1], 0.8)
-
     def test_a_fault_that_is_over_is_named_at_the_end_and_in_the_recording(self):
         with self.cell():
             process = self.hold()
             self.tell("fault 14")
             self.until_state(process, "fault")
             self.tell("fault 0")
-            self.assertRegex(self.failed(process), "(?m)^the gripper failed: fault 14, too much current; needs activation; ")
+            err = self.failed(process)
+            self.assertIn("fault; the width stays", err)
+            self.assertRegex(err, "(?m)^the gripper failed: fault 14, too much current; needs activation; ")
+            self.assertGreater(self.tell()[1], 0.8)
         self.assertTrue(any("the gripper failed: fault 14, too much current" in text for _, text in files.read_grip_events(self.csv)))
         rows = self.rows()
         self.assertEqual(set(rows["fault"][rows["state"] == "fault"]), {14})

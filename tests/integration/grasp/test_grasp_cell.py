@@ -19,10 +19,8 @@ import unittest
 import numpy as np
 
 FINGERTIP, FINGERTIP_SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:5])
-sys.path[:0] = [
-    str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"),
-    str(pathlib.Path(__file__).resolve().parents[2] / "support"),
-]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
 from simulated_time import SimulatedTime  # noqa: E402
 
@@ -44,11 +42,8 @@ class CellTest(unittest.TestCase):
         self.folder = folder.name
         self.csv, self.truth_csv = f"{self.folder}/grasp.csv", f"{self.folder}/truth.csv"
         self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
-        self.environment |= {
-            "LC_ALL": "C.UTF-8",
-            "XDG_RUNTIME_DIR": self.folder,
-            "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right",
-        }
+        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder}
+        self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
         self.begin_world()
 
     def begin_world(self):
@@ -58,12 +53,8 @@ class CellTest(unittest.TestCase):
     @contextlib.contextmanager
     def cell(self, *options, model="2f85"):
         self.model = model
-        process = self.world.start(
-            [FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", model]
-            + ["--cache", TABLES, "--truth", self.truth_csv, *options],
-            stdin=subprocess.PIPE,
-        )
-        self.process = process
+        words = f"--lift --ports {self.folder} --gripper {model} --cache {TABLES} --truth {self.truth_csv}"
+        process = self.process = self.world.start([FINGERTIP_SIMULATE, *words.split(), *options], stdin=subprocess.PIPE)
         try:
             ready = process.readline()
             self.assertTrue(ready.startswith("ready: "), process.read("stderr") if not ready else ready)
@@ -123,20 +114,13 @@ class CellTest(unittest.TestCase):
         self.wait_for(lambda: self.now()["world_s"] >= until_s, "the world stands still")
 
     def start(self, *arguments, **how):
-        self.out = open(f"{self.folder}/out", "w+", encoding="utf-8")
-        self.err = open(f"{self.folder}/err", "w+", encoding="utf-8")
+        self.out = open(f"{self.folder}/said", "w+", encoding="utf-8")
         self.addCleanup(self.out.close)
-        self.addCleanup(self.err.close)
-        return self.world.start(
-            [FINGERTIP, "grasp", "--gripper", self.model, "--gripper-port", f"{self.folder}/gripper", *arguments],
-            env=self.environment,
-            stdout=self.out,
-            stderr=self.err,
-            **how,
-        )
+        words = [FINGERTIP, "grasp", "--gripper", self.model, "--gripper-port", f"{self.folder}/gripper", *arguments]
+        return self.world.start(words, env=self.environment, stdout=self.out, stderr=self.out, **how)
 
     def said(self):
-        return "".join(pathlib.Path(f"{self.folder}/{name}").read_text(encoding="utf-8") for name in ("out", "err"))
+        return pathlib.Path(self.out.name).read_text(encoding="utf-8")
 
     def wait_for_words(self, words, process):
         def are_said():

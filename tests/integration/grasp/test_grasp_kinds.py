@@ -52,14 +52,9 @@ class Kinds(unittest.TestCase):
         self.assertEqual((found["grasps"], found["never_settled_percent"]), (4, 0))
 
     def test_what_the_grippers_steps_allow_is_better_than_ours(self):
-        rms = [
-            kinds.summary_of_sets(
-                json.loads(run("--kind", "gentle", "--still", "12", "--controller", controller, "--count", "24", "--seed", "3").stdout)[
-                    "each"
-                ]
-            )["firm_rms_p50_percent"]
-            for controller in ("oracle", "ours")
-        ]
+        words = "--kind gentle --still 12 --count 24 --seed 3 --controller".split()
+        grasps = [json.loads(run(*words, controller).stdout)["each"] for controller in ("oracle", "ours")]
+        rms = [kinds.summary_of_sets(each)["firm_rms_p50_percent"] for each in grasps]
         self.assertLess(rms[0], 0.8 * rms[1])
 
     def test_a_trace_has_a_value_for_each_moment(self):
@@ -69,19 +64,9 @@ class Kinds(unittest.TestCase):
         self.assertGreater(lengths.pop(), 500)
 
     def test_wrong_usage_is_one_line(self):
-        for options in (
-            ("--count", "0"),
-            ("--gripper", "banana"),
-            ("--kind", "bananas"),
-            ("--controller", "firm"),
-            ("--rate", "x"),
-            ("--rate", "0"),
-            ("--set", "grip=1"),
-            ("--set", "fixed"),
-            ("--jobs", "0"),
-            ("--what", "1"),
-        ):
-            done = run(*options)
+        wrong = "--count 0/--gripper banana/--kind bananas/--controller firm/--rate x/--rate 0/--set grip=1/--set fixed/--jobs 0/--what 1"
+        for options in wrong.split("/"):
+            done = run(*options.split())
             self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), options)
 
 

@@ -15,8 +15,10 @@ import threading
 import unittest
 
 FINGERTIP, FINGERTIP_SIMULATE, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
+from real_time import RealTime  # noqa: E402
 
 # A machine that is held up for less than that changes nothing of what is asked here.
 HELD_UP = ("--timeout", "10000", "--silent", "5000", "--stale", "1000")
@@ -31,25 +33,15 @@ class Stopped(unittest.TestCase):
         self.folder = folder.name
         self.csv = f"{self.folder}/grasp.csv"
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("LC_")}
-        self.environment |= {
-            "LC_ALL": "C.UTF-8",
-            "XDG_RUNTIME_DIR": self.folder,
-            "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right",
-        }
+        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder}
+        self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
+        self.world = RealTime()
+        self.addCleanup(self.world.close)
         faulthandler.dump_traceback_later(PATIENCE_s, exit=True)
         self.addCleanup(faulthandler.cancel_dump_traceback_later)
 
     def start(self, *arguments):
-        process = subprocess.Popen(
-            arguments, env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-
-        def end():
-            process.kill()
-            process.communicate()
-
-        self.addCleanup(end)
-        return process
+        return self.world.start(arguments, env=self.environment, stdin=subprocess.PIPE)
 
     def until(self, process, words):
         lines = []
@@ -60,9 +52,8 @@ class Stopped(unittest.TestCase):
         return lines[-1]
 
     def test_the_tool_and_then_the_cell(self):
-        cell = self.start(
-            FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES
-        )  # which stands on the table
+        words = f"--lift --ports {self.folder} --gripper 2f85 --by-command --cache {TABLES}"
+        cell = self.start(FINGERTIP_SIMULATE, *words.split())  # what it grips stands on the table
         self.until(cell, "ready: ")
         tool = self.start(FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", f"{self.folder}/gripper", "-o", self.csv, *HELD_UP)
         self.until(tool, " s  holding ")
