@@ -21,6 +21,7 @@ import bags  # noqa: E402  finds the package too
 from fingertip import InputError, JointRecordingWriter, RecordingWriter, read_recording  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 from mcap.writer import Writer  # noqa: E402
+from real_time import RealTime, plugged_in  # noqa: E402
 
 TWO = ROOT / "tests/fuzz/corpus/recording/two"
 
@@ -112,6 +113,18 @@ class TestMcap(unittest.TestCase):
                 self.assertFalse((self.folder / "none.csv").exists())
             for out in ("out.csv", "out.mcap"):
                 self.assertEqual(bags.call(FINGERTIP, "convert", start, self.folder / out, "--salvage", "--overwrite").stderr, said)
+
+    def test_of_a_killed_recorder_every_written_chunk_is_read(self):
+        port, bag = self.folder / "killed_port", self.folder / "killed.mcap"
+        contacts = lambda: sum(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag))
+        with plugged_in(FAKE_DEVICE, port, f"rate={bags.RATE_Hz}"):
+            with subprocess.Popen([FINGERTIP, "record", bag, "--port", port], stderr=subprocess.DEVNULL) as recorder:
+                RealTime().until(lambda: recorder.poll() is not None or bag.exists() and contacts())
+                recorder.kill()
+        whole = self.convert(bag, "killed.csv").read_bytes()
+        self.assertNotIn(b"\n# end:", whole)
+        self.assertGreater(contacts(), 0)
+        self.assertEqual(contacts(), sum(line[:1].isdigit() for line in whole.splitlines()))
 
     def test_what_is_no_recording_is_said(self):
         other = self.folder / "other.mcap"

@@ -24,6 +24,7 @@ FINGERTIP, SIMULATED_FINGERTIP, SIMULATED_DEVICE, TIME_KEEPER = (os.path.abspath
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
 sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
+import bags  # noqa: E402
 import fingertip  # noqa: E402
 from fingertip import Fingertip, Fingertips, Flag, Streams, clock, device, errors, host_time, transport, wire  # noqa: E402
 from simulated_host_time import SimulatedHostTime  # noqa: E402
@@ -101,6 +102,26 @@ class Codec(Folder):
         ):
             with self.assertRaises(errors.FormatError):
                 wire.encode(bad)
+
+    def test_what_it_writes_is_what_c_writes_of_the_same_line(self):
+        packets = [packet._replace(sequence=number & 0xFFFF) for number, packet in enumerate(bags.some_packets(1, 400), 65500)]
+        pathlib.Path(self.path("line.ftr")).write_bytes(b"\0" + b"".join(map(wire.encode, packets)))
+        self.call("replay", self.path("line.ftr"), "--to-csv", self.path("c.csv"))
+        with fingertip.RecordingWriter(self.path("python.csv"), packets[0].body) as writer:
+            for packet in packets:
+                writer.packet(packet)
+        by_c, by_python = (pathlib.Path(self.path(name)).read_text(encoding="utf-8") for name in ("c.csv", "python.csv"))
+        rows = r"(?m)^\d.*$"
+        self.assertGreater(len(re.findall(rows, by_c)), 300)
+        self.assertEqual(re.findall(rows, by_python), re.findall(rows, by_c))
+
+    def test_cobs_at_its_longest_run(self):
+        for length in (1, 253, 254, 255, 507, 508, 509):
+            for packet in (length * b"\7", length * b"\7" + b"\0", b"\0" + length * b"\7"):
+                coded = wire.cobs_encode(packet)
+                self.assertNotIn(0, coded)
+                self.assertLessEqual(len(coded), len(packet) + 1 + len(packet) // 254)
+                self.assertEqual(wire.cobs_decode(coded), packet)
 
 
 class Clock(unittest.TestCase):

@@ -78,11 +78,6 @@ TEST(Symbols, EveryCutOrDamagedFileIsAnErrorOrHarmless) {
   }
 }
 
-TEST(Symbols, NoSuchFile) {
-  EXPECT_THROW(Symbols::of_file("/nowhere/at.elf"), Error);
-  EXPECT_THROW(Symbols::of_file("/"), Error);
-}
-
 TEST(Crash, InWords) {
   Symbols symbols(small_elf(), "small.elf");
   EXPECT_EQ(crash_text(with_places(record_of(CRASH_FAULT), symbols)),

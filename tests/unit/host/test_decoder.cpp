@@ -51,7 +51,7 @@ std::uint64_t errors(const LineStatistics &statistics) {
 
 } // namespace
 
-/* Versions, types, sequences, noise and what is too long: the streams of tests/formats have them, also for Python. */
+/* Versions, types, damage, noise and what is too long: the streams of tests/formats have them, also for Python. */
 TEST(Decoder, FindsPacketsHoweverTheBytesArePartitioned) {
   Bytes bytes = joined({frame(7), frame(8), {0, 0}, frame(9)});
   for (std::size_t chunk : {std::size_t{1}, std::size_t{3}, std::size_t{17}, bytes.size()}) {
@@ -60,36 +60,6 @@ TEST(Decoder, FindsPacketsHoweverTheBytesArePartitioned) {
     EXPECT_EQ(errors(result.statistics), 0u);
     EXPECT_EQ(result.statistics.dropped_packets, 0u);
     EXPECT_EQ(result.statistics.bytes, bytes.size());
-  }
-}
-
-TEST(Decoder, JoiningAtAnyByteIsNoError) {
-  Bytes first = frame(1);
-  for (std::size_t torn = 1; torn < first.size(); torn++) {
-    Bytes bytes = joined({Bytes(first.begin() + static_cast<std::ptrdiff_t>(torn), first.end()), frame(2), frame(3)});
-    Result result = decode(bytes);
-    EXPECT_EQ(result.sequences, (std::vector<std::uint16_t>{2, 3})) << torn;
-    EXPECT_EQ(errors(result.statistics), 0u) << torn;
-    EXPECT_EQ(result.statistics.dropped_packets, 0u) << torn;
-  }
-}
-
-TEST(Decoder, AFlippedBitCostsOnePacketOrTwoAndIsCounted) {
-  Bytes clean = joined({frame(1), frame(2), frame(3), frame(4)});
-  std::size_t begin = frame(1).size();
-  std::size_t end = begin + frame(2).size();
-  for (std::size_t at = begin; at < end; at++) {
-    for (int bit = 0; bit < 8; bit++) {
-      Bytes bytes = clean;
-      bytes[at] = static_cast<std::uint8_t>(bytes[at] ^ 1 << bit);
-      Result result = decode(bytes);
-      /* A flip into or out of 0x00 moves a frame boundary: the neighbour may go too. */
-      EXPECT_GE(result.sequences.size(), 2u);
-      EXPECT_LE(result.sequences.size(), 3u);
-      EXPECT_EQ(result.sequences.back(), 4);
-      EXPECT_GE(errors(result.statistics), 1u);
-      EXPECT_EQ(result.statistics.dropped_packets + result.sequences.size(), 4u);
-    }
   }
 }
 

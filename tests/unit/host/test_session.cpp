@@ -166,25 +166,3 @@ TEST(Session, RelatesTheClocksWhateverTimeADeviceReports) {
     EXPECT_LE(session.clock()->uncertainty_us, 1000000);
   }
 }
-
-TEST(Session, AVanishedPortAndAStopEndTheWait) {
-  FakeTransport line;
-  line.gone = true;
-  Session session(line);
-  EXPECT_THROW(session.info(), Gone);
-  FakeTransport silent;
-  Session stopped(silent, [] { return true; });
-  EXPECT_THROW(stopped.info(), Interrupted);
-}
-
-TEST(Session, BytesAreTappedAsTheyCome) {
-  FakeTransport line;
-  wire_packet contact = test::make_contact(1, 2, 3);
-  line.say(contact);
-  Session session(line);
-  std::vector<std::uint8_t> tapped;
-  session.on_bytes(
-      [&](const std::uint8_t *bytes, std::size_t length) { tapped.insert(tapped.end(), bytes, bytes + length); });
-  session.poll(milliseconds(0));
-  EXPECT_EQ(tapped, frame_bytes(contact));
-}

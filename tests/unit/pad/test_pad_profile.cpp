@@ -66,26 +66,6 @@ TEST(PadProfile, HoldsTheLayerWithinItsError) {
   EXPECT_LT(misfit_of(pad).tangential, 0.0120);
 }
 
-/* Of a least-squares fit every step away makes it worse. */
-TEST(PadProfile, IsTheOptimum) {
-  const pad_profile best = profile_of(h_mm);
-  const Misfit least = misfit_of(best);
-  for (float factor : {0.99F, 1.01F}) {
-    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-      pad_profile share = best, sd = best;
-      share.normal[j].share *= factor;
-      sd.normal[j].sd_mm *= factor;
-      EXPECT_GT(std::min(misfit_of(share).normal, misfit_of(sd).normal), least.normal);
-    }
-    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-      pad_profile moment = best, sd = best;
-      moment.tangential[j].moment_mm *= factor;
-      sd.tangential[j].sd_mm *= factor;
-      EXPECT_GT(std::min(misfit_of(moment).tangential, misfit_of(sd).tangential), least.tangential);
-    }
-  }
-}
-
 TEST(PadProfile, GrowsWithTheThickness) {
   const pad_profile thin = profile_of(6), thick = profile_of(12);
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
