@@ -10,7 +10,6 @@ Each report makes the page again when it ends. Pictures are inside, nothing is l
 
 import argparse
 import base64
-import csv
 import fnmatch
 import html
 import json
@@ -122,13 +121,7 @@ def picture_html(path, caption):
 def further_table_html(path, caption):
     if not path.is_file():
         return f"<p>{html.escape(caption)} ({path.name}): <strong>not there</strong>.</p>"
-    if path.suffix == ".json":
-        inside = value_html(json.loads(path.read_text(encoding="utf-8")))
-    else:
-        with open(path, newline="", encoding="utf-8") as file:
-            header, *rows = csv.reader(file)
-        inside = table_html(header, [[html.escape(cell) for cell in row] for row in rows])
-    return folded(f"{caption} ({path.name})", inside)
+    return folded(f"{caption} ({path.name})", value_html(json.loads(path.read_text(encoding="utf-8"))))
 
 
 def read_figures(path):

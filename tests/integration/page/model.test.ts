@@ -2,16 +2,8 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Line } from '../../../host_tools/web/src/line/line';
-import {
-  Flag,
-  PacketType,
-  Result,
-  Stream,
-  WIRE_VERSION,
-  type Contact,
-  type Info,
-  type Raw,
-} from '../../../host_tools/web/src/line/line_facts';
+import { Flag, PacketType, Result, Stream, WIRE_VERSION } from '../../../host_tools/web/src/line/line_facts';
+import type { Contact, Info, Raw } from '../../../host_tools/web/src/line/line_facts';
 import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
 import { PATIENCE } from '../../../host_tools/web/src/model/patience';
 import { History } from '../../../host_tools/web/src/model/history';
@@ -108,22 +100,13 @@ class SpokenLine implements Line {
   private first: (() => void) | null = null;
 
   private acknowledge(command: number, view: DataView, result: number): void {
-    this.say({
-      type: PacketType.ACK,
-      command,
-      result,
-      command_sequence: view.getUint16(2, true),
-      host_time_us: Number(view.getBigUint64(4, true)),
-    });
+    const asked = { command_sequence: view.getUint16(2, true), host_time_us: Number(view.getBigUint64(4, true)) };
+    this.say({ type: PacketType.ACK, command, result, ...asked });
   }
 
   private answer(command: number, view: DataView): void {
-    const asks: Record<number, string> = {
-      [PacketType.CMD_INFO]: 'info_grasp',
-      [PacketType.CMD_HEALTH]: 'health',
-      [PacketType.CMD_CRASH]: 'crash',
-    };
-    const name = asks[command];
+    const { CMD_INFO, CMD_HEALTH, CMD_CRASH } = PacketType;
+    const name = { [CMD_INFO]: 'info_grasp', [CMD_HEALTH]: 'health', [CMD_CRASH]: 'crash' }[command];
     this.acknowledge(command, view, name ? Result.DONE : this.result);
     if (name && --this.loses < 0) {
       this.say({ ...decoded(vector(name).frame)!, t_us: this.device_us, ...(this.serial && { serial: this.serial }) });

@@ -33,21 +33,23 @@ function historyOf(count: number, contact: (i: number) => Partial<Contact> | nul
   return history;
 }
 
+/** Of a history of so many frames, one each millisecond, in intervals of that width; and the numbers of its first and last interval. */
+function bucketsOf(history: History, width_s: number, capacity = 500, end_s = (history.end - 1) / 1000): [Buckets, number, number] {
+  const buckets = new Buckets(capacity);
+  const { first, last } = buckets.read(history, width_s, 0, end_s);
+  return [buckets, first, last];
+}
+
 const forceOf = (buckets: Buckets) => buckets.tracks.get('force_N')!;
 
 test('an interval keeps the lowest and the highest value, and which came first', () => {
   const history = historyOf(1000, (i) => ({ force_N: i === 503 ? 9 : i === 507 ? -1 : 2, force_sd_N: 0.5 }));
-  const buckets = new Buckets(500);
-  const { first, last } = buckets.read(history, 0.01, 0, 0.999);
+  const [buckets, first, last] = bucketsOf(history, 0.01);
   assert.deepEqual([first, last], [0, 99]);
-  const force = forceOf(buckets);
-  assert.equal(force.high[buckets.slot(50)], 9);
-  assert.equal(force.low[buckets.slot(50)], -1);
-  assert.equal(force.rises[buckets.slot(50)], 0);
-  assert.equal(force.sdHigh[buckets.slot(50)], 9.5);
-  assert.equal(force.sdLow[buckets.slot(50)], -1.5);
-  assert.equal(force.high[buckets.slot(51)], 2);
-  assert.equal(buckets.frames[buckets.slot(50)], 10);
+  const { high, low, rises, sdHigh, sdLow } = forceOf(buckets);
+  const at = buckets.slot(50);
+  assert.deepEqual([high[at], low[at], rises[at], sdHigh[at], sdLow[at], buckets.frames[at]], [9, -1, 0, 9.5, -1.5, 10]);
+  assert.equal(high[buckets.slot(51)], 2);
 });
 
 test('read in many small steps, or back and forth, intervals are those of one reading', () => {
@@ -76,23 +78,15 @@ test('read in many small steps, or back and forth, intervals are those of one re
 
 test('a ring that is full gives the newest intervals alone', () => {
   const history = historyOf(5000, (i) => ({ force_N: i }), 1000);
-  const buckets = new Buckets(4000);
-  const { first, last } = buckets.read(history, 0.01, 0, 4.999);
-  const there = [];
-  for (let b = first; b <= last; b++) {
-    if (buckets.slot(b) >= 0) {
-      there.push(b);
-    }
-  }
-  assert.equal(there[0], 400);
-  assert.equal(there.length, 100);
+  const [buckets, first, last] = bucketsOf(history, 0.01, 4000);
+  const there = Array.from({ length: last - first + 1 }, (_, i) => first + i).filter((b) => buckets.slot(b) >= 0);
+  assert.deepEqual([there[0], there.length], [400, 100]);
   assert.equal(forceOf(buckets).low[buckets.slot(400)], 4000);
 });
 
 test('a fingertip that restarts goes on in time, and its frame numbers are no loss', () => {
   const history = historyOf(3000, () => ({ force_N: 5 }));
-  const buckets = new Buckets(500);
-  buckets.read(history, 0.01, 0, 2.999);
+  const [buckets] = bucketsOf(history, 0.01);
   for (let i = 0; i < 100; i++) {
     history.addContact(contactOf({ frame: i, t_us: i * 1000, force_N: 1 }));
   }
@@ -103,58 +97,46 @@ test('a fingertip that restarts goes on in time, and its frame numbers are no lo
 });
 
 test('doubtful frames count only where there is no other', () => {
-  const history = historyOf(40, (i) => ({
-    force_N: i % 2 ? 50 : 2,
-    flags: i < 20 && i % 2 === 0 ? FITTED : FITTED | Flag.UNCERTAIN,
-  }));
-  const buckets = new Buckets(10);
-  buckets.read(history, 0.02, 0, 0.039);
-  const force = forceOf(buckets);
-  assert.equal(force.trust[buckets.slot(0)], Trust.good);
-  assert.equal(force.high[buckets.slot(0)], 2);
-  assert.equal(force.trust[buckets.slot(1)], Trust.doubtful);
-  assert.equal(force.high[buckets.slot(1)], 50);
+  const flagsOf = (i: number) => (i < 20 && i % 2 === 0 ? FITTED : FITTED | Flag.UNCERTAIN);
+  const [buckets] = bucketsOf(
+    historyOf(40, (i) => ({ force_N: i % 2 ? 50 : 2, flags: flagsOf(i) })),
+    0.02,
+  );
+  const { trust, high } = forceOf(buckets);
+  const found = [0, 1].flatMap((b) => [trust[buckets.slot(b)], high[buckets.slot(b)]]);
+  assert.deepEqual(found, [Trust.good, 2, Trust.doubtful, 50]);
 });
 
 test('a value without its flag is none', () => {
   const history = historyOf(10, () => ({ force_N: 7, flags: Flag.TARED }));
-  const buckets = new Buckets(10);
-  buckets.read(history, 0.01, 0, 0.009);
+  const [buckets] = bucketsOf(history, 0.01);
   assert.equal(forceOf(buckets).trust[buckets.slot(0)], Trust.none);
   assert.equal(buckets.tracks.get('slip_mm')?.trust[buckets.slot(0)], Trust.none);
 });
 
 test('a line is broken where frames were lost, and where none came, and nowhere else', () => {
   const history = historyOf(3000, (i) => (i === 1005 || (i >= 1500 && i < 2400) ? null : { force_N: 1, force_sd_N: 0.1 }));
-  const buckets = new Buckets(500);
-  const { first, last } = buckets.read(history, 0.01, 0, 2.999);
+  const [buckets, first, last] = bucketsOf(history, 0.01, 500, 2.999);
   const chart = chartOf(buckets, ['force_N'], first, last, 0.25);
   const good = chart.curves.get('force_N')?.good ?? [];
   const broken = chart.t_s.filter((_, i) => good[i] === null);
   assert.equal(chart.t_s.length, good.length);
-  assert.deepEqual(
-    broken.map((t_s) => Math.round(t_s * 100)),
-    [100, 240],
-  );
-  assert.deepEqual(
-    spansOf(buckets, 'lost', first, last, 0.02).map(({ from_s }) => Math.round(from_s * 100)),
-    [100, 240],
-  );
+  const lost = spansOf(buckets, 'lost', first, last, 0.02).map(({ from_s }) => from_s);
+  for (const all of [broken, lost]) {
+    assert.equal(all.map((t_s) => Math.round(t_s * 100)).join(), '100,240');
+  }
   assert.equal(buckets.lost[buckets.slot(240)], 900);
 });
 
 test('a frame number that wraps is no loss', () => {
   const history = historyOf(10, (i) => ({ force_N: 1, frame: (0xfffffffb + i) >>> 0 }));
-  const buckets = new Buckets(10);
-  buckets.read(history, 0.02, 0, 0.009);
-  assert.equal(buckets.frames[buckets.slot(0)], 10);
-  assert.equal(buckets.lost[buckets.slot(0)], 0);
+  const [buckets] = bucketsOf(history, 0.02);
+  assert.deepEqual([buckets.frames[buckets.slot(0)], buckets.lost[buckets.slot(0)]], [10, 0]);
 });
 
 test('solid where it can be trusted, dashed where not, and the two meet', () => {
   const history = historyOf(60, (i) => ({ force_N: i, flags: i >= 20 && i < 40 ? FITTED | Flag.FLAT : FITTED }));
-  const buckets = new Buckets(10);
-  const { first, last } = buckets.read(history, 0.01, 0, 0.059);
+  const [buckets, first, last] = bucketsOf(history, 0.01);
   const { good, doubtful } = chartOf(buckets, ['force_N'], first, last, 0.25).curves.get('force_N')!;
   const both = good.flatMap((value, i) => (value !== null && doubtful[i] !== null ? [i] : []));
   assert.deepEqual(both, [3, 8]);
@@ -163,10 +145,7 @@ test('solid where it can be trusted, dashed where not, and the two meet', () => 
 });
 
 test('limits of axes and intervals are round', () => {
-  assert.equal(roundAbove(0.11), 0.2);
-  assert.equal(roundAbove(1), 1);
-  assert.equal(roundAbove(5.01), 10);
-  assert.equal(roundAbove(NaN), 1);
+  assert.deepEqual([0.11, 1, 5.01, NaN].map(roundAbove), [0.2, 1, 10, 1]);
   for (const [span_s, pixels] of [
     [20, 900],
     [180, 333],
@@ -277,48 +256,43 @@ test('readers of the screen are told what begins, ends and changes, no faster th
 });
 
 const LAYOUT = { x_mm: [-9, 0, 9], y_mm: [0, 0, 0] };
+/** A picture of it, live or old. */
+const pictureOf = (contact: Contact, isLive = true) => sceneOf(LAYOUT, contact, READINGS, [], null, isLive);
 const READINGS = { valid: 0b011, saturated: 0, doubtful: 0b010, pressure_Pa: new Float32Array([1000, 2000, NaN]) };
 
 test('a picture shows doubt, broken sensors, and nothing that is old', () => {
   const contact = contactOf({ force_N: 2, p0_Pa: 9000, sigma_mm: 3, location_sd_mm: 0.3, flags: FITTED | Flag.MODEL });
-  const scene = sceneOf(LAYOUT, contact, READINGS, [], null, true);
+  const scene = pictureOf(contact);
   assert.deepEqual(scene.broken, [false, false, true]);
   assert.deepEqual(scene.doubtful, [false, true, false]);
   assert.equal(scene.fit?.doubtful, true);
   assert.ok(Math.abs((scene.fit?.sd_mm ?? 0) - 0.3) < 1e-6);
-  const old = sceneOf(LAYOUT, contact, READINGS, [], null, false);
+  const old = pictureOf(contact, false);
   assert.equal(old.fit, null);
   assert.deepEqual(old.pressure_Pa, [null, null, null]);
-  assert.equal(sceneOf(LAYOUT, contactOf({ flags: Flag.TARED }), READINGS, [], null, true).fit, null);
+  assert.equal(pictureOf(contactOf({ flags: Flag.TARED })).fit, null);
 });
 
 test('an arrow has a direction only where the load is no noise', () => {
   const flags = FITTED | Flag.TANGENTIAL_VALID;
   const pull = { flags, force_N: 4, qx_N: 0, qy_N: 2, tangential_ratio: 0.5 };
-  const sure = sceneOf(LAYOUT, contactOf({ ...pull, q_sd_N: 0.1 }), READINGS, [], null, true).fit?.arrow;
+  const sure = pictureOf(contactOf({ ...pull, q_sd_N: 0.1 })).fit?.arrow;
   assert.deepEqual([sure?.along_x, sure?.along_y, sure?.length_mm], [0, 1, 15]);
-  const unsure = sceneOf(LAYOUT, contactOf({ ...pull, q_sd_N: 1.5 }), READINGS, [], null, true).fit?.arrow;
+  const unsure = pictureOf(contactOf({ ...pull, q_sd_N: 1.5 })).fit?.arrow;
   assert.equal(unsure?.length_mm, 0);
   assert.ok((unsure?.sd_mm ?? 0) > 10);
-  assert.equal(sceneOf(LAYOUT, contactOf({ ...pull, flags: FITTED }), READINGS, [], null, true).fit?.arrow, null);
+  assert.equal(pictureOf(contactOf({ ...pull, flags: FITTED })).fit?.arrow, null);
 });
 
 test('two contacts are two spots, and a long one has its ends', () => {
   const two = { x1_mm: -5, y1_mm: 7, location1_sd_mm: 0.25, x2_mm: 4, y2_mm: -2, location2_sd_mm: 0.5 };
-  const both = sceneOf(LAYOUT, contactOf({ ...two, flags: FITTED | Flag.SHAPE_VALID | Flag.TWO_CONTACTS }), READINGS, [], null, true).fit;
+  const both = pictureOf(contactOf({ ...two, flags: FITTED | Flag.SHAPE_VALID | Flag.TWO_CONTACTS })).fit;
   assert.deepEqual(both?.two, [
     { x_mm: -5, y_mm: 7, sd_mm: 0.25 },
     { x_mm: 4, y_mm: -2, sd_mm: 0.5 },
   ]);
   assert.ok(both?.doubtful && both.edge === null);
-  const long = sceneOf(
-    LAYOUT,
-    contactOf({ edge_angle_deg: -90, edge_length_mm: 20, flags: FITTED | Flag.SHAPE_VALID | Flag.EDGE }),
-    READINGS,
-    [],
-    null,
-    true,
-  ).fit;
+  const long = pictureOf(contactOf({ edge_angle_deg: -90, edge_length_mm: 20, flags: FITTED | Flag.SHAPE_VALID | Flag.EDGE })).fit;
   assert.deepEqual([long?.edge?.x_mm.toFixed(3), long?.edge?.y_mm, long?.two, long?.doubtful], ['0.000', -10, [], false]);
 });
 
