@@ -67,12 +67,7 @@ class Bench extends ImageBench {
     return this.recording()
       .filter((line) => line.startsWith('# packet: sync'))
       .map((line) => {
-        const fields = Object.fromEntries(
-          line
-            .split(' ')
-            .slice(3)
-            .map((pair) => pair.split('=')),
-        );
+        const fields = Object.fromEntries([...line.matchAll(/(\w+)=(\S+)/g)].map(([, key, value]) => [key, value]));
         return { t_us: Number(fields.t_us), number: Number(fields.number), high: fields.level === '1' };
       });
   }

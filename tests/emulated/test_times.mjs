@@ -9,12 +9,7 @@ import { test } from 'node:test';
 import { ImageBench } from './harness/image_bench.mjs';
 
 const [images, fingertip, command_frame] = process.argv.slice(2);
-const DAY_us = 86400e6;
-const CROSSINGS = [
-  ['2^32 us', 2 ** 32],
-  ['2^32 ms', 2 ** 32 * 1000],
-  ['60 days', 60 * DAY_us],
-];
+const CROSSINGS = Object.entries({ '2^32 us': 2 ** 32, '2^32 ms': 2 ** 32 * 1000, '60 days': 60 * 86400e6 });
 const BEFORE_us = 400e3;
 
 function bench(name, crossing_us) {
@@ -34,10 +29,8 @@ for (const name of ['pico_mux', 'pico_parallel']) {
       const [least, most] = [Math.min(...steps_us), Math.max(...steps_us)];
       t.diagnostic(`${told.length} frames, ${least} to ${most} us apart`);
       assert.ok(least > 0.5 * most, `${least} to ${most} us apart`);
-      assert.ok(
-        told.slice(1).every(([, frame], i) => frame === told[i][1] + 1),
-        'each frame has the next number',
-      );
+      const isNext = told.slice(1).every(([, frame], i) => frame === told[i][1] + 1);
+      assert.ok(isNext, 'each frame has the next number');
       const { reboots, usb } = device.end();
       assert.deepEqual([reboots, usb.enumerations], [0, 1]);
     });

@@ -8,10 +8,8 @@ const [TYPE_HEALTH, TYPE_CRASH] = [0x04, 0x06];
 export class CrashBench extends ImageBench {
   constructor(images, tools, name, options) {
     super(images, tools, name, options);
-    const lines = execFileSync('arm-none-eabi-nm', ['-S', this.elf], { encoding: 'utf8' })
-      .trim()
-      .split('\n')
-      .map((l) => l.split(' '));
+    const listed = execFileSync('arm-none-eabi-nm', ['-S', this.elf], { encoding: 'utf8' }).trim().split('\n');
+    const lines = listed.map((l) => l.split(' '));
     this.symbols = new Map(lines.map((words) => [words.at(-1), parseInt(words[0], 16) & ~1]));
     this.functions = lines
       .filter((words) => /^[tT]$/.test(words.at(-2)) && !words.at(-1).startsWith('$'))
@@ -92,22 +90,6 @@ function decoded(body) {
   const words = Array.from({ length: 9 + 8 }, (_, i) => body.readUInt32LE(21 + 4 * i));
   const [r0, r1, r2, r3, r12, lr, pc, xpsr, sp] = words;
   const events = Array.from({ length: 8 }, (_, i) => [body[5 + i], body[13 + i], words[9 + i] * 1.024]).filter(([code]) => code);
-  return {
-    kind,
-    exception,
-    vector,
-    activity,
-    stuck,
-    r0,
-    r1,
-    r2,
-    r3,
-    r12,
-    lr,
-    pc,
-    xpsr,
-    sp,
-    events,
-    t_us: Number(body.readBigUInt64LE(89)),
-  };
+  const registers = { r0, r1, r2, r3, r12, lr, pc, xpsr, sp };
+  return { kind, exception, vector, activity, stuck, ...registers, events, t_us: Number(body.readBigUInt64LE(89)) };
 }

@@ -97,20 +97,13 @@ export class ImageBench {
     this.machine.client.write(this.encoded('health'));
     this.run(20);
     const line = this.recording().findLast((l) => l.startsWith('# packet: health'));
-    return Object.fromEntries(
-      line
-        .split(' ')
-        .slice(3)
-        .map((pair) => pair.split('='))
-        .map(([key, value]) => [key, Number(value)]),
-    );
+    return Object.fromEntries([...line.matchAll(/(\w+)=(\S+)/g)].map(([, key, value]) => [key, Number(value)]));
   }
 
   /** Frames of the recording, by column; NaN where there is nothing. */
   rows() {
-    const [head, ...rows] = this.recording()
-      .filter((l) => !l.startsWith('#'))
-      .map((l) => l.split(','));
+    const lines = this.recording().filter((l) => !l.startsWith('#'));
+    const [head, ...rows] = lines.map((l) => l.split(','));
     return rows.map((cells) => Object.fromEntries(head.map((name, i) => [name, cells[i] === '' ? NaN : Number(cells[i])])));
   }
 
