@@ -41,8 +41,7 @@ def check_grip(path, prng):
 
 
 def check_scenario(path, _):
-    scenario = files.read_scenario(path)
-    assert scenario is not None
+    assert files.read_scenario(path) is not None
 
 
 def check_truth(path, _):

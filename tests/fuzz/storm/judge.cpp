@@ -295,21 +295,10 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
     find("time", t_us, text("uptime %u s at %.3f s", health.uptime_s, uptime_s));
   }
   if (health_of_life_) {
-    constexpr std::uint32_t wire_health::*COUNTERS[] = {
-        &wire_health::frames,
-        &wire_health::frames_incomplete,
-        &wire_health::frames_skipped,
-        &wire_health::packets_sent,
-        &wire_health::packets_dropped,
-        &wire_health::commands_done,
-        &wire_health::commands_rejected,
-        &wire_health::bus_nacks,
-        &wire_health::bus_timeouts,
-        &wire_health::bus_recoveries,
-        &wire_health::zero_readings,
-        &wire_health::implausible_readings,
-    };
-    for (const auto counter : COUNTERS) {
+    using H = wire_health;
+    for (const auto counter : {&H::frames, &H::frames_incomplete, &H::frames_skipped, &H::packets_sent,
+                               &H::packets_dropped, &H::commands_done, &H::commands_rejected, &H::bus_nacks,
+                               &H::bus_timeouts, &H::bus_recoveries, &H::zero_readings, &H::implausible_readings}) {
       if (health.*counter - (*health_of_life_).*counter >= 0x80000000u) {
         find("loss", t_us, "a counter of the health packet went back");
         break;

@@ -207,21 +207,16 @@ TEST(Judge, AnExcuseCounts) {
   EXPECT_EQ(line.judge().figures().excused, 1u);
 }
 
-TEST(Judge, FindsALossThatIsNotCounted) {
-  Line line;
-  line.run_to(5000000);
-  line.lose_packet(false);
-  line.run_to(8000000);
-  EXPECT_EQ(found(line), "loss; ");
-}
-
-TEST(Judge, FindsFramesThatAreMissingAndNotCounted) {
-  Line line;
-  line.run_to(5000000);
-  line.skip_frame(false);
-  line.skip_frame(false); // one might still wait for the processor
-  line.run_to(8000000);
-  EXPECT_EQ(found(line), "loss; ");
+TEST(Judge, FindsPacketsAndFramesThatAreMissingAndNotCounted) {
+  for (const bool packet : {true, false}) {
+    Line line;
+    line.run_to(5000000);
+    for (int i = 0; i < 2; i++) { // one frame might still wait for the processor
+      packet ? line.lose_packet(false) : line.skip_frame(false);
+    }
+    line.run_to(8000000);
+    EXPECT_EQ(found(line), "loss; ");
+  }
 }
 
 TEST(Judge, FindsACommandWithoutAnAnswerAndAnAnswerWithoutACommand) {
