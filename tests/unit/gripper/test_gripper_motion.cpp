@@ -172,6 +172,18 @@ TEST(GripperMotion, ActivationDropsWhatIsHeld) {
   EXPECT_EQ(motion.width_mm(), 85.0);
 }
 
+TEST(GripperMotion, WithoutPowerTheFingersStay) {
+  GripperMotion motion = activated("2f85");
+  motion.move({.width_mm = 0, .speed_mm_s = 100});
+  run(motion, 0.2);
+  const double stands_mm = motion.width_mm();
+  motion.power_off();
+  motion.move({.width_mm = 0, .speed_mm_s = 100});
+  run(motion, 1.0);
+  EXPECT_EQ(motion.width_mm(), stands_mm);
+  EXPECT_FALSE(motion.status().active);
+}
+
 TEST(GripperMotion, TheSameCommandAgainIsNone) {
   GripperMotion motion = activated("2f85");
   motion.blocked_at = spring(40, 10);
