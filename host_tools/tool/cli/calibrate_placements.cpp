@@ -1,8 +1,9 @@
+#include "tool/cli/calibrate_placements.hpp"
+
 #include "libfingertip/error.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/thickness.hpp"
 #include "tool/calibration/judge.hpp"
-#include "tool/cli/calibrate.hpp"
 
 extern "C" {
 #include "common/limits.h"

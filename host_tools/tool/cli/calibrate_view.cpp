@@ -75,48 +75,31 @@ Canvas draw(const GainSession &session, int columns, int rows) {
   return canvas;
 }
 
-class ScreenCalibrateView : public CalibrateView {
-public:
-  explicit ScreenCalibrateView(ColourDepth depth) : screen_(depth) {}
-  void update(const GainSession &session, bool news) override {
-    const auto now = host_now();
-    if (news || now >= next_) {
-      next_ = now + REDRAW;
-      screen_.draw(draw(session, screen_.columns(), screen_.rows()));
-    }
-  }
-  std::optional<Key> key() override { return screen_.key(); }
-
-private:
-  Screen screen_;
-  HostTime next_{};
-};
-
-class LineCalibrateView : public CalibrateView {
-public:
-  void update(const GainSession &session, bool news) override {
-    const std::string advice = session.advice();
-    if (news) {
-      std::printf("%s\n", session.progress().c_str());
-    }
-    if (advice != advice_) {
-      std::printf("%s\n", advice.c_str());
-      advice_ = advice;
-    }
-    std::fflush(stdout);
-  }
-
-private:
-  std::string advice_;
-};
-
 } // namespace
 
-std::unique_ptr<CalibrateView> make_calibrate_view(ColourMode mode) {
+CalibrateView::CalibrateView(ColourMode mode) {
   if (auto depth = screen_depth(mode)) {
-    return std::make_unique<ScreenCalibrateView>(*depth);
+    screen_ = std::make_unique<Screen>(*depth);
   }
-  return std::make_unique<LineCalibrateView>();
+}
+
+void CalibrateView::update(const GainSession &session, bool news) {
+  const auto now = host_now();
+  if (screen_) {
+    if (news || now >= next_) {
+      next_ = now + REDRAW;
+      screen_->draw(draw(session, screen_->columns(), screen_->rows()));
+    }
+    return;
+  }
+  if (news) {
+    std::printf("%s\n", session.progress().c_str());
+  }
+  if (session.advice() != advice_) {
+    advice_ = session.advice();
+    std::printf("%s\n", advice_.c_str());
+  }
+  std::fflush(stdout);
 }
 
 } // namespace fingertip

@@ -6,18 +6,22 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 namespace fingertip {
 
+/* The pad on a terminal, elsewhere a line for each placement. */
 class CalibrateView {
 public:
-  virtual ~CalibrateView() = default;
+  explicit CalibrateView(ColourMode mode);
   /* Called often. news: a placement was taken or taken back. */
-  virtual void update(const calibrating::GainSession &session, bool news) = 0;
-  virtual std::optional<Key> key() { return std::nullopt; }
-};
+  void update(const calibrating::GainSession &session, bool news);
+  std::optional<Key> key() { return screen_ ? screen_->key() : std::nullopt; }
 
-/* The pad on a terminal, elsewhere a line for each placement. */
-std::unique_ptr<CalibrateView> make_calibrate_view(ColourMode mode);
+private:
+  std::unique_ptr<Screen> screen_;
+  HostTime next_{};
+  std::string advice_;
+};
 
 } // namespace fingertip

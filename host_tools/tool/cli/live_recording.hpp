@@ -3,13 +3,13 @@
 
 #include "libfingertip/device_loop.hpp"
 #include "libfingertip/recording_writer.hpp"
-#include "tool/cli/live.hpp"
 
 #include <string>
 #include <vector>
 
 namespace fingertip {
 
+inline constexpr const char *STDOUT_NAME = "-"; /* of a file */
 /* How long a row may wait for earlier ones of other fingertips. */
 constexpr double SETTLE_us = 250e3;
 
@@ -20,7 +20,7 @@ class LiveRecording {
 public:
   /* ready: the news of that kind of each fingertip; port: of the only one. extra: for the head of a recording
    * of several. */
-  LiveRecording(const LiveOptions &options, const std::vector<DeviceNews> &ready, const std::string &port,
+  LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
                 std::int64_t host_zero_us, const Metadata &extra = {});
 
   void packet(const DeviceNews &news);

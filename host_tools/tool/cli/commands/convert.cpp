@@ -1,16 +1,190 @@
+#include "libfingertip/command.hpp"
+#include "libfingertip/error.hpp"
 #include "libfingertip/line_sink.hpp"
 #include "libfingertip/line_source.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/packet_file.hpp"
+#include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/cli/command_line.hpp"
 #include "tool/cli/converter.hpp"
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
+#include <string>
 
 namespace fingertip {
 
 namespace {
+
+using Count = unsigned long long;
+
+bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
+
+/* That a recording has a place for. */
+bool is_kept(const wire_packet &packet) {
+  return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO || packet.type == WIRE_ACK ||
+         packet.type == WIRE_SYNC;
+}
+
+void check_paths(const Conversion &conversion) {
+  if (is_same_file(conversion.from, conversion.to)) {
+    throw Error(conversion.to + ": is the file to read; give another name");
+  }
+  check_output(conversion.to, conversion.overwrite);
+}
+
+/* The facts of a file that is read for them once. */
+struct Contents {
+  std::optional<wire_info> info; /* the first */
+  std::optional<std::uint8_t> sensor_count;
+  std::uint64_t frames = 0; /* packets of them */
+  std::uint64_t left_out = 0;
+  Metadata recorder;
+};
+
+Contents contents_of(const Conversion &conversion) {
+  PacketFile file(conversion.from, conversion.salvage, conversion.device);
+  Contents contents;
+  while (auto item = file.next()) {
+    if (item->kind != PacketFile::Item::Kind::packet) {
+      continue;
+    }
+    const wire_packet &packet = item->packet;
+    contents.frames += is_frame(packet);
+    contents.left_out += !is_kept(packet);
+    if (packet.type == WIRE_INFO && !contents.info) {
+      contents.info = packet.body.info;
+    } else if (packet.type == WIRE_RAW && !contents.sensor_count) {
+      contents.sensor_count = packet.body.raw.sensor_count;
+    }
+  }
+  contents.recorder = file.recorder_metadata();
+  if (contents.frames == 0) {
+    throw Error(conversion.from + ": no frames in it; give one of a streaming fingertip");
+  }
+  return contents;
+}
+
+void report_cut_short(const std::string &path, bool is_cut_short) {
+  if (is_cut_short) {
+    std::fprintf(stderr, "%s: no end line: the recording was cut short, its recorder killed or its disk full\n",
+                 printable(path).c_str());
+  }
+}
+
+} // namespace
+
+void report_losses(const std::string &path, const PacketFile &file) {
+  std::string name = printable(path);
+  if (file.skipped_lines() > 0) {
+    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", name.c_str(), static_cast<Count>(file.skipped_lines()));
+  }
+  report_cut_short(path, file.is_cut_short());
+}
+
+void convert_packets(const Conversion &conversion) {
+  check_paths(conversion);
+  Contents contents = contents_of(conversion);
+  Metadata metadata = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", conversion.from}};
+  for (const auto &[key, value] : contents.recorder) {
+    bool replaced = key == "recorded_by" || key == "source" || key == "host_zero_us";
+    if (!replaced) {
+      metadata.emplace_back(key, value);
+    }
+  }
+  RecordingWriter writer(make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished),
+                         contents.info ? &*contents.info : nullptr,
+                         contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}),
+                         metadata, contents.sensor_count.has_value());
+  PacketFile file(conversion.from, conversion.salvage, conversion.device);
+  while (auto item = file.next()) {
+    if (item->kind == PacketFile::Item::Kind::packet) {
+      writer.packet(item->packet);
+    } else {
+      writer.event(0, item->event);
+    }
+  }
+  writer.finish({file.statistics()}, "converted");
+  report_losses(conversion.from, file);
+  if (contents.left_out > 0) {
+    std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n",
+                 printable(conversion.from).c_str(), static_cast<Count>(contents.left_out));
+  }
+  std::printf("%s: %llu frames, %s\n", printable(conversion.to).c_str(), static_cast<Count>(writer.frames()),
+              file.statistics().text().c_str());
+}
+
+namespace {
+
+/* To a recording, line by line: nothing is lost, nothing changed. Throws Error. */
+void convert_lines(const Conversion &conversion) {
+  check_paths(conversion);
+  RecordingReader(conversion.from, true); /* throws for what is none */
+  auto source = open_lines(conversion.from);
+  auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
+  LineSource::Line line;
+  std::uint64_t last = 0, count = 0;
+  bool is_ended = false;
+  const auto report_damage = [&](const std::string &what, const std::string &place = "") {
+    if (!conversion.salvage) {
+      throw Error(ErrorCode::damaged_line, conversion.from + place + ": " + what);
+    }
+    std::fprintf(stderr, "%s: %s\n", printable(conversion.from).c_str(), what.c_str());
+  };
+  for (;;) {
+    try {
+      if (!source->next(line)) {
+        break;
+      }
+    } catch (const Error &error) {
+      if (!conversion.salvage || error.code() != ErrorCode::damaged_line) {
+        throw;
+      }
+      std::fprintf(stderr, "%s\n", printable(error.what()).c_str());
+      continue;
+    }
+    if (line.number > last + 1) {
+      report_damage(std::to_string(line.number - last - 1) + " lines are lost before line " +
+                    std::to_string(line.number));
+    }
+    last = line.number;
+    count++;
+    is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
+    if (line.torn) {
+      report_damage("the last line is torn", ":" + std::to_string(line.number));
+      sink->torn_line(line.text);
+    } else {
+      sink->line(line.text);
+    }
+  }
+  sink->finish();
+  report_cut_short(conversion.from, !is_ended);
+  std::printf("%s: %llu lines\n", printable(conversion.to).c_str(), static_cast<Count>(count));
+}
+
+/* To the bytes of the line. */
+void convert_to_capture(const Conversion &conversion) {
+  check_paths(conversion);
+  contents_of(conversion); /* throws before anything is written */
+  OutputFile capture(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
+  PacketFile file(conversion.from, conversion.salvage, conversion.device);
+  std::uint64_t packets = 0;
+  while (auto item = file.next()) {
+    if (item->kind == PacketFile::Item::Kind::packet) {
+      const auto bytes = frame_bytes(item->packet);
+      capture.append(bytes.data(), bytes.size());
+      packets++;
+    }
+  }
+  capture.finish();
+  report_losses(conversion.from, file);
+  std::printf("%s: %llu packets, without the recorder's own lines\n", printable(conversion.to).c_str(),
+              static_cast<Count>(packets));
+}
 
 /* Whether its content is a recording; the reader reports a file that is neither. */
 bool is_recording(const std::string &path) {

@@ -1,23 +1,425 @@
-/* monitor and record. */
-#include "tool/cli/live.hpp"
-
+/* monitor and record: fingertips on their ports, shown and recorded until something ends it; one and many alike. */
+#include "libfingertip/clock.hpp"
+#include "libfingertip/command.hpp"
+#include "libfingertip/connection.hpp"
+#include "libfingertip/device_loop.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/packet_file.hpp"
+#include "libfingertip/text.hpp"
 #include "tool/cli/command_line.hpp"
+#include "tool/cli/live_recording.hpp"
+#include "tool/cli/names_of_values.hpp"
+#include "tool/cli/terminal.hpp"
+#include "tool/cli/view.hpp"
 
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
 #include <memory>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
 
 namespace fingertip {
 
 namespace {
 
-struct Options {
+using std::chrono::milliseconds;
+
+constexpr milliseconds POLL{20};
+
+struct LiveOptions {
   Choice choice; /* without the device */
   std::vector<std::string> devices;
   bool all = false;
-  LiveOptions live;
+  std::optional<double> seconds; /* of device time from the first frame; of several fingertips, of
+                                    the host's time from their common start */
+  std::string recording;         /* empty: none; "-": standard output, if it is no monitor */
+  std::string raw_bytes;         /* of one fingertip; empty: none */
+  bool overwrite = false;
+  bool until_gone = false; /* end when a port vanishes, instead of waiting for it */
+  bool monitor = true;     /* else a line of progress */
+  ColourMode colour = ColourMode::automatic;
 };
 
+class Live {
+public:
+  Live(const LiveOptions &options, const std::vector<Way> &ways)
+      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()), taring_(ways.size()),
+        accepted_(ways.size()), reported_missing_(ways.size()) {
+    DeviceLoop::Options wanted;
+    wanted.streams = WIRE_STREAM_ALL;
+    wanted.follow_clock = several();
+    wanted.bytes = !options.raw_bytes.empty();
+    wanted.wait_for_back = !options.until_gone;
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      loops_.push_back(std::make_unique<DeviceLoop>(i, ways[i], wanted, feed_));
+      models_[i].set_source(loops_[i]->name());
+    }
+    running_ = loops_.size();
+    if (!options.recording.empty() && !to_standard_output_) {
+      note_ = "recording to " + printable(options.recording);
+    }
+    view_ = options.monitor       ? make_monitor_view(options.colour)
+            : to_standard_output_ ? make_state_view()
+                                  : make_progress_view();
+  }
+
+  int run() {
+    while (running_ > 0) {
+      take_news();
+      show();
+      if (reason_.empty()) {
+        reason_ = reason_to_end();
+        if (!reason_.empty()) {
+          stop();
+        }
+      }
+    }
+    update_statistics();
+    view_.reset();
+    for (const auto &loop : loops_) {
+      loop->rethrow();
+    }
+    if (!begun_ && stop_requested()) {
+      throw Interrupted();
+    }
+    finish();
+    if (!several() && models_[0].frames() == 0 && reason_ == "gone") {
+      throw Gone(loops_[0]->name() + ": vanished before the first frame");
+    }
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      if (models_[i].is_without_sensors()) {
+        throw Error(loops_[i]->name() + ": none of its sensors answers; see their wiring and supply (fingertip info)");
+      }
+    }
+    return 0;
+  }
+
+private:
+  bool several() const { return models_.size() > 1; }
+
+  void take_news() {
+    /* Asked first: what was read until then is in the feed. A row waits for those of a fingertip
+     * whose thread got no time to read them. */
+    double settled_us = static_cast<double>(steady_now_us());
+    for (const auto &loop : loops_) {
+      settled_us = std::min(settled_us, loop->read_until_us());
+    }
+    for (DeviceNews &news : feed_.take(POLL)) {
+      take(news);
+    }
+    if (RecordingWriter *recording = joint_recording()) {
+      recording->settle(settled_us - SETTLE_us);
+    }
+  }
+
+  void take(DeviceNews &news) {
+    using Kind = DeviceNews::Kind;
+    Model &model = models_[news.device];
+    switch (news.kind) {
+    case Kind::packet:
+      model.take(news.packet);
+      if (news.packet.type == WIRE_HEALTH) {
+        report_missing(news.device);
+      }
+      take_answer(news.device, news.packet);
+      if (recording_) {
+        recording_->packet(news);
+      } else if (ready_[news.device]) {
+        early_[news.device].push_back(std::move(news));
+      }
+      break;
+    case Kind::ready:
+      ready_[news.device] = std::move(news);
+      if (std::all_of(ready_.begin(), ready_.end(), [](const auto &each) { return each; })) {
+        begin();
+      }
+      break;
+    case Kind::back:
+      model.set_state(Model::State::live);
+      event(news.device, EVENT_BACK);
+      break;
+    case Kind::gone:
+      model.set_state(Model::State::gone);
+      any_gone_ = true;
+      event(news.device, EVENT_GONE);
+      break;
+    case Kind::mute:
+      event(news.device, "no answer to the end of the streams");
+      break;
+    case Kind::bytes:
+      if (!raw_bytes_) {
+        raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite, OutputFile::Appears::at_once);
+      }
+      raw_bytes_->append(news.bytes.data(), news.bytes.size());
+      break;
+    case Kind::clock:
+      if (RecordingWriter *recording = joint_recording()) {
+        recording->clock(news.device, news.estimate, news.jumps);
+      }
+      break;
+    case Kind::ended:
+      running_--;
+      stop(); /* the others end too; what was written stays */
+      break;
+    }
+  }
+
+  /* Every one of them has answered. */
+  void begin() {
+    std::vector<DeviceNews> ready;
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      const char *serial = ready_[i]->packet.body.info.serial;
+      for (const DeviceNews &other : ready) {
+        if (std::memcmp(other.packet.body.info.serial, serial, WIRE_TEXT_BYTES) == 0) {
+          throw Error(loops_[i]->name() + ": is the same fingertip as another; name each once");
+        }
+      }
+      ready.push_back(*ready_[i]);
+    }
+    zero_us_ = steady_now_us();
+    if (!options_.recording.empty()) {
+      recording_.emplace(options_.recording, options_.overwrite, ready, loops_[0]->name(), zero_us_);
+      for (const auto &early : early_) {
+        for (const DeviceNews &news : early) {
+          recording_->packet(news);
+        }
+      }
+    }
+    begun_ = true;
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      models_[i].set_state(Model::State::live);
+      loops_[i]->start();
+    }
+  }
+
+  RecordingWriter *joint_recording() { return recording_ && several() ? &recording_->writer() : nullptr; }
+
+  void event(std::size_t device, const std::string &text) {
+    if (recording_) {
+      recording_->event(device, text);
+    }
+  }
+
+  void stop() {
+    for (const auto &loop : loops_) {
+      loop->stop();
+    }
+  }
+
+  double seconds() const {
+    return several() ? static_cast<double>(steady_now_us() - zero_us_) / 1e6 : models_[0].seconds();
+  }
+
+  /* "" to go on. */
+  std::string reason_to_end() const {
+    if (options_.until_gone && any_gone_) {
+      return "gone";
+    }
+    if (stop_requested() || quit_ || (to_standard_output_ && !is_standard_output_read())) {
+      return "interrupted";
+    }
+    if (begun_ && options_.seconds && models_[0].frames() > 0 && seconds() >= *options_.seconds) {
+      return "seconds";
+    }
+    return "";
+  }
+
+  void update_statistics() {
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      models_[i].set_statistics(loops_[i]->statistics());
+    }
+  }
+
+  void show() {
+    update_statistics();
+    if (options_.monitor || begun_ || !several()) {
+      view_->update(models_, caption());
+    }
+    auto now = host_now();
+    while (auto key = view_->key()) {
+      take_key(*key, now);
+      view_->hurry();
+    }
+    tare_.expire(now);
+    if (now > message_until_) {
+      message_.clear();
+    }
+  }
+
+  void take_key(Key key, HostTime now) {
+    if (tare_.is_asked()) {
+      if (tare_.answer(key, now)) {
+        taring_.assign(loops_.size(), true);
+        for (const auto &loop : loops_) {
+          loop->send(command_tare());
+        }
+        show_message("taring");
+      } else {
+        show_message("not tared");
+      }
+    } else if (key == 'q') {
+      quit_ = true;
+    } else if (key == 't' && std::all_of(models_.begin(), models_.end(),
+                                         [](const Model &model) { return model.state() == Model::State::live; })) {
+      tare_.ask(now);
+    }
+  }
+
+  void show_message(const std::string &text) {
+    message_ = text;
+    message_until_ = host_now() + MESSAGE_TIME;
+  }
+
+  /* Takes the answers to a key: a tare is done once the frames of all fingertips report it. */
+  void take_answer(std::size_t device, const wire_packet &packet) {
+    if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
+      accepted_[device] = packet.body.ack.result == WIRE_RESULT_DONE;
+      if (!accepted_[device]) {
+        taring_[device] = false;
+        show_message((is_refused() ? message_ + "; " : "") + name_of(device) +
+                     "not tared: " + refusal(device, packet.body.ack.result));
+      }
+    } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
+      std::uint32_t flags = packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
+      if (flags & CONTACT_FLAG_TARED) {
+        accepted_[device] = taring_[device] = false;
+        if (!is_refused() && std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
+          show_message("tared");
+        }
+      }
+    }
+  }
+
+  std::string refusal(std::size_t device, std::uint8_t result) const {
+    const auto &contact = models_[device].contact();
+    return result == WIRE_RESULT_NOT_NOW && contact && (contact->flags & CONTACT_FLAG_CONTACT)
+               ? "it reports a contact, let go of the pad"
+               : result_text(result);
+  }
+
+  bool is_refused() const { return message_.find("not tared: ") != std::string::npos; }
+
+  /* Which of several. */
+  std::string name_of(std::size_t device) const {
+    const Model &model = models_[device];
+    return !several() || !model.info() ? "" : text_field(model.info()->serial) + ": ";
+  }
+
+  Caption caption() {
+    Caption caption;
+    caption.keys = "q quit  t tare";
+    if (tare_.is_asked()) {
+      caption.question = several() ? "tare all, pads free? y/n" : "tare, pad free? y/n";
+    }
+    auto add = [&](const std::string &text) {
+      caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
+    };
+    add(message_);
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      std::uint32_t missing = models_[i].missing_sensors();
+      add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
+    }
+    if (const RecordingWriter *recording = joint_recording(); recording && !options_.monitor) {
+      add("aligned to " + fixed(recording->alignment_us(), 0) + " us");
+    }
+    add(note_);
+    return caption;
+  }
+
+  /* For programs and log files: once, and when it changes. */
+  void report_missing(std::size_t device) {
+    std::uint32_t missing = models_[device].missing_sensors();
+    if (options_.monitor || missing == reported_missing_[device]) {
+      return;
+    }
+    reported_missing_[device] = missing;
+    std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "",
+                 printable(loops_[device]->name()).c_str(),
+                 missing ? ("sensors missing: " + sensors_text(missing) + "; see their wiring (fingertip info)").c_str()
+                         : "all sensors answer");
+  }
+
+  void finish() {
+    std::vector<LineStatistics> statistics;
+    LineStatistics sum;
+    for (const Model &model : models_) {
+      statistics.push_back(model.statistics());
+      sum += model.statistics();
+    }
+    if (recording_) {
+      recording_->finish(statistics, reason_);
+    }
+    std::string name = recording_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
+    if (!several()) {
+      std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(), summary_text(models_[0]).c_str());
+      return;
+    }
+    const RecordingWriter *joint = joint_recording();
+    if (!joint) {
+      for (std::size_t i = 0; i < models_.size(); i++) {
+        std::printf("%s%s\n", name_of(i).c_str(), summary_text(models_[i]).c_str());
+      }
+      return;
+    }
+    std::uint64_t frames = 0;
+    std::string edges;
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      frames += joint->frames(i);
+      edges += edges_text(models_[i]);
+    }
+    const double edges_us = joint->edges_alignment_us();
+    const std::string by_edges = edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
+    std::fprintf(
+        stderr,
+        "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets dropped, %llu CRC errors%s\n",
+        name.c_str(), static_cast<unsigned long long>(frames), models_.size(), fixed(joint->alignment_us(), 0).c_str(),
+        by_edges.c_str(), static_cast<unsigned long long>(sum.dropped_packets),
+        static_cast<unsigned long long>(sum.crc_errors), edges.c_str());
+  }
+
+  const LiveOptions &options_;
+  const bool to_standard_output_ = options_.recording == STDOUT_NAME;
+  DeviceFeed feed_;
+  std::vector<Model> models_;
+  std::vector<std::optional<DeviceNews>> ready_;
+  std::vector<std::vector<DeviceNews>> early_; /* packets before all were ready */
+  std::unique_ptr<OutputFile> raw_bytes_;
+  std::optional<LiveRecording> recording_;
+  std::unique_ptr<View> view_;
+  std::string note_;
+  std::string message_;
+  HostTime message_until_{};
+  Confirmation tare_;
+  std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
+  std::vector<std::uint32_t> reported_missing_;
+  std::string reason_;
+  std::int64_t zero_us_ = 0;
+  std::size_t running_ = 0;
+  bool begun_ = false;
+  bool any_gone_ = false;
+  bool quit_ = false;
+  std::vector<std::unique_ptr<DeviceLoop>> loops_; /* end first: their threads use the feed */
+};
+
+/* Before a port is opened, so that a wrong path costs nothing. Throws Error. */
+void check_outputs(const LiveOptions &options) {
+  for (const std::string &path : {options.recording, options.raw_bytes}) {
+    if (!path.empty() && path != STDOUT_NAME) {
+      check_output(path, options.overwrite);
+    }
+  }
+  if (!options.recording.empty() && !options.raw_bytes.empty() && is_same_file(options.recording, options.raw_bytes)) {
+    throw Error(options.raw_bytes + ": is the recording too; give --raw-bytes another name");
+  }
+}
+
 /* Throws Error if there is no fingertip, or it is not clear which. */
-std::vector<Way> ways_of(const Options &options) {
+std::vector<Way> ways_of(const LiveOptions &options) {
   std::vector<Way> ways;
   if (options.all) {
     ways = all_ways(options.choice.reach);
@@ -34,23 +436,26 @@ std::vector<Way> ways_of(const Options &options) {
   return ways;
 }
 
-int run(const Options &options) {
-  const LiveOptions &live = options.live;
-  if (live.recording == STDOUT_NAME && live.monitor) {
+int run(const LiveOptions &options) {
+  if (options.recording == STDOUT_NAME && options.monitor) {
     throw WrongUsage("monitor shows on standard output; give --record a file, or use `fingertip record -`");
   }
-  if (live.recording == STDOUT_NAME && (options.all || options.devices.size() > 1)) {
+  if (options.recording == STDOUT_NAME && (options.all || options.devices.size() > 1)) {
     throw WrongUsage("several fingertips need a file; for - run one `fingertip record - --device SERIAL` for each");
   }
-  if (live.raw_bytes == STDOUT_NAME) {
+  if (options.raw_bytes == STDOUT_NAME) {
     throw WrongUsage("--raw-bytes needs a file; give it a name");
   }
-  check_outputs(live);
-  return run_live(live, ways_of(options));
+  check_outputs(options);
+  const std::vector<Way> ways = ways_of(options);
+  if (ways.size() > 1 && !options.raw_bytes.empty()) {
+    throw Error("--raw-bytes keeps one fingertip's line; leave it out, or choose one fingertip");
+  }
+  return Live(options, ways).run();
 }
 
 CLI::App *add(CommandLine &line, const std::string &name, const std::string &help,
-              const std::shared_ptr<Options> &options) {
+              const std::shared_ptr<LiveOptions> &options) {
   CLI::App *command = line.add(name, help, [options] { return run(*options); });
   command->add_option("--device", options->devices, "Serial number of the fingertip; several are taken on one clock")
       ->take_all()
@@ -58,28 +463,28 @@ CLI::App *add(CommandLine &line, const std::string &name, const std::string &hel
       ->type_name("SERIAL");
   with_port_only(command, options->choice);
   command->add_flag("--all", options->all, "Every fingertip there is, on one clock");
-  with_seconds(command, options->live.seconds, "End after this much device time");
-  command->add_option("--raw-bytes", options->live.raw_bytes, "Also keep the bytes of the line as they came")
+  with_seconds(command, options->seconds, "End after this much device time");
+  command->add_option("--raw-bytes", options->raw_bytes, "Also keep the bytes of the line as they came")
       ->type_name("FILE.ftr");
-  command->add_flag("--overwrite", options->live.overwrite, "Replace files that exist");
-  command->add_flag("--until-gone", options->live.until_gone, "End when the port vanishes, instead of waiting for it");
+  command->add_flag("--overwrite", options->overwrite, "Replace files that exist");
+  command->add_flag("--until-gone", options->until_gone, "End when the port vanishes, instead of waiting for it");
   return command;
 }
 
 } // namespace
 
 void add_monitor(CommandLine &line) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LiveOptions>();
   CLI::App *command = add(line, "monitor", "Show live what fingertips feel", options);
-  command->add_option("--record", options->live.recording, "Record at the same time")->type_name("FILE.csv|FILE.mcap");
-  with_colour(command, options->live.colour);
+  command->add_option("--record", options->recording, "Record at the same time")->type_name("FILE.csv|FILE.mcap");
+  with_colour(command, options->colour);
 }
 
 void add_record(CommandLine &line) {
-  auto options = std::make_shared<Options>();
-  options->live.monitor = false;
+  auto options = std::make_shared<LiveOptions>();
+  options->monitor = false;
   add(line, "record", "Record every frame to a CSV or MCAP file, until Ctrl-C", options)
-      ->add_option("file", options->live.recording,
+      ->add_option("file", options->recording,
                    "The recording to write, CSV or MCAP by its name; -: standard output, each row as it comes")
       ->required()
       ->type_name("FILE.csv|FILE.mcap|-");
