@@ -37,7 +37,6 @@ def check_recording(path, prng):
 
 def check_grip(path, prng):
     files.read_grip(path, salvage=prng.random() < 0.5)
-    files.read_grip_events(path)
 
 
 def check_scenario(path, _):

@@ -56,6 +56,15 @@ wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
   return command_calibrate(made, SENSORS);
 }
 
+std::uint8_t streams_of(const std::string &text) {
+  for (std::uint8_t streams = 0; streams <= WIRE_STREAM_ALL; streams++) {
+    if (streams_text(streams) == text) {
+      return streams;
+    }
+  }
+  throw Error("streams \"" + text + "\" are unknown; give none, or some of contact,raw,health in this order");
+}
+
 /* Of settings that travel in one command. */
 wire_packet command_of(std::initializer_list<std::string> texts) {
   std::vector<WantedSetting> wanted;
@@ -72,7 +81,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
   };
   auto word = [&](std::size_t i) { return words[i]; };
   std::map<std::string, Form> forms = {
-      {"stream", {1, [&] { return command_stream(streams_from_text(word(1))); }}},
+      {"stream", {1, [&] { return command_stream(streams_of(word(1))); }}},
       {"tare", {0, [] { return command_tare(); }}},
       {"tare-force", {0, [] { return command_tare(true); }}},
       {"slip",

@@ -87,13 +87,6 @@ const Setting *find_setting(const std::string &name) {
   return nullptr;
 }
 
-wire_packet command_with(const char *name, const SettingValues &values) {
-  const Setting &setting = *find_setting(name);
-  wire_packet packet = packet_of(setting.command);
-  put(packet, setting, values);
-  return packet;
-}
-
 /* In units of the packet, not yet rounded. */
 std::optional<double> number_of(const SettingValue &value, const std::string &text) {
   if (value.words) {
@@ -167,16 +160,6 @@ wire_packet command_tare(bool force) {
   return packet;
 }
 
-wire_packet command_rate_mHz(std::uint32_t rate_mHz) { return command_with("rate", {static_cast<double>(rate_mHz)}); }
-
-wire_packet command_osr(std::uint32_t osr) { return command_with("osr", {static_cast<double>(osr)}); }
-
-wire_packet command_slip(float threshold_mm, std::uint32_t window_ms) {
-  wire_packet packet = command_with("slip_threshold", {threshold_mm});
-  put(packet, *find_setting("slip_window"), {static_cast<double>(window_ms)});
-  return packet;
-}
-
 wire_packet command_info() { return packet_of(WIRE_CMD_INFO); }
 wire_packet command_health() { return packet_of(WIRE_CMD_HEALTH); }
 wire_packet command_crash() { return packet_of(WIRE_CMD_CRASH); }
@@ -204,10 +187,6 @@ wire_packet command_keep(bool keep) {
   packet.body.cmd_keep.keep = keep ? 1 : 0;
   return packet;
 }
-
-wire_packet command_prior(float sigma_mm, float width_mm) { return command_with("prior", {sigma_mm, width_mm}); }
-
-wire_packet command_location_limit(float limit_mm) { return command_with("limit", {limit_mm}); }
 
 wire_packet command_pad(const pad_profile &profile) {
   if (!pad_profile_is_valid(&profile)) {

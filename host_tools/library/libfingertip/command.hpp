@@ -18,18 +18,13 @@ std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams);
 /* The sender fills in sequence and time. */
 wire_packet command_stream(std::uint8_t streams);
 wire_packet command_tare(bool force = false); /* refused in contact unless forced */
-wire_packet command_rate_mHz(std::uint32_t rate_mHz);
-wire_packet command_osr(std::uint32_t osr);
-wire_packet command_slip(float threshold_mm, std::uint32_t window_ms);
 wire_packet command_info();
 wire_packet command_health();
 wire_packet command_crash();
 wire_packet command_loader();
 wire_packet command_calibrate(const calibration &calibration, std::uint8_t sensor_count);
 wire_packet command_erase_calibration();
-wire_packet command_keep(bool keep);                       /* the present settings, or none */
-wire_packet command_prior(float sigma_mm, float width_mm); /* 0 and 0: none */
-wire_packet command_location_limit(float limit_mm);
+wire_packet command_keep(bool keep); /* the present settings, or none */
 wire_packet command_pad(const pad_profile &profile);
 wire_packet command_erase_pad();
 

@@ -1,6 +1,5 @@
 #include "libfingertip/names.hpp"
 
-#include "libfingertip/error.hpp"
 #include "libfingertip/line_fields.hpp"
 #include "libfingertip/text.hpp"
 #include "libfingertip/wire.hpp"
@@ -84,26 +83,5 @@ std::string capabilities_text(std::uint32_t capabilities) {
 std::string stored_text(std::uint32_t stored) { return bits_text(words::stored, stored, "nothing"); }
 
 std::string streams_text(std::uint8_t streams) { return bits_text(words::streams, streams, "none"); }
-
-std::uint8_t streams_from_text(const std::string &text) {
-  std::uint8_t streams = 0;
-  if (text == "none") {
-    return streams;
-  }
-  for (std::string_view part : split(text, ',')) {
-    bool known = false;
-    for (const words::Word &stream : words::streams) {
-      if (part == stream.word) {
-        streams = static_cast<std::uint8_t>(streams | stream.value);
-        known = true;
-      }
-    }
-    if (!known) {
-      throw Error(ErrorCode::bad_value,
-                  "stream \"" + std::string(part) + "\" is unknown; give none, or some of contact,raw,health");
-    }
-  }
-  return streams;
-}
 
 } // namespace fingertip

@@ -35,9 +35,8 @@ std::string capabilities_text(std::uint32_t capabilities);
 /* "calibration,settings,pad": what a fingertip keeps without power; "nothing". */
 std::string stored_text(std::uint32_t stored);
 
-/* "contact,raw" and back; "none" is 0. Throws Error on an unknown name. */
+/* "contact,raw": what a fingertip sends unasked; "none". */
 std::string streams_text(std::uint8_t streams);
-std::uint8_t streams_from_text(const std::string &text);
 
 } // namespace fingertip
 #pragma GCC visibility pop

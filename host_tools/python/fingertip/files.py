@@ -546,7 +546,7 @@ def read_recording(
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names
 GRIP_STATES = "idle activating approach squeeze ready holding slipping still release open dropped missed fault".split()
-GRIP_ROW, GRIP_EVENT = "# grip: ", "# grip_event: "
+GRIP_ROW = "# grip: "
 
 
 def restart_rows(t: npt.NDArray[Any], frame: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
@@ -597,16 +597,6 @@ def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
     if columns is None or not rows:
         return {}
     return {name: np.array(values, dtype=None if name in GRIP_WORDS else float) for name, values in zip(columns, zip(*rows))}
-
-
-def read_grip_events(path: Path) -> list[tuple[float, str]]:
-    """What was asked of the gripper and what went wrong: [(time_us, text)]."""
-    events = []
-    for number, line, torn in _undamaged(path, False):
-        if line.startswith(GRIP_EVENT) and not torn:
-            time_us, _, text = line[len(GRIP_EVENT) :].partition(",")
-            events.append((_number(path, number, "time_us", time_us, False), text))
-    return events
 
 
 def read_run(path: Path | None) -> dict[str, Any]:

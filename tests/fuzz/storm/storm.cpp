@@ -1,6 +1,7 @@
 #include "storm.hpp"
 
 #include "libfingertip/command.hpp"
+#include "libfingertip/text.hpp"
 #include "support/pad.h"
 
 #include <algorithm>
@@ -35,6 +36,10 @@ constexpr Target ON_THE_LINE[] = {
     {"store_writes", 100000, 1500000},
 };
 
+wire_packet set(const std::string &text) {
+  return fingertip::setting_commands({fingertip::setting_from_text(text)}, {})[0];
+}
+
 } // namespace
 
 Storm::Storm(NativePlant &plant, World &world, Judge &judge, std::uint64_t seed, fuzz_input input)
@@ -61,7 +66,7 @@ void Storm::write(wire_packet packet) {
 void Storm::write_garbage() {
   std::vector<std::uint8_t> bytes;
   if (random_below(&random_, 3) == 0) { // a packet with a few bits wrong
-    wire_packet packet = fingertip::command_osr(256);
+    wire_packet packet = set("osr=256");
     packet.sequence = static_cast<std::uint16_t>(random_u32(&random_));
     bytes = fingertip::frame_bytes(packet);
     bytes[random_below(&random_, static_cast<std::uint32_t>(bytes.size() - 1))] ^=
@@ -82,15 +87,18 @@ void Storm::write_some_command() {
   wire_packet packet{};
   switch (random_below(r, 12)) {
   case 0:
-    return write(fingertip::command_osr(256u << random_below(r, 6)));
+    return write(set("osr=" + std::to_string(256u << random_below(r, 6))));
   case 1:
-    return write(fingertip::command_rate_mHz(random_below(r, 2) ? 0 : 20000 + random_below(r, 1980000)));
+    return write(
+        set("rate=" + (random_below(r, 2) ? "max" : fingertip::fixed(20 + 1e-3 * random_below(r, 1980000), 3))));
   case 2:
-    return write(fingertip::command_slip(static_cast<float>(random_between(r, 0.05, 5)), 5 + random_below(r, 900)));
+    packet = set("slip_threshold=" + fingertip::fixed(random_between(r, 0.05, 5), 6));
+    packet.body.cmd_slip.window_ms = static_cast<std::uint16_t>(5 + random_below(r, 900));
+    return write(packet);
   case 3:
-    return write(random_below(r, 2) ? fingertip::command_prior(0, 0) : fingertip::command_prior(6.5f, 3));
+    return write(set(random_below(r, 2) ? "prior=none" : "prior=6.5:3"));
   case 4:
-    return write(fingertip::command_location_limit(static_cast<float>(random_between(r, 0.3, 0.6))));
+    return write(set("limit=" + fingertip::fixed(random_between(r, 0.3, 0.6), 6)));
   case 5:
     return write(fingertip::command_health());
   case 6:
@@ -198,8 +206,8 @@ void Storm::begin_bout() {
 
 void Storm::set_for_most_frames() {
   streams_ = WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
-  write(fingertip::command_osr(256));
-  write(fingertip::command_rate_mHz(0));
+  write(set("osr=256"));
+  write(set("rate=max"));
   write(fingertip::command_pad(pad_of_12_mm()));
 }
 
