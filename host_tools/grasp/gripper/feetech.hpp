@@ -30,8 +30,6 @@ public:
   double count(double width_mm) const;
   // The change of width for one count, at this width.
   double slope_mm(double width_mm) const;
-  int closed_count() const { return closed_; }
-  int open_count() const { return open_; }
 
 private:
   int closed_, open_;

@@ -13,41 +13,29 @@ namespace fingertip::feetech {
 constexpr int BAUD = 1'000'000;
 constexpr int SLAVE = 6; // the gripper of an SO-101
 constexpr int MOST_SLAVE = 253;
-constexpr std::uint8_t BROADCAST = 254;
 constexpr double COUNTS_PER_TURN = 4096.0;
 
 enum Instruction : std::uint8_t {
   PING = 1,
   READ = 2,
   WRITE = 3,
-  REG_WRITE = 4, // done on ACTION
-  ACTION = 5,
-  SYNC_READ = 0x82,
-  SYNC_WRITE = 0x83,
 };
 
 enum Address : std::uint8_t {
-  FIRMWARE = 0, // major, minor
-  MODEL = 3,    // 2 bytes
+  MODEL = 3, // 2 bytes
   ID = 5,
-  BAUD_RATE = 6,
   LEAST_ANGLE = 9,     // 2 bytes
   MOST_ANGLE = 11,     // 2 bytes
   MOST_TORQUE = 16,    // 2 bytes, 0.1 %
   OPERATING_MODE = 33, // 0: position
   TORQUE_ENABLE = 40,
   ACCELERATION = 41,
-  GOAL_POSITION = 42, // 2 bytes
-  GOAL_TIME = 44,     // 2 bytes
-  GOAL_SPEED = 46,    // 2 bytes, counts a second
-  TORQUE_LIMIT = 48,  // 2 bytes, 0.1 % of the stall torque
-  LOCK = 55,
-  PRESENT_POSITION = 56,    // 2 bytes
-  PRESENT_SPEED = 58,       // 2 bytes
-  PRESENT_LOAD = 60,        // 2 bytes, 0.1 % of its voltage, sign in bit 10
-  PRESENT_VOLTAGE = 62,     // 0.1 V
-  PRESENT_TEMPERATURE = 63, // degrees Celsius
-  STATUS = 65,              // enum Trouble
+  GOAL_POSITION = 42,    // 2 bytes
+  GOAL_TIME = 44,        // 2 bytes
+  GOAL_SPEED = 46,       // 2 bytes, counts a second
+  TORQUE_LIMIT = 48,     // 2 bytes, 0.1 % of the stall torque
+  PRESENT_POSITION = 56, // 2 bytes
+  STATUS = 65,           // enum Trouble
   MOVING = 66,
   PRESENT_CURRENT = 69, // 2 bytes, 6.5 mA
   TABLE_END = 71,

@@ -23,8 +23,6 @@ constexpr int REGISTERS = 3;
 enum Action : std::uint16_t {
   rACT = 1 << 8,
   rGTO = 1 << 11, // go to the position of rPR
-  rATR = 1 << 12, // automatic release: opens slowly, then needs a reset
-  rARD = 1 << 13, // of it: to open instead of to close
 };
 
 // Bits of the status, in the high byte of the first status register.

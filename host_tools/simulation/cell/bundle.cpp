@@ -7,14 +7,8 @@
 #include <limits>
 
 namespace fingertip::cell {
-namespace {
 
-using twin::HeldObject;
-
-// Q / (mu F) over x / d.
-double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
-
-} // namespace
+using twin::HeldObject, twin::mindlin;
 
 Bundle::Bundle(double friction, double kinetic_share) : static_(friction), kinetic_share_(kinetic_share) {
   // Straight between as many points of the curve as there are elements; where its slope falls, one

@@ -16,7 +16,6 @@ volatile std::sig_atomic_t interrupted = 0;
 struct Options {
   GripperServer::Options server;
   LineTrouble trouble;
-  double late_ms = 0, latency_timer_ms = 0;
   double object_mm = 0, stiffness_N_mm = 10;
   int fault = 0;
 };
@@ -45,11 +44,6 @@ int serve(const Options &options) {
 int main(int argc, char **argv) {
   CLI::App app("Serves a simulated gripper with its own protocol; prints its port. Ctrl-C ends it.",
                "fingertip_cell_gripper");
-  const std::vector<std::pair<std::string, LineFault>> faults = {{"silent", LineFault::silent},
-                                                                 {"garbage", LineFault::garbage},
-                                                                 {"damaged", LineFault::damaged},
-                                                                 {"other_slave", LineFault::other_slave},
-                                                                 {"refused", LineFault::refused}};
   Options options;
   std::vector<std::string> models;
   for (const GripperTraits &traits : gripper_models()) {
@@ -65,22 +59,13 @@ int main(int argc, char **argv) {
       ->type_name("NUMBER")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--functions", options.server.functions, "Modbus functions that it answers, else 3 4 16 23")
-      ->type_name("N")
-      ->check(CLI::IsMember(std::vector<int>{3, 4, 16, 23}));
   app.add_option("--line", options.trouble.fault, "What befalls each answer")
       ->type_name("FAULT")
-      ->transform(CLI::CheckedTransformer(faults));
-  app.add_option("--late", options.late_ms, "Delay of the answers")->type_name("MS")->check(CLI::NonNegativeNumber);
-  app.add_option("--latency-timer", options.latency_timer_ms, "Of its USB adapter: 16 is usual")
-      ->type_name("MS")
-      ->check(CLI::NonNegativeNumber);
+      ->transform(CLI::CheckedTransformer(line_faults()));
   app.add_option("--fault", options.fault, "The gripper's own, by the maker's code")
       ->type_name("CODE")
       ->check(CLI::Range(0, 255));
   CLI11_PARSE(app, argc, argv);
-  options.trouble.late_s = options.late_ms / 1000;
-  options.trouble.latency_timer_s = options.latency_timer_ms / 1000;
   for (int signal : {SIGINT, SIGTERM}) {
     std::signal(signal, [](int) { interrupted = 1; });
   }

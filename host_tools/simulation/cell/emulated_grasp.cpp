@@ -19,7 +19,7 @@ enum Stream : std::uint64_t { LINE = 841 };
 
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double MOVES_s = 2.5e-4; // between two samples of the gripper
-constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
+constexpr double LOST_N = 0.01;
 constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
 
@@ -51,8 +51,10 @@ EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const
     : trial_(trial), face_(face), cell_(face, trial.object, trial.grasp),
       gripper_(trial.gripper, trial.object.width_mm + trial.course.opens_mm, Random(trial.seed, LINE, 0)),
       fingers_{EmulatedFingertip(profile, trial.rubber[0].stored), EmulatedFingertip(profile, trial.rubber[1].stored)},
-      holds_s_(NEVER_s), lift_s_(NEVER_s), touched_s_(NEVER_s) {
-  gripper_.press(cell_);
+      holds_s_(NEVER_s), lift_s_(NEVER_s) {
+  gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
+    return force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
+  };
 }
 
 void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::size_t length, double arrived_s) {
@@ -132,10 +134,6 @@ void EmulatedGrasp::advance(double to_s) {
     moved_.push_back({t_s_, drive.width_mm});
   }
   const double force_N = cell_.force_N();
-  peak_N_ = std::max(peak_N_, force_N);
-  if (force_N > TOUCHED_N) {
-    touched_s_ = std::min(touched_s_, t_s_);
-  }
   if (lifts) {
     slips_.sample(t_s_, cell_.slips(), force_N, cell_.slid_mm());
   }
@@ -196,13 +194,9 @@ ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
 
 ordered_json EmulatedGrasp::summary() const {
   ordered_json out;
-  out["held"] = !dropped_;
   out["dropped"] = dropped_;
   out["slid_mm"] = cell_.slid_mm();
-  out["force_N"] = cell_.force_N();
-  out["peak_N"] = peak_N_;
   out["asked_s"] = to_us(asked_s_);
-  out["touched_s"] = to_us(touched_s_);
   out["holding_s"] = to_us(holds_s_);
   out["lift_s"] = to_us(lift_s_);
   out["end_s"] = to_us(t_s_);

@@ -82,8 +82,7 @@ private:
   GripCommand command_{};
   GripReport report_{};
   Slips slips_;
-  double t_s_ = 0.0, holds_s_, lift_s_, touched_s_, asked_s_ = 0.0;
-  double peak_N_ = 0.0;
+  double t_s_ = 0.0, holds_s_, lift_s_, asked_s_ = 0.0;
   std::uint32_t trouble_ = 0;
   bool over_ = false, dropped_ = false;
   std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready

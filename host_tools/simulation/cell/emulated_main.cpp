@@ -20,13 +20,14 @@ using nlohmann::ordered_json;
 
 constexpr const char *FACE = "sphere15";
 constexpr double LAYER_mm = 12.0;
+constexpr double FRICTION = 0.65; // static, before it falls
+constexpr std::uint64_t SEED = 1; // of pads and of the gripper's line
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 enum Stream : std::uint64_t { PAD = 842 };
 
 struct Options {
-  std::string gripper = gripper_models().front().model, cache;
-  std::uint64_t seed = 1;
-  double slice_us = 500.0, friction = 0.65, friction_falls = 0.67;
+  std::string cache;
+  double slice_us = 500.0, friction_falls = 0.67;
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
@@ -34,7 +35,7 @@ EmulatedTrial trial_of(const Options &options, const pad_profile &profile) {
   EmulatedTrial trial;
   trial.object.width_mm = 40.0;
   trial.object.mass_kg = trial.course.mass_kg = 0.3;
-  trial.object.friction = options.friction;
+  trial.object.friction = FRICTION;
   trial.object.uneven_friction = 0.03;
   trial.object.com_mm = {3.0, 1.0};
   trial.grasp.place_mm = {0.8, -1.5};
@@ -47,10 +48,10 @@ EmulatedTrial trial_of(const Options &options, const pad_profile &profile) {
   course.lift_s = 0.5;
   course.events = {{Event::Kind::slick, course.lift_s + 0.1, 0.03, options.friction_falls}};
   course.ends_s = course.lift_s + 0.4;
-  trial.gripper = gripper_mechanics(options.gripper);
-  trial.seed = options.seed;
+  trial.gripper = gripper_mechanics(gripper_models().front().model);
+  trial.seed = SEED;
   for (std::size_t f = 0; f < trial.rubber.size(); f++) {
-    Random random(options.seed, PAD, f);
+    Random random(SEED, PAD, f);
     trial.rubber[f] = draw_rubber(profile, random);
   }
   return trial;
@@ -111,7 +112,7 @@ int serve(const Options &options) {
     std::fflush(stdout);
   }
   ordered_json out;
-  out["gripper"] = options.gripper;
+  out["gripper"] = trial.gripper.traits.model;
   out["face"] = FACE;
   out["mass_kg"] = trial.object.mass_kg;
   out["friction"] = trial.object.friction;
@@ -129,15 +130,8 @@ int main(int argc, char **argv) {
                "a gripper and the controller. It is lifted, and its friction falls.",
                "fingertip_cell_emulated");
   Options options;
-  app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")->capture_default_str();
-  app.add_option("--friction", options.friction, "Static, before it falls")
-      ->check(CLI::Range(0.1, 1.5))
-      ->capture_default_str();
   app.add_option("--friction-falls", options.friction_falls, "By this share")
       ->check(CLI::Range(0.0, 0.9))
-      ->capture_default_str();
-  app.add_option("--seed", options.seed, "Of pads and of the gripper's line")
-      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 32))
       ->capture_default_str();
   app.add_option("--slice-us", options.slice_us, "As the boards have it")
       ->check(CLI::Range(100.0, 10000.0))

@@ -1,7 +1,13 @@
-#include "simulation/cell/feetech_slave.hpp"
+// The memory of a simulated Feetech STS3215 (gripper/feetech_table.hpp) over its jaw's motion, and what it
+// answers to read and write, the instructions that the gripper's driver sends.
+#include "grasp/gripper/feetech.hpp"
+#include "grasp/gripper/feetech_table.hpp"
+#include "simulation/cell/gripper_slave.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 namespace fingertip {
 
@@ -10,137 +16,119 @@ using namespace feetech;
 namespace {
 
 constexpr double STALL_A = 2.7;
-constexpr int LOAD_SIGN = 1 << 10;
+
+class FeetechSlave : public GripperServer::Slave {
+public:
+  FeetechSlave(GripperMotion &motion, const GripperWay &complete)
+      : motion_(motion), jaw_(complete), id_(static_cast<std::uint8_t>(complete.slave)) {
+    FeetechSlave::lose_power();
+  }
+
+  double baud() const override { return BAUD; }
+
+  bool take_frame(Bytes *came, Bytes *frame) override {
+    std::size_t skipped = 0;
+    const std::optional<Packet> packet = take_packet(came, &skipped);
+    *frame = packet ? encoded(*packet) : Bytes();
+    return packet.has_value();
+  }
+
+  Bytes answer(const Bytes &frame, bool refuse) override {
+    const Packet question = packet_of(frame);
+    const Bytes &given = question.parameters;
+    if (question.id != id_ || given.size() < 2 || (question.code != READ && question.code != WRITE)) {
+      return {};
+    }
+    Packet answer = {.id = id_, .code = trouble_};
+    if (question.code == READ) {
+      refresh();
+      for (std::size_t i = given[0]; i < std::size_t{given[0]} + given[1]; i++) {
+        answer.parameters.push_back(i < memory_.size() ? memory_[i] : 0);
+      }
+    } else {
+      write(given);
+    }
+    answer.code |= refuse ? std::uint8_t{OVERLOAD} : std::uint8_t{0};
+    return encoded(answer);
+  }
+
+  Bytes of_other_slave(Bytes answer) override {
+    Packet packet = packet_of(answer);
+    packet.id++;
+    return encoded(packet);
+  }
+
+  void lose_power() override {
+    motion_.power_off();
+    memory_ = {};
+    trouble_ = 0;
+    put(MODEL, STS3215);
+    memory_[ID] = id_;
+    put(MOST_ANGLE, 4095);
+    put(MOST_TORQUE, 1000);
+    put(TORQUE_LIMIT, 1000);
+    refresh();
+    put(GOAL_POSITION, word(PRESENT_POSITION));
+  }
+
+  // Bits of enum Trouble.
+  void fail(std::uint8_t trouble) override { trouble_ = trouble; }
+
+private:
+  // Of a whole one.
+  static Packet packet_of(Bytes bytes) {
+    std::size_t skipped = 0;
+    return *take_packet(&bytes, &skipped);
+  }
+
+  int word(std::size_t at) const { return memory_[at] | memory_[at + 1] << 8; }
+  void put(std::size_t at, int value) {
+    memory_[at] = static_cast<std::uint8_t>(value & 0xFF);
+    memory_[at + 1] = static_cast<std::uint8_t>(value >> 8);
+  }
+
+  void refresh() {
+    put(PRESENT_POSITION, static_cast<int>(std::lround(jaw_.count(motion_.reported_width_mm()))));
+    memory_[STATUS] = trouble_;
+    memory_[MOVING] = motion_.moving() ? 1 : 0;
+    put(PRESENT_CURRENT, static_cast<int>(std::lround(std::abs(motion_.effort()) * STALL_A / AMPERE_PER_COUNT)));
+  }
+
+  // given: an address and what goes there. Then it does what its memory asks for.
+  void write(const Bytes &given) {
+    for (std::size_t i = 1; i < given.size(); i++) {
+      const std::size_t at = given[0] + i - 1;
+      if (at > MODEL + 1 && at < PRESENT_POSITION) {
+        memory_[at] = given[i];
+      }
+    }
+    if (memory_[TORQUE_ENABLE] == 0) {
+      motion_.power_off();
+      return;
+    }
+    if (!motion_.active()) {
+      motion_.activate();
+      trouble_ &= static_cast<std::uint8_t>(~OVERLOAD);
+    }
+    const GripperTraits &traits = motion_.mechanics().traits;
+    const double width_mm = jaw_.width_mm(std::clamp(word(GOAL_POSITION), word(LEAST_ANGLE), word(MOST_ANGLE)));
+    const int speed = word(GOAL_SPEED);
+    motion_.move({.width_mm = width_mm,
+                  .speed_mm_s = speed == 0 ? traits.speed_max_mm_s : speed * jaw_.slope_mm(width_mm),
+                  .force_N = std::min(word(TORQUE_LIMIT), word(MOST_TORQUE)) * traits.force_max_N / 1000});
+  }
+
+  GripperMotion &motion_;
+  Jaw jaw_;
+  std::uint8_t id_;
+  std::array<std::uint8_t, 128> memory_{};
+  std::uint8_t trouble_ = 0;
+};
 
 } // namespace
 
-FeetechSlave::FeetechSlave(GripperMotion &motion, const GripperWay &complete)
-    : motion_(motion), jaw_(complete), id_(static_cast<std::uint8_t>(complete.slave)) {
-  lose_power();
-}
-
-int FeetechSlave::word(int address) const {
-  const auto at = static_cast<std::size_t>(address);
-  return memory_[at] | memory_[at + 1] << 8;
-}
-
-void FeetechSlave::put(int address, int value) {
-  const auto at = static_cast<std::size_t>(address);
-  memory_[at] = static_cast<std::uint8_t>(value & 0xFF);
-  memory_[at + 1] = static_cast<std::uint8_t>(value >> 8);
-}
-
-void FeetechSlave::lose_power() {
-  motion_.power_off();
-  memory_ = {};
-  waiting_.clear();
-  trouble_ = 0;
-  memory_[FIRMWARE] = 3;
-  memory_[FIRMWARE + 1] = 10;
-  put(MODEL, STS3215);
-  memory_[ID] = id_;
-  put(MOST_ANGLE, 4095);
-  put(MOST_TORQUE, 1000);
-  put(TORQUE_LIMIT, 1000);
-  memory_[LOCK] = 1;
-  refresh();
-  put(GOAL_POSITION, word(PRESENT_POSITION));
-}
-
-void FeetechSlave::refresh() {
-  put(PRESENT_POSITION, static_cast<int>(std::lround(jaw_.count(motion_.reported_width_mm()))));
-  const double effort = motion_.effort();
-  const bool down = (effort < 0) == (jaw_.open_count() > jaw_.closed_count());
-  put(PRESENT_LOAD, static_cast<int>(std::lround(std::abs(effort) * 1000)) | (down && effort != 0 ? LOAD_SIGN : 0));
-  memory_[PRESENT_VOLTAGE] = 74;
-  memory_[PRESENT_TEMPERATURE] = 35;
-  memory_[STATUS] = trouble_;
-  memory_[MOVING] = motion_.moving() ? 1 : 0;
-  put(PRESENT_CURRENT, static_cast<int>(std::lround(std::abs(effort) * STALL_A / AMPERE_PER_COUNT)));
-}
-
-void FeetechSlave::write(std::uint8_t address, const std::uint8_t *bytes, std::size_t count) {
-  for (std::size_t i = 0; i < count; i++) {
-    const std::size_t at = address + i;
-    if (at > MODEL + 1 && at < PRESENT_POSITION) {
-      memory_[at] = bytes[i];
-    }
-  }
-  obey();
-}
-
-void FeetechSlave::obey() {
-  if (memory_[TORQUE_ENABLE] == 0) {
-    motion_.power_off();
-    return;
-  }
-  if (!motion_.active()) {
-    motion_.activate();
-    trouble_ &= static_cast<std::uint8_t>(~OVERLOAD);
-  }
-  const GripperTraits &traits = motion_.mechanics().traits;
-  const int goal = std::clamp(word(GOAL_POSITION), word(LEAST_ANGLE), word(MOST_ANGLE));
-  const double width_mm = jaw_.width_mm(goal);
-  const int speed = word(GOAL_SPEED);
-  motion_.move({.width_mm = width_mm,
-                .speed_mm_s = speed == 0 ? traits.speed_max_mm_s : speed * jaw_.slope_mm(width_mm),
-                .force_N = std::min(word(TORQUE_LIMIT), word(MOST_TORQUE)) * traits.force_max_N / 1000});
-}
-
-Packet FeetechSlave::telling(std::uint8_t address, std::uint8_t length) {
-  refresh();
-  Packet answer = {.id = id_, .code = trouble_};
-  for (std::size_t i = 0; i < length; i++) {
-    answer.parameters.push_back(address + i < memory_.size() ? memory_[address + i] : 0);
-  }
-  return answer;
-}
-
-std::optional<Packet> FeetechSlave::answer(const Packet &question) {
-  const Bytes &given = question.parameters;
-  const bool all = question.id == BROADCAST;
-  if (!all && question.id != id_) {
-    return {};
-  }
-  const Packet done = {.id = id_, .code = trouble_};
-  switch (question.code) {
-  case PING:
-    return done;
-  case READ:
-    if (given.size() == 2 && !all) {
-      return telling(given[0], given[1]);
-    }
-    return {};
-  case WRITE:
-    if (given.size() >= 2) {
-      write(given[0], given.data() + 1, given.size() - 1);
-    }
-    break;
-  case REG_WRITE:
-    waiting_ = given;
-    break;
-  case ACTION:
-    if (waiting_.size() >= 2) {
-      write(waiting_[0], waiting_.data() + 1, waiting_.size() - 1);
-      waiting_.clear();
-    }
-    break;
-  case SYNC_WRITE: // address, length, then of each servo its id and its bytes
-    for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size(); at += given[1] + 1u) {
-      if (given[at] == id_) {
-        write(given[0], given.data() + at + 1, given[1]);
-      }
-    }
-    return {};
-  case SYNC_READ: // address, length, ids; each answers in turn, this one as the only servo
-    if (given.size() > 2 && std::find(given.begin() + 2, given.end(), id_) != given.end()) {
-      return telling(given[0], given[1]);
-    }
-    return {};
-  default:
-    return {};
-  }
-  return all ? std::nullopt : std::optional<Packet>(done);
+std::unique_ptr<GripperServer::Slave> feetech_slave(GripperMotion &motion, const GripperServer::Options &options) {
+  return std::make_unique<FeetechSlave>(motion, feetech_way({.model = options.model, .slave = options.slave}));
 }
 
 } // namespace fingertip

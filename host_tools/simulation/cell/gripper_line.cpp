@@ -21,12 +21,6 @@ GripperLine::GripperLine(const GripperMechanics &mechanics, double width_mm, Ran
   }
 }
 
-void GripperLine::press(const Cell &cell) {
-  motion_.blocked_at = [&cell](double width_mm, double force_N) {
-    return force_N > 0.0 && cell.force_at_N(width_mm) >= force_N;
-  };
-}
-
 GripperLine::Answer GripperLine::exchange(const GripCommand &command) {
   const double t_s = next_s_, poll_s = motion_.mechanics().traits.poll_s;
   if (command.motion == GRIP_ACTIVATE && sent_.motion != GRIP_ACTIVATE) {

@@ -4,7 +4,6 @@
 
 #include "grasp/control/grip.hpp"
 #include "libfingertip/random.hpp"
-#include "simulation/cell/cell.hpp"
 #include "simulation/cell/gripper_motion.hpp"
 
 namespace fingertip::cell {
@@ -14,9 +13,6 @@ public:
   // At the start it is activated and has this width. random: when the first
   // exchange is.
   GripperLine(const GripperMechanics &mechanics, double width_mm, Random random);
-
-  // What is between the fingers; must outlive it.
-  void press(const Cell &cell);
 
   GripperMotion &motion() { return motion_; }
   const GripperMotion &motion() const { return motion_; }

@@ -1,14 +1,9 @@
 #include "simulation/cell/gripper_server.hpp"
 
-#include "grasp/gripper/common.hpp"
-#include "simulation/cell/feetech_slave.hpp"
-#include "simulation/cell/robotiq_slave.hpp"
+#include "simulation/cell/gripper_slave.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <modbus.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 namespace fingertip {
 
@@ -22,198 +17,14 @@ constexpr double BITS_PER_BYTE = 10;
 constexpr double STALL_s = 0.1;
 constexpr double LONGEST_STEP_s = 0.01; // of the motion
 
-std::uint16_t modbus_crc(const Bytes &bytes, std::size_t count) {
-  std::uint16_t crc = 0xFFFF;
-  for (std::size_t i = 0; i < count; i++) {
-    crc ^= bytes[i];
-    for (int bit = 0; bit < 8; bit++) {
-      crc = static_cast<std::uint16_t>(crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1);
-    }
-  }
-  return crc;
+} // namespace
+
+const std::vector<std::pair<std::string, LineFault>> &line_faults() {
+  static const std::vector<std::pair<std::string, LineFault>> all = {
+      {"none", LineFault::none},       {"silent", LineFault::silent},           {"garbage", LineFault::garbage},
+      {"damaged", LineFault::damaged}, {"other_slave", LineFault::other_slave}, {"refused", LineFault::refused}};
+  return all;
 }
-
-} // namespace
-
-class GripperServer::Slave {
-public:
-  virtual ~Slave() = default;
-  virtual double baud() const = 0;
-  // Takes a whole frame out of what came; false: there is none yet.
-  virtual bool take_frame(Bytes *came, Bytes *frame) = 0;
-  // Empty: it does not answer.
-  virtual Bytes answer(const Bytes &frame, bool refuse) = 0;
-  virtual Bytes of_other_slave(Bytes answer) = 0;
-  virtual void lose_power() = 0;
-  virtual void fail(std::uint8_t fault) = 0;
-};
-
-namespace {
-
-// libmodbus sits at one end of a pair of sockets, so that its answers can be kept and spoilt.
-class ModbusSlave : public GripperServer::Slave {
-public:
-  ModbusSlave(GripperMotion &motion, const GripperServer::Options &options)
-      : registers_(motion), functions_(options.functions),
-        modbus_(modbus_new_rtu("/dev/null", robotiq::BAUD, 'N', 8, 1)),
-        mapping_(modbus_mapping_new_start_address(0, 0, 0, 0, robotiq::COMMAND_REGISTER, MAPPED,
-                                                  robotiq::STATUS_REGISTER, robotiq::REGISTERS)) {
-    if (modbus_ == nullptr || mapping_ == nullptr || socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends_) != 0) {
-      throw std::bad_alloc();
-    }
-    modbus_set_slave(modbus_, options.slave == 0 ? robotiq::SLAVE : options.slave);
-    modbus_set_socket(modbus_, ends_[0]);
-    modbus_set_indication_timeout(modbus_, 0, 1000);
-    modbus_set_byte_timeout(modbus_, 0, 1000);
-  }
-  ~ModbusSlave() override {
-    modbus_mapping_free(mapping_);
-    modbus_free(modbus_);
-    close(ends_[0]);
-    close(ends_[1]);
-  }
-
-  double baud() const override { return robotiq::BAUD; }
-
-  bool take_frame(Bytes *came, Bytes *frame) override {
-    std::size_t size = 8;
-    if (came->size() < 2) {
-      return false;
-    }
-    const std::size_t counted = (*came)[1] == 16 ? 6 : (*came)[1] == 23 ? 10 : 0;
-    if (counted != 0) {
-      if (came->size() <= counted) {
-        return false;
-      }
-      size = counted + (*came)[counted] + 3u;
-    }
-    if (came->size() < size) {
-      return false;
-    }
-    frame->assign(came->begin(), came->begin() + static_cast<std::ptrdiff_t>(size));
-    came->erase(came->begin(), came->begin() + static_cast<std::ptrdiff_t>(size));
-    return true;
-  }
-
-  Bytes answer(const Bytes &frame, bool refuse) override {
-    Bytes bytes(MODBUS_RTU_MAX_ADU_LENGTH);
-    while (recv(ends_[0], bytes.data(), bytes.size(), 0) > 0) {
-    }
-    if (send(ends_[1], frame.data(), frame.size(), 0) != static_cast<ssize_t>(frame.size())) {
-      return {};
-    }
-    Bytes query(MODBUS_RTU_MAX_ADU_LENGTH);
-    const int length = modbus_receive(modbus_, query.data());
-    if (length <= 0) {
-      return {}; // damaged, or another's
-    }
-    registers_.heard();
-    if (refuse) {
-      modbus_reply_exception(modbus_, query.data(), MODBUS_EXCEPTION_ILLEGAL_FUNCTION);
-    } else {
-      if (!obey(query)) {
-        return {};
-      }
-      modbus_reply(modbus_, query.data(), length, mapping_);
-      registers_.answered();
-    }
-    const ssize_t size = recv(ends_[1], bytes.data(), bytes.size(), 0);
-    bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
-    return bytes;
-  }
-
-  Bytes of_other_slave(Bytes answer) override {
-    answer[0]++;
-    const std::uint16_t crc = modbus_crc(answer, answer.size() - 2);
-    answer[answer.size() - 2] = static_cast<std::uint8_t>(crc & 0xFF);
-    answer[answer.size() - 1] = static_cast<std::uint8_t>(crc >> 8);
-    return answer;
-  }
-  void lose_power() override { registers_.lose_power(); }
-  void fail(std::uint8_t fault) override { registers_.fail(fault); }
-
-private:
-  static constexpr int MAPPED = robotiq::STATUS_REGISTER + robotiq::REGISTERS - robotiq::COMMAND_REGISTER;
-
-  // False: a function or register that it does not know, which it does not answer.
-  bool obey(const Bytes &query) {
-    const auto word = [&](std::size_t at) { return query[at] << 8 | query[at + 1]; };
-    const auto all_in = [](int address, int count, int first) {
-      return count > 0 && address >= first && address + count <= first + robotiq::REGISTERS;
-    };
-    const int function = query[1];
-    if (std::find(functions_.begin(), functions_.end(), function) == functions_.end()) {
-      return false;
-    }
-    if (function != 16 && !all_in(word(2), word(4), robotiq::STATUS_REGISTER)) {
-      return false;
-    }
-    if (function == 16 || function == 23) {
-      const std::size_t at = function == 16 ? 2 : 6, values = function == 16 ? 7 : 11;
-      if (!all_in(word(at), word(at + 2), robotiq::COMMAND_REGISTER)) {
-        return false;
-      }
-      for (int i = 0; i < word(at + 2); i++) {
-        registers_.write(word(at) + i, static_cast<std::uint16_t>(word(values + 2 * static_cast<std::size_t>(i))));
-      }
-    }
-    registers_.update();
-    const auto status = registers_.status();
-    std::copy(status.begin(), status.end(), mapping_->tab_input_registers);
-    std::copy(status.begin(), status.end(),
-              mapping_->tab_registers + robotiq::STATUS_REGISTER - robotiq::COMMAND_REGISTER);
-    return true;
-  }
-
-  RobotiqSlave registers_;
-  std::vector<int> functions_;
-  modbus_t *modbus_;
-  modbus_mapping_t *mapping_;
-  int ends_[2] = {-1, -1};
-};
-
-class FeetechBus : public GripperServer::Slave {
-public:
-  FeetechBus(GripperMotion &motion, const GripperServer::Options &options)
-      : servo_(motion, feetech_way({.model = options.model, .slave = options.slave})) {}
-
-  double baud() const override { return feetech::BAUD; }
-
-  bool take_frame(Bytes *came, Bytes *frame) override {
-    std::size_t skipped = 0;
-    const std::optional<feetech::Packet> packet = feetech::take_packet(came, &skipped);
-    *frame = packet ? feetech::encoded(*packet) : Bytes();
-    return packet.has_value();
-  }
-
-  Bytes answer(const Bytes &frame, bool refuse) override {
-    Bytes bytes = frame;
-    std::size_t skipped = 0;
-    const std::optional<feetech::Packet> question = feetech::take_packet(&bytes, &skipped);
-    std::optional<feetech::Packet> answer = servo_.answer(*question);
-    if (!answer) {
-      return {};
-    }
-    if (refuse) {
-      answer->code |= feetech::OVERLOAD;
-    }
-    return feetech::encoded(*answer);
-  }
-
-  Bytes of_other_slave(Bytes answer) override {
-    std::size_t skipped = 0;
-    feetech::Packet packet = *feetech::take_packet(&answer, &skipped);
-    packet.id++;
-    return feetech::encoded(packet);
-  }
-  void lose_power() override { servo_.lose_power(); }
-  void fail(std::uint8_t fault) override { servo_.fail(fault); }
-
-private:
-  FeetechSlave servo_;
-};
-
-} // namespace
 
 GripperMechanics GripperServer::mechanics(const std::string &model) {
   GripperMechanics mechanics = gripper_mechanics(gripper_traits(model).model);
@@ -224,16 +35,10 @@ GripperMechanics GripperServer::mechanics(const std::string &model) {
 }
 
 GripperServer::GripperServer(GripperMotion &motion, const Options &options)
-    : motion_(motion), real_time_(options.real_time), port_(options.link), stepped_at_(host_now()) {
-  switch (gripper_traits(options.model).driver) {
-  case GripperDriver::robotiq:
-    slave_ = std::make_unique<ModbusSlave>(motion, options);
-    break;
-  case GripperDriver::feetech:
-    slave_ = std::make_unique<FeetechBus>(motion, options);
-    break;
-  }
-}
+    : motion_(motion), real_time_(options.real_time),
+      slave_(gripper_traits(options.model).driver == GripperDriver::robotiq ? robotiq_slave(motion, options)
+                                                                            : feetech_slave(motion, options)),
+      port_(options.link), stepped_at_(host_now()) {}
 
 GripperServer::~GripperServer() = default;
 

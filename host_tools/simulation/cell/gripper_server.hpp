@@ -33,6 +33,7 @@ enum class LineFault {
   other_slave, // another's answer
   refused,     // Modbus: exception 1; Feetech: bits of trouble
 };
+const std::vector<std::pair<std::string, LineFault>> &line_faults(); // and their names
 
 struct LineTrouble {
   LineFault fault = LineFault::none;

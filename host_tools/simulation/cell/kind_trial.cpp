@@ -1,7 +1,6 @@
 #include "simulation/cell/kind_trial.hpp"
 
 #include "libfingertip/random.hpp"
-#include "simulation/cell/arrivals.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/pinch.hpp"
 
@@ -12,6 +11,7 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 
 namespace fingertip::cell {
 namespace {
@@ -109,6 +109,43 @@ private:
   tangential_settings settings_{};
   motion_history history_{};
   double next_s_, known_s_ = 0.0;
+};
+
+// What is on its way to the controller: touches and the gripper's answers, each late by its own delay.
+class Arrivals {
+public:
+  void touch(double at_s, std::size_t finger, const GripTouch &touch) { known_.push_back({at_s, finger, touch, {}}); }
+  void status(double at_s, const GripperStatus &status) { known_.push_back({at_s, GRIPPER, {}, status}); }
+  // Hands over what has come, in the order in which it was sent. After each, after(finger, touch)
+  // or after(): the controller may step.
+  template <class AFTER_TOUCH, class AFTER_STATUS>
+  void deliver(double now_s, Controller &controller, AFTER_TOUCH after_touch, AFTER_STATUS after_status) {
+    for (auto known = known_.begin(); known != known_.end();) {
+      if (known->at_s > now_s) {
+        ++known;
+        continue;
+      }
+      const Known come = *known;
+      known = known_.erase(known);
+      if (come.from == GRIPPER) {
+        controller.take_status(come.status);
+        after_status();
+      } else {
+        controller.take_touch(come.from, come.touch);
+        after_touch(come.from, come.touch);
+      }
+    }
+  }
+
+private:
+  static constexpr std::size_t GRIPPER = 2; // instead of a fingertip
+  struct Known {
+    double at_s;
+    std::size_t from;
+    GripTouch touch;
+    GripperStatus status;
+  };
+  std::deque<Known> known_;
 };
 
 // A force that is to be held.
@@ -360,8 +397,7 @@ private:
     outcome_.slid_mm = pinch_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;
-    outcome_.reversals_s = reversals_ / (grasp_.ends_s - grasp_.steady_s);
-    outcome_.hunts = !outcome_.dropped && outcome_.reversals_s >= HUNTS_s;
+    outcome_.hunts = !outcome_.dropped && reversals_ / (grasp_.ends_s - grasp_.steady_s) >= HUNTS_s;
     if (!margins_.empty()) {
       const auto middle = margins_.begin() + static_cast<std::ptrdiff_t>(margins_.size() / 2);
       std::nth_element(margins_.begin(), middle, margins_.end());

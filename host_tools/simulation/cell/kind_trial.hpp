@@ -60,7 +60,6 @@ struct KindOutcome {
   double slid_mm = 0.0, peak_N = 0.0;
   double first_N = 0.0;      // the largest force before the lift
   double margin = 0.0;       // median of force over least force, from the lift's end on
-  double reversals_s = 0.0;  // of the commanded width, a second, while nothing happens any more
   std::vector<Slip> catches; // slides that ended before the object was lost
   // Only of a still trial.
   std::optional<double> settle_s; // from the touch until the force stays within 10 % for 0.5 s

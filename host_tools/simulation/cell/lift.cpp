@@ -270,9 +270,9 @@ private:
       return true;
     }
     if (verb == "line") {
-      const auto known =
-          std::find_if(std::begin(FAULTS), std::end(FAULTS), [&](const auto &one) { return what == one.first; });
-      if (known == std::end(FAULTS)) {
+      const auto &faults = line_faults();
+      const auto known = std::find_if(faults.begin(), faults.end(), [&](const auto &one) { return what == one.first; });
+      if (known == faults.end()) {
         return false;
       }
       line_.fault = known->second;
@@ -300,9 +300,6 @@ private:
       "give lift, take, pour|jerk|knock|slick AMOUNT once it is lifted, kill|freeze|thaw "
       "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
       "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
-  static constexpr std::pair<const char *, LineFault> FAULTS[] = {
-      {"none", LineFault::none},       {"silent", LineFault::silent},           {"garbage", LineFault::garbage},
-      {"damaged", LineFault::damaged}, {"other_slave", LineFault::other_slave}, {"refused", LineFault::refused}};
 
   const LiftOptions &options_;
   const Place &place_;

@@ -203,17 +203,11 @@ void press(const PressOptions &options, const Place &place) {
   }
 }
 
-void validate(const ValidateHandOptions &options, const Place &place) {
+void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place) {
   FingerProcess process = place.finger(0, 2 * options.seed);
   process.gain.fill(1.0); // the pad has its own
   process.parallel_bus = true;
-  ValidatedOptions pad_options;
-  pad_options.weight_g = options.weight_g;
-  pad_options.pulling = options.pulling;
-  pad_options.seed = options.seed;
-  pad_options.cache = options.cache;
-  std::optional<ValidatedPad> pad;
-  pad.emplace(pad_options);
+  std::optional<ValidatedPad> pad(std::in_place, options);
   Fingers fingers(place, {process});
   fingers.wait_until_ready();
   std::printf("ready: %s\n", place.port(SIDES[0]).c_str());
@@ -231,7 +225,7 @@ void validate(const ValidateHandOptions &options, const Place &place) {
     last_us = now_us;
     if (!began_us && fingers.rates_set(0) != rates_set) {
       began_us = now_us;
-      pad.emplace(pad_options);
+      pad.emplace(options);
     }
     Pressures pressures{};
     if (began_us) {
@@ -246,7 +240,7 @@ void validate(const ValidateHandOptions &options, const Place &place) {
     }
     fingers.put(now_us, {pressures});
     fingers.look();
-    if (options.seconds && 1e-6 * static_cast<double>(now_us - ready_us) >= *options.seconds) {
+    if (seconds && 1e-6 * static_cast<double>(now_us - ready_us) >= *seconds) {
       break;
     }
   }

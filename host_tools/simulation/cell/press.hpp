@@ -25,14 +25,7 @@ constexpr const char *PRESS_FACE = "sphere15"; // a ball of 15 mm, as calibrate 
 
 // Instead, a hand that goes through the steps of `fingertip validate` (validated.hpp) whenever a
 // program sets the fingertip's frame rate, as validate does first.
-struct ValidateHandOptions {
-  std::string cache;
-  std::uint64_t seed = 1;
-  double weight_g = 300.0;
-  Pulling pulling = {};
-  std::optional<double> seconds;
-};
-void validate(const ValidateHandOptions &options, const Place &place);
+void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place);
 
 // Until a signal comes, or its time is over. Throws Error.
 void press(const PressOptions &options, const Place &place);

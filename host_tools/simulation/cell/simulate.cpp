@@ -71,15 +71,12 @@ void run(const Options &options, bool is_lift, bool is_validate) {
     check(one);
     lift(one, Place(options.ports));
   } else if (is_validate) {
-    ValidateHandOptions one;
+    ValidatedOptions one;
     one.weight_g = options.press.weight_g;
     one.pulling.weight_g = options.pull_g;
     one.seed = options.seed;
     one.cache = cache(PRESS_FACE);
-    if (options.seconds > 0.0) {
-      one.seconds = options.seconds;
-    }
-    validate(one, Place(options.ports));
+    validate(one, options.seconds > 0.0 ? std::optional(options.seconds) : std::nullopt, Place(options.ports));
   } else {
     PressOptions one = options.press;
     both(one);

@@ -3,8 +3,7 @@
  *
  * The host's end of the line is native_cdc.h. Nothing takes time but the bus and the conversions.
  */
-#ifndef PLAYER_NATIVE_FINGERTIP_H
-#define PLAYER_NATIVE_FINGERTIP_H
+#pragma once
 
 #include "common/pad_profile.h"
 #include "native/sim_array.h"
@@ -38,6 +37,4 @@ bool native_fingertip_run_until(uint64_t t_us);
 
 #ifdef __cplusplus
 }
-#endif
-
 #endif

@@ -1,7 +1,6 @@
 /* The computing part of the firmware on pressures that a fingertip has sent: what should its
  * contact packets have been? */
-#ifndef PLAYER_REPEAT_H
-#define PLAYER_REPEAT_H
+#pragma once
 
 #include "wire/packet.h"
 
@@ -24,6 +23,4 @@ void repeat_frame(const struct wire_packet *raw, bool held, struct wire_contact 
 
 #ifdef __cplusplus
 }
-#endif
-
 #endif

@@ -9,10 +9,9 @@ namespace {
 
 constexpr double mN_PER_N = 1e3; // and mm/s2 per m/s2
 
-// Q / (mu F) over x / d.
-double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
-
 } // namespace
+
+double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
 
 HeldObject::HeldObject(double mass_kg, double friction, double kinetic_share)
     : mass_kg_(mass_kg), static_(friction), kinetic_(kinetic_share * friction) {

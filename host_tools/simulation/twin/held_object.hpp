@@ -30,6 +30,9 @@
 
 namespace fingertip::twin {
 
+// Q / (mu F) over x / d.
+double mindlin(double share);
+
 class HeldObject {
 public:
   static constexpr double SETTLES_mm = 0.2, HEALS_s = 0.1, LOSS_s = 1e-3;

@@ -55,11 +55,6 @@ std::vector<Indenter> make() {
 
 } // namespace
 
-bool Indenter::operator==(const Indenter &other) const {
-  return shape == other.shape && size_x_mm == other.size_x_mm && size_y_mm == other.size_y_mm &&
-         size_z_mm == other.size_z_mm && edge_mm == other.edge_mm && youngs_modulus_Pa == other.youngs_modulus_Pa;
-}
-
 double Indenter::profile_mm(double x_mm, double y_mm) const {
   const double x = std::abs(x_mm), y = std::abs(y_mm);
   const double a = 0.5 * size_x_mm, b = 0.5 * size_y_mm, c = 0.5 * size_z_mm;

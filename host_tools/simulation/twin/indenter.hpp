@@ -26,7 +26,6 @@ struct Indenter {
   double edge_mm;           // radius of the rounded edge; 0 where there is none
   double youngs_modulus_Pa; // of its own half-space, with nu = 0.49; 0: rigid
 
-  bool operator==(const Indenter &) const;
   // Height of its surface above its lowest point; infinite where it has none. Even in x and y.
   double profile_mm(double x_mm, double y_mm) const;
   // Half the extent of what can touch, along x and y.

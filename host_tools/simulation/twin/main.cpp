@@ -178,8 +178,6 @@ int scenario(Options &options) {
   check_output(options.output, options.overwrite);
   check_output(truth_path(options.output), options.overwrite);
   const ContactTable table = table_of(chosen.indenter, layer, options);
-  const bool other = !chosen.second_indenter.empty() && chosen.second_indenter != chosen.indenter;
-  const ContactTable second = other ? table_of(chosen.second_indenter, layer, options) : table;
   const Scenario made = make_scenario(chosen, table);
   std::optional<BlockTable> block;
   if (chosen.overhang_mm) {
@@ -190,7 +188,7 @@ int scenario(Options &options) {
   Written written;
   {
     ProgressBar bar(made.name, ProgressBar::Lines::none);
-    written = write_scenario(made, layer, table, second, block ? &*block : nullptr, options.output, options.overwrite,
+    written = write_scenario(made, layer, table, block ? &*block : nullptr, options.output, options.overwrite,
                              [&](double share) { show(bar, share); });
   }
   std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n", printable(options.output).c_str(),
@@ -263,8 +261,6 @@ int run(int argc, char **argv) {
   option(write, "-o,--output", options.output, "FILE.csv", "The scenario to write")->required();
   with_contact(write);
   option(write, "--overhang", s.overhang_mm, "MM", "The pad ends so far beyond its outer sensors; default: never");
-  option(write, "--second", s.second_indenter, "NAME",
-         "Contact shape of the second contact, in scenarios of two; default: the same");
   option(write, "--gain", options.gain, "PERCENT", "Short for the effect gain; 0: none");
   option(write, "--effects", options.effects, "NAME[=VALUE],...",
          "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all");

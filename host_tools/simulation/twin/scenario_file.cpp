@@ -209,11 +209,6 @@ std::string list(const std::vector<double> &values, double factor, int digits) {
 
 std::string file_name(const std::string &path) { return std::filesystem::path(path).filename().string(); }
 
-const ScenarioKind &kind_of(const Scenario &scenario) {
-  return *std::find_if(scenario_kinds().begin(), scenario_kinds().end(),
-                       [&](const ScenarioKind &kind) { return kind.name == scenario.options.kind; });
-}
-
 bool moves_under_load(const std::string &kind) {
   return kind == "lift" || kind == "drag" || kind == "slide" || kind == "screw";
 }
@@ -221,7 +216,7 @@ bool moves_under_load(const std::string &kind) {
 void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pad &pad, const std::string &path) {
   const ScenarioOptions &options = scenario.options;
   metadata(text, "name", scenario.name);
-  metadata(text, "description", kind_of(scenario).description + "; simulated by twin");
+  metadata(text, "description", scenario_kind(options.kind).description + "; simulated by twin");
   metadata(text, "kind", options.kind);
   metadata(text, "seed", std::to_string(options.seed));
   metadata(text, "pad_seed", std::to_string(*options.pad_seed));
@@ -229,10 +224,6 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
   metadata(text, "temperature_degC", number(pad.temperature_degC(0.0)));
   metadata(text, "sensors", std::to_string(geometry.sensor_count));
   metadata(text, "indenter", options.indenter + ", " + indenter(options.indenter).description);
-  if (options.kind == "two") {
-    const std::string &second = options.second_indenter.empty() ? options.indenter : options.second_indenter;
-    metadata(text, "second_indenter", second + ", " + indenter(second).description);
-  }
   metadata(text, "layer_mm", number(layer.thickness_mm));
   if (options.overhang_mm) {
     metadata(text, "overhang_mm", number(*options.overhang_mm));
@@ -246,7 +237,7 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
     metadata(text, "tangential", options.tangential);
     metadata(text, "friction", options.friction);
   }
-  if (moves_under_load(options.kind)) {
+  if (moves_under_load(options.kind) || options.kind == "slip") {
     metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
   }
   if (options.kind == "slide") {
@@ -254,7 +245,6 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
     metadata(text, "mass_kg", options.mass_kg);
   }
   if (options.kind == "slip") {
-    metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
     metadata(text, "creep_share", number(options.creep_share));
     metadata(text, "stick_slip_mm", number(options.stick_slip_mm));
   }
@@ -381,9 +371,8 @@ std::string truth_path(const std::string &scenario_path) {
   return path.string() + ".truth.csv";
 }
 
-Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
-                       const ContactTable &second, const BlockTable *block, const std::string &path, bool replace,
-                       const std::function<void(double share)> &on_progress) {
+Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table, const BlockTable *block,
+                       const std::string &path, bool replace, const std::function<void(double share)> &on_progress) {
   const ScenarioOptions &options = scenario.options;
   OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
   OutputFile file(path, replace, OutputFile::Appears::when_finished);
@@ -391,9 +380,9 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
   const std::size_t sensors = geometry.sensor_count;
   Pad pad(options.effects, sensors, layer.thickness_mm, AMBIENT_Pa, *options.pad_seed);
   const BestGaussian gaussian(table, layer.thickness_mm);
-  std::vector<TractionTable> tractions; // of the first and the second indenter
+  std::optional<TractionTable> traction;
   if (scenario.pulls) {
-    tractions = {TractionTable(table, layer), TractionTable(second, layer)};
+    traction.emplace(table, layer);
   }
   Written written;
 
@@ -447,8 +436,7 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
         row.x_mm = row.y_mm = row.force_N = row.pull_x_N = row.pull_y_N = 0.0;
         for (std::size_t c = 0; c < contacts.size(); c++) {
           const Touch &contact = contacts[c];
-          const ContactTable &pressing = c == 0 ? table : second;
-          const double radius_mm = pressing.contact_radius_mm(contact.force_N);
+          const double radius_mm = table.contact_radius_mm(contact.force_N);
           if (block) {
             check_inside(block->block(), contact, episode.tracks[c], radius_mm);
           }
@@ -458,7 +446,7 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
             const double dx = (static_cast<double>(geometry.x_mm[k]) + seat.dx_mm - contact.x_mm) / seat.width;
             const double dy = (static_cast<double>(geometry.y_mm[k]) + seat.dy_mm - contact.y_mm) / seat.width;
             const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
-            base_Pa[k] += pressing.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
+            base_Pa[k] += table.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
             if (block) {
               base_Pa[k] += block->added_Pa(k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm},
                                             contact.x_mm, contact.y_mm);
@@ -467,7 +455,7 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
               const TractionTable::Load load{contact.force_N, contact.stuck_N,
                                              cosine * contact.pull_x_N + sine * contact.pull_y_N,
                                              cosine * contact.pull_y_N - sine * contact.pull_x_N};
-              base_Pa[k] += tractions[c].base_pressure_Pa(load, along_x, along_y);
+              base_Pa[k] += traction->base_pressure_Pa(load, along_x, along_y);
             }
           }
           row.pull_x_N += contact.pull_x_N;

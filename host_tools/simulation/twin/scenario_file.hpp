@@ -55,11 +55,10 @@ struct Written {
   double peak_Pa = 0.0; // largest reading above ambient
 };
 
-// Both files, whole or not at all. `second` is the table of the second indenter, for two contacts;
-// `block` is null for a layer without end. Throws Error, also if a contact leaves the block, but by
-// rolling off.
-Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
-                       const ContactTable &second, const BlockTable *block, const std::string &path, bool replace,
+// Both files, whole or not at all. `block` is null for a layer without end. Throws Error, also if a contact leaves the
+// block, but by rolling off.
+Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table, const BlockTable *block,
+                       const std::string &path, bool replace,
                        const std::function<void(double share)> &on_progress = {});
 
 } // namespace fingertip::twin

@@ -229,77 +229,7 @@ Episode two(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-constexpr const char *USUAL_FRICTION = "0.5", *USUAL_MASS_kg = "0.1..0.5"; // assumed
-
-struct Kind {
-  ScenarioKind kind;
-  Episode (*episode)(const Stage &stage, std::size_t n);
-  const char *usual_indenter = "sphere6";
-  double usual_margin_mm = 0.5 * GRID_STEP_mm;
-  const char *usual_tangential = "0";
-  const char *usual_friction = USUAL_FRICTION;
-  bool pulls_itself = false;
-};
-
-const std::vector<Kind> &all_kinds() {
-  static const std::vector<Kind> all{
-      {{"grid", 200, "1,2.5,5,10,15", "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart"}, grid},
-      {{"taps", 120, "1..15", "short taps at random places"}, tap},
-      {{"high", 120, "25..50", "strong presses at random places"}, high},
-      {{"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place"}, poke},
-      {{"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor"}, cycle},
-      {{"slip", 120, "6", "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s"}, slip},
-      {{"twist", 60, "6", "a gripped object turns by 90 degrees about its contact"}, twist},
-      {{"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s"}, rolloff},
-      {{"placements", 150, "3", "one weight set down at random places for 2 s each, to calibrate from"},
-       placement,
-       "sphere15",
-       GRID_STEP_mm}, // to the outer sensors
-      {{"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s"},
-       lift,
-       "sphere6",
-       0.5 * GRID_STEP_mm,
-       "0.3",
-       USUAL_FRICTION,
-       true},
-      {{"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides"},
-       drag,
-       "sphere15",
-       0.5 * GRID_STEP_mm,
-       "0.3",
-       USUAL_FRICTION,
-       true},
-      {{"slide", 240, "6",
-        "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let "
-        "loose, or carried"},
-       slide,
-       "sphere6",
-       0.5 * GRID_STEP_mm,
-       "0",
-       "0.3..0.8",
-       true},
-      {{"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side"},
-       screw,
-       "sphere6",
-       0.5 * GRID_STEP_mm,
-       "0",
-       USUAL_FRICTION,
-       true},
-      {{"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart"}, two},
-  };
-  return all;
-}
-
-const Kind &kind_of(const ScenarioOptions &options) {
-  std::string names;
-  for (const Kind &one : all_kinds()) {
-    if (one.kind.name == options.kind) {
-      return one;
-    }
-    names += (names.empty() ? "" : ", ") + one.kind.name;
-  }
-  throw Error("there is no kind of scenario \"" + printable(options.kind) + "\"; give one of: " + names);
-}
+constexpr const char *USUAL_MASS_kg = "0.1..0.5"; // assumed
 
 void check(const char *option, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest)) {
@@ -324,9 +254,6 @@ void check_slide(const ScenarioOptions &options, double friction) {
 // What shows all that differs but the seeds, the length and the kind's own settings.
 std::string name_of(const ScenarioOptions &options) {
   std::string name = options.kind + "-" + options.indenter;
-  if (!options.second_indenter.empty()) {
-    name += "+" + options.second_indenter;
-  }
   name += "-h" + number(options.layer_mm);
   if (options.overhang_mm) {
     name += "-overhang" + number(*options.overhang_mm);
@@ -352,14 +279,40 @@ std::string name_of(const ScenarioOptions &options) {
 } // namespace
 
 const std::vector<ScenarioKind> &scenario_kinds() {
-  static const std::vector<ScenarioKind> kinds = [] {
-    std::vector<ScenarioKind> list;
-    for (const Kind &one : all_kinds()) {
-      list.push_back(one.kind);
+  static const std::vector<ScenarioKind> all{
+      {"grid", 200, "1,2.5,5,10,15", "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart", grid},
+      {"taps", 120, "1..15", "short taps at random places", tap},
+      {"high", 120, "25..50", "strong presses at random places", high},
+      {"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place", poke},
+      {"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor", cycle},
+      {"slip", 120, "6", "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s", slip},
+      {"twist", 60, "6", "a gripped object turns by 90 degrees about its contact", twist},
+      {"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s", rolloff},
+      {"placements", 150, "3", "one weight set down at random places for 2 s each, to calibrate from", placement,
+       "sphere15", GRID_STEP_mm}, // to the outer sensors
+      {"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s", lift,
+       "sphere6", 0.5 * GRID_STEP_mm, "0.3", "0.5", true},
+      {"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides", drag,
+       "sphere15", 0.5 * GRID_STEP_mm, "0.3", "0.5", true},
+      {"slide", 240, "6",
+       "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let loose, or carried",
+       slide, "sphere6", 0.5 * GRID_STEP_mm, "0", "0.3..0.8", true},
+      {"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side", screw, "sphere6",
+       0.5 * GRID_STEP_mm, "0", "0.5", true},
+      {"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart", two},
+  };
+  return all;
+}
+
+const ScenarioKind &scenario_kind(const std::string &name) {
+  std::string names;
+  for (const ScenarioKind &one : scenario_kinds()) {
+    if (one.name == name) {
+      return one;
     }
-    return list;
-  }();
-  return kinds;
+    names += (names.empty() ? "" : ", ") + one.name;
+  }
+  throw Error("there is no kind of scenario \"" + printable(name) + "\"; give one of: " + names);
 }
 
 Forces::Forces(const std::string &text) {
@@ -387,8 +340,6 @@ Forces::Forces(const std::string &text) {
 double Forces::pick(std::size_t turn, double random_share) const {
   return range_ ? values_[0] + random_share * (values_[1] - values_[0]) : values_[turn % values_.size()];
 }
-
-double Forces::largest() const { return *std::max_element(values_.begin(), values_.end()); }
 
 Range::Range(const std::string &option, const std::string &text) {
   const std::size_t dots = text.find("..");
@@ -436,11 +387,11 @@ std::vector<Place> sensor_places() {
 }
 
 ScenarioOptions complete(const ScenarioOptions &options) {
-  const ScenarioKind &kind = kind_of(options).kind;
+  const ScenarioKind &kind = scenario_kind(options.kind);
   ScenarioOptions chosen = options;
   chosen.seconds = milliseconds(options.seconds.value_or(kind.usual_seconds));
-  chosen.indenter = options.indenter.empty() ? kind_of(options).usual_indenter : options.indenter;
-  chosen.margin_mm = options.margin_mm.value_or(kind_of(options).usual_margin_mm);
+  chosen.indenter = options.indenter.empty() ? kind.usual_indenter : options.indenter;
+  chosen.margin_mm = options.margin_mm.value_or(kind.usual_margin_mm);
   chosen.pad_seed = options.pad_seed.value_or(options.seed);
   chosen.forces = options.forces.empty() ? kind.usual_forces : options.forces;
   check("--seconds", *chosen.seconds, 1.0, 7200.0);
@@ -467,9 +418,8 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   if (!chosen.speeds_mm_s.empty() && !is({"slip", "rolloff", "drag", "slide"})) {
     no_effect("--speed", "slip, rolloff, drag or slide");
   }
-  const Kind &usual = kind_of(options);
-  chosen.tangential = options.tangential.empty() ? usual.usual_tangential : options.tangential;
-  chosen.friction = options.friction.empty() ? usual.usual_friction : options.friction;
+  chosen.tangential = options.tangential.empty() ? kind.usual_tangential : options.tangential;
+  chosen.friction = options.friction.empty() ? kind.usual_friction : options.friction;
   if (is({"slide"})) {
     chosen.mass_kg = options.mass_kg.empty() ? USUAL_MASS_kg : options.mass_kg;
   } else if (!options.mass_kg.empty()) {
@@ -491,15 +441,12 @@ ScenarioOptions complete(const ScenarioOptions &options) {
     check("--dead-travel", chosen.dead_travel_mm, 0.1, 4.0);
     check_slide(chosen, friction.lowest);
   }
-  if (!chosen.second_indenter.empty() && chosen.kind != "two") {
-    throw Error("--second has no effect in a scenario of \"" + chosen.kind + "\"; leave it out, or choose two");
-  }
   static_cast<void>(Forces(chosen.forces));
   return chosen;
 }
 
 Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table) {
-  const Kind &kind = kind_of(options);
+  const ScenarioKind &kind = scenario_kind(options.kind);
   Scenario scenario;
   scenario.options = complete(options);
   const ScenarioOptions &chosen = scenario.options;
@@ -517,7 +464,7 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
   }
   if (stage.episodes.empty()) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" + chosen.kind +
-                "\"; leave it out for " + number(kind.kind.usual_seconds));
+                "\"; leave it out for " + number(kind.usual_seconds));
   }
   scenario.episodes = std::move(stage.episodes);
   scenario.name = name_of(chosen);

@@ -26,13 +26,22 @@ constexpr double AMBIENT_Pa = 101325.0;
 // In x, without overhang_mm; the paper's box is 30 mm by 50 mm.
 constexpr double PAD_HALF_WIDTH_mm = 15.0;
 
+class Stage;
+struct Episode;
 struct ScenarioKind {
   std::string name;
   double usual_seconds;
   std::string usual_forces;
   std::string description;
+  Episode (*episode)(const Stage &stage, std::size_t n); // the nth
+  const char *usual_indenter = "sphere6";
+  double usual_margin_mm = 2.25; // half a step of the paper's grid
+  const char *usual_tangential = "0", *usual_friction = "0.5";
+  bool pulls_itself = false;
 };
 const std::vector<ScenarioKind> &scenario_kinds();
+// Throws Error: there is none of this name.
+const ScenarioKind &scenario_kind(const std::string &name);
 
 // "5": always that; "1,2,5": one after the other; "1..15": anywhere between, uniform. In N.
 class Forces {
@@ -40,7 +49,6 @@ public:
   // Throws Error unless all are from 0.02 N to the tables' end.
   explicit Forces(const std::string &text);
   double pick(std::size_t turn, double random_share) const;
-  double largest() const;
 
 private:
   std::vector<double> values_;
@@ -66,8 +74,7 @@ struct Tangential {
 
 struct ScenarioOptions {
   std::string kind = "taps";
-  std::string indenter;        // empty: the kind's usual one
-  std::string second_indenter; // kind "two"; empty: as the first
+  std::string indenter; // empty: the kind's usual one
   double layer_mm = 12.0;
   std::optional<double> overhang_mm; // rubber beyond the outer sensors; else no end
   EffectValues effects;

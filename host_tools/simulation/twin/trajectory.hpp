@@ -45,16 +45,10 @@ private:
 // What a held object does on the pad while something pushes it: the way of the contact, given that
 // of the pusher. Both in mm, 0 at rest; the way never falls.
 //
-// At first the object is held. The pusher's way goes into the rubber and all else that gives: the
-// dead travel. The part of it at the base creeps along with the tangential force, which Cattaneo and
-// Mindlin's contact lets rise as 1 - (1 - s / dead travel)^(3/2) until the last ring slips
-// (Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949). Its amount for a
-// sphere on a half-space, 3 (2-nu) mu F / (16 G a), is 0.8 to 1.7 mm for 2 to 6 N of a sphere of 6
-// mm at mu = 0.5 on rubber of Shore 15 A; the slip of human fingertips begins in the same way after
-// millimetres (Delhaye, Lefevre, Thonnard, "Dynamics of fingertip contact during the onset of
-// tangential slip", J. R. Soc. Interface 11, 2014). The share that creeps is an assumption, and so
-// is how stick-slip goes: the object rests for 4/5 of each period of the pusher's way and catches
-// up in the last fifth.
+// At first the object is held, and the pusher's way goes into the rubber and all else that gives: the dead travel
+// (README.md has its amount and sources). The part of it at the base creeps along as 1 - (1 - s / dead travel)^(3/2)
+// (Mindlin, J. Appl. Mech. 16, 1949). In stick-slip the object rests for 4/5 of each period of the pusher's way and
+// catches up in the last fifth.
 struct Grip {
   double dead_travel_mm = 0.0;
   double creep_share = 0.5;   // of the dead travel

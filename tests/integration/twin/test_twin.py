@@ -264,7 +264,6 @@ class Usage(TwinTest):
         for arguments, what in {
             ("glide",): 'there is no kind of scenario "glide"; give one of: grid, taps',
             ("taps", "--indenter", "finger"): 'there is no indenter "finger"',
-            ("two", "--second", "finger"): 'there is no indenter "finger"',
             ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
             ("taps", "--layer", "nan"): "--layer nan is out of range",
             ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: dip, widths',
@@ -294,7 +293,7 @@ class Usage(TwinTest):
             *("taps --seconds 2", "taps --seconds 1e9", "taps --seconds nan", "taps --force 0", "taps --force 1..51", "taps --force 9..2"),
             *("taps --force 5,", "taps --margin -1", "slip --speed 0", "taps --tangential -0.1", "taps --tangential 0.3,0,0"),
             *("lift --friction nan", "lift --tangential 0.4..0.1", "lift --tangential 0.1..", "lift --friction 0.3..0.5 --tangential 0.4"),
-            *("slide --mass 0..1", "slide --kinetic 1.1", "slide --dead-travel 0", "slip --second cube6", "slip --dead-travel 11"),
+            *("slide --mass 0..1", "slide --kinetic 1.1", "slide --dead-travel 0", "slip --dead-travel 11"),
             "taps --overhang 20.1",
         ):
             self.assertIn("; ", self.scenario_error(*words.split()), words)

@@ -182,7 +182,7 @@ TEST(Robotiq, OnlyActivateClearsAFault) {
   EXPECT_EQ(wait_for(simulated, *gripper, is_active).fault, 0);
 }
 
-/* What the manuals say of moves that come at the wrong time, and of automatic release. */
+/* What the manuals say of moves that come at the wrong time. */
 TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
   Served simulated(served("2f85"));
   const auto fault = [&] { return asked(simulated.port(), "09 04 07 D0 00 03 B1 CE", 11).substr(6 * 3 - 3, 2); };
@@ -195,13 +195,6 @@ TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
   EXPECT_EQ(wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.active && !status.moving; })
                 .width_mm,
             0.0);
-  gripper.reset();
-  asked(simulated.port(), with_crc("09 10 03 E8 00 03 06 39 00 00 FF FF FF"), 8);
-  EXPECT_EQ(fault(), "0B");
-  gripper = opened("2f85", simulated.port());
-  wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.fault == 0x0F; });
-  EXPECT_EQ(gripper->poll().width_mm, 85.0);
-  EXPECT_FALSE(gripper->poll().active);
 }
 
 TEST(Robotiq, RefusesWhatCannotBe) {

@@ -38,9 +38,7 @@ struct File {
 
 File written(const Scenario &scenario, const BlockTable *block = nullptr) {
   const std::string path = testing::TempDir() + "twin_scenario.csv";
-  const std::string &first = scenario.options.indenter, &second = scenario.options.second_indenter;
-  write_scenario(scenario, silicone(LAYER_mm), table_of(first), table_of(second.empty() ? first : second), block, path,
-                 true);
+  write_scenario(scenario, silicone(LAYER_mm), table_of(scenario.options.indenter), block, path, true);
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
   File file;
@@ -84,23 +82,22 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
   const BlockTable block =
       BlockTable::load_or_build(block_around(silicone(LAYER_mm), 6.0), sensor_places(), FINGERTIP_TEST_TABLES);
   struct Case {
-    const char *kind, *indenter = "sphere6", *tangential = "", *second = "";
+    const char *kind, *indenter = "sphere6", *tangential = "";
     double dip_share = 0.0, overhang_mm = 0.0;
   };
-  for (const Case &one : {Case{"taps", "sphere6", "", "", 0.05},
+  for (const Case &one : {Case{"taps", "sphere6", "", 0.05},
                           {"slip"},
                           {"rolloff"},
-                          {"two", "sphere6", "", "cube6"},
+                          {"two"},
                           {"taps", "sphere6", "0.35"},
                           {"lift", "sphere6", "0.35"},
                           {"two", "sphere6", "0.35"},
                           {"twist", "cube6", "0.35"},
-                          {"taps", "sphere6", "0.35", "", 0.0, 6.0},
-                          {"lift", "sphere6", "0.35", "", 0.0, 6.0},
-                          {"two", "sphere6", "0.35", "", 0.0, 6.0}}) {
+                          {"taps", "sphere6", "0.35", 0.0, 6.0},
+                          {"lift", "sphere6", "0.35", 0.0, 6.0},
+                          {"two", "sphere6", "0.35", 0.0, 6.0}}) {
     const Scenario scenario = scenario_of(one.kind, [&](ScenarioOptions &o) {
       o.indenter = one.indenter;
-      o.second_indenter = one.second;
       o.tangential = one.tangential;
       o.seconds = 30;
       o.effects = parse_effects(one.dip_share > 0.0 ? "dip=5" : "none");
@@ -125,7 +122,7 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
         tracks = episode.tracks.size();
         for (std::size_t n = 0; n < tracks; n++) {
           const Touch touch = episode.tracks[n].at(t_s - episode.begin_s);
-          const std::string name = n == 1 && *one.second != 0 ? one.second : one.indenter;
+          const std::string name = one.indenter;
           const auto bare_Pa = base_Pa(touch, table_of(name), nullptr, one.dip_share);
           const auto felt_Pa = base_Pa(touch, table_of(name), &traction_of(name), one.dip_share);
           const double radius_mm = table_of(name).contact_radius_mm(touch.force_N);
@@ -172,9 +169,6 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
     EXPECT_EQ(most_added_Pa > 1000.0, *one.tangential != 0) << one.kind;
     EXPECT_EQ(file.metadata.count("tangential"), *one.tangential != 0 ? 1u : 0u);
     EXPECT_EQ(file.metadata.count("overhang_mm"), one.overhang_mm > 0.0 ? 1u : 0u);
-    if (*one.second != 0) {
-      EXPECT_EQ(file.metadata.at("second_indenter").substr(0, 5), "cube6");
-    }
   }
 }
 
