@@ -30,7 +30,7 @@ struct findings {
   struct fit_result fit;                   /* location_stage; doubt_stage widens its standard deviation */
   struct contact_force force;              /* location_stage: the force of the fit, scaled */
   const struct fit_tangential *tangential; /* tangential_stage: the estimate; NULL: there is none */
-  struct tangential_load load;             /* tangential_stage: the estimate in the scales of the pad */
-  struct motion motion;                    /* motion_update */
-  struct shapes_place location;            /* shapes_stage: the location to report */
+  struct tangential_force tangential_force; /* tangential_stage: the estimate in the scales of the pad */
+  struct motion motion;                     /* motion_update */
+  struct shapes_place location;             /* shapes_stage: the location to report */
 };

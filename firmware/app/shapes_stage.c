@@ -59,9 +59,9 @@ void shapes_stage_judge_tangential(const struct shapes_stage *own, struct findin
 
 void shapes_stage_locate(const struct shapes_stage *own, const struct location_stage *location,
                          struct findings *found) {
-  const bool has_load = (found->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+  const bool has_force = (found->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
   found->contact.flags |= shapes_flags(&own->report);
-  found->location = shapes_locate(&own->report, &found->fit, has_load ? &found->load : NULL);
+  found->location = shapes_locate(&own->report, &found->fit, has_force ? &found->tangential_force : NULL);
   found->contact.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAIN;
   if (found->location.location_sd_mm > location->settings.location_sd_limit_mm) {
     found->contact.flags |= CONTACT_FLAG_UNCERTAIN;

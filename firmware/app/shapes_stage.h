@@ -1,6 +1,6 @@
 /* Stage: the shape of the contact, where the pad's profile is known: round, long, or two contacts (contact/shapes.h).
- * Reads findings.frame, .conditioned, .fit and .load, and the settings of earlier stages. Writes findings.location, may
- * take away .tangential, and adds flags.
+ * Reads findings.frame, .conditioned, .fit and .tangential_force, and the settings of earlier stages. Writes
+ * findings.location, may take away .tangential, and adds flags.
  *
  * The second processor fits it part by part (jobs.h), so what this stage reports is of an earlier frame. */
 #pragma once

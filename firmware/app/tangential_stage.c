@@ -122,22 +122,22 @@ void tangential_stage_scale(struct tangential_stage *own, const struct location_
                             struct findings *found) {
   found->contact_input.tangential = found->tangential;
   own->settings.location_sd_limit_mm = location->settings.location_sd_limit_mm;
-  tangential_update(&own->history, &own->settings, &found->contact_input, &found->contact, &found->load);
+  tangential_update(&own->history, &own->settings, &found->contact_input, &found->contact, &found->tangential_force);
   found->contact.flags |= own->is_late ? (uint32_t)CONTACT_FLAG_TANGENTIAL_LATE : 0;
 }
 
 void tangential_stage_put(const struct findings *found, struct wire_contact *packet) {
   if (found->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
-    const struct tangential_load *load = &found->load;
-    packet->x_mm = load->x_mm;
-    packet->y_mm = load->y_mm;
-    packet->location_sd_mm = load->location_sd_mm;
-    packet->force_N = load->force_N;
-    packet->force_sd_N = load->force_sd_N;
-    packet->qx_N = load->qx_N;
-    packet->qy_N = load->qy_N;
-    packet->q_sd_N = load->q_sd_N;
-    packet->tangential_ratio = load->ratio;
+    const struct tangential_force *force = &found->tangential_force;
+    packet->x_mm = force->x_mm;
+    packet->y_mm = force->y_mm;
+    packet->location_sd_mm = force->location_sd_mm;
+    packet->force_N = force->force_N;
+    packet->force_sd_N = force->force_sd_N;
+    packet->qx_N = force->qx_N;
+    packet->qy_N = force->qy_N;
+    packet->q_sd_N = force->q_sd_N;
+    packet->tangential_ratio = force->ratio;
   }
   packet->vx_mm_s = found->motion.vx_mm_s;
   packet->vy_mm_s = found->motion.vy_mm_s;

@@ -1,6 +1,6 @@
 /* Stage: the tangential force of the contact, where the pad's profile is known (contact/tangential.h).
  * Reads findings.frame, .conditioned, .fit and .contact_input, and the settings of location_stage. Writes
- * findings.tangential, .load and .slept_us, and adds flags.
+ * findings.tangential, .tangential_force and .slept_us, and adds flags.
  *
  * The second processor estimates it (jobs.h). Frames that come faster than TANGENTIAL_BESIDE_us do not wait: each takes
  * the estimate of the frame before, moved and scaled as the Gaussian has changed since. Slower ones wait for their own.

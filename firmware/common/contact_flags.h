@@ -40,7 +40,7 @@ enum contact_flag {
   CONTACT_FLAG_TANGENTIAL_FROM_TOUCH = 1 << 21,
   CONTACT_FLAG_VELOCITY_VALID = 1 << 22, /* the velocity of the contact has values */
   CONTACT_FLAG_MOVING = 1 << 23, /* the speed of the contact is above the threshold */
-  /* the contact moves beyond what the load explains, however slowly */
+  /* the contact moves beyond what the tangential force explains, however slowly */
   CONTACT_FLAG_SLIDING = 1 << 24,
   /* warning: the second processor did not estimate the tangential force in time: location and
    * force are not corrected for it */

@@ -245,16 +245,16 @@ static bool find_velocity(struct motion_history *history) {
 
 /* Enters a tangential force: what it has changed by, over the force of now. The normal force's own scale is in
  * both. Exact over any number of frames of one force. */
-static void follow_load(struct motion_load *load, int32_t tangential_N_q24, int32_t force_N_q12, bool first) {
+static void follow_ratio(struct motion_ratio *ratio, int32_t tangential_N_q24, int32_t force_N_q12, bool first) {
   if (first) {
-    load->remainder = 0;
+    ratio->remainder = 0;
   } else {
-    int32_t change = tangential_N_q24 - load->newest_q24 + load->remainder;
+    int32_t change = tangential_N_q24 - ratio->newest_q24 + ratio->remainder;
     int32_t ratio_q12 = port_divide(change, force_N_q12);
-    load->remainder = change - ratio_q12 * force_N_q12;
-    load->ratio_q12 += (uint32_t)ratio_q12;
+    ratio->remainder = change - ratio_q12 * force_N_q12;
+    ratio->ratio_q12 += (uint32_t)ratio_q12;
   }
-  load->newest_q24 = tangential_N_q24;
+  ratio->newest_q24 = tangential_N_q24;
 }
 
 static int32_t noise_um(const struct fit_tangential *found) {
@@ -280,8 +280,8 @@ static void add(struct motion_history *history, const struct tangential_settings
   history->now.count++;
   history->now.x += x;
   history->now.y += y;
-  follow_load(&history->load_x, clamped(fit_fixed(found->qx_N, 24), LOAD_MAX_q24), force_N_q12, first);
-  follow_load(&history->load_y, clamped(fit_fixed(found->qy_N, 24), LOAD_MAX_q24), force_N_q12, first);
+  follow_ratio(&history->load_x, clamped(fit_fixed(found->qx_N, 24), LOAD_MAX_q24), force_N_q12, first);
+  follow_ratio(&history->load_y, clamped(fit_fixed(found->qy_N, 24), LOAD_MAX_q24), force_N_q12, first);
   history->now.load_x += history->load_x.ratio_q12;
   history->now.load_y += history->load_y.ratio_q12;
   history->now.variance += noise * noise;

@@ -73,7 +73,7 @@ struct motion_sums {
 
 /* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the tangential force
  * grows leaves Q / F as it is, though the rubber gives way. */
-struct motion_load {
+struct motion_ratio {
   uint32_t ratio_q12;            /* modulo 2^32 */
   int32_t newest_q24, remainder; /* Q as last entered; what is below the integral's last bit */
 };
@@ -97,7 +97,7 @@ struct motion {
 struct motion_history {
   struct motion_sums now;        /* with the newest frame in them */
   struct motion_moments moments; /* the same */
-  struct motion_load load_x, load_y;
+  struct motion_ratio load_x, load_y;
   struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
   struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
   uint64_t newest_us;

@@ -93,15 +93,15 @@ void shapes_estimate(void *job) {
 }
 
 struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
-                                  const struct tangential_load *load) {
+                                  const struct tangential_force *force) {
   struct shapes_place place = {fit->x_mm, fit->y_mm, fit->location_sd_mm};
-  if (load) {
-    place = (struct shapes_place){load->x_mm, load->y_mm, load->location_sd_mm};
+  if (force) {
+    place = (struct shapes_place){force->x_mm, force->y_mm, force->location_sd_mm};
   }
   const bool is_pulled = report->shape == FIT_SHAPE_PULLED;
   if (report->shape == FIT_SHAPE_ROUND) {
     place.location_sd_mm *= report->doubt;
-  } else if (report->shape == FIT_SHAPE_ELONGATED || (is_pulled && !load)) {
+  } else if (report->shape == FIT_SHAPE_ELONGATED || (is_pulled && !force)) {
     const float dx_mm = fabsf(fit->x_mm + report->from_fit_x_mm - place.x_mm);
     const float dy_mm = fabsf(fit->y_mm + report->from_fit_y_mm - place.y_mm);
     place.location_sd_mm = fit_quadrature(1.0f, place.location_sd_mm, 1.0f, fit_quadrature(1.0f, dx_mm, 1.0f, dy_mm));

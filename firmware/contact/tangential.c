@@ -190,7 +190,7 @@ static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q
 
 /* The place is the mean of that of a contact that is pulled as estimated and of one that is not,
  * each by how likely it is. The standard deviation has what lies between the two. */
-static void weigh_load(struct fit_tangential *found) {
+static void weigh_force(struct fit_tangential *found) {
   int32_t force_N_q24 = fit_fixed(found->force_N, 24);
   force_N_q24 = force_N_q24 < FORCE_MIN_N_Q24 ? FORCE_MIN_N_Q24 : force_N_q24;
   const int32_t ratio_x_q26 = per_force_q26(found->qx_N, force_N_q24);
@@ -209,11 +209,11 @@ static void weigh_load(struct fit_tangential *found) {
   found->y_mm = fit_float(fit_fixed(found->y_mm, 20) - fixed_mul_16(dy_q20, not_pulled) * 4, -20);
   struct scaled variance = squares_of(fit_fixed(found->location_sd_mm, 20), 0, 20);
   const struct scaled least = {variance.mantissa, variance.exponent - 4};
-  struct scaled of_load = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
-  of_load.mantissa = -of_load.mantissa;
+  struct scaled of_force = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
+  of_force.mantissa = -of_force.mantissa;
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
-  variance = sum_of(variance, scaled_mul(sum_of(between, of_load), share));
+  variance = sum_of(variance, scaled_mul(sum_of(between, of_force), share));
   const bool small = sum_of(variance, (struct scaled){-least.mantissa, least.exponent}).mantissa < 0;
   const struct scaled root = scaled_sqrt(small ? least : variance);
   found->location_sd_mm = fit_float(root.mantissa, root.exponent);
@@ -237,10 +237,11 @@ static bool settle_zero(struct tangential_history *history, uint64_t t_us, float
 }
 
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
-                       const struct contact_input *input, struct contact_result *result, struct tangential_load *load) {
+                       const struct contact_input *input, struct contact_result *result,
+                       struct tangential_force *force) {
   struct fit_tangential mended;
   const struct fit_tangential *found = &mended;
-  memset(load, 0, sizeof *load);
+  memset(force, 0, sizeof *force);
   if (!input->contact) {
     tangential_reset(history);
   }
@@ -248,7 +249,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
       !without_edges(settings, input->tangential, &mended)) {
     return;
   }
-  weigh_load(&mended);
+  weigh_force(&mended);
   float qx_N = found->qx_N, qy_N = found->qy_N;
   if (settings->from_touch) {
     if (!settle_zero(history, input->t_us, qx_N / found->force_N, qy_N / found->force_N)) {
@@ -263,19 +264,20 @@ void tangential_update(struct tangential_history *history, const struct tangenti
   /* Both scales' share of the standard deviation, along the tangential force, where it is the whole. */
   const float scale_sd = fit_quadrature(settings->force_scale, settings->tangential_scale_sd,
                                         settings->tangential_scale, settings->force_scale_sd);
-  load->x_mm = found->x_mm;
-  load->y_mm = found->y_mm;
-  load->location_sd_mm = found->location_sd_mm;
-  load->force_N = settings->force_scale * found->force_N;
-  load->force_sd_N = fit_quadrature(settings->force_scale, found->force_sd_N, settings->force_scale_sd, found->force_N);
-  load->qx_N = scale * qx_N;
-  load->qy_N = scale * qy_N;
-  load->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);
-  load->ratio = settings->tangential_scale * size_N / found->force_N;
+  force->x_mm = found->x_mm;
+  force->y_mm = found->y_mm;
+  force->location_sd_mm = found->location_sd_mm;
+  force->force_N = settings->force_scale * found->force_N;
+  force->force_sd_N =
+      fit_quadrature(settings->force_scale, found->force_sd_N, settings->force_scale_sd, found->force_N);
+  force->qx_N = scale * qx_N;
+  force->qy_N = scale * qy_N;
+  force->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);
+  force->ratio = settings->tangential_scale * size_N / found->force_N;
   result->flags |= CONTACT_FLAG_TANGENTIAL_VALID;
   result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED);
   result->flags |= found->elongated ? (uint32_t)CONTACT_FLAG_ELONGATED : 0;
-  if (load->location_sd_mm > settings->location_sd_limit_mm) {
+  if (force->location_sd_mm > settings->location_sd_limit_mm) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }
 }

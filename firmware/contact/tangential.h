@@ -39,8 +39,8 @@ struct tangential_history {
 
 /* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as
  * estimated and of one that nothing pulls, each by how likely it is: a small tangential force may be none, and
- * chance loads would move it. location_sd_mm has what lies between the two. */
-struct tangential_load {
+ * chance tangential forces would move it. location_sd_mm has what lies between the two. */
+struct tangential_force {
   float x_mm, y_mm, location_sd_mm;
   float force_N, force_sd_N;
   float qx_N, qy_N; /* of the object on the rubber */
@@ -102,4 +102,5 @@ void tangential_reset(struct tangential_history *history);
  * none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
-                       const struct contact_input *input, struct contact_result *result, struct tangential_load *load);
+                       const struct contact_input *input, struct contact_result *result,
+                       struct tangential_force *force);

@@ -12,7 +12,7 @@
  * sensor, g(v) = exp(-d' d / (2 v)):
  *   residual = g(1) (a + b dx + c dy + e d' d) + far g(FAR) + (qx dx + qy dy) g(PULL)
  * The first four are what a step of the fit would still take. `far` is 0 +- FAR_SD of p0: what the
- * rubber has around a contact, or what a known dip is off by. The last two are the trace of a load. */
+ * rubber has around a contact, or what a known dip is off by. The last two are the trace of a tangential force. */
 enum { HEIGHT, ALONG_X, ALONG_Y, WIDTH, FAR, PULL_X, PULL_Y, UNKNOWNS };
 _Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 
@@ -273,29 +273,29 @@ static bool is_located(const struct fit_result *result) {
   return (result->flags & CONTACT_FLAG_FIT_VALID) && !(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT));
 }
 
-void fit_doubt_begin(struct fit_doubt *load) {
-  load->known = false;
-  load->part = 0;
+void fit_doubt_begin(struct fit_doubt *doubt) {
+  doubt->known = false;
+  doubt->part = 0;
 }
 
-void fit_doubt_widen(const struct fit_doubt *load, const struct fit_array *array, const struct fit_settings *settings,
+void fit_doubt_widen(const struct fit_doubt *doubt, const struct fit_array *array, const struct fit_settings *settings,
                      struct fit_result *result) {
-  if (!is_located(result) || (load->known && load->ratio == 0.0f)) {
+  if (!is_located(result) || (doubt->known && doubt->ratio == 0.0f)) {
     return;
   }
   float by_pitch = SHIFT_PER_PITCH * array->pitch_mm;
   float by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
-  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, load->known ? load->ratio : FIT_DOUBT_USUAL,
+  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, doubt->known ? doubt->ratio : FIT_DOUBT_USUAL,
                                           by_pitch > by_sigma ? by_pitch : by_sigma);
   if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }
 }
 
-void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+void fit_doubt_follow(struct fit_doubt *doubt, const struct fit_array *array, const int32_t *pressure_Pa_q10,
                       const struct fit_settings *settings, const struct fit_result *result) {
-  struct fit_doubt_search *look = &load->look;
-  switch (load->part) {
+  struct fit_doubt_search *look = &doubt->look;
+  switch (doubt->part) {
   case 0:
     if (!is_located(result) || !take_readings(array, pressure_Pa_q10, settings, result, look)) {
       return;
@@ -316,9 +316,9 @@ void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, con
   default: {
     struct scaled ratio =
         scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))), fit_grid_scaled(RATIO_PER_TRACE));
-    load->ratio = fit_scaled_float(ratio);
-    load->known = true;
+    doubt->ratio = fit_scaled_float(ratio);
+    doubt->known = true;
   }
   }
-  load->part = (uint8_t)((load->part + 1) % FIT_DOUBT_PARTS);
+  doubt->part = (uint8_t)((doubt->part + 1) % FIT_DOUBT_PARTS);
 }

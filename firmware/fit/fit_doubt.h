@@ -1,13 +1,13 @@
-/* What a tangential load that is not estimated does to the location.
+/* What a tangential force that is not estimated does to the location.
  *
- * A load moves the Gaussian by some 0.38 pitch for each unit of Q / F, and leaves a trace in the
+ * A tangential force moves the Gaussian by some 0.38 pitch for each unit of Q / F, and leaves a trace in the
  * residual. The look finds how large that trace is, beyond what noise, gains and model leave by
- * chance. That much of a load is part of the location's error (NUMERICS.md, "A load that is not
+ * chance. That much of a tangential force is part of the location's error (NUMERICS.md, "A tangential force that is not
  * known").
  *
  * A look is one least squares in fixed point, of the residual of a fit that is done: for every
  * kernel, any layout, any sensors missing. It is in parts, one a frame, for the time after the
- * frame's packet. Until a contact's first look has ended, and where there is none, the load is
+ * frame's packet. Until a contact's first look has ended, and where there is none, the tangential force is
  * FIT_DOUBT_USUAL. */
 #pragma once
 
@@ -52,15 +52,15 @@ struct fit_doubt {
   struct fit_doubt_search look;
 };
 
-/* At each frame without a contact, or whose load is estimated otherwise. */
-void fit_doubt_begin(struct fit_doubt *load);
+/* At each frame without a contact, or whose tangential force is estimated otherwise. */
+void fit_doubt_begin(struct fit_doubt *doubt);
 
-/* Adds to location_sd_mm what the load does, as far as it is known, and sets UNCERTAIN if that
+/* Adds to location_sd_mm what the tangential force does, as far as it is known, and sets UNCERTAIN if that
  * exceeds the limit. Leaves a result alone that is no fit, stopped at a limit, or is FLAT. */
-void fit_doubt_widen(const struct fit_doubt *load, const struct fit_array *array, const struct fit_settings *settings,
+void fit_doubt_widen(const struct fit_doubt *doubt, const struct fit_array *array, const struct fit_settings *settings,
                      struct fit_result *result);
 
 /* The next part of a look. A look begins with these readings, which are those of the result; its
  * later parts do not see them. A result that fit_doubt_widen leaves alone begins none. */
-void fit_doubt_follow(struct fit_doubt *load, const struct fit_array *array, const int32_t *pressure_Pa_q10,
+void fit_doubt_follow(struct fit_doubt *doubt, const struct fit_array *array, const int32_t *pressure_Pa_q10,
                       const struct fit_settings *settings, const struct fit_result *result);

@@ -9,8 +9,8 @@
 /* Readings whose errors are more than 3 % of their unit determine no shape. */
 #define BASE_MAX_Q22 (1 << 17)
 #define LOG2E_HALF_FLOAT 0.72134752f
-/* Frames of a contact, counted from 1. The load joins its model once the line has settled. From the first that answers
- * on, one frame answers where the models are, and the next steps. */
+/* Frames of a contact, counted from 1. The tangential force joins its model once the line has settled. From the first
+ * that answers on, one frame answers where the models are, and the next steps. */
 #define FIRST_WITH_LOAD 10
 #define FIRST_ANSWER FIT_SHAPES_FRAMES
 #define LAST_FRAME (FIRST_ANSWER + 1)

@@ -3,7 +3,7 @@
  * Three models explain the readings of each frame by the pad's profile (common/pad_profile.h) and
  * by the dip that its calibration found (struct fit_settings):
  *   round  one contact
- *   long   one contact along a straight line, under a tangential load
+ *   long   one contact along a straight line, under a tangential force
  *   two    two contacts with forces of their own
  * Each takes one damped Gauss-Newton step a frame, from where the frame before ended, so the cost is
  * fixed. A contact at rest has its answer after FIT_SHAPES_FRAMES frames, and then in every other
@@ -40,8 +40,8 @@
 enum fit_shape {
   FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */
   FIT_SHAPE_ROUND,
-  FIT_SHAPE_PULLED,    /* one, under a tangential load */
-  FIT_SHAPE_ELONGATED, /* one along a line, under a load or not */
+  FIT_SHAPE_PULLED,    /* one, under a tangential force */
+  FIT_SHAPE_ELONGATED, /* one along a line, under a tangential force or not */
   FIT_SHAPE_TWO,
   FIT_SHAPE_NONE, /* none of these explains the readings */
 };

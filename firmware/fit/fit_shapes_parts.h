@@ -2,7 +2,7 @@
  *
  * The models, lengths in pitches. A blob at d = (dx, dy) from its middle, t its contact's spread:
  *   s = sum_j share_j V / v_j exp(-d' d / (2 v_j)) - dip,    v_j = V_j + t,  V the widest V_j
- * and what of a load Q the rubber shows there:
+ * and what of a tangential force Q the rubber shows there:
  *   f = sum_j moment_j V / v_j^2 d exp(-d' d / (2 v_j)),     v_j = V_j + 1.3 t
  * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight
  * w_b by lever_b span from the middle.

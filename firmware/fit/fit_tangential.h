@@ -1,4 +1,4 @@
-/* Tangential load from the normal pressures. A pull along the rubber presses the base ahead of it
+/* Tangential force from the normal pressures. A pull along the rubber presses the base ahead of it
  * and relieves it behind. This pattern is broader than that of a shifted contact.
  *
  * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the
@@ -95,7 +95,7 @@ struct fit_tangential {
   float q_sd_N;                            /* standard deviation of either */
   int32_t moved_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
                                               by 1, and along y of qy; what moves across is a tenth of that */
-  bool elongated;                          /* the contact is not round, whatever the Gaussian makes of its load */
+  bool elongated; /* the contact is not round, whatever the Gaussian makes of its tangential force */
 };
 
 /* A contact at rest is at its optimum after this number of frames. */

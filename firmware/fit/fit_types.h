@@ -53,7 +53,7 @@ struct fit_settings {
    * 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
   /* A reading cut_noises noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
-   * reading is changed, as a tangential load asks for. */
+   * reading is changed, as a tangential force asks for. */
   uint8_t cut_noises;
   /* What the rubber takes from the readings around a contact, where that is known:
    * dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not cut then. None unless the share is above 0 and at most
@@ -80,7 +80,7 @@ struct fit_result {
   float force_N;           /* 2 pi p0 sigma^2 */
   float residual_rms_Pa;   /* over the sensors used */
   float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it; without
-                              what a tangential load does, which fit_doubt.h adds */
+                              what a tangential force does, which fit_doubt.h adds */
   float location_noise_mm; /* what of it is noise: how far a contact at rest jitters */
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */

@@ -44,7 +44,7 @@ static published published_of(const pad_profile &profile, double force_scale, co
   input.tangential = &estimate;
   tangential_history history{};
   contact_result result{};
-  tangential_load load;
+  tangential_force load;
   tangential_update(&history, &settings, &input, &result, &load);
   const auto number = [](float value) { return static_cast<double>(value); };
   published found{};
@@ -102,7 +102,7 @@ static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes
     question.parts = FIT_SHAPES_PARTS;
     question.settings = settings_of(all_settings, own, contact);
     const published &estimate = estimates[contact];
-    tangential_load load{};
+    tangential_force load{};
     load.x_mm = static_cast<float>(estimate.x_mm);
     load.y_mm = static_cast<float>(estimate.y_mm);
     load.location_sd_mm = static_cast<float>(estimate.location_sd_mm);
@@ -168,7 +168,7 @@ static void motion_flags(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 
       input.fit = pressed[i] ? &fit : nullptr;
       input.tangential = &estimate;
       contact_result result;
-      tangential_load load;
+      tangential_force load;
       motion motion;
       contact_update(&slip, &contact, &input, &result);
       tangential_update(&history, &published, &input, &result, &load);

@@ -214,8 +214,8 @@ TEST(a_calibration_and_the_scale_of_the_profile_act) {
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
   TEST_ASSERT_EQUAL_FLOAT(scale * app.found.tangential->force_N, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.found.tangential->qx_N, contact.qx_N);
-  TEST_ASSERT_EQUAL_FLOAT(app.found.load.location_sd_mm, contact.location_sd_mm);
-  TEST_ASSERT_TRUE(app.found.load.location_sd_mm != app.found.fit.location_sd_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.found.tangential_force.location_sd_mm, contact.location_sd_mm);
+  TEST_ASSERT_TRUE(app.found.tangential_force.location_sd_mm != app.found.fit.location_sd_mm);
 }
 
 TEST(from_touch_tells_what_changed) {
@@ -295,9 +295,9 @@ TEST(fast_frames_take_the_load_of_the_frame_before) {
     TEST_ASSERT_EQUAL_FLOAT(before.force_N * share, app.stages.tangential.estimate.force_N);
     TEST_ASSERT_EQUAL_FLOAT(before.qx_N * share, app.stages.tangential.estimate.qx_N);
     TEST_ASSERT_EQUAL_FLOAT(before.q_sd_N * share, app.stages.tangential.estimate.q_sd_N);
-    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.5f, app.found.load.x_mm);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 1.5f, app.found.tangential_force.x_mm);
     feed_fast(1.25);
-    TEST_ASSERT_FLOAT_WITHIN(0.2f, 6.25f, app.found.load.force_N);
+    TEST_ASSERT_FLOAT_WITHIN(0.2f, 6.25f, app.found.tangential_force.force_N);
     feed_fast(3.0); /* another contact's */
     TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_VALID, app.found.contact.flags);
     TEST_ASSERT_BITS_LOW(CONTACT_FLAG_TANGENTIAL_LATE, app.found.contact.flags);

@@ -128,7 +128,7 @@ static uint32_t judge(uint32_t crc) {
     uint32_t crc;
     struct contact_result result;
     struct contact_force force;
-    struct tangential_load load;
+    struct tangential_force load;
     struct motion motion;
   } told;
   memset(&told, 0, sizeof told);

@@ -5,12 +5,12 @@
 
 static struct shapes_report report;
 static struct fit_result fit;
-static struct tangential_load load;
+static struct tangential_force load;
 
 void setUp(void) {
   report = (struct shapes_report){.shape = FIT_SHAPE_UNDECIDED};
   fit = (struct fit_result){.x_mm = 2.0f, .y_mm = -5.0f, .location_sd_mm = 0.3f};
-  load = (struct tangential_load){.x_mm = 4.0f, .y_mm = -8.0f, .location_sd_mm = 0.4f};
+  load = (struct tangential_force){.x_mm = 4.0f, .y_mm = -8.0f, .location_sd_mm = 0.4f};
 }
 
 /* Each as long as the longest, and the load, which takes several steps of slow frames. */
@@ -31,7 +31,7 @@ static void has_middle(enum fit_shape shape) {
   report.from_fit_y_mm = 0.5f;
 }
 
-static void is_at(float x_mm, float y_mm, float sd_mm, const struct tangential_load *of) {
+static void is_at(float x_mm, float y_mm, float sd_mm, const struct tangential_force *of) {
   const struct shapes_place place = shapes_locate(&report, &fit, of);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, x_mm, place.x_mm);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, y_mm, place.y_mm);

@@ -12,7 +12,7 @@ static struct tangential_history history;
 static struct fit_tangential found;
 static struct contact_input input;
 static struct contact_result result;
-static struct tangential_load load;
+static struct tangential_force load;
 
 void setUp(void) {
   settings = (struct tangential_settings){.force_scale = 1.0f, .tangential_scale = 1.0f, .location_sd_limit_mm = 0.6f};
@@ -39,7 +39,7 @@ static uint32_t update(uint32_t flags) {
 }
 
 static void assert_nothing(uint32_t flags) {
-  static const struct tangential_load none;
+  static const struct tangential_force none;
   TEST_ASSERT_EQUAL_HEX32(flags, update(flags));
   TEST_ASSERT_EQUAL_MEMORY(&none, &load, sizeof load);
 }

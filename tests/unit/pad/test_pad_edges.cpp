@@ -77,7 +77,7 @@ Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, dou
   input.contact = true;
   input.tangential = &found;
   contact_result result{};
-  tangential_load load;
+  tangential_force load;
   tangential_update(&history, &settings, &input, &result, &load);
   return {(result.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0,
           double(load.x_mm),
