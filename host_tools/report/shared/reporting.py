@@ -145,17 +145,17 @@ def contacts_of(options):
         raise InputError(str(error)) from None
 
 
-def chosen_parts(options, parts, usual):
-    """Those of --parts, or the usual ones."""
-    chosen = options.parts.split(",") if options.parts else list(usual)
+def add_parts(parser, name, parts):
+    parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(parts)}; the others from the folder's {name}.json")
+
+
+def report_of_parts(options, name, parts, goals, measure, pages, derive=lambda found, out: {}, usual=None):
+    """A report of parts that run one after the other: those of --parts, or the usual ones, or all. parts: what each does; measure[part](options) ->
+    figures; derive(found, out) -> figures that follow from others; pages: the module that draws name.png, and names in PICTURED the tables that only
+    the picture shows. Exit status."""
+    chosen = options.parts.split(",") if options.parts else list(parts) if usual is None else usual
     if unknown := [part for part in chosen if part not in parts]:
         raise InputError(f"--parts: {unknown[0]} is none of {','.join(parts)}")
-    return chosen
-
-
-def report_of_programs(options, name, parts, chosen, goals, measure, derive, pages):
-    """A report of programs that run one after the other. parts: what each does; measure(part) -> figures; derive(found, out) -> figures
-    that follow from others; pages: the module that draws name.png, and names in PICTURED the tables that only the picture shows. Exit status."""
     out = output_folder(options)
     path = out / f"{name}.json"
     found = {figure: None for figure, _, _ in goals}
@@ -163,7 +163,7 @@ def report_of_programs(options, name, parts, chosen, goals, measure, derive, pag
         found |= json.loads(path.read_text())
     for part in chosen:
         print(f"        {parts[part]}", flush=True)
-        found |= measure(part)
+        found |= measure[part](options)
         found = judge({**found, **derive(found, out)}, goals)
         write_json(path, found)  # what is found is kept though a later part fails
     text.write(found, name, out, pages.PICTURED)

@@ -22,7 +22,7 @@ sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_
 import shear_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from reporting import chosen_parts, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_programs  # noqa: E402
+from reporting import add_parts, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_parts  # noqa: E402
 
 # part: what it measures
 PARTS = {
@@ -93,10 +93,10 @@ def measure_chip(options):
 MEASURE = {"static": measure_static, "motion": measure_motion, "chip": measure_chip}
 
 
-def lifts(found):
-    """Of lifts of any duration."""
+def derived(found, out):
+    """Of lifts of any duration, and the optimum of the test."""
     false = [value for name, value in found.items() if name.startswith("lift_false_slides_") and value is not None]
-    return {"lift_false_slides": sum(false)} if false else {}
+    return ({"lift_false_slides": sum(false)} if false else {}) | figures_kept(out / OPTIMUM_FILE, OPTIMUM)
 
 
 def main(argv):
@@ -107,24 +107,14 @@ def main(argv):
     parser.add_argument(
         "--few", action="store_true", help="no rubber of other thicknesses than 12 mm, no other cases of motion than the usual"
     )
-    parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's shear.json")
+    add_parts(parser, "shear", PARTS)
     options = parser.parse_args(argv)
     usual = [part for part in PARTS if part != "chip" or fit_cycles_of(options.boards).is_file()]
-    parts = chosen_parts(options, PARTS, usual)
-    if not options.parts and len(parts) < len(PARTS):
+    if not options.parts and len(usual) < len(PARTS):
         print("        not built, so not measured: chip", flush=True)
     if not options.parts and (test := pathlib.Path(options.build) / OPTIMUM_TEST).is_file():
         subprocess.run([str(test), str(output_folder(options) / OPTIMUM_FILE)], stdout=subprocess.DEVNULL)
-    return report_of_programs(
-        options,
-        "shear",
-        PARTS,
-        parts,
-        GOALS,
-        lambda part: MEASURE[part](options),
-        lambda found, out: {**lifts(found), **figures_kept(out / OPTIMUM_FILE, OPTIMUM)},
-        shear_report,
-    )
+    return report_of_parts(options, "shear", PARTS, GOALS, MEASURE, shear_report, derived, usual)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ import truth_report  # noqa: E402
 import zero_and_gate  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from measure import Measure, MeasureError  # noqa: E402
-from reporting import chosen_parts, figures_kept, option_parser, report_of_programs  # noqa: E402
+from reporting import add_parts, figures_kept, option_parser, report_of_parts  # noqa: E402
 
 PARTS = {
     "fit": "one press: coverage of the standard deviations, warnings, contacts that are not round",
@@ -73,15 +73,23 @@ GOALS = (
 KEPT = {"fit.json": ("cold_cycles", "masked_cycles"), "reliability.json": ("flash_lost", "flash_frames_skipped")}
 
 
-# part: figures(firmware, options)
-FIGURES = {"fit": one_press.figures, "calibration": calibrations.figures, "gate": zero_and_gate.figures}
+def measured(figures):
+    """Of a part whose figures are those of figures(firmware, options)."""
+
+    def measure(options):
+        try:
+            return figures(Measure(options.build), options)
+        except MeasureError as error:
+            raise InputError(str(error)) from None
+
+    return measure
 
 
-def measured(part, options):
-    try:
-        return FIGURES[part](Measure(options.build), options)
-    except MeasureError as error:
-        raise InputError(str(error)) from None
+MEASURE = {"fit": measured(one_press.figures), "calibration": measured(calibrations.figures), "gate": measured(zero_and_gate.figures)}
+
+
+def kept(_, out):
+    return {name: value for file, names in KEPT.items() for name, value in figures_kept(out / file, names).items()}
 
 
 def main(argv):
@@ -89,19 +97,8 @@ def main(argv):
     parser.add_argument("--recordings", default=os.environ.get("FINGERTIP_RECORDINGS"), metavar="DIR", help="of real strips")
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--pads", type=int, metavar="N", help="where pads differ; default 200 or more")
-    parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's truth.json")
-    options = parser.parse_args(argv)
-    parts = chosen_parts(options, PARTS, PARTS)
-    return report_of_programs(
-        options,
-        "truth",
-        PARTS,
-        parts,
-        GOALS,
-        lambda part: measured(part, options),
-        lambda _, out: {name: value for file, names in KEPT.items() for name, value in figures_kept(out / file, names).items()},
-        truth_report,
-    )
+    add_parts(parser, "truth", PARTS)
+    return report_of_parts(parser.parse_args(argv), "truth", PARTS, GOALS, MEASURE, truth_report, kept)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_
 import two_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from reporting import chosen_parts, contacts_of, figures_printed, given, option_parser, positive, report_of_programs  # noqa: E402
+from reporting import add_parts, contacts_of, figures_printed, given, option_parser, positive, report_of_parts  # noqa: E402
 
 # part: what it does
 PARTS = {
@@ -60,19 +60,8 @@ def main(argv):
     parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--pads", type=positive, metavar="N", help="calibrated pads; default 200")
-    parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's two.json")
-    options = parser.parse_args(argv)
-    parts = chosen_parts(options, PARTS, PARTS)
-    return report_of_programs(
-        options,
-        "two",
-        PARTS,
-        parts,
-        GOALS,
-        lambda part: MEASURE[part](options),
-        lambda found, out: {},
-        two_report,
-    )
+    add_parts(parser, "two", PARTS)
+    return report_of_parts(parser.parse_args(argv), "two", PARTS, GOALS, MEASURE, two_report)
 
 
 if __name__ == "__main__":

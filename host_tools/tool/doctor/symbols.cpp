@@ -1,6 +1,5 @@
-#include "tool/doctor/crash.hpp"
-
 #include "libfingertip/error.hpp"
+#include "tool/doctor/crash.hpp"
 
 #include <algorithm>
 #include <cerrno>

@@ -83,10 +83,7 @@ FOUND, PARTS, EXPECTED = REPORTS[NAME]["found"], ",".join(REPORTS[NAME]["found"]
 class Folder(unittest.TestCase):
     def setUp(self):
         self.out = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
-        table = "FIGURES" if NAME == "truth" else "MEASURE"
-        self.enterContext(mock.patch.dict(getattr(report, table), {part: lambda *_, found=found: found for part, found in FOUND.items()}))
-        if NAME == "truth":
-            self.enterContext(mock.patch.object(report, "Measure"))
+        self.enterContext(mock.patch.dict(report.MEASURE, {part: lambda options, found=found: found for part, found in FOUND.items()}))
 
     def run_parts(self, parts, *options):
         with contextlib.redirect_stdout(io.StringIO()):
@@ -148,14 +145,14 @@ if NAME == "truth":
 
     class Truth(Folder):
         def test_options_reach_the_parts_and_a_missing_build_is_an_error(self):
-            with mock.patch.dict(
-                report.FIGURES, gate=lambda firmware, options: {"options": [options.seed, options.pads, options.recordings]}
-            ):
-                self.run_parts("gate", "--seed", "3", "--pads", "2", "--recordings", "strips")
-            self.assertEqual(json.loads((self.out / "truth.json").read_text())["options"], [3, 2, "strips"])
-            with mock.patch.object(report, "Measure", side_effect=report.MeasureError("build it")):
-                with self.assertRaisesRegex(InputError, "build it"):
-                    self.run_parts("fit")
+            part = report.measured(lambda firmware, options: {"options": [options.seed, options.pads, options.recordings]})
+            with mock.patch.dict(report.MEASURE, gate=part):
+                with mock.patch.object(report, "Measure"):
+                    self.run_parts("gate", "--seed", "3", "--pads", "2", "--recordings", "strips")
+                self.assertEqual(json.loads((self.out / "truth.json").read_text())["options"], [3, 2, "strips"])
+                with mock.patch.object(report, "Measure", side_effect=report.MeasureError("build it")):
+                    with self.assertRaisesRegex(InputError, "build it"):
+                        self.run_parts("gate")
 
 
 if __name__ == "__main__":
