@@ -54,7 +54,7 @@ class Flag(enum.IntFlag):
     TANGENTIAL_FROM_TOUCH = 1 << 21  #: the tangential force is the change since the first touch
     VELOCITY_VALID = 1 << 22  #: the velocity of the contact has values
     MOVING = 1 << 23  #: the speed of the contact is above the threshold
-    SLIDING = 1 << 24  #: the contact moves beyond what the load explains, however slowly
+    SLIDING = 1 << 24  #: the contact moves beyond what the tangential force explains, however slowly
     TANGENTIAL_LATE = 1 << 25  #: warning: the second processor did not estimate the tangential force in time: location and force are not corrected for it
     SHAPE_VALID = 1 << 26  #: the contact shape is known: one contact, unless one of the three below is set
     TWO_CONTACTS = 1 << 27  #: warning: two contacts press, and each has a place and a force: x_mm and y_mm are the place of neither
@@ -193,13 +193,13 @@ class PadProfile(NamedTuple):
     edge_place_y_mm: Annotated[tuple[float, ...], Wire("f", 3)]
     """on the place, y"""
     edge_pull_x_mm: Annotated[tuple[float, ...], Wire("f", 3)]
-    """on the place by a load along x"""
+    """on the place by a tangential force along x"""
     edge_pull_y_mm: Annotated[tuple[float, ...], Wire("f", 3)]
-    """on the place by a load along y"""
+    """on the place by a tangential force along y"""
     edge_force: Annotated[tuple[float, ...], Wire("f", 3)]
     """on the force"""
     from_touch: Annotated[int, Wire("B")]
-    """1: the fingertip reports the load from the first touch on; 0: from zero"""
+    """1: the fingertip reports the tangential force from the first touch on; 0: from zero"""
 
 
 class Contact(NamedTuple):

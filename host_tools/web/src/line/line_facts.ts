@@ -387,13 +387,13 @@ export interface Info extends Header {
   pad_edge_place_x_mm: Float64Array;
   /** on the place, y */
   pad_edge_place_y_mm: Float64Array;
-  /** on the place by a load along x */
+  /** on the place by a tangential force along x */
   pad_edge_pull_x_mm: Float64Array;
-  /** on the place by a load along y */
+  /** on the place by a tangential force along y */
   pad_edge_pull_y_mm: Float64Array;
   /** on the force */
   pad_edge_force: Float64Array;
-  /** 1: the fingertip reports the load from the first touch on; 0: from zero */
+  /** 1: the fingertip reports the tangential force from the first touch on; 0: from zero */
   pad_from_touch: number;
 }
 /** Counters since start, modulo 2^32, and present state. */
