@@ -86,6 +86,16 @@ static bool is_text(const uint8_t *field, unsigned count) {
 #define LOWEST_OF_EXPONENT 0x00800000u
 #define IS_FINITE(bits) (((bits)&EXPONENT) != EXPONENT)
 
+/* From one 32-bit value of a run to the next: of a pair the two take turns. */
+struct stride {
+  int next, after;
+};
+
+static inline struct stride stride_of(bool pairs) {
+  const int across = 4 * FT_MAX_SENSORS;
+  return pairs ? (struct stride){across, 4 - across} : (struct stride){4, 4};
+}
+
 struct writer {
   uint8_t *at;
   uint32_t crc;
@@ -177,14 +187,15 @@ static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, u
   }
 }
 
-/* pairs: of each of two arrays of sensors in turn. */
 static bool get_u32(const uint8_t *at, uint8_t *field, unsigned count, bool pairs) {
+  struct stride stride = stride_of(pairs);
   bool finite = true;
-  for (unsigned i = 0; i < count; i++, at += 4) {
-    const uint32_t value = bytes_get_u32(at);
-    const unsigned place = pairs ? i / 2 + i % 2 * FT_MAX_SENSORS : i;
-    memcpy(__builtin_assume_aligned(field + 4 * place, 4), &value, sizeof value);
+  for (; count > 0; count--, at += 4) {
+    uint32_t value = bytes_get_u32(at);
+    memcpy(__builtin_assume_aligned(field, 4), &value, sizeof value);
     finite = finite && IS_FINITE(value);
+    field += stride.next;
+    stride = (struct stride){stride.after, stride.next};
   }
   return finite;
 }

@@ -13,12 +13,17 @@ namespace fingertip::feetech {
 constexpr int BAUD = 1'000'000;
 constexpr int SLAVE = 6; // the gripper of an SO-101
 constexpr int MOST_SLAVE = 253;
+constexpr std::uint8_t BROADCAST = 254;
 constexpr double COUNTS_PER_TURN = 4096.0;
 
 enum Instruction : std::uint8_t {
   PING = 1,
   READ = 2,
   WRITE = 3,
+  REG_WRITE = 4, // done on ACTION
+  ACTION = 5,
+  SYNC_READ = 0x82,
+  SYNC_WRITE = 0x83,
 };
 
 enum Address : std::uint8_t {

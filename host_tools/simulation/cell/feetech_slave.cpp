@@ -1,5 +1,5 @@
 // The memory of a simulated Feetech STS3215 (gripper/feetech_table.hpp) over its jaw's motion, and what it
-// answers to read and write, the instructions that the gripper's driver sends.
+// answers to the instructions of the maker's SDK.
 #include "grasp/gripper/feetech.hpp"
 #include "grasp/gripper/feetech_table.hpp"
 #include "simulation/cell/gripper_slave.hpp"
@@ -36,17 +36,51 @@ public:
   Bytes answer(const Bytes &frame, bool refuse) override {
     const Packet question = packet_of(frame);
     const Bytes &given = question.parameters;
-    if (question.id != id_ || given.size() < 2 || (question.code != READ && question.code != WRITE)) {
+    const bool all = question.id == BROADCAST;
+    if (!all && question.id != id_) {
       return {};
     }
     Packet answer = {.id = id_, .code = trouble_};
-    if (question.code == READ) {
-      refresh();
-      for (std::size_t i = given[0]; i < std::size_t{given[0]} + given[1]; i++) {
-        answer.parameters.push_back(i < memory_.size() ? memory_[i] : 0);
+    switch (question.code) {
+    case PING:
+      break;
+    case READ:
+      if (given.size() != 2 || all) {
+        return {};
       }
-    } else {
+      answer = read(given);
+      break;
+    case WRITE:
       write(given);
+      break;
+    case REG_WRITE:
+      waiting_ = given;
+      break;
+    case ACTION:
+      write(waiting_);
+      waiting_.clear();
+      break;
+    case SYNC_WRITE: // address, length, then of each servo its id and its bytes
+      for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size(); at += given[1] + 1u) {
+        if (given[at] == id_) {
+          Bytes own = {given[0]};
+          own.insert(own.end(), given.begin() + std::ptrdiff_t(at) + 1,
+                     given.begin() + std::ptrdiff_t(at) + 1 + given[1]);
+          write(own);
+        }
+      }
+      return {};
+    case SYNC_READ: // address, length, ids; each answers in turn, this one as the only servo
+      if (given.size() < 3 || std::find(given.begin() + 2, given.end(), id_) == given.end()) {
+        return {};
+      }
+      answer = read(given);
+      break;
+    default:
+      return {};
+    }
+    if (all && question.code != PING && question.code != SYNC_READ) {
+      return {};
     }
     answer.code |= refuse ? std::uint8_t{OVERLOAD} : std::uint8_t{0};
     return encoded(answer);
@@ -61,6 +95,7 @@ public:
   void lose_power() override {
     motion_.power_off();
     memory_ = {};
+    waiting_.clear();
     trouble_ = 0;
     put(MODEL, STS3215);
     memory_[ID] = id_;
@@ -94,8 +129,21 @@ private:
     put(PRESENT_CURRENT, static_cast<int>(std::lround(std::abs(motion_.effort()) * STALL_A / AMPERE_PER_COUNT)));
   }
 
+  // given: an address and how much from there on.
+  Packet read(const Bytes &given) {
+    refresh();
+    Packet answer = {.id = id_, .code = trouble_};
+    for (std::size_t i = given[0]; i < std::size_t{given[0]} + given[1]; i++) {
+      answer.parameters.push_back(i < memory_.size() ? memory_[i] : 0);
+    }
+    return answer;
+  }
+
   // given: an address and what goes there. Then it does what its memory asks for.
   void write(const Bytes &given) {
+    if (given.size() < 2) {
+      return;
+    }
     for (std::size_t i = 1; i < given.size(); i++) {
       const std::size_t at = given[0] + i - 1;
       if (at > MODEL + 1 && at < PRESENT_POSITION) {
@@ -122,6 +170,7 @@ private:
   Jaw jaw_;
   std::uint8_t id_;
   std::array<std::uint8_t, 128> memory_{};
+  Bytes waiting_; // of REG_WRITE
   std::uint8_t trouble_ = 0;
 };
 
