@@ -86,7 +86,7 @@ static bool reaches(const struct motion_ring *ring, uint32_t now_us, uint32_t sp
 
 /* From one span of time to another. */
 struct change {
-  int32_t x_um, y_um, load_x_um, load_y_um;
+  int32_t x_um, y_um, ratio_x_um, ratio_y_um;
   int32_t variance_um2; /* of the noise of x and y together */
 };
 
@@ -103,7 +103,7 @@ static int32_t um_from_q11(int32_t mm_q11) { return clamped(mm_q11 * 125 / 256, 
 /* What the tangential force explains. */
 static int32_t um_from_ratio(int32_t ratio_q12, int32_t scale_q8) {
   ratio_q12 = clamped(ratio_q12, RATIO_CHANGE_MAX_q12);
-  return clamped(ratio_q12 * (MOTION_PER_LOAD_mm * 125) / 512 * scale_q8 / 256, CHANGE_MAX_um);
+  return clamped(ratio_q12 * (MOTION_PER_RATIO_mm * 125) / 512 * scale_q8 / 256, CHANGE_MAX_um);
 }
 
 static struct change change_of(const struct motion_history *history, const struct motion_ring *ring,
@@ -122,10 +122,10 @@ static struct change change_of(const struct motion_history *history, const struc
   struct change change;
   change.x_um = um_from_q11(mean_of(now->x, c->x, since) - mean_of(b->x, a->x, before));
   change.y_um = um_from_q11(mean_of(now->y, c->y, since) - mean_of(b->y, a->y, before));
-  change.load_x_um =
-      um_from_ratio(mean_of(now->load_x, c->load_x, since) - mean_of(b->load_x, a->load_x, before), history->scale_q8);
-  change.load_y_um =
-      um_from_ratio(mean_of(now->load_y, c->load_y, since) - mean_of(b->load_y, a->load_y, before), history->scale_q8);
+  change.ratio_x_um = um_from_ratio(mean_of(now->ratio_x, c->ratio_x, since) - mean_of(b->ratio_x, a->ratio_x, before),
+                                    history->scale_q8);
+  change.ratio_y_um = um_from_ratio(mean_of(now->ratio_y, c->ratio_y, since) - mean_of(b->ratio_y, a->ratio_y, before),
+                                    history->scale_q8);
   change.variance_um2 = port_divide(mean_of(now->variance, c->variance, since), since) +
                         port_divide(mean_of(b->variance, a->variance, before), before);
   return change;
@@ -143,11 +143,11 @@ static int32_t squared_doubt(const struct change *change, bool already) {
 
 static bool slides(const struct change *change, const struct pair_spans *spans, int32_t crosstalk_q8, bool already) {
   int32_t way2 = squared_way(change);
-  int32_t load2 = change->load_x_um * change->load_x_um + change->load_y_um * change->load_y_um;
-  if (way2 <= squared_doubt(change, already) + (load2 >> 8) * crosstalk_q8) {
+  int32_t ratio2 = change->ratio_x_um * change->ratio_x_um + change->ratio_y_um * change->ratio_y_um;
+  if (way2 <= squared_doubt(change, already) + (ratio2 >> 8) * crosstalk_q8) {
     return false;
   }
-  int32_t beyond = way2 - change->x_um * change->load_x_um - change->y_um * change->load_y_um; /* times way */
+  int32_t beyond = way2 - change->x_um * change->ratio_x_um - change->y_um * change->ratio_y_um; /* times way */
   int32_t least_um = already ? spans->unexplained_um / 2 : spans->unexplained_um;
   return beyond > 0 && (uint64_t)beyond * (uint32_t)beyond > (uint64_t)(uint32_t)(least_um * least_um) * (uint32_t)way2;
 }
@@ -241,7 +241,7 @@ static bool find_velocity(struct motion_history *history) {
   return true;
 }
 
-#define LOAD_MAX_q24 (32 << 24)
+#define RATIO_MAX_q24 (32 << 24)
 
 /* Enters a tangential force: what it has changed by, over the force of now. The normal force's own scale is in
  * both. Exact over any number of frames of one force. */
@@ -280,10 +280,10 @@ static void add(struct motion_history *history, const struct tangential_settings
   history->now.count++;
   history->now.x += x;
   history->now.y += y;
-  follow_ratio(&history->load_x, clamped(fit_fixed(found->qx_N, 24), LOAD_MAX_q24), force_N_q12, first);
-  follow_ratio(&history->load_y, clamped(fit_fixed(found->qy_N, 24), LOAD_MAX_q24), force_N_q12, first);
-  history->now.load_x += history->load_x.ratio_q12;
-  history->now.load_y += history->load_y.ratio_q12;
+  follow_ratio(&history->ratio_x, clamped(fit_fixed(found->qx_N, 24), RATIO_MAX_q24), force_N_q12, first);
+  follow_ratio(&history->ratio_y, clamped(fit_fixed(found->qy_N, 24), RATIO_MAX_q24), force_N_q12, first);
+  history->now.ratio_x += history->ratio_x.ratio_q12;
+  history->now.ratio_y += history->ratio_y.ratio_q12;
   history->now.variance += noise * noise;
   history->moments.t += tick;
   history->moments.tt += tick * tick;

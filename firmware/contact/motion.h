@@ -7,7 +7,7 @@
  * creeps with the tangential force, never against it. If all of the contact slides, it goes on while Q / F
  * stays or comes down, as friction falls once it has given way. So the measure is how far the
  * contact has moved beyond what the change of its tangential force explains:
- *   |d| - MOTION_PER_LOAD_mm dq . d / |d|,    d: displacement, dq: change of Q / F, both vectors
+ *   |d| - MOTION_PER_RATIO_mm dq . d / |d|,    d: displacement, dq: change of Q / F, both vectors
  * from an earlier span of time to the latest. Location and tangential force are means over the same frames, so
  * that no course of a tangential force makes an elastic contact slide.
  *
@@ -18,7 +18,7 @@
  *
  * Limits: a contact that rolls moves without a tangential force as a sliding one does. So does one carried
  * along by an object that is held elsewhere too. Friction that rises with a slide by more than 1 /
- * MOTION_PER_LOAD_mm for each mm hides it. A location that jumps because another set of sensors is
+ * MOTION_PER_RATIO_mm for each mm hides it. A location that jumps because another set of sensors is
  * in use is no motion: then the history is dropped.
  *
  * Sums are integers modulo 2^32. Their difference over a span is exact however long they have run.
@@ -49,7 +49,7 @@
  * at 1 mm and 0.5. At nine tenths of what friction holds it moves twice that. In lifts and slides
  * of the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 gave the same.
  */
-#define MOTION_PER_LOAD_mm 8
+#define MOTION_PER_RATIO_mm 8
 /* SLIDING ends after this time without a slide: a caught object rings. */
 #define MOTION_SLIDING_ENDS_us 15000u
 
@@ -64,11 +64,11 @@
 
 /* What all frames before one add up to. */
 struct motion_sums {
-  uint32_t t_us;           /* of that frame */
-  uint32_t count;          /* of frames */
-  uint32_t x, y;           /* location, mm / 2^11 */
-  uint32_t load_x, load_y; /* integral of dQ / F, 1 / 2^12 */
-  uint32_t variance;       /* of the location's noise, um^2 */
+  uint32_t t_us;             /* of that frame */
+  uint32_t count;            /* of frames */
+  uint32_t x, y;             /* location, mm / 2^11 */
+  uint32_t ratio_x, ratio_y; /* integral of dQ / F, 1 / 2^12 */
+  uint32_t variance;         /* of the location's noise, um^2 */
 };
 
 /* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the tangential force
@@ -97,7 +97,7 @@ struct motion {
 struct motion_history {
   struct motion_sums now;        /* with the newest frame in them */
   struct motion_moments moments; /* the same */
-  struct motion_ratio load_x, load_y;
+  struct motion_ratio ratio_x, ratio_y;
   struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
   struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
   uint64_t newest_us;

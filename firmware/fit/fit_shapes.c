@@ -11,7 +11,7 @@
 #define LOG2E_HALF_FLOAT 0.72134752f
 /* Frames of a contact, counted from 1. The tangential force joins its model once the line has settled. From the first
  * that answers on, one frame answers where the models are, and the next steps. */
-#define FIRST_WITH_LOAD 10
+#define FIRST_WITH_FORCE 10
 #define FIRST_ANSWER FIT_SHAPES_FRAMES
 #define LAST_FRAME (FIRST_ANSWER + 1)
 /* The best of the models explains nothing if its chi^2 is above that. */
@@ -77,7 +77,7 @@ static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fi
 static void set_residuals(struct fit_shapes_pad *pad, int model, struct fit_shapes_state *state,
                           struct priors *priors) {
   struct fit_shapes_equations *equations = &pad->room.equations[model];
-  const bool early = model == LONG && state->frames < FIRST_WITH_LOAD;
+  const bool early = model == LONG && state->frames < FIRST_WITH_FORCE;
   struct fit_shapes_at *at = &state->at[model];
   fit_shapes_round_places(at);
   fit_shapes_set_rows(pad, model, early ? BALANCE : unknowns_of[model], at, equations);

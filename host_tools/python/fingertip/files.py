@@ -18,6 +18,7 @@ Every error is an InputError whose text is one line that names file and line and
 """
 
 import array
+import contextlib
 import json
 import math
 import os
@@ -68,7 +69,7 @@ def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
 def check_range(name: str, value: float, low: float, high: float) -> None:
     """Of an option of a command."""
     if not low <= value <= high:  # false for NaN
-        raise InputError(f"--{name} {value:g} is out of range; give {low:g} to {high:g}")
+        raise InputError(f"--{name} {value:.10g} is out of range; give {low:.10g} to {high:.10g}")
 
 
 def reporter(name: str) -> Callable[[str], None]:
@@ -110,10 +111,18 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
+    """Whole or not at all, where path is a file."""
+    to_file = os.path.isfile(path) or not os.path.exists(path)
+    part = f"{path}.part" if to_file else path
     try:
-        with open(path, "wb") as file:
+        with open(part, "wb") as file:
             file.write(content)
+        if to_file:
+            os.replace(part, path)
     except OSError as error:
+        if to_file:
+            with contextlib.suppress(OSError):
+                os.remove(part)
         raise InputError(f"{path}: {error.strerror}; choose another place") from None
 
 

@@ -99,18 +99,23 @@ def draw_pad(axes, recording, t_s, x, y, good, doubtful, truth):
     axes.set_title("contact on the pad", loc="left", size=10)
 
 
-def spans(t_s, on):
-    """(start, end) of consecutive rows that are on, each to the next row."""
-    ends = np.append(t_s[1:], t_s[-1])
+def runs(on):
+    """(first, last) of consecutive rows that are on."""
     edges = np.diff(np.concatenate(([0], on.astype(int), [0])))
-    return [(t_s[a], ends[b]) for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1)]
+    return list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1))
+
+
+def spans(t_s, on):
+    """(start, end) of consecutive rows that are on, each to the next row: of a state that lasts until another is reported."""
+    ends = np.append(t_s[1:], t_s[-1])
+    return [(t_s[first], ends[last]) for first, last in runs(on)]
 
 
 def draw_doubtful(panel, t_s, curves, doubtful, scales=False):
     """What carries a warning is shown, but no axis is made for it, unless there is nothing else."""
     low, high = panel.get_ylim()
-    for i, values in enumerate(curves):
-        label = "doubtful" if doubtful.any() and i == 0 else None
+    for values in curves:
+        label = "doubtful" if doubtful.any() and "doubtful" not in panel.get_legend_handles_labels()[1] else None
         panel.scatter(t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, label=label, zorder=2)
     if not scales:
         panel.set_ylim(low, high)
@@ -122,8 +127,8 @@ def draw_marks(panel, marks):
     low, high = panel.get_ylim()
     step = 0.06 * (high - low)
     for i, (t_s, on, colour, label) in enumerate(marks):
-        for j, (start, end) in enumerate(spans(t_s, on)):
-            reach, height = [start, max(end, start + 1e-3)], [low - (i + 1) * step] * 2
+        for j, (first, last) in enumerate(runs(on)):
+            reach, height = [t_s[first], max(t_s[last], t_s[first] + 1e-3)], [low - (i + 1) * step] * 2
             panel.plot(reach, height, color=colour, lw=4, solid_capstyle="butt", label=None if j else label)
     panel.set_ylim(low - (len(marks) + 0.7) * step, high)
 

@@ -124,12 +124,6 @@ def _check_output(path, overwrite):
     check_output(path)
 
 
-def _write(path, text):
-    """Whole or not at all."""
-    write_text(f"{path}.part", text)
-    os.replace(f"{path}.part", path)
-
-
 def _print(card):
     for figure in card.figures:
         print(f"{figure.value:9.{figure.digits}f} {figure.unit:7s} {figure.text}")
@@ -151,15 +145,15 @@ def run(argv):
     if options.template:
         array = array_of(SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm)
         draw = template_pdf if options.template.lower().endswith(".pdf") else template_svg
-        _write(options.template, draw(array))
+        write_text(options.template, draw(array))
         print(f"{printable(options.template)}: print it at 100 %, and measure its line of {RULER_mm:.0f} mm")
         return
     measured = read_measurement(options.recording, options.device) if options.recording else validate_live(options)
     card = Card(measured, printable(options.recording or options.record))
     if options.output:
-        _write(options.output, card_html(card, __version__))
+        write_text(options.output, card_html(card, __version__))
     if options.figures:
-        _write(options.figures, json.dumps(card_json(card), indent=1) + "\n")
+        write_text(options.figures, json.dumps(card_json(card), indent=1) + "\n")
     _print(card)
 
 

@@ -18,8 +18,9 @@ using FaultKind = Fault::Kind;
 
 constexpr double UNLIMITED = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t SEED = 1001;
-// Opening by less is still holding: a first grip comes down to what the load needs, of the cup by 1.5 mm.
-constexpr double OPENS_mm = 1.6;
+// More than the same grasp opens without the fault: a first grip comes down to what the load needs, of the cup by 1.5
+// mm.
+constexpr double OPENS_mm = 1.0;
 
 struct Thing {
   const char *name;
@@ -167,12 +168,19 @@ std::vector<std::string> one_of_each_driver() {
   return models;
 }
 
+KindOutcome outcome_of(const FaultTrial &one, const KindTrial &trial) {
+  const GripperTraits &traits = trial.gripper.traits;
+  CoreController controller(settings_for(traits, {{"cap", one.thing.cap_N}}), traits);
+  return run_kind(trial, controller);
+}
+
 nlohmann::ordered_json row_of(const FaultTrial &one) {
-  const GripperTraits &traits = one.trial.gripper.traits;
   const double cap_N = one.thing.cap_N;
-  CoreController controller(settings_for(traits, {{"cap", cap_N}}), traits);
-  const KindOutcome outcome = run_kind(one.trial, controller);
+  const KindOutcome outcome = outcome_of(one, one.trial);
   const Failed &failed = outcome.failed;
+  KindTrial sound = one.trial;
+  sound.fault->lasts_s = 0.0;
+  const double may_open_mm = outcome_of(one, sound).failed.opened_mm + OPENS_mm;
   const bool ends =
       one.ends_in.empty() || std::find(one.ends_in.begin(), one.ends_in.end(), failed.state) != one.ends_in.end();
   const bool reports = (failed.trouble & one.all_of) == one.all_of &&
@@ -180,7 +188,7 @@ nlohmann::ordered_json row_of(const FaultTrial &one) {
                        failed.gripper_fault == (one.happening.kind == FaultKind::fault ? 9 : 0);
   return {{"fault", one.happening.name},
           {"state", one.when.name},
-          {"gripper", traits.model},
+          {"gripper", one.trial.gripper.traits.model},
           {"object", one.thing.name},
           {"begun", failed.begun},
           {"untold", one.is_untold},
@@ -190,7 +198,7 @@ nlohmann::ordered_json row_of(const FaultTrial &one) {
           {"peak_N", outcome.peak_N},
           {"cap_N", cap_N},
           {"crushed", outcome.crushed},
-          {"opened", one.when.state != GRIP_RELEASE && failed.opened_mm > OPENS_mm},
+          {"opened", one.when.state != GRIP_RELEASE && failed.opened_mm > may_open_mm},
           {"beyond_cap", outcome.peak_N > cap_N},
           {"unsaid", !ends || !reports}};
 }

@@ -6,7 +6,8 @@ from presentation import table_md
 
 GOALS = (("faults_opened", "<=", 0), ("faults_beyond_cap", "<=", 0), ("faults_unsaid", "<=", 0), ("cups_crushed", "<=", 0))
 ABOUT = """Each fault begins in each state of a grasp of each object (a paper cup that 5 N crush, a lime, a ball; caps of 4, 8 and 10 N), on a 2F-85 and
-on the servo; 0.8 s later the hand lifts, if it has not yet, then the mass doubles. Opened: by more than 1.6 mm without being asked to; less a grip takes back that was raised too far.
+on the servo; 0.8 s later the hand lifts, if it has not yet, then the mass doubles. Opened: by 1 mm more than the same grasp
+without the fault, and not asked to.
 Beyond the cap: a true force above it. A row is the worst of both grippers and all objects; said: what was reported of any of them."""
 # No controller can distinguish this: fingertips whose readings froze before anything touched them feel what fingertips in air do.
 UNTOLD = """Not counted: both fingertips whose readings freeze before they touch. They report what they would report in air, so the gripper closes until its own limit

@@ -1,5 +1,5 @@
 // The tangential estimate's reference: its model, weights and priors (firmware/fit/NUMERICS.md,
-// "Tangential load") in double precision and millimetres, minimised by Ceres with derivatives of
+// "Tangential force") in double precision and millimetres, minimised by Ceres with derivatives of
 // its own from many starts; the lowest cost counts.
 #pragma once
 

@@ -14,14 +14,15 @@ export const isPositive = (value) => Number.isFinite(value) && value > 0;
 
 /** parseArgs takes "-1" behind "--name" for an option: join the two, so that the value is judged. */
 function joinNegativeNumbers(argv, options) {
+  const end = argv.includes('--') ? argv.indexOf('--') : argv.length;
   const joined = [];
-  for (const argument of argv) {
+  for (const argument of argv.slice(0, end)) {
     const name = joined.at(-1) ?? '';
     if (/^-[.0-9]/.test(argument) && name.startsWith('--') && options[name.slice(2)]?.type === 'string')
       joined[joined.length - 1] = `${name}=${argument}`;
     else joined.push(argument);
   }
-  return joined;
+  return [...joined, ...argv.slice(end)];
 }
 
 function parse(usage, { defaults, needed, allowPositionals }) {

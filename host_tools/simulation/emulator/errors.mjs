@@ -9,11 +9,12 @@ export function inWords(error) {
   return getSystemErrorMap().get(error.errno)?.[1] ?? error.message;
 }
 
-/** The content of a file that the user named, as text where an encoding is given. */
-export function readInput(path, what, { advice = 'check the path', encoding } = {}) {
+/** The content of a file that the user named, as text where an encoding is given; null for a file that may be missing and is. */
+export function readInput(path, what, { advice = 'check the path', encoding, optional = false } = {}) {
   try {
     return readFileSync(path, encoding);
   } catch (error) {
+    if (optional && error.code === 'ENOENT') return null;
     throw new InputError(`${path}: cannot read the ${what} (${inWords(error)}); ${advice}`);
   }
 }

@@ -1,6 +1,5 @@
 #!/usr/bin/env node
 /** Command line of the emulator: see USAGE. */
-import { existsSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { BOARDS, findBoard } from './board/boards.mjs';
 import { findSensor } from './board/ms5840.mjs';
@@ -102,9 +101,8 @@ function judgeOptions(values) {
 
 /** Null before there is such a file. */
 function readFlash(path) {
-  if (!existsSync(path)) return null;
-  const flash = readInput(path, 'flash');
-  if (flash.length !== FLASH_BYTES)
+  const flash = readInput(path, 'flash', { optional: true });
+  if (flash !== null && flash.length !== FLASH_BYTES)
     throw new InputError(`${path}: ${flash.length} bytes; the flash has ${FLASH_BYTES}; give the file of an earlier run, or a new name`);
   return flash;
 }

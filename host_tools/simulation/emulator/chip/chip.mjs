@@ -60,8 +60,9 @@ const BOOT_TRIES_CYCLES = 3.06e6;
 /** A longer sleep without one wake-up means that the firmware hung. */
 const HUNG_AFTER_NS = 2e9;
 
-/** Page (address >> 14) to bit in RESETS. */
+/** Page (address >> 14) to bit in RESETS; JTAG has no registers. */
 const RESET_BIT_OF_PAGE = new Map([...RESET_BLOCKS.map(([, address], bit) => [address >>> 14, bit]), [DPRAM_BASE >>> 14, 24]]);
+RESET_BIT_OF_PAGE.delete(0);
 
 /** Ends the run; `reason` is what the report calls it. */
 export class Stopped extends Error {

@@ -12,10 +12,10 @@ const TMOD_TX_AND_RX = 0;
 const TMOD_EEPROM_READ = 3;
 
 const LOST = { write() {} };
-const configuration = (key, mask) => ({
+const configuration = (name, key, mask) => ({
   ...field(key, mask),
   write(block, value) {
-    if (block.enabled) block.rp2040.fail('SSI', `configuration register ${key} written while enabled`);
+    if (block.enabled) block.rp2040.fail('SSI', `configuration register ${name} written while enabled`);
     field(key, mask).write(block, value);
   },
 });
@@ -129,11 +129,11 @@ export class Ssi extends RegisterBlock {
   }
 
   static registers = {
-    0x00: configuration('ctrlr0'),
-    0x04: configuration('ctrlr1', 0xffff),
+    0x00: configuration('CTRLR0', 'ctrlr0'),
+    0x04: configuration('CTRLR1', 'ctrlr1', 0xffff),
     0x08: { read: (b) => b.enabled, write: (b, value) => b.#enable(value & 1) },
     0x10: { read: (b) => b.ser, write: (b, value) => b.#choose(value & 1) },
-    0x14: configuration('baudr', 0xfffe),
+    0x14: configuration('BAUDR', 'baudr', 0xfffe),
     0x18: LOST,
     0x1c: LOST,
     0x20: { read: (b) => b.tx.length },
@@ -145,9 +145,9 @@ export class Ssi extends RegisterBlock {
     0x58: { read: () => 0x51535049 },
     0x5c: { read: () => 0x3430312a },
     0x60: { read: (b) => b.#pop(), write: (b, value) => b.#push(value) },
-    0xf0: configuration('sampleDelay', 0xff),
-    0xf4: configuration('spiCtrlr0'),
-    0xf8: configuration('driveEdge', 0xff),
+    0xf0: configuration('RX_SAMPLE_DLY', 'sampleDelay', 0xff),
+    0xf4: configuration('SPI_CTRLR0', 'spiCtrlr0'),
+    0xf8: configuration('TXD_DRIVE_EDGE', 'driveEdge', 0xff),
   };
 
   writeUint32(offset, value) {
