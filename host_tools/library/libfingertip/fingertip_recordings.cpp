@@ -1,16 +1,13 @@
 /* Recordings of fingertip.h: bytes that are fed instead of read, and taken instead of written. */
 #include "libfingertip/fingertip_values.hpp"
 #include "libfingertip/line_sink.hpp"
-#include "libfingertip/line_source.hpp"
-#include "libfingertip/mcap_recording.hpp"
-#include "libfingertip/recording_reader.hpp"
+#include "libfingertip/packet_file.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -83,39 +80,6 @@ private:
   Window &window_;
 };
 
-class FedLines : public LineSource {
-public:
-  FedLines(Window &window, std::string name) : window_(window), name_(std::move(name)) {}
-
-  bool next(Line &line) override {
-    constexpr std::size_t LONGEST = 1 << 20;
-    const std::string_view bytes = window_.all();
-    const std::size_t end = bytes.find('\n');
-    line.torn = end == std::string_view::npos;
-    if (line.torn && !window_.is_whole()) {
-      if (bytes.size() > LONGEST) {
-        throw Error(ErrorCode::other_format,
-                    name_ + ":" + std::to_string(number_ + 1) + ": a line of more than a megabyte");
-      }
-      throw NotYet();
-    }
-    if (bytes.empty()) {
-      return false;
-    }
-    line.text = bytes.substr(0, end);
-    line.number = ++number_;
-    window_.go_to(window_.begin() + line.text.size() + (line.torn ? 0 : 1));
-    return true;
-  }
-  Place place() override { return {0, 0, number_}; }
-  void go_to(const Place &) override {} /* what was fed is not read again */
-
-private:
-  Window &window_;
-  std::string name_;
-  std::uint64_t number_ = 0;
-};
-
 /* The bytes of a file that were not taken yet. */
 class MemorySink : public ByteSink {
 public:
@@ -168,70 +132,13 @@ bool sends_both(const wire_info &info) {
 struct fingertip_reader {
   fingertip_reader(const char *file, std::uint64_t size, bool skip) : name(file), salvage(skip), window(size) {}
 
-  /* Nothing at the end. */
-  std::optional<RecordingReader::Item> next();
-
   std::string name;
   bool salvage;
   Window window;
-  bool known = false; /* which of the two it is */
-  std::optional<RecordingReader> recording;
-  Decoder decoder; /* of a capture */
-  std::deque<wire_packet> decoded;
-  std::optional<RecordingReader::Item> waiting; /* for a larger buffer */
+  std::optional<PacketFile> packets;       /* once its first bytes are there */
+  std::optional<PacketFile::Item> waiting; /* for a larger buffer */
   std::string event;
-  bool ended = false;
-
-private:
-  void look();
 };
-
-/* Detects the kind by the first bytes, as PacketFile does. */
-void fingertip_reader::look() {
-  constexpr std::uint64_t START = 4096; /* several frames, each of which would end with 0x00 */
-  const std::string_view bytes = window.all();
-  if (bytes.size() < std::min(START, window.size())) {
-    throw NotYet();
-  }
-  const std::string_view start = bytes.substr(0, START);
-  if (start.rfind("# fingertip-", 0) == 0) {
-    recording.emplace(name, salvage, std::make_unique<FedLines>(window, name));
-  } else if (start.rfind(std::string_view(mcap::MAGIC, sizeof mcap::MAGIC), 0) == 0) {
-    recording.emplace(name, salvage, std::make_unique<McapLineSource>(name, std::make_unique<FedBytes>(window)));
-  } else if (start.find('\0') == std::string_view::npos) {
-    throw Error(ErrorCode::not_a_recording,
-                name + (start.empty() ? ": is empty" : ": neither a recording nor bytes of a fingertip's line"));
-  }
-  known = true;
-}
-
-std::optional<RecordingReader::Item> fingertip_reader::next() {
-  if (waiting) {
-    return waiting;
-  }
-  if (!known) {
-    look();
-  }
-  if (recording) {
-    return recording->next();
-  }
-  constexpr std::size_t STEP = 4096;
-  while (decoded.empty()) {
-    const std::string_view bytes = window.all().substr(0, STEP);
-    if (bytes.empty()) {
-      if (!window.is_whole()) {
-        throw NotYet();
-      }
-      return std::nullopt;
-    }
-    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size(),
-                 [&](const wire_packet &packet) { decoded.push_back(packet); });
-    window.go_to(window.begin() + bytes.size());
-  }
-  RecordingReader::Item item{RecordingReader::Item::Kind::packet, decoded.front(), ""};
-  decoded.pop_front();
-  return item;
-}
 
 struct fingertip_writer {
   std::string bytes; /* that wait to be taken */
@@ -266,17 +173,19 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, str
     if (!reader || !item || !values || !count) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
     }
-    std::optional<RecordingReader::Item> next;
+    auto next = reader->waiting;
     try {
-      next = reader->next();
+      if (!reader->packets) {
+        reader->packets.emplace(reader->name, reader->salvage, std::make_unique<FedBytes>(reader->window));
+      }
+      next = next ? next : reader->packets->next();
     } catch (const NotYet &) {
       return FINGERTIP_WAIT;
     }
     if (!next) {
-      reader->ended = true;
       return FINGERTIP_END;
     }
-    const bool is_event = next->kind == RecordingReader::Item::Kind::event;
+    const bool is_event = next->kind == PacketFile::Item::Kind::event;
     const wire_packet &packet = next->packet;
     const std::size_t needed = is_event ? 0 : count_of(packet.type);
     if (needed > size) {
@@ -299,23 +208,29 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, str
 
 const char *fingertip_reader_event(const struct fingertip_reader *reader) { return reader->event.c_str(); }
 
-int fingertip_reader_is_capture(const struct fingertip_reader *reader) { return reader->known && !reader->recording; }
+int fingertip_reader_is_capture(const struct fingertip_reader *reader) {
+  return reader->packets && !reader->packets->recording();
+}
 
 int fingertip_reader_has_end(const struct fingertip_reader *reader) {
-  return reader->recording ? reader->recording->has_end() : reader->ended;
+  return reader->packets && reader->packets->has_end();
 }
 
 uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader) {
-  return reader->recording ? reader->recording->skipped_lines() : 0;
+  return reader->packets ? reader->packets->skipped_lines() : 0;
 }
 
 void fingertip_reader_counts(const struct fingertip_reader *reader, double counts[FINGERTIP_COUNTS]) {
-  put(reader->recording ? reader->recording->end_statistics().value_or(LineStatistics()) : reader->decoder.statistics(),
-      counts);
+  LineStatistics found;
+  if (reader->packets) {
+    const RecordingReader *recording = reader->packets->recording();
+    found = recording ? recording->end_statistics().value_or(found) : reader->packets->statistics();
+  }
+  put(found, counts);
 }
 
 uint8_t fingertip_reader_other_version(const struct fingertip_reader *reader) {
-  return reader->decoder.other_version();
+  return reader->packets ? reader->packets->other_version() : 0;
 }
 
 namespace {

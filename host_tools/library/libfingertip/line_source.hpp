@@ -1,6 +1,8 @@
 /* The lines of a recording, whatever file they are in: CSV, or MCAP (mcap_recording.hpp). */
 #pragma once
 
+#include "libfingertip/mcap.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <ios>
@@ -33,10 +35,14 @@ public:
   virtual void go_to(const Place &place) = 0;
 };
 
-/* Whether it begins as an MCAP file does. */
-bool is_mcap(const std::string &path);
+/* By its first bytes: a recording, else a capture of the line. path: for messages. Throws Error for what is neither. */
+bool is_recording(const std::string &path, ByteSource &bytes);
 
-/* Throws Error if it cannot be read. */
+/* Of a recording. path: for messages. */
+std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<ByteSource> bytes);
+
+/* Of files. Throw Error if it cannot be read. */
+std::unique_ptr<ByteSource> open_bytes(const std::string &path);
 std::unique_ptr<LineSource> open_lines(const std::string &path);
 
 } // namespace fingertip

@@ -22,7 +22,7 @@ class ByteSource {
 public:
   virtual ~ByteSource() = default;
 
-  /* Fewer than length only where the bytes end, or cannot be read. */
+  /* Fewer than length only where the bytes end. Throws Error where they cannot be read. */
   virtual std::size_t read(std::uint64_t at, char *to, std::size_t length) = 0;
   /* The total size. */
   virtual std::uint64_t size() const = 0;

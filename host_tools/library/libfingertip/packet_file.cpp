@@ -1,26 +1,19 @@
 #include "libfingertip/packet_file.hpp"
 
-#include "libfingertip/error.hpp"
-
-#include <cerrno>
-#include <cstring>
+#include <utility>
 
 namespace fingertip {
 
-PacketFile::PacketFile(const std::string &path, bool salvage, const std::string &device) {
-  bytes_.open(path, std::ios::binary);
-  std::string start(4096, ' '); /* several frames, each of which would end with 0x00 */
-  if (!bytes_ || (!bytes_.read(start.data(), 4096) && !bytes_.eof())) {
-    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
-  }
-  start.resize(static_cast<std::size_t>(bytes_.gcount()));
-  bytes_.clear();
-  bytes_.seekg(0);
-  if (start.rfind("# fingertip-", 0) == 0 || is_mcap(path)) {
-    bytes_.close();
+PacketFile::PacketFile(const std::string &path, bool salvage, const std::string &device) : bytes_(open_bytes(path)) {
+  if (is_recording(path, *bytes_)) {
     reader_ = std::make_unique<RecordingReader>(path, salvage, device);
-  } else if (!start.empty() && start.find('\0') == std::string::npos) {
-    throw Error(ErrorCode::not_a_recording, path + ": neither a recording nor bytes of a fingertip's line");
+  }
+}
+
+PacketFile::PacketFile(const std::string &path, bool salvage, std::unique_ptr<ByteSource> bytes)
+    : bytes_(std::move(bytes)) {
+  if (is_recording(path, *bytes_)) {
+    reader_ = std::make_unique<RecordingReader>(path, salvage, lines_of(path, std::move(bytes_)));
   }
 }
 
@@ -41,12 +34,12 @@ std::optional<PacketFile::Item> PacketFile::next_of_recording() {
 }
 
 std::optional<PacketFile::Item> PacketFile::next_of_capture() {
-  std::uint8_t bytes[4096];
+  char bytes[4096];
   while (state_.decoded.empty() && !state_.ended) {
-    bytes_.read(reinterpret_cast<char *>(bytes), sizeof bytes);
-    auto length = static_cast<std::size_t>(bytes_.gcount());
+    const std::size_t length = bytes_->read(state_.offset, bytes, sizeof bytes);
+    state_.offset += length;
     state_.ended = length == 0;
-    state_.decoder.feed(bytes, length, [this](const wire_packet &packet) {
+    state_.decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes), length, [this](const wire_packet &packet) {
       state_.decoded.push_back({Item::Kind::packet, packet, ""});
     });
     state_.statistics = state_.decoder.statistics();
@@ -59,24 +52,11 @@ std::optional<PacketFile::Item> PacketFile::next_of_capture() {
   return item;
 }
 
-PacketFile::Place PacketFile::place() {
-  Place place;
-  if (reader_) {
-    place.in_recording = reader_->place();
-  } else {
-    bytes_.clear(); /* of the end */
-    place.offset = bytes_.tellg();
-  }
-  place.state = state_;
-  return place;
-}
+PacketFile::Place PacketFile::place() { return {reader_ ? std::optional(reader_->place()) : std::nullopt, state_}; }
 
 void PacketFile::go_to(const Place &place) {
   if (place.in_recording) {
     reader_->go_to(*place.in_recording);
-  } else {
-    bytes_.clear();
-    bytes_.seekg(place.offset);
   }
   state_ = place.state;
 }

@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,6 +25,9 @@ public:
   /* Throws Error if the file cannot be read; so does next for a damaged line, unless salvaging.
    * device: the serial number of one of several fingertips in the file. */
   PacketFile(const std::string &path, bool salvage, const std::string &device = "");
+  /* All fingertips in other bytes than those of a file, whose other exceptions than Error pass: next may then be
+   * called again. path: for messages. */
+  PacketFile(const std::string &path, bool salvage, std::unique_ptr<ByteSource> bytes);
 
   /* Nothing at the end of the file. */
   std::optional<Item> next();
@@ -35,12 +37,12 @@ public:
     SequenceFollower sequence;
     Decoder decoder; /* of a capture */
     std::deque<Item> decoded;
+    std::uint64_t offset = 0;
     LineStatistics statistics;
     bool ended = false;
   };
   struct Place {
     std::optional<RecordingReader::Place> in_recording;
-    std::streamoff offset = 0; /* in a capture */
     State state;
   };
   Place place();
@@ -50,17 +52,22 @@ public:
    * recorder, which saw the line itself. */
   const LineStatistics &statistics() const { return state_.statistics; }
   /* At the end of the file: a recording without its end line. */
-  bool is_cut_short() const { return state_.ended && reader_ && !reader_->has_end(); }
+  bool is_cut_short() const { return state_.ended && !has_end(); }
+  bool has_end() const { return reader_ ? reader_->has_end() : state_.ended; }
   std::uint64_t skipped_lines() const { return reader_ ? reader_->skipped_lines() : 0; }
   /* The recorder's own keys, once the first item was read. */
   Metadata recorder_metadata() const { return reader_ ? reader_->recorder_metadata() : Metadata(); }
+  /* Of a recording, else nullptr. */
+  const RecordingReader *recording() const { return reader_.get(); }
+  /* Of a capture, as Decoder has it. */
+  std::uint8_t other_version() const { return state_.decoder.other_version(); }
 
 private:
   std::optional<Item> next_of_recording();
   std::optional<Item> next_of_capture();
 
   std::unique_ptr<RecordingReader> reader_; /* of a recording */
-  std::ifstream bytes_;                     /* of a capture */
+  std::unique_ptr<ByteSource> bytes_;       /* of a capture */
   State state_;
 };
 

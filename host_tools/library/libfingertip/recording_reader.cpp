@@ -1,6 +1,7 @@
 #include "libfingertip/recording_reader.hpp"
 
 #include "libfingertip/error.hpp"
+#include "libfingertip/mcap_recording.hpp"
 #include "libfingertip/recording_fields.hpp"
 #include "libfingertip/text.hpp"
 
@@ -15,6 +16,54 @@ using namespace recording;
 
 namespace {
 
+constexpr std::string_view OUR_FILES = "# fingertip-";
+
+class TextLines : public LineSource {
+public:
+  explicit TextLines(std::unique_ptr<ByteSource> bytes) : bytes_(std::move(bytes)) {}
+
+  bool next(Line &line) override {
+    std::size_t end = block_.find('\n', at_);
+    while (end == std::string::npos) {
+      begin_ += at_;
+      block_.erase(0, std::exchange(at_, 0));
+      char more[16384];
+      const std::size_t length = block_.size(), count = bytes_->read(begin_ + length, more, sizeof more);
+      if (count == 0) {
+        break;
+      }
+      block_.append(more, count);
+      end = block_.find('\n', length);
+    }
+    line.torn = end == std::string::npos;
+    line.text.assign(block_, at_, line.torn ? end : end - at_);
+    at_ = line.torn ? block_.size() : end + 1;
+    line.number = number_ + 1;
+    const bool is_there = !line.torn || !line.text.empty();
+    number_ += is_there;
+    return is_there;
+  }
+  Place place() override { return {static_cast<std::streamoff>(begin_ + at_), 0, number_}; }
+  void go_to(const Place &place) override {
+    begin_ = static_cast<std::uint64_t>(place.offset);
+    block_.clear();
+    at_ = 0;
+    number_ = place.number;
+  }
+
+private:
+  std::unique_ptr<ByteSource> bytes_;
+  std::string block_;       /* the part of them that begins at begin_; read until at_ */
+  std::uint64_t begin_ = 0; /* where it does */
+  std::size_t at_ = 0;
+  std::uint64_t number_ = 0;
+};
+
+bool is_mcap(ByteSource &bytes) {
+  char begin[sizeof mcap::MAGIC];
+  return bytes.read(0, begin, sizeof begin) == sizeof begin && std::memcmp(begin, mcap::MAGIC, sizeof begin) == 0;
+}
+
 /* The format in the first line, "1" or "2". Throws Error with what it is instead. */
 std::string format_of(const std::string &path, const std::string &line) {
   std::string_view words = trim(line);
@@ -27,8 +76,7 @@ std::string format_of(const std::string &path, const std::string &line) {
     }
     return format;
   }
-  std::string_view ours = "# fingertip-";
-  std::string kind(words.substr(0, ours.size()) == ours ? words.substr(ours.size()) : "");
+  std::string kind(words.substr(0, OUR_FILES.size()) == OUR_FILES ? words.substr(OUR_FILES.size()) : "");
   throw Error(ErrorCode::not_a_recording,
               path + (kind.empty()
                           ? ":1: no recording; its first line is not \"" + std::string(begin) + FORMAT_OF_ONE + "\""
@@ -36,6 +84,26 @@ std::string format_of(const std::string &path, const std::string &line) {
 }
 
 } // namespace
+
+bool is_recording(const std::string &path, ByteSource &bytes) {
+  std::string start(4096, ' '); /* several frames, each of which would end with 0x00 */
+  start.resize(bytes.read(0, start.data(), start.size()));
+  if (start.rfind(OUR_FILES, 0) == 0 || is_mcap(bytes)) {
+    return true;
+  }
+  if (start.find('\0') == std::string::npos) {
+    throw Error(ErrorCode::not_a_recording,
+                path + (start.empty() ? ": is empty" : ": neither a recording nor bytes of a fingertip's line"));
+  }
+  return false;
+}
+
+std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<ByteSource> bytes) {
+  if (is_mcap(*bytes)) {
+    return std::make_unique<McapLineSource>(path, std::move(bytes));
+  }
+  return std::make_unique<TextLines>(std::move(bytes));
+}
 
 RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device)
     : path_(path), salvage_(salvage), source_(open_lines(path)), wanted_(device) {

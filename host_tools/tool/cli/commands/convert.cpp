@@ -11,7 +11,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -186,13 +185,6 @@ void convert_to_capture(const Conversion &conversion) {
               static_cast<Count>(packets));
 }
 
-/* Whether its content is a recording; the reader reports a file that is neither. */
-bool is_recording(const std::string &path) {
-  std::string begin(12, '\0');
-  std::ifstream(path, std::ios::binary).read(begin.data(), 12);
-  return begin == "# fingertip-" || is_mcap(path);
-}
-
 int convert(const Conversion &conversion) {
   const auto end = std::filesystem::path(conversion.to).extension();
   const bool to_capture = end == ".ftr";
@@ -202,7 +194,7 @@ int convert(const Conversion &conversion) {
   }
   if (to_capture) {
     convert_to_capture(conversion);
-  } else if (conversion.device.empty() && is_recording(conversion.from)) {
+  } else if (conversion.device.empty() && is_recording(conversion.from, *open_bytes(conversion.from))) {
     convert_lines(conversion);
   } else {
     convert_packets(conversion);
