@@ -3,47 +3,30 @@
 extern "C" {
 #include "common/bytes.h"
 #include "common/crc32.h"
+#include "wire/cobs.h"
 }
+
+#include <algorithm>
+#include <utility>
 
 namespace fingertip {
 
 namespace {
 
 constexpr std::size_t SEQUENCE_AT = 2;
-constexpr std::size_t LONGEST_RUN = 255;
-
-/* PROTOCOL.md: COBS. Nothing for bytes that no encoder produces. */
-std::optional<Bytes> unstuffed(const Bytes &frame) {
-  Bytes packet;
-  packet.reserve(frame.size());
-  for (std::size_t at = 0; at < frame.size();) {
-    std::size_t run = frame[at];
-    if (run == 0 || run > frame.size() - at) {
-      return std::nullopt;
-    }
-    auto begin = frame.begin() + static_cast<std::ptrdiff_t>(at);
-    packet.insert(packet.end(), begin + 1, begin + static_cast<std::ptrdiff_t>(run));
-    at += run;
-    if (run != LONGEST_RUN && at < frame.size()) {
-      packet.push_back(0);
-    }
-  }
-  return packet;
-}
-
 } // namespace
 
-std::optional<Envelope> Envelope::opened(const Bytes &frame) {
-  auto packet = unstuffed(frame);
-  if (!packet || packet->size() < WIRE_HEADER_BYTES + WIRE_CRC_BYTES) {
+std::optional<Envelope> Envelope::opened(Bytes frame) {
+  const std::size_t used = cobs_decode(frame.data(), frame.size());
+  if (used < WIRE_HEADER_BYTES + WIRE_CRC_BYTES) {
     return std::nullopt;
   }
-  std::size_t length = packet->size() - WIRE_CRC_BYTES;
-  if (crc32_iso_hdlc(packet->data(), length) != bytes_get_u32(packet->data() + length)) {
+  const std::size_t length = used - WIRE_CRC_BYTES;
+  if (crc32_iso_hdlc(frame.data(), length) != bytes_get_u32(frame.data() + length)) {
     return std::nullopt;
   }
-  packet->resize(length);
-  return Envelope(std::move(*packet));
+  frame.resize(length);
+  return Envelope(std::move(frame));
 }
 
 std::uint16_t Envelope::sequence() const { return bytes_get_u16(packet_.data() + SEQUENCE_AT); }
@@ -51,33 +34,11 @@ std::uint16_t Envelope::sequence() const { return bytes_get_u16(packet_.data() +
 void Envelope::set_sequence(std::uint16_t sequence) { bytes_put_u16(packet_.data() + SEQUENCE_AT, sequence); }
 
 void Envelope::append_frame(Bytes &to) const {
-  std::uint8_t crc[WIRE_CRC_BYTES];
+  const std::size_t begin = to.size(), length = packet_.size() + WIRE_CRC_BYTES;
+  to.resize(begin + length + length / 254 + 2);
+  std::uint8_t *crc = std::copy(packet_.begin(), packet_.end(), to.data() + begin + 1);
   bytes_put_u32(crc, crc32_iso_hdlc(packet_.data(), packet_.size()));
-  std::size_t code_at = to.size();
-  to.push_back(0);
-  auto end_run = [&] {
-    to[code_at] = static_cast<std::uint8_t>(to.size() - code_at);
-    code_at = to.size();
-    to.push_back(0);
-  };
-  auto put = [&](std::uint8_t byte) {
-    if (to.size() - code_at == LONGEST_RUN) {
-      end_run(); /* of a full run no zero follows, and none is needed at the end */
-    }
-    if (byte == 0) {
-      end_run();
-    } else {
-      to.push_back(byte);
-    }
-  };
-  for (std::uint8_t byte : packet_) {
-    put(byte);
-  }
-  for (std::uint8_t byte : crc) {
-    put(byte);
-  }
-  to[code_at] = static_cast<std::uint8_t>(to.size() - code_at);
-  to.push_back(0);
+  to.resize(begin + cobs_encode(to.data() + begin, length));
 }
 
 void FrameCutter::feed(const std::uint8_t *bytes, std::size_t length, const Handler &handler) {

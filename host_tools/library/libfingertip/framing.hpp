@@ -18,7 +18,7 @@ using Bytes = std::vector<std::uint8_t>;
 class Envelope {
 public:
   /* A frame without its delimiter; nothing if it is damaged. */
-  static std::optional<Envelope> opened(const Bytes &frame);
+  static std::optional<Envelope> opened(Bytes frame);
   /* packet: header and body. */
   explicit Envelope(Bytes packet) : packet_(std::move(packet)) {}
 
