@@ -5,7 +5,7 @@
 // Betti's theorem: displace one point of the base alone. The surface's displacement at (x, y) along
 // a force is then the pressure of that point per force at (x, y). So one solution for each point
 // answers every load. The solver computes only the difference from the infinite layer: it takes the
-// stress of point_lift.hpp from the block's sides. The point itself, where all is singular, is not
+// stress of PointLift (block.cpp) from the block's sides. The point itself, where all is singular, is not
 // in the equations. The remainder is smooth except at the edges along the base, where held rubber
 // and free rubber meet (displacement there goes with the distance to the power of 0.6).
 //
@@ -29,6 +29,7 @@
 
 #include "library/pad/layer.hpp"
 
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -57,6 +58,13 @@ struct BlockAnswer {
   // [x][y], pressure per force: Pa / N under a force down, along x, along y.
   std::vector<float> down, along_x, along_y;
 };
+
+// The four of equally spaced nodes around a place, in steps from the first node, and their weights.
+struct Cubic {
+  int first;
+  std::array<double, 4> weight;
+};
+Cubic cubic_at(double at, int nodes);
 
 // Lines from -half_mm to half_mm, at most step_mm apart.
 int block_nodes(double half_mm, double step_mm);

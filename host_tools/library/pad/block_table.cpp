@@ -32,19 +32,9 @@ std::string key_of(const Block &block, const std::vector<Place> &places) {
   return key;
 }
 
-// The four nodes around a place on a line from -half to half, and their weights.
-struct Between {
-  int first;
-  std::array<double, 4> weight;
-};
-
-Between between(double place, double half, int nodes) {
-  const double at = (std::clamp(place / half, -1.0, 1.0) + 1.0) * 0.5 * (nodes - 1);
-  const int first = std::clamp(static_cast<int>(at) - 1, 0, nodes - 4);
-  const double t = at - first - 1;
-  return {first,
-          {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0, -(t + 1.0) * t * (t - 2.0) / 2.0,
-           (t + 1.0) * t * (t - 1.0) / 6.0}};
+// On a line from -half to half.
+Cubic between(double place, double half, int nodes) {
+  return cubic_at((std::clamp(place / half, -1.0, 1.0) + 1.0) * 0.5 * (nodes - 1), nodes);
 }
 
 } // namespace
@@ -95,8 +85,8 @@ double BlockTable::added_Pa(std::size_t sensor, const Load &load, double x_mm, d
   const double away_mm = std::sqrt(SPREAD) * load.radius_mm;
   double sum = 0.0;
   for (const auto &[dx, dy] : {std::pair{away_mm, 0.0}, {-away_mm, 0.0}, {0.0, away_mm}, {0.0, -away_mm}}) {
-    const Between x = between(at.sign_x * (x_mm + dx), block_.half_x_mm, nodes_x_);
-    const Between y = between(at.sign_y * (y_mm + dy), block_.half_y_mm, nodes_y_);
+    const Cubic x = between(at.sign_x * (x_mm + dx), block_.half_x_mm, nodes_x_);
+    const Cubic y = between(at.sign_y * (y_mm + dy), block_.half_y_mm, nodes_y_);
     for (int i = 0; i < 4; i++) {
       const float *node = values + 3 * ((x.first + i) * nodes_y_ + y.first);
       for (int j = 0; j < 4; j++) {

@@ -93,18 +93,19 @@ def _own_keys(extra: Mapping[str, str | None] | None) -> dict[str, str]:
     return {key: "".join(c if c.isprintable() else "?" for c in value) for key, value in keys.items() if value is not None}
 
 
-class _PacketLines:
-    """The packets of one fingertip as comments and rows."""
+class _Member:
+    """One fingertip of a recording: its packets as comments and rows. number: among several."""
 
-    def __init__(
-        self, path: str, sensors: int, raw_expected: bool, comment: Callable[[str, str], None], row: Callable[[int, str], None]
-    ) -> None:
+    def __init__(self, writer: "_Writer", info: Info, raw_expected: bool, number: int | None) -> None:
         self.frames = 0
-        self._path = path
-        self._sensors = sensors
+        self.packet_us = (0, 0.0)  # of the packet under way: device and host
+        self.last_line_us = -math.inf
+        self.clock: ClockEstimate | None = None
+        self.clock_written_us = -math.inf
+        self.jumps = 0
+        self._writer, self._number = writer, number
+        self._sensors = info.sensors
         self._raw_expected = raw_expected
-        self._comment = comment
-        self._write_row = row
         self._pending: Packet | None = None
         self._metadata: dict[str, str] = {}
         self._first_us: int | None = None
@@ -112,7 +113,18 @@ class _PacketLines:
         self._last_edge: int | None = None
         self._edges = self._edges_missing = 0
         self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(LATER_COLUMNS))
-        self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * sensors)
+        self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * info.sensors)
+        self.info(info)
+
+    def comment(self, key: str, value: str, host_us: float | None = None) -> None:
+        """host_us: if not with the packet under way."""
+        number = "" if self._number is None else f"{self._number}/"
+        self._writer.put(self, self.packet_us[1] if host_us is None else host_us, f"# {number}{key}: {value}")
+
+    def event(self, text: str) -> None:
+        """Behind all its lines until now."""
+        self.write_pending()
+        self.comment("event", text, self.last_line_us)
 
     @property
     def seconds(self) -> float:
@@ -123,7 +135,7 @@ class _PacketLines:
         now = info_metadata(info)
         for key, value in now.items():
             if self._metadata.get(key) != value:
-                self._comment(key, value)
+                self.comment(key, value)
         self._metadata = now
 
     def packet(self, packet: Packet) -> None:
@@ -136,7 +148,7 @@ class _PacketLines:
                 self._row(packet, None)
         elif isinstance(body, Raw):
             if body.sensors != self._sensors:
-                raise InputError(f"{self._path}: the fingertip now has {body.sensors} sensors instead of {self._sensors}")
+                raise InputError(f"{self._writer.path}: the fingertip now has {body.sensors} sensors instead of {self._sensors}")
             pending = self._pending
             if pending and pending.t_us == packet.t_us and isinstance(pending.body, Contact) and pending.body.frame == body.frame:
                 self._pending = None
@@ -152,7 +164,7 @@ class _PacketLines:
                 self.info(body)
             fields = {} if isinstance(body, Info) else body._asdict()
             pairs = {"sequence": packet.sequence, "t_us": packet.t_us, **fields}
-            self._comment("packet", _KINDS[type(body)] + "".join(f" {name}={_cell(value)}" for name, value in pairs.items()))
+            self.comment("packet", _KINDS[type(body)] + "".join(f" {name}={_cell(value)}" for name, value in pairs.items()))
 
     def _take_edge(self, edge: SyncEdge) -> None:
         ahead = 1 if self._last_edge is None else edge.number - self._last_edge & 0xFFFFFFFF
@@ -189,7 +201,8 @@ class _PacketLines:
             cells += [f"{read.temperature_cC / 100:.2f}", *(f"{value / Q10:.4f}" for value in (*read.readings[0::2], *read.readings[1::2]))]
         else:
             cells += self._no_raw
-        self._write_row(t_us, f"{t_us},{frame}," + ",".join(cells))
+        host_us = self.packet_us[1] + (t_us - self.packet_us[0])
+        self._writer.put_row(self, self._number, host_us, f"{t_us},{frame}," + ",".join(cells))
         self.frames += 1
         if self._first_us is not None and t_us < self._last_us:
             self._before_us += self._last_us - self._first_us
@@ -214,7 +227,7 @@ Writer = TypeVar("Writer", bound="_Writer")
 
 
 class _Writer:
-    """What writers of either format share: a file, its lock, and how it ends."""
+    """What writers of either format share: a file, its lock, the fingertips in it, and how it ends."""
 
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
         self.path = os.fspath(path)
@@ -222,6 +235,28 @@ class _Writer:
         self._closed = False
         self._failure: InputError | None = None
         self._file = _open_lines(path, replace)
+        self._members: list[_Member] = []
+
+    def _begin(
+        self, first: Iterable[str], extra: Mapping[str, str | None] | None, infos: Sequence[Info], raw_expected: bool, columns: str = ""
+    ) -> None:
+        """The head. columns: before those of the fingertip."""
+        try:
+            for text in (*first, *(f"# {key}: {value}" for key, value in _own_keys(extra).items())):
+                self._file.line(text)
+            for number, info in enumerate(infos):
+                self._members.append(_Member(self, info, raw_expected, number if columns else None))
+            self._file.line(columns + _header(infos[0].sensors))
+        except InputError:
+            self.abandon()
+            raise
+
+    def put(self, member: _Member, host_us: float, text: str) -> None:
+        """A line of a fingertip."""
+        self._file.line(text)
+
+    def put_row(self, member: _Member, number: int | None, host_us: float, cells: str) -> None:
+        self._file.line(cells)
 
     def fail(self, error: InputError) -> None:
         """Closes without an end line; close() will raise this."""
@@ -249,6 +284,11 @@ class _Writer:
 
     def _end(self, reason: str) -> None:
         raise NotImplementedError
+
+    @property
+    def frames(self) -> int:
+        """Rows until now."""
+        return sum(member.frames for member in self._members)
 
     def __enter__(self: Writer) -> Writer:
         return self
@@ -278,61 +318,28 @@ class RecordingWriter(_Writer):
     ) -> None:
         super().__init__(path, replace)
         self._count = count
-        self._lines = _PacketLines(self.path, info.sensors, raw_expected, self._comment, lambda _, cells: self._file.line(cells))
-        try:
-            self._file.line("# fingertip-recording 1")
-            for key, value in _own_keys(extra).items():
-                self._comment(key, value)
-            self._lines.info(info)
-            self._file.line(_header(info.sensors))
-        except InputError:
-            self.abandon()
-            raise
-
-    def _comment(self, key: str, value: str) -> None:
-        self._file.line(f"# {key}: {value}")
-
-    @property
-    def frames(self) -> int:
-        """Rows until now."""
-        return self._lines.frames
+        self._begin(["# fingertip-recording 1"], extra, [info], raw_expected)
 
     def packet(self, packet: Packet) -> None:
         """Of any type; commands are left out."""
         with self._lock:
             if not self._closed:
-                self._lines.packet(packet)
+                self._members[0].packet(packet)
 
     def event(self, text: str) -> None:
         """Something else that happened: "gone", "back"."""
         with self._lock:
             if not self._closed:
-                self._lines.write_pending()
-                self._comment("event", text)
+                self._members[0].event(text)
 
     def _end(self, reason: str) -> None:
-        self._lines.write_pending()
-        lines = self._lines
-        self._comment(
-            "end", f"reason={reason} frames={lines.frames} seconds={lines.seconds:.6f}{lines.edges_text()} {self._count().text()}"
-        )
+        own = self._members[0]
+        own.write_pending()
+        self._file.line(f"# end: reason={reason} frames={own.frames} seconds={own.seconds:.6f}{own.edges_text()} {self._count().text()}")
 
 
 def _bounds_text(clock: ClockEstimate) -> str:
     return f"drift_ppm={clock.drift_ppm:.3f} uncertainty_us={clock.uncertainty_us:.1f}"
-
-
-class _Member:
-    """One fingertip of a joint recording."""
-
-    def __init__(self, number: int, lines: _PacketLines) -> None:
-        self.number = number
-        self.lines = lines
-        self.packet_us = (0, 0.0)  # of the packet under way: device and host
-        self.last_line_us = -math.inf
-        self.clock: ClockEstimate | None = None
-        self.clock_written_us = -math.inf
-        self.jumps = 0
 
 
 class JointRecordingWriter(_Writer):
@@ -360,49 +367,27 @@ class JointRecordingWriter(_Writer):
         self._order = 0
         self._last_us = float(self._host_zero_us)
         self._alignment_us = 0.0
-        self._members: list[_Member] = []
-        try:
-            self._file.line("# fingertip-recording 2")
-            self._file.line("# devices: " + " ".join(info.serial for info in infos))
-            self._file.line(f"# host_zero_us: {self._host_zero_us}")
-            for key, value in _own_keys(extra).items():
-                self._file.line(f"# {key}: {value}")
-            for number, info in enumerate(infos):
-                self._members.append(self._member(number, info, raw_expected))
-            self._head_written = True
-            self._file.line("device,time_us," + _header(infos[0].sensors))
-        except InputError:
-            self.abandon()
-            raise
-
-    _head_written = False
-
-    def _member(self, number: int, info: Info, raw_expected: bool) -> _Member:
-        def comment(key: str, value: str) -> None:
-            text = f"# {number}/{key}: {value}"
-            if self._head_written:
-                self._wait(member, member.packet_us[1], text)
-            else:
-                self._file.line(text)
-
-        def row(t_us: int, cells: str) -> None:
-            device_us, packet_host_us = member.packet_us
-            host_us = packet_host_us + (t_us - device_us)
-            self._wait(member, host_us, f"{number},{self._time(host_us)},{cells}")
-            self._last_us = max(self._last_us, host_us)
-
-        member = _Member(number, _PacketLines(self.path, info.sensors, raw_expected, comment, row))
-        member.lines.info(info)
-        return member
+        self._head_written = False
+        serials = " ".join(info.serial for info in infos)
+        first = ["# fingertip-recording 2", f"# devices: {serials}", f"# host_zero_us: {self._host_zero_us}"]
+        self._begin(first, extra, infos, raw_expected, "device,time_us,")
+        self._head_written = True
 
     def _time(self, host_us: float) -> str:
         return f"{host_us - self._host_zero_us:.1f}"
 
-    def _wait(self, member: _Member, host_us: float, text: str) -> None:
+    def put(self, member: _Member, host_us: float, text: str) -> None:
         """The lines of one fingertip keep their order."""
+        if not self._head_written:
+            self._file.line(text)
+            return
         member.last_line_us = max(member.last_line_us, host_us)
         self._order += 1
         heapq.heappush(self._waiting, (member.last_line_us, self._order, text))
+
+    def put_row(self, member: _Member, number: int | None, host_us: float, cells: str) -> None:
+        self.put(member, host_us, f"{number},{self._time(host_us)},{cells}")
+        self._last_us = max(self._last_us, host_us)
 
     def _settle(self, host_us: float) -> None:
         while self._waiting and self._waiting[0][0] <= host_us:
@@ -417,7 +402,7 @@ class JointRecordingWriter(_Writer):
             member.packet_us = (packet.t_us, clock.host_at(packet.t_us))
             if clock is not member.clock:
                 self._clock(member, clock, jumps)
-            member.lines.packet(packet)
+            member.packet(packet)
             self._settle(host_now_us() - LATE_us)
 
     def _clock(self, member: _Member, clock: ClockEstimate, jumps: int) -> None:
@@ -427,27 +412,24 @@ class JointRecordingWriter(_Writer):
         if clock.host_us - member.clock_written_us >= CLOCK_LINES_us:
             member.clock_written_us = clock.host_us
             now = f"t_us={clock.device_us} time_us={self._time(clock.host_us)}"
-            self._wait(member, clock.host_us, f"# {member.number}/clock: {now} {_bounds_text(clock)}")
+            member.comment("clock", f"{now} {_bounds_text(clock)}", clock.host_us)
 
     def event(self, number: int, text: str) -> None:
         with self._lock:
             if not self._closed:
-                member = self._members[number]
-                member.lines.write_pending()
-                self._wait(member, member.last_line_us, f"# {number}/event: {text}")
+                self._members[number].event(text)
 
     def _end(self, reason: str) -> None:
         for member in self._members:
-            member.lines.write_pending()
+            member.write_pending()
         self._settle(math.inf)
         counts = self._count() if self._count else [LineStatistics() for _ in self._members]
         total = LineStatistics()
-        for member, statistics in zip(self._members, counts):
+        for number, (member, statistics) in enumerate(zip(self._members, counts)):
             total += statistics
             clock = f" {_bounds_text(member.clock)}" if member.clock else ""
-            text = f"frames={member.lines.frames} jumps={member.jumps}{clock}{member.lines.edges_text()} {statistics.text()}"
-            self._file.line(f"# {member.number}/end: {text}")
-        frames = sum(member.lines.frames for member in self._members)
-        seconds = (self._last_us - self._host_zero_us) / 1e6 if frames else 0
-        text = f"reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}"
+            text = f"frames={member.frames} jumps={member.jumps}{clock}{member.edges_text()} {statistics.text()}"
+            self._file.line(f"# {number}/end: {text}")
+        seconds = (self._last_us - self._host_zero_us) / 1e6 if self.frames else 0
+        text = f"reason={reason} frames={self.frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}"
         self._file.line(f"# end: {text}")

@@ -101,7 +101,7 @@ struct CalibrateOptions {
 // Calibrates like fingertip calibrate --from: the thickness that is found makes the pad's profile.
 int calibrate(const CalibrateOptions &options) {
   check_output(options.commands, options.replace);
-  auto [info, session] = calibrating::session_from(options.placements, {}, {});
+  auto [info, session] = calibrating::gain_session_from(options.placements, "", [](const auto &) {});
   calibrating::refuse_unless_good(session.judgement());
   calibration made = session.made(options.force_N, CALIBRATED_s);
   const auto for_profile = pad::thickness_for_profile(info, made);

@@ -18,6 +18,14 @@ constexpr double COST_SETTLED = 1e-10; /* relative */
 constexpr double SEEN_BEFORE = 4.0;
 constexpr double CAPPED = 4.0; /* sds: one odd placement is weak evidence on the others */
 
+double largest_Pa(const Placement &placement) {
+  double largest_Pa = 0.0;
+  for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
+    largest_Pa = placement.usable >> k & 1u ? std::max(largest_Pa, placement.reading_Pa[k]) : largest_Pa;
+  }
+  return largest_Pa;
+}
+
 /* A reading's part of the normal matrix: of the global unknowns, of these and the placement's own, and of its own. */
 void accumulate(const Reading &r, double weight, MatrixXd &global, MatrixXd &cross, LocalSquare &local) {
   for (const auto &[a, by_a] : r.terms) {
@@ -30,6 +38,182 @@ void accumulate(const Reading &r, double weight, MatrixXd &global, MatrixXd &cro
 }
 
 } // namespace
+
+double huber(double square) {
+  return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER;
+}
+double huber_weight(double square) { return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square); }
+
+Model::Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions)
+    : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements), assumed_(assumptions) {
+  double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
+  std::vector<double> peaks;
+  for (const Placement &placement : placements) {
+    first_s = std::min(first_s, placement.t_s);
+    last_s = std::max(last_s, placement.t_s);
+    peaks.push_back(largest_Pa(placement));
+  }
+  peak_Pa_ = std::max(median(peaks), 1.0);
+  const std::size_t strong = 9 * peaks.size() / 10;
+  std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(strong), peaks.end());
+  near_Pa_ = std::max(peaks[strong], 1.0);
+  middle_s_ = 0.5 * (first_s + last_s);
+  half_s_ = std::max(0.5 * (last_s - first_s), 1e-9);
+}
+
+void Model::assume(const Spread &spread, double excess) {
+  assumed_.position_mm = spread.position_mm;
+  assumed_.force = spread.force;
+  assumed_.width = spread.width;
+  assumed_.ellipse = spread.ellipse;
+  assumed_.memory = spread.memory;
+  assumed_.own_width = spread.own_width;
+  excess_ = excess;
+}
+
+Unknowns Model::first_guess() const {
+  Unknowns first;
+  first.global = VectorXd::Zero(layout.size());
+  std::vector<double> peaks, widths;
+  for (const Placement &placement : placements_) {
+    const double largest = largest_Pa(placement);
+    Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    double sum = 0.0, at_x = 0.0, at_y = 0.0;
+    for (int k = 0; k < layout.sensors; k++) {
+      const double p = placement.reading_Pa[std::size_t(k)] / std::max(largest, 1e-9);
+      if (!(placement.usable >> k & 1u) || p < 0.02) {
+        continue;
+      }
+      const double x = array_.x_mm[std::size_t(k)] / array_.pitch_mm;
+      const double y = array_.y_mm[std::size_t(k)] / array_.pitch_mm;
+      const Eigen::Vector4d row(1.0, x, y, x * x + y * y);
+      normal += p * p * row * row.transpose();
+      right += p * p * std::log(p) * row;
+      sum += p * p;
+      at_x += p * p * x;
+      at_y += p * p * y;
+    }
+    /* A ridge towards a width of half a pitch, where few readings are large. */
+    constexpr double RIDGE = 0.003, WIDTH = 0.5;
+    normal(3, 3) += RIDGE;
+    right[3] += RIDGE * -0.5 / (WIDTH * WIDTH);
+    normal += 1e-9 * Eigen::Matrix4d::Identity();
+    const Eigen::Vector4d paraboloid = normal.ldlt().solve(right);
+    const double bend = std::min(paraboloid[3], -0.5 / 9.0);
+    double x = -0.5 * paraboloid[1] / bend, y = -0.5 * paraboloid[2] / bend;
+    if (sum > 0.0 && std::hypot(x - at_x / sum, y - at_y / sum) > 1.0) {
+      x = at_x / sum;
+      y = at_y / sum;
+    }
+    Local local = Local::Zero();
+    local[0] = x * array_.pitch_mm;
+    local[1] = y * array_.pitch_mm;
+    first.locals.push_back(local);
+    peaks.push_back(largest * std::exp(paraboloid[0] - bend * (x * x + y * y)));
+    widths.push_back(array_.pitch_mm * std::sqrt(-0.5 / bend));
+  }
+  first.global[layout.log_peak()] = std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
+  first.global[layout.log_width()] = std::log(median(widths));
+  first.global[layout.mixing()] = assumed_.mixing;
+  first.global[layout.dip_width()] = std::log(DIP_PITCHES);
+  return first;
+}
+
+Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, double earlier_Pa) const {
+  const double u = array_.x_mm[std::size_t(k)] + g[layout.dx(k)] - l[0];
+  const double v = array_.y_mm[std::size_t(k)] + g[layout.dy(k)] - l[1];
+  const double q1 = l[4] + g[layout.ellipse(0)], q2 = l[5] + g[layout.ellipse(1)];
+  const double square = std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
+  const double width = std::exp(g[layout.log_width()] + g[layout.own_width(k)] + l[3]);
+  const double m = g[layout.mixing()];
+  const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
+  const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
+  const double full = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
+  const double dip_mm = array_.pitch_mm * std::exp(g[layout.dip_width()]);
+  const double dip_per = 0.5 / (dip_mm * dip_mm);
+  const double h = g[layout.dip()];
+  const double dip = std::exp(-dip_per * square);
+  const double sensed = full * ((1.0 - m) * wide + m * narrow - h * dip);
+  const RelaxationEffect hidden = relaxation_effect(g[layout.memory(k)] * earlier_Pa, sensed);
+  const double left = 1.0 - hidden.by_sensed;
+  const double strength = left * full, value = left * sensed;
+  const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
+  const double by_square = core_by_square + strength * h * dip * dip_per;
+  const double by_log_width = -2.0 * square * core_by_square;
+  const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
+  const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
+  Reading r;
+  r.model = sensed - hidden.Pa + g[layout.offset(k)] + g[layout.drift(k)] * tau;
+  const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
+  std::size_t terms = 0;
+  const auto add = [&](int at, double by) { r.terms[terms++] = {at, by}; };
+  add(k, value);
+  add(layout.log_peak(), value);
+  add(layout.log_width(), by_log_width);
+  add(layout.mixing(), strength * (narrow - wide));
+  add(layout.dx(k), by_u);
+  add(layout.dy(k), by_v);
+  add(layout.offset(k), 1.0);
+  add(layout.drift(k), tau);
+  add(layout.memory(k), -hidden.by_remembered * earlier_Pa);
+  add(layout.ellipse(0), by_q1);
+  add(layout.ellipse(1), by_q2);
+  add(layout.dip(), -strength * dip);
+  add(layout.dip_width(), -2.0 * square * strength * h * dip * dip_per);
+  add(layout.own_width(k), by_log_width);
+  r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
+  return r;
+}
+
+double Model::residual(const Unknowns &unknowns, std::size_t i, int k) const {
+  const Placement &placement = placements_[i];
+  const double earlier_Pa = placement.earlier_Pa[std::size_t(k)];
+  return placement.reading_Pa[std::size_t(k)] -
+         reading(unknowns.global, unknowns.locals[i], k, tau(placement), earlier_Pa).model;
+}
+
+double Model::expected_sd(const Placement &placement, double reading_Pa) const {
+  return std::sqrt(placement.noise_Pa * placement.noise_Pa +
+                   excess_ * excess_ *
+                       (assumed_.model_share * peak_Pa_ * assumed_.model_share * peak_Pa_ +
+                        assumed_.reading_share * reading_Pa * assumed_.reading_share * reading_Pa));
+}
+
+std::pair<double, double> Model::prior(int at) const {
+  const int n = layout.sensors;
+  if (at < n) {
+    return {0.0, assumed_.gain};
+  }
+  if (at == layout.log_peak()) {
+    return {std::log(near_Pa_), assumed_.peak};
+  }
+  if (at == layout.mixing()) {
+    return {assumed_.mixing, assumed_.mixing_sd};
+  }
+  if (at == layout.dip()) {
+    return {0.0, assumed_.dip};
+  }
+  if (at == layout.dip_width()) {
+    return {std::log(DIP_PITCHES), assumed_.dip_log_sd};
+  }
+  if (at < layout.dx(0)) {
+    return {0.0, at < layout.ellipse(0) ? 0.0 : assumed_.ellipse_of_all};
+  }
+  if (at < layout.offset(0)) {
+    return {0.0, assumed_.position_mm};
+  }
+  if (at < layout.memory(0)) {
+    return {0.0, assumed_.offset_share * peak_Pa_};
+  }
+  return {0.0, at < layout.own_width(0) ? assumed_.memory : assumed_.own_width};
+}
+
+Local Model::local_sd() const {
+  Local sd;
+  sd << 0.0, 0.0, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.ellipse;
+  return sd;
+}
 
 Optimiser::Optimiser(const Model &model)
     : at(model.first_guess()), kept(model.placements().size(), true), model_(model), placements_(model.placements()) {}

@@ -211,11 +211,35 @@ void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
   });
 }
 
-void show_placement(const GainSession &session) {
-  const Placement &found = session.placements().back();
-  std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(), found.t_s,
-              1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
-}
+/* What a calibration is of: a session, live or of a recording, that is good, and the fingertip, unless it is only
+ * shown. */
+template <typename Session> struct Work {
+  std::optional<CalibratedDevice> device;
+  std::optional<Session> session;
+  wire_info info{}; /* of the session */
+
+  /* live: leads the session that make makes. from: of a recording. Throws Error. */
+  template <typename Check, typename Make, typename Live, typename From>
+  Work(const CalibrateOptions &options, const Check &check, const Make &make, const Live &live, const From &from) {
+    if (options.from.empty()) {
+      device.emplace(options);
+      info = device->info();
+      check(info, device->name());
+      device->check_sensors();
+      session.emplace(make(info));
+      live(*device, *session);
+    } else {
+      calibrating::Recorded<Session> recorded = from();
+      info = recorded.info;
+      session.emplace(std::move(recorded.session));
+    }
+    calibrating::refuse_unless_good(session->judgement());
+    if (!device && !options.dry_run) {
+      device.emplace(options);
+      device->check_is(info, options.from);
+    }
+  }
+};
 
 void show(const CalibrateOptions &options) {
   CalibratedDevice device(options);
@@ -266,43 +290,30 @@ void use_thickness(CalibratedDevice &device, const calibration &made,
 }
 
 void calibrate(const CalibrateOptions &options) {
-  std::optional<CalibratedDevice> device;
-  std::optional<GainSession> work;
-  wire_info info{};
-  if (options.from.empty()) {
-    device.emplace(options);
-    calibrating::check_firmware(device->info(), device->name());
-    device->check_sensors();
-    work.emplace(device->info());
-    work_live(*device, *work, options.colour);
-    info = device->info();
-  } else {
-    calibrating::Recorded recorded = calibrating::session_from(options.from, options.choice.device, show_placement);
-    work.emplace(std::move(recorded.session));
-    info = recorded.info;
-    calibrating::refuse_unless_good(work->judgement());
-    if (!options.dry_run) {
-      device.emplace(options);
-      device->check_is(info, options.from);
-      info = device->info();
-    }
-  }
-  calibrating::refuse_unless_good(work->judgement());
-  const std::time_t now_s = std::chrono::system_clock::to_time_t(wall_now());
-  const auto date_s = static_cast<std::uint32_t>(now_s);
-  calibration made = work->made(options.force_N, date_s);
+  Work<GainSession> work(
+      options, calibrating::check_firmware, [](const wire_info &info) { return GainSession(info); },
+      [&](CalibratedDevice &device, GainSession &session) { work_live(device, session, options.colour); },
+      [&] {
+        return calibrating::gain_session_from(options.from, options.choice.device, [](const GainSession &session) {
+          const Placement &found = session.placements().back();
+          std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(), found.t_s,
+                      1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
+        });
+      });
+  const wire_info &info = work.device ? work.device->info() : work.info;
+  const auto date_s = static_cast<std::uint32_t>(std::chrono::system_clock::to_time_t(wall_now()));
+  calibration made = work.session->made(options.force_N, date_s);
   const auto for_profile = pad::thickness_for_profile(info, made);
   if (for_profile || (info.stored & WIRE_STORED_PAD)) {
-    work->expect_profile();
-    made = work->made(options.force_N, date_s);
+    work.session->expect_profile();
+    made = work.session->made(options.force_N, date_s);
   }
-  print_result(*work, made, options.force_N);
-  if (!device) {
-    return;
+  print_result(*work.session, made, options.force_N);
+  if (work.device) {
+    write(options, *work.device, made);
+    use_thickness(*work.device, made, for_profile);
+    std::printf("calibrated: it applies from now on\n");
   }
-  write(options, *device, made);
-  use_thickness(*device, made, for_profile);
-  std::printf("calibrated: it applies from now on\n");
 }
 
 void pull_live(CalibratedDevice &device, PullSession &work) {
@@ -326,35 +337,29 @@ void pull_live(CalibratedDevice &device, PullSession &work) {
                 [&] { return work.judgement().state == PullJudgement::State::more; });
 }
 
-PullSession pull_session_from(const CalibrateOptions &options, wire_info &info) {
-  RecordingReader reader(options.from, false, options.choice.device);
-  std::optional<PullSession> work;
+calibrating::Recorded<PullSession> pull_session_from(const CalibrateOptions &options) {
   std::string weak;
-  while (auto item = reader.next()) {
-    if (item->kind != RecordingReader::Item::Kind::packet) {
-      continue;
-    }
-    if (item->packet.type == WIRE_INFO && !work) {
-      info = item->packet.body.info;
-      check_pad(info, printable(options.from));
-      work.emplace(info, *options.force_N);
-    } else if (work) {
-      if (work->take(item->packet)) {
-        std::printf("%s\n", work->last_pull_text().c_str());
-      }
-      weak = work->finder().refusal() == PullFinder::Refusal::weak ? work->weak_text() : weak;
-    }
-  }
-  if (!work) {
+  auto recorded = calibrating::session_from(
+      options.from, options.choice.device,
+      [&](const wire_info &info) {
+        check_pad(info, printable(options.from));
+        return PullSession(info, *options.force_N);
+      },
+      [&](const PullSession &session, const wire_packet &, bool taken) {
+        if (taken) {
+          std::printf("%s\n", session.last_pull_text().c_str());
+        }
+        weak = session.finder().refusal() == PullFinder::Refusal::weak ? session.weak_text() : weak;
+      });
+  if (!recorded) {
     throw Error(printable(options.from) + ": holds no frames");
   }
-  if (work->pulls().empty()) {
+  if (recorded->session.pulls().empty()) {
     throw Error(
         "not calibrated: " +
         (weak.empty() ? "no pull was found; leave the object alone for a second, then pull and hold for two" : weak));
   }
-  work->judge(true);
-  return std::move(*work);
+  return std::move(*recorded);
 }
 
 void check_same_pad(const pad_profile &recorded, const pad_profile &stored, const std::string &recording) {
@@ -377,35 +382,19 @@ void print_result(const PullSession &work, const pad_profile &before, const pad_
 }
 
 void calibrate_drag(const CalibrateOptions &options) {
-  std::optional<CalibratedDevice> device;
-  std::optional<PullSession> work;
-  wire_info info{};
-  if (options.from.empty()) {
-    device.emplace(options);
-    info = device->info();
-    check_pad(info, device->name());
-    device->check_sensors();
-    work.emplace(info, *options.force_N);
-    pull_live(*device, *work);
-  } else {
-    work.emplace(pull_session_from(options, info));
+  Work<PullSession> work(
+      options, check_pad, [&](const wire_info &info) { return PullSession(info, *options.force_N); }, pull_live,
+      [&] { return pull_session_from(options); });
+  if (work.device && !options.from.empty()) {
+    check_pad(work.device->info(), work.device->name());
+    check_same_pad(work.info.pad, work.device->info().pad, options.from);
   }
-  if (work->judgement().state != PullJudgement::State::good) {
-    throw Error("not calibrated: " + work->judgement().text);
+  const pad_profile made = work.session->scaled(work.device ? work.device->info().pad : work.info.pad);
+  print_result(*work.session, work.info.pad, made, work.info.stored & WIRE_STORED_CALIBRATION);
+  if (work.device) {
+    write(options, *work.device, made);
+    std::printf("calibrated: it applies from now on\n");
   }
-  if (!options.from.empty() && !options.dry_run) {
-    device.emplace(options);
-    device->check_is(info, options.from);
-    check_pad(device->info(), device->name());
-    check_same_pad(info.pad, device->info().pad, options.from);
-  }
-  const pad_profile made = work->scaled(device ? device->info().pad : info.pad);
-  print_result(*work, info.pad, made, info.stored & WIRE_STORED_CALIBRATION);
-  if (!device) {
-    return;
-  }
-  write(options, *device, made);
-  std::printf("calibrated: it applies from now on\n");
 }
 
 int run_calibrate(const CalibrateOptions &options) {
