@@ -158,7 +158,7 @@ for (const name of BOARDS) {
     assert.deepEqual(bench.edges(), []);
     const { pins, pio } = bench.machine.chip;
     assert.equal((pins.low | pins.high) & (1 << bench.machine.Board.syncPin), 0);
-    assert.ok(pio[1].machines.every(({ enabled }) => !enabled));
+    assert.ok(!pio[1].enabled);
     bench.end();
   });
 

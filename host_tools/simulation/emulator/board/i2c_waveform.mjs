@@ -32,8 +32,7 @@ export class I2cWaveform {
     }
   }
 
-  start({ high_ns, low_ns, hold_ns }, t_ns) {
-    if (this.inTransfer) this.#raiseScl(true, { high_ns, low_ns, hold_ns }, t_ns);
+  start({ high_ns }, t_ns) {
     this.inTransfer = true;
     this.#set(WAVEFORM_SDA, false, t_ns);
     this.#set(WAVEFORM_SCL, false, t_ns + high_ns);
@@ -53,16 +52,14 @@ export class I2cWaveform {
     this.#flush(t_ns);
   }
 
-  stop(timing, t_ns) {
-    if (this.inTransfer) this.#raiseScl(false, timing, t_ns);
+  stop({ high_ns, low_ns, hold_ns }, t_ns) {
+    if (this.inTransfer) {
+      this.#set(WAVEFORM_SDA, false, t_ns - high_ns - low_ns + hold_ns);
+      this.#set(WAVEFORM_SCL, true, t_ns - high_ns);
+    }
     this.inTransfer = false;
     this.#set(WAVEFORM_SDA, true, t_ns);
     this.#flush(t_ns);
-  }
-
-  #raiseScl(sdaHigh, { high_ns, low_ns, hold_ns }, t_ns) {
-    this.#set(WAVEFORM_SDA, sdaHigh, t_ns - high_ns - low_ns + hold_ns);
-    this.#set(WAVEFORM_SCL, true, t_ns - high_ns);
   }
 
   /** The block gave up: no one drives. */
