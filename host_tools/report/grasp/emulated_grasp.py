@@ -31,7 +31,7 @@ def program(build):
 
 
 def grasp(node, image, world, tables, *options):
-    """What host_tools/simulation/cell/emulated_grasp.hpp reports, and of the boards."""
+    """What host_tools/simulation/cell/emulated_grasp.cpp reports, and of the boards."""
     return json.loads(
         run(
             node,

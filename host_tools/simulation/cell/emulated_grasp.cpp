@@ -1,218 +1,471 @@
-#include "simulation/cell/emulated_grasp.hpp"
-
+// fingertip_cell_emulated: the world of one grasp, closed loop, whose fingertips are emulated boards with their release
+// image. It speaks the protocol of host_tools/simulation/emulator/lockstep.mjs on its standard input and output: the
+// cell, the gripper and the controller go on by slices of emulated time, after each of which the boards' bytes are
+// handed over.
+//
+// The controller takes what came in a slice at its end, so up to a slice late; all else is at its
+// own time.
 #include "grasp/convert.hpp"
+#include "grasp/gripper/gripper.hpp"
+#include "libfingertip/clock_fit.hpp"
+#include "libfingertip/command.hpp"
+#include "libfingertip/decoder.hpp"
+#include "libfingertip/names.hpp"
+#include "library/pad/profile.hpp"
+#include "simulation/cell/controller.hpp"
+#include "simulation/cell/gripper_line.hpp"
+#include "simulation/cell/kinds.hpp"
+#include "simulation/cell/slips.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
+#include "config/geometry.h"
 }
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace fingertip::cell {
 namespace {
 
 using nlohmann::ordered_json;
+using Bytes = std::vector<std::uint8_t>;
 
-enum Stream : std::uint64_t { LINE = 841 };
+enum Stream : std::uint64_t { LINE = 841, PAD = 842 };
 
+constexpr const char *FACE = "sphere15";
+constexpr double LAYER_mm = 12.0;
+constexpr double FRICTION = 0.65; // static, before it falls
+constexpr std::uint64_t SEED = 1; // of pads and of the gripper's line
+constexpr int CLOCK_EXCHANGES = 8;
+constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double MOVES_s = 2.5e-4; // between two samples of the gripper
 constexpr double LOST_N = 0.01;
+// Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
 constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
 
-ordered_json in_ms(double s) {
-  return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / 1e3) : ordered_json(nullptr);
+struct Options {
+  std::string cache;
+  double slice_us = 500.0, friction_falls = 0.67;
+};
+
+// A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's
+// profile and its calibration first, then it streams its readings.
+//
+// Its clock is fitted from commands and their acknowledgements, as the tool does it, on the
+// emulated time.
+class EmulatedFingertip {
+public:
+  // random: of its sensors' gains and its calibration.
+  EmulatedFingertip(const pad_profile &profile, Random random) {
+    calibration stored{};
+    stored.placements = 20;
+    stored.force_scale = 1.0F / profile.force_ratio;
+    stored.force_scale_sd = static_cast<float>(FORCE_SCALE_SD);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      gain_[k] = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
+      stored.sensors[k].gain = static_cast<float>(gain_[k] * (1.0 + CALIBRATION_SD * random.normal()));
+      stored.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
+    }
+    commands_ = {command_pad(profile), command_calibrate(stored, geometry.sensor_count)};
+    commands_.insert(commands_.end(), CLOCK_EXCHANGES, command_stream(0));
+    commands_.push_back(command_stream(WIRE_STREAM_CONTACT));
+  }
+
+  // It has obeyed and has a zero.
+  bool is_ready() const { return commands_.empty() && tared_; }
+
+  // A command whose time has come; often nothing.
+  Bytes to_send(std::int64_t now_us) {
+    if (commands_.empty() || awaits_ || now_us <= 0) {
+      return {};
+    }
+    awaits_ = true;
+    wire_packet command = commands_.front();
+    command.sequence = ++sequence_;
+    command.t_us = static_cast<std::uint64_t>(now_us);
+    return frame_bytes(command);
+  }
+
+  // Decodes what has come by now; calls the handler for each frame. Throws std::runtime_error where a command is
+  // refused.
+  template <typename Handler> void take(const Bytes &bytes, std::int64_t now_us, const Handler &handler) {
+    decoder_.feed(bytes.data(), bytes.size(), [&](const wire_packet &packet) {
+      if (packet.type == WIRE_ACK) {
+        obeyed(packet, now_us);
+      } else if (const auto now = clock_.estimate(); packet.type == WIRE_CONTACT && now) {
+        tared_ = (packet.body.contact.flags & CONTACT_FLAG_TARED) != 0;
+        const double measured_us = std::clamp(now->host_at(packet.t_us), 0.0, static_cast<double>(now_us));
+        handler(touch_from_packet(packet, measured_us), 1e-6 * measured_us);
+      }
+    });
+  }
+
+  Pressures sensed_Pa(Pressures base_Pa) const {
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      base_Pa[k] *= gain_[k];
+    }
+    return base_Pa;
+  }
+  ordered_json line_summary() const {
+    const LineStatistics &line = decoder_.statistics();
+    return {{"lost_packets", line.dropped_packets},
+            {"damaged_packets", line.crc_errors + line.format_errors},
+            {"clock_uncertainty_us", clock_.estimate() ? clock_.estimate()->uncertainty_us : 0.0}};
+  }
+
+private:
+  void obeyed(const wire_packet &packet, std::int64_t now_us) {
+    const wire_ack &ack = packet.body.ack;
+    if (!awaits_ || ack.sequence != sequence_) {
+      return;
+    }
+    if (ack.result != WIRE_RESULT_DONE) {
+      throw std::runtime_error("a fingertip refuses the command " + command_name(ack.command) + " with result " +
+                               std::to_string(ack.result));
+    }
+    clock_.add({static_cast<std::int64_t>(ack.host_time_us), now_us, packet.t_us});
+    awaits_ = false;
+    commands_.pop_front();
+  }
+
+  Pressures gain_{};
+  std::deque<wire_packet> commands_; // the first may be under way
+  bool awaits_ = false, tared_ = false;
+  std::uint16_t sequence_ = 0;
+  Decoder decoder_;
+  ClockFit clock_;
+};
+
+struct EmulatedTrial {
+  Object object;
+  Grasp grasp;
+  KindOfGrasp course; // the lift and the events
+  GripperMechanics gripper;
+};
+
+// Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
+EmulatedTrial trial_of(const Options &options) {
+  EmulatedTrial trial;
+  trial.object.width_mm = 40.0;
+  trial.object.mass_kg = trial.course.mass_kg = 0.3;
+  trial.object.friction = FRICTION;
+  trial.object.uneven_friction = 0.03;
+  trial.object.com_mm = {3.0, 1.0};
+  trial.grasp.place_mm = {0.8, -1.5};
+  trial.grasp.angle_rad = 0.3;
+  trial.grasp.down_rad = 0.4;
+  KindOfGrasp &course = trial.course;
+  course.opens_mm = 1.0;
+  course.waits_s = 0.05;
+  course.lift_mm = 4.0;
+  course.lift_s = 0.5;
+  course.events = {{Event::Kind::slick, course.lift_s + 0.1, 0.03, options.friction_falls}};
+  course.ends_s = course.lift_s + 0.4;
+  trial.gripper = gripper_mechanics(gripper_models().front().model);
+  return trial;
 }
 
-ordered_json to_us(double s) {
-  return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / 1e6) : ordered_json(nullptr);
+// In microseconds over what a unit has of them.
+ordered_json rounded(double s, double per_unit) {
+  return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / per_unit) : ordered_json(nullptr);
+}
+ordered_json in_ms(double s) { return rounded(s, 1e3); }
+ordered_json to_us(double s) { return rounded(s, 1e6); }
+
+class EmulatedGrasp {
+public:
+  // All must outlive it.
+  EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
+      : trial_(trial), face_(face), cell_(face, trial.object, trial.grasp),
+        gripper_(trial.gripper, trial.object.width_mm + trial.course.opens_mm, Random(SEED, LINE, 0)),
+        fingers_{EmulatedFingertip(profile, Random(SEED, PAD, 0)), EmulatedFingertip(profile, Random(SEED, PAD, 1))} {
+    gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
+      return force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
+    };
+  }
+
+  // What a board sent at this time, since the last run().
+  void take(std::size_t finger, const Bytes &bytes, double arrived_s) {
+    fingers_.at(finger).take(bytes, std::llround(1e6 * t_s_), [&](const GripTouch &touch, double measured_s) {
+      if (!controller_) {
+        return;
+      }
+      controller_->take_touch(finger, touch);
+      reports_.push_back({arrived_s, measured_s, finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0,
+                          std::hypot(touch.qx_N, touch.qy_N)});
+      frames_[finger]++;
+      loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+      step_controller();
+    });
+  }
+
+  // To the end of the next slice.
+  void run(double until_s) {
+    if (!controller_ && fingers_[0].is_ready() && fingers_[1].is_ready()) {
+      const GripperTraits &traits = trial_.gripper.traits;
+      controller_ = std::make_unique<CoreController>(default_settings(traits), traits);
+      asked_s_ = t_s_;
+    }
+    while (t_s_ < until_s && !over_) {
+      double next_s = std::min({until_s, gripper_.next_s(), t_s_ + MOVES_s});
+      if (!line_.empty()) {
+        next_s = std::min(next_s, line_.front().known_s);
+      }
+      advance(next_s);
+      if (!line_.empty() && line_.front().known_s <= t_s_) {
+        if (controller_) {
+          controller_->take_status(line_.front().status);
+          step_controller();
+        }
+        line_.pop_front();
+      }
+      if (gripper_.next_s() <= t_s_) {
+        const double width_mm = gripper_.sent().width_mm;
+        line_.push_back(gripper_.exchange(command_));
+        if (gripper_.sent().width_mm != width_mm) {
+          asked_.push_back({t_s_, gripper_.sent().width_mm});
+        }
+      }
+    }
+  }
+
+  Bytes to_send(std::size_t finger) { return fingers_[finger].to_send(std::llround(1e6 * t_s_)); }
+  // The present pressures of the sensors.
+  Pressures sensed_Pa(std::size_t finger) const {
+    return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.touch(finger)));
+  }
+  bool over() const { return over_; }
+
+  // What happened, and when, of the first slip after the lift:
+  //   begin_s  emulated time
+  //   by ms after it: measured_ms the first frame that reported it, sent_ms the packet that left its
+  //   chip whole, answered_ms the controller's command, asked_ms on the gripper's line, moved_ms
+  //   the fingers, reaction_ms 5 % more force; null: never
+  // told_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
+  ordered_json summary() const {
+    ordered_json out;
+    out["dropped"] = dropped_;
+    out["slid_mm"] = cell_.slid_mm();
+    out["asked_s"] = to_us(asked_s_);
+    out["holding_s"] = to_us(holds_s_);
+    out["lift_s"] = to_us(lift_s_);
+    out["end_s"] = to_us(t_s_);
+    out["trouble"] = trouble_;
+    out["slips"] = slips_.slips.size();
+    out["slip"] = slips_.slips.empty() ? ordered_json(nullptr) : answer_to(slips_.slips.front());
+    for (std::size_t f = 0; f < fingers_.size(); f++) {
+      ordered_json one = {{"frames", frames_[f]}, {"loads", loads_[f]}}; // loads: frames that report one
+      one.update(fingers_[f].line_summary());
+      out["fingers"].push_back(one);
+    }
+    return out;
+  }
+
+private:
+  struct Report {
+    double arrived_s, measured_s;
+    std::size_t finger;
+    bool slides;
+    double load_N;
+  };
+  struct Change {
+    double at_s, width_mm;
+  };
+
+  void step_controller() {
+    const double width_mm = command_.width_mm;
+    report_ = controller_->step(t_s_, command_);
+    if (command_.width_mm != width_mm) {
+      commanded_.push_back({t_s_, command_.width_mm});
+    }
+    if (report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING) {
+      trouble_ |= report_.trouble;
+      holds_s_ = std::min(holds_s_, t_s_);
+    }
+  }
+
+  void advance(double to_s) {
+    const double seconds = to_s - t_s_;
+    if (seconds <= 0.0) {
+      return;
+    }
+    if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.course.waits_s) {
+      lift_s_ = t_s_;
+    }
+    const bool lifts = lift_s_ < NEVER_s;
+    const double width_mm = gripper_.motion().width_mm();
+    gripper_.motion().step(seconds);
+    const KindOfGrasp::Inputs inputs = trial_.course.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
+    Drive drive = drive_of(inputs, trial_.grasp.down_rad);
+    drive.width_mm = gripper_.motion().width_mm();
+    cell_.run(seconds, drive);
+    t_s_ = to_s;
+    if (drive.width_mm != width_mm) {
+      moved_.push_back({t_s_, drive.width_mm});
+    }
+    const double force_N = cell_.force_N();
+    if (lifts) {
+      slips_.sample(t_s_, cell_.slips(), force_N, cell_.slid_mm());
+    }
+    const Vector way = cell_.way_mm();
+    dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !drive.table && force_N < LOST_N);
+    over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.course.ends_s);
+    if (over_) {
+      slips_.end();
+    }
+  }
+
+  ordered_json answer_to(const Slip &slip) const {
+    std::array<double, 2> load_N{};
+    const Report *first = nullptr;
+    for (const Report &report : reports_) {
+      if (report.arrived_s < slip.begin_s) {
+        load_N[report.finger] = report.load_N;
+      } else if (report.slides || report.load_N > MORE_LOAD * load_N[report.finger] + MORE_LOAD_N) {
+        first = &report;
+        break;
+      }
+    }
+    // The first step that closes further than the width before it.
+    const auto closed = [&](const std::vector<Change> &changes) {
+      double width_mm = NEVER_s;
+      for (const Change &change : changes) {
+        if (change.at_s >= slip.begin_s && change.width_mm < width_mm) {
+          return change.at_s - slip.begin_s;
+        }
+        width_mm = change.width_mm;
+      }
+      return NEVER_s;
+    };
+    ordered_json out;
+    out["begin_s"] = to_us(slip.begin_s);
+    out["way_mm"] = slip.way_mm;
+    out["reported_by"] = !first ? ordered_json(nullptr) : first->slides ? "SLIDING" : "load";
+    out["measured_ms"] = in_ms(first ? first->measured_s - slip.begin_s : NEVER_s);
+    out["sent_ms"] = in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s);
+    out["answered_ms"] = in_ms(closed(commanded_));
+    out["asked_ms"] = in_ms(closed(asked_));
+    out["moved_ms"] = in_ms(closed(moved_));
+    out["reaction_ms"] = in_ms(slip.reaction_s.value_or(NEVER_s));
+    return out;
+  }
+
+  const EmulatedTrial &trial_;
+  const Face &face_;
+  Cell cell_;
+  GripperLine gripper_;
+  std::array<EmulatedFingertip, 2> fingers_;
+  std::unique_ptr<CoreController> controller_; // none before both are ready
+  std::deque<GripperLine::Answer> line_;
+  GripCommand command_{};
+  GripReport report_{};
+  Slips slips_;
+  double t_s_ = 0.0, holds_s_ = NEVER_s, lift_s_ = NEVER_s, asked_s_ = 0.0;
+  std::uint32_t trouble_ = 0;
+  bool over_ = false, dropped_ = false;
+  std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready
+  std::vector<Report> reports_;
+  std::vector<Change> commanded_, asked_, moved_;
+};
+
+// Reads from the standard input; false: it has ended.
+bool read_whole(void *to, std::size_t length) { return std::fread(to, 1, length, stdin) == length; }
+
+template <typename Value> Value next() {
+  Value value;
+  if (!read_whole(&value, sizeof value)) {
+    throw std::runtime_error("the boards have ended");
+  }
+  return value;
+}
+
+void put(const void *bytes, std::size_t length) {
+  if (std::fwrite(bytes, 1, length, stdout) != length) {
+    throw std::runtime_error("the boards do not listen");
+  }
+}
+
+void put_u32(std::size_t value) {
+  const auto word = static_cast<std::uint32_t>(value);
+  put(&word, sizeof word);
+}
+
+int serve(const Options &options) {
+  const Face face(FACE, LAYER_mm, options.cache);
+  const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
+  const EmulatedTrial trial = trial_of(options);
+  EmulatedGrasp grasp(trial, face, profile);
+  Bytes bytes;
+  while (!grasp.over()) {
+    const double t_s = 1e-9 * static_cast<double>(next<std::uint64_t>());
+    for (std::uint32_t chunks = next<std::uint32_t>(); chunks > 0; chunks--) {
+      const auto board = next<std::uint32_t>();
+      const double at_s = 1e-9 * static_cast<double>(next<std::uint64_t>());
+      const auto length = next<std::uint32_t>();
+      if (board > 1 || length > CHUNK_LIMIT) {
+        throw std::runtime_error("two boards are needed");
+      }
+      bytes.resize(length);
+      if (!read_whole(bytes.data(), length)) {
+        throw std::runtime_error("the boards have ended");
+      }
+      grasp.take(board, bytes, at_s);
+    }
+    const std::array<Bytes, 2> sent{grasp.to_send(0), grasp.to_send(1)};
+    grasp.run(t_s + 1e-6 * options.slice_us);
+    put_u32(grasp.over());
+    for (std::size_t f = 0; !grasp.over() && f < sent.size(); f++) {
+      const Pressures sensed_Pa = grasp.sensed_Pa(f);
+      put(sensed_Pa.data(), sizeof sensed_Pa);
+      put_u32(sent[f].size());
+      put(sent[f].data(), sent[f].size());
+    }
+    std::fflush(stdout);
+  }
+  ordered_json out;
+  out["gripper"] = trial.gripper.traits.model;
+  out["face"] = FACE;
+  out["mass_kg"] = trial.object.mass_kg;
+  out["friction"] = trial.object.friction;
+  out["friction_falls"] = options.friction_falls;
+  out.update(grasp.summary());
+  const std::string text = out.dump();
+  put(text.data(), text.size());
+  return std::fflush(stdout) == 0 ? 0 : 1;
 }
 
 } // namespace
-
-CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
-  CalibratedRubber rubber{};
-  rubber.stored.placements = 20;
-  rubber.stored.force_scale = 1.0F / profile.force_ratio;
-  rubber.stored.force_scale_sd = static_cast<float>(FORCE_SCALE_SD);
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    const double gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
-    rubber.gain[k] = gain;
-    rubber.stored.sensors[k].gain = static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
-    rubber.stored.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
-  }
-  return rubber;
-}
-
-EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
-    : trial_(trial), face_(face), cell_(face, trial.object, trial.grasp),
-      gripper_(trial.gripper, trial.object.width_mm + trial.course.opens_mm, Random(trial.seed, LINE, 0)),
-      fingers_{EmulatedFingertip(profile, trial.rubber[0].stored), EmulatedFingertip(profile, trial.rubber[1].stored)},
-      holds_s_(NEVER_s), lift_s_(NEVER_s) {
-  gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
-    return force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
-  };
-}
-
-void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::size_t length, double arrived_s) {
-  fingers_[finger].take(
-      bytes, length, 1e6 * arrived_s, std::llround(1e6 * t_s_), [&](const EmulatedFingertip::Frame &frame) {
-        if (!controller_) {
-          return;
-        }
-        const GripTouch &touch = frame.touch;
-        controller_->take_touch(finger, touch);
-        reports_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us, finger,
-                            (touch.flags & CONTACT_FLAG_SLIDING) != 0, std::hypot(touch.qx_N, touch.qy_N)});
-        frames_[finger]++;
-        loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
-        step_controller();
-      });
-}
-
-void EmulatedGrasp::step_controller() {
-  const double width_mm = command_.width_mm;
-  report_ = controller_->step(t_s_, command_);
-  if (command_.width_mm != width_mm) {
-    commanded_.push_back({t_s_, command_.width_mm});
-  }
-  if (report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING) {
-    trouble_ |= report_.trouble;
-    holds_s_ = std::min(holds_s_, t_s_);
-  }
-}
-
-void EmulatedGrasp::run(double until_s) {
-  if (!controller_ && fingers_[0].is_ready() && fingers_[1].is_ready()) {
-    const GripperTraits &traits = trial_.gripper.traits;
-    controller_ = std::make_unique<CoreController>(default_settings(traits), traits);
-    asked_s_ = t_s_;
-  }
-  while (t_s_ < until_s && !over_) {
-    double next_s = std::min({until_s, gripper_.next_s(), t_s_ + MOVES_s});
-    if (!line_.empty()) {
-      next_s = std::min(next_s, line_.front().known_s);
-    }
-    advance(next_s);
-    if (!line_.empty() && line_.front().known_s <= t_s_) {
-      if (controller_) {
-        controller_->take_status(line_.front().status);
-        step_controller();
-      }
-      line_.pop_front();
-    }
-    if (gripper_.next_s() <= t_s_) {
-      const double width_mm = gripper_.sent().width_mm;
-      line_.push_back(gripper_.exchange(command_));
-      if (gripper_.sent().width_mm != width_mm) {
-        asked_.push_back({t_s_, gripper_.sent().width_mm});
-      }
-    }
-  }
-}
-
-void EmulatedGrasp::advance(double to_s) {
-  const double seconds = to_s - t_s_;
-  if (seconds <= 0.0) {
-    return;
-  }
-  if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.course.waits_s) {
-    lift_s_ = t_s_;
-  }
-  const bool lifts = lift_s_ < NEVER_s;
-  const double width_mm = gripper_.motion().width_mm();
-  gripper_.motion().step(seconds);
-  const KindOfGrasp::Inputs inputs = trial_.course.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
-  Drive drive = drive_of(inputs, trial_.grasp.down_rad);
-  drive.width_mm = gripper_.motion().width_mm();
-  cell_.run(seconds, drive);
-  t_s_ = to_s;
-  if (drive.width_mm != width_mm) {
-    moved_.push_back({t_s_, drive.width_mm});
-  }
-  const double force_N = cell_.force_N();
-  if (lifts) {
-    slips_.sample(t_s_, cell_.slips(), force_N, cell_.slid_mm());
-  }
-  const Vector way = cell_.way_mm();
-  dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !drive.table && force_N < LOST_N);
-  over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.course.ends_s);
-  if (over_) {
-    slips_.end();
-  }
-}
-
-std::vector<std::uint8_t> EmulatedGrasp::to_send(std::size_t finger) {
-  return fingers_[finger].to_send(std::llround(1e6 * t_s_));
-}
-
-Pressures EmulatedGrasp::sensed_Pa(std::size_t finger) const {
-  Pressures sensed_Pa = face_.base_Pa(cell_.touch(finger));
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    sensed_Pa[k] *= trial_.rubber[finger].gain[k];
-  }
-  return sensed_Pa;
-}
-
-ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
-  std::array<double, 2> load_N{};
-  const Report *first = nullptr;
-  for (const Report &report : reports_) {
-    if (report.arrived_s < slip.begin_s) {
-      load_N[report.finger] = report.load_N;
-    } else if (report.slides || report.load_N > MORE_LOAD * load_N[report.finger] + MORE_LOAD_N) {
-      first = &report;
-      break;
-    }
-  }
-  // The first step that closes further than the width before it.
-  const auto closed = [&](const std::vector<Change> &changes) {
-    double width_mm = NEVER_s;
-    for (const Change &change : changes) {
-      if (change.at_s >= slip.begin_s && change.width_mm < width_mm) {
-        return change.at_s - slip.begin_s;
-      }
-      width_mm = change.width_mm;
-    }
-    return NEVER_s;
-  };
-  ordered_json out;
-  out["begin_s"] = to_us(slip.begin_s);
-  out["way_mm"] = slip.way_mm;
-  out["reported_by"] = !first ? ordered_json(nullptr) : first->slides ? "SLIDING" : "load";
-  out["measured_ms"] = in_ms(first ? first->measured_s - slip.begin_s : NEVER_s);
-  out["sent_ms"] = in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s);
-  out["answered_ms"] = in_ms(closed(commanded_));
-  out["asked_ms"] = in_ms(closed(asked_));
-  out["moved_ms"] = in_ms(closed(moved_));
-  out["reaction_ms"] = in_ms(slip.reaction_s.value_or(NEVER_s));
-  return out;
-}
-
-ordered_json EmulatedGrasp::summary() const {
-  ordered_json out;
-  out["dropped"] = dropped_;
-  out["slid_mm"] = cell_.slid_mm();
-  out["asked_s"] = to_us(asked_s_);
-  out["holding_s"] = to_us(holds_s_);
-  out["lift_s"] = to_us(lift_s_);
-  out["end_s"] = to_us(t_s_);
-  out["trouble"] = trouble_;
-  out["slips"] = slips_.slips.size();
-  out["slip"] = slips_.slips.empty() ? ordered_json(nullptr) : answer_to(slips_.slips.front());
-  for (std::size_t f = 0; f < fingers_.size(); f++) {
-    ordered_json one;
-    one["frames"] = frames_[f];
-    one["loads"] = loads_[f]; // frames that report one
-    one["lost_packets"] = fingers_[f].line().dropped_packets;
-    one["damaged_packets"] = fingers_[f].line().crc_errors + fingers_[f].line().format_errors;
-    one["clock_uncertainty_us"] = fingers_[f].clock_uncertainty_us();
-    out["fingers"].push_back(one);
-  }
-  return out;
-}
-
 } // namespace fingertip::cell
+
+int main(int argc, char **argv) {
+  CLI::App app("The world of a grasp for simulation/emulator/lockstep.mjs: an object, two fingertips' rubber, "
+               "a gripper and the controller. It is lifted, and its friction falls.",
+               "fingertip_cell_emulated");
+  fingertip::cell::Options options;
+  app.add_option("--friction-falls", options.friction_falls, "By this share")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  app.add_option("--slice-us", options.slice_us, "As the boards have it")
+      ->check(CLI::Range(100.0, 10000.0))
+      ->capture_default_str();
+  app.add_option("--cache", options.cache, "Folder of the contact tables")->required();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return fingertip::cell::serve(options);
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "fingertip_cell_emulated: %s\n", error.what());
+    return 1;
+  }
+}
