@@ -2,7 +2,7 @@
  * turn is the one that is interrupted, at every access to what both know, by whole steps of the
  * other. */
 #include "explore.h"
-#include "unity.h"
+#include "support/unit.h"
 #include "worker/worker.h"
 
 #include <string.h>
@@ -13,9 +13,6 @@ static struct { uint32_t question[WORDS], answer[WORDS]; } job;
 static struct worker worker;
 static uint32_t asked, answered; /* as the main loop counts them */
 static uint32_t worked;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /* In pieces, with a point before each (explore.c). */
 static void copy(uint32_t to[WORDS], const uint32_t from[WORDS]) {
@@ -106,17 +103,6 @@ static void explore_and_tell(const char *who, void (*run)(void), void (*other)(v
   TEST_ASSERT_GREATER_THAN(1000, runs);
 }
 
-static void test_answers_are_whole_wherever_the_worker_comes(void) {
-  explore_and_tell("main loop", main_goes_on, serve);
-}
+TEST(test_answers_are_whole_wherever_the_worker_comes) { explore_and_tell("main loop", main_goes_on, serve); }
 
-static void test_answers_are_whole_wherever_the_main_loop_comes(void) {
-  explore_and_tell("worker", worker_goes_on, main_step);
-}
-
-int main(void) {
-  UNITY_BEGIN();
-  RUN_TEST(test_answers_are_whole_wherever_the_worker_comes);
-  RUN_TEST(test_answers_are_whole_wherever_the_main_loop_comes);
-  return UNITY_END();
-}
+TEST(test_answers_are_whole_wherever_the_main_loop_comes) { explore_and_tell("worker", worker_goes_on, main_step); }
