@@ -1,16 +1,11 @@
 #include "support/gripper_lines.hpp"
 
-#include "grasp/gripper/robotiq_registers.hpp"
 #include "grasp/gripper/serial_line.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <modbus.h>
-#include <stdexcept>
-#include <sys/socket.h>
-#include <unistd.h>
 
 namespace fingertip {
 
@@ -131,65 +126,6 @@ std::string asked(const std::string &port, const std::string &question, std::siz
     came.insert(came.end(), bytes, bytes + length);
   }
   return digits(came);
-}
-
-struct PlainSlave::Mapped {
-  modbus_t *modbus = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
-  modbus_mapping_t *mapping =
-      modbus_mapping_new_start_address(0, 0, 0, 0, robotiq::COMMAND_REGISTER, 1003, robotiq::STATUS_REGISTER, 3);
-  int ends[2]; /* libmodbus at the first, the port's bytes at the second */
-  Mapped() {
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends) != 0) {
-      throw std::runtime_error("no pair of sockets");
-    }
-    modbus_set_slave(modbus, 9);
-    modbus_set_socket(modbus, ends[0]);
-    put(0xF900);
-  }
-  ~Mapped() {
-    modbus_mapping_free(mapping);
-    modbus_free(modbus);
-    close(ends[0]);
-    close(ends[1]);
-  }
-  void put(std::uint16_t status) {
-    for (std::uint16_t *registers : {mapping->tab_input_registers, mapping->tab_registers + 1000}) {
-      registers[0] = status;
-      registers[2] = 100 << 8 | 42;
-    }
-  }
-};
-
-PlainSlave::PlainSlave() : port_(""), mapped_(std::make_unique<Mapped>()), serves_([this] { serve(); }) {}
-
-PlainSlave::~PlainSlave() { serves_.end(); }
-
-void PlainSlave::serve() {
-  port_.wait(host_now() + ROUND);
-  std::uint8_t bytes[MODBUS_RTU_MAX_ADU_LENGTH];
-  const std::size_t count = port_.read(bytes, sizeof bytes);
-  if (count == 0) {
-    return;
-  }
-  std::uint8_t query[MODBUS_RTU_MAX_ADU_LENGTH];
-  if (write(mapped_->ends[1], bytes, count) != static_cast<ssize_t>(count)) {
-    return;
-  }
-  const int length = modbus_receive(mapped_->modbus, query);
-  if (length <= 0) {
-    return;
-  }
-  modbus_reply(mapped_->modbus, query, length, mapped_->mapping);
-  if (query[1] == 16) {
-    mapped_->put((mapped_->mapping->tab_registers[0] & 0x100) ? 0x1100 : 0);
-  }
-  const ssize_t size = read(mapped_->ends[1], bytes, sizeof bytes);
-  port_.write(bytes, static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-}
-
-std::array<int, 3> PlainSlave::command() const {
-  const std::uint16_t *registers = mapped_->mapping->tab_registers;
-  return {registers[0], registers[1], registers[2]};
 }
 
 } // namespace fingertip

@@ -5,10 +5,8 @@
 #include "libfingertip/served_port.hpp"
 #include "simulation/cell/gripper_server.hpp"
 
-#include <array>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -69,23 +67,5 @@ std::string with_crc(const std::string &bytes);
 
 /* The first so many bytes that come after this question. */
 std::string asked(const std::string &port, const std::string &question, std::size_t answer_length);
-
-/* A Modbus slave of libmodbus' own making, whose status says active, going, at 100, 0.42 A. */
-class PlainSlave {
-public:
-  PlainSlave();
-  ~PlainSlave();
-  const std::string &port() const { return port_.path(); }
-  /* What is in the command registers. Activation shows in the status, as far as gACT goes. */
-  std::array<int, 3> command() const;
-
-private:
-  void serve();
-
-  struct Mapped;
-  ServedPort port_;
-  std::unique_ptr<Mapped> mapped_;
-  Repeated serves_;
-};
 
 } // namespace fingertip

@@ -235,17 +235,3 @@ TEST(Robotiq, WorksThroughASlowLine) {
   late.late_s = 0.03;
   EXPECT_GT(ten_moves(late), 10 * 30ms);
 }
-
-/* libmodbus as it comes, without any of the simulated gripper. */
-TEST(Robotiq, IsServedByLibmodbus) {
-  PlainSlave slave;
-  std::unique_ptr<Gripper> gripper = opened("2f140", slave.port());
-  GripperStatus status = gripper->poll();
-  EXPECT_TRUE(status.active);
-  EXPECT_NEAR(status.width_mm, (230 - 100) * 140.0 / 227, 1e-9);
-  EXPECT_DOUBLE_EQ(status.current_A, 0.42);
-  gripper->move({.width_mm = 70, .speed_mm_s = 250, .force_N = 10});
-  EXPECT_EQ(slave.command(), (std::array<int, 3>{0, 117, 0xFF00}));
-  gripper->activate();
-  EXPECT_EQ(slave.command(), (std::array<int, 3>{0x100, 0, 0}));
-}
