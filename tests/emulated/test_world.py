@@ -1,4 +1,4 @@
-"""An emulated fingertip in a simulated world (tests/support/emulated_fingertip.cpp): two runs are the same, however slow the machine is.
+"""An emulated fingertip in a simulated world (tests/support/emulated_fingertip.py): two runs are the same, however slow the machine is.
 
 usage: test_world.py --image F.bin --support FOLDER --node NODE
 """

@@ -6,8 +6,9 @@ with World(OPTIONS.support, OPTIONS.node, folder) as world:
 """
 
 import pathlib
+import sys
 
-from emulation import MAIN
+from emulation import MAIN, ROOT
 from simulated_time import PATIENCE_s, SimulatedTime
 
 
@@ -20,7 +21,8 @@ class World(SimulatedTime):
 
     def emulator(self, port, *options, wait_open=True):
         """One whose power comes when the port is first opened; a process, whose first line is the world's time then, us."""
-        call = (self._support / "emulated_fingertip", port, *["--wait-open"] * wait_open, self._node, MAIN, *options)
+        program = ROOT / "tests/support/emulated_fingertip.py"
+        call = (sys.executable, program, port, *["--wait-open"] * wait_open, self._node, MAIN, *options)
         process = self.start([str(part) for part in call])
         if process.poll() is not None:
             raise AssertionError(f"the emulator did not start: {process.communicate()[1]}")

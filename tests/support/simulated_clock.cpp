@@ -1,8 +1,6 @@
 // libfingertip's clock, simulated: programs that are linked with this one instead live on the time
 // of a time keeper (time_keeper.cpp), whose socket the environment names. One thread of all those
 // programs runs at a time; time passes only while all of them wait.
-#include "support/simulated_clock.hpp"
-
 #include "libfingertip/clock.hpp"
 #include "support/time_keeper.hpp"
 
@@ -29,7 +27,7 @@ constexpr std::int64_t WALL_ZERO_s = 1767225600;
 // So often without a wait means that somebody counts on time to pass by itself.
 constexpr int MOST_LOOKS = 1'000'000;
 
-std::atomic<std::int64_t> now_us{0}, others_us{0};
+std::atomic<std::int64_t> now_us{0};
 std::atomic<int> looks{0};
 
 [[noreturn]] void fail(const char *what) {
@@ -123,7 +121,6 @@ public:
       std::_Exit(125); // the test is over
     }
     now_us = told.now_us;
-    others_us = told.others_us;
     looks = 0;
     return is_whole;
   }
@@ -155,11 +152,6 @@ thread_local Line line;
 HostTime host_now() {
   line.be_there();
   return HostTime(microseconds(now_us));
-}
-
-HostTime test::others_wait_until() {
-  line.be_there();
-  return others_us == INT64_MAX ? HostTime::max() : HostTime(microseconds(others_us));
 }
 
 std::chrono::system_clock::time_point wall_now() {

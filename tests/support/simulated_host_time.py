@@ -7,37 +7,11 @@ programs do, each with a connection of its own to the keeper.
 import contextlib
 import os
 import select
-import socket
 import threading
 
-from simulated_time import BYE, FOR_EVER_us, HELLO, TURN, VARIABLE, WAIT, encoded
+from simulated_time import BYE, FOR_EVER_us, VARIABLE, Line
 
 WALL_ZERO_ns = 1767225600 * 10**9  # as simulated_clock.cpp has it
-
-
-class Line:
-    """A thread's connection."""
-
-    def __init__(self, path):
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.connect(path)
-        self.say(HELLO)
-
-    def say(self, kind, until_us=0, descriptors=()):
-        data, rights = encoded(kind, 0, until_us, descriptors)
-        self._socket.sendmsg([data], rights)
-
-    def take_turn(self):
-        """The time; ends the thread where the world has ended."""
-        told = self._socket.recv(TURN.size)
-        if len(told) != TURN.size:
-            raise SystemExit
-        return TURN.unpack(told)[0]
-
-    def close(self):
-        with contextlib.suppress(OSError):
-            self.say(BYE)
-        self._socket.close()
 
 
 class Waiters:
@@ -115,6 +89,8 @@ class Thread(threading.Thread):
             self._work(*self._arguments)
         finally:
             self._ended.set()
+            with contextlib.suppress(OSError):
+                self._line.say(BYE)
             self._line.close()
 
     def join(self, timeout=None):
@@ -133,7 +109,7 @@ class SimulatedHostTime:
 
     def take_first_turn(self, line):
         self._own.line = line
-        self._us = line.take_turn()
+        self._took_turn(line.take_turn())
 
     def now_ns(self):
         return max(self._us, round(self._world.now_s * 1e6)) * 1000
@@ -164,8 +140,13 @@ class SimulatedHostTime:
             self._us = round(self._world.now_s * 1e6)
             return
         until_us = FOR_EVER_us if seconds is None else self._us + max(1, round(seconds * 1e6))
-        line.say(WAIT, until_us, descriptors)
-        self._us = line.take_turn()
+        self._took_turn(line.wait(until_us, descriptors))
+
+    def _took_turn(self, is_whole):
+        """Ends the thread where the world has ended."""
+        if not is_whole:
+            raise SystemExit
+        self._us = self._own.line.now_us
 
     @staticmethod
     def _has_something(descriptor):

@@ -34,11 +34,38 @@ class TimedOut(AssertionError):
     pass
 
 
-def encoded(kind, pid, until_us, descriptors):
-    """An order for the keeper: its bytes, and what goes with them."""
-    events = [POLLIN] * len(descriptors) + [0] * (MOST_DESCRIPTORS - len(descriptors))
-    rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
-    return ORDER.pack(kind, pid, until_us, len(descriptors), *events), rights
+class Line:
+    """A thread's connection to the keeper, which it tells by its first word that it is there."""
+
+    def __init__(self, path):
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.connect(path)
+        self.now_us = self.others_us = 0  # as of its last turn; others: the first moment that another thread goes on by itself
+        self.say(HELLO)
+
+    def say(self, kind, pid=0, until_us=0, descriptors=()):
+        events = [POLLIN] * len(descriptors) + [0] * (MOST_DESCRIPTORS - len(descriptors))
+        rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
+        self._socket.sendmsg([ORDER.pack(kind, pid, until_us, len(descriptors), *events)], rights)
+
+    def ask(self, kind, pid):
+        self.say(kind, pid)
+        return struct.unpack("=q", self._socket.recv(8))[0]
+
+    def take_turn(self):
+        """False: the world has ended."""
+        told = self._socket.recv(TURN.size)
+        if len(told) == TURN.size:
+            self.now_us, self.others_us = TURN.unpack(told)
+        return len(told) == TURN.size
+
+    def wait(self, until_us, descriptors=()):
+        """Until then, or until one of them can be read."""
+        self.say(WAIT, until_us=until_us, descriptors=descriptors)
+        return self.take_turn()
+
+    def close(self):
+        self._socket.close()
 
 
 class SimulatedTime:
@@ -46,15 +73,12 @@ class SimulatedTime:
         path = os.path.join(folder, "time")
         self._keeper = subprocess.Popen([keeper, path], stdout=subprocess.PIPE, text=True)
         assert self._keeper.stdout.readline() == "ready\n"
-        self._line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._line.connect(path)
+        self._line = Line(path)
         os.chmod(folder, 0o755)  # for programs of other users
         os.chmod(path, 0o777)
         self.environment = {VARIABLE: path}
         self._processes = []
-        self._us = 0
-        self._say(HELLO)
-        self._take_turn()
+        self._turn(self._line.take_turn())
 
     def __enter__(self):
         return self
@@ -74,33 +98,26 @@ class SimulatedTime:
 
     @property
     def now_s(self):
-        return self._us / 1e6
+        return self._line.now_us / 1e6
 
-    def _say(self, kind, pid=0, until_us=0, descriptors=()):
-        data, rights = encoded(kind, pid, until_us, descriptors)
-        self._line.sendmsg([data], rights)
-
-    def _take_turn(self):
-        told = self._line.recv(TURN.size)
-        if len(told) != TURN.size:
+    def _turn(self, is_whole):
+        if not is_whole:
             raise AssertionError(f"the time keeper ended with {self._keeper.wait()}; its words are on standard error")
-        self._us, _ = TURN.unpack(told)
 
     def wait(self, descriptors=(), seconds=PATIENCE_s):
         """Until one of them can be read, not longer than this."""
-        self._say(WAIT, until_us=self._us + max(1, round(seconds * 1e6)), descriptors=list(descriptors))
-        self._take_turn()
+        self._turn(self._line.wait(self._line.now_us + max(1, round(seconds * 1e6)), list(descriptors)))
 
     def sleep(self, seconds):
-        end_us = self._us + round(seconds * 1e6)
-        while self._us < end_us:
-            self.wait(seconds=(end_us - self._us) / 1e6)
+        end_us = self._line.now_us + round(seconds * 1e6)
+        while self._line.now_us < end_us:
+            self.wait(seconds=(end_us - self._line.now_us) / 1e6)
 
     def until(self, condition, limit_s=PATIENCE_s, step_s=0.01):
         """The first true answer of condition, which is asked every step of the world's time."""
-        end_us = self._us + round(limit_s * 1e6)
+        end_us = self._line.now_us + round(limit_s * 1e6)
         while not (answer := condition()):
-            if self._us >= end_us:
+            if self._line.now_us >= end_us:
                 raise TimedOut(f"waited {limit_s} s of the world's time")
             self.wait(seconds=step_s)
         return answer
@@ -109,7 +126,7 @@ class SimulatedTime:
         """As subprocess.Popen; both outputs are pipes unless said otherwise. Returns once it waits for the first time."""
         process = Process(self, arguments, **options)
         self._processes.append(process)
-        self._say(SPAWNED, process.pid)
+        self._line.say(SPAWNED, process.pid)
         self.wait(seconds=1e-6)
         return process
 
@@ -120,15 +137,14 @@ class SimulatedTime:
         return process.returncode, out, err
 
     def turns(self, pid):
-        self._say(TURNS, pid)
-        return struct.unpack("=q", self._line.recv(8))[0]
+        return self._line.ask(TURNS, pid)
 
     def hold(self, pid, seconds):
-        self._say(HELD, pid, FOR_EVER_us if seconds is None else self._us + round(seconds * 1e6))
+        self._line.say(HELD, pid, FOR_EVER_us if seconds is None else self._line.now_us + round(seconds * 1e6))
 
     def will_signal(self, pid):
         """A signal comes there next: time stands until it has arrived."""
-        self._say(SIGNALLED, pid)
+        self._line.say(SIGNALLED, pid)
 
 
 class Output:

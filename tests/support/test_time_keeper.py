@@ -5,7 +5,7 @@ import sys
 import tempfile
 import unittest
 
-from simulated_time import FOR_EVER_us, WAIT, SimulatedTime, TimedOut
+from simulated_time import FOR_EVER_us, SimulatedTime, TimedOut
 
 SIMULATED_DEVICE, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:3])
 
@@ -46,9 +46,8 @@ class TimeKeeper(unittest.TestCase):
         self.assertGreater(device.turns(), turns)
 
     def test_a_world_that_waits_for_ever_is_an_error(self):
-        self.world._say(WAIT, until_us=FOR_EVER_us)
         with self.assertRaisesRegex(AssertionError, "ended with 1"):
-            self.world._take_turn()
+            self.world._turn(self.world._line.wait(FOR_EVER_us))
 
 
 if __name__ == "__main__":

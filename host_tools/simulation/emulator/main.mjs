@@ -43,7 +43,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        --usbredir); fast: as fast as possible
   --stepped            serve the CDC port on stdin and stdout to a program that has a clock of its own: emulated time
                        passes only as far as that program asks (frames: port/stepped_port.mjs). So a test and its
-                       emulators share one time, however slow the machine is: tests/support/emulated_fingertip.cpp
+                       emulators share one time, however slow the machine is: tests/support/emulated_fingertip.py
   --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
                        Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
                        -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug". While a packet
