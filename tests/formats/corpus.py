@@ -6,15 +6,15 @@ A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or t
 
 import pathlib
 import random
-import re
 import struct
 import sys
 import zlib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / folder) for folder in ("tests/support", "tests/fuzz", "host_tools/python")]
 
 import bags  # noqa: E402
+import fuzz  # noqa: E402
 import mcap.writer  # noqa: E402
 from fingertip import RecordingWriter, wire  # noqa: E402
 from fingertip.line import LATER_COLUMNS, SHAPE_COLUMNS, Flag  # noqa: E402
@@ -486,22 +486,8 @@ def frame_of(packet):
     return wire.cobs_encode(data + struct.pack("<I", zlib.crc32(data))) + b"\0"
 
 
-def vectors():
-    """{name: (packet with its CRC, frame)} of tests/vectors/wire."""
-    found = {}
-    for path in sorted((ROOT / "tests/vectors/wire").glob("*.txt")):
-        parts, to = {"packet": [], "frame": []}, []
-        for word in re.sub("#.*", "", path.read_text(encoding="ascii")).split():
-            if word in parts:
-                to = parts[word]
-            else:
-                to.append(int(word, 16))
-        found[path.stem] = bytes(parts["packet"]), bytes(parts["frame"])
-    return found
-
-
 def stream_cases(corpus):
-    found = vectors()
+    found = fuzz.vectors()
     add = corpus.stream
     for name, (packet, frame) in found.items():
         body = packet[:-4]

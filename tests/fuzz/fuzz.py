@@ -41,7 +41,8 @@ class Stop(Exception):
 
 
 def vectors():
-    """(packet, frame) of each file of test vectors."""
+    """{name: (packet with its CRC, frame)} of the test vectors."""
+    found = {}
     for path in sorted(VECTORS.glob("*.txt")):
         parts, name = {"packet": b"", "frame": b""}, None
         for line in path.read_text(encoding="ascii").splitlines():
@@ -50,7 +51,8 @@ def vectors():
                 name = words
             elif words:
                 parts[name] += bytes.fromhex(words)
-        yield parts["packet"], parts["frame"]
+        found[path.stem] = parts["packet"], parts["frame"]
+    return found
 
 
 def part_of_packet(packet):
@@ -66,7 +68,7 @@ def part_of_frame(frame):
 def vector_seeds(target):
     """Inputs for the targets that a line leads to."""
     head = {"wire": bytes(3), "capture": b"\x02"}.get(target)
-    for packet, frame in vectors():
+    for packet, frame in vectors().values():
         if head is not None:
             yield head + part_of_packet(packet)
             yield head + part_of_frame(frame)

@@ -24,15 +24,13 @@ import tempfile
 import threading
 import time
 import unittest
-import zlib
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
-sys.path[:0] = [str(ROOT / folder) for folder in ("host_tools/python", "host_tools/report/shared", "tests/support", "tests/emulated")]
-from emulated import unstuffed  # noqa: E402
+sys.path[:0] = [str(ROOT / folder) for folder in ("host_tools/python", "tests/support", "tests/emulated")]
 from emulation import MAIN, options, write_scenario  # noqa: E402
-from fingertip import files  # noqa: E402
+from fingertip import files, wire  # noqa: E402
 import figures  # noqa: E402
 import guest as virtual  # noqa: E402
 
@@ -71,25 +69,19 @@ CONTROLLER_WARNING = re.compile(
 )
 # What the kernel says of its own clock and processor when the computer gave the virtual machine no time.
 MACHINE_WARNING = re.compile(r"(clocksource: |hrtimer: interrupt took |rcu: |sched: RT throttling )")
-CONTACT, RAW = 0x01, 0x02
 PRESSED_s = 1.2
 
 
 def packets_of(stream):
-    """(type, sequence, body) of each good packet, and how many frames were damaged. The first frame may be cut."""
-    packets, damaged = [], 0
-    for number, coded in enumerate(stream.split(b"\0")[:-1]):
-        packet = unstuffed(coded)
-        if len(packet) >= 16 and zlib.crc32(packet[:-4]) == int.from_bytes(packet[-4:], "little"):
-            packets.append((packet[1], int.from_bytes(packet[2:4], "little"), packet[12:-4]))
-        elif number and coded:
-            damaged += 1
-    return packets, damaged
+    """Its packets, and how many frames were damaged. The first frame may be cut."""
+    decoder = wire.Decoder()
+    packets = list(decoder.feed(stream))
+    return packets, decoder.statistics.crc_errors + decoder.statistics.format_errors
 
 
 def gaps(packets):
     """How many packets are missing between the first and the last."""
-    return sum((b[1] - a[1] - 1) % 65536 for a, b in zip(packets, packets[1:]))
+    return sum((b.sequence - a.sequence - 1) % 65536 for a, b in zip(packets, packets[1:]))
 
 
 class Emulator:
@@ -353,9 +345,10 @@ class Linux(unittest.TestCase):
         REPORT.update(packets_serial=len(received["serial"]), packets_libusb=len(received["usb"]))
         REPORT["lost"] = sum(map(gaps, received.values()))
         for packets in received.values():
-            frames = [(kind, int.from_bytes(body[:4], "little")) for kind, _, body in packets if kind in (CONTACT, RAW)]
+            kinds = (wire.Contact, wire.Raw)
+            frames = [(type(packet.body), packet.body.frame) for packet in packets if isinstance(packet.body, kinds)]
             first = frames[0][1]
-            wanted = [(kind, first + i) for i in range(PACKETS // 2) for kind in (CONTACT, RAW)]
+            wanted = [(kind, first + i) for i in range(PACKETS // 2) for kind in kinds]
             self.assertEqual(frames[:PACKETS] == wanted, True, "not a contact and a raw packet for each frame in turn")
 
     def stall(self, transport):
