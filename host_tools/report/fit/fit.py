@@ -25,11 +25,11 @@ sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "r
 import errors  # noqa: E402
 import stiff  # noqa: E402
 import text  # noqa: E402
-from boards import TO_BUILD, fit_cycles_of  # noqa: E402
+from boards import fit_cycles_of  # noqa: E402
 from presentation import BLUE, FAINT, GOAL, INK, judge, plt, save  # noqa: E402
-from fingertip.files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.files import run_tool, write_text  # noqa: E402
 from measure import Measure  # noqa: E402
-from reporting import Steps, finish, option_parser, output_folder, positive, run, write_json  # noqa: E402
+from reporting import Steps, built, finish, option_parser, output_folder, positive, run, write_json  # noqa: E402
 
 CLOCK_Hz = 125e6
 SETS = errors.SETS
@@ -41,9 +41,7 @@ BUILT_MASKS = tuple(f"{mask} {BUILT}" for mask in MASKS[:2])
 
 def measure(options, out):
     steps = Steps()
-    image = fit_cycles_of(options.boards)
-    if not image.exists():
-        raise InputError(f"{image} is not there; {TO_BUILD}")
+    image = built(fit_cycles_of(options.boards))
     measure = Measure(options.build)
     bench = errors.Bench(measure, options.seed, options.limit, out / "cache")
     steps.report("error against the reference (the first run solves the reference, about eight minutes on two cores)")

@@ -22,6 +22,7 @@ import emulated_grasp  # noqa: E402
 import faults  # noqa: E402
 import grasp_report  # noqa: E402
 import kinds  # noqa: E402
+import text  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
@@ -59,7 +60,7 @@ def main(argv):
     found = {name: None for name, _, _ in GOALS}
     found = judge(found | measure(options), GOALS)
     write_json(out / "grasp.json", found)
-    grasp_report.write(found, out / "grasp.md")
+    text.write(found, "grasp", out, ("distributions",))
     grasp_report.draw(found, out / "grasp.png")
     return finish(found, options, ("grasp.json", "grasp.md", "grasp.png"))
 

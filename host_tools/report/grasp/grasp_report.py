@@ -1,34 +1,9 @@
-"""What grasp.py measured as text and as a picture."""
+"""What grasp.py measured as a picture."""
 
 import bisect
 
-import emulated_grasp
-import faults
-import kinds
-from presentation import BLUE, FAINT, GOAL, INK, ORANGE, goal_table_md, plt, save, text_of
-from fingertip.files import write_text
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, text_of
 from kinds import GRIPPERS
-
-ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller is the tool's own.
-Nothing was checked on hardware. An object is on a table; the gripper closes, holds, lifts it; then it is disturbed. What a dip of cast rubber does
-to the load that a fingertip estimates is in the part `shear` (`dip_*`), to location and force in `truth` and `validation`."""
-
-
-def write(found, path):
-    lines = [
-        "# Grasps",
-        "",
-        *ABOUT.split("\n"),
-        "",
-        "![Drops, grip, reaction, a slip that is caught](grasp.png)",
-        "",
-        *goal_table_md(found),
-        "",
-    ]
-    lines += [*kinds.text(found), "## Faults", "", *faults.text(found)]
-    if "emulated_grasp" in found:
-        lines += ["## With the release image", "", *emulated_grasp.text(found["emulated_grasp"])]
-    write_text(path, "\n".join(lines))
 
 
 def tidy(axes, title, label):

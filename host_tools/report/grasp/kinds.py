@@ -11,9 +11,9 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip.files import InputError, run_tool  # noqa: E402
-from presentation import BLUE, GOAL, ORANGE, table_md, text_of  # noqa: E402
-from reporting import run  # noqa: E402
+from fingertip.files import run_tool  # noqa: E402
+from presentation import BLUE, GOAL, ORANGE  # noqa: E402
+from reporting import built, figures_printed  # noqa: E402
 
 # model: what the figures call it, its colour
 GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}
@@ -46,13 +46,7 @@ GOALS = tuple(
     ("step_us", "<=", 20),
     ("limit_cycles", "<=", 0),
 )
-CONTROLLERS = {
-    "ours": "ours",
-    "textbook": "a textbook's: 1.3 load / friction, 30 % more in a slide",
-    "fixed": "15 N",
-    "paper": "eq. (5) and (6) at 6 N",
-    "oracle": "oracle",
-}
+CONTROLLERS = ("ours", "textbook", "fixed", "paper", "oracle")
 MIXED = ("--kind", "usual,rough")
 # row: its options, whether it is judged; the others' controllers are beside it
 ROWS = {
@@ -83,66 +77,10 @@ USUAL, USUAL_MORE = 300, 100
 FIRM_N = 8.0
 NEED_LEAST_N = 1.5  # of a catch that counts
 FIRST_MUCH = 2.0
-ABOUT = """A world that was written to disagree with the controller: pads F ~ d^1.3 to d^1.9 whose stiffness differs by up to 20 %, 6 to
-30 % relaxation, friction that falls by up to 29 % when sliding begins and differs by side, objects off the centre that are free along the grip's axis, minimum-jerk
-lifts, knocks, pushes, vibration, pouring, carrying and slickness, frames that come late, with jitter or not at all, errors of force and load. The ranges
-of each kind are in `host_tools/simulation/cell/kinds.cpp`. Only SLIDING is computed by the firmware's own code. No grasp needs more than 16 N.
-
-Dropped: slid by 22 mm in all, or never held. Need: what just holds by static friction. A catch: a slide of 0.3 mm or more that ended, with a need of 1.5 N
-or more. Hunting: the commanded width turns by 0.05 mm or more, half a time a second or more often, in the 4 s after the last disturbance. Over the cap: a true
-force of either pad. First grip over 2x: the mean force before the lift over twice the start force. An egg breaks at 25 N, a strawberry at 5 N, a cup at
-3 N; each is held with its preset. What the tool refuses before it moves (a crisp of 1.5 N in a 2F-85) is in no row. The oracle knows the true load, friction and stiffness, and has the same frames, gripper and least move: a bar that it
-meets is one that the gripper allows."""
-COLUMNS = {
-    "row": "kinds",
-    "gripper": "gripper",
-    "controller": "controller",
-    "grasps": "grasps",
-    "drops_percent": "dropped, %",
-    "margin_p50": "margin: p50",
-    "margin_p95": "p95",
-    "catches": "catches",
-    "peak_over_need_p50": "peak over need: p50",
-    "peak_over_need_p95": "p95",
-    "slid_p50_mm": "slid, mm: p50",
-    "slid_p95_mm": "p95",
-    "reaction_p50_ms": "reaction, ms: p50",
-    "hunting_percent": "hunting, %",
-    "crushed_percent": "crushed, %",
-    "over_cap": "over the cap",
-    "first_grip_over_2x_percent": "first grip over 2x, %",
-}
-ABOUT_SETS = """A set force of 2 to 15 N on an object that stays on the table. Settled: within 10 % for 0.5 s, by what the fingertips report. The rms error counts
-from there on. A limit cycle: the commanded width turns four times or more in the last half of a hold. Firm: of set forces of 8 N and more. The oracle knows the true force, how it follows the width and how the rubber is going to relax. Of the positions that
-the gripper can reach it takes the one whose mean squared error over the rest of the hold is least, and it moves no more often than ours may. It plans no
-second move, so it shows what is possible, and is no least bound. Ours does not know how the rubber is going to relax."""
-SET_COLUMNS = {
-    "row": "held for",
-    "gripper": "gripper",
-    "grasps": "grasps",
-    "settle_p50_s": "settles within, s: p50",
-    "settle_p95_s": "p95",
-    "never_settled_percent": "never, %",
-    "rms_p50_percent": "rms error, %: p50",
-    "firm_settle_p50_s": "firm: settles within, s: p50",
-    "firm_rms_p50_percent": "rms error, %: p50",
-    "limit_cycles": "limit cycles",
-}
-
-
-def program(build):
-    path = pathlib.Path(build) / "host_tools/report/grasp/fingertip_grasp_kinds"
-    if not path.is_file():
-        raise InputError(f"{path} is not there; build it: cmake --build --preset host")
-    return path
 
 
 def found_by(build, *more):
-    text = run(program(build), *more)
-    try:
-        return json.loads(text)
-    except ValueError as error:
-        raise InputError(f"fingertip_grasp_kinds wrote no JSON ({error})") from None
+    return figures_printed("fingertip_grasp_kinds", [built(build, "host_tools/report/grasp/fingertip_grasp_kinds"), *more])
 
 
 def quantile(values, share):
@@ -288,28 +226,6 @@ def measure(options, steps):
             found["sets"].append({"row": name, "gripper": gripper, **summary_of_sets(found_by(options.build, *call)["each"])})
             steps.report(f"{gripper}, a set force for {name}: {count} grasps")
     return found | figures(found["kinds"], found["sets"])
-
-
-def rows_md(rows, columns):
-    return table_md(list(columns.values()), [[text_of(row.get(key), 3) for key in columns] for row in rows])
-
-
-def text(found):
-    rows = [{**row, "controller": CONTROLLERS[row["controller"]]} for row in found["kinds"]]
-    return [
-        "## By kind",
-        "",
-        *ABOUT.split("\n"),
-        "",
-        *rows_md(rows, COLUMNS),
-        "",
-        "## Set forces",
-        "",
-        *ABOUT_SETS.split("\n"),
-        "",
-        *rows_md(found["sets"], SET_COLUMNS),
-        "",
-    ]
 
 
 def main(argv):

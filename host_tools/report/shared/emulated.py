@@ -11,7 +11,7 @@ from boards import BOARDS, TO_BUILD, image_of
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 from fingertip.files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
-from reporting import run  # noqa: E402
+from reporting import built, run  # noqa: E402
 
 HELD = 1 << 6
 # Of a packet, firmware/wire/PROTOCOL.md.
@@ -36,8 +36,7 @@ class Tools:
         self.command_frame = pathlib.Path(build) / "tests/support/command_frame"
         self.boards = pathlib.Path(boards)
         for path in (self.fingertip, self.command_frame, *(self.image(board) for board in BOARDS)):
-            if not path.is_file():
-                raise InputError(f"{path}: is not there; {TO_BUILD}")
+            built(path)
 
     def image(self, board, suffix="bin"):
         return image_of(self.boards, board, suffix)

@@ -12,6 +12,7 @@ import time
 
 import page
 import text
+from boards import TO_BUILD
 from fingertip.files import InputError, check_output, write_text
 from presentation import judge, missed, print_goals
 
@@ -45,6 +46,14 @@ def run(*call):
         shown = " ".join(str(part) for part in call[:3])
         raise InputError(f"{shown} ... failed: {(done.stderr or done.stdout).strip()[-500:]}")
     return done.stdout
+
+
+def built(build, *path):
+    """A file of a build folder."""
+    path = pathlib.Path(build, *path)
+    if not path.is_file():
+        raise InputError(f"{path} is not there; {TO_BUILD}")
+    return path
 
 
 class Steps:

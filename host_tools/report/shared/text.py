@@ -1,6 +1,7 @@
 """The text of a report: the file text.md.in of its folder with the figures filled in, then every table that this file does not name.
 
-In text.md.in, {goals} is the table of goals, {table NAME} a table of the figures, and {NAME:.1f} a figure in Python's format. A section (##) whose
+In text.md.in, {goals} is the table of goals, {table NAME} a table of the figures, and {NAME:.1f} a figure in Python's format, {NAME.KEY:.1f} one
+of a dict. A section (##) whose
 table was not measured is left out.
 """
 
@@ -11,7 +12,7 @@ from fingertip.files import write_text
 from presentation import goal_table_md, table_of_dicts_md
 
 TABLE = re.compile(r"^\{table (\w+)\}$", re.M)
-FIGURE = re.compile(r"\{(\w+):([^}]+)\}")
+FIGURE = re.compile(r"\{([\w.]+):([^}]+)\}")
 
 
 def is_table(value):
@@ -34,7 +35,9 @@ def table(found, name):
 
 
 def figure(found, name, form):
-    return "(not measured)" if found.get(name) is None else format(found[name], form)
+    for key in name.split("."):
+        found = (found or {}).get(key)
+    return "(not measured)" if found is None else format(found, form)
 
 
 def filled(template, found, pictured=()):

@@ -21,8 +21,8 @@ sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_
 
 import shear_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
-from reporting import add_parts, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_parts  # noqa: E402
+from fingertip.files import run_tool  # noqa: E402
+from reporting import add_parts, built, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_parts  # noqa: E402
 
 # part: what it measures
 PARTS = {
@@ -85,8 +85,7 @@ def measure_motion(options):
 def measure_chip(options):
     import chip
 
-    if not (image := fit_cycles_of(options.boards)).is_file():
-        raise InputError(f"{image} is not there; build it: cmake --build --preset host")
+    built(fit_cycles_of(options.boards))
     return chip.measure(options.build, options.boards, lambda what: print(f"        {what}", flush=True))
 
 

@@ -20,8 +20,8 @@ sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_
 
 import two_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
-from reporting import add_parts, contacts_of, figures_printed, given, option_parser, positive, report_of_parts  # noqa: E402
+from fingertip.files import run_tool  # noqa: E402
+from reporting import add_parts, built, contacts_of, figures_printed, given, option_parser, positive, report_of_parts  # noqa: E402
 
 # part: what it does
 PARTS = {
@@ -47,8 +47,7 @@ def measure_touches(options):
 
 
 def measure_cycles(options):
-    if not (image := fit_cycles_of(options.boards)).is_file():
-        raise InputError(f"{image} is not there; build it: sh cmake/bootstrap.sh")
+    image = built(fit_cycles_of(options.boards))
     return figures_printed("cycles.mjs", ["node", pathlib.Path(__file__).with_name("cycles.mjs"), image])
 
 

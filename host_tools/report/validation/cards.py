@@ -17,8 +17,9 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / "host_tools/python")]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from fingertip.files import InputError, run_tool  # noqa: E402
+from reporting import built  # noqa: E402
 
 PACKAGE = ROOT / "host_tools/python"
 TOOL = "host_tools/tool/cli/fingertip"
@@ -64,8 +65,7 @@ def session(build, cache, folder, fault, seed, calibrated, options=()):
 def sessions(build, jobs):
     """jobs: (fault, seed, calibrated), and options of the pad. In their order: each with what session gives."""
     for program in (TOOL, PAD):
-        if not (build / program).exists():
-            raise InputError(f"{build / program} is not there; build it: cmake --build --preset host")
+        built(build, program)
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder, concurrent.futures.ThreadPoolExecutor(WORKERS) as pool:
         cache = pathlib.Path(folder) / "tables"
         cache.mkdir()

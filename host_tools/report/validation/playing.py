@@ -14,10 +14,10 @@ import subprocess
 import time
 
 import numpy as np
-from boards import MULTIPLEXED, TO_BUILD, image_of
+from boards import MULTIPLEXED, image_of
 from fingertip import Streams, wire
 from fingertip.files import FIT_VALID, InputError, read_recording
-from reporting import run
+from reporting import built, run
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 
@@ -77,11 +77,7 @@ class Workshop:
     """Scenarios are written, played and read; the files go, the arrays stay."""
 
     def __init__(self, options, out):
-        tools = pathlib.Path(options.build) / "host_tools"
-        self.twin, self.player = tools / "simulation/twin/twin", tools / "simulation/player/fingertip_player"
-        for tool in (self.twin, self.player):
-            if not tool.exists():
-                raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
+        self.twin, self.player = (built(options.build, "host_tools/simulation", tool) for tool in ("twin/twin", "player/fingertip_player"))
         self.image, self.seed, self.scale = image_of(options.boards, MULTIPLEXED), options.seed, options.scale
         self.tables = pathlib.Path(options.tables or out / "contact_tables")
         self.work = out / "validation_work"
@@ -176,8 +172,7 @@ class Workshop:
 
     def emulate(self, effects, seconds):
         """Runs a scenario on the image of the emulated chip, and computes its contact packets here from its pressures."""
-        if not self.image.exists():
-            raise InputError(f"{self.image} is not there; {TO_BUILD}")
+        built(self.image)
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
         self.write(scenario, "taps", effects, self.seed, seconds, "--indenter", "sphere6", "--layer", 12)
         commands = wire.SetStreams(Streams.CONTACT | Streams.RAW), wire.AskInfo(), wire.Tare(0)
