@@ -95,24 +95,12 @@ def cycles(command_frame, place, scene, board, osrs, folder):
         begin_s = t_s if first else t_s + SETTLE_s
         windows.append((str(osr), begin_s, begin_s + WINDOW_s))
         t_s = begin_s + WINDOW_s
-    files = [pathlib.Path(folder) / f"{scene}-{board}.{suffix}" for suffix in ("script", "json")]
-    files[0].write_text("".join(f"{at_s:.3f} {what}\n" for at_s, what in sorted(script)))
-    run(
-        "node",
-        ROOT / "host_tools/report/rate/stage_cycles.mjs",
-        "--image",
-        place / f"fingertip-{board}",
-        "--board",
-        board,
-        "--scenario",
-        scenario(folder, "wander", t_s + 1, f"{scene}-{board}"),
-        "--host-script",
-        files[0],
-        "--json",
-        files[1],
-        *(word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")),
-    )
-    found = json.loads(files[1].read_text())
+    host_script = pathlib.Path(folder) / f"{scene}-{board}.script"
+    host_script.write_text("".join(f"{at_s:.3f} {what}\n" for at_s, what in sorted(script)))
+    windows = [word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")]
+    image = ("--image", place / f"fingertip-{board}", "--board", board, "--host-script", host_script)
+    path = scenario(folder, "wander", t_s + 1, f"{scene}-{board}")
+    found = json.loads(run("node", ROOT / "host_tools/report/rate/stage_cycles.mjs", *image, "--scenario", path, *windows))
     contact = found[str(osrs[0])]
     guards = sum(cycles for name, cycles in contact["functions"].items() if set(name.split("=")) & set(GUARD_FUNCTIONS))
     return {

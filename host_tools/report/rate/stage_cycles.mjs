@@ -1,24 +1,20 @@
 #!/usr/bin/env node
-/** Counts where the cycles of an image go, by stage of the frame and by function: see USAGE. */
-import { readFileSync, writeFileSync } from 'node:fs';
+/**
+ * usage: stage_cycles.mjs --image BASE --board NAME --scenario FILE --host-script FILE --window NAME:FROM_S:TO_S...
+ *
+ * Runs BASE.bin on the emulated board and counts the cycles of each stage in the windows of emulated time, in order of time, with the
+ * symbols of BASE.elf. A stage is a function that the main loop calls, or an interrupt, with all that it calls; what the main loop does
+ * besides is "other". Interrupts are counted as their own stages, wherever they strike.
+ *
+ * Prints {window: {frames, frames_per_s, cycles_per_frame: {stage: cycles}, total_cycles_per_frame, busy_percent, functions: {name: cycles}}}.
+ */
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { findBoard } from '../../simulation/emulator/board/boards.mjs';
-import { InputError, inWords } from '../../simulation/emulator/errors.mjs';
 import { Machine } from '../../simulation/emulator/machine.mjs';
 import { readHostScript, scheduleHostScript } from '../../simulation/emulator/port/host_script.mjs';
 import { readScenario } from '../../simulation/emulator/scenario.mjs';
-import { readFunctions } from './elf_symbols.mjs';
-
-const USAGE = `usage: stage_cycles.mjs --image BASE --board NAME --scenario FILE --host-script FILE --window NAME:FROM_S:TO_S...
-
-Runs BASE.bin on the emulated board and counts the cycles of each stage in the windows of emulated time, with the
-symbols of BASE.elf. A stage is a function that the main loop calls, or an interrupt, with all that it calls; what the
-main loop does besides is "other". Interrupts are counted as their own stages, wherever they strike.
-
-  --json FILE      {window: {frames, cycles_per_frame: {stage: cycles}, frames_per_s, busy_percent, functions}}
-  --functions      print the functions with the most cycles, too
-
-Exit: 0 done; 1 the image failed or warned; 2 wrong usage or input.`;
 
 /** Function that begins a stage in the main loop, and the stage. */
 const STAGES = {
@@ -42,7 +38,7 @@ const INTERRUPTS = { 0: 'bus', 5: 'usb', 7: 'bus', 11: 'bus', 23: 'bus', 26: 'us
 const FRAME = 'condition_frame';
 const RAM = 0x20000000;
 
-export class StageMeter {
+class StageMeter {
   constructor(functions) {
     this.functions = functions;
     this.stages = [...new Set([...Object.values(STAGES), ...Object.values(INTERRUPTS), 'other'])];
@@ -53,14 +49,13 @@ export class StageMeter {
       if (known) this.entry[start - RAM] = 1 + this.stages.indexOf(STAGES[known]);
       if (name.split('=').includes(FRAME)) this.frameEntry = start;
     }
-    if (!this.frameEntry) throw new InputError(`the image has no function ${FRAME}`);
+    if (!this.frameEntry) throw new Error(`the image has no function ${FRAME}`);
     this.reset();
   }
 
   reset() {
     this.cycles = new Float64Array(this.stages.length);
     this.byPlace = new Float64Array(1 << 17);
-    this.elsewhere = 0;
     this.frames = 0;
   }
 
@@ -117,7 +112,6 @@ export class StageMeter {
         const spent = core.cycles - before - meter.charged;
         meter.cycles[stage] += spent;
         if (at >= 0 && at < 1 << 18) meter.byPlace[at >> 1] += spent;
-        else meter.elsewhere += spent;
         if (meter.left) {
           stage = calls.pop()?.stage ?? other; // none: the counting began within this exception
           depth = Math.max(0, depth - 1);
@@ -140,115 +134,61 @@ export class StageMeter {
 }
 const NEVER = Object.freeze({ earliestChanged: false });
 
-function parseOptions(argv) {
-  let values;
-  try {
-    const text = { type: 'string' };
-    ({ values } = parseArgs({
-      args: argv,
-      strict: true,
-      options: {
-        image: text,
-        board: text,
-        scenario: text,
-        'host-script': text,
-        window: { type: 'string', multiple: true, default: [] },
-        json: text,
-        functions: { type: 'boolean', default: false },
-        help: { type: 'boolean', short: 'h', default: false },
-      },
-    }));
-  } catch (error) {
-    throw new InputError(`${error.message.split('\n')[0]}; see --help`);
+/** The functions of an image: [{name, start, end}], by address, aliases joined with "=". */
+function readFunctions(path) {
+  const byStart = new Map();
+  for (const line of execFileSync('arm-none-eabi-nm', ['-p', '-f', 'sysv', path], { encoding: 'utf8' }).split('\n')) {
+    const [name, value, , type, size] = line.split('|').map((cell) => cell.trim());
+    if (type !== 'FUNC') continue;
+    const start = Number.parseInt(value, 16) & ~1;
+    const known = byStart.get(start);
+    if (known) known.name += `=${name}`;
+    else byStart.set(start, { name, start, bytes: Number.parseInt(size || '0', 16) });
   }
-  if (values.help) return values;
-  for (const name of ['image', 'board', 'scenario', 'host-script'])
-    if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
-  values.windows = values.window.map((text) => {
-    const [name, from, to] = text.split(':');
-    const window = { name, from_s: Number(from), to_s: Number(to) };
-    if (!name || !(window.from_s >= 0) || !(window.to_s > window.from_s))
-      throw new InputError(`--window "${text}" is not NAME:FROM_S:TO_S`);
-    return window;
+  const functions = [...byStart.values()].sort((a, b) => a.start - b.start);
+  functions.forEach((f, i) => {
+    f.end = f.bytes ? f.start + f.bytes : (functions[i + 1]?.start ?? f.start + 2);
   });
-  if (!values.windows.length) throw new InputError('--window is missing; see --help');
-  values.windows.reduce((before, next) => {
-    if (next.from_s < before.to_s)
-      throw new InputError(`--window ${next.name} begins before ${before.name} ends; give them in order of time`);
-    return next;
-  });
-  return values;
+  return functions;
 }
 
-function readImage(path) {
-  try {
-    return readFileSync(path);
-  } catch (error) {
-    throw new InputError(`${path}: cannot read the image (${inWords(error)}); build it first`);
-  }
-}
-
-function main(argv) {
-  const options = parseOptions(argv);
-  if (options.help) {
-    process.stdout.write(`${USAGE}\n`);
-    return 0;
-  }
-  const meter = new StageMeter(readFunctions(`${options.image}.elf`));
-  const machine = new Machine({
-    image: readImage(`${options.image}.bin`),
-    Board: findBoard(options.board),
-    scenario: readScenario(options.scenario),
-    fastEnumeration: true,
-  });
-  scheduleHostScript(readHostScript(options['host-script']), machine.scope, machine.client);
-  const run = (to_s) => {
-    if (!machine.run(to_s * 1e9))
-      throw new Error(`the image stopped at ${machine.time.nanos / 1e9} s: ${machine.result.warnings.join('; ') || machine.endReason}`);
-  };
-  run(options.windows[0].from_s);
-  meter.attach(machine.chip);
-  const result = {};
-  for (const { name, from_s, to_s } of options.windows) {
-    run(from_s);
-    meter.reset();
-    run(to_s);
-    if (!meter.frames) throw new Error(`no frame in window ${name}`);
-    const clock_Hz = machine.Board.clkSys_Hz;
-    const busy = meter.cycles.reduce((sum, value) => sum + value, 0);
-    const cycles_per_frame = Object.fromEntries(meter.stages.map((stage, i) => [stage, Math.round(meter.cycles[i] / meter.frames)]));
-    const functions = meter.functionsOfFrame();
-    result[name] = {
-      frames: meter.frames,
-      frames_per_s: meter.frames / (to_s - from_s),
-      cycles_per_frame,
-      total_cycles_per_frame: Math.round(busy / meter.frames),
-      busy_percent: (100 * busy) / ((to_s - from_s) * clock_Hz),
-      functions: Object.fromEntries(functions.map((f) => [f.name, Math.round(f.cycles)])),
-    };
-    const stages = Object.entries(cycles_per_frame)
-      .map(([stage, cycles]) => `${stage} ${cycles}`)
-      .join(', ');
-    process.stdout.write(
-      `${name}: ${result[name].frames_per_s.toFixed(1)} frames/s, ${result[name].total_cycles_per_frame} cycles a frame, busy ${result[name].busy_percent.toFixed(1)} %: ${stages}\n`,
-    );
-    if (options.functions)
-      for (const f of functions.slice(0, 45)) process.stdout.write(`  ${f.cycles.toFixed(0).padStart(8)}  ${f.name}\n`);
-  }
-  if (options.json) {
-    try {
-      writeFileSync(options.json, `${JSON.stringify(result, null, 2)}\n`);
-    } catch (error) {
-      throw new InputError(`${options.json}: cannot write (${inWords(error)}); check the folder`);
-    }
-  }
-  for (const line of machine.result.warnings) process.stderr.write(`${line}\n`);
-  return machine.result.warnings.length ? 1 : 0;
-}
-
-try {
-  process.exitCode = main(process.argv.slice(2));
-} catch (error) {
+process.on('uncaughtException', (error) => {
   process.stderr.write(`stage_cycles.mjs: ${error.message}\n`);
-  process.exitCode = error instanceof InputError ? 2 : 1;
+  process.exit(1);
+});
+const text = { type: 'string' };
+const options = { image: text, board: text, scenario: text, 'host-script': text, window: { ...text, multiple: true } };
+const { values } = parseArgs({ options });
+const windows = values.window.map((one) => one.split(':')).map(([name, from, to]) => ({ name, from_s: Number(from), to_s: Number(to) }));
+const meter = new StageMeter(readFunctions(`${values.image}.elf`));
+const machine = new Machine({
+  image: readFileSync(`${values.image}.bin`),
+  Board: findBoard(values.board),
+  scenario: readScenario(values.scenario),
+  fastEnumeration: true,
+});
+scheduleHostScript(readHostScript(values['host-script']), machine.scope, machine.client);
+const run = (to_s) => {
+  if (!machine.run(to_s * 1e9))
+    throw new Error(`the image stopped at ${machine.time.nanos / 1e9} s: ${machine.result.warnings.join('; ') || machine.endReason}`);
+};
+run(windows[0].from_s);
+meter.attach(machine.chip);
+const result = {};
+for (const { name, from_s, to_s } of windows) {
+  run(from_s);
+  meter.reset();
+  run(to_s);
+  if (!meter.frames) throw new Error(`no frame in window ${name}`);
+  const busy = meter.cycles.reduce((sum, value) => sum + value, 0);
+  result[name] = {
+    frames: meter.frames,
+    frames_per_s: meter.frames / (to_s - from_s),
+    cycles_per_frame: Object.fromEntries(meter.stages.map((stage, i) => [stage, Math.round(meter.cycles[i] / meter.frames)])),
+    total_cycles_per_frame: Math.round(busy / meter.frames),
+    busy_percent: (100 * busy) / ((to_s - from_s) * machine.Board.clkSys_Hz),
+    functions: Object.fromEntries(meter.functionsOfFrame().map((f) => [f.name, Math.round(f.cycles)])),
+  };
 }
+if (machine.result.warnings.length) throw new Error(machine.result.warnings.join('; '));
+process.stdout.write(`${JSON.stringify(result)}\n`);
