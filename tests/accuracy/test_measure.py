@@ -12,7 +12,6 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
-import sessions  # noqa: E402
 from measure import Measure, MeasureError, q10, stream_of, usable_of  # noqa: E402
 
 MEASURE = Measure(sys.argv.pop())
@@ -84,12 +83,13 @@ class Fit(unittest.TestCase):
 
 class Held(unittest.TestCase):
     def test_a_press_that_is_held_is_the_fit_and_what_the_search_adds(self):
-        settings, readings = MEASURE.settings(noise_Pa=5.0), q10(presses(50)[2])
-        alone = MEASURE.fit(ARRAY, settings, readings, kernel="fit_grid")
-        np.testing.assert_array_equal(sessions.fit_held(MEASURE, ARRAY, settings, readings[:, None]), alone)
-        MEASURE.widen_held(ARRAY, settings, readings, alone)
-        held = np.ascontiguousarray(np.repeat(readings[:, None], 7, axis=1))
-        np.testing.assert_array_equal(sessions.fit_held(MEASURE, ARRAY, settings, held), alone)
+        touches = MEASURE.made("twin_touch", 8)
+        touches["force_N"], touches["pull_x_N"] = 6.0, np.linspace(1.0, 2.0, 8)
+        settings, readings = MEASURE.settings(noise_Pa=5.0, gain_sd=0.01), q10(MEASURE.base_pressure("sphere15", 12.0, touches))
+        alone, held = MEASURE.fit(ARRAY, settings, readings), MEASURE.fit_held(ARRAY, settings, readings)
+        np.testing.assert_array_equal(MEASURE.fit_held(ARRAY, settings, readings[:, None].copy()), alone)
+        np.testing.assert_array_equal(held["x_mm"], alone["x_mm"])
+        self.assertTrue((held["location_sd_mm"] > alone["location_sd_mm"]).all())
 
     def test_gains_that_are_apart_are_learnt(self):
         gains, sd = MEASURE.made("fit_gains", 1), np.array([0.1])

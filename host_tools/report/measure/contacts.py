@@ -9,7 +9,7 @@ import functools
 import numpy as np
 import sessions
 from fingertip.files import FIT_VALID
-from measure import Measure, q10
+from measure import Measure, q10, stream_of
 from sessions import SENSORS
 
 FORCE_N = ("pull_x_N", "pull_y_N")  # the tangential force of a twin_touch
@@ -84,12 +84,20 @@ class Contacts(Measure):
     def calibrated_pads(self, kinds, seeds):
         """Each as a good session of placements calibrates it, without a force scale; the kinds (sessions.py) take turns."""
         kinds = sessions.kinds(self, *kinds)[np.arange(len(seeds)) % len(kinds)]
-        found, own, seats = sessions.calibrated_by(self, kinds, seeds)
-        pads = self.perfect_pads(len(seeds))
-        for name in ("gain", "gain_sd", "dip_share", "dip_sd_mm"):
-            pads[name] = found[name]
-        pads["own"], pads["seat"], pads["cast_dip_share"] = own, seats, found["true_dip_share"]
+        pads, session = self.perfect_pads(len(seeds)), sessions.Session.of(self, len(seeds))
+        truth = np.empty((len(seeds), SENSORS)), np.empty(len(seeds)), self.made("twin_seat", len(seeds), SENSORS)
+        found = (session.found, session.sensors, session.own)
+        self.call("pad_calibrated", kinds, sessions.LAYER_mm, self.contact_tables, seeds, *found, *truth)
+        pads["gain"], pads["gain_sd"] = truth[0] / session.sensors["gain"], session.sensors["reading_sd"]
+        pads["own"], pads["cast_dip_share"], pads["seat"] = session.own, *truth[1:]
+        for name in ("dip_share", "dip_sd_mm"):
+            pads[name] = session.found[name]
         return pads
+
+    def calibrated_for(self, judged, kinds, seed):
+        """One for every ten pads that are judged, a hundred at most."""
+        count = min(max(judged // 10, 1), 100)
+        return self.calibrated_pads(kinds, self.random(seed, stream_of("calibrated sessions"), np.arange(count)).bits())
 
     def learned_thickness(self, kinds, seeds):
         """mm, standard deviation, and rounded as the tool shows it: what the width of the response shows in sessions of 24 placements."""

@@ -97,21 +97,27 @@ static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array,
 }
 MEASURE_ENTRY(fit)
 
-// Of presses that are held for this number of frames: adds to the results what a tangential force that is
-// not estimated does to the location.
-static void widen_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                       Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, std::int64_t frames,
-                       Batch<fit_result, 1> results) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
-  same_length(results, pressure_Pa_q10);
+// Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
+// is not estimated has found in the frames before. A single frame is not searched.
+static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
+                     Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10,
+                     Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
+  same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);
   in_parallel(results.size(), [&](std::size_t press) {
     const fit_settings settings = settings_of(all_settings, own, press);
+    const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
+    const std::int32_t *pressure = pressure_Pa_q10.row(press);
+    fit_gaussian(array, pressure, usable[press], &settings, &results[press]);
     fit_doubt doubt{};
-    for (std::int64_t frame = 0; frame < frames; frame++) {
-      fit_doubt_follow(&doubt, array, pressure_Pa_q10.row(press), &settings, results.row(press));
+    for (std::size_t i = 1; i < frames; i++, pressure += sensors) {
+      fit_doubt_follow(&doubt, array, pressure, &settings, &results[press]);
+      fit_gaussian(array, pressure + sensors, usable[press], &settings, &results[press]);
     }
-    fit_doubt_widen(&doubt, array, &settings, results.row(press));
+    if (frames > 1) {
+      fit_doubt_widen(&doubt, array, &settings, &results[press]);
+    }
   });
 }
-MEASURE_ENTRY(widen_held)
+MEASURE_ENTRY(fit_held)

@@ -175,9 +175,15 @@ class Measure(Library):
         self.call("fit", kernel, threads, array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found, us)
         return found, float(us[0])
 
-    def widen_held(self, array, settings, pressure_Pa_q10, fits, *, own=None, frames=6):
-        """Adds to the fits of presses that are held what a tangential force that is not estimated does to the location."""
-        self.call("widen_held", array, settings, self.no_own if own is None else own, pressure_Pa_q10, frames, fits)
+    def fit_held(self, array, settings, pressure_Pa_q10, usable=None, *, own=None):
+        """fit_result of presses that are held [press, frame, sensor], or for seven frames alike [press, sensor]: of the last frame, with what the firmware's
+        search for a tangential force has found in the frames before. One frame alone is not searched."""
+        if pressure_Pa_q10.ndim == 2:
+            pressure_Pa_q10 = np.repeat(pressure_Pa_q10[:, None], 7, axis=1)
+        found = self.made("fit_result", len(pressure_Pa_q10))
+        usable = np.full(len(found), (1 << pressure_Pa_q10.shape[2]) - 1, np.uint32) if usable is None else usable
+        self.call("fit_held", array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found)
+        return found
 
     def chain(self, array, settings, frames, *, before=None, gains=None, own=None, contacts=None):
         """(conditioned, fit_result, contact_result), each [run, frame], of frames through condition, fit and contact. Every run begins after the frames

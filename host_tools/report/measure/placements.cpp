@@ -3,12 +3,10 @@
 #include "report/measure/calibrations.hpp"
 #include "report/measure/entry.hpp"
 #include "report/measure/sessions.hpp"
-#include "simulation/twin/scenarios.hpp"
+#include "report/measure/tables.hpp"
 
 #include <algorithm>
 #include <functional>
-#include <map>
-#include <mutex>
 
 using namespace fingertip;
 using namespace fingertip::measure;
@@ -27,40 +25,8 @@ namespace {
 
 constexpr double TAP_MIN_N = 1.0, TAP_MAX_N = 15.0;
 constexpr std::size_t JUDGED_EVERY = 2; // the tool does it after each placement
-enum Stream : std::uint64_t { TAP_LOCATIONS = 401 };
-
-// What pads of one thickness are touched with, read or solved once.
-struct Tables {
-  Feet feet;
-  twin::ContactTable small, flat;
-  std::map<double, twin::BlockTable> blocks; // by overhang
-  Tables(double layer_mm, const std::string &cache)
-      : feet(layer_mm, cache),
-        small(twin::ContactTable::load_or_build(twin::indenter("sphere6"), twin::silicone(layer_mm), cache)),
-        flat(twin::ContactTable::load_or_build(twin::indenter("cylinder6"), twin::silicone(layer_mm), cache)) {}
-};
-
-Tables &tables_on(double layer_mm, const std::string &cache) {
-  static std::mutex mutex;
-  static std::map<double, Tables> all;
-  const std::lock_guard<std::mutex> lock(mutex);
-  return all.try_emplace(layer_mm, layer_mm, cache).first->second;
-}
-
-const twin::BlockTable *block_of(double overhang_mm, double layer_mm, const std::string &cache) {
-  static std::mutex mutex;
-  Tables &tables = tables_on(layer_mm, cache);
-  const std::lock_guard<std::mutex> lock(mutex);
-  auto found = tables.blocks.find(overhang_mm);
-  if (found == tables.blocks.end()) {
-    found = tables.blocks
-                .emplace(overhang_mm,
-                         twin::BlockTable::load_or_build(twin::block_around(twin::silicone(layer_mm), overhang_mm),
-                                                         twin::sensor_places(), cache))
-                .first;
-  }
-  return &found->second;
-}
+constexpr std::size_t PLACEMENTS = 30;  // of a session that is repeated until one is accepted
+enum Stream : std::uint64_t { SESSION = 302, TAP_LOCATIONS = 401 };
 
 // Pads with their seeds.
 struct Pads {
@@ -73,10 +39,13 @@ struct Pads {
     const pad_kind &kind = *kinds.row_or_all(i);
     return {kind.gain_percent,   kind.relaxation_percent,
             kind.misplaced_mm,   kind.dip_percent,
-            kind.widths_percent, kind.overhang_mm > 0.0 ? block_of(kind.overhang_mm, layer_mm, cache) : nullptr};
+            kind.widths_percent, kind.overhang_mm > 0.0 ? &block_table(layer_mm, kind.overhang_mm, cache) : nullptr};
   }
   std::uint64_t seed(std::size_t i) const { return static_cast<std::uint64_t>(seeds[i]); }
   SessionPad pad(std::size_t i) const { return {options(i), layer_mm, seed(i)}; }
+  const Feet &feet() const {
+    return once_for(layer_mm, [&] { return Feet(layer_mm, cache); });
+  }
   // work(i) for every pad.
   void each(const std::function<void(std::size_t)> &work) const {
     length_or_one(seeds, kinds);
@@ -118,7 +87,7 @@ static void pad_placements(std::string session_kind, Batch<const pad_kind, 1> ki
   same_length(seeds, t_s, reading_Pa, fading);
   require(t_s.size(1) == reading_Pa.size(1) && t_s.size(1) == fading.size(1), "other numbers of placements");
   const Pads pads{kinds, layer_mm, cache, seeds};
-  const Feet &feet = tables_on(layer_mm, cache).feet;
+  const Feet &feet = pads.feet();
   pads.each([&](std::size_t i) {
     SessionPad pad = pads.pad(i);
     Session session(feet, kind_named(session_kind), pads.seed(i), calibrating::PLACEMENTS_MAX);
@@ -138,7 +107,7 @@ static void pad_lead(std::string session_kind, Batch<const pad_kind, 1> kinds, d
                      Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own, Batch<std::int64_t, 1> placements) {
   same_length(seeds, found, sensors, own, placements);
   const Pads pads{kinds, layer_mm, cache, seeds};
-  const Feet &feet = tables_on(layer_mm, cache).feet;
+  const Feet &feet = pads.feet();
   pads.each([&](std::size_t i) {
     SessionPad pad = pads.pad(i);
     Session session(feet, kind_named(session_kind), pads.seed(i), static_cast<std::size_t>(planned));
@@ -156,8 +125,9 @@ static void pad_taps(Batch<const pad_kind, 1> kinds, double layer_mm, std::strin
                      Batch<double, 2> force_N, Batch<double, 3> reading_Pa) {
   same_length(seeds, x_mm, y_mm, force_N, reading_Pa);
   const Pads pads{kinds, layer_mm, cache, seeds};
-  const Tables &tables = tables_on(layer_mm, cache);
-  const twin::ContactTable *const objects[] = {&tables.small, &tables.feet.round, &tables.flat};
+  const twin::ContactTable *const objects[] = {&contact_table(twin::indenter("sphere6"), layer_mm, cache),
+                                               &pads.feet().round,
+                                               &contact_table(twin::indenter("cylinder6"), layer_mm, cache)};
   const calibrating::Array array = session_array();
   pads.each([&](std::size_t i) {
     SessionPad pad = pads.pad(i);
@@ -185,39 +155,43 @@ static void pad_gains(Batch<const pad_kind, 1> kinds, double layer_mm, std::stri
 }
 MEASURE_ENTRY(pad_gains)
 
-// What an accepted calibration left of a pad. gain: true over estimated. The prior, its sd and the dip are those that
-// the fit gets; true_dip_share is that of the rubber.
-struct calibrated_pad {
-  double gain[15], gain_sd[15];
-  double force_scale, force_scale_sd, prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm, true_dip_share;
-};
-MEASURE_RECORD(calibrated_pad, FIELD(gain), FIELD(gain_sd), FIELD(force_scale), FIELD(force_scale_sd),
-               FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(true_dip_share))
-
-// Sessions of thirty placements on pads of their own, each repeated on another pad until a calibration is accepted.
-// own: zeros where the session found none; seats: where the sensors are.
+// What accepted calibrations found: sessions of thirty placements on pads of their own, each repeated on another pad
+// until a calibration is accepted. true_gain, true_dip_share and seats are how that pad is.
 static void pad_calibrated(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
-                           Batch<const std::int64_t, 1> seeds, Batch<calibrated_pad, 1> found, Batch<fit_own, 2> own,
-                           Batch<twin::Pad::Seat, 2> seats) {
-  same_length(seeds, found, own, seats);
+                           Batch<const std::int64_t, 1> seeds, Batch<calibration, 1> found,
+                           Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own, Batch<double, 2> true_gain,
+                           Batch<double, 1> true_dip_share, Batch<twin::Pad::Seat, 2> seats) {
+  same_length(seeds, found, sensors, own, true_gain, true_dip_share, seats);
   const Pads pads{kinds, layer_mm, cache, seeds};
-  const Feet &feet = tables_on(layer_mm, cache).feet;
+  const Feet &feet = pads.feet();
+  // Whether the calibration is accepted.
+  const auto made = [&](std::size_t i, std::uint64_t seed) {
+    SessionPad pad(pads.options(i), layer_mm, seed);
+    Session session(feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
+    std::vector<Placement> placements;
+    while (const auto placement = session.next(pad)) {
+      placements.push_back(*placement);
+      if (placements.size() < PLACEMENTS) {
+        continue;
+      }
+      const Judgement judgement = calibrating::judge(session_array(), placements, false);
+      if (judgement.state == Judgement::State::refused) {
+        break;
+      }
+      describe(session_array(), placements, judgement, WEIGHT_N, found[i], sensors.row(i), own.row(i));
+      if (judgement.state == Judgement::State::good && found[i].force_scale > 0.0) {
+        const std::vector<double> gains = pad.settled_gains();
+        std::copy(gains.begin(), gains.end(), true_gain.row(i));
+        true_dip_share[i] = pad.rubber().dip_share();
+        std::copy(pad.rubber().seats().begin(), pad.rubber().seats().end(), seats.row(i));
+        return true;
+      }
+    }
+    return false;
+  };
   pads.each([&](std::size_t i) {
-    const Calibrated session = calibrated_session(feet, pads.options(i), pads.seed(i));
-    const calibrating::Shape &shape = session.shape;
-    calibrated_pad &pad = found[i];
-    std::copy(session.remaining_gain.begin(), session.remaining_gain.end(), pad.gain);
-    std::copy(session.gain_sd.begin(), session.gain_sd.end(), pad.gain_sd);
-    pad.force_scale = session.force_scale;
-    pad.force_scale_sd = session.force_scale_sd;
-    pad.prior_sigma_mm = shape.sigma_mm;
-    pad.prior_width_mm = shape.sigma_sd_mm;
-    pad.dip_share = shape.dip_share;
-    pad.dip_sd_mm = shape.dip_sd_mm;
-    pad.true_dip_share = session.dip_share;
-    const std::vector<fit_own> kept = calibrating::own_of(session_array(), shape);
-    std::copy(kept.begin(), kept.end(), own.row(i));
-    std::copy(session.seats.begin(), session.seats.end(), seats.row(i));
+    for (std::uint64_t attempt = 0; !made(i, Random(pads.seed(i), SESSION, attempt).next()); attempt++) {
+    }
   });
 }
 MEASURE_ENTRY(pad_calibrated)

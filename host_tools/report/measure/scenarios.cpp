@@ -2,42 +2,19 @@
 #include "simulation/twin/scenarios.hpp"
 
 #include "libfingertip/in_parallel.hpp"
-#include "library/pad/block_table.hpp"
 #include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/thickness.hpp"
 #include "report/measure/entry.hpp"
+#include "report/measure/tables.hpp"
 
 #include <algorithm>
 #include <cstring>
 #include <map>
-#include <mutex>
 
 using namespace fingertip;
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
-
-// What make() makes is made once for each key, by one thread at a time.
-template <class Key, class Make> static auto &once_for(const Key &key, const Make &make) {
-  static std::map<Key, decltype(make())> all;
-  static std::mutex mutex;
-  const std::lock_guard<std::mutex> lock(mutex);
-  const auto found = all.find(key);
-  return found == all.end() ? all.emplace(key, make()).first->second : found->second;
-}
-
-static const twin::ContactTable &table_of(const std::string &name, double layer_mm, const std::string &cache) {
-  return once_for(std::make_pair(name, layer_mm), [&] {
-    return twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(layer_mm), cache);
-  });
-}
-
-static const twin::BlockTable &block_of(double layer_mm, double overhang_mm, const std::string &cache) {
-  return once_for(std::make_pair(layer_mm, overhang_mm), [&] {
-    const auto block = twin::block_around(twin::silicone(layer_mm), overhang_mm);
-    return twin::BlockTable::load_or_build(block, twin::sensor_places(), cache);
-  });
-}
 
 // Adds to a profile the effect of the pad's ends on the estimate.
 static void add_ends(double overhang_mm, std::string cache, Batch<pad_profile, 1> profile) {
@@ -50,8 +27,8 @@ MEASURE_ENTRY(add_ends)
 static void add_block(std::string name, double layer_mm, double overhang_mm, std::string cache,
                       Batch<const twin::Touch, 1> touches, Batch<double, 2> base_Pa) {
   same_length(touches, base_Pa);
-  const twin::BlockTable &block = block_of(layer_mm, overhang_mm, cache);
-  const twin::ContactTable &table = table_of(name, layer_mm, cache);
+  const twin::BlockTable &block = block_table(layer_mm, overhang_mm, cache);
+  const twin::ContactTable &table = contact_table(twin::indenter(name), layer_mm, cache);
   in_parallel(touches.size(), [&](std::size_t i) {
     const twin::Touch &touch = touches[i];
     const twin::BlockTable::Load load{touch.force_N, touch.pull_x_N, touch.pull_y_N,
@@ -139,7 +116,8 @@ static void scenario_begin(Batch<const scenario_options, 1> options, std::string
   if (given.margin_mm >= 0.0) {
     chosen.margin_mm = given.margin_mm;
   }
-  twin::Scenario made = twin::make_scenario(chosen, table_of(given.contact_shape, given.layer_mm, cache));
+  const twin::Indenter &indenter = twin::indenter(given.contact_shape);
+  twin::Scenario made = twin::make_scenario(chosen, contact_table(indenter, given.layer_mm, cache));
   facts[0] = scenarios().empty() ? 0 : scenarios().rbegin()->first + 1;
   facts[1] = facts[2] = 0;
   for (const twin::Episode &act : made.episodes) {

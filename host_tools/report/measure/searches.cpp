@@ -1,40 +1,12 @@
-// Presses that are held or repeated: what the firmware's searches beside the fit find of them.
-#include "libfingertip/in_parallel.hpp"
+// Presses that are repeated: what they show of the sensors' gains.
 #include "report/measure/fit_arguments.hpp"
 
 extern "C" {
-#include "fit/fit_doubt.h"
 #include "fit/fit_gains.h"
 #include "ms58xx/ms58xx.h"
 }
 
 using namespace fingertip::measure;
-using fingertip::twin::in_parallel;
-
-// Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
-// is not estimated has found in the frames before. A single frame is not searched.
-static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                     Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10,
-                     Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
-  same_length(results, pressure_Pa_q10, usable);
-  length_or_one(results, all_settings);
-  in_parallel(results.size(), [&](std::size_t press) {
-    const fit_settings settings = settings_of(all_settings, own, press);
-    const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
-    const std::int32_t *pressure = pressure_Pa_q10.row(press);
-    fit_gaussian_grid(array, pressure, usable[press], &settings, &results[press]);
-    fit_doubt doubt{};
-    for (std::size_t i = 1; i < frames; i++, pressure += sensors) {
-      fit_doubt_follow(&doubt, array, pressure, &settings, &results[press]);
-      fit_gaussian_grid(array, pressure + sensors, usable[press], &settings, &results[press]);
-    }
-    if (frames > 1) {
-      fit_doubt_widen(&doubt, array, &settings, &results[press]);
-    }
-  });
-}
-MEASURE_ENTRY(fit_held)
 
 MEASURE_RECORD(fit_gains)
 

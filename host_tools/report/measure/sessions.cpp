@@ -214,40 +214,4 @@ std::optional<calibrating::Placement> Session::next(SessionPad &pad, std::option
   return placement;
 }
 
-Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::uint64_t seed) {
-  constexpr std::size_t PLACEMENTS = 30;
-  for (std::uint64_t attempt = 0;; attempt++) {
-    const std::uint64_t own = Random(seed, SESSION, attempt).next();
-    SessionPad pad(options, feet.layer_mm, own);
-    Session session(feet, SessionKind::good, own, calibrating::PLACEMENTS_MAX);
-    std::vector<calibrating::Placement> placements;
-    while (auto placement = session.next(pad)) {
-      placements.push_back(*placement);
-      if (placements.size() < PLACEMENTS) {
-        continue;
-      }
-      const calibrating::Judgement judgement = calibrating::judge(session_array(), placements, false);
-      if (judgement.state == calibrating::Judgement::State::refused) {
-        break;
-      }
-      const auto scale = calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N,
-                                                  calibrating::shape_of(judgement.solution));
-      if (judgement.state == calibrating::Judgement::State::good && scale) {
-        const std::vector<double> truth = pad.settled_gains();
-        Calibrated left{{},
-                        judgement.solution.reading_sd,
-                        scale->scale,
-                        scale->sd,
-                        calibrating::shape_of(judgement.solution),
-                        pad.rubber().dip_share(),
-                        pad.rubber().seats()};
-        for (std::size_t k = 0; k < truth.size(); k++) {
-          left.remaining_gain.push_back(truth[k] / judgement.solution.gain[k]);
-        }
-        return left;
-      }
-    }
-  }
-}
-
 } // namespace fingertip::measure

@@ -8,7 +8,6 @@
 #include "simulation/twin/effects.hpp"
 #include "tool/calibration/judge.hpp"
 
-#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -26,10 +25,6 @@ struct PadOptions {
   double dip_percent = 0.0, widths_percent = 0.0;
   const twin::BlockTable *block = nullptr; // of rubber that ends; of sensors that are in their places
 };
-
-// As real arrays are (host_tools/report/real); and each of gains and dip alone.
-constexpr PadOptions LIKE_REAL{20.0, 0.0, 0.1, 5.0, 3.5};
-constexpr PadOptions GAINS_20{20.0}, DIP{10.0, 0.0, 0.0, 5.0};
 
 // Fifteen sensors under a layer, over time. What touches it is a table of the twin.
 class SessionPad {
@@ -64,9 +59,6 @@ private:
 };
 
 enum class SessionKind { good, elongated, offsets, one_end, cluster, drift, too_few, weights };
-constexpr std::array<SessionKind, 7> BAD_SESSIONS{SessionKind::elongated, SessionKind::offsets, SessionKind::one_end,
-                                                  SessionKind::cluster,   SessionKind::drift,   SessionKind::too_few,
-                                                  SessionKind::weights};
 const char *name_of(SessionKind kind);
 
 constexpr double WEIGHT_N = 3.0;
@@ -102,17 +94,5 @@ private:
   double middle_x_mm_, middle_y_mm_, angle_rad_;
   std::vector<double> zero_Pa_, drift_Pa_;
 };
-
-// What a calibration left: true over estimated gains, their sds by the solver, and the response that it found; and how
-// the pad is.
-struct Calibrated {
-  std::vector<double> remaining_gain, gain_sd; // [sensor]
-  double force_scale, force_scale_sd;
-  calibrating::Shape shape;
-  double dip_share;
-  std::vector<twin::Pad::Seat> seats; // [sensor]
-};
-// Of a good session of thirty placements on a pad of its own, until one is accepted.
-Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::uint64_t seed);
 
 } // namespace fingertip::measure

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from measure import stream_of
 
 TEN_PERCENT = {"gain_percent": 10.0}
 GAINS_20 = {"gain_percent": 20.0}
@@ -13,7 +12,6 @@ LIKE_REAL = {"gain_percent": 20.0, "misplaced_mm": 0.1, "dip_percent": 5.0, "wid
 # As the twin's own, and as many whose sensors relax by 9 to 26 % and sit 0.1 mm (sd) off.
 USUAL = (TEN_PERCENT, TEN_PERCENT | {"relaxation_percent": 17.5, "misplaced_mm": 0.1})
 LAYER_mm, WEIGHT_N = 12.0, 3.0
-PADS_PER_SESSION, SESSIONS_MAX = 10, 100
 
 
 SENSORS = 15
@@ -43,30 +41,6 @@ def kinds(firmware, *each):
         for name, value in kind.items():
             row[name] = value
     return made
-
-
-def calibrated(firmware, of, judged, seed, layer_mm=LAYER_mm):
-    """calibrated_pad: what accepted calibrations left of pads of these kinds in turn, one for every ten pads that are judged, a hundred at most."""
-    count = min(max(judged // PADS_PER_SESSION, 1), SESSIONS_MAX)
-    seeds = firmware.random(seed, stream_of("calibrated sessions"), np.arange(count)).bits()
-    return calibrated_by(firmware, kinds(firmware, *of)[np.arange(count) % len(of)], seeds, layer_mm)[0]
-
-
-def calibrated_by(firmware, of, seeds, layer_mm=LAYER_mm):
-    """calibrated_pad [pad], fit_own and twin_seat [pad, sensor] of pads of their own for each seed."""
-    count = len(seeds)
-    found = firmware.made("calibrated_pad", count), firmware.made("fit_own", count, SENSORS), firmware.made("twin_seat", count, SENSORS)
-    firmware.call("pad_calibrated", of, layer_mm, firmware.contact_tables, seeds, *found)
-    return found
-
-
-def fit_held(firmware, array, settings, pressure_Pa_q10, usable=None, own=None):
-    """fit_result of presses [press, frame, sensor] that are held: of the last frame, with what the firmware's search for a tangential force has found in
-    the frames before. One frame alone is not searched."""
-    found = firmware.made("fit_result", len(pressure_Pa_q10))
-    usable = np.full(len(found), (1 << SENSORS) - 1, np.uint32) if usable is None else usable
-    firmware.call("fit_held", array, settings, firmware.no_own if own is None else own, pressure_Pa_q10, usable, found)
-    return found
 
 
 @dataclasses.dataclass

@@ -3,8 +3,8 @@
 #include "libfingertip/random.hpp"
 #include "library/pad/profile.hpp"
 #include "report/measure/entry.hpp"
+#include "report/measure/tables.hpp"
 #include "simulation/twin/effects.hpp"
-#include "simulation/twin/traction_table.hpp"
 #include "simulation/twin/trajectory.hpp"
 
 extern "C" {
@@ -12,9 +12,6 @@ extern "C" {
 }
 
 #include <algorithm>
-#include <map>
-#include <memory>
-#include <mutex>
 
 using namespace fingertip;
 using namespace fingertip::measure;
@@ -118,44 +115,6 @@ static void shape_named(std::string name, Batch<contact_shape, 1> shape) {
 }
 MEASURE_ENTRY(shape_named)
 
-namespace {
-
-struct Tables {
-  explicit Tables(twin::ContactTable of) : pressure(std::move(of)) {}
-  twin::ContactTable pressure;
-  std::once_flag made;
-  std::unique_ptr<twin::TractionTable> traction;
-};
-
-// Each solved or read once.
-Tables &tables_of(const std::string &name, const contact_shape &shape, double layer_mm, const std::string &cache) {
-  static std::mutex mutex;
-  static std::map<std::pair<std::string, double>, std::unique_ptr<Tables>> all;
-  const std::lock_guard<std::mutex> lock(mutex);
-  std::unique_ptr<Tables> &tables = all[{name, layer_mm}];
-  if (!tables) {
-    const twin::Indenter indenter{name,
-                                  "",
-                                  static_cast<twin::Indenter::Shape>(shape.kind),
-                                  shape.size_x_mm,
-                                  shape.size_y_mm,
-                                  shape.size_z_mm,
-                                  shape.edge_mm,
-                                  shape.youngs_modulus_Pa};
-    tables = std::make_unique<Tables>(twin::ContactTable::load_or_build(indenter, twin::silicone(layer_mm), cache));
-  }
-  return *tables;
-}
-
-const twin::TractionTable &traction_of(Tables &tables, double layer_mm) {
-  std::call_once(tables.made, [&] {
-    tables.traction = std::make_unique<twin::TractionTable>(tables.pressure, twin::silicone(layer_mm));
-  });
-  return *tables.traction;
-}
-
-} // namespace
-
 // Pressure on the base under each sensor [touch][sensor], Pa. name and shape are those of one contact shape, cache the
 // folder of the contact tables. dip_share: [1 or touch]; seats [1 or touch][sensor]: how the sensors sit.
 static void base_pressure(std::string name, Batch<const contact_shape, 1> shape, double layer_mm, std::string cache,
@@ -165,11 +124,18 @@ static void base_pressure(std::string name, Batch<const contact_shape, 1> shape,
   same_length(x_mm, y_mm);
   length_or_one(touches, dip_share, seats);
   require(base_Pa.size(1) == x_mm.size() && seats.size(1) == x_mm.size(), "another number of sensors");
-  Tables &tables = tables_of(name, shape[0], layer_mm, cache);
+  const contact_shape &it = shape[0];
+  const auto kind = static_cast<twin::Indenter::Shape>(it.kind);
+  const twin::Indenter indenter{name,         "",           kind,       it.size_x_mm,
+                                it.size_y_mm, it.size_z_mm, it.edge_mm, it.youngs_modulus_Pa};
+  const twin::ContactTable &pressure = contact_table(indenter, layer_mm, cache);
+  const auto is_pulled = [](const twin::Touch &touch) { return touch.pull_x_N != 0.0 || touch.pull_y_N != 0.0; };
+  const twin::TractionTable *const traction = std::any_of(touches.data, touches.data + touches.size(), is_pulled)
+                                                  ? &traction_table(indenter, layer_mm, cache)
+                                                  : nullptr;
   in_parallel(touches.size(), [&](std::size_t i) {
     const twin::Touch &touch = touches[i];
     const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
-    const bool pulls = touch.pull_x_N != 0.0 || touch.pull_y_N != 0.0;
     const twin::TractionTable::Load load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
                                          c * touch.pull_y_N - s * touch.pull_x_N};
     for (std::size_t k = 0; k < x_mm.size(); k++) {
@@ -178,9 +144,9 @@ static void base_pressure(std::string name, Batch<const contact_shape, 1> shape,
       const double dy = (y_mm[k] + seat.dy_mm - touch.y_mm) / seat.width;
       const double along = c * dx + s * dy, across = c * dy - s * dx;
       double &base = base_Pa.row(i)[k];
-      base = tables.pressure.base_pressure_Pa(touch.force_N, along, across, *dip_share.row_or_all(i));
-      if (pulls) {
-        base += traction_of(tables, layer_mm).base_pressure_Pa(load, along, across);
+      base = pressure.base_pressure_Pa(touch.force_N, along, across, *dip_share.row_or_all(i));
+      if (is_pulled(touch)) {
+        base += traction->base_pressure_Pa(load, along, across);
       }
     }
   });

@@ -122,9 +122,7 @@ class Fingertip:
     def fit(self, *arguments, **named):
         """fit_result [press] of the inputs of these arguments, as of presses that are held."""
         settings, readings, usable, own = self.inputs(*arguments, **named)
-        found = self.measure.fit(self.array, settings, readings, usable, own=own)
-        self.measure.widen_held(self.array, settings, readings, found, own=own)
-        return found
+        return self.measure.fit_held(self.array, settings, readings, usable, own=own)
 
     def us(self, several):
         """Microseconds of one fit of each of several inputs, in the quickest of PASSES passes in which they take turns."""

@@ -66,9 +66,7 @@ class Bench:
         return self.contacts.random(self.seed, stream_of(table), index)
 
     def sessions(self, kinds):
-        """Calibrated pads: one for every ten that are judged, a hundred at most."""
-        seeds = self.random("calibrated sessions", np.arange(min(max(self.pads // 10, 1), 100))).bits()
-        return self.contacts.calibrated_pads(kinds, seeds)
+        return self.contacts.calibrated_for(self.pads, kinds, self.seed)
 
     def calibrated_as(self, kinds):
         """Pads of these kinds in turn, each calibrated as it is and with the force scale that a known weight shows."""

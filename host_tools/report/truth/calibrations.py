@@ -58,8 +58,7 @@ class Taps:
                 settings[name] = found[name][pad]
             of_pad = own[pad : pad + 1] if own is not None and found["has_own"][pad] else None
             pressure = q10(readings / gain[pad])
-            fits = self.firmware.fit(self.firmware.array(), settings, pressure, own=of_pad, kernel="fit_grid")
-            self.firmware.widen_held(self.firmware.array(), settings, pressure, fits, own=of_pad)
+            fits = self.firmware.fit_held(self.firmware.array(), settings, pressure, own=of_pad)
             distance_mm[pad] = np.hypot(fits["x_mm"] - self.x_mm[pad], fits["y_mm"] - self.y_mm[pad])
             force[pad] = fits["force_N"] / self.force_N[pad]
             warned[pad] = fits["flags"] & WARNINGS > 0

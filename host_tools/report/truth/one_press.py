@@ -152,7 +152,7 @@ class Bench:
             settings["model_sd_q16"] = 0
         print(f"truth_fit: {case.name}", flush=True)
         for settings["iterations"] in iterations:
-            yield Results(touch, sessions.fit_held(self.contacts, self.array, settings, readings, usable))
+            yield Results(touch, self.contacts.fit_held(self.array, settings, readings, usable))
 
     def row(self, case):
         (results,) = self.run(case)
@@ -311,7 +311,7 @@ def figures(firmware, options):
         raise InputError("--pads needs at least one pad")
     bench = Bench(Contacts(firmware.build), 20221015 if options.seed is None else options.seed, count)
     out = {}
-    of = calibrated(sessions.calibrated(firmware, sessions.USUAL, count, bench.seed))
+    of = calibrated(bench.contacts.calibrated_for(count, sessions.USUAL, bench.seed))
     for part in (coverage, tangential, elongated, iterations, few_sensors):
         part(bench, of, out)
     return out
