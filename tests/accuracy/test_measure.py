@@ -90,6 +90,7 @@ class Held(unittest.TestCase):
         np.testing.assert_array_equal(MEASURE.fit_held(ARRAY, settings, readings[:, None].copy()), alone)
         np.testing.assert_array_equal(held["x_mm"], alone["x_mm"])
         self.assertTrue((held["location_sd_mm"] > alone["location_sd_mm"]).all())
+        self.assertGreater(held["location_sd_mm"][-1], 1.5 * held["location_sd_mm"][0])  # by the tangential force that it has found
 
     def test_gains_that_are_apart_are_learnt(self):
         gains, sd = MEASURE.made("fit_gains", 1), np.array([0.1])

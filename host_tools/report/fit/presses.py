@@ -8,13 +8,10 @@
 Noise 2 to 20 Pa rms, every range log-uniform, location uniform over the array (18 x 36 mm, De Clercq et al., RA-L 2022). Presses whose largest reading is
 below 20 noise standard deviations would not pass the firmware's gate and are drawn again.
 
-C and D: pressure on the bonded base of a linear elastic layer under a contact pressure without friction. The contact pressure is assumed, not solved: Hertz
-for the spheres (radius from the force by Hertz for a half-space, at most the sphere's radius and the layer's thickness), the rigid punch on a half-space
-for the cylinder, its analogue with square contours for the cube. That model differs from the fitted Gaussian, with the width and tails of a layer; it is no
-contact solver and does not show what hyperelastic rubber does.
+C and D are the twin's elastic layer under its contact shapes (simulation/twin/contact.hpp): a model that differs from the fitted Gaussian, with the width
+and tails of a layer, and does not show what hyperelastic rubber does.
 """
 
-import functools
 import hashlib
 import pathlib
 import sys
@@ -32,86 +29,17 @@ LAYER_mm = {"C": 12.0, "D": 6.0}
 SENSORS = 15
 ALL = np.uint32((1 << SENSORS) - 1)
 
-POISSON = 0.49
-YOUNG_Pa = 0.56e6  # silicone rubber of Shore hardness 15 A by Gent's relation
-TABLE_REACH, STEPS_PER_THICKNESS = 24, 128
 SHAPES = ("sphere6", "sphere15", "cylinder6", "cube6")
-DIRECTIONS = 16
 MASK_STREAM = 1000
-
-
-def rule(nodes):
-    """Gauss-Legendre on 0 to 1: (node, weight)."""
-    at, weight = np.polynomial.legendre.leggauss(nodes)
-    return 0.5 * (1 + at), 0.5 * weight
-
-
-@functools.cache
-def point_load_table(measure):
-    """Pressure under a point load on a layer of thickness 1, [r * STEPS_PER_THICKNESS]: the Hankel transform (1 / 2 pi) int u T(u) J0(u r) du. T falls
-    as u exp(-u), and a panel of 1/4 holds one period of J0 at the reach."""
-    at, weight = rule(8)
-    u = (np.arange(0, 48, 0.25)[:, None] + 0.25 * at).ravel()
-    transfer = np.zeros(len(u))
-    measure.call("base_transfer", u, POISSON, transfer)
-    strength = 0.25 * np.tile(weight, 192) * u * transfer / (2 * np.pi)
-    r = np.arange(TABLE_REACH * STEPS_PER_THICKNESS + 3) / STEPS_PER_THICKNESS
-    waves = np.zeros((len(r), len(u)))
-    measure.call("bessel_j0", np.outer(r, u), waves)
-    return waves @ strength
-
-
-def point_load_Pa(measure, layer_mm, r_mm):
-    """Under a point load of 1 N at distances from it: 0 beyond the reach. A cubic through four neighbours; the response is even in r."""
-    table = point_load_table(measure)
-    position = np.minimum(r_mm / layer_mm * STEPS_PER_THICKNESS, TABLE_REACH * STEPS_PER_THICKNESS)
-    i = position.astype(int)
-    t = position - i
-    value = (
-        -t * (t - 1) * (t - 2) / 6 * table[np.abs(i - 1)]
-        + (t + 1) * (t - 1) * (t - 2) / 2 * table[i]
-        - (t + 1) * t * (t - 2) / 2 * table[np.minimum(i + 1, len(table) - 1)]
-        + (t + 1) * t * (t - 1) / 6 * table[np.minimum(i + 2, len(table) - 1)]
-    )
-    return np.where(position < TABLE_REACH * STEPS_PER_THICKNESS, 1e6 / layer_mm**2 * value, 0.0)
-
-
-def contact_pressure(shape, force_N, layer_mm):
-    """The contact pressure as point loads, (x_mm, y_mm, share), each [press, load] for forces [press]; shares are positive and add up to 1.
-
-    With t = sqrt(1 - (r/a)^2) the force within the contour r is dt for the punch, whose pressure goes as 1/t, and 3 t^2 dt for Hertz, whose pressure goes as
-    t. The base has even powers of r."""
-    radius_mm = {"sphere6": 3.0, "sphere15": 7.5}.get(shape)
-    a_mm = np.full_like(force_N, 3.0)
-    t, weight = rule(6)
-    share = weight
-    if radius_mm:
-        a_mm = np.minimum(1e3 * np.cbrt(0.75 * force_N * radius_mm * 1e-3 * (1 - POISSON**2) / YOUNG_Pa), min(radius_mm, layer_mm))
-        share = weight * 3 * t**2
-    contour = np.sqrt(1 - t**2)
-    if shape == "cube6":
-        side = 2 * t - 1
-        ones = np.ones(6)
-        x = np.concatenate([side, side, ones, -ones])
-        y = np.concatenate([ones, -ones, side, side])
-        along = np.tile(weight, 4) / 4
-    else:
-        angle = 2 * np.pi * (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
-        x, y, along = np.cos(angle), np.sin(angle), np.full(DIRECTIONS, 1 / DIRECTIONS)
-    x, y, share = (np.outer(*pair).ravel() for pair in ((contour, x), (contour, y), (share, along)))
-    return np.outer(a_mm, x), np.outer(a_mm, y), np.broadcast_to(share, (len(force_N), len(share)))
 
 
 def layer_pressure_Pa(measure, layer_mm, shapes, x_mm, y_mm, force_N):
     """[press, sensor]"""
-    sensor_x, sensor_y, _ = measure.layout()
+    touches = measure.made("twin_touch", len(force_N))
+    touches["x_mm"], touches["y_mm"], touches["force_N"] = x_mm, y_mm, force_N
     pressure_Pa = np.zeros((len(force_N), SENSORS))
     for number, shape in enumerate(SHAPES):
-        for some in np.array_split(np.flatnonzero(shapes == number), 1 + len(force_N) // 2000):
-            load_x, load_y, share = contact_pressure(shape, force_N[some], layer_mm)
-            for k in range(SENSORS):
-                r_mm = np.hypot(sensor_x[k] - x_mm[some, None] - load_x, sensor_y[k] - y_mm[some, None] - load_y)
-                pressure_Pa[some, k] = force_N[some] * (share * point_load_Pa(measure, layer_mm, r_mm)).sum(axis=1)
+        pressure_Pa[shapes == number] = measure.base_pressure(shape, layer_mm, touches[shapes == number])
     return pressure_Pa
 
 

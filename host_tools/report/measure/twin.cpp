@@ -74,20 +74,6 @@ static void random_below(Batch<Random, 1> states, std::int64_t end, Batch<std::i
 }
 MEASURE_ENTRY(random_below)
 
-// Of waves on one bonded layer (pad/layer.hpp), and Bessel's function of their distance.
-static void base_transfer(Batch<const double, 1> h, double poisson, Batch<double, 1> transfer) {
-  same_length(h, transfer);
-  std::transform(h.data, h.data + h.size(), transfer.data,
-                 [&](double one) { return twin::base_transfer(one, poisson); });
-}
-MEASURE_ENTRY(base_transfer)
-
-static void bessel_j0(Batch<const double, 2> x, Batch<double, 2> value) {
-  require(x.shape == value.shape, "arrays of different shapes");
-  std::transform(x.data, x.data + x.size() * x.stride(), value.data, [](double one) { return j0(one); });
-}
-MEASURE_ENTRY(bessel_j0)
-
 // The profile of a pad over the firmware's own sensors; overhang 0: not set.
 static void profile_of(double thickness_mm, double overhang_mm, std::int64_t from_touch,
                        Batch<pad_profile, 1> profile) {
