@@ -54,23 +54,6 @@ TEST(test_every_length_arrives_without_waiting_for_more) {
   }
 }
 
-TEST(test_packets_of_a_write) {
-  open_port();
-  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
-  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL(16, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
-
-  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 128));
-  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL(0, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
-
-  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 0));
-  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
-}
-
 TEST(test_write_takes_all_or_nothing) {
   open_port();
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, cdc_write(bytes, QUEUE_BYTES + 1));
@@ -115,36 +98,6 @@ TEST(test_close_discards_what_waits) {
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"new", 3));
   TEST_ASSERT_EQUAL(7, host_in(0x82, packet));
   TEST_ASSERT_EQUAL_MEMORY("\0\0\0\0new", packet, 7);
-  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
-}
-
-/* Once, and before the first bytes only: a terminal that still echoes gets nothing to send back. */
-TEST(test_what_follows_a_cut_is_set_apart_from_what_came_before) {
-  set_dtr(1);
-  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
-  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL_MEMORY("\0\0\0\0", packet, 4);
-  TEST_ASSERT_EQUAL_MEMORY(bytes, packet + 4, 60);
-  host_suspend();
-  host_resume();
-  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
-  for (int i = 0; i < 2; i++) {
-    TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"more", 4));
-    TEST_ASSERT_EQUAL(i == 0 ? 8 : 4, host_in(0x82, packet));
-    TEST_ASSERT_EQUAL_MEMORY(i == 0 ? "\0\0\0\0more" : "more", packet, i == 0 ? 8 : 4);
-  }
-}
-
-/* The port closes between the look at it and the queueing: the bytes must not greet the next one.
- */
-TEST(test_write_overtaken_by_close) {
-  set_dtr(1);
-  fake_hold_interrupts();
-  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 30));
-  set_dtr(0);
-  fake_run_interrupts();
-  set_dtr(1);
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
 }
 
@@ -206,21 +159,6 @@ TEST(test_host_waits_while_nobody_reads) {
   TEST_ASSERT_EQUAL(256, cdc_read(got + 64, 1000));
   TEST_ASSERT_EQUAL(0, cdc_read(got, sizeof got));
   TEST_ASSERT_EQUAL_MEMORY(bytes, got, 320);
-}
-
-/* A terminal in cooked mode echoes the stream byte for byte, before anybody has opened and after.
- */
-TEST(test_echoing_terminal) {
-  for (int round = 0; round < 2; round++) {
-    for (int i = 0; i < 1000; i++) {
-      uint8_t byte = (uint8_t)i;
-      TEST_ASSERT_EQUAL(0, host_out(0x02, &byte, 1));
-      TEST_ASSERT_EQUAL(1, cdc_read(got, sizeof got));
-      TEST_ASSERT_EQUAL_HEX8(byte, got[0]);
-      TEST_ASSERT_EQUAL(0, host_out(0x02, NULL, 0));
-    }
-    set_dtr(1);
-  }
 }
 
 TEST(test_line_coding_is_kept) {
