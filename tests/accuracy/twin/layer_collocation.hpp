@@ -15,7 +15,6 @@ struct LayerWave {
   double sinks_per_pressure; // downward displacement of the surface, h / G
   double base_per_traction;  // Q: the base's pressure is -i Q per traction along k
   double moves_per_traction; // displacement of the surface along k, h / G
-  double rises_per_traction; // upward displacement of the surface is i times this, h / G
 };
 
 // order: of the polynomials.

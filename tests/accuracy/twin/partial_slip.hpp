@@ -5,7 +5,8 @@
 // gradients (Beck and Teboulle, SIAM J. Imaging Sciences 2, 2009): where q is below its bound the
 // surface has moved by the shift; elsewhere it slides back along q (Kalker, Three-Dimensional
 // Elastic Bodies in Rolling Contact, Kluwer 1990, for one step from rest). C is the layer's
-// answer along and across each wave. Normal displacements are left alone.
+// answer along and across each wave. Normal displacements are left alone: solved with them, a pull of 0.3 of 8 N
+// changes the base by 0.3 % of the tangential field's peak for sphere6 on 12 mm, by 12 % for sphere15 on 6 mm.
 #pragma once
 
 #include "simulation/twin/contact.hpp"
@@ -33,20 +34,6 @@ inline double surface_shift_along(double H, double poisson) {
 
 inline double surface_shift_across(double H) { return H < 1e-4 ? 1.0 : std::tanh(H) / H; }
 
-// Upward displacement of the surface is i (k . t / |k|) times this, h / G: incompressible rubber
-// rises ahead of what pulls it.
-inline double surface_rise(double H, double poisson) {
-  if (H > 300.0) {
-    return 0.5 * (1.0 - 2.0 * poisson) / H;
-  }
-  if (H == 0.0) {
-    return 0.0;
-  }
-  const double b = 1.0 - 2.0 * poisson, c = 3.0 - 4.0 * poisson;
-  const double sinh = std::sinh(H), cosh = std::cosh(H);
-  return (b * c * sinh * sinh - H * H) / (2.0 * H * (c * cosh * cosh + H * H + b * b));
-}
-
 struct Traction {
   std::vector<double> x_Pa, y_Pa;
 };
@@ -55,8 +42,7 @@ class PartialSlip {
 public:
   PartialSlip(const Layer &layer, const Grid &grid)
       : layer_(layer), grid_(grid), transform_(grid.nodes), xx_(transform_.waves()), xy_(transform_.waves()),
-        yy_(transform_.waves()), base_(transform_.waves()), rise_x_(transform_.waves()), base_x_(transform_.waves()),
-        base_y_(transform_.waves()) {
+        yy_(transform_.waves()), base_x_(transform_.waves()), base_y_(transform_.waves()) {
     const double unit = 2.0 * M_PI / (grid.nodes * grid.step_mm);
     const double norm = 1.0 / (double(grid.nodes) * grid.nodes);
     const double h_per_G = layer.thickness_mm * 2.0 * (1.0 + layer.poisson) / layer.youngs_modulus_Pa;
@@ -73,8 +59,6 @@ public:
         xx_[n] = cx * cx * along + cy * cy * across;
         yy_[n] = cy * cy * along + cx * cx * across;
         xy_[n] = ends_x || ends_y ? 0.0 : cx * cy * (along - across);
-        base_[n] = norm * base_transfer(H, layer.poisson);
-        rise_x_[n] = {0.0, ends_x ? 0.0 : cx * norm * h_per_G * surface_rise(H, layer.poisson)};
         base_x_[n] = {0.0, ends_x ? 0.0 : -cx * base};
         base_y_[n] = {0.0, ends_y ? 0.0 : -cy * base};
       }
@@ -116,12 +100,6 @@ public:
     return base;
   }
 
-  // Pressure on the base under one on the surface.
-  std::vector<double> under_pressure_Pa(const std::vector<double> &pressure_Pa) { return answer(pressure_Pa, base_); }
-
-  // Upward displacement of the surface under a traction along x.
-  std::vector<double> rise_mm(const std::vector<double> &x_Pa) { return answer(x_Pa, rise_x_); }
-
   double force_N(const std::vector<double> &stress_Pa) const {
     double sum = 0.0;
     for (double value : stress_Pa) {
@@ -145,8 +123,8 @@ private:
   Layer layer_;
   Grid grid_;
   Transform transform_;
-  std::vector<double> xx_, xy_, yy_, base_;
-  std::vector<std::complex<double>> rise_x_, base_x_, base_y_;
+  std::vector<double> xx_, xy_, yy_;
+  std::vector<std::complex<double>> base_x_, base_y_;
   double steepest_; // length of a step that never overshoots, Pa / mm
 };
 
