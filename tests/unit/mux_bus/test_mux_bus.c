@@ -105,15 +105,6 @@ TEST(test_transactions_and_bus_time_of_a_frame) {
   }
 }
 
-TEST(test_a_read_opens_the_channels_itself) {
-  for (int n = 0; n < 3; n++) {
-    const unsigned before = fake.transactions;
-    TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
-    expect_readings(ALL_SENSORS);
-    TEST_ASSERT_EQUAL_UINT(OPEN_TRANSACTIONS + READ_TRANSACTIONS, fake.transactions - before);
-  }
-}
-
 TEST(test_reads_of_every_length_without_a_command) {
   for (uint8_t count = 1; count <= ARRAY_BUS_MAX_READ_BYTES; count++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, read_back(0xA2, count));

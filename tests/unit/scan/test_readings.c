@@ -428,35 +428,6 @@ TEST(test_one_and_two_sensors_have_nobody_to_ask) {
   }
 }
 
-/* Every third temperature has one bit wrong, of every sensor, all the time. */
-TEST(test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted) {
-  for (uint64_t seed = 1; seed <= 20; seed++) {
-    next_case();
-    struct random random = {seed};
-    uint32_t rest[FT_MAX_SENSORS];
-    memcpy(rest, d2, sizeof rest);
-    for (int n = 0; n < 2000; n++) {
-      for (int k = 0; k < SENSORS; k++) {
-        d2[k] = rest[k];
-        if (random_below(&random, 10) < 3) {
-          d2[k] ^= 1u << random_below(&random, 24);
-        }
-      }
-      temperature.returned = readings.suspects;
-      take_temperature();
-      take_pressures(ALL);
-      for (int k = 0; k < SENSORS; k++) {
-        const double error_Pa = frame.pressure_Pa_q10[k] / 1024.0 - true_Pa(k, rest[k]);
-        if (frame.valid & ~frame.doubtful & 1u << k) {
-          TEST_ASSERT_DOUBLE_WITHIN(1300, 0, error_Pa); /* 5 degC */
-        } else if (frame.valid & 1u << k) {
-          TEST_ASSERT_DOUBLE_WITHIN(15000, 0, error_Pa);
-        }
-      }
-    }
-  }
-}
-
 TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others) {
   static const struct {
     double apart_Pa;

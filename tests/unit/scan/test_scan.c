@@ -11,22 +11,6 @@ TEST(test_settings_outside_their_range) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_init(&scan, &bus, &settings));
 }
 
-TEST(test_start_up_sequence) {
-  next_frame();
-  next_frame();
-  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(10000, fake.log[0].start_us);
-  int at = assert_admission(0, 1);
-  assert_entry(at++, FAKE_COMMAND, 0x54);
-  assert_entry(at++, FAKE_READ, 0x00);
-  assert_entry(at++, FAKE_COMMAND, 0x44);
-  assert_entry(at++, FAKE_READ, 0x00);
-  assert_entry(at++, FAKE_COMMAND, 0x44);
-  assert_entry(at++, FAKE_READ, 0x00);
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.present));
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
-  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.prom_bad));
-}
-
 TEST(test_frame_contents) {
   next_frame();
   const struct fake_entry *convert = &fake.log[find_entry(0, 0x44, FAKE_COMMAND)];

@@ -2,15 +2,6 @@
 
 #include <string.h>
 
-TEST(test_prom_misread_once_is_read_again) {
-  fake.misread_prom = DISTURBED_BIT;
-  fake.misread_passes = 1;
-  next_frame();
-  assert_entry(assert_admission(0, 2), FAKE_COMMAND, 0x54);
-  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.prom_bad));
-  assert_good_frame(ALL);
-}
-
 /* It is used once it has been seen to read like the others, and doubtful. */
 TEST(test_prom_with_differing_crc_is_used_and_reported) {
   fake.prom[DISTURBED].word[0] ^= 0x3000;

@@ -23,24 +23,6 @@ TEST(test_zeros_and_ones_void_the_next_reading_too) {
   }
 }
 
-/* A sensor that lost its reset answers 0 for ever: the second 0 in a row costs its admission, and
- * it is reset within a second. */
-TEST(test_two_zeros_in_a_row_lead_to_a_reset) {
-  run_until(3000000);
-  for (int i = 0; i < 2; i++) {
-    TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
-    fake.zero_next = DISTURBED_BIT;
-    next_frame();
-  }
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.present));
-  next_frame(); /* its conversion has already begun */
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  next_frame();
-  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
-  assert_good_frame(ALL);
-}
-
 /* A sensor that missed two reads before all were reset restarts: one more does not cost its
  * admission, as the third in a row would. */
 TEST(test_what_was_missed_before_a_reset_does_not_count_after_it) {
@@ -63,31 +45,6 @@ TEST(test_what_was_missed_before_a_reset_does_not_count_after_it) {
   TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
   fake.answering = ALL;
   skip_frames(5);
-  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
-}
-
-TEST(test_sensor_stops_and_comes_back) {
-  skip_frames(10);
-  fake.answering = ALL & ~DISTURBED_BIT;
-  skip_frames(2);
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.present));
-  run_until(now_us + 5000000);
-  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* the others run undisturbed */
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-
-  /* Another part takes its place: its PROM is read before its readings count. */
-  fake.prom[DISTURBED].word[1] = 40000;
-  fake.prom[DISTURBED].word[0] &= 0x0FFF;
-  fake.prom[DISTURBED].word[0] |= (uint16_t)(ms58xx_prom_crc4(&fake.prom[DISTURBED]) << 12);
-  fake.answering = ALL;
-  for (int i = 0; i < 50; i++) {
-    next_frame();
-    uint32_t valid = frame.valid;
-    TEST_ASSERT_TRUE(valid == ALL || valid == (ALL & ~DISTURBED_BIT));
-    assert_good_frame(valid);
-  }
-  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
 }
 
@@ -231,22 +188,6 @@ TEST(test_timeout_leads_to_recovery_and_admission) {
   assert_good_frame(ALL);
   TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_timeouts));
   TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_recoveries));
-}
-
-TEST(test_failure_at_any_operation_is_survived) {
-  static const enum ft_status failures[] = {FT_ERR_TIMEOUT, FT_ERR_STUCK, FT_ERR_ARGUMENT};
-  for (int which = 0; which < 3; which++) {
-    for (int at = 0; at < 60; at++) {
-      next_case(&usual);
-      fake.fail_at = at;
-      fake.fail_with = failures[which];
-      run_until(400000);
-      TEST_ASSERT_EQUAL_INT(-1, fake.fail_at);
-      assert_good_frame(ALL);
-      TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
-      TEST_ASSERT_EQUAL_INT(1, count_entries(0, FAKE_RECOVERY));
-    }
-  }
 }
 
 TEST(test_stuck_bus_is_tried_ever_more_rarely) {
