@@ -71,29 +71,6 @@ TEST(a_press_is_located_and_weighed) {
   TEST_ASSERT_FALSE(contact.flags & CONTACT_FLAG_SLIP);
 }
 
-TEST(a_moving_contact_slips) {
-  press.force_N = 5.0;
-  press.y_mm = -10.0;
-  press.speed_y_mm_s = 40.0;
-  press.from_us = 700000;
-  connect_for(600);
-  start_streams(WIRE_STREAM_CONTACT);
-  run_for(400);
-  struct wire_packet packet;
-  int slipping = 0;
-  float last_mm = 0.0f;
-  while (next_of_type(WIRE_CONTACT, &packet)) {
-    if (packet.body.contact.flags & CONTACT_FLAG_SLIP) {
-      slipping++;
-      last_mm = packet.body.contact.slip_mm;
-      TEST_ASSERT_TRUE(packet.t_us > press.from_us + 90000);
-    }
-  }
-  TEST_ASSERT_GREATER_THAN(20, slipping);
-  /* v (window + interval) / 2 with an interval of 5 to 6 ms */
-  TEST_ASSERT_FLOAT_WITHIN(0.05f, 40.0f * 0.1055f / 2.0f, last_mm);
-}
-
 TEST(info_tells_what_this_is) {
   connect_for(1500);
   struct wire_info info = get_info();

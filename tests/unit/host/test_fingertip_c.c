@@ -375,22 +375,6 @@ TEST(what_is_no_recording_is_refused) {
   TEST_ASSERT_NULL(fingertip_writer_new(FINGERTIP_CSV, info.of, "no key"));
 }
 
-TEST(a_capture_of_the_line_is_read_too) {
-  file.length = 0;
-  file.bytes[file.length++] = 0;
-  for (int i = 0; i < 300; i++) {
-    struct numbers contact = contact_of(i, 1000 * i);
-    contact.of[0] = i;
-    file.length += frame_of(CONTACT, &contact, file.bytes + file.length);
-  }
-  file.bytes[5000] ^= 64;
-  const struct found found = found_in(1000, 0);
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_END, found.status);
-  TEST_ASSERT_EQUAL_UINT(299, found.contacts);
-  TEST_ASSERT_TRUE(found.counts[FINGERTIP_COUNT_PACKETS] == 299);
-  TEST_ASSERT_TRUE(found.counts[FINGERTIP_COUNT_DROPPED] == 1);
-}
-
 TEST(a_clock_is_fitted) {
   struct fingertip_clock *clock = fingertip_clock_new();
   double estimate[4];

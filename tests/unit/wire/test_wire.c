@@ -5,53 +5,41 @@
 
 /* Body length by PROTOCOL.md. */
 static size_t body_length(const struct wire_packet *packet) {
+  static const struct {
+    uint32_t flag;
+    uint8_t length;
+  } of_flags[] = {
+      {CONTACT_FLAG_FIT_VALID, 28},    {CONTACT_FLAG_UNCERTAINTY_VALID, 8}, {CONTACT_FLAG_SLIP_VALID, 4},
+      {CONTACT_FLAG_WIDTHS_VALID, 12}, {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
+      {CONTACT_FLAG_SHAPE_VALID, 4},   {CONTACT_FLAG_TWO_CONTACTS, 40},     {CONTACT_FLAG_EDGE, 12}};
+  static const uint8_t fixed[256] = {[WIRE_ACK] = 12,       [WIRE_CRASH] = 97,
+                                     [WIRE_SYNC] = 5,       [WIRE_CMD_STREAM] = 1,
+                                     [WIRE_CMD_TARE] = 1,   [WIRE_CMD_KEEP] = 1,
+                                     [WIRE_CMD_SYNC] = 1,   [WIRE_CMD_RATE] = 4,
+                                     [WIRE_CMD_LOADER] = 4, [WIRE_CMD_LOCATION_LIMIT] = 4,
+                                     [WIRE_CMD_PRIOR] = 8,  [WIRE_CMD_PAD] = 177,
+                                     [WIRE_CMD_OSR] = 2,    [WIRE_CMD_SLIP] = 6};
+  const struct wire_info *info = &packet->body.info;
+  size_t length = 22;
   switch (packet->type) {
-  case WIRE_CONTACT: {
-    uint32_t flags = packet->body.contact.flags;
-    return 22u + (flags & CONTACT_FLAG_FIT_VALID ? 28 : 0) + (flags & CONTACT_FLAG_UNCERTAINTY_VALID ? 8 : 0) +
-           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) + (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0) +
-           (flags & CONTACT_FLAG_TANGENTIAL_VALID ? 16 : 0) + (flags & CONTACT_FLAG_VELOCITY_VALID ? 8 : 0) +
-           (flags & CONTACT_FLAG_SHAPE_VALID ? 4 : 0) + (flags & CONTACT_FLAG_TWO_CONTACTS ? 40 : 0) +
-           (flags & CONTACT_FLAG_EDGE ? 12 : 0);
-  }
+  case WIRE_CONTACT:
+    for (size_t i = 0; i < sizeof of_flags / sizeof of_flags[0]; i++) {
+      length += packet->body.contact.flags & of_flags[i].flag ? of_flags[i].length : 0u;
+    }
+    return length;
   case WIRE_RAW:
     return 23 + 8u * packet->body.raw.sensor_count;
-  case WIRE_INFO: {
-    const struct wire_info *info = &packet->body.info;
+  case WIRE_INFO:
     return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
            (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) +
            8u * info->sensor_count + (info->stored & WIRE_STORED_CALIBRATION ? 23 + 14u * info->sensor_count : 0) +
            (info->stored & WIRE_STORED_PAD ? 177 : 0);
-  }
   case WIRE_HEALTH:
     return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
-  case WIRE_ACK:
-    return 12;
-  case WIRE_CRASH:
-    return 97;
-  case WIRE_CMD_STREAM:
-  case WIRE_CMD_TARE:
-  case WIRE_CMD_KEEP:
-  case WIRE_CMD_SYNC:
-    return 1;
-  case WIRE_SYNC:
-    return 5;
-  case WIRE_CMD_RATE:
-  case WIRE_CMD_LOADER:
-  case WIRE_CMD_LOCATION_LIMIT:
-    return 4;
-  case WIRE_CMD_PRIOR:
-    return 8;
   case WIRE_CMD_CALIBRATE:
     return 24 + 14u * packet->body.cmd_calibrate.sensor_count;
-  case WIRE_CMD_PAD:
-    return 177;
-  case WIRE_CMD_OSR:
-    return 2;
-  case WIRE_CMD_SLIP:
-    return 6;
   default:
-    return 0;
+    return fixed[packet->type];
   }
 }
 
