@@ -3,42 +3,28 @@
 usage: test_fit_report.py --build BUILD --boards BOARDS
 """
 
-import argparse
 import csv
-import json
 import pathlib
-import subprocess
 import sys
-import tempfile
-import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-OPTIONS = argparse.Namespace()
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import report_case  # noqa: E402
+
 FIGURES = """observable_presses p99_9_um shipped_p99_9_um shipped_above_100um above_100um masked_p99_9_um masked_p99_um_d masked_peak_p99_um
     masked_peak_above_100um_d bad_unflagged_percent_worst good_flagged_percent_c good_flagged_percent_d cold_cycles masked_cycles
     speed_vs_ceres speed_vs_tinysolver speed_vs_cminpack""".split()
 # Worst over the presses measured here; the goals are in fit.py.
 COLD_CYCLES_MAX = 31000
 MASKED_CYCLES_MAX = 62000
+FEW = "--limit 600 --budget 0.25 --passes 1".split()
 
 
-def report(folder, boards):
-    program = ROOT / "host_tools/report/fit/fit.py"
-    few = "--limit 600 --budget 0.25 --passes 1".split()
-    command = [sys.executable, program, "--build", OPTIONS.build, "--boards", boards, "-o", folder, *few]
-    return subprocess.run(command, capture_output=True, text=True)
+class Report(report_case.ReportCase):
+    NAME = "fit"
 
-
-class Report(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
-        done = report(cls.folder, OPTIONS.boards)
-        if done.returncode != 0:
-            raise AssertionError(done.stdout + done.stderr)
-        cls.found = json.loads((cls.folder / "fit.json").read_text())
+        cls.make(*FEW)
         with open(cls.folder / "fit_cycles.csv", newline="") as file:
             cls.cycles = {(row["kernel"], row["variant"]): row for row in csv.DictReader(file)}
 
@@ -80,15 +66,8 @@ class Report(unittest.TestCase):
             self.assertEqual(columns, {15}, kernel)
 
     def test_a_missing_image_is_one_line(self):
-        done = report(self.folder / "other", self.folder)
-        self.assertEqual(done.returncode, 1)
-        self.assertEqual(len(done.stderr.strip().split("\n")), 1)
-        self.assertIn("fit_cycles.bin is not there; build it", done.stderr)
+        self.assert_refused("fit_cycles.bin is not there; build it", *FEW, boards=self.folder)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for option in ("build", "boards"):
-        parser.add_argument(f"--{option}", required=True)
-    _, rest = parser.parse_known_args(namespace=OPTIONS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    report_case.main()

@@ -11,7 +11,6 @@ import resource
 import signal
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import numpy as np
@@ -22,24 +21,19 @@ PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
 sys.path[:0] = [str(PYTHON_TOOLS), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
 from fingertip import files  # noqa: E402
 from simulated_terminal import Terminal  # noqa: E402
-from simulated_time import SimulatedTime  # noqa: E402
+from world_case import WorldCase  # noqa: E402
 
 MISSED, DROPPED, FAULT = 3, 4, 5
 # A load of 2 N on both pads at the friction that is taken before any slide.
 HOLDS_2_N = 1 / 0.5
 
 
-class GraspTest(unittest.TestCase):
+class GraspTest(WorldCase):
+    TIME_KEEPER = TIME_KEEPER
+
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        self.csv = os.path.join(self.folder, "grasp.csv")
-        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
-        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "PYTHONDONTWRITEBYTECODE": "1"}
+        super().setUp()
         self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
-        self.world = SimulatedTime(TIME_KEEPER, self.folder)
-        self.addCleanup(self.world.close)
 
     @contextlib.contextmanager
     def cell(self, *options):

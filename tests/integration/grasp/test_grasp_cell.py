@@ -12,7 +12,6 @@ import select
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import unittest
 
@@ -22,7 +21,7 @@ FINGERTIP, FINGERTIP_SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
-from simulated_time import SimulatedTime  # noqa: E402
+from world_case import WorldCase  # noqa: E402
 
 PATIENCE_s = 60
 STOPS_s = 0.3  # of real time
@@ -35,20 +34,13 @@ OVER_CAP = 1.25
 OPENS_mm = 1.1
 
 
-class CellTest(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        self.csv, self.truth_csv = f"{self.folder}/grasp.csv", f"{self.folder}/truth.csv"
-        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
-        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder}
-        self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
-        self.begin_world()
+class CellTest(WorldCase):
+    TIME_KEEPER = TIME_KEEPER
 
-    def begin_world(self):
-        self.world = SimulatedTime(TIME_KEEPER, self.folder)
-        self.addCleanup(self.world.close)
+    def setUp(self):
+        super().setUp()
+        self.truth_csv = self.path("truth.csv")
+        self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
 
     @contextlib.contextmanager
     def cell(self, *options, model="2f85"):

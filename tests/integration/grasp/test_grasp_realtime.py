@@ -10,7 +10,6 @@ import pathlib
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import unittest
 
@@ -18,7 +17,7 @@ FINGERTIP, FINGERTIP_SIMULATE, TABLES = (os.path.abspath(path) for path in sys.a
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
-from real_time import RealTime  # noqa: E402
+from world_case import WorldCase  # noqa: E402
 
 # A machine that is held up for less than that changes nothing of what is asked here.
 HELD_UP = ("--timeout", "10000", "--silent", "5000", "--stale", "1000")
@@ -26,17 +25,10 @@ STOPPED_s = 2  # a Robotiq reports a second without a command
 PATIENCE_s = 300  # then it ends and says where it waited
 
 
-class Stopped(unittest.TestCase):
+class Stopped(WorldCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        self.csv = f"{self.folder}/grasp.csv"
-        self.environment = {k: v for k, v in os.environ.items() if not k.startswith("LC_")}
-        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder}
+        super().setUp()
         self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
-        self.world = RealTime()
-        self.addCleanup(self.world.close)
         faulthandler.dump_traceback_later(PATIENCE_s, exit=True)
         self.addCleanup(faulthandler.cancel_dump_traceback_later)
 

@@ -1,45 +1,25 @@
 """What the tests of the fingertip command share, on simulated time; they are called with FINGERTIP, FAKE_DEVICE and TIME_KEEPER first."""
 
-import contextlib
 import os
 import pathlib
 import re
 import shutil
 import signal
 import sys
-import tempfile
-import unittest
 
 FINGERTIP, FAKE_DEVICE, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PYTHON_TOOLS = ROOT / "host_tools/python"
 sys.path[:0] = [str(PYTHON_TOOLS), str(ROOT / "tests/support")]
-from simulated_time import SimulatedTime  # noqa: E402
+from world_case import WorldCase  # noqa: E402
 
 
-class CliTest(unittest.TestCase):
+class CliTest(WorldCase):
+    TIME_KEEPER, DEVICE = TIME_KEEPER, FAKE_DEVICE
+
     def setUp(self):
-        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
-        self.port = os.path.join(self.folder, "tty")
-        self.csv = os.path.join(self.folder, "r.csv")
-        self.ftr = os.path.join(self.folder, "r.ftr")
-        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
-        self.environment["LC_ALL"] = "C.UTF-8"
-        self.environment["XDG_RUNTIME_DIR"] = self.folder  # where no program shares a fingertip
-        self.world = self.make_world()
-        self.addCleanup(self.world.close)
-
-    def make_world(self):
-        return SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
-
-    @contextlib.contextmanager
-    def device(self, *options, port=None):
-        process = self.world.start([FAKE_DEVICE, port or self.port, *options], stdout=None, stderr=None)
-        try:
-            yield process
-        finally:
-            process.terminate()
-            process.wait()
+        super().setUp()
+        self.ftr = self.path("r.ftr")
 
     def start(self, *arguments, **options):
         return self.world.start([FINGERTIP, *arguments], **{"env": self.environment, **options})

@@ -4,7 +4,6 @@ usage: test_real_port.py FINGERTIP FAKE_DEVICE [unittest arguments]
 """
 
 # real time: the kernel passes on the bytes of a pseudo-terminal, and locks it, in its own time
-import contextlib
 import os
 import re
 import shutil
@@ -16,20 +15,12 @@ sys.argv.insert(3, "")  # there is no keeper of time
 import test_flash  # noqa: E402
 from cli_case import CliTest, FINGERTIP, ROOT  # noqa: E402
 from fingertip import files  # noqa: E402
-from real_time import RealTime  # noqa: E402
 
 
 class RealPort:
     """Before CliTest: the same, in real time."""
 
-    def make_world(self):
-        return RealTime()
-
-    @contextlib.contextmanager
-    def device(self, *options):
-        with super().device(*options) as process:
-            self.world.until(lambda: os.path.lexists(self.port))
-            yield process
+    TIME_KEEPER = None
 
 
 class Port(RealPort, CliTest):

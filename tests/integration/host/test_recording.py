@@ -42,7 +42,7 @@ class Recording(CliTest):
                 self.world.sleep(3)
                 self.interrupt(process)
             self.world.close()
-            self.world = self.make_world()
+            self.begin_world()
             return pathlib.Path(self.csv).read_bytes()
 
         first = recorded()

@@ -52,9 +52,6 @@ class ServeTest(CliTest):
         """Of packets: each client has its own."""
         return [{key: value for key, value in row.items() if key not in ("sequence", "raw_sequence")} for row in self.rows(path)[0]]
 
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
     def recording(self, name, *arguments):
         """A recorder that has rows, and its file."""
         path = self.path(name)

@@ -3,7 +3,6 @@
 usage: test_package.py FINGERTIP SIMULATED_FINGERTIP SIMULATED_DEVICE TIME_KEEPER [unittest arguments]
 """
 
-import contextlib
 import importlib
 import math
 import os
@@ -13,7 +12,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import unittest
 from unittest import mock
@@ -28,7 +26,7 @@ import bags  # noqa: E402
 import fingertip  # noqa: E402
 from fingertip import Fingertip, Fingertips, Flag, Streams, clock, device, errors, host_time, transport, wire  # noqa: E402
 from simulated_host_time import SimulatedHostTime  # noqa: E402
-from simulated_time import SimulatedTime  # noqa: E402
+from world_case import WorldCase  # noqa: E402
 
 PATIENCE_s = 60
 SERIAL = "E660583883265A2C"  # of the fake device where none is said
@@ -44,38 +42,39 @@ def vectors():
     return found
 
 
-class Folder(unittest.TestCase):
-    def setUp(self):
-        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
-        self.enterContext(mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.folder, "LC_ALL": "C.UTF-8"}))
-        os.environ.pop("FINGERTIP_PORT", None)
+class DeviceTest(WorldCase):
+    TIME_KEEPER, DEVICE = TIME_KEEPER, SIMULATED_DEVICE
 
-    def path(self, name):
-        return os.path.join(self.folder, name)
+    def setUp(self):
+        super().setUp()
+        self.enterContext(mock.patch.dict(os.environ, self.environment, clear=True))
+        self.host = SimulatedHostTime(self.world)
+        host_time.use(self.host)
+        self.addCleanup(host_time.use, host_time.HostTime())
 
     def call(self, *words):
         done = subprocess.run([FINGERTIP, *words], capture_output=True, text=True, timeout=PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
 
+    def until_gone(self, fingertip_):
+        frames = []
+        with self.assertRaises(fingertip.GoneError):
+            for frame in fingertip_:
+                frames.append(frame)
+        return frames
 
-class Codec(Folder):
-    def test_vectors(self):
-        found = vectors()
+
+class Codec(DeviceTest):
+    def test_each_field_is_what_its_vector_states(self):
         protocol = (ROOT / "firmware/wire/PROTOCOL.md").read_text(encoding="utf-8")
         specified = {int(number, 16) for number in re.findall(r"(?m)^(?:### |\| )0x([0-9A-F]{2}) [\w|]", protocol)}
-        self.assertEqual({each["packet"][1] for each in found.values()}, specified)
+        self.assertEqual({each["packet"][1] for each in vectors().values()}, specified)
         self.assertGreaterEqual(len(specified), 20)
-        for name, vector in found.items():
-            with self.subTest(name):
-                packet = wire.decode(vector["frame"][:-1])
-                self.assertEqual(wire.encode(packet), vector["frame"])
-                self.assertEqual(wire.cobs_decode(vector["frame"][:-1]), vector["packet"])
-                self.assertEqual(wire.cobs_encode(vector["packet"]) + b"\0", vector["frame"])
-
-    def test_each_field_is_what_its_vector_states(self):
         stated = 0
         for name, vector in vectors().items():
-            body = wire.decode(vector["frame"][:-1]).body
+            packet = wire.decode(vector["frame"][:-1])
+            self.assertEqual(wire.encode(packet), vector["frame"], name)
+            body = packet.body
             for field, text in re.findall(r"(?m)# (\w+) (0x[0-9a-f]+|-?[0-9.]+)\b", vector["text"]):
                 if isinstance(getattr(body, field, None), (int, float)):
                     stated += 1
@@ -115,14 +114,6 @@ class Codec(Folder):
         self.assertGreater(len(re.findall(rows, by_c)), 300)
         self.assertEqual(re.findall(rows, by_python), re.findall(rows, by_c))
 
-    def test_cobs_at_its_longest_run(self):
-        for length in (1, 253, 254, 255, 507, 508, 509):
-            for packet in (length * b"\7", length * b"\7" + b"\0", b"\0" + length * b"\7"):
-                coded = wire.cobs_encode(packet)
-                self.assertNotIn(0, coded)
-                self.assertLessEqual(len(coded), len(packet) + 1 + len(packet) // 254)
-                self.assertEqual(wire.cobs_decode(coded), packet)
-
 
 class Clock(unittest.TestCase):
     def exchanges(self, prng, count, drift_ppm, offset_us=0):
@@ -154,35 +145,6 @@ class Clock(unittest.TestCase):
         fit.add(clock.ClockExchange(10, 5, exchange.device_us + 1))  # ends before it began
         fit.add(clock.ClockExchange(5, 10, 3))  # the fingertip's clock does not run backwards
         self.assertEqual(fit.estimate, before)
-
-
-class DeviceTest(Folder):
-    def setUp(self):
-        super().setUp()
-        self.port = self.path("tty")
-        self.world = SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
-        self.addCleanup(self.world.close)
-        self.host = SimulatedHostTime(self.world)
-        host_time.use(self.host)
-        self.addCleanup(host_time.use, host_time.HostTime())
-
-    @contextlib.contextmanager
-    def device(self, *options, port=None):
-        process = self.world.start([SIMULATED_DEVICE, port or self.port, *options], stdout=None, stderr=None)
-        try:
-            yield process
-        finally:
-            process.kill()
-            process.wait()
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(port or self.port)
-
-    def until_gone(self, fingertip_):
-        frames = []
-        with self.assertRaises(fingertip.GoneError):
-            for frame in fingertip_:
-                frames.append(frame)
-        return frames
 
 
 class Streaming(DeviceTest):

@@ -11,7 +11,6 @@ import os
 import pathlib
 import re
 import sys
-import tempfile
 import tty
 import unittest
 from unittest import mock
@@ -25,38 +24,18 @@ sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
 import fingertip  # noqa: E402
 import readme_example  # noqa: E402
 from fingertip import Fingertip, Flag, wire  # noqa: E402
-from real_time import RealTime  # noqa: E402
+from world_case import WorldCase  # noqa: E402
 
 PATIENCE_s = 300
 SERIAL = "E660583883265A2C"  # of the fake device where none is said
 
 
-class DeviceTest(unittest.TestCase):
+class DeviceTest(WorldCase):
+    DEVICE = FAKE_DEVICE
+
     def setUp(self):
-        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
-        self.enterContext(mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.folder, "LC_ALL": "C.UTF-8"}))
-        os.environ.pop("FINGERTIP_PORT", None)
-        self.port = self.path("tty")
-        self.world = RealTime()
-        self.addCleanup(self.world.close)
-
-    def path(self, name):
-        return os.path.join(self.folder, name)
-
-    @contextlib.contextmanager
-    def device(self, *options, port=None):
-        process = self.world.start([FAKE_DEVICE, port or self.port, *options], stdout=None, stderr=None)
-        self.wait_for(lambda: os.path.lexists(port or self.port))
-        try:
-            yield process
-        finally:
-            process.kill()
-            process.wait()
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(port or self.port)
-
-    def wait_for(self, condition):
-        return self.world.until(condition)
+        super().setUp()
+        self.enterContext(mock.patch.dict(os.environ, self.environment, clear=True))
 
 
 class Streaming(DeviceTest):

@@ -3,41 +3,27 @@
 usage: test_rate.py --build BUILD --boards BOARDS
 """
 
-import argparse
-import json
 import pathlib
-import subprocess
 import sys
-import tempfile
-import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "host_tools/report/rate"))
+sys.path[:0] = [str(ROOT / "host_tools/report/rate"), str(ROOT / "tests/support")]
 import rate  # noqa: E402, adds the path of the next
 import emulated  # noqa: E402
+import report_case  # noqa: E402
 import scenes  # noqa: E402
 
-OPTIONS = argparse.Namespace()
 FIGURES = """parallel_fps_osr256 parallel_fps_osr1024 mux_fps_osr256 mux_fps_osr1024 latency_parallel_us latency_parallel_median_us
     latency_parallel_p99_us latency_parallel_p99_9_us latency_parallel_max_us idle_sleep_percent contact_sleep_percent flash_bytes
     ram_bytes code_in_sram_bytes stack_bytes raw_flash_bytes dropped""".split()
 
 
-def report(*options):
-    return subprocess.run([sys.executable, str(ROOT / "host_tools/report/rate/rate.py"), *options], capture_output=True, text=True)
+class Rate(report_case.ReportCase):
+    NAME = "rate"
 
-
-class Rate(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
-        done = report("--build", OPTIONS.build, "--boards", OPTIONS.boards, "-o", str(cls.folder), "--quick", "--seconds", "1")
-        if done.returncode != 0:
-            raise AssertionError(done.stdout + done.stderr)
-        cls.printed = done.stdout
-        cls.found = json.loads((cls.folder / "rate.json").read_text())
+        cls.make("--quick", "--seconds", "1")
 
     def test_every_figure_is_there_and_judged(self):
         for name in FIGURES:
@@ -96,7 +82,7 @@ class Rate(unittest.TestCase):
 
     def test_the_same_again(self):
         """Emulated cycles and times, to the last one."""
-        tools = scenes.SceneTools(OPTIONS.build, OPTIONS.boards, "slip")
+        tools = scenes.SceneTools(report_case.OPTIONS.build, report_case.OPTIONS.boards, "slip")
         path = emulated.scenario(self.folder, "wander", 4)
 
         def measured(name):
@@ -121,19 +107,9 @@ class Rate(unittest.TestCase):
             self.assertEqual(len({line.count("|") for line in table.strip().split("\n")}), 1, table)
 
     def test_a_missing_build_and_a_wrong_number_are_one_line(self):
-        for options, message in (
-            (("--build", str(self.folder / "none"), "--boards", OPTIONS.boards), "is not there; build it"),
-            (("--build", OPTIONS.build, "--boards", OPTIONS.boards, "--seconds", "0"), "give 1 to 600"),
-        ):
-            done = report(*options, "-o", str(self.folder / "other"))
-            self.assertEqual(done.returncode, 1)
-            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
-            self.assertIn(message, done.stderr)
+        self.assert_refused("is not there; build it", build=self.folder / "none")
+        self.assert_refused("give 1 to 600", "--seconds", "0")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    for option in ("build", "boards"):
-        parser.add_argument(f"--{option}", required=True)
-    _, rest = parser.parse_known_args(namespace=OPTIONS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    report_case.main()

@@ -3,38 +3,21 @@
 usage: test_validation.py --build BUILD --boards BOARDS
 """
 
-import argparse
-import json
 import math
 import pathlib
-import subprocess
 import sys
-import tempfile
-import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-OPTIONS = argparse.Namespace()
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+import report_case  # noqa: E402
 
 
-def validate(build, boards, folder, *more):
-    program = str(ROOT / "host_tools/report/validation/validation.py")
-    return subprocess.run(
-        [sys.executable, program, "--build", build, "--boards", boards, "-o", folder, *more], capture_output=True, text=True
-    )
+class Validation(report_case.ReportCase):
+    NAME = "validation"
 
-
-class Validation(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
         short = "--indenters sphere6,cube6,sphere12 --scale 0.05 --pads 2 --emulated-seconds 4 --cards 0".split()
-        tables = pathlib.Path(OPTIONS.build) / "contact_tables"
-        done = validate(OPTIONS.build, OPTIONS.boards, cls.folder, "--tables", tables, *short)
-        if done.returncode != 0:
-            raise AssertionError(done.stdout + done.stderr)
-        cls.found = json.loads((cls.folder / "validation.json").read_text())
+        cls.make("--tables", pathlib.Path(report_case.OPTIONS.build) / "contact_tables", *short)
 
     def test_figures_are_what_physics_and_the_method_give(self):
         for name, low, high in (
@@ -101,14 +84,8 @@ class Validation(unittest.TestCase):
         self.assertFalse((self.folder / "validation_work").exists())
 
     def test_a_missing_build_is_said(self):
-        done = validate(self.folder, "none", self.folder / "none")
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("cmake --build", done.stderr)
+        self.assert_refused("cmake --build", build=self.folder, boards="none")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--build", required=True)
-    parser.add_argument("--boards", required=True)
-    OPTIONS, rest = parser.parse_known_args()
-    unittest.main(argv=[sys.argv[0], *rest])
+    report_case.main()
