@@ -13,26 +13,29 @@ import { parseScenario } from '../../../host_tools/simulation/emulator/scenario.
 const RIG = fileURLToPath(new URL('./rig', import.meta.url));
 const CPU = ['-mcpu=cortex-m0plus', '-mthumb'];
 
+/** The second stage with its CRC, the same in all images. */
+let stage;
+
 /** @returns the flash image of `source` (C, sees rig.h) */
 export function build(source) {
   const folder = mkdtempSync(join(tmpdir(), 'rig-'));
   try {
     const path = (name) => join(folder, name);
+    const binary = (name, ...args) => {
+      execFileSync('arm-none-eabi-gcc', [...CPU, ...args, '-o', path(`${name}.elf`)], { stdio: 'pipe' });
+      execFileSync('arm-none-eabi-objcopy', ['-O', 'binary', path(`${name}.elf`), path(`${name}.bin`)]);
+      return readFileSync(path(`${name}.bin`));
+    };
+    if (!stage) {
+      stage = new Uint8Array(256);
+      stage.set(binary('boot2', '-c', join(RIG, 'boot2.S')));
+      new DataView(stage.buffer).setUint32(252, boot2Crc(stage.subarray(0, 252)), true);
+    }
     writeFileSync(path('main.c'), `${/\bvoid isr\(/.test(source) ? '#define HAS_ISR\n' : ''}#include "rig.h"\n${source}\n`);
-    const gcc = (...args) => execFileSync('arm-none-eabi-gcc', [...CPU, ...args], { stdio: 'pipe' });
-    const binary = (elf, bin) => execFileSync('arm-none-eabi-objcopy', ['-O', 'binary', path(elf), path(bin)]);
-    gcc('-c', join(RIG, 'boot2.S'), '-o', path('boot2.o'));
     const strict = ['-Wall', '-Werror', '--param=min-pagesize=0', '-fno-delete-null-pointer-checks', '-fno-tree-loop-distribute-patterns'];
     const bare = ['-O2', '-ffreestanding', '-nostdlib', ...strict, `-I${RIG}`, `-T${join(RIG, 'rig.ld')}`];
-    gcc(...bare, path('main.c'), '-lgcc', '-o', path('main.elf'));
-    binary('boot2.o', 'boot2.bin');
-    binary('main.elf', 'main.bin');
-    const main = readFileSync(path('main.bin'));
-    const image = new Uint8Array(256 + main.length);
-    image.set(readFileSync(path('boot2.bin')));
-    new DataView(image.buffer).setUint32(252, boot2Crc(image.subarray(0, 252)), true);
-    image.set(main, 256);
-    return image;
+    const main = binary('main', ...bare, path('main.c'), '-lgcc');
+    return Uint8Array.from([...stage, ...main]);
   } finally {
     rmSync(folder, { recursive: true });
   }
