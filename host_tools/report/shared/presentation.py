@@ -111,3 +111,15 @@ def tidy(axes, title, label="", grid="y"):
     if grid:
         axes.grid(axis=grid)
     axes.tick_params(labelsize=8)
+
+
+def draw_panels(found, path, title, shape, size, panels):
+    """A picture of rows and columns of panels (figure, draw(axes)), each where the figure was measured."""
+    figure, places = plt.subplots(*shape, figsize=size, layout="constrained")
+    for axes, (name, panel) in zip(places.flat, panels):
+        if name in found:
+            panel(axes)
+        else:
+            axes.set_axis_off()
+    figure.suptitle(title, x=0.01, ha="left", size=12, weight="bold")
+    save(figure, path)

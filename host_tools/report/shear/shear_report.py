@@ -1,12 +1,12 @@
 """The picture of what shear.py measured."""
 
 import numpy as np
-from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, tidy
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, draw_panels, tidy
 
 PICTURED = ("map", "arrows", "location_quantiles")  # tables that only the picture shows
 
 
-def draw_map(axes, figure, cells):
+def draw_map(axes, cells):
     xs, ys = (sorted({cell[name] for cell in cells}) for name in ("x_mm", "y_mm"))
     values = {(cell["x_mm"], cell["y_mm"]): cell["vector_error_p50"] for cell in cells}
     step = xs[1] - xs[0]
@@ -14,7 +14,7 @@ def draw_map(axes, figure, cells):
     extent = (xs[0] - step / 2, xs[-1] + step / 2, ys[0] - step / 2, ys[-1] + step / 2)
     image = axes.imshow(grid, origin="lower", extent=extent, cmap="viridis", vmin=0)
     axes.plot(*zip(*((9 * i, 9 * k) for i in (-1, 0, 1) for k in range(-2, 3))), "o", color="white", mec=INK, ms=4, clip_on=False)
-    figure.colorbar(image, ax=axes, shrink=0.8).ax.tick_params(labelsize=8)
+    axes.figure.colorbar(image, ax=axes, shrink=0.8).ax.tick_params(labelsize=8)
     tidy(axes, "Error of Q/F by place\n(median, Q/F = 0.3; dots: sensors)", "y, mm", grid=None)
     axes.set_xlabel("x, mm", size=9)
 
@@ -109,20 +109,12 @@ def draw_overhang(axes, rows):
 
 
 def draw(found, path):
-    """Only what was measured."""
-    figure, places = plt.subplots(2, 3, figsize=(15, 9.5), layout="constrained")
     panels = (
-        ("map", lambda axes: draw_map(axes, figure, found["map"])),
+        ("map", lambda axes: draw_map(axes, found["map"])),
         ("arrows", lambda axes: draw_arrows(axes, found["arrows"])),
         ("location_quantiles", lambda axes: draw_location(axes, found["location_quantiles"])),
         ("bounds", lambda axes: draw_bounds(axes, found)),
         ("by_object", lambda axes: draw_objects(axes, found["by_object"])),
         ("by_overhang", lambda axes: draw_overhang(axes, found["by_overhang"])),
     )
-    for axes, (name, panel) in zip(places.flat, panels):
-        if name in found:
-            panel(axes)
-        else:
-            axes.set_axis_off()
-    figure.suptitle("Tangential force: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
-    save(figure, path)
+    draw_panels(found, path, "Tangential force: simulated pads, the firmware's own code", (2, 3), (15, 9.5), panels)

@@ -1,6 +1,6 @@
 """The picture of what truth.py measured."""
 
-from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, tidy
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, draw_panels, tidy
 
 # Share of truths within one and two radial standard deviations of a normal distribution in the plane.
 IDEAL_PERCENT = (63.2, 98.2)
@@ -63,18 +63,10 @@ def draw_iterations(axes, rows):
 
 
 def draw(found, path):
-    """Only what was measured."""
-    panels = []
-    if "cases" in found:
-        panels += [lambda axes: draw_coverage(axes, found["cases"]), lambda axes: draw_warnings(axes, found["cases"])]
-    if "truth_calibration" in found:
-        panels.append(lambda axes: draw_placements(axes, found["truth_calibration"], found["before_cal_median_mm"]))
-    if "iterations" in found:
-        panels.append(lambda axes: draw_iterations(axes, found["iterations"]))
-    figure, places = plt.subplots(2, 2, figsize=(12, 8), layout="constrained")
-    for axes, panel in zip(places.flat, panels):
-        panel(axes)
-    for axes in places.flat[len(panels) :]:
-        axes.set_axis_off()
-    figure.suptitle("From the optimum to the truth: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
-    save(figure, path)
+    panels = (
+        ("cases", lambda axes: draw_coverage(axes, found["cases"])),
+        ("cases", lambda axes: draw_warnings(axes, found["cases"])),
+        ("truth_calibration", lambda axes: draw_placements(axes, found["truth_calibration"], found["before_cal_median_mm"])),
+        ("iterations", lambda axes: draw_iterations(axes, found["iterations"])),
+    )
+    draw_panels(found, path, "From the optimum to the truth: simulated pads, the firmware's own code", (2, 2), (12, 8), panels)

@@ -1,6 +1,6 @@
 """The picture of what two.py measured."""
 
-from presentation import BLUE, FAINT, INK, ORANGE, plt, save, tidy
+from presentation import BLUE, FAINT, INK, ORANGE, draw_panels, tidy
 
 CALLED = (("one", BLUE), ("pulled", "#8fb4d9"), ("long", ORANGE), ("two", "#4a9a5b"), ("none", FAINT), ("undecided", "#dddddd"))
 DISTANCES_mm = (6, 8, 10, 12, 15, 20)
@@ -47,21 +47,9 @@ def draw_errors(axes, rows):
 
 
 def draw(found, path):
-    figure, places = plt.subplots(1, 3, figsize=(15, 7), layout="constrained")
-    if "touches" in found:
-        rows = {row["case"]: row for row in found["touches"]}
-        plain = {name: row for name, row in rows.items() if name.count(",") < 3}
-        draw_pairs(places[0], rows)
-        draw_called(places[1], plain)
-        draw_errors(places[2], plain)
-    else:
-        for axes in places:
-            axes.set_axis_off()
-    figure.suptitle(
-        "Contact shapes: simulated pads, calibrated, with a dip; the firmware's own code; no real pad",
-        x=0.01,
-        ha="left",
-        size=12,
-        weight="bold",
-    )
-    save(figure, path)
+    rows = {row["case"]: row for row in found.get("touches", ())}
+    plain = {name: row for name, row in rows.items() if name.count(",") < 3}
+    title = "Contact shapes: simulated pads, calibrated, with a dip; the firmware's own code; no real pad"
+    panels = ((draw_pairs, rows), (draw_called, plain), (draw_errors, plain))
+    panels = [("touches", lambda axes, draw=draw, shown=shown: draw(axes, shown)) for draw, shown in panels]
+    draw_panels(found, path, title, (1, 3), (15, 7), panels)
