@@ -10,13 +10,13 @@ import tempfile
 import unittest
 
 from emulation import Run, main, make_scenario
-import emulated
-from fingertip import Flag, files
+from fingertip import Flag, files, wire
 
 TOOLS = argparse.Namespace()
 BOARD = "pico_parallel"
 # Of a packet, firmware/wire/PROTOCOL.md: types, and bytes of the body without what belongs to a capability.
 CONTACT, RAW, INFO, HEALTH, ACK = 0x01, 0x02, 0x03, 0x04, 0x05
+HEADER_AND_CRC_BYTES = 12 + 4
 INFO_BYTES, HEALTH_BYTES = 93 + 8 * 15, 72
 OF_FIT = {INFO: 13, HEALTH: 4}
 UNKNOWN_COMMAND, OUT_OF_RANGE = "1", "2"
@@ -34,9 +34,9 @@ class SceneRun(Run):
         self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
         self.body_bytes = {}
         for frame in self.path("ftr").read_bytes().split(b"\0"):
-            packet = emulated.unstuffed(frame)
+            packet = wire.cobs_decode(frame)
             if packet:
-                self.body_bytes.setdefault(packet[1], set()).add(len(packet) - emulated.HEADER_BYTES - emulated.CRC_BYTES)
+                self.body_bytes.setdefault(packet[1], set()).add(len(packet) - HEADER_AND_CRC_BYTES)
         self.has_contact = self.recording.has_contact
         self.has_raw = self.recording["valid"] == self.recording["valid"]
 

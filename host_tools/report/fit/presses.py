@@ -89,19 +89,7 @@ def usable_sensors(measure, set_, mask, seed, readings):
     if mask == "peak":
         return ALL & ~(np.uint32(1) << readings.argmax(axis=1).astype(np.uint32))
     random = measure.random(seed, MASK_STREAM + SETS.index(set_), np.arange(len(readings)))
-    return without(random, {"none": 0, "random": 1, "random2": 2, "random3": 3}[mask])
-
-
-def without(random, sensors):
-    """Bitmap for each state of the sensors that are left without this number of them."""
-    usable = np.full(len(random.states), ALL, np.uint32)
-    while (more := np.flatnonzero(sensors_in(usable) > SENSORS - sensors)).size:
-        usable[more] &= ~(np.uint32(1) << random.below(SENSORS, of=more)[more].astype(np.uint32))
-    return usable
-
-
-def sensors_in(usable):
-    return (usable[:, None] >> np.arange(SENSORS, dtype=np.uint32) & 1).sum(axis=1)
+    return random.some_of(SENSORS, SENSORS - {"none": 0, "random": 1, "random2": 2, "random3": 3}[mask])
 
 
 class Compared(Measure):

@@ -134,7 +134,7 @@ def dead(alive, peak):
         made = inside()(layout, random)
         if peak:
             return made.but(dead=np.uint32(1) << made.pressure_Pa.argmax(axis=1).astype(np.uint32))
-        return made.but(dead=presses.ALL & ~presses.without(random, presses.SENSORS - alive))
+        return made.but(dead=presses.ALL & ~random.some_of(presses.SENSORS, alive))
 
     return case
 

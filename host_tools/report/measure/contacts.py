@@ -22,6 +22,18 @@ def terms_of(field):
     return field.view(np.float32).reshape(-1, 2).astype(float)
 
 
+def with_tangential(touch, tangential_N, direction, held=True):
+    for name, share in zip(FORCE_N, (np.cos(direction), np.sin(direction))):
+        touch[name] = tangential_N * share
+    touch["stuck_N"] = stuck_N(touch["force_N"], tangential_N) if held else 0.0
+    return touch
+
+
+def stuck_N(force_N, tangential_N):
+    """The force whose contact sticks after the tangential force has risen to this under a constant normal one."""
+    return np.maximum(0.0, force_N - tangential_N / FRICTION)
+
+
 class Contacts(Measure):
     def __init__(self, build):
         super().__init__(build)

@@ -312,6 +312,16 @@ class Random:
         """Whole numbers."""
         return self.drawn("random_below", int(end), count=count, of=of, kind=np.int64)
 
+    def some_of(self, sensors, count):
+        """Bitmaps of `count` of this many sensors."""
+        usable = np.full(len(self.states), (1 << sensors) - 1, np.uint32)
+        left = np.full(len(usable), sensors)
+        while (more := left > count).any():
+            bit = np.where(more, np.uint32(1) << self.below(sensors, of=more).astype(np.uint32), np.uint32(0))
+            left -= (usable & bit) > 0
+            usable &= ~bit
+        return usable
+
 
 def signed(number):
     """The same 64 bits."""

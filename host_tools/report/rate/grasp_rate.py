@@ -1,12 +1,11 @@
 """The release images, of scene grasp (with two contacts of scene shapes), with a pad's profile in the emulator: its rate, latency and sleep, with one contact and with two, on calibrated rubber with a dip, where the fit costs most, and with a sensor that reads double."""
 
-import math
 import pathlib
 
 import numpy as np
 from boards import BOARDS, PARALLEL, short
-from emulated import FROM_s, Measurement, Tools, distribution, scenario
-from fingertip.files import TANGENTIAL_VALID, read_recording
+from emulated import FROM_s, Measurement, Tools, distribution, pressed, scenario
+from fingertip.files import TANGENTIAL_VALID, read_recording, read_scenario, write_scenario
 from fingertip.line import Flag
 from reporting import run
 from scenes import SceneTools
@@ -25,44 +24,22 @@ GOALS = (
 )
 TWO_FROM_s = 0.65
 ONE_SLIP_s = 6  # a scenario with one contact at least
-BROKEN = "s3_Pa"
+BROKEN = 3
 PITCH_mm, SIGMA_mm, PEAK_Pa = 9.0, 5.7, 25000.0
 
 
 def two_contacts(path, seconds):
     """A scenario of two presses 18 mm apart."""
-    sensors = [(PITCH_mm * (k // 5 - 1), PITCH_mm * (k % 5 - 2)) for k in range(15)]
-    pressures = [
-        round(sum(PEAK_Pa * math.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / (2 * SIGMA_mm**2)) for at_x, at_y in ((2, 10), (-1, -8))))
-        for x, y in sensors
-    ]
-    names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
-    rows = [(0.0, [0] * 15), (TWO_FROM_s, [0] * 15), (TWO_FROM_s + 0.01, pressures), (seconds, pressures)]
-    path.write_text(
-        "\n".join(
-            [
-                "# fingertip-scenario 1",
-                "# name: two",
-                ",".join(names),
-                *(",".join(map(str, [f"{t_s:g}", *[0] * 7, *values])) for t_s, values in rows),
-            ]
-        )
-        + "\n"
-    )
-    return path
+    x_mm, y_mm = PITCH_mm * (np.arange(15) // 5 - 1), PITCH_mm * (np.arange(15) % 5 - 2)
+    press_Pa = sum(PEAK_Pa * np.exp(-((x_mm - x) ** 2 + (y_mm - y) ** 2) / (2 * SIGMA_mm**2)) for x, y in ((2, 10), (-1, -8)))
+    return pressed(path, "two", [0, TWO_FROM_s, TWO_FROM_s + 0.01, seconds], np.outer([0, 0, 1, 1], press_Pa.round()))
 
 
 def with_broken_sensor(path, scenario_path):
     """The scenario, with a sensor that reads double."""
-    lines = scenario_path.read_text().splitlines()
-    names = next(line for line in lines if not line.startswith("#")).split(",")
-
-    def doubled(line):
-        values = line.split(",")
-        values[names.index(BROKEN)] = str(2 * float(values[names.index(BROKEN)]))
-        return ",".join(values)
-
-    path.write_text("\n".join(line if line.startswith("#") or line.split(",") == names else doubled(line) for line in lines) + "\n")
+    read = read_scenario(scenario_path)
+    read.sensors_Pa[:, BROKEN] *= 2
+    write_scenario(path, read.metadata, {"t_s": read.t_s, "sensors_Pa": read.sensors_Pa, **read.truth})
     return path
 
 
@@ -78,23 +55,9 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
     tools = Tools(build, boards)
 
     dipped = wander.with_name("grasp-dip.csv")
-    run(
-        pathlib.Path(build) / "host_tools/simulation/twin/twin",
-        "scenario",
-        "slip",
-        "--force",
-        "5",
-        "--quiet",
-        "0.3",
-        "--effects",
-        "dip=5",
-        "--seconds",
-        f"{max(FROM_s + seconds + 1, ONE_SLIP_s):g}",
-        "-o",
-        dipped,
-        "--cache",
-        pathlib.Path(folder) / "contact_tables",
-    )
+    slip = ("--force", "5", "--quiet", "0.3", "--effects", "dip=5", "--seconds", f"{max(FROM_s + seconds + 1, ONE_SLIP_s):g}")
+    twin, tables = pathlib.Path(build) / "host_tools/simulation/twin/twin", pathlib.Path(folder) / "contact_tables"
+    run(twin, "scenario", "slip", *slip, "-o", dipped, "--cache", tables)
 
     def one(board, path, *commands):
         of_scene = SceneTools(build, boards, "shapes") if path is two else tools

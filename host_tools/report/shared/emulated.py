@@ -10,13 +10,14 @@ from boards import BOARDS, TO_BUILD, image_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-from fingertip.files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
+from fingertip.files import CONTACT, FIT_VALID, TRUTH_COLUMNS, InputError, read_recording, write_scenario  # noqa: E402
+from fingertip.wire import cobs_decode  # noqa: E402
 from reporting import built, run  # noqa: E402
 
 HELD = 1 << 6
 # Of a packet, firmware/wire/PROTOCOL.md.
 WIRE_CONTACT = 0x01
-HEADER_BYTES, CRC_BYTES = 12, 4
+HEADER_BYTES = 12
 CLOCK_Hz = 125e6
 # Longest conversion by OSR, us: MS5840-02BA datasheet.
 CONVERSION_us = {256: 560, 512: 1100, 1024: 2170, 2048: 4320, 4096: 8610, 8192: 17200}
@@ -45,28 +46,20 @@ class Tools:
         return run(self.command_frame, *command).strip()
 
 
+def pressed(path, name, times_s, sensors_Pa):
+    """A scenario of pressures [time, sensor], whose truth is not judged."""
+    columns = dict.fromkeys(TRUTH_COLUMNS, np.zeros(len(times_s))) | {"t_s": times_s, "sensors_Pa": sensors_Pa}
+    write_scenario(path, {"name": name}, columns)
+    return path
+
+
 def scenario(folder, name, seconds, stem=None):
     """ "wander" touches from 0.65 s on; "rest" never."""
     path = pathlib.Path(folder) / f"{stem or name}.csv"
     if name != "rest":
         run(sys.executable, ROOT / "host_tools/python", "scenario", name, "-o", path, "--seconds", f"{seconds:g}")
         return path
-    names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
-    zeros = ",0" * (len(names) - 1)
-    path.write_text(f"# fingertip-scenario 1\n# name: rest\n{','.join(names)}\n0{zeros}\n{seconds:g}{zeros}\n")
-    return path
-
-
-def unstuffed(frame):
-    """The packet in a COBS frame without its delimiter."""
-    packet, at = bytearray(), 0
-    while at < len(frame):
-        code = frame[at]
-        packet += frame[at + 1 : at + code]
-        at += code
-        if code != 0xFF and at < len(frame):
-            packet.append(0)
-    return bytes(packet)
+    return pressed(path, name, [0, seconds], np.zeros((2, 15)))
 
 
 def contact_times_us(usb_log, zero_us):
@@ -82,7 +75,7 @@ def contact_times_us(usb_log, zero_us):
                 if byte:
                     frame.append(byte)
                     continue
-                packet = unstuffed(frame)
+                packet = cobs_decode(bytes(frame))
                 if len(packet) > HEADER_BYTES and packet[1] == WIRE_CONTACT:
                     times.append((int.from_bytes(packet[4:HEADER_BYTES], "little"), offered_us, float(row["t_ns"]) / 1e3 - zero_us))
                 frame = bytearray()
@@ -117,26 +110,9 @@ class Measurement:
 
         def emulate(name, until_s):
             to = f"{base}.{name}"
-            run(
-                "node",
-                ROOT / "host_tools/simulation/emulator/main.mjs",
-                "--board",
-                board,
-                "--image",
-                tools.image(board),
-                "--scenario",
-                path,
-                "--seconds",
-                until_s,
-                "--host-script",
-                script,
-                "--capture",
-                f"{to}.ftr",
-                "--report",
-                f"{to}.json",
-                "--usb-log",
-                f"{to}.usb",
-            )
+            chip = ("--board", board, "--image", tools.image(board), "--scenario", path, "--seconds", until_s)
+            out = ("--capture", f"{to}.ftr", "--report", f"{to}.json", "--usb-log", f"{to}.usb")
+            run("node", ROOT / "host_tools/simulation/emulator/main.mjs", *chip, "--host-script", script, *out)
             return to, json.loads(pathlib.Path(f"{to}.json").read_text())
 
         _, before = emulate("before", FROM_s)

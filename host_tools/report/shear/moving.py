@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from contacts import FORCE_N, SENSORS, Scenario
+from contacts import FORCE_N, SENSORS, Scenario, stuck_N
 from presentation import percent, quantile
-from touches import LAYER_mm, TOUCHES, UNITS_PER_PAD, Judged, draw, frame_normals, judged, of_all, stuck_N
+from touches import LAYER_mm, TOUCHES, UNITS_PER_PAD, Judged, draw, frame_normals, judged, of_all
 
 TAP_OBJECTS, TAP_PADS = ("sphere6", "sphere15", "cylinder6", "cube6"), 8
 # What is read, and when.

@@ -9,12 +9,11 @@ import sys
 import bounds
 import moving
 import numpy as np
-from contacts import FORCE_N, SENSORS
+from contacts import FORCE_N, FRICTION, SENSORS, with_tangential
 from measure import stream_of
 from sessions import DIP, LIKE_REAL, USUAL, WEIGHT_N
 from presentation import percent, quantile
 from touches import (
-    FRICTION,
     LAYER_mm,
     SEVEN,
     SHARE,
@@ -27,7 +26,6 @@ from touches import (
     judged,
     of_all,
     run,
-    with_tangential,
 )
 
 # name, Q / F, how it came

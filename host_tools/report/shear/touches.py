@@ -7,7 +7,7 @@ import dataclasses
 import math
 
 import numpy as np
-from contacts import FORCE_N, FRICTION, SENSORS
+from contacts import FORCE_N, FRICTION, SENSORS, with_tangential
 from measure import stream_of
 from presentation import percent, quantile
 
@@ -56,18 +56,6 @@ def draw(contacts, case, random):
     return with_tangential(touch, tangential_N, random.uniform(0.0, 2.0 * np.pi), case.history == "held")
 
 
-def with_tangential(touch, tangential_N, direction, held=True):
-    for name, share in zip(FORCE_N, (np.cos(direction), np.sin(direction))):
-        touch[name] = tangential_N * share
-    touch["stuck_N"] = stuck_N(touch["force_N"], tangential_N) if held else 0.0
-    return touch
-
-
-def stuck_N(force_N, tangential_N):
-    """The force whose contact sticks after the tangential force has risen to this under a constant normal one."""
-    return np.maximum(0.0, force_N - tangential_N / FRICTION)
-
-
 def frame_normals(contacts, random):
     """The noise of one touch of each generator, in standard deviations."""
     return random.normal(contacts.tangential_frames * SENSORS)
@@ -89,24 +77,12 @@ def run(bench, table, case):
     drawn = []
     for _ in range(TOUCHES):
         touches, which = draw(contacts, case, random), random.below(len(case.objects))
-        usable = chosen_sensors(noise, case.sensors)
+        usable = noise.some_of(SENSORS, case.sensors)
         drawn.append((touches, which, frame_normals(contacts, noise), usable))
     touches, which, normals, usable = (np.concatenate(each) for each in zip(*drawn))
     pads = np.tile(case.pads[unit // UNITS_PER_PAD % len(case.pads)], TOUCHES)
     found = judged(contacts, case, touches, which, pads, normals, usable=usable)
     return found.where(found.found)  # without a positive reading there is nothing to judge
-
-
-def chosen_sensors(random, count):
-    """Bitmaps of this many sensors."""
-    usable = np.full(len(random.states), (1 << SENSORS) - 1)
-    left = np.full(len(usable), SENSORS)
-    while (many := left > count).any():
-        bit = 1 << random.below(SENSORS, of=many)
-        bit[~many] = 0
-        left -= (usable & bit) > 0
-        usable &= ~bit
-    return usable
 
 
 class Judged:

@@ -13,14 +13,14 @@ import sessions
 from emulated import CONVERSION_us
 from fingertip.files import InputError
 from fingertip.line import Flag
-from contacts import Contacts
+from contacts import Contacts, with_tangential
 from measure import q10, stream_of
 from sessions import SENSORS
 from presentation import percent, quantile
 
 TOUCHES = 50  # of each pad
 LEARNT_FROM = 20  # touches of a pad that was never calibrated, before those
-BAD_mm, FRICTION = 1.0, 0.5  # friction: all of the contact slides at it
+BAD_mm = 1.0
 # Rounded feet, a flat cylinder and a cube, and everyday objects; all of them round or nearly so.
 OBJECTS = ("sphere6", "sphere15", "cylinder6", "cube6", "ping_pong", "rubber_duck", "lime")
 FORCE_N = (1.0, 15.0)
@@ -100,8 +100,7 @@ class Bench:
         if case.tangential:
             tangential_N = random.uniform(*case.tangential) * touch["force_N"]
             direction = angle + random.uniform(0.0, 2.0 * np.pi)
-            touch["pull_x_N"], touch["pull_y_N"] = tangential_N * np.cos(direction), tangential_N * np.sin(direction)
-            touch["stuck_N"] = np.maximum(0.0, touch["force_N"] - tangential_N / FRICTION)
+            with_tangential(touch, tangential_N, direction)
         return touch, which, self.noises_Pa[random.below(len(OSRS))]
 
     def base_Pa(self, case, touch, which):
@@ -141,7 +140,7 @@ class Bench:
         for _ in range(TOUCHES):
             touch, which, noise_Pa = self.draw(case, random)
             first = random.normal(SENSORS)
-            usable = choose_sensors(case.sensors, random)
+            usable = random.some_of(SENSORS, case.sensors)
             normals = [first] + [random.normal(SENSORS) for _ in range(frames - 1)]
             base_Pa = of["gain"] * self.base_Pa(case, touch, which)
             readings = q10(base_Pa[:, None] + noise_Pa[:, None, None] * np.stack(normals, axis=1))
@@ -157,17 +156,6 @@ class Bench:
     def row(self, case):
         (results,) = self.run(case)
         return results, {"case": case.name} | results.row()
-
-
-def choose_sensors(count, random):
-    """Bitmaps of this many sensors."""
-    usable = np.full(len(random.states), (1 << SENSORS) - 1, np.int64)
-    left = np.full(len(usable), SENSORS)
-    while (more := left > count).any():
-        bit = 1 << random.below(SENSORS, of=more)
-        left[more] -= usable[more] & bit[more] > 0
-        usable[more] &= ~bit[more]
-    return usable.astype(np.uint32)
 
 
 class Results:

@@ -9,7 +9,7 @@ import dataclasses
 
 import numpy as np
 import pair_bound
-from contacts import FORCE_N, FRICTION
+from contacts import with_tangential
 from measure import stream_of
 from sessions import SENSORS, USUAL
 from presentation import percent, quantile
@@ -109,10 +109,7 @@ def answers(contacts, case, pads, seed):
     for _ in range(TOUCHES):
         which, touches = random.below(len(case.objects)), draw(contacts, case, random)
         direction = random.uniform(0.0, 2.0 * np.pi)[:, None]
-        tangential_N = case.share * touches["force_N"]
-        for name, share in zip(FORCE_N, (np.cos(direction), np.sin(direction))):
-            touches[name] = tangential_N * share
-        touches["stuck_N"] = np.maximum(0.0, touches["force_N"] - tangential_N / FRICTION)
+        with_tangential(touches, case.share * touches["force_N"], direction)
         noise_Pa = oversampled_Pa[random.below(6)]
         base_Pa = sum(contacts.base_Pa(LAYER_mm, case.objects, which, one, pads) for one in touches.T)
         estimate, _ = contacts.estimated(base_Pa, pads, noise_Pa, of_estimate.normal(contacts.tangential_frames * SENSORS), profile)
