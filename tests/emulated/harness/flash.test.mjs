@@ -109,6 +109,14 @@ fails('execution in place while busy', /read of flash at .* while the flash is b
   d.read(0x10000000);
 });
 
+fails('continuous-read mode', /read of flash at .* the SSI sends no command/, (d) => {
+  d.write(0x18000008, 0);
+  d.write(0x18000000, (31 << 16) | (3 << 8));
+  d.write(0x180000f4, 0xa0 << 24);
+  d.write(0x18000008, 1);
+  d.read(0x10000000);
+});
+
 /** Erases or programs on a memory without a chip, cut after part of the time. */
 function cut(seed, command, share, prepare = () => {}) {
   const time = new SimulatedTime();

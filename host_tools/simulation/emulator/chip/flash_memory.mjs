@@ -1,9 +1,8 @@
 /**
  * The flash chip of a Pico, a W25Q16JV (Winbond, revision H): 2 MiB behind a serial interface.
  *
- * Modelled: read (03h), page program (02h), sector erase (20h), write enable (06h), read and write status
- * (05h, 35h, 01h), read unique id (4Bh) and JEDEC id (9Fh), the dummy read that enters continuous-read mode and its
- * exit by FFh. Programming only clears bits, needs write enable, and keeps the chip busy like an erase; while it is busy
+ * Modelled: read (03h), page program (02h), sector erase (20h), write enable (06h), read status (05h) and read unique
+ * id (4Bh). Programming only clears bits, needs write enable, and keeps the chip busy like an erase; while it is busy
  * it answers nothing but read status. What a chip would pass over in silence fails the run: a change without write
  * enable, another command while busy, bytes beyond the end of a page, a command that is not modelled.
  *
@@ -17,18 +16,7 @@ export const FLASH_BYTES = 2 * 1024 * 1024;
 const PAGE_BYTES = 256;
 const SECTOR_BYTES = 4096;
 
-const OP = {
-  writeStatus: 0x01,
-  program: 0x02,
-  read: 0x03,
-  status: 0x05,
-  writeEnable: 0x06,
-  erase: 0x20,
-  status2: 0x35,
-  uniqueId: 0x4b,
-  jedecId: 0x9f,
-  exit: 0xff,
-};
+const OP = { program: 0x02, read: 0x03, status: 0x05, writeEnable: 0x06, erase: 0x20, uniqueId: 0x4b };
 const KNOWN = new Set(Object.values(OP));
 
 /** Datasheet 9.6, typical and maximum: page program, sector erase. The typical page is that of older revisions, 0.7 ms. */
@@ -59,8 +47,6 @@ export class FlashMemory {
     this.operation = null;
     this.busyUntil_ns = 0;
     this.writeEnabled = false;
-    this.continuousRead = false;
-    this.status2 = 0x02;
     this.command = [];
     this.alarm.cancel();
   }
@@ -79,15 +65,8 @@ export class FlashMemory {
     const [op] = command;
     this.command = [];
     if (op === undefined) return;
-    if (this.continuousRead) {
-      if (command.every((b) => b === 0xff || b === 0)) this.continuousRead = false;
-      else this.fail('flash', `command 0x${op.toString(16)} while in continuous-read mode; leave it with FFh bytes first`);
-    } else if (op === OP.writeEnable) this.writeEnabled = true;
-    else if (op === OP.writeStatus) {
-      this.#needsWriteEnable('status written');
-      this.status2 = command[2] ?? this.status2;
-      this.writeEnabled = false;
-    } else if (op === OP.uniqueId && command.length < 13) {
+    if (op === OP.writeEnable) this.writeEnabled = true;
+    else if (op === OP.uniqueId && command.length < 13) {
       this.fail(
         'flash',
         `chip select rose after ${command.length} of the 13 bytes of a unique-id read; keep the FIFO fed or force chip select`,
@@ -117,25 +96,20 @@ export class FlashMemory {
 
   exchange(byte) {
     this.command.push(byte);
-    if (this.continuousRead) return 0xff;
     const { command } = this;
     const index = command.length - 1;
     const op = command[0];
     if (index === 0) {
       if (!KNOWN.has(op)) this.fail('flash', `command 0x${op.toString(16)} is not modelled`);
-      if (this.isBusy && op !== OP.status && op !== OP.status2)
+      if (this.isBusy && op !== OP.status)
         this.fail('flash', `command 0x${op.toString(16)} while the flash is busy; it would be passed over`);
       return 0xff;
     }
     switch (op) {
       case OP.status:
         return (this.isBusy ? 1 : 0) | (this.writeEnabled ? 2 : 0);
-      case OP.status2:
-        return this.status2;
       case OP.uniqueId:
         return index >= 5 && index < 13 ? this.serial[index - 5] : 0xff;
-      case OP.jedecId:
-        return [0xff, 0xef, 0x40, 0x15][index] ?? 0xff;
       case OP.read:
         return index < 4 ? 0xff : this.#readByte((this.#address(command) + index - 4) & (FLASH_BYTES - 1));
     }

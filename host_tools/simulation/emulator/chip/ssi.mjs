@@ -41,7 +41,6 @@ export class Ssi extends RegisterBlock {
     this.spiCtrlr0 = (0x03 << 24) | (2 << 8) | (6 << 2);
     this.sampleDelay = 0;
     this.driveEdge = 0;
-    this.entering = [];
     this.#settingsChanged();
   }
 
@@ -58,11 +57,9 @@ export class Ssi extends RegisterBlock {
     if (this.baudr < 2 || this.baudr & 1) return `the SSI divider BAUDR is ${this.baudr}`;
     if (this.forcedSelect) return 'chip select is forced';
     if (this.flash.isBusy) return 'the flash is busy';
-    const hasInstruction = (this.spiCtrlr0 >>> 8) & 3;
-    if (hasInstruction && this.flash.continuousRead) return 'the flash is in continuous-read mode but the SSI sends a command';
-    if (!hasInstruction && !this.flash.continuousRead) return 'the SSI sends no command but the flash is not in continuous-read mode';
+    if (!((this.spiCtrlr0 >>> 8) & 3)) return 'the SSI sends no command; the continuous-read mode of the flash is not modelled';
     const command = this.spiCtrlr0 >>> 24;
-    if (hasInstruction && ![0x03, 0x0b, 0x3b, 0x6b, 0xbb, 0xeb].includes(command)) {
+    if (![0x03, 0x0b, 0x3b, 0x6b, 0xbb, 0xeb].includes(command)) {
       return `0x${command.toString(16)} is not a read command`;
     }
     return null;
@@ -163,7 +160,6 @@ export class Ssi extends RegisterBlock {
       this.alarm.cancel();
       this.tx = [];
       this.rx = [];
-      this.entering = [];
     }
     this.enabled = enabled;
   }
@@ -175,18 +171,6 @@ export class Ssi extends RegisterBlock {
 
   #push(value) {
     if (!this.enabled) this.rp2040.fail('SSI', 'data register written while disabled');
-    if (((this.ctrlr0 >>> 8) & 3) === TMOD_EEPROM_READ) {
-      // Command and address of one read; only the dummy read that enters continuous-read mode is of interest.
-      this.entering.push(value >>> 0);
-      if (this.entering.length === 2) {
-        const modeBits = this.entering[1] & 0xff;
-        if (![0xeb, 0xbb].includes(this.entering[0]))
-          this.rp2040.fail('SSI', `dummy read with command 0x${this.entering[0].toString(16)} is not modelled`);
-        this.flash.continuousRead = (modeBits & 0xf0) === 0xa0;
-        this.rx.push(0);
-      }
-      return;
-    }
     if (!this.#serialMode) this.rp2040.fail('SSI', 'only 8-bit single-lane transmit-and-receive transfers are modelled');
     if (this.tx.length >= FIFO_DEPTH) this.rp2040.fail('SSI', 'transmit FIFO overflow');
     this.tx.push(value & 0xff);

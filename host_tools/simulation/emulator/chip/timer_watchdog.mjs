@@ -29,7 +29,6 @@ export class Timer extends RegisterBlock {
     }
     this.zero_ns = null;
     this.stopped_us = this.begin_us;
-    this.latchedHigh = 0;
     this.raw = 0;
     this.enable = 0;
     this.force = 0;
@@ -71,12 +70,6 @@ export class Timer extends RegisterBlock {
     return this.count_us;
   }
 
-  #readLow() {
-    const count = this.#count();
-    this.latchedHigh = Math.floor(count / 2 ** 32);
-    return count;
-  }
-
   #arm(a, target) {
     a.target = target >>> 0;
     a.armed = true;
@@ -94,8 +87,6 @@ export class Timer extends RegisterBlock {
   static #alarm = (i) => ({ read: (b) => b.alarms[i].target, write: (b, value) => b.#arm(b.alarms[i], value) });
 
   static registers = {
-    0x08: { read: (b) => b.latchedHigh },
-    0x0c: { read: (b) => b.#readLow() },
     0x10: Timer.#alarm(0),
     0x14: Timer.#alarm(1),
     0x18: Timer.#alarm(2),
