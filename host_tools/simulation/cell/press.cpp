@@ -145,6 +145,33 @@ std::string head_of(const PressOptions &options, const std::vector<FingerProcess
   return text.str();
 }
 
+void be_ready(Fingers &fingers, const Place &place) {
+  fingers.wait_until_ready();
+  std::printf("ready:");
+  for (std::size_t i = 0; i < fingers.count(); i++) {
+    std::printf("%s %s", i ? "," : "", place.port(SIDES[i]).c_str());
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+// What each round gives, of a host's time and of the time since it began, goes to the fingertips.
+template <typename Round> void run(Fingers &fingers, std::optional<double> seconds, Round round) {
+  const std::int64_t began_us = steady_now_us();
+  std::int64_t last_us = 0;
+  double time_s = 0.0;
+  while (!interrupted && !(seconds && time_s >= *seconds)) {
+    fingers.share(ROUND);
+    const std::int64_t now_us = steady_now_us();
+    time_s = 1e-6 * static_cast<double>(now_us - began_us);
+    if (now_us - last_us >= ROUND_us) {
+      last_us = now_us;
+      fingers.put(now_us, round(now_us, time_s));
+      fingers.look();
+    }
+  }
+}
+
 } // namespace
 
 void press(const PressOptions &options, const Place &place) {
@@ -160,47 +187,29 @@ void press(const PressOptions &options, const Place &place) {
   if (place.is_shared() || options.by_hand) {
     hands.emplace(place, fingers.count(), options.by_hand);
   }
-  fingers.wait_until_ready();
-  std::printf("ready:");
-  for (std::size_t i = 0; i < fingers.count(); i++) {
-    std::printf("%s %s", i ? "," : "", place.port(SIDES[i]).c_str());
-  }
-  std::printf("\n");
-  std::fflush(stdout);
+  be_ready(fingers, place);
   if (options.by_hand) {
     std::fprintf(stderr, "press it with the pointer in the page: fingertip web\n");
   }
-  const std::int64_t began_us = steady_now_us();
-  std::int64_t last_us = 0;
-  while (!interrupted) {
-    fingers.share(ROUND);
-    const std::int64_t now_us = steady_now_us();
-    const double time_s = 1e-6 * static_cast<double>(now_us - began_us);
-    if (now_us - last_us >= ROUND_us) {
-      last_us = now_us;
-      if (hands) {
-        hands->step();
-      }
-      const bool sends = hands && hands->is_due(now_us);
-      std::vector<Pressures> pressures;
-      std::string cells;
-      for (std::size_t i = 0; i < pressed.size(); i++) {
-        Pressed &one = pressed[i];
-        options.by_hand ? one.follow(time_s, hands->hand(i)) : one.advance(time_s);
-        pressures.push_back(one.pressures_Pa());
-        cells += (cells.empty() ? "" : ",") + one.cells();
-        if (sends) {
-          hands->send(i, fingers.device_us(i, now_us), one.truth());
-        }
-      }
-      fingers.put(now_us, pressures);
-      truth.row(now_us, cells);
-      fingers.look();
+  run(fingers, options.seconds, [&](std::int64_t now_us, double time_s) {
+    if (hands) {
+      hands->step();
     }
-    if (options.seconds && time_s >= *options.seconds) {
-      break;
+    const bool sends = hands && hands->is_due(now_us);
+    std::vector<Pressures> pressures;
+    std::string cells;
+    for (std::size_t i = 0; i < pressed.size(); i++) {
+      Pressed &one = pressed[i];
+      options.by_hand ? one.follow(time_s, hands->hand(i)) : one.advance(time_s);
+      pressures.push_back(one.pressures_Pa());
+      cells += (cells.empty() ? "" : ",") + one.cells();
+      if (sends) {
+        hands->send(i, fingers.device_us(i, now_us), one.truth());
+      }
     }
-  }
+    truth.row(now_us, cells);
+    return pressures;
+  });
 }
 
 void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place) {
@@ -209,41 +218,28 @@ void validate(const ValidatedOptions &options, std::optional<double> seconds, co
   process.parallel_bus = true;
   std::optional<ValidatedPad> pad(std::in_place, options);
   Fingers fingers(place, {process});
-  fingers.wait_until_ready();
-  std::printf("ready: %s\n", place.port(SIDES[0]).c_str());
-  std::fflush(stdout);
+  be_ready(fingers, place);
   std::uint32_t rates_set = fingers.rates_set(0);
-  std::optional<std::int64_t> began_us;
-  const std::int64_t ready_us = steady_now_us();
-  std::int64_t last_us = 0;
-  while (!interrupted) {
-    fingers.share(ROUND);
-    const std::int64_t now_us = steady_now_us();
-    if (now_us - last_us < ROUND_us) {
-      continue;
-    }
-    last_us = now_us;
-    if (!began_us && fingers.rates_set(0) != rates_set) {
-      began_us = now_us;
+  bool goes = false;
+  double began_s = 0.0;
+  run(fingers, seconds, [&](std::int64_t, double now_s) {
+    if (!goes && fingers.rates_set(0) != rates_set) {
+      goes = true;
+      began_s = now_s;
       pad.emplace(options);
     }
     Pressures pressures{};
-    if (began_us) {
-      const double time_s = 1e-6 * static_cast<double>(now_us - *began_us);
+    if (goes) {
       for (std::size_t k = 0; k < SENSORS; k++) {
-        pressures[k] = pad->pressure_Pa(k, time_s);
+        pressures[k] = pad->pressure_Pa(k, now_s - began_s);
       }
-      if (time_s >= pad->end_s()) {
-        began_us.reset();
+      if (now_s - began_s >= pad->end_s()) {
+        goes = false;
         rates_set = fingers.rates_set(0);
       }
     }
-    fingers.put(now_us, {pressures});
-    fingers.look();
-    if (seconds && 1e-6 * static_cast<double>(now_us - ready_us) >= *seconds) {
-      break;
-    }
-  }
+    return std::vector<Pressures>{pressures};
+  });
 }
 
 } // namespace fingertip::cell
