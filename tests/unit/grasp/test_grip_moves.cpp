@@ -28,6 +28,7 @@ TEST(Grip, TheTrueForceStaysBelowTheCap) {
       world.run(2.0);
       EXPECT_LE(world.peak_N, 10.0) << model << " " << power;
       EXPECT_GT(world.peak_N, 5.0) << model << " " << power;
+      EXPECT_LE(world.report.wanted_N, 10.0);
       EXPECT_NE(world.report.trouble & GRIP_AT_CAP, 0u);
     }
   }
