@@ -66,7 +66,8 @@ def decode(path, pairs):
             transactions[-1]["whole"] = True
     return [
         [
-            (t["address"], t["rw"], t["bytes"], all(t["acks"][:-1] if t["rw"] == "r" and t["bytes"] else t["acks"]))
+            # The controller acknowledges each byte that it reads but the last.
+            (t["address"], t["rw"], t["bytes"], t["acks"] == [True] * (len(t["acks"]) - 1) + [t["rw"] == "w" or not t["bytes"]])
             for t in lines[name]
             if t["whole"]
         ]
