@@ -23,7 +23,6 @@ CUTS_s, LATENCY_s = 50, 20
     ("mcap_messages_differ", "<=", 0),
     ("mcap_bags_differ", "<=", 0),
     ("mcap_round_trips_differ", "<=", 0),
-    ("mcap_chunks_lost", "<=", 1),
     ("mcap_truncations_unread", "<=", 0),
 )
 def mcap(build):
