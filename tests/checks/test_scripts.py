@@ -254,6 +254,7 @@ class Demo(Folder):
 
     # Stays until it is ended: no program writes there.
     CELL = 'mkdir "$1"; mkfifo "$1/end"; trap "exit 0" TERM; touch "$1/gripper"; read -r end <> "$1/end"'
+    MONITOR = 'case $1 in set | calibrate) test -e "$3" || exit; [ $1 = set ] || echo "good: all" ;; esac'
 
     def setUp(self):
         super().setUp()
@@ -265,7 +266,7 @@ class Demo(Folder):
         for program in ("twin/twin", "player/fingertip_player"):
             self.write(f"build/host/host_tools/simulation/{program}", "#!/bin/sh\n", 0o755)
         self.cell(self.CELL)
-        self.monitor('case $1 in set | calibrate) test -e "$3" || exit; [ $1 = set ] || echo "good: all" ;; esac')
+        self.monitor(self.MONITOR)
 
     def emulator(self, body):
         self.write(
@@ -289,14 +290,6 @@ class Demo(Folder):
     def play(self, *options, **how):
         call = ["sh", self.folder / "host_tools/demo/demo.sh", *options]
         return subprocess.run(call, capture_output=True, text=True, timeout=PATIENCE_s, **how)
-
-    def assert_fails(self, message, log):
-        done = self.play()
-        self.assertEqual(done.returncode, 1, done.stderr)
-        lines = done.stderr.splitlines()
-        self.assertEqual(lines[-1], f"demo: {message}; whole logs are build/demo/*.log")
-        self.assertEqual(lines[-2], log)
-        self.assertLessEqual(len(lines), 21)
 
     def test_a_slow_start_is_waited_for(self):
         self.emulator("later(1500, () => { writeFileSync(link, ''); later(500, () => {}); });")
@@ -330,39 +323,32 @@ class Demo(Folder):
         self.assertRegex(done.stdout, r"force off by, median +- +-\n")
         self.assertRegex(done.stdout, r"slips found +2 of 3 +2 of 3\nafter their start by +78, 30 ms")
 
-    def test_an_emulator_that_does_not_start(self):
-        self.emulator("for (let i = 0; i < 100; i++) console.error(`line ${i}`); process.exitCode = 2;")
-        self.assert_fails("the emulator did not start", "line 99")
-
-    def test_an_emulator_that_finds_something_wrong(self):
-        self.emulator("writeFileSync(link, ''); later(1000, () => { console.error('warning'); process.exitCode = 1; });")
-        self.assert_fails("the emulator found something wrong", "warning")
-
-    def test_a_monitor_that_fails(self):
-        self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor("case $1 in set | calibrate | info) ;; *) exit 3 ;; esac")
-        self.assert_fails("the monitor ended with an error", "ready")
-
-    def test_a_calibration_that_fails(self):
-        self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor("test $1 != calibrate || exit 3")
-        self.assert_fails("the calibration failed", "ready")
-
-    def test_a_player_that_fails(self):
-        self.emulator("")
-        self.write("build/host/host_tools/simulation/player/fingertip_player", "#!/bin/sh\necho no pad; exit 1\n", 0o755)
-        self.assert_fails("the placements could not be played", "no pad")
-
-    def test_a_cell_that_does_not_start(self):
-        self.emulator("writeFileSync(link, ''); later(500, () => {});")
-        self.cell("echo no cell >&2; exit 1")
-        self.assert_fails("the cell did not start", "no cell")
-
-    def test_a_grasp_that_fails(self):
-        self.emulator("writeFileSync(link, ''); later(500, () => {});")
-        self.cell(f"echo dropped; {self.CELL}")
-        self.monitor("test $1 != grasp || exit 4")
-        self.assert_fails("the grasp ended with an error", "dropped")
+    def test_what_fails_is_said(self):
+        """The demo's last word, the last line of the log that it shows, and what fails: emulator, monitor, cell, player."""
+        stays, player = "console.error('ready'); writeFileSync(link, ''); later(20000, () => {});", "simulation/player/fingertip_player"
+        many = "for (let i = 0; i < 100; i++) console.error(`line ${i}`); process.exitCode = 2;"
+        wrong = "writeFileSync(link, ''); later(1000, () => { console.error('warning'); process.exitCode = 1; });"
+        short = "writeFileSync(link, ''); later(500, () => {});"
+        for message, log, emulator, monitor, cell in (
+            ("the emulator did not start", "line 99", many, None, None),
+            ("the emulator found something wrong", "warning", wrong, None, None),
+            ("the monitor ended with an error", "ready", stays, "case $1 in set | calibrate | info) ;; *) exit 3 ;; esac", None),
+            ("the calibration failed", "ready", stays, "test $1 != calibrate || exit 3", None),
+            ("the cell did not start", "no cell", short, None, "echo no cell >&2; exit 1"),
+            ("the grasp ended with an error", "dropped", short, "test $1 != grasp || exit 4", f"echo dropped; {self.CELL}"),
+            ("the placements could not be played", "no pad", "", None, None),
+        ):
+            with self.subTest(message):
+                self.emulator(emulator)
+                self.monitor(monitor or self.MONITOR)
+                self.cell(cell or self.CELL)
+                if not emulator:
+                    self.write(f"build/host/host_tools/{player}", "#!/bin/sh\necho no pad; exit 1\n", 0o755)
+                done = self.play()
+                self.assertEqual(done.returncode, 1, done.stderr)
+                lines = done.stderr.splitlines()
+                self.assertEqual(lines[-2:], [log, f"demo: {message}; whole logs are build/demo/*.log"])
+                self.assertLessEqual(len(lines), 21)
 
 
 if __name__ == "__main__":
