@@ -283,8 +283,7 @@ def plot(path, results, found):
 
 
 def main(argv):
-    parser = option_parser(__doc__)
-    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
+    parser = option_parser(__doc__, boards=True)
     parser.add_argument("--limit", type=positive, default=120000, help="presses, in all (default: %(default)s)")
     parser.add_argument("--seed", type=positive, default=20221015)
     parser.add_argument("--budget", type=float, default=15.0, help="million emulated cycles for each variant (default: %(default)s)")

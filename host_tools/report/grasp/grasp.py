@@ -22,10 +22,9 @@ import emulated_grasp  # noqa: E402
 import faults  # noqa: E402
 import grasp_report  # noqa: E402
 import kinds  # noqa: E402
-import text  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
-from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
+from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
 
 SEED = 27001  # seen by no choice of a constant
 CHOSE = (5001, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101, 18001, 18101)  # and all below 1000
@@ -43,11 +42,10 @@ def measure(options):
 
 
 def main(argv):
-    parser = option_parser(__doc__)
+    parser = option_parser(__doc__, boards=True)
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help="1000 or more; default %(default)s")
     parser.add_argument("--usual", action="store_true", help="a fifth of the grasps")
     parser.add_argument("--grasps", type=int, metavar="N", help="of each row")
-    parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="folder of the boards' builds; default %(default)s")
     parser.add_argument("--no-emulated", action="store_true", help="without the grasp of two emulated fingertips")
     options = parser.parse_args(argv)
     if options.seed < 1000 or options.seed in CHOSE:
@@ -56,13 +54,10 @@ def main(argv):
         raise InputError("--grasps needs 1 or more")
     if not options.no_emulated:
         emulated_grasp.program(options.build)
-    out = output_folder(options)
+    output_folder(options)
     found = {name: None for name, _, _ in GOALS}
     found = judge(found | measure(options), GOALS)
-    write_json(out / "grasp.json", found)
-    text.write(found, "grasp", out, ("distributions",))
-    grasp_report.draw(found, out / "grasp.png")
-    return finish(found, options, ("grasp.json", "grasp.md", "grasp.png"))
+    return publish(found, options, "grasp", {"grasp.png": lambda path: grasp_report.draw(found, path)}, ("distributions",))
 
 
 if __name__ == "__main__":

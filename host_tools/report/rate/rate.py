@@ -22,12 +22,11 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import grasp_rate  # noqa: E402
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
-import text  # noqa: E402
 from boards import BOARDS, DESCRIPTORS, PARALLEL, short  # noqa: E402
 from emulated import CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
-from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
+from reporting import Steps, option_parser, output_folder, publish, run  # noqa: E402
 
 # What the checks of the images allow each scene.
 LIMITS = json.loads((ROOT / "tests/checks/scene_limits.json").read_text(encoding="utf-8"))
@@ -147,14 +146,14 @@ def figures(runs, resting, rows):
 
 
 def main(argv):
-    parser = option_parser(__doc__)
-    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds; the scenes are built there, too")
+    parser = option_parser(__doc__, boards=True)
     parser.add_argument("--seconds", type=float, default=30, help="emulated, of the longest runs (default: %(default)s)")
     parser.add_argument("--quick", action="store_true", help="OSR 256 and 1024, scenes raw and slip on one board")
     options = parser.parse_args(argv)
     if not 1 <= options.seconds <= 600:
         raise InputError(f"--seconds {options.seconds:g} is out of range; give 1 to 600")
-    tools, out, steps = scenes.SceneTools(options.build, options.boards, "slip"), output_folder(options), Steps()
+    output_folder(options)
+    tools, steps = scenes.SceneTools(options.build, options.boards, "slip"), Steps()
     few = {"scenes": ("raw", "slip"), "boards": BOARDS[:1], "osrs": QUICK_OSRS} if options.quick else {}
     rows = scenes.measure(tools.command_frame, tools.boards / "scenes", steps, **few)
     runs, resting = measure(tools, options, steps)
@@ -165,10 +164,7 @@ def main(argv):
         of_grasp = grasp_rate.figures(grasp)
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
-    write_json(out / "rate.json", found)
-    text.write(found, "rate", out)
-    rate_report.draw(out / "rate.png", found, runs[PARALLEL, 256])
-    return finish(found, options, ("rate.json", "rate.md", "rate.png"))
+    return publish(found, options, "rate", {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])})
 
 
 if __name__ == "__main__":

@@ -29,11 +29,10 @@ import grids  # noqa: E402
 import pace  # noqa: E402
 import real_report  # noqa: E402
 import strips  # noqa: E402
-import text  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from measure import Measure  # noqa: E402
-from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
+from reporting import option_parser, output_folder, publish  # noqa: E402
 
 GOALS = (
     ("raw_inside_p50_mm", "<=", 0.35),
@@ -198,7 +197,8 @@ def main(argv):
     )
     parser.add_argument("--pads", type=int, default=30, help="simulated ones for the run times (default: %(default)s)")
     options = parser.parse_args(argv)
-    out, firmware = output_folder(options), Measure(options.build)
+    output_folder(options)
+    firmware = Measure(options.build)
     sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
     here = found_below(options.folder, sources)
     found, shown = judge_grids(Measure(options.build, "measure_2x4"), sources["grids"], here)
@@ -210,11 +210,11 @@ def main(argv):
     found["missing_recordings"] = ", ".join(missing) or "none"
     found["recordings"] = [{key: source[key] for key in ("repository", "commit", "terms", "what")} for source in sources.values()]
     found = judge(found, GOALS)
-    write_json(out / "real.json", found)
-    text.write(found, "real", out)
-    real_report.draw(found, shown, out / "real.png")
-    real_report.draw_pace(found["pace"], out / "pace.png")
-    return finish(found, options, ("real.json", "real.md", "real.png", "pace.png"))
+    pictures = {
+        "real.png": lambda path: real_report.draw(found, shown, path),
+        "pace.png": lambda path: real_report.draw_pace(found["pace"], path),
+    }
+    return publish(found, options, "real", pictures)
 
 
 if __name__ == "__main__":

@@ -12,18 +12,20 @@ import time
 
 import page
 import text
-from boards import TO_BUILD
+from boards import ROOT, TO_BUILD
 from fingertip.files import InputError, check_output, write_text
 from presentation import judge, missed, print_goals
 
 
-def option_parser(description):
-    """With the options that every report has."""
+def option_parser(description, boards=False):
+    """With the options that every report has; boards: and that of reports with images."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
     parser.add_argument("-o", "--output", required=True, metavar="DIR")
     parser.add_argument("--picture", metavar="FILE.png", help="a second copy of the picture, the first if there are several")
     parser.add_argument("--check", action="store_true", help="exit status 1 if a goal is missed")
+    if boards:
+        parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="folder of the boards' builds; default %(default)s")
     return parser
 
 
@@ -111,6 +113,17 @@ def finish(found, options, files):
     return 1 if options.check and missed(found) else 0
 
 
+def publish(found, options, name, pictures, pictured=()):
+    """Writes NAME.json, NAME.md and the pictures of judged figures, and ends. pictures: {file: draw(path)}; pictured: tables that only they show. Exit
+    status."""
+    out = pathlib.Path(options.output)
+    write_json(out / f"{name}.json", found)
+    text.write(found, name, out, pictured)
+    for file, draw in pictures.items():
+        draw(out / file)
+    return finish(found, options, (f"{name}.json", f"{name}.md", *pictures))
+
+
 def figures_printed(name, command):
     """The JSON that a program prints; its progress goes to stderr as it comes."""
     done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, text=True)
@@ -175,6 +188,4 @@ def report_of_parts(options, name, parts, goals, measure, pages, derive=lambda f
         found |= measure[part](options)
         found = judge({**found, **derive(found, out)}, goals)
         write_json(path, found)  # what is found is kept though a later part fails
-    text.write(found, name, out, pages.PICTURED)
-    pages.draw(found, out / f"{name}.png")
-    return finish(found, options, tuple(f"{name}.{kind}" for kind in ("json", "md", "png")))
+    return publish(found, options, name, {f"{name}.png": lambda path: pages.draw(found, path)}, pages.PICTURED)

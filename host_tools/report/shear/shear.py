@@ -99,9 +99,8 @@ def derived(found, out):
 
 
 def main(argv):
-    parser = option_parser(__doc__)
+    parser = option_parser(__doc__, boards=True)
     parser.add_argument("--seed", type=int, metavar="N")
-    parser.add_argument("--boards", default=ROOT / "build", metavar="DIR", help="folder of the boards' images; default %(default)s")
     parser.add_argument("--pads", type=positive, metavar="N", help="of each case of one touch; default 1500")
     parser.add_argument(
         "--few", action="store_true", help="no rubber of other thicknesses than 12 mm, no other cases of motion than the usual"

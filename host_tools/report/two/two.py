@@ -55,8 +55,7 @@ MEASURE = {"touches": measure_touches, "cycles": measure_cycles}
 
 
 def main(argv):
-    parser = option_parser(__doc__)
-    parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
+    parser = option_parser(__doc__, boards=True)
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--pads", type=positive, metavar="N", help="calibrated pads; default 200")
     add_parts(parser, "two", PARTS)

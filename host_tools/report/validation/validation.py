@@ -23,12 +23,11 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import cards  # noqa: E402
-import text  # noqa: E402
 from fingertip.files import SLIP, InputError, run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
 from presentation import BLUE, FAINT, ORANGE, judge, plt, save  # noqa: E402
 from playing import PAPER_RATE_Hz, PRIOR_WIDTH_mm, STIFF_LAYER_mm, Workshop  # noqa: E402
-from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
+from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
 
 # A saturated or missing sensor is left out: that alone makes no location worse.
 LOCATION_WARNINGS = int(Flag.LOW_SIGNAL | Flag.FLAT | Flag.UNCERTAIN | Flag.MODEL | Flag.AT_BOUND)
@@ -403,8 +402,7 @@ def draw(shown, path):
 
 
 def main(argv):
-    parser = option_parser(__doc__)
-    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
+    parser = option_parser(__doc__, boards=True)
     parser.add_argument("--tables", metavar="DIR", help="cache of the contact tables; default: contact_tables in the output")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
     parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenarios' lengths; default 1")
@@ -434,10 +432,7 @@ def main(argv):
         print("        report cards of simulated pads", flush=True)
         found = cards.measure(pathlib.Path(options.build).resolve(), steps, options.cards)
     found = judge(measure(shop, seconds, emulated) | found, GOALS)
-    write_json(out / "validation.json", found)
-    draw(curves(shop), out / "validation_force.png")
-    text.write(found, "validation", out)
-    return finish(found, options, ("validation.json", "validation.md", "validation_force.png"))
+    return publish(found, options, "validation", {"validation_force.png": lambda path: draw(curves(shop), path)})
 
 
 if __name__ == "__main__":
