@@ -6,7 +6,7 @@
 #include "fit/fit_doubt.h"
 #include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
-#include "support/random.h"
+#include "support/draw.h"
 
 #include <stdbool.h>
 #include <string.h>
@@ -17,16 +17,9 @@
 #define SHAPES_FRAMES (FIT_SHAPES_FRAMES + 2)
 #define ONE_Q16 65536
 
-static struct random presses; /* by integers alone, the same on every machine */
 static struct fit_array layouts[LAYOUTS];
 static struct fit_pad pads[PADS];
 static struct fit_shapes_pad shapes_pad;
-
-/* low..high, both included. */
-static int32_t draw_between(int32_t low, int32_t high) {
-  uint64_t span = (uint64_t)((int64_t)high - low) + 1;
-  return (int32_t)(low + (int64_t)(span * random_u32(&presses) >> 32));
-}
 
 static void stop_unless(enum ft_status status) {
   while (status != FT_OK) {
@@ -61,7 +54,7 @@ void fit_bits_init(void) {
     y_mm[k] = 6.0625f * (float)(k / 5) - 9.0f;
   }
   stop_unless(fit_array_init(&layouts[2], 19, x_mm, y_mm, 7.0f));
-  presses.state = 1;
+  draw_from(1);
   for (int k = 0; k < FT_MAX_SENSORS; k++) { /* anywhere, some of them twice */
     x_mm[k] = k % 8 == 7 ? x_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
     y_mm[k] = k % 8 == 7 ? y_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
@@ -146,8 +139,8 @@ uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
 }
 
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
-  presses.state = UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel;
-  random_u32(&presses);
+  draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
+  draw();
   bool other = (kernel == FIT_BITS_GENERAL && press % 2) || (kernel == FIT_BITS_DOUBT && press % 16 == 1);
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 
@@ -219,7 +212,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
       usable &= ~(UINT32_C(1) << draw_between(0, array->sensor_count - 1));
     }
   } else if (kernel == FIT_BITS_GENERAL && press % 4 < 2) {
-    usable = random_u32(&presses) | random_u32(&presses);
+    usable = draw() | draw();
   }
 
   if (kernel == FIT_BITS_SHAPES) {

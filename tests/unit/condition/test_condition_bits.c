@@ -3,7 +3,7 @@
  * here. */
 #include "common/crc32.h"
 #include "condition/condition.h"
-#include "emulated/fit_bits/draw.h"
+#include "support/draw.h"
 #include "support/golden.h"
 #include "support/unit.h"
 

@@ -6,7 +6,7 @@
 #include "contact/contact.h"
 #include "contact/motion.h"
 #include "contact/tangential.h"
-#include "emulated/fit_bits/draw.h"
+#include "support/draw.h"
 #include "support/golden.h"
 #include "support/unit.h"
 
