@@ -13,7 +13,7 @@ from fingertip import BadValueError, InputError, read_recording, wire  # noqa: E
 from fingertip.line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SETTINGS  # noqa: E402
 from fingertip.lines import shortest  # noqa: E402
 from fingertip.recording import info_metadata  # noqa: E402
-from fingertip.settings import setting_commands  # noqa: E402
+from fingertip.device import setting_commands  # noqa: E402
 
 FLAG_OF = {name: int(field.when[1]) for name, field in wire.layout_of(wire.Contact) if field.when and field.code == "f"}
 CONTACT = (*CONTACT_COLUMNS, *LATER_COLUMNS)

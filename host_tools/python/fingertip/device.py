@@ -2,21 +2,23 @@
 
 import collections
 import contextlib
+import itertools
+import math
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from types import TracebackType
+from typing import Any
 
 from . import discovery, host_time, wire
 from .clock import ClockEstimate, host_now_us
 from .conversation import ANSWER_TIMEOUT_s, Conversation
 from .errors import BadValueError, FingertipError, GoneError, InputError, NoFingertipError, NoFrameError, OtherFingertipError
 from .frames import Block, Edge, Frame
-from .line import Capability, Settable, Streams
+from .line import SETTINGS, Capability, Settable, Setting, Streams
 from .recording import Recorder, RecordingWriter
-from .settings import setting_commands
 from .transport import Transport, open_way
-from .wire import Acknowledgement, Contact, Crash, Health, Info, LineStatistics, Raw, SyncEdge
+from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw, SyncEdge
 
 EXCHANGE_INTERVAL_us = 500_000  # the two clocks are compared so often
 FIRST_EXCHANGES = 8
@@ -28,6 +30,54 @@ EDGES_KEPT = 65536
 def _in_range(name: str, value: float, span: tuple[float, float], unit: str) -> None:
     if not span[0] <= value <= span[1]:  # false for NaN
         raise BadValueError(f"{name} {value:g} is out of range; give {span[0]:g} to {span[1]:g} {unit}")
+
+
+Given = Mapping[str, float | str | None]
+
+
+def _number(setting: Setting, value: float | str | None) -> float | None:
+    """Of what is given, which may be a word."""
+    if value is None or not setting.words:
+        assert not isinstance(value, str)
+        return value
+    if value not in setting.words:
+        raise BadValueError(f"{setting.argument} {value!r} is unknown; give {setting.give}")
+    return (*setting.choices, 0)[setting.words.index(str(value))]
+
+
+def _wanted(setting: Setting, given: Given, now: Info) -> float:
+    """What is given, else its default, else as it is now."""
+    value = _number(setting, given[setting.argument])
+    if value is not None and setting.needs and given[setting.needs] is None:
+        raise BadValueError(f"{setting.argument} needs {setting.needs}")
+    if value is None and setting.default is not None:
+        return 0.0 if given[setting.needs] == 0 else setting.default
+    if value is None:
+        value = getattr(now, setting.info)
+        if value is None or math.isnan(value):
+            raise BadValueError(f"firmware of scene {now.scene} knows no {setting.of}")
+        value /= setting.per
+    return value
+
+
+def setting_commands(given: Given, now: Info) -> list[Body]:
+    """Of the arguments of Fingertip.set; None: not given. Raises BadValueError."""
+    commands: list[Body] = []
+    for command, group in itertools.groupby(SETTINGS, lambda setting: setting.command):
+        settings = list(group)
+        if all(given[setting.argument] is None for setting in settings):
+            continue
+        values = [_wanted(setting, given, now) for setting in settings]
+        zeros = not any(values)
+        for setting, value in zip(settings, values, strict=True):
+            in_range = setting.least <= value <= setting.most and (not setting.choices or value in setting.choices)  # NaN is in no range
+            if not in_range and not (zeros and setting.zero):
+                raise BadValueError(f"{setting.argument} {value:g} is out of range; give {setting.give}")
+        fields: dict[str, Any] = {
+            setting.field: round(value * setting.per) if setting.whole else value for setting, value in zip(settings, values, strict=True)
+        }
+        commands.append(command(**fields))
+    return commands
 
 
 class Fingertip(Settable):

@@ -30,6 +30,7 @@ without contact belong to neither.
 """
 
 import argparse
+import functools
 import json
 import sys
 
@@ -183,6 +184,5 @@ def main(argv):
     return 0
 
 
-def command():
-    """The console command fingertip-evaluate."""
-    return run_tool("fingertip-evaluate", main)
+command = functools.partial(run_tool, "fingertip-evaluate", main)
+"""The console command."""

@@ -9,6 +9,7 @@ Fast DDS and rosbags; not run against ROS 2.
 """
 
 import argparse
+import functools
 import math
 import os
 import sys
@@ -235,9 +236,8 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def command() -> int:
-    """The console command fingertip-ros2."""
-    return run_tool("fingertip-ros2", main)
+command = functools.partial(run_tool, "fingertip-ros2", main)
+"""The console command."""
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ give the same bytes. The file format is described in files.py.
 """
 
 import argparse
+import functools
 
 import numpy as np
 
@@ -176,6 +177,5 @@ def main(argv):
     return 0
 
 
-def command():
-    """The console command fingertip-scenario."""
-    return run_tool("fingertip-scenario", main)
+command = functools.partial(run_tool, "fingertip-scenario", main)
+"""The console command."""
