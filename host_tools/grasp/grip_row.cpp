@@ -102,11 +102,7 @@ const std::vector<Column> &columns() {
 } // namespace
 
 std::string grip_columns() {
-  std::string text;
-  for (const Column &column : columns()) {
-    text += (text.empty() ? "" : ",") + std::string(column.name);
-  }
-  return text;
+  return joined(columns(), ",", [](const Column &column) { return column.name; });
 }
 
 std::string grip_cells(const GripRow &row) {

@@ -81,14 +81,13 @@ std::map<std::string, double> breaking_values(double breaks_N) {
 }
 
 std::map<std::string, double> preset_values(const std::string &preset) {
-  std::string names;
   for (const GraspPreset &one : grasp_presets()) {
     if (preset == one.name) {
       return breaking_values(one.breaks_N);
     }
-    names += std::string(names.empty() ? "" : ", ") + one.name;
   }
-  impossible("no preset " + printable(preset) + "; there are " + names);
+  impossible("no preset " + printable(preset) + "; there are " +
+             joined(grasp_presets(), ", ", [](const GraspPreset &one) { return one.name; }));
 }
 
 GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted) {

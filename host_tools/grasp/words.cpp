@@ -71,13 +71,7 @@ bool is_end_state(std::uint8_t state) {
 }
 
 std::string trouble_names(std::uint32_t trouble) {
-  std::string names;
-  for (const Trouble &each : TROUBLES) {
-    if ((trouble & each.bit) != 0) {
-      names += (names.empty() ? "" : " ") + std::string(each.name);
-    }
-  }
-  return names;
+  return joined(TROUBLES, " ", [&](const Trouble &each) { return (trouble & each.bit) != 0 ? each.name : ""; });
 }
 
 std::optional<std::uint32_t> trouble_of_names(std::string_view names) {

@@ -80,12 +80,8 @@ constexpr Advice GRIPPER_ADVICE[] = {
 
 template <std::size_t count>
 std::string advice_in(const Advice (&all)[count], ErrorCode code, const std::string &otherwise) {
-  for (const Advice &each : all) {
-    if (each.code == code) {
-      return each.text;
-    }
-  }
-  return otherwise;
+  const Advice *found = find_in(all, [&](const Advice &each) { return each.code == code; });
+  return found ? found->text : otherwise;
 }
 
 } // namespace

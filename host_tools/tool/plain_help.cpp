@@ -73,11 +73,7 @@ Values values_of(const CLI::Option &option) {
 }
 
 std::string names_of(const std::set<CLI::Option *> &options) {
-  std::string names;
-  for (const CLI::Option *option : options) {
-    names += (names.empty() ? "" : ", ") + option->get_name();
-  }
-  return names;
+  return joined(options, ", ", [](const CLI::Option *option) { return option->get_name(); });
 }
 
 /* No word is cut by a terminal of 80 columns; ranges, defaults and what excludes what in words. */
@@ -112,10 +108,7 @@ public:
     if (!option->get_excludes().empty()) {
       more.push_back("not with " + names_of(option->get_excludes()));
     }
-    for (std::size_t i = 0; i < more.size(); i++) {
-      text += (i ? "; " : " (") + more[i];
-    }
-    return text + (more.empty() ? "" : ")");
+    return text + (more.empty() ? "" : " (" + joined(more, "; ") + ")");
   }
 
   std::string make_help(const CLI::App *app, std::string name, CLI::AppFormatMode mode) const override {

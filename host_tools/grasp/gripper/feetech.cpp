@@ -3,6 +3,7 @@
 #include "grasp/gripper/common.hpp"
 #include "grasp/gripper/feetech_table.hpp"
 #include "libfingertip/clock.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -275,12 +276,7 @@ std::string FeetechGripper::fault_text(std::uint8_t fault) const {
     const char *text;
   } TEXTS[] = {{VOLTAGE, "voltage out of its range"}, {SENSOR, "position sensor fails"}, {TEMPERATURE, "too hot"},
                {CURRENT, "too much current"},         {ANGLE, "angle out of its range"}, {OVERLOAD, "overloaded"}};
-  std::string text;
-  for (const auto &entry : TEXTS) {
-    if (fault & entry.bit) {
-      text += (text.empty() ? "" : ", ") + std::string(entry.text);
-    }
-  }
+  const std::string text = joined(TEXTS, ", ", [&](const auto &entry) { return fault & entry.bit ? entry.text : ""; });
   return text.empty() && fault != 0 ? "a fault that its memory table does not have" : text;
 }
 

@@ -79,11 +79,7 @@ std::vector<GripperTraits> gripper_models() {
 }
 
 std::string gripper_model_names() {
-  std::string names;
-  for (const Model &model : models()) {
-    names += (names.empty() ? "" : ", ") + model.traits.model;
-  }
-  return names;
+  return joined(models(), ", ", [](const Model &model) { return model.traits.model; });
 }
 
 const GripperTraits &gripper_traits(const std::string &model) { return model_of(model).traits; }

@@ -78,15 +78,6 @@ void put(wire_packet &command, const Setting &setting, const SettingValues &valu
   }
 }
 
-const Setting *find_setting(const std::string &name) {
-  for (const Setting &setting : all_settings) {
-    if (name == setting.name) {
-      return &setting;
-    }
-  }
-  return nullptr;
-}
-
 /* In units of the packet, not yet rounded. */
 std::optional<double> number_of(const SettingValue &value, const std::string &text) {
   if (value.words) {
@@ -201,15 +192,12 @@ wire_packet command_erase_pad() { return packet_of(WIRE_CMD_ERASE_PAD); }
 
 WantedSetting setting_from_text(const std::string &text) {
   const std::size_t equals = text.find('=');
-  const Setting *setting = find_setting(text.substr(0, equals));
+  const Setting *setting =
+      find_in(all_settings, [&](const Setting &each) { return text.substr(0, equals) == each.name; });
   if (!setting) {
-    std::string known;
-    for (const Setting &each : all_settings) {
-      known += (known.empty()                         ? ""
-                : &each == std::end(all_settings) - 1 ? " or "
-                                                      : ", ") +
-               std::string(each.name) + "=" + each.typed;
-    }
+    std::string known =
+        joined(all_settings, ", ", [](const Setting &each) { return std::string(each.name) + "=" + each.typed; });
+    known.replace(known.rfind(", "), 2, " or ");
     throw Error("setting \"" + text + "\" is unknown; give " + known);
   }
   return {setting, values_from_text(*setting, equals == std::string::npos ? "" : text.substr(equals + 1))};
@@ -259,11 +247,7 @@ std::string settings_text(const wire_info &info) {
 }
 
 std::string settings_help() {
-  std::string text;
-  for (const Setting &setting : all_settings) {
-    text += (text.empty() ? "" : ", ") + std::string(setting.help);
-  }
-  return text;
+  return joined(all_settings, ", ", [](const Setting &setting) { return setting.help; });
 }
 
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet) {

@@ -4,6 +4,7 @@
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/serial_transport.hpp"
 #include "libfingertip/share_socket.hpp"
+#include "libfingertip/text.hpp"
 #include "libfingertip/usb_transport.hpp"
 
 #include <algorithm>
@@ -16,9 +17,7 @@ namespace {
 constexpr Session::Policy QUICK = {std::chrono::milliseconds(400), 3};
 
 const Found *with_serial(const std::vector<Found> &found, const std::string &serial) {
-  auto at =
-      std::find_if(found.begin(), found.end(), [&](const Found &each) { return is_same_serial(each.serial, serial); });
-  return at == found.end() ? nullptr : &*at;
+  return find_in(found, [&](const Found &each) { return is_same_serial(each.serial, serial); });
 }
 
 /* Of the fingertip there. */
@@ -60,11 +59,9 @@ Way only_one(const std::vector<Found> &found, Reach reach, const std::string &ro
     throw Error(ErrorCode::no_fingertip, none);
   }
   if (found.size() > 1) {
-    std::string names;
-    for (const Found &each : found) {
-      names += (names.empty() ? "" : ", ") + name_of(each, reach, root);
-    }
-    throw Error(ErrorCode::several_fingertips, "several fingertips found: " + names);
+    throw Error(ErrorCode::several_fingertips,
+                "several fingertips found: " +
+                    joined(found, ", ", [&](const Found &each) { return name_of(each, reach, root); }));
   }
   return sure_way_to(found[0], reach);
 }

@@ -1,32 +1,24 @@
 #include "libfingertip/decoder.hpp"
 
-#include <utility>
+#include "libfingertip/text.hpp"
 
 namespace fingertip {
 
-namespace {
-
-constexpr std::pair<std::string_view, std::uint64_t LineStatistics::*> COUNTS[] = {
-    {"packets", &LineStatistics::packets},
-    {"dropped_packets", &LineStatistics::dropped_packets},
-    {"out_of_order", &LineStatistics::out_of_order},
-    {"crc_errors", &LineStatistics::crc_errors},
-    {"format_errors", &LineStatistics::format_errors},
-    {"version_errors", &LineStatistics::version_errors},
-    {"unknown_types", &LineStatistics::unknown_types}};
-
-} // namespace
+const std::array<LineStatistics::Named, 7> LineStatistics::counts = {
+    {{"packets", &LineStatistics::packets},
+     {"dropped_packets", &LineStatistics::dropped_packets},
+     {"out_of_order", &LineStatistics::out_of_order},
+     {"crc_errors", &LineStatistics::crc_errors},
+     {"format_errors", &LineStatistics::format_errors},
+     {"version_errors", &LineStatistics::version_errors},
+     {"unknown_types", &LineStatistics::unknown_types}}};
 
 std::string LineStatistics::text() const {
-  std::string all;
-  for (const auto &[name, count] : COUNTS) {
-    all += (all.empty() ? "" : " ") + std::string(name) + "=" + std::to_string(this->*count);
-  }
-  return all;
+  return joined(counts, " ", [&](const Named &each) { return each.name + ("=" + std::to_string(this->*each.count)); });
 }
 
 bool LineStatistics::set(std::string_view key, std::uint64_t value) {
-  for (const auto &[name, count] : COUNTS) {
+  for (const auto &[name, count] : counts) {
     if (name == key) {
       this->*count = value;
       return true;
@@ -37,10 +29,19 @@ bool LineStatistics::set(std::string_view key, std::uint64_t value) {
 
 LineStatistics &LineStatistics::operator+=(const LineStatistics &other) {
   bytes += other.bytes;
-  for (const auto &[name, count] : COUNTS) {
+  for (const auto &[name, count] : counts) {
     this->*count += other.*count;
   }
   return *this;
+}
+
+LineStatistics LineStatistics::operator-(const LineStatistics &before) const {
+  LineStatistics now = *this;
+  now.bytes -= before.bytes;
+  for (const auto &[name, count] : counts) {
+    now.*count -= before.*count;
+  }
+  return now;
 }
 
 Decoder::Decoder() { wire_receiver_init(&receiver_, wire_all_layouts); }

@@ -6,6 +6,7 @@
 
 #include "libfingertip/wire.hpp"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -26,12 +27,20 @@ struct LineStatistics {
   std::uint64_t version_errors = 0;
   std::uint64_t unknown_types = 0; /* undamaged, from a newer firmware */
 
+  /* All but bytes, by their names. */
+  struct Named {
+    const char *name;
+    std::uint64_t LineStatistics::*count;
+  };
+  static const std::array<Named, 7> counts;
+
   /* "packets=7 dropped_packets=0 ...", as recordings end with. */
   std::string text() const;
   /* Takes one of these; false if it is none. */
   bool set(std::string_view key, std::uint64_t value);
 
   LineStatistics &operator+=(const LineStatistics &other);
+  LineStatistics operator-(const LineStatistics &before) const;
 };
 
 /* Packet loss, by the sequence numbers. */

@@ -245,7 +245,7 @@ void DeviceLoop::take(const wire_packet &packet) {
   DeviceNews news{Kind::packet, number_};
   news.packet = packet;
   news.host_us = fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
-  if (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW) {
+  if (is_frame(packet)) {
     last_frame_ = host_now();
   }
   auto until_us = std::clamp(static_cast<std::int64_t>(news.host_us), now_us - LONGEST_BACKLOG_us, now_us);

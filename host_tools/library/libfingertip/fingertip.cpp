@@ -45,8 +45,7 @@ static_assert(all_fit());
 thread_local std::string last_error;
 
 const Packet *find(std::uint8_t type) {
-  auto at = std::find_if(std::begin(packets), std::end(packets), [&](const Packet &each) { return each.type == type; });
-  return at == std::end(packets) ? nullptr : at;
+  return find_in(packets, [&](const Packet &each) { return each.type == type; });
 }
 
 /* Calls with a number of the kind's type. */
@@ -143,25 +142,21 @@ void put(const wire_packet &packet, double *values) {
   }
 }
 
-namespace {
-
-constexpr std::uint64_t LineStatistics::*counted[FINGERTIP_COUNTS] = {
-    &LineStatistics::bytes,          &LineStatistics::packets,      &LineStatistics::dropped_packets,
-    &LineStatistics::out_of_order,   &LineStatistics::crc_errors,   &LineStatistics::format_errors,
-    &LineStatistics::version_errors, &LineStatistics::unknown_types};
-
-} // namespace
+static_assert(std::tuple_size_v<decltype(LineStatistics::counts)> == FINGERTIP_COUNTS - 1); /* in the same order */
 
 void put(const LineStatistics &statistics, double counts[FINGERTIP_COUNTS]) {
-  for (std::size_t i = 0; i < FINGERTIP_COUNTS; i++) {
-    counts[i] = static_cast<double>(statistics.*counted[i]);
+  *counts = static_cast<double>(statistics.bytes);
+  for (const auto &[name, count] : LineStatistics::counts) {
+    *++counts = static_cast<double>(statistics.*count);
   }
 }
 
 LineStatistics statistics_of(const double counts[FINGERTIP_COUNTS]) {
+  const auto whole = [](double count) { return count > 0 ? static_cast<std::uint64_t>(count) : 0; };
   LineStatistics statistics;
-  for (std::size_t i = 0; i < FINGERTIP_COUNTS; i++) {
-    statistics.*counted[i] = counts[i] > 0 ? static_cast<std::uint64_t>(counts[i]) : 0;
+  statistics.bytes = whole(*counts);
+  for (const auto &[name, count] : LineStatistics::counts) {
+    statistics.*count = whole(*++counts);
   }
   return statistics;
 }
@@ -183,9 +178,8 @@ fingertip_status failed(const Error &error) {
       {ErrorCode::not_firmware, FINGERTIP_ERR_FIRMWARE},
       {ErrorCode::other_chip, FINGERTIP_ERR_FIRMWARE},
       {ErrorCode::damaged_firmware, FINGERTIP_ERR_FIRMWARE}};
-  const auto at = std::find_if(std::begin(STATUSES), std::end(STATUSES),
-                               [&](const auto &each) { return each.first == error.code(); });
-  return failed(at == std::end(STATUSES) ? FINGERTIP_ERR_OTHER : at->second, error.what());
+  const auto *found = find_in(STATUSES, [&](const auto &each) { return each.first == error.code(); });
+  return failed(found ? found->second : FINGERTIP_ERR_OTHER, error.what());
 }
 
 std::size_t put_text(const std::string &from, char *text, std::size_t size) {

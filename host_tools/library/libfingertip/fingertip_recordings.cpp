@@ -121,12 +121,6 @@ std::vector<wire_info> infos_of(const double *infos, std::size_t devices) {
   return all;
 }
 
-/* Whether the fingertip sends both packets of a frame. */
-bool sends_both(const wire_info &info) {
-  constexpr std::uint32_t BOTH = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_RAW_STREAM;
-  return (info.capabilities & BOTH) == BOTH;
-}
-
 } // namespace
 
 struct fingertip_reader {
@@ -194,7 +188,7 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, str
     }
     reader->waiting.reset();
     reader->event = next->event;
-    const bool is_row = !is_event && (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW);
+    const bool is_row = !is_event && is_frame(packet);
     item->time_us = is_row ? next->time_us.value_or(static_cast<double>(packet.t_us)) : static_cast<double>(NAN);
     item->device = next->device;
     item->type = is_event ? 0 : packet.type;

@@ -85,21 +85,17 @@ std::optional<std::pair<std::string, std::string>> key_and_value(const std::stri
 }
 
 void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
-  auto found = std::find_if(pairs.begin(), pairs.end(), [&](const auto &pair) { return pair.first == key; });
-  if (found == pairs.end()) {
-    pairs.emplace_back(key, value);
-  } else {
+  if (auto *found = find_in(pairs, [&](const auto &pair) { return pair.first == key; })) {
     found->second = value;
+  } else {
+    pairs.emplace_back(key, value);
   }
 }
 
 std::string json(const std::string &serial, const mcap::Pairs &pairs) {
   std::string text = "{\"serial\": \"" + serial + "\"";
   for (const auto &[key, value] : pairs) {
-    std::string numbers;
-    for (std::string_view word : split(value, ' ')) {
-      numbers += (numbers.empty() ? "" : ", ") + std::string(word);
-    }
+    const std::string numbers = joined(split(value, ' '), ", ");
     text += ", \"" + key + "\": " + (is_list(key) ? "[" + numbers + "]" : value);
   }
   return text + "}";
@@ -212,8 +208,8 @@ void McapLineSink::begin() {
     }
   }
   auto value = [&](const char *key) {
-    auto found = std::find_if(keys.begin(), keys.end(), [&](const auto &pair) { return pair.first == key; });
-    return found == keys.end() ? std::string() : found->second;
+    const auto *found = find_in(keys, [&](const auto &pair) { return pair.first == key; });
+    return found ? found->second : std::string();
   };
   joint_ = head[0].first == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
   const std::string serials = value(joint_ ? "devices" : "serial");

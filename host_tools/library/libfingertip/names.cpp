@@ -26,41 +26,28 @@ std::uint32_t warning_flags() {
 }
 
 std::string flags_text(std::uint32_t flags) {
-  std::string text;
-  auto add = [&](const std::string &name) { text += (text.empty() ? "" : " ") + name; };
+  std::vector<std::string> names;
   for (const FlagName &flag : flag_names()) {
-    if (flags & flag.bit) {
-      add(flag.name);
-      flags &= ~flag.bit;
-    }
+    names.emplace_back(flags & flag.bit ? flag.name : "");
+    flags &= ~flag.bit;
   }
   for (int bit = 0; bit < 32; bit++) {
-    if (flags >> bit & 1u) {
-      add("bit" + std::to_string(bit));
-    }
+    names.push_back(flags >> bit & 1u ? "bit" + std::to_string(bit) : "");
   }
-  return text;
+  return joined(names, " ");
 }
 
 namespace {
 
 template <std::size_t count> const char *word_of(const words::Word (&all)[count], std::uint32_t value) {
-  for (const words::Word &each : all) {
-    if (each.value == value) {
-      return each.word;
-    }
-  }
-  return nullptr;
+  const auto *found = find_in(all, [&](const words::Word &each) { return each.value == value; });
+  return found ? found->word : nullptr;
 }
 
 template <std::size_t count>
 std::string bits_text(const words::Word (&all)[count], std::uint32_t bits, const char *none) {
-  std::string text;
-  for (const words::Word &each : all) {
-    if (bits & each.value) {
-      text += (text.empty() ? "" : ",") + std::string(each.word);
-    }
-  }
+  const std::string text =
+      joined(all, ",", [&](const words::Word &each) { return bits & each.value ? each.word : ""; });
   return text.empty() ? none : text;
 }
 

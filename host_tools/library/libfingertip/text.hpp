@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,30 @@ std::optional<std::int64_t> to_i64(std::string_view text);
 /* Empty parts are kept: "a,,b" has three. */
 std::vector<std::string_view> split(std::string_view text, char separator);
 std::string_view trim(std::string_view text);
+/* The first for which is_it holds, else nullptr. */
+template <typename Range, typename IsIt>
+auto find_in(Range &range, const IsIt &is_it) -> decltype(&*std::begin(range)) {
+  for (auto &each : range) {
+    if (is_it(each)) {
+      return &each;
+    }
+  }
+  return nullptr;
+}
+
+struct AsText {
+  template <typename Text> std::string operator()(const Text &text) const { return std::string(text); }
+};
+/* What text_of makes of each, with the separator between; what is empty is left out. */
+template <typename Range, typename TextOf = AsText>
+std::string joined(const Range &range, const char *separator, const TextOf &text_of = {}) {
+  std::string all;
+  for (const auto &each : range) {
+    const std::string text = text_of(each);
+    all += (all.empty() || text.empty() ? "" : separator) + text;
+  }
+  return all;
+}
 /* For names that others chose, in one line and harmless to a terminal: control characters, and
  * what is no UTF-8, as \x1b. */
 std::string printable(std::string_view text);

@@ -4,7 +4,6 @@
 #include "libfingertip/in_parallel.hpp"
 #include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
-#include "library/pad/thickness.hpp"
 #include "report/measure/entry.hpp"
 #include "report/measure/tables.hpp"
 

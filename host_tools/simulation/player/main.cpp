@@ -6,7 +6,6 @@
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
-#include "library/pad/thickness.hpp"
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/repeat.h"
 #include "simulation/player/scenario.hpp"

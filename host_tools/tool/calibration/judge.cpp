@@ -81,11 +81,7 @@ double spread_of(const Solution &solution) {
 std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
 
 std::string list_of(const std::vector<std::size_t> &sensors) {
-  std::string text;
-  for (std::size_t k : sensors) {
-    text += (text.empty() ? "" : " ") + std::to_string(k);
-  }
-  return text;
+  return joined(sensors, " ", [](std::size_t k) { return std::to_string(k); });
 }
 
 std::string too_little_load(const std::vector<std::size_t> &sensors) {

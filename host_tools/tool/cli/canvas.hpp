@@ -1,6 +1,8 @@
 /* A grid of coloured character cells. */
 #pragma once
 
+#include "libfingertip/text.hpp"
+
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -66,5 +68,26 @@ std::string first_columns(std::string_view text, int columns);
 
 /* Between two colours, 0 to 1. */
 Colour mix(Colour a, Colour b, float part);
+
+/* Colours and shapes that the parts of a screen share. */
+inline constexpr Colour INK = {222, 222, 228};
+inline constexpr Colour FAINT = {128, 130, 145};
+inline constexpr Colour RULE = {66, 68, 84};
+inline constexpr Colour BAR = {32, 34, 50};
+inline constexpr Colour PAD = {16, 16, 28};
+inline constexpr Colour WHITE = {255, 255, 255};
+inline constexpr Colour BLACK = {0, 0, 0};
+inline constexpr Colour GOOD = {92, 214, 140};
+inline constexpr Colour WARNING = {250, 190, 60};
+inline constexpr Colour BAD = {255, 84, 84};
+inline constexpr Colour ACCENT = {96, 190, 255};
+
+constexpr Style text_style(Colour colour, bool bold = false) { return {colour, std::nullopt, bold}; }
+
+struct Area {
+  int left, top, width, height;
+};
+
+inline std::string number(float value, int digits) { return fixed(static_cast<double>(value), digits); }
 
 } // namespace fingertip

@@ -67,11 +67,11 @@ CLI::App *CommandLine::add(const std::string &name, const std::string &text, std
 }
 
 int CommandLine::run(int argc, char **argv) {
-  std::string commands, meant;
+  std::string meant;
   bool is_known = false;
   std::size_t nearest = argc > 1 ? letters_mistyped(std::string(argv[1]).size()) + 1 : 0;
-  for (const CLI::App *command : app_.get_subcommands([](const CLI::App *) { return true; })) {
-    commands += (commands.empty() ? "" : ", ") + command->get_name();
+  const auto commands = app_.get_subcommands([](const CLI::App *) { return true; });
+  for (const CLI::App *command : commands) {
     const std::size_t apart = argc > 1 ? letters_apart(argv[1], command->get_name()) : nearest;
     is_known = is_known || apart == 0;
     if (apart < nearest) {
@@ -83,8 +83,9 @@ int CommandLine::run(int argc, char **argv) {
     if (!meant.empty()) {
       throw WrongUsage("\"" + std::string(argv[1]) + "\" is no command; is " + meant + " meant? see fingertip --help");
     }
-    throw WrongUsage((argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") +
-                     "; give one of " + commands + "; see fingertip --help");
+    throw WrongUsage(
+        (argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") + "; give one of " +
+        joined(commands, ", ", [](const CLI::App *command) { return command->get_name(); }) + "; see fingertip --help");
   }
   try {
     app_.parse(argc, argv);
@@ -106,16 +107,14 @@ void with_transport(CLI::App *command, Reach &reach) {
 }
 
 void with_port_only(CLI::App *command, Choice &choice) {
-  command
-      ->add_option("--port", choice.port,
-                   "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in")
-      ->type_name("PATH");
+  with_value(command, "PATH", "--port", choice.port,
+             "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in");
   with_transport(command, choice.reach);
 }
 
 void with_port(CLI::App *command, Choice &choice) {
-  command->add_option("--device", choice.device, "Serial number of the fingertip; default: the only one there is")
-      ->type_name("SERIAL");
+  with_value(command, "SERIAL", "--device", choice.device,
+             "Serial number of the fingertip; default: the only one there is");
   with_port_only(command, choice);
 }
 

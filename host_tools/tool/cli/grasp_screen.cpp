@@ -187,9 +187,9 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
   if (!has_room_for_charts(area)) {
     return;
   }
-  using Sample = GripModel::Sample;
+  using Shown = GripModel::Sample;
   float force_N = 1, load_N = 0.5f, width_mm = 10;
-  std::vector<Curve> forces = {grip_curve(grip, &Sample::controlled, &Sample::wanted_N, INK)};
+  std::vector<Curve> forces = {grip_curve(grip, &Shown::controlled, &Shown::wanted_N, INK)};
   for (std::size_t i = 0; i < fingertips.size() && i < 2; i++) {
     Curve curve = force_curve(fingertips[i]);
     curve.colour = i == 0 ? LEFT : RIGHT;
@@ -200,25 +200,21 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
     forces.push_back(std::move(curve));
   }
   each_shown(area, grip.samples().last(), [&](std::int64_t interval) {
-    const Sample &sample = grip.samples()[interval];
+    const Shown &sample = grip.samples()[interval];
     force_N = sample.controlled ? std::max(force_N, sample.wanted_N) : force_N;
     load_N = sample.loaded ? std::max(load_N, sample.load_N) : load_N;
     width_mm = sample.answered ? std::max(width_mm, sample.width_mm) : width_mm;
   });
-  draw_charts(canvas, area,
-              {{"force", "N", 0, round_above(force_N), std::nullopt, std::move(forces)},
-               {"load",
-                "N",
-                0,
-                round_above(load_N),
-                std::nullopt,
-                {grip_curve(grip, &Sample::loaded, &Sample::load_N, ACCENT)}},
-               {"width",
-                "mm",
-                0,
-                round_above(width_mm),
-                std::nullopt,
-                {grip_curve(grip, &Sample::answered, &Sample::width_mm, ACCENT)}}});
+  draw_charts(
+      canvas, area,
+      {{"force", "N", 0, round_above(force_N), std::nullopt, std::move(forces)},
+       {"load", "N", 0, round_above(load_N), std::nullopt, {grip_curve(grip, &Shown::loaded, &Shown::load_N, ACCENT)}},
+       {"width",
+        "mm",
+        0,
+        round_above(width_mm),
+        std::nullopt,
+        {grip_curve(grip, &Shown::answered, &Shown::width_mm, ACCENT)}}});
 }
 
 } // namespace

@@ -24,15 +24,12 @@ std::string only_port() {
 } // namespace
 
 void with_gripper_line(CLI::App *command, GripperWay &way) {
-  command->add_option("--slave", way.slave, "Its address on the line; default: 9, of a servo 6")->type_name("N");
-  command
-      ->add_option("--closed", way.closed_count,
-                   "Position that it reports when its pads touch; default: 230, of a servo 2048")
-      ->type_name("COUNT");
-  command->add_option("--open", way.open_count, "Position that it reports when it is open; default: 3, of a servo 2700")
-      ->type_name("COUNT");
-  command->add_option("--jaw", way.jaw_mm, "Of a servo: from its axis to the middle of the pad; default: 100 mm")
-      ->type_name("MM");
+  with_value(command, "N", "--slave", way.slave, "Its address on the line; default: 9, of a servo 6");
+  with_value(command, "COUNT", "--closed", way.closed_count,
+             "Position that it reports when its pads touch; default: 230, of a servo 2048");
+  with_value(command, "COUNT", "--open", way.open_count,
+             "Position that it reports when it is open; default: 3, of a servo 2700");
+  with_value(command, "MM", "--jaw", way.jaw_mm, "Of a servo: from its axis to the middle of the pad; default: 100 mm");
   command
       ->add_option_function<double>(
           "--timeout", [&way](double timeout_ms) { way.timeout_s = timeout_ms / 1000; },

@@ -10,12 +10,6 @@ namespace fingertip {
 
 namespace {
 
-/* A raw packet follows each contact packet. */
-bool raw_expected(const wire_info &info) {
-  constexpr std::uint32_t can_both = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_RAW_STREAM;
-  return (info.capabilities & can_both) == can_both;
-}
-
 RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready,
                           const std::string &port, std::int64_t host_zero_us, const Metadata &extra) {
   Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
@@ -23,7 +17,7 @@ RecordingWriter writer_of(const std::string &path, bool overwrite, const std::ve
   for (const DeviceNews &each : ready) {
     infos.push_back(each.packet.body.info);
   }
-  const bool both = raw_expected(infos[0]);
+  const bool both = sends_both(infos[0]);
   auto lines = make_lines(path, overwrite,
                           path == STDOUT_NAME ? OutputFile::Appears::on_standard_output : OutputFile::Appears::at_once);
   if (ready.size() > 1) {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "tool/cli/canvas.hpp"
-#include "tool/cli/grip_model.hpp"
+#include "tool/cli/model.hpp"
 
 #include <vector>
 

@@ -13,11 +13,9 @@ namespace fingertip {
 std::string sensors_text(std::uint32_t sensors) {
   std::string text;
   for (int k = 0; k < FT_MAX_SENSORS; k++) {
-    if (sensors >> k & 1u) {
-      text += (text.empty() ? "" : " ") + std::to_string(k);
-    }
+    text += sensors >> k & 1u ? " " + std::to_string(k) : "";
   }
-  return text;
+  return std::string(trim(text));
 }
 
 std::uint32_t missing_sensors(std::uint32_t present, std::uint8_t sensor_count) {
@@ -35,8 +33,8 @@ std::string present_text(std::uint32_t present, std::uint8_t sensor_count) {
 std::string rate_text(std::uint32_t rate_mHz) { return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max"; }
 
 std::string value_of(const Metadata &pairs, const std::string &key) {
-  const auto pair = std::find_if(pairs.begin(), pairs.end(), [&](const auto &each) { return each.first == key; });
-  return pair == pairs.end() ? "" : pair->second;
+  const auto *pair = find_in(pairs, [&](const auto &each) { return each.first == key; });
+  return pair ? pair->second : "";
 }
 
 std::string date_text(std::uint32_t date_s) {

@@ -45,23 +45,20 @@ public:
         pixels_(static_cast<std::size_t>(columns()) * static_cast<std::size_t>(rows()) * 2, PAD) {}
 
   int cells_of(float mm) const { return static_cast<int>(mm / pixel_mm()); }
-  Colour *pixel(int column, int pixel_row) {
-    if (column < 0 || column >= columns() || pixel_row < 0 || pixel_row >= 2 * rows()) {
-      return nullptr;
-    }
-    return &pixels_[static_cast<std::size_t>(pixel_row) * static_cast<std::size_t>(columns()) +
-                    static_cast<std::size_t>(column)];
+  Colour &pixel(int column, int pixel_row) {
+    return pixels_[static_cast<std::size_t>(pixel_row) * static_cast<std::size_t>(columns()) +
+                   static_cast<std::size_t>(column)];
   }
   void paint(int column, int pixel_row, Colour colour, float part) {
-    if (Colour *at = pixel(column, pixel_row)) {
-      *at = mix(*at, colour, part);
+    if (column >= 0 && column < columns() && pixel_row >= 0 && pixel_row < 2 * rows()) {
+      pixel(column, pixel_row) = mix(pixel(column, pixel_row), colour, part);
     }
   }
   /* Every pixel and its location. */
   template <typename Paint> void each(Paint &&paint) {
     for (int row = 0; row < 2 * rows(); row++) {
       for (int column = 0; column < columns(); column++) {
-        Colour &at = *pixel(column, row);
+        Colour &at = pixel(column, row);
         at = paint(at, x_mm(column), y_mm(row));
       }
     }
@@ -187,7 +184,7 @@ struct Mark {
 void draw_picture(Canvas &canvas, Picture &picture, int left, int top) {
   for (int row = 0; row < picture.rows(); row++) {
     for (int column = 0; column < picture.columns(); column++) {
-      canvas.halves(left + column, top + row, *picture.pixel(column, 2 * row), *picture.pixel(column, 2 * row + 1));
+      canvas.halves(left + column, top + row, picture.pixel(column, 2 * row), picture.pixel(column, 2 * row + 1));
     }
   }
 }

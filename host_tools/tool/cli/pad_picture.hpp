@@ -2,7 +2,7 @@
  * number, its measured and its fitted pressure, and the tangential force as an arrow. */
 #pragma once
 
-#include "tool/cli/ink.hpp"
+#include "tool/cli/canvas.hpp"
 #include "tool/cli/model.hpp"
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "tool/cli/canvas.hpp"
-#include "tool/cli/ink.hpp"
 #include "tool/cli/model.hpp"
 
 #include <optional>

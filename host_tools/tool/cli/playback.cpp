@@ -18,8 +18,6 @@ constexpr double SHORT_WAY_us = 5e6, LONG_WAY_us = 60e6;
 constexpr double MARKS_us = 10e6;
 constexpr double END = std::numeric_limits<double>::infinity();
 
-bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
-
 std::optional<double> time_of(const PacketFile::Item &item, FrameClock &clock) {
   if (item.kind != PacketFile::Item::Kind::packet || !is_frame(item.packet)) {
     return std::nullopt;

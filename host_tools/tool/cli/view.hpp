@@ -9,8 +9,19 @@
 
 namespace fingertip {
 
-/* How long the answer to a key is shown. */
-constexpr std::chrono::milliseconds MESSAGE_TIME{5000};
+/* The answer to a key, as long as it is shown. */
+class Message {
+public:
+  void show(const std::string &text) {
+    text_ = text;
+    until_ = host_now() + std::chrono::seconds(5);
+  }
+  std::string text() const { return host_now() > until_ ? "" : text_; }
+
+private:
+  std::string text_;
+  HostTime until_{};
+};
 
 class View {
 public:

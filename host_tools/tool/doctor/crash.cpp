@@ -62,13 +62,7 @@ std::string activity_text(unsigned activity) {
 std::string stuck_text(unsigned stuck) {
   static constexpr std::pair<unsigned, const char *> names[] = {
       {CRASH_STUCK_MAIN, "the main loop"}, {CRASH_STUCK_SCAN, "the scan of the sensors"}, {CRASH_STUCK_USB, "USB"}};
-  std::string text;
-  for (auto [bit, name] : names) {
-    if (stuck & bit) {
-      text += (text.empty() ? "" : " and ") + std::string(name);
-    }
-  }
-  return text;
+  return joined(names, " and ", [&](const auto &each) { return stuck & each.first ? each.second : ""; });
 }
 
 std::string place_text(std::uint32_t address, const std::string &place) {
@@ -104,12 +98,8 @@ std::string event_text(unsigned code, unsigned detail) {
       {CRASH_EVENT_BUS, "timeouts on the sensor bus" + in_a_second},
       {CRASH_EVENT_WORKER, "second processor started again"},
       {CRASH_EVENT_SKIPPED, "frames skipped" + in_a_second}};
-  for (const auto &[known, text] : texts) {
-    if (known == code) {
-      return text;
-    }
-  }
-  return "event " + std::to_string(code) + "." + std::to_string(detail);
+  const auto *found = find_in(texts, [&](const auto &each) { return each.first == code; });
+  return found ? found->second : "event " + std::to_string(code) + "." + std::to_string(detail);
 }
 
 } // namespace
@@ -157,13 +147,9 @@ std::vector<std::pair<const char *, std::uint32_t>> registers_of(const crash_rec
 }
 
 std::string registers_text(const crash_record &record) {
-  std::string text;
-  for (auto [name, value] : registers_of(record)) {
-    if (name != std::string("pc")) {
-      text += (text.empty() ? "" : " ") + std::string(name) + " " + hex_text(value);
-    }
-  }
-  return record.sp == 0 ? "" : text;
+  return record.sp == 0 ? "" : joined(registers_of(record), " ", [](const auto &each) {
+    return each.first == std::string("pc") ? "" : std::string(each.first) + " " + hex_text(each.second);
+  });
 }
 
 } // namespace fingertip

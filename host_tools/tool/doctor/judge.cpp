@@ -54,11 +54,8 @@ constexpr unsigned STACK_FREE_MIN_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USE
 constexpr unsigned BUSY_MAX_permille = 950;
 
 std::string list(const std::vector<unsigned> &sensors) {
-  std::string text = sensors.size() == 1 ? "sensor " : "sensors ";
-  for (std::size_t i = 0; i < sensors.size(); i++) {
-    text += (i ? ", " : "") + std::to_string(sensors[i]);
-  }
-  return text;
+  return (sensors.size() == 1 ? "sensor " : "sensors ") +
+         joined(sensors, ", ", [](unsigned sensor) { return std::to_string(sensor); });
 }
 
 std::vector<unsigned> sensors_in(std::uint32_t bitmap) {
@@ -149,11 +146,9 @@ private:
   }
 
   std::string holders_text() const {
-    std::string text;
-    for (const Holder &holder : facts_.holders.seen) {
-      text += (text.empty() ? "" : ", ") + holder.name + " (process " + std::to_string(holder.process) + ")";
-    }
-    return text;
+    return joined(facts_.holders.seen, ", ", [](const Holder &holder) {
+      return holder.name + " (process " + std::to_string(holder.process) + ")";
+    });
   }
 
   void port() {
@@ -377,11 +372,10 @@ private:
   /* The last; the one before is not known any more. */
   void crash() {
     const Crash &crash = *facts_.crash;
-    std::string text = crash_text(crash);
-    std::string events = events_text(crash.record), registers = registers_text(crash.record);
-    text += events.empty() ? "" : "; before that: " + events;
-    text += registers.empty() ? "" : "; " + registers;
-    text += crash.symbols_note.empty() ? "" : "; " + crash.symbols_note;
+    const std::string events = events_text(crash.record);
+    const std::string text = joined(std::vector{crash_text(crash), events.empty() ? "" : "before that: " + events,
+                                                registers_text(crash.record), crash.symbols_note},
+                                    "; ");
     bool is_start = crash.record.kind == CRASH_START;
     add(is_start ? Verdict::warn : Verdict::bad, "crash", text,
         is_start ? "check its supply; if it stays, the board's crystal"

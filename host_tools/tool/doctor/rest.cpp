@@ -1,5 +1,7 @@
 #include "tool/doctor/rest.hpp"
 
+#include "libfingertip/packet_fields.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -59,12 +61,12 @@ void RestMeter::add(const wire_packet &packet) {
   if (packet.type == WIRE_SYNC) {
     edges_.take(packet.body.sync);
   }
-  if (packet.type != WIRE_CONTACT && packet.type != WIRE_RAW) {
+  if (!is_frame(packet)) {
     return;
   }
   bool is_raw = packet.type == WIRE_RAW;
   std::uint32_t frame = is_raw ? packet.body.raw.frame : packet.body.contact.frame;
-  std::uint32_t flags = is_raw ? packet.body.raw.flags : packet.body.contact.flags;
+  std::uint32_t flags = flags_of(packet);
   if (!any_) {
     any_ = true;
     first_us_ = packet.t_us;

@@ -3,7 +3,7 @@
 // The page frees the sessions. Errors are exceptions (exceptions.cpp).
 #include "libfingertip/error.hpp"
 #include "tool/calibration/gain_session.hpp"
-#include "tool/calibration/pull_session.hpp"
+#include "tool/calibration/pulls.hpp"
 #include "tool/doctor/judge.hpp"
 
 #include <cerrno> // which nlohmann/json.hpp uses

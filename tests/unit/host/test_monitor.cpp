@@ -15,8 +15,8 @@ using namespace fingertip;
 
 namespace {
 
-constexpr std::uint32_t GOOD = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                               CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
+constexpr std::uint32_t FITTED = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                                 CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
 
 Model model_with_info() {
   Model model;
@@ -26,7 +26,7 @@ Model model_with_info() {
   return model;
 }
 
-constexpr std::uint32_t PULLED = GOOD | CONTACT_FLAG_TANGENTIAL_VALID;
+constexpr std::uint32_t PULLED = FITTED | CONTACT_FLAG_TANGENTIAL_VALID;
 
 /* Of a fingertip that can tell tangential load. */
 Model model_of_grasp(bool with_pad) {
@@ -77,7 +77,7 @@ void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_m
 }
 
 /* After two seconds of one contact, 50 frames a second. */
-Model touched(Model model, float x_mm, float y_mm, std::uint32_t flags = GOOD, const Pull &pull = {}) {
+Model touched(Model model, float x_mm, float y_mm, std::uint32_t flags = FITTED, const Pull &pull = {}) {
   for (std::uint32_t frame = 0; frame < 100; frame++) {
     take_frame(model, 1000000 + 20000 * frame, frame, x_mm, y_mm, 5, flags, pull);
   }
@@ -140,10 +140,10 @@ void report(const std::string &json) {
 TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
   /* Measured at 200 x 60 before: every cell at 25 Hz, 2.3 MB/s. */
   constexpr std::size_t before = 23000000;
-  Sent sent = sent_in_ten_seconds(200, 60, GOOD);
+  Sent sent = sent_in_ten_seconds(200, 60, FITTED);
   EXPECT_LE(sent.changes, before / 10);
   EXPECT_LT(sent.changes, sent.all / 2);
-  EXPECT_LE(sent_in_ten_seconds(200, 60, GOOD | CONTACT_FLAG_UNCERTAIN).changes, before / 10);
+  EXPECT_LE(sent_in_ten_seconds(200, 60, FITTED | CONTACT_FLAG_UNCERTAIN).changes, before / 10);
   Sent pulled = sent_in_ten_seconds(200, 60, PULLED);
   EXPECT_LE(pulled.changes, before / 10) << "an arrow that turns with it";
   report("{\n  \"monitor_200x60_10_s_bytes\": " + std::to_string(sent.changes) +
@@ -153,7 +153,7 @@ TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
 
 TEST(Monitor, SendsNothingWhereNothingChanged) {
   Model model = model_with_info();
-  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, FITTED);
   Painter painter(ColourDepth::truecolour, Characters::utf_8);
   EXPECT_GT(painter.paint(one(model)).size(), 1000u);
   EXPECT_EQ(painter.paint(one(model)), "");
@@ -164,7 +164,7 @@ TEST(Monitor, SendsNothingWhereNothingChanged) {
 
 TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
   Model model = model_with_info();
-  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, FITTED);
   Canvas good = one(model);
   EXPECT_TRUE(shows(good, "5.00 N")) << text_of(good);
   EXPECT_TRUE(shows(good, "┼"));
@@ -175,7 +175,7 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
         CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED,
         CONTACT_FLAG_ZERO_DOUBTFUL, CONTACT_FLAG_SENSOR_DOUBTFUL}) {
     EXPECT_TRUE(shows(one(all), flags_text(flag))) << text_of(one(all));
-    take_frame(model, 2000000, 2, 4.5f, 4.5f, 5, GOOD | flag);
+    take_frame(model, 2000000, 2, 4.5f, 4.5f, 5, FITTED | flag);
     Canvas doubtful = one(model);
     EXPECT_TRUE(shows(doubtful, "5.00?N")) << text_of(doubtful);
     EXPECT_TRUE(shows(doubtful, "x   +4.50?") && shows(doubtful, "y   +4.50?")) << text_of(doubtful);
@@ -183,9 +183,9 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
     EXPECT_TRUE(shows(doubtful, "╌")) << text_of(doubtful);
   }
   EXPECT_TRUE(shows(one(model), "SENSOR_DOUBTFUL, a sensor is in doubt"));
-  take_frame(model, 3000000, 3, 4.5f, 4.5f, 5, GOOD | CONTACT_FLAG_UNCERTAIN);
+  take_frame(model, 3000000, 3, 4.5f, 4.5f, 5, FITTED | CONTACT_FLAG_UNCERTAIN);
   EXPECT_TRUE(shows(one(model), "UNCERTAIN, may be off by more than 0.60 mm"));
-  take_frame(model, 4000000, 4, 4.5f, 4.5f, 5, GOOD | CONTACT_FLAG_FORCE_LOWER_BOUND);
+  take_frame(model, 4000000, 4, 4.5f, 4.5f, 5, FITTED | CONTACT_FLAG_FORCE_LOWER_BOUND);
   EXPECT_TRUE(shows(one(model), "≥5.00?N"));
   take_frame(model, 5000000, 5, 1, 2, 5, CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED);
   Canvas unfitted = one(model);
@@ -196,7 +196,7 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
 TEST(Monitor, AForceAtLiftOffDoesNotScaleTheTrace) {
   Model model = touched(model_with_info(), 1, 2);
   Canvas before = one(model);
-  take_frame(model, 3050000, 100, -40, 2, 76254, GOOD | CONTACT_FLAG_AT_BOUND);
+  take_frame(model, 3050000, 100, -40, 2, 76254, FITTED | CONTACT_FLAG_AT_BOUND);
   Canvas after = one(model);
   EXPECT_TRUE(shows(before, "force  5 N┤")) << text_of(before);
   EXPECT_TRUE(shows(after, "force  5 N┤")) << text_of(after);
@@ -249,7 +249,7 @@ TEST(Monitor, EachCounterIsColouredByItself) {
       health.body.health.packets_dropped = 0;
   health.body.health.bus_nacks = 1;
   model.take(health);
-  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, FITTED);
   Canvas canvas = one(model);
   /* The colour of the number after a label. */
   auto colour_after = [&](const std::string &label) {
@@ -380,7 +380,7 @@ TEST(Monitor, AnUnsureArrowIsWideAndOneThatMayBeNothingHasNoDirection) {
     take_frame(model, 1000000, 1, -4.5f, 4.5f, 5, flags, {qx_N, 0, sd_N});
     return one(model, 200, 60);
   };
-  Canvas without = picture(1.5f, 0.05f, GOOD);
+  Canvas without = picture(1.5f, 0.05f, FITTED);
   Canvas sure = picture(1.5f, 0.05f, PULLED), unsure = picture(1.5f, 0.7f, PULLED);
   Canvas nothing = picture(0.5f, 0.5f, PULLED);
   EXPECT_GT(differing(sure, without), 5);
@@ -414,7 +414,7 @@ TEST(Monitor, SlidingIsToldOnThePadAndByALamp) {
 TEST(Monitor, WithoutAPadItSaysWhatIsMissing) {
   for (auto [columns, rows] : {std::pair{80, 24}, {120, 40}}) {
     Model model = model_of_grasp(false);
-    take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+    take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, FITTED);
     std::string text = text_of(one(model, columns, rows));
     auto at = text.find("no pad profile: fingertip pad");
     EXPECT_NE(at, std::string::npos) << text;
@@ -424,7 +424,7 @@ TEST(Monitor, WithoutAPadItSaysWhatIsMissing) {
     EXPECT_FALSE(shows(one(model_with_info(), columns, rows), "no pad profile"));
   }
   Model model = model_of_grasp(false);
-  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, FITTED);
   Canvas two = draw_monitor({model, model}, {"keys", "note", ""}, 80, 24);
   EXPECT_TRUE(shows(two, "no pad profile:") && shows(two, "fingertip pad ")) << text_of(two);
 }
@@ -461,7 +461,7 @@ TEST(Monitor, SeveralStandSideBySide) {
 
 TEST(Painter, WithoutColourTheLocationIsStillSeen) {
   Model model = model_with_info();
-  take_frame(model, 1000000, 1, 4.5f, 4.5f, 15, GOOD);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 15, FITTED);
   for (auto characters : {Characters::utf_8, Characters::ascii}) {
     std::string bytes = Painter(ColourDepth::none, characters).paint(one(model));
     EXPECT_EQ(bytes.find("38;"), std::string::npos);

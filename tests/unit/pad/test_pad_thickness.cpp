@@ -1,4 +1,4 @@
-#include "library/pad/thickness.hpp"
+#include "library/pad/profile.hpp"
 #include "report/measure/sessions.hpp"
 
 #include <cmath>

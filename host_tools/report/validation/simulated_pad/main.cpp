@@ -6,7 +6,6 @@
 #include "libfingertip/recording_writer.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
-#include "library/pad/thickness.hpp"
 #include "report/measure/sessions.hpp"
 #include "simulation/cell/place.hpp"
 #include "simulation/cell/validated.hpp"

@@ -52,16 +52,6 @@ std::string device_of(const Way &way, const std::string &root) {
   return "";
 }
 
-LineStatistics less(LineStatistics now, const LineStatistics &then) {
-  now.bytes -= then.bytes;
-  now.packets -= then.packets;
-  now.dropped_packets -= then.dropped_packets;
-  now.out_of_order -= then.out_of_order;
-  now.crc_errors -= then.crc_errors;
-  now.format_errors -= then.format_errors;
-  return now;
-}
-
 /* What it was built into, seen from the source's folder. */
 std::string usual_elf(const wire_info &info) {
   std::string board = text_field(info.board);
@@ -106,9 +96,7 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
   RestMeter meter;
   std::int64_t last_us = steady_now_us();
   session.on_packet([&](const wire_packet &packet) {
-    if (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW) {
-      last_us = steady_now_us();
-    }
+    last_us = is_frame(packet) ? steady_now_us() : last_us;
     meter.add(packet);
   });
   facts.before = session.health().body.health;
@@ -124,7 +112,7 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
     }
     progress(meter.seconds() / seconds);
   }
-  facts.line = less(session.statistics(), before);
+  facts.line = session.statistics() - before;
   facts.rest = meter.result();
   facts.after = session.health().body.health;
   ask_for_crash(session, facts, elf); /* it may have crashed meanwhile */
@@ -307,13 +295,10 @@ void add_doctor(CommandLine &line) {
       command, "--seconds", 1, 600, "1 to 600", [options](double value) { options->seconds = value; },
       "How long to measure noise, drift and rate; default 10")
       ->type_name("S");
-  command
-      ->add_option("--elf", options->elf,
-                   "ELF file of the firmware, for the names in a crash; default build/BOARD/fingertip-BOARD.elf")
-      ->type_name("FILE");
+  with_value(command, "FILE", "--elf", options->elf,
+             "ELF file of the firmware, for the names in a crash; default build/BOARD/fingertip-BOARD.elf");
   command->add_flag("--json", options->json, "Print all of it as JSON");
-  command->add_option("--root", options->root, "Folder that contains etc, dev, proc, sys and usr; default /")
-      ->type_name("FOLDER");
+  with_value(command, "FOLDER", "--root", options->root, "Folder that contains etc, dev, proc, sys and usr; default /");
 }
 
 } // namespace fingertip

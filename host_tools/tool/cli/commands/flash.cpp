@@ -284,13 +284,9 @@ void add_flash(CommandLine &line) {
   auto options = std::make_shared<FlashOptions>();
   CLI::App *command = line.add("flash", "Install firmware and see it come back", [options] { return flash(*options); });
   with_port(command, options->choice);
-  command->add_option("image", options->file, "The firmware, build/BOARD/fingertip-BOARD.uf2")
-      ->required()
-      ->type_name("IMAGE.uf2");
-  command
-      ->add_option("--volume", options->volume,
-                   "Where the loader's drive RPI-RP2 is mounted; default: found, or mounted")
-      ->type_name("FOLDER");
+  with_value(command, "IMAGE.uf2", "image", options->file, "The firmware, build/BOARD/fingertip-BOARD.uf2")->required();
+  with_value(command, "FOLDER", "--volume", options->volume,
+             "Where the loader's drive RPI-RP2 is mounted; default: found, or mounted");
 }
 
 } // namespace fingertip

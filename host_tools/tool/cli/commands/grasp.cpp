@@ -276,7 +276,7 @@ private:
       requested_ = true;
       for (std::size_t i = 0; i < FINGERS; i++) {
         if (touches_[i]) {
-          show_message(std::string(SIDES[i]) + " has contact already, which is taken for the object");
+          message_.show(std::string(SIDES[i]) + " has contact already, which is taken for the object");
         }
       }
       wish(GRIP_REQUEST_GRASP, "grasp");
@@ -319,7 +319,7 @@ private:
     bool done = loop_.request(request);
     event(name + (done ? "" : ", which cannot be now"));
     if (!done) {
-      show_message("cannot " + name + " while it is " + state_name(state()));
+      message_.show("cannot " + name + " while it is " + state_name(state()));
     }
   }
 
@@ -327,8 +327,8 @@ private:
   void answer_interrupts() {
     if (interrupts() > reported_interrupts_) {
       reported_interrupts_ = interrupts();
-      show_message(reported_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly"
-                                             : "Ctrl-C: opens slowly; again: ends here");
+      message_.show(reported_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly"
+                                              : "Ctrl-C: opens slowly; again: ends here");
       view_->hurry();
       event("interrupted");
     }
@@ -357,15 +357,9 @@ private:
     for (std::size_t i = 0; i < FINGERS; i++) {
       models_[i].set_statistics(loop_.statistics(i));
     }
-    auto now = host_now();
-    if (now > message_until_) {
-      message_.clear();
-    }
     Caption caption;
     caption.keys = "q end, holding  o open  h hold  g grasp";
-    for (const std::string &text : {message_, fault_.empty() ? trouble_ : fault_, lost_}) {
-      caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
-    }
+    caption.note = joined(std::vector{message_.text(), fault_.empty() ? trouble_ : fault_, lost_}, "  ");
     if (caption.note.empty() && recording_) {
       caption.note = has_keys_ ? "recording to " + printable(options_.recording) : "";
     }
@@ -385,11 +379,6 @@ private:
     } else if (key == 'g') {
       wish(GRIP_REQUEST_GRASP, "grasp");
     }
-  }
-
-  void show_message(const std::string &text) {
-    message_ = text;
-    message_until_ = host_now() + MESSAGE_TIME;
   }
 
   int status_of_end() const {
@@ -466,8 +455,8 @@ private:
   bool silent_at_end_ = false;
   unsigned reported_interrupts_ = 0;
   std::uint8_t state_at_end_ = GRIP_IDLE;
-  std::string message_, trouble_, fault_, lost_, failure_;
-  HostTime message_until_{};
+  Message message_;
+  std::string trouble_, fault_, lost_, failure_;
 };
 
 int run(const GraspOptions &options) {
@@ -497,10 +486,9 @@ std::string default_of(const GraspSetting &setting, const GripSettings &usual, c
 
 /* What breaks: a preset by name, or the force that breaks it. Options of single limits override it. */
 void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
-  std::string names;
-  for (const GraspPreset &preset : grasp_presets()) {
-    names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" + plain(preset.breaks_N) + " N)";
-  }
+  const std::string names = joined(grasp_presets(), ", ", [](const GraspPreset &preset) {
+    return std::string(preset.name) + " (" + plain(preset.breaks_N) + " N)";
+  });
   auto *preset = command->add_option_function<std::string>(
       "--preset", [&breaking](const std::string &name) { breaking = typed([&] { return preset_values(name); }); },
       "Cap, start, floor and approach for what breaks: " + names);
@@ -534,17 +522,15 @@ void add_grasp(CommandLine &line) {
   auto options = std::make_shared<GraspOptions>();
   CLI::App *command =
       line.add("grasp", "Hold an object between two fingertips on a gripper", [options] { return run(*options); });
-  command->add_option("--gripper", options->gripper.model, gripper_model_names())->required()->type_name("MODEL");
-  command
-      ->add_option("--gripper-port", options->gripper.port,
-                   "Its serial line; default: the only one on USB that is no fingertip")
-      ->type_name("PATH");
-  command->add_option("--left", options->left, "Fingertip; default: the first of two")->type_name("SERIAL|PORT");
-  command->add_option("--right", options->right, "Fingertip; default: the other")->type_name("SERIAL|PORT");
+  with_value(command, "MODEL", "--gripper", options->gripper.model, gripper_model_names())->required();
+  with_value(command, "PATH", "--gripper-port", options->gripper.port,
+             "Its serial line; default: the only one on USB that is no fingertip");
+  with_value(command, "SERIAL|PORT", "--left", options->left, "Fingertip; default: the first of two");
+  with_value(command, "SERIAL|PORT", "--right", options->right, "Fingertip; default: the other");
   command->add_flag("--activate", options->activate,
                     "Activate a gripper that is not: it moves, and drops what it holds");
   with_seconds(command, options->seconds, "End after this long, the gripper holding");
-  command->add_option("-o,--record", options->recording, "Record all of it")->type_name("FILE.csv|FILE.mcap");
+  with_value(command, "FILE.csv|FILE.mcap", "-o,--record", options->recording, "Record all of it");
   command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
   command->add_flag("--quiet", options->quiet, "Print only changes, on standard error");
   with_transport(command, options->reach);

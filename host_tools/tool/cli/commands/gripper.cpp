@@ -238,21 +238,15 @@ void add_gripper(CommandLine &line) {
                                "Try a gripper by hand: list models, show its state, open it, close it, move it to a "
                                "width; waits and prints how it ended",
                                [options] { return gripper_command(*options); });
-  command->add_option("ACTION", options->action, "list, info, move WIDTH, open or close")
-      ->required()
-      ->type_name("ACTION");
-  command->add_option("WIDTH", options->width_mm, "For move: width between the pads, in mm")->type_name("MM");
-  command->add_option("--model", options->way.model, "Model of the gripper: " + gripper_model_names())
-      ->type_name("MODEL");
-  command->add_option("--port", options->way.port, "Its serial line; default: the only one on USB that is no fingertip")
-      ->type_name("PATH");
-  command
-      ->add_option("--speed", options->speed_mm_s, "Speed of the width; default: 50 mm/s, or the nearest that it can")
-      ->type_name("MM/S");
-  command
-      ->add_option("--force", options->force_N,
-                   "Force at which it stops, by its maker's scale, which is not newtons; default: its least")
-      ->type_name("N");
+  with_value(command, "ACTION", "ACTION", options->action, "list, info, move WIDTH, open or close")->required();
+  with_value(command, "MM", "WIDTH", options->width_mm, "For move: width between the pads, in mm");
+  with_value(command, "MODEL", "--model", options->way.model, "Model of the gripper: " + gripper_model_names());
+  with_value(command, "PATH", "--port", options->way.port,
+             "Its serial line; default: the only one on USB that is no fingertip");
+  with_value(command, "MM/S", "--speed", options->speed_mm_s,
+             "Speed of the width; default: 50 mm/s, or the nearest that it can");
+  with_value(command, "N", "--force", options->force_N,
+             "Force at which it stops, by its maker's scale, which is not newtons; default: its least");
   command->add_flag(
       "--activate", options->activate,
       "Activate it first, which clears its faults; a Robotiq opens and closes fully, and whatever it holds falls");

@@ -246,9 +246,6 @@ private:
       view_->hurry();
     }
     tare_.expire(now);
-    if (now > message_until_) {
-      message_.clear();
-    }
   }
 
   void take_key(Key key, HostTime now) {
@@ -258,9 +255,9 @@ private:
         for (const auto &loop : loops_) {
           loop->send(command_tare());
         }
-        show_message("taring");
+        message_.show("taring");
       } else {
-        show_message("not tared");
+        message_.show("not tared");
       }
     } else if (key == 'q') {
       quit_ = true;
@@ -270,27 +267,19 @@ private:
     }
   }
 
-  void show_message(const std::string &text) {
-    message_ = text;
-    message_until_ = host_now() + MESSAGE_TIME;
-  }
-
   /* Takes the answers to a key: a tare is done once the frames of all fingertips report it. */
   void take_answer(std::size_t device, const wire_packet &packet) {
     if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
       accepted_[device] = packet.body.ack.result == WIRE_RESULT_DONE;
       if (!accepted_[device]) {
         taring_[device] = false;
-        show_message((is_refused() ? message_ + "; " : "") + name_of(device) +
-                     "not tared: " + refusal(device, packet.body.ack.result));
+        message_.show((is_refused() ? message_.text() + "; " : "") + name_of(device) +
+                      "not tared: " + refusal(device, packet.body.ack.result));
       }
-    } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
-      std::uint32_t flags = packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
-      if (flags & CONTACT_FLAG_TARED) {
-        accepted_[device] = taring_[device] = false;
-        if (!is_refused() && std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
-          show_message("tared");
-        }
+    } else if (accepted_[device] && is_frame(packet) && (flags_of(packet) & CONTACT_FLAG_TARED)) {
+      accepted_[device] = taring_[device] = false;
+      if (!is_refused() && std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
+        message_.show("tared");
       }
     }
   }
@@ -302,7 +291,7 @@ private:
                : result_text(result);
   }
 
-  bool is_refused() const { return message_.find("not tared: ") != std::string::npos; }
+  bool is_refused() const { return message_.text().find("not tared: ") != std::string::npos; }
 
   /* Which of several. */
   std::string name_of(std::size_t device) const {
@@ -316,18 +305,16 @@ private:
     if (tare_.is_asked()) {
       caption.question = several() ? "tare all, pads free? y/n" : "tare, pad free? y/n";
     }
-    auto add = [&](const std::string &text) {
-      caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
-    };
-    add(message_);
+    std::vector<std::string> notes = {message_.text()};
     for (std::size_t i = 0; i < models_.size(); i++) {
       std::uint32_t missing = models_[i].missing_sensors();
-      add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
+      notes.push_back(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
     }
     if (const RecordingWriter *recording = joint_recording(); recording && !options_.monitor) {
-      add("aligned to " + fixed(recording->alignment_us(), 0) + " us");
+      notes.push_back("aligned to " + fixed(recording->alignment_us(), 0) + " us");
     }
-    add(note_);
+    notes.push_back(note_);
+    caption.note = joined(notes, "  ");
     return caption;
   }
 
@@ -392,8 +379,7 @@ private:
   std::optional<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   std::string note_;
-  std::string message_;
-  HostTime message_until_{};
+  Message message_;
   Confirmation tare_;
   std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
   std::vector<std::uint32_t> reported_missing_;
@@ -464,8 +450,7 @@ CLI::App *add(CommandLine &line, const std::string &name, const std::string &hel
   with_port_only(command, options->choice);
   command->add_flag("--all", options->all, "Every fingertip there is, on one clock");
   with_seconds(command, options->seconds, "End after this much device time");
-  command->add_option("--raw-bytes", options->raw_bytes, "Also keep the bytes of the line as they came")
-      ->type_name("FILE.ftr");
+  with_value(command, "FILE.ftr", "--raw-bytes", options->raw_bytes, "Also keep the bytes of the line as they came");
   command->add_flag("--overwrite", options->overwrite, "Replace files that exist");
   command->add_flag("--until-gone", options->until_gone, "End when the port vanishes, instead of waiting for it");
   return command;
@@ -476,7 +461,7 @@ CLI::App *add(CommandLine &line, const std::string &name, const std::string &hel
 void add_monitor(CommandLine &line) {
   auto options = std::make_shared<LiveOptions>();
   CLI::App *command = add(line, "monitor", "Show live what fingertips feel", options);
-  command->add_option("--record", options->recording, "Record at the same time")->type_name("FILE.csv|FILE.mcap");
+  with_value(command, "FILE.csv|FILE.mcap", "--record", options->recording, "Record at the same time");
   with_colour(command, options->colour);
 }
 

@@ -68,8 +68,8 @@ void add_web(CommandLine &line) {
   command->add_option("--port", options->port, "TCP port; 0: any that is free; default 8109")
       ->check(CLI::Range(0, 65535))
       ->type_name("N");
-  command->add_option("--address", options->address, "Address to listen on; default 127.0.0.1: this machine only")
-      ->type_name("ADDRESS");
+  with_value(command, "ADDRESS", "--address", options->address,
+             "Address to listen on; default 127.0.0.1: this machine only");
   command->add_flag("--no-browser", options->no_browser, "Only print the address, do not open it");
 }
 

@@ -1,13 +1,17 @@
+/* replay and convert: recordings and captures shown, and turned into one another. */
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/line_sink.hpp"
 #include "libfingertip/line_source.hpp"
 #include "libfingertip/output_file.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/cli/command_line.hpp"
-#include "tool/cli/converter.hpp"
+#include "tool/cli/playback.hpp"
+#include "tool/cli/view.hpp"
 
 #include <cstdio>
 #include <filesystem>
@@ -19,9 +23,14 @@ namespace fingertip {
 
 namespace {
 
-using Count = unsigned long long;
+struct Conversion {
+  std::string from, to;
+  std::string device; /* of several in the file; empty: all, or the only one */
+  bool salvage = false;
+  bool overwrite = false;
+};
 
-bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
+using Count = unsigned long long;
 
 /* That a recording has a place for. */
 bool is_kept(const wire_packet &packet) {
@@ -75,8 +84,7 @@ void report_cut_short(const std::string &path, bool is_cut_short) {
   }
 }
 
-} // namespace
-
+/* On standard error: damaged lines, a missing end. */
 void report_losses(const std::string &path, const PacketFile &file) {
   std::string name = printable(path);
   if (file.skipped_lines() > 0) {
@@ -85,6 +93,7 @@ void report_losses(const std::string &path, const PacketFile &file) {
   report_cut_short(path, file.is_cut_short());
 }
 
+/* To a recording of one fingertip, packet by packet, with counts of its own in the end line. Throws Error. */
 void convert_packets(const Conversion &conversion) {
   check_paths(conversion);
   Contents contents = contents_of(conversion);
@@ -116,8 +125,6 @@ void convert_packets(const Conversion &conversion) {
   std::printf("%s: %llu frames, %s\n", printable(conversion.to).c_str(), static_cast<Count>(writer.frames()),
               file.statistics().text().c_str());
 }
-
-namespace {
 
 /* To a recording, line by line: nothing is lost, nothing changed. Throws Error. */
 void convert_lines(const Conversion &conversion) {
@@ -202,22 +209,91 @@ int convert(const Conversion &conversion) {
   return 0;
 }
 
+struct ReplayOptions {
+  std::string file;
+  double speed = 1; /* 0: as fast as possible */
+  bool salvage = false;
+  std::string device; /* of several in the file */
+  std::string to_csv; /* empty: show it */
+  bool overwrite = false;
+  ColourMode colour = ColourMode::automatic;
+};
+
+double speed_from_text(const std::string &text) {
+  if (text == "max") {
+    return 0;
+  }
+  auto speed = to_double(text);
+  if (!speed || *speed < 0.01 || *speed > 1000) {
+    wrong_value("--speed", text, "0.01 to 1000, or max");
+  }
+  return *speed;
+}
+
+int show(const ReplayOptions &options) {
+  Playback playback(options.file, options.salvage, options.device, options.speed);
+  std::string name = printable(options.file);
+  std::unique_ptr<View> view =
+      playback.grip() ? make_grasp_view(options.colour, *playback.grip()) : make_monitor_view(options.colour);
+  while (!playback.is_over() && !stop_requested()) {
+    playback.step(host_now());
+    view->update(playback.models(), playback.caption(name));
+    while (auto key = view->key()) {
+      playback.key(*key);
+      view->hurry();
+    }
+    wait_until(playback.next_step(host_now()));
+  }
+  view.reset();
+  for (std::size_t i = 0; i < playback.tracks().size(); i++) {
+    const FingertipTrack &track = playback.tracks()[i];
+    const Model &model = playback.models()[i];
+    if (model.frames() == 0 && track.is_ended()) {
+      throw Error(options.file + ": no frames in it; give a recording or capture of a streaming fingertip");
+    }
+    report_losses(options.file, track.file());
+    bool several = playback.tracks().size() > 1;
+    std::printf("%s: %s%s\n", name.c_str(),
+                several && model.info() ? (text_field(model.info()->serial) + ": ").c_str() : "",
+                summary_text(model).c_str());
+  }
+  return 0;
+}
+
 } // namespace
+
+void add_replay(CommandLine &line) {
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App *command = line.add("replay", "Show a recording or a capture of bytes", [options] {
+    if (options->to_csv.empty()) {
+      return show(*options);
+    }
+    convert_packets({options->file, options->to_csv, options->device, options->salvage, options->overwrite});
+    return 0;
+  });
+  with_value(command, "FILE", "file", options->file, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
+  command
+      ->add_option_function<std::string>(
+          "--speed", [options](const std::string &text) { options->speed = speed_from_text(text); },
+          "Times the recorded speed, or max; default 1")
+      ->type_name("X|max");
+  with_value(command, "SERIAL", "--device", options->device,
+             "Serial number of one of several fingertips in the recording; default: show all");
+  command->add_flag("--salvage", options->salvage, "Skip damaged lines and count them");
+  with_value(command, "OUT.csv", "--to-csv", options->to_csv, "Write a recording instead of showing it");
+  command->add_flag("--overwrite", options->overwrite, "Replace OUT.csv if it exists");
+  with_colour(command, options->colour);
+}
 
 void add_convert(CommandLine &line) {
   auto options = std::make_shared<Conversion>();
   CLI::App *command =
       line.add("convert", "Turn a recording or a capture into another kind", [options] { return convert(*options); });
-  command->add_option("from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")
-      ->required()
-      ->type_name("FILE");
-  command->add_option("to", options->to, "File to write; its ending selects the format")
-      ->required()
-      ->type_name("OUT.csv|OUT.mcap|OUT.ftr");
-  command
-      ->add_option("--device", options->device,
-                   "Serial number of one of several fingertips in the recording; only this one")
-      ->type_name("SERIAL");
+  with_value(command, "FILE", "from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
+  with_value(command, "OUT.csv|OUT.mcap|OUT.ftr", "to", options->to, "File to write; its ending selects the format")
+      ->required();
+  with_value(command, "SERIAL", "--device", options->device,
+             "Serial number of one of several fingertips in the recording; only this one");
   command->add_flag("--salvage", options->salvage, "Read what is readable of a damaged file, and report the rest");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
 }
