@@ -1,9 +1,7 @@
-/** PIO against the RP2040 datasheet, chapter 3: in every cycle like a plain model of it, and case by case. */
+/** PIO against the RP2040 datasheet, chapter 3, instruction by instruction and case by case. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
 import { ChipBench } from './chip_bench.mjs';
-import { ReferencePio } from './pio_reference.mjs';
 
 const PIO0 = 0x50200000;
 const [CTRL, TXF0, RXF0, INSTR_MEM0] = [0, 0x10, 0x20, 0x48].map((o) => PIO0 + o);
@@ -22,87 +20,110 @@ const [X, Y] = [1, 2];
 const [AUTOPUSH, AUTOPULL, IN_RIGHT, OUT_RIGHT, JOIN_RX] = [1 << 16, 1 << 17, 1 << 18, 1 << 19, 2 ** 31];
 
 /** A bench with `program` at 0: wrap around it, pin groups from GPIO0, pins 0 to 15 with PIO0. */
-function bench(program, { shift = IN_RIGHT | OUT_RIGHT, clkdiv = 1 << 16, start = true } = {}) {
+function bench(program, { shift = IN_RIGHT | OUT_RIGHT, clkdiv = 1 << 16, exec = 0, pin = 16 << 20, start = true } = {}) {
   const b = new ChipBench();
   b.pinFunction([...Array(16).keys()], 6);
   program.forEach((instruction, i) => b.write(INSTR_MEM0 + 4 * i, instruction));
   b.write(CLKDIV, clkdiv);
-  b.write(EXECCTRL, (program.length - 1) << 12);
+  b.write(EXECCTRL, ((program.length - 1) << 12) | exec);
   b.write(SHIFTCTRL, shift);
-  b.write(PINCTRL, 16 << 20);
+  b.write(PINCTRL, pin);
   b.pio = b.chip.pio[0];
   if (start) b.write(CTRL, 1);
   return b;
 }
 
-test('agrees in every cycle with a plain model of the datasheet: random programs, dividers, FIFO traffic, pins', () => {
-  const random = new Prng(2040);
-  const below = (n) => random.uint32() % n;
-  const pick = (list) => list[below(list.length)];
-  const instruction = () => {
-    const delay = random.uniform() < 0.5 ? 0 : below(32);
-    const kinds = [
-      () => jmp(below(32), pick([0, 2, 4, 6]), delay),
-      () => wait(below(2), below(32), delay),
-      () => inn(below(32), delay),
-      () => out(below(32), delay),
-      () => push(delay),
-      () => pick([lower, notY])(delay),
-      () => set(pick([X, Y]), below(32), delay),
-    ];
-    return pick(kinds)();
-  };
-  const executed = new Set();
-  for (let round = 0; round < 150; round++) {
-    const b = new ChipBench();
-    b.pinFunction([...Array(16).keys()], 6);
-    let outside = random.uint32() & 0x3fff0000;
-    b.chip.pins.setLevels(0x3fff0000, outside);
-    b.run(8);
-    const memory = Array.from({ length: 32 }, instruction);
-    memory.forEach((m, i) => b.write(INSTR_MEM0 + 4 * i, m));
-    const drawn = (of, ...names) => Object.fromEntries(names.map((name) => [name, below(of)]));
-    const c = {
-      ...{ divisor: pick([1, 1, 2, 5, 7]), jumpPin: below(30), outCount: below(32) },
-      ...drawn(2, 'autopush', 'autopull', 'join'),
-      ...drawn(32, 'wrapTop', 'wrapBottom', 'inBase', 'outBase'),
-    };
-    c.rxDepth = c.join ? 8 : 4;
-    b.write(CLKDIV, c.divisor << 16);
-    b.write(EXECCTRL, (c.wrapBottom << 7) | (c.wrapTop << 12) | (c.jumpPin << 24));
-    b.write(SHIFTCTRL, (c.autopush ? AUTOPUSH : 0) | (c.autopull ? AUTOPULL : 0) | IN_RIGHT | OUT_RIGHT | (c.join ? JOIN_RX : 0));
-    b.write(PINCTRL, c.outBase | (c.inBase << 15) | (c.outCount << 20));
-    const reference = new ReferencePio(memory, c);
-    reference.history = [outside, outside, outside];
-    const pio = b.chip.pio[0];
-    b.write(CTRL, 0x11);
-    const levels = (r) => outside | (r.values & r.directions & 0xffff);
-    for (let cycle = 0; cycle < 250; cycle++) {
-      b.run(1);
-      reference.cycle(levels);
-      executed.add(memory[reference.pc] >> 13);
-      const { values, directions } = reference;
-      const state = (m) => [m.pc, m.x, m.y, m.isr | 0, m.osr | 0, m.isrCount, m.osrCount, [...m.tx], m.rx.map((v) => v | 0)];
-      assert.deepEqual(
-        [pio.pinValues | 0, pio.pinDirections | 0, ...state(pio)],
-        [values | 0, directions | 0, ...state(reference)],
-        `round ${round}, cycle ${cycle}`,
-      );
-      // The bus in this cycle: what it changes is seen from the next on.
-      if (below(2) === 0 && reference.tx.length < (c.join ? 0 : 4)) {
-        const word = random.uint32() | 0;
-        b.write(TXF0, word);
-        reference.tx.push(word);
-      }
-      if (below(4) === 0 && reference.rx.length) assert.equal(b.read(RXF0) | 0, reference.rx.shift() | 0);
-      if (below(6) === 0) {
-        outside = (outside ^ (1 << (16 + below(14)))) & 0x3fff0000;
-        b.chip.pins.setLevels(0x3fff0000, outside);
-        reference.history[2] = levels(reference);
-      }
-    }
+const [ALL, HIGH] = [-1, 1 << 21];
+const [BLOCKED, FULL] = [{ pc: 0 }, [1, 2, 3, 4]];
+const PUSHES = { shift: AUTOPUSH | IN_RIGHT };
+const PULLS = { shift: AUTOPULL | OUT_RIGHT };
+/** One instruction at 0 in one cycle: the machine before and after; pins: levels of GPIO16 and up; options: as bench. */
+const STEPS = [
+  ['JMP', jmp(5), {}, { pc: 5 }],
+  ['JMP X--', jmp(5, 2), { x: 3 }, { pc: 5, x: 2 }],
+  ['JMP X--, at 0', jmp(5, 2), { x: 0 }, { pc: 1, x: -1 }],
+  ['JMP Y--', jmp(5, 4), { y: (1 << 31) + 1 }, { pc: 5, y: 1 << 31 }],
+  ['JMP Y--, at 0', jmp(5, 4), { y: 0 }, { pc: 1, y: -1 }],
+  ['JMP PIN', jmp(5, 6), { pins: HIGH }, { pc: 5 }, { exec: 21 << 24 }],
+  ['JMP PIN, low', jmp(5, 6), { pins: ~HIGH }, { pc: 1 }, { exec: 21 << 24 }],
+  ['WAIT high', wait(1, 3), { pins: HIGH }, { pc: 1 }, { pin: 18 << 15 }],
+  ['WAIT high, low', wait(1, 3), { pins: ~HIGH }, BLOCKED, { pin: 18 << 15 }],
+  ['WAIT low', wait(0, 3), { pins: ~HIGH }, { pc: 1 }, { pin: 18 << 15 }],
+  ['WAIT, round', wait(1, 25), { pins: HIGH }, { pc: 1 }, { pin: 28 << 15 }],
+  ['IN', inn(8), { pins: 0x50000, isr: 0x80000001 | 0 }, { isr: 0x50800000, isrCount: 8 }, { pin: 12 << 15 }],
+  ['IN of all', inn(32), { pins: 0x28000000, isr: 5, isrCount: 9 }, { isr: (0x28000000 << 4) | 2, isrCount: 32 }, { pin: 28 << 15 }],
+  ['autopush', inn(31), { isrCount: 1 }, { rx: [0], isrCount: 0 }, PUSHES],
+  ['autopush, not yet', inn(31), {}, { rx: [], isrCount: 31 }, PUSHES],
+  ['autopush, full', inn(32), { rx: FULL, isr: 7 }, { ...BLOCKED, isr: 7, rx: FULL }, PUSHES],
+  ['OUT', out(8), { osr: 0xabcd12a5 | 0 }, { directions: 0xa50, osr: 0xabcd12, osrCount: 8 }, { pin: (8 << 20) | 4 }],
+  ['OUT of all', out(32), { osr: ALL, osrCount: 30 }, { directions: 0xffff, osr: 0, osrCount: 32 }],
+  ['OUT of nothing', out(32), {}, { directions: 0 }],
+  ['OUT, round', out(32), { osr: 0xb, directions: ALL }, { directions: 0xfffffffe | 0 }, { pin: (4 << 20) | 30 }],
+  ['autopull, behind the OUT', out(8), { osr: 3, osrCount: 24, tx: [7] }, { directions: 3, osr: 7, osrCount: 0, tx: [] }, PULLS],
+  ['autopull, before the OUT', out(8), { osrCount: 32 }, { ...BLOCKED, directions: 0 }, PULLS],
+  ['autopull, for the OUT', out(8), { osrCount: 32, tx: [7] }, { ...BLOCKED, osr: 7, osrCount: 0 }, PULLS],
+  ['autopull, beside another', set(X, 1), { osrCount: 32, tx: [7] }, { x: 1, osr: 7, osrCount: 0, tx: [] }, PULLS],
+  ['PUSH', push(), { isr: 9, isrCount: 3 }, { rx: [9], isr: 0, isrCount: 0 }],
+  ['PUSH of nothing', push(), {}, { rx: [0] }],
+  ['PUSH, full', push(), { isr: 9, rx: FULL }, { pc: 1, rx: FULL, isr: 0 }],
+  ['MOV PINS, NULL', lower(), { values: 0xff }, { values: 0xc3 }, { pin: (4 << 20) | 2 }],
+  ['MOV ISR, !Y', notY(), { y: 0xf, isrCount: 9 }, { isr: ~0xf, isrCount: 0 }],
+  ['SET X', set(X, 31), {}, { x: 31 }],
+  ['SET Y', set(Y, 17), {}, { y: 17 }],
+  ['wrap', set(X, 1), { pc: 20 }, { pc: 6 }, { exec: 6 << 7, wrap: 20 }],
+  ['round', set(X, 1), { pc: 31 }, { pc: 0, x: 1 }],
+];
+
+for (const [name, instruction, before, after, { wrap = 7, exec = 0, ...options } = {}] of STEPS) {
+  test(`${name}: one cycle`, () => {
+    const { pins = 0, values = 0, directions = 0, pc = 0, ...state } = before;
+    const b = bench([instruction], { ...options, start: false });
+    b.write(EXECCTRL, (wrap << 12) | exec);
+    b.write(INSTR_MEM0 + 4 * pc, instruction);
+    b.chip.pins.setLevels(0x3fff0000, pins);
+    b.run(4);
+    Object.assign(b.pio, { osrCount: 0, pc, pinValues: values, pinDirections: directions, ...structuredClone(state) });
+    b.write(CTRL, 1);
+    b.run(1);
+    const is = { ...b.pio, values: b.pio.pinValues, directions: b.pio.pinDirections };
+    for (const [key, value] of Object.entries(after)) assert.deepEqual(is[key], value, key);
+  });
+}
+
+test('delays are cycles of the divider, which begin when it is written; behind a jump it goes on', () => {
+  const b = bench([set(X, 1), jmp(3, 0, 1), set(X, 2), set(X, 3, 2)], { start: false });
+  b.run(5);
+  b.write(CLKDIV, 3 << 16);
+  b.write(CTRL, 1);
+  const seen = Array.from({ length: 36 }, () => (b.run(1), b.pio.x)).join('');
+  assert.equal(seen, '111111111333333333111111111333333333');
+});
+
+test('inputs are two cycles late', () => {
+  const b = bench([wait(1, 20), set(X, 1), jmp(2)]);
+  b.run(10);
+  b.chip.pins.setLevels(1 << 20, -1);
+  b.run(3);
+  assert.deepEqual([b.pio.pc, b.pio.x], [1, 0]);
+  b.run(1);
+  assert.equal(b.pio.x, 1);
+});
+
+test('each side of a full FIFO waits for the other: no word is lost', () => {
+  const b = bench([out(32, 3), inn(32)], { shift: AUTOPULL | AUTOPUSH | IN_RIGHT | OUT_RIGHT, clkdiv: 2 << 16 });
+  for (let pin = 0; pin < 16; pin++) b.write(0x4001c004 + 4 * pin, 0x4a);
+  const got = [];
+  for (let i = 0, sent = 0; i < 400; i++) {
+    if (b.pio.tx.length < 4) b.write(TXF0, 1000 + sent++);
+    b.run(1);
+    if (i % (i < 200 ? 5 : 25) === 0 && b.pio.rx.length) got.push(~b.read(RXF0) & 0xffff);
   }
-  assert.deepEqual([...executed].sort(), [0, 1, 2, 3, 4, 5, 7]);
+  assert.deepEqual(
+    got,
+    got.map((_, i) => 1000 + i),
+  );
+  assert.ok(got.length > 20, `${got.length}`);
+  assert.deepEqual(b.warnings, []);
 });
 
 test('a stalled machine and a disabled one leave no event behind', () => {
