@@ -2,6 +2,7 @@
 #include "fuzz.h"
 #include "grasp/grip_row.hpp"
 #include "libfingertip/line_sink.hpp"
+#include "libfingertip/mcap.hpp"
 #include "packet_file.hpp"
 
 #include <cmath>

@@ -1,6 +1,7 @@
 /* Recordings of fingertip.h: bytes that are fed instead of read, and taken instead of written. */
 #include "libfingertip/fingertip_values.hpp"
 #include "libfingertip/line_sink.hpp"
+#include "libfingertip/mcap.hpp"
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"

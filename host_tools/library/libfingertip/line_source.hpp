@@ -1,8 +1,6 @@
 /* The lines of a recording, whatever file they are in: CSV, or MCAP (mcap_recording.hpp). */
 #pragma once
 
-#include "libfingertip/mcap.hpp"
-
 #include <cstddef>
 #include <cstdint>
 #include <ios>
@@ -11,6 +9,17 @@
 
 #pragma GCC visibility push(default)
 namespace fingertip {
+
+/* Where the bytes of a recording come from: a file, or a program's own memory. */
+class ByteSource {
+public:
+  virtual ~ByteSource() = default;
+
+  /* Fewer than length only where the bytes end. Throws Error where they cannot be read. */
+  virtual std::size_t read(std::uint64_t at, char *to, std::size_t length) = 0;
+  /* The total size. */
+  virtual std::uint64_t size() const = 0;
+};
 
 class LineSource {
 public:
@@ -34,6 +43,9 @@ public:
   virtual Place place() = 0;
   virtual void go_to(const Place &place) = 0;
 };
+
+/* Whether they begin as an MCAP file does. */
+bool is_mcap(ByteSource &bytes);
 
 /* By its first bytes: a recording, else a capture of the line. path: for messages. Throws Error for what is neither. */
 bool is_recording(const std::string &path, ByteSource &bytes);

@@ -3,6 +3,8 @@
  * written, from the beginning and without the index, so that a file whose end is missing reads as far as it goes. */
 #pragma once
 
+#include "libfingertip/line_source.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -14,21 +16,6 @@
 #include <string_view>
 #include <utility>
 #include <vector>
-
-namespace fingertip {
-
-/* Where the bytes of a recording come from: a file, or a program's own memory. */
-class ByteSource {
-public:
-  virtual ~ByteSource() = default;
-
-  /* Fewer than length only where the bytes end. Throws Error where they cannot be read. */
-  virtual std::size_t read(std::uint64_t at, char *to, std::size_t length) = 0;
-  /* The total size. */
-  virtual std::uint64_t size() const = 0;
-};
-
-} // namespace fingertip
 
 namespace fingertip::mcap {
 

@@ -59,11 +59,6 @@ private:
   std::uint64_t number_ = 0;
 };
 
-bool is_mcap(ByteSource &bytes) {
-  char begin[sizeof mcap::MAGIC];
-  return bytes.read(0, begin, sizeof begin) == sizeof begin && std::memcmp(begin, mcap::MAGIC, sizeof begin) == 0;
-}
-
 /* The format in the first line, "1" or "2". Throws Error with what it is instead. */
 std::string format_of(const std::string &path, const std::string &line) {
   std::string_view words = trim(line);
@@ -84,6 +79,11 @@ std::string format_of(const std::string &path, const std::string &line) {
 }
 
 } // namespace
+
+bool is_mcap(ByteSource &bytes) {
+  char begin[sizeof mcap::MAGIC];
+  return bytes.read(0, begin, sizeof begin) == sizeof begin && std::memcmp(begin, mcap::MAGIC, sizeof begin) == 0;
+}
 
 bool is_recording(const std::string &path, ByteSource &bytes) {
   std::string start(4096, ' '); /* several frames, each of which would end with 0x00 */
