@@ -29,7 +29,7 @@ class SceneRun(Run):
         numbered = (("info",), ("stream", "contact,raw,health"), ("slip", "1", "100"), ("stream", f"{stream},health"))
         commands = [(0.46 + 0.01 * i, "--sequence", str(1 + i), *command) for i, command in enumerate(numbered)]
         commands += [(1.7, "--sequence", "5", "health"), *extra]
-        image = TOOLS.image if scene == "grasp" else f"{TOOLS.scenes}/{scene}/fingertip-{BOARD}.bin"
+        image = TOOLS.image if scene == "grasp" else f"{TOOLS.scenes}/{scene}/{BOARD}/fingertip-{BOARD}.bin"
         super().__init__(TOOLS, folder, scene, BOARD, make_scenario(f"{folder}/wander.csv", "wander", 3), 1.8, commands, image=image)
         self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
         self.body_bytes = {}

@@ -64,7 +64,7 @@ class OneScene(Tools):
 
     def __init__(self, build, scene):
         self.scene = scene
-        self.place = pathlib.Path(build).absolute() / "scenes" / scene if scene != Tools.scene else ROOT / "build" / PARALLEL
+        self.place = ROOT / "build" / (f"scenes/{scene}" if scene != Tools.scene else "") / PARALLEL
         super().__init__(build, ROOT / "build")
 
     def image(self, board, suffix="bin"):

@@ -85,17 +85,11 @@ class Rate(report_case.ReportCase):
         tools = scenes.SceneTools(report_case.OPTIONS.build, report_case.OPTIONS.boards, "slip")
         path = emulated.scenario(self.folder, "wander", 4)
 
-        def measured(name):
-            folder = self.folder / name
-            folder.mkdir()
-            return emulated.Measurement(tools, folder, "pico_mux", 1024, path, 1)
-
-        first, second = measured("first"), measured("second")
-        self.assertEqual(first.cycles, second.cycles)
-        self.assertTrue((first.offered_us == second.offered_us).all() and (first.delivered_us == second.delivered_us).all())
+        again = emulated.Measurement(tools, self.folder, "pico_mux", 1024, path, 1)
         row = next(row for row in self.found["by_osr"] if (row["board"], row["osr"]) == ("pico_mux", 1024))
-        self.assertEqual(row["sleep_percent"], first.sleep_percent)
-        self.assertEqual(row["latency_us"], emulated.distribution(first.offered_us))
+        self.assertEqual(row["sleep_percent"], again.sleep_percent)
+        self.assertEqual(row["latency_us"], emulated.distribution(again.offered_us))
+        self.assertEqual(row["delivery_us"], emulated.distribution(again.delivered_us))
 
     def test_text_and_picture(self):
         self.assertEqual((self.folder / "rate.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
