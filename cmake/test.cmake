@@ -13,9 +13,9 @@ function(ft_test label)
   if(FINGERTIP_SANITIZE AND NOT FINGERTIP_LIBFUZZER AND label STREQUAL "accuracy" AND "Python3::Interpreter" IN_LIST arg_COMMAND)
     ft_loads_sanitized(${arg_NAME})
   endif()
-  # Tests in real time run one at a time. Each measures how late the machine was.
+  # Tests in real time run one at a time, from the beginning on: they wait while others compute. Each measures how late the machine was.
   if(label STREQUAL "realtime")
-    set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK real_time)
+    set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK real_time COST 80)
   elseif(label STREQUAL "nightly")
     set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK nightly TIMEOUT 14400)
   endif()

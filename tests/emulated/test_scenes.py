@@ -33,7 +33,7 @@ class SceneRun(Run):
         super().__init__(TOOLS, folder, scene, BOARD, make_scenario(f"{folder}/wander.csv", "wander", 3), 1.8, commands, image=image)
         self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
         self.body_bytes = {}
-        for frame in self.path("ftr").read_bytes().split(b"\0"):
+        for frame in self.path("ftr").read_bytes().split(b"\0")[:-1]:  # the last one may be cut
             packet = wire.cobs_decode(frame)
             if packet:
                 self.body_bytes.setdefault(packet[1], set()).add(len(packet) - HEADER_AND_CRC_BYTES)
