@@ -56,11 +56,11 @@ def jobs(build, boards, folder, seconds, on=BOARDS):
 
     dipped = wander.with_name("grasp-dip.csv")
     slip = ("--force", "5", "--quiet", "0.3", "--effects", "dip=5", "--seconds", f"{max(FROM_s + seconds + 1, ONE_SLIP_s):g}")
-    twin, tables = pathlib.Path(build) / "host_tools/simulation/twin/twin", pathlib.Path(folder) / "contact_tables"
+    twin, tables = pathlib.Path(build) / "host_tools/simulation/twin/twin", pathlib.Path(build) / "contact_tables"
     run(twin, "scenario", "slip", *slip, "-o", dipped, "--cache", tables)
 
     def one(board, path, *commands):
-        of_scene = SceneTools(build, boards, "shapes") if path is two else tools
+        of_scene = SceneTools(build, boards, "shapes", (board,)) if path is two else tools
         return Measurement(of_scene, folder, board, 256, path, seconds, commands=[*commands, tools.encoded("pad", *PAD)])
 
     cases = [(short(board), board, wander, ()) for board in on] + [("two", PARALLEL, two, ())]

@@ -43,10 +43,10 @@ def build(scene, board, folder):
 class SceneTools(Tools):
     """The images of a scene instead of the boards' own; builds them."""
 
-    def __init__(self, build_folder, boards, scene):
+    def __init__(self, build_folder, boards, scene, on=BOARDS):
         super().__init__(build_folder, boards)
         self.scene = scene
-        self.places = {board: build(scene, board, self.boards / "scenes") for board in BOARDS}
+        self.places = {board: build(scene, board, self.boards / "scenes") for board in on}
 
     def image(self, board, suffix="bin"):
         return self.places[board] / f"fingertip-{board}.{suffix}" if hasattr(self, "places") else super().image(board, suffix)

@@ -108,19 +108,15 @@ class Measurement:
             + "".join(f"{0.465 + 0.09 * n:.3f} {command}\n" for n, command in enumerate(commands))
         )
 
-        def emulate(name, until_s):
-            to = f"{base}.{name}"
-            chip = ("--board", board, "--image", tools.image(board), "--scenario", path, "--seconds", until_s)
-            out = ("--capture", f"{to}.ftr", "--report", f"{to}.json", "--usb-log", f"{to}.usb")
-            run("node", ROOT / "host_tools/simulation/emulator/main.mjs", *chip, "--host-script", script, *out)
-            return to, json.loads(pathlib.Path(f"{to}.json").read_text())
-
-        _, before = emulate("before", FROM_s)
         # A health packet comes with each whole second.
-        name, emulated = emulate("run", FROM_s + seconds + 0.02)
-        self.name = name
-        self.cycles = emulated["cycles"] - before["cycles"]
-        self.sleep_percent = 100 * (1 - self.cycles / ((emulated["emulated_s"] - before["emulated_s"]) * CLOCK_Hz))
+        self.name = name = f"{base}.run"
+        chip = ("--board", board, "--image", tools.image(board), "--scenario", path, "--seconds", FROM_s + seconds + 0.02)
+        out = ("--capture", f"{name}.ftr", "--report", f"{name}.json", "--count-from", FROM_s, "--usb-log", f"{name}.usb")
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", *chip, "--host-script", script, *out)
+        emulated = json.loads(pathlib.Path(f"{name}.json").read_text())
+        counted = emulated["counted"]
+        self.cycles = counted["cycles"]
+        self.sleep_percent = 100 * (1 - self.cycles / (counted["emulated_s"] * CLOCK_Hz))
         run(tools.fingertip, "replay", f"{name}.ftr", "--to-csv", f"{name}.csv")
         recording = read_recording(f"{name}.csv")
         if recording.metadata["scene"] != tools.scene:

@@ -62,6 +62,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --rise-ns N          rise time of the bus lines, 0 to 1000 ns; default: what the board's pull-ups make it
   --usb-log FILE.csv   USB packets: t_ns,endpoint,dir,length,bytes,offered_ns (when the firmware gave an IN packet to the controller)
   --report FILE.json   what happened, in numbers
+  --count-from S       the report also has the cycles of core 0 from this time on: counted
   --progress           a line on stderr each second
 
 Runs without --pty and --usbredir are the same bit for bit each time; with --stepped, if what the program asks is. SIGINT ends a run cleanly.
@@ -87,6 +88,7 @@ function judgeOptions(values) {
       values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
   }
   if (values['vcd-to'] < values['vcd-from']) throw new InputError('--vcd-to is before --vcd-from');
+  if (values['count-from'] !== undefined) values['count-from'] = number('count-from', isPositive, 'a positive number of seconds');
   if (values['sync-strobe'] !== undefined)
     values['sync-strobe'] = number('sync-strobe', (v) => v >= 2 && v <= 60000, 'a period from 2 to 60000 ms');
   if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
@@ -236,6 +238,8 @@ async function run(options) {
     else if (stepped) stepped.connect(machine.scope, machine.client);
     else if (!usbredir) scheduleHostScript(script, machine.scope, machine.client);
 
+    const count_ns = (options['count-from'] ?? 0) * 1e9;
+    let counted; // at that time
     let paced_ms = started_ms;
     let paced_ns = 0;
     let shown_ms = started_ms;
@@ -245,8 +249,10 @@ async function run(options) {
       for (;;) {
         const reader = usbredir ?? (options['wait-reader'] ? pty : null);
         while (reader?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
-        const target = Math.min(end_ns, machine.time.nanos + slice_ns);
+        let target = Math.min(end_ns, machine.time.nanos + slice_ns);
+        if (count_ns > machine.time.nanos) target = Math.min(target, count_ns);
         if (!machine.run(target) || target >= end_ns) break;
+        if (target === count_ns) counted = machine.result;
         const now_ms = performance.now();
         if (interrupted) {
           machine.endReason = 'interrupted';
@@ -279,7 +285,8 @@ async function run(options) {
     vcd?.close(machine.time.nanos);
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
-    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));
+    const from = counted && { emulated_s: result.emulated_s - counted.emulated_s, cycles: result.cycles - counted.cycles };
+    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, ...(from && { counted: from }), wall_s }, null, 2)}\n`));
     if (machine.memory.isBusy) machine.memory.cutPower(); // the end of the run is the end of its power
     if (options.flash) output(options.flash).write(machine.memory.bytes);
     for (const line of result.warnings) process.stderr.write(`${line}\n`);

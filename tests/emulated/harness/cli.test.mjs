@@ -37,13 +37,15 @@ const base = ['--board', 'pico_mux', '--scenario', scenario, '--fast-enumeration
 const run = (...args) => spawnSync(process.execPath, [MAIN, ...args], { encoding: 'utf8' });
 
 test('a host script drives the port; capture, logs and report are written; exit 0', () => {
-  const logs = ['--usb-log', out('u.csv'), '--bus-log', out('b.csv'), '--report', out('r.json')];
+  const logs = ['--usb-log', out('u.csv'), '--bus-log', out('b.csv'), '--report', out('r.json'), '--count-from', '0.13'];
   const { status, stderr } = run('--image', image, ...base, '--host-script', script, '--capture', out('c.bin'), ...logs);
   assert.equal(status, 0, stderr);
   assert.deepEqual([...readFileSync(out('c.bin'))], [1, 2, 255]);
   const report = JSON.parse(readFileSync(out('r.json')));
   assert.equal(report.end_reason, 'end of time');
   assert.ok(Math.abs(report.emulated_s - 0.2) < 1e-6);
+  assert.ok(Math.abs(report.counted.emulated_s - 0.07) < 1e-6);
+  assert.ok(Math.abs(report.counted.cycles / report.cycles - 0.35) < 0.1); // it never sleeps, and starts on a slower clock
   assert.deepEqual([report.usb.in_bytes, report.usb.out_bytes], [3, 3]);
   assert.match(readFileSync(out('u.csv'), 'utf8'), /^t_ns,endpoint,dir,length,bytes,offered_ns\n.*,2,out,3,0102ff,\n/s);
   assert.match(readFileSync(out('b.csv'), 'utf8'), /^start_ns,end_ns,muxes,address,rw,bytes,ack\n$/);

@@ -82,7 +82,7 @@ class Rate(report_case.ReportCase):
 
     def test_the_same_again(self):
         """Emulated cycles and times, to the last one."""
-        tools = scenes.SceneTools(report_case.OPTIONS.build, report_case.OPTIONS.boards, "slip")
+        tools = scenes.SceneTools(report_case.OPTIONS.build, report_case.OPTIONS.boards, "slip", ("pico_mux",))
         path = emulated.scenario(self.folder, "wander", 4)
 
         again = emulated.Measurement(tools, self.folder, "pico_mux", 1024, path, 1)
