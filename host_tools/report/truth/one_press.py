@@ -293,13 +293,16 @@ def few_sensors(bench, of, out):
             out["few_sensors"].append(row | {"sensors": sensors, "off_by_2_mm_unflagged": results.silent_percent(bad_mm=2.0)})
 
 
-def figures(firmware, options):
+PARTS = (coverage, tangential, elongated, iterations, few_sensors)
+
+
+def figures(firmware, options, parts=PARTS):
     count = 1500 if options.pads is None else options.pads
     if count < 1:
         raise InputError("--pads needs at least one pad")
     bench = Bench(Contacts(firmware.build), 20221015 if options.seed is None else options.seed, count)
     out = {}
     of = calibrated(bench.contacts.calibrated_for(count, sessions.USUAL, bench.seed))
-    for part in (coverage, tangential, elongated, iterations, few_sensors):
+    for part in parts:
         part(bench, of, out)
     return out
