@@ -37,6 +37,22 @@ function(ft_loads_sanitized)
   endforeach()
 endfunction()
 
+# After all tests of this folder: those of googletest take its header from gtest_header, but for those of another standard.
+function(ft_share_gtest folder)
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  foreach(target IN LISTS targets)
+    get_target_property(libraries ${target} LINK_LIBRARIES)
+    get_target_property(features ${target} COMPILE_FEATURES)
+    if("GTest::gtest_main" IN_LIST libraries AND NOT "cxx_std_20" IN_LIST features)
+      target_precompile_headers(${target} REUSE_FROM gtest_header)
+    endif()
+  endforeach()
+  get_property(folders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(one IN LISTS folders)
+    ft_share_gtest(${one})
+  endforeach()
+endfunction()
+
 # After all tests: `cmake --build build/host --target quick_tests` builds what the quick ones run.
 function(ft_quick_target)
   get_property(programs GLOBAL PROPERTY FT_QUICK_PROGRAMS)
