@@ -123,8 +123,9 @@ class ShearStatic(unittest.TestCase):
 
     def test_the_same_seed_gives_the_same_and_another_another(self):
         contacts = Contacts(BUILD)
-        once, again, other = (static.figures(contacts, seed=seed, pads=4, tables=("objects", "rubber", "taps")) for seed in (3, 3, 4))
+        once, again = (static.figures(contacts, seed=3, pads=4, tables=("objects", "rubber", "taps")) for _ in range(2))
         self.assertEqual(once, again)
+        other = static.figures(contacts, seed=4, pads=4, tables=("objects",))
         self.assertNotEqual(once["by_object"], other["by_object"])
 
     def test_wrong_usage_is_an_error(self):
