@@ -45,7 +45,7 @@ class Pressed {
 public:
   Pressed(const Face &face, const PressOptions &options, std::uint64_t seed)
       : face_(face), weight_N_(1e-3 * options.weight_g * GRAVITY_m_s2),
-        rubber_(twin::parse_effects("relaxation"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS),
+        rubber_(twin::parse_effects("memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS),
         sensed_Pa_(SENSORS) {
     Random random(seed, PLACES, 0);
     begin_x_ = random.uniform(0.0, 1.0);

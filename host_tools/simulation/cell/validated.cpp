@@ -61,9 +61,7 @@ double smooth(double share) { return 0.5 - 0.5 * std::cos(M_PI * std::clamp(shar
 
 } // namespace
 
-twin::EffectValues usual_effects() {
-  return twin::parse_effects("gain,relaxation,aftereffect,drift,places,dip,widths");
-}
+twin::EffectValues usual_effects() { return twin::parse_effects("gain,memory,aftereffect,drift,places,dip,widths"); }
 
 const std::vector<std::string> &pad_fault_names() {
   static const std::vector<std::string> names = {"none",      "dead_sensor", "loose_sensor", "tilted_skin",

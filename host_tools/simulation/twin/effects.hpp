@@ -7,12 +7,15 @@
 //   m):
 //                the loop is V of the area below the loading curve. Loading again leads straight back to m. Nothing
 //                remains at p = 0.
-//   relaxation   linear viscoelastic, a Prony series: p less the sum of g_i z_i; z_i follows p with the time constant
-//                TIMES_s[i]. No reading leaves the range from 0 to p: rubber does not pull.
+//   memory       less m z: z follows p with the sensor's own time constant of 1 to 4 s. m is drawn, of either sign, so
+//   that a
+//                hold of 8 s changes by V (sd), for one sensor of eight by 4.6 V. What a hold took off stands off after
+//                it.
 //   aftereffect  plus a share of the peak that each sensor remembers and p has left: a (m - p). m is p while p rises
-//                above it, and otherwise returns to p with its time constant. p is the pressure on the base: relaxation
-//                makes nothing to be remembered. a is 0.1 to 2 V, for one sensor of three -0.25 to -2.25 V.
+//                above it, and otherwise returns to p with its time constant. a is 0.5 to 1.25 V, for one sensor of
+//                three -0.75 to -2.25 V.
 //   creep        plus V of what follows p with the time constant CREEP_s
+//   relaxation   acts on the force, not on a sensor: relaxed_share().
 //   temperature  by V with the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
 #pragma once
 
@@ -47,8 +50,8 @@ EffectValues parse_effects(const std::string &text);
 // One pad: the same seed draws the same pad, and the same draws at any value of an effect.
 class Pad {
 public:
-  static constexpr std::array<double, 2> TIMES_s{1.0, 10.0};
-  static constexpr double WARMING_K_s = 0.1; // of `branch`
+  static constexpr std::array<double, 2> TIMES_s{1.0, 10.0}; // of `relaxation`
+  static constexpr double WARMING_K_s = 0.1;                 // of `branch`
 
   Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa, std::uint64_t seed);
 
@@ -57,6 +60,11 @@ public:
   // the beginning: the pad is at rest until then.
   void report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa);
   double temperature_degC(double t_s) const;
+
+  // Where travel is held the force falls: a linear viscoelastic layer, a Prony series. What is left of a force, in
+  // shares of what the travel asks for at first. Call it once at each time of a contact, and with 0 before and after
+  // it: each contact is of fresh rubber. 1 without the effect.
+  double relaxed_share(double t_s, double travel_N);
 
   double dip_share() const { return dip_share_; }
   // How a sensor sits: its offset from its place, and the width of its response over the usual one.
@@ -68,7 +76,10 @@ public:
   // Drawn, [sensor]; empty where the effect is off.
   const std::vector<double> &gain_errors() const { return gain_errors_; }
   const std::vector<double> &drifts_Pa_s() const { return drifts_Pa_s_; }
-  const std::vector<double> &relaxations() const { return relaxations_; } // share lost in the hold
+  struct Memory {
+    double share, time_s; // share lost in a hold of 8 s, below 0 gained
+  };
+  const std::vector<Memory> &memories() const { return memories_; }
   struct Aftereffect {
     double share, time_s; // share of the peak, below 0 an undershoot
   };
@@ -81,8 +92,8 @@ public:
 
 private:
   struct Rubber { // of one sensor
-    std::array<double, TIMES_s.size()> strength{}, follows_Pa{};
-    double elastic_Pa = 0.0; // after the hysteresis, at the last time
+    // Memory: after the hysteresis at the last time, what follows it, its decay over a step, its share of that.
+    double elastic_Pa = 0.0, follows_Pa = 0.0, decay = 1.0, strength = 0.0;
     // Hysteresis: the last pressure and what it lacks, whether it falls, where it turned last, and
     // the largest since the pressure was none.
     double pressure_Pa = 0.0, lacks_Pa = 0.0;
@@ -93,7 +104,7 @@ private:
     double sensed_Pa = 0.0, remembered_Pa = 0.0, forgetting = 1.0;
   };
   double with_hysteresis(Rubber &rubber, double pressure_Pa) const;
-  double relaxed(Rubber &rubber, double pressure_Pa);
+  double lost(Rubber &rubber, double time_s, double pressure_Pa) const;
   double left_behind(Rubber &rubber, const Aftereffect &effect, double base_Pa) const;
   double crept(Rubber &rubber, double base_Pa) const;
 
@@ -102,15 +113,16 @@ private:
   double hysteresis_ = 0.0; // share of the loop
   double bias_ = 0.0, clip_Pa_ = 0.0, warming_K_ = 0.0, warming_s_ = 0.0;
   double start_degC_ = ROOM_degC;
-  bool relaxes_ = false;
-  std::vector<double> gain_errors_, drifts_Pa_s_, relaxations_;
+  std::array<double, TIMES_s.size()> strength_{}, follows_N_{};
+  double relaxes_s_ = 0.0, travel_N_ = 0.0;
+  std::vector<double> gain_errors_, drifts_Pa_s_;
+  std::vector<Memory> memories_;
   std::vector<Aftereffect> aftereffects_;
   std::vector<Branch> branches_;
   std::vector<Seat> seats_;
   std::vector<Rubber> rubber_;
   double t_s_ = 0.0, step_s_ = 0.0, begin_s_ = 0.0;
   bool begun_ = false;
-  std::array<double, TIMES_s.size()> decay_{};
 };
 
 // g of the Prony series that makes a hold of 8 s after a press of 1.3 s lose this share of its peak.

@@ -213,6 +213,21 @@ bool moves_under_load(const std::string &kind) {
   return kind == "lift" || kind == "drag" || kind == "slide" || kind == "screw";
 }
 
+// What is drawn for each sensor of an effect that has a share and a time.
+template <typename Own>
+void describe_own(Text &text, const char *shares, const char *times, const std::vector<Own> &sensors) {
+  if (sensors.empty()) {
+    return;
+  }
+  std::vector<double> each, each_s;
+  for (const Own &sensor : sensors) {
+    each.push_back(sensor.share);
+    each_s.push_back(sensor.time_s);
+  }
+  metadata(text, shares, list(each, 100.0, 3));
+  metadata(text, times, list(each_s, 1.0, 3));
+}
+
 void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pad &pad, const std::string &path) {
   const ScenarioOptions &options = scenario.options;
   metadata(text, "name", scenario.name);
@@ -271,18 +286,8 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
   if (!pad.drifts_Pa_s().empty()) {
     metadata(text, "drifts_Pa_s", list(pad.drifts_Pa_s(), 1.0, 5));
   }
-  if (!pad.relaxations().empty()) {
-    metadata(text, "relaxations_percent", list(pad.relaxations(), 100.0, 2));
-  }
-  if (!pad.aftereffects().empty()) {
-    std::vector<double> shares, times_s;
-    for (const Pad::Aftereffect &effect : pad.aftereffects()) {
-      shares.push_back(effect.share);
-      times_s.push_back(effect.time_s);
-    }
-    metadata(text, "aftereffects_percent", list(shares, 100.0, 3));
-    metadata(text, "aftereffect_times_s", list(times_s, 1.0, 3));
-  }
+  describe_own(text, "memories_percent", "memory_times_s", pad.memories());
+  describe_own(text, "aftereffects_percent", "aftereffect_times_s", pad.aftereffects());
   if (!pad.branches().empty()) {
     std::vector<double> steps_Pa;
     for (const Pad::Branch &branch : pad.branches()) {
@@ -419,8 +424,11 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
     }
   };
 
+  // Weights rest on the pad, and grips that carry are of controlled force: elsewhere the travel is held.
+  const bool holds_travel = options.kind != "placements" && !moves_under_load(options.kind);
+  Row travel; // what the travel asks for of rubber that has not relaxed
   std::vector<Touch> contacts, before;
-  std::vector<double> base_Pa(sensors);
+  std::vector<double> base_Pa(sensors), relaxed_Pa(sensors);
   for (const Episode &episode : scenario.episodes) {
     quiet_until(episode.begin_s);
     const long long steps = std::llround((episode.end_s - episode.begin_s) / STEP_s);
@@ -472,10 +480,19 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
         row.p0_Pa = one ? fit.p0_Pa : 0.0;
         row.sigma_mm = one ? fit.sigma_mm : 0.0;
         before = contacts;
+        travel = row;
       }
+      const double share = holds_travel ? pad.relaxed_share(t_s, travel.force_N) : 1.0;
+      row.contact = share * travel.force_N > 0.0;
+      row.force_N = share * travel.force_N;
+      row.p0_Pa = share * travel.p0_Pa;
+      row.pull_x_N = share * travel.pull_x_N;
+      row.pull_y_N = share * travel.pull_y_N;
+      std::transform(base_Pa.begin(), base_Pa.end(), relaxed_Pa.begin(), [&](double Pa) { return share * Pa; });
       row.slip = row.contact && episode.slips(t_s);
-      add(t_s, base_Pa);
+      add(t_s, relaxed_Pa);
     }
+    pad.relaxed_share(t_s, 0.0);
     t_s = episode.end_s;
     if (on_progress) {
       on_progress(t_s / *options.seconds);

@@ -86,7 +86,7 @@ class Files(TwinTest):
                 self.assertEqual(emulator["metadata"], scenario.metadata)
                 self.assertEqual(
                     scenario.metadata["name"],
-                    f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-dip-widths-places-drift-relaxation-hysteresis-aftereffect-creep-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}",
+                    f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-dip-widths-places-drift-relaxation-memory-hysteresis-aftereffect-creep-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}",
                 )
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
@@ -104,7 +104,11 @@ class Files(TwinTest):
                     slips = row["phase"] in ("dead_travel", "slip")
                     self.assertEqual(bool(scenario.is_on("slip", middle)), slips, row)
                     force = float(row["force_end_N"]) + float(row["force2_end_N"] or 0)
-                    self.assertAlmostEqual(scenario.at("force_N", float(row["t_end_s"])), force, delta=0.02, msg=row)
+                    true_N = scenario.at("force_N", float(row["t_end_s"]))
+                    if kind in ("placements", "lift", "drag", "slide", "screw"):  # a weight, or a grip of controlled force
+                        self.assertAlmostEqual(true_N, force, delta=0.02, msg=row)
+                    else:  # travel that is held, on rubber that relaxes
+                        self.assertTrue(0.7 * force - 0.02 <= true_N <= force + 0.02, row)
                 acts = {row["act"]: row for row in events}
                 self.assertEqual(len(scenario.intervals("contact")), len(acts))
 
