@@ -41,7 +41,7 @@ void location_stage_start(struct location_stage *own) {
   own->settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-void location_stage_process(struct location_stage *own, struct findings *found) {
+void location_stage_process(struct location_stage *own, const int32_t *past_sd_Pa_q10, struct findings *found) {
   const uint32_t t_us = (uint32_t)found->frame.t_us;
   if (!found->conditioned.contact || t_us - own->frame_us >= OUTLIER_EACH_FRAME_us) {
     memset(&own->watch, 0, sizeof own->watch);
@@ -49,6 +49,7 @@ void location_stage_process(struct location_stage *own, struct findings *found) 
   own->frame_us = t_us;
   if (found->conditioned.contact) {
     own->settings.noise_Pa_q10 = found->frame.noise_Pa_q10;
+    memcpy(own->settings.past_sd_Pa_q10, past_sd_Pa_q10, sizeof own->settings.past_sd_Pa_q10);
     FIT(&own->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &own->settings, &own->watch,
         &found->fit);
     own->failures += !(found->fit.flags & CONTACT_FLAG_FIT_VALID);

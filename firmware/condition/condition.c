@@ -162,7 +162,12 @@ static void begin_contact(struct condition *condition, const struct conditioned 
   condition->calm.snapshots = 0;
 }
 
-static void end_contact(struct condition *condition) {
+static void end_contact(struct condition *condition, uint8_t count) {
+  for (uint8_t k = 0; k < count; k++) {
+    struct condition_sensor *sensor = &condition->sensor[k];
+    condition->to_learn |= UINT32_C(1) << k;
+    sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, sensor->reached_Pa_q10);
+  }
   condition->drifted_Pa_q10 = larger(condition->drifted_Pa_q10, update_drift_in(condition->gate.pressed_ms));
 }
 
@@ -270,7 +275,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   if (changes && pressed) {
     begin_contact(condition, conditioned, count);
   } else if (changes) {
-    end_contact(condition);
+    end_contact(condition, count);
   }
   if (!pressed) {
     sum_up(condition, frame, conditioned->usable);

@@ -26,7 +26,13 @@
  * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
  *
- * The zero of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
+ * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
+ * - So the remainder at a touch fades in the contact, with PAST_ms.
+ * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
+ * both: a share of what the sensor has felt, which rises in a hold, is all of it after a contact and fades with
+ * PAST_ms. The share is learnt from what stands off after each contact.
+ *
+ * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset (the sensor had lost its state), or
  * before the temperature turned out to be another. No single sensor is tared in a contact that others measure. It waits
  * for eight seconds at most, since wrong zeros may make that contact. Such a zero is a guess until the contact ends.
@@ -68,6 +74,8 @@ struct condition_sensor {
   int32_t spread_Pa_q10;  /* 0: settled */
   int32_t memory_Pa_q10;  /* strongest press, fading */
   int32_t reached_Pa_q10; /* the same of this contact alone */
+  int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, is all of it after a contact, fades in 3 s */
+  int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what stands off after contacts */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;
   int32_t crept_Pa_q10;   /* risen slowly */
@@ -98,6 +106,7 @@ struct condition {
   uint32_t below;      /* bitmap: too far below zero */
   uint32_t firm;       /* bitmap: stronger than what the zero has wandered */
   uint32_t sudden;     /* bitmap: stronger than what may have crept up */
+  uint32_t to_learn;   /* bitmap: a contact has ended, and its past_share has not learnt from it */
   uint32_t zero_risen; /* bitmap: the zero has taken more than opens the gate */
 
   /* Of the whole pad. */
@@ -109,10 +118,11 @@ struct condition {
   struct gate gate;
   struct calm calm;
 
-  int32_t zero_Pa_q10[FT_MAX_SENSORS];   /* [sensor] 1/1024 Pa, as all here: level + remainder */
-  int32_t margin_Pa_q10[FT_MAX_SENSORS]; /* by which the gate is higher */
-  int32_t sum_Pa_q10[FT_MAX_SENSORS];    /* of readings above the zero, since the last update */
-  uint8_t summed[FT_MAX_SENSORS];        /* readings in the sum */
+  int32_t zero_Pa_q10[FT_MAX_SENSORS];    /* [sensor] 1/1024 Pa, as all here: level + remainder */
+  int32_t margin_Pa_q10[FT_MAX_SENSORS];  /* by which the gate is higher */
+  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* of a pressure: what a press before and this hold leave in it */
+  int32_t sum_Pa_q10[FT_MAX_SENSORS];     /* of readings above the zero, since the last update */
+  uint8_t summed[FT_MAX_SENSORS];         /* readings in the sum */
   struct condition_sensor sensor[FT_MAX_SENSORS];
 };
 

@@ -57,7 +57,14 @@
 #define BAND_SHIFT 3          /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
 #define DIP_SHIFT 2           /* a quarter may be missing */
 #define REOPEN_SHIFT 4        /* a sixteenth: what a sudden press must exceed after FRESH_ms */
-#define CROSS_SHIFT 1         /* half of the strongest memory counts for all: far sensors keep 2 % of a peak */
+#define PAST_ms SECONDS(3)    /* time constant of what it keeps, and of a hold's own part; strips: 1 to 4 s */
+#define PAST_SHARE 1311       /* 2 % of it is the sd, until a release has shown it; simulated pads: 1.5 to 3 % */
+#define PAST_SHARE_LEAST 655  /* 1 %: one release may hide it */
+#define PAST_SHARE_MOST 16384 /* a quarter; range */
+#define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
+#define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
+#define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
+#define CROSS_SHIFT 1 /* half of the strongest memory counts for all: far sensors keep 2 % of a peak */
 #define FRESH_ms ((uint32_t)SECONDS(2)) /* after a contact: a remainder may rise */
 #define REMAINDER_ms MS(700)            /* time constant of a remainder; strips: 0.5 s at least */
 #define REMAINDER_DOWN_ms MS(100)       /* the same when a force goes at last */

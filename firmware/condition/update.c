@@ -42,7 +42,8 @@ void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
   sensor->tare_max = INT32_MIN;
   sensor->tare_begun_ms = condition->now_ms;
   sensor->tare_left = ZERO_TARE_FRAMES;
-  sensor->memory_Pa_q10 = sensor->reached_Pa_q10 = 0;
+  sensor->memory_Pa_q10 = sensor->reached_Pa_q10 = sensor->past_Pa_q10 = 0;
+  sensor->past_share = larger(sensor->past_share, PAST_SHARE);
   sensor->wander_Pa_q10 = sensor->taken_Pa_q10 = sensor->crept_Pa_q10 = 0;
   condition->margin_Pa_q10[k] = 0;
   condition->sum_Pa_q10[k] = 0;
@@ -83,6 +84,36 @@ static int32_t take_mean(struct condition *condition, uint8_t k, int32_t above_P
   return mean;
 }
 
+#ifdef FT_WITHOUT_PAST
+static void follow_past(const struct step *step) { (void)step; }
+static void learn_past(const struct step *step, int32_t above_level_Pa_q10) { (void)step, (void)above_level_Pa_q10; }
+#else
+static void follow_past(const struct step *step) {
+  struct condition_sensor *sensor = step->sensor;
+  const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
+  sensor->past_Pa_q10 += part_of(held - sensor->past_Pa_q10, share_in(step->ms, PAST_ms));
+  step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
+}
+
+/* What stands off after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
+static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
+  struct condition_sensor *sensor = step->sensor;
+  const uint32_t bit = UINT32_C(1) << step->k;
+  if (!(step->condition->to_learn & bit) || step->condition->gate.released_ms < PAST_SHOWS_ms) {
+    return;
+  }
+  step->condition->to_learn &= ~bit;
+  if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
+    const int32_t off = size_of(above_level_Pa_q10);
+    const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
+    const int32_t shown =
+        port_divide((off < most ? off : most) + (off < most ? off : most) / 4, sensor->past_Pa_q10 >> 16);
+    sensor->past_share += (shown - sensor->past_share) >> PAST_LEARN_SHIFT;
+    sensor->past_share = larger(sensor->past_share, PAST_SHARE_LEAST);
+  }
+}
+#endif
+
 /* What depends on the readings alone: the memory of presses, and the creep. */
 static void remember(const struct step *step, int32_t rise_Pa_q10) {
   struct condition *condition = step->condition;
@@ -95,6 +126,7 @@ static void remember(const struct step *step, int32_t rise_Pa_q10) {
   sensor->memory_Pa_q10 = memory;
   condition->memory_Pa_q10 = larger(condition->memory_Pa_q10, memory);
 
+  follow_past(step);
   const int32_t crept = pressed ? sensor->crept_Pa_q10 : faded(sensor->crept_Pa_q10, step->wander_share);
   const int32_t most = step->ms << CREEPING_SHIFT;
   sensor->crept_Pa_q10 = clamp(crept + clamp(rise_Pa_q10, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
@@ -119,6 +151,8 @@ static void hold(const struct step *step) {
     sensor->level_Pa_q10 += drifted;
     condition->zero_Pa_q10[step->k] += drifted;
   }
+  const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->level_Pa_q10;
+  condition->zero_Pa_q10[step->k] -= part_of(remainder, share_in(step->ms, PAST_ms));
 }
 
 /* The zero is what level and remainder are now: what it may be off by grows by what they have moved. */
@@ -236,6 +270,7 @@ static void follow(const struct step *step) {
   int32_t remainder = before - sensor->level_Pa_q10;
   const int32_t above_level = step->above_Pa_q10 + remainder;
   if (!unsure) {
+    learn_past(step, above_level);
     remainder = follow_remainder(step, &band, fresh, remainder);
   }
   const struct band none = {0};

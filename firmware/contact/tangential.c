@@ -189,7 +189,8 @@ static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q
 }
 
 /* The place is the mean of that of a contact that is pulled as estimated and of one that is not,
- * each by how likely it is. The standard deviation has what lies between the two. */
+ * each by how likely it is. The standard deviation has what lies between the two. What it loses where nothing pulls is
+ * of the same misfit as the place's: else what is left would be mostly the difference of the two factors. */
 static void weigh_force(struct fit_tangential *found) {
   int32_t force_N_q24 = fit_fixed(found->force_N, 24);
   force_N_q24 = force_N_q24 < FORCE_MIN_N_Q24 ? FORCE_MIN_N_Q24 : force_N_q24;
@@ -210,6 +211,7 @@ static void weigh_force(struct fit_tangential *found) {
   struct scaled variance = squares_of(fit_fixed(found->location_sd_mm, 20), 0, 20);
   const struct scaled least = {variance.mantissa, variance.exponent - 4};
   struct scaled of_force = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
+  of_force = scaled_mul(of_force, squares_of(fit_fixed(found->place_per_pull, 20), 0, 20));
   of_force.mantissa = -of_force.mantissa;
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);

@@ -71,8 +71,8 @@ FIXED_INLINE int32_t in_sigmas(float at, int32_t from_q16, int32_t per_sigma_q12
 }
 
 /* What a sensor's row holds before it is one: its place from the contact, its reading of p0, what
- * its gain makes of its error, and what is its own (fit.h), zeros where that is not known. */
-enum { AT_X_Q12, AT_Y_Q12, READING_Q18, GAIN_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q15 };
+ * its gain and its past make of its error, and what is its own (fit.h), zeros where that is not known. */
+enum { AT_X_Q12, AT_Y_Q12, READING_Q18, OWN_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q15 };
 
 /* False: there is nothing to be seen in so few or such readings. */
 static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
@@ -110,7 +110,9 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
     (*row)[AT_X_Q12] = in_sigmas(array->x[k], x_q16, per_sigma_q12);
     (*row)[AT_Y_Q12] = in_sigmas(array->y[k], y_q16, per_sigma_q12);
     (*row)[READING_Q18] = shifted(reading * per_p0.mantissa, per_p0.exponent + shift - 10 + 18);
-    (*row)[GAIN_Q4] = (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_size(reading)) >> 12);
+    int32_t gain_q4 = (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_size(reading)) >> 12);
+    int32_t past_q4 = fixed_clamp(shifted(settings->past_sd_Pa_q10[k], 4 - shift), 0, ERROR_MAX_Q4);
+    (*row)[OWN_Q4] = fixed_longer_leg(gain_q4, past_q4);
     (*row)[OFF_X_Q12] = (*row)[OFF_Y_Q12] = (*row)[WIDER_Q15] = 0;
     if (settings->own) {
       const struct fit_own *own = &settings->own[k];
@@ -129,7 +131,7 @@ static NOINLINE void set_row(struct fit_doubt_search *look, int32_t *row) {
   uint32_t z = (uint32_t)fixed_mul_q30(square_q20 * 4, 774541002); /* log2(e) / 2, Q22 */
   int32_t e_q18 = exp2_negative(z) >> 12;
   int32_t pull_q17 = exp2_rough(z >> PULL_SHIFT) >> 13;
-  int32_t error_q4 = fixed_longer_leg(look->base_q4, row[GAIN_Q4]);
+  int32_t error_q4 = fixed_longer_leg(look->base_q4, row[OWN_Q4]);
   if (look->dip_q18 != 0) {
     int32_t z_dip = fixed_mul_q26((int32_t)(z < Z_MAX_Q22 ? z : Z_MAX_Q22), look->dip_per_q26);
     int32_t dip_q12 = exp2_rough((uint32_t)z_dip) >> 18;

@@ -344,8 +344,9 @@ struct own_errors {
   float location, force; /* pitches squared, and share squared */
 };
 
-static void add_own_errors(const struct samples *samples, const struct fit_settings *settings, const struct dip *dip,
-                           const struct parameters *at, const struct influence *influence, struct own_errors *own) {
+static void add_own_errors(const struct samples *samples, const struct fit_settings *settings, float scale,
+                           const struct dip *dip, const struct parameters *at, const struct influence *influence,
+                           struct own_errors *own) {
   float inverse = 1.0f / (at->sigma * at->sigma);
   float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
   own->gains = own->location = own->force = 0.0f;
@@ -357,10 +358,12 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
     float by_x = product(row, influence->x), by_y = product(row, influence->y);
     float by_force = product(row, influence->force);
     float gain_sd = (float)settings->gain_sd_q16[samples->sensor[k]] * (1.0f / 65536.0f);
+    float past_sd = scale * (float)settings->past_sd_Pa_q10[samples->sensor[k]];
     float error = at->p0 * (gain_sd * e + FIT_DIP_ERROR * d);
-    own->gains += error * error;
-    own->location += (by_x * by_x + by_y * by_y) * error * error;
-    own->force += by_force * by_force * error * error;
+    float variance = error * error + past_sd * past_sd;
+    own->gains += variance;
+    own->location += (by_x * by_x + by_y * by_y) * variance;
+    own->force += by_force * by_force * variance;
     float shape = e * (r2 * inverse) * (r2 * inverse);
     shape_x += by_x * shape;
     shape_y += by_y * shape;
@@ -526,7 +529,7 @@ static bool set_errors(const struct problem *problem, const struct solution *sol
   struct influence influence;
   set_influence(problem->array, before, &solution->normal, &influence);
   struct own_errors own;
-  add_own_errors(&problem->samples, settings, &problem->dip, before, &influence, &own);
+  add_own_errors(&problem->samples, settings, problem->scale, &problem->dip, before, &influence, &own);
   int freedom = count > problem->unknowns ? count - problem->unknowns : 1;
   float noise = (float)settings->noise_Pa_q10 * problem->scale;
   float model = (float)settings->model_sd_q16 * (1.0f / 65536.0f);

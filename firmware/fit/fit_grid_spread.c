@@ -102,8 +102,30 @@ FIXED_INLINE void set_force_moves(const struct fit_system *system, const struct 
   spread->f3 = aligned[3];
 }
 
-NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings, const struct fit_system *system,
-                                    const struct fit_columns_q *columns, struct fit_spread *spread) {
+#ifdef FT_WITHOUT_PAST
+FIXED_INLINE void set_past(int32_t shift, struct fit_spread *spread) { (void)shift, (void)spread; }
+FIXED_INLINE int32_t past_q16(const struct fit_settings *settings, uint8_t sensor, const struct fit_spread *spread) {
+  (void)settings, (void)sensor, (void)spread;
+  return 0;
+}
+#else
+FIXED_INLINE void set_past(int32_t shift, struct fit_spread *spread) {
+  spread->past = fit_grid_reciprocal(spread->amplitude);
+  spread->past.exponent += shift - 28 + 6 + 16;
+}
+/* What a sensor's past leaves, as a share of the amplitude, at most half. */
+FIXED_INLINE int32_t past_q16(const struct fit_settings *settings, uint8_t sensor, const struct fit_spread *spread) {
+  int32_t past_q4 = fixed_clamp(settings->past_sd_Pa_q10[sensor] >> 6, 0, INT16_MAX);
+  if (past_q4 == 0) {
+    return 0;
+  }
+  return fixed_clamp(shifted(past_q4 * spread->past.mantissa, spread->past.exponent), 0, INT16_MAX);
+}
+#endif
+
+NOINLINE void fit_grid_begin_spread(const struct fit_grid_shape *grid, const struct fit_settings *settings,
+                                    int32_t shift, const struct fit_system *system, const struct fit_columns_q *columns,
+                                    struct fit_spread *spread) {
   spread->inverse_mass = fit_grid_reciprocal(fit_scaled_from(system->mass_q20, -20));
   spread->inverse1 = fit_grid_reciprocal(system->d1);
   spread->inverse2 = fit_grid_reciprocal(system->d2);
@@ -120,9 +142,11 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings, const s
   most_q21 = most_q21 > SHAPE_USUAL_Q21 ? most_q21 : SHAPE_USUAL_Q21;
   spread->shape_shift = fixed_bits((uint32_t)most_q21) - 15;
 
+  set_past(shift, spread);
   uint32_t gains = 1;
   for (int k = 0; k < NODES; k++) {
-    gains |= settings->gain_sd_q16[k];
+    uint8_t sensor = grid->sensor[k];
+    gains |= (uint32_t)fixed_longer_leg(settings->gain_sd_q16[sensor], past_q16(settings, sensor, spread));
   }
   if (fit_has_dip(settings)) {
     gains |= (uint32_t)FIT_DIP_ERROR_Q16 >> 2; /* the dip is at most a quarter */
@@ -156,9 +180,10 @@ NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struc
   at_node = room->q28;
   for (int k = 0; k < NODES; k++) {
     uint32_t gain = (uint32_t)settings->gain_sd_q16[sensor[k]] << gain_shift;
-    uint32_t error = (gain * (uint32_t)at_node[k]) >> 16;
-    errors[k] = (int32_t)error;
-    gains += (error * error) >> SPREAD_SQUARE_SHIFT;
+    int32_t past = shifted(past_q16(settings, sensor[k], spread), spread->gain_shift);
+    int32_t error = fixed_longer_leg((int32_t)((gain * (uint32_t)at_node[k]) >> 16), past);
+    errors[k] = error;
+    gains += (uint32_t)(error * error) >> SPREAD_SQUARE_SHIFT;
   }
   spread->gains = gains;
 }

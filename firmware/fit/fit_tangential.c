@@ -12,10 +12,10 @@
 #define ELONGATION_SD_mm2 3.0f
 
 /* Factors of the stated variances by chi^2. NUMERICS.md has their reasons ("What the firmware does not report"). */
-#define GAINS_SHIFT 1         /* 1 / 2: share of the gains' part that a small chi^2 leaves */
 #define MISFIT_SHIFT_PULL 3   /* chi^2 / 8 of a tangential force: its degrees of freedom */
 #define MISFIT_SHIFT_PLACE 4  /* chi^2 / 16 of a location: by the coverage on rubber with a dip */
 #define MISFIT_LEAST_Q16 6554 /* 0.1 */
+#define GAINS_SHIFT_PULL 1    /* half of the gains' part stays where chi^2 is small; of a location all */
 
 /* Thickness of a layer in units of length: the widest term's sd is 0.478 of the thickness. On layers thinner than
  * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
@@ -33,8 +33,7 @@
 #define ELONGATED_LEAST 0.05f
 #define ELONGATED_SURE 2.5f
 /* Larger where the pad ends, which leaves residuals. */
-#define CHI_SQUARE_MAX 8
-#define CHI_SQUARE_MAX_WITH_ENDS 16
+#define CHI_SQUARE_MAX 16
 #define CHI_SQUARE_MAX_NEAR_ENDS 60
 
 #define GAUSSIAN_VARIANCE_Q26 15300821 /* of the Gaussian that fits a point contact: 0.912 V0 */
@@ -122,9 +121,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
   float force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
   pad->force_unit = (struct scaled){fit_fixed(force_unit_N, FORCE_UNIT_Q), -FORCE_UNIT_Q};
   bool near_ends = profile->overhang_mm > 0.0f && profile->overhang_mm < NEAR_ENDS * profile->thickness_mm;
-  pad->chi_square_max = near_ends                     ? CHI_SQUARE_MAX_NEAR_ENDS
-                        : profile->overhang_mm > 0.0f ? CHI_SQUARE_MAX_WITH_ENDS
-                                                      : CHI_SQUARE_MAX;
+  pad->chi_square_max = near_ends ? CHI_SQUARE_MAX_NEAR_ENDS : CHI_SQUARE_MAX;
   pad->long_most_q15 = near_ends ? LONG_MOST_NEAR_ENDS_Q15 : LONG_MOST_Q15;
   float thin = array->pitch_mm / (THICKNESS_PER_UNIT * unit_mm);
   thin *= thin;
@@ -253,10 +250,10 @@ static bool is_elongated(const struct fit_tangential_room *room, const struct ou
 static struct scaled root_of_product(struct scaled a, struct scaled b) { return fit_scaled_sqrt(scaled_mul(a, b)); }
 
 /* What the stated variance is to be multiplied by. */
-static struct scaled misfit_factor(const struct problem *problem, int32_t misfit_q16) {
+static struct scaled misfit_factor(const struct problem *problem, int32_t misfit_q16, int gains_shift) {
   misfit_q16 = misfit_q16 < MISFIT_LEAST_Q16 ? MISFIT_LEAST_Q16 : misfit_q16;
   if (misfit_q16 < 1 << 16) {
-    misfit_q16 += (((1 << 16) - misfit_q16) * problem->by_gains_q12) >> (12 + GAINS_SHIFT);
+    misfit_q16 += (((1 << 16) - misfit_q16) * problem->by_gains_q12) >> (12 + gains_shift);
   }
   return fit_scaled_from(misfit_q16, -16);
 }
@@ -281,9 +278,10 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
     return;
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
-  struct scaled pull_variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL));
+  struct scaled pull_variance =
+      scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL, GAINS_SHIFT_PULL));
   pull_variance = fit_scaled_short(pull_variance);
-  variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE));
+  variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE, 0));
   variance = fit_scaled_short(variance);
   int32_t x_q8, y_q8;
   struct scaled pulls =
@@ -310,6 +308,7 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   result->location_sd_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, variance)));
   struct scaled noise = fit_scaled_from(problem->base.noise_q22, -22);
   result->location_noise_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
+  result->place_per_pull = fit_scaled_float(fit_scaled_sqrt(scaled_div(variance, pull_variance)));
   struct scaled height = variance_of(room, outcome, AMPLITUDE, 0, NULL);
   result->force_sd_N = fit_scaled_float(scaled_mul(unit, root_of_product(height, variance)));
   struct scaled moved = scaled_mul(length, amplitude);

@@ -13,7 +13,7 @@
  * every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the
  * limits.
  *
- * At most 41 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
+ * At most 42 600 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
  * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards
  * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet. */
@@ -95,6 +95,7 @@ struct fit_tangential {
   float q_sd_N;                            /* standard deviation of either */
   int32_t moved_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
                                               by 1, and along y of qy; what moves across is a tenth of that */
+  float place_per_pull;                    /* by what more than q_sd_N the misfit has widened location_sd_mm */
   bool elongated; /* the contact is not round, whatever the Gaussian makes of its tangential force */
 };
 

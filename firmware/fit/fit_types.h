@@ -63,9 +63,10 @@ struct fit_settings {
    * corrected by it to first order, by at most half of what the model has there. */
   const struct fit_own *own;
   /* Other errors that the standard deviations contain. */
-  uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
-  uint16_t model_sd_q16;                /* sd of the model's own error, as a share of the largest reading; 0: none */
-  float location_sd_limit_mm;           /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
+  uint16_t gain_sd_q16[FT_MAX_SENSORS];   /* [sensor] relative sd of its gain; 0: exact */
+  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* [sensor] sd of what rubber keeps of presses, 1/1024 Pa; 0..2^29 */
+  uint16_t model_sd_q16;                  /* sd of the model's own error, as a share of the largest reading; 0: none */
+  float location_sd_limit_mm;             /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
 #define FIT_PRIOR_WEIGHT 0.01f

@@ -173,6 +173,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   if (press % 2) {
     for (int k = 0; k < FT_MAX_SENSORS; k++) {
       settings.gain_sd_q16[k] = (uint16_t)(draw_between(0, 1 << 16) >> draw_between(1, 12));
+      settings.past_sd_Pa_q10[k] = draw_between(0, 1 << 20) >> draw_between(0, 12);
     }
     settings.model_sd_q16 = (uint16_t)(draw_between(0, 1 << 14) >> draw_between(0, 8));
   }

@@ -1,5 +1,7 @@
 #include "condition_bench.h"
 
+#include <math.h>
+
 /* Ten minutes with drift: five seconds later the zero is right, and there was no phantom. */
 TEST(test_zero_recovers_after_a_long_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
@@ -129,5 +131,57 @@ TEST(test_a_press_proves_the_zero_that_it_leaves) {
     press(600 * Pa);
     run_s(3);
     TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+  }
+}
+
+/* Of what sensor 7 stands off by at a touch nothing stays in the contact: the pressure is right all the time. */
+TEST(test_what_stands_off_at_a_touch_fades_in_the_contact) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (int sign = -1; sign <= 1; sign += 2) {
+      begin_calm(periods_us[i]);
+      press(20000 * Pa);
+      run_s(5);
+      release(0.04f * (float)sign, 3, 1);
+      const float left_Pa = 800.0f * (float)sign * expf(-1.0f / 3.0f);
+      for (int tenth = 0; tenth < 60; tenth++) {
+        press(8000 * Pa);
+        frame.pressure_Pa_q10[7] += (int32_t)(1024.0f * left_Pa * expf(-0.1f / 3.0f * (float)tenth));
+        run_s(0.1f);
+        TEST_ASSERT_INT32_WITHIN(150 * Pa, 8000 * Pa, conditioned.pressure_Pa_q10[7]);
+      }
+    }
+  }
+}
+
+/* The sd of what rubber keeps: of a hold as it grows, after it of all, and then less in 3 s. A sensor that stood off by
+ * a tenth counts for more from then on, one that did not for less. */
+TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    TEST_ASSERT_EQUAL(0, condition.past_sd_Pa_q10[7]);
+    press(20000 * Pa);
+    run_s(3);
+    TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa,
+                             condition.past_sd_Pa_q10[7]);
+    press(0);
+    run_s(0.2f);
+    TEST_ASSERT_INT32_WITHIN(40 * Pa, 390 * Pa, condition.past_sd_Pa_q10[7]);
+    run_s(30);
+    TEST_ASSERT_INT32_WITHIN(Pa, 0, condition.past_sd_Pa_q10[7]);
+    for (int n = 0; n < 12; n++) {
+      press(20000 * Pa);
+      run_s(3);
+      fill(AMBIENT);
+      for (int tenth = 0; tenth < 50; tenth++) {
+        frame.pressure_Pa_q10[7] = AMBIENT - (int32_t)(2000.0f * expf(-0.1f / 3.0f * (float)tenth)) * Pa;
+        run_s(0.1f);
+      }
+    }
+    press(20000 * Pa);
+    run_s(1);
+    press(0);
+    run_s(0.15f);
+    TEST_ASSERT_INT32_WITHIN(500 * Pa, 2400 * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_TRUE(condition.past_sd_Pa_q10[4] * 5 < condition.past_sd_Pa_q10[7]);
   }
 }

@@ -25,7 +25,8 @@ void setUp(void) {
                                   .force_sd_N = 0.128f,
                                   .qx_N = 0.75f,
                                   .qy_N = -1.0f,
-                                  .q_sd_N = 0.04f};
+                                  .q_sd_N = 0.04f,
+                                  .place_per_pull = 1.0f};
   input = (struct contact_input){.t_us = 5000000, .contact = true, .tangential = &found};
 }
 
@@ -94,6 +95,21 @@ TEST(a_small_load_may_be_none_and_the_place_knows_it) {
     before = share;
   }
   TEST_ASSERT_TRUE(load.location_sd_mm > 0.25f && load.location_sd_mm < 0.35f);
+}
+
+/* What a pull that is likely none takes from the place's variance is in the measure of the place. */
+TEST(a_misfit_widens_what_goes_as_it_widens_the_place) {
+  use_moved();
+  found.qx_N = found.qy_N = 0.0f;
+  found.location_sd_mm = 0.5f;
+  found.q_sd_N = 0.2f;
+  float taken[2];
+  for (int i = 0; i < 2; i++) {
+    found.place_per_pull = 1.0f + 0.5f * (float)i;
+    update(0);
+    taken[i] = 0.25f - load.location_sd_mm * load.location_sd_mm;
+  }
+  TEST_ASSERT_FLOAT_WITHIN(0.02f * taken[1], taken[1], 2.25f * taken[0]);
 }
 
 /* Half of the contacts are pulled, by 0.1 of the force along each axis. Errors of the load and of

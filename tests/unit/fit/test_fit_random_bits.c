@@ -169,6 +169,7 @@ static struct input draw(uint32_t number) {
   settings->noise_Pa_q10 += settings->noise_Pa_q10 == 0;
   for (int k = 0; k < FT_MAX_SENSORS && random_below(&random, 8); k++) { /* of some sensors */
     settings->gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 16));
+    settings->past_sd_Pa_q10[k] = (int32_t)(random_u32(&random) >> (3 + random_below(&random, 29)));
   }
   settings->model_sd_q16 = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
   settings->cut_noises = random_below(&random, 2) ? 0 : (uint8_t)random_u32(&random);

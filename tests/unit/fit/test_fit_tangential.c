@@ -502,6 +502,7 @@ TEST(test_any_bits_give_finite_results) {
     settings.noise_Pa_q10 = (int32_t)(random_u32(&random) >> (1 + random_below(&random, 31))) | 1;
     for (int k = 0; k < SENSORS; k++) {
       settings.gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
+      settings.past_sd_Pa_q10[k] = (int32_t)(random_u32(&random) >> (15 + random_below(&random, 17)));
     }
     uint32_t usable = random_below(&random, 2) ? ALL : random_u32(&random) | random_u32(&random);
     struct fit_tangential found = i % 2 ? go_on(&state, readings, usable) : estimate(readings, usable);
