@@ -25,6 +25,10 @@ constexpr double FORCE_MODEL_SD = 0.01;
 constexpr double FADED_BEFORE = 2.7;
 /* Contacts add to sigma^2, each its own spread; sd of that, about the calibration's foot. */
 constexpr double CONTACTS_SD_mm2 = 0.6;
+/* A sensor has load if it should read as much as this share of the peak. */
+constexpr double LOADED_SHARE = 0.1;
+/* From the middle of the rest before a placement to that of its readings. */
+constexpr double RESTED_BEFORE_s = 1.5;
 /* Evidence refuses a session from EVIDENCE_SURE placements on. From EVIDENCE_MIN on it does so if it
  * is EVIDENCE_CLEAR times its bound; otherwise it only keeps a session from being good. */
 constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
@@ -69,6 +73,29 @@ double force_share(const Array &array, const Solution &solution) {
   return rms(forces);
 }
 
+/* What zeros move between the rest and the readings of a placement, rms over the sensors: by the line through the rests
+ * of all. */
+double drift_Pa(const std::vector<Placement> &placements, std::size_t sensors) {
+  std::vector<double> drifts_Pa;
+  for (std::size_t k = 0; k < sensors; k++) {
+    double count = 0.0, t = 0.0, p = 0.0, tt = 0.0, tp = 0.0;
+    for (const Placement &placement : placements) {
+      if (placement.usable >> k & 1u && !placement.rest_Pa.empty()) {
+        const double t_s = placement.t_s - placements[0].t_s, rest_Pa = placement.rest_Pa[k];
+        count += 1.0;
+        t += t_s;
+        p += rest_Pa;
+        tt += t_s * t_s;
+        tp += t_s * rest_Pa;
+      }
+    }
+    if (count * tt > t * t) {
+      drifts_Pa.push_back(RESTED_BEFORE_s * (count * tp - t * p) / (count * tt - t * t));
+    }
+  }
+  return rms(drifts_Pa);
+}
+
 /* Rms of the log gains, beyond what their sds make. */
 double spread_of(const Solution &solution) {
   std::vector<double> logs;
@@ -88,11 +115,43 @@ std::string too_little_load(const std::vector<std::size_t> &sensors) {
   return sensors.empty() ? "" : ", so sensors " + list_of(sensors) + " had too little load";
 }
 
+/* Beside what the others tell of the placements. */
+bool feels_nothing(const Array &array, std::vector<Placement> placements, const Solution &solution, std::size_t k) {
+  double most_Pa = 0.0;
+  for (Placement &placement : placements) {
+    most_Pa = std::max(most_Pa, placement.reading_Pa[k]);
+    placement.usable &= ~(1u << k);
+  }
+  if (most_Pa > FELT_MIN * solution.peak_Pa) {
+    return false;
+  }
+  const Solution others = solve(array, placements);
+  double felt = 0.0, expected = 0.0;
+  for (std::size_t i = 0; others.solved && i < placements.size(); i++) {
+    const Fitted &at = others.placements[i];
+    const double widths = std::hypot(array.x_mm[k] - at.x_mm, array.y_mm[k] - at.y_mm) / others.sigma_mm;
+    const double usual_Pa = others.peak_Pa * std::exp(-0.5 * widths * widths);
+    felt += placements[i].reading_Pa[k] * usual_Pa;
+    expected += usual_Pa * usual_Pa;
+  }
+  return expected > LOADED_SHARE * others.peak_Pa * LOADED_SHARE * others.peak_Pa && felt < FELT_MIN * expected;
+}
+
+/* What it has of the pad, with readings as uncertain as without gains, or without them. */
+Solution in_part(Solution solution, bool with_gains) {
+  solution.gain_sd.assign(solution.gain.size(), Assumptions{}.gain);
+  solution.reading_sd = solution.gain_sd;
+  if (!with_gains) {
+    solution.gain.assign(solution.gain.size(), 1.0);
+    solution.own_width.clear();
+  }
+  return solution;
+}
+
 /* Differences of the gains of odd and even placements beyond their uncertainty, and whether
- * either's make the firmware's fit of the other better. */
-void compare_halves(const Array &array, std::vector<Placement> placements, const Solution &solution,
+ * either's, and width and dip alone, make the firmware's fit of the other better. */
+void compare_halves(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
                     Judgement &judgement) {
-  remember(placements);
   std::vector<Placement> halves[2];
   Solution from[2] = {solution, solution};
   from[0].placements.clear();
@@ -128,14 +187,19 @@ void compare_halves(const Array &array, std::vector<Placement> placements, const
   judgement.halves_gauge = std::max(std::sqrt(squares) - HALVES_SDS * gauge_sd, 0.0);
   /* Location and force alike, either half by the other. */
   const std::vector<double> ones(array.sensors(), 1.0);
-  double better = 1.0;
+  double by_all = 1.0, by_profile = 1.0;
   for (int half : {0, 1}) {
     const Solution &other = half == 0 ? even : odd;
-    const Scatter raw = scatter(array, halves[half], from[half], ones, {});
-    const Scatter calibrated = scatter(array, halves[half], from[half], other.gain, shape_of(other));
-    better *= calibrated.location_mm * calibrated.force / (raw.location_mm * raw.force);
+    const auto off = [&](const std::vector<double> &gain, const Shape &found_shape) {
+      const Scatter left = scatter(array, halves[half], from[half], gain, found_shape);
+      return left.location_mm * left.force;
+    };
+    const double raw = off(ones, {});
+    by_all *= off(other.gain, shape_of(other)) / raw;
+    by_profile *= off(ones, shape_of(in_part(other, false))) / raw;
   }
-  judgement.helps = better < 1.0;
+  judgement.helps = by_all < std::min(by_profile, 1.0);
+  judgement.profile_helps = by_profile < 1.0;
 }
 
 /* What the placements lack where gains are not known: by where they are. Where they are not all
@@ -206,8 +270,8 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "the zeros of the sensors were off by " + percent(j.offset_share) +
            " of the peak: see that nothing touches the pad, tare, and begin again";
   case Reason::drift:
-    return "the zeros of the sensors moved by " + percent(j.drift_share) +
-           " of the peak meanwhile: let the fingertip warm up, and begin again";
+    return "the zeros of the sensors move by " + percent(j.drift_share) +
+           " of the peak in the second of a placement: let the fingertip warm up, and begin again";
   case Reason::stray:
     return "only " + percent(j.kept_share) +
            " of the placements fit each other: let the same weight rest freely each time";
@@ -225,7 +289,8 @@ std::string text_of(const Judgement &j, std::size_t placements) {
            " mm from where the firmware has them: see geometry.c";
   case Reason::silent:
     return "sensors " + list_of(j.silent) +
-           " gave no reading to rely on: fingertip info shows whether they answer and their PROM is good";
+           " feel nothing, or gave no reading to rely on: fingertip info shows whether they answer and their PROM is "
+           "good";
   }
   return "";
 }
@@ -304,6 +369,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
   j.solution = solve(array, placements);
   const Solution &s = j.solution;
 
+  const bool thin = s.solved && s.sigma_mm < THIN_PITCHES * array.pitch_mm;
   const double helps = s.solved ? HELPS_SHARE * spread_of(s) : 0.0;
   const bool enough = placements.size() >= PLACEMENTS_ENOUGH;
   j.wanted_sd = enough ? std::max(SHAPE_SD_WANTED, helps) : SHAPE_SD_WANTED;
@@ -313,10 +379,11 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     seen |= placement.usable;
   }
   for (std::size_t k = 0; k < array.sensors(); k++) {
-    if (!s.solved || s.shape_sd[k] > j.wanted_sd) {
+    if (!s.solved || thin || s.shape_sd[k] > j.wanted_sd) {
       j.unsure.push_back(k);
     }
-    if (!(seen >> k & 1u)) {
+    if (!(seen >> k & 1u) ||
+        (s.solved && placements.size() >= EVIDENCE_MIN && feels_nothing(array, placements, s, k))) {
       j.silent.push_back(k);
     }
   }
@@ -327,7 +394,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     j.force_share = force_share(array, s);
     j.kept_share = double(s.kept) / double(placements.size());
     j.offset_share = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
-    j.drift_share = rms_beyond(s.drift_Pa, s.drift_sd_Pa) / s.peak_Pa;
+    j.drift_share = drift_Pa(placements, array.sensors()) / s.peak_Pa;
   }
   if (placements.size() >= EVIDENCE_MIN && !j.silent.empty()) {
     j.state = Judgement::State::refused;
@@ -346,21 +413,30 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
   }
   const Reason lacks = lacking(array, placements, s);
   const bool all_over = lacks != Reason::cluster && lacks != Reason::one_end;
-  const bool known = placements.size() >= PLACEMENTS_WANTED && s.solved && j.unsure.empty() &&
-                     s.gauge_sd <= wanted_gauge_sd && all_over;
-  if (!known || evidence.times > 1.0) {
-    j.reason = known ? evidence.reason : lacks;
-    j.state = last ? Judgement::State::refused : Judgement::State::more;
-    j.text = text_of(j, placements.size());
+  const bool spread = placements.size() >= PLACEMENTS_WANTED && s.solved && all_over;
+  const bool known = spread && j.unsure.empty() && s.gauge_sd <= wanted_gauge_sd;
+  const bool ends = last || ((known || thin) && placements.size() >= HALVES_SURE);
+  const bool compared = spread && evidence.times <= 1.0 && (known || ends);
+  if (compared) {
+    compare_halves(array, placements, s, j);
+  }
+  const bool agree = j.halves_shape <= HALVES_SHAPE_MAX && j.halves_gauge <= HALVES_GAUGE_MAX;
+  j.reason = !known                 ? lacks
+             : evidence.times > 1.0 ? evidence.reason
+             : !agree               ? Reason::halves
+             : !j.helps             ? Reason::useless
+                                    : Reason::none;
+  j.text = text_of(j, placements.size());
+  if (j.reason != Reason::none && placements.size() >= HALVES_SURE && ends && compared && agree &&
+      (j.helps || j.profile_helps)) {
+    j.state = Judgement::State::good;
+    j.text = (j.helps ? "good as far as it goes: " : "good for the pad's width and dip alone: ") + j.text;
+    j.solution = in_part(s, j.helps);
     return j;
   }
-  compare_halves(array, placements, s, j);
-  const bool agree = j.halves_shape <= HALVES_SHAPE_MAX && j.halves_gauge <= HALVES_GAUGE_MAX;
-  j.reason = !agree ? Reason::halves : j.helps ? Reason::none : Reason::useless;
-  j.state = agree && j.helps                           ? Judgement::State::good
-            : last || placements.size() >= HALVES_SURE ? Judgement::State::refused
-                                                       : Judgement::State::more;
-  j.text = text_of(j, placements.size());
+  j.state = j.reason == Reason::none ? Judgement::State::good
+            : ends                   ? Judgement::State::refused
+                                     : Judgement::State::more;
   return j;
 }
 
@@ -417,17 +493,22 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
 Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
                 const std::vector<double> &gain, const Shape &shape) {
   FirmwareFit fit(array, shape);
-  std::vector<double> distances, forces;
+  std::vector<double> dx_mm, dy_mm, distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted = solution.placements[i].kept ? fit(placements[i], gain) : std::nullopt;
     if (fitted) {
-      distances.push_back(std::hypot(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm,
-                                     static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm));
+      dx_mm.push_back(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm);
+      dy_mm.push_back(static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm);
       forces.push_back(static_cast<double>(fitted->force_N));
     }
   }
   if (forces.empty()) {
     return {};
+  }
+  /* A slope moves all of them. */
+  const double all_x_mm = median(dx_mm), all_y_mm = median(dy_mm);
+  for (std::size_t i = 0; i < dx_mm.size(); i++) {
+    distances.push_back(std::hypot(dx_mm[i] - all_x_mm, dy_mm[i] - all_y_mm));
   }
   const double force = median(forces);
   for (double &each : forces) {

@@ -3,6 +3,8 @@
  * Good: the calibration helps, and nothing in the session speaks against it. It helps if every gain
  * is known to SHAPE_SD_WANTED, or after PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ,
  * and if the gains from half of the placements make the firmware's fit of the other half better.
+ * Where many placements all over the pad do not tell the gains, but half of them mend the other half, good is what they
+ * tell, with readings as uncertain as without gains: the gains, or width and dip alone (reason is not none then).
  * Refused: what speaks against it does not go away with more placements. More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm,
@@ -35,7 +37,11 @@ constexpr double ELLIPSE_MAX = 0.05;          /* rms of q1, q2 beyond their sds:
                                                  cylinders of 6 by 12 mm have 0.053 and more, balls
                                                  0.031 at most (report truth, part calibration, seed 20000) */
 constexpr double OFFSET_MAX = 0.012;          /* rms over the sensors, of the peak: zeros */
-constexpr double DRIFT_MAX = 0.006;           /* the same, from first to last placement */
+constexpr double DRIFT_MAX = 0.006;           /* the same, moving from the rest before a placement to it */
+constexpr double FELT_MIN = 0.25;             /* of what a usual sensor would read: less is nothing */
+constexpr double THIN_PITCHES = 0.36;         /* sigma; on thinner rubber too few sensors measure a placement: gains
+                                                 that seem to be known left 2.7 % of the presses of a real pad of
+                                                 0.33 off by 1 mm without a warning */
 constexpr double POSITION_MAX_mm = 0.5;       /* rms: distance of sensors from the layout */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */
 constexpr std::size_t PLACEMENTS_ENOUGH = 20; /* more hardly make gains surer that are not by then */
@@ -50,13 +56,13 @@ enum class Reason {
   weights,   /* not the same force every time */
   elongated, /* no round foot */
   offsets,   /* zeros were off */
-  drift,     /* zeros moved */
+  drift,     /* zeros move */
   stray,     /* too many placements do not fit the others */
   residual,  /* no such profile */
   halves,    /* odd and even placements give different gains */
   useless,   /* the gains from half of the placements make the other half no better */
   layout,    /* sensors are not where the firmware's layout has them */
-  silent,    /* a sensor has no reading in any placement */
+  silent,    /* a sensor has no reading in any placement, or feels nothing */
 };
 
 /* A word for programs: "too_few", "cluster", ... */
@@ -68,15 +74,16 @@ struct Judgement {
   std::string text;                /* a sentence: why, and what to do */
   Solution solution;
   double halves_shape = 0.0, halves_gauge = 0.0; /* 0 before there are PLACEMENTS_WANTED */
-  bool helps = false;                            /* the halves each other; as halves_shape */
+  bool helps = false, profile_helps = false;     /* the halves each other, by all and by width and dip alone; as
+                                                    halves_shape */
   double kept_share = 0.0, force_share = 0.0;    /* the latter: rms of e, of placements within the
                                                     array */
   double ellipse = 0.0;                          /* rms of q1, q2 beyond their sds */
-  double offset_share = 0.0, drift_share = 0.0;  /* rms over the sensors beyond what is by chance, of
-                                                    the peak */
+  double offset_share = 0.0, drift_share = 0.0;  /* rms over the sensors, of the peak; offsets beyond what is
+                                                    by chance */
   double wanted_sd = 0.0;                        /* of the gains outside the gauge, to be good */
   std::vector<std::size_t> unsure;               /* sensors whose gain is not known well enough yet */
-  std::vector<std::size_t> silent;               /* of those, the ones without a reading in any placement */
+  std::vector<std::size_t> silent;               /* those without a reading in any placement, or that feel nothing */
 };
 
 /* last: there will be no more placements, so what is not good is refused. */
@@ -109,8 +116,8 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
                                       const Solution &solution, double force_N, const Shape &shape);
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements, with these
- * gains and this shape. Medians: of the distance of its locations from those of the solution, of
- * the force's deviation from its median, relative. */
+ * gains and this shape. Medians: of the distance of its locations from those of the solution, less what
+ * all have in common, of the force's deviation from its median, relative. */
 struct Scatter {
   double location_mm = 0.0, force = 0.0;
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace fingertip::calibrating {
@@ -46,19 +45,14 @@ double huber_weight(double square) { return square <= HUBER * HUBER ? 1.0 : HUBE
 
 Model::Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions)
     : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements), assumed_(assumptions) {
-  double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
   std::vector<double> peaks;
   for (const Placement &placement : placements) {
-    first_s = std::min(first_s, placement.t_s);
-    last_s = std::max(last_s, placement.t_s);
     peaks.push_back(largest_Pa(placement));
   }
   peak_Pa_ = std::max(median(peaks), 1.0);
   const std::size_t strong = 9 * peaks.size() / 10;
   std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(strong), peaks.end());
   near_Pa_ = std::max(peaks[strong], 1.0);
-  middle_s_ = 0.5 * (first_s + last_s);
-  half_s_ = std::max(0.5 * (last_s - first_s), 1e-9);
 }
 
 void Model::assume(const Spread &spread, double excess) {
@@ -66,7 +60,6 @@ void Model::assume(const Spread &spread, double excess) {
   assumed_.force = spread.force;
   assumed_.width = spread.width;
   assumed_.ellipse = spread.ellipse;
-  assumed_.memory = spread.memory;
   assumed_.own_width = spread.own_width;
   excess_ = excess;
 }
@@ -116,11 +109,11 @@ Unknowns Model::first_guess() const {
   first.global[layout.log_peak()] = std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
   first.global[layout.log_width()] = std::log(median(widths));
   first.global[layout.mixing()] = assumed_.mixing;
-  first.global[layout.dip_width()] = std::log(DIP_PITCHES);
+  first.global[layout.dip_width()] = std::log(DIP_WIDTHS);
   return first;
 }
 
-Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, double earlier_Pa) const {
+Reading Model::reading(const VectorXd &g, const Local &l, int k, double earlier_Pa) const {
   const double u = array_.x_mm[std::size_t(k)] + g[layout.dx(k)] - l[0];
   const double v = array_.y_mm[std::size_t(k)] + g[layout.dy(k)] - l[1];
   const double q1 = l[4] + g[layout.ellipse(0)], q2 = l[5] + g[layout.ellipse(1)];
@@ -130,47 +123,49 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau, dou
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
   const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
   const double full = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
-  const double dip_mm = array_.pitch_mm * std::exp(g[layout.dip_width()]);
-  const double dip_per = 0.5 / (dip_mm * dip_mm);
+  const double dip_per = per * std::exp(-2.0 * g[layout.dip_width()]);
   const double h = g[layout.dip()];
   const double dip = std::exp(-dip_per * square);
-  const double sensed = full * ((1.0 - m) * wide + m * narrow - h * dip);
-  const RelaxationEffect hidden = relaxation_effect(g[layout.memory(k)] * earlier_Pa, sensed);
-  const double left = 1.0 - hidden.by_sensed;
-  const double strength = left * full, value = left * sensed;
-  const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
-  const double by_square = core_by_square + strength * h * dip * dip_per;
-  const double by_log_width = -2.0 * square * core_by_square;
-  const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
-  const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
+  double pulled = 0.0, pulled_per = 0.0;
+  for (const auto &[strength, ratio] : PULL) {
+    const double term = full * strength * std::exp(-per / (ratio * ratio) * square);
+    pulled += term / width;
+    pulled_per += term / width * per / (ratio * ratio);
+  }
+  const double t1 = g[layout.pull(0)], t2 = g[layout.pull(1)], along = t1 * u + t2 * v;
+  const double value = full * ((1.0 - m) * wide + m * narrow - h * dip) + along * pulled;
+  const double by_square =
+      -full * ((1.0 - m) * wide * per + m * narrow * narrow_per - h * dip * dip_per) - along * pulled_per;
+  const double by_log_width = -2.0 * square * by_square - along * pulled;
+  const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v) + t1 * pulled;
+  const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u) + t2 * pulled;
   Reading r;
-  r.model = sensed - hidden.Pa + g[layout.offset(k)] + g[layout.drift(k)] * tau;
+  r.model = value + g[layout.offset(k)] - g[layout.memory(k)] * earlier_Pa;
   const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
   std::size_t terms = 0;
   const auto add = [&](int at, double by) { r.terms[terms++] = {at, by}; };
   add(k, value);
   add(layout.log_peak(), value);
   add(layout.log_width(), by_log_width);
-  add(layout.mixing(), strength * (narrow - wide));
+  add(layout.mixing(), full * (narrow - wide));
   add(layout.dx(k), by_u);
   add(layout.dy(k), by_v);
   add(layout.offset(k), 1.0);
-  add(layout.drift(k), tau);
-  add(layout.memory(k), -hidden.by_remembered * earlier_Pa);
+  add(layout.memory(k), -earlier_Pa);
   add(layout.ellipse(0), by_q1);
   add(layout.ellipse(1), by_q2);
-  add(layout.dip(), -strength * dip);
-  add(layout.dip_width(), -2.0 * square * strength * h * dip * dip_per);
+  add(layout.dip(), -full * dip);
+  add(layout.dip_width(), -2.0 * square * full * h * dip * dip_per);
   add(layout.own_width(k), by_log_width);
+  add(layout.pull(0), u * pulled);
+  add(layout.pull(1), v * pulled);
   r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
   return r;
 }
 
 double Model::residual(const Unknowns &unknowns, std::size_t i, int k) const {
-  const Placement &placement = placements_[i];
-  const double earlier_Pa = placement.earlier_Pa[std::size_t(k)];
-  return placement.reading_Pa[std::size_t(k)] -
-         reading(unknowns.global, unknowns.locals[i], k, tau(placement), earlier_Pa).model;
+  return placements_[i].reading_Pa[std::size_t(k)] -
+         reading(unknowns.global, unknowns.locals[i], k, earlier_Pa(i, k)).model;
 }
 
 double Model::expected_sd(const Placement &placement, double reading_Pa) const {
@@ -195,10 +190,10 @@ std::pair<double, double> Model::prior(int at) const {
     return {0.0, assumed_.dip};
   }
   if (at == layout.dip_width()) {
-    return {std::log(DIP_PITCHES), assumed_.dip_log_sd};
+    return {std::log(DIP_WIDTHS), assumed_.dip_log_sd};
   }
   if (at < layout.dx(0)) {
-    return {0.0, at < layout.ellipse(0) ? 0.0 : assumed_.ellipse_of_all};
+    return {0.0, at < layout.ellipse(0) ? 0.0 : at < layout.pull(0) ? assumed_.ellipse_of_all : assumed_.pull};
   }
   if (at < layout.offset(0)) {
     return {0.0, assumed_.position_mm};
@@ -263,7 +258,7 @@ MatrixXd Optimiser::information_at(double x_mm, double y_mm) const {
     square(j, j) += 1.0 / (sd[j] * sd[j]);
   }
   for (int k = 0; k < model_.layout.sensors; k++) {
-    const Reading r = model_.reading(at.global, local, k, 1.0, 0.0);
+    const Reading r = model_.reading(at.global, local, k);
     const double expected = model_.expected_sd(quiet, r.model);
     accumulate(r, 1.0 / (expected * expected), own, cross, square);
   }
@@ -326,12 +321,11 @@ void Optimiser::assemble() {
       continue;
     }
     local_normal_[i].setZero();
-    const double t = model_.tau(placements_[i]);
     for (int k = 0; k < model_.layout.sensors; k++) {
       if (!(placements_[i].usable >> k & 1u)) {
         continue;
       }
-      const Reading r = model_.reading(at.global, at.locals[i], k, t, placements_[i].earlier_Pa[std::size_t(k)]);
+      const Reading r = model_.reading(at.global, at.locals[i], k, model_.earlier_Pa(i, k));
       const double per = 1.0 / model_.expected_sd(placements_[i], k);
       const double left = (placements_[i].reading_Pa[std::size_t(k)] - r.model) * per;
       const double weight = huber_weight(left * left) * per;
@@ -402,7 +396,7 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
   const auto &[global, locals] = optimiser.at;
   const std::vector<Placement> &placements = model.placements();
   const int n = layout.sensors;
-  double position = 0.0, memory = 0.0, own_width = 0.0, known = 3.0;
+  double position = 0.0, own_width = 0.0, known = 3.0;
   for (int at = 0; at < layout.size(); at++) {
     const auto [mean, sd] = model.prior(at);
     if (sd > 0.0) {
@@ -412,8 +406,6 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
       position += global[at] * global[at] + covariance(at, at);
     } else if (at >= layout.own_width(0)) {
       own_width += global[at] * global[at] + covariance(at, at);
-    } else if (at >= layout.memory(0)) {
-      memory += global[at] * global[at] + covariance(at, at);
     }
   }
   Local squares = Local::Zero();
@@ -447,7 +439,6 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
     spread = now;
   };
   learn(learnt.position_mm, given.position_mm, position, 2.0 * n);
-  learn(learnt.memory, given.memory, memory, double(n));
   learn(learnt.own_width, given.own_width, own_width, double(n));
   learn(learnt.force, given.force, squares[2], count);
   learn(learnt.width, given.width, squares[3], count);

@@ -14,11 +14,11 @@
 namespace fingertip::calibrating {
 
 constexpr int LOCAL = 6;  /* x, y, e, w, q1, q2 */
-constexpr int COMMON = 7; /* log A, log s, m, q1, q2 of all, h, log of B in pitches */
+constexpr int COMMON = 9; /* log A, log s, m, q1, q2 of all, h, log B / s, t1, t2 */
 using Local = Eigen::Matrix<double, LOCAL, 1>;
 using LocalSquare = Eigen::Matrix<double, LOCAL, LOCAL>;
 
-/* Where a global unknown lies in the vector: log gains, common, dx, dy, o, d, r, b. */
+/* Where a global unknown lies in the vector: log gains, common, dx, dy, o, r, b. */
 struct Layout {
   int sensors;
   int log_peak() const { return sensors; }
@@ -27,15 +27,15 @@ struct Layout {
   int dx(int k) const { return sensors + COMMON + k; }
   int dy(int k) const { return 2 * sensors + COMMON + k; }
   int offset(int k) const { return 3 * sensors + COMMON + k; }
-  int drift(int k) const { return 4 * sensors + COMMON + k; }
-  int memory(int k) const { return 5 * sensors + COMMON + k; }
-  int own_width(int k) const { return 6 * sensors + COMMON + k; }
+  int memory(int k) const { return 4 * sensors + COMMON + k; }
+  int own_width(int k) const { return 5 * sensors + COMMON + k; }
   int ellipse(int which) const { return sensors + 3 + which; }
   int dip() const { return sensors + 5; }
   int dip_width() const { return sensors + 6; }
-  int size() const { return 7 * sensors + COMMON; }
+  int pull(int which) const { return sensors + 7 + which; }
+  int size() const { return 6 * sensors + COMMON; }
 };
-constexpr int TOUCHED = 14; /* global unknowns that a reading depends on */
+constexpr int TOUCHED = 15; /* global unknowns that a reading depends on */
 
 struct Unknowns {
   Eigen::VectorXd global;
@@ -57,18 +57,21 @@ double huber_weight(double square);
 
 class Model {
 public:
-  /* placements: with earlier_Pa; they and the array outlive the model. */
+  /* Placements and array outlive the model. */
   Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions);
 
   /* Each placement where the readings' logarithms have their peak, in pitches. */
   Unknowns first_guess() const;
-  Reading reading(const Eigen::VectorXd &g, const Local &l, int k, double tau, double earlier_Pa) const;
+  Reading reading(const Eigen::VectorXd &g, const Local &l, int k, double earlier_Pa = 0.0) const;
   /* A reading less that of the model, Pa. */
   double residual(const Unknowns &unknowns, std::size_t i, int k) const;
-  double tau(const Placement &placement) const { return (placement.t_s - middle_s_) / half_s_; }
   double expected_sd(const Placement &placement, double reading_Pa) const;
   double expected_sd(const Placement &placement, int k) const {
     return expected_sd(placement, placement.reading_Pa[std::size_t(k)]);
+  }
+  double earlier_Pa(std::size_t i, int k) const {
+    const std::vector<double> &earlier_Pa = placements_[i].earlier_Pa;
+    return earlier_Pa.empty() ? 0.0 : earlier_Pa[std::size_t(k)];
   }
   /* sd and mean of the prior of a global unknown; none: sd 0 */
   std::pair<double, double> prior(int at) const;
@@ -77,8 +80,7 @@ public:
   const std::vector<Placement> &placements() const { return placements_; }
   double excess() const { return excess_; }
   Spread spread() const {
-    return {assumed_.position_mm, assumed_.force,  assumed_.width,
-            assumed_.ellipse,     assumed_.memory, assumed_.own_width};
+    return {assumed_.position_mm, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.own_width};
   }
   /* From now on, instead of what was assumed. */
   void assume(const Spread &spread, double excess);
@@ -90,7 +92,7 @@ private:
   const std::vector<Placement> &placements_;
   Assumptions assumed_; /* prior spreads as they are estimated */
   double excess_ = 1.0; /* of the model's own error over what is assumed */
-  double peak_Pa_ = 0.0, near_Pa_ = 0.0, middle_s_ = 0.0, half_s_ = 0.0;
+  double peak_Pa_ = 0.0, near_Pa_ = 0.0;
 };
 
 class Optimiser {

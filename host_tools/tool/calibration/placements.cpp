@@ -47,9 +47,11 @@ std::optional<Placement> PlacementFinder::take(const Frame &frame) {
     }
   }
   last_s_ = t_s;
+  if (state_ == State::resting) {
+    zero_Pa_ = frame.zero_Pa;
+  }
   if (!begun_) {
     begun_ = true;
-    zero_Pa_ = frame.zero_Pa;
     rest_from_s_ = t_s;
   }
   std::optional<Placement> found;
@@ -66,7 +68,7 @@ std::optional<Placement> PlacementFinder::take(const Frame &frame) {
   for (std::size_t k = 0; k < sensors_; k++) {
     if (frame.valid >> k & 1u) {
       open_.counts[k]++;
-      open_.means[k] += (frame.pressure_Pa[k] - open_.means[k]) / open_.counts[k];
+      open_.means[k] += (frame.pressure_Pa[k] - frame.zero_Pa[k] - open_.means[k]) / open_.counts[k];
     }
   }
   return found;
@@ -99,7 +101,7 @@ void PlacementFinder::find_rest(double t_s) {
   std::uint32_t seen = 0;
   const std::vector<double> mean = mean_of(std::max(end_s - REST_s, rest_from_s_), end_s, &seen);
   if (rest_Pa_.empty()) {
-    rest_Pa_ = zero_Pa_;
+    rest_Pa_.assign(sensors_, 0.0);
   }
   for (std::size_t k = 0; k < sensors_; k++) {
     if (seen >> k & 1u) {
@@ -168,6 +170,7 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   placement.usable = seen;
   double peak = 0.0, sum = 0.0;
   for (std::size_t k = 0; k < sensors_; k++) {
+    placement.rest_Pa.push_back(rest_Pa_[k] + zero_Pa_[k]);
     placement.reading_Pa.push_back(seen >> k & 1u ? mean[k] - rest_Pa_[k] : 0.0);
     peak = std::max(peak, placement.reading_Pa[k]);
     sum += std::max(placement.reading_Pa[k], 0.0);
@@ -235,6 +238,13 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
     }
     return std::nullopt;
   }
+  past_Pa_.resize(sensors_, 0.0);
+  placement.earlier_Pa.resize(sensors_, 0.0);
+  for (std::size_t k = 0; k < sensors_; k++) {
+    placement.earlier_Pa[k] = past_Pa_[k] * std::exp((past_s_ - placement.t_s) / PAST_s);
+    past_Pa_[k] = placement.earlier_Pa[k] + placement.reading_Pa[k];
+  }
+  past_s_ = placement.t_s;
   state_ = State::taken;
   return placement;
 }

@@ -1,9 +1,8 @@
 /* Finds placements in a stream of frames: a weight was set down, rested, and was lifted again.
  *
  * Frames of any rate from 12 a second and any oversampling; all times are the frames' own. What
- * touches the pad is decided by absolute pressures alone, against those just before, so neither
- * the firmware's gate nor its zero matters; only whether something lies on the pad at the very
- * beginning is asked of the zero.
+ * touches the pad is decided against the readings just before, so the firmware's gate does not matter. Of
+ * its zero only what it moves by in a contact does: what stood off before goes on to fade there.
  *
  * A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it
  * has rested for a second: then the mean of the readings from 0.5 to 1 s is taken, above the mean
@@ -82,7 +81,8 @@ private:
   double last_s_ = 0.0, ahead_s_ = 0.0; /* ahead_s_: of the frames' own time, since a restart */
   Slot open_;
   std::deque<Slot> slots_; /* of the last seconds, oldest first */
-  std::vector<double> rest_Pa_, zero_Pa_, above_Pa_;
+  std::vector<double> rest_Pa_, zero_Pa_, above_Pa_, past_Pa_;
+  double past_s_ = 0.0;
   double touch_s_ = 0.0, moved_s_ = 0.0, rest_from_s_ = 0.0, peak_Pa_ = 0.0;
 };
 

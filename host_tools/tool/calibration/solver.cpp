@@ -14,8 +14,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/* Times of the rubber's recovery; see remember. */
-constexpr double SLOW_s = 10.0, FAST_s = 1.0, FAST_SHARE = 20.0;
 /* A placement whose residuals are beyond these many times what is expected, and as many times the
  * median placement's, was no such placement: another object, a hand, a weight that tipped. */
 constexpr double DROP_MISFIT = 3.0;
@@ -130,7 +128,6 @@ void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
     global[layout.dx(k)] = solution.dx_mm[at];
     global[layout.dy(k)] = solution.dy_mm[at];
     global[layout.offset(k)] = solution.offset_Pa[at];
-    global[layout.drift(k)] = 0.5 * solution.drift_Pa[at];
     global[layout.memory(k)] = solution.memory[at];
     global[layout.own_width(k)] = solution.own_width[at];
   }
@@ -140,7 +137,9 @@ void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
   global[layout.ellipse(0)] = solution.ellipse_of_all[0];
   global[layout.ellipse(1)] = solution.ellipse_of_all[1];
   global[layout.dip()] = solution.dip;
-  global[layout.dip_width()] = std::log(solution.dip_pitches);
+  global[layout.pull(0)] = solution.pull[0];
+  global[layout.pull(1)] = solution.pull[1];
+  global[layout.dip_width()] = std::log(solution.dip_widths);
   for (std::size_t i = 0; i < model.placements().size(); i++) {
     const Fitted &fitted = solution.placements[i];
     optimiser.kept[i] = fitted.kept;
@@ -172,45 +171,15 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-RelaxationEffect relaxation_effect(double remembered_Pa, double sensed_Pa) {
-  if (remembered_Pa <= 0.0) {
-    return {remembered_Pa, 1.0, 0.0};
-  }
-  if (sensed_Pa <= 0.0) {
-    return {0.0, 0.0, 0.0};
-  }
-  const double ratio = sensed_Pa / remembered_Pa, square = 1.0 + ratio * ratio;
-  const double root = 1.0 / std::sqrt(square), by_sensed = root / square;
-  return {sensed_Pa * root, by_sensed * ratio * ratio * ratio, by_sensed};
-}
-
-void remember(std::vector<Placement> &placements) {
-  for (std::size_t i = 0; i < placements.size(); i++) {
-    if (!placements[i].earlier_Pa.empty()) {
-      continue;
-    }
-    placements[i].earlier_Pa.assign(placements[i].reading_Pa.size(), 0.0);
-    for (std::size_t j = 0; j < i; j++) {
-      const double age_s = placements[i].t_s - placements[j].t_s;
-      const double left = std::exp(-age_s / SLOW_s) + FAST_SHARE * std::exp(-age_s / FAST_s);
-      for (std::size_t k = 0; k < placements[i].reading_Pa.size(); k++) {
-        placements[i].earlier_Pa[k] += placements[j].usable >> k & 1u ? left * placements[j].reading_Pa[k] : 0.0;
-      }
-    }
-  }
-}
-
 namespace {
 
-Solution solve_any(const Array &array, const std::vector<Placement> &given, const Assumptions &assumptions,
+Solution solve_any(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions,
                    bool keep_all, const Solution *from) {
-  for (const Placement &placement : given) {
+  for (const Placement &placement : placements) {
     if (placement.reading_Pa.size() != array.sensors()) {
       throw std::invalid_argument("a placement has as many readings as the array has sensors");
     }
   }
-  std::vector<Placement> placements = given;
-  remember(placements);
   Solution solution;
   solution.placements.resize(placements.size());
   if (placements.size() < PLACEMENTS_MIN) {
@@ -305,13 +274,14 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
     solution.gain_sd.push_back(std::sqrt(std::max(of_gains(k, k), 0.0)));
     const int width = layout.own_width(k);
     const double reading = of_gains(k, k) + 2.0 * OWN_WIDTH_SQUARE * covariance(k, width) +
-                           OWN_WIDTH_SQUARE * OWN_WIDTH_SQUARE * covariance(width, width);
+                           OWN_WIDTH_SQUARE * OWN_WIDTH_SQUARE * covariance(width, width) +
+                           PLACE_SLOPE * PLACE_SLOPE * 0.5 *
+                               (covariance(layout.dx(k), layout.dx(k)) + covariance(layout.dy(k), layout.dy(k))) *
+                               std::exp(-2.0 * global[layout.log_width()]);
     solution.reading_sd.push_back(std::sqrt(std::max(reading, of_gains(k, k))));
     solution.shape_sd.push_back(std::sqrt(std::max(of_shape(k, k), 0.0)));
     solution.offset_Pa.push_back(global[layout.offset(k)]);
-    solution.drift_Pa.push_back(2.0 * global[layout.drift(k)]);
     solution.offset_sd_Pa.push_back(std::sqrt(covariance(layout.offset(k), layout.offset(k))));
-    solution.drift_sd_Pa.push_back(2.0 * std::sqrt(covariance(layout.drift(k), layout.drift(k))));
     solution.dx_mm.push_back(global[layout.dx(k)]);
     solution.dy_mm.push_back(global[layout.dy(k)]);
     solution.memory.push_back(global[layout.memory(k)]);
@@ -321,26 +291,26 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given, cons
   solution.width_mm = std::exp(global[layout.log_width()]);
   solution.mixing = global[layout.mixing()];
   for (int which : {0, 1}) {
+    solution.pull[which] = global[layout.pull(which)];
     const int at = layout.ellipse(which);
     solution.ellipse_of_all[which] = global[at];
     solution.ellipse_of_all_sd[which] = std::sqrt(std::max(covariance(at, at), 0.0));
   }
   solution.dip = global[layout.dip()];
   solution.dip_sd = std::sqrt(std::max(covariance(layout.dip(), layout.dip()), 0.0));
-  solution.dip_pitches = std::exp(global[layout.dip_width()]);
-  const double dip_width = solution.dip_pitches * array.pitch_mm / solution.width_mm;
+  solution.dip_widths = std::exp(global[layout.dip_width()]);
   const double offset = global.segment(layout.offset(0), layout.sensors).mean() / peak_Pa;
   const auto near = [&](double mixing) {
     return equivalent_gaussian({{{1.0 - mixing, 1.0},
                                  {mixing, NARROW},
-                                 {-solution.dip, dip_width},
+                                 {-solution.dip, solution.dip_widths},
                                  {offset, std::numeric_limits<double>::infinity()}}},
-                               dip_width, reach_mm(array) / solution.width_mm);
+                               solution.dip_widths, reach_mm(array) / solution.width_mm);
   };
   const auto [width, dip_share] = near(solution.mixing);
   solution.sigma_mm = solution.width_mm * width;
-  solution.dip_share = std::max(dip_share, 0.0);
-  solution.dip_sd_mm = solution.dip_pitches * array.pitch_mm;
+  solution.dip_share = solution.sigma_mm < DIP_FROM_PITCHES * array.pitch_mm ? 0.0 : dip_share;
+  solution.dip_sd_mm = solution.dip_widths * solution.width_mm;
   /* Derivatives by the width and the mixing, which counteract each other. */
   constexpr double STEP = 0.05;
   const double by_mixing =
@@ -365,10 +335,8 @@ Solution solve_from(const Array &array, const std::vector<Placement> &placements
   return solve_any(array, placements, assumptions, true, &from);
 }
 
-Wanted next_place(const Array &array, const std::vector<Placement> &given, const Solution &solution,
+Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
                   const Assumptions &assumptions) {
-  std::vector<Placement> placements = given;
-  remember(placements);
   std::vector<double> x_mm, y_mm;
   const double step = 0.5 * array.pitch_mm;
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());

@@ -6,9 +6,8 @@
  * (x, y), its squared distance R from sensor k and c = NARROW,
  *
  *   reading = g_k A exp(e - 2 w) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2)
- *                                 - h exp(-R / 2 B^2)] + o_k + d_k tau - r_k M,
- *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
- *   M = sum over earlier placements of what rubber has not let go of yet (remember)
+ *                                 - h exp(-R / 2 B^2 S^2) + (t1 u + t2 v) / S P(R / S^2)] + o_k - r_k M_k,
+ *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v
  *
  * One profile for all: peak A, widths s and B and mixing m are fitted along, so nothing need be
  * known of the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the
@@ -25,11 +24,15 @@
  *
  * All else that a session may hold is in the model with a prior around nothing, so that it neither
  * passes for a gain nor stays unseen: where the sensors sit (they are soldered by hand), sensors
- * whose response is wider or narrower than that of the others (b), zeros that were off (o) or move
- * (d), rubber that has not let go of the placements before (r), contacts that are not round (q, of
- * all and of each). The posterior of each is in the Solution; judge.hpp has the limits.
+ * whose response is wider or narrower than that of the others (b), zeros that were off (o), contacts
+ * that are not round (q, of all and of each), a pad or a hand aslant (t: tangential force of all
+ * placements over their normal force, P as PULL has it). The posterior of each is in the Solution; judge.hpp has
+ * the limits. Zeros that move are not in the readings, which are above those just before. What a
+ * sensor alone keeps of a press is: of this one it is a constant share, and so part of its gain; of those before (r) it
+ * fades between the rest and the readings. It is not much, but without it the dip passes for what it would be
+ * elsewhere.
  *
- * How large the spreads of b, e, w, q, r and of the places are, and the model's own error, is
+ * How large the spreads of b, e, w, q and of the places are, and the model's own error, is
  * learnt from the session itself (expectation and maximisation, from the Assumptions as the start):
  * sensors that are where they should be determine the gains better than others, with smaller standard
  * deviations.
@@ -56,26 +59,15 @@ struct Placement {
   double t_s = 0.0;               /* of the readings, on any clock that goes on */
   std::vector<double> reading_Pa; /* [sensor] above zero, mean over the frames */
   std::uint32_t usable = 0;       /* bitmap of the sensors whose reading is a measurement */
+  std::vector<double> rest_Pa;    /* [sensor] just before it, of any origin; empty: not known */
+  std::vector<double> earlier_Pa; /* [sensor] M: of the placements before it what is left, fading in PAST_s;
+                                     empty: none */
   double noise_Pa = 0.0;          /* sd of a mean */
-  std::vector<double> earlier_Pa; /* [sensor] M; empty: of the placements before it in the list */
   double fading = 0.0;            /* share of them that the readings together lose in the half second */
 };
 
 /* The upper one of an even number; of none undefined. */
 double median(std::vector<double> values);
-
-/* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,
- * (exp(-age / 10 s) + 20 exp(-age / 1 s)) of its reading: two times and their proportion after two
- * seconds of rest, as in the holds of a real strip (twin/effects.hpp). The rest of them
- * hides at most the present pressure. */
-void remember(std::vector<Placement> &placements);
-/* The pressure that relaxation hides, with its derivatives: the smaller of the remembered and the
- * sensed pressure, rounded off where they are alike. A remembered pressure of the other sign adds to
- * the sensed one and hides nothing. */
-struct RelaxationEffect {
-  double Pa, by_remembered, by_sensed;
-};
-RelaxationEffect relaxation_effect(double remembered_Pa, double sensed_Pa);
 
 /* Standard gravity: the force of a weight. */
 constexpr double GRAVITY_N_PER_g = 9.80665e-3;
@@ -84,39 +76,48 @@ constexpr double GRAVITY_N_PER_g = 9.80665e-3;
 struct Assumptions {
   double gain = 0.2;                    /* of the log gains: real pads spread by 12 to 22 % */
   double position_mm = 0.1;             /* of a sensor from its place in the layout, each way */
-  double offset_share = 0.0075;         /* of the peak: zeros that were off, and how far they move from
-                                           first to last placement. A wide dip and such zeros look alike:
+  double offset_share = 0.0075;         /* of the peak: zeros that were off. A wide dip and such zeros look alike:
                                            with more, gains of real pads suffer; with less, sessions of the
                                            twin pass whose zeros were off (report truth, part calibration, seed 20000) */
   double force = 0.025;                 /* of the force between placements of one weight */
   double width = 0.01;                  /* of the width between places: a pad cast a little aslant */
   double ellipse = 0.007;               /* of q1 and q2 from placement to placement; axes differ by 2 q */
   double ellipse_of_all = 0.03;         /* of their means: a foot is a foot, but its shape is not known */
-  double memory = 0.03;                 /* of r: losing 17.5 % in 8 s makes 0.025 */
+  double pull = 0.1;                    /* of t1 and t2: the tangent of the slope */
+  double memory = 0.03;                 /* of r: of a press 1 to 9 % stand off after it, either sign */
   double own_width = 0.01;              /* of b: 0.035 to 0.07 on real pads, which a session shows */
   double model_share = 0.002;           /* of the peak: what the profile leaves (above, and 0.13 % rms) */
   double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
   double dip = 0.05;                    /* of h: 0.05 on real pads, 0 on the twin's */
-  /* Sd of log B. With 0.05 and more, places and forces on the recording of host_tools/report/real that chooses
-   * are worse: zeros and model errors look like another width where the readings contain little. */
-  double dip_log_sd = 0.03;
+  /* Of log B / S. With 0.1 and more, places and forces on the recording of host_tools/report/real that chooses are
+   * worse: zeros and model errors look like another width where the readings contain little. */
+  double dip_log_sd = 0.05;
   /* Sd of log A around the reading of a strong placement, which was near a sensor: without it a
    * narrow peak that is far from every sensor explains a few placements as well. */
   double peak = 0.15;
 };
 
+/* Rubber's after-effects fade with 1 to 4 s. */
+constexpr double PAST_s = 3.0;
 /* Width of the narrow part of the profile over that of the wide one. */
 constexpr double NARROW = 0.64;
 /* m of the profile of a bonded layer of 12 mm under a foot of 15 mm (pad/profile.hpp). */
 constexpr double LAYER_MIXING = 0.22;
-/* Standard deviation B of the dip's Gaussian that is expected, in pitches: about as wide as the
- * array can still distinguish from zeros that were off. As the assumed spread of forces, chosen on the
- * recording of host_tools/report/real that chooses. */
-constexpr double DIP_PITCHES = 2.3;
+/* P(x) = sum of strength exp(-x / 2 ratio^2): what a tangential force presses on the base, as pad/profile.cpp has it in
+ * thicknesses, of which S is .478. */
+constexpr struct { double strength, ratio; } PULL[] = {{0.357, 0.846}, {0.1743, 1.393}, {0.00568, 3.554}};
+/* B / S that is expected: about as wide as the array of the recording of host_tools/report/real that chooses can still
+ * distinguish from zeros that were off. */
+constexpr double DIP_WIDTHS = 5.0;
 /* An own width b takes b R / S^2 of a reading. The readings that locate a contact have
  * R / S^2 of 1 to 2. */
 constexpr double OWN_WIDTH_SQUARE = 1.5;
+/* A place that is off by d takes u d / S^2 of a reading. The readings that locate a contact have u / S of some 1.2. */
+constexpr double PLACE_SLOPE = 1.2;
+/* A narrower response has two solutions with a dip, of which the firmware's fit may find the wrong one: it gets none.
+ * Real pads of 0.27 pitches are 1.3 to 1.6 mm off without, 2 to 2.6 with; of 0.33 pitches 0.7 and 0.4. */
+constexpr double DIP_FROM_PITCHES = 0.3;
 /* In residual standard deviations: where a reading's weight begins to fall. */
 constexpr double HUBER = 2.5;
 
@@ -132,27 +133,26 @@ struct Fitted { /* one placement */
 
 /* What the session shows of the Assumptions of the same names; every sd is by these. */
 struct Spread {
-  double position_mm = 0.0, force = 0.0, width = 0.0, ellipse = 0.0, memory = 0.0;
-  double own_width = 0.0;
+  double position_mm = 0.0, force = 0.0, width = 0.0, ellipse = 0.0, own_width = 0.0;
 };
 
 struct Solution {
-  bool solved = false;                     /* else too few placements or readings for any of it */
-  std::vector<double> gain;                /* [sensor] relative to their mean */
-  std::vector<double> gain_sd;             /* relative */
-  std::vector<double> reading_sd;          /* of a reading after this: gain_sd, and what of the
-                                              own width (OWN_WIDTH_SQUARE) is not known */
-  std::vector<double> shape_sd;            /* the part of gain_sd outside the gauge */
-  std::vector<double> offset_Pa, drift_Pa; /* o, and 2 d: from first to last placement */
-  std::vector<double> offset_sd_Pa, drift_sd_Pa;
-  std::vector<double> dx_mm, dy_mm; /* of the sensors from the layout */
-  std::vector<double> memory;       /* r */
-  std::vector<double> own_width;    /* b: log */
+  bool solved = false;                         /* else too few placements or readings for any of it */
+  std::vector<double> gain;                    /* [sensor] relative to their mean */
+  std::vector<double> gain_sd;                 /* relative */
+  std::vector<double> reading_sd;              /* of a reading after this: gain_sd, and what of the
+                                                  own width (OWN_WIDTH_SQUARE) is not known */
+  std::vector<double> shape_sd;                /* the part of gain_sd outside the gauge */
+  std::vector<double> offset_Pa, offset_sd_Pa; /* o */
+  std::vector<double> dx_mm, dy_mm;            /* of the sensors from the layout */
+  std::vector<double> own_width;               /* b: log */
+  std::vector<double> memory;                  /* r */
   double ellipse_of_all[2] = {0.0, 0.0}, ellipse_of_all_sd[2] = {0.0, 0.0};
   double peak_Pa = 0.0; /* A, of a sensor of mean gain */
   double width_mm = 0.0, mixing = 0.0;
+  double pull[2] = {0.0, 0.0};    /* t1, t2 */
   double dip = 0.0, dip_sd = 0.0; /* h */
-  double dip_pitches = 0.0;       /* B */
+  double dip_widths = 0.0;        /* B / s */
   /* The firmware's model that is nearest to the profile: one Gaussian less a dip. */
   double sigma_mm = 0.0, sigma_sd_mm = 0.0, dip_share = 0.0, dip_sd_mm = 0.0;
   std::vector<Fitted> placements; /* as given */

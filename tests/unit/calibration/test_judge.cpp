@@ -89,9 +89,21 @@ TEST(Judge, names_a_sensor_without_readings_before_long) {
   for (Placement &placement : placements) {
     placement.usable &= ~(1u << 7);
   }
-  expect_refused(judge(pad.array, placements, false), Reason::silent, "sensors 7 gave no reading");
+  expect_refused(judge(pad.array, placements, false), Reason::silent, "sensors 7 feel nothing");
   placements.back().usable |= 1u << 7;
   EXPECT_EQ(judge(pad.array, placements, false).state, State::more);
+}
+
+TEST(Judge, names_a_sensor_that_feels_nothing) {
+  for (std::uint64_t seed = 62; seed < 72; seed++) {
+    const KnownPad pad(seed);
+    auto placements = good_session(pad, 20, seed);
+    for (Placement &placement : placements) {
+      placement.reading_Pa[seed % 15] = 0.0;
+    }
+    expect_refused(judge(pad.array, placements, true), Reason::silent,
+                   "sensors " + std::to_string(seed % 15) + " feel nothing");
+  }
 }
 
 TEST(Judge, asks_for_more_until_it_is_good) {
@@ -129,7 +141,11 @@ TEST(Judge, refuses_with_the_reason) {
        }},
       {Reason::offsets, "tare", 64, anywhere, [](Placement &placement, int) { alternate(placement, 500.0); }},
       {Reason::drift, "warm up", 65, anywhere,
-       [](Placement &placement, int i) { alternate(placement, 200.0 * i / 29.0); }},
+       [](Placement &placement, int) {
+         for (int k = 0; k < 15; k++) {
+           placement.rest_Pa.push_back(1e5 + (k % 2 ? 100.0 : -100.0) * placement.t_s);
+         }
+       }},
       {Reason::weights, "same weight", 66,
        [](Random &random, int i) {
          KnownPad::Press press = anywhere(random);
@@ -159,6 +175,22 @@ TEST(Judge, refuses_with_the_reason) {
     EXPECT_TRUE(each.reason != Reason::unsure || !judgement.unsure.empty());
   }
   expect_refused(judge(KnownPad(70).array, {}, true), Reason::too_few, "no placement was found");
+}
+
+/* Thin rubber again: gains that are not known are stated so. */
+TEST(Judge, keeps_what_many_placements_tell) {
+  const auto thin = [](Random &random, int) {
+    KnownPad::Press press = anywhere(random);
+    press.width_mm = 2.4;
+    return press;
+  };
+  const Judgement judgement = judged(73, thin, {}, 44);
+  EXPECT_EQ(judgement.state, State::good) << judgement.text;
+  EXPECT_STREQ(name_of(judgement.reason), "unsure");
+  EXPECT_NE(judgement.text.find("good as far as it goes"), std::string::npos) << judgement.text;
+  EXPECT_EQ(judgement.solution.gain_sd[3], Assumptions{}.gain);
+  EXPECT_NEAR(judgement.solution.sigma_mm, 2.4, 0.3);
+  EXPECT_EQ(judgement.solution.dip_share, 0.0); /* it is narrower than DIP_FROM_PITCHES */
 }
 
 TEST(Judge, refuses_sensors_in_other_places) {

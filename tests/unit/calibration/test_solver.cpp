@@ -67,8 +67,8 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   const Solution s = solve(pad.array, placements);
   ASSERT_TRUE(s.solved);
   // The pad's profile is not of the solver's family. It passes in part for a spread of the forces,
-  // and so for gains: some 1 % of either.
-  EXPECT_LT(rms_error(s.gain, pad.gain), 0.014);
+  // and so for gains: some 1 % of either, and for a slope: some 1 % of a tilt.
+  EXPECT_LT(rms_error(s.gain, pad.gain), 0.018);
   EXPECT_NEAR(std::accumulate(s.gain.begin(), s.gain.end(), 0.0), 15.0, 1e-9);
   EXPECT_NEAR(s.peak_Pa / KnownPad::PEAK_Pa, 1.0, 0.02);
   EXPECT_EQ(s.kept, 30u);
@@ -240,11 +240,9 @@ TEST(Solver, sees_what_a_session_holds) {
   auto moved = good_session(pad, 30, 7);
   for (Placement &placement : moved) {
     placement.reading_Pa[4] += 300.0;
-    placement.reading_Pa[9] += 400.0 * (placement.t_s / moved.back().t_s - 0.5);
   }
   const Solution zeros = solve(pad.array, moved);
-  EXPECT_NEAR(zeros.offset_Pa[4], 300.0, 40.0);
-  EXPECT_NEAR(zeros.drift_Pa[9], 400.0, 60.0);
+  EXPECT_NEAR(zeros.offset_Pa[4], 300.0, 60.0);
   EXPECT_NEAR(zeros.offset_Pa[0], 0.0, 60.0);
 
   pad.x_mm[12] += 0.6;
@@ -260,25 +258,48 @@ TEST(Solver, sees_what_a_session_holds) {
   EXPECT_NEAR(shape.ellipse_of_all[1], 0.0, 0.02);
 }
 
-/* Rubber that has not let go of the placement before. */
-TEST(Solver, tells_memory_from_gain) {
+/* What a sensor keeps of the placement before fades between the rest and the readings. */
+TEST(Solver, tells_what_remains_of_the_placement_before) {
   const KnownPad pad(8);
-  auto placements = good_session(pad, 30, 8);
-  remember(placements);
-  std::vector<double> memory;
-  for (std::size_t k = 0; k < 15; k++) {
-    memory.push_back(0.01 + 0.004 * static_cast<double>(k % 5));
-  }
-  std::vector<Placement> felt = placements;
-  for (Placement &placement : felt) {
+  const auto placements = good_session(pad, 30, 8);
+  auto felt = placements;
+  for (std::size_t i = 0; i < felt.size(); i++) {
+    felt[i].earlier_Pa = i ? placements[i - 1].reading_Pa : std::vector<double>(15, 0.0);
     for (std::size_t k = 0; k < 15; k++) {
-      placement.reading_Pa[k] -= std::min(memory[k] * placement.earlier_Pa[k], std::max(placement.reading_Pa[k], 0.0));
+      felt[i].reading_Pa[k] -= 0.01 * (static_cast<double>(k % 5) - 2.0) * felt[i].earlier_Pa[k];
     }
   }
-  const Solution s = solve(pad.array, felt);
-  EXPECT_LT(rms_error(s.gain, pad.gain), 0.012);
+  const Solution s = solve(pad.array, felt), without = solve(pad.array, placements);
   for (std::size_t k = 0; k < 15; k++) {
-    EXPECT_NEAR(s.memory[k], memory[k], 0.012) << k;
+    EXPECT_NEAR(s.memory[k], 0.01 * (static_cast<double>(k % 5) - 2.0), 0.003) << k;
+    EXPECT_NEAR(s.gain[k], without.gain[k], 0.004) << k;
+  }
+}
+
+/* A pad aslant: a tangential force that all placements share, as PULL has it. */
+TEST(Solver, tells_a_slope_from_gains) {
+  const KnownPad pad(12);
+  constexpr double SLOPE = 0.17, WIDE_mm = 5.6;
+  auto level = good_session(pad, 30, 12), slanting = level;
+  Random random(12, 2, 0);
+  for (std::size_t i = 0; i < level.size(); i++) {
+    const double x = random.uniform(-9.0, 9.0), y = random.uniform(-18.0, 18.0);
+    for (std::size_t k = 0; k < 15; k++) {
+      const double u = pad.array.x_mm[k] - x, v = pad.array.y_mm[k] - y, r_mm = std::hypot(u, v);
+      double pulled = 0.0;
+      for (const auto &[strength, ratio] : PULL) {
+        pulled += strength * bell(r_mm, ratio * WIDE_mm);
+      }
+      slanting[i].reading_Pa[k] += pad.gain[k] * KnownPad::PEAK_Pa * SLOPE * u / WIDE_mm * pulled;
+      random.normal();
+    }
+  }
+  const Solution flat = solve(pad.array, level), slope = solve(pad.array, slanting);
+  EXPECT_NEAR(flat.pull[0], 0.0, 0.03);
+  EXPECT_NEAR(slope.pull[0] - flat.pull[0], SLOPE, 0.05); /* the bump is no layer */
+  EXPECT_NEAR(slope.pull[1], flat.pull[1], 0.02);
+  for (std::size_t k = 0; k < 15; k++) {
+    EXPECT_NEAR(slope.gain[k] / flat.gain[k], 1.0, 0.015) << k;
   }
 }
 

@@ -345,6 +345,7 @@ void pull_live(CalibratedDevice &device, PullSession &work) {
 
 calibrating::Recorded<PullSession> pull_session_from(const CalibrateOptions &options) {
   std::string weak;
+  bool was_ready = false; /* somewhere a pull could have been read */
   auto recorded = calibrating::session_from(
       options.from, options.choice.device,
       [&](const wire_info &info) {
@@ -356,14 +357,16 @@ calibrating::Recorded<PullSession> pull_session_from(const CalibrateOptions &opt
           std::printf("%s\n", session.last_pull_text().c_str());
         }
         weak = session.finder().refusal() == PullFinder::Refusal::weak ? session.weak_text() : weak;
+        was_ready = was_ready || session.finder().state() == PullFinder::State::resting;
       });
   if (!recorded) {
     throw Error(printable(options.from) + ": holds no frames");
   }
   if (recorded->session.pulls().empty()) {
-    throw Error(
-        "not calibrated: " +
-        (weak.empty() ? "no pull was found; leave the object alone for a second, then pull and hold for two" : weak));
+    throw Error("not calibrated: " +
+                (weak.empty() || was_ready
+                     ? "no pull was found; leave the object alone for a second, then pull and hold for two"
+                     : weak));
   }
   return std::move(*recorded);
 }
