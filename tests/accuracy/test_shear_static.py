@@ -33,7 +33,9 @@ LIMITS = (
     ("valid_percent", 91, 100),
     ("q_cover_1sd", 65, 98),
     ("q_cover_2sd", 96, 100),
-    ("location_cover_1sd", 60, 92),
+    # Cautious where something pulls: half of the gains' part would leave 94 here, but of presses without a pull on pads that
+    # remember only 91 within two standard deviations (truth, over_time).
+    ("location_cover_1sd", 60, 98),
     ("location_cover_2sd", 92, 100),
     ("force_p50_percent", 0.1, 0.6),
     ("force_without_p50_percent", 1, 2.2),
@@ -113,13 +115,12 @@ class ShearStatic(unittest.TestCase):
         row = self.rows("by_thickness", "case")
         self.assertLess(row["12 mm, set 12 mm, Q/F 0"]["vector_error_p50"], 0.6 * row["12 mm, set 13.2 mm, Q/F 0"]["vector_error_p50"])
         rubber = self.rows("by_rubber", "case")
-        at = "{}, 10 s after the load"
-        self.assertLess(
-            rubber[at.format("none")]["vector_error_p50"], 0.5 * rubber[at.format("relaxation, calibrated")]["vector_error_p50"]
+        # What a calibration cannot take away: it is read 0.75 s after the touch, and the rubber goes on for seconds.
+        none, calibrated, memory = (
+            rubber[f"{name}, 10 s after the load"]["vector_error_p50"] for name in ("none", "memory, calibrated", "memory")
         )
-        self.assertLess(
-            rubber[at.format("relaxation, calibrated")]["vector_error_p50"], rubber[at.format("relaxation")]["vector_error_p50"]
-        )
+        self.assertLess(none, 0.8 * calibrated)
+        self.assertLess(calibrated, 0.85 * memory)
 
     def test_the_same_seed_gives_the_same_and_another_another(self):
         contacts = Contacts(BUILD)

@@ -15,7 +15,7 @@ using namespace fingertip::calibrating;
 using namespace fingertip::measure;
 
 MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(helps), FIELD(has_own), FIELD(width_mm),
-               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(memory), FIELD(position_mm),
+               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm),
                FIELD(halves_shape), FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd),
                FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd),
                FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share),
@@ -47,7 +47,6 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.sigma_sd_mm = solution.sigma_sd_mm;
   found.dip = solution.dip;
   found.dip_sd = solution.dip_sd;
-  found.memory = solution.spread.memory;
   found.position_mm = solution.spread.position_mm;
   found.halves_shape = judgement.halves_shape;
   found.halves_gauge = judgement.halves_gauge;

@@ -18,7 +18,7 @@ struct calibration {
   bool has_own; // the tool would keep `own`
   double width_mm, residual_share;
   double prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm; // as fit_settings has them
-  double sigma_sd_mm, dip, dip_sd, memory, position_mm, halves_shape, halves_gauge;
+  double sigma_sd_mm, dip, dip_sd, position_mm, halves_shape, halves_gauge;
   double force_scale, force_scale_sd; // 0: there is none
   double worst_shape_sd, gauge_sd, force_share, ellipse, offset_share, drift_share, kept_share;
 };

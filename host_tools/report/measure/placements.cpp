@@ -16,9 +16,9 @@ using calibrating::Placement;
 // Percents and sds as effects.hpp has them. overhang_mm: how far the rubber extends beyond the outer sensors; 0:
 // without end.
 struct pad_kind {
-  double gain_percent, relaxation_percent, misplaced_mm, dip_percent, widths_percent, overhang_mm;
+  double gain_percent, memory_percent, misplaced_mm, dip_percent, widths_percent, overhang_mm;
 };
-MEASURE_RECORD(pad_kind, FIELD(gain_percent), FIELD(relaxation_percent), FIELD(misplaced_mm), FIELD(dip_percent),
+MEASURE_RECORD(pad_kind, FIELD(gain_percent), FIELD(memory_percent), FIELD(misplaced_mm), FIELD(dip_percent),
                FIELD(widths_percent), FIELD(overhang_mm))
 
 namespace {
@@ -37,7 +37,7 @@ struct Pads {
 
   PadOptions options(std::size_t i) const {
     const pad_kind &kind = *kinds.row_or_all(i);
-    return {kind.gain_percent,   kind.relaxation_percent,
+    return {kind.gain_percent,   kind.memory_percent,
             kind.misplaced_mm,   kind.dip_percent,
             kind.widths_percent, kind.overhang_mm > 0.0 ? &block_table(layer_mm, kind.overhang_mm, cache) : nullptr};
   }

@@ -18,8 +18,9 @@ constexpr double DOWN_s = 0.3, TAP_DOWN_s = 0.1; // from first touch to the full
 constexpr double SETTLED_BEGIN_s = 0.5, SETTLED_END_s = 1.0, WEIGHT_DOWN_s = 2.0, PAUSE_s = 1.5;
 constexpr int SETTLED_STEPS = 5;
 constexpr double TAP_READ_s = 0.15;
+constexpr double RESTED_BEFORE_s = 1.3; // the readings after the rest
 
-constexpr double OFFSET_Pa = 500.0, DRIFT_Pa = 200.0;
+constexpr double OFFSET_Pa = 500.0, DRIFT_Pa_s = 100.0;
 constexpr double CLUSTER_RADIUS_mm = 7.0;
 constexpr std::size_t TOO_FEW = 6;
 constexpr double AIM_SD_mm = 3.0;
@@ -31,8 +32,8 @@ twin::EffectValues effects_of(const PadOptions &options) {
   if (options.gain_percent > 0.0) {
     values["gain"] = options.gain_percent;
   }
-  if (options.relaxation_percent > 0.0) {
-    values["relaxation"] = options.relaxation_percent;
+  if (options.memory_percent > 0.0) {
+    values["memory"] = options.memory_percent;
   }
   values["places"] = options.misplaced_mm;
   values["dip"] = options.dip_percent;
@@ -175,7 +176,7 @@ Session::Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::si
   for (std::size_t k = 0; k < array.sensors(); k++) {
     const double sign = errors.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
     zero_Pa_.push_back(kind != SessionKind::offsets ? 0.0 : variant_ ? OFFSET_Pa : sign * OFFSET_Pa);
-    drift_Pa_.push_back(kind == SessionKind::drift ? sign * DRIFT_Pa : 0.0);
+    drift_Pa_s_.push_back(kind == SessionKind::drift ? sign * DRIFT_Pa_s : 0.0);
   }
 }
 
@@ -206,9 +207,9 @@ std::optional<calibrating::Placement> Session::next(SessionPad &pad, std::option
   const double angle = variant_ ? angle_rad_ : random_.uniform(0.0, M_PI);
   calibrating::Placement placement =
       pad.place(lying ? feet_.lying : feet_.round, force_N, x_mm, y_mm, lying ? angle : 0.0);
-  const double share = planned_ > 1 ? double(made_) / double(planned_ - 1) : 0.0;
   for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
-    placement.reading_Pa[k] += zero_Pa_[k] + share * drift_Pa_[k];
+    placement.reading_Pa[k] += zero_Pa_[k] + drift_Pa_s_[k] * RESTED_BEFORE_s;
+    placement.rest_Pa.push_back(drift_Pa_s_[k] * placement.t_s);
   }
   made_++;
   return placement;

@@ -19,9 +19,9 @@ namespace fingertip::measure {
 calibrating::Array session_array();
 
 struct PadOptions {
-  double gain_percent = 10.0;      // spread of the gains
-  double relaxation_percent = 0.0; // mean of what a sensor loses in a hold; 17.5: 9 to 26 %
-  double misplaced_mm = 0.0;       // sd of a sensor's place, each way
+  double gain_percent = 10.0;  // spread of the gains
+  double memory_percent = 0.0; // each sensor's own part of a hold; 1 is usual (twin/effects.hpp)
+  double misplaced_mm = 0.0;   // sd of a sensor's place, each way
   double dip_percent = 0.0, widths_percent = 0.0;
   const twin::BlockTable *block = nullptr; // of rubber that ends; of sensors that are in their places
 };
@@ -76,7 +76,7 @@ struct Feet {
 //   offsets    zeros off by 500 Pa: up in every other session, else up or down by the sensor
 //   one_end    all in the upper third of the array
 //   cluster    all within 7 mm of one location
-//   drift      zeros move by 200 Pa from first to last, up or down by the sensor
+//   drift      zeros move by 100 Pa/s, up or down by the sensor
 //   too_few    six placements
 //   weights    in turn 3 and 4 N, or anything from 1.5 to 4.5 N
 class Session {
@@ -92,7 +92,7 @@ private:
   std::size_t planned_, made_ = 0;
   bool variant_;
   double middle_x_mm_, middle_y_mm_, angle_rad_;
-  std::vector<double> zero_Pa_, drift_Pa_;
+  std::vector<double> zero_Pa_, drift_Pa_s_;
 };
 
 } // namespace fingertip::measure

@@ -48,6 +48,7 @@ GOALS = (
     ("cal_force_scatter_percent", "<=", 7),
     ("sessions_accepted_percent", ">=", 90),
     ("worse_after_accept", "<=", 0),
+    ("rows_refused_as_drift", "<=", 0),
     ("one_missing_over_1mm_percent", "<=", 15),
     ("phantom_percent_1308", "<=", 2.5),
     ("phantom_percent_57", "<=", 5),
@@ -83,7 +84,9 @@ def judge_grid(measure, one, path):
     readings, xy = grid.reading_Pa[grid.judged], grid.xy[grid.judged]
     inside, outside = grid.inside[grid.judged], grid.outside[grid.judged]
     set_by_hand = (float(np.median(grid.width_mm)), grids.PRIOR_WIDTH_MM)
-    calibrations = fingertip.calibrate(np.array([grid.reading_Pa[these] for these in grid.sessions(SEED)]))
+    sessions = np.array(grid.sessions(SEED))
+    calibrations = fingertip.calibrate(grid.reading_Pa[sessions])
+    in_rows = fingertip.calibrate(grid.reading_Pa[np.sort(sessions)])  # as the gantry went
     solved = [one for one in calibrations if one.found["solved"]]
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
     calibrated = [grids.Errors(fingertip.fit(readings, one), xy) for one in solved]
@@ -106,6 +109,7 @@ def judge_grid(measure, one, path):
         "sessions": len(calibrations),
         "accepted": len(accepted),
         "reasons": sorted({one.found["reason"].decode() for one in calibrations} - {"none"}),
+        "rows_refused_as_drift": sum(one.found["reason"] == b"drift" for one in in_rows),
         "width_found_mm": grids.quantile([one.found["width_mm"] for one in solved], 0.5),
         "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(calibrated, solved) if one.good),
     }
@@ -162,6 +166,7 @@ def judge_grids(measure, source, here):
         100 * sum(row["accepted"] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
     )
     figures["worse_after_accept"] = sum(row["worse_after_accept"] for row in rows) if rows else None
+    figures["rows_refused_as_drift"] = sum(row["rows_refused_as_drift"] for row in found) if found else None
     figures["one_missing_over_1mm_percent"] = mean_of(rows, "one_missing_over_1mm_percent")
     return {**figures, "grids": found}, shown
 

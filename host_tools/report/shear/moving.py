@@ -18,11 +18,11 @@ MOMENTS = (
 )
 RUBBER = (
     ("none", False),
-    ("relaxation", False),
-    ("relaxation", True),
+    ("memory", False),
+    ("memory", True),
     ("hysteresis", False),
     ("aftereffect", False),
-    ("relaxation,hysteresis,aftereffect", True),
+    ("memory,hysteresis,aftereffect", True),
 )
 
 
@@ -47,7 +47,7 @@ def settled_gains(contacts, effects, seeds):
 
 
 def rubber(bench, out):
-    """A press and a tangential force that comes and goes. Gains are equal, or as placements on rubber that relaxes find them."""
+    """A press and a tangential force that comes and goes. Gains are equal, or as placements on rubber that remembers find them."""
     case, contacts = bench.usual(), bench.contacts
     random = bench.random("rubber", np.arange(max(20, bench.pads)))
     full, which, seeds = draw(contacts, case, random), random.below(len(case.objects)), random.bits()

@@ -24,7 +24,6 @@ EVIDENCE = {
     "force": "force_share",
     "halves_gauge": "halves_gauge",
     "halves_shape": "halves_shape",
-    "memory": "memory",
     "offset": "offset_share",
     "position_mm": "position_mm",
     "residual": "residual_share",
@@ -179,8 +178,8 @@ def figures(firmware, options):
     thick = {
         "gains 10 %": (ten, 1),
         "gains 20 %": (sessions.GAINS_20, 2),
-        "relaxing": (ten | {"relaxation_percent": 17.5}, 2),  # 9 to 26 %
-        "relaxing, misplaced": (ten | {"relaxation_percent": 17.5, "misplaced_mm": 0.1}, 1),  # sensors soldered 0.1 mm (sd) off
+        "remembering": (ten | {"memory_percent": 1.0}, 2),
+        "remembering, misplaced": (ten | {"memory_percent": 1.0, "misplaced_mm": 0.1}, 1),  # sensors soldered 0.1 mm (sd) off
         "dip": (dip, 2),
         "like real ones": (real, 2),
         "ends 9 mm beyond": (ten | {"overhang_mm": 9.0}, 4),
@@ -192,7 +191,7 @@ def figures(firmware, options):
     on_thick = list(cases.values())
     cases |= {name: PadCase(firmware, name, options, sessions.kinds(firmware, kind), one_of, 6.0) for name, (kind, one_of) in thin.items()}
     bad = {name: bad_session(firmware, name, options) for name in BAD_SESSIONS}
-    usual, rough, cast = cases["gains 10 %"], cases["relaxing, misplaced"], cases["like real ones"]
+    usual, rough, cast = cases["gains 10 %"], cases["remembering, misplaced"], cases["like real ones"]
     return {
         # 10 % gain spread, thirty placements anywhere: median over pads of the median error of taps.
         "cal_median_mm": middle(usual.after_mm),

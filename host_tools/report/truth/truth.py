@@ -22,6 +22,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/r
 
 import calibrations  # noqa: E402
 import one_press  # noqa: E402
+import over_time  # noqa: E402
 import truth_report  # noqa: E402
 import zero_and_gate  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
@@ -32,6 +33,7 @@ PARTS = {
     "fit": "one press: coverage of the standard deviations, warnings, contacts that are not round",
     "calibration": "gains by placements of one weight",
     "gate": "zero and gate over time, on simulated and recorded rubber",
+    "over_time": "contacts after contacts, on pads that remember, end, or are thin",
 }
 GOALS = (
     ("cal_median_mm", "<=", 0.15),
@@ -55,6 +57,18 @@ GOALS = (
     ("unloaded_warned_percent", "<=", 5),
     ("elongated_bad_unflagged_percent", "<=", 3),
     ("round_elongated_percent", "<=", 1),
+    ("remembered_location_p50_mm", "<=", 0.12),
+    ("remembered_location_p95_mm", "<=", 0.35),
+    ("remembered_cover_1sd_min", ">=", 55),
+    ("remembered_cover_1sd_max", "<=", 80),
+    ("remembered_silent_percent_worst", "<=", 0.5),
+    ("remembered_trusted_percent", ">=", 90),
+    ("remembered_force_p50_percent", "<=", 2),
+    ("remembered_valid_percent", ">=", 95),
+    ("remembered_ratio_error_p95", "<=", 0.07),
+    ("remembered_beyond_2sd_percent", "<=", 5),
+    ("remembered_pulled_error_p50", "<=", 0.03),
+    ("remembered_pulled_error_p95", "<=", 0.08),
     ("slow_force_error_percent", "<=", 2),
     ("false_contacts", "<=", 0),
     ("zero_recovery_s", "<=", 5),
@@ -85,7 +99,12 @@ def measured(figures):
     return measure
 
 
-MEASURE = {"fit": measured(one_press.figures), "calibration": measured(calibrations.figures), "gate": measured(zero_and_gate.figures)}
+MEASURE = {
+    "fit": measured(one_press.figures),
+    "calibration": measured(calibrations.figures),
+    "gate": measured(zero_and_gate.figures),
+    "over_time": over_time.figures,
+}
 
 
 def kept(_, out):

@@ -37,7 +37,7 @@ NOISY_OVER_MEDIAN = 4.0
 TILT_MIN, TILT_SDS = 0.04, 4.0  # the width's change from the middle to an end
 THIN_SHARE = 0.85  # of the thickness that the user states
 DRIFT_MAX_Pa_min = 40.0  # a sensor against the median of all
-READS_OF_FORCE = 0.87  # share of the force that an uncalibrated pad reads: the twin's, with the relaxation and the dip of real ones
+READS_OF_FORCE = 1.01  # share of the force that an uncalibrated pad reads: on seeds 101 to 124 of the twin, 0.95 to 1.09, sd 0.03
 WEIGHT_OFF_MAX = 0.22  # force by the readings, over the weight, less 1
 USABLE_SD_MAX = 1.0  # of the force: a larger standard deviation is of no use, and is not shown
 MOSTLY_WARNED_percent = 50.0
@@ -364,7 +364,7 @@ class Card:
             ratio = 1 / (found["force_scale"] * found["force_ratio"] * READS_OF_FORCE)
         self._add("weight_ratio", "force by the readings, over the weight as given", "", ratio, 2)
         # A calibration of another skin does not show the weight, nor does the one width that is fitted to a tilted skin: weights are then up to
-        # 1.24 times too heavy (seed 853).
+        # 1.09 times too heavy (seeds 853 and 961 to 964).
         if not (is_thin if self.is_calibrated else is_tilted) and abs(ratio - 1) > WEIGHT_OFF_MAX:
             repair = (
                 "calibrate again, with --weight."

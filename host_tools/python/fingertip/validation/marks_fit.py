@@ -2,12 +2,12 @@
 leave this picture. Nothing is assumed of the sensors' places at first, so two swapped wires, a sensor without response and a loose one
 appear as what they are.
 
-Press i is at c_i, near its mark; sensor k is at s_k. With R = |c_i - s_k|^2, c = NARROW and M what is left of earlier presses,
+Press i is at c_i, near its mark; sensor k is at s_k. With R = |c_i - s_k|^2 and c = NARROW,
 
-    reading = g_k A exp(e_i) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2) - h exp(-R / 2 B^2)] - r_k M
+    reading = g_k A exp(e_i) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2) - h exp(-R / 2 B^2)]
     S = S0 exp(b_k + w_x X_i + w_y Y_i),   X, Y: the mark's place, from -1 to 1 over the marks
 
-Unknowns are A, S0, m, h, B, the slopes w, per sensor g, s, b, r, per press c and e. Marks are known up to the hand's error, whose sd is
+Unknowns are A, S0, m, h, B, the slopes w, per sensor g, s, b, per press c and e. Marks are known up to the hand's error, whose sd is
 learnt from the presses (expectation and maximisation). Robust least squares (Huber) by Levenberg-Marquardt. Same input, same bits.
 
 The fit runs twice. First nothing is assumed of the sensors' places: where the print is on the pad, shifted and turned by a little, follows
@@ -26,13 +26,12 @@ NARROW = 0.64  # width of the narrow part of the profile over that of the wide o
 _HUBER = 2.5
 _MIXING_0, _MIXING_SD, _DIP_0, _DIP_SD = 0.2, 0.1, 0.03, 0.03
 _DIP_PITCHES_0, _DIP_LOG_SD = 1.9, 0.3  # between the twin's pads and what calibrations find
-_MEMORY_0, _MEMORY_SD, _SLOPE_SD, _GAIN_SD, _OWN_WIDTH_SD, _FORCE_SD = 0.02, 0.02, 0.3, 0.5, 0.035, 0.025
+_SLOPE_SD, _GAIN_SD, _OWN_WIDTH_SD, _FORCE_SD = 0.3, 0.5, 0.035, 0.025
 _FREE_pitches, _SEATED_mm, _FIXED = 3.0, 0.1, 1e-6  # sd of a sensor's place in the first fit and in the second
 _HAND_BEGIN_mm, _HAND_MIN_mm = 0.5, 0.02
 _MODEL_SHARE, _READING_SHARE = 0.003, 0.005  # error of the picture itself, of the peak and of the reading
 _STEPS, _HAND_TURNS, _ALIGN_TURNS = 40, 4, 30
 _CAUCHY_mm = 1.0  # a sensor found further away hardly counts for where the print is
-_SLOW_s, _FAST_s, _FAST_SHARE = 10.0, 1.0, 20.0  # rubber that recovers, as remember() of calibration/solver.hpp
 
 RESPONDS_SHARE = 0.2  # of the strongest reading: less does not count
 # A sensor that is left out is loose if its scatter_share is more: up to 0.025 where it is not loose, with a dead neighbour too, 0.069 at least
@@ -43,7 +42,7 @@ SWAPPED_PITCHES = 0.5
 MARKS_MIN = 6
 
 _LOG_PEAK, _LOG_WIDTH, _MIXING, _DIP, _DIP_WIDTH, _SLOPE_X, _SLOPE_Y = range(7)
-_COMMON, _OF_SENSOR, _OF_PRESS, _PRINT = 7, 5, 3, 3  # unknowns of all, of a sensor, of a press, of the print
+_COMMON, _OF_SENSOR, _OF_PRESS, _PRINT = 7, 4, 3, 3  # unknowns of all, of a sensor, of a press, of the print
 
 
 class MarksFit(NamedTuple):
@@ -75,25 +74,6 @@ def _turned(points, turn_rad, shift=(0.0, 0.0)):
     return points @ np.array([[c, s], [-s, c]]) + shift
 
 
-def _remembered_Pa(presses):
-    """[press][sensor]: what earlier presses left in the rubber."""
-    t_s = np.array([press.placement.t_s for press in presses])
-    age_s = np.maximum(t_s[:, None] - t_s, 0)
-    left = np.tril(np.exp(-age_s / _SLOW_s) + _FAST_SHARE * np.exp(-age_s / _FAST_s), -1)
-    return left @ np.array([np.where(press.placement.usable, press.placement.reading_Pa, 0) for press in presses])
-
-
-def _hidden(remembered, response):
-    """What earlier presses hide, and its derivatives by both: the less of the two, rounded where they are alike. A negative rest hides
-    nothing: it adds."""
-    both = (remembered > 0) & (response > 0)
-    ratio = np.where(both, response / np.where(both, remembered, 1), 0)
-    root = 1 / np.sqrt(1 + ratio * ratio)
-    by_response = np.where(both, root**3, 0)
-    negative = remembered <= 0
-    return np.where(negative, remembered, np.where(both, response * root, 0)), np.where(negative, 1, by_response * ratio**3), by_response
-
-
 class _Fit:
     def __init__(self, array, presses, without):
         self.array, self.without = array, without
@@ -105,7 +85,6 @@ class _Fit:
         self.mark = np.array([press.mark for press in presses])
         self.reading = np.array([press.placement.reading_Pa for press in presses])
         self.usable = np.array([press.placement.usable for press in presses])
-        self.earlier = _remembered_Pa(presses)
         response = np.where(self.usable, np.maximum(self.reading, 0), 0)
         self.peak_Pa = max(response.max(), 1.0)
         noise = np.array([press.placement.noise_Pa for press in presses])[:, None]
@@ -139,7 +118,7 @@ class _Fit:
         width = math.log(0.6 * self.array.pitch_mm)
         dip_width = math.log(_DIP_PITCHES_0 * self.array.pitch_mm)
         common = [math.log(self.peak_Pa), width, _MIXING_0, _DIP_0, dip_width, 0, 0]
-        own = np.column_stack([most / self.peak_Pa, self.begin_mm, np.zeros(self.sensors), np.full(self.sensors, _MEMORY_0)])
+        own = np.column_stack([most / self.peak_Pa, self.begin_mm, np.zeros(self.sensors)])
         press = np.column_stack([self.mark_mm, np.zeros(self.presses)])
         self.value = np.concatenate([common, own.ravel(), press.ravel(), np.zeros(_PRINT)])
         self.common_prior = common, [1.0, 1.0, _MIXING_SD, _DIP_SD, _DIP_LOG_SD, _SLOPE_SD, _SLOPE_SD]
@@ -150,8 +129,8 @@ class _Fit:
         mean[:_COMMON], weight[:_COMMON] = self.common_prior[0], 1 / np.array(self.common_prior[1])
         place_sd = _SEATED_mm if self.is_seated else _FREE_pitches * self.array.pitch_mm
         own = mean[_COMMON : self.at_press[0]].reshape(-1, _OF_SENSOR)
-        own[:, 0], own[:, 1:3], own[:, 4] = 1, self.begin_mm, _MEMORY_0
-        sds = (_GAIN_SD, place_sd, place_sd, _OWN_WIDTH_SD, _MEMORY_SD)
+        own[:, 0], own[:, 1:3] = 1, self.begin_mm
+        sds = (_GAIN_SD, place_sd, place_sd, _OWN_WIDTH_SD)
         weight[_COMMON : self.at_press[0]] = np.tile(1 / np.array(sds), self.sensors)
         weight[self.at_press + 2] = 1 / _FORCE_SD
         weight[self.at_print :] = 0 if self.is_seated else 1 / _FIXED
@@ -171,11 +150,9 @@ class _Fit:
         profile = (1 - mixing) * a + mixing * b - dip * c
         full = np.exp(v[_LOG_PEAK] + press[:, 2:])
         response = own[:, 0] * full * profile
-        hidden, by_remembered, by_response = _hidden(own[:, 4] * self.earlier, response)
         if not with_slopes:
-            return response - hidden
-        height = (1 - by_response) * full
-        scale = own[:, 0] * height
+            return response
+        scale = own[:, 0] * full
         core = (1 - mixing) * a * inverse + mixing * b * narrow
         by_square, by_width = -0.5 * (core - dip * c * outer), square * core
         slopes = (
@@ -186,16 +163,15 @@ class _Fit:
             -scale * dip * c * square * outer,
             scale * by_width * self.along[:, :1],
             scale * by_width * self.along[:, 1:],
-            height * profile,
+            full * profile,
             -2 * scale * by_square * dx,
             -2 * scale * by_square * dy,
             scale * by_width,
-            -by_remembered * self.earlier,
             2 * scale * by_square * dx,
             2 * scale * by_square * dy,
             scale * profile,
         )
-        return response - hidden, np.stack(slopes, axis=2)
+        return response, np.stack(slopes, axis=2)
 
     def printed_mm(self, v):
         """Where the print has the marks, in the axes of the fit."""

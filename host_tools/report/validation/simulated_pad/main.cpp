@@ -31,7 +31,7 @@ constexpr std::uint32_t DATE_s = 1767225600;
 constexpr std::uint64_t SLICE_us = 5'000, COMMAND_us = 100'000;
 constexpr std::size_t PLACEMENTS = 20; // of a calibration
 // Of the pad that is validated: the same seed draws the same one.
-constexpr measure::PadOptions LIKE_REAL{10.0, 17.5, 0.1, 5.0, 3.5}, PLAIN{10.0};
+constexpr measure::PadOptions LIKE_REAL{10.0, 1.0, 0.1, 5.0, 3.5}, PLAIN{10.0};
 
 struct Options {
   ValidatedOptions pad;
