@@ -241,7 +241,7 @@ static bool find_velocity(struct motion_history *history) {
   return true;
 }
 
-#define RATIO_MAX_q24 (32 << 24)
+#define PULL_MAX_q24 (32 << 24)
 
 /* Enters a tangential force: what it has changed by, over the force of now. The normal force's own scale is in
  * both. Exact over any number of frames of one force. */
@@ -280,8 +280,8 @@ static void add(struct motion_history *history, const struct tangential_settings
   history->now.count++;
   history->now.x += x;
   history->now.y += y;
-  follow_ratio(&history->ratio_x, clamped(fit_fixed(found->qx_N, 24), RATIO_MAX_q24), force_N_q12, first);
-  follow_ratio(&history->ratio_y, clamped(fit_fixed(found->qy_N, 24), RATIO_MAX_q24), force_N_q12, first);
+  follow_ratio(&history->ratio_x, clamped(fit_fixed(found->qx_N, 24), PULL_MAX_q24), force_N_q12, first);
+  follow_ratio(&history->ratio_y, clamped(fit_fixed(found->qy_N, 24), PULL_MAX_q24), force_N_q12, first);
   history->now.ratio_x += history->ratio_x.ratio_q12;
   history->now.ratio_y += history->ratio_y.ratio_q12;
   history->now.variance += noise * noise;

@@ -33,6 +33,7 @@
 /* The errors of a reading in the standard deviations, independent of each other (NUMERICS.md, "Errors"):
  *   the noise;
  *   its gain's: gain_sd times the model there;
+ *   what its rubber keeps of presses: past_sd;
  *   the model's: model_sd times the largest reading, alike for every sensor;
  *   its shape's: one amplitude for all sensors,
  *   FIT_SHAPE_PER_MODEL model_sd (FIT_SHAPE_SIGMA / sigma)^2 amplitude e (r / sigma)^4, for the force

@@ -32,7 +32,7 @@
  */
 #define ELONGATED_LEAST 0.05f
 #define ELONGATED_SURE 2.5f
-/* Larger where the pad ends, which leaves residuals. */
+/* Larger where the pad ends near, which leaves residuals. */
 #define CHI_SQUARE_MAX 16
 #define CHI_SQUARE_MAX_NEAR_ENDS 60
 

@@ -56,7 +56,7 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
 void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements,
                                   const Judgement &judgement, double force_N, calibration &found,
                                   calibrated_sensor *sensors, fit_own *own) {
-  const Solution &solution = judgement.solution;
+  const Solution &solution = judgement.kept;
   const Shape shape = shape_of(solution);
   found = found_by(judgement, shape);
   if (const auto scale = force_scale(layout, placements, solution, force_N, shape); solution.solved && scale) {

@@ -48,7 +48,7 @@ GOALS = (
     ("cal_force_scatter_percent", "<=", 7),
     ("sessions_accepted_percent", ">=", 90),
     ("worse_after_accept", "<=", 0),
-    ("rows_refused_as_drift", "<=", 0),
+    ("rows_accepted_percent", ">=", 90),
     ("one_missing_over_1mm_percent", "<=", 15),
     ("phantom_percent_1308", "<=", 2.5),
     ("phantom_percent_57", "<=", 5),
@@ -109,7 +109,7 @@ def judge_grid(measure, one, path):
         "sessions": len(calibrations),
         "accepted": len(accepted),
         "reasons": sorted({one.found["reason"].decode() for one in calibrations} - {"none"}),
-        "rows_refused_as_drift": sum(one.found["reason"] == b"drift" for one in in_rows),
+        "rows_accepted": sum(one.good for one in in_rows),
         "width_found_mm": grids.quantile([one.found["width_mm"] for one in solved], 0.5),
         "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(calibrated, solved) if one.good),
     }
@@ -162,11 +162,9 @@ def judge_grids(measure, source, here):
         figures[f"cal_{name}"] = mean_of(rows, "calibrated", name)
     figures["cal_by_gains_inside_p50_mm"] = mean_of(rows, "by_gains_inside_p50_mm")  # without the sensors' own places and widths
     figures["cal_cover_1sd_most_percent"] = figures["cal_cover_1sd_percent"]
-    figures["sessions_accepted_percent"] = (
-        100 * sum(row["accepted"] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
-    )
+    for name, accepted in (("sessions_accepted_percent", "accepted"), ("rows_accepted_percent", "rows_accepted")):
+        figures[name] = 100 * sum(row[accepted] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
     figures["worse_after_accept"] = sum(row["worse_after_accept"] for row in rows) if rows else None
-    figures["rows_refused_as_drift"] = sum(row["rows_refused_as_drift"] for row in found) if found else None
     figures["one_missing_over_1mm_percent"] = mean_of(rows, "one_missing_over_1mm_percent")
     return {**figures, "grids": found}, shown
 

@@ -173,7 +173,7 @@ calibration calibration_of(const Solution &solution, const std::optional<ForceSc
 }
 
 calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_s) const {
-  const Solution &solution = judgement_.solution;
+  const Solution &solution = judgement_.kept;
   std::optional<ForceScale> scale;
   if (force_N) {
     scale = force_scale(array_, placements_, solution, *force_N, shape());
@@ -192,7 +192,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
 }
 
 Shape GainSession::shape() const {
-  Shape shape = shape_of(judgement_.solution);
+  Shape shape = shape_of(judgement_.kept);
   if (has_profile_) {
     shape = without_width(std::move(shape));
   }
@@ -206,7 +206,7 @@ Shape GainSession::shape() const {
 Scatter GainSession::scatter(bool calibrated) const {
   const Solution &solution = judgement_.solution;
   return calibrated
-             ? calibrating::scatter(array_, placements_, solution, solution.gain, shape())
+             ? calibrating::scatter(array_, placements_, solution, judgement_.kept.gain, shape())
              : calibrating::scatter(array_, placements_, solution, std::vector<double>(array_.sensors(), 1.0), prior_);
 }
 

@@ -115,26 +115,31 @@ std::string too_little_load(const std::vector<std::size_t> &sensors) {
   return sensors.empty() ? "" : ", so sensors " + list_of(sensors) + " had too little load";
 }
 
-/* Beside what the others tell of the placements. */
-bool feels_nothing(const Array &array, std::vector<Placement> placements, const Solution &solution, std::size_t k) {
+/* Whether the sensor measures nothing where the other sensors locate placements. */
+bool measures_nothing(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                      std::size_t k) {
+  std::vector<Placement> without = placements;
   double most_Pa = 0.0;
-  for (Placement &placement : placements) {
-    most_Pa = std::max(most_Pa, placement.reading_Pa[k]);
+  for (Placement &placement : without) {
+    most_Pa = std::max(most_Pa, placement.usable >> k & 1u ? placement.reading_Pa[k] : 0.0);
     placement.usable &= ~(1u << k);
   }
-  if (most_Pa > FELT_MIN * solution.peak_Pa) {
+  if (most_Pa > MEASURED_MIN * solution.peak_Pa) {
     return false;
   }
-  const Solution others = solve(array, placements);
-  double felt = 0.0, expected = 0.0;
+  const Solution others = solve(array, without);
+  double measured = 0.0, expected = 0.0;
   for (std::size_t i = 0; others.solved && i < placements.size(); i++) {
     const Fitted &at = others.placements[i];
+    if (!at.kept || !(placements[i].usable >> k & 1u)) {
+      continue;
+    }
     const double widths = std::hypot(array.x_mm[k] - at.x_mm, array.y_mm[k] - at.y_mm) / others.sigma_mm;
     const double usual_Pa = others.peak_Pa * std::exp(-0.5 * widths * widths);
-    felt += placements[i].reading_Pa[k] * usual_Pa;
+    measured += placements[i].reading_Pa[k] * usual_Pa;
     expected += usual_Pa * usual_Pa;
   }
-  return expected > LOADED_SHARE * others.peak_Pa * LOADED_SHARE * others.peak_Pa && felt < FELT_MIN * expected;
+  return expected > LOADED_SHARE * others.peak_Pa * LOADED_SHARE * others.peak_Pa && measured < MEASURED_MIN * expected;
 }
 
 /* What it has of the pad, with readings as uncertain as without gains, or without them. */
@@ -143,7 +148,9 @@ Solution in_part(Solution solution, bool with_gains) {
   solution.reading_sd = solution.gain_sd;
   if (!with_gains) {
     solution.gain.assign(solution.gain.size(), 1.0);
-    solution.own_width.clear();
+    for (std::vector<double> *own : {&solution.dx_mm, &solution.dy_mm, &solution.own_width}) {
+      own->assign(own->size(), 0.0);
+    }
   }
   return solution;
 }
@@ -282,15 +289,15 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "every other placement gives other gains, by " + percent(std::max(j.halves_shape, j.halves_gauge)) +
            ": something changed meanwhile; begin again";
   case Reason::useless:
-    return "the gains from half of the placements do not make the other half better, so the gains are as good without: "
+    return "the gains from half of the placements make the other half no better than the pad's width and dip do: "
            "the sensors are alike, or something changed meanwhile";
   case Reason::layout:
     return "the sensors seem to sit " + fixed(s.spread.position_mm, 2) +
            " mm from where the firmware has them: see geometry.c";
   case Reason::silent:
     return "sensors " + list_of(j.silent) +
-           " feel nothing, or gave no reading to rely on: fingertip info shows whether they answer and their PROM is "
-           "good";
+           " measured nothing under the weight, or gave no valid reading: see fingertip info; one that answers is not "
+           "covered by the rubber, or broken";
   }
   return "";
 }
@@ -366,7 +373,7 @@ const char *name_of(Reason reason) {
 
 Judgement judge(const Array &array, const std::vector<Placement> &placements, bool last) {
   Judgement j;
-  j.solution = solve(array, placements);
+  j.solution = j.kept = solve(array, placements);
   const Solution &s = j.solution;
 
   const bool thin = s.solved && s.sigma_mm < THIN_PITCHES * array.pitch_mm;
@@ -383,7 +390,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
       j.unsure.push_back(k);
     }
     if (!(seen >> k & 1u) ||
-        (s.solved && placements.size() >= EVIDENCE_MIN && feels_nothing(array, placements, s, k))) {
+        (s.solved && placements.size() >= EVIDENCE_MIN && measures_nothing(array, placements, s, k))) {
       j.silent.push_back(k);
     }
   }
@@ -431,7 +438,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
       (j.helps || j.profile_helps)) {
     j.state = Judgement::State::good;
     j.text = (j.helps ? "good as far as it goes: " : "good for the pad's width and dip alone: ") + j.text;
-    j.solution = in_part(s, j.helps);
+    j.kept = in_part(s, j.helps);
     return j;
   }
   j.state = j.reason == Reason::none ? Judgement::State::good

@@ -3,9 +3,10 @@
  * Good: the calibration helps, and nothing in the session speaks against it. It helps if every gain
  * is known to SHAPE_SD_WANTED, or after PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ,
  * and if the gains from half of the placements make the firmware's fit of the other half better.
- * Where many placements all over the pad do not tell the gains, but half of them mend the other half, good is what they
- * tell, with readings as uncertain as without gains: the gains, or width and dip alone (reason is not none then).
- * Refused: what speaks against it does not go away with more placements. More: neither yet.
+ * Where many placements all over the pad do not determine every gain, but either half improves the fit of the other,
+ * the part that helps is kept: the gains, with readings as uncertain as without them, or width and dip alone. It is
+ * good then, and reason says what is not known. Refused: what speaks against it does not go away with more placements.
+ * More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm,
  * alike and as uneven as real ones (report truth, part calibration, tables evidence_p1_p50_p99; chosen
@@ -38,7 +39,7 @@ constexpr double ELLIPSE_MAX = 0.05;          /* rms of q1, q2 beyond their sds:
                                                  0.031 at most (report truth, part calibration, seed 20000) */
 constexpr double OFFSET_MAX = 0.012;          /* rms over the sensors, of the peak: zeros */
 constexpr double DRIFT_MAX = 0.006;           /* the same, moving from the rest before a placement to it */
-constexpr double FELT_MIN = 0.25;             /* of what a usual sensor would read: less is nothing */
+constexpr double MEASURED_MIN = 0.25;         /* of what a usual sensor would read: less counts as nothing */
 constexpr double THIN_PITCHES = 0.36;         /* sigma; on thinner rubber too few sensors measure a placement: gains
                                                  that seem to be known left 2.7 % of the presses of a real pad of
                                                  0.33 off by 1 mm without a warning */
@@ -60,9 +61,9 @@ enum class Reason {
   stray,     /* too many placements do not fit the others */
   residual,  /* no such profile */
   halves,    /* odd and even placements give different gains */
-  useless,   /* the gains from half of the placements make the other half no better */
+  useless,   /* the gains from half of the placements make the other half no better than width and dip alone do */
   layout,    /* sensors are not where the firmware's layout has them */
-  silent,    /* a sensor has no reading in any placement, or feels nothing */
+  silent,    /* a sensor has no reading in any placement, or measures nothing */
 };
 
 /* A word for programs: "too_few", "cluster", ... */
@@ -70,10 +71,11 @@ const char *name_of(Reason reason);
 
 struct Judgement {
   enum class State { more, good, refused } state = State::more;
-  Reason reason = Reason::too_few; /* none if good */
-  std::string text;                /* a sentence: why, and what to do */
-  Solution solution;
-  double halves_shape = 0.0, halves_gauge = 0.0; /* 0 before there are PLACEMENTS_WANTED */
+  Reason reason = Reason::too_few;               /* none if good in full */
+  std::string text;                              /* a sentence: why, and what to do */
+  Solution solution;                             /* as solved */
+  Solution kept;                                 /* what is to be stored: all of it, or the part that helps */
+  double halves_shape = 0.0, halves_gauge = 0.0; /* 0 unless the halves were compared */
   bool helps = false, profile_helps = false;     /* the halves each other, by all and by width and dip alone; as
                                                     halves_shape */
   double kept_share = 0.0, force_share = 0.0;    /* the latter: rms of e, of placements within the
@@ -83,7 +85,7 @@ struct Judgement {
                                                     by chance */
   double wanted_sd = 0.0;                        /* of the gains outside the gauge, to be good */
   std::vector<std::size_t> unsure;               /* sensors whose gain is not known well enough yet */
-  std::vector<std::size_t> silent;               /* those without a reading in any placement, or that feel nothing */
+  std::vector<std::size_t> silent;               /* those without a reading in any placement, or that measure nothing */
 };
 
 /* last: there will be no more placements, so what is not good is refused. */

@@ -1,4 +1,5 @@
 #include "support/placements.hpp"
+#include "tool/calibration/gain_session.hpp"
 #include "tool/calibration/judge.hpp"
 
 #include <functional>
@@ -79,7 +80,7 @@ TEST(Judge, accepts_a_dip_narrower_than_expected) {
     const Judgement judgement = judge(pad.array, good_session(pad, 36, seed), true);
     EXPECT_EQ(judgement.state, State::good) << seed << judgement.text;
     EXPECT_LT(rms(judgement.solution.offset_Pa) / judgement.solution.peak_Pa, OFFSET_MAX);
-    EXPECT_NEAR(judgement.solution.dip_sd_mm, pad.dip_mm, 2.5); /* 20.7 is expected */
+    EXPECT_NEAR(judgement.solution.dip_sd_mm, pad.dip_mm, 2.5); /* five widths, some 27, are expected */
   }
 }
 
@@ -89,12 +90,12 @@ TEST(Judge, names_a_sensor_without_readings_before_long) {
   for (Placement &placement : placements) {
     placement.usable &= ~(1u << 7);
   }
-  expect_refused(judge(pad.array, placements, false), Reason::silent, "sensors 7 feel nothing");
+  expect_refused(judge(pad.array, placements, false), Reason::silent, "sensors 7 measured nothing");
   placements.back().usable |= 1u << 7;
   EXPECT_EQ(judge(pad.array, placements, false).state, State::more);
 }
 
-TEST(Judge, names_a_sensor_that_feels_nothing) {
+TEST(Judge, names_a_sensor_that_measures_nothing) {
   for (std::uint64_t seed = 62; seed < 72; seed++) {
     const KnownPad pad(seed);
     auto placements = good_session(pad, 20, seed);
@@ -102,7 +103,23 @@ TEST(Judge, names_a_sensor_that_feels_nothing) {
       placement.reading_Pa[seed % 15] = 0.0;
     }
     expect_refused(judge(pad.array, placements, true), Reason::silent,
-                   "sensors " + std::to_string(seed % 15) + " feel nothing");
+                   "sensors " + std::to_string(seed % 15) + " measured nothing");
+  }
+}
+
+/* Saturated wherever it has a load: a reading that is no measurement, as the finder leaves it, is not one of nothing.
+ */
+TEST(Judge, does_not_take_what_a_sensor_missed_for_nothing) {
+  for (std::uint64_t seed = 62; seed < 72; seed++) {
+    const KnownPad pad(seed);
+    auto placements = good_session(pad, 30, seed);
+    for (Placement &placement : placements) {
+      if (placement.reading_Pa[7] > 0.2 * KnownPad::PEAK_Pa) {
+        placement.usable &= ~(1u << 7);
+        placement.reading_Pa[7] = 0.0;
+      }
+    }
+    EXPECT_NE(judge(pad.array, placements, true).reason, Reason::silent) << seed;
   }
 }
 
@@ -178,7 +195,7 @@ TEST(Judge, refuses_with_the_reason) {
 }
 
 /* Thin rubber again: gains that are not known are stated so. */
-TEST(Judge, keeps_what_many_placements_tell) {
+TEST(Judge, keeps_what_many_placements_determine) {
   const auto thin = [](Random &random, int) {
     KnownPad::Press press = anywhere(random);
     press.width_mm = 2.4;
@@ -188,9 +205,35 @@ TEST(Judge, keeps_what_many_placements_tell) {
   EXPECT_EQ(judgement.state, State::good) << judgement.text;
   EXPECT_STREQ(name_of(judgement.reason), "unsure");
   EXPECT_NE(judgement.text.find("good as far as it goes"), std::string::npos) << judgement.text;
-  EXPECT_EQ(judgement.solution.gain_sd[3], Assumptions{}.gain);
+  EXPECT_EQ(judgement.kept.gain_sd[3], Assumptions{}.gain);
   EXPECT_NEAR(judgement.solution.sigma_mm, 2.4, 0.3);
   EXPECT_EQ(judgement.solution.dip_share, 0.0); /* it is narrower than DIP_FROM_PITCHES */
+}
+
+/* Of sensors that are alike: nothing of the gains, the places and the own widths. */
+TEST(Judge, keeps_width_and_dip_alone_where_gains_help_nothing) {
+  int kept = 0;
+  for (std::uint64_t seed = 80; seed < 90; seed++) {
+    KnownPad pad(seed, 0.0);
+    pad.dip = 0.05;
+    const Judgement judgement = judge(pad.array, good_session(pad, 44, seed), true);
+    if (judgement.text.find("width and dip alone") == std::string::npos) {
+      continue;
+    }
+    kept++;
+    EXPECT_EQ(judgement.state, State::good);
+    EXPECT_STREQ(name_of(judgement.reason), "useless");
+    const calibration stored = calibration_of(judgement.kept, std::nullopt, 0);
+    for (std::size_t k = 0; k < 15; k++) {
+      EXPECT_EQ(stored.sensors[k].gain, 1.0f);
+      EXPECT_EQ(stored.sensors[k].off_x_um, 0);
+      EXPECT_EQ(stored.sensors[k].off_y_um, 0);
+      EXPECT_EQ(stored.sensors[k].wider_q15, 0);
+      EXPECT_NE(judgement.solution.gain[k], 1.0);
+    }
+    EXPECT_GT(stored.sigma_um, 0);
+  }
+  EXPECT_GT(kept, 0);
 }
 
 TEST(Judge, refuses_sensors_in_other_places) {
