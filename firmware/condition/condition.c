@@ -109,7 +109,8 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
       conditioned->pressure_Pa_q10[k] = 0;
       continue;
     }
-    int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
+    int32_t above =
+        clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k] - condition->faded_Pa_q10[k]);
     if (gains) {
       above = scaled_by(clamp(above, -PRESSURE_MAX, PRESSURE_MAX - 1), gains->inverse_q16[k]);
     }
@@ -163,11 +164,7 @@ static void begin_contact(struct condition *condition, const struct conditioned 
 }
 
 static void end_contact(struct condition *condition, uint8_t count) {
-  for (uint8_t k = 0; k < count; k++) {
-    struct condition_sensor *sensor = &condition->sensor[k];
-    condition->to_learn |= UINT32_C(1) << k;
-    sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, sensor->reached_Pa_q10);
-  }
+  update_past_shows(condition, count);
   condition->drifted_Pa_q10 = larger(condition->drifted_Pa_q10, update_drift_in(condition->gate.pressed_ms));
 }
 
@@ -237,16 +234,17 @@ static bool move_gate(struct condition *condition, const struct frame *frame, co
 }
 
 /* Whether the zero follows this contact as if nothing touched. */
-static bool is_unsure(const struct condition *condition, const struct conditioned *conditioned, bool saturated) {
+static bool is_unsure(const struct condition *condition, const struct conditioned *conditioned, int32_t peak,
+                      bool saturated) {
   return condition->gate.pressed && !saturated &&
          (condition->guessed != 0 || (condition->firm & conditioned->usable) == 0 ||
-          conditioned->peak_Pa_q10 < update_drift_in(condition->gate.pressed_ms));
+          peak < update_drift_in(condition->gate.pressed_ms));
 }
 
 /* Sets .sure, and returns whether a force and a zero that has moved look alike. After the updates of this frame. */
-static bool is_doubtful(struct condition *condition, const struct conditioned *conditioned, bool saturated) {
+static bool is_doubtful(struct condition *condition, const struct conditioned *conditioned, int32_t peak,
+                        bool saturated) {
   const uint32_t usable = conditioned->usable;
-  const int32_t peak = conditioned->peak_Pa_q10;
   if (!condition->gate.pressed) {
     condition->sure = false;
     return conditioned->contact || (condition->zero_risen & usable) != 0;
@@ -270,6 +268,8 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   }
   const uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
 
+  /* A contact is judged with the whole remainder, since it leaves one too; its pressures are without what has faded. */
+  const int32_t peak = conditioned->peak_Pa_q10 - condition->faded_Pa_q10[strongest];
   const bool changes = move_gate(condition, frame, conditioned, strongest);
   const bool pressed = condition->gate.pressed;
   if (changes && pressed) {
@@ -281,7 +281,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
     sum_up(condition, frame, conditioned->usable);
   }
   conditioned->contact = pressed || conditioned->peak_Pa_q10 > condition->gate.open_Pa_q10;
-  condition->unsure = is_unsure(condition, conditioned, saturated);
+  condition->unsure = is_unsure(condition, conditioned, peak, saturated);
   if (!pressed || condition->unsure) { /* what is updated is part of the answer */
     condition_follow(condition, frame, conditioned);
   }
@@ -292,5 +292,5 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   conditioned->tared =
       readable != 0 && conditioned->usable == readable && (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, count);
-  conditioned->zero_doubtful = is_doubtful(condition, conditioned, saturated);
+  conditioned->zero_doubtful = is_doubtful(condition, conditioned, peak, saturated);
 }

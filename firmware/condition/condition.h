@@ -29,7 +29,7 @@
  * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
  * - So the remainder at a touch fades in the contact, with PAST_ms.
  * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
- * both: a share of what the sensor has felt, which rises in a hold, is all of it after a contact and fades with
+ * both: a share of what the sensor has measured, which rises in a hold, is all of it after a contact and fades with
  * PAST_ms. The share is learnt from what stands off after each contact.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
@@ -119,6 +119,7 @@ struct condition {
   struct calm calm;
 
   int32_t zero_Pa_q10[FT_MAX_SENSORS];    /* [sensor] 1/1024 Pa, as all here: level + remainder */
+  int32_t faded_Pa_q10[FT_MAX_SENSORS];   /* of the remainder, in this contact */
   int32_t margin_Pa_q10[FT_MAX_SENSORS];  /* by which the gate is higher */
   int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* of a pressure: what a press before and this hold leave in it */
   int32_t sum_Pa_q10[FT_MAX_SENSORS];     /* of readings above the zero, since the last update */

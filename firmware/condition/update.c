@@ -27,6 +27,51 @@ struct band {
 
 static int32_t faded(int32_t value, int32_t share) { return value - part_of(value, share); }
 
+#ifdef FT_WITHOUT_PAST
+static void follow_past(const struct step *step) { (void)step; }
+static void learn_past(const struct step *step, int32_t above_level_Pa_q10) { (void)step, (void)above_level_Pa_q10; }
+static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
+void update_past_shows(struct condition *condition, uint8_t count) { (void)condition, (void)count; }
+#else
+static void follow_past(const struct step *step) {
+  struct condition_sensor *sensor = step->sensor;
+  const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
+  sensor->past_Pa_q10 += part_of(held - sensor->past_Pa_q10, share_in(step->ms, PAST_ms));
+  step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
+}
+
+/* What stands off after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
+static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
+  struct condition_sensor *sensor = step->sensor;
+  const uint32_t bit = UINT32_C(1) << step->k;
+  if (!(step->condition->to_learn & bit) || step->condition->gate.released_ms < PAST_SHOWS_ms) {
+    return;
+  }
+  step->condition->to_learn &= ~bit;
+  if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
+    const int32_t off = size_of(above_level_Pa_q10);
+    const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
+    const int32_t shown =
+        port_divide((off < most ? off : most) + (off < most ? off : most) / 4, sensor->past_Pa_q10 >> 16);
+    sensor->past_share += (shown - sensor->past_share) >> PAST_LEARN_SHIFT;
+    sensor->past_share = larger(sensor->past_share, PAST_SHARE_LEAST);
+  }
+}
+
+static void forget_past(struct condition_sensor *sensor) {
+  sensor->past_Pa_q10 = 0;
+  sensor->past_share = larger(sensor->past_share, PAST_SHARE);
+}
+
+void update_past_shows(struct condition *condition, uint8_t count) {
+  for (uint8_t k = 0; k < count; k++) {
+    struct condition_sensor *sensor = &condition->sensor[k];
+    condition->to_learn |= UINT32_C(1) << k;
+    sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, sensor->reached_Pa_q10);
+  }
+}
+#endif
+
 int32_t update_drift_in(uint32_t pressed_ms) {
   const uint32_t drift = pressed_ms >> DRIFT_SHIFT;
   return drift < Pa_q10(DRIFT_MAX_Pa) ? (int32_t)drift : Pa_q10(DRIFT_MAX_Pa);
@@ -42,10 +87,10 @@ void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
   sensor->tare_max = INT32_MIN;
   sensor->tare_begun_ms = condition->now_ms;
   sensor->tare_left = ZERO_TARE_FRAMES;
-  sensor->memory_Pa_q10 = sensor->reached_Pa_q10 = sensor->past_Pa_q10 = 0;
-  sensor->past_share = larger(sensor->past_share, PAST_SHARE);
+  sensor->memory_Pa_q10 = sensor->reached_Pa_q10 = 0;
+  forget_past(sensor);
   sensor->wander_Pa_q10 = sensor->taken_Pa_q10 = sensor->crept_Pa_q10 = 0;
-  condition->margin_Pa_q10[k] = 0;
+  condition->faded_Pa_q10[k] = condition->margin_Pa_q10[k] = 0;
   condition->sum_Pa_q10[k] = 0;
   condition->summed[k] = 0;
   condition->taring |= UINT32_C(1) << k;
@@ -83,36 +128,6 @@ static int32_t take_mean(struct condition *condition, uint8_t k, int32_t above_P
   condition->summed[k] = 0;
   return mean;
 }
-
-#ifdef FT_WITHOUT_PAST
-static void follow_past(const struct step *step) { (void)step; }
-static void learn_past(const struct step *step, int32_t above_level_Pa_q10) { (void)step, (void)above_level_Pa_q10; }
-#else
-static void follow_past(const struct step *step) {
-  struct condition_sensor *sensor = step->sensor;
-  const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
-  sensor->past_Pa_q10 += part_of(held - sensor->past_Pa_q10, share_in(step->ms, PAST_ms));
-  step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
-}
-
-/* What stands off after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
-static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
-  struct condition_sensor *sensor = step->sensor;
-  const uint32_t bit = UINT32_C(1) << step->k;
-  if (!(step->condition->to_learn & bit) || step->condition->gate.released_ms < PAST_SHOWS_ms) {
-    return;
-  }
-  step->condition->to_learn &= ~bit;
-  if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
-    const int32_t off = size_of(above_level_Pa_q10);
-    const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
-    const int32_t shown =
-        port_divide((off < most ? off : most) + (off < most ? off : most) / 4, sensor->past_Pa_q10 >> 16);
-    sensor->past_share += (shown - sensor->past_share) >> PAST_LEARN_SHIFT;
-    sensor->past_share = larger(sensor->past_share, PAST_SHARE_LEAST);
-  }
-}
-#endif
 
 /* What depends on the readings alone: the memory of presses, and the creep. */
 static void remember(const struct step *step, int32_t rise_Pa_q10) {
@@ -152,7 +167,9 @@ static void hold(const struct step *step) {
     condition->zero_Pa_q10[step->k] += drifted;
   }
   const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->level_Pa_q10;
-  condition->zero_Pa_q10[step->k] -= part_of(remainder, share_in(step->ms, PAST_ms));
+  int32_t *gone = &condition->faded_Pa_q10[step->k];
+  *gone += part_of(remainder - *gone, share_in(step->ms, PAST_ms));
+  condition->margin_Pa_q10[step->k] += *gone;
 }
 
 /* The zero is what level and remainder are now: what it may be off by grows by what they have moved. */
@@ -264,6 +281,7 @@ static void follow(const struct step *step) {
   if (!unsure && settle(step)) {
     return;
   }
+  condition->faded_Pa_q10[step->k] = 0;
   const int32_t before = condition->zero_Pa_q10[step->k];
   const bool fresh = condition->gate.released_ms < FRESH_ms;
   const struct band band = band_of(step, fresh);
@@ -325,7 +343,7 @@ void update_sensor(struct condition *condition, const struct frame *frame, const
       .above_Pa_q10 = take_mean(condition, k, above),
   };
   remember(&step, rise);
-  update_compare(condition, k, conditioned->pressure_Pa_q10[k]);
+  update_compare(condition, k, clamped_difference(conditioned->pressure_Pa_q10[k], condition->faded_Pa_q10[k]));
   if (condition->gate.pressed && !condition->unsure) {
     hold(&step);
   } else {

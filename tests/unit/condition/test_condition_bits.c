@@ -104,8 +104,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x1906E5A2, 0x2B4971AC, 0x1862028D, 0x51C567AB,
-                                                 0xC0297B41, 0x43FC6961, 0xBFF18A80, 0x94B67F46};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x8D9E6DE0, 0x94447C18, 0xB49A94A1, 0xD9C5824B,
+                                                 0xA6B2E4FF, 0x0178CA89, 0xDFDDECC5, 0x53938B40};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {
