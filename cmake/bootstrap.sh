@@ -76,7 +76,6 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
 /usr/include/modbus/modbus.h libmodbus-dev
 /usr/include/zstd.h libzstd-dev
-/usr/include/httplib.h libcpp-httplib-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
@@ -169,7 +168,7 @@ if [ "$job" = docs ]; then
     note "fetching mkdocs-material with pip into build/docs"
     mkdir -p build/docs
     /usr/bin/python3 -m venv --clear build/docs/venv
-    build/docs/venv/bin/pip --quiet --disable-pip-version-check install -r cmake/docs.txt
+    build/docs/venv/bin/pip --quiet --disable-pip-version-check install --require-hashes -r cmake/docs.txt
     cp cmake/docs.txt build/docs/venv/.installed-requirements
   fi
   /usr/bin/python3 cmake/docs.py
@@ -192,7 +191,7 @@ if [ -n "$own_node" ] && ! cmp -s cmake/node.txt build/node/.installed-requireme
   rm -rf build/node
   mkdir -p build/node/bin
   /usr/bin/python3 -m venv build/node/venv
-  build/node/venv/bin/pip --quiet --disable-pip-version-check install -r cmake/node.txt || {
+  build/node/venv/bin/pip --quiet --disable-pip-version-check install --require-hashes -r cmake/node.txt || {
     echo "bootstrap: pip cannot fetch node and npm; connect to the internet and run again, or install nodejs and npm" >&2
     exit 1
   }
@@ -217,7 +216,7 @@ if { [ "$job" = test ] || [ "$job" = nightly ] || [ "$job" = report ]; } && ! cm
   note "fetching the judges with pip, while the rest is built"
   {
     /usr/bin/python3 -m venv --clear build/venv &&
-      build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt &&
+      build/venv/bin/pip --quiet --disable-pip-version-check install --require-hashes -r tests/requirements.txt &&
       cp tests/requirements.txt build/venv/.installed-requirements
   } > build/judges.log 2>&1 &
   judges=$!

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The build's and the demo's scripts: what they compute, and the one line they end with when something is missing."""
 
+import hashlib
 import json
 import os
 import pathlib
@@ -178,17 +179,19 @@ class Bootstrap(Folder):
                 wheel.writestr(info, text)
         pinned = self.folder / "cmake/node.txt"
         pinned.parent.mkdir()
-        pinned.write_text("./fake_node-1-py3-none-any.whl\n")
+        wheel = "fake_node-1-py3-none-any.whl"
+        pinned.write_text(f"./{wheel} --hash=sha256:{hashlib.sha256((self.folder / wheel).read_bytes()).hexdigest()}\n")
         path = self.path_without("node", "npm")
         for fetches in (True, False):
             done = self.up_to_npm(node=None, path=path)
             self.assertEqual(done.returncode, 33, done.stderr)
             self.assertEqual("== fetching node and npm with pip" in done.stdout, fetches)
-        pinned.write_text("./absent\n")
-        done = self.up_to_npm(node=None, path=path)
-        self.assertEqual(done.returncode, 1)
-        self.assertTrue(done.stderr.endswith("connect to the internet and run again, or install nodejs and npm\n"), done.stderr)
-        self.assertFalse((self.folder / "build/node/.installed-requirements").exists())  # the next run fetches again
+        for unusable in ("./absent", f"./{wheel}", f"./{wheel} --hash=sha256:{'0' * 64}"):  # what was not pinned, what was changed
+            pinned.write_text(unusable + "\n")
+            done = self.up_to_npm(node=None, path=path)
+            self.assertEqual(done.returncode, 1, unusable)
+            self.assertTrue(done.stderr.endswith("connect to the internet and run again, or install nodejs and npm\n"), done.stderr)
+            self.assertFalse((self.folder / "build/node/.installed-requirements").exists())  # the next run fetches again
 
     def test_node_and_npm_of_the_machine_are_taken(self):
         done = self.up_to_npm()

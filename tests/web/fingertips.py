@@ -75,8 +75,8 @@ class Bench(contextlib.ExitStack):
         return process
 
     def served(self, runtime):
-        """The page, by `fingertip web`: its address without the last slash."""
+        """The page, by `fingertip web`: its address, with the token."""
         _, url = self._tool(runtime, "web", "--port", "0", "--no-browser")
-        if not re.fullmatch(r"http://127\.0\.0\.1:\d+/", url):
+        if not re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=\w+", url):
             raise AssertionError("the page is not served")
-        return url.rstrip("/")
+        return url

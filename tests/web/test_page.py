@@ -69,7 +69,7 @@ class PageTest(unittest.TestCase):
 
     @classmethod
     def policy(cls):
-        return {"SerialAllowAllPortsForUrls": [cls.url]}
+        return {"SerialAllowAllPortsForUrls": [cls.url.partition("/?")[0]]}
 
     def setUp(self):
         self.bench = self.enterContext(Bench(OPTIONS))
@@ -77,7 +77,7 @@ class PageTest(unittest.TestCase):
     def open(self, before="", patience=PATIENT, **options):
         """patience: the page's, model/patience.ts."""
         before = f"globalThis.fingertipPatience = {json.dumps(patience)}; {NO_SAVE_DIALOG}{before}"
-        page = self.browser.page(self.url + "/", before=before, **options)
+        page = self.browser.page(self.url, before=before, **options)
         self.addCleanup(page.close)
         self.addCleanup(self.nothing_else_happened, page)
         driven.ready_s(page)
@@ -346,7 +346,7 @@ class BadInput(PageTest):
         page = self.browser.page()
         self.addCleanup(page.close)
         page.call("Network.setBlockedURLs", urls=["*core.wasm"])
-        page.go(self.url + "/")
+        page.go(self.url)
         self.assertRegex(self.alert(page, "/cannot start/"), "core.wasm.*Reload")
 
     def test_a_browser_without_web_serial(self):

@@ -48,6 +48,15 @@ std::string own_share_folder() {
   return geteuid() == 0 ? COMMON_SHARE_FOLDER : own_folder_in_tmp();
 }
 
+void make_own_folder(const std::string &path) {
+  if (mkdir(path.c_str(), 0750) != 0 && errno != EEXIST) {
+    throw Error(ErrorCode::cannot_share, path + ": cannot share there (" + std::strerror(errno) + ")");
+  }
+  if (!is_of_this_user(path)) {
+    throw Error(ErrorCode::cannot_share, path + ": is no folder of this user");
+  }
+}
+
 std::string simulated_folder() { return own_share_folder() + "/simulated"; }
 
 std::string port_of(const std::string &path) {

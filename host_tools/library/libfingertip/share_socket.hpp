@@ -27,6 +27,10 @@ std::vector<Shared> find_shared();
 std::string own_share_folder();
 inline constexpr const char *COMMON_SHARE_FOLDER = "/run/fingertip";
 
+/* Makes the folder if it is not there. Throws Error: it cannot be, or is not a folder of this user's, who alone decides
+ * what is in it. Judge it before anything in it is opened. */
+void make_own_folder(const std::string &path);
+
 /* Where `fingertip simulate` has its ports left, right and gripper: a folder in the own one. */
 std::string simulated_folder();
 /* "sim:left" is the port left in it, "sim:" the same; any other path stays as it is. Throws Error:

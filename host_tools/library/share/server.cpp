@@ -397,14 +397,7 @@ private:
 };
 
 Server::Server(const Options &options, Log log) : folder_(options.folder), group_(options.group), log_(std::move(log)) {
-  struct stat status;
-  bool made = mkdir(folder_.c_str(), FOLDER_MODE) == 0;
-  if ((!made && errno != EEXIST) || lstat(folder_.c_str(), &status) != 0) {
-    throw cannot_share(folder_);
-  }
-  if (!S_ISDIR(status.st_mode) || status.st_uid != geteuid()) {
-    throw Error(ErrorCode::cannot_share, folder_ + ": is no folder of this user");
-  }
+  make_own_folder(folder_);
   if ((group_ && chown(folder_.c_str(), static_cast<uid_t>(-1), *group_) != 0) ||
       chmod(folder_.c_str(), FOLDER_MODE) != 0) {
     throw cannot_share(folder_);

@@ -1,6 +1,7 @@
 """Publishes every fingertip of this computer on Zenoh, until it is ended: contact, raw, health and info packets as they were on the
 line, with this computer's clock. Keys: README.md of the package. A fingertip that is plugged in later is found, one that is unplugged is
-waited for. Nothing is encrypted and everybody in reach may tare and set, unless --config has it otherwise.
+waited for. It listens on this computer alone, unless --listen, --connect or --config has it otherwise, and takes no commands, unless
+--commands does: nothing is encrypted, and everybody in reach may tare and set then, unless --config restricts it.
 
 In Python, because the package reconnects, finds and shares fingertips already, and Debian has no Zenoh for C++.
 """
@@ -40,7 +41,7 @@ class _Published:
     """One fingertip on Zenoh. Its reading thread numbers and keeps the packets, a thread of its own publishes them: the network never
     holds up the line."""
 
-    def __init__(self, session, tip, keep, clock_of_host):
+    def __init__(self, session, tip, keep, clock_of_host, commands):
         self.tip = tip
         self._zenoh = zenoh_module()
         self._session = session
@@ -61,7 +62,8 @@ class _Published:
         names = (*NAMES.values(), "other", "status")
         self._publishers = {name: session.declare_publisher(f"{self._root}/{name}", **drop) for name in names}
         self._pool = concurrent.futures.ThreadPoolExecutor(3, thread_name_prefix="answer")
-        answers = {"tare": self._tare, "set": self._set, "info": self._info, "status": self._answer_status, "again": self._again}
+        answers = {"info": self._info, "status": self._answer_status, "again": self._again}
+        answers |= {"tare": self._tare, "set": self._set} if commands else dict.fromkeys(("tare", "set"), self._refuse)
         self._queryables = [session.declare_queryable(f"{self._root}/{name}", self._when_asked(answer)) for name, answer in answers.items()]
         self._begin_line()
         self._thread = host_time.thread(self._publish, name="publish", daemon=True)
@@ -168,6 +170,9 @@ class _Published:
     def _reply_info(self, query, name, info):
         query.reply(f"{self._root}/{name}", wire.encode(wire.Packet(0, 0, info))[:-1])
 
+    def _refuse(self, query):
+        raise InputError("this bridge takes no commands; start it with --commands")
+
     def _tare(self, query):
         self.tip.tare(force=self._parameters(query).get("force", "0") == "1")
         self._reply_info(query, "tare", self.tip.info)
@@ -202,14 +207,15 @@ class _Published:
 
 
 class Bridge:
-    """ports: these alone; none: all that discovery finds, again and again."""
+    """ports: these alone; none: all that discovery finds, again and again. commands: whether others may tare and set."""
 
-    def __init__(self, session, ports, keep, latency_ms, report):
+    def __init__(self, session, ports, keep, latency_ms, report, commands):
         self._session = session
         self._ports = ports
         self._keep = keep
         self._latency_ms = latency_ms
         self._report = report
+        self._commands = commands
         self._published = {}
         self._complaints = {}
         self.clock = host_clock()
@@ -248,7 +254,7 @@ class Bridge:
         if any(one.tip.serial == tip.serial for one in self._published.values()):  # it is waited for already, and has another name now
             tip.close()
             return
-        self._published[way] = _Published(self._session, tip, self._keep, lambda: self.clock)
+        self._published[way] = _Published(self._session, tip, self._keep, lambda: self.clock, self._commands)
         self._report(f"{tip.serial} at {tip.description}")
 
     def close(self):
@@ -266,14 +272,15 @@ def main(argv):
     add("--keep", type=int, default=100_000, metavar="N", help=keep + ": 38 s at the highest rate")
     add("--latency-ms", type=float, default=1.0, metavar="MS", help="how long bytes may wait to be read together; default 1")
     parser.add_argument("--router", action="store_true", help="be a router too, for others to --connect to; with --listen")
+    parser.add_argument("--commands", action="store_true", help="let everybody who reaches this tare and set; otherwise that is refused")
     add_session_options(parser)
     options = parser.parse_args(argv)
     check_range("keep", options.keep, 1, 10_000_000)
     check_range("latency-ms", options.latency_ms, 0, 1000)
     ended, report = until_ended(), reporter("fingertip-bridge")
 
-    with open_session(options, options.router) as session:
-        bridge = Bridge(session, options.port, options.keep, options.latency_ms, report)
+    with open_session(options, options.router, serves=True) as session:
+        bridge = Bridge(session, options.port, options.keep, options.latency_ms, report, options.commands)
         report(bridge.clock.text)
         try:
             while not ended.is_set():

@@ -31,6 +31,7 @@ from .errors import BadValueError, InputError
 from .line import SETTINGS
 
 ROOT = "fingertip"
+LOOPBACK = "tcp/127.0.0.1:7447"  # where a bridge listens and a recorder connects to if no option has it otherwise
 AGAIN_MOST = 4000  # packets that one question asks for
 CHRONYC_TIMEOUT_s = 5
 _STAMP = struct.Struct("<QQqqffI")
@@ -110,8 +111,8 @@ def zenoh_module() -> types.ModuleType:
 
 
 def add_session_options(parser: argparse.ArgumentParser) -> None:
-    connect = "a router, as tcp/192.168.1.2:7447; it is waited for. Without, others are found by multicast"
-    listen = "where others reach this, as tcp/0.0.0.0:7447"
+    connect = "a router, as tcp/192.168.1.2:7447; it is waited for"
+    listen = f"where others reach this, as tcp/0.0.0.0:7447. Without these three options it is this computer alone: {LOOPBACK}"
     parser.add_argument("--connect", action="append", default=[], metavar="ENDPOINT", help=connect)
     parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT", help=listen)
     config = "Zenoh's own configuration, with TLS and access control; the options above add to it"
@@ -126,19 +127,23 @@ def until_ended() -> threading.Event:
     return ended
 
 
-def open_session(options: argparse.Namespace, router: bool = False) -> Any:
-    """A zenoh.Session. Raises InputError."""
+def open_session(options: argparse.Namespace, router: bool = False, serves: bool = False) -> Any:
+    """A zenoh.Session; serves: others come to it where no option has it otherwise. Nothing is found by multicast, unless --config has that.
+    Raises InputError."""
     zenoh = zenoh_module()
     zenoh.init_log_from_env_or("error")
     try:
         config = zenoh.Config.from_file(options.config) if options.config else zenoh.Config()
-        if router or options.connect:
+        alone = [] if options.config or options.connect or options.listen else [LOOPBACK]
+        connect, listen = options.connect or alone * (not serves), options.listen or alone * serves
+        if router or connect:
             config.insert_json5("mode", json.dumps("router" if router else "client"))
+        if router or connect or not options.config:
             config.insert_json5("scouting/multicast/enabled", "false")
-        if options.connect:
-            config.insert_json5("connect/endpoints", json.dumps(options.connect))
-        if options.listen:
-            config.insert_json5("listen/endpoints", json.dumps(options.listen))
+        if connect:
+            config.insert_json5("connect/endpoints", json.dumps(connect))
+        if listen:
+            config.insert_json5("listen/endpoints", json.dumps(listen))
         if not options.config:  # started before the router, it waits
             config.insert_json5("connect/timeout_ms", "-1")
             config.insert_json5("connect/exit_on_failure", "false")

@@ -38,11 +38,13 @@ volatile std::sig_atomic_t interrupted = 0;
 Place::Place(const std::string &folder)
     : folder_(folder.empty() ? simulated_folder() : folder), is_shared_(folder.empty()) {
   std::error_code error;
-  fs::create_directories(folder_, error);
-  if (error) {
+  if (is_shared_) {
+    make_own_folder(own_share_folder());
+    make_own_folder(folder_);
+  } else if (fs::create_directories(folder_, error); error) {
     throw Error(ErrorCode::cannot_write, folder_ + ": " + error.message());
   }
-  lock_ = open((folder_ + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  lock_ = open((folder_ + "/lock").c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (lock_ < 0) {
     throw Error(ErrorCode::cannot_write, folder_ + ": " + std::strerror(errno));
   }

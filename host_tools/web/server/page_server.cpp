@@ -1,16 +1,14 @@
 #include "web/server/page_server.hpp"
 
-#include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
 
+#include <algorithm>
 #include <arpa/inet.h>
-#include <cerrno>
-#include <chrono>
-#include <cstring>
 #include <fstream>
-#include <httplib.h>
 #include <sstream>
-#include <thread>
+#include <sys/random.h>
+#include <system_error>
 
 namespace fingertip {
 
@@ -23,22 +21,15 @@ constexpr const char *POLICY =
     "data: blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-const httplib::Headers HEADERS{
-    {"Content-Security-Policy", POLICY},
-    {"Permissions-Policy", "serial=(self), camera=(), geolocation=(), microphone=()"},
-    {"X-Content-Type-Options", "nosniff"},
-    {"Referrer-Policy", "no-referrer"},
-    {"Cross-Origin-Opener-Policy", "same-origin"},
-    {"Cross-Origin-Embedder-Policy", "require-corp"},
-    {"Cross-Origin-Resource-Policy", "same-origin"},
-    {"Cache-Control", "no-cache"}, /* the next build has the same address */
-};
-
-constexpr std::chrono::milliseconds LOOK_INTERVAL{50};
-
-/* Lines of simulated fingertips, and as many for all that is short. */
-constexpr std::size_t THREADS = 2 * Simulations::MOST_LINES;
-constexpr std::size_t MOST_BODY_BYTES = 65536;
+const std::string HEADERS = std::string("Content-Security-Policy: ") + POLICY +
+                            "\r\n"
+                            "Permissions-Policy: serial=(self), camera=(), geolocation=(), microphone=()\r\n"
+                            "X-Content-Type-Options: nosniff\r\n"
+                            "Referrer-Policy: no-referrer\r\n"
+                            "Cross-Origin-Opener-Policy: same-origin\r\n"
+                            "Cross-Origin-Embedder-Policy: require-corp\r\n"
+                            "Cross-Origin-Resource-Policy: same-origin\r\n"
+                            "Cache-Control: no-cache\r\n"; /* the next build has the same address */
 
 enum { MISDIRECTED_REQUEST = 421, FORBIDDEN = 403, METHOD_NOT_ALLOWED = 405, NOT_FOUND = 404 };
 
@@ -75,17 +66,31 @@ bool is_address(const std::string &text) {
   return inet_pton(AF_INET, text.c_str(), &any) == 1 || inet_pton(AF_INET6, text.c_str(), &any) == 1;
 }
 
-std::string why_not(const std::string &address, unsigned port) {
+bool has_cookie(const HttpRequest &request, const std::string &cookie) {
+  const std::string all = request.header("cookie");
+  const std::vector<std::string_view> each = split(all, ';');
+  return std::any_of(each.begin(), each.end(), [&](std::string_view one) { return trim(one) == cookie; });
+}
+
+std::string new_token() {
+  std::vector<std::uint8_t> bytes(16);
+  if (getentropy(bytes.data(), bytes.size()) != 0) {
+    throw Error("the kernel gives no random bytes");
+  }
+  return hex(bytes);
+}
+
+std::string why_not(const std::string &address, unsigned port, int error) {
   std::string place = "port " + std::to_string(port) + " of " + address;
-  switch (errno) {
+  switch (error) {
   case EADDRINUSE:
     return place + " is taken by another program; end that one, or choose another --port (a browser asks "
                    "for fingertips again there)";
   case EACCES:
     return place + " needs privileges; choose another --port, from 1024 on";
   default:
-    return place + " cannot be had" + (errno ? std::string(" (") + std::strerror(errno) + ")" : "") +
-           "; is it an address of this machine?";
+    return place + " cannot be had (" + std::generic_category().message(error) +
+           "); is it an address of this machine?";
   }
 }
 
@@ -99,8 +104,7 @@ bool is_loopback(const std::string &address) {
          (inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_LOOPBACK(&six));
 }
 
-PageServer::PageServer(const fs::path &folder, const std::string &address, unsigned port)
-    : server_(std::make_unique<httplib::Server>()) {
+PageServer::PageServer(const fs::path &folder, const std::string &address, unsigned port) {
   std::error_code failed;
   for (fs::recursive_directory_iterator entry(folder, failed), end; !failed && entry != end; entry.increment(failed)) {
     if (entry->is_regular_file()) {
@@ -111,65 +115,60 @@ PageServer::PageServer(const fs::path &folder, const std::string &address, unsig
   if (failed) {
     throw Error(ErrorCode::cannot_read, folder.string() + ": " + failed.message());
   }
-
-  server_->set_default_headers(HEADERS);
-  if (is_loopback(address)) {
-    simulations_ = std::make_unique<Simulations>();
-    simulations_->serve(*server_);
-    server_->new_task_queue = [] { return new httplib::ThreadPool(THREADS); };
-    server_->set_payload_max_length(MOST_BODY_BYTES);
-  }
-  /* The library's own would share the port with another server. */
-  server_->set_socket_options([](socket_t socket) {
-    int yes = 1;
-    setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  });
-  server_->set_pre_routing_handler([this](const httplib::Request &request, httplib::Response &response) {
-    std::string host = host_of(request.get_header_value("Host"));
-    auto refuse = [&](int status, const char *text) {
-      response.status = status;
-      response.set_content(text, "text/plain; charset=utf-8");
-    };
-    auto file = files_.find(request.path == "/" ? "/index.html" : request.path);
-    if (host != "localhost" && !is_address(host)) {
-      refuse(MISDIRECTED_REQUEST, "ask for it by its address\n");
-    } else if (simulations_ && Simulations::is_for(request.path)) {
-      if (Simulations::is_from_page(request)) {
-        return httplib::Server::HandlerResponse::Unhandled;
-      }
-      refuse(FORBIDDEN, "only the page itself may ask\n");
-    } else if (request.method != "GET" && request.method != "HEAD") {
-      response.set_header("Allow", "GET, HEAD");
-      refuse(METHOD_NOT_ALLOWED, "it is only to be read\n");
-    } else if (file == files_.end()) {
-      refuse(NOT_FOUND, "the page has no such file\n");
-    } else {
-      response.set_content(file->second.bytes, file->second.type);
-    }
-    return httplib::Server::HandlerResponse::Handled;
-  });
-
-  errno = 0;
-  int bound = port == 0                                                ? server_->bind_to_any_port(address)
-              : server_->bind_to_port(address, static_cast<int>(port)) ? static_cast<int>(port)
-                                                                       : -1;
-  if (bound < 0) {
-    throw Error(why_not(address, port));
+  try {
+    server_ = std::make_unique<HttpServer>(address, port, HEADERS);
+  } catch (const std::system_error &error) {
+    throw Error(why_not(address, port, error.code().value()));
   }
   bool is_six = address.find(':') != std::string::npos;
-  url_ = "http://" + (is_six ? "[" + address + "]" : address) + ":" + std::to_string(bound) + "/";
+  url_ = "http://" + (is_six ? "[" + address + "]" : address) + ":" + std::to_string(server_->port()) + "/";
+  if (is_loopback(address)) {
+    simulations_ = std::make_unique<Simulations>();
+    token_ = new_token();
+    url_ += "?token=" + token_;
+  }
 }
 
 PageServer::~PageServer() = default;
 
-void PageServer::serve(const std::function<bool()> &is_over) {
-  std::thread answering([this] { server_->listen_after_bind(); });
-  /* Before it runs, it ignores a stop. */
-  while (!is_over() || !server_->is_running()) {
-    wait_until(host_now() + LOOK_INTERVAL);
+HttpAnswer PageServer::answer(const HttpRequest &request) {
+  const std::string host = host_of(request.header("host"));
+  const std::string cookie = "fingertip-" + std::to_string(server_->port()) + "=" + token_;
+  const auto file = files_.find(request.path == "/" ? "/index.html" : request.path);
+  HttpAnswer answer;
+  const auto refuse = [&](int status, const char *text) {
+    answer.status = status;
+    answer.text = text;
+  };
+  if (host != "localhost" && !is_address(host)) {
+    refuse(MISDIRECTED_REQUEST, "ask for it by its address\n");
+  } else if (simulations_ && Simulations::is_for(request.path)) {
+    if (!Simulations::is_from_page(request)) {
+      refuse(FORBIDDEN, "only the page itself may ask\n");
+    } else if (request.parameter("token") != token_ && !has_cookie(request, cookie)) {
+      refuse(FORBIDDEN, "open the address that fingertip web has printed: its token is of that one run\n");
+    } else if (!request.is_of_this_user()) {
+      refuse(FORBIDDEN, "it is another user's\n");
+    } else {
+      return simulations_->answer(request);
+    }
+  } else if (request.method != "GET" && request.method != "HEAD") {
+    refuse(METHOD_NOT_ALLOWED, "it is only to be read\n");
+    answer.header = "Allow: GET, HEAD\r\n";
+  } else if (file == files_.end()) {
+    refuse(NOT_FOUND, "the page has no such file\n");
+  } else {
+    answer.type = file->second.type;
+    answer.file = &file->second.bytes;
+    if (simulations_ && request.parameter("token") == token_) {
+      answer.header = "Set-Cookie: " + cookie + "; Path=" + Simulations::PATH + "; HttpOnly; SameSite=Strict\r\n";
+    }
   }
-  server_->stop();
-  answering.join();
+  return answer;
+}
+
+void PageServer::serve(const std::function<bool()> &is_over) {
+  server_->serve([this](const HttpRequest &request) { return answer(request); }, is_over);
 }
 
 } // namespace fingertip

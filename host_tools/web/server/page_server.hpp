@@ -4,10 +4,15 @@
  * other site may embed or read it, and it is given only to who asks for it by an address or as
  * localhost: a name of the asker's own that leads here (DNS rebinding) is refused with 421.
  *
- * Memory: the page's, some megabytes. Errors: Error, of a folder that cannot be read and an address
+ * Everyone on this machine may read the page. Simulated fingertips are given to who has the token, which each server
+ * makes anew: as a parameter of the request, or as the cookie that the page gets with it. Other users may see it where
+ * a browser is started with it, so they are refused even then.
+ *
+ * Memory: the page's, some megabytes, and what http_server.hpp allows its clients. Errors: Error, of a folder that cannot be read and an address
  * that cannot be had. */
 #pragma once
 
+#include "web/server/http_server.hpp"
 #include "web/server/simulations.hpp"
 
 #include <filesystem>
@@ -15,10 +20,6 @@
 #include <map>
 #include <memory>
 #include <string>
-
-namespace httplib {
-class Server;
-}
 
 namespace fingertip {
 
@@ -28,22 +29,24 @@ public:
   PageServer(const std::filesystem::path &folder, const std::string &address, unsigned port);
   ~PageServer();
 
-  /* For the browser: http://127.0.0.1:8109/ */
+  /* For the browser: http://127.0.0.1:8109/?token=...; no token where it passes on no fingertips */
   const std::string &url() const { return url_; }
 
   /* Until is_over is true, which is asked every 50 ms. */
   void serve(const std::function<bool()> &is_over);
 
 private:
+  HttpAnswer answer(const HttpRequest &request);
+
   struct File {
     std::string type;
     std::string bytes;
   };
 
   std::map<std::string, File> files_; /* by the path of the request: /index.html */
-  std::string url_;
+  std::string url_, token_;
   std::unique_ptr<Simulations> simulations_; /* of a server that only this machine reaches */
-  std::unique_ptr<httplib::Server> server_;
+  std::unique_ptr<HttpServer> server_;
 };
 
 /* Whether only this machine reaches it: 127.0.0.0/8, ::1, localhost. */

@@ -7,7 +7,6 @@
 
 #include <cstring>
 #include <filesystem>
-#include <httplib.h>
 #include <optional>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -20,10 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char *PATH = "/simulated";
 constexpr const char *SIDES[] = {"left", "right"}; /* ports, as `fingertip simulate` names them */
-constexpr std::chrono::milliseconds LOOK_INTERVAL{100};
-constexpr std::chrono::milliseconds GATHERS{8}; /* half a picture's time: fewer, larger pieces */
 constexpr std::size_t MOST_COMMAND_BYTES = 4096, LONGEST_TRUTH = 4096;
 enum { BAD_REQUEST = 400, NOT_FOUND = 404, CONFLICT = 409, UNAVAILABLE = 503 };
 
@@ -61,10 +57,9 @@ int connect_to_truth() {
   return -1;
 }
 
-void refuse(httplib::Response &response, int status, const std::string &why) {
-  response.status = status;
-  response.set_content(why + "\n", "text/plain; charset=utf-8");
-}
+HttpAnswer refusal(int status, const std::string &why) { return HttpAnswer(status, why + "\n"); }
+
+HttpAnswer json(const std::string &text) { return HttpAnswer(200, text, "application/json"); }
 
 bool is_client(const std::string &text) {
   return text.size() >= 8 && text.size() <= 32 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
@@ -98,40 +93,21 @@ public:
   Session(const Simulated &one) : side_(one.side), line_(one.socket), truth_(connect_to_truth()) {}
   ~Session() { close(truth_); }
 
-  /* Waits a moment; false: the sink is gone. Ends the sink where the fingertip is. */
-  bool pass_on(httplib::DataSink &sink) {
-    std::vector<pollfd> descriptors;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      descriptors = line_.poll_descriptors();
-    }
-    if (wait_for(descriptors.data(), descriptors.size(), host_now() + LOOK_INTERVAL) > 0) {
-      wait_until(host_now() + GATHERS);
-    }
-    std::uint8_t bytes[65536];
+  std::vector<pollfd> poll_descriptors() const { return line_.poll_descriptors(); }
+  /* False: the fingertip is gone. */
+  bool read(std::string *bytes) {
+    std::uint8_t some[65536];
     std::size_t length = 0;
-    Transport::Result result;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      result = line_.read(bytes, sizeof bytes, &length, std::chrono::milliseconds(0));
-    }
-    if (result == Transport::Result::timeout) {
-      return sink.is_writable();
-    }
-    if (result == Transport::Result::gone) {
-      sink.done();
-      return true;
-    }
-    return sink.write(reinterpret_cast<const char *>(bytes), length);
+    const auto result = line_.read(some, sizeof some, &length, std::chrono::milliseconds(0));
+    bytes->append(reinterpret_cast<const char *>(some), length);
+    return result != Transport::Result::gone;
   }
   bool send(const std::string &bytes) {
-    const std::lock_guard<std::mutex> lock(mutex_);
     return line_.write(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
   }
   const std::string &side() const { return side_; }
   /* What is true now, as JSON; or why the command cannot be. */
   std::string send_to_hand(const std::string &command, std::string *why_not) {
-    const std::lock_guard<std::mutex> lock(mutex_);
     if (!command.empty()) {
       (void)!::send(truth_, command.data(), command.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     }
@@ -168,11 +144,23 @@ private:
     }
   }
 
-  std::mutex mutex_;
   const std::string side_;
   SocketTransport line_;
   int truth_;
   std::string came_, newest_ = "{}";
+};
+
+/* Takes the session away when its client has gone. */
+class Simulations::Line : public HttpAnswer::Stream {
+public:
+  Line(Simulations &of, std::string client) : of_(of), client_(std::move(client)) {}
+  ~Line() override { of_.sessions_.erase(client_); }
+  std::vector<pollfd> poll_descriptors() const override { return of_.sessions_.at(client_)->poll_descriptors(); }
+  bool read(std::string *bytes) override { return of_.sessions_.at(client_)->read(bytes); }
+
+private:
+  Simulations &of_;
+  std::string client_;
 };
 
 Simulations::Simulations() = default;
@@ -182,101 +170,73 @@ bool Simulations::is_for(const std::string &path) {
   return path == PATH || path.rfind(std::string(PATH) + "/", 0) == 0;
 }
 
-bool Simulations::is_from_page(const httplib::Request &request) {
-  const std::string site = request.get_header_value("Sec-Fetch-Site");
-  const std::string origin = request.get_header_value("Origin");
+bool Simulations::is_from_page(const HttpRequest &request) {
+  const std::string site = request.header("sec-fetch-site");
+  const std::string origin = request.header("origin");
   return (site.empty() || site == "same-origin" || site == "none") &&
-         (origin.empty() || origin == "http://" + request.get_header_value("Host"));
+         (origin.empty() || origin == "http://" + request.header("host"));
 }
 
-void Simulations::serve(httplib::Server &server) {
-  server.Get(PATH, [](const httplib::Request &, httplib::Response &response) {
+HttpAnswer Simulations::answer(const HttpRequest &request) {
+  const std::string what = request.path.substr(std::strlen(PATH));
+  if (request.method == "GET" && what.empty()) {
     std::error_code none;
-    const bool hand = fs::exists(simulated_folder() + "/hand", none);
-    std::string list;
-    for (const Simulated &one : find_simulated()) {
-      list += std::string(list.empty() ? "" : ", ") + "{\"serial\": \"" + one.serial +
-              "\", \"hand\": " + (hand ? "true" : "false") + "}";
-    }
-    response.set_content("[" + list + "]", "application/json");
-  });
-  const std::string line = std::string(PATH) + "/line";
-  server.Get(line,
-             [this](const httplib::Request &request, httplib::Response &response) { open_line(request, response); });
-  server.Post(line, [this](const httplib::Request &request, httplib::Response &response) {
-    if (request.body.size() > MOST_COMMAND_BYTES) {
-      return refuse(response, BAD_REQUEST, "more than a fingertip takes at once");
-    }
-    if (const auto to = session(request, response); to && !to->send(request.body)) {
-      refuse(response, UNAVAILABLE, "the fingertip takes no more commands");
-    }
-  });
-  server.Post(std::string(PATH) + "/hand",
-              [this](const httplib::Request &request, httplib::Response &response) { hand(request, response); });
-}
-
-void Simulations::open_line(const httplib::Request &request, httplib::Response &response) {
-  const std::string client = request.get_param_value("client");
-  const std::string serial = request.get_param_value("serial");
-  if (!is_client(client)) {
-    return refuse(response, BAD_REQUEST, "client: give 8 to 32 hexadecimal digits");
+    const std::string hand = fs::exists(simulated_folder() + "/hand", none) ? "true" : "false";
+    return json("[" + joined(find_simulated(), ", ", [&](const Simulated &one) {
+                  return R"({"serial": ")" + one.serial + R"(", "hand": )" + hand + "}";
+                }) + "]");
   }
-  for (const Simulated &one : find_simulated()) {
-    if (one.serial != serial) {
-      continue;
-    }
-    std::shared_ptr<Session> session;
-    try {
-      session = std::make_shared<Session>(one);
-    } catch (const Error &error) {
-      return refuse(response, UNAVAILABLE, error.what());
-    }
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (sessions_.size() >= MOST_LINES) {
-        return refuse(response, UNAVAILABLE, "too many lines are open; close other pages");
-      }
-      if (!sessions_.emplace(client, session).second) {
-        return refuse(response, CONFLICT, "this client has a line already");
-      }
-    }
-    response.set_chunked_content_provider(
-        "application/octet-stream", [session](std::size_t, httplib::DataSink &sink) { return session->pass_on(sink); },
-        [this, client](bool) {
-          const std::lock_guard<std::mutex> lock(mutex_);
-          sessions_.erase(client);
-        });
-    return;
+  if (request.method == "GET" && what == "/line") {
+    return open_line(request);
   }
-  refuse(response, NOT_FOUND, "no simulated fingertip has this serial number; start fingertip simulate");
-}
-
-std::shared_ptr<Simulations::Session> Simulations::session(const httplib::Request &request,
-                                                           httplib::Response &response) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = sessions_.find(request.get_param_value("client"));
+  if (request.method != "POST" || (what != "/line" && what != "/hand")) {
+    return refusal(NOT_FOUND, "there is nothing of this name");
+  }
+  const auto found = sessions_.find(request.parameter("client"));
+  if (request.body.size() > MOST_COMMAND_BYTES) {
+    return refusal(BAD_REQUEST, "more than a fingertip takes at once");
+  }
   if (found == sessions_.end()) {
-    refuse(response, NOT_FOUND, "this client has no line; open one first");
-    return nullptr;
+    return refusal(NOT_FOUND, "this client has no line; open one first");
   }
-  return found->second;
-}
-
-void Simulations::hand(const httplib::Request &request, httplib::Response &response) {
-  const auto of = session(request, response);
-  if (!of) {
-    return;
+  Session &session = *found->second;
+  if (what == "/line") {
+    return session.send(request.body) ? HttpAnswer{} : refusal(UNAVAILABLE, "the fingertip takes no more commands");
   }
-  const auto command = request.body.empty() ? std::string() : command_of(request.body, of->side());
+  const auto command = request.body.empty() ? std::string() : command_of(request.body, session.side());
   if (!command) {
-    return refuse(response, BAD_REQUEST, "give press X_mm Y_mm FORCE_N, lift, or nothing");
+    return refusal(BAD_REQUEST, "give press X_mm Y_mm FORCE_N, lift, or nothing");
   }
   std::string why_not;
-  const std::string truth = of->send_to_hand(*command, &why_not);
-  if (!why_not.empty()) {
-    return refuse(response, CONFLICT, why_not);
+  const std::string truth = session.send_to_hand(*command, &why_not);
+  return why_not.empty() ? json(truth) : refusal(CONFLICT, why_not);
+}
+
+HttpAnswer Simulations::open_line(const HttpRequest &request) {
+  const std::string client = request.parameter("client");
+  if (!is_client(client)) {
+    return refusal(BAD_REQUEST, "client: give 8 to 32 hexadecimal digits");
   }
-  response.set_content(truth, "application/json");
+  const std::vector<Simulated> all = find_simulated();
+  const Simulated *one = find_in(all, [&](const Simulated &each) { return each.serial == request.parameter("serial"); });
+  if (!one) {
+    return refusal(NOT_FOUND, "no simulated fingertip has this serial number; start fingertip simulate");
+  }
+  if (sessions_.size() >= MOST_LINES) {
+    return refusal(UNAVAILABLE, "too many lines are open; close other pages");
+  }
+  if (sessions_.count(client)) {
+    return refusal(CONFLICT, "this client has a line already");
+  }
+  try {
+    sessions_.emplace(client, std::make_shared<Session>(*one));
+  } catch (const Error &error) {
+    return refusal(UNAVAILABLE, error.what());
+  }
+  HttpAnswer answer;
+  answer.type = "application/octet-stream";
+  answer.stream = std::make_unique<Line>(*this, client);
+  return answer;
 }
 
 } // namespace fingertip

@@ -10,43 +10,37 @@
  *
  * client: 8 to 32 hexadecimal digits of the page's own, new for each line. A client is gone when its line is,
  * and what its hand pressed is lifted then. A request that another site makes is refused with 403. Errors are one
- * sentence, of status 4xx. A line takes a thread of the server's as long as it is open. */
+ * sentence, of status 4xx. */
 #pragma once
+
+#include "web/server/http_server.hpp"
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
-
-namespace httplib {
-class Server;
-struct Request;
-struct Response;
-} // namespace httplib
 
 namespace fingertip {
 
 class Simulations {
 public:
+  static constexpr const char *PATH = "/simulated";
   static constexpr std::size_t MOST_LINES = 16;
 
   Simulations();
   ~Simulations();
 
-  void serve(httplib::Server &server);
-  /* Whether it is one of the paths above. */
+  /* Of a path for which is_for is true. */
+  HttpAnswer answer(const HttpRequest &request);
   static bool is_for(const std::string &path);
   /* Whether the page itself asks, or no browser. */
-  static bool is_from_page(const httplib::Request &request);
+  static bool is_from_page(const HttpRequest &request);
 
 private:
   class Session;
+  class Line;
 
-  void open_line(const httplib::Request &request, httplib::Response &response);
-  void hand(const httplib::Request &request, httplib::Response &response);
-  std::shared_ptr<Session> session(const httplib::Request &request, httplib::Response &response);
+  HttpAnswer open_line(const HttpRequest &request);
 
-  std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Session>> sessions_; /* by client */
 };
 

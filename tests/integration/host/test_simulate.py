@@ -94,6 +94,22 @@ class Presses(SimulateTest):
         self.assertGreater(np.std(true), 0.06)
         self.assertLess(np.std(found / np.mean(found) - true / np.mean(true)), 0.5 * np.std(true))
 
+    def test_nothing_is_made_where_another_decides(self):
+        shared, elsewhere = os.path.join(self.folder, "fingertip"), os.path.join(self.folder, "elsewhere")
+        os.mkdir(elsewhere)
+        for link, target, why in (
+            (shared, elsewhere, "fingertip: is no folder of this user"),
+            (f"{shared}/simulated", elsewhere, "simulated: is no folder of this user"),
+            (f"{shared}/simulated/lock", f"{elsewhere}/lock", "simulated: Too many levels of symbolic links"),
+        ):
+            os.makedirs(os.path.dirname(link), exist_ok=True)
+            os.symlink(target, link)
+            process = self.world.start([SIMULATE, "--cache", TABLES], env=self.environment)
+            _, err = process.communicate()
+            self.assertEqual((process.returncode, os.listdir(elsewhere)), (1, []), err)
+            self.assertIn(why, err)
+            os.unlink(link)
+
     def test_one_at_a_time(self):
         with self.simulated():
             process = self.world.start([SIMULATE, "--cache", TABLES], env=self.environment)

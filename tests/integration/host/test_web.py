@@ -69,12 +69,15 @@ class WebCase(unittest.TestCase):
 
     @contextlib.contextmanager
     def served(self, *options, **environment):
-        with self.run_tool("web", "--port", "0", *options, **environment) as (process, url):
-            self.host, port = url.removeprefix("http://").rstrip("/").rsplit(":", 1)
+        with self.run_tool("web", "--port", "0", *options, **environment) as (process, self.url):
+            place, _, self.token = self.url.partition("/?token=")
+            self.host, port = place.removeprefix("http://").rstrip("/").rsplit(":", 1)
             self.host, self.port = self.host.strip("[]"), int(port)
             yield process
 
     def ask(self, path="/", method="GET", content=None, **headers):
+        if path.startswith("/simulated") and "Cookie" not in headers:
+            headers["Cookie"] = f"a=b; fingertip-{self.port}={self.token}"
         connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
         try:
             connection.request(method, path, content, {name.replace("_", "-"): value for name, value in headers.items()})
@@ -186,19 +189,43 @@ class Web(WebCase):
         opener.chmod(0o755)
         path = f"{opener.parent}:{os.environ['PATH']}"
         with self.served(DISPLAY=":0", PATH=path):
-            self.assertEqual(opened.read_text(), f"http://127.0.0.1:{self.port}/")
+            self.assertEqual(opened.read_text(), self.url)
         self.assertIn("opening it in the browser; Ctrl-C ends", self.said)
         for options, environment in ((["--no-browser"], {"DISPLAY": ":0"}), ([], {})):
             with self.served(*options, PATH=path, **environment):
                 pass
             self.assertIn("open it in Chromium, Chrome or Edge", self.said)
 
-    def test_a_connection_that_stays_does_not_keep_it_from_ending(self):
-        with self.served() as process:
-            with socket.create_connection((self.host, self.port)) as silent:
-                process.send_signal(signal.SIGINT)
-                process.wait(PATIENCE_s)
-                silent.close()
+    def attack(self, head, piece, count):
+        """The end of what it answers to count pieces after a head, or to as many as it takes."""
+        with socket.create_connection((self.host, self.port), timeout=PATIENCE_s) as attacker, contextlib.suppress(OSError):
+            attacker.sendall(head)
+            for _ in range(count):
+                attacker.sendall(piece)
+            return attacker.recv(65536)
+        return b""
+
+    def test_what_a_peer_may_use_is_bounded(self):
+        """Bytes without end, and silent connections in number, before they ask and after: neither memory nor time of others."""
+        with self.served() as process, contextlib.ExitStack() as many:
+            megabyte = b"%x\r\n%b\r\n" % (1 << 20, bytes(1 << 20))
+            for head, piece, status in (
+                (b"POST /simulated/hand HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n", megabyte, b"411"),
+                (b"POST /simulated/hand HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 99999999999\r\n\r\n", megabyte, b"413"),
+                (b"GET / HTTP/1.1\r\n", b"".join(b"a%d: %b\r\n" % (k, b"b" * 1000) for k in range(1000)), b"431"),
+                (b"", bytes(1 << 20), b"431"),
+            ):
+                self.assertIn(self.attack(head, piece, 300)[9:12], (status, b""), head)
+            for ask in (b"", b"GET /", b"GET /assets/pad.bin HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 3):
+                for _ in range(300):
+                    many.enter_context(socket.create_connection((self.host, self.port))).sendall(ask)
+                begun_s = time.monotonic()
+                self.assertEqual(self.ask()[0], 200)
+                self.assertLess(time.monotonic() - begun_s, 1)
+            peak = pathlib.Path(f"/proc/{process.pid}/status").read_text().partition("VmHWM:")[2].split()[0]
+            self.assertLess(int(peak), 100e3)
+            process.send_signal(signal.SIGINT)
+            process.wait(PATIENCE_s)
 
 
 class SimulationsCase(WebCase):
@@ -211,7 +238,7 @@ class SimulationsCase(WebCase):
     def line(self, client=ONE, serial=LEFT):
         connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
         try:
-            connection.request("GET", f"/simulated/line?serial={serial}&client={client}")
+            connection.request("GET", f"/simulated/line?serial={serial}&client={client}&token={self.token}")
             answer = connection.getresponse()
             self.assertEqual(answer.status, 200, answer.read() if answer.status != 200 else "")
             yield answer
@@ -307,7 +334,7 @@ class Line(SimulationsCase):
         with self.served():
             with self.run_tool("simulate"):
                 connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
-                connection.request("GET", f"/simulated/line?serial={LEFT}&client={ONE}")
+                connection.request("GET", f"/simulated/line?serial={LEFT}&client={ONE}&token={self.token}")
                 answer = connection.getresponse()
             answer.read()  # to its end
             connection.close()
@@ -335,6 +362,23 @@ class Strangers(SimulationsCase):
             self.assertEqual(self.told("/simulated", Host="evil.example")[0], 421)
             self.assertEqual(self.told("/simulated", Origin=here, Sec_Fetch_Site="same-origin")[0], 200)
             self.assertEqual(self.hand()["force_N"], 0)
+
+    def test_only_who_has_the_token_may_ask(self):
+        with self.served(), self.run_tool("simulate", "--mouse"):
+            cookie = self.ask(f"/?token={self.token}")[1]["Set-Cookie"]
+            self.assertRegex(cookie, rf"^fingertip-{self.port}={self.token}; Path=/simulated; HttpOnly; SameSite=Strict$")
+            self.assertNotIn("Set-Cookie", self.ask()[1] | self.ask("/?token=0")[1])
+            self.assertEqual(self.told("/simulated", Cookie=cookie)[0], 200)
+            for wrong in ("", f"fingertip-{self.port}=0", f"fingertip={self.token}"):
+                self.assertIn("open the address", self.told("/simulated", Cookie=wrong)[1])
+
+    @unittest.skipUnless(os.geteuid() == 0, "only root becomes another user")
+    def test_another_user_may_not_even_with_the_token(self):
+        ask = f"import http.client as h; c = h.HTTPConnection('{{}}', {{}}); c.request('GET', '/simulated?token={{}}'); print(c.getresponse().status)"
+        with self.served():
+            words = [sys.executable, "-c", ask.format(self.host, self.port, self.token)]
+            told = [subprocess.run(words, capture_output=True, text=True, check=True, user=user).stdout for user in (0, 65534)]
+        self.assertEqual(told, ["200\n", "403\n"])
 
     def test_what_is_wrong_is_said(self):
         with self.served(), self.run_tool("simulate"), self.line():

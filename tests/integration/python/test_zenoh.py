@@ -1,6 +1,7 @@
 """The bridge and the recorder on Zenoh, with fake devices: usage test_zenoh.py FAKE_DEVICE [unittest arguments]."""
 
 # real time: routers, bridges and recorders are processes on a network
+import argparse
 import contextlib
 import json
 import math
@@ -316,9 +317,6 @@ class OnZenoh(unittest.TestCase):
             for block in re.findall(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(encoding="utf-8"), re.S)
             if "import zenoh" in block
         )
-        config = zenoh.Config()
-        config.insert_json5("mode", '"client"')
-        config.insert_json5("connect/endpoints", json.dumps([self.endpoint]))
         shown = []
 
         def show(*values):
@@ -326,9 +324,9 @@ class OnZenoh(unittest.TestCase):
             if len(shown) == 3:
                 raise EOFError
 
-        with self.session("router"), mock.patch.object(zenoh, "Config", lambda: config), self.assertRaises(EOFError):
+        with self.session("router"), self.assertRaises(EOFError):
             self.bridge("--connect", self.endpoint, "--port", self.device("AAAA"))
-            exec(compile(code, "README.md", "exec"), {"print": show})
+            exec(compile(code.replace(network.LOOPBACK, self.endpoint), "README.md", "exec"), {"print": show})
         self.assertEqual([(str(key), force_N) for key, _, _, force_N in shown], 3 * [("fingertip/AAAA/contact", 5)])
 
     def test_unplugged_and_back(self):
@@ -360,14 +358,28 @@ class OnZenoh(unittest.TestCase):
         self.assertEqual(frames, [*range(frames[0], frames[again - 1] + 1), *range(1, frames[-1] + 1)])
         self.assertTrue(any("restarted" in event for event in found.events), found.events)
 
+    def test_without_options_it_is_this_computer_alone(self):
+        parser = argparse.ArgumentParser()
+        network.add_session_options(parser)
+        here, there = "tcp/127.0.0.1:7447", "tcp/0.0.0.0:7447"
+        for words, serves, listens, connects in (([], True, here, None), ([], False, None, here), (["--listen", there], True, there, None)):
+            with mock.patch.object(zenoh, "open") as opened:
+                network.open_session(parser.parse_args(words), serves=serves)
+            config = opened.call_args[0][0]
+            for name, endpoint in (("listen", listens), ("connect", connects)):
+                found = json.loads(config.get_json(f"{name}/endpoints"))
+                self.assertEqual(found, [endpoint] if endpoint else json.loads(zenoh.Config().get_json(f"{name}/endpoints")), name)
+            self.assertEqual(config.get_json("scouting/multicast/enabled"), "false")
+
     def test_commands_liveliness_and_clocks(self):
-        tared = self.folder / "tared"
+        tared, unasked = self.folder / "tared", self.folder / "unasked"
         with self.session("router") as session:
             self.chrony(Clocks.TRACKING.format("Not synchronised"))
-            self.bridge("--connect", self.endpoint, "--port", self.device("AAAA", f"tared={tared}"))
-            self.wait_for(
-                lambda: "fingertip/AAAA/alive" in [str(each.ok.key_expr) for each in session.liveliness().get("fingertip/*/alive")]
-            )
+            for serial, tared_at, options in (("AAAA", tared, ["--commands"]), ("BBBB", unasked, [])):
+                self.bridge("--connect", self.endpoint, "--port", self.device(serial, f"tared={tared_at}"), *options)
+            self.wait_for(lambda: len(list(session.liveliness().get("fingertip/*/alive"))) == 2)
+            for command in ("tare?force=1", "set?osr=512"):
+                self.assertIn("start it with --commands", self.ask(session, f"fingertip/BBBB/{command}"))
             self.assertEqual(self.ask(session, "fingertip/AAAA/info").serial, "AAAA")
             self.assertEqual(self.ask(session, "fingertip/AAAA/set?osr=512;rate_Hz=50").osr, 512)
             self.assertIn("256, 512", self.ask(session, "fingertip/AAAA/set?osr=500"))
@@ -375,6 +387,7 @@ class OnZenoh(unittest.TestCase):
             self.assertFalse(tared.exists())
             self.assertEqual(self.ask(session, "fingertip/AAAA/tare?force=1").serial, "AAAA")
             self.wait_for(tared.exists)
+            self.assertFalse(unasked.exists())
             refused = self.recorder(self.folder / "x.mcap", "--connect", self.endpoint, "--wait", PATIENCE_s)
             self.assertIn("clock not disciplined", refused.communicate(timeout=PATIENCE_s)[1])
             self.assertEqual((refused.returncode, (self.folder / "x.mcap").exists()), (1, False))
@@ -408,7 +421,7 @@ class OnZenoh(unittest.TestCase):
         for name in ("router", "bridge", "recorder", "operator", "viewer", "unlisted"):
             self.certificate(name)
         with zenoh.open(zenoh.Config.from_file(self.example("router.json5", "router"))):
-            self.bridge("--config", self.example("client.json5", "bridge"), "--port", self.device("AAAA", f"tared={tared}"))
+            self.bridge("--config", self.example("client.json5", "bridge"), "--commands", "--port", self.device("AAAA", f"tared={tared}"))
             with (
                 zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer"))) as viewer,
                 zenoh.open(zenoh.Config.from_file(self.example("client.json5", "operator"))) as operator,

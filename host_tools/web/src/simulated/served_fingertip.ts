@@ -19,9 +19,12 @@ const at = (path: string, query: Record<string, string> = {}): string => {
   return url.href;
 };
 
-/** Those that run now. null: this server knows none, now and later. Throws where it does not answer. */
-export async function findServed(): Promise<Served[] | null> {
+/** Those that run now. null: this server knows none, or refuses them to this page, now and later. Throws where it does not answer. */
+export async function findServed(refused: (why: string) => void): Promise<Served[] | null> {
   const answer = await fetch(at('simulated'));
+  if (answer.status === 403) {
+    refused((await answer.text()).trim());
+  }
   const isList = answer.ok && (answer.headers.get('content-type') ?? '').startsWith('application/json');
   return isList ? ((await answer.json()) as Served[]) : null;
 }

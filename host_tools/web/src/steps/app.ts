@@ -220,7 +220,7 @@ export class App {
 
   private async lookForServed(): Promise<void> {
     try {
-      const found = await findServed();
+      const found = await findServed((why) => this.notice(`simulated fingertips: ${why}`, 'plain'));
       if (found === null) {
         return;
       }
