@@ -25,7 +25,7 @@ constexpr milliseconds LOOK_INTERVAL{50};
 constexpr milliseconds GATHERS{8}; /* half a picture's time: a stream has fewer, larger pieces */
 constexpr int BACKLOG = 4096, AT_ONCE = 64;
 constexpr int SENT_AHEAD_BYTES = 65536; /* the kernel's memory for one that does not read; it doubles this */
-constexpr unsigned ESTABLISHED = 1; /* in the kernel's tables of connections */
+constexpr unsigned ESTABLISHED = 1;     /* in the kernel's tables of connections */
 
 const char *name_of(int status) {
   static const std::map<int, const char *> names{
@@ -289,15 +289,14 @@ void HttpServer::accept_all() {
   for (int n = 0; n < AT_ONCE; n++) {
     sockaddr_storage address = {};
     socklen_t length = sizeof address;
-    const int fd =
-        accept4(listening_, reinterpret_cast<sockaddr *>(&address), &length, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    const int fd = accept4(listening_, reinterpret_cast<sockaddr *>(&address), &length, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) {
       return;
     }
     const std::string peer = peer_of(address);
     const auto of_peer = [&](const Connection &each) { return each.peer() == peer; };
-    const bool too_many = std::count_if(connections_.begin(), connections_.end(), of_peer) >=
-                          static_cast<std::ptrdiff_t>(MOST_OF_A_PEER);
+    const bool too_many =
+        std::count_if(connections_.begin(), connections_.end(), of_peer) >= static_cast<std::ptrdiff_t>(MOST_OF_A_PEER);
     if (too_many || connections_.size() >= MOST_CONNECTIONS) {
       const auto oldest = std::max_element(connections_.begin(), connections_.end(), [&](const auto &a, const auto &b) {
         const auto rank = [&](const Connection &one) { return too_many && !of_peer(one) ? 0 : one.is_replaced(); };

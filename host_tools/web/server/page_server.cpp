@@ -89,8 +89,7 @@ std::string why_not(const std::string &address, unsigned port, int error) {
   case EACCES:
     return place + " needs privileges; choose another --port, from 1024 on";
   default:
-    return place + " cannot be had (" + std::generic_category().message(error) +
-           "); is it an address of this machine?";
+    return place + " cannot be had (" + std::generic_category().message(error) + "); is it an address of this machine?";
   }
 }
 

@@ -8,8 +8,8 @@
  * makes anew: as a parameter of the request, or as the cookie that the page gets with it. Other users may see it where
  * a browser is started with it, so they are refused even then.
  *
- * Memory: the page's, some megabytes, and what http_server.hpp allows its clients. Errors: Error, of a folder that cannot be read and an address
- * that cannot be had. */
+ * Memory: the page's, some megabytes, and what http_server.hpp allows its clients. Errors: Error, of a folder that
+ * cannot be read and an address that cannot be had. */
 #pragma once
 
 #include "web/server/http_server.hpp"

@@ -182,9 +182,11 @@ HttpAnswer Simulations::answer(const HttpRequest &request) {
   if (request.method == "GET" && what.empty()) {
     std::error_code none;
     const std::string hand = fs::exists(simulated_folder() + "/hand", none) ? "true" : "false";
-    return json("[" + joined(find_simulated(), ", ", [&](const Simulated &one) {
-                  return R"({"serial": ")" + one.serial + R"(", "hand": )" + hand + "}";
-                }) + "]");
+    return json(
+        "[" +
+        joined(find_simulated(), ", ",
+               [&](const Simulated &one) { return R"({"serial": ")" + one.serial + R"(", "hand": )" + hand + "}"; }) +
+        "]");
   }
   if (request.method == "GET" && what == "/line") {
     return open_line(request);
@@ -218,7 +220,8 @@ HttpAnswer Simulations::open_line(const HttpRequest &request) {
     return refusal(BAD_REQUEST, "client: give 8 to 32 hexadecimal digits");
   }
   const std::vector<Simulated> all = find_simulated();
-  const Simulated *one = find_in(all, [&](const Simulated &each) { return each.serial == request.parameter("serial"); });
+  const Simulated *one =
+      find_in(all, [&](const Simulated &each) { return each.serial == request.parameter("serial"); });
   if (!one) {
     return refusal(NOT_FOUND, "no simulated fingertip has this serial number; start fingertip simulate");
   }

@@ -35,6 +35,12 @@ class SimulateTest(CliTest):
         self.assertRegex(err, f"^{says}$")
         self.assertEqual(os.listdir(os.path.join(self.folder, "fingertip/simulated")), [])
 
+    def run_simulate(self, *options, status):
+        process = self.world.start([SIMULATE, *options], env=self.environment)
+        out, err = process.communicate()
+        self.assertEqual(process.returncode, status, err)
+        return out, err
+
 
 class Presses(SimulateTest):
     def test_what_is_felt_is_what_is_true(self):
@@ -97,17 +103,12 @@ class Presses(SimulateTest):
     def test_nothing_is_made_where_another_decides(self):
         shared, elsewhere = os.path.join(self.folder, "fingertip"), os.path.join(self.folder, "elsewhere")
         os.mkdir(elsewhere)
-        for link, target, why in (
-            (shared, elsewhere, "fingertip: is no folder of this user"),
-            (f"{shared}/simulated", elsewhere, "simulated: is no folder of this user"),
-            (f"{shared}/simulated/lock", f"{elsewhere}/lock", "simulated: Too many levels of symbolic links"),
-        ):
+        for link, target in ((shared, elsewhere), (f"{shared}/simulated", elsewhere), (f"{shared}/simulated/lock", f"{elsewhere}/lock")):
             os.makedirs(os.path.dirname(link), exist_ok=True)
             os.symlink(target, link)
-            process = self.world.start([SIMULATE, "--cache", TABLES], env=self.environment)
-            _, err = process.communicate()
-            self.assertEqual((process.returncode, os.listdir(elsewhere)), (1, []), err)
-            self.assertIn(why, err)
+            _, err = self.run_simulate("--cache", TABLES, status=1)
+            self.assertRegex(err, "is no folder of this user|simulated: Too many levels of symbolic links")
+            self.assertEqual(os.listdir(elsewhere), [])
             os.unlink(link)
 
     def test_one_at_a_time(self):
@@ -124,12 +125,6 @@ class Presses(SimulateTest):
 
 
 class Usage(SimulateTest):
-    def run_simulate(self, *options, status):
-        process = self.world.start([SIMULATE, *options], env=self.environment)
-        out, err = process.communicate()
-        self.assertEqual(process.returncode, status, err)
-        return out, err
-
     def test_help_fits_into_80_columns(self):
         page = self.run_simulate("--help", status=0)[0]
         self.assertIn("Usage: fingertip simulate", page)

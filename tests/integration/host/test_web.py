@@ -136,20 +136,12 @@ class Web(WebCase):
             listening = subprocess.run(["cat", f"/proc/{process.pid}/net/tcp"], capture_output=True, text=True, timeout=PATIENCE_s).stdout
             self.assertRegex(listening, rf"0100007F:{self.port:04X} 00000000:0000 0A")
         with self.served("--address", "0.0.0.0"):
-            pass
+            self.assertEqual(self.ask("/simulated")[0], 404)  # passes nothing on
         self.assertIn("everyone who reaches 0.0.0.0", self.said)
-        with self.served("--address", "127.0.0.2"):
-            self.assertEqual(self.ask()[0], 200)
-        self.assertNotIn("anyone", self.said)
-
-    def test_over_ipv6(self):
-        try:
-            with socket.create_server(("::1", 0), family=socket.AF_INET6):
-                pass
-        except OSError as error:
-            self.skipTest(f"no IPv6 here ({error})")
-        with self.served("--address", "::1"):
-            self.assertEqual(self.ask()[0], 200)
+        for address in ("127.0.0.2", *["::1"] * bool(pathlib.Path("/proc/net/if_inet6").read_text())):
+            with self.served("--address", address):
+                self.assertEqual(self.ask()[0], 200)
+            self.assertNotIn("everyone", self.said)
 
     def refused(self, *options):
         done = subprocess.run([self.tool, "web", *options], capture_output=True, text=True, timeout=PATIENCE_s)
@@ -396,10 +388,6 @@ class Strangers(SimulationsCase):
                 self.assertEqual(found, status, (path, said))
                 self.assertIn(words, said)
             self.assertEqual(self.told(f"/simulated/line?client={ONE}", "x" * 100000)[0], 413)
-
-    def test_a_server_for_other_machines_passes_nothing_on(self):
-        with self.served("--address", "0.0.0.0"), self.run_tool("simulate", "--mouse"):
-            self.assertEqual(self.told("/simulated")[0], 404)
 
 
 if __name__ == "__main__":
