@@ -20,8 +20,8 @@
  *
  * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
  * - Each sensor remembers its strongest press; the memory fades in 20 s. Half of the strongest memory of the pad counts
- * for all. An eighth of the memory is the band: this may remain above the level, and twice as much below. A contact
- * closes within it.
+ * for all. An eighth of the memory is the band, or twice the share that this sensor has kept of others: this may remain
+ * above the level, and a quarter below. A contact closes within it.
  * - After a contact the remainder follows the reading within the band. It rises only for two seconds, and never as fast
  * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.

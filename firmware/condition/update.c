@@ -28,11 +28,20 @@ struct band {
 static int32_t faded(int32_t value, int32_t share) { return value - part_of(value, share); }
 
 #ifdef FT_WITHOUT_PAST
+static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
+  (void)sensor;
+  return of_Pa_q10 >> BAND_SHIFT;
+}
 static void follow_past(const struct step *step) { (void)step; }
 static void learn_past(const struct step *step, int32_t above_level_Pa_q10) { (void)step, (void)above_level_Pa_q10; }
 static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
 void update_past_shows(struct condition *condition, uint8_t count) { (void)condition, (void)count; }
 #else
+/* Of a press: an eighth, or twice the sd of what this sensor has kept of others. */
+static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
+  return larger(of_Pa_q10 >> BAND_SHIFT, part_of(of_Pa_q10, 2 * sensor->past_share));
+}
+
 static void follow_past(const struct step *step) {
   struct condition_sensor *sensor = step->sensor;
   const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
@@ -155,7 +164,7 @@ static void hold(const struct step *step) {
   const int32_t reached = larger(faded(sensor->reached_Pa_q10, step->memory_share), steady);
   sensor->reached_Pa_q10 = reached;
   condition->reached_Pa_q10 = larger(condition->reached_Pa_q10, reached);
-  condition->margin_Pa_q10[step->k] = larger(reached, condition->reached_Pa_q10 >> CROSS_SHIFT) >> BAND_SHIFT;
+  condition->margin_Pa_q10[step->k] = may_remain(sensor, larger(reached, condition->reached_Pa_q10 >> CROSS_SHIFT));
   condition->strongest_Pa_q10 = larger(condition->strongest_Pa_q10, step->steady_Pa_q10);
   sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share);
   sensor->taken_Pa_q10 = condition->sure ? 0 : faded(sensor->taken_Pa_q10, step->wander_share);
@@ -211,7 +220,7 @@ static struct band band_of(const struct step *step, bool fresh) {
   const struct condition *condition = step->condition;
   const int32_t memory = larger(step->sensor->memory_Pa_q10, condition->memory_Pa_q10 >> CROSS_SHIFT);
   const int32_t drifted = condition->drifted_Pa_q10;
-  const int32_t highest = (memory >> BAND_SHIFT) + drifted;
+  const int32_t highest = may_remain(step->sensor, memory) + drifted;
   return (struct band){
       .lowest_Pa_q10 = -((memory >> DIP_SHIFT) + drifted),
       .highest_Pa_q10 = highest,

@@ -112,6 +112,7 @@ class Strip:
             "name": self.name,
             "frames_per_s": frames_per_s,
             "free_rows": int(np.count_nonzero(self.free)),
+            "free_s": float(free_s),
             "holds": len(self.holds),
             "phantom_percent": share_of(step_s[judged & certain].sum(), free_s),
             "phantom_longest_s": float(run_s.max(initial=0.0)),
