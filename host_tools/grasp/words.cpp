@@ -49,6 +49,8 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_FINGER_1_NO_FORCE, "finger_1_untold", "right: no force can be estimated"},
     {GRIP_FINGER_0_LATE, "finger_0_late", "left: late"},
     {GRIP_FINGER_1_LATE, "finger_1_late", "right: late"},
+    {GRIP_FINGER_0_EMPTY, "finger_0_empty", "left: reports nothing, while the other is pressed"},
+    {GRIP_FINGER_1_EMPTY, "finger_1_empty", "right: reports nothing, while the other is pressed"},
 };
 
 } // namespace

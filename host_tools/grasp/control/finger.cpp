@@ -1,5 +1,7 @@
 #include "grasp/control/finger.hpp"
 
+#include "grasp/control/reach.hpp"
+
 extern "C" {
 #include "common/contact_flags.h"
 }
@@ -19,6 +21,7 @@ constexpr int FROZEN_FRAMES = 5;
 constexpr double OLD_s = 0.5;        // an older frame is no evidence of the present
 constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average of the delay
 constexpr int ZERO_FRAMES = 3;
+constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
 // A force whose standard deviation is a larger share of it is no measurement.
 constexpr double FORCE_SD_MOST = 1.0;
 // A tangential force with one of these flags is not trusted.
@@ -135,24 +138,96 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   return reading;
 }
 
-GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s,
-                              const GripSettings &settings) {
+void GripFinger::believe(const GripReading &reading) {
+  believed_ = reading;
+  is_doubted_ = false;
+}
+
+void GripFinger::doubt(const GripReading &reading) {
+  doubted_s_ = is_doubted_ ? doubted_s_ : reading.t_s;
+  is_doubted_ = true;
+}
+
+double GripFinger::doubted_for_s(const GripReading &reading) const {
+  return is_doubted_ ? reading.t_s - doubted_s_ : 0.0;
+}
+
+namespace {
+
+using Readings = std::array<GripReading, GRIP_FINGERS>;
+
+// Replaces a reading that is doubted by the last one that was believed, or leaves the fingertip out.
+void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, const GripSettings &settings,
+           const GripReach &reach) {
+  std::array<bool, GRIP_FINGERS> explained{}, lasts{};
+  for (std::size_t i = 0; i < fingers.size(); i++) {
+    const GripReading &reading = readings[i], &before = fingers[i].believed();
+    lasts[i] = fingers[i].doubted_for_s(reading) >= settings.stale_s;
+    explained[i] = reading.has_force && !lasts[i] &&
+                   reach.explains(before.force_N, before.t_s, reading.force_N, reading.t_s, settings);
+  }
+  const bool both = readings[0].has_force && readings[1].has_force;
+  const double differ_N = std::abs(readings[0].force_N - readings[1].force_N);
+  const double alike_N = settings.alike_N(std::max(readings[0].force_N, readings[1].force_N));
+  const bool together = both && !lasts[0] && !lasts[1] && differ_N <= alike_N; // squeezed, or gone
+  for (std::size_t i = 0; i < fingers.size(); i++) {
+    GripReading &reading = readings[i];
+    if (!reading.has_force) {
+      continue;
+    }
+    const bool alone = !both || !explained[1 - i];
+    // What was left out comes back where it clearly agrees.
+    if (explained[i] || together || (lasts[i] && (alone || differ_N <= 0.5 * alike_N))) {
+      fingers[i].believe(reading);
+      continue;
+    }
+    fingers[i].doubt(reading);
+    if (lasts[i]) {
+      const bool empty = !reading.contact && readings[1 - i].force_N > 2.0 * settings.touch_N;
+      reading.trouble |= empty ? GRIP_FINGER_0_EMPTY : 0u;
+      reading.has_force = reading.has_load = reading.slides = false;
+      reading.is_left_out = true;
+    } else {
+      const std::uint32_t trouble = reading.trouble;
+      reading = fingers[i].believed();
+      reading.trouble = trouble;
+      reading.fresh = false;
+    }
+  }
+}
+
+} // namespace
+
+GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings,
+                              const GripReach *held) {
+  Readings readings;
+  for (std::size_t i = 0; i < fingers.size(); i++) {
+    readings[i] = fingers[i].sample(now_s, settings);
+  }
+  if (held != nullptr) {
+    judge(fingers, readings, settings, *held);
+  } else {
+    for (std::size_t i = 0; i < fingers.size(); i++) {
+      fingers[i].believe(readings[i]);
+    }
+  }
   GripReadings all;
   all.low_N = all.t_s = std::numeric_limits<double>::infinity();
   double loads_N = 0.0, most_N = 0.0, normal_N = 0.0;
   int loads = 0;
   all.speed_mm_s = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fingers.size(); i++) {
-    const GripReading reading = fingers[i].sample(now_s, settings);
+    const GripReading &reading = readings[i];
     all.trouble |= reading.trouble << i;
     all.fresh = all.fresh || reading.fresh;
     all.over = all.over || reading.over;
     all.touches += reading.contact;
     all.slides = all.slides || reading.slides;
     all.delay_s = std::max(all.delay_s, reading.counts ? fingers[i].delay_s() : 0.0);
+    all.trouble |= reading.is_left_out ? GRIP_FINGERS_DIFFER : 0u;
+    all.force_N[i] = reading.has_force || reading.is_left_out ? reading.force_N : 0.0;
     if (reading.has_force) {
       all.fingers++;
-      all.force_N[i] = reading.force_N;
       all.mean_N += reading.force_N;
       all.low_N = std::min(all.low_N, reading.force_N);
       all.high_N = std::max(all.high_N, reading.force_N);
@@ -173,12 +248,20 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   } else {
     all.mean_N /= all.fingers;
   }
-  // An object in the air presses on both alike, so the mean is the better estimate.
-  all.grip_N = all.high_N - all.low_N > settings.differ * all.high_N ? all.low_N : all.mean_N;
+  // An object in the air presses on both alike, so the mean is the better estimate. The further they
+  // differ, the less is believed.
+  all.grip_N = std::max(all.low_N, all.mean_N - std::max(all.high_N - all.low_N - settings.differ * all.high_N, 0.0));
   all.has_load = loads > 0;
   if (loads > 0) {
     // Both share the load; if one carries far more, that one slides first.
     all.load_N = std::max(loads_N / loads, 0.8 * most_N);
+    for (std::size_t i = 0; i < fingers.size(); i++) {
+      if (loads == 2 && readings[i].load_N > SHARED_N) {
+        fingers[i].shares(readings[i].load_N, all.load_N);
+      } else if (loads == 1 && readings[i].has_load) {
+        all.load_N = fingers[i].load_of_both_N(all.load_N);
+      }
+    }
     all.ratio = normal_N > 0.0 ? loads_N / normal_N : 0.0;
   } else {
     all.speed_mm_s = 0.0;

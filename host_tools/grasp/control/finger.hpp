@@ -42,6 +42,8 @@ enum GripTrouble : std::uint32_t {
   GRIP_FINGER_1_NO_FORCE = 1u << 16,
   GRIP_FINGER_0_LATE = 1u << 17, // frames older than settings.late_s when they come
   GRIP_FINGER_1_LATE = 1u << 18,
+  GRIP_FINGER_0_EMPTY = 1u << 19, // no contact in a hold, while the other has more than twice touch_N
+  GRIP_FINGER_1_EMPTY = 1u << 20,
 };
 
 constexpr std::uint32_t GRIP_GRIPPER_FAULTS = GRIP_GRIPPER_FAULT | GRIP_GRIPPER_INACTIVE;
@@ -53,15 +55,27 @@ struct GripReading {
   bool counts = false;       // frames arrive, and their values change
   bool has_force = false, has_load = false;
   bool contact = false, over = false, slides = false;
-  double t_s = 0.0; // time of the force
+  bool is_left_out = false; // contradicts the other fingertip
+  double t_s = 0.0;         // time of the measured force
   double force_N = 0.0, sd_N = 0.0, load_N = 0.0, speed_mm_s = 0.0;
 };
 
+class GripReach;
+
+// A force that the gripper's motion does not explain is doubted. It is believed once it has lasted as
+// long as a silence may, and the other fingertip does not contradict it.
 class GripFinger {
 public:
   void take(const GripTouch &touch);
   GripReading sample(double now_s, const GripSettings &settings);
+  // The load of both, from that of this one alone.
+  double load_of_both_N(double load_N) const { return load_N * of_both_; }
+  void shares(double load_N, double of_both_N) { of_both_ = of_both_N / load_N; }
   double delay_s() const { return delay_s_; } // moving average of the delay of its frames
+  const GripReading &believed() const { return believed_; }
+  void believe(const GripReading &reading);
+  void doubt(const GripReading &reading);
+  double doubted_for_s(const GripReading &reading) const; // since the first frame that was doubted
 
   // Sets the zero of the tangential force to its mean between begin and end.
   void begin_zero();
@@ -76,6 +90,9 @@ private:
   double heard_s_ = 0.0, changed_s_ = 0.0, force_s_ = 0.0; // arrival of a frame, a change, a force
   double delay_s_ = 0.0;
   double force_t_s_ = 0.0, force_N_ = 0.0, sd_N_ = 0.0;
+  GripReading believed_;
+  double doubted_s_ = 0.0, of_both_ = 1.0;
+  bool is_doubted_ = false;
   int unchanged_ = 0; // frames whose values are those of the one before
   double zero_x_N_ = 0.0, zero_y_N_ = 0.0, sum_x_N_ = 0.0, sum_y_N_ = 0.0;
   int sums_ = 0;
@@ -97,7 +114,8 @@ struct GripReadings {
   bool is_alone() const { return low_N < 0.5 * high_N; } // one fingertip carries most of the force
 };
 
-GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s,
-                              const GripSettings &settings);
+// held: what moves an object that both fingertips hold; none: their forces are believed as they come.
+GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings,
+                              const GripReach *held);
 
 } // namespace fingertip

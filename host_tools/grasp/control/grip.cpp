@@ -293,7 +293,8 @@ std::uint32_t Grip::go_on() {
 }
 
 void Grip::sample() {
-  readings_ = combine_readings(fingers_, now_s_, settings_);
+  const bool held = was_held_ && is_grasping();
+  readings_ = combine_readings(fingers_, now_s_, settings_, held ? &reach_ : nullptr);
   trouble_ = readings_.trouble | gripper_trouble();
   // The frames of the two are not simultaneous, so the forces always differ while they change.
   const bool uneven = readings_.fingers == 2 && readings_.high_N > 4.0 * settings_.touch_N &&

@@ -77,6 +77,8 @@ double GripRubber::width_for(double wanted_N, double force_N, double from_mm) co
   return from_mm - (grown - 1.0) * indentation_mm(from_mm, both_mm_);
 }
 
+double GripRubber::furthest_mm(double from_mm) const { return from_mm - indentation_mm(from_mm, both_mm_); }
+
 void GripRubber::learn(double force_N, double width_mm) {
   if (has_pair_) {
     double &steep = width_mm < pair_mm_ ? closing_ : opening_;
@@ -233,6 +235,14 @@ double GripReach::allowed(double width_mm, const GripReadings &readings, const G
   return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
 }
 
+bool GripReach::explains(double from_N, double from_s, double to_N, double to_s, const GripSettings &settings) const {
+  const double from_mm = width_at(from_s);
+  const auto [narrow_mm, wide_mm] = std::minmax({from_mm, width_at(to_s), status_.width_mm, target_mm_});
+  const double least_N = rubber_.force_at(wide_mm, from_N, from_mm),
+               most_N = rubber_.force_at(narrow_mm, from_N, from_mm);
+  return knows(from_s) && to_N >= least_N - settings.alike_N(least_N) && to_N <= most_N + settings.alike_N(most_N);
+}
+
 double GripReach::steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const {
   return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
 }
@@ -371,6 +381,7 @@ double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const Gr
   if (aim.haste == Haste::patient) {
     way_mm = std::min(way_mm, whole_steps(SHORT_mm));
   }
+  way_mm = std::min(way_mm, whole_steps(outlook.coming_mm - rubber_.furthest_mm(outlook.width_mm)));
   way_mm = std::max(way_mm, outlook.least_mm);
   const double below_cap_mm = travel_below_cap_mm(readings, settings, outlook.coming_mm);
   if (way_mm > below_cap_mm) {

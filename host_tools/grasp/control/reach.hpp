@@ -22,6 +22,8 @@ public:
   double force_at(double to_mm, double force_N, double from_mm) const;
   // The width for another force.
   double width_for(double wanted_N, double force_N, double from_mm) const;
+  // The furthest width that a force at this one justifies: it doubles the indentation.
+  double furthest_mm(double from_mm) const;
   // A pair of force and width, both at rest.
   void learn(double force_N, double width_mm);
 
@@ -112,6 +114,10 @@ public:
   // The nearest width within all caps.
   double allowed(double width_mm, const GripReadings &readings, const GripSettings &settings,
                  std::uint32_t &trouble) const;
+
+  // Whether the gripper's motion, as known and as commanded, makes one force of the other, both of a
+  // fingertip in a hold.
+  bool explains(double from_N, double from_s, double to_N, double to_s, const GripSettings &settings) const;
 
   // Sends the gripper to the width of the wanted force. Returns the caps that prevent it.
   std::uint32_t aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s);

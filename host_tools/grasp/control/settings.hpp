@@ -3,6 +3,7 @@
 
 #include "grasp/gripper/gripper.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
 namespace fingertip {
@@ -43,6 +44,8 @@ struct GripSettings {
   double rest_s = 0.3;    // no decay for this time after a slide
   // A set force: the same grip at the start, later and without a load. While there is no load, the
   // controller holds the nearest force that the gripper reaches, not the least that is enough.
+  // Forces this far apart are alike.
+  double alike_N(double force_N) const { return std::max(differ * force_N, 2.0 * touch_N); }
   bool sets_force() const { return start_N == floor_N && start_N == blind_N; }
 };
 

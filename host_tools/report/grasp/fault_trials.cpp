@@ -50,6 +50,7 @@ constexpr Happening HAPPENINGS[] = {
     {"both gone for 0.5 s", FaultKind::gone, BOTH, STALE, 0.5},
     {"one frozen", FaultKind::frozen, LEFT, GRIP_FINGER_0_FROZEN},
     {"both frozen", FaultKind::frozen, BOTH, FROZEN},
+    {"one reports nothing", FaultKind::nothing, LEFT, GRIP_FINGER_0_EMPTY},
     {"one lies, UNCERTAIN", FaultKind::uncertain, LEFT, GRIP_FINGER_0_FORCE_ONLY},
     {"both lie, UNCERTAIN", FaultKind::uncertain, BOTH, FORCE_ONLY},
     {"one SATURATED", FaultKind::saturated, LEFT, GRIP_FINGER_0_OVER},
@@ -139,6 +140,12 @@ void expect(FaultTrial &one) {
     one.is_untold = happening.fingers == BOTH;
     one.all_of = 0;
     one.any_of = one.is_untold ? 0 : GRIP_FINGER_0_FROZEN | GRIP_FINGERS_DIFFER;
+  }
+  if (happening.kind == FaultKind::nothing && (untouched || when.state == GRIP_RELEASE)) {
+    one.all_of = untouched ? std::uint32_t{GRIP_FINGERS_DIFFER} : 0u;
+  } else if (happening.kind == FaultKind::nothing && when.state == GRIP_SQUEEZE) {
+    one.all_of = 0; // it may have touched with too little force to be missed
+    one.any_of = GRIP_FINGER_0_EMPTY | GRIP_FINGERS_DIFFER;
   }
   if (happening.kind == FaultKind::fault || happening.kind == FaultKind::power) {
     one.ends_in = {GRIP_FAULT};

@@ -1,6 +1,7 @@
 // fingertip_grasp_kinds: many grasps in simulated time (host_tools/simulation/cell/kind_trial.hpp). It prints
 // one JSON object: what was asked for, and each grasp. kinds.py sums them up.
 #include "grasp/settings.hpp"
+#include "grasp/words.hpp"
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
@@ -24,9 +25,22 @@ enum Stream : std::uint64_t { NOISE = 881, SET };
 constexpr double FIXED_N = 15.0, PAPER_N = 6.0;
 constexpr double SET_LEAST_N = 2.0, SET_MOST_N = 15.0; // of a still grasp
 constexpr double SENSORS_NOISE = 0.05;
+constexpr double STEADY_s = 1.5, WATCHED_s = 3.5; // before and after wrong readings
+
+// Wrong readings of one fingertip.
+struct Wrong {
+  const char *name;
+  Fault::Kind kind;
+  double frames; // 0: for good
+};
+constexpr Wrong WRONG[] = {{"none", Fault::Kind::nothing, 1e-9}, {"frame", Fault::Kind::nothing, 1},
+                           {"frames", Fault::Kind::nothing, 10}, {"nothing", Fault::Kind::nothing, 0},
+                           {"spike", Fault::Kind::spike, 1},     {"tared", Fault::Kind::tared, 0},
+                           {"reboot", Fault::Kind::reboot, 0},   {"moved_zero", Fault::Kind::moved_zero, 0},
+                           {"weak", Fault::Kind::weak, 0}};
 
 struct Options {
-  std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings;
+  std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings, wrong;
   double later_ms = 0.0, rate_Hz = 410.0, load_share = 1.0, still_s = 0.0;
   std::uint64_t seed = 1, count = 100, jobs = 2;
   std::optional<std::uint64_t> trace;
@@ -70,6 +84,21 @@ KindTrial trial_of(const Options &options, std::uint64_t n) {
     trial.set_of_smaller = options.controller != "paper";
     trial.grasp.table_friction = 0.0; // both pads press alike
     trial.noise = SENSORS_NOISE;
+  }
+  for (const Wrong &wrong : WRONG) {
+    if (options.wrong == wrong.name) {
+      trial.grasp.events.clear();
+      trial.grasp.gone = -1;
+      Fault fault;
+      fault.kind = wrong.kind;
+      fault.fingers[n % 2] = true;
+      fault.state = GRIP_HOLDING;
+      fault.after_s = trial.grasp.waits_s + trial.grasp.lift_s + STEADY_s;
+      fault.lasts_s = wrong.frames > 0 ? wrong.frames / options.rate_Hz : fault.lasts_s;
+      fault.watched_s = WATCHED_s;
+      fault.is_followed_by_pouring = false;
+      trial.fault = fault;
+    }
   }
   return trial;
 }
@@ -181,6 +210,11 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                                {"least_N", slip.least_N},
                                {"reaction_ms", slip.reaction_s ? ordered_json(1e3 * *slip.reaction_s) : nullptr}});
   }
+  if (one.trial.fault) {
+    line["before_N"] = o.failed.before_N;
+    line["after_N"] = o.failed.after_N;
+    line["reported"] = trouble_names(o.failed.trouble);
+  }
   if (one.trial.still_s > 0.0) {
     line["set_N"] = one.trial.set_N;
     line["settle_s"] = o.settle_s ? ordered_json(*o.settle_s) : nullptr;
@@ -251,6 +285,11 @@ int run(int argc, char **argv) {
                  "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
       ->check(CLI::PositiveNumber)
       ->type_name("S");
+  std::vector<std::string> wrong;
+  std::transform(std::begin(WRONG), std::end(WRONG), std::back_inserter(wrong),
+                 [](const Wrong &one) { return one.name; });
+  app.add_option("--wrong", options.wrong, "Instead of events: what one fingertip reports wrongly in a steady hold")
+      ->check(CLI::IsMember(wrong));
   app.add_option("--seed", options.seed,
                  "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
       ->capture_default_str();

@@ -13,6 +13,20 @@ using Kind = Fault::Kind;
 
 constexpr double LATE_s = 0.03, LATENCY_TIMER_s = 0.016;
 constexpr double WRONG_mm = 10.0; // of the location
+constexpr double BOOTS_s = 1.5, MOVED_N = 1.5, LESS = 0.3, SPIKE_N = 10.0, GATE_N = 0.05;
+
+// Less than a contact's least force is none.
+GripTouch less_by(GripTouch touch, double force_N, double qx_N, double qy_N) {
+  touch.force_N -= force_N;
+  touch.qx_N -= qx_N;
+  touch.qy_N -= qy_N;
+  if (touch.force_N < GATE_N) {
+    GripTouch nothing;
+    nothing.t_s = touch.t_s;
+    return nothing;
+  }
+  return touch;
+}
 
 } // namespace
 
@@ -28,8 +42,25 @@ std::optional<GripTouch> Faults::frame(std::size_t finger, GripTouch touch) {
     return touch;
   }
   const bool contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0;
-  if (fault_.kind == Kind::gone) {
+  const bool boots = fault_.kind == Kind::reboot && touch.t_s < begins_s_ + BOOTS_s;
+  if (fault_.kind == Kind::gone || boots) {
     return std::nullopt;
+  }
+  if (fault_.kind == Kind::nothing) {
+    return less_by(touch, touch.force_N, 0.0, 0.0);
+  }
+  if (fault_.kind == Kind::tared || fault_.kind == Kind::reboot) {
+    zero_[finger] = zero_[finger].value_or(touch);
+    return less_by(touch, zero_[finger]->force_N, zero_[finger]->qx_N, zero_[finger]->qy_N);
+  }
+  if (fault_.kind == Kind::weak) {
+    return less_by(touch, LESS * touch.force_N, LESS * touch.qx_N, LESS * touch.qy_N);
+  }
+  if (fault_.kind == Kind::moved_zero) {
+    return less_by(touch, MOVED_N, 0.0, 0.0);
+  }
+  if (fault_.kind == Kind::spike) {
+    return less_by(touch, -SPIKE_N, 0.0, -SPIKE_N);
   }
   if (fault_.kind == Kind::frozen) {
     GripTouch frozen = last_[finger].value_or(touch);

@@ -26,12 +26,19 @@ struct Fault {
     fault,         // 9: the gripper stops and takes no moves
     power,         // power was lost and is back: the gripper is not active
     taken,         // the object is taken away
+    nothing,       // no contact is reported
+    tared,         // the present force and load count as zero
+    reboot,        // no frames for 1.5 s, then as tared
+    moved_zero,    // the force is 1.5 N less
+    weak,          // force and load are 30 % less
+    spike,         // force and load are 10 N more
   };
   Kind kind = Kind::none;
   std::array<bool, 2> fingers{}; // of which fingertips
   // The fault begins after_s after the controller first reported this state; GRIP_STATES: never.
   std::uint8_t state = GRIP_STATES;
   double after_s = 0.0, lasts_s = std::numeric_limits<double>::infinity(), watched_s = 2.0;
+  bool is_followed_by_pouring = true; // kind_trial.hpp
 };
 
 class Faults {
@@ -58,7 +65,7 @@ private:
   Fault fault_;
   Random random_;
   double begins_s_ = std::numeric_limits<double>::infinity();
-  std::array<std::optional<GripTouch>, 2> last_;
+  std::array<std::optional<GripTouch>, 2> last_, zero_;
 };
 
 } // namespace fingertip::cell

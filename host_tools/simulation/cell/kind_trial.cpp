@@ -243,7 +243,7 @@ private:
       }
       inputs.friction_share *= 1.0 - std::min(1.0, (t_s_ - slick_s_) / SLICK_s) * (1.0 - slick_share_);
     }
-    if (trial_.fault && lift_s_ < NEVER_s) {
+    if (trial_.fault && trial_.fault->is_followed_by_pouring && lift_s_ < NEVER_s) {
       const double poured = (t_s_ - faults_.begins_s() - POURS_AFTER_s) / POURS_s;
       inputs.mass_kg += grasp_.mass_kg * std::clamp(poured, 0.0, 1.0);
     }
@@ -322,6 +322,7 @@ private:
     if (!failed.begun) {
       failed.begun = true;
       began_mm_ = width_mm();
+      failed.before_N = pinch_.mean_N();
       if (is_between_) {
         lift_s_ = std::min(lift_s_, t_s_ + LIFTS_AFTER_s);
       }
@@ -332,6 +333,7 @@ private:
       }
       is_taken_ = is_taken_ || faults_.is(Fault::Kind::taken, t_s_);
     }
+    failed.after_N = std::max(failed.after_N, pinch_.mean_N());
     is_taken_ = is_taken_ || outcome_.dropped;
     is_between_ = is_between_ && !is_taken_;
     if (is_between_) {

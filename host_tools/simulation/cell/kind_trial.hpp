@@ -42,16 +42,18 @@ struct KindTrial {
   // This time after the lift began friction falls a tenth below the value that holds the object.
   std::optional<double> slick_after_s;
   // The trial ends when the fault has been watched. Where nothing is lifted by then, the hand lifts 0.8 s
-  // after it began; after 1.2 s as much mass again is poured in: any controller would then like more force.
+  // after it began; after 1.2 s as much mass again is poured in, unless the fault is not followed by that: any
+  // controller would then like more force.
   std::optional<Fault> fault;
 };
 
 // Since a fault began.
 struct Failed {
   bool begun = false;
-  double opened_mm = 0.0;    // the fingers wider than when it began, at most, with the object between them
-  std::uint32_t trouble = 0; // all that was ever on
-  std::uint8_t state = 0;    // at the end
+  double before_N = 0.0, after_N = 0.0; // the grip when it began, the largest since
+  double opened_mm = 0.0;               // the fingers wider than when it began, at most, with the object between them
+  std::uint32_t trouble = 0;            // all that was ever on
+  std::uint8_t state = 0;               // at the end
   std::uint8_t gripper_fault = 0;
 };
 

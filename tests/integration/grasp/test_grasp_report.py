@@ -36,6 +36,9 @@ else:
         late, oracle = options["--gripper"] == "sts3215", options["--controller"] == "oracle"
         each = [{**one, "set_N": 9.0, "settle_s": 1.4 if late else 0.4, "rms_percent": 0.6 if oracle else 1.0, "reversals": 0} for one in each]
         each[0]["reversals"] = 4
+    if "--wrong" in options:
+        each = [{**one, "before_N": 2.0, "after_N": 2.9, "reported": ""} for one in each]
+        each[0]["after_N"] = 3.1
     found = {"each": each}
 print(json.dumps(found))
 """
@@ -71,6 +74,7 @@ class Grasp(unittest.TestCase):
         for name in "drops_percent_ideal margin_median_ideal peak_over_need_p50_ideal over_cap settle_s_servo limit_cycles".split():
             self.assertIs(met[name], False, name)
         self.assertEqual((found["limit_cycles"], found["over_cap"]), (6, 3))
+        self.assertEqual((found["one_bad_frame_squeezed"], found["lasting_bad_squeezed_percent"]), (9, 3.03))
         kinds = {(row["row"], row["gripper"], row["controller"]): row["grasps"] for row in found["kinds"]}
         for row, grasps in {
             ("usual and rough", "2f85", "paper"): 300,
@@ -97,7 +101,7 @@ class Grasp(unittest.TestCase):
     def test_what_is_written_to_read(self):
         self.run_tool("--grasps", "5")
         text = (self.out / "grasp.md").read_text()
-        words = "Simulated rubber/Nothing was checked on hardware/no load reported/## By kind/## Set forces/## Faults/both frozen | holding | True"
+        words = "Simulated rubber/Nothing was checked on hardware/no load reported/## By kind/## Set forces/## Wrong readings/## Faults/both frozen | holding | True"
         for each in words.split("/"):
             self.assertIn(each, text)
 

@@ -23,7 +23,7 @@ TEST(Words, EveryStateHasAnotherNameAndIsFoundByIt) {
 }
 
 TEST(Words, EveryTroubleHasAName) {
-  constexpr std::uint32_t all = (GRIP_FINGER_1_LATE << 1) - 1;
+  constexpr std::uint32_t all = (GRIP_FINGER_1_EMPTY << 1) - 1;
   EXPECT_EQ(trouble_of_names(trouble_names(all)), all);
   for (std::uint32_t bit = 1; bit <= all; bit <<= 1) {
     EXPECT_FALSE(trouble_names(bit).empty()) << bit;
