@@ -269,7 +269,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   const uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
 
   /* A contact is judged with the whole remainder, since it leaves one too; its pressures are without what has faded. */
-  const int32_t peak = conditioned->peak_Pa_q10 - condition->faded_Pa_q10[strongest];
+  const int32_t peak = (int32_t)((uint32_t)conditioned->peak_Pa_q10 - (uint32_t)condition->faded_Pa_q10[strongest]);
   const bool changes = move_gate(condition, frame, conditioned, strongest);
   const bool pressed = condition->gate.pressed;
   if (changes && pressed) {

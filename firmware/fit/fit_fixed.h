@@ -16,6 +16,11 @@ extern const int32_t fit_exp2_table[256];
 extern const uint16_t fit_log2_table[65];
 extern const uint8_t fit_bits_table[256];
 
+/* a + b, a - b and a * b modulo 2^32, for what only readings that no contact makes bring beyond 2^31. */
+FIXED_INLINE int32_t fixed_plus(int32_t a, int32_t b) { return (int32_t)((uint32_t)a + (uint32_t)b); }
+FIXED_INLINE int32_t fixed_minus(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
+FIXED_INLINE int32_t fixed_times(int32_t a, int32_t b) { return (int32_t)((uint32_t)a * (uint32_t)b); }
+
 /* a * b / 2^32 for |a|, |b| <= 2^30, error below 2 units: three 16-bit products. */
 FIXED_INLINE int32_t fixed_mul_q32(int32_t a, int32_t b) {
   int32_t a_high = a >> 16, a_low = (uint16_t)a;
@@ -52,8 +57,10 @@ FIXED_INLINE int32_t fixed_mul_near_q28(int32_t a, int32_t b) {
   return a_high * b_high * 16 + ((a_high * b_low + a_low * b_high) >> 12) + 4;
 }
 
-/* a * b / 2^16 for any a and |b| < 2^15. */
-FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) { return (a >> 16) * b + (((int32_t)(uint16_t)a * b) >> 16); }
+/* a * b / 2^16 for any a and |b| < 2^15; an int32_t for any b. */
+FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) {
+  return fixed_plus(fixed_times(a >> 16, b), fixed_times((uint16_t)a, b) >> 16);
+}
 
 /* Position of the highest set bit plus one; 0 for 0. */
 FIXED_INLINE int32_t fixed_bits(uint32_t value) {
@@ -127,15 +134,15 @@ FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int 
   pivot.half = element >> 30 ? 0 : (30 - fixed_bits((uint32_t)element)) >> 1;
   int32_t down = 15 - pivot.half, round = 1 << down >> 1;
   pivot.inverse_q14 = port_divide((1 << 29) - 1, (element * (1 << (2 * pivot.half))) >> 15);
-  pivot.own = fixed_clamp((right[j] + round) >> down, -(1 << 15), 1 << 15);
-  pivot.over = (pivot.own * pivot.inverse_q14 + (1 << 14)) >> 15;
+  pivot.own = fixed_clamp(fixed_plus(right[j], round) >> down, -(1 << 15), 1 << 15);
+  pivot.over = fixed_plus(fixed_times(pivot.own, pivot.inverse_q14), 1 << 14) >> 15;
   for (int i = j + 1; i < count; i++) {
     int32_t *row = matrix + i * words;
-    int32_t twice = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15) * 2; /* Q16 */
-    over[i] = (twice * pivot.inverse_q14 + (1 << 15)) >> 16;
-    right[i] -= twice * pivot.over;
+    int32_t twice = fixed_clamp(fixed_plus(row[j], round) >> down, -(1 << 15), 1 << 15) * 2; /* Q16 */
+    over[i] = fixed_plus(fixed_times(twice, pivot.inverse_q14), 1 << 15) >> 16;
+    right[i] = fixed_minus(right[i], fixed_times(twice, pivot.over));
     for (int k = j + 1; k <= i; k++) {
-      row[k] -= twice * over[k];
+      row[k] = fixed_minus(row[k], fixed_times(twice, over[k]));
     }
   }
   return pivot;

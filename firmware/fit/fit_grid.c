@@ -158,8 +158,8 @@ static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t 
   int32_t product = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0;
-    UNROLL for (int j = 0; j < ROWS; j++) { sum += p_q14[i * ROWS + j] * y[j]; }
-    product += fixed_mul_16(sum, x[i]);
+    UNROLL for (int j = 0; j < ROWS; j++) { sum = fixed_plus(sum, fixed_times(p_q14[i * ROWS + j], y[j])); }
+    product = fixed_plus(product, fixed_mul_16(sum, x[i]));
   }
   return product;
 }

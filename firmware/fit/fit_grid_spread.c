@@ -146,7 +146,8 @@ NOINLINE void fit_grid_begin_spread(const struct fit_grid_shape *grid, const str
   uint32_t gains = 1;
   for (int k = 0; k < NODES; k++) {
     uint8_t sensor = grid->sensor[k];
-    gains |= (uint32_t)fixed_longer_leg(settings->gain_sd_q16[sensor], past_q16(settings, sensor, spread));
+    int32_t error = fixed_longer_leg(settings->gain_sd_q16[sensor], past_q16(settings, sensor, spread));
+    gains |= (uint32_t)fixed_clamp(error, 0, UINT16_MAX);
   }
   if (fit_has_dip(settings)) {
     gains |= (uint32_t)FIT_DIP_ERROR_Q16 >> 2; /* the dip is at most a quarter */

@@ -46,7 +46,7 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
     return;
   }
   int32_t both = readings->q14[first] + most;
-  at->value[AMPLITUDE] = port_divide(both << 14, height_q14) << 6;
+  at->value[AMPLITUDE] = fixed_clamp(port_divide(both << 14, height_q14), 0, AMPLITUDE_MAX >> 6) << 6;
   at->value[PLACE_X] = (first / ROWS + second / ROWS - 2 * (COLUMNS / 2)) * (ONE_Q20 / 2);
   at->value[PLACE_Y] = (first % ROWS + second % ROWS - 2 * (ROWS / 2)) * (ONE_Q20 / 2);
   at->value[SPAN_X] = (first / ROWS - second / ROWS) * (ONE_Q20 / 2);

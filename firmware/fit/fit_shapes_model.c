@@ -265,7 +265,8 @@ void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const
     int32_t residual = row[RESIDUAL];
     if (pad->room.frame.has_own) { /* what a sensor reads that is off its place */
       const struct fit_own *own = &pad->room.own[k];
-      residual += (row[PLACE_X] >> 2) * own->off_x_q15 + (row[PLACE_Y] >> 2) * own->off_y_q15;
+      residual = fixed_plus(residual, fixed_plus(fixed_times(row[PLACE_X] >> 2, own->off_x_q15),
+                                                 fixed_times(row[PLACE_Y] >> 2, own->off_y_q15)));
     }
     residual = fixed_clamp(residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];
     row[RESIDUAL] = residual;

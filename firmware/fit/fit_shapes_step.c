@@ -62,8 +62,10 @@ static NOINLINE void sum_products(const int32_t *a, const int32_t *b, const int3
   sums[1] = second;
 }
 static void put_prior(int u, int32_t element_q27, int32_t off_q20, struct priors *priors) {
+  const int32_t element_q15 = element_q27 >> 12;
+  const int32_t most_q16 = port_divide(INT32_MAX, element_q15 > 1 ? element_q15 : 1);
   priors->element_q27[u] = element_q27;
-  priors->off_q28[u] = (element_q27 >> 12) * (off_q20 >> 4) >> 3;
+  priors->off_q28[u] = element_q15 * fixed_clamp(off_q20 >> 4, -most_q16, most_q16) >> 3;
 }
 
 void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, struct priors *priors,

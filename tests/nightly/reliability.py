@@ -19,6 +19,7 @@ EMULATED = TESTS / "emulated"
 FUZZ_s, SEED = 300, 1
 KILLS, KILLING_h, CHIPS = 1000, 0.2, 4
 SENSOR = "ms5837_30ba"
+UNDEFINED_SEEDS, UNDEFINED_INPUTS = 20, 400000
 CUTS, STEP_us = ("write", "erase", "mend", "start", "reset"), 100
 
 
@@ -106,6 +107,19 @@ def shared_clock(build):
     stamps = figures_of("node", EMULATED / "test_sync.mjs", build.parent, *tools_of(build))
     wire = ("--image", image_of(build.parent, "pico_mux"), "--support", build / "tests/support", "--node", "node", "--report")
     return stamps | figures_of("/usr/bin/python3", EMULATED / "test_sync_wire.py", *wire)
+
+
+@job("reliability", ("ubsan_calls", ">=", 1e8), ("ubsan_findings", "<=", 0))
+def undefined(build):
+    """Inputs of any bits for all public functions of fit, contact and condition, under the sanitizers."""
+
+    def one(seed):
+        call = ["env", f"RANDOM_BITS={UNDEFINED_INPUTS} {seed}", build / "tests/unit/fit/test_fit_random_bits"]
+        done = subprocess.run(call, capture_output=True, text=True, check=False)
+        return sum(map(int, re.findall(r"(\d+) calls", done.stdout))), [(done.stdout + done.stderr)[-800:]] * (done.returncode != 0)
+
+    calls, what = zip(*in_parallel({seed: functools.partial(one, seed) for seed in range(UNDEFINED_SEEDS)}).values(), strict=True)
+    return {"ubsan_calls": sum(calls), "ubsan_findings": len(sum(what, [])), "ubsan_what": sum(what, [])}
 
 
 @job("reliability", ("fuzz_bytes", ">=", 1e9), ("crashes", "<=", 0), ("sanitizer_findings", "<=", 0))

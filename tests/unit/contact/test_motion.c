@@ -238,18 +238,3 @@ TEST(frames_without_an_estimate_say_nothing_and_are_passed_over) {
     TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, update());
   }
 }
-
-TEST(nothing_overflows) {
-  found.location_noise_mm = 0.001f * MOTION_NOISE_MAX_um;
-  found.location_sd_mm = 1e9f;
-  for (int i = 0; i < 2000; i++) {
-    const float side = i % 3 == 0 ? -1.0f : 1.0f;
-    found.x_mm = 63.0f * side;
-    found.y_mm = -63.0f * side;
-    found.force_N = i % 2 ? 1e-30f : 1e9f;
-    found.qx_N = 1e9f * side;
-    found.qy_N = -1e9f * side;
-    update();
-    TEST_ASSERT_TRUE(isfinite(motion.vx_mm_s) && isfinite(motion.vy_mm_s));
-  }
-}

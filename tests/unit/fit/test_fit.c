@@ -3,19 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-TEST(test_without_noise_there_is_no_fit) {
-  static const struct press press = {3.1, -5.2, 4000.0, 7.0};
-  static const int32_t noises[] = {0, -1, INT32_MIN};
-  read_press(&press, 0.0, NULL);
-  for (int i = 0; i < 6; i++) {
-    struct fit_settings settings = usual;
-    settings.noise_Pa_q10 = noises[i / 2];
-    fit_gaussian(&array, readings, i % 2 ? ALL : ALL - 1, &settings, &result);
-    TEST_ASSERT_EQUAL_HEX32(0, result.flags);
-    TEST_ASSERT_EQUAL_HEX32(0, result.used);
-  }
-}
-
 TEST(test_array_arguments) {
   struct fit_array made;
   memset(&made, 0x5A, sizeof made);
@@ -156,18 +143,6 @@ TEST(test_quadrature) {
     const double found = (double)fit_quadrature(v[0], v[1], v[2], v[3]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3 * expected, expected, found);
   }
-}
-
-TEST(test_repeated_fits_give_the_same_bits) {
-  struct random random = {93};
-  struct press press = random_press(&random, 0.0);
-  read_press(&press, 5.0, &random);
-  fit_gaussian(&array, readings, ALL, &usual, &result);
-  struct fit_result first = result;
-  fit_gaussian(&array, readings, 0x3333, &usual, &result);
-  memset(&result, 0xA5, sizeof result);
-  fit_gaussian(&array, readings, ALL, &usual, &result);
-  TEST_ASSERT_EQUAL_MEMORY(&first, &result, sizeof first);
 }
 
 TEST(test_an_array_far_from_the_origin_is_none_for_the_grid) {

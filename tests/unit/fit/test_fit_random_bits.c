@@ -1,18 +1,20 @@
-/* A million inputs of any bits, fewer for the other size of grid: every result is finite, consistent, and within its
- * documented range. Every input goes through fit_gaussian; one in four, through each kernel by name as well. The number
- * in a failure's message repeats the input. */
+/* Inputs of any bits: every result is finite, consistent, and within its documented range, and the build's sanitizers
+ * find nothing. Every input goes through fit_gaussian; some, as
+ * frames that follow each other, through all that is computed of a frame. The number in a failure's message repeats the
+ * input. RANDOM_BITS, if set, is the number of inputs and the seed. */
+#include "common/calibration.h"
 #include "common/contact_flags.h"
-#include "fit/fit.h"
-#include "support/random.h"
-#include "support/unit.h"
+#include "condition/plausibility.h"
+#include "contact/motion.h"
+#include "contact/shapes.h"
+#include "fit/fit_doubt.h"
+#include "fit/fit_gains.h"
+#include "pad_press.h"
 
-#include <math.h>
-#include <stdbool.h>
-#include <string.h>
+#include <inttypes.h>
+#include <stdlib.h>
 
-#define INPUTS (FIT_GRID_COLUMNS == 3 ? 1000000 : 200000)
 #define ARRAYS 12
-#define SEED UINT64_C(0x66696E676572)
 
 static const uint32_t always = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED |
                                CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
@@ -27,6 +29,13 @@ struct input {
 };
 
 static struct fit_array arrays[ARRAYS];
+static uint64_t seed = UINT64_C(0x66696E676572);
+static uint32_t inputs = RANDOM_BITS_INPUTS;
+
+void setUp(void) {
+  const char *said = getenv("RANDOM_BITS");
+  TEST_ASSERT_TRUE(!said || sscanf(said, "%" SCNu32 " %" SCNu64, &inputs, &seed) == 2);
+}
 
 static void make_array(struct fit_array *array, uint8_t count, const float *x_mm, const float *y_mm, float pitch_mm) {
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(array, count, x_mm, y_mm, pitch_mm));
@@ -151,13 +160,15 @@ static float any_float(struct random *random) {
 
 static int32_t any_q15(struct random *random) { return (int32_t)random_below(random, 65535) - 32767; }
 
-static struct input draw(uint32_t number) {
-  struct random random = {SEED + number * UINT64_C(0x9E3779B97F4A7C15)};
+/* own_grid: of the boards. */
+static struct input draw(uint32_t number, bool own_grid) {
+  struct random random = {seed + number * UINT64_C(0x9E3779B97F4A7C15)};
   random_u64(&random);
   struct input input;
   memset(&input, 0, sizeof input);
   /* Half of them on the arrays that the fixed-point kernel takes. */
   input.array = &arrays[random_below(&random, random_below(&random, 2) ? 3 : ARRAYS)];
+  input.array = own_grid ? &arrays[0] : input.array;
   input.usable = random_below(&random, 2) ? UINT32_MAX : random_u32(&random);
   if (random_below(&random, 4) == 0) {
     input.usable |= random_u32(&random) | random_u32(&random);
@@ -166,7 +177,7 @@ static struct input draw(uint32_t number) {
   struct fit_settings *settings = &input.settings;
   settings->iterations = (uint8_t)random_below(&random, random_below(&random, 8) ? 8 : 21);
   settings->noise_Pa_q10 = (int32_t)(random_u32(&random) >> (1 + random_below(&random, 31)));
-  settings->noise_Pa_q10 += settings->noise_Pa_q10 == 0;
+  settings->noise_Pa_q10 += random_below(&random, 32) != 0 && settings->noise_Pa_q10 == 0;
   for (int k = 0; k < FT_MAX_SENSORS && random_below(&random, 8); k++) { /* of some sensors */
     settings->gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 16));
     settings->past_sd_Pa_q10[k] = (int32_t)(random_u32(&random) >> (3 + random_below(&random, 29)));
@@ -212,6 +223,9 @@ static const char *complaint(const struct input *input, const struct fit_result 
   const struct fit_array *array = input->array;
   const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   const float slack = 1e-5f, huge = 1e30f;
+  if (input->settings.noise_Pa_q10 < 1) {
+    return !(result->flags & CONTACT_FLAG_FIT_VALID) && is_zero(result) ? NULL : "a fit without noise";
+  }
   if (result->flags & ~(always | warnings)) {
     return "an undefined flag";
   }
@@ -263,37 +277,225 @@ static const char *complaint(const struct input *input, const struct fit_result 
 
 static void judge(uint32_t number, const char *kernel, const struct input *input, const struct fit_result *result) {
   const char *wrong = complaint(input, result);
-  CHECK(wrong == NULL, "input %u, %s: %s; x %g y %g sigma %g p0 %g force %g rms %g sd %g %g flags %x", (unsigned)number,
-        kernel, wrong ? wrong : "", (double)result->x_mm, (double)result->y_mm, (double)result->sigma_mm,
-        (double)result->p0_Pa, (double)result->force_N, (double)result->residual_rms_Pa, (double)result->location_sd_mm,
-        (double)result->force_sd_N, (unsigned)result->flags);
+  CHECK(wrong == NULL, "input %u, %s: %s; flags %x", (unsigned)number, kernel, wrong ? wrong : "",
+        (unsigned)result->flags);
 }
 
 TEST(test_any_bits_give_finite_consistent_results) {
-  struct random random = {SEED};
+  struct random random = {seed};
   make_arrays(&random);
-  uint32_t fits = 0, plain_grids = 0;
-  for (uint32_t number = 0; number < INPUTS; number++) {
-    struct input input = draw(number);
+  uint32_t fits = 0;
+  for (uint32_t number = 0; number < inputs; number++) {
+    struct input input = draw(number, false);
     struct fit_result result;
     memset(&result, 0xFF, sizeof result);
     fit_gaussian(input.array, input.pressure_Pa_q10, input.usable, &input.settings, &result);
     judge(number, "fit_gaussian", &input, &result);
     fits += (result.flags & CONTACT_FLAG_FIT_VALID) != 0;
-    if (number % 4 != 0) {
-      continue;
-    }
-    memset(&result, 0xFF, sizeof result);
-    fit_general(input.array, input.pressure_Pa_q10, input.usable, &input.settings, &result);
-    judge(number, "fit_general", &input, &result);
-    if (input.array < &arrays[3]) {
-      plain_grids++;
-      input.usable = UINT32_MAX;
-      memset(&result, 0xFF, sizeof result);
-      fit_grid(input.array, input.pressure_Pa_q10, &input.settings, &result);
-      judge(number, "fit_grid", &input, &result);
-    }
   }
-  TEST_ASSERT_GREATER_THAN_UINT32(INPUTS / 2, fits);
-  TEST_ASSERT_GREATER_THAN_UINT32(INPUTS / 8, plain_grids);
+  TEST_ASSERT_GREATER_THAN_UINT32(inputs / 2, fits);
 }
+
+#if FIT_GRID_COLUMNS == 3
+static uint32_t calls;
+
+/* All that is kept of one fingertip, and what is new in a frame. */
+static struct {
+  struct random random;
+  struct fit_watch watch;
+  struct fit_doubt doubt;
+  struct fit_gains gains;
+  struct fit_settings settings;
+  struct fit_result fit;
+  struct tangential_job tangential;
+  struct tangential_settings scales;
+  struct tangential_history history;
+  struct shapes_job shapes;
+  struct slip_history slip;
+  struct motion_history motion;
+  struct pad_press rubber;
+  struct condition condition;
+  struct plausibility plausibility;
+  struct frame frame;
+} tip;
+
+static double any(double low, double high) { return random_between(&tip.random, low, high); }
+
+static uint32_t below(uint32_t limit) { return random_below(&tip.random, limit); }
+
+static bool are_finite(const void *values, size_t bytes) {
+  bool good = true;
+  for (size_t k = 0; k < bytes / sizeof(float); k++) {
+    good = good && isfinite(((const float *)values)[k]);
+  }
+  return good;
+}
+#define FINITE(object) are_finite(&(object), sizeof(object))
+
+/* Of any thickness, narrower or wider, with any ends. */
+static void draw_pad(void) {
+  struct pad_profile profile;
+  do {
+    profile = pad_of_12_mm();
+    const float by = (float)any(0.4, 1.7), wider = (float)exp(any(-0.4, 0.4));
+    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+      profile.normal[j % PAD_NORMAL_TERMS].sd_mm = pad_of_12_mm().normal[j % PAD_NORMAL_TERMS].sd_mm * by * wider;
+      profile.tangential[j].sd_mm *= by * wider;
+      profile.tangential[j].moment_mm *= by * (float)exp(any(-1, 0.5));
+      ((float *)&profile.edges)[below(PAD_EDGE_FLOATS)] = (float)any((double)-PAD_EDGE_MAX, (double)PAD_EDGE_MAX);
+    }
+    profile.spread_mm2 = (float)any(0, 100);
+    profile.spread_sd_mm2 = (float)exp(any(log(0.11), log(99)));
+    profile.from_touch = (uint8_t)below(2);
+    tangential_use(&tip.scales, &profile, &(struct contact_settings){0.75f, 0, (float)any(0.1, 10), 1.0f}, below(2));
+  } while (fit_pad_init(&tip.tangential.pad, &arrays[0], &profile) != FT_OK ||
+           fit_shapes_init(&tip.shapes.pad, &arrays[0], &profile) != FT_OK);
+  tip.rubber.profile = profile;
+}
+
+static void press(int32_t *readings) {
+  const double far = any(0, 1), force_N = exp(any(-6, 5)), q_N = force_N * pow(any(0, 1.5), 3);
+  const struct contact contact = {far * any(-28, 28), far * any(-32, 32), force_N, q_N, any(-1, 1) * q_N, any(0, 8)};
+  for (int k = 0; k < GRID_SENSORS; k++) {
+    readings[k] = to_int32(1024.0 * pad_press_Pa(&tip.rubber, &contact, k));
+  }
+}
+
+static void begin(uint32_t number) {
+  memset(&tip, 0, sizeof tip);
+  tip.random = (struct random){seed + number};
+  random_u64(&tip.random);
+  draw_pad();
+  tip.shapes.array = tip.tangential.array = &arrays[0];
+  fit_gains_begin(&tip.gains, (float)any(0.0, 0.5));
+  tip.scales.location_sd_limit_mm = FIT_LOCATION_SD_LIMIT_mm;
+  condition_start(&tip.condition);
+  tip.plausibility.apart_Pa = 5000;
+}
+
+static void condition_any(const struct input *input) {
+  struct frame *frame = &tip.frame;
+  struct condition_gains gains;
+  struct conditioned found;
+  frame->sensor_count = (uint8_t)(1 + below(FT_MAX_SENSORS));
+  const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count);
+  frame->valid = input->usable & all;
+  frame->saturated = below(4) ? 0 : random_u32(&tip.random) & frame->valid;
+  frame->doubtful = random_u32(&tip.random) & random_u32(&tip.random) & frame->valid;
+  frame->unsettled = below(4) ? 0 : random_u32(&tip.random) & frame->valid;
+  frame->restored = below(8) ? 0 : random_u32(&tip.random) & all;
+  frame->renewed = below(8) ? 0 : random_u32(&tip.random) & all;
+  frame->noise_Pa_q10 = (int32_t)(1 + below(20000));
+  for (int k = 0; k < frame->sensor_count; k++) {
+    frame->pressure_Pa_q10[k] = below(2) ? input->pressure_Pa_q10[k] : frame->pressure_Pa_q10[k];
+    gains.inverse_q16[k] = 16384 + below(262144 - 16384 + 1);
+  }
+  if (below(200) == 0) {
+    condition_tare(&tip.condition);
+  }
+  condition_frame(&tip.condition, frame, below(2) ? &gains : NULL, &found);
+  condition_follow(&tip.condition, frame, &found);
+  plausibility_compare(&tip.plausibility, frame, &found);
+  TEST_ASSERT_EQUAL_HEX32(0, found.usable & ~(frame->valid & ~frame->saturated));
+  int32_t peak = 0;
+  for (int k = 0; k < frame->sensor_count; k++) {
+    TEST_ASSERT_TRUE(found.usable >> k & 1u || found.pressure_Pa_q10[k] == 0);
+    peak = found.pressure_Pa_q10[k] > peak ? found.pressure_Pa_q10[k] : peak;
+  }
+  TEST_ASSERT_EQUAL_INT32(peak, found.peak_Pa_q10);
+  calls += 3;
+}
+
+/* What becomes of a contact: by the firmware in the same order. */
+static void fit_any(uint32_t number, const struct input *input, bool begins) {
+  const int32_t *readings = input->pressure_Pa_q10;
+  struct fit_result fit;
+  struct fit_settings *settings = &tip.settings;
+  *settings = input->settings;
+  settings->cut_noises = 0;
+  settings->location_sd_limit_mm = 0.0f;
+  void (*const plain[])(const struct fit_array *, const int32_t *, uint32_t, const struct fit_settings *,
+                        struct fit_result *) = {fit_gaussian_grid, fit_gaussian_grid_plain, fit_gaussian_grid_small,
+                                                fit_general};
+  for (size_t k = 0; k < sizeof plain / sizeof *plain; k++) {
+    plain[k](input->array, readings, input->usable, settings, &fit);
+    judge(number, "a kernel of the grid", input, &fit);
+  }
+  struct fit_watch watch = tip.watch;
+  fit_gaussian_grid_follow(input->array, readings, input->usable, settings, &watch, &fit);
+  fit_gaussian_follow(input->array, readings, input->usable, settings, &tip.watch, &fit);
+  fit_doubt_widen(&tip.doubt, input->array, settings, &fit);
+  tip.fit = fit;
+  tip.tangential.question = (struct tangential_question){begins, 0, tip.frame.t_us, readings, settings, &tip.fit};
+  tangential_estimate(&tip.tangential);
+  struct shapes_question *question = &tip.shapes.question;
+  if (begins || tip.shapes.progress != FIT_SHAPES_UNFINISHED) {
+    *question = (struct shapes_question){
+        .begins = begins, .t_us = tip.frame.t_us, .settings = *settings, .fit = fit, .force_scale = 1.0f};
+    memcpy(question->pressure_Pa_q10, readings, sizeof question->pressure_Pa_q10);
+  }
+  question->parts = below(8) ? 1 : FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
+  shapes_estimate(&tip.shapes);
+  const struct contact_settings scales = {0.75f, 100000, tip.scales.force_scale, tip.scales.force_scale_sd};
+  const struct contact_input of_frame = {
+      .t_us = tip.frame.t_us, .contact = true, .tared = true, .fit = &fit, .tangential = &tip.tangential.estimate};
+  struct contact_result result;
+  struct tangential_force force;
+  struct motion motion;
+  contact_update(&tip.slip, &scales, &of_frame, &result);
+  tangential_update(&tip.history, &tip.scales, &of_frame, &result, &force);
+  motion_update(&tip.motion, &tip.scales, &of_frame, &result, &motion);
+  const struct contact_force weighed = contact_weigh(&scales, &fit);
+  const bool has_force = result.flags & CONTACT_FLAG_TANGENTIAL_VALID;
+  const struct shapes_place place = shapes_locate(&tip.shapes.report, &fit, has_force ? &force : NULL);
+  fit_doubt_follow(&tip.doubt, input->array, readings, settings, &fit);
+  fit_gains_learn(&tip.gains, input->array, readings, settings, &fit);
+  const struct fit_tangential *found = &tip.tangential.estimate;
+  bool good = are_finite(&found->x_mm, 9 * sizeof(float)) && FINITE(force) && FINITE(weighed) && FINITE(motion) &&
+              FINITE(place) && FINITE(tip.shapes.report.contact) && FINITE(tip.shapes.report.edge_length_mm);
+  static const struct fit_tangential none;
+  good = good && (found->valid ? (fit.flags & CONTACT_FLAG_FIT_VALID) && found->force_N > 0.0f && found->q_sd_N > 0.0f
+                               : memcmp(found, &none, sizeof none) == 0);
+  CHECK(good, "input %u: what follows the fit", (unsigned)number);
+  calls += 16;
+}
+
+TEST(test_any_bits_of_frames_that_follow_each_other) {
+  make_arrays(&(struct random){seed});
+  uint32_t estimates = 0, shapes = 0;
+  for (uint32_t number = 0; number < inputs; number += 8) {
+    if (number % 512 == 0) {
+      begin(number);
+    }
+    struct input input = draw(number, true);
+    if (below(2)) {
+      press(input.pressure_Pa_q10);
+    }
+    if (below(4)) { /* as the firmware has them, nearly */
+      struct fit_settings *settings = &input.settings;
+      *settings = (struct fit_settings){.iterations = 4, .noise_Pa_q10 = (int32_t)(1 + below(1u << below(18)))};
+      settings->prior_sigma_mm = (float)any(0, 20);
+      settings->prior_width_mm = (float)any(0, 40) * (float)below(2);
+      settings->dip_share = below(2) ? 0.0f : (float)any(0, 0.1);
+      settings->dip_sd_mm = (float)any(5, 40);
+      fit_set_errors(settings, (float)any(0, 0.1) * (float)below(2), 0.0065f * (float)below(2));
+    }
+    const uint32_t period_us = random_u32(&tip.random) >> below(32);
+    const uint32_t count = below(4) ? 1 : 1 + below(2 * FIT_SHAPES_FRAMES);
+    for (uint32_t n = 0; n < count; n++) {
+      tip.frame.t_us += 1 + (below(2) ? period_us : 1000);
+      condition_any(&input);
+      fit_any(number, &input, n == 0 && below(2));
+      estimates += tip.tangential.estimate.valid;
+      shapes += tip.shapes.report.shape != FIT_SHAPE_UNDECIDED;
+    }
+    struct calibration calibration;
+    for (size_t k = 0; k < sizeof calibration; k++) {
+      ((uint8_t *)&calibration)[k] = (uint8_t)random_u32(&tip.random);
+    }
+    calibration_is_valid(&calibration, FT_MAX_SENSORS);
+  }
+  printf("%u calls\n", (unsigned)calls);
+  TEST_ASSERT_TRUE(estimates > calls / 1000 && shapes > calls / 1000);
+}
+#endif

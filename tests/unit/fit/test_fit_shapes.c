@@ -478,24 +478,3 @@ TEST(test_parts_add_up_to_a_frame) {
   TEST_ASSERT_EQUAL(0, parts.frames);
   TEST_ASSERT_EQUAL(0, parts.part);
 }
-
-TEST(test_garbage_leaves_finite_results) {
-  rubber.dip_share = 0.05;
-  noise_Pa = 0.0;
-  for (int i = 0; i < 400; i++) {
-    begin();
-    memset(&result, 0, sizeof result);
-    for (int n = 0; n < FIT_SHAPES_FRAMES + 3; n++) {
-      for (int k = 0; k < SENSORS; k++) {
-        reading_Pa[k] = ((int32_t)any(-2147483647.0, 2147483647.0) >> (int)any(0.0, i % 31)) / 1024.0;
-      }
-      frame(ALL);
-      const float all[] = {result.x_mm[0],      result.y_mm[0],    result.force_N[0],        result.x_mm[1],
-                           result.y_mm[1],      result.force_N[1], result.length_mm,         result.along_x,
-                           result.angle_sd_rad, result.qx_N,       result.location_sd_mm[0], result.force_sd_N[1]};
-      for (size_t m = 0; m < sizeof all / sizeof all[0]; m++) {
-        TEST_ASSERT_TRUE(isfinite(all[m]));
-      }
-    }
-  }
-}
