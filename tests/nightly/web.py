@@ -19,7 +19,7 @@ from fingertip.files import InputError
 
 LOADS, RATE_Hz, WATCHED_s = 5, 1310, 60
 REMEMBERED_s, SETTLES_s, SAMPLE_s = 600, 180, 20  # of memory; what the page keeps is full after SETTLES_s
-KINDS = ("grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "lift", "drag", "slide", "screw", "two")
+KINDS = "grid taps hold high pokes cycle slip twist rolloff placements lift drag slide screw two".split()
 # Options of the player and of the scenario, and whether the pad's profile is set.
 WAYS = (((), (), True), (("--osr", "256", "--raw"), ("--effects", "all"), False))
 

@@ -1,6 +1,6 @@
 """Figures beside their goals, tables of Markdown and pictures, as every report judges and shows them.
 
-A goal is (name, sign, limit): sign ">=" or "<="; limit a number or the name of another figure. A figure that was not
+A goal is (name, sign, limit): sign ">=" or "<="; limit a number or the name of another figure; or sign "within", and two limits. A figure that was not
 measured is None.
 """
 
@@ -67,6 +67,10 @@ def judge(found, goals):
     """found with "goals" added: name -> {"goal": text, "met": True, False or None}."""
     judged = {}
     for name, sign, limit in goals:
+        if sign == "within":
+            met = None if found[name] is None else limit[0] <= found[name] <= limit[1]
+            judged[name] = {"goal": "{:g} to {:g}".format(*limit), "met": met}
+            continue
         value, bound = found[name], found[limit] if isinstance(limit, str) else limit
         met = None
         if value is not None and bound is not None:

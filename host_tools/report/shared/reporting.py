@@ -159,12 +159,8 @@ def given(options, *names):
 def contacts_of(options):
     """The firmware, the twin and their contacts (measure/contacts.py) of the build folder."""
     from contacts import Contacts
-    from measure import MeasureError
 
-    try:
-        return Contacts(options.build)
-    except MeasureError as error:
-        raise InputError(str(error)) from None
+    return Contacts(options.build)
 
 
 def add_parts(parser, name, parts):

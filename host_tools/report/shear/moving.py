@@ -1,4 +1,4 @@
-"""The tables of contacts over time: rubber that relaxes, screws, the taps of the paper, and pads that end."""
+"""The tables of contacts over time: rubber that remembers, screws, the taps of the paper, and pads that end."""
 
 import math
 

@@ -165,14 +165,8 @@ def pads(bench, out):
                 out["location_loaded_median_mm" if calibrated else "equal_location_loaded_mm"] = row["location_p50_mm"]
                 out[prefix + "location_loaded_without_mm"] = row["location_without_p50_mm"]
             if calibrated and load == "0.3":
-                for key in (
-                    "valid_percent",
-                    *COVERS,
-                    "location_cover_1sd",
-                    "location_cover_2sd",
-                    "force_p50_percent",
-                    "force_without_p50_percent",
-                ):
+                out["loaded_valid_percent"] = row["valid_percent"]
+                for key in (*COVERS, "location_cover_1sd", "location_cover_2sd", "force_p50_percent", "force_without_p50_percent"):
                     out[key] = row[key]
                 by_place(found, out)
             if calibrated and load == "0":

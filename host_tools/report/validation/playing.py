@@ -10,14 +10,14 @@ import csv
 import dataclasses
 import json
 import pathlib
-import subprocess
 import time
 
 import numpy as np
 from boards import MULTIPLEXED, image_of
 from fingertip import Streams, wire
-from fingertip.files import FIT_VALID, InputError, read_recording
+from fingertip.files import FIT_VALID, read_recording
 from reporting import built, run
+from twin_player import TwinPlayer
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 
@@ -73,13 +73,12 @@ class Played:
         self.error_mm = np.hypot(self.estimated["x_mm"] - self.x_mm, self.estimated["y_mm"] - self.y_mm)
 
 
-class Workshop:
+class Workshop(TwinPlayer):
     """Scenarios are written, played and read; the files go, the arrays stay."""
 
     def __init__(self, options, out):
-        self.twin, self.player = (built(options.build, "host_tools/simulation", tool) for tool in ("twin/twin", "player/fingertip_player"))
+        super().__init__(options.build, pathlib.Path(options.tables or out / "contact_tables"))
         self.image, self.seed, self.scale = image_of(options.boards, MULTIPLEXED), options.seed, options.scale
-        self.tables = pathlib.Path(options.tables or out / "contact_tables")
         self.work = out / "validation_work"
         self.work.mkdir(parents=True, exist_ok=True)
         self.indenters = set(options.indenters.split(",")) if options.indenters else None
@@ -94,7 +93,7 @@ class Workshop:
 
     def add_on_pads(self, what, kind, indenter, seconds, effects, **more):
         """Unequal sensors are drawn again for each pad, the presses too: one pad's luck is not what the spread costs."""
-        pads = self.pads if any(name in effects for name in ("gain", "all", "widths", "places")) else 1
+        pads = self.pads if any(name in effects for name in ("gain", "all", "widths", "places", "memory", "aftereffect")) else 1
         for pad in range(1, pads + 1):
             self.add(what, kind, indenter, seconds=seconds / pads, pad=pad, effects=effects, **more)
 
@@ -103,9 +102,7 @@ class Workshop:
         pairs = sorted({(scenario.indenter, scenario.layer_mm) for scenario in self.scenarios})
         feet = {(WEIGHT_FOOT, scenario.layer_mm) for scenario in self.scenarios if scenario.calibrated is not None}
         print(f"        contact tables: {len(pairs)} (the first time some five minutes)", flush=True)
-        for layer_mm in sorted({layer for _, layer in pairs}):
-            names = ",".join(sorted({name for name, layer in feet.union(pairs) if layer == layer_mm}))
-            run(self.twin, "tables", "--indenter", names, "--layer", layer_mm, "--cache", self.tables)
+        self.solve(feet.union(pairs))
         for indenter, layer_mm in pairs:
             text = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)
             widths = {name: float(value) for name, value in (word.split("=") for word in text.split())}
@@ -116,13 +113,6 @@ class Workshop:
         """Of the stiff layer: the mean over the indenters there, for a prior does not know which it will be."""
         return float(np.mean([g["sigma_mm"] for g in self.gaussians if g["layer_mm"] == STIFF_LAYER_mm]))
 
-    def write(self, path, kind, effects, seed, seconds, *more):
-        options = ("--effects", effects or "none", "--seed", seed, "--seconds", seconds, "--cache", self.tables, "-o", path, "--overwrite")
-        run(self.twin, "scenario", kind, *options, *more)
-
-    def play(self, path, recording, seed, rate, *more):
-        run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", rate, "--seed", seed, *more)
-
     def calibrate(self, layer_mm, effects, pad):
         """The first session on this pad that is accepted, or None, and how many were refused."""
         path = self.work / f"session-{layer_mm}-{effects}-{pad}.csv"
@@ -130,13 +120,9 @@ class Workshop:
         for refused in range(SESSIONS_MAX):
             more = ("--layer", layer_mm, "--pad", seed, "--force", WEIGHT_N)
             self.write(path, "placements", effects, seed + OTHER_PLACES * refused, SESSION_s, *more)
-            self.play(path, recording, seed, SESSION_RATE_Hz, "--raw")
-            command = [str(self.player), "calibrate", recording, "--force", str(WEIGHT_N), "-o", commands]
-            judged = subprocess.run(command, capture_output=True, text=True)
-            if judged.returncode == 0:
+            self.play(path, recording, seed, "--rate", SESSION_RATE_Hz, "--raw")
+            if self.accepts(recording, WEIGHT_N, commands):
                 return commands, refused
-            if "not calibrated: " not in judged.stderr:
-                raise InputError(judged.stderr.strip())
         return None, SESSIONS_MAX
 
     def play_one(self, scenario):
@@ -148,7 +134,7 @@ class Workshop:
         self.write(path, scenario.kind, scenario.effects, seed, seconds, *pressed)
         prior = ("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()
         first = () if scenario.calibrated is None else ("--first", self.sessions[scenario.session])
-        self.play(path, recording, seed, scenario.rate, "--noise", scenario.noise, *prior, *first)
+        self.play(path, recording, seed, "--rate", scenario.rate, "--noise", scenario.noise, *prior, *first)
         played = Played(path, recording, truth)
         for file in (path, truth, recording):
             file.unlink()

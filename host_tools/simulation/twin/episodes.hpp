@@ -34,7 +34,8 @@ enum Stream : std::uint64_t {
   DIRECTION,
   DRAG,
   SLIDE,
-  SCREW
+  SCREW,
+  HOLD
 };
 
 inline double milliseconds(double seconds) { return 1e-3 * std::round(1e3 * seconds); }

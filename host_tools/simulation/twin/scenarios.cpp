@@ -73,6 +73,11 @@ Episode random_press(const Stage &stage, std::size_t n, const std::string &name,
 
 Episode tap(const Stage &stage, std::size_t n) { return random_press(stage, n, "tap", 0.12, 0.3); }
 
+Episode hold(const Stage &stage, std::size_t n) {
+  Random random(stage.options.seed, HOLD, n);
+  return random_press(stage, n, "hold", 0.2, milliseconds(random.log_uniform(0.2, 10.0)));
+}
+
 Episode high(const Stage &stage, std::size_t n) { return random_press(stage, n, "hold", 0.5, 0.6); }
 
 // A weight is set down by hand, rests by itself and is lifted.
@@ -282,6 +287,7 @@ const std::vector<ScenarioKind> &scenario_kinds() {
   static const std::vector<ScenarioKind> all{
       {"grid", 200, "1,2.5,5,10,15", "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart", grid},
       {"taps", 120, "1..15", "short taps at random places", tap},
+      {"hold", 200, "1..15", "presses at random places, held for 0.2 to 10 s", hold},
       {"high", 120, "25..50", "strong presses at random places", high},
       {"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place", poke},
       {"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor", cycle},

@@ -1,6 +1,6 @@
-"""The part gate of the report truth on few pads and on made-up recordings: its keys are there, meet their goals, and distinguish a press from what follows it.
+"""Parts of the report truth on few pads: their figures are there, repeatable, and as good as they are meant to be.
 
-usage: test_truth_gate.py BUILD
+usage: test_truth.py TruthFit|TruthGate|TruthOverTime BUILD
 """
 
 import argparse
@@ -12,12 +12,76 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host_tools" / folder) for folder in ("report/truth", "report/measure", "report/shared", "python")]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/truth", "report/measure", "report/shared", "report/shear", "python")]
+import one_press  # noqa: E402
+import over_time  # noqa: E402
+import shear  # noqa: E402
+import truth  # noqa: E402
 import zero_and_gate  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from measure import Measure  # noqa: E402
 
-GOALS = {"slow_force_error_percent": 2, "false_contacts": 0, "zero_recovery_s": 5, "phantom_force_longest_s": 1}
+BUILD = sys.argv.pop()
+FIRMWARE = Measure(BUILD)
+# (key, least, most): what a full run is held to, with room for a tenth of its pads.
+FIT_GOALS = (
+    ("cover_1sd_min", 54, 100),
+    ("cover_1sd_max", 0, 77),
+    ("cover_2sd_min", 92, 100),
+    ("cal_warned_percent", 0, 6),
+    ("cal_bad_unflagged_percent", 0, 0.2),
+    ("raw_warned_percent", 0, 36),
+    ("raw_bad_unflagged_percent", 0, 2),
+    ("raw_20_bad_unflagged_percent", 0, 4),
+    ("loaded_silent_percent", 0, 1),
+    ("raw_loaded_silent_percent", 0, 4),
+    ("unloaded_warned_percent", 0, 6),
+    ("elongated_bad_unflagged_percent", 0, 3),
+    ("round_elongated_percent", 0, 1),
+)
+
+
+def run(pads, seed, parts=one_press.PARTS):
+    return one_press.figures(FIRMWARE, argparse.Namespace(pads=pads, seed=seed), parts)
+
+
+class TruthFit(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.found = run(150, 3)
+
+    def test_goals(self):
+        for key, least, most in FIT_GOALS:
+            with self.subTest(key):
+                self.assertGreaterEqual(self.found[key], least)
+                self.assertLessEqual(self.found[key], most)
+
+    def test_four_iterations_do_what_more_do(self):
+        medians = {}
+        for row in self.found["iterations"]:
+            medians.setdefault((row["layer_mm"], row["gain_percent"]), {})[row["iterations"]] = row["error_p50_mm"]
+        self.assertEqual(len(medians), 4)
+        for median in medians.values():
+            self.assertEqual(sorted(median), [3, 4, 5, 6, 7, 8])
+            self.assertLess(median[4], 1.03 * median[8])
+
+    def test_calibration_helps(self):
+        rows = {row["case"]: row for row in self.found["cases"]}
+        self.assertLess(rows["12 mm, calibrated"]["error_p50_mm"], 0.5 * rows["12 mm, gains 10 %"]["error_p50_mm"])
+        self.assertLess(rows["noise only"]["error_p50_mm"], 0.01)
+
+    def test_a_seed_decides_what_is_drawn(self):
+        parts = (one_press.coverage, one_press.few_sensors)  # all kinds of draws
+        once = run(4, 3, parts)
+        self.assertEqual(run(4, 3, parts), once)
+        self.assertNotEqual(run(4, 4, parts), once)
+
+    def test_no_pads_are_refused(self):
+        with self.assertRaises(InputError):
+            run(0, 3)
+
+
+GATE_GOALS = {"slow_force_error_percent": 2, "false_contacts": 0, "zero_recovery_s": 5, "phantom_force_longest_s": 1}
 REAL = (
     "real_phantom_percent_worst",
     "real_phantom_longest_s",
@@ -58,7 +122,7 @@ def write_recording(path, sigma_mm, stays_Pa=0, seed=1):
 
 
 def judged(pads, recordings):
-    return zero_and_gate.figures(Measure(BUILD), argparse.Namespace(pads=pads, seed=None, recordings=recordings))
+    return zero_and_gate.figures(FIRMWARE, argparse.Namespace(pads=pads, seed=None, recordings=recordings))
 
 
 class TruthGate(unittest.TestCase):
@@ -76,7 +140,7 @@ class TruthGate(unittest.TestCase):
             cls.strips.setdefault(strip["name"], []).append(strip)
 
     def test_goals_are_met(self):
-        for name, goal in GOALS.items():
+        for name, goal in GATE_GOALS.items():
             self.assertLessEqual(self.found[name], goal, name)
 
     def test_a_force_that_is_left_is_contact_or_in_doubt(self):
@@ -114,11 +178,34 @@ class TruthGate(unittest.TestCase):
             found = judged(0, folder)
         for name in REAL:
             self.assertIsNone(found[name], name)
-        self.assertFalse(GOALS.keys() & found.keys())
+        self.assertFalse(GATE_GOALS.keys() & found.keys())
         with self.assertRaises(InputError):
             judged(0, "/nowhere")
 
 
+KINDS = [kind for kind in over_time.KINDS if kind.key]
+# (of a row, most location_p50_mm, most silent_percent, least trusted_percent)
+BOUNDS = {"plain": (0.05, 0, 90), "remembered": (0.15, 1, 80), "pulled": (0.3, 1, 70), "ends": (0.2, 1, 80), "ends_pulled": (0.35, 2, 60)}
+BOUNDS |= {"beyond": (3, 5, 0), "leaning": (0.2, 1, 80), "thin": (4, 2, 0)}
+
+
+class TruthOverTime(unittest.TestCase):
+    def test_figures(self):
+        found = over_time.figures(argparse.Namespace(build=BUILD, pads=1, seed=901), KINDS)
+        asked = [name for name, *_ in truth.GOALS if name.startswith(truth.OVER_TIME)]
+        self.assertLessEqual({*asked, *(there for _, there, *_ in shear.OVER_TIME)}, found.keys())
+        self.assertEqual(found["remembered_refused"], 0)
+        for row, (key, (location_mm, silent, trusted)) in zip(found["over_time"], BOUNDS.items(), strict=True):
+            with self.subTest(key):
+                self.assertLess(row["location_p50_mm"], location_mm)
+                self.assertLessEqual(row["silent_percent"], silent)
+                self.assertGreaterEqual(row["trusted_percent"], trusted)
+                self.assertGreater(row["frames"], 100)
+                self.assertEqual([name for name, value in row.items() if value is None and key != "thin"], [])
+        self.assertLess(found["pulled_vector_error_p50"], 0.06)
+        none = over_time.row_of(KINDS[0], 1, [])
+        self.assertEqual([name for name in found["over_time"][0] if none[name] is not None], list(over_time.COUNTS))
+
+
 if __name__ == "__main__":
-    BUILD = sys.argv.pop()
     unittest.main()

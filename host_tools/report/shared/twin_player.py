@@ -1,0 +1,35 @@
+"""Scenarios of the twin, and fingertip_player, which plays them through the firmware's own code."""
+
+import subprocess
+
+from fingertip.files import InputError
+from reporting import built, run
+
+
+class TwinPlayer:
+    """tables: the folder of the contact tables; solve() those that several jobs need, so that none is solved twice."""
+
+    def __init__(self, build, tables):
+        self.twin, self.player = (built(build, "host_tools/simulation", tool) for tool in ("twin/twin", "player/fingertip_player"))
+        self.tables = tables
+
+    def solve(self, pairs):
+        """pairs: of an indenter and the layer under it, mm."""
+        for layer_mm in sorted({layer for _, layer in pairs}):
+            names = ",".join(sorted({name for name, layer in pairs if layer == layer_mm}))
+            run(self.twin, "tables", "--indenter", names, "--layer", layer_mm, "--cache", self.tables)
+
+    def write(self, path, kind, effects, seed, seconds, *more):
+        options = ("--effects", effects or "none", "--seed", seed, "--seconds", seconds, "--cache", self.tables, "-o", path, "--overwrite")
+        run(self.twin, "scenario", kind, *options, *more)
+
+    def play(self, path, recording, seed, *more):
+        run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--seed", seed, *more)
+
+    def accepts(self, recording, weight_N, commands):
+        """Whether what it recorded of a weight's placements is a calibration. Then the file has the commands that bring what was found."""
+        command = [str(part) for part in (self.player, "calibrate", recording, "--force", weight_N, "-o", commands)]
+        judged = subprocess.run(command, capture_output=True, text=True)
+        if judged.returncode and "not calibrated: " not in judged.stderr:
+            raise InputError(judged.stderr.strip())
+        return judged.returncode == 0
