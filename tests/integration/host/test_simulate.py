@@ -63,8 +63,8 @@ class Presses(SimulateTest):
                 if wanted:
                     off_mm = np.hypot(felt["x_mm"] - x_mm[at], felt["y_mm"] - y_mm[at])[at_rest]
                     self.assertLess(np.median(off_mm), 1.0)
-                    # what is not calibrated tells some 20 % less, and rubber relaxes
-                    self.assertLess(abs(np.median(felt["force_N"][at_rest]) / WEIGHT_N - 1), 0.3)
+                    # never calibrated: the gains of the sensors near it, and the tails of a contact that is no Gaussian
+                    self.assertLess(abs(np.median(felt["force_N"][at_rest]) / WEIGHT_N - 1), 0.15)
                 else:
                     # what rubber keeps of the press before is not taken for a force
                     left = at_rest & ~np.isnan(felt["force_N"])
@@ -96,7 +96,7 @@ class Presses(SimulateTest):
             true = np.array(next(line for line in file if line.startswith("# gain_left:")).split()[2:], float)
         found = np.array(re.findall(r"(?m)^ +\d+ +(\d\.\d+) ", shown), float)
         self.assertEqual(len(found), 15, shown)
-        # The rubber over each sensor relaxes by a share of its own, which counts as gain; the mean belongs to the scale of force.
+        # What the rubber over a sensor keeps of a hold counts as gain; the mean belongs to the scale of force.
         self.assertGreater(np.std(true), 0.06)
         self.assertLess(np.std(found / np.mean(found) - true / np.mean(true)), 0.5 * np.std(true))
 

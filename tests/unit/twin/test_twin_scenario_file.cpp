@@ -261,7 +261,7 @@ TEST(ScenarioFile, HasItsEffectsInIt) {
       o.effects = parse_effects(effects);
     });
   };
-  const Scenario scenario = taps("gain=5,drift=200,aftereffect,branch=8");
+  const Scenario scenario = taps("gain=5,drift=200,memory,aftereffect,branch=8");
   const File file = written(scenario), plain = written(taps("none"));
   Pad pad(scenario.options.effects, 15, LAYER_mm, 101325.0, *scenario.options.pad_seed);
   std::vector<double> base_Pa(15), reported_Pa(15);
@@ -291,6 +291,8 @@ TEST(ScenarioFile, HasItsEffectsInIt) {
   };
   has("gain_errors_percent", 0.01, [&](std::size_t k) { return pad.gain_errors()[k]; });
   has("drifts_Pa_s", 1.0, [&](std::size_t k) { return pad.drifts_Pa_s()[k]; });
+  has("memories_percent", 0.01, [&](std::size_t k) { return pad.memories()[k].share; });
+  has("memory_times_s", 1.0, [&](std::size_t k) { return pad.memories()[k].time_s; });
   has("aftereffects_percent", 0.01, [&](std::size_t k) { return pad.aftereffects()[k].share; });
   has("aftereffect_times_s", 1.0, [&](std::size_t k) { return pad.aftereffects()[k].time_s; });
   has("branch_steps_Pa", 1.0, [&](std::size_t k) { return pad.branches()[k].step_Pa; });
