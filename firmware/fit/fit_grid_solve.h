@@ -119,8 +119,6 @@ struct fit_spread {
 /* The square of a number of 15 bits, so that those of all sensors and of two coordinates add up. */
 #define SPREAD_SQUARE_SHIFT (NODES > 15 ? 6 : 5)
 
-#define FIT_DIP_ERROR_Q16 ((int32_t)(FIT_DIP_ERROR * 65536.0f))
-
 /* shift: the readings'. The columns have at most 1.5 * 2^15. */
 void fit_grid_begin_spread(const struct fit_grid_shape *grid, const struct fit_settings *settings, int32_t shift,
                            const struct fit_system *system, const struct fit_columns_q *columns,

@@ -78,6 +78,7 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
 /* What the dip may be off by at each sensor, of itself. It counts where the derivatives have the
  * dip. Chosen on the recording that chooses of host_tools/report/real. */
 #define FIT_DIP_ERROR 0.2f
+#define FIT_DIP_ERROR_Q16 ((int32_t)(FIT_DIP_ERROR * 65536.0f))
 #define FIT_DIP_SD_MIN 0.5f
 #define FIT_DIP_SD_MAX 5.0f
 

@@ -7,9 +7,11 @@
 
 #include <string.h>
 
-#define MODEL_SD_Q16 328 /* 0.005 of the largest reading */
+/* 0.005 of the largest reading, and of a known dip half of what it may be off by in its middle. */
+#define MODEL_SD_Q16 328
+#define DIP_SD_Q16 (FIT_DIP_ERROR_Q16 / 2)
 /* Prior of both elongations. */
-#define ELONGATION_SD_mm2 3.0f
+#define ELONGATION_SD_mm2 4.0f
 
 /* Factors of the stated variances by chi^2. NUMERICS.md has their reasons ("What the firmware does not report"). */
 #define MISFIT_SHIFT_PULL 3   /* chi^2 / 8 of a tangential force: its degrees of freedom */
@@ -23,14 +25,14 @@
 
 /* An elongation beyond this share of the widest term's variance is no report; all are taken where a pad ends nearer
  * than NEAR_ENDS of its thickness, which makes round contacts look long (report shear, elongated_false_percent). */
-#define LONG_MOST_Q15 1507 /* 0.046 */
+#define LONG_MOST_Q15 2294 /* 0.07: a lime of 45 by 55 mm has up to that */
 #define LONG_MOST_NEAR_ENDS_Q15 8192
 #define NEAR_ENDS 0.75f
 
 /* A contact is elongated if its elongation exceeds this share of the widest term's variance with t,
  * and ELONGATED_SURE standard deviations. The report shear counts them by object and tangential force.
  */
-#define ELONGATED_LEAST 0.05f
+#define ELONGATED_LEAST 0.07f
 #define ELONGATED_SURE 2.5f
 /* Larger where the pad ends near, which leaves residuals. */
 #define CHI_SQUARE_MAX 16
@@ -113,6 +115,11 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
   pad->spread_q26 = q26_from(spread < VARIANCE_MAX ? spread : VARIANCE_MAX);
   pad->spread_sd_q26 = q26_from(spread_sd < VARIANCE_MAX ? spread_sd : VARIANCE_MAX);
   pad->long_sd_q26 = q26_from(ELONGATION_SD_mm2 * per_square);
+  float height = 0.0f;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    height += (float)pad->strength_q26[j] * 0.25f / (float)(pad->variance_q26[j] + pad->spread_q26);
+  }
+  pad->height_q26 = q26_from(height);
   float least = (float)spread_least(pad) * (1.0f / 67108864.0f);
   if (!is_carried(pad, 0, PAD_NORMAL_TERMS, least, false) ||
       !is_carried(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
@@ -133,8 +140,8 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
 /* False: too few sensors. */
 static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
                   struct problem *problem, struct fit_tangential_room *room) {
-  int sensors = fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, MODEL_SD_Q16, room->weight_q12,
-                               &problem->base);
+  int sensors = fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, problem->model_sd_q16,
+                               room->weight_q12, &problem->base);
   problem->by_gains_q12 = sensors > 0 ? (1 << 12) - port_divide(problem->base.squares_q12, sensors) : 0;
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
@@ -321,12 +328,15 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
 static void set_known(const struct fit_array *array, const struct fit_settings *settings, struct problem *problem) {
   problem->own = settings->own;
   problem->sensor = array->grid.sensor;
-  problem->dip_share_q16 = 0;
+  problem->model_sd_q16 = MODEL_SD_Q16;
+  problem->dip_q22 = 0;
   if (fit_has_dip(settings)) {
     int32_t sd_q20 = fixed_mul_q30(fit_fixed(settings->dip_sd_mm, 20), problem->pad->per_unit_q30);
     int32_t sd_q13 = fixed_clamp(sd_q20 >> 7, DIP_SD_LEAST_Q13, DIP_SD_MOST_Q13);
-    problem->dip_share_q16 = fit_fixed(settings->dip_share, 16);
-    problem->dip_bend_q22 = fixed_div_q26(LOG2E_HALF_Q26 >> 4, sd_q13 * sd_q13);
+    int32_t share_q16 = fit_fixed(settings->dip_share, 16), square_q26 = sd_q13 * sd_q13;
+    problem->model_sd_q16 = fixed_longer_leg(MODEL_SD_Q16, fixed_mul_16(share_q16, DIP_SD_Q16));
+    problem->dip_q22 = fixed_mul_q26(fixed_mul_16(problem->pad->height_q26, share_q16), square_q26) >> 4;
+    problem->dip_variance_q26 = square_q26 - problem->pad->spread_q26;
   }
 }
 

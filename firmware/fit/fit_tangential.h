@@ -8,12 +8,11 @@
  * a report the estimate starts from the Gaussian again.
  *
  * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull; the
- * dip that a calibration has found (fit_settings) is in the model too. A prior holds elongation near
- * round. Readings count by their noise, gain error and model error. Fixed point, the same bits on
- * every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the
- * limits.
+ * dip that a calibration has found (fit_settings) is in the model too, as a term that takes. A
+ * prior holds elongation near round. Readings count by their noise, gain error and model error. Fixed point, the same
+ * bits on every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the limits.
  *
- * At most 42 600 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
+ * At most 43 100 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
  * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards
  * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet. */
@@ -55,6 +54,7 @@ struct fit_pad {
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
   int32_t spread_q26, spread_sd_q26;     /* prior of the contact's own variance */
+  int32_t height_q26;                    /* of the model's middle with it, for amplitude 1 */
   int32_t long_sd_q26;                   /* and of its elongations */
   struct scaled force_unit;              /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
   struct scaled per_force;               /* amplitude of the Gaussian's 1 N at 1 Pa */

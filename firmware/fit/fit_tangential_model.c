@@ -151,21 +151,23 @@ NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t n
   set_axis(bend_q22, by_square, nodes, axis, exp2_rough, 15, value_q15);
 }
 
-/* Takes the dip from the model: a share of the height in the contact's middle, in a Gaussian about
- * it. The dip is in the column of the amplitude; it is so wide that those of place and spread do
- * without. */
-NOINLINE static void take_dip(const struct problem *problem, const struct term *terms, const struct parabola *axes,
+#define DIP_VARIANCE_LEAST_Q26 (ONE_Q26 / 8)
+
+/* Takes the dip from the model: one more term, which a contact's own spread widens as the others. What is long in the
+ * contact does without. */
+NOINLINE static void take_dip(const struct problem *problem, int32_t t_q26, const struct parabola *axes,
                               int32_t amplitude_q13, struct fit_tangential_room *room) {
   int32_t x_q15[COLUMNS], y_q15[ROWS];
-  int32_t bend_q22 = problem->dip_bend_q22;
+  int32_t v = problem->dip_variance_q26 + t_q26;
+  int32_t inverse_q26 = fixed_div_q26(ONE_Q26, v < DIP_VARIANCE_LEAST_Q26 ? DIP_VARIANCE_LEAST_Q26 : v); /* 1 / v */
+  int32_t bend_q22 = fixed_mul_q26(inverse_q26 >> 4, LOG2E_HALF_Q26);
   int32_t by_square = fixed_mul_q26(bend_q22, problem->pad->pitch_square_q26);
   set_dip_axis(bend_q22, by_square, COLUMNS, &axes[0], x_q15);
   set_dip_axis(bend_q22, by_square, ROWS, &axes[1], y_q15);
-  int32_t height_q27 = 0;
-  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    height_q27 += terms[j].height_q28 >> 1;
-  }
-  int32_t depth_q17 = fixed_mul_16(height_q27, problem->dip_share_q16) >> 10;
+  int32_t depth_q22 = fixed_clamp(fixed_mul_q26(problem->dip_q22, inverse_q26), 0, (1 << 20) - 1);
+  int32_t first_q22 = fixed_mul_q26(depth_q22, inverse_q26);
+  int32_t depth_q17 = depth_q22 >> 5, first_q15 = first_q22 >> 7;
+  int32_t second_q12 = fixed_mul_q26(first_q22, inverse_q26) >> 10;
   int32_t lack_q16 = (depth_q17 * amplitude_q13) >> 14; /* with the amplitude */
   const int32_t *weight_q12 = room->weight_q12;
   int32_t *residual = room->residual;
@@ -174,6 +176,8 @@ NOINLINE static void take_dip(const struct problem *problem, const struct term *
     for (int k = 0; k < ROWS; k++, node++) {
       int32_t bell_q15 = (((x_q15[i] * y_q15[k]) >> 15) * *weight_q12++) >> 12;
       node->sums.s0_q14 -= (bell_q15 * depth_q17) >> 18;
+      node->sums.s1_q25 -= (bell_q15 * first_q15) >> 5;
+      node->sums.s2_q22 -= (bell_q15 * second_q12) >> 5;
       *residual++ += (bell_q15 * lack_q16) >> 7;
     }
   }
@@ -277,8 +281,8 @@ void fit_tangential_linearise(const struct problem *problem, const struct fit_ta
     set_terms(problem, terms, i, &off_x[i], off_y, origin.amplitude_q13, room);
   }
   set_sums(terms, room->node);
-  if (problem->dip_share_q16 != 0) {
-    take_dip(problem, terms, axes, origin.amplitude_q13, room);
+  if (problem->dip_q22 != 0) {
+    take_dip(problem, at->t_q26, axes, origin.amplitude_q13, room);
   }
   for (int i = 0; i < COLUMNS; i++) {
     union fit_tangential_node *node = &room->node[i * ROWS];

@@ -36,8 +36,9 @@ struct problem {
   struct readings readings;
   struct fit_base base;
   int32_t by_gains_q12; /* share of the readings' variances that is their gains', mean */
-  /* The dip: its depth in the height of the model's middle, 0: none; log2(e) / (2 sd^2). */
-  int32_t dip_share_q16, dip_bend_q22;
+  int32_t model_sd_q16;
+  /* The dip, -depth v0 / v exp(-d' d / (2 v)), v = v0 + t as of a term: depth v0, 0: none; v0. */
+  int32_t dip_q22, dip_variance_q26;
   const struct fit_own *own; /* [sensor] or NULL */
   const uint8_t *sensor;     /* [node] */
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */

@@ -20,7 +20,7 @@ const SEARCH_CYCLES_MAX = 46200;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
 const OUTLIER_CYCLES_MAX = 96200;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
-const TANGENTIAL_CYCLES_MAX = 42600;
+const TANGENTIAL_CYCLES_MAX = 43100;
 /** A part of the look for a load that is not estimated, which follows the frame's packet (fit_doubt.h), and all of them. */
 const LOAD_PART_CYCLES_MAX = 6700;
 const LOAD_CYCLES_MAX = 25000;

@@ -13,7 +13,7 @@ enum { F, X, Y, T, E1, E2, QX, QY, UNKNOWNS };
 
 constexpr double KAPPA = 1.3;
 constexpr double MODEL_SD = 0.005;
-constexpr double ELONGATION_SD_mm2 = 3.0;
+constexpr double ELONGATION_SD_mm2 = 4.0;
 constexpr double GAUSSIAN_VARIANCE = 0.912, GAUSSIAN_FORCE = 1.0753;
 constexpr double SPREAD_LEAST = 0.3; // of the narrowest term's variance, below zero
 constexpr double SPREAD_MOST = 2.0;  // of the widest term's

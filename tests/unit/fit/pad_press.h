@@ -17,7 +17,7 @@ struct contact {
 
 struct pad_press {
   struct pad_profile profile;
-  double dip_share, dip_sd_mm; /* of the height in the contact's middle */
+  double dip_share, dip_sd_mm; /* of the height in the middle of a contact of the profile's spread */
   struct fit_own own[GRID_SENSORS];
 };
 
@@ -28,12 +28,13 @@ static inline double pad_press_Pa(const struct pad_press *pad, const struct cont
   const double dx = nearer * (9.0 * (sensor / 5 - 1 + own->off_x_q15 / 32768.0) - contact->x_mm);
   const double dy = nearer * (9.0 * (sensor % 5 - 2 + own->off_y_q15 / 32768.0) - contact->y_mm);
   const double r2 = dx * dx + dy * dy;
+  const double usual_mm2 = (double)pad->profile.spread_mm2, square_mm2 = pad->dip_sd_mm * pad->dip_sd_mm;
   double sum = 0.0, middle = 0.0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    const double v = pow((double)pad->profile.normal[j].sd_mm, 2) + contact->spread_mm2;
-    const double height = contact->force_N * (double)pad->profile.normal[j].share / v;
-    sum += height * exp(-r2 / (2 * v));
-    middle += height;
+    const double share = contact->force_N * (double)pad->profile.normal[j].share;
+    const double point = pow((double)pad->profile.normal[j].sd_mm, 2), v = point + contact->spread_mm2;
+    sum += share / v * exp(-r2 / (2 * v));
+    middle += share / (point + usual_mm2);
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     const double v = pow((double)pad->profile.tangential[j].sd_mm, 2) + 1.3 * contact->spread_mm2;
@@ -41,7 +42,8 @@ static inline double pad_press_Pa(const struct pad_press *pad, const struct cont
            exp(-r2 / (2 * v));
   }
   if (pad->dip_share > 0.0) {
-    sum -= pad->dip_share * middle * exp(-r2 / (2 * pad->dip_sd_mm * pad->dip_sd_mm));
+    const double v = square_mm2 + contact->spread_mm2 - usual_mm2;
+    sum -= pad->dip_share * middle * square_mm2 / v * exp(-r2 / (2 * v));
   }
   return 1e6 * sum / 6.283185307179586;
 }
