@@ -22,7 +22,8 @@ GripTouch touch_from_packet(const wire_packet &packet, double host_us) {
   touch.qx_N = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.qx_N);
   touch.qy_N = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.qy_N);
   touch.q_sd_N = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.q_sd_N);
-  touch.speed_mm_s = under(CONTACT_FLAG_VELOCITY_VALID, std::hypot(contact.vx_mm_s, contact.vy_mm_s));
+  touch.speed_x_mm_s = under(CONTACT_FLAG_VELOCITY_VALID, contact.vx_mm_s);
+  touch.speed_y_mm_s = under(CONTACT_FLAG_VELOCITY_VALID, contact.vy_mm_s);
   return touch;
 }
 

@@ -3,6 +3,7 @@
 #include "grasp/convert.hpp"
 #include "grasp/words.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -195,19 +196,21 @@ void GraspLoop::step() {
   news.status = status_;
   put(std::move(news));
   if (has_failed) {
-    report_fault(report_.trouble);
+    report_fault(report_);
   }
 }
 
-void GraspLoop::report_fault(std::uint32_t trouble) {
+void GraspLoop::report_fault(const GripReport &report) {
+  std::vector<std::string> causes;
+  if ((report.trouble & GRIP_GRIPPER_FAULT) != 0) {
+    causes.push_back(fault_text_);
+  }
+  if ((report.trouble & GRIP_GRIPPER_INACTIVE) != 0) {
+    causes.push_back("it is not active any more: it lost its power, or was reset");
+  }
   GraspNews news{Kind::fault, steady_now_us()};
-  if ((trouble & GRIP_GRIPPER_FAULT) != 0) {
-    news.text = fault_text_;
-  }
-  if ((trouble & GRIP_GRIPPER_INACTIVE) != 0) {
-    news.text +=
-        (news.text.empty() ? "" : "; ") + std::string("it is not active any more: it lost its power, or was reset");
-  }
+  news.text = causes.empty() ? "no grip: " : "the gripper failed: ";
+  news.text += joined(causes.empty() ? trouble_texts(report) : causes, "; ");
   put(std::move(news));
 }
 

@@ -104,7 +104,7 @@ private:
   void take_devices();
   void take_gripper();
   void step();
-  void report_fault(std::uint32_t trouble);
+  void report_fault(const GripReport &report);
   void obey_interrupts();
   void put(GraspNews news);
 

@@ -51,6 +51,7 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_FINGER_1_LATE, "finger_1_late", "right: late"},
     {GRIP_FINGER_0_EMPTY, "finger_0_empty", "left: reports nothing, while the other is pressed"},
     {GRIP_FINGER_1_EMPTY, "finger_1_empty", "right: reports nothing, while the other is pressed"},
+    {GRIP_NO_GRIP, "no_grip", "squeezed, and less than half of the wanted force has come"},
 };
 
 } // namespace

@@ -22,7 +22,7 @@ GripTouch draw_touch(fuzz_input &input, double now_s) {
   touch.sigma_mm = draw(input, 0.0, 40.0);
   touch.qx_N = draw(input, -20.0, 20.0);
   touch.qy_N = draw(input, -20.0, 20.0);
-  touch.speed_mm_s = draw(input, 0.0, 300.0);
+  touch.speed_y_mm_s = draw(input, -300.0, 300.0);
   return touch;
 }
 

@@ -22,7 +22,8 @@ constexpr double OLD_s = 0.5;        // an older frame is no evidence of the pre
 constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average of the delay
 constexpr int ZERO_FRAMES = 3;
 constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
-// A force whose standard deviation is a larger share of it is no measurement.
+// A force whose standard deviation is a larger share of it is no measurement. A plate's is measured: only how
+// far it reaches beyond the pad is not.
 constexpr double FORCE_SD_MOST = 1.0;
 // A tangential force with one of these flags is not trusted.
 constexpr std::uint32_t FORCE_ONLY = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND |
@@ -44,7 +45,8 @@ bool force_is_valid(const GripTouch &touch) {
     return true; // the force is 0
   }
   return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 &&
-         ((touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 || touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
+         (touch.sigma_mm > WIDE_mm || (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 ||
+          touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
 }
 
 bool is_same(const GripTouch &a, const GripTouch &b) {
@@ -128,13 +130,16 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   reading.force_N = force_N_;
   reading.sd_N = sd_N_;
   reading.has_load = reading.contact && has_load();
+  bool recoils = false; // moves against its load
   if (reading.has_load) {
-    reading.load_N = std::hypot(touch_.qx_N - zero_x_N_, touch_.qy_N - zero_y_N_);
-    reading.speed_mm_s = touch_.speed_mm_s;
+    const double load_x_N = touch_.qx_N - zero_x_N_, load_y_N = touch_.qy_N - zero_y_N_;
+    reading.load_N = std::hypot(load_x_N, load_y_N);
+    reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
+    recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * load_x_N + touch_.speed_y_mm_s * load_y_N < 0.0;
   }
   // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence.
   const std::uint32_t slide = reading.has_load ? CONTACT_FLAG_SLIDING : CONTACT_FLAG_SLIP;
-  reading.slides = reading.contact && (touch_.flags & slide) != 0;
+  reading.slides = reading.contact && (touch_.flags & slide) != 0 && !recoils;
   return reading;
 }
 
@@ -259,7 +264,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
       if (loads == 2 && readings[i].load_N > SHARED_N) {
         fingers[i].shares(readings[i].load_N, all.load_N);
       } else if (loads == 1 && readings[i].has_load) {
-        all.load_N = fingers[i].load_of_both_N(all.load_N);
+        all.load_N = loads_N = fingers[i].load_of_both_N(all.load_N);
       }
     }
     all.ratio = normal_N > 0.0 ? loads_N / normal_N : 0.0;

@@ -17,8 +17,8 @@ struct GripTouch {
   std::uint32_t flags = 0; // enum contact_flag
   double force_N = 0.0, force_sd_N = 0.0;
   double x_mm = 0.0, y_mm = 0.0, sigma_mm = 0.0;
-  double qx_N = 0.0, qy_N = 0.0, q_sd_N = 0.0; // tangential force of the object on the rubber
-  double speed_mm_s = 0.0;                     // of the contact on the rubber
+  double qx_N = 0.0, qy_N = 0.0, q_sd_N = 0.0;   // tangential force of the object on the rubber
+  double speed_x_mm_s = 0.0, speed_y_mm_s = 0.0; // of the contact on the rubber
 };
 
 // Bits. Each is on while its trouble lasts; those that led to GRIP_FAULT stay on.
@@ -44,6 +44,7 @@ enum GripTrouble : std::uint32_t {
   GRIP_FINGER_1_LATE = 1u << 18,
   GRIP_FINGER_0_EMPTY = 1u << 19, // no contact in a hold, while the other has more than twice touch_N
   GRIP_FINGER_1_EMPTY = 1u << 20,
+  GRIP_NO_GRIP = 1u << 21, // squeezed for 3 s, and less than half of the wanted force has come
 };
 
 constexpr std::uint32_t GRIP_GRIPPER_FAULTS = GRIP_GRIPPER_FAULT | GRIP_GRIPPER_INACTIVE;

@@ -13,6 +13,7 @@ constexpr double RISES_s = 0.27; // rise of the start force
 constexpr double RAMP_s = 0.1;
 constexpr double SQUEEZE_s = 3.0; // squeezing ends after this time with the force that it reached
 constexpr double SQUEEZED = 0.8;  // share of the start force that is enough
+constexpr double HALF = 0.5;      // a smaller share is no grip
 constexpr double ACTIVATION_s = 10.0;
 constexpr double EMPTY_s = 0.06;  // without any contact for this time the object is gone
 constexpr double CLOSED_s = 0.4;  // a gripper at rest where it was sent for this time has missed
@@ -201,6 +202,12 @@ std::uint32_t Grip::squeeze() {
     return trouble;
   }
   const bool over = now_s_ - since_s_ > SQUEEZE_s;
+  const double least_N = fixed ? settings_.touch_N : HALF * aimed_N;
+  if (over && (alone || readings_.fingers == 0 || (readings_.low_N < least_N && !capped))) {
+    fault_trouble_ = trouble_ | trouble | GRIP_NO_GRIP;
+    enter(GRIP_FAULT);
+    return trouble;
+  }
   if (!alone && (((there || capped) && !status_.moving) || over)) {
     if (!fixed && !is_blind_ && !readings_.has_load) {
       is_blind_ = true; // squeeze on to the grip that holds without a load

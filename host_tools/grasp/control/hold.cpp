@@ -7,7 +7,7 @@ namespace fingertip {
 
 namespace {
 
-constexpr double FRICTION_LEAST = 0.08, FRICTION_MOST = 1.5;
+constexpr double FRICTION_LEAST = 0.08;
 constexpr double LOAD_NOISE_N = 0.06;
 // Above its latest peak the load and its rate are used as measured. Below the peak the object swings
 // on the rubber, or has begun to slide, and the mean is used.
@@ -29,6 +29,8 @@ constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
 // unless it became slick. Then it slides by FAR_mm and more; squeezed rubber, and an object that was
 // just caught, move less.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
+// Friction that falls as a slide begins is followed with this time constant.
+constexpr double FALLS_s = 0.06;
 // The load of an object that slides and does not slow down is its friction plus the force that stops
 // it within STOPS_s. The estimate follows with the time constant FOLLOWS_s.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
@@ -41,14 +43,17 @@ double late_s(double delay_s) { return std::clamp(delay_s - SOON_s, 0.0, LATEST_
 
 } // namespace
 
-void GripFriction::held(double ratio) { held_ = std::clamp(ratio, held_, FRICTION_MOST); }
+void GripFriction::held(double ratio) { held_ = std::clamp(ratio, held_, MOST); }
 
-void GripFriction::slid(double ratio) {
-  ratio = std::clamp(ratio, FRICTION_LEAST, FRICTION_MOST);
-  slid_ = slid_ > 0.0 ? std::min(slid_, ratio) : ratio;
+void GripFriction::slid(double ratio, double lately) {
+  now_ = std::min(now_, std::max(ratio, FRICTION_LEAST));
+  slid_ = std::min(slid_ > 0.0 ? slid_ : MOST, std::max(lately, FRICTION_LEAST));
+  held_ = 0.0;
 }
 
-double GripFriction::value(double assumed) const { return slid_ > 0.0 ? slid_ : std::max(assumed, held_); }
+double GripFriction::value(double assumed) const {
+  return std::min(now_, slid_ > 0.0 ? std::max(slid_, held_ / GROWN) : std::max(assumed, held_));
+}
 
 void GripLoad::rests(double load_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
@@ -93,6 +98,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   // The largest speed within LATELY_s: a slower slide slows down.
   fastest_mm_s_ -= std::min(passed_s / LATELY_s, 1.0) * fastest_mm_s_;
   fastest_mm_s_ = std::max(fastest_mm_s_, readings.speed_mm_s);
+  lately_ -= std::min(passed_s / (sliding_ ? FALLS_s : LATELY_s), 1.0) * lately_;
   const bool creeps = readings.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
   const bool holds = moved_mm_ < FAR_mm && readings.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * readings.grip_N;
   const bool was_sliding = sliding_;
@@ -106,7 +112,8 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
       const bool grown = was_sliding && readings.grip_N > GROWN * going_N_;
       const bool caught = grown && readings.load_N < going_load_N_;
       if (!caught) {
-        friction_.slid(std::max(readings.ratio, FRICTION_LEAST));
+        lately_ = std::max(lately_, readings.ratio);
+        friction_.slid(readings.ratio, lately_);
       }
       if (!was_sliding || (grown && !caught)) {
         going_N_ = readings.grip_N;
@@ -116,6 +123,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
     }
     return;
   }
+  friction_.rests();
   if (!readings.has_load) {
     return;
   }
@@ -123,7 +131,6 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   load_.rests(readings.load_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
   was_N_ = std::max(was_N_ - std::min(passed_s / REMEMBERS_s, 1.0) * was_N_, load_.now_N());
   ratio_ += std::min(passed_s / HELD_s, 1.0) * (readings.ratio - ratio_);
-  lately_ -= std::min(passed_s / LATELY_s, 1.0) * lately_;
   if (readings.grip_N > 2.0 * settings.touch_N) {
     lately_ = std::max(lately_, readings.ratio);
     readings.slides ? void() : friction_.held(ratio_);

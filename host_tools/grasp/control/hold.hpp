@@ -7,17 +7,21 @@
 
 namespace fingertip {
 
-// The friction coefficient as an interval: the largest ratio of tangential to normal force that held,
-// and the least that slid.
+// The friction coefficient: the largest ratio of tangential to normal force that held since a slide, and the
+// least that slid.
 class GripFriction {
 public:
   void held(double ratio);
-  void slid(double ratio);
+  // lately: the ratio that lasts. The present one counts until the slide is over.
+  void slid(double ratio, double lately);
+  void rests() { now_ = MOST; }
   // The coefficient to use. assumed: its value if nothing is known.
   double value(double assumed) const;
 
 private:
+  static constexpr double MOST = 1.5;
   double held_ = 0.0, slid_ = 0.0; // 0: unknown
+  double now_ = MOST;
 };
 
 // The load that the grip carries. A sliding contact does not show it: its tangential force is its

@@ -42,6 +42,7 @@ GOALS = tuple(
     ("dropped_fragile_percent", "<=", 1),
     ("over_cap", "<=", 0),
     ("first_grip_over_2x_percent", "<=", 0.5),
+    ("first_grip_below_wanted_half_percent", "<=", 0),
     ("late_40ms_drops_percent", "<=", 3),
     ("step_us", "<=", 20),
     ("limit_cycles", "<=", 0),
@@ -123,6 +124,7 @@ def summary(each):
         "crushed_percent": percent(sum(one["crushed"] for one in each), len(each)),
         "over_cap": sum(one["peak_N"] > one["cap_N"] for one in each),
         "first_grip_over_2x_percent": percent(sum(one["first_N"] > FIRST_MUCH * one["start_N"] for one in each), len(each)),
+        "first_grip_below_wanted_half_percent": percent(sum(one["first_N"] < 0.5 * one["start_N"] for one in each), len(each)),
         "step_us": quantile([one["step_us"] for one in each], 0.5),
     }
 
@@ -192,6 +194,7 @@ def figures(rows, sets, wrong):
         "dropped_fragile_percent": worst(rows, "drops_percent", "fragile"),
         "over_cap": sum(row["over_cap"] for row in rows if row["controller"] == "ours"),
         "first_grip_over_2x_percent": worst(rows, "first_grip_over_2x_percent", "usual and rough"),
+        "first_grip_below_wanted_half_percent": worst(rows, "first_grip_below_wanted_half_percent", "usual and rough"),
         "late_40ms_drops_percent": worst(rows, "drops_percent", "usual and rough, 40 ms later"),
         "step_us": worst(rows, "step_us"),
         "limit_cycles": sum(row["limit_cycles"] for row in sets if row["row"] in ("60 s", "12 s, eq. (5) and (6)")),

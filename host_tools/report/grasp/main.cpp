@@ -193,6 +193,8 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                     {"hunts", o.hunts},
                     {"margin", o.margin},
                     {"slid_mm", o.slid_mm},
+                    {"slides", o.slides},
+                    {"friction_over_true", o.friction},
                     {"first_N", o.first_N},
                     {"peak_N", o.peak_N},
                     {"start_N", one.settings.start_N},

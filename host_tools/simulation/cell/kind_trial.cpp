@@ -97,7 +97,8 @@ public:
       touch.qx_N = static_cast<double>(found.qx_N);
       touch.qy_N = static_cast<double>(found.qy_N);
       touch.q_sd_N = 0.05 * sensed_N;
-      touch.speed_mm_s = static_cast<double>(std::hypot(moved.vx_mm_s, moved.vy_mm_s));
+      touch.speed_x_mm_s = static_cast<double>(moved.vx_mm_s);
+      touch.speed_y_mm_s = static_cast<double>(moved.vy_mm_s);
     }
     return touch;
   }
@@ -397,6 +398,9 @@ private:
 
   KindOutcome outcome() {
     outcome_.slid_mm = pinch_.slid_mm();
+    outcome_.slides = report_.slides;
+    outcome_.friction =
+        report_.friction / (0.5 * inputs().friction_share * (grasp_.pads[0].friction + grasp_.pads[1].friction));
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;
     outcome_.hunts = !outcome_.dropped && reversals_ / (grasp_.ends_s - grasp_.steady_s) >= HUNTS_s;

@@ -1,4 +1,4 @@
-"""Grasps in simulated time. Few of the kinds: the same seed, the same answer; more grip, fewer drops. And every fault in every state of a grasp: the
+"""Grasps in simulated time. Few of the kinds: the same seed, the same answer. And every fault in every state of a grasp: the
 grip never opens by itself, never exceeds its cap, always says what happened, and no paper cup is crushed.
 
 usage: test_grasp_kinds.py FINGERTIP_GRASP_KINDS [unittest arguments]
@@ -38,14 +38,6 @@ class Kinds(unittest.TestCase):
         first = each("--count", "6")
         self.assertEqual(first, each("--count", "6", "--jobs", "1"))
         self.assertNotEqual(first, each("--count", "6", "--seed", "2"))
-
-    def test_what_hardly_grips_drops(self):
-        weak, firm = (
-            kinds.summary(each("--controller", "fixed", "--set", f"fixed={set_N}", "--count", "12", "--kind", "usual"))
-            for set_N in (0.4, 17)
-        )
-        self.assertGreaterEqual(weak["drops_percent"], 80)
-        self.assertLessEqual(firm["drops_percent"], 10)
 
     def test_a_set_force_settles(self):
         found = kinds.summary_of_sets(each("--kind", "gentle", "--still", "6", "--count", "4"))

@@ -86,6 +86,7 @@ public:
   double frame_s = 1.0 / 410.0;
   std::array<double, 2> gain{1.0, 1.0};
   double sd_share = 0.05; // of a force, as reported
+  double sigma_mm = 6.0;
   std::array<bool, 2> slides{}, mute{}, frozen{};
   std::array<std::uint32_t, 2> add_flags{}, drop_flags{};
   bool active = true, gripper_mute = false, activated = false;
@@ -119,10 +120,10 @@ private:
                   ~drop_flags[finger];
     touch.force_N = sensed_N;
     touch.force_sd_N = sd_share * sensed_N;
-    touch.sigma_mm = 6.0;
+    touch.sigma_mm = sigma_mm;
     touch.x_mm = frozen[finger] ? 0.0 : 1e-3 * (frames_ % 7);
     touch.qy_N = (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 ? load_N : 0.0;
-    touch.speed_mm_s = slide_mm_s;
+    touch.speed_y_mm_s = slide_mm_s;
     return touch;
   }
 

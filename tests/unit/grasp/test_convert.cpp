@@ -20,8 +20,8 @@ TEST(Convert, ATouchIsThePacketsContact) {
   EXPECT_EQ(static_cast<float>(touch.qx_N), packet.body.contact.qx_N);
   EXPECT_EQ(static_cast<float>(touch.qy_N), packet.body.contact.qy_N);
   EXPECT_EQ(static_cast<float>(touch.q_sd_N), packet.body.contact.q_sd_N);
-  EXPECT_FLOAT_EQ(static_cast<float>(touch.speed_mm_s),
-                  std::hypot(packet.body.contact.vx_mm_s, packet.body.contact.vy_mm_s));
+  EXPECT_EQ(static_cast<float>(touch.speed_x_mm_s), packet.body.contact.vx_mm_s);
+  EXPECT_EQ(static_cast<float>(touch.speed_y_mm_s), packet.body.contact.vy_mm_s);
 }
 
 TEST(Convert, WhatNoFlagStandsForIsZero) {
@@ -30,7 +30,7 @@ TEST(Convert, WhatNoFlagStandsForIsZero) {
   packet.body.contact.flags = CONTACT_FLAG_CONTACT;
   const GripTouch touch = touch_from_packet(packet, -1);
   for (const double value :
-       {touch.force_N, touch.force_sd_N, touch.x_mm, touch.sigma_mm, touch.qx_N, touch.speed_mm_s, touch.t_s}) {
+       {touch.force_N, touch.force_sd_N, touch.x_mm, touch.sigma_mm, touch.qx_N, touch.speed_x_mm_s, touch.t_s}) {
     EXPECT_EQ(value, 0.0);
   }
 }

@@ -80,25 +80,6 @@ TEST(Grip, LateFramesAreLateAndNotMissing) {
   world.pull(2.0, 0.3);
   world.run(0.5);
   EXPECT_GT(world.force_N, 2.0 / world.settings.friction);
-  world.mute = {true, true};
-  world.run(0.2);
-  EXPECT_NE(world.report.trouble & GRIP_FINGER_0_STALE, 0u);
-}
-
-TEST(Grip, GoesOnWithOneFingertipAndStaysWithoutAny) {
-  GripWorld world;
-  world.grasp();
-  world.mute[0] = true;
-  world.run(0.1);
-  EXPECT_EQ(world.report.trouble, GRIP_FINGER_0_STALE);
-  world.pull(2.0, 0.3);
-  world.run(0.5);
-  EXPECT_GT(world.force_N, 2.0 / world.settings.friction);
-  world.mute[1] = true;
-  world.run(0.1);
-  const double before_mm = world.width_mm;
-  world.run(1.0);
-  EXPECT_EQ(world.width_mm, before_mm);
 }
 
 // No frame is believed alone.
@@ -135,6 +116,20 @@ TEST(Grip, ForcesThatDifferAreToldAtRestWithBothNumbers) {
   world.run(1.0);
   EXPECT_NE(world.report.trouble & GRIP_FINGERS_DIFFER, 0u);
   EXPECT_GT(world.report.finger_N[0], 1.8 * world.report.finger_N[1]);
+}
+
+// Squeezed without a force is no hold, and says why.
+TEST(Grip, SqueezingThatEndsWithoutAForceIsAFault) {
+  for (const bool plate : {false, true}) {
+    GripWorld world;
+    world.sd_share = 3.0;
+    world.sigma_mm = plate ? 100.0 : 6.0; // of a plate only the part on the pad counts
+    ASSERT_TRUE(world.grip.request(GRIP_REQUEST_GRASP));
+    world.run_to(plate ? GRIP_HOLDING : GRIP_FAULT, 12.0);
+    EXPECT_EQ((world.report.trouble & GRIP_NO_GRIP) != 0, !plate);
+    EXPECT_EQ((world.report.trouble & GRIP_FINGER_0_NO_FORCE) != 0, !plate);
+    EXPECT_TRUE(world.grip.request(GRIP_REQUEST_RELEASE));
+  }
 }
 
 // One bad answer is looked at again.

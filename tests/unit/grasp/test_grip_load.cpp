@@ -44,6 +44,19 @@ TEST(Grip, LearnsFrictionWhileItSlides) {
   expect_share(0.7 * held, world.report.friction, 0.05);
 }
 
+// Rubber that springs back moves against its load: that is no slide, and teaches no friction.
+TEST(Grip, WhatMovesAgainstItsLoadDoesNotSlide) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.5, 0.3);
+  world.run(0.5);
+  const double friction = world.report.friction, before_N = world.force_N;
+  world.slide(0.3 * friction, -40.0, 0.2);
+  EXPECT_EQ(world.report.slides, 0u);
+  EXPECT_EQ(world.report.friction, friction);
+  EXPECT_LT(world.peak_N, 1.3 * before_N);
+}
+
 // What slides carries more as its grip grows. What carries less has been caught, though the slide is
 // still reported: its ratio is no friction.
 TEST(GripHold, WhatHasBeenCaughtTeachesNoFriction) {

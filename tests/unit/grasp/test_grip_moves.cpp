@@ -83,16 +83,19 @@ TEST(Grip, NeverTravelsBeyondItsCap) {
   EXPECT_NE(world.report.trouble & GRIP_AT_TRAVEL_CAP, 0u);
 }
 
-TEST(Grip, NeverTightensASaturatedFingertip) {
-  GripWorld world;
-  world.grasp();
-  world.add_flags[0] = CONTACT_FLAG_SATURATED;
-  world.run(0.1);
-  const double before_mm = world.width_mm;
-  world.pull(5.0, 0.2);
-  world.run(0.5);
-  EXPECT_GE(world.width_mm, before_mm);
-  EXPECT_NE(world.report.trouble & GRIP_FINGER_0_OVER, 0u);
+TEST(Grip, NeverTightensASaturatedFingertipNorWithoutFrames) {
+  for (const bool mute : {false, true}) {
+    GripWorld world;
+    world.grasp();
+    world.add_flags[0] = mute ? 0u : std::uint32_t{CONTACT_FLAG_SATURATED};
+    world.mute = {mute, mute};
+    world.run(0.1);
+    const double before_mm = world.width_mm;
+    world.pull(5.0, 0.2);
+    world.run(0.5);
+    EXPECT_GE(world.width_mm, before_mm);
+    EXPECT_NE(world.report.trouble & (mute ? GRIP_FINGER_0_STALE : GRIP_FINGER_0_OVER), 0u);
+  }
 }
 
 // A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the

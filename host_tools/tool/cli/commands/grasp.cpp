@@ -219,8 +219,7 @@ private:
         event("gripper: " + (news.text.empty() ? "answers, without a fault" : news.text));
         break;
       case GraspNews::Kind::fault:
-        fault_ = "the gripper failed: " + news.text;
-        event(fault_);
+        event(fault_ = news.text);
         break;
       case GraspNews::Kind::dropped:
         lost_ = std::to_string(news.count) + " lines not recorded: this program was held up";
