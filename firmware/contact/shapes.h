@@ -63,7 +63,7 @@ struct shapes_place {
  * where there is none (force NULL), the Gaussian. But neither knows a length, nor the Gaussian a
  * tangential force. So of a long contact, and of a pulled one without an estimate, what lies between that location
  * and the middle that the shape has is part of the standard deviation. It is not the place: rubber
- * that relaxes makes a round object look long or pulled, with its middle further off. The standard
+ * that remembers makes a round object look long or pulled, with its middle further off. The standard
  * deviation of a round contact grows where its shape leaves residuals. */
 struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
                                   const struct tangential_force *force);

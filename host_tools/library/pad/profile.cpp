@@ -90,7 +90,7 @@ void check(const char *what, double value, double least, double greatest) {
 // pressure. A sphere of 15 mm under 1 to 6 N makes 2.1 to 3.5 mm on the twin's silicone: 0.8 to 2.5
 // mm^2, and more on softer rubber.
 constexpr double SPREAD_mm2 = 2.0, SPREAD_SD_mm2 = 1.5;
-// Sessions of the twin with relaxation, a dip, sensors off their places: their widths differ so.
+// Sessions of the twin with memories, a dip, sensors off their places: their widths differ so (unit.pad_thickness).
 constexpr double SESSION_SD = 0.02;
 constexpr double AGREES_SDS = 2.0;
 constexpr double LEAST_mm = 1.0, MOST_mm = 60.0; // among which it is sought

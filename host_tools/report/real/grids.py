@@ -17,7 +17,7 @@ NOISE_PA = 10.0  # of a mean of ten samples, whose steps are 20 Pa
 RESPONSE_MM = 6.0  # a sensor's response is fitted to presses so near it
 OUTSIDE_MM = 3.0  # presses so far beyond the outer sensors are judged apart
 PRIOR_WIDTH_MM = 0.5  # of the prior on sigma that a user sets: PRIOR_WIDTH in line.toml
-DIP_PITCHES = 2.3  # standard deviation of the dip
+DIP_WIDTHS = 5.0  # standard deviation of the dip, over that of the response: as a calibration expects it
 DIP_FROM_WIDTHS = 3.0
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
 PASSES = 31
@@ -139,7 +139,7 @@ class Calibration:
 
     @property
     def good(self):
-        return self.found["state"] == 1
+        return bool(self.found["state"] == 1)
 
     def by_gains(self):
         """Without the sensors' own locations and widths."""
@@ -153,7 +153,7 @@ def dip_share(grid):
     square = ((grid.xy[:, None, :] - grid.layout) ** 2).sum(axis=2) / grid.width_mm**2
     far = (square > DIP_FROM_WIDTHS**2) & ~grid.judged[:, None]
     below = (np.exp(-square / 2) - grid.reading_Pa / grid.peak_Pa)[far]
-    dip = np.exp(-square[far] / (2 * (DIP_PITCHES * grid.pitch_mm / grid.width_mm.mean()) ** 2))
+    dip = np.exp(-square[far] / (2 * DIP_WIDTHS**2))
     return float((below * dip).sum() / (dip**2).sum())
 
 

@@ -63,7 +63,7 @@ CASES = (
 
 
 def dipped_pads(contacts, count, seed):
-    """Calibrated pads with a dip; half of them relax, and have sensors off their places."""
+    """Calibrated pads with a dip; half of them remember, and have sensors off their places."""
     seeds = contacts.random(seed, stream_of("dipped sessions"), np.arange(count)).bits()
     return contacts.calibrated_pads([kind | {"dip_percent": 1.25} for kind in USUAL], seeds)
 

@@ -124,7 +124,7 @@ def plan(shop):
     for indenter in INDENTERS:
         shop.add_on_pads("taps", "taps", indenter, 300, ALL, case=EVERY_EFFECT, margin_mm=0)
         shop.add("high biased", "high", indenter, effects="clip,bias")
-    shop.add("cycle", "cycle", "sphere6", seconds=120, effects="relaxation,hysteresis")
+    shop.add("cycle", "cycle", "sphere6", seconds=120, effects="memory,hysteresis")
     for indenter in (*OBJECTS, *SOLIDS):
         shop.add("slip", "slip", indenter, case="steady")
         shop.add("slip", "slip", indenter, case="stick-slip", options=("--stick-slip", 2))
@@ -396,7 +396,7 @@ def draw(shown, path):
     if "cycle" in shown:
         axes[1, 1].plot(shown["cycle"]["true_N"], shown["cycle"]["estimated_N"], color=BLUE)
         axes[1, 1].plot((0, 20), (0, 20), color=FAINT, lw=0.8)
-        axes[1, 1].set(title="(d) slow load cycle, relaxation and hysteresis", xlabel="true force, N", ylabel="estimated force, N")
+        axes[1, 1].set(title="(d) slow load cycle, memory and hysteresis", xlabel="true force, N", ylabel="estimated force, N")
     figure.suptitle("Simulated fingertip, as the paper's Fig. 7")
     save(figure, path)
 

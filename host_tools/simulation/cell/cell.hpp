@@ -53,7 +53,7 @@ struct Grasp {
   Vector place_mm;           // where it touches, fingertip 0
   double angle_rad = 0.0;    // fingertip 0: its face is turned by
   double down_rad = 0.0;     // direction of gravity from x towards y
-  double relaxation = 0.175; // share of the force lost in 8 s: simulation/twin/effects.hpp
+  double relaxation = 0.175; // share of the force lost in 8 s; real pads: 0.04 to 0.14 (simulation/twin/README.md)
   // The rubber's tangential stiffness per radius of contact: 8 G / (2 - nu), as on a half-space of
   // Shore 15 A (Mindlin, J. Appl. Mech. 16, 1949). A sphere of 15 mm then goes 1 mm before it slips
   // at 6 N and a friction of 0.5.

@@ -40,7 +40,7 @@ const char *name_of(Event::Kind kind);
 
 struct KindOfPad {
   double at_1_mm_N = 3.0;    // force at 1 mm of indentation
-  double relaxation = 0.175; // share of the force lost in 8 s
+  double relaxation = 0.175; // share of the force lost in 8 s; real pads: 0.04 to 0.14
   double friction = 0.5;     // static
   double gain = 1.0;         // of the force that it reports, over the true one
   Vector ratio;              // error of tangential over normal force

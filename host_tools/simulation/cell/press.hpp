@@ -2,7 +2,7 @@
 // look at, to record and to calibrate from. With --mouse a hand presses instead (hand_server.hpp):
 // the ball goes where the hand is, within some 30 ms, without friction.
 //
-// The pad: 12 mm of silicone without ends, which relaxes as the twin's does (twin/effects.hpp).
+// The pad: 12 mm of silicone without ends, which remembers as the twin's does (memory, aftereffect; twin/effects.hpp).
 // Sensors' gains differ by 10 %, and are not calibrated.
 #pragma once
 

@@ -99,7 +99,7 @@ const std::vector<Effect> &effects() {
   static const std::vector<Effect> all{
       {"dip", "%", 5.0, 0.0, 10.0,
        "around a contact the pressure is lower by this share of its middle, 2.5 times as wide",
-       std::string(GRIDS) + ": 5 % by calibrations on them, -1 to -2 % is left at 3.5 to 4 widths"},
+       std::string(GRIDS) + ": 5 % as calibrations expect it, -1 to -2 % is left at 3.5 to 4 widths"},
       {"widths", "%", 3.5, 0.0, 20.0, "each sensor's response is wider or narrower by this sd",
        std::string(GRIDS) + ": widths of sensors' responses differ by 3 to 4 % (sd)"},
       {"places", "mm", 0.1, 0.0, 1.0, "each sensor sits off its place by this sd, each way",
@@ -111,12 +111,12 @@ const std::vector<Effect> &effects() {
        std::string(STRIP) + ": 130 to 210 Pa in 16 min"},
       {"relaxation", "%", 9.0, 0.0, 40.0,
        "where travel is held the force itself falls by this share in 8 s, on a pad up to 56 % more or less of it",
-       "holds beside a load cell: 3.6 % in 5 s; " + std::string(STRIP) +
+       "presses by position beside a load cell, Shaevitzaiden/slip_detection: 3.6 % in 5 s; " + std::string(STRIP) +
            ": 4 to 14 % in a hold of 8 s; times 1 and 10 s fitted to its holds"},
       {"memory", "%", 1.0, 0.0, 20.0,
        "each sensor's own part of a hold of 8 s, by this sd, one in eight by 4.6 times of it; it is off by as much "
        "after the hold and comes back in 1 to 4 s",
-       "sensors of one press on a cast pad: 0.35 %; " + std::string(STRIP) +
+       "public recordings, read once: 0.35 % between sensors of a press on a cast pad (n = 5); " + std::string(STRIP) +
            ": 2.6 %, one in eight 10 to 15 %, and as much off after the hold"},
       {"hysteresis", "%", 3.0, 0.0, 20.0,
        "loop of loading and unloading at any speed, as a share of the work of loading",

@@ -27,9 +27,8 @@
 //               force's contact slid, until three quarters of it stick again) and slip (all
 //               slides), as they come; of the first two none shorter than 5 ms
 //   t_begin_s t_end_s              on the scenario's clock
-//   x_mm y_mm force_N angle_deg    at its beginning, of the first contact; the force is what its travel asks for of
-//   rubber
-//                                  that has not relaxed
+//   x_mm y_mm force_N angle_deg    at its beginning, of the first contact; the force is what its
+//                                  travel asks for of rubber that has not relaxed
 //   x_end_mm y_end_mm force_end_N angle_end_deg   at its end
 //   x2_mm y2_mm force2_N force2_end_N   of the second contact; empty if there is none
 //   sensors_near                   grid: 1 above a sensor, 2 between two, 4 between four; else 0

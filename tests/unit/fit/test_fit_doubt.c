@@ -125,7 +125,7 @@ TEST(test_a_search_does_not_mix_frames) {
 }
 
 /* What is known of the pad's dip is taken out of the residual too. A calibration finds a wider one
- * than there is, since it can not tell a narrow one from zeros (DIP_PITCHES of the solver). */
+ * than there is, since it can not tell a narrow one from zeros (DIP_WIDTHS of the solver). */
 TEST(test_a_dip_that_is_known_is_no_force) {
   static const float known_mm[] = {15.0f, 20.7f};
   rubber.dip_share = 0.05;
