@@ -70,6 +70,7 @@ g++ g++
 git git
 pkg-config pkg-config
 python3 python3
+/usr/share/doc/python3-venv python3-venv
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
 /usr/include/fftw3.h libfftw3-dev
@@ -90,7 +91,6 @@ sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
-/usr/share/doc/python3-venv python3-venv
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
 LIST
@@ -124,7 +124,6 @@ cppcheck cppcheck
 openssl openssl
 /bin/ip iproute2
 LIST
-  [ -z "$own_node" ] || echo /usr/share/doc/python3-venv python3-venv
   # Ubuntu has no package of it; without it the page's tests report why they do not run.
   case $1.$(sed -n 's/^ID=//p' /etc/os-release) in nightly.debian) echo chromium chromium ;; esac
 }
@@ -208,6 +207,16 @@ if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; 
   note "fetching the emulator's one dependency with npm"
   (cd $emulator && npm ci --no-audit --no-fund --loglevel=error)
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
+fi
+
+if ! cmp -s cmake/mujoco.txt build/mujoco/.installed-requirements; then
+  note "fetching MuJoCo with pip into build/mujoco"
+  rm -rf build/mujoco
+  pip=build/node/venv/bin/pip
+  [ -x $pip ] || { /usr/bin/python3 -m venv build/mujoco/venv && pip=build/mujoco/venv/bin/pip; }
+  $pip --quiet --disable-pip-version-check install --no-deps --target build/mujoco -r cmake/mujoco.txt &&
+    cp cmake/mujoco.txt build/mujoco/.installed-requirements ||
+    echo "bootstrap: pip cannot fetch MuJoCo: fingertip simulate --lift and the reports on grasps will not run" >&2
 fi
 
 mkdir -p build

@@ -120,6 +120,8 @@ def main(argv):
             shutil.copy(build / f"fingertip-{board}.uf2", out / f"{name}-{board}-{scene}.uf2")
 
     print("tool, library and page", flush=True)
+    mujoco = source / "build/mujoco"
+    run(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", mujoco, "-r", source / "cmake/mujoco.txt")
     build = source / "build/host"
     run(
         "cmake",

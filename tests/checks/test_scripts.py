@@ -202,10 +202,12 @@ class Bootstrap(Folder):
         for path in ("package-lock.json", "node_modules/.installed-lock"):
             self.write(f"host_tools/simulation/emulator/{path}", "{}")
         self.write("tests/requirements.txt", "./absent\n")
+        self.write("cmake/mujoco.txt", "./absent\n")
         self.programs(ctest="echo tested")
         done = self.up_to_npm(job=("test",))
         self.assertEqual(done.returncode, 1)
         self.assertIn("absent", done.stderr)
+        self.assertIn("pip cannot fetch MuJoCo: fingertip simulate --lift", done.stderr)  # and it goes on
         self.assertNotIn("tested", done.stdout)
 
 
@@ -217,7 +219,12 @@ class BootstrapReport(Folder):
             (self.folder / folder).mkdir(parents=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
         self.write("host_tools/simulation/emulator/package-lock.json", "{}")
-        for path in ("tests/requirements.txt", "build/venv/.installed-requirements"):
+        for path in (
+            "tests/requirements.txt",
+            "build/venv/.installed-requirements",
+            "cmake/mujoco.txt",
+            "build/mujoco/.installed-requirements",
+        ):
             self.write(path, "")
         self.programs(apt_get="", sudo="", npm="", cmake="echo cmake version 3.25.1", node="echo v18.0.0")
         parts = ROOT / "host_tools/report"

@@ -6,8 +6,8 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
 #include "report/grasp/fault_trials.hpp"
-#include "report/grasp/oracle.hpp"
 #include "report/grasp/textbook.hpp"
+#include "simulation/cell/kind_trial.hpp"
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -156,26 +156,13 @@ Done run_one(const Options &options, std::uint64_t n, const std::function<void(c
   done.settings = settings_with(options, done.trial);
   const GripperTraits &traits = done.trial.gripper.traits;
   std::unique_ptr<Controller> controller;
-  std::function<void(const KindMoment &)> seen = trace;
-  if (options.controller == "oracle") {
-    std::unique_ptr<Knowing> oracle;
-    if (done.trial.still_s > 0.0) {
-      oracle = std::make_unique<StillOracle>(done.trial);
-    } else {
-      oracle = std::make_unique<Oracle>(done.trial, done.settings);
-    }
-    seen = [&trace, &knowing = *oracle](const KindMoment &moment) {
-      knowing.see(moment);
-      trace ? trace(moment) : void();
-    };
-    controller = std::move(oracle);
-  } else if (options.controller == "textbook") {
+  if (options.controller == "textbook") {
     controller = std::make_unique<Textbook>(traits);
   } else {
     controller = std::make_unique<CoreController>(done.settings, traits);
   }
   Timed timed(*controller);
-  done.outcome = run_kind(done.trial, timed, seen);
+  done.outcome = run_kind(done.trial, timed, trace);
   done.step_us = timed.mean_us();
   return done;
 }
@@ -184,6 +171,7 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
   const KindOfGrasp &grasp = one.trial.grasp;
   const KindOutcome &o = one.outcome;
   ordered_json line{{"n", n},
+                    {"shape", name_of(grasp.shape)},
                     {"mass_kg", grasp.mass_kg},
                     {"friction", grasp.pads[0].friction},
                     {"lift_s", grasp.lift_s},
@@ -195,6 +183,7 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                     {"slid_mm", o.slid_mm},
                     {"slides", o.slides},
                     {"friction_over_true", o.friction},
+                    {"turned_deg", o.turned_deg},
                     {"first_N", o.first_N},
                     {"peak_N", o.peak_N},
                     {"start_N", one.settings.start_N},
@@ -268,10 +257,8 @@ int run(int argc, char **argv) {
   app.add_option("--kind", options.kind, "gentle, usual, rough, slick, fragile; several, split by commas, by turns")
       ->capture_default_str();
   app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")->capture_default_str();
-  app.add_option("--controller", options.controller,
-                 "textbook; fixed: 15 N; paper: eq. (5) and (6) at 6 N; oracle: knows the true load, friction, "
-                 "stiffness and relaxation")
-      ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper", "oracle"}))
+  app.add_option("--controller", options.controller, "textbook; fixed: 15 N; paper: eq. (5) and (6) at 6 N")
+      ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper"}))
       ->capture_default_str();
   app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
   app.add_option("--later", options.later_ms, "All frames come later")->check(CLI::NonNegativeNumber)->type_name("MS");

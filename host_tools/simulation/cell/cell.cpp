@@ -1,197 +1,387 @@
 #include "simulation/cell/cell.hpp"
 
 #include "simulation/twin/effects.hpp"
-#include "simulation/twin/traction_table.hpp"
+#include "simulation/twin/traction.hpp"
+
+extern "C" {
+#include "config/geometry.h"
+}
 
 #include <algorithm>
 #include <cmath>
+#include <mujoco/mujoco.h>
+#include <mutex>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
 
 namespace fingertip::cell {
 namespace {
 
-constexpr double PER_M = 1e3;
-constexpr double SQUEEZE_STEP_mm = 0.005;
-// Stiffness of each foot, and its damping.
-constexpr double TABLE_N_mm = 20.0, TABLE_DAMPING = 0.3;
-constexpr double FEET_BELOW_mm = 40.0; // the centre of mass
+constexpr double M = 1e-3; // m per mm
+// Time constants of a contact, normal and along it. The equal ones that MuJoCo has by default lift a sliding face off
+// the object, by friction times twice the constant times its speed. A held object creeps with the second over the
+// ratio.
+constexpr double CONTACT_s = 1e-3, SLIDE_s = 20e-3, IMPRATIO = 1000.0;
+constexpr double GYRATION = 0.6;              // radius of, per half of the mean size
+constexpr double LOSS_s = 5e-4;               // of the rubber's normal spring
+constexpr double FREE_N_mm = 1.0;             // brings a free face back to its finger
+constexpr double JUMPS_mm = 5.0;              // a finger that is so far off was put there
+constexpr double RADIUS_mm = 4.0, AT_N = 4.0; // of contact, under that force
+constexpr double SPIN = 3.0 * M_PI / 16.0;    // torque that spins a Hertz contact, per radius, friction and force
+constexpr double FILTER_s = 1e-3;             // of speeds: contacts chatter in a slide, which rubber does not
+constexpr double LEAST_SHARE = 0.02;          // of the force: a point with less is not part of the patch
+constexpr double PAD_mm = 6.0, TABLE_ROLLS = 10.0, AWAY_m = 10.0, APART_mm = 200.0;
 
-Vector turned(const Vector &v, double rad) {
-  const double c = std::cos(rad), s = std::sin(rad);
-  return {c * v.x - s * v.y, s * v.x + c * v.y};
+double pad_half_x_mm() { return PAD_OVERHANG_mm + static_cast<double>(geometry.x_mm[SENSORS - 1]); }
+double pad_half_y_mm() { return PAD_OVERHANG_mm + std::abs(static_cast<double>(geometry.y_mm[0])); }
+
+struct Size {
+  const char *geom;
+  double x_mm, y_mm, z_mm; // half of it: along the grip's axis, level, upwards
+};
+Size size_of(const KindOfGrasp &grasp) {
+  const double w = 0.5 * grasp.width_mm, h = 0.5 * grasp.height_mm, d = 0.5 * grasp.depth_mm;
+  switch (grasp.shape) {
+  case Shape::ball:
+    return {"sphere", w, w, w};
+  case Shape::egg:
+    return {"ellipsoid", w, w, 1.3 * w};
+  case Shape::box:
+  case Shape::plate:
+    return {"box", w, d, h};
+  case Shape::lying:
+    return {"cylinder", w, h, w};
+  case Shape::upright:
+  case Shape::cup:
+    return {"cylinder", w, w, h};
+  }
+  return {"sphere", w, w, w};
+}
+
+std::string xml_of(const KindOfGrasp &grasp) {
+  const Size size = size_of(grasp);
+  const double gyration_mm = GYRATION * std::cbrt(size.x_mm * size.y_mm * size.z_mm);
+  const double turn = std::atan2(-std::cos(grasp.down_rad), -std::sin(grasp.down_rad));
+  const double c = std::cos(turn), s = std::sin(turn);
+  const double level_mm = c * grasp.place_mm.x - s * grasp.place_mm.y;
+  const double up_mm = s * grasp.place_mm.x + c * grasp.place_mm.y;
+  std::ostringstream xml;
+  xml.precision(12);
+  xml << "<mujoco><option timestep='" << Cell::STEP_s << "' integrator='implicitfast' cone='elliptic' impratio='"
+      << IMPRATIO
+      << "'><flag multiccd='enable' island='disable'/></option><default><geom contype='0' conaffinity='0'/><pair "
+         "solref='"
+      << CONTACT_s
+      << " 1' solimp='.95 .99 .0002'/></default><worldbody><geom name='table' type='plane' size='1 1 .1' pos='0 0 "
+      << -M * size.z_mm << "'/>"
+      << "<body name='object' pos='" << M * grasp.off_mm << " 0 0'><freejoint/><inertial pos='0 " << M * grasp.com_mm.x
+      << " " << M * grasp.com_mm.y << "' mass='" << grasp.mass_kg << "' diaginertia='";
+  for (int i = 0; i < 3; i++) {
+    xml << grasp.mass_kg * M * M * gyration_mm * gyration_mm << " ";
+  }
+  xml << "'/><geom name='thing' type='" << size.geom << "' size='" << M * size.x_mm << " ";
+  if (std::string(size.geom) == "cylinder") {
+    const bool lies = grasp.shape == Shape::lying;
+    xml << M * (lies ? size.y_mm : size.z_mm) << "'" << (lies ? " euler='90 0 0'" : "");
+  } else {
+    xml << M * size.y_mm << " " << M * size.z_mm << "'";
+  }
+  xml << "/></body>";
+  for (const int side : {-1, 1}) {
+    xml << "<body gravcomp='1' pos='" << side * M * (0.5 * grasp.width_mm + PAD_mm) << " " << -M * level_mm << " "
+        << -M * up_mm << "'><inertial pos='0 0 0' mass='" << Cell::FACE_kg << "' diaginertia='1e-6 1e-6 1e-6'/>"
+        << "<joint type='slide' axis='" << -side << " 0 0'/><joint type='slide' axis='0 1 0'/>"
+        << "<joint type='slide' axis='0 0 1'/><geom name='face" << (side > 0) << "' type='box' size='" << M * PAD_mm
+        << " " << M * pad_half_x_mm() << " " << M * pad_half_y_mm() << "' euler='" << turn * 180.0 / M_PI
+        << " 0 0'/></body>";
+  }
+  xml << "</worldbody><contact><pair geom1='thing' geom2='table' condim='6' friction='" << grasp.table_friction << " "
+      << grasp.table_friction << " .001 " << M * TABLE_ROLLS << " " << M * TABLE_ROLLS << "'/>";
+  for (const int side : {0, 1}) {
+    xml << "<pair name='pair" << side << "' geom1='thing' geom2='face" << side << "' condim='4' solreffriction='"
+        << SLIDE_s << " 1'/>";
+  }
+  xml << "</contact></mujoco>";
+  return xml.str();
+}
+
+struct FreeModel {
+  void operator()(mjModel *model) const { mj_deleteModel(model); }
+  void operator()(mjData *data) const { mj_deleteData(data); }
+};
+
+std::unique_ptr<mjModel, FreeModel> compiled(const KindOfGrasp &grasp) {
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
+  char why[500] = "";
+  mjSpec *spec = mj_parseXMLString(xml_of(grasp).c_str(), nullptr, why, sizeof why);
+  std::unique_ptr<mjModel, FreeModel> model(spec ? mj_compile(spec, nullptr) : nullptr);
+  const std::string error = spec ? mjs_getError(spec) : why;
+  mj_deleteSpec(spec);
+  if (!model) {
+    throw std::runtime_error("MuJoCo takes no such object: " + error);
+  }
+  return model;
 }
 
 } // namespace
 
-Cell::Cell(const Face &face, const Object &object, const Grasp &grasp)
-    : face_(face), object_(object), grasp_(grasp), down_{std::cos(grasp.down_rad), std::sin(grasp.down_rad)},
-      bundles_{Bundle(object.friction * (1.0 + object.uneven_friction), object.kinetic_share),
-               Bundle(object.friction * (1.0 - object.uneven_friction), object.kinetic_share)},
-      strength_(twin::relaxation_strengths(grasp.relaxation)), com_mm_(object.com_mm), mass_kg_(object.mass_kg),
-      table_mm_(object.mass_kg * GRAVITY_m_s2 / (2.0 * TABLE_N_mm)) {
-  // The squeeze over the force is the known direction.
-  const double gives = 1.0 / grasp.fingers_N_mm + 1.0 / object.stiffness_N_mm;
-  const auto squeezed = [&](double force_N) { return 2.0 * face_.indentation_mm(force_N) + gives * force_N; };
-  constexpr double FORCE_STEP_N = 0.002;
-  double force_N = 0.0;
-  force_by_squeeze_.push_back(0.0F);
-  for (double at_mm = SQUEEZE_STEP_mm; force_N < Face::FORCE_MAX_N; at_mm += SQUEEZE_STEP_mm) {
-    while (squeezed(force_N + FORCE_STEP_N) < at_mm && force_N < Face::FORCE_MAX_N) {
-      force_N += FORCE_STEP_N;
+struct Cell::World {
+  struct Point {
+    double level_m, up_m, force_N; // from the middle of the face
+  };
+  struct Pad {
+    KindOfPad kind;
+    double gives_mm_N;   // of finger and object
+    int face, pair, dof; // dof: the first of three, normal, level, upwards
+    std::array<double, 2> strength{}, follows_N{};
+    double elastic_N = 0.0, force_N = 0.0, shear_N_m = 0.0, friction = 0.0;
+    Vector load_N, slide_mm_s;
+    std::vector<Point> points;
+    bool slides = true;
+  };
+
+  explicit World(const KindOfGrasp &of) : grasp(of), model(compiled(of)), data(mj_makeData(model.get())) {
+    table = mj_name2id(model.get(), mjOBJ_GEOM, "table");
+    object = mj_name2id(model.get(), mjOBJ_BODY, "object");
+    turn = std::atan2(-std::cos(of.down_rad), -std::sin(of.down_rad));
+    table_m = model->geom_pos[3 * table + 2];
+    for (std::size_t i = 0; i < pads.size(); i++) {
+      pads[i].kind = of.pads[i];
+      pads[i].gives_mm_N = 0.5 / FINGERS_N_mm + 0.5 / of.stiffness_N_mm;
+      pads[i].face = mj_name2id(model.get(), mjOBJ_GEOM, i == 0 ? "face0" : "face1");
+      pads[i].pair = mj_name2id(model.get(), mjOBJ_PAIR, i == 0 ? "pair0" : "pair1");
+      pads[i].dof = model->body_dofadr[model->geom_bodyid[pads[i].face]];
+      pads[i].strength = twin::relaxation_strengths(of.pads[i].relaxation);
     }
-    const double below_mm = squeezed(force_N), above_mm = squeezed(force_N + FORCE_STEP_N);
-    force_by_squeeze_.push_back(
-        static_cast<float>(force_N + FORCE_STEP_N * (at_mm - below_mm) / std::max(above_mm - below_mm, 1e-12)));
+  }
+
+  double elastic_N(const Pad &pad, double pressed_mm) const {
+    // pressed = (F / A)^(1/n) + gives F, by Newton's steps from above.
+    double x = std::max(pressed_mm, 0.0);
+    for (int i = 0; i < 20 && x > 0.0; i++) {
+      const double force_N = pad.kind.at_1_mm_N * std::pow(x, grasp.exponent);
+      const double step =
+          (x + pad.gives_mm_N * force_N - pressed_mm) / (1.0 + pad.gives_mm_N * grasp.exponent * force_N / x);
+      x -= step;
+      if (std::abs(step) < 1e-9) {
+        break;
+      }
+    }
+    return pad.kind.at_1_mm_N * std::pow(std::max(x, 0.0), grasp.exponent);
+  }
+
+  void press(Pad &pad, double finger_mm, double finger_mm_s) {
+    double &at_m = data->qpos[model->jnt_qposadr[model->dof_jntid[pad.dof]]];
+    double &speed_m_s = data->qvel[pad.dof];
+    if (std::abs(finger_mm - at_m / M) > JUMPS_mm) {
+      at_m = M * finger_mm;
+      speed_m_s = 0.0;
+    }
+    const double pressed_mm = finger_mm - at_m / M;
+    pad.elastic_N = elastic_N(pad, pressed_mm);
+    double loss_N = 0.0;
+    for (std::size_t k = 0; k < pad.strength.size(); k++) {
+      pad.follows_N[k] += STEP_s / twin::Pad::TIMES_s[k] * (pad.elastic_N - pad.follows_N[k]);
+      loss_N += pad.strength[k] * pad.follows_N[k];
+    }
+    const double stiffness_N_m = pressed_mm > 0.0 ? grasp.exponent * pad.elastic_N / (M * pressed_mm) : 0.0;
+    const double damping = grasp.rubber_N_s_mm / M + LOSS_s * stiffness_N_m;
+    const double spring_N =
+        pressed_mm > 0.0 ? std::clamp(pad.elastic_N - loss_N, 0.0, pad.elastic_N) : FREE_N_mm * pressed_mm;
+    pad.force_N = pad.points.empty() ? 0.0 : std::max(spring_N, 0.0);
+    data->qfrc_applied[pad.dof] = spring_N + damping * M * finger_mm_s;
+    model->dof_damping[pad.dof] = damping;
+  }
+
+  void shear(Pad &pad) {
+    pad.shear_N_m = grasp.shear_N_mm / M * std::cbrt(std::max(pad.force_N, 0.05) / AT_N);
+    for (int k = 1; k < 3; k++) {
+      const int dof = pad.dof + k;
+      const double spring_N = pad.shear_N_m * data->qpos[model->jnt_qposadr[model->dof_jntid[dof]]];
+      data->qfrc_applied[dof] = -spring_N;
+      model->dof_damping[dof] = grasp.rubber_N_s_mm / M;
+      (k == 1 ? pad.load_N.x : pad.load_N.y) =
+          pad.points.empty() ? 0.0 : spring_N + grasp.rubber_N_s_mm / M * data->qvel[dof];
+    }
+  }
+
+  // Friction of the next step, by the speed of this one.
+  void rub(Pad &pad, double friction_share) {
+    const double speed = std::hypot(pad.slide_mm_s.x, pad.slide_mm_s.y);
+    const double falls = pad.slides ? std::exp(-std::pow(speed / grasp.stribeck_mm_s, 2)) : 1.0;
+    pad.friction = friction_share * pad.kind.friction * (grasp.kinetic_share + (1.0 - grasp.kinetic_share) * falls);
+    mjtNum *friction = &model->pair_friction[5 * pad.pair];
+    friction[0] = friction[1] = pad.friction;
+    friction[2] = SPIN * pad.friction * M * RADIUS_mm * std::cbrt(pad.force_N / AT_N);
+  }
+
+  // Where it touches, and how fast the object slides there.
+  void look(Pad &pad) {
+    pad.points.clear();
+    const mjtNum *middle = &data->geom_xpos[3 * pad.face];
+    double sum_N = 0.0, level_m = 0.0, up_m = 0.0;
+    for (int i = 0; i < data->ncon; i++) {
+      const mjContact &contact = data->contact[i];
+      if (contact.geom[0] != pad.face && contact.geom[1] != pad.face) {
+        continue;
+      }
+      mjtNum wrench[6];
+      mj_contactForce(model.get(), data.get(), i, wrench);
+      const Point point{contact.pos[1] - middle[1], contact.pos[2] - middle[2], std::max(wrench[0], 1e-9)};
+      sum_N += point.force_N;
+      level_m += point.force_N * point.level_m;
+      up_m += point.force_N * point.up_m;
+      pad.points.push_back(point);
+    }
+    Vector slide;
+    if (!pad.points.empty()) {
+      const double arm_y = level_m / sum_N + middle[1] - data->xpos[3 * object + 1];
+      const double arm_z = up_m / sum_N + middle[2] - data->xpos[3 * object + 2];
+      const double arm_x = middle[0] - data->xpos[3 * object]; // to the face, less its thickness
+      const double at_x = arm_x + (arm_x > 0.0 ? -M * PAD_mm : M * PAD_mm);
+      const int dof = model->body_dofadr[object];
+      mjtNum spin[3];
+      mju_mulMatVec3(spin, &data->xmat[9 * object], &data->qvel[dof + 3]);
+      slide.x = (data->qvel[dof + 1] + spin[2] * at_x - spin[0] * arm_z - data->qvel[pad.dof + 1]) / M;
+      slide.y = (data->qvel[dof + 2] + spin[0] * arm_y - spin[1] * at_x - data->qvel[pad.dof + 2]) / M;
+    }
+    const double share = STEP_s / FILTER_s;
+    pad.slide_mm_s.x += share * (slide.x - pad.slide_mm_s.x);
+    pad.slide_mm_s.y += share * (slide.y - pad.slide_mm_s.y);
+    pad.slides = pad.points.empty() || std::hypot(pad.slide_mm_s.x, pad.slide_mm_s.y) > SLIDES_mm_s;
+  }
+
+  void step(double width_mm, const KindOfGrasp::Inputs &inputs) {
+    const double finger_mm = 0.5 * (grasp.width_mm - width_mm);
+    const bool jumps = std::abs(finger_mm - finger_before_mm) > JUMPS_mm;
+    const double finger_mm_s = jumps ? 0.0 : (finger_mm - finger_before_mm) / STEP_s;
+    finger_before_mm = finger_mm;
+    if (finger_mm < -APART_mm) { // nothing is between the fingers
+      for (Pad &pad : pads) {
+        pad.points.clear();
+        pad.force_N = 0.0;
+        pad.load_N = {};
+      }
+      return;
+    }
+    for (Pad &pad : pads) {
+      press(pad, finger_mm, finger_mm_s);
+      shear(pad);
+      rub(pad, inputs.friction_share);
+    }
+    const double heavier = inputs.mass_kg / model->body_mass[object];
+    model->body_mass[object] *= heavier;
+    for (int k = 0; k < 3; k++) {
+      model->body_inertia[3 * object + k] *= heavier;
+    }
+    model->opt.gravity[1] = -inputs.hand_m_s2.x;
+    model->opt.gravity[2] = -GRAVITY_m_s2 - inputs.hand_m_s2.y;
+    data->xfrc_applied[6 * object + 1] = inputs.push_N.x;
+    data->xfrc_applied[6 * object + 2] = inputs.push_N.y;
+    model->geom_pos[3 * table + 2] = table_m - (inputs.table ? M * inputs.lifted_mm : AWAY_m);
+    mj_step(model.get(), data.get());
+    for (Pad &pad : pads) {
+      look(pad);
+    }
+    if (pads[0].slides && pads[1].slides) {
+      const Vector &one = pads[0].slide_mm_s, &other = pads[1].slide_mm_s;
+      slid_mm += 0.5 * STEP_s * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y));
+    }
+  }
+
+  double turned_rad() const {
+    const mjtNum *turned = &data->xquat[4 * object];
+    return 2.0 * std::atan2(turned[1], turned[0]);
+  }
+
+  const KindOfGrasp &grasp;
+  std::unique_ptr<mjModel, FreeModel> model;
+  std::unique_ptr<mjData, FreeModel> data;
+  std::array<Pad, 2> pads;
+  int table, object;
+  double turn, table_m; // turn: from the hand's x to fingertip 0's
+  double due_s = 0.0, finger_before_mm = 1e9, slid_mm = 0.0;
+};
+
+Cell::Cell(const KindOfGrasp &grasp) : world_(std::make_unique<World>(grasp)) {}
+Cell::~Cell() = default;
+
+void Cell::run(double seconds, double width_mm, const KindOfGrasp::Inputs &inputs) {
+  world_->due_s += seconds;
+  for (; world_->due_s > 0.5 * STEP_s; world_->due_s -= STEP_s) {
+    world_->step(width_mm, inputs);
   }
 }
 
-double Cell::elastic_N(double squeezed_mm) const {
-  if (!(squeezed_mm > 0.0)) {
-    return 0.0;
-  }
-  const double at = squeezed_mm / SQUEEZE_STEP_mm;
-  const std::size_t i = static_cast<std::size_t>(at);
-  if (i + 1 >= force_by_squeeze_.size()) {
-    return static_cast<double>(force_by_squeeze_.back());
-  }
-  const double t = at - static_cast<double>(i);
-  return (1.0 - t) * static_cast<double>(force_by_squeeze_[i]) + t * static_cast<double>(force_by_squeeze_[i + 1]);
-}
+double Cell::force_N(std::size_t finger) const { return world_->pads[finger].force_N; }
 
 double Cell::force_at_N(double width_mm) const {
-  // What has relaxed by now stays away.
-  const double elastic = elastic_N(object_.width_mm - width_mm);
-  return std::max(0.0, elastic - (elastic_N_ - force_N_));
-}
-
-void Cell::press(double seconds, double width_mm) {
-  const double elastic = elastic_N(object_.width_mm - width_mm);
-  double loss_N = 0.0;
-  for (std::size_t i = 0; i < strength_.size(); i++) {
-    // Trapezoid: steps are a ten-thousandth of the times.
-    const double share = seconds / twin::Pad::TIMES_s[i];
-    follows_N_[i] += share * (0.5 * (elastic + elastic_N_) - follows_N_[i]);
-    loss_N += strength_[i] * follows_N_[i];
+  double force_N = 0.0;
+  const double along_mm = world_->data->xpos[3 * world_->object] / M;
+  for (std::size_t i = 0; i < world_->pads.size(); i++) {
+    const World::Pad &pad = world_->pads[i];
+    const double pressed_mm = 0.5 * (world_->grasp.width_mm - width_mm) + (i == 0 ? -along_mm : along_mm);
+    force_N = std::max(force_N, world_->elastic_N(pad, pressed_mm) - std::max(pad.elastic_N - pad.force_N, 0.0));
   }
-  elastic_N_ = elastic;
-  force_N_ = std::clamp(elastic - loss_N, 0.0, elastic);
+  return force_N;
 }
 
-Vector Cell::arm() const { return turned(object_.com_mm, turn_rad_); }
+Vector Cell::load_N(std::size_t finger) const { return world_->pads[finger].load_N; }
 
 Vector Cell::way_mm() const {
-  const Vector to = arm();
-  return {com_mm_.x - to.x, com_mm_.y - to.y};
+  const mjtNum *at = &world_->data->xpos[3 * world_->object];
+  return {at[1] / M, at[2] / M};
 }
 
-// On the centre of mass.
-Wrench Cell::table(const Drive &drive) {
-  table_N_ = 0.0;
-  Wrench sum;
-  if (!drive.table) {
-    return sum;
+double Cell::turned_rad() const { return world_->turned_rad(); }
+bool Cell::slips() const { return world_->pads[0].slides && world_->pads[1].slides; }
+double Cell::slid_mm() const { return world_->slid_mm; }
+double Cell::friction(std::size_t finger) const { return world_->pads[finger].friction; }
+
+Patch Cell::patch(std::size_t finger) const {
+  const World::Pad &pad = world_->pads[finger];
+  Patch patch;
+  if (pad.points.empty() || pad.force_N <= 0.0) {
+    return patch;
   }
-  const double damping = 2.0 * TABLE_DAMPING * std::sqrt(0.5 * mass_kg_ * TABLE_N_mm / PER_M); // N s/mm
-  const Vector along{-down_.y, down_.x};
-  for (const double side : {-0.5, 0.5}) {
-    const Vector foot{FEET_BELOW_mm * down_.x + side * object_.base_mm * along.x,
-                      FEET_BELOW_mm * down_.y + side * object_.base_mm * along.y};
-    const Vector now = turned(foot, turn_rad_);
-    const Vector moved{com_mm_.x - object_.com_mm.x + now.x - foot.x, com_mm_.y - object_.com_mm.y + now.y - foot.y};
-    const Vector speed{com_mm_s_.x - turning_ * now.y, com_mm_s_.y + turning_ * now.x};
-    const double depth_mm = table_mm_ + moved.dot(down_) - drive.lifted_mm;
-    const double closing_mm_s = speed.dot(down_) - drive.lift_mm_s;
-    if (depth_mm <= 0.0) {
+  // Along the object's own level axis, and across: extents, and the centre of pressure.
+  const double turned = world_->turned_rad(), c = std::cos(turned), s = std::sin(turned);
+  double all_N = 0.0, u_mm = 0.0, v_mm = 0.0;
+  double u_low = 1e9, u_high = -1e9, v_low = 1e9, v_high = -1e9;
+  for (const World::Point &point : pad.points) {
+    all_N += point.force_N;
+  }
+  for (const World::Point &point : pad.points) {
+    if (point.force_N < LEAST_SHARE * all_N) {
       continue;
     }
-    const double push_N = std::max(0.0, TABLE_N_mm * depth_mm + damping * closing_mm_s);
-    table_N_ += push_N;
-    const Vector force{-push_N * down_.x, -push_N * down_.y};
-    sum.x_N += force.x;
-    sum.y_N += force.y;
-    sum.turn_Nmm += now.x * force.y - now.y * force.x;
+    const double u = (c * point.level_m + s * point.up_m) / M, v = (c * point.up_m - s * point.level_m) / M;
+    u_mm += point.force_N / all_N * u;
+    v_mm += point.force_N / all_N * v;
+    u_low = std::min(u_low, u), u_high = std::max(u_high, u);
+    v_low = std::min(v_low, v), v_high = std::max(v_high, v);
   }
-  return sum;
-}
-
-void Cell::step(double seconds, const Drive &drive) {
-  press(seconds, drive.width_mm);
-  mass_kg_ = drive.mass_kg;
-  const double radius_mm = face_.radius_mm(force_N_);
-  const double stiffness_N_mm = grasp_.shear_N_mm2 * radius_mm;
-  Wrench held;
-  const Motion motion{speed_.x, speed_.y, turning_};
-  for (std::size_t f = 0; f < bundles_.size(); f++) {
-    const double uneven = f == 0 ? object_.uneven_friction : -object_.uneven_friction;
-    bundles_[f].set_friction(object_.friction * (1.0 + uneven) * drive.friction_share);
-    const Wrench one = bundles_[f].step(seconds, force_N_, stiffness_N_mm, radius_mm, motion);
-    held.x_N += one.x_N;
-    held.y_N += one.y_N;
-    held.turn_Nmm += one.turn_Nmm;
-  }
-  const Wrench feet = table(drive);
-  const Vector outer_N{mass_kg_ * (GRAVITY_m_s2 * down_.x - drive.hand_m_s2.x) + drive.knock_N.x,
-                       mass_kg_ * (GRAVITY_m_s2 * down_.y - drive.hand_m_s2.y) + drive.knock_N.y};
-  const Vector to_com = arm();
-  const double inertia_kg_mm2 = mass_kg_ * object_.gyration_mm * object_.gyration_mm;
-  const double torque_Nmm = held.turn_Nmm + feet.turn_Nmm - (to_com.x * held.y_N - to_com.y * held.x_N);
-  const Vector before = com_mm_s_;
-  com_mm_s_.x += PER_M * (outer_N.x + held.x_N + feet.x_N) / mass_kg_ * seconds;
-  com_mm_s_.y += PER_M * (outer_N.y + held.y_N + feet.y_N) / mass_kg_ * seconds;
-  turning_ += PER_M * torque_Nmm / inertia_kg_mm2 * seconds;
-  const Vector mean{0.5 * (before.x + com_mm_s_.x), 0.5 * (before.y + com_mm_s_.y)};
-  work_mJ_ += outer_N.dot(mean) * seconds;
-  table_lost_mJ_ -= (feet.x_N * mean.x + feet.y_N * mean.y + feet.turn_Nmm * turning_) * seconds;
-  com_mm_.x += com_mm_s_.x * seconds;
-  com_mm_.y += com_mm_s_.y * seconds;
-  turn_rad_ += turning_ * seconds;
-  const Vector now = arm();
-  speed_ = {com_mm_s_.x + turning_ * now.y, com_mm_s_.y - turning_ * now.x};
-  if (slips()) {
-    slid_mm_ += std::hypot(speed_.x, speed_.y) * seconds;
-  }
-}
-
-void Cell::run(double seconds, const Drive &drive) {
-  constexpr double SLOW_mm_s = 20.0;
-  for (double left_s = seconds; left_s > 0.0;) {
-    const bool fast = bundles_[0].slips() || bundles_[1].slips() || std::abs(speed_.x) + std::abs(speed_.y) > SLOW_mm_s;
-    const double longest_s = fast ? SLIP_s : REST_s;
-    // Equal parts, so that no step is a mere remainder.
-    const double parts = std::ceil(left_s / longest_s - 1e-9);
-    const double step_s = left_s / std::max(parts, 1.0);
-    step(step_s, drive);
-    left_s = parts > 1.0 ? left_s - step_s : 0.0;
-  }
-}
-
-twin::Touch Cell::touch(std::size_t finger) const {
-  const Bundle &bundle = bundles_[finger];
-  const Vector way = way_mm();
   const double mirror = finger == 0 ? 1.0 : -1.0;
-  twin::Touch touch;
-  touch.force_N = force_N_;
-  touch.x_mm = mirror * (grasp_.place_mm.x + way.x);
-  touch.y_mm = grasp_.place_mm.y + way.y;
-  touch.angle_rad = mirror * (grasp_.angle_rad + turn_rad_);
-  touch.pull_x_N = mirror * bundle.pull_x_N();
-  touch.pull_y_N = bundle.pull_y_N();
-  touch.stuck_N = bundle.slips()
-                      ? 0.0
-                      : twin::stuck_force_N(force_N_, std::hypot(touch.pull_x_N, touch.pull_y_N), bundle.friction());
-  return touch;
-}
-
-Cell::Energy Cell::energy() const {
-  Energy energy;
-  energy.work = work_mJ_;
-  energy.kinetic = 0.5 * mass_kg_ / PER_M *
-                   (com_mm_s_.dot(com_mm_s_) + object_.gyration_mm * object_.gyration_mm * turning_ * turning_);
-  energy.lost = table_lost_mJ_;
-  for (const Bundle &bundle : bundles_) {
-    energy.elastic += bundle.elastic_mJ(grasp_.shear_N_mm2 * face_.radius_mm(force_N_));
-    energy.lost += bundle.lost_mJ();
-  }
-  return energy;
+  const double tc = std::cos(world_->turn), ts = std::sin(world_->turn);
+  const auto in_own = [&](double level, double up) {
+    return Vector{mirror * (tc * level + ts * up), tc * up - ts * level};
+  };
+  const Vector at = in_own(c * u_mm - s * v_mm, s * u_mm + c * v_mm), pull = in_own(pad.load_N.x, pad.load_N.y);
+  patch.force_N = pad.force_N;
+  patch.x_mm = at.x;
+  patch.y_mm = at.y;
+  patch.angle_rad = mirror * (turned - world_->turn);
+  patch.pull_x_N = pull.x;
+  patch.pull_y_N = pull.y;
+  const double pull_N = std::hypot(pull.x, pull.y);
+  patch.stuck_N = pad.slides ? 0.0 : twin::stuck_force_N(pad.force_N, pull_N, pad.friction);
+  patch.length_mm = u_high - u_low;
+  patch.width_mm = v_high - v_low;
+  patch.off_length_mm = mirror * (u_mm - 0.5 * (u_low + u_high));
+  patch.off_width_mm = v_mm - 0.5 * (v_low + v_high);
+  return patch;
 }
 
 } // namespace fingertip::cell

@@ -12,9 +12,9 @@
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/names.hpp"
 #include "library/pad/profile.hpp"
+#include "simulation/cell/cell.hpp"
 #include "simulation/cell/controller.hpp"
 #include "simulation/cell/gripper_line.hpp"
-#include "simulation/cell/kinds.hpp"
 #include "simulation/cell/slips.hpp"
 
 extern "C" {
@@ -149,30 +149,25 @@ private:
 };
 
 struct EmulatedTrial {
-  Object object;
-  Grasp grasp;
-  KindOfGrasp course; // the lift and the events
+  KindOfGrasp grasp;
   GripperMechanics gripper;
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
 EmulatedTrial trial_of(const Options &options) {
   EmulatedTrial trial;
-  trial.object.width_mm = 40.0;
-  trial.object.mass_kg = trial.course.mass_kg = 0.3;
-  trial.object.friction = FRICTION;
-  trial.object.uneven_friction = 0.03;
-  trial.object.com_mm = {3.0, 1.0};
-  trial.grasp.place_mm = {0.8, -1.5};
-  trial.grasp.angle_rad = 0.3;
-  trial.grasp.down_rad = 0.4;
-  KindOfGrasp &course = trial.course;
-  course.opens_mm = 1.0;
-  course.waits_s = 0.05;
-  course.lift_mm = 4.0;
-  course.lift_s = 0.5;
-  course.events = {{Event::Kind::slick, course.lift_s + 0.1, 0.03, options.friction_falls}};
-  course.ends_s = course.lift_s + 0.4;
+  KindOfGrasp &grasp = trial.grasp;
+  grasp.pads[0].friction = 1.03 * FRICTION;
+  grasp.pads[1].friction = 0.97 * FRICTION;
+  grasp.com_mm = {3.0, 1.0};
+  grasp.place_mm = {0.8, -1.5};
+  grasp.down_rad = 0.4;
+  grasp.opens_mm = 1.0;
+  grasp.waits_s = 0.05;
+  grasp.lift_mm = 4.0;
+  grasp.lift_s = 0.5;
+  grasp.events = {{Event::Kind::slick, grasp.lift_s + 0.1, 0.03, options.friction_falls}};
+  grasp.ends_s = grasp.lift_s + 0.4;
   trial.gripper = gripper_mechanics(gripper_models().front().model);
   return trial;
 }
@@ -188,8 +183,8 @@ class EmulatedGrasp {
 public:
   // All must outlive it.
   EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
-      : trial_(trial), face_(face), cell_(face, trial.object, trial.grasp),
-        gripper_(trial.gripper, trial.object.width_mm + trial.course.opens_mm, Random(SEED, LINE, 0)),
+      : trial_(trial), face_(face), cell_(trial.grasp),
+        gripper_(trial.gripper, trial.grasp.width_mm + trial.grasp.opens_mm, Random(SEED, LINE, 0)),
         fingers_{EmulatedFingertip(profile, Random(SEED, PAD, 0)), EmulatedFingertip(profile, Random(SEED, PAD, 1))} {
     gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
       return force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
@@ -244,7 +239,7 @@ public:
   Bytes to_send(std::size_t finger) { return fingers_[finger].to_send(std::llround(1e6 * t_s_)); }
   // The present pressures of the sensors.
   Pressures sensed_Pa(std::size_t finger) const {
-    return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.touch(finger)));
+    return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.patch(finger)));
   }
   bool over() const { return over_; }
 
@@ -301,27 +296,26 @@ private:
     if (seconds <= 0.0) {
       return;
     }
-    if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.course.waits_s) {
+    if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.grasp.waits_s) {
       lift_s_ = t_s_;
     }
     const bool lifts = lift_s_ < NEVER_s;
     const double width_mm = gripper_.motion().width_mm();
     gripper_.motion().step(seconds);
-    const KindOfGrasp::Inputs inputs = trial_.course.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
-    Drive drive = drive_of(inputs, trial_.grasp.down_rad);
-    drive.width_mm = gripper_.motion().width_mm();
-    cell_.run(seconds, drive);
+    const KindOfGrasp::Inputs inputs = trial_.grasp.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
+    const double moved_mm = gripper_.motion().width_mm();
+    cell_.run(seconds, moved_mm, inputs);
     t_s_ = to_s;
-    if (drive.width_mm != width_mm) {
-      moved_.push_back({t_s_, drive.width_mm});
+    if (moved_mm != width_mm) {
+      moved_.push_back({t_s_, moved_mm});
     }
-    const double force_N = cell_.force_N();
+    const double force_N = cell_.mean_N();
     if (lifts) {
       slips_.sample(t_s_, cell_.slips(), force_N, cell_.slid_mm());
     }
     const Vector way = cell_.way_mm();
-    dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !drive.table && force_N < LOST_N);
-    over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.course.ends_s);
+    dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !inputs.table && force_N < LOST_N);
+    over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.grasp.ends_s);
     if (over_) {
       slips_.end();
     }
@@ -437,8 +431,8 @@ int serve(const Options &options) {
   ordered_json out;
   out["gripper"] = trial.gripper.traits.model;
   out["face"] = FACE;
-  out["mass_kg"] = trial.object.mass_kg;
-  out["friction"] = trial.object.friction;
+  out["mass_kg"] = trial.grasp.mass_kg;
+  out["friction"] = FRICTION;
   out["friction_falls"] = options.friction_falls;
   out.update(grasp.summary());
   const std::string text = out.dump();

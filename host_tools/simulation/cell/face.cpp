@@ -6,61 +6,73 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace fingertip::cell {
 
-Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache) {
-  const twin::Layer layer = twin::silicone(layer_mm);
-  if (name == "plate") {
-    make_plate(layer);
-    return;
-  }
-  table_ = twin::ContactTable::load_or_build(twin::indenter(name), layer, cache);
-  traction_.emplace(*table_, layer);
-}
+Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache)
+    : layer_mm_(layer_mm),
+      table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(layer_mm), cache)),
+      traction_(table_, twin::silicone(layer_mm)) {}
 
-void Face::make_plate(const twin::Layer &layer) {
-  double half_x_mm = PAD_OVERHANG_mm, half_y_mm = PAD_OVERHANG_mm;
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    half_x_mm = std::max(half_x_mm, PAD_OVERHANG_mm + static_cast<double>(geometry.x_mm[k]));
-    half_y_mm = std::max(half_y_mm, PAD_OVERHANG_mm + static_cast<double>(geometry.y_mm[k]));
-  }
-  plate_.emplace(layer, half_x_mm, half_y_mm);
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    const double x = static_cast<double>(geometry.x_mm[k]);
-    const double y = static_cast<double>(geometry.y_mm[k]);
-    plate_Pa_N_.push_back({plate_->normal_Pa_N(x, y), plate_->along_x_Pa_N(x), plate_->along_y_Pa_N(y)});
-  }
-}
-
-double Face::indentation_mm(double force_N) const {
-  return plate_ ? std::min(force_N, FORCE_MAX_N) / plate_->stiffness_N_mm() : table_->indentation_mm(force_N);
-}
-
-double Face::radius_mm(double force_N) const {
-  return plate_ ? plate_->radius_mm() : table_->contact_radius_mm(std::max(force_N, twin::ContactTable::FORCE_MIN_N));
-}
-
-Pressures Face::base_Pa(const twin::Touch &touch) const {
+Pressures Face::base_Pa(const Patch &patch) const {
   Pressures base_Pa{};
-  if (!(touch.force_N > 0.0)) {
+  if (!(patch.force_N > 0.0)) {
     return base_Pa;
   }
+  // Nodes in the middle of equal parts; their weights give the centre of pressure.
+  struct Node {
+    double u_mm, v_mm, weight;
+  };
+  const auto parts = [](double mm) { return static_cast<int>(std::ceil(mm / NODE_mm + 0.5)); };
+  const int along = parts(patch.length_mm), across = parts(patch.width_mm);
+  const double a_mm = 0.5 * patch.length_mm, b_mm = 0.5 * patch.width_mm;
+  std::vector<Node> nodes;
+  double sum = 0.0;
+  for (int i = 0; i < along; i++) {
+    for (int j = 0; j < across; j++) {
+      const double u = a_mm * ((2 * i + 1.0) / along - 1.0), v = b_mm * ((2 * j + 1.0) / across - 1.0);
+      const double held_in = 2.0 / (layer_mm_ * layer_mm_) * (a_mm * a_mm - u * u) * (b_mm * b_mm - v * v) /
+                             std::max(a_mm * a_mm + b_mm * b_mm, 1e-9);
+      nodes.push_back({u, v, 1.0 + held_in});
+      sum += nodes.back().weight;
+    }
+  }
+  double uu = 0.0, vv = 0.0;
+  for (Node &node : nodes) {
+    node.weight /= sum;
+    uu += node.weight * node.u_mm * node.u_mm;
+    vv += node.weight * node.v_mm * node.v_mm;
+  }
+  const double tilt_u = uu > 0.0 ? patch.off_length_mm / uu : 0.0, tilt_v = vv > 0.0 ? patch.off_width_mm / vv : 0.0;
+  sum = 0.0;
+  for (Node &node : nodes) {
+    node.weight *= std::max(1.0 + tilt_u * node.u_mm + tilt_v * node.v_mm, 0.0);
+    sum += node.weight;
+  }
+  const double c = std::cos(patch.angle_rad), s = std::sin(patch.angle_rad);
+  for (const Node &node : nodes) {
+    const double share = node.weight / sum;
+    if (share > 0.0) {
+      const double u = node.u_mm - patch.off_length_mm, v = node.v_mm - patch.off_width_mm;
+      add({share * patch.force_N, patch.x_mm + c * u - s * v, patch.y_mm + s * u + c * v, patch.angle_rad,
+           share * patch.pull_x_N, share * patch.pull_y_N, share * patch.stuck_N},
+          base_Pa);
+    }
+  }
+  return base_Pa;
+}
+
+void Face::add(const twin::Touch &touch, Pressures &base_Pa) const {
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
   const twin::TractionLoad load{touch.force_N, touch.stuck_N, c * touch.pull_x_N + s * touch.pull_y_N,
                                 c * touch.pull_y_N - s * touch.pull_x_N};
   for (std::size_t k = 0; k < SENSORS; k++) {
-    if (plate_) {
-      const auto [down, along_x, along_y] = plate_Pa_N_[k];
-      base_Pa[k] = touch.force_N * down + touch.pull_x_N * along_x + touch.pull_y_N * along_y;
-      continue;
-    }
     const double dx = static_cast<double>(geometry.x_mm[k]) - touch.x_mm;
     const double dy = static_cast<double>(geometry.y_mm[k]) - touch.y_mm;
     const double x = c * dx + s * dy, y = c * dy - s * dx;
-    base_Pa[k] = table_->base_pressure_Pa(touch.force_N, x, y) + traction_->base_pressure_Pa(load, x, y);
+    base_Pa[k] += table_.base_pressure_Pa(touch.force_N, x, y) + traction_.base_pressure_Pa(load, x, y);
   }
-  return base_Pa;
 }
 
 } // namespace fingertip::cell

@@ -1,45 +1,48 @@
-// What a fingertip's rubber meets: the face of an object, from the twin's tables.
+// What a fingertip's rubber meets: a patch of an object, its pressures from the twin's tables.
 //
-// A face is one of the twin's indenters (twin/indenter.hpp) on a layer without end: how deep it
-// goes in and how wide it touches under a force, and what the fifteen sensors feel of it wherever
-// it is and however it pulls. Or it is `plate`, a flat larger than the pad: plate.hpp.
+// A face is one of the twin's indenters (twin/indenter.hpp) on a layer without end, and what the fifteen
+// sensors feel of it wherever it is and however it pulls. A line or an area is as many of them side by
+// side: the base's pressures add up, and rubber as thick as their distance does not tell them apart. On an
+// area wider than the layer the middle carries more, as Gent and Lindley's bonded block does ("The
+// compression of bonded rubber blocks", Proc. Inst. Mech. Eng. 173, 1959; for rectangles Gent and Meinecke,
+// Polymer Eng. Sci. 10, 1970): p = E strain (1 + P), Laplacian of P = -4 / h^2.
 #pragma once
 
-#include "simulation/cell/plate.hpp"
 #include "simulation/twin/traction_table.hpp"
 #include "simulation/twin/trajectory.hpp"
 
 #include <array>
 #include <filesystem>
-#include <optional>
 #include <string>
-#include <vector>
 
 namespace fingertip::cell {
 
 constexpr std::size_t SENSORS = 15;
 using Pressures = std::array<double, SENSORS>; // Pa, on the base
 
+// Its place is the centre of pressure, its angle that of its length.
+struct Patch : twin::Touch {
+  double length_mm = 0.0, width_mm = 0.0;         // both 0: a point
+  double off_length_mm = 0.0, off_width_mm = 0.0; // of the centre of pressure from the middle
+};
+
 class Face {
 public:
-  static constexpr double FORCE_MAX_N = 50.0;
-
   // Solved once and kept in the cache (contact_table.hpp). Throws std::runtime_error for a name
   // that there is not.
   Face(const std::string &name, double layer_mm, const std::filesystem::path &cache);
 
-  // 0..FORCE_MAX_N; beyond, as there.
-  double indentation_mm(double force_N) const;
-  double radius_mm(double force_N) const; // of contact
-  Pressures base_Pa(const twin::Touch &touch) const;
+  // Some 5 us for each NODE_mm of a line, 100 us for an area of the pad's size.
+  Pressures base_Pa(const Patch &patch) const;
 
 private:
-  void make_plate(const twin::Layer &layer);
+  static constexpr double NODE_mm = 8.0; // apart at most: two thirds of the usual thickness
 
-  std::optional<twin::ContactTable> table_; // or the plate
-  std::optional<twin::TractionTable> traction_;
-  std::optional<Plate> plate_;
-  std::vector<std::array<double, 3>> plate_Pa_N_; // [sensor], down, along x, along y
+  void add(const twin::Touch &touch, Pressures &base_Pa) const;
+
+  double layer_mm_;
+  twin::ContactTable table_;
+  twin::TractionTable traction_;
 };
 
 } // namespace fingertip::cell

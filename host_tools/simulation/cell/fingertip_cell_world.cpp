@@ -31,16 +31,12 @@ Event event_of(Event::Kind kind, double begin_s, double amount) {
   return {kind, begin_s, known->seconds, amount};
 }
 
-KindOfGrasp course_of(const World::Options &options) {
-  KindOfGrasp course = options.course;
-  const Object &object = options.object;
-  course.mass_kg = object.mass_kg;
-  course.pads[0].friction = object.friction * (1.0 + object.uneven_friction);
-  course.pads[1].friction = object.friction * (1.0 - object.uneven_friction);
+KindOfGrasp grasp_of(const World::Options &options) {
+  KindOfGrasp grasp = options.grasp;
   for (const Planned &one : options.planned) {
-    course.events.push_back(event_of(one.kind, course.lift_s + one.after_s, one.amount));
+    grasp.events.push_back(event_of(one.kind, grasp.lift_s + one.after_s, one.amount));
   }
-  return course;
+  return grasp;
 }
 
 } // namespace
@@ -69,23 +65,8 @@ bool is_disturbance(const std::string &name) {
   return std::any_of(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return name == name_of(one.kind); });
 }
 
-void World::be_of_kind(Options &options, const KindOfGrasp &grasp) {
-  const double left = grasp.pads[0].friction, right = grasp.pads[1].friction;
-  Object &object = options.object;
-  object.width_mm = grasp.width_mm;
-  object.mass_kg = grasp.mass_kg;
-  object.friction = 0.5 * (left + right);
-  object.uneven_friction = (left - right) / (left + right);
-  object.kinetic_share = grasp.kinetic_share;
-  object.crushes_N = grasp.crushes_N;
-  options.grasp.relaxation = 0.5 * (grasp.pads[0].relaxation + grasp.pads[1].relaxation);
-  options.course = grasp;
-  options.kind = grasp.kind;
-}
-
 World::World(const Options &options, const Face &face, GripperMotion &motion)
-    : options_(options), course_(course_of(options)), face_(face), motion_(motion),
-      cell_(face, options.object, options.grasp) {
+    : options_(options), grasp_(grasp_of(options)), face_(face), motion_(motion), cell_(grasp_) {
   motion.blocked_at = [this](double width_mm, double force_N) {
     return is_there_ && force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
   };
@@ -101,10 +82,10 @@ bool World::lift() {
 }
 
 bool World::disturb(Event::Kind kind, double amount) {
-  if (since_lift_s() < course_.lift_s || !is_there_) {
+  if (since_lift_s() < grasp_.lift_s || !is_there_) {
     return false;
   }
-  course_.events.push_back(event_of(kind, since_lift_s(), amount));
+  grasp_.events.push_back(event_of(kind, since_lift_s(), amount));
   return true;
 }
 
@@ -112,11 +93,8 @@ void World::advance(double seconds) {
   for (double left_s = seconds; left_s > 0.0; left_s -= STEP_s) {
     const double step_s = std::min(STEP_s, left_s);
     motion_.step(step_s);
-    const KindOfGrasp::Inputs inputs = course_.inputs(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0);
-    Drive now = drive_of(inputs, options_.grasp.down_rad);
-    now.width_mm = motion_.width_mm();
     if (is_there_) {
-      cell_.run(step_s, now);
+      cell_.run(step_s, motion_.width_mm(), grasp_.inputs(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0));
     }
     time_s_ += step_s;
     watch_force();
@@ -125,9 +103,9 @@ void World::advance(double seconds) {
 }
 
 void World::watch_force() {
-  const double force_N = is_there_ ? cell_.force_N() : 0.0;
+  const double force_N = is_there_ ? cell_.mean_N() : 0.0;
   peak_N_ = std::max(peak_N_, force_N);
-  if (force_N > options_.object.crushes_N && !is_crushed_) {
+  if (force_N > grasp_.crushes_N && !is_crushed_) {
     is_crushed_ = true;
     events_.push_back("crushed");
   }
@@ -146,11 +124,11 @@ void World::watch_object() {
   if (!is_there_) {
     return;
   }
-  begun_.resize(course_.events.size());
+  begun_.resize(grasp_.events.size());
   for (std::size_t i = 0; i < begun_.size(); i++) {
-    if (!begun_[i] && since_s >= course_.events[i].begin_s) {
+    if (!begun_[i] && since_s >= grasp_.events[i].begin_s) {
       begun_[i] = true;
-      events_.push_back(name_of(course_.events[i].kind));
+      events_.push_back(name_of(grasp_.events[i].kind));
     }
   }
   const double slid_mm = cell_.slid_mm() - slid_before_mm_;
@@ -168,8 +146,8 @@ void World::watch_object() {
     slid_before_mm_ = cell_.slid_mm();
   }
   const Vector way = cell_.way_mm();
-  const bool in_the_air = lift_s_ && since_s >= course_.lift_s;
-  if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.force_N() < LOST_N)) {
+  const bool in_the_air = lift_s_ && since_s >= grasp_.lift_s;
+  if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.mean_N() < LOST_N)) {
     is_dropped_ = true;
     is_there_ = false;
     events_.push_back("dropped");
@@ -177,7 +155,7 @@ void World::watch_object() {
 }
 
 Pressures World::pressures_Pa(std::size_t finger) const {
-  return is_there_ ? face_.base_Pa(cell_.touch(finger)) : Pressures{};
+  return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{};
 }
 
 const char *World::columns() {
@@ -188,16 +166,15 @@ const char *World::columns() {
 std::string World::cells() const {
   double load_N = 0.0;
   for (const std::size_t finger : {0U, 1U}) {
-    const twin::Touch touch = cell_.touch(finger);
-    load_N += is_there_ ? 0.5 * std::hypot(touch.pull_x_N, touch.pull_y_N) : 0.0;
+    const Vector load = cell_.load_N(finger);
+    load_N += is_there_ ? 0.5 * std::hypot(load.x, load.y) : 0.0;
   }
   const double since_s = since_lift_s();
-  const double least_N = is_there_ && since_s >= course_.lift_s ? need_N(since_s) : 0.0;
+  const double least_N = is_there_ && since_s >= grasp_.lift_s ? need_N(since_s) : 0.0;
   const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
   std::string text = fixed(time_s_, 5);
-  for (const double value :
-       {motion_.width_mm(), is_there_ ? cell_.force_N() : 0.0, peak_N_, load_N, least_N, cell_.slid_mm(),
-        cell_.way_mm().dot(cell_.down()), friction, course_.inputs(since_s).lifted_mm}) {
+  for (const double value : {motion_.width_mm(), is_there_ ? cell_.mean_N() : 0.0, peak_N_, load_N, least_N,
+                             cell_.slid_mm(), -cell_.way_mm().y, friction, grasp_.inputs(since_s).lifted_mm}) {
     text += "," + fixed(value, 4);
   }
   for (const bool value : {is_there_ && cell_.slips(), is_there_, is_dropped_, is_crushed_}) {

@@ -6,8 +6,8 @@
 // slid DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
+#include "simulation/cell/cell.hpp"
 #include "simulation/cell/gripper_motion.hpp"
-#include "simulation/cell/kinds.hpp"
 #include "simulation/cell/slips.hpp"
 
 #include <optional>
@@ -28,18 +28,11 @@ bool is_disturbance(const std::string &name);
 class World {
 public:
   struct Options {
-    Object object;
-    Grasp grasp;
-    KindOfGrasp course;                       // the lift and the events
+    KindOfGrasp grasp;                        // with the lift and the events
     std::optional<double> lift_after_s = 1.0; // none: only by a command
     std::vector<Planned> planned;
     std::optional<Kind> kind; // whose course it is
   };
-
-  // Takes object, lift and events from the grasp; lift_after_s stays. Left out is what is no part of this
-  // world: the rubber's law, a place off the gripper's middle, errors and delays of frames, a fingertip
-  // that goes silent.
-  static void be_of_kind(Options &options, const KindOfGrasp &grasp);
 
   // Both outlive it. From now on the object is between the fingers of motion.
   World(const Options &options, const Face &face, GripperMotion &motion);
@@ -55,10 +48,10 @@ public:
 
   Pressures pressures_Pa(std::size_t finger) const;
   // Without a force where nothing is touched.
-  twin::Touch touch(std::size_t finger) const { return is_there_ ? cell_.touch(finger) : twin::Touch{}; }
+  Patch patch(std::size_t finger) const { return is_there_ ? cell_.patch(finger) : Patch{}; }
 
   // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
-  double need_N(double since_lift_s) const { return course_.least_N(since_lift_s); }
+  double need_N(double since_lift_s) const { return grasp_.least_N(since_lift_s); }
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
   // The columns of the truth, in order.
@@ -75,7 +68,7 @@ private:
   void watch_object();
 
   Options options_;
-  KindOfGrasp course_;
+  KindOfGrasp grasp_; // and what was planned or commanded
   const Face &face_;
   GripperMotion &motion_;
   Cell cell_;

@@ -1,8 +1,8 @@
 #include "simulation/cell/kind_trial.hpp"
 
 #include "libfingertip/random.hpp"
+#include "simulation/cell/cell.hpp"
 #include "simulation/cell/gripper_line.hpp"
-#include "simulation/cell/pinch.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -190,7 +190,7 @@ private:
 class KindRun {
 public:
   KindRun(const KindTrial &trial, Controller &controller, const std::function<void(const KindMoment &)> &trace)
-      : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), pinch_(grasp_),
+      : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), cell_(grasp_),
         gripper_(slowed(trial), trial.activates ? trial.gripper.traits.stroke_mm : grasp_.width_mm + grasp_.opens_mm,
                  Random(trial.seed, LINE, 0)),
         tips_{Tip(trial, 0), Tip(trial, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)),
@@ -199,15 +199,15 @@ public:
       gripper_.motion().power_off();
     }
     gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
-      return is_between_ && force_N > 0.0 && pinch_.force_at_N(width_mm) >= force_N;
+      return is_between_ && force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
     };
   }
 
   KindOutcome go() {
     while (!over_) {
-      t_s_ += Pinch::STEP_s;
-      gripper_.motion().step(Pinch::STEP_s);
-      pinch_.step(Pinch::STEP_s, is_between_ ? width_mm() : APART_mm, inputs());
+      t_s_ += Cell::STEP_s;
+      gripper_.motion().step(Cell::STEP_s);
+      cell_.run(Cell::STEP_s, is_between_ ? width_mm() : APART_mm, inputs());
       observe();
       deliver();
       if (t_s_ - stepped_s_ >= STEPS_s) {
@@ -240,7 +240,7 @@ private:
     if (trial_.slick_after_s && since_lift_s() >= *trial_.slick_after_s) {
       if (slick_s_ == NEVER_s) {
         slick_s_ = t_s_;
-        slick_share_ = std::min(1.0, SLICK_SHARE * least_N_ / std::max(pinch_.mean_N(), LOST_N));
+        slick_share_ = std::min(1.0, SLICK_SHARE * least_N_ / std::max(cell_.mean_N(), LOST_N));
       }
       inputs.friction_share *= 1.0 - std::min(1.0, (t_s_ - slick_s_) / SLICK_s) * (1.0 - slick_share_);
     }
@@ -257,7 +257,7 @@ private:
       if (tip.next_s() > t_s_) {
         continue;
       }
-      const auto touch = faults_.frame(i, tip.measure(pinch_.force_N(i), pinch_.load_N(i), pinch_.way_mm()));
+      const auto touch = faults_.frame(i, tip.measure(cell_.force_N(i), cell_.load_N(i), cell_.way_mm()));
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone && touch) {
         arrivals_.touch(tip.known_s(grasp_.jitter_s, trial_.later_s), i, *touch);
@@ -323,7 +323,7 @@ private:
     if (!failed.begun) {
       failed.begun = true;
       began_mm_ = width_mm();
-      failed.before_N = pinch_.mean_N();
+      failed.before_N = cell_.mean_N();
       if (is_between_) {
         lift_s_ = std::min(lift_s_, t_s_ + LIFTS_AFTER_s);
       }
@@ -334,7 +334,7 @@ private:
       }
       is_taken_ = is_taken_ || faults_.is(Fault::Kind::taken, t_s_);
     }
-    failed.after_N = std::max(failed.after_N, pinch_.mean_N());
+    failed.after_N = std::max(failed.after_N, cell_.mean_N());
     is_taken_ = is_taken_ || outcome_.dropped;
     is_between_ = is_between_ && !is_taken_;
     if (is_between_) {
@@ -344,9 +344,9 @@ private:
   }
 
   void observe() {
-    const double since_s = since_lift_s(), force_N = pinch_.mean_N();
+    const double since_s = since_lift_s(), force_N = cell_.mean_N();
     const bool lifts = since_s >= 0.0;
-    outcome_.peak_N = std::max({outcome_.peak_N, pinch_.force_N(0), pinch_.force_N(1)});
+    outcome_.peak_N = std::max({outcome_.peak_N, cell_.force_N(0), cell_.force_N(1)});
     touched_s_ = force_N > TOUCHED_N ? std::min(touched_s_, t_s_) : touched_s_;
     if (!is_between_ && !is_taken_) {
       is_between_ = gripper_.motion().active() && width_mm() > grasp_.width_mm + FREE_mm;
@@ -356,9 +356,10 @@ private:
       outcome_.never_held = t_s_ > PATIENCE_s && lift_s_ == NEVER_s && trial_.still_s == 0.0;
     } else {
       least_N_ = grasp_.least_N(since_s);
-      slips_.sample(since_s, pinch_.slips(), force_N, pinch_.slid_mm(), since_s >= grasp_.lift_s ? least_N_ : 0.0);
-      const Vector way = pinch_.way_mm();
-      outcome_.dropped = pinch_.slid_mm() >= DROP_mm || std::hypot(way.x, way.y) >= DROP_mm;
+      slips_.sample(since_s, cell_.slips(), force_N, cell_.slid_mm(), since_s >= grasp_.lift_s ? least_N_ : 0.0);
+      outcome_.turned_deg = std::max(outcome_.turned_deg, std::abs(cell_.turned_rad()) * 180.0 / M_PI);
+      const Vector way = cell_.way_mm();
+      outcome_.dropped = cell_.slid_mm() >= DROP_mm || std::hypot(way.x, way.y) >= DROP_mm;
     }
     const bool waited =
         trial_.still_s > 0.0 && (t_s_ >= touched_s_ + trial_.still_s || t_s_ > trial_.still_s + PATIENCE_s);
@@ -372,7 +373,7 @@ private:
     sample_s_ += SAMPLED_s;
     const double since_s = since_lift_s();
     if (since_s >= grasp_.lift_s) {
-      margins_.push_back(pinch_.mean_N() / least_N_);
+      margins_.push_back(cell_.mean_N() / least_N_);
     }
     const double sent_mm = gripper_.sent().width_mm;
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
@@ -389,18 +390,18 @@ private:
       turned_mm_ = sent_mm;
     }
     if (trace_) {
-      const Vector one = pinch_.load_N(0), other = pinch_.load_N(1);
-      trace_({t_s_, since_s, width_mm(), pinch_.force_N(0), pinch_.force_N(1), since_s >= 0.0 ? least_N_ : 0.0,
-              0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)), -pinch_.way_mm().y, pinch_.slid_mm(),
-              pinch_.slips(), report_});
+      const Vector one = cell_.load_N(0), other = cell_.load_N(1);
+      trace_({t_s_, since_s, width_mm(), cell_.force_N(0), cell_.force_N(1), since_s >= 0.0 ? least_N_ : 0.0,
+              0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)), -cell_.way_mm().y, cell_.slid_mm(),
+              cell_.slips(), report_});
     }
   }
 
   KindOutcome outcome() {
-    outcome_.slid_mm = pinch_.slid_mm();
     outcome_.slides = report_.slides;
     outcome_.friction =
         report_.friction / (0.5 * inputs().friction_share * (grasp_.pads[0].friction + grasp_.pads[1].friction));
+    outcome_.slid_mm = cell_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;
     outcome_.hunts = !outcome_.dropped && reversals_ / (grasp_.ends_s - grasp_.steady_s) >= HUNTS_s;
@@ -419,7 +420,7 @@ private:
   const KindOfGrasp &grasp_;
   Controller &controller_;
   const std::function<void(const KindMoment &)> &trace_;
-  Pinch pinch_;
+  Cell cell_;
   GripperLine gripper_;
   std::array<Tip, 2> tips_;
   Arrivals arrivals_;

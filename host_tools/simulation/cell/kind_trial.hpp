@@ -1,4 +1,4 @@
-// One grasp (kinds.hpp), closed loop, in simulated time: the pinch (pinch.hpp), what two fingertips
+// One grasp (kinds.hpp), closed loop, in simulated time: the cell (cell.hpp), what two fingertips
 // report of it, a controller, and a gripper's mechanics.
 //
 // A simplified fingertip reports the truth with the kind's errors and noise. The firmware's own
@@ -61,6 +61,7 @@ struct KindOutcome {
   bool dropped = false, never_held = false, crushed = false, hunts = false;
   double slid_mm = 0.0, peak_N = 0.0;
   double first_N = 0.0;      // the largest force before the lift
+  double turned_deg = 0.0;   // about the grip's axis, the most since the lift
   double margin = 0.0;       // median of force over least force, from the lift's end on
   std::uint32_t slides = 0;  // that the controller counted
   double friction = 0.0;     // that it used in the end, over the true one

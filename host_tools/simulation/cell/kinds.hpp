@@ -4,15 +4,36 @@
 // a kind and seed is always the same. host_tools/grasp/control/CONTROL.md has the table of kinds.
 #pragma once
 
-#include "simulation/cell/cell.hpp"
-
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
 
 namespace fingertip::cell {
+
+constexpr double GRAVITY_m_s2 = 9.81;
+
+struct Vector {
+  double x = 0.0, y = 0.0;
+};
+
+// Of the object: what touches the pads is a point (ball, egg), a line (upright, lying, cup) or an area.
+enum class Shape {
+  ball,
+  egg, // stands
+  box,
+  plate,   // a box, thin along the grip's axis
+  upright, // cylinder
+  lying,   // cylinder, its axis level and along the pads
+  cup,     // an upright cylinder: its cone is left out
+};
+constexpr std::array<Shape, 7> SHAPES = {Shape::ball,    Shape::egg,   Shape::box, Shape::plate,
+                                         Shape::upright, Shape::lying, Shape::cup};
+const char *name_of(Shape shape);
+// Throws std::runtime_error: there is none.
+Shape shape_of(const std::string &name);
 
 enum class Kind { gentle, usual, rough, slick, fragile };
 constexpr std::array<Kind, 5> KINDS = {Kind::gentle, Kind::usual, Kind::rough, Kind::slick, Kind::fragile};
@@ -51,14 +72,20 @@ struct KindOfPad {
 struct KindOfGrasp {
   Kind kind = Kind::gentle;
   std::string object; // of kind fragile
+  Shape shape = Shape::ball;
+  double height_mm = 40.0, depth_mm = 40.0; // of box, plate and egg; of a cylinder its length
+  Vector com_mm;                            // centre of mass from the middle
+  Vector place_mm;                          // of the middle on fingertip 0, in its own x and y
+  double down_rad = -M_PI_2;                // gravity there, from x towards y
   std::array<KindOfPad, 2> pads;
-  double exponent = 1.6;        // of force over indentation
-  double shear_N_mm = 3.5;      // tangential stiffness of a pad at 4 N
-  double rubber_N_s_mm = 0.008; // damping of it, with the loss at the contact's edge
-  double kinetic_share = 0.8;   // of static friction, at speed
-  double stribeck_mm_s = 3.0;   // at which friction has fallen by 63 % of the way there
-  double width_mm = 40.0, mass_kg = 0.3;
-  double off_mm = 0.0; // from the middle between the fingers
+  double exponent = 1.6;                 // of force over indentation
+  double shear_N_mm = 3.5;               // tangential stiffness of a pad at 4 N
+  double rubber_N_s_mm = 0.008;          // damping of it, with the loss at the contact's edge
+  double kinetic_share = 0.8;            // of static friction, at speed
+  double stribeck_mm_s = 3.0;            // at which friction has fallen by 63 % of the way there
+  double width_mm = 40.0, mass_kg = 0.3; // width: along the grip's axis
+  double stiffness_N_mm = std::numeric_limits<double>::infinity(); // of the object, when squeezed
+  double off_mm = 0.0;                                             // from the middle between the fingers
   double table_friction = 0.4;
   double crushes_N = std::numeric_limits<double>::infinity();
   double opens_mm = 4.0;               // how much wider than the object the gripper is at first
@@ -82,12 +109,10 @@ struct KindOfGrasp {
   Inputs inputs(double since_lift_s) const;
   // Grip of one fingertip that holds what is carried then, by static friction.
   double least_N(double since_lift_s) const;
-  // Force of both pads, in a row and not relaxed, with the fingers at this width.
-  double elastic_N(double width_mm) const;
 };
 
-// The inputs in the frame of a cell's hand (cell.hpp); the gripper's width is not among them.
-Drive drive_of(const KindOfGrasp::Inputs &inputs, double down_rad);
+// The pads' stiffness and exponent under another shape than a ball: lines and areas are stiffer.
+void stiffen(KindOfGrasp &grasp);
 
 // No grasp needs more than this at its worst, by kinetic friction.
 constexpr double NEEDS_MOST_N = 16.0;

@@ -113,7 +113,7 @@ public:
         fingers_(place, fingers_of(options, place)), motion_(GripperServer::mechanics(options.model)),
         server_(motion_, server_options()) {
     fingers_.wait_until_ready();
-    open_gripper(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
+    open_gripper(server_, motion_, options.model, options.world.grasp.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
     world_.emplace(options.world, face_, motion_);
     if (place.is_shared()) {
@@ -151,14 +151,14 @@ private:
   }
 
   std::string head() const {
-    const Object &object = options_.world.object;
+    const KindOfGrasp &grasp = options_.world.grasp;
     std::ostringstream text;
     text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model
          << "\n# face: " << options_.face
          << "\n# kind: " << (options_.world.kind ? name_of(*options_.world.kind) : "none")
-         << "\n# width_mm: " << object.width_mm << "\n# mass_kg: " << object.mass_kg
-         << "\n# friction: " << object.friction << "\n# crushes_N: " << object.crushes_N
-         << "\n# seed: " << options_.seed << "\n";
+         << "\n# shape: " << name_of(grasp.shape) << "\n# width_mm: " << grasp.width_mm
+         << "\n# mass_kg: " << grasp.mass_kg << "\n# friction: " << grasp.pads[0].friction << ", "
+         << grasp.pads[1].friction << "\n# crushes_N: " << grasp.crushes_N << "\n# seed: " << options_.seed << "\n";
     return text.str();
   }
 
@@ -214,7 +214,7 @@ private:
     server_of_truth_->step();
     if (server_of_truth_->is_due(now_us)) {
       for (std::size_t i = 0; i < FINGERS; i++) {
-        const twin::Touch touch = world_->touch(i);
+        const twin::Touch touch = world_->patch(i);
         server_of_truth_->send(i, fingers_.device_us(i, now_us),
                                {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
       }
@@ -320,14 +320,16 @@ private:
 } // namespace
 
 void be_of_kind(LiftOptions &options, Kind kind) {
-  const KindOfGrasp grasp = draw_grasp(kind, options.seed, 0);
-  World::be_of_kind(options.world, grasp);
-  options.opens_mm = grasp.opens_mm;
+  const double stiffness_N_mm = options.world.grasp.stiffness_N_mm;
+  options.world.grasp = draw_grasp(kind, options.seed, 0);
+  options.world.grasp.stiffness_N_mm = stiffness_N_mm;
+  options.world.kind = kind;
+  options.opens_mm = options.world.grasp.opens_mm;
 }
 
 void check(const LiftOptions &options) {
   const GripperTraits &traits = gripper_traits(options.model);
-  const double widest_mm = options.world.object.width_mm + options.opens_mm;
+  const double widest_mm = options.world.grasp.width_mm + options.opens_mm;
   if (widest_mm > traits.stroke_mm) {
     throw Error(ErrorCode::bad_value, options.model + " opens to " + fixed(traits.stroke_mm, 1) +
                                           " mm; the object and --opens take " + fixed(widest_mm, 1));

@@ -107,7 +107,7 @@ private:
   double weight_N_, followed_s_ = 0.0;
   twin::Pad rubber_;
   double begin_x_, begin_y_; // of both sequences
-  twin::Touch touch_;
+  Patch touch_;
   std::vector<double> base_Pa_, sensed_Pa_; // [sensor]
 };
 

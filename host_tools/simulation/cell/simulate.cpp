@@ -94,7 +94,10 @@ int main(int argc, char **argv) {
                "fingertip simulate");
   speak_plainly(app);
   Options options;
-  Object &object = options.lift.world.object;
+  KindOfGrasp &object = options.lift.world.grasp;
+  object.down_rad = M_PI_2; // the fingertips' cables leave upwards
+  double friction = object.pads[0].friction;
+  std::string shape = name_of(object.shape);
   std::vector<std::string> models, planned_texts;
   for (const GripperTraits &traits : gripper_models()) {
     models.push_back(traits.model);
@@ -167,8 +170,10 @@ int main(int argc, char **argv) {
   of_lift.push_back(app.add_option("--gripper", options.lift.model, "Which one")
                         ->check(CLI::IsMember(models))
                         ->capture_default_str());
-  of_lift.push_back(app.add_option("--face", options.lift.face, "What of the object is touched: an indenter, or plate")
-                        ->capture_default_str());
+  of_lift.push_back(
+      app.add_option("--face", options.lift.face,
+                     "The indenter whose pressures a point of the object has, and a line or an area in a row")
+          ->capture_default_str());
   std::vector<std::string> kinds;
   for (const Kind kind : KINDS) {
     kinds.push_back(name_of(kind));
@@ -177,9 +182,17 @@ int main(int argc, char **argv) {
                                      "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
                           ->check(CLI::IsMember(kinds));
   const std::size_t before_drawn = of_lift.size();
-  lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object");
+  std::vector<std::string> shapes;
+  for (const Shape one : SHAPES) {
+    shapes.push_back(name_of(one));
+  }
+  of_lift.push_back(
+      app.add_option("--shape", shape, "Of the object")->check(CLI::IsMember(shapes))->capture_default_str());
+  lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object, between the fingers");
+  lift_number("--length", object.height_mm, "MM", 1.0, 500.0, "Of a cylinder, and the height of a box or plate");
+  lift_number("--off-centre", object.com_mm.x, "MM", 0.0, 250.0, "Of its centre of mass, level");
   lift_number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
-  lift_number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
+  lift_number("--friction", friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
   lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
   const std::size_t stiffness = of_lift.size();
   of_lift.push_back(app.add_option("--stiffness", object.stiffness_N_mm, "Its stiffness; default: it does not yield")
@@ -190,8 +203,8 @@ int main(int argc, char **argv) {
                         ->check(CLI::Range(0.1, 1e6)));
   lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0,
               "How much wider than the object the gripper is at first");
-  lift_number("--height", options.lift.world.course.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
-  lift_number("--lift-time", options.lift.world.course.lift_s, "S", 0.05, 60.0, "And how long that takes");
+  lift_number("--height", object.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
+  lift_number("--lift-time", object.lift_s, "S", 0.05, 60.0, "And how long that takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
     if (i != stiffness) { // no kind sets it
       kind->excludes(of_lift[i]);
@@ -225,8 +238,9 @@ int main(int argc, char **argv) {
       options.lift.world.planned.push_back(planned(text));
     }
     options.lift.world.lift_after_s = by_command ? std::nullopt : std::optional(lift_after_s);
-    object.base_mm = 40.0;
-    options.lift.world.grasp.down_rad = 0.5 * M_PI;
+    object.shape = shape_of(shape);
+    object.pads[0].friction = object.pads[1].friction = friction;
+    stiffen(object);
     run(options, lift_flag->count() > 0, validate_flag->count() > 0);
     return 0;
   } catch (const Error &error) {

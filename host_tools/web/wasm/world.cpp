@@ -17,7 +17,7 @@ constexpr double PAD_mm = 12.0;
 constexpr double GRAVITY_mm_s2 = 9806.65;
 constexpr double mN_PER_N = 1e3; // and mm/s2 per m/s2
 constexpr double SHEAR_N_mm2 = 1.0;
-constexpr int STEPS_WITHIN = 20; // cell::Bundle's longest step while all slides
+constexpr int STEPS_WITHIN = 20; // Bundle's longest step while all slides
 constexpr double LEAST_N = twin::ForcePlanes::FORCE_MIN_N;
 
 bool all_finite(std::initializer_list<double> values) {
@@ -56,7 +56,7 @@ void World::set_friction(double friction) {
 
 void World::begin_touch(Way way, double x_mm, double y_mm) {
   way_ = way;
-  bundle_ = cell::Bundle(friction_, KINETIC_SHARE);
+  bundle_ = Bundle(friction_, KINETIC_SHARE);
   x_mm_ = x_mm;
   y_mm_ = y_mm;
   vx_mm_s_ = vy_mm_s_ = force_N_ = 0.0;
@@ -135,7 +135,7 @@ void World::move(double seconds) {
   const double radius_mm =
       force_N_ > 0.0 ? twin::ForcePlanes::between_forces(object_->radius_mm, std::max(force_N_, LEAST_N)) : 0.0;
   const double touching_mm = std::max(radius_mm, 0.05);
-  const cell::Wrench rubber =
+  const Wrench rubber =
       bundle_.step(seconds, force_N_, SHEAR_N_mm2 * touching_mm, touching_mm, {vx_mm_s_, vy_mm_s_, 0.0});
   if (way_ != Way::hand) {
     vx_mm_s_ += mN_PER_N * (load_x_N_ + rubber.x_N) / mass_kg_ * seconds;

@@ -5,7 +5,7 @@
 // sensors' errors are its too (twin/effects.hpp). An object touches where its middle is within the
 // pad, 30 by 50 mm; beyond, it has fallen off.
 //
-// Friction is that of the simulated cell (cell/bundle.hpp): Coulomb's, static then kinetic, with
+// Friction is that of the simulated cell (bundle.hpp): Coulomb's, static then kinetic, with
 // the rubber's give before all slides, which is 1 N/mm for each millimetre of contact radius. The
 // middle of the contact goes along with the object. Objects do not turn, roll or tilt.
 //
@@ -22,8 +22,8 @@
 // at the same times give the same bits. Some 25 us a millisecond while something touches.
 #pragma once
 
-#include "simulation/cell/bundle.hpp"
 #include "simulation/twin/effects.hpp"
+#include "web/wasm/bundle.hpp"
 #include "web/wasm/objects.hpp"
 
 #include <cstdint>
@@ -82,7 +82,7 @@ private:
   const Object *object_;
   twin::Pad errors_;
   Way way_ = Way::none;
-  cell::Bundle bundle_;
+  Bundle bundle_;
   double friction_ = 0.5;
   double wanted_x_mm_ = 0.0, wanted_y_mm_ = 0.0, wanted_force_N_ = 0.0;
   double wanted_load_x_N_ = 0.0, wanted_load_y_N_ = 0.0;

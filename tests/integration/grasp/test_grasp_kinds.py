@@ -43,12 +43,6 @@ class Kinds(unittest.TestCase):
         found = kinds.summary_of_sets(each("--kind", "gentle", "--still", "6", "--count", "4"))
         self.assertEqual((found["grasps"], found["never_settled_percent"]), (4, 0))
 
-    def test_what_the_grippers_steps_allow_is_better_than_ours(self):
-        words = "--kind gentle --still 12 --count 24 --seed 3 --controller".split()
-        grasps = [json.loads(run(*words, controller).stdout)["each"] for controller in ("oracle", "ours")]
-        rms = [kinds.summary_of_sets(each)["firm_rms_p50_percent"] for each in grasps]
-        self.assertLess(rms[0], 0.8 * rms[1])
-
     def test_a_trace_has_a_value_for_each_moment(self):
         found = json.loads(run("--trace", "2").stdout)
         lengths = {len(values) for values in found["series"].values()}
@@ -80,7 +74,7 @@ class Faults(unittest.TestCase):
         self.assertGreaterEqual(len(kinds), 20)
         each = {(row["fault"], row["state"], row["gripper"], row["object"]) for row in self.rows}
         self.assertEqual(len(each), len(self.rows))
-        self.assertEqual(len(each), len(kinds) * len(STATES) * 2 * 3)
+        self.assertEqual(len(each), len(kinds) * len(STATES) * 2 * 2)
         self.assert_none([row for row in self.rows if not row["begun"]], "never began")
 
     def test_it_never_opens_by_itself(self):

@@ -1,6 +1,5 @@
 #include "libfingertip/random.hpp"
 #include "simulation/cell/face.hpp"
-#include "simulation/cell/plate.hpp"
 #include "simulation/twin/traction_table.hpp"
 
 extern "C" {
@@ -24,7 +23,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
     const Face face(name, 12.0, FINGERTIP_TEST_TABLES);
     Random random(3, 1, 1);
     for (int i = 0; i < 300; i++) {
-      twin::Touch touch;
+      Patch touch;
       touch.force_N = random.log_uniform(0.5, 40.0);
       touch.stuck_N = touch.force_N * random.uniform(0.0, 0.99);
       touch.x_mm = random.uniform(-12.0, 12.0);
@@ -54,52 +53,56 @@ TEST(Face, FeelsWhatTheTwinDoes) {
 
 TEST(Face, KnowsNoOther) { EXPECT_THROW(Face("banana", 12.0, FINGERTIP_TEST_TABLES), std::runtime_error); }
 
-TEST(Plate, CarriesForceAndMoment) {
-  constexpr double HALF_X_mm = 18.0, HALF_Y_mm = 27.0, STEP_mm = 0.25;
-  const twin::Layer layer = twin::silicone(12.0);
-  const Plate plate(layer, HALF_X_mm, HALF_Y_mm);
-  double force = 0.0, moment_x_mm = 0.0, moment_y_mm = 0.0;
-  for (double x = -HALF_X_mm + 0.5 * STEP_mm; x < HALF_X_mm; x += STEP_mm) {
-    for (double y = -HALF_Y_mm + 0.5 * STEP_mm; y < HALF_Y_mm; y += STEP_mm) {
-      const double cell_m2 = 1e-6 * STEP_mm * STEP_mm;
-      force += plate.normal_Pa_N(x, y) * cell_m2;
-      moment_x_mm += x * plate.along_x_Pa_N(x) * cell_m2;
-      moment_y_mm += y * plate.along_y_Pa_N(y) * cell_m2;
+// Of a line or an area: as many contacts side by side.
+TEST(Face, ALongContactIsItsPartsAndKeepsForceAndPlace) {
+  const Face face("sphere15", 12.0, FINGERTIP_TEST_TABLES);
+  Patch point;
+  point.force_N = 2.0;
+  const double peak_Pa = face.base_Pa(point)[7];
+  Patch line = point;
+  line.length_mm = 24.0;
+  line.angle_rad = 0.5 * M_PI; // along y
+  const Pressures lengthwise = face.base_Pa(line);
+  EXPECT_LT(lengthwise[7], 0.75 * peak_Pa);
+  EXPECT_NEAR(lengthwise[6], lengthwise[8], 1e-6 * peak_Pa);
+  EXPECT_GT(lengthwise[8], 2.5 * lengthwise[2]); // beside it
+  line.off_length_mm = 6.0;                      // more weight at the end towards +y, its place there
+  line.y_mm = 6.0;
+  const Pressures leaning = face.base_Pa(line);
+  EXPECT_GT(leaning[8], 1.5 * leaning[6]);
+  // The nodes of a long one with their force, by hand.
+  Patch two = point;
+  two.length_mm = 8.0;
+  Pressures sum{};
+  for (const double u_mm : {-2.0, 2.0}) {
+    Patch half = point;
+    half.force_N = 1.0;
+    half.x_mm = u_mm;
+    const Pressures part = face.base_Pa(half);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      sum[k] += part[k];
     }
   }
-  EXPECT_NEAR(force, 1.0, 0.01);
-  EXPECT_NEAR(moment_x_mm, 6.0, 0.1);
-  EXPECT_NEAR(moment_y_mm, 6.0, 0.1);
-  // Held in by its own width, the middle carries more than the sides.
-  EXPECT_GT(plate.normal_Pa_N(0.0, 0.0), 1.8 * plate.normal_Pa_N(HALF_X_mm, 0.0));
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    EXPECT_NEAR(face.base_Pa(two)[k], sum[k], 1e-9 * peak_Pa);
+  }
 }
 
-TEST(Plate, IsAsStiffAsGentAndLindleysStrip) {
-  // Long, between plates: E A / h (1 + w^2 / (3 h^2)), w its width.
-  const twin::Layer layer = twin::silicone(12.0);
-  constexpr double HALF_X_mm = 18.0, HALF_Y_mm = 5000.0;
-  const Plate plate(layer, HALF_X_mm, HALF_Y_mm);
-  const double area_mm2 = 4.0 * HALF_X_mm * HALF_Y_mm;
-  const double expected = 1e-6 * layer.youngs_modulus_Pa * area_mm2 / 12.0 * (1.0 + 36.0 * 36.0 / (3.0 * 144.0));
-  EXPECT_NEAR(plate.stiffness_N_mm() / expected, 1.0, 0.02);
-}
-
-TEST(Plate, HidesSlidingFromTheBase) {
-  const Face face("plate", 12.0, FINGERTIP_TEST_TABLES);
-  twin::Touch touch;
-  touch.force_N = 5.0;
-  const Pressures here = face.base_Pa(touch);
-  touch.x_mm = 6.0;
-  touch.angle_rad = 0.3;
-  EXPECT_EQ(face.base_Pa(touch), here);
-  touch.pull_x_N = 2.0;
-  const Pressures pulled = face.base_Pa(touch);
+TEST(Face, AnAreaIsHeldInByItsOwnWidth) {
+  const Face face("sphere15", 12.0, FINGERTIP_TEST_TABLES);
+  Patch area;
+  area.force_N = 10.0;
+  area.length_mm = 36.0;
+  area.width_mm = 54.0;
+  const Pressures pressed = face.base_Pa(area);
+  EXPECT_GT(pressed[7], 1.15 * pressed[2]);
+  EXPECT_GT(pressed[2], 1.15 * pressed[0]);
+  area.pull_y_N = 3.0;
   double most_Pa = 0.0;
   for (std::size_t k = 0; k < SENSORS; k++) {
-    most_Pa = std::max(most_Pa, std::abs(pulled[k] - here[k]));
+    most_Pa = std::max(most_Pa, std::abs(face.base_Pa(area)[k] - pressed[k]));
   }
-  EXPECT_GT(most_Pa, 10.0);
-  EXPECT_LT(most_Pa, 0.1 * here[7]);
+  EXPECT_LT(most_Pa, 0.3 * pressed[7]); // what an area pulls is hardly felt
 }
 
 } // namespace

@@ -18,7 +18,7 @@
 
 #include <array>
 
-namespace fingertip::cell {
+namespace fingertip::web {
 
 // Along x and y of the hand's frame and about the grasp's axis.
 struct Wrench {
@@ -62,4 +62,4 @@ private:
   double slip_mm_s_ = 0.0, pull_x_N_ = 0.0, pull_y_N_ = 0.0, lost_mJ_ = 0.0;
 };
 
-} // namespace fingertip::cell
+} // namespace fingertip::web

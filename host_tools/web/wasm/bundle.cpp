@@ -1,4 +1,4 @@
-#include "simulation/cell/bundle.hpp"
+#include "web/wasm/bundle.hpp"
 
 #include "simulation/twin/held_object.hpp"
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace fingertip::cell {
+namespace fingertip::web {
 
 using twin::HeldObject, twin::mindlin;
 
@@ -87,4 +87,4 @@ double Bundle::elastic_mJ(double stiffness_N_mm) const {
   return sum;
 }
 
-} // namespace fingertip::cell
+} // namespace fingertip::web

@@ -1,12 +1,12 @@
 #include "libfingertip/random.hpp"
-#include "simulation/cell/bundle.hpp"
+#include "web/wasm/bundle.hpp"
 
 #include <cmath>
 #include <gtest/gtest.h>
 
 namespace {
 
-using namespace fingertip::cell;
+using namespace fingertip::web;
 
 constexpr double FRICTION = 0.5, KINETIC_SHARE = 0.8, FORCE_N = 6.0, STIFFNESS_N_mm = 4.5;
 constexpr double RADIUS_mm = 4.0, STEP_s = 5e-5;
