@@ -150,16 +150,20 @@ TEST(Scenarios, GridIsThePapers) {
   EXPECT_EQ(count[4], 8);
 }
 
-TEST(Scenarios, RandomPlacesFillTheAreaAndForcesTheRange) {
-  const Scenario scenario = scenario_of("taps", [](ScenarioOptions &o) { o.seconds = 2000; });
-  double x_max = 0, y_max = 0, force_min = 99, force_max = 0;
+TEST(Scenarios, RandomPlacesFillTheAreaAndForcesAndTimesTheRange) {
+  const Scenario scenario = scenario_of("hold", [](ScenarioOptions &o) { o.seconds = 6000; });
+  double x_max = 0, y_max = 0, force_min = 99, force_max = 0, hold_min = 99, hold_max = 0;
   for (const Episode &episode : scenario.episodes) {
     const Touch held = episode.tracks[0].at(episode.phases[1].begin_s - episode.begin_s);
     x_max = std::max(x_max, std::abs(held.x_mm));
     y_max = std::max(y_max, std::abs(held.y_mm));
     force_min = std::min(force_min, held.force_N);
     force_max = std::max(force_max, held.force_N);
+    hold_min = std::min(hold_min, episode.phases[1].end_s - episode.phases[1].begin_s);
+    hold_max = std::max(hold_max, episode.phases[1].end_s - episode.phases[1].begin_s);
   }
+  EXPECT_NEAR(hold_min, 0.2, 0.01);
+  EXPECT_NEAR(hold_max, 10.0, 0.1);
   EXPECT_LE(x_max, 6.75);
   EXPECT_GT(x_max, 6.6);
   EXPECT_LE(y_max, 15.75);
