@@ -29,8 +29,8 @@
  * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
  * - So the remainder at a touch fades in the contact, with PAST_ms.
  * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
- * both: a share of what the sensor has measured, which rises in a hold, is all of it after a contact and fades with
- * PAST_ms. The share is learnt from what stands off after each contact.
+ * both: a share of what the sensor has measured, which rises in a hold and by all that it lets go of, after a contact
+ * or where one moves on, and fades with PAST_ms. The share is learnt from what stands off after each contact.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset (the sensor had lost its state), or
@@ -74,7 +74,7 @@ struct condition_sensor {
   int32_t spread_Pa_q10;  /* 0: settled */
   int32_t memory_Pa_q10;  /* strongest press, fading */
   int32_t reached_Pa_q10; /* the same of this contact alone */
-  int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, is all of it after a contact, fades in 3 s */
+  int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
   int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what stands off after contacts */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;

@@ -13,6 +13,7 @@ struct step {
   int32_t reading_Pa_q10; /* absolute */
   int32_t steady_Pa_q10;  /* above the zero, but for one disturbed reading */
   int32_t slow_Pa_q10;    /* the reading above its low pass */
+  int32_t fell_Pa_q10;    /* since the last update */
   int32_t above_Pa_q10;   /* above the zero: mean of the readings since the last update */
   bool moves;             /* the reading moved as in a press or a release */
 };
@@ -46,6 +47,10 @@ static void follow_past(const struct step *step) {
   struct condition_sensor *sensor = step->sensor;
   const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
   sensor->past_Pa_q10 += part_of(held - sensor->past_Pa_q10, share_in(step->ms, PAST_ms));
+  if (step->condition->gate.pressed) { /* what a sensor lets go of in a contact that moves, as after one */
+    const int32_t with_it = sensor->past_Pa_q10 + step->fell_Pa_q10;
+    sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, clamp(with_it, 0, sensor->reached_Pa_q10));
+  }
   step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
 }
 
@@ -347,6 +352,7 @@ void update_sensor(struct condition *condition, const struct frame *frame, const
       .wander_share = share_in(ms, WANDER_ms),
       .noise_Pa_q10 = frame->noise_Pa_q10,
       .reading_Pa_q10 = reading,
+      .fell_Pa_q10 = clamp(clamped_difference(before, reading), 0, PRESSURE_MAX),
       .steady_Pa_q10 = clamped_difference(reading < before ? reading : before, zero),
       .slow_Pa_q10 = slow,
       .above_Pa_q10 = take_mean(condition, k, above),
