@@ -42,6 +42,8 @@ const std::vector<GraspSetting> &grasp_settings() {
       {"decay", "%/s", 0, 2000, 0.01, [](S &s) -> double & { return s.decay_1_s; },
        "How fast an excess of force decays"},
       {"rest", "s", 0, 60, 1, [](S &s) -> double & { return s.rest_s; }, "No decay for this time after a slide"},
+      {"pull", "N", 0.2, 20, 1, [](S &s) -> double & { return s.pull_N; },
+       "Hand over when each fingertip is pulled so hard"},
       {"touch", "N", 0.02, 2, 1, [](S &s) -> double & { return s.touch_N; }, "Force at which a touch begins"},
       {"approach", "mm/s", 0.5, 8, 1, [](S &s) -> double & { return s.approach_mm_s; },
        "Speed until the touch; slower where frames come late"},

@@ -17,6 +17,8 @@ constexpr State STATES[GRIP_STATES] = {
     {"ready", "squeezed; the present load counts as zero"},
     {"holding", "holding"},
     {"slipping", "holding, the object slides"},
+    {"placing", "holding until a table has the load, then opening"},
+    {"handing", "holding until it is pulled, then opening"},
     {"still", "the width stays, nothing is controlled"},
     {"release", "opening"},
     {"open", "open"},

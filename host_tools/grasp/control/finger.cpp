@@ -21,6 +21,7 @@ constexpr int FROZEN_FRAMES = 5;
 constexpr double OLD_s = 0.5;        // an older frame is no evidence of the present
 constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average of the delay
 constexpr int ZERO_FRAMES = 3;
+constexpr double LOAD_SD_LEAST_N = 0.06;
 constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
 // A force whose standard deviation is a larger share of it is no measurement. A plate's is measured: only how
 // far it reaches beyond the pad is not.
@@ -132,10 +133,13 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   reading.has_load = reading.contact && has_load();
   bool recoils = false; // moves against its load
   if (reading.has_load) {
-    const double load_x_N = touch_.qx_N - zero_x_N_, load_y_N = touch_.qy_N - zero_y_N_;
-    reading.load_N = std::hypot(load_x_N, load_y_N);
+    reading.load_x_N = touch_.qx_N - zero_x_N_;
+    reading.load_y_N = touch_.qy_N - zero_y_N_;
+    reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
+    reading.load_sd_N = std::max(touch_.q_sd_N, LOAD_SD_LEAST_N);
     reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
-    recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * load_x_N + touch_.speed_y_mm_s * load_y_N < 0.0;
+    recoils = reading.load_N > SHARED_N &&
+              touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
   }
   // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence.
   const std::uint32_t slide = reading.has_load ? CONTACT_FLAG_SLIDING : CONTACT_FLAG_SLIP;
@@ -146,6 +150,11 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
 void GripFinger::believe(const GripReading &reading) {
   believed_ = reading;
   is_doubted_ = false;
+}
+
+double GripFinger::along_N(const GripReading &reading) const {
+  return (reading.load_x_N * mark_x_N_ + reading.load_y_N * mark_y_N_) /
+         std::max(std::hypot(mark_x_N_, mark_y_N_), 1e-9);
 }
 
 void GripFinger::doubt(const GripReading &reading) {
@@ -242,6 +251,9 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
     if (reading.has_load) {
       loads++;
       loads_N += reading.load_N;
+      all.along_N += fingers[i].along_N(reading);
+      all.pull_N += fingers[i].pull_N(reading);
+      all.load_sd_N = std::max(all.load_sd_N, reading.load_sd_N);
       normal_N += reading.force_N;
       most_N = std::max(most_N, reading.load_N);
       all.speed_mm_s = std::min(all.speed_mm_s, reading.speed_mm_s);
@@ -258,6 +270,8 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   all.grip_N = std::max(all.low_N, all.mean_N - std::max(all.high_N - all.low_N - settings.differ * all.high_N, 0.0));
   all.has_load = loads > 0;
   if (loads > 0) {
+    all.along_N /= loads;
+    all.pull_N /= loads;
     // Both share the load; if one carries far more, that one slides first.
     all.load_N = std::max(loads_N / loads, 0.8 * most_N);
     for (std::size_t i = 0; i < fingers.size(); i++) {

@@ -4,6 +4,7 @@
 #include "grasp/control/settings.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -58,7 +59,8 @@ struct GripReading {
   bool contact = false, over = false, slides = false;
   bool is_left_out = false; // contradicts the other fingertip
   double t_s = 0.0;         // time of the measured force
-  double force_N = 0.0, sd_N = 0.0, load_N = 0.0, speed_mm_s = 0.0;
+  double load_x_N = 0.0, load_y_N = 0.0;
+  double force_N = 0.0, sd_N = 0.0, load_N = 0.0, load_sd_N = 0.0, speed_mm_s = 0.0;
 };
 
 class GripReach;
@@ -78,6 +80,14 @@ public:
   void doubt(const GripReading &reading);
   double doubted_for_s(const GripReading &reading) const; // since the first frame that was doubted
 
+  // along_N and pull_N are of this load from now on.
+  void mark() { mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N; }
+  // The load along the marked one, and how far it is from it.
+  double along_N(const GripReading &reading) const;
+  double pull_N(const GripReading &reading) const {
+    return std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_);
+  }
+
   // Sets the zero of the tangential force to its mean between begin and end.
   void begin_zero();
   void end_zero();
@@ -92,7 +102,7 @@ private:
   double delay_s_ = 0.0;
   double force_t_s_ = 0.0, force_N_ = 0.0, sd_N_ = 0.0;
   GripReading believed_;
-  double doubted_s_ = 0.0, of_both_ = 1.0;
+  double doubted_s_ = 0.0, of_both_ = 1.0, mark_x_N_ = 0.0, mark_y_N_ = 0.0;
   bool is_doubted_ = false;
   int unchanged_ = 0; // frames whose values are those of the one before
   double zero_x_N_ = 0.0, zero_y_N_ = 0.0, sum_x_N_ = 0.0, sum_y_N_ = 0.0;
@@ -108,9 +118,11 @@ struct GripReadings {
   double t_s = 0.0;                                           // time of the older of the two forces
   double delay_s = 0.0;
   bool fresh = false, over = false, has_load = false, slides = false;
-  double load_N = 0.0;     // tangential force at one fingertip, less its zero
-  double ratio = 0.0;      // tangential over normal force, of the fingertips that have both
-  double speed_mm_s = 0.0; // sliding speed at the slower fingertip
+  double load_N = 0.0; // tangential force at one fingertip, less its zero
+  double load_sd_N = 0.0;
+  double along_N = 0.0, pull_N = 0.0; // GripFinger::mark: of the fingertips that have a load, the means
+  double ratio = 0.0;                 // tangential over normal force, of the fingertips that have both
+  double speed_mm_s = 0.0;            // sliding speed at the slower fingertip
   std::array<double, GRIP_FINGERS> force_N{};
   bool is_alone() const { return low_N < 0.5 * high_N; } // one fingertip carries most of the force
 };

@@ -13,6 +13,7 @@ constexpr double RISES_s = 0.27; // rise of the start force
 constexpr double RAMP_s = 0.1;
 constexpr double SQUEEZE_s = 3.0; // squeezing ends after this time with the force that it reached
 constexpr double SQUEEZED = 0.8;  // share of the start force that is enough
+constexpr double TAKEN = 0.2;     // share of the load that a table has left: it is placed
 constexpr double HALF = 0.5;      // a smaller share is no grip
 constexpr double ACTIVATION_s = 10.0;
 constexpr double EMPTY_s = 0.06;  // without any contact for this time the object is gone
@@ -63,7 +64,7 @@ void Grip::enter(GripState state) {
 
 bool Grip::is_grasping() const {
   return state_ == GRIP_SQUEEZE || state_ == GRIP_READY || state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING ||
-         (state_ == GRIP_STILL && still_grasps_);
+         state_ == GRIP_PLACING || state_ == GRIP_HANDING || (state_ == GRIP_STILL && still_grasps_);
 }
 
 bool Grip::request(GripRequest request) {
@@ -75,6 +76,7 @@ bool Grip::request(GripRequest request) {
     }
     hold_.begin();
     fixed_.begin();
+    holds_ = GRIP_HOLDING;
     wanted_N_ = 0.0;
     may_activate_ = is_blind_ = was_held_ = false;
     enter(GRIP_ACTIVATING);
@@ -92,6 +94,20 @@ bool Grip::request(GripRequest request) {
       return false;
     }
     enter(GRIP_RELEASE);
+    return true;
+  case GRIP_REQUEST_PLACE:
+  case GRIP_REQUEST_HAND_OVER:
+    if (state_ != GRIP_HOLDING || settings_.mode == GRIP_MODE_FIXED || !readings_.has_load ||
+        (request == GRIP_REQUEST_PLACE && !hold_.is_loaded())) {
+      return false;
+    }
+    for (GripFinger &finger : fingers_) {
+      finger.mark();
+    }
+    marked_N_ = readings_.load_N;
+    kept_s_ = now_s_;
+    holds_ = request == GRIP_REQUEST_PLACE ? GRIP_PLACING : GRIP_HANDING;
+    enter(holds_);
     return true;
   }
   return false;
@@ -240,6 +256,16 @@ std::uint32_t Grip::hold() {
   if (settings_.mode == GRIP_MODE_FIXED) {
     return fixed_.step(readings_, settings_, traits_, now_s_, reach_);
   }
+  if (holds_ != GRIP_HOLDING) {
+    if (is_taken()) {
+      enter(GRIP_RELEASE);
+      return 0;
+    }
+    const bool places = holds_ == GRIP_PLACING;
+    readings_.load_N =
+        places ? std::clamp(readings_.along_N, 0.0, readings_.load_N) : std::min(readings_.load_N, marked_N_);
+    readings_.slides = readings_.slides && (places ? readings_.along_N > TAKEN * marked_N_ : true);
+  }
   const double wanted_N = hold_.wants(readings_, reach_.coming_N(readings_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
   std::uint32_t trouble = readings_.has_load ? 0u : GRIP_NO_LOAD;
@@ -255,9 +281,19 @@ std::uint32_t Grip::hold() {
     trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set()});
   }
   if (slides != (state_ == GRIP_SLIPPING)) {
-    enter(slides ? GRIP_SLIPPING : GRIP_HOLDING);
+    enter(slides ? GRIP_SLIPPING : holds_);
   }
   return trouble;
+}
+
+// The table has the load, or someone pulls: for as long as a silence may last.
+bool Grip::is_taken() {
+  const bool kept = !readings_.has_load ||
+                    (holds_ == GRIP_PLACING ? readings_.along_N > TAKEN * marked_N_
+                                            : readings_.pull_N < settings_.pull_N &&
+                                                  !(readings_.slides && readings_.pull_N > 0.5 * settings_.pull_N));
+  kept_s_ = kept ? now_s_ : kept_s_;
+  return now_s_ - kept_s_ >= settings_.stale_s;
 }
 
 bool Grip::is_gone() {
@@ -287,6 +323,8 @@ std::uint32_t Grip::go_on() {
     return make_ready();
   case GRIP_HOLDING:
   case GRIP_SLIPPING:
+  case GRIP_PLACING:
+  case GRIP_HANDING:
     return hold();
   case GRIP_RELEASE:
     ramp(settings_.release_width_mm, settings_.release_mm_s);
@@ -328,6 +366,8 @@ void Grip::fill(GripCommand &command) const {
   case GRIP_SQUEEZE:
   case GRIP_READY:
   case GRIP_HOLDING:
+  case GRIP_PLACING:
+  case GRIP_HANDING:
     speed_mm_s = std::abs(reach_.target_mm() - status_.width_mm) / MOVE_s;
     break;
   case GRIP_SLIPPING:
@@ -356,7 +396,7 @@ GripReport Grip::report() const {
   report.width_mm = status_.width_mm;
   report.delay_s = readings_.delay_s;
   report.slides = hold_.slides();
-  const bool loaded = state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING;
+  const bool loaded = state_ >= GRIP_HOLDING && state_ <= GRIP_HANDING;
   if (loaded && readings_.has_load && settings_.mode == GRIP_MODE_HOLD) {
     report.load_N = hold_.load_N();
     if (hold_.is_loaded()) {

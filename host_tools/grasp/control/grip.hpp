@@ -49,6 +49,8 @@ enum GripState : std::uint8_t {
   GRIP_READY,    // the start force is reached; the zero of the load is measured
   GRIP_HOLDING,
   GRIP_SLIPPING, // as HOLDING, while the object slides
+  GRIP_PLACING,  // as HOLDING, until a table has taken the load: then RELEASE
+  GRIP_HANDING,  // as HOLDING, until someone pulls: then RELEASE
   GRIP_STILL,    // the width stays, on request
   GRIP_RELEASE,  // opening, on request
   GRIP_OPEN,     // opened
@@ -58,7 +60,13 @@ enum GripState : std::uint8_t {
   GRIP_STATES,
 };
 
-enum GripRequest { GRIP_REQUEST_GRASP, GRIP_REQUEST_HOLD, GRIP_REQUEST_RELEASE };
+enum GripRequest {
+  GRIP_REQUEST_GRASP,
+  GRIP_REQUEST_HOLD,
+  GRIP_REQUEST_RELEASE,
+  GRIP_REQUEST_PLACE,
+  GRIP_REQUEST_HAND_OVER,
+};
 
 struct GripReport {
   std::uint8_t state = GRIP_IDLE;              // GripState
@@ -85,7 +93,8 @@ public:
 
   // GRASP: from IDLE, OPEN, DROPPED, MISSED, STILL. HOLD: the width stays, from every state but
   // FAULT. RELEASE: opens, from every state but a FAULT of the gripper itself. False: not from this
-  // state.
+  // state. PLACE and HAND_OVER: from HOLDING in mode hold, PLACE with a load of 0.15 N and more: until it opens, a
+  // load against the present one, or a pull, does not raise the grip. HOLD ends them.
   bool request(GripRequest request);
 
   // Computes the command. Call it after every input, and every 10 ms without one.
@@ -102,6 +111,7 @@ private:
   std::uint32_t squeeze();
   std::uint32_t make_ready();
   std::uint32_t hold();
+  bool is_taken();
   std::uint32_t aim(const GripAim &aim);
   void ramp(double to_mm, double speed_mm_s);
   double dead_s() const;
@@ -118,15 +128,17 @@ private:
   GripFixed fixed_;
   GripperStatus status_;
   bool hears_status_ = false;
-  double now_s_ = 0.0, since_s_ = 0.0; // since_s_: the state was entered
-  GripState state_ = GRIP_IDLE;
-  std::uint32_t trouble_ = 0, fault_trouble_ = 0; // of the last step; of FAULT
-  std::uint8_t fault_code_ = 0;                   // the gripper's own code
-  double fault_s_ = 0.0;                          // time of the first bad answer in a row
+  double now_s_ = 0.0, since_s_ = 0.0;                 // since_s_: the state was entered
+  GripState state_ = GRIP_IDLE, holds_ = GRIP_HOLDING; // holds_: while nothing slides
+  std::uint32_t trouble_ = 0, fault_trouble_ = 0;      // of the last step; of FAULT
+  std::uint8_t fault_code_ = 0;                        // the gripper's own code
+  double fault_s_ = 0.0;                               // time of the first bad answer in a row
   double wanted_N_ = 0.0;
   double filled_s_ = 0.0; // last contact of any fingertip
   double moved_s_ = 0.0;  // last motion of an approach
   double ramped_s_ = 0.0; // last step of an approach or a release
+  double kept_s_ = 0.0;   // last time that the load was there, or nobody pulled
+  double marked_N_ = 0.0; // load when PLACE or HAND_OVER was requested
   double even_s_ = 0.0;   // last time that both forces were alike, or the gripper moved
   bool may_activate_ = false, is_entered_ = false;
   bool still_grasps_ = false; // STILL with an object

@@ -8,7 +8,6 @@ namespace fingertip {
 namespace {
 
 constexpr double FRICTION_LEAST = 0.08;
-constexpr double LOAD_NOISE_N = 0.06;
 // Above its latest peak the load and its rate are used as measured. Below the peak the object swings
 // on the rubber, or has begun to slide, and the mean is used.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
@@ -34,8 +33,7 @@ constexpr double FALLS_s = 0.06;
 // The load of an object that slides and does not slow down is its friction plus the force that stops
 // it within STOPS_s. The estimate follows with the time constant FOLLOWS_s.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
-// Friction falls by less than this factor as a slide gets faster. So a sliding contact carries more
-// after its grip has grown by this factor; a contact that carries less has been caught.
+// Friction falls by less than this factor as a slide begins.
 constexpr double GROWN = 1.4;
 constexpr double MORE = 1.3; // factor on the grip of an object that slides without a known load
 
@@ -55,11 +53,11 @@ double GripFriction::value(double assumed) const {
   return std::min(now_, slid_ > 0.0 ? std::max(slid_, held_ / GROWN) : std::max(assumed, held_));
 }
 
-void GripLoad::rests(double load_N, double passed_s, bool swings) {
+void GripLoad::rests(double load_N, double sd_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
   const bool rises = load_N >= peak_N_ && !swings;
-  swings_s_ = load_N < peak_N_ - 2.0 * LOAD_NOISE_N ? SWINGS_s : swings_s_ - passed_s;
-  rate_N_s_ = rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
+  swings_s_ = load_N < peak_N_ - 2.0 * sd_N ? SWINGS_s : swings_s_ - passed_s;
+  rate_N_s_ = rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - sd_N, 0.0) / RATE_s : 0.0;
   slow_N_ += std::min(passed_s / RATE_s, 1.0) * (load_N - slow_N_);
   if (rises) {
     load_N_ = peak_N_ = load_N;
@@ -100,7 +98,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   fastest_mm_s_ = std::max(fastest_mm_s_, readings.speed_mm_s);
   lately_ -= std::min(passed_s / (sliding_ ? FALLS_s : LATELY_s), 1.0) * lately_;
   const bool creeps = readings.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
-  const bool holds = moved_mm_ < FAR_mm && readings.load_N + LOAD_NOISE_N < BEGINS_AT * lately_ * readings.grip_N;
+  const bool holds = moved_mm_ < FAR_mm && readings.load_N < BEGINS_AT * lately_ * readings.grip_N;
   const bool was_sliding = sliding_;
   sliding_ = readings.slides && (was_sliding || !readings.has_load || !(holds || creeps));
   goes_on_ = sliding_ && (!readings.has_load || (!holds && readings.speed_mm_s >= fastest_mm_s_));
@@ -108,17 +106,8 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
     slides_ += was_sliding ? 0 : 1;
     slid_s_ = now_s;
     if (goes_on_ && readings.has_load) {
-      // The ratio of an object that has been caught is not its friction.
-      const bool grown = was_sliding && readings.grip_N > GROWN * going_N_;
-      const bool caught = grown && readings.load_N < going_load_N_;
-      if (!caught) {
-        lately_ = std::max(lately_, readings.ratio);
-        friction_.slid(readings.ratio, lately_);
-      }
-      if (!was_sliding || (grown && !caught)) {
-        going_N_ = readings.grip_N;
-        going_load_N_ = readings.load_N;
-      }
+      lately_ = std::max(lately_, readings.ratio);
+      friction_.slid(readings.ratio, lately_);
       load_.slides_at(readings.load_N, readings.speed_mm_s, passed_s);
     }
     return;
@@ -128,7 +117,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
     return;
   }
   has_seen_load_ = true;
-  load_.rests(readings.load_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
+  load_.rests(readings.load_N, readings.load_sd_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
   was_N_ = std::max(was_N_ - std::min(passed_s / REMEMBERS_s, 1.0) * was_N_, load_.now_N());
   ratio_ += std::min(passed_s / HELD_s, 1.0) * (readings.ratio - ratio_);
   if (readings.grip_N > 2.0 * settings.touch_N) {

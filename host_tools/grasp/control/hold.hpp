@@ -28,8 +28,9 @@ private:
 // friction.
 class GripLoad {
 public:
-  // Updates from a contact that rests. swings: it was caught, and swings on the rubber.
-  void rests(double load_N, double passed_s, bool swings);
+  // Updates from a contact that rests. sd_N: less is no rise. swings: it was
+  // caught, and swings on the rubber.
+  void rests(double load_N, double sd_N, double passed_s, bool swings);
   // Updates from a contact that slides and does not slow down: its load is at least its friction, and
   // stopping it takes more.
   void slides_at(double load_N, double speed_mm_s, double passed_s);
@@ -70,13 +71,12 @@ private:
   double now_s_ = 0.0, updated_s_ = 0.0;
   double slid_s_ = 0.0; // time of the last frame of a slide
   double fastest_mm_s_ = 0.0;
-  double going_N_ = 0.0, going_load_N_ = 0.0; // grip and load when the friction of a slide was measured
-  double still_s_ = 0.0;                      // time of the last frame without a slide
-  double steady_s_ = 0.0;                     // the load has been steady since
-  double was_N_ = 0.0;                        // largest recent load; it decays over REMEMBERS_s
-  double ratio_ = 0.0;                        // smoothed tangential over normal force at rest
-  double lately_ = 0.0;                       // largest ratio within LATELY_s
-  double moved_mm_ = 0.0;                     // length of the present reported slide
+  double still_s_ = 0.0;  // time of the last frame without a slide
+  double steady_s_ = 0.0; // the load has been steady since
+  double was_N_ = 0.0;    // largest recent load; it decays over REMEMBERS_s
+  double ratio_ = 0.0;    // smoothed tangential over normal force at rest
+  double lately_ = 0.0;   // largest ratio within LATELY_s
+  double moved_mm_ = 0.0; // length of the present reported slide
   bool begun_ = false, sliding_ = false, goes_on_ = false, has_seen_load_ = false, was_loaded_ = false, is_set_ = false;
   std::uint32_t slides_ = 0;
 };

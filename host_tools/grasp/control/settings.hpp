@@ -41,6 +41,7 @@ struct GripSettings {
   double margin = 1.3;    // grip over load / friction; more if frames are late
   double slid = 1.05;     // factor on the margin after the first slide
   double decay_1_s = 5.0; // share of an excess of grip that decays in a second
+  double pull_N = 0.6;    // HAND_OVER: the load of a fingertip changes by so much
   double rest_s = 0.3;    // no decay for this time after a slide
   // A set force: the same grip at the start, later and without a load. While there is no load, the
   // controller holds the nearest force that the gripper reaches, not the least that is enough.

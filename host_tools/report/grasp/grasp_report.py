@@ -1,7 +1,5 @@
 """What grasp.py measured as a picture."""
 
-import bisect
-
 from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, text_of
 from kinds import GRIPPERS
 
@@ -41,51 +39,7 @@ def draw_drops(axes, found):
     tidy(axes, "Dropped", f"% of {' to '.join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))} grasps")
 
 
-def moment(series, t_s):
-    return min(bisect.bisect_left(series["t_s"], t_s), len(series["t_s"]) - 1)
-
-
-def draw_film(axes, series, at):
-    """Seen along the pads: rubber grey, between them the object; drawn to scale but for the arrows."""
-    i = moment(series, at)
-    half_mm, thick_mm, base_mm = 14, 12, 0.5 * series["width_mm"][i]
-    for side in (-1, 1):
-        inner, outer = side * base_mm, side * (base_mm + thick_mm)
-        axes.fill_betweenx([-18, 18], inner, outer, color="#c9ced8", lw=0)
-        axes.plot([outer, outer], [-18, 18], color=INK, lw=2)
-        force_N, load_N = series["force_N"][i], series["load_N"][i]
-        axes.annotate(
-            "",
-            (inner + side * 1, -series["way_mm"][i]),
-            (inner + side * (1 + 0.8 * force_N), -series["way_mm"][i]),
-            arrowprops={"arrowstyle": "-|>", "color": BLUE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0},
-        )
-        axes.annotate(
-            "",
-            (side * (base_mm - 1), -series["way_mm"][i] + 2 + 3 * load_N),
-            (side * (base_mm - 1), -series["way_mm"][i] + 2),
-            arrowprops={"arrowstyle": "-|>", "color": ORANGE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0},
-        )
-    axes.add_patch(
-        plt.Rectangle(
-            (-base_mm - 1, -half_mm - series["way_mm"][i]), 2 * base_mm + 2, 2 * half_mm, angle=0, color="#f3ddb8", ec=INK, lw=0.8, zorder=2
-        )
-    )
-    axes.axhline(0, color=FAINT, lw=0.6, ls=":", zorder=3)
-    axes.plot([-base_mm, base_mm], [-series["way_mm"][i]] * 2, color=INK, lw=0.8, zorder=3)
-    axes.set_xlim(-base_mm - 16, base_mm + 16)
-    axes.set_ylim(-26, 22)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_title(
-        f"{1e3 * (series['lift_s'][i] - series['begin_s']):+.0f} ms\ngrip {series['force_N'][i]:.1f} N, slid {series['slid_mm'][i] - series['slid_from_mm']:.1f} mm"
-        f"{', slides' if series['slips'][i] else ''}",
-        size=8,
-        color=INK,
-    )
-
-
-def draw_caught(axes, series, shots):
+def draw_caught(axes, series, title):
     begin = series["begin_s"]
     t_ms = [1e3 * (at - begin) for at in series["lift_s"]]
     for key, colour, label in (
@@ -96,18 +50,16 @@ def draw_caught(axes, series, shots):
     ):
         axes.plot(t_ms, series[key], color=colour, lw=1, label=label)
     axes.plot(t_ms, [value - series["slid_from_mm"] for value in series["slid_mm"]], color=INK, lw=1.4, label="slid, mm")
-    for shot in shots:
-        axes.axvline(1e3 * shot, color=FAINT, lw=0.5, ls=":")
     axes.set_xlim(-80, 300)
     shown = [i for i, at in enumerate(t_ms) if -80 <= at <= 300]
     axes.set_ylim(0, 1.15 * max(series["force_N"][i] for i in shown))
     axes.legend(fontsize=7, loc="upper left", ncols=3)
-    tidy(axes, "The same over time: N, and mm that it slid", "ms since it began to slide; dotted: the pictures above")
+    tidy(axes, title, "ms since it began to slide; N, and mm that it slid")
 
 
 def draw(found, path):
-    figure = plt.figure(figsize=(15, 12.5), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(1, 1))
+    figure = plt.figure(figsize=(15, 11), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(1.2, 1))
     places = above.subplots(1, 4, width_ratios=(1.3, 1, 1, 1))
     draw_drops(places[0], found)
     draw_distribution(places[1], found, "margin", "Grip over the least that holds", "median over the hold", 8)
@@ -118,18 +70,9 @@ def draw(found, path):
         series = {**caught["series"], "begin_s": caught["begin_s"]}
         start = min(range(len(series["lift_s"])), key=lambda i: abs(series["lift_s"][i] - caught["begin_s"]))
         series["slid_from_mm"] = series["slid_mm"][start]
-        offset_s = series["t_s"][start] - caught["begin_s"]
-        shots = (-0.05, 0.01, 0.03, 0.06, 0.1, 0.25)
-        film, course = below.subfigures(2, 1, height_ratios=(1, 1.1))
-        for axes, shot in zip(film.subplots(1, len(shots)), shots):
-            draw_film(axes, series, caught["begin_s"] + offset_s + shot)
-        draw_caught(course.subplots(), series, shots)
-        film.suptitle(
-            f"A slip that is caught: {caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, "
-            f"{' and '.join(caught['events'])} (blue: grip; orange: load)",
-            x=0.01,
-            ha="left",
-            size=10,
+        object_text = (
+            f"{caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, {' and '.join(caught['events'])}"
         )
+        draw_caught(below.subplots(), series, f"A slip that is caught: {object_text}")
     figure.suptitle("Grasps: simulated, the tool's own controller", x=0.01, ha="left", size=12, weight="bold")
     save(figure, path)

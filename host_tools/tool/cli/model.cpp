@@ -16,7 +16,7 @@ constexpr std::uint64_t SLIP_SHOWN_us = 150000;
 constexpr const char *CAP_KEY = "grasp_cap", *GRIPPER_KEY = "grasp_gripper";
 
 bool is_controlled(std::uint8_t state) {
-  return state == GRIP_SQUEEZE || state == GRIP_READY || state == GRIP_HOLDING || state == GRIP_SLIPPING;
+  return state == GRIP_SQUEEZE || state == GRIP_READY || (state >= GRIP_HOLDING && state <= GRIP_HANDING);
 }
 
 } // namespace

@@ -249,3 +249,23 @@ TEST(Grip, ALoadIsExpectedToRiseByNoMoreThanAShareOfIt) {
   EXPECT_LT(most, 1.7);
   EXPECT_GT(most, 1.4);
 }
+
+// Lowered onto a table it opens once the table has the load; pressed down or pulled it grips no harder.
+TEST(Grip, PlacesOnATableAndHandsOverToAPull) {
+  for (const double to_N : {1.9, 0.0, -3.0, 3.2}) {
+    GripWorld world;
+    world.grasp();
+    EXPECT_FALSE(world.grip.request(GRIP_REQUEST_PLACE)); // there is no load
+    world.pull(2.0, 0.3);
+    world.run(2.0);
+    const double before_N = world.force_N;
+    ASSERT_TRUE(world.grip.request(to_N > 2.0 ? GRIP_REQUEST_HAND_OVER : GRIP_REQUEST_PLACE));
+    world.run(0.5);
+    EXPECT_EQ(world.report.state, to_N > 2.0 ? GRIP_HANDING : GRIP_PLACING);
+    world.peak_N = 0.0;
+    world.pull(to_N, 0.2);
+    world.run(0.1);
+    EXPECT_EQ(world.report.state, to_N == 1.9 ? GRIP_PLACING : GRIP_RELEASE) << to_N;
+    EXPECT_LT(world.peak_N, 1.03 * before_N) << to_N;
+  }
+}

@@ -357,7 +357,7 @@ private:
       models_[i].set_statistics(loop_.statistics(i));
     }
     Caption caption;
-    caption.keys = "q end, holding  o open  h hold  g grasp";
+    caption.keys = "q end, holding  o open  h hold  g grasp  p place  r hand over";
     caption.note = joined(std::vector{message_.text(), fault_.empty() ? trouble_ : fault_, lost_}, "  ");
     if (caption.note.empty() && recording_) {
       caption.note = has_keys_ ? "recording to " + printable(options_.recording) : "";
@@ -375,6 +375,10 @@ private:
       wish(GRIP_REQUEST_RELEASE, "open");
     } else if (key == 'h') {
       wish(GRIP_REQUEST_HOLD, "hold");
+    } else if (key == 'p') {
+      wish(GRIP_REQUEST_PLACE, "place");
+    } else if (key == 'r') {
+      wish(GRIP_REQUEST_HAND_OVER, "hand over");
     } else if (key == 'g') {
       wish(GRIP_REQUEST_GRASP, "grasp");
     }
@@ -538,7 +542,7 @@ void add_grasp(CommandLine &line) {
   with_presets(command, options->breaking);
   with_limits(command, options->limits);
   command->footer(
-      "Keys, on a terminal: q end, holding; o open; h hold; g grasp.\n\nExit status:\n  0  as asked, the gripper "
+      "Keys, on a terminal: q end, holding; o open; h hold; g grasp; p place; r hand over.\n\nExit status:\n  0  as asked, the gripper "
       "holding or open\n  1  an error, which is named\n  2  wrong usage\n  3  it closed, and nothing was there\n  4  "
       "the object fell\n  5  the gripper failed, was not active, or did not answer at the end");
 }
