@@ -103,6 +103,7 @@ json setting_json(const std::string &text) {
 const char *kind_of(ErrorCode code) {
   switch (code) {
   case ErrorCode::not_a_recording:
+  case ErrorCode::unread_kind:
     return "no recording";
   case ErrorCode::other_format:
     return "other format";

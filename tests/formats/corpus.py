@@ -168,6 +168,12 @@ def csv_cases(corpus, name, text, devices):
     add("blank_lines", [*lines[:row], "", " \t", *lines[row:]])
     add("blank_line_first", ["", *lines])
     add("byte_order_mark", b"\xef\xbb\xbf" + text)
+    for what, cell in {"semicolons": "{};", "tabs": "{}\t", "quotes": '"{}",', "decimal_commas": "{},"}.items():
+        cells = [line.replace(".", "," if "comma" in what else ".").split(",") for line in lines]
+        add(what, [line if line[0] == "#" else "".join(map(cell.format, each))[:-1] for line, each in zip(lines, cells)])
+    add("cr_only", text.replace(b"\n", b"\r"))
+    add("note", [*lines[:row], "# 12:30 object placed", "#", *lines[row:]])
+    add("no_info_packet", [line for line in lines if "packet: info" not in line])
     add("rows_twice", [*lines[: row + 1], *lines[row:]])
     add("rows_backwards", [*lines[: header + 1], *reversed(lines[header + 1 : -1]), lines[-1]])
     add("head_only", lines[: header + 1])
@@ -333,6 +339,7 @@ def message_cases(corpus, name, bag, devices):
     add("no_chunks", use_chunking=False)
     add("no_crc", enable_crcs=False)
     add("no_index", index_types=mcap.writer.IndexType.NONE, use_statistics=False, use_summary_offsets=False)
+    add("large_chunks", lambda kind, row: [("std_msgs/Header", bytes(3_000_000)), (kind, row)], chunk=10**8)
     for what, changes in {
         "nan_under_its_flag": {"x_mm": nan},
         "all_nan": {"x_mm": nan, "y_mm": nan, "force_n": nan},

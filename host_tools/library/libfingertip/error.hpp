@@ -59,6 +59,7 @@ enum class ErrorCode {
   write_torn,         /* a write failed, the file's last line is torn */
   not_a_recording,    /* nor a capture of the line */
   other_format,       /* of a recording: newer or older than this library */
+  unread_kind,        /* a file that a recording may be in; the text has what makes it one */
   damaged_line,       /* of a recording: the lines after it can be read */
   damaged_head,       /* of a recording: without it no row can be read */
   several_in_file,    /* fingertips, and none was chosen; the text names them */
@@ -71,7 +72,11 @@ enum class ErrorCode {
 
 class Error : public std::runtime_error {
 public:
-  Error(ErrorCode code, const std::string &facts) : std::runtime_error(facts), code_(code) {}
+  /* Of facts longer than 600 characters, which quote what may be as long as a file, the middle is left out. */
+  Error(ErrorCode code, const std::string &facts)
+      : std::runtime_error(facts.size() <= 600 ? facts
+                                               : facts.substr(0, 300) + " ... " + facts.substr(facts.size() - 300)),
+        code_(code) {}
   /* A text that is complete. */
   explicit Error(const std::string &text) : Error(ErrorCode::other, text) {}
 

@@ -172,6 +172,7 @@ fingertip_status failed(const Error &error) {
       {ErrorCode::bad_value, FINGERTIP_ERR_VALUE},
       {ErrorCode::not_a_recording, FINGERTIP_ERR_NOT_A_RECORDING},
       {ErrorCode::other_format, FINGERTIP_ERR_OTHER_FORMAT},
+      {ErrorCode::unread_kind, FINGERTIP_ERR_NOT_A_RECORDING},
       {ErrorCode::damaged_line, FINGERTIP_ERR_DAMAGED_LINE},
       {ErrorCode::damaged_head, FINGERTIP_ERR_DAMAGED_HEAD},
       {ErrorCode::other_sensor_count, FINGERTIP_ERR_SENSORS},

@@ -19,6 +19,8 @@ public:
   virtual void torn_line(const std::string &text) = 0;
   /* Last of all. */
   virtual void finish() = 0;
+  /* Of lines that are rows to people and that it keeps as text alone: how many, and what is wrong with the first. */
+  virtual std::string unread_rows() const { return ""; }
   virtual const std::string &path() const = 0;
 };
 

@@ -1,5 +1,6 @@
 #include "libfingertip/mcap.hpp"
 
+#include "libfingertip/error.hpp"
 #include "libfingertip/little_endian.hpp"
 
 #include <algorithm>
@@ -66,8 +67,8 @@ std::uint32_t crc_of(std::string_view bytes) {
   return crc32_iso_hdlc(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
 }
 
-/* Largest chunk and record; they bound the memory that a false size costs. Others write chunks of up to some MB. */
-constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26, RECORD_MOST_bytes = CHUNK_MOST_bytes + (1 << 16);
+/* Largest chunk and record; they bound the memory that a false size costs. Recorders of cameras write some 100 MB. */
+constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 28, RECORD_MOST_bytes = CHUNK_MOST_bytes + (1 << 16);
 
 /* The fields of a record's content. */
 class Fields {
@@ -99,6 +100,10 @@ private:
 std::string unpacked(std::string_view compression, std::string_view packed, std::uint64_t size) {
   if (compression.empty()) {
     return std::string(packed);
+  }
+  if (compression == "lz4") {
+    throw Error(ErrorCode::unread_kind,
+                "chunks packed by lz4 are not read; pack them by zstd: mcap compress FILE -o OUT");
   }
   if (compression != "zstd") {
     throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");

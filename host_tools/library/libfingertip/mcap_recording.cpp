@@ -307,7 +307,11 @@ void McapLineSink::comment(const std::string &text) {
   }
 }
 
-/* False if it is not written as this library writes rows. */
+std::string McapLineSink::unread_rows() const {
+  return unread_count_ ? std::to_string(unread_count_) + " rows cannot be read, the first in line " + unread_ : "";
+}
+
+/* False if it is none. */
 bool McapLineSink::put_row(const std::string &text) {
   ros::Row row;
   std::string_view cells = text;
@@ -318,19 +322,15 @@ bool McapLineSink::put_row(const std::string &text) {
       row.time_us = to_double(cells.substr(0, cells.find(',')));
       cells.remove_prefix(std::min(cells.find(','), cells.size() - 1) + 1);
       if (!device || *device >= devices_.size() || !row.time_us) {
-        return false;
+        throw Damage{"neither a comment nor a row"};
       }
       row.device = static_cast<std::uint32_t>(*device);
     }
     RowPackets packets = parse_row(cells, sensor_count_, sets_);
     row.contact = packets.contact;
     row.raw = packets.raw;
-  } catch (const Damage &) {
-    return false;
-  }
-  std::string as_written = joint_ ? joint_cells(row.device, *row.time_us) : "";
-  as_written += row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr, sensor_count_, sets_);
-  if (as_written != text) {
+  } catch (const Damage &damage) {
+    unread_ = unread_count_++ ? unread_ : std::to_string(number_ + 1) + ": " + damage.what;
     return false;
   }
   row.number = ++number_;

@@ -26,6 +26,7 @@ public:
   void torn_line(const std::string &text) override;
   void finish() override;
   const std::string &path() const override { return file_->path(); }
+  std::string unread_rows() const override;
 
 private:
   /* When a row was measured. */
@@ -77,6 +78,8 @@ private:
   std::vector<Device> devices_;
   std::uint16_t lines_ = 0, diagnostics_ = 0; /* channels */
   LogClock clock_;
+  std::uint64_t unread_count_ = 0;
+  std::string unread_; /* the first */
 };
 
 class McapLineSource : public LineSource {

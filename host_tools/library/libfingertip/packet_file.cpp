@@ -24,10 +24,10 @@ std::optional<PacketFile::Item> PacketFile::next_of_recording() {
   if (!item) {
     state_.ended = true;
     state_.statistics = reader_->end_statistics().value_or(state_.statistics);
-  } else if (item->kind == Item::Kind::packet) {
+  } else if (item->kind == Item::Kind::packet && !item->made) {
     state_.statistics.packets++;
     state_.sequence.follow(item->packet.sequence, state_.statistics);
-  } else if (item->event.rfind(EVENT_GONE, 0) == 0) {
+  } else if (item->kind == Item::Kind::event && item->event.rfind(EVENT_GONE, 0) == 0) {
     state_.sequence.restart();
   }
   return item;
@@ -40,7 +40,7 @@ std::optional<PacketFile::Item> PacketFile::next_of_capture() {
     state_.offset += length;
     state_.ended = length == 0;
     state_.decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes), length, [this](const wire_packet &packet) {
-      state_.decoded.push_back({Item::Kind::packet, packet, ""});
+      state_.decoded.push_back({Item::Kind::packet, packet, "", {}, 0, false});
     });
     state_.statistics = state_.decoder.statistics();
   }

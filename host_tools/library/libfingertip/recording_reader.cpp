@@ -18,12 +18,13 @@ namespace {
 
 constexpr std::string_view OUR_FILES = "# fingertip-";
 
+/* A mark before the first line, and ends by CR LF or CR alone, which editors write, are no part of them. */
 class TextLines : public LineSource {
 public:
   explicit TextLines(std::unique_ptr<ByteSource> bytes) : bytes_(std::move(bytes)) {}
 
   bool next(Line &line) override {
-    std::size_t end = block_.find('\n', at_);
+    std::size_t end = block_.find(end_, at_);
     while (end == std::string::npos) {
       begin_ += at_;
       block_.erase(0, std::exchange(at_, 0));
@@ -33,7 +34,10 @@ public:
         break;
       }
       block_.append(more, count);
-      end = block_.find('\n', length);
+      if (begin_ + length == 0) {
+        end_ = block_.find('\n') == std::string::npos && block_.find('\r') != std::string::npos ? '\r' : '\n';
+      }
+      end = block_.find(end_, length);
     }
     line.torn = end == std::string::npos;
     line.text.assign(block_, at_, line.torn ? end : end - at_);
@@ -41,6 +45,12 @@ public:
     line.number = number_ + 1;
     const bool is_there = !line.torn || !line.text.empty();
     number_ += is_there;
+    while (!line.text.empty() && line.text.back() == '\r') {
+      line.text.pop_back();
+    }
+    if (number_ == 1 && line.text.rfind(BYTE_ORDER_MARK, 0) == 0) {
+      line.text.erase(0, BYTE_ORDER_MARK.size());
+    }
     return is_there;
   }
   Place place() override { return {static_cast<std::streamoff>(begin_ + at_), 0, number_}; }
@@ -52,11 +62,14 @@ public:
   }
 
 private:
+  static constexpr std::string_view BYTE_ORDER_MARK = "\xef\xbb\xbf";
+
   std::unique_ptr<ByteSource> bytes_;
   std::string block_;       /* the part of them that begins at begin_; read until at_ */
   std::uint64_t begin_ = 0; /* where it does */
   std::size_t at_ = 0;
   std::uint64_t number_ = 0;
+  char end_ = '\n';
 };
 
 /* The format in the first line, "1" or "2". Throws Error with what it is instead. */
@@ -88,7 +101,7 @@ bool is_mcap(ByteSource &bytes) {
 bool is_recording(const std::string &path, ByteSource &bytes) {
   std::string start(4096, ' '); /* several frames, each of which would end with 0x00 */
   start.resize(bytes.read(0, start.data(), start.size()));
-  if (start.rfind(OUR_FILES, 0) == 0 || is_mcap(bytes)) {
+  if (start.substr(0, 16).find(OUR_FILES) != std::string::npos || is_mcap(bytes)) {
     return true;
   }
   if (start.find('\0') == std::string::npos) {
@@ -180,8 +193,8 @@ bool RecordingReader::read_next() {
     if (line.torn && !line.text.empty()) {
       throw Damage{"the last line is torn"};
     }
-    if (!line.text.empty() && line.text.back() == '\r') {
-      line.text.pop_back(); /* somebody's editor */
+    while (!line.text.empty() && line.text.back() == '\r') {
+      line.text.pop_back(); /* of an MCAP file that was made of an editor's */
     }
     read_line(line.text);
   } catch (const Damage &damage) {
@@ -214,6 +227,11 @@ void RecordingReader::read_line(const std::string &text) {
   } else {
     const auto columns = columns_of(text, joint_);
     if (!columns || (joint_ && devices_.empty())) {
+      if (text.find_first_of(";\t\"") != std::string::npos) {
+        throw Error(ErrorCode::unread_kind,
+                    path_ +
+                        ": cells between semicolons or tabs, or in quotes: a spreadsheet's? Save it with commas alone");
+      }
       throw Damage{"unknown header"};
     }
     sensor_count_ = columns->sensor_count;
@@ -238,7 +256,7 @@ std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number)
 void RecordingReader::read_comment(const std::string &text) {
   std::size_t colon = text.find(": ");
   if (colon == std::string::npos) {
-    throw Damage{"neither a comment \"# key: value\" nor a row"};
+    return; /* a person's note */
   }
   std::string key(trim(std::string_view(text).substr(1, colon - 1)));
   std::uint32_t device = number_.value_or(0);
@@ -288,14 +306,8 @@ void RecordingReader::read_comment(const std::string &text) {
       if (info.sensor_count < 1 || info.sensor_count > FT_MAX_SENSORS) {
         throw Damage{"an info packet without \"# sensors:\" before it"};
       }
-      item.packet.type = WIRE_INFO;
-      item.packet.body.info = info;
-      if (!(info.stored & WIRE_STORED_CALIBRATION)) {
-        item.packet.body.info.calibration = {};
-      }
-      if (!(info.stored & WIRE_STORED_PAD)) {
-        item.packet.body.info.pad = {};
-      }
+      put_info(device, item.packet, false);
+      return;
     } else {
       throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
     }
@@ -312,6 +324,24 @@ void RecordingReader::read_comment(const std::string &text) {
   } else {
     read_info_field(info, key, value);
   }
+}
+
+/* With what the comments until now have. Before the first row one is made, where a recorder has written none. */
+void RecordingReader::put_info(std::uint32_t device, wire_packet packet, bool made) {
+  const wire_info &info = state_.infos[device];
+  state_.has_info[device] = true;
+  if (info.sensor_count < 1 || info.sensor_count > FT_MAX_SENSORS) {
+    return;
+  }
+  packet.type = WIRE_INFO;
+  packet.body.info = info;
+  if (!(info.stored & WIRE_STORED_CALIBRATION)) {
+    packet.body.info.calibration = {};
+  }
+  if (!(info.stored & WIRE_STORED_PAD)) {
+    packet.body.info.pad = {};
+  }
+  state_.items.push_back({Item::Kind::packet, packet, "", {}, device, made});
 }
 
 void RecordingReader::read_end(std::string_view text) {
@@ -402,6 +432,7 @@ void RecordingReader::choose_device(const std::string &serials) {
   const auto all = split(trim(serials), ' ');
   devices_.assign(all.begin(), all.end());
   state_.infos.assign(all.size(), wire_info{});
+  state_.has_info.assign(all.size(), false);
   if (all_) {
     return;
   }
@@ -420,9 +451,12 @@ void RecordingReader::choose_device(const std::string &serials) {
 
 void RecordingReader::read_row(std::string_view text, std::uint32_t device, std::optional<double> time_us) {
   RowPackets row = parse_row(text, sensor_count_, sets_);
+  if (!state_.has_info[device]) {
+    put_info(device, wire_packet{}, true);
+  }
   for (const auto &packet : {row.contact, row.raw}) {
     if (packet) {
-      state_.items.push_back({Item::Kind::packet, *packet, "", time_us, device});
+      state_.items.push_back({Item::Kind::packet, *packet, "", time_us, device, false});
     }
   }
 }

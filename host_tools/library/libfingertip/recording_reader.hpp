@@ -28,6 +28,7 @@ public:
     std::string event;
     std::optional<double> time_us = {}; /* of a joint recording's rows, on the recorder's clock */
     std::uint32_t device = 0;           /* in a joint recording */
+    bool made = false; /* an info packet of the head's keys: no such packet is in the file before the first row */
   };
 
   /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.
@@ -49,6 +50,7 @@ public:
     std::uint64_t line_number = 0, skipped_lines = 0;
     bool header_seen = false, has_end = false;
     std::vector<wire_info> infos{wire_info{}}; /* of each fingertip */
+    std::vector<bool> has_info{false};         /* whether it was given */
     std::deque<Item> items;
   };
   struct Place {
@@ -71,6 +73,7 @@ private:
   bool read_next();
   void read_line(const std::string &text);
   void read_comment(const std::string &text);
+  void put_info(std::uint32_t device, wire_packet packet, bool made);
   void read_row(std::string_view text, std::uint32_t device, std::optional<double> time_us = {});
   void choose_device(const std::string &serials);
   void read_end(std::string_view text);

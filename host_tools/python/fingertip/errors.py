@@ -9,7 +9,10 @@ class FingertipError(Exception):
 
 
 class InputError(FingertipError):
-    """A file or an argument that the user can mend; the text names file and line and states what to do."""
+    """A file or an argument that the user can mend; the text names file and line and states what to do. Of a long one the middle is left out."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text if len(text) <= 600 else f"{text[:300]} ... {text[-300:]}")
 
 
 class BadValueError(FingertipError, ValueError):

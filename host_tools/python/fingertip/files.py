@@ -19,6 +19,7 @@ Every error is an InputError whose text is one line that names file and line and
 
 import array
 import contextlib
+import io
 import json
 import math
 import os
@@ -334,12 +335,14 @@ class _RecordingLines:
         """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
-                if file.read(len(MAGIC)) == MAGIC:
+                begin = file.read(16384)
+                if begin.startswith(MAGIC):
                     yield from McapLineReader(self.path, self.progress).lines()
                     return
-                file.seek(0)
+                file.seek(3 if begin.startswith(b"\xef\xbb\xbf") else 0)
+                source: Any = file if b"\n" in begin or b"\r" not in begin else io.BytesIO(file.read().replace(b"\r", b"\n"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
-                while lines := file.readlines(BLOCK_bytes):
+                while lines := source.readlines(BLOCK_bytes):
                     block = b"".join(lines)
                     read += len(block)
                     if self.progress and size > WORTH_WAITING_bytes and read - shown > size // 100:
@@ -348,7 +351,7 @@ class _RecordingLines:
                     torn = not block.endswith(b"\n")
                     texts = block.decode("utf-8", "surrogateescape").removesuffix("\n").split("\n")
                     if b"\r" in block:
-                        texts = [text.removesuffix("\r") for text in texts]
+                        texts = [text.rstrip("\r") for text in texts]
                     begin = 0
                     for at in sorted({*(at for at, text in enumerate(texts) if text[:1] in "# \t"), len(texts) - torn}):
                         if at > begin:
@@ -399,6 +402,7 @@ class _Reading:
         self.table, self.line_numbers, self.times_us = array.array("d"), array.array("q"), array.array("d")
         self.waits: list[tuple[int, str, float]] = []  # rows of a joint recording, or of MCAP: line, text, time_us
         self.sensors = self.info_sensors = 0
+        self.has_info = False
 
     def line(self, number: int, text: str) -> None:
         """Raises ValueError where it is damaged."""
@@ -418,14 +422,17 @@ class _Reading:
                 self.waits.append((number, cells[2], recorded.number("time_us", cells[1])))
 
     def _header(self, text: str) -> None:
+        wrong = "wrong header; record again with this version of fingertip"
+        if any(c in text for c in ';\t"'):
+            wrong = "cells between semicolons or tabs, or in quotes: a spreadsheet's? Save it with commas alone"
         if self.is_joint:
             if not text.startswith(JOINT_COLUMNS) or self.number is None:
-                raise ValueError("wrong header; record again with this version of fingertip")
+                raise ValueError(wrong)
             text = text.removeprefix(JOINT_COLUMNS)
         try:
             self.rows = Rows(text)
         except ValueError:
-            raise ValueError("wrong header; record again with this version of fingertip") from None
+            raise ValueError(wrong) from None
         names = self.rows.names
         self.wanted = (
             tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
@@ -450,6 +457,9 @@ class _Reading:
                 damaged(numbers[at], found)
                 at += 1
                 continue
+            if not self.has_info and 1 <= self.info_sensors <= SENSORS_MAX:  # of a recorder that has written none
+                self.packets.append(("info", {"sequence": "0", "t_us": "0"}))
+            self.has_info = True
             self.table.frombytes((found if self.columns is None else found[:, self.wanted]).tobytes())
             self.line_numbers.extend(numbers[at : at + len(found)])
             self.times_us.extend(times_us[at : at + len(found)])
@@ -458,7 +468,7 @@ class _Reading:
     def _comment(self, line: int, text: str) -> None:
         key, separator, value = text[1:].partition(": ")
         if not separator:
-            raise ValueError('neither a comment "# key: value" nor a row')
+            return  # a person's note
         key = key.strip(" \t\r")
         if self.is_joint and "/" in key:
             number, _, key = key.partition("/")
@@ -488,6 +498,7 @@ class _Reading:
         kind, fields = packet_of(text)
         if kind == "info" and not 1 <= self.info_sensors <= SENSORS_MAX:
             raise ValueError('an info packet without "# sensors:" before it')
+        self.has_info = self.has_info or kind == "info"
         self.packets.append((kind, fields))
 
 

@@ -26,7 +26,7 @@ from .ros_messages import decode, encode, schema_of
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
-CHUNK_MOST_bytes = 1 << 26  # of one that is read
+CHUNK_MOST_bytes = 1 << 28  # of one that is read
 
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
 _CONTACT_NAMES = (*CONTACT_COLUMNS, *LATER_COLUMNS)
@@ -384,6 +384,8 @@ class McapLineReader:
 
     def _chunk(self, chunk: Any) -> list[tuple[str, str, bytes]]:
         size = chunk.uncompressed_size
+        if chunk.compression == "lz4":
+            raise InputError(f"{self.path}: chunks packed by lz4 are not read; pack them by zstd: mcap compress FILE -o OUT")
         if chunk.compression not in ("", "zstd"):
             raise ValueError(f'compression "{chunk.compression}" is unknown')
         if size > CHUNK_MOST_bytes:

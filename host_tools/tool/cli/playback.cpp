@@ -16,6 +16,8 @@ constexpr int PACKETS_AT_ONCE = 2000;
 constexpr double SHORT_WAY_us = 5e6, LONG_WAY_us = 60e6;
 /* Spacing of the positions to go back to. */
 constexpr double MARKS_us = 10e6;
+/* A longer pause in a recording, or a time that is damaged, is passed over. */
+constexpr double PAUSE_MOST_us = 10e6;
 constexpr double END = std::numeric_limits<double>::infinity();
 
 std::optional<double> time_of(const PacketFile::Item &item, FrameClock &clock) {
@@ -115,6 +117,10 @@ void Playback::step(HostTime now) {
   if (grip_track_) {
     is_there_ = grip_track_->read_to(time_us_, PACKETS_AT_ONCE, grip_) && is_there_;
   }
+  if (const double next_us = due_us();
+      is_there_ && !paused_ && std::isfinite(next_us) && next_us > time_us_ + PAUSE_MOST_us) {
+    time_us_ = next_us;
+  }
   if (is_there_ && std::isinf(time_us_)) {
     time_us_ = grip_track_ ? grip_track_->last_us() : 0;
     for (const FingertipTrack &track : tracks_) {
@@ -123,15 +129,17 @@ void Playback::step(HostTime now) {
   }
 }
 
-HostTime Playback::next_step(HostTime now) const {
-  constexpr std::chrono::milliseconds patience{20};
-  double due_us = END;
+double Playback::due_us() const {
+  double due_us = grip_track_ && !grip_track_->is_ended() ? grip_track_->next_us() : END;
   for (const FingertipTrack &track : tracks_) {
     due_us = track.is_ended() ? due_us : std::min(due_us, track.next_us());
   }
-  if (grip_track_ && !grip_track_->is_ended()) {
-    due_us = std::min(due_us, grip_track_->next_us());
-  }
+  return due_us;
+}
+
+HostTime Playback::next_step(HostTime now) const {
+  constexpr std::chrono::milliseconds patience{20};
+  const double due_us = this->due_us();
   if (!is_there_ || (!paused_ && speed_ == 0)) {
     return now;
   }

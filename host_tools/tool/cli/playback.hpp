@@ -82,6 +82,7 @@ public:
 
 private:
   void seek(double time_us);
+  double due_us() const; /* of what comes next; infinite: nothing */
 
   std::vector<FingertipTrack> tracks_;
   std::vector<Model> models_; /* of the tracks */

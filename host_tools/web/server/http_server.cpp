@@ -23,30 +23,15 @@ using std::chrono::seconds;
 constexpr seconds TO_ASK{10}, IDLE{30}, TO_TAKE{60}, TO_TAKE_SOME{10}, TO_LEAVE{2};
 constexpr milliseconds LOOK_INTERVAL{50};
 constexpr milliseconds GATHERS{8}; /* half a picture's time: a stream has fewer, larger pieces */
+constexpr const char *FAULT = "no request, or one that is too large\n";
 constexpr int BACKLOG = 4096, AT_ONCE = 64;
 constexpr int SENT_AHEAD_BYTES = 65536; /* the kernel's memory for one that does not read; it doubles this */
 constexpr unsigned ESTABLISHED = 1;     /* in the kernel's tables of connections */
-
-const char *name_of(int status) {
-  static const std::map<int, const char *> names{
-      {200, "OK"}, {400, "Bad Request"}, {403, "Forbidden"}, {404, "Not Found"}, {405, "Method Not Allowed"},
-  };
-  const auto found = names.find(status);
-  return found == names.end() ? "Refused" : found->second;
-}
 
 std::string small_letters(std::string_view text) {
   std::string small(text);
   std::transform(small.begin(), small.end(), small.begin(), [](unsigned char c) { return std::tolower(c); });
   return small;
-}
-
-/* Without the port. */
-std::string peer_of(const sockaddr_storage &address) {
-  char host[NI_MAXHOST] = "";
-  getnameinfo(reinterpret_cast<const sockaddr *>(&address), sizeof address, host, sizeof host, nullptr, 0,
-              NI_NUMERICHOST);
-  return host;
 }
 
 /* 0, or the status of what is wrong. text: up to the empty line, without it. */
@@ -187,7 +172,7 @@ private:
     }
     const std::size_t end = std::min(in_.find("\r\n\r\n"), HEAD_BYTES + 1);
     if (end > HEAD_BYTES) {
-      return in_.size() <= HEAD_BYTES ? host_now() < until_ : reply(HttpAnswer(431), headers, false, true);
+      return in_.size() <= HEAD_BYTES ? host_now() < until_ : reply(HttpAnswer(431, FAULT), headers, false, true);
     }
     HttpRequest request;
     bool stays = false;
@@ -197,7 +182,7 @@ private:
       fault = request.headers.count("transfer-encoding") ? 411 : !length ? 400 : *length > BODY_BYTES ? 413 : 0;
     }
     if (fault != 0) {
-      return reply(HttpAnswer(fault), headers, false, true);
+      return reply(HttpAnswer(fault, FAULT), headers, false, true);
     }
     const std::size_t whole = end + 4 + *length;
     if (in_.size() < whole) {
@@ -210,13 +195,10 @@ private:
   }
 
   bool reply(HttpAnswer answer, const std::string &headers, bool only_head, bool ends) {
-    if (answer.status != 200 && answer.text.empty()) {
-      answer.text = std::string(name_of(answer.status)) + "\n";
-    }
     ends = ends || answer.stream;
     const std::size_t length = answer.file ? answer.file->size() : answer.text.size();
-    out_ = "HTTP/1.1 " + std::to_string(answer.status) + " " + name_of(answer.status) + "\r\n" + headers +
-           answer.header + "Content-Type: " + answer.type + "\r\n" +
+    out_ = "HTTP/1.1 " + std::to_string(answer.status) + " \r\n" + headers + answer.header +
+           "Content-Type: " + answer.type + "\r\n" +
            (answer.stream ? "" : "Content-Length: " + std::to_string(length) + "\r\n") +
            (ends ? "Connection: close\r\n\r\n" : "\r\n") + (only_head || answer.file ? "" : answer.text);
     file_ = only_head ? nullptr : answer.file;
@@ -293,7 +275,8 @@ void HttpServer::accept_all() {
     if (fd < 0) {
       return;
     }
-    const std::string peer = peer_of(address);
+    char peer[NI_MAXHOST] = "";
+    getnameinfo(reinterpret_cast<const sockaddr *>(&address), length, peer, sizeof peer, nullptr, 0, NI_NUMERICHOST);
     const auto of_peer = [&](const Connection &each) { return each.peer() == peer; };
     const bool too_many =
         std::count_if(connections_.begin(), connections_.end(), of_peer) >= static_cast<std::ptrdiff_t>(MOST_OF_A_PEER);

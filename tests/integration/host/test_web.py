@@ -141,7 +141,6 @@ class Web(WebCase):
         for address in ("127.0.0.2", *["::1"] * bool(pathlib.Path("/proc/net/if_inet6").read_text())):
             with self.served("--address", address):
                 self.assertEqual(self.ask()[0], 200)
-            self.assertNotIn("everyone", self.said)
 
     def refused(self, *options):
         done = subprocess.run([self.tool, "web", *options], capture_output=True, text=True, timeout=PATIENCE_s)
@@ -358,8 +357,8 @@ class Strangers(SimulationsCase):
     def test_only_who_has_the_token_may_ask(self):
         with self.served(), self.run_tool("simulate", "--mouse"):
             cookie = self.ask(f"/?token={self.token}")[1]["Set-Cookie"]
-            self.assertRegex(cookie, rf"^fingertip-{self.port}={self.token}; Path=/simulated; HttpOnly; SameSite=Strict$")
-            self.assertNotIn("Set-Cookie", self.ask()[1] | self.ask("/?token=0")[1])
+            self.assertEqual(cookie, f"fingertip-{self.port}={self.token}; Path=/simulated; HttpOnly; SameSite=Strict")
+            self.assertNotIn("Set-Cookie", self.ask("/?token=0")[1])
             self.assertEqual(self.told("/simulated", Cookie=cookie)[0], 200)
             for wrong in ("", f"fingertip-{self.port}=0", f"fingertip={self.token}"):
                 self.assertIn("open the address", self.told("/simulated", Cookie=wrong)[1])

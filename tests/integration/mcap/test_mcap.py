@@ -1,7 +1,6 @@
 """MCAP recordings of the tool and of the Python package, by readers of others: usage test_mcap.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
 
 # real time: a recorder on a pseudo-terminal
-import contextlib
 import os
 import pathlib
 import random
@@ -57,6 +56,16 @@ class TestMcap(unittest.TestCase):
         for name in ("messages_differ", "bags_differ", "round_trips_differ", "truncations_unread"):
             self.assertEqual(figures[f"mcap_{name}"], 0, name)
 
+    def test_no_row_is_lost_in_silence(self):
+        lines = self.csv.read_bytes().split(b"\n")
+        row = next(at for at, line in enumerate(lines) if line[:1].isdigit() and b",," not in line[:40])
+        path, bag = self.folder / "crlf.csv", self.folder / "crlf.mcap"
+        path.write_bytes(b"\xef\xbb\xbf" + b"\r\n".join(lines))
+        self.assertEqual(bags.contents(self.convert(path, "crlf.mcap")), bags.contents(self.convert(self.csv, "lf.mcap")))
+        path.write_bytes(b"\n".join([*lines[:row], b"x" + lines[row], *lines[row + 1 :]]))
+        self.assertIn(f"1 rows cannot be read, the first in line {row + 1}: t_us is", self.refused("convert", path, bag, "--overwrite"))
+        self.assertEqual(self.convert(self.convert(path, "x.mcap", "--salvage"), "x.csv").read_bytes(), path.read_bytes())
+
     def test_tool_and_package_write_the_same_of_several(self):
         bags.of_python(self.several_csv, self.folder / "same.mcap")
         there = self.convert(self.several_csv, "tool.mcap")
@@ -78,9 +87,13 @@ class TestMcap(unittest.TestCase):
                 data.decode("utf-8")
             except UnicodeDecodeError:
                 continue
-            self.assertEqual(
-                self.convert(self.convert(path, "edited.mcap", "--salvage"), "edited_back.csv", "--salvage").read_bytes(), data, number
-            )
+            back = self.convert(self.convert(path, "edited.mcap", "--salvage"), "edited_back.csv", "--salvage")
+            lines = [file.read_bytes().replace(b"\r", b"").split(b"\n") for file in (path, back)]
+            changed = [one for one, other in zip(*lines) if one != other]  # rows, to what this tool writes
+            self.assertEqual((len(lines[0]), [line for line in changed if not line[:1].isdigit()]), (len(lines[1]), []), number)
+            if changed:
+                there, here = (read_recording(file, salvage=True, serial="AAAA") for file in (path, back))
+                self.assertEqual(repr((there.columns, there.sensors_Pa)), repr((here.columns, here.sensors_Pa)), number)
         path.write_bytes(text + b"# note: \xff\n")
         self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
 
@@ -134,15 +147,9 @@ class TestMcap(unittest.TestCase):
         channel = writer.register_channel("/chatter", "cdr", schema)
         writer.add_message(channel, 1, b"\0\1\0\0\1\0\0\0\0", 1)
         writer.finish()
-        with contextlib.suppress(FileNotFoundError):
-            (self.folder / "out.csv").unlink()
-        for words, said in (
-            ((other,), "an MCAP file, but no recording of a fingertip; give a file that `fingertip record` wrote"),
-            ((self.folder / "none.mcap",), "No such file or directory; check the path"),
-            ((__file__,), "neither a recording nor bytes"),
-        ):
-            self.assertIn(said, self.refused("convert", *words, self.folder / "out.csv"))
-        self.assertIn("is the file to read", self.refused("convert", self.bag, self.bag, "--overwrite"))
+        (self.folder / "out.csv").unlink(missing_ok=True)
+        said = "an MCAP file, but no recording of a fingertip; give a file that `fingertip record` wrote"
+        self.assertIn(said, self.refused("convert", other, self.folder / "out.csv"))
         head = self.folder / "head.mcap"
         head.write_bytes(self.bag.read_bytes()[:50])
         self.assertIn("breaks off before a recording begins", self.refused("replay", head))
@@ -171,10 +178,6 @@ class TestMcap(unittest.TestCase):
             signal.signal(signal.SIGXFSZ, handler)
             writer.abandon()
         self.assertGreater(len(read_recording(full, salvage=True)["t_us"]), 20)
-
-    def test_it_is_replayed_as_the_csv_file(self):
-        told = [bags.call(FINGERTIP, "replay", path, "--speed", "max").stdout.replace(path.name, "") for path in (self.csv, self.bag)]
-        self.assertEqual(told[0].splitlines()[-1].replace(str(self.folder), ""), told[1].splitlines()[-1].replace(str(self.folder), ""))
 
     def test_without_mcap_it_says_what_to_install_and_csv_files_are_read(self):
         said = r"MCAP files need the package mcap; pip install mcap"

@@ -63,8 +63,8 @@ struct Recorded {
   Frames frames() const {
     RecordingReader reader(path, false);
     std::vector<wire_packet> packets;
-    while (auto item = reader.next()) {
-      packets.push_back(item->packet);
+    for (auto item = reader.next(); item; item = reader.next()) {
+      packets.insert(packets.end(), item->made ? 0 : 1, item->packet);
     }
     return frames_of(packets);
   }
@@ -193,6 +193,7 @@ TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
   EXPECT_TRUE(recorded.has("\n1000,1,1,32,0,,,,,,,,,,,,,0,0,0,0,0,0,0,,,,,,,"));
   EXPECT_TRUE(recorded.has("\n2000,2,2,340787367,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"));
   EXPECT_EQ(recorded.frames(), frames_of(packets));
+  EXPECT_TRUE(RecordingReader(recorded.path, false).next()->made) << "no info packet came: one is made";
 }
 
 /* The counts of a joint recording, from its lines alone and at its end. */

@@ -58,7 +58,10 @@ Contents contents_of(const Conversion &conversion) {
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   Contents contents;
   while (auto item = file.next()) {
-    if (item->kind != PacketFile::Item::Kind::packet) {
+    if (item->kind != PacketFile::Item::Kind::packet || item->made) {
+      if (item->made && !contents.info) {
+        contents.info = item->packet.body.info;
+      }
       continue;
     }
     const wire_packet &packet = item->packet;
@@ -110,9 +113,9 @@ void convert_packets(const Conversion &conversion) {
                          metadata, contents.sensor_count.has_value());
   PacketFile file(conversion.from, conversion.salvage, conversion.device);
   while (auto item = file.next()) {
-    if (item->kind == PacketFile::Item::Kind::packet) {
+    if (item->kind == PacketFile::Item::Kind::packet && !item->made) {
       writer.packet(item->packet);
-    } else {
+    } else if (item->kind == PacketFile::Item::Kind::event) {
       writer.event(0, item->event);
     }
   }
@@ -166,6 +169,9 @@ void convert_lines(const Conversion &conversion) {
     } else {
       sink->line(line.text);
     }
+  }
+  if (const std::string unread = sink->unread_rows(); !unread.empty()) {
+    report_damage(unread); /* they are kept as text */
   }
   sink->finish();
   report_cut_short(conversion.from, !is_ended);
